@@ -1,0 +1,356 @@
+"""What the emulator's UDP side and its flight models say to each other.
+
+Everything here is SI unless a name says otherwise. Axes: NED for the earth, FRD for the body. The planet is X-Plane's: a sphere of
+6 378 145 m that does not turn, with the same gravity everywhere. Signs of commands: roll + right, pitch + nose up, yaw + nose right.
+Surfaces as X-Plane reports them: degrees, trailing edge down +, rudder trailing edge right +, spoilers and speed brakes up +.
+
+A surface is named as the leaf of X-Plane's ``sim/flightmodel/controls/<name>def`` dataref without ``def``: ``wing2l_ail1``,
+``hstab1_elv1``, ``vstab1_rud1``. ``hstab1`` is the left and ``hstab2`` the right half of the tailplane.
+"""
+
+from __future__ import annotations
+
+import copy
+import enum
+import importlib
+from dataclasses import dataclass, field
+from typing import Dict, List, Optional, Protocol, Sequence, Tuple
+
+EARTH_RADIUS_M = 6378145.0
+GRAVITY_MPS2 = 9.80665
+MAX_ENGINES = 8
+
+#: Longest integration step of a flight model [s]; ``step`` splits what it is given.
+MAX_SUBSTEP_S = 1.0 / 120.0
+
+
+class FlightModelError(ValueError):
+    """A flight model was asked for something it cannot do; the message says what, what it expects, and the remedy."""
+
+
+class SurfaceKind(enum.Enum):
+    AILERON = "aileron"
+    ELEVATOR = "elevator"
+    RUDDER = "rudder"
+    FLAP = "flap"
+    SPEED_BRAKE = "speed_brake"
+
+
+class Side(enum.Enum):
+    LEFT = "left"
+    RIGHT = "right"
+    CENTRE = "centre"
+
+
+@dataclass(frozen=True)
+class SurfaceSpec:
+    """One control surface: what it is, where, and how far and how fast its own actuator moves it."""
+
+    name: str  #: X-Plane dataref leaf without ``def``
+    kind: SurfaceKind
+    side: Side
+    minimum_deg: float  #: trailing edge up (rudder: left)
+    maximum_deg: float  #: trailing edge down (rudder: right)
+    rate_deg_s: float
+
+
+class SurfaceFaultKind(enum.Enum):
+    STUCK = "stuck"  #: at ``value`` [deg], any angle; at the present one where ``value`` is None
+    CENTRED = "centred"
+    HARD_OVER_UP = "hard_over_up"  #: trailing edge fully up (rudder: left)
+    HARD_OVER_DOWN = "hard_over_down"  #: trailing edge fully down (rudder: right)
+    GONE = "gone"  #: no aerodynamic effect, reads 0
+    FLOATING = "floating"  #: trails in the wind
+    REDUCED = "reduced"  #: moves, but acts with ``value`` [0..1] of its effect
+    SLOW = "slow"  #: moves at ``value`` [0..1] of its normal rate
+
+
+@dataclass(frozen=True)
+class SurfaceFault:
+    kind: SurfaceFaultKind
+    value: Optional[float] = None
+
+
+class EngineFault(enum.Enum):
+    NONE = "none"
+    STOPPED = "stopped"  #: no combustion (or no current): windmills
+    SEIZED = "seized"  #: the shaft does not turn
+
+
+@dataclass
+class Controls:
+    """Everything that can be commanded. The caller keeps one, changes it, and passes it to ``step``; the model only reads it."""
+
+    roll: float = 0.0  #: stick, -1..1
+    pitch: float = 0.0
+    yaw: float = 0.0
+    throttle: List[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: levers, 0..1 (-1..0 reverse, where there is one)
+    propeller: List[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = highest speed)
+    mixture: List[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = rich)
+    roll_trim: float = 0.0  #: -1..1
+    pitch_trim: float = 0.0
+    yaw_trim: float = 0.0
+    flap_request: float = 0.0  #: handle, 0..1
+    speed_brake: float = 0.0  #: handle, -0.5 (armed) .. 1
+    gear_down: bool = True
+    brake_left: float = 0.0  #: 0..1
+    brake_right: float = 0.0
+    parking_brake: float = 0.0
+    thrust_vector: float = 0.0  #: 0 forward .. 1 vertical (and a little beyond: see the tiltrotor)
+    artificial_stability: bool = True  #: the stabilisation inside the model, where it has one
+
+    override_surfaces: bool = False  #: X-Plane's override_control_surfaces: nothing drives any surface but ``surface_deg``
+    surface_deg: Dict[str, float] = field(default_factory=dict)  #: used while overridden; surfaces not named stay where they are
+    override_throttles: bool = False  #: engines obey ``throttle_use`` alone: levers, mixing and stabilisation are out of the loop
+    throttle_use: List[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: per engine or motor, -1..1
+
+    surface_faults: Dict[str, SurfaceFault] = field(default_factory=dict)  #: by surface name
+    engine_faults: List[EngineFault] = field(default_factory=lambda: [EngineFault.NONE] * MAX_ENGINES)
+    stability_fault: bool = False  #: the artificial stability has failed, whatever the switch says
+
+    def copy(self) -> "Controls":
+        return copy.deepcopy(self)
+
+
+@dataclass
+class EngineState:
+    """One engine, motor or rotor. What a kind of engine does not have stays 0."""
+
+    running: bool = False
+    throttle: float = 0.0  #: what drives it now, -1..1: lever, mixing result, or override
+    rpm: float = 0.0  #: shaft
+    prop_rpm: float = 0.0
+    power_w: float = 0.0
+    thrust_n: float = 0.0
+    torque_nm: float = 0.0
+    fuel_flow_kg_s: float = 0.0
+    manifold_pressure_pa: float = 0.0
+    exhaust_gas_temperature_k: float = 0.0
+    cylinder_head_temperature_k: float = 0.0
+    oil_temperature_k: float = 0.0
+    oil_pressure_pa: float = 0.0
+    blade_pitch_deg: float = 0.0
+    nacelle_deg: float = 0.0  #: 0 = thrust forward, 90 = thrust up
+
+
+@dataclass
+class GearState:
+    """One wheel or skid."""
+
+    name: str = ""
+    extended: float = 1.0  #: 0 up .. 1 down
+    on_ground: bool = False
+    compression_m: float = 0.0
+    vertical_force_n: float = 0.0  #: ground on wheel, up +
+    steer_deg: float = 0.0  #: nose right +
+
+
+@dataclass
+class ModelState:
+    """The aircraft after a step: one coherent instant. ``FlightModel.state`` is overwritten by the next step; ``copy`` keeps one."""
+
+    sim_time_s: float = 0.0
+
+    latitude_deg: float = 0.0
+    longitude_deg: float = 0.0
+    altitude_m: float = 0.0  #: of the centre of gravity above the sphere (MSL)
+    agl_m: float = 0.0  #: of the centre of gravity above the ground below it
+    terrain_elevation_m: float = 0.0
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    heading_rad: float = 0.0  #: true, 0..2 pi
+    quaternion: Tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)  #: w x y z, rotates FRD vectors into local NED
+    p_rad_s: float = 0.0
+    q_rad_s: float = 0.0
+    r_rad_s: float = 0.0
+    p_dot_rad_s2: float = 0.0
+    q_dot_rad_s2: float = 0.0
+    r_dot_rad_s2: float = 0.0
+
+    v_north_mps: float = 0.0
+    v_east_mps: float = 0.0
+    v_down_mps: float = 0.0
+    u_mps: float = 0.0  #: over ground, FRD
+    v_mps: float = 0.0
+    w_mps: float = 0.0
+    specific_force_x_mps2: float = 0.0  #: all but gravity, per mass, FRD: at rest and level (0, 0, -9.80665)
+    specific_force_y_mps2: float = 0.0
+    specific_force_z_mps2: float = 0.0
+    acceleration_north_mps2: float = 0.0  #: d/dt of v_north... in the local level
+    acceleration_east_mps2: float = 0.0
+    acceleration_down_mps2: float = 0.0
+
+    wind_north_mps: float = 0.0  #: velocity of the air, turbulence included
+    wind_east_mps: float = 0.0
+    wind_down_mps: float = 0.0
+    alpha_rad: float = 0.0
+    beta_rad: float = 0.0  #: wind from the right +
+    alpha_dot_rad_s: float = 0.0
+    true_airspeed_mps: float = 0.0
+    equivalent_airspeed_mps: float = 0.0
+    calibrated_airspeed_mps: float = 0.0
+    mach: float = 0.0
+    dynamic_pressure_pa: float = 0.0
+    air_density_kg_m3: float = 0.0
+    pressure_pa: float = 0.0
+    temperature_k: float = 0.0
+    speed_of_sound_mps: float = 0.0
+    pressure_altitude_m: float = 0.0
+    stall_warning: bool = False
+
+    surfaces_deg: Dict[str, float] = field(default_factory=dict)  #: every surface of ``FlightModel.surfaces``
+    roll_ratio: float = 0.0  #: the command that reaches mixing, after artificial stability, -1..1
+    pitch_ratio: float = 0.0
+    yaw_ratio: float = 0.0
+    flap_ratio: float = 0.0  #: where the flaps are, 0..1
+    slat_ratio: float = 0.0
+    speed_brake_ratio: float = 0.0
+    thrust_vector_ratio: float = 0.0  #: where the nacelles are
+
+    engines: List[EngineState] = field(default_factory=list)
+    fuel_kg: List[float] = field(default_factory=list)  #: per tank
+    payload_kg: float = 0.0
+    empty_mass_kg: float = 0.0
+    mass_kg: float = 0.0
+    cg_forward_m: float = 0.0  #: of the centre of gravity ahead of the model's reference point
+    cg_right_m: float = 0.0
+    cg_down_m: float = 0.0
+
+    lift_n: float = 0.0  #: perpendicular to the air's motion, up +
+    drag_n: float = 0.0
+    side_force_n: float = 0.0  #: FRD y
+    aero_roll_nm: float = 0.0  #: aerodynamic moments about the centre of gravity, FRD
+    aero_pitch_nm: float = 0.0
+    aero_yaw_nm: float = 0.0
+
+    gear: List[GearState] = field(default_factory=list)
+    on_ground_any: bool = False
+    on_ground_all: bool = False
+    crashed: bool = False
+
+    def copy(self) -> "ModelState":
+        return copy.deepcopy(self)
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """Where and how a flight starts. In the air the aircraft starts trimmed, with its engines at their working speed."""
+
+    latitude_deg: float = 47.4647
+    longitude_deg: float = 8.5492
+    heading_deg: float = 0.0
+    on_ground: bool = False
+    altitude_m: float = 1000.0  #: MSL; ignored on the ground
+    airspeed_mps: Optional[float] = None  #: true; None: the aircraft's usual cruise (0 for a hover)
+    terrain_elevation_m: float = 0.0
+    engines_running: bool = True
+    sim_time_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class ModelInfo:
+    """What the wire needs to know about the aircraft itself."""
+
+    name: str  #: stem of config/aircraft/<name>.yaml
+    description: str
+    icao: str
+    engine_count: int
+    propeller_direction: Tuple[int, ...]  #: +1 clockwise seen from behind (rotors: from above), -1 the other way
+    tank_count: int
+    gear_names: Tuple[str, ...]
+    retractable_gear: bool
+    max_throttle: float = 1.0
+    min_throttle: float = 0.0  #: < 0 where the engine reverses
+    hover_thrust_vector: Optional[float] = None  #: tiltrotor only
+    maximum_power_w: float = 0.0  #: per engine
+    maximum_rpm: float = 0.0
+    never_exceed_mps: float = 0.0  #: indicated
+    stall_mps: float = 0.0  #: clean, calibrated, at the default weight
+    wing_span_m: float = 0.0
+    length_m: float = 0.0
+    eye_forward_m: float = 0.0  #: pilot's eye (or camera) from the reference point, FRD
+    eye_down_m: float = 0.0
+    trim_deg: Tuple[Tuple[str, float], ...] = ()  #: surface kind -> deflection at full trim
+
+
+class FlightModel(Protocol):
+    """A flying aircraft. Not thread-safe; never looks at a clock; the same calls with the same seed give the same flight."""
+
+    info: ModelInfo
+    surfaces: Tuple[SurfaceSpec, ...]
+
+    @property
+    def state(self) -> ModelState:
+        """The present state (overwritten by the next step)."""
+
+    @property
+    def trim_controls(self) -> Controls:
+        """A copy of the controls that keep the aircraft as ``reset`` left it: start the flight with them."""
+
+    def reset(self, initial: InitialState) -> Controls:
+        """Starts a flight; returns the controls that hold it there (parked: brakes set). Wind, faults and loading stay."""
+
+    def step(self, dt: float, controls: Controls) -> ModelState:
+        """Flies ``dt`` [s] > 0 on, in steps of at most ``MAX_SUBSTEP_S``. Returns ``state``."""
+
+    def place(
+        self,
+        latitude_deg: Optional[float] = None,
+        longitude_deg: Optional[float] = None,
+        altitude_m: Optional[float] = None,
+        roll_rad: Optional[float] = None,
+        pitch_rad: Optional[float] = None,
+        heading_rad: Optional[float] = None,
+        v_ned_mps: Optional[Sequence[float]] = None,
+        pqr_rad_s: Optional[Sequence[float]] = None,
+    ) -> ModelState:
+        """Moves the aircraft at once (PREL, VEHS, writes to position, q, velocity and rates). What is None stays as it is."""
+
+    def save(self) -> bytes:
+        """The whole situation (SIMO): ``restore`` of the same model continues from it exactly as it would have gone on."""
+
+    def restore(self, situation: bytes) -> ModelState:
+        """Raises ``FlightModelError`` for a situation of another model or version."""
+
+    def set_wind(self, north_mps: float, east_mps: float, down_mps: float = 0.0) -> None:
+        """Steady velocity of the air (a wind from the north has north_mps < 0)."""
+
+    def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
+        """Dryden turbulence with this standard deviation of the vertical gust [m/s]; 0 ends it. ``seed`` restarts the sequence."""
+
+    def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
+        """The day's difference from the standard atmosphere."""
+
+    def set_terrain(self, elevation_m: float) -> None:
+        """Height of the ground above the sphere below the aircraft."""
+
+    def set_loading(self, fuel_kg: Optional[Sequence[float]] = None, payload_kg: Optional[float] = None) -> None:
+        """Fuel per tank and payload; what is None stays as it is."""
+
+    def set_engine_running(self, engine: int, running: bool) -> None:
+        """Starts (at once, at working speed) or stops an engine."""
+
+
+_MODELS = {
+    "fixed_wing": ("xplane_bridge.emulator.fixed_wing", "FixedWing"),
+    "multirotor": ("xplane_bridge.emulator.multirotor", "Multirotor"),
+    "tiltrotor": ("xplane_bridge.emulator.tiltrotor", "Tiltrotor"),
+}
+
+
+def model_names() -> Tuple[str, ...]:
+    """The aircraft that ``create_model`` knows."""
+    return tuple(_MODELS)
+
+
+def create_model(name: str, seed: int = 0) -> FlightModel:
+    """Builds the aircraft of this name; ``seed`` feeds everything random in it.
+
+    Raises:
+        FlightModelError: no such aircraft.
+    """
+    if name not in _MODELS:
+        raise FlightModelError(f"unknown aircraft '{name}': the emulator has {', '.join(_MODELS)}")
+    module, cls = _MODELS[name]
+    return getattr(importlib.import_module(module), cls)(seed=seed)
