@@ -1,0 +1,1 @@
+"""Command-line programs: a parser and `main(argv) -> int` each, started by the launchers in scripts/."""
