@@ -1,0 +1,102 @@
+/// Test signals for system identification and delay estimation, and the state machine that plays one safely.
+///
+/// Signals are functions of simulator time since the start, so they stand still while X-Plane is paused and do not
+/// depend on the rate at which they are sampled. No randomness beyond the given seed: the same specification gives the
+/// same signal on every machine.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace xplane_bridge::core {
+
+enum class ExcitationShape : std::uint8_t {
+  kDoublet,    ///< +A for `pulse`, then -A for `pulse`
+  k3211,       ///< +A for 3 `pulse`, -A for 2, +A for 1, -A for 1
+  kMultisine,  ///< equal-power harmonics of 1/`duration` within the band, Schroeder phases (low crest factor)
+  kChirp,      ///< logarithmic sweep from `frequency_min` to `frequency_max`
+};
+
+const char* toString(ExcitationShape shape);
+
+/// What to play. Defaults are a usable roll multisine.
+struct ExcitationSpec {
+  ExcitationShape shape = ExcitationShape::kMultisine;
+  double amplitude = 0.1;         ///< peak, in the unit of the target (axis: -1..1; surface: deg); > 0
+  double pulse = 0.5;             ///< [s] unit pulse of doublet and 3-2-1-1; > 0
+  double duration = 20.0;         ///< [s] length of multisine and chirp; the pulse shapes have their own
+  double frequency_min = 0.1;     ///< [Hz] lower end of the band
+  double frequency_max = 2.0;     ///< [Hz] upper end of the band
+  std::uint32_t seed = 0;         ///< shifts the multisine in time: another realisation, the same spectrum and peak
+  double fade = 0.5;              ///< [s] raised-cosine fade in and out of multisine and chirp; not used by the pulses
+  double roll_limit_deg = 45.0;   ///< |roll| beyond which the excitation is aborted; > 0
+  double pitch_limit_deg = 20.0;  ///< |pitch| beyond which the excitation is aborted; > 0
+};
+
+/// First thing wrong with the specification (field, given value, expected), or nullopt.
+std::optional<std::string> validate(const ExcitationSpec& spec);
+
+/// A signal over time. Immutable.
+class ExcitationSignal {
+ public:
+  /// Throws std::invalid_argument with validate()'s text.
+  explicit ExcitationSignal(const ExcitationSpec& spec);
+
+  const ExcitationSpec& spec() const { return spec_; }
+  double duration() const { return duration_; }  ///< [s]
+
+  /// Value at `t` [s] since the start; 0 outside [0, duration).
+  double value(double t) const;
+
+  /// [Hz] of each component of a multisine; empty for the other shapes.
+  const std::vector<double>& frequencies() const { return frequencies_; }
+
+ private:
+  double multisine(double t) const;
+  double chirp(double t) const;
+  double window(double t) const;
+
+  ExcitationSpec spec_;
+  double duration_ = 0.0;
+  std::vector<double> frequencies_;
+  std::vector<double> phases_;
+  double scale_ = 1.0;
+};
+
+enum class ExcitationPhase : std::uint8_t { kIdle, kRunning, kDone, kAborted };
+
+const char* toString(ExcitationPhase phase);
+
+/// Plays one signal at a time against simulator time and stops it where the aircraft leaves the allowed attitude.
+class ExcitationRunner {
+ public:
+  /// Starts at simulator time `sim_time` [s]. Throws std::invalid_argument (specification) or std::logic_error (one is
+  /// running already).
+  void start(const ExcitationSpec& spec, double sim_time);
+
+  /// Advances to `sim_time` [s] with the present attitude [deg] and returns the value to add to the target's command.
+  /// A non-finite attitude, or simulator time running backwards (reset, replay), aborts.
+  double step(double sim_time, double roll_deg, double pitch_deg);
+
+  /// Ends a running excitation; the reason is kept for the label. Without one running, nothing happens.
+  void abort(const std::string& reason);
+
+  ExcitationPhase phase() const { return phase_; }
+  const std::string& reason() const { return reason_; }  ///< why it was aborted; else empty
+  const ExcitationSpec* spec() const { return signal_ ? &signal_->spec() : nullptr; }
+  double startTime() const { return start_time_; }  ///< [s] simulator time
+  double duration() const { return signal_ ? signal_->duration() : 0.0; }
+  double value() const { return value_; }  ///< as returned by the last step
+
+ private:
+  std::optional<ExcitationSignal> signal_;
+  ExcitationPhase phase_ = ExcitationPhase::kIdle;
+  std::string reason_;
+  double start_time_ = 0.0;
+  double last_time_ = 0.0;
+  double value_ = 0.0;
+};
+
+}  // namespace xplane_bridge::core

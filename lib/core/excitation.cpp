@@ -1,0 +1,211 @@
+#include "xplane_bridge/core/excitation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+namespace xplane_bridge::core {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kMaxDuration = 600.0;     // [s] longer ones are a mistake in the unit
+constexpr int kMaxComponents = 2000;       // bounds the work of one sample
+constexpr int kPeakSamplesPerPeriod = 32;  // of the highest component; leaves the true peak within 0.5 %
+
+std::string complaint(const char* field, double given, const char* expected) {
+  char text[160];
+  std::snprintf(text, sizeof text, "excitation %s is %g: expected %s", field, given, expected);
+  return text;
+}
+
+bool isPulse(ExcitationShape shape) { return shape == ExcitationShape::kDoublet || shape == ExcitationShape::k3211; }
+
+// Harmonics of 1/duration within [low, high], both ends included despite rounding.
+int firstHarmonic(const ExcitationSpec& s) {
+  return std::max(1, static_cast<int>(std::ceil(s.frequency_min * s.duration - 1e-9)));
+}
+int lastHarmonic(const ExcitationSpec& s) { return static_cast<int>(std::floor(s.frequency_max * s.duration + 1e-9)); }
+
+// Uniform in [0, 1) from a seed (SplitMix32's finaliser): the standard library's distributions differ between vendors.
+double unitFromSeed(std::uint32_t seed) {
+  if (seed == 0) return 0.0;
+  std::uint32_t z = seed * 0x9E3779B9u;
+  z = (z ^ (z >> 16)) * 0x85EBCA6Bu;
+  z = (z ^ (z >> 13)) * 0xC2B2AE35u;
+  z ^= z >> 16;
+  return static_cast<double>(z) / 4294967296.0;
+}
+
+}  // namespace
+
+const char* toString(ExcitationShape shape) {
+  switch (shape) {
+    case ExcitationShape::kDoublet:
+      return "doublet";
+    case ExcitationShape::k3211:
+      return "3-2-1-1";
+    case ExcitationShape::kMultisine:
+      return "multisine";
+    case ExcitationShape::kChirp:
+      return "chirp";
+  }
+  return "unknown";
+}
+
+const char* toString(ExcitationPhase phase) {
+  switch (phase) {
+    case ExcitationPhase::kIdle:
+      return "idle";
+    case ExcitationPhase::kRunning:
+      return "running";
+    case ExcitationPhase::kDone:
+      return "done";
+    case ExcitationPhase::kAborted:
+      return "aborted";
+  }
+  return "unknown";
+}
+
+std::optional<std::string> validate(const ExcitationSpec& s) {
+  const auto positive = [](double v) { return std::isfinite(v) && v > 0.0; };
+  if (!positive(s.amplitude)) return complaint("amplitude", s.amplitude, "a value above 0");
+  if (!positive(s.roll_limit_deg)) return complaint("roll_limit_deg", s.roll_limit_deg, "an angle above 0 deg");
+  if (!positive(s.pitch_limit_deg)) return complaint("pitch_limit_deg", s.pitch_limit_deg, "an angle above 0 deg");
+  if (isPulse(s.shape)) {
+    if (!positive(s.pulse) || s.pulse > kMaxDuration) return complaint("pulse", s.pulse, "above 0 and up to 600 s");
+    return std::nullopt;
+  }
+  if (!positive(s.duration) || s.duration > kMaxDuration) {
+    return complaint("duration", s.duration, "above 0 and up to 600 s");
+  }
+  if (!positive(s.frequency_min)) return complaint("frequency_min", s.frequency_min, "above 0 Hz");
+  if (!std::isfinite(s.frequency_max) || s.frequency_max < s.frequency_min) {
+    return complaint("frequency_max", s.frequency_max, "not below frequency_min");
+  }
+  if (!std::isfinite(s.fade) || s.fade < 0.0 || 2.0 * s.fade > s.duration) {
+    return complaint("fade", s.fade, "0 to half the duration");
+  }
+  if (s.shape == ExcitationShape::kMultisine) {
+    if (s.frequency_max * s.duration > 1e6) return complaint("frequency_max", s.frequency_max, "a lower frequency");
+    const int count = lastHarmonic(s) - firstHarmonic(s) + 1;
+    if (count < 1) {
+      return complaint("frequency_max", s.frequency_max, "a band that holds a multiple of 1/duration");
+    }
+    if (count > kMaxComponents) return complaint("duration", s.duration, "at most 2000 harmonics in the band");
+  }
+  return std::nullopt;
+}
+
+ExcitationSignal::ExcitationSignal(const ExcitationSpec& spec) : spec_(spec) {
+  if (const auto wrong = validate(spec)) throw std::invalid_argument(*wrong);
+  switch (spec.shape) {
+    case ExcitationShape::kDoublet:
+      duration_ = 2.0 * spec.pulse;
+      return;
+    case ExcitationShape::k3211:
+      duration_ = 7.0 * spec.pulse;
+      return;
+    case ExcitationShape::kChirp:
+      duration_ = spec.duration;
+      scale_ = spec.amplitude;
+      return;
+    case ExcitationShape::kMultisine:
+      break;
+  }
+  duration_ = spec.duration;
+  const int first = firstHarmonic(spec), last = lastHarmonic(spec), count = last - first + 1;
+  const double shift = 2.0 * kPi * unitFromSeed(spec.seed);
+  for (int n = 0; n < count; ++n) {
+    frequencies_.push_back((first + n) / duration_);
+    // Schroeder (1970) for a flat spectrum; the seed's time shift turns harmonic k by k times its angle.
+    phases_.push_back(std::fmod(-kPi * n * (n + 1.0) / count + shift * (first + n), 2.0 * kPi));
+  }
+  const int samples = kPeakSamplesPerPeriod * last;
+  double peak = 0.0;
+  scale_ = 1.0;
+  for (int i = 0; i < samples; ++i) peak = std::max(peak, std::abs(multisine(duration_ * i / samples)));
+  scale_ = spec.amplitude / peak;
+}
+
+double ExcitationSignal::multisine(double t) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < frequencies_.size(); ++i) sum += std::cos(2.0 * kPi * frequencies_[i] * t + phases_[i]);
+  return scale_ * sum;
+}
+
+double ExcitationSignal::chirp(double t) const {
+  const double ratio = std::log(spec_.frequency_max / spec_.frequency_min);
+  const double cycles = ratio < 1e-9 ? spec_.frequency_min * t
+                                     : spec_.frequency_min * duration_ / ratio * std::expm1(ratio * t / duration_);
+  return scale_ * std::sin(2.0 * kPi * cycles);
+}
+
+double ExcitationSignal::window(double t) const {
+  const double edge = std::min(t, duration_ - t);
+  if (spec_.fade <= 0.0 || edge >= spec_.fade) return 1.0;
+  return 0.5 * (1.0 - std::cos(kPi * edge / spec_.fade));
+}
+
+double ExcitationSignal::value(double t) const {
+  if (!(t >= 0.0) || t >= duration_) return 0.0;
+  switch (spec_.shape) {
+    case ExcitationShape::kDoublet:
+      return t < spec_.pulse ? spec_.amplitude : -spec_.amplitude;
+    case ExcitationShape::k3211: {
+      const double pulses = t / spec_.pulse;
+      return pulses < 3.0 || (pulses >= 5.0 && pulses < 6.0) ? spec_.amplitude : -spec_.amplitude;
+    }
+    case ExcitationShape::kMultisine:
+      return window(t) * multisine(t);
+    case ExcitationShape::kChirp:
+      return window(t) * chirp(t);
+  }
+  return 0.0;
+}
+
+void ExcitationRunner::start(const ExcitationSpec& spec, double sim_time) {
+  if (phase_ == ExcitationPhase::kRunning) {
+    throw std::logic_error(std::string("an excitation is running (") + toString(signal_->spec().shape) +
+                           "): wait for its end or abort it first");
+  }
+  if (!std::isfinite(sim_time)) throw std::invalid_argument("excitation needs simulator time, which is not known");
+  signal_.emplace(spec);
+  phase_ = ExcitationPhase::kRunning;
+  reason_.clear();
+  start_time_ = last_time_ = sim_time;
+  value_ = 0.0;
+}
+
+double ExcitationRunner::step(double sim_time, double roll_deg, double pitch_deg) {
+  if (phase_ != ExcitationPhase::kRunning) return value_ = 0.0;
+  const ExcitationSpec& spec = signal_->spec();
+  char text[120];
+  if (!std::isfinite(sim_time) || sim_time < last_time_) {
+    abort("simulator time ran backwards or is unknown");
+  } else if (!std::isfinite(roll_deg) || !std::isfinite(pitch_deg)) {
+    abort("attitude is unknown");
+  } else if (std::abs(roll_deg) > spec.roll_limit_deg) {
+    std::snprintf(text, sizeof text, "roll %.1f deg is beyond the limit of %.1f deg", roll_deg, spec.roll_limit_deg);
+    abort(text);
+  } else if (std::abs(pitch_deg) > spec.pitch_limit_deg) {
+    std::snprintf(text, sizeof text, "pitch %.1f deg is beyond the limit of %.1f deg", pitch_deg, spec.pitch_limit_deg);
+    abort(text);
+  } else if (sim_time - start_time_ >= signal_->duration()) {
+    phase_ = ExcitationPhase::kDone;
+    value_ = 0.0;
+  } else {
+    value_ = signal_->value(sim_time - start_time_);
+  }
+  last_time_ = sim_time;
+  return value_;
+}
+
+void ExcitationRunner::abort(const std::string& reason) {
+  if (phase_ != ExcitationPhase::kRunning) return;
+  phase_ = ExcitationPhase::kAborted;
+  reason_ = reason;
+  value_ = 0.0;
+}
+
+}  // namespace xplane_bridge::core
