@@ -72,13 +72,10 @@ std::optional<std::string> validate(const ExcitationSpec& s) {
   if (!positive(s.amplitude)) return complaint("amplitude", s.amplitude, "a value above 0");
   if (!positive(s.roll_limit_deg)) return complaint("roll_limit_deg", s.roll_limit_deg, "an angle above 0 deg");
   if (!positive(s.pitch_limit_deg)) return complaint("pitch_limit_deg", s.pitch_limit_deg, "an angle above 0 deg");
-  if (isPulse(s.shape)) {
-    if (!positive(s.pulse) || s.pulse > kMaxDuration) return complaint("pulse", s.pulse, "above 0 and up to 600 s");
-    return std::nullopt;
-  }
   if (!positive(s.duration) || s.duration > kMaxDuration) {
     return complaint("duration", s.duration, "above 0 and up to 600 s");
   }
+  if (isPulse(s.shape)) return std::nullopt;
   if (!positive(s.frequency_min)) return complaint("frequency_min", s.frequency_min, "above 0 Hz");
   if (!std::isfinite(s.frequency_max) || s.frequency_max < s.frequency_min) {
     return complaint("frequency_max", s.frequency_max, "not below frequency_min");
@@ -99,32 +96,19 @@ std::optional<std::string> validate(const ExcitationSpec& s) {
 
 ExcitationSignal::ExcitationSignal(const ExcitationSpec& spec) : spec_(spec) {
   if (const auto wrong = validate(spec)) throw std::invalid_argument(*wrong);
-  switch (spec.shape) {
-    case ExcitationShape::kDoublet:
-      duration_ = 2.0 * spec.pulse;
-      return;
-    case ExcitationShape::k3211:
-      duration_ = 7.0 * spec.pulse;
-      return;
-    case ExcitationShape::kChirp:
-      duration_ = spec.duration;
-      scale_ = spec.amplitude;
-      return;
-    case ExcitationShape::kMultisine:
-      break;
-  }
-  duration_ = spec.duration;
+  scale_ = spec.amplitude;
+  if (spec.shape != ExcitationShape::kMultisine) return;
   const int first = firstHarmonic(spec), last = lastHarmonic(spec), count = last - first + 1;
   const double shift = 2.0 * kPi * unitFromSeed(spec.seed);
   for (int n = 0; n < count; ++n) {
-    frequencies_.push_back((first + n) / duration_);
+    frequencies_.push_back((first + n) / spec.duration);
     // Schroeder (1970) for a flat spectrum; the seed's time shift turns harmonic k by k times its angle.
     phases_.push_back(std::fmod(-kPi * n * (n + 1.0) / count + shift * (first + n), 2.0 * kPi));
   }
   const int samples = kPeakSamplesPerPeriod * last;
   double peak = 0.0;
   scale_ = 1.0;
-  for (int i = 0; i < samples; ++i) peak = std::max(peak, std::abs(multisine(duration_ * i / samples)));
+  for (int i = 0; i < samples; ++i) peak = std::max(peak, std::abs(multisine(spec.duration * i / samples)));
   scale_ = spec.amplitude / peak;
 }
 
@@ -136,24 +120,25 @@ double ExcitationSignal::multisine(double t) const {
 
 double ExcitationSignal::chirp(double t) const {
   const double ratio = std::log(spec_.frequency_max / spec_.frequency_min);
-  const double cycles = ratio < 1e-9 ? spec_.frequency_min * t
-                                     : spec_.frequency_min * duration_ / ratio * std::expm1(ratio * t / duration_);
+  const double cycles = ratio < 1e-9
+                            ? spec_.frequency_min * t
+                            : spec_.frequency_min * spec_.duration / ratio * std::expm1(ratio * t / spec_.duration);
   return scale_ * std::sin(2.0 * kPi * cycles);
 }
 
 double ExcitationSignal::window(double t) const {
-  const double edge = std::min(t, duration_ - t);
+  const double edge = std::min(t, spec_.duration - t);
   if (spec_.fade <= 0.0 || edge >= spec_.fade) return 1.0;
   return 0.5 * (1.0 - std::cos(kPi * edge / spec_.fade));
 }
 
 double ExcitationSignal::value(double t) const {
-  if (!(t >= 0.0) || t >= duration_) return 0.0;
+  if (!(t >= 0.0) || t >= spec_.duration) return 0.0;
   switch (spec_.shape) {
     case ExcitationShape::kDoublet:
-      return t < spec_.pulse ? spec_.amplitude : -spec_.amplitude;
+      return t < 0.5 * spec_.duration ? spec_.amplitude : -spec_.amplitude;
     case ExcitationShape::k3211: {
-      const double pulses = t / spec_.pulse;
+      const double pulses = 7.0 * t / spec_.duration;
       return pulses < 3.0 || (pulses >= 5.0 && pulses < 6.0) ? spec_.amplitude : -spec_.amplitude;
     }
     case ExcitationShape::kMultisine:

@@ -10,12 +10,11 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-ExcitationSpec specOf(ExcitationShape shape) {
+ExcitationSpec specOf(ExcitationShape shape, double duration = 20.0) {
   ExcitationSpec spec;
   spec.shape = shape;
   spec.amplitude = 0.2;
-  spec.pulse = 0.5;
-  spec.duration = 20.0;
+  spec.duration = duration;
   spec.fade = 0.0;
   return spec;
 }
@@ -32,7 +31,7 @@ double lineAmplitude(const ExcitationSignal& signal, double frequency, int sampl
 }
 
 TEST(Excitation, DoubletIsUpThenDownForOnePulseEach) {
-  const ExcitationSignal signal(specOf(ExcitationShape::kDoublet));
+  const ExcitationSignal signal(specOf(ExcitationShape::kDoublet, 1.0));
   EXPECT_DOUBLE_EQ(signal.duration(), 1.0);
   EXPECT_DOUBLE_EQ(signal.value(-0.001), 0.0);
   EXPECT_DOUBLE_EQ(signal.value(0.0), 0.2);
@@ -43,7 +42,7 @@ TEST(Excitation, DoubletIsUpThenDownForOnePulseEach) {
 }
 
 TEST(Excitation, ThreeTwoOneOneSwitchesAtThreeFiveSixAndSevenPulses) {
-  const ExcitationSignal signal(specOf(ExcitationShape::k3211));
+  const ExcitationSignal signal(specOf(ExcitationShape::k3211, 3.5));
   EXPECT_DOUBLE_EQ(signal.duration(), 3.5);  // 7 pulses of 0.5 s
   const struct {
     double t, value;
@@ -153,8 +152,8 @@ TEST(Excitation, RefusesWhatCannotBePlayedAndNamesTheField) {
             std::string::npos);
   EXPECT_NE(wrong([](auto& s) {
               s.shape = ExcitationShape::kDoublet;
-              s.pulse = 0.0;
-            }).find("pulse"),
+              s.duration = 0.0;
+            }).find("duration is 0"),
             std::string::npos);
   EXPECT_THROW(ExcitationSignal([] {
                  ExcitationSpec s;
@@ -167,14 +166,14 @@ TEST(Excitation, RefusesWhatCannotBePlayedAndNamesTheField) {
 TEST(ExcitationRunner, PlaysAgainstSimulatorTimeAndEnds) {
   ExcitationRunner runner;
   EXPECT_EQ(runner.phase(), ExcitationPhase::kIdle);
-  runner.start(specOf(ExcitationShape::kDoublet), 100.0);
+  runner.start(specOf(ExcitationShape::kDoublet, 1.0), 100.0);
   EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0), 0.2);
   EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0), 0.2);  // paused: simulator time stands still
   EXPECT_DOUBLE_EQ(runner.step(100.7, 0.0, 0.0), -0.2);
-  EXPECT_THROW(runner.start(specOf(ExcitationShape::kDoublet), 100.8), std::logic_error);
+  EXPECT_THROW(runner.start(specOf(ExcitationShape::kDoublet, 1.0), 100.8), std::logic_error);
   EXPECT_DOUBLE_EQ(runner.step(101.0, 0.0, 0.0), 0.0);
   EXPECT_EQ(runner.phase(), ExcitationPhase::kDone);
-  runner.start(specOf(ExcitationShape::kDoublet), 102.0);
+  runner.start(specOf(ExcitationShape::kDoublet, 1.0), 102.0);
   EXPECT_EQ(runner.phase(), ExcitationPhase::kRunning);
 }
 
@@ -190,7 +189,7 @@ TEST(ExcitationRunner, AbortsOutsideTheAttitudeLimitsAndSaysWhy) {
                {9.9, 0.0, 0.0, "backwards"}};
   for (const auto& c : cases) {
     ExcitationRunner runner;
-    runner.start(specOf(ExcitationShape::kDoublet), 10.0);
+    runner.start(specOf(ExcitationShape::kDoublet, 1.0), 10.0);
     EXPECT_DOUBLE_EQ(runner.step(10.1, 44.9, 19.9), 0.2);
     EXPECT_DOUBLE_EQ(runner.step(c.t, c.roll, c.pitch), 0.0);
     EXPECT_EQ(runner.phase(), ExcitationPhase::kAborted);

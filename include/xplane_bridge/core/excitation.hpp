@@ -13,8 +13,8 @@
 namespace xplane_bridge::core {
 
 enum class ExcitationShape : std::uint8_t {
-  kDoublet,    ///< +A for `pulse`, then -A for `pulse`
-  k3211,       ///< +A for 3 `pulse`, -A for 2, +A for 1, -A for 1
+  kDoublet,    ///< +A for the first half of `duration`, then -A
+  k3211,       ///< +A for 3/7 of `duration`, -A for 2/7, +A for 1/7, -A for 1/7
   kMultisine,  ///< equal-power harmonics of 1/`duration` within the band, Schroeder phases (low crest factor)
   kChirp,      ///< logarithmic sweep from `frequency_min` to `frequency_max`
 };
@@ -25,8 +25,7 @@ const char* toString(ExcitationShape shape);
 struct ExcitationSpec {
   ExcitationShape shape = ExcitationShape::kMultisine;
   double amplitude = 0.1;         ///< peak, in the unit of the target (axis: -1..1; surface: deg); > 0
-  double pulse = 0.5;             ///< [s] unit pulse of doublet and 3-2-1-1; > 0
-  double duration = 20.0;         ///< [s] length of multisine and chirp; the pulse shapes have their own
+  double duration = 20.0;         ///< [s] of the whole signal; > 0, up to 600
   double frequency_min = 0.1;     ///< [Hz] lower end of the band
   double frequency_max = 2.0;     ///< [Hz] upper end of the band
   std::uint32_t seed = 0;         ///< shifts the multisine in time: another realisation, the same spectrum and peak
@@ -45,7 +44,7 @@ class ExcitationSignal {
   explicit ExcitationSignal(const ExcitationSpec& spec);
 
   const ExcitationSpec& spec() const { return spec_; }
-  double duration() const { return duration_; }  ///< [s]
+  double duration() const { return spec_.duration; }  ///< [s]
 
   /// Value at `t` [s] since the start; 0 outside [0, duration).
   double value(double t) const;
@@ -59,7 +58,6 @@ class ExcitationSignal {
   double window(double t) const;
 
   ExcitationSpec spec_;
-  double duration_ = 0.0;
   std::vector<double> frequencies_;
   std::vector<double> phases_;
   double scale_ = 1.0;
