@@ -1,0 +1,202 @@
+"""Bags are written from bytes packed here by hand, so that the reader cannot agree with itself on a mistake."""
+
+from __future__ import annotations
+
+import bz2
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer
+
+from xplane_bridge.bags import BagError, Bags
+
+HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
+SEP = "=" * 80 + "\n"
+STATE = (
+    "uint32 GOOD = 7\nHeader header\nfloat64 x\nfloat32[3] axes\nbool on\nduration age\nint16 step\n"
+    + SEP
+    + "MSG: std_msgs/Header\n"
+    + HEADER
+)
+MD5 = "0" * 32
+
+
+def header(seq: int, sec: int, nsec: int, frame: bytes) -> bytes:
+    return struct.pack("<IIII", seq, sec, nsec, len(frame)) + frame
+
+
+def state(k: int, frame: bytes = b"base_link_frd") -> bytes:
+    body = struct.pack("<d3f?iih", k + 0.5, k, 2 * k, -k, k % 2 == 0, -k, 250, -5 * k)
+    return header(k, 1000 + k, 7, frame) + body
+
+
+def write(path: Path, topics: list, compression: object = None) -> Path:
+    """Topics: (name, type, definition, [(time ns, bytes)])."""
+    writer = Writer(path)
+    if compression is not None:
+        writer.set_compression(compression)
+    with writer:
+        for topic, msgtype, definition, messages in topics:
+            connection = writer.add_connection(topic, msgtype, msgdef=definition, md5sum=MD5)
+            for time, raw in messages:
+                writer.write(connection, time, raw)
+    return path
+
+
+def flight(path: Path, count: int = 5, start: int = 0, **kwargs: object) -> Path:
+    messages = [(10 * (k + 1), state(k)) for k in range(start, start + count)]
+    return write(path, [("/s", "pkg/msg/State", STATE, messages)], **kwargs)
+
+
+def test_every_kind_of_field_is_decoded_to_its_column(tmp_path: Path) -> None:
+    with Bags(flight(tmp_path / "a.bag")) as bags:
+        table = bags.read("/s")
+        assert bags.constants("/s") == {"GOOD": 7}
+    assert len(table) == 5
+    assert table.msgtype == "pkg/State"
+    np.testing.assert_array_equal(table.time, [10, 20, 30, 40, 50])
+    np.testing.assert_array_equal(table.stamp, [(1000 + k) * 10**9 + 7 for k in range(5)])
+    np.testing.assert_array_equal(table["x"], [0.5, 1.5, 2.5, 3.5, 4.5])
+    np.testing.assert_array_equal(table["axes"], [[k, 2 * k, -k] for k in range(5)])
+    np.testing.assert_array_equal(table["on"], [True, False, True, False, True])
+    np.testing.assert_array_equal(table["age"], [-k * 10**9 + 250 for k in range(5)])
+    np.testing.assert_array_equal(table["step"], [0, -5, -10, -15, -20])
+    assert list(table["header.frame_id"]) == ["base_link_frd"] * 5
+    assert table["axes"].dtype == np.float32
+
+
+def test_strings_of_changing_length_keep_order_and_values(tmp_path: Path) -> None:
+    frames = [b"map", b"odom", b"map", b"", b"axe"]  # "map" and "axe" share a length, not a value
+    messages = [(k, state(k, frame)) for k, frame in enumerate(frames)]
+    with Bags(write(tmp_path / "a.bag", [("/s", "pkg/msg/State", STATE, messages)])) as bags:
+        table = bags.read("/s")
+    assert list(table["header.frame_id"]) == ["map", "odom", "map", "", "axe"]
+    np.testing.assert_array_equal(table["x"], [0.5, 1.5, 2.5, 3.5, 4.5])
+
+
+def test_equal_sizes_with_lengths_moved_between_fields_are_told_apart(tmp_path: Path) -> None:
+    definition = "string a\nstring b\n"
+    raws = [b"\1\0\0\0x\3\0\0\0abc", b"\3\0\0\0abc\1\0\0\0x", b"\1\0\0\0y\3\0\0\0def"]
+    with Bags(write(tmp_path / "a.bag", [("/t", "pkg/msg/T", definition, list(enumerate(raws)))])) as bags:
+        table = bags.read("/t")
+    assert list(table["a"]) == ["x", "abc", "y"]
+    assert list(table["b"]) == ["abc", "x", "def"]
+
+
+def test_lists_of_numbers_vary_and_lists_of_messages_stay_objects(tmp_path: Path) -> None:
+    definition = "float32[] v\n"
+    raws = [struct.pack("<I2f", 2, 1.5, 2.5), struct.pack("<I", 0), struct.pack("<I1f", 1, 9.0)]
+    nested = "Item[] items\nuint8 n\n" + SEP + "MSG: pkg/Item\nint32 k\nstring s\n"
+    item = struct.pack("<I", 2) + struct.pack("<iI1s", 5, 1, b"a") + struct.pack("<iI0s", 6, 0, b"") + b"\2"
+    path = write(
+        tmp_path / "a.bag",
+        [("/l", "pkg/msg/L", definition, list(enumerate(raws))), ("/n", "pkg/msg/N", nested, [(0, item)])],
+    )
+    with Bags(path) as bags:
+        values = bags.read("/l")["v"]
+        table = bags.read("/n")
+    assert [list(v) for v in values] == [[1.5, 2.5], [], [9.0]]
+    assert [(i.k, i.s) for i in table["items"][0]] == [(5, "a"), (6, "")]
+    assert table["n"][0] == 2
+
+
+def test_columns_can_be_selected_alone_or_as_a_group(tmp_path: Path) -> None:
+    with Bags(flight(tmp_path / "a.bag")) as bags:
+        assert sorted(bags.read("/s", ["x"]).columns) == ["x"]
+        assert sorted(bags.read("/s", ["header"]).columns) == ["header.frame_id", "header.seq", "header.stamp"]
+        with pytest.raises(BagError, match="no column 'speed'"):
+            bags.read("/s", ["speed"])
+        with pytest.raises(BagError, match=r"no topic /q .* there is: /s"):
+            bags.read("/q")
+        with pytest.raises(BagError, match="it has: age, axes"):
+            bags.read("/s")["speed"]
+
+
+def test_compressed_bags_read_the_same(tmp_path: Path) -> None:
+    with Bags(flight(tmp_path / "plain.bag", 50)) as bags:
+        plain = bags.read("/s")
+    for kind in Writer.CompressionFormat:
+        with Bags(flight(tmp_path / f"{kind.name}.bag", 50, compression=kind)) as bags:
+            table = bags.read("/s")
+        for name, column in plain.columns.items():
+            np.testing.assert_array_equal(table[name], column)
+
+
+def test_split_bags_are_one_flight_in_receive_order(tmp_path: Path) -> None:
+    flight(tmp_path / "f_0.bag", 3, 0)
+    flight(tmp_path / "f_1.bag", 4, 3)
+    for paths in ([tmp_path / "f_1.bag", tmp_path / "f_0.bag"], tmp_path):
+        with Bags(paths) as bags:
+            assert bags.topics["/s"].count == 7
+            assert (bags.topics["/s"].first_time, bags.topics["/s"].last_time) == (10, 70)
+            np.testing.assert_array_equal(bags.read("/s")["x"], np.arange(7) + 0.5)
+            assert [time for time, _ in bags.messages("/s")] == [10, 20, 30, 40, 50, 60, 70]
+
+
+def test_mixed_versions_read_each_by_its_own_definition(tmp_path: Path) -> None:
+    write(tmp_path / "old.bag", [("/v", "pkg/msg/V", "float64 a\n", [(1, struct.pack("<d", 1.25))])])
+    write(tmp_path / "new.bag", [("/v", "pkg/msg/V", "float64 a\nuint8 b\n", [(2, struct.pack("<dB", 2.5, 9))])])
+    with Bags([tmp_path / "old.bag", tmp_path / "new.bag"]) as bags:
+        # Both carry the same dummy md5: the definition itself must decide.
+        table = bags.read("/v")
+    np.testing.assert_array_equal(table["a"], [1.25, 2.5])
+    assert np.isnan(table["b"][0])
+    assert table["b"][1] == 9
+
+
+def test_a_message_that_does_not_fit_its_definition_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.bag", [("/t", "pkg/msg/T", "float64 a\n", [(1, b"\0" * 9)])])
+    with Bags(path) as bags, pytest.raises(BagError, match=r"/t: .*9 bytes, its definition takes 8"):
+        bags.read("/t")
+
+
+def test_topic_of_type_and_empty_topics(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "a.bag",
+        [("/b/s", "pkg/msg/State", STATE, []), ("/a/s", "pkg/msg/State", STATE, [(1, state(1))])],
+    )
+    with Bags(path) as bags:
+        assert bags.topic_of_type("pkg/State") == "/a/s"
+        assert bags.topic_of_type("pkg/State", "/b/s") == "/b/s"
+        assert bags.topic_of_type("pkg/Other") is None
+        assert bags.topics["/b/s"].count == 0
+        assert len(bags.read("/b/s")) == 0
+
+
+def damage(path: Path, change: object) -> Path:
+    path.write_bytes(change(path.read_bytes()))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda _: b"", "the file is empty"),
+        (lambda raw: bz2.compress(raw), "not a ROS 1 bag"),
+        (lambda raw: raw[: len(raw) * 2 // 3], "rosbag reindex"),
+        (lambda raw: raw[:40], "rosbag reindex"),
+        (
+            lambda raw: raw.replace(
+                b"index_pos=" + raw[raw.index(b"index_pos=") + 10 :][:8], b"index_pos=" + b"\0" * 8, 1
+            ),
+            "not indexed.*rosbag reindex",
+        ),
+    ],
+)
+def test_bad_files_are_refused_in_one_line_with_the_remedy(tmp_path: Path, change: object, text: str) -> None:
+    path = damage(flight(tmp_path / "bad.bag", 200), change)
+    with pytest.raises(BagError, match=text) as caught, Bags(path):
+        pass
+    assert "\n" not in str(caught.value)
+    assert "bad.bag" in str(caught.value)
+
+
+def test_missing_paths_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match="No such file"), Bags(tmp_path / "none.bag"):
+        pass
+    with pytest.raises(BagError, match=r"without any \.bag"):
+        Bags(tmp_path)
+    with pytest.raises(BagError, match="no bag given"):
+        Bags([])
