@@ -25,6 +25,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from xplane_bridge.bags.decoding import NeedsObjectsError, Types, decode_bulk, decode_objects, wanted
+from xplane_bridge.bags.units import Unit, parse_units
 
 PathLike = Union[str, Path]
 
@@ -166,6 +167,11 @@ class Bags:
         types, _ = self._definition(connection)
         return {name: value for name, _, value in types[connection.msgtype][0]}
 
+    def units(self, topic: str) -> dict[str, Unit]:
+        """Give the unit of every column of a topic, from the comments of the bag's own definition."""
+        connection = self._connections(topic)[0][1]
+        return parse_units(_definition_text(connection), connection.msgtype.replace("/msg/", "/"))
+
     def read(self, topic: str, columns: Sequence[str] | None = None) -> Table:
         """Read one topic into arrays.
 
@@ -208,7 +214,7 @@ class Bags:
         return found
 
     def _definition(self, connection: Any) -> tuple[Types, Any]:
-        definition = getattr(connection.msgdef, "data", connection.msgdef)  # a plain string before rosbags 0.10
+        definition = _definition_text(connection)
         key = (connection.msgtype, definition)
         if key not in self._definitions:
             store = get_typestore(Stores.EMPTY)
@@ -232,6 +238,10 @@ class Bags:
         except (SerdeError, AssertionError, struct.error, ValueError, IndexError) as err:
             msg = f"{connection.topic}: a message does not fit its definition {msgtype}: {err}"
             raise BagError(msg) from None
+
+
+def _definition_text(connection: Any) -> str:
+    return str(getattr(connection.msgdef, "data", connection.msgdef))  # a plain string before rosbags 0.10
 
 
 def _open_reader(path: Path) -> Reader:
