@@ -35,11 +35,12 @@ def _explain(error):
     """Says what to do about a module that is not there."""
     if (error.name or "").split(".")[0] == "xplane_bridge":
         return (
-            "the Python package xplane_bridge ({}) is not where {} expects it: run scripts/setup in the clone, or source "
-            "the setup.bash of the workspace it was built in".format(error.name, os.path.realpath(sys.argv[0]))
+            f"the Python package xplane_bridge ({error.name}) is not where {os.path.realpath(sys.argv[0])} expects it: "
+            "run scripts/setup in the clone, or source the setup.bash of the workspace it was built in"
         )
-    return "{} has no Python module '{}': run scripts/setup in the clone, or pip install -r requirements.txt".format(
-        sys.executable, error.name
+    return (
+        f"{sys.executable} has no Python module '{error.name}': "
+        "run scripts/setup in the clone, or pip install -r requirements.txt"
     )
 
 
@@ -80,3 +81,8 @@ def _add_to_path(folder, first):
     sys.path[:] = [path for path in sys.path if os.path.realpath(path or os.curdir) != _HERE]
     if folder not in sys.path:
         sys.path.insert(0 if first else len(sys.path), folder)
+
+
+if __name__ == "__main__":
+    # For scripts that have made the environment themselves: launcher.py <name> [argument...]
+    launch(sys.argv.pop(1))

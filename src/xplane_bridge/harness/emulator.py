@@ -1,0 +1,55 @@
+"""X-Plane's stand-in as a child process."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Sequence
+
+from xplane_bridge.harness.processes import ManagedProcess
+from xplane_bridge.resources import program
+
+
+class EmulatorProcess(ManagedProcess):
+    """`xplane_emulator` on a free port of the loopback interface, without a beacon, so that several run side by side.
+
+    After `restart` it listens on the same port again, as a restarted X-Plane does.
+
+    Args:
+        log_dir: folder of its log.
+        options: further options, e.g. ``["--fps", "60", "--pilot", path]``.
+        name: of the log, for programs that start several.
+        port: UDP port to listen on; 0 for a free one.
+    """
+
+    _READY = r"^READY\b.*?\bport[ =:]+(\d+)"
+    _START_TIMEOUT_S = 60.0
+
+    def __init__(
+        self, log_dir: Path, options: Sequence[str | Path] = (), name: str = "xplane_emulator", port: int = 0
+    ) -> None:
+        self._options = list(options)
+        #: The UDP port it listens on; known after `start`.
+        self.port = port
+        super().__init__(name, [], log_dir)
+
+    def start(self) -> None:
+        """Starts it and waits until it says on which port it listens.
+
+        Raises:
+            HarnessError: It ends before that, or is silent for a minute.
+        """
+        where = ["--bind", "127.0.0.1", "--port", self.port, "--no-beacon"]
+        self.command = [str(part) for part in [sys.executable, program("xplane_emulator"), *where, *self._options]]
+        super().start()
+        try:
+            self.port = int(self.wait_for_line(self._READY, self._START_TIMEOUT_S).group(1))
+        except BaseException:
+            self.stop()
+            raise
+
+    def restart(self) -> None:
+        """Kills it if it runs and starts it anew on the same port."""
+        if self.running:
+            self.kill()
+        self.start()

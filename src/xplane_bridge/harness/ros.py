@@ -1,0 +1,150 @@
+"""A ROS master of one's own, and roslaunch under it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import xmlrpc.client
+from pathlib import Path
+from typing import Mapping
+
+from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
+from xplane_bridge.resources import clone_dir
+
+_MASTER_TIMEOUT_S = 30.0
+
+
+def free_tcp_port() -> int:
+    """A TCP port of the loopback interface that nobody uses now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def ros_environment(base: Mapping[str, str] | None = None) -> dict[str, str]:
+    """An environment in which ROS's programs find this package.
+
+    Args:
+        base: the environment to start from; this process's own when omitted.
+
+    Returns:
+        `base` when this package is in it (setup.bash has been sourced), else what scripts/setup has made in the clone.
+
+    Raises:
+        HarnessError: There is neither.
+    """
+    env = dict(os.environ if base is None else base)
+    if shutil.which("roslaunch", path=env.get("PATH")) and _knows_package(env):
+        return env
+    clone = clone_dir()
+    file = clone / ".workspace" / "env.bash" if clone else None
+    if file is None or not file.is_file():
+        msg = "ROS does not know xplane_bridge here: source the setup.bash of its workspace" + (
+            ", or run scripts/setup" if clone else ""
+        )
+        raise HarnessError(msg)
+    script = 'source "$1" >/dev/null && env -0'
+    done = subprocess.run(["bash", "-c", script, "bash", str(file)], env=env, stdout=subprocess.PIPE, check=False)
+    if done.returncode != 0:
+        msg = f"{file} cannot be sourced; run scripts/setup"
+        raise HarnessError(msg)
+    pairs = (entry.partition("=") for entry in done.stdout.decode().split("\0") if entry)
+    return {key: value for key, _, value in pairs}
+
+
+def _knows_package(env: Mapping[str, str]) -> bool:
+    rospack = shutil.which("rospack", path=env.get("PATH"))
+    if rospack is None:
+        return False
+    done = subprocess.run([rospack, "find", "xplane_bridge"], env=dict(env), capture_output=True, check=False)
+    return done.returncode == 0
+
+
+class RosMaster(ManagedProcess):
+    """`roscore` on a free port of the loopback interface; ready when ``with`` or `start` returns.
+
+    Args:
+        log_dir: folder of its log, of the nodes' logs, and of what else ROS keeps (ROS_HOME).
+    """
+
+    _ATTEMPTS = 5  # of finding a port that nobody takes in the meantime
+
+    def __init__(self, log_dir: Path) -> None:
+        self._ros_home = Path(log_dir).resolve() / "ros"
+        self._base = ros_environment()
+        #: ROS_MASTER_URI of this master; known after `start`.
+        self.uri = ""
+        super().__init__("roscore", [], log_dir)
+
+    @property
+    def env(self) -> dict[str, str]:
+        """The environment of a program that is to use this master."""
+        return {
+            **self._base,
+            "ROS_MASTER_URI": self.uri,
+            "ROS_IP": "127.0.0.1",
+            "ROS_HOSTNAME": "127.0.0.1",
+            "ROS_HOME": str(self._ros_home),
+            "ROS_LOG_DIR": str(self._ros_home / "log"),
+            "PYTHONUNBUFFERED": "1",
+        }
+
+    def start(self) -> None:
+        """Starts the master and waits until it answers.
+
+        Raises:
+            HarnessError: It does not come up.
+        """
+        self._ros_home.mkdir(parents=True, exist_ok=True)
+        for attempt in range(self._ATTEMPTS):
+            port = free_tcp_port()
+            self.uri = f"http://127.0.0.1:{port}"
+            self.command = ["roscore", "-p", str(port)]
+            self._env = self.env
+            super().start()
+            try:
+                wait_until(self._answers, _MASTER_TIMEOUT_S, "answer of the ROS master")
+                return
+            except HarnessError:
+                self.stop()
+                if attempt == self._ATTEMPTS - 1:
+                    raise
+
+    def _answers(self) -> bool:
+        self.check_running()
+        try:
+            with xmlrpc.client.ServerProxy(self.uri) as master:
+                code, _, _ = master.getPid("/xplane_bridge_harness")
+                nodes = master.lookupNode("/xplane_bridge_harness", "/rosout")
+        except (OSError, xmlrpc.client.Error):
+            return False
+        return code == 1 and nodes[0] == 1
+
+    def use_here(self) -> None:
+        """Makes this very process use the master: its environment, and rospy's once that is imported."""
+        os.environ.update(self.env)
+        for folder in reversed(self.env.get("PYTHONPATH", "").split(os.pathsep)):
+            if folder and folder not in sys.path:
+                sys.path.insert(0, folder)
+
+
+def roslaunch(
+    master: RosMaster, log_dir: Path, launch_file: str, name: str = "roslaunch", **args: object
+) -> ManagedProcess:
+    """`roslaunch xplane_bridge <launch_file> key:=value ...` under a master; not started yet.
+
+    Args:
+        master: a running master.
+        log_dir: folder of its log.
+        launch_file: a file in launch/, e.g. "demo.launch".
+        name: of the log, for programs that start several.
+        **args: the launch file's arguments; booleans become true and false.
+    """
+    values = {key: str(value).lower() if isinstance(value, bool) else str(value) for key, value in args.items()}
+    assignments = [f"{key}:={value}" for key, value in values.items()]
+    return ManagedProcess(
+        name, ["roslaunch", "--wait", "xplane_bridge", launch_file, *assignments], log_dir, env=master.env
+    )
