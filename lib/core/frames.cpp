@@ -85,7 +85,7 @@ Eigen::Vector3d eulerRates(const EulerAngles& attitude, const Eigen::Vector3d& r
   const double cp = std::cos(attitude.pitch);
   const double turn = rates_frd.y() * sr + rates_frd.z() * cr;
   const double pitch_rate = rates_frd.y() * cr - rates_frd.z() * sr;
-  constexpr double kMinCosPitch = 0.01 * kRadiansPerDegree;
+  constexpr double kMinCosPitch = 0.1 * kRadiansPerDegree;
   if (std::abs(cp) < kMinCosPitch) return {kNaN, pitch_rate, kNaN};
   return {rates_frd.x() + turn * std::sin(attitude.pitch) / cp, pitch_rate, turn / cp};
 }
@@ -97,7 +97,7 @@ Eigen::Vector3d airRelativeVelocity(const Eigen::Matrix3d& R_ned_frd, const Eige
 
 AirAngles airAngles(const Eigen::Vector3d& v) {
   const double speed = v.norm();
-  if (!(speed >= kMinAirspeedForAngles)) return {speed, kNaN, kNaN};
+  if (!(speed >= kMinAirspeedForAngles)) return {speed, 0.0, 0.0};
   return {speed, std::atan2(v.z(), v.x()), std::atan2(v.y(), std::hypot(v.x(), v.z()))};
 }
 
@@ -107,17 +107,12 @@ Eigen::Vector3d windNedFromDirection(double from_direction, double speed) {
 
 double windFromDirectionDeg(const Eigen::Vector3d& wind_ned) {
   constexpr double kCalm = 1e-3;
-  if (!(std::hypot(wind_ned.x(), wind_ned.y()) >= kCalm)) return kNaN;
+  if (!(std::hypot(wind_ned.x(), wind_ned.y()) >= kCalm)) return 0.0;
   return wrap360(std::atan2(-wind_ned.y(), -wind_ned.x()) * kDegreesPerRadian);
 }
 
-Eigen::Vector3d specificForceFromRow(double axial, double side, double normal) {
-  return kStandardGravity * Eigen::Vector3d(kRowAxialSign * axial, kRowSideSign * side, kRowNormalSign * normal);
-}
-
-Eigen::Vector3d specificForceFromDatarefs(double g_axil, double g_side, double g_nrml) {
-  return kStandardGravity *
-         Eigen::Vector3d(kDatarefAxialSign * g_axil, kDatarefSideSign * g_side, kDatarefNormalSign * g_nrml);
+Eigen::Vector3d specificForce(double axial, double side, double normal) {
+  return kStandardGravity * Eigen::Vector3d(axial, side, -normal);
 }
 
 Eigen::Matrix3d levelAxes(double latitude_deg, double longitude_deg) {

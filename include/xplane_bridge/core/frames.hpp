@@ -35,14 +35,15 @@ struct GeoPoint {
 /// X-Plane's earth is a sphere of this radius [m] (protocol reference 1.8; `sim/physics/earth_radius_m` says it).
 inline constexpr double kEarthRadius = 6378145.0;
 
-/// Signs that turn X-Plane's load values into specific force in FRD, in units of g. DATA row 4 and the datarefs
-/// `g_axil`, `g_side`, `g_nrml` differ in the axial sign; [?] on a live simulator (at rest f_x must be +g sin(pitch)).
+/// Signs that turn X-Plane's load values into load factors (axial forward +, side right +, normal up +), in units of g.
+/// DATA row 4 and the datarefs `sim/flightmodel/forces/g_*` differ in the axial sign (protocol reference 1.9); [?] on a
+/// live simulator: at rest the axial load factor must be +sin(pitch).
 inline constexpr double kRowAxialSign = +1.0;
 inline constexpr double kRowSideSign = +1.0;
-inline constexpr double kRowNormalSign = -1.0;
+inline constexpr double kRowNormalSign = +1.0;
 inline constexpr double kDatarefAxialSign = -1.0;
 inline constexpr double kDatarefSideSign = +1.0;
-inline constexpr double kDatarefNormalSign = -1.0;
+inline constexpr double kDatarefNormalSign = +1.0;
 
 // --- angles ---
 
@@ -77,7 +78,7 @@ EulerAngles eulerAngles(const Eigen::Matrix3d& R_ned_frd);
 
 /// Rates of roll, pitch and heading [rad/s] from body rates.
 /// @param rates_frd p, q, r [rad/s]
-/// @return NaN in roll and heading where |pitch| is within 0.01 deg of 90 deg: they are not defined there.
+/// @return NaN in roll and heading where |pitch| is within 0.1 deg of 90 deg: they are not defined there.
 Eigen::Vector3d eulerRates(const EulerAngles& attitude, const Eigen::Vector3d& rates_frd);
 
 // --- air data axes ---
@@ -89,8 +90,8 @@ struct AirAngles {
   double sideslip = 0.0;         ///< air from the right +
 };
 
-/// Below this airspeed [m/s] the two angles are noise and NaN is returned for them.
-inline constexpr double kMinAirspeedForAngles = 0.5;
+/// Below this airspeed [m/s] the two angles are noise and 0 is returned for them.
+inline constexpr double kMinAirspeedForAngles = 1.0;
 
 /// @return velocity of the aircraft through the air, FRD [m/s].
 Eigen::Vector3d airRelativeVelocity(const Eigen::Matrix3d& R_ned_frd, const Eigen::Vector3d& velocity_ned,
@@ -99,15 +100,12 @@ AirAngles airAngles(const Eigen::Vector3d& air_relative_velocity_frd);
 
 /// Velocity of the air, NED [m/s], from where it comes [rad, true] and how fast [m/s]; no vertical part.
 Eigen::Vector3d windNedFromDirection(double from_direction, double speed);
-/// @return where the wind comes from, true, [0, 360) [deg]; NaN when calm (below 1 mm/s).
+/// @return where the wind comes from, true, [0, 360) [deg]; 0 when calm (below 1 mm/s).
 double windFromDirectionDeg(const Eigen::Vector3d& wind_ned);
 
-// --- specific force, FRD [m/s^2] ---
-
-/// @param axial,side,normal DATA row 4, in g
-Eigen::Vector3d specificForceFromRow(double axial, double side, double normal);
-/// @param g_axil,g_side,g_nrml datarefs `sim/flightmodel/forces/g_*`, in g
-Eigen::Vector3d specificForceFromDatarefs(double g_axil, double g_side, double g_nrml);
+/// Specific force, FRD [m/s^2]: what an accelerometer reads, (0, 0, -g) in level flight and at rest.
+/// @param axial,side,normal load factors in g: forward +, right +, up +
+Eigen::Vector3d specificForce(double axial, double side, double normal);
 
 // --- X-Plane's sphere ---
 
@@ -148,7 +146,8 @@ class TangentFrame {
   Eigen::Vector3d origin_earth_;  ///< origin in earth-fixed axes [m]
 };
 
-/// @return R_ned_level: attitude given against the scenery origin's axes turned into attitude against the local level.
+/// @return R_ned_frd at the aircraft: attitude given against the scenery origin's axes turned into attitude against the
+/// local level.
 /// @param R_originned_frd FRD -> NED of the scenery origin
 Eigen::Matrix3d levelAttitude(const TangentFrame& scenery, const Eigen::Matrix3d& R_originned_frd, double latitude_deg,
                               double longitude_deg);

@@ -1,0 +1,171 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+namespace xplane_bridge::core {
+
+/// Receive times that a step of the wall clock does not reach.
+///
+/// The kernel stamps datagrams with the wall clock (SO_TIMESTAMPNS). This carries that stamp over to the steady clock
+/// and adds the offset between the two, so that results are wall-clock times that run evenly. The offset follows a real
+/// step of the wall clock once it has persisted for `kReadings` readings; a reading delayed by the scheduler does not
+/// count.
+class ReceiveClock {
+ public:
+  static constexpr int kReadings = 32;
+  static constexpr std::int64_t kStepThresholdNs = 1000000;
+
+  /// @param kernel_wall_ns the datagram's receive stamp
+  /// @param now_wall_ns, now_steady_ns both clocks read after the datagram was taken, wall clock first
+  /// @return receive time on the evenly running wall clock [ns]
+  std::int64_t toHostTime(std::int64_t kernel_wall_ns, std::int64_t now_wall_ns, std::int64_t now_steady_ns);
+  /// Steps of the wall clock followed so far.
+  std::uint32_t steps() const { return steps_; }
+
+ private:
+  bool started_ = false;
+  std::int64_t offset_ns_ = 0;
+  std::int64_t best_offset_ns_ = 0;  ///< largest of the current batch: delays between the two readings only shrink it
+  int readings_ = 0;
+  std::uint32_t steps_ = 0;
+};
+
+/// One received sample of the simulator's clock.
+struct ClockSample {
+  std::int64_t receive_ns = 0;  ///< host receive time [ns]
+  float sim_time = 0.0F;        ///< simulator running time, raw float32 as received [s]
+  float frame_period = 0.0F;    ///< simulator time of one frame [s]; <= 0 or NaN: unknown
+  bool paused = false;
+  bool replay = false;
+};
+
+/// What a sample did to the clock.
+enum class ClockEvent : std::uint8_t {
+  kNone = 0,
+  kFirst,          ///< first sample ever
+  kDuplicate,      ///< same frame again: to be dropped
+  kOutOfOrder,     ///< older than the newest frame: to be dropped
+  kPaused,         ///< simulator time stands since this sample
+  kResumed,        ///< runs again; the fit starts anew
+  kGap,            ///< nothing was heard for a while and the old fit does not hold; the fit starts anew
+  kRateChanged,    ///< simulator time runs at another rate (frame rate too low, time acceleration); the fit starts anew
+  kReset,          ///< simulator time jumped, or the caller reported a jump: new epoch
+  kReplayStarted,  ///< new epoch
+  kReplayEnded,    ///< new epoch
+  kHostClockStep,  ///< receive time went backwards: new epoch
+};
+const char* toString(ClockEvent event);
+
+struct ClockEstimate {
+  bool usable = false;        ///< false: duplicate or out of order, to be dropped
+  std::int64_t stamp_ns = 0;  ///< host time of the simulator frame; strictly increasing within an epoch [ns]
+  double sim_time = 0.0;      ///< unwrapped simulator time, no float32 steps; starts at the raw value of each epoch [s]
+  double uncertainty = 0.0;   ///< half width around stamp_ns, without the constant smallest delay nobody can see [s]
+  double time_ratio = 1.0;    ///< simulator time over host time
+  std::uint32_t epoch = 0;
+  ClockEvent event = ClockEvent::kNone;
+};
+
+/// Maps simulator time to host time and back.
+///
+/// Datagrams are only ever late, never early: the line host = offset + slope * sim that lies below all samples of a
+/// short window and closest to them is the one with the smallest delay. Samples are thinned to the least delayed one of
+/// each bucket, so an update costs the same at any rate. Simulator time arrives as float32 (steps of 3.9 ms after nine
+/// hours); it is rebuilt from the frame periods and kept within one step of the raw value.
+///
+/// Has no clock of its own and allocates nothing. One thread calls, or the caller locks.
+class ClockFilter {
+ public:
+  struct Options {
+    double window = 4.0;        ///< length of the fit [s]
+    double min_span = 0.25;     ///< shortest span of samples that makes a fit; before, a stamp is the receive time [s]
+    double gap = 0.5;           ///< silence after which a fit that no longer holds is given up [s]
+    double rate_change = 0.02;  ///< every recent sample this much later than the fit: the rate has changed [s]
+    double rate_change_after = 0.25;  ///< ... for this long [s]
+    double backward_tolerance = 1.0;  ///< older samples within this are late datagrams, not a reset [s]
+    double forward_jump = 2.0;        ///< simulator time ahead of `max_time_ratio` times host time by this: a reset [s]
+    double max_time_ratio = 20.0;     ///< fastest time acceleration taken for real
+    double unfitted_uncertainty = 0.02;  ///< said while there is no fit: one frame at a low rate [s]
+  };
+
+  ClockFilter() = default;
+  explicit ClockFilter(const Options& options) : options_(options) {}
+
+  ClockEstimate update(const ClockSample& sample);
+  /// The caller saw a jump (aircraft placed elsewhere, other aircraft): the next sample starts a new epoch.
+  void raiseEpoch() { raise_epoch_ = true; }
+  /// Forgets the fit and the simulator time, as after a lost link; the next sample starts a new epoch.
+  void reset();
+
+  /// Unwrapped simulator time at a host time; empty while there is no fit or the simulator is paused.
+  std::optional<double> simTime(std::int64_t host_ns) const;
+  /// Host time of an unwrapped simulator time [ns]; empty as above.
+  std::optional<std::int64_t> hostTime(double sim_time) const;
+  /// Unwrapped time of a raw value that came by another way than update(), of the current epoch [s].
+  double unwrap(float raw_sim_time) const {
+    return static_cast<double>(raw_sim_time) + (sim_time_ - static_cast<double>(last_.sim_time));
+  }
+  bool fitted() const { return fitted_; }
+  bool paused() const { return paused_; }
+  /// Half width of the mapping [s], see ClockEstimate.
+  double uncertainty() const;
+  double timeRatio() const { return fitted_ ? 1.0 / slope_ : 1.0; }
+  std::uint32_t epoch() const { return epoch_; }
+
+ private:
+  /// Relative to the references, so that doubles keep nanoseconds.
+  struct Point {
+    double sim = 0.0;   ///< [s]
+    double host = 0.0;  ///< [s]
+  };
+  static constexpr std::size_t kBuckets = 32;
+  static constexpr std::size_t kMinBuckets = 3;
+
+  bool isForwardJump(const ClockSample& sample, double host_step) const;
+  void startEpoch(const ClockSample& sample);
+  void restartFit(const ClockSample& sample);
+  void advanceSimTime(const ClockSample& sample);
+  /// Gives up what of the fit no longer holds. @return kGap, kRateChanged or kNone.
+  ClockEvent judgeDelay(const ClockSample& sample, double host_step);
+  void dropBucketsBefore(double host);
+  void addToFit(const Point& point);
+  void fit();
+  Point relative(const ClockSample& sample) const;
+  double delay(const Point& point) const { return point.host - (offset_ + slope_ * point.sim); }
+  const Point& bucket(std::size_t i) const { return buckets_[(first_ + i) % kBuckets]; }
+  std::int64_t stampOf(const ClockSample& sample);
+
+  Options options_;
+
+  bool started_ = false;
+  bool raise_epoch_ = false;
+  bool paused_ = false;
+  bool replay_ = false;
+  std::uint32_t epoch_ = 0;
+  ClockSample last_;
+  bool has_stamp_ = false;
+  std::uint32_t stamp_epoch_ = 0;
+  std::int64_t last_stamp_ns_ = 0;
+  int backward_samples_ = 0;
+  double sim_time_ = 0.0;
+  double sim_time_step_ = 0.0;  ///< float32 step that sim_time_ shows, 0 when rebuilt from frame periods [s]
+
+  std::int64_t host_reference_ns_ = 0;
+  double sim_reference_ = 0.0;
+  std::array<Point, kBuckets> buckets_{};
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+  double bucket_start_ = 0.0;
+  bool fitted_ = false;
+  double offset_ = 0.0;
+  double slope_ = 1.0;
+  double fit_spread_ = 0.0;  ///< twice the rms delay of the buckets [s]
+
+  double late_since_ = 0.0;  ///< host time since which every sample has been late, relative [s]
+  bool late_ = false;
+};
+
+}  // namespace xplane_bridge::core
