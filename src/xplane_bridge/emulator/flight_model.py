@@ -1,11 +1,12 @@
 """What the emulator's UDP side and its flight models say to each other.
 
-Everything here is SI unless a name says otherwise. Axes: NED for the earth, FRD for the body. The planet is X-Plane's: a sphere of
-6 378 145 m that does not turn, with the same gravity everywhere. Signs of commands: roll + right, pitch + nose up, yaw + nose right.
-Surfaces as X-Plane reports them: degrees, trailing edge down +, rudder trailing edge right +, spoilers and speed brakes up +.
+Everything here is SI unless a name says otherwise. Axes: NED for the earth, FRD for the body. The planet is X-Plane's: a
+sphere of 6 378 145 m that does not turn, with the same gravity everywhere. Signs of commands: roll + right, pitch + nose up,
+yaw + nose right. Surfaces as X-Plane reports them: degrees, trailing edge down +, rudder trailing edge right +, spoilers and
+speed brakes up +.
 
-A surface is named as the leaf of X-Plane's ``sim/flightmodel/controls/<name>def`` dataref without ``def``: ``wing2l_ail1``,
-``hstab1_elv1``, ``vstab1_rud1``. ``hstab1`` is the left and ``hstab2`` the right half of the tailplane.
+A surface is named as the leaf of X-Plane's ``sim/flightmodel/controls/<name>def`` dataref without ``def``:
+``wing2l_ail1``, ``hstab1_elv1``, ``vstab1_rud1``. ``hstab1`` is the left and ``hstab2`` the right half of the tailplane.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ EARTH_RADIUS_M = 6378145.0
 GRAVITY_MPS2 = 9.80665
 MAX_ENGINES = 8
 
-#: Longest integration step of a flight model [s]; ``step`` splits what it is given.
-MAX_SUBSTEP_S = 1.0 / 120.0
+#: Longest integration step of a flight model [s]; ``step`` divides what it is given into equal parts no longer than this.
+MAX_SUBSTEP_S = 1.0 / 240.0
+#: Longest time one ``step`` may fly [s].
+MAX_STEP_S = 1.0
 
 
 class FlightModelError(ValueError):
@@ -79,12 +82,12 @@ class EngineFault(enum.Enum):
 
 @dataclass
 class Controls:
-    """Everything that can be commanded. The caller keeps one, changes it, and passes it to ``step``; the model only reads it."""
+    """Everything that can be commanded. The caller keeps one, changes it, and passes it to ``step``; the model reads it."""
 
     roll: float = 0.0  #: stick, -1..1
     pitch: float = 0.0
     yaw: float = 0.0
-    throttle: List[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: levers, 0..1 (-1..0 reverse, where there is one)
+    throttle: List[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: levers, 0..1
     propeller: List[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = highest speed)
     mixture: List[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = rich)
     roll_trim: float = 0.0  #: -1..1
@@ -99,9 +102,9 @@ class Controls:
     thrust_vector: float = 0.0  #: 0 forward .. 1 vertical (and a little beyond: see the tiltrotor)
     artificial_stability: bool = True  #: the stabilisation inside the model, where it has one
 
-    override_surfaces: bool = False  #: X-Plane's override_control_surfaces: nothing drives any surface but ``surface_deg``
-    surface_deg: Dict[str, float] = field(default_factory=dict)  #: used while overridden; surfaces not named stay where they are
-    override_throttles: bool = False  #: engines obey ``throttle_use`` alone: levers, mixing and stabilisation are out of the loop
+    override_surfaces: bool = False  #: X-Plane's override_control_surfaces: only ``surface_deg`` drives any surface
+    surface_deg: Dict[str, float] = field(default_factory=dict)  #: used while overridden; those not named stay as they are
+    override_throttles: bool = False  #: engines obey ``throttle_use`` alone, without levers, mixing and stabilisation
     throttle_use: List[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: per engine or motor, -1..1
 
     surface_faults: Dict[str, SurfaceFault] = field(default_factory=dict)  #: by surface name
@@ -147,7 +150,7 @@ class GearState:
 
 @dataclass
 class ModelState:
-    """The aircraft after a step: one coherent instant. ``FlightModel.state`` is overwritten by the next step; ``copy`` keeps one."""
+    """The aircraft after a step: one coherent instant. ``FlightModel.state`` is overwritten by the next; ``copy`` keeps one."""
 
     sim_time_s: float = 0.0
 
@@ -235,7 +238,7 @@ class ModelState:
 
 @dataclass(frozen=True)
 class InitialState:
-    """Where and how a flight starts. In the air the aircraft starts trimmed, with its engines at their working speed."""
+    """Where and how a flight starts. In the air the aircraft starts trimmed, its engines at their working speed."""
 
     latitude_deg: float = 47.4647
     longitude_deg: float = 8.5492
@@ -271,11 +274,12 @@ class ModelInfo:
     length_m: float = 0.0
     eye_forward_m: float = 0.0  #: pilot's eye (or camera) from the reference point, FRD
     eye_down_m: float = 0.0
+    standing_height_m: float = 0.0  #: of the centre of gravity above the ground, parked at the default loading
     trim_deg: Tuple[Tuple[str, float], ...] = ()  #: surface kind -> deflection at full trim
 
 
 class FlightModel(Protocol):
-    """A flying aircraft. Not thread-safe; never looks at a clock; the same calls with the same seed give the same flight."""
+    """A flying aircraft. Not thread-safe; never looks at a clock; the same calls with the same seed: the same flight."""
 
     info: ModelInfo
     surfaces: Tuple[SurfaceSpec, ...]
@@ -289,7 +293,7 @@ class FlightModel(Protocol):
         """A copy of the controls that keep the aircraft as ``reset`` left it: start the flight with them."""
 
     def reset(self, initial: InitialState) -> Controls:
-        """Starts a flight; returns the controls that hold it there (parked: brakes set). Wind, faults and loading stay."""
+        """Starts a flight; returns the controls that hold it there (parked: brakes set). Wind and loading stay."""
 
     def step(self, dt: float, controls: Controls) -> ModelState:
         """Flies ``dt`` [s] > 0 on, in steps of at most ``MAX_SUBSTEP_S``. Returns ``state``."""
@@ -305,10 +309,10 @@ class FlightModel(Protocol):
         v_ned_mps: Optional[Sequence[float]] = None,
         pqr_rad_s: Optional[Sequence[float]] = None,
     ) -> ModelState:
-        """Moves the aircraft at once (PREL, VEHS, writes to position, q, velocity and rates). What is None stays as it is."""
+        """Moves the aircraft at once (PREL, VEHS, writes to position, q, velocity, rates). What is None stays as it is."""
 
     def save(self) -> bytes:
-        """The whole situation (SIMO): ``restore`` of the same model continues from it exactly as it would have gone on."""
+        """The whole situation but the controls (SIMO): after ``restore`` the flight goes on as it would have, to millimetres."""
 
     def restore(self, situation: bytes) -> ModelState:
         """Raises ``FlightModelError`` for a situation of another model or version."""
@@ -317,7 +321,7 @@ class FlightModel(Protocol):
         """Steady velocity of the air (a wind from the north has north_mps < 0)."""
 
     def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
-        """Dryden turbulence with this standard deviation of the vertical gust [m/s]; 0 ends it. ``seed`` restarts the sequence."""
+        """Dryden turbulence, this standard deviation of the vertical gust [m/s]; 0 ends it. ``seed`` restarts the sequence."""
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
         """The day's difference from the standard atmosphere."""
