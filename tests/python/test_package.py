@@ -1,0 +1,232 @@
+"""Rules of the package as a whole: layers, lists kept in step, versions, what git tracks."""
+
+import importlib
+import re
+import subprocess
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+from catkin_pkg.changelog import get_changelog_from_path
+
+import xplane_bridge
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def sources(*folders, suffixes=(".hpp", ".cpp")):
+    """All files below these folders with these suffixes."""
+    return sorted(p for folder in folders for p in (ROOT / folder).rglob("*") if p.suffix in suffixes)
+
+
+def includes(path):
+    """What a C++ file includes, in the form it is written."""
+    return re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def without_comments(text):
+    """A C++ source without its comments."""
+    return re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL)
+
+
+def git(*arguments):
+    # A clone of another user's (sudo, containers) is not to be refused.
+    command = ["git", "-c", f"safe.directory={ROOT}", "-C", str(ROOT), *arguments]
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+
+
+def tracked_files():
+    listing = git("ls-files", "-z")
+    if listing.returncode != 0:
+        pytest.fail("git ls-files failed: the test needs a git clone")
+    return [ROOT / name for name in listing.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+# ---------------------------------------------------------------------------------------------------------- layers
+
+ROS_HEADER = re.compile(
+    r"^(ros|roscpp|rosconsole|tf2?|tf2_\w+|actionlib|diagnostic_\w+|image_transport|cv_bridge|camera_info_manager|"
+    r"(\w+_msgs|std_srvs)|xplane_bridge/[A-Z]\w*\.h)(/|$)|^xplane_bridge/[A-Z]\w*\.h$"
+)
+GRAPHICS_HEADER = re.compile(r"^(opencv|opencv2|X11|xcb|turbojpeg)([/.]|$)")
+UPPER_LAYER = re.compile(r"^xplane_bridge/(vision/|[a-z]\w*\.hpp$)")
+
+
+def test_the_core_includes_nothing_of_ros_or_of_pictures():
+    files = sources("include/xplane_bridge/core", "lib/core")
+    assert files
+    wrong = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in files
+        for name in includes(path)
+        if ROS_HEADER.search(name) or GRAPHICS_HEADER.search(name) or UPPER_LAYER.search(name)
+    ]
+    assert not wrong
+
+
+def test_vision_includes_nothing_of_ros():
+    wrong = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in sources("include/xplane_bridge/vision", "lib/vision")
+        for name in includes(path)
+        if ROS_HEADER.search(name) or re.search(r"^xplane_bridge/[a-z]\w*\.hpp$", name)
+    ]
+    assert not wrong
+
+
+def node_sources():
+    return [p for folder in ("include/xplane_bridge", "lib") for p in (ROOT / folder).glob("*.[ch]pp")]
+
+
+def test_the_nodes_name_no_dataref():
+    wrong = [
+        f"{path.relative_to(ROOT)}: {match}"
+        for path in node_sources()
+        for match in re.findall(r'"sim/[^"]*"', without_comments(path.read_text(encoding="utf-8")))
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize(
+    ("header", "layer"),
+    [("ros/ros.h", ROS_HEADER), ("sensor_msgs/Joy.h", ROS_HEADER), ("xplane_bridge/FlightState.h", ROS_HEADER),
+     ("tf2_ros/transform_broadcaster.h", ROS_HEADER), ("opencv2/core.hpp", GRAPHICS_HEADER),
+     ("xcb/xcb.h", GRAPHICS_HEADER), ("xplane_bridge/base_node.hpp", UPPER_LAYER),
+     ("xplane_bridge/vision/window.hpp", UPPER_LAYER)],
+)  # fmt: skip
+def test_the_rules_know_what_they_forbid(header, layer):
+    assert layer.search(header)
+    allowed = ("xplane_bridge/core/frames.hpp", "Eigen/Core", "vector", "sys/socket.h", "nlohmann/json.hpp")
+    assert not any(layer.search(name) for name in allowed)
+
+
+ROS_IMPORT = re.compile(
+    r"(import|from)\s+(rospy|roslib|rosbag|rosgraph|roslaunch|tf2?|\w+_msgs|xplane_bridge\.(msg|srv))\b"
+)
+
+
+def test_python_imports_ros_only_inside_functions():
+    wrong = [
+        f"{path.relative_to(ROOT)}: {line}"
+        for path in sources("src/xplane_bridge", suffixes=(".py",))
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if ROS_IMPORT.match(line)
+    ]  # fmt: skip
+    assert not wrong
+
+
+def test_only_bags_imports_rosbags():
+    wrong = [
+        str(path.relative_to(ROOT))
+        for path in sources("src/xplane_bridge", suffixes=(".py",))
+        if "bags" not in path.relative_to(ROOT / "src/xplane_bridge").parts[0]
+        and re.search(r"^\s*(import|from)\s+rosbags\b", path.read_text(encoding="utf-8"), re.MULTILINE)
+    ]
+    assert not wrong
+
+
+# ----------------------------------------------------------------------------------------------------------- lists
+
+
+@pytest.mark.parametrize(
+    ("command", "folder", "suffix"), [("add_message_files", "msg", ".msg"), ("add_service_files", "srv", ".srv")]
+)
+def test_cmake_lists_every_message_and_service(command, folder, suffix):
+    cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    listed = re.search(command + r"\(FILES([^)]*)\)", cmake).group(1).split()
+    assert listed == sorted(p.name for p in (ROOT / folder).glob("*" + suffix))
+
+
+def launchers():
+    return {
+        p.name: re.search(r'^ +launch\("(\w+)"\)', p.read_text(encoding="utf-8"), re.MULTILINE).group(1)
+        for p in (ROOT / "scripts").iterdir()
+        if p.is_file() and "from launcher import launch" in p.read_text(encoding="utf-8")
+    }
+
+
+def test_every_launcher_starts_a_program_that_exists():
+    assert launchers()
+    for name, module in launchers().items():
+        assert callable(importlib.import_module(f"xplane_bridge.cli.{module}").main), name
+
+
+def test_pip_installs_the_same_programs():
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    section = re.search(r"^\[project\.scripts\]\n(.*?)^\[", project, re.MULTILINE | re.DOTALL).group(1)
+    scripts = dict(re.findall(r'^(\w+) = "xplane_bridge\.cli\.(\w+):main"$', section, re.MULTILINE))
+    assert scripts == launchers()
+
+
+def test_every_launch_argument_is_documented():
+    wrong = []
+    for path in (ROOT / "launch").glob("*.launch"):
+        root = ElementTree.parse(path).getroot()
+        wrong += [f"{path.name}: {arg.get('name')}" for arg in root.findall("arg") if not arg.get("doc")]
+    assert not wrong
+
+
+# ------------------------------------------------------------------------------------------------- version, changelog
+
+
+def test_the_version_is_the_same_everywhere():
+    version = ElementTree.parse(ROOT / "package.xml").getroot().findtext("version")
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert re.search(r'^version = "([^"]+)"', project, re.MULTILINE).group(1) == version
+    assert xplane_bridge.__version__ == version
+
+
+def test_the_changelog_is_as_rep_132_wants_it():
+    changelog = get_changelog_from_path(str(ROOT / "CHANGELOG.rst"), "xplane_bridge")
+    assert changelog is not None
+    assert list(changelog.foreach_version())
+    for version, _, entries in changelog.foreach_version():
+        assert entries, f"section {version} is empty"
+
+
+# ------------------------------------------------------------------------------------------------------------- git
+
+
+def test_sources_in_lib_are_not_ignored():
+    # Popular .gitignore templates ignore lib/, which holds C++ sources here.
+    for path in ("lib/core/new.cpp", "lib/new.cpp", "lib/vision/new.cpp", "src/xplane_bridge/new.py"):
+        assert git("check-ignore", "-q", path).returncode == 1, path
+    assert git("check-ignore", "-q", "build/x").returncode == 0
+
+
+def test_no_file_names_a_path_of_somebodys_machine():
+    pattern = re.compile(r"(?<![\w.$}])/(home|root|Users)/\w+")
+    wrong = []
+    for path in tracked_files():
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue
+        wrong += [f"{path.relative_to(ROOT)}: {match.group(0)}" for match in pattern.finditer(text)]
+    assert not wrong
+
+
+def test_files_end_with_a_newline_and_lines_without_spaces():
+    wrong = []
+    text_suffixes = {
+        ".py",
+        ".hpp",
+        ".cpp",
+        ".txt",
+        ".cmake",
+        ".yaml",
+        ".toml",
+        ".md",
+        ".rst",
+        ".msg",
+        ".srv",
+        ".launch",
+        ".xml",
+    }
+    for path in tracked_files():
+        if path.suffix not in text_suffixes or path.stat().st_size == 0:
+            continue
+        text = path.read_text(encoding="utf-8")
+        if not text.endswith("\n") or re.search(r"[ \t]+$", text, re.MULTILINE) or "\r" in text:
+            wrong.append(str(path.relative_to(ROOT)))
+    assert not wrong
