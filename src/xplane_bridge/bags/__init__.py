@@ -26,11 +26,12 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 
 from xplane_bridge.bags.decoding import NeedsObjectsError, Types, decode_bulk, decode_objects, wanted
 from xplane_bridge.bags.units import Unit, parse_units
+from xplane_bridge.errors import XplaneBridgeError
 
 PathLike = Union[str, Path]
 
 
-class BagError(Exception):
+class BagError(XplaneBridgeError):
     """A bag cannot be read; the text is one line with the remedy."""
 
 

@@ -1,0 +1,80 @@
+"""Message columns as the columns of an export: units in the names, one column a number, optionally on one time base."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Mapping
+
+import numpy as np
+
+from xplane_bridge.analysis.resampling import held, interpolated, rotated
+
+if TYPE_CHECKING:
+    from xplane_bridge.bags.units import Unit
+
+
+def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: str = "") -> dict[str, np.ndarray]:
+    """Flatten columns and put the unit into each name.
+
+    Args:
+        columns: From a `Table`; shape (n,) or (n, k).
+        units: From `Bags.units`.
+        prefix: Put before every name, with an underscore.
+
+    Returns:
+        ``altitude_msl_m``, ``velocity_ned_x_mps``, ``roll_deg``, ``throttle_command_0``, ... in message order, without the
+        header; arrays are spread over numbered columns, lists of varying length stay objects.
+    """
+    out: dict[str, np.ndarray] = {}
+    for path, values in columns.items():
+        if path.split(".")[0] == "header":
+            continue
+        base = f"{prefix}_{path}" if prefix else path
+        base = base.replace(".", "_").replace("[", "_").replace("]", "")
+        suffix = units[path].suffix if path in units else ""
+        ending = f"_{suffix}" if suffix and not base.endswith(f"_{suffix}") else ""
+        if values.ndim == 1:
+            out[base + ending] = values
+        else:
+            flat = values.reshape(len(values), -1)
+            for k in range(flat.shape[1]):
+                out[f"{base}_{k}{ending}"] = flat[:, k]
+    return out
+
+
+def on_base(
+    base: np.ndarray,
+    time: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    units: Mapping[str, Unit],
+    parts: list[slice],
+) -> dict[str, np.ndarray]:
+    """Bring columns onto a time base: numbers linearly, wrapping angles and quaternions along the short way, others held.
+
+    Args:
+        base: int64 [ns], shape (m,).
+        time: int64 [ns], shape (n,), of the columns.
+        columns: From a `Table`.
+        units: From `Bags.units`; say which angles wrap.
+        parts: Segments of `time` (`segments`).
+
+    Returns:
+        The same names, m rows. NaN where there is nothing to interpolate.
+    """
+    out: dict[str, np.ndarray] = {}
+    done: set[str] = set()
+    for path, values in columns.items():
+        if path in done:
+            continue
+        quaternion = [f"{path[:-2]}.{axis}" for axis in "xyzw"]
+        if path.endswith(".x") and all(q in columns for q in quaternion):
+            turned = rotated(base, time, np.stack([columns[q] for q in quaternion], axis=1), parts)
+            for k, name in enumerate(quaternion):
+                out[name] = turned[:, k]
+            done.update(quaternion)
+        elif np.issubdtype(values.dtype, np.floating):
+            unit = units.get(path)
+            wrap, low = (unit.wrap, unit.low) if unit else (0.0, 0.0)
+            out[path] = interpolated(base, time, values, parts, wrap, low)
+        else:
+            out[path] = held(base, time, values)
+    return out

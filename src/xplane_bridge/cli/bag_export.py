@@ -1,0 +1,127 @@
+"""bag_export: flights from bags to tables, trajectories and image data sets."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Sequence
+
+from tqdm import tqdm
+
+from xplane_bridge.cli.entry import guarded
+from xplane_bridge.export import campaign
+from xplane_bridge.export.dataset import Options
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    p = argparse.ArgumentParser(
+        prog="bag_export",
+        description="Exports flights. Every BAG is a flight; a folder of split bags is one flight too.",
+        epilog="An export that was cut off goes on where it stopped when the same command is given again.",
+    )
+    p.add_argument("bags", nargs="*", metavar="BAG", help=".bag files, or folders of split bags")
+    p.add_argument("-o", "--output", default="export", metavar="DIR", help="where to write (default: %(default)s)")
+    p.add_argument("--format", choices=campaign.FORMATS, default="csv", help="default: %(default)s")
+    p.add_argument("--verify", action="store_true", help="compare DIR with its manifest instead of exporting")
+    table = p.add_argument_group("tables and trajectories")
+    table.add_argument(
+        "--rate", type=_positive, metavar="HZ", help="one uniform time base; default: samples as recorded"
+    )
+    table.add_argument(
+        "--topics",
+        nargs="+",
+        default=[],
+        metavar="TOPIC",
+        help="csv, parquet: further topics, newest value in each row",
+    )
+    data = p.add_argument_group("image data sets")
+    data.add_argument("--split-by", choices=("time", "flight"), default="time", help="default: %(default)s")
+    data.add_argument("--train-share", type=_share, default=0.8, metavar="0..1", help="default: %(default)s")
+    data.add_argument("--seed", type=int, default=0, help="of the draw with --split-by flight (default: %(default)s)")
+    data.add_argument("--keep-bad-frames", action="store_true", help="keep frames whose quality bits say they are bad")
+    run = p.add_argument_group("how to run")
+    run.add_argument(
+        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
+    )
+    run.add_argument("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, e.g. tcp://host:8786")
+    return p
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < float("inf"):
+        msg = f"{text} is not a positive number"
+        raise argparse.ArgumentTypeError(msg)
+    return value
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 1:
+        msg = f"{text} is not between 0 and 1"
+        raise argparse.ArgumentTypeError(msg)
+    return value
+
+
+@guarded
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    p = parser()
+    args = p.parse_args(argv)
+    output = Path(args.output)
+    if args.verify:
+        problems = campaign.verify(output)
+        print("\n".join(problems) if problems else f"{output}: all files are as the manifest says")
+        return 1 if problems else 0
+    if not args.bags:
+        p.error("no BAG given")
+    if args.jobs < 1:
+        p.error(f"--jobs {args.jobs}: at least 1 process is needed")
+    jobs = _jobs(args, output)
+    run = (
+        partial(campaign.run_dask, address=args.scheduler)
+        if args.scheduler
+        else partial(campaign.run_local, workers=args.jobs)
+    )
+    failed = 0
+    outcomes = campaign.export(jobs, run, _parameters(args))
+    bar = tqdm(outcomes, total=len(jobs), unit="flight", disable=not sys.stderr.isatty())
+    for outcome in bar:
+        if outcome.record is None:
+            failed += 1
+            bar.write(f"{outcome.name}: {outcome.error}", file=sys.stderr)
+        else:
+            bar.write(f"{outcome.name}: {_summary(outcome)}", file=sys.stdout)
+    print(f"{len(jobs) - failed} of {len(jobs)} flights exported to {output}")
+    return 1 if failed else 0
+
+
+def _jobs(args: argparse.Namespace, output: Path) -> list[campaign.Job]:
+    dataset = Options(args.keep_bad_frames, args.train_share, args.split_by, args.seed)
+    named = campaign.flights(args.bags)
+    training = campaign.choose_training(named, dataset)
+    return [
+        campaign.Job(
+            name, bags, str(output.resolve()), args.format, args.rate, tuple(args.topics), dataset, name in training
+        )
+        for name, bags in sorted(named.items())
+    ]
+
+
+def _parameters(args: argparse.Namespace) -> dict[str, object]:
+    names = ("format", "rate", "topics", "split_by", "train_share", "seed", "keep_bad_frames")
+    return {name: getattr(args, name) for name in names}
+
+
+def _summary(outcome: campaign.Outcome) -> str:
+    assert outcome.record is not None
+    counts = dict(outcome.record["counts"])
+    left_out = counts.pop("left_out", {})
+    text = ", ".join(f"{value} {key}" for key, value in counts.items())
+    if left_out:
+        text += "; left out: " + ", ".join(f"{value} {key}" for key, value in left_out.items())
+    return text + (" (made earlier)" if outcome.reused else "")

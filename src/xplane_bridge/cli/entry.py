@@ -1,0 +1,35 @@
+"""The one place where command-line programs turn exceptions into a line and an exit code."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from typing import Callable, Sequence
+
+from xplane_bridge.errors import XplaneBridgeError
+
+Main = Callable[..., int]
+
+
+def guarded(main: Main) -> Main:
+    """Wrap a program's `main(argv=None) -> exit code`.
+
+    An error that the user can put right is one line on stderr and exit code 1; Ctrl-C is 130; a reader that closed the
+    pipe is 0. Anything else is a fault of ours and keeps its traceback.
+    """
+
+    @functools.wraps(main)
+    def wrapped(argv: Sequence[str] | None = None) -> int:
+        try:
+            return main(argv)
+        except XplaneBridgeError as err:
+            print(f"{os.path.basename(sys.argv[0])}: {err}", file=sys.stderr)
+            return 1
+        except KeyboardInterrupt:
+            return 130
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+
+    return wrapped

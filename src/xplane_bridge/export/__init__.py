@@ -1,0 +1,1 @@
+"""Flights as files for other programs: tables, trajectories, and data sets of images with their labels."""

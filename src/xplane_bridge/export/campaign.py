@@ -1,0 +1,290 @@
+"""Many flights, exported side by side: here in processes, or on a Dask cluster; the same files either way.
+
+An export folder holds one entry a flight and ``manifest.json``: versions, parameters, counts, and the SHA-256 of every
+file. A flight is built under a temporary name and renamed when whole, so that an export that was cut off goes on where
+it stopped: flights whose record in ``.flights/`` fits the bags and parameters are not made again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import random
+import shutil
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, Callable, Iterable, Iterator, NamedTuple, Sequence
+
+from xplane_bridge import __version__
+from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.export.dataset import Options, export_images
+
+SCHEMA = 1
+MANIFEST = "manifest.json"
+_RECORDS = ".flights"
+FORMATS = ("csv", "parquet", "tum", "euroc", "images")
+
+
+class ExportError(XplaneBridgeError):
+    """An export that cannot be done; the text is one line with the remedy."""
+
+
+class Job(NamedTuple):
+    """One flight to export. Plain values: it travels to other processes and machines."""
+
+    name: str  #: folder or file stem in the export
+    bags: tuple[str, ...]
+    output: str
+    format: str
+    rate: float | None
+    topics: tuple[str, ...]
+    dataset: Options
+    train_flight: bool
+
+
+class Outcome(NamedTuple):
+    """What became of a job."""
+
+    name: str
+    record: dict[str, Any] | None  #: the flight's part of the manifest
+    error: str  #: empty, or one line
+    reused: bool  #: an earlier run had made it
+
+
+def flights(arguments: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Name the flights given on a command line: a bag is a flight, a folder of (split) bags is one too.
+
+    Returns:
+        Unique name to bag paths; names take as many parent folders as it needs to tell them apart.
+
+    Raises:
+        BagError: A folder without bags.
+        ExportError: The same bag twice.
+    """
+    paths = [Path(argument).resolve() for argument in arguments]
+    for path in paths:
+        if paths.count(path) > 1:
+            msg = f"{path} is given twice"
+            raise ExportError(msg)
+    names: dict[str, tuple[str, ...]] = {}
+    for path in paths:
+        parts = [*path.parent.parts, path.stem if path.suffix == ".bag" else path.name]
+        depth = 1
+        while sum(_ends_alike(other, parts, depth) for other in paths) > 1:
+            depth += 1
+        names["_".join(parts[-depth:]).replace("/", "")] = tuple(str(p) for p in Bags(path).paths)
+    return names
+
+
+def _ends_alike(path: Path, parts: list[str], depth: int) -> bool:
+    own = [*path.parent.parts, path.stem if path.suffix == ".bag" else path.name]
+    return own[-depth:] == parts[-depth:]
+
+
+def choose_training(names: Iterable[str], options: Options) -> set[str]:
+    """Choose the flights that train, with ``split_by="flight"``: a seeded draw of the share, at least one of each side."""
+    ordered = sorted(names)
+    random.Random(options.seed).shuffle(ordered)
+    count = round(len(ordered) * options.train_share)
+    if len(ordered) > 1 and 0 < options.train_share < 1:
+        count = min(max(count, 1), len(ordered) - 1)
+    return set(ordered[:count])
+
+
+def export_flight(job: Job) -> Outcome:
+    """Export one flight; the one function that local processes and cluster workers run."""
+    output = Path(job.output)
+    record_file = output / _RECORDS / f"{job.name}.json"
+    try:
+        key = _key(job)
+        old = _read_json(record_file)
+        if old and old["key"] == key and all((output / f).is_file() for f in old["record"]["files"]):
+            return Outcome(job.name, old["record"], "", True)
+        record = _export(job, output)
+        record_file.parent.mkdir(parents=True, exist_ok=True)
+        _write_json(record_file, {"key": key, "record": record})
+        return Outcome(job.name, record, "", False)
+    except (BagError, ExportError) as err:
+        return Outcome(job.name, None, str(err), False)
+    except OSError as err:
+        return Outcome(job.name, None, f"{err.filename}: {err.strerror}", False)
+
+
+def _export(job: Job, output: Path) -> dict[str, Any]:
+    suffix = {"csv": ".csv", "parquet": ".parquet", "tum": ".tum", "euroc": ".csv", "images": ""}[job.format]
+    final = output / f"{job.name}{suffix}"
+    building = output / f".{job.name}{suffix}.part"
+    _remove(building)
+    output.mkdir(parents=True, exist_ok=True)
+    counts: dict[str, Any]
+    with Bags(job.bags) as bags:
+        if job.format == "images":
+            counts = export_images(bags, building, job.dataset, job.train_flight)._asdict()
+        elif job.format in ("csv", "parquet"):
+            from xplane_bridge.export import tables
+
+            frame = tables.flight_table(bags, job.rate, job.topics)
+            (tables.write_csv if job.format == "csv" else tables.write_parquet)(frame, building)
+            counts = {"rows": len(frame), "columns": len(frame.columns)}
+        else:
+            from xplane_bridge.export import trajectories
+
+            stamp, position, orientation = trajectories.trajectory(bags, job.rate)
+            write = trajectories.write_tum if job.format == "tum" else trajectories.write_euroc
+            write(building, stamp, position, orientation)
+            counts = {"poses": len(stamp)}
+    _remove(final)
+    os.replace(building, final)
+    files = sorted(p for p in final.rglob("*") if p.is_file()) if final.is_dir() else [final]
+    return {
+        "bags": [Path(path).name for path in job.bags],
+        "counts": counts,
+        "files": {p.relative_to(output).as_posix(): _sha256(p) for p in files},
+    }
+
+
+def run_local(jobs: Sequence[Job], workers: int) -> Iterator[Outcome]:
+    """Export in parallel processes, yielding each outcome as it comes."""
+    if workers == 1 or len(jobs) == 1:
+        yield from map(export_flight, jobs)
+        return
+    with ProcessPoolExecutor(max_workers=min(workers, len(jobs))) as pool:
+        for future in as_completed([pool.submit(export_flight, job) for job in jobs]):
+            yield future.result()
+
+
+def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:
+    """Export on a running Dask cluster whose workers see the same paths.
+
+    Raises:
+        ExportError: dask.distributed is not installed, or nothing answers at the address.
+    """
+    try:
+        from distributed import Client
+        from distributed import as_completed as completed
+    except ImportError:
+        msg = "--scheduler needs dask.distributed: pip install 'dask[distributed]'"
+        raise ExportError(msg) from None
+    try:
+        client = Client(address, timeout="10s")
+    except (OSError, ValueError) as err:
+        msg = f"no Dask scheduler at {address} ({err}); start one with `dask scheduler` and workers with `dask worker`"
+        raise ExportError(msg) from None
+    with client:
+        futures = [client.submit(export_flight, job, key=f"export-{job.name}", pure=False) for job in jobs]
+        for future in completed(futures):
+            yield future.result()
+
+
+def export(
+    jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]], parameters: dict[str, Any]
+) -> Iterator[Outcome]:
+    """Run all jobs, then write the manifest of those that succeeded.
+
+    Args:
+        jobs: One a flight, all to the same output folder.
+        run: `run_local` or `run_dask`, bound to its own arguments.
+        parameters: What the user asked for; goes into the manifest.
+
+    Yields:
+        Every outcome, as it comes.
+    """
+    records: dict[str, Any] = {}
+    for outcome in run(jobs):
+        if outcome.record is not None:
+            records[outcome.name] = outcome.record
+        yield outcome
+    output = Path(jobs[0].output)
+    output.mkdir(parents=True, exist_ok=True)
+    _write_json(
+        output / MANIFEST,
+        {
+            "schema": SCHEMA,
+            "xplane_bridge": __version__,
+            "parameters": parameters,
+            "counts": {"flights": len(records), "files": sum(len(r["files"]) for r in records.values())},
+            "flights": {name: records[name] for name in sorted(records)},
+        },
+    )
+
+
+def verify(output: Path) -> list[str]:
+    """Compare an export with its manifest.
+
+    Returns:
+        One line a difference: missing, changed and surplus files; empty when all is as recorded.
+
+    Raises:
+        ExportError: No manifest there.
+    """
+    manifest = _read_json(output / MANIFEST)
+    if manifest is None:
+        msg = f"{output}: no readable {MANIFEST}; export first"
+        raise ExportError(msg)
+    problems = []
+    known = {MANIFEST}
+    for flight in manifest["flights"].values():
+        for name, checksum in flight["files"].items():
+            known.add(name)
+            path = output / name
+            if not path.is_file():
+                problems.append(f"missing: {name}")
+            elif _sha256(path) != checksum:
+                problems.append(f"changed: {name}")
+    for path in sorted(output.rglob("*")):
+        name = path.relative_to(output).as_posix()
+        if path.is_file() and name not in known and not name.startswith(_RECORDS + "/"):
+            problems.append(f"not in the manifest: {name}")
+    return problems
+
+
+def _key(job: Job) -> dict[str, Any]:
+    """All that decides the content of a flight's files; an earlier export with the same key is good."""
+    sources = []
+    for path in job.bags:
+        try:
+            status = os.stat(path)
+        except OSError as err:
+            msg = f"{path}: {err.strerror}"
+            raise BagError(msg) from None
+        sources.append([path, status.st_size, status.st_mtime_ns])
+    return {
+        "schema": SCHEMA,
+        "xplane_bridge": __version__,
+        "sources": sources,
+        "format": job.format,
+        "rate": job.rate,
+        "topics": list(job.topics),
+        "dataset": job.dataset._asdict(),
+        "train_flight": job.train_flight,
+    }
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    elif path.exists():
+        path.unlink()
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        for block in iter(lambda: file.read(1 << 20), b""):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _write_json(path: Path, content: Any) -> None:
+    part = path.with_name(path.name + ".part")
+    part.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    os.replace(part, path)

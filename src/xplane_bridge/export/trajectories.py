@@ -1,0 +1,60 @@
+"""Flights as trajectories that SLAM evaluation tools read: TUM and EuRoC files of the odometry (map, ENU/FLU)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from xplane_bridge.analysis.resampling import DEFAULT_MAX_GAP, interpolated, rotated, segments, time_base
+from xplane_bridge.export.flight import ODOMETRY, topic_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from xplane_bridge.bags import Bags
+
+_POSITION = [f"pose.pose.position.{axis}" for axis in "xyz"]
+_ORIENTATION = [f"pose.pose.orientation.{axis}" for axis in "xyzw"]
+
+
+def trajectory(bags: Bags, rate: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Read the trajectory of a flight.
+
+    Args:
+        bags: Open bags of one flight.
+        rate: [1/s] of a uniform time base; None: the samples as they are.
+
+    Returns:
+        Stamps (int64 [ns], shape (n,)), positions (ENU in `map` [m], (n, 3)), orientations (x, y, z, w, (n, 4)).
+
+    Raises:
+        BagError: No odometry in the bag.
+    """
+    table = bags.read(topic_of(bags, ODOMETRY), ["header.stamp", "pose.pose"])
+    order = np.argsort(table.stamp, kind="stable")
+    stamp = table.stamp[order]
+    position = np.stack([table[name][order] for name in _POSITION], axis=1)
+    orientation = np.stack([table[name][order] for name in _ORIENTATION], axis=1)
+    if rate is None:
+        return stamp, position, orientation
+    parts = segments(stamp, max_gap=DEFAULT_MAX_GAP)
+    base = time_base(stamp, parts, rate)
+    return base, interpolated(base, stamp, position, parts), rotated(base, stamp, orientation, parts)
+
+
+def write_tum(path: Path, stamp: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> None:
+    """Write ``timestamp[s] x y z qx qy qz qw``, one line a pose."""
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        for t, p, q in zip(stamp, position, orientation):
+            seconds = f"{t // 1_000_000_000}.{t % 1_000_000_000:09d}"
+            file.write(seconds + "".join(f" {value:.9f}" for value in (*p, *q)) + "\n")
+
+
+def write_euroc(path: Path, stamp: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> None:
+    """Write EuRoC's ground truth: ``timestamp[ns], p_x, p_y, p_z, q_w, q_x, q_y, q_z``."""
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.write("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n")
+        for t, p, q in zip(stamp, position, orientation):
+            values = (*p, q[3], q[0], q[1], q[2])
+            file.write(f"{t}" + "".join(f",{value:.9f}" for value in values) + "\n")
