@@ -21,8 +21,8 @@ def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: 
         prefix: Put before every name, with an underscore.
 
     Returns:
-        ``altitude_msl_m``, ``velocity_ned_x_mps``, ``roll_deg``, ``throttle_command_0``, ... in message order, without the
-        header; arrays are spread over numbered columns, lists of varying length stay objects.
+        ``altitude_msl_m``, ``velocity_ned_x_mps``, ``roll_deg``, ``throttle_command_0``, ... in message order, without
+        the header; arrays are spread over numbered columns, lists of varying length stay objects.
     """
     out: dict[str, np.ndarray] = {}
     for path, values in columns.items():
@@ -48,7 +48,7 @@ def on_base(
     units: Mapping[str, Unit],
     parts: list[slice],
 ) -> dict[str, np.ndarray]:
-    """Bring columns onto a time base: numbers linearly, wrapping angles and quaternions along the short way, others held.
+    """Bring columns onto a time base: numbers linearly, angles and quaternions the short way round, others held.
 
     Args:
         base: int64 [ns], shape (m,).

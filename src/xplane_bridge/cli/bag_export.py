@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
         nargs="+",
         default=[],
         metavar="TOPIC",
-        help="csv, parquet: further topics, newest value in each row",
+        help="tables: further topics, newest value in each row",
     )
     data = p.add_argument_group("image data sets")
     data.add_argument("--split-by", choices=("time", "flight"), default="time", help="default: %(default)s")

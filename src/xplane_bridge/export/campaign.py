@@ -84,7 +84,7 @@ def _ends_alike(path: Path, parts: list[str], depth: int) -> bool:
 
 
 def choose_training(names: Iterable[str], options: Options) -> set[str]:
-    """Choose the flights that train, with ``split_by="flight"``: a seeded draw of the share, at least one of each side."""
+    """Choose the flights that train, with ``split_by="flight"``: a seeded draw, at least one flight on each side."""
     ordered = sorted(names)
     random.Random(options.seed).shuffle(ordered)
     count = round(len(ordered) * options.train_share)

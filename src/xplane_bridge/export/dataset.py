@@ -2,20 +2,18 @@
 
 Folder of one flight::
 
-    labels.csv        one row an image: file, split, stamps, the paired state with units, mode, failures, excitation, quality
+    labels.csv        one row an image: file, split, stamp, quality, the paired state, mode, failures, excitation
     images/000000.jpg numbered in time order; JPEG bytes as recorded, raw images as PNG (lossless)
 """
 
 from __future__ import annotations
 
 import csv
-import io
 from collections import Counter
 from pathlib import Path
 from typing import Any, Iterator, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from xplane_bridge.analysis.columns import named
 from xplane_bridge.bags import BagError, Bags
@@ -166,7 +164,3 @@ def _text(value: Any) -> str:
         return "" if np.isnan(value) else np.format_float_positional(value, unique=True, trim="-")
     return str(value)
 
-
-def read_labels(folder: Path) -> pd.DataFrame:
-    """Read the labels of one exported flight."""
-    return pd.read_csv(io.BytesIO((folder / "labels.csv").read_bytes()))
