@@ -169,8 +169,8 @@ std::optional<ImageAssociator::FrameChoice> ImageAssociator::chooseFrame(const I
     choice.period = period;
     choice.inferred = inferred;
     const double to_border = 0.5 * period - std::abs(wanted - (base.frame.sim_time + delta));
-    choice.ambiguous = to_border < std::max(moment.uncertainty, kBorder * period) ||
-                       resolution(choice.raw) > (0.5 - kBorder) * period;
+    choice.ambiguous =
+        to_border < std::max(moment.uncertainty, kBorder * period) || resolution(choice.raw) > (0.5 - kBorder) * period;
     choice.settled = settled;
     choice.at_edge = before != nullptr && after != nullptr && before->segment != after->segment;
     return choice;
@@ -307,12 +307,24 @@ void ImageAssociator::settle(const Association& answer) {
   counters_.ambiguous += answer.ambiguous ? 1 : 0;
   counters_.frames_inferred += answer.frame_inferred ? 1 : 0;
   switch (answer.method) {
-    case PairingMethod::kNone: ++counters_.without_state; break;
-    case PairingMethod::kFrame: ++counters_.by_frame; break;
-    case PairingMethod::kNearestFrame: ++counters_.by_nearest; break;
-    case PairingMethod::kInterpolated: ++counters_.interpolated; break;
-    case PairingMethod::kStamp: ++counters_.by_stamp; break;
-    case PairingMethod::kPaused: ++counters_.paused; break;
+    case PairingMethod::kNone:
+      ++counters_.without_state;
+      break;
+    case PairingMethod::kFrame:
+      ++counters_.by_frame;
+      break;
+    case PairingMethod::kNearestFrame:
+      ++counters_.by_nearest;
+      break;
+    case PairingMethod::kInterpolated:
+      ++counters_.interpolated;
+      break;
+    case PairingMethod::kStamp:
+      ++counters_.by_stamp;
+      break;
+    case PairingMethod::kPaused:
+      ++counters_.paused;
+      break;
   }
 }
 

@@ -139,8 +139,8 @@ TEST(ImageAssociator, NeverInterpolatesAcrossAnEpochPauseOrGap) {
       const double sim_time = k / 60.0 + (k > 30 ? gap : 0.0);
       associator.addFrame(frameAt(sim_time));
       if (k % 3 != 0) continue;
-      associator.addState(stateAt(static_cast<std::uint64_t>(k), sim_time, new_epoch && k > 30 ? 1U : 0U,
-                                  pause && k > 30));
+      associator.addState(
+          stateAt(static_cast<std::uint64_t>(k), sim_time, new_epoch && k > 30 ? 1U : 0U, pause && k > 30));
     }
     return associator.associate(momentAt(31.0 / 60.0), false);
   };

@@ -38,11 +38,12 @@ struct StateKey {
 
 /// When the picture appeared.
 struct ImageMoment {
-  std::optional<double> sim_time;  ///< [s] unwrapped simulator time of (change - display delay); empty: clock not fitted
-  double uncertainty = 0.0;        ///< [s] 1-sigma of that mapping, as the ClockFilter states it
-  std::uint32_t epoch = 0;         ///< the ClockFilter's epoch of that mapping
-  std::int64_t host_time_ns = 0;   ///< [ns] (change - display delay) on the capture host's clock
-  bool paused = false;             ///< the simulator was paused or in replay at that moment
+  std::optional<double>
+      sim_time;                   ///< [s] unwrapped simulator time of (change - display delay); empty: clock not fitted
+  double uncertainty = 0.0;       ///< [s] 1-sigma of that mapping, as the ClockFilter states it
+  std::uint32_t epoch = 0;        ///< the ClockFilter's epoch of that mapping
+  std::int64_t host_time_ns = 0;  ///< [ns] (change - display delay) on the capture host's clock
+  bool paused = false;            ///< the simulator was paused or in replay at that moment
 };
 
 /// How a state was found for a picture.
@@ -63,13 +64,15 @@ struct Association {
   std::uint64_t id_after = 0;  ///< later state when interpolated, else equal to `id`
   double fraction = 0.0;       ///< [0, 1) way from `id` to `id_after` in simulator time
   bool frame_known = false;    ///< the three following fields are meaningful
-  double frame_sim_time = 0.0; ///< [s] simulator time of the frame shown, in the raw float32's numbers (kept in double)
-  double frame_offset = 0.0;   ///< [s] moment - frame: jitter of the display plus the error of the display delay
-  double state_offset = 0.0;   ///< [s] simulator time of the state - simulator time of the frame; 0 when interpolated
-  bool frame_inferred = false; ///< the frame itself was not heard (datagram lost): put in evenly between its neighbours
-  bool at_edge = false;        ///< the frame lies at a pause, reset, epoch or gap
-  double frame_period = 0.0;   ///< [s] simulator time of one frame, 0 = unknown
-  bool ambiguous = false;      ///< the moment lies nearer to the border between two frames than its uncertainty
+  double frame_sim_time =
+      0.0;                    ///< [s] simulator time of the frame shown, in the raw float32's numbers (kept in double)
+  double frame_offset = 0.0;  ///< [s] moment - frame: jitter of the display plus the error of the display delay
+  double state_offset = 0.0;  ///< [s] simulator time of the state - simulator time of the frame; 0 when interpolated
+  bool frame_inferred =
+      false;                  ///< the frame itself was not heard (datagram lost): put in evenly between its neighbours
+  bool at_edge = false;       ///< the frame lies at a pause, reset, epoch or gap
+  double frame_period = 0.0;  ///< [s] simulator time of one frame, 0 = unknown
+  bool ambiguous = false;     ///< the moment lies nearer to the border between two frames than its uncertainty
 };
 
 /// Bits of FrameState.quality, equal in value to the message's QUALITY_* (0 is perfect).

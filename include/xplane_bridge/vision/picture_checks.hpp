@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+
+namespace xplane_bridge::vision {
+
+/// Whether a picture is (almost) black: a window that is not drawn, a blanked screen, a loading screen.
+/// @param bgr CV_8UC3 or CV_8UC4
+/// @return true when at least 99.5 % of sparsely taken pixels have every colour below 16 of 255
+[[nodiscard]] bool isBlack(const cv::Mat& bgr);
+
+/// Whether two pictures of any type have the same size, type and pixels.
+[[nodiscard]] bool samePixels(const cv::Mat& a, const cv::Mat& b);
+
+/// Notices a picture that stands still while the aircraft moves. Pure bookkeeping; times are the caller's.
+class FrozenCheck {
+ public:
+  /// @param after_ns [ns] how long the picture must have stood still, > 0
+  explicit FrozenCheck(std::int64_t after_ns) : after_ns_(after_ns) {}
+
+  /// The picture changed.
+  void pictureChanged(std::int64_t now_ns) { standing_since_ns_ = now_ns; }
+
+  /// The flight state moved (attitude or position clearly different from before).
+  void stateMoved(std::int64_t now_ns) { moved_at_ns_ = now_ns; }
+
+  /// True when the picture has stood still for longer than the limit and the state moved within that time.
+  [[nodiscard]] bool frozen(std::int64_t now_ns) const {
+    return standing_since_ns_ != 0 && now_ns - standing_since_ns_ > after_ns_ && moved_at_ns_ != 0 &&
+           moved_at_ns_ > standing_since_ns_ && now_ns - moved_at_ns_ < after_ns_;
+  }
+
+ private:
+  std::int64_t after_ns_;
+  std::int64_t standing_since_ns_ = 0;  // 0: no picture yet
+  std::int64_t moved_at_ns_ = 0;        // 0: never
+};
+
+}  // namespace xplane_bridge::vision

@@ -1,0 +1,173 @@
+#include "x11_connection.hpp"
+
+#include <xcb/composite.h>
+#include <xcb/damage.h>
+#include <xcb/shm.h>
+
+#include <cstring>
+#include <regex>
+#include <stdexcept>
+#include <tuple>
+
+namespace xplane_bridge::vision {
+namespace {
+
+constexpr std::uint32_t kLongestText = 4096;  // [4 bytes] of a window property
+
+bool present(xcb_connection_t* connection, xcb_extension_t* extension) {
+  const xcb_query_extension_reply_t* reply = xcb_get_extension_data(connection, extension);
+  return reply != nullptr && reply->present != 0;
+}
+
+std::string displayOrEnvironment(const std::string& display) {
+  if (!display.empty()) return display;
+  const char* environment = std::getenv("DISPLAY");
+  return environment == nullptr ? std::string() : std::string(environment);
+}
+
+}  // namespace
+
+X11Connection::X11Connection(const std::string& display) : display_name_(displayOrEnvironment(display)) {
+  if (display_name_.empty()) {
+    throw std::runtime_error("no X display: DISPLAY is not set and the parameter `display` is empty");
+  }
+  int screen_number = 0;
+  connection_ = xcb_connect(display_name_.c_str(), &screen_number);
+  if (!alive()) {
+    xcb_disconnect(connection_);
+    throw std::runtime_error("cannot connect to X display \"" + display_name_ + "\"");
+  }
+  xcb_screen_iterator_t screens = xcb_setup_roots_iterator(xcb_get_setup(connection_));
+  for (int i = 0; i < screen_number && screens.rem > 1; ++i) xcb_screen_next(&screens);
+  screen_ = screens.data;
+
+  if (present(connection_, &xcb_composite_id)) {
+    const XcbPointer<xcb_composite_query_version_reply_t> version(xcb_composite_query_version_reply(
+        connection_, xcb_composite_query_version(connection_, XCB_COMPOSITE_MAJOR_VERSION, XCB_COMPOSITE_MINOR_VERSION),
+        nullptr));
+    // NameWindowPixmap came with 0.2.
+    has_composite_ = version != nullptr && std::tie(version->major_version, version->minor_version) >=
+                                               std::make_tuple(std::uint32_t{0}, std::uint32_t{2});
+  }
+  if (present(connection_, &xcb_damage_id)) {
+    const XcbPointer<xcb_damage_query_version_reply_t> version(xcb_damage_query_version_reply(
+        connection_, xcb_damage_query_version(connection_, XCB_DAMAGE_MAJOR_VERSION, XCB_DAMAGE_MINOR_VERSION),
+        nullptr));
+    has_damage_ = version != nullptr;
+    damage_event_ =
+        static_cast<std::uint8_t>(xcb_get_extension_data(connection_, &xcb_damage_id)->first_event + XCB_DAMAGE_NOTIFY);
+  }
+  if (present(connection_, &xcb_shm_id)) {
+    const XcbPointer<xcb_shm_query_version_reply_t> version(
+        xcb_shm_query_version_reply(connection_, xcb_shm_query_version(connection_), nullptr));
+    has_shm_ = version != nullptr;
+  }
+  net_wm_name_ = atom("_NET_WM_NAME");
+}
+
+X11Connection::~X11Connection() { xcb_disconnect(connection_); }
+
+bool X11Connection::succeeded(xcb_void_cookie_t cookie) const {
+  const XcbPointer<xcb_generic_error_t> error(xcb_request_check(connection_, cookie));
+  return error == nullptr && alive();
+}
+
+xcb_atom_t X11Connection::atom(const char* name) const {
+  const XcbPointer<xcb_intern_atom_reply_t> reply(xcb_intern_atom_reply(
+      connection_, xcb_intern_atom(connection_, 0, static_cast<std::uint16_t>(std::strlen(name)), name), nullptr));
+  return reply == nullptr ? static_cast<xcb_atom_t>(XCB_ATOM_NONE) : reply->atom;
+}
+
+std::optional<PixelFormat> X11Connection::pixelFormat(xcb_visualid_t visual, int depth) const {
+  const xcb_setup_t* setup = xcb_get_setup(connection_);
+  PixelFormat format;
+  format.depth = depth;
+  format.msb_first = setup->image_byte_order == XCB_IMAGE_ORDER_MSB_FIRST;
+  for (auto i = xcb_setup_pixmap_formats_iterator(setup); i.rem > 0; xcb_format_next(&i)) {
+    if (i.data->depth != depth) continue;
+    format.bits_per_pixel = i.data->bits_per_pixel;
+    format.scanline_pad = i.data->scanline_pad;
+  }
+  for (auto d = xcb_screen_allowed_depths_iterator(screen_); d.rem > 0; xcb_depth_next(&d)) {
+    for (auto v = xcb_depth_visuals_iterator(d.data); v.rem > 0; xcb_visualtype_next(&v)) {
+      if (v.data->visual_id != visual) continue;
+      format.red_mask = v.data->red_mask;
+      format.green_mask = v.data->green_mask;
+      format.blue_mask = v.data->blue_mask;
+      return format;
+    }
+  }
+  return std::nullopt;
+}
+
+std::string X11Connection::textProperty(xcb_window_t window, xcb_atom_t property) const {
+  const XcbPointer<xcb_get_property_reply_t> reply(xcb_get_property_reply(
+      connection_, xcb_get_property(connection_, 0, window, property, XCB_GET_PROPERTY_TYPE_ANY, 0, kLongestText),
+      nullptr));
+  if (reply == nullptr || reply->format != 8) return {};
+  const auto length = static_cast<std::size_t>(xcb_get_property_value_length(reply.get()));
+  return {static_cast<const char*>(xcb_get_property_value(reply.get())), length};
+}
+
+std::string X11Connection::title(xcb_window_t window) const {
+  std::string text = net_wm_name_ == XCB_ATOM_NONE ? std::string() : textProperty(window, net_wm_name_);
+  return text.empty() ? textProperty(window, XCB_ATOM_WM_NAME) : text;
+}
+
+bool X11Connection::viewable(xcb_window_t window) const {
+  const XcbPointer<xcb_get_window_attributes_reply_t> attributes(
+      xcb_get_window_attributes_reply(connection_, xcb_get_window_attributes(connection_, window), nullptr));
+  return attributes != nullptr && attributes->map_state == XCB_MAP_STATE_VIEWABLE &&
+         attributes->_class == XCB_WINDOW_CLASS_INPUT_OUTPUT;
+}
+
+std::vector<xcb_window_t> X11Connection::allWindows() const {
+  std::vector<xcb_window_t> windows{screen_->root};
+  for (std::size_t i = 0; i < windows.size(); ++i) {
+    const XcbPointer<xcb_query_tree_reply_t> tree(
+        xcb_query_tree_reply(connection_, xcb_query_tree(connection_, windows[i]), nullptr));
+    if (tree == nullptr) continue;
+    const xcb_window_t* children = xcb_query_tree_children(tree.get());
+    windows.insert(windows.end(), children, children + xcb_query_tree_children_length(tree.get()));
+  }
+  windows.erase(windows.begin());
+  return windows;
+}
+
+std::optional<xcb_window_t> X11Connection::findWindow(const X11SourceOptions& options, int& looked_at) const {
+  if (options.window_id != 0) {
+    looked_at = 1;
+    return viewable(options.window_id) ? std::optional<xcb_window_t>(options.window_id) : std::nullopt;
+  }
+  const std::vector<xcb_window_t> windows = allWindows();
+  looked_at = static_cast<int>(windows.size());
+  const std::regex pattern(options.title_is_regex ? options.title : std::string());
+  std::optional<xcb_window_t> best;
+  std::pair<bool, std::uint32_t> best_rank{false, 0};  // exact title, area
+  for (const xcb_window_t window : windows) {
+    bool exact = false;
+    if (!options.class_name.empty()) {
+      const std::string both = textProperty(window, XCB_ATOM_WM_CLASS);  // two strings, each ended by a zero
+      const std::string instance = both.c_str();
+      const std::string name = instance.size() < both.size() ? both.c_str() + instance.size() + 1 : "";
+      if (instance != options.class_name && name != options.class_name) continue;
+    } else {
+      const std::string text = title(window);
+      const bool fits =
+          options.title_is_regex ? std::regex_search(text, pattern) : text.find(options.title) != std::string::npos;
+      if (text.empty() || !fits) continue;
+      exact = text == options.title;
+    }
+    if (!viewable(window)) continue;
+    const XcbPointer<xcb_get_geometry_reply_t> geometry(
+        xcb_get_geometry_reply(connection_, xcb_get_geometry(connection_, window), nullptr));
+    if (geometry == nullptr) continue;
+    const std::pair<bool, std::uint32_t> rank{exact, std::uint32_t{geometry->width} * geometry->height};
+    if (best.has_value() && rank <= best_rank) continue;
+    best = window;
+    best_rank = rank;
+  }
+  return best;
+}
+
+}  // namespace xplane_bridge::vision

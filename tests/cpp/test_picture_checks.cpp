@@ -1,0 +1,47 @@
+#include "xplane_bridge/vision/picture_checks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+namespace vision = xplane_bridge::vision;
+
+TEST(IsBlack, ToleratesNoiseAndAFewLitPixelsButNotANightSky) {
+  EXPECT_TRUE(vision::isBlack(cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(0))));
+  EXPECT_TRUE(vision::isBlack(cv::Mat(480, 640, CV_8UC4, cv::Scalar(15, 15, 15, 255))));
+  cv::Mat message(480, 640, CV_8UC3, cv::Scalar::all(0));
+  message(cv::Rect(0, 0, 30, 20)).setTo(255);
+  EXPECT_TRUE(vision::isBlack(message));
+  EXPECT_FALSE(vision::isBlack(cv::Mat(480, 640, CV_8UC3, cv::Scalar(30, 10, 10))));
+  cv::Mat half(480, 640, CV_8UC3, cv::Scalar::all(0));
+  half(cv::Rect(0, 240, 640, 240)).setTo(90);
+  EXPECT_FALSE(vision::isBlack(half));
+  EXPECT_FALSE(vision::isBlack(cv::Mat()));
+}
+
+TEST(SamePixels, ComparesSizeTypeAndEveryPixel) {
+  cv::Mat a(48, 64, CV_8UC3, cv::Scalar::all(9));
+  cv::Mat b = a.clone();
+  EXPECT_TRUE(vision::samePixels(a, b));
+  b.at<cv::Vec3b>(47, 63)[2] = 10;
+  EXPECT_FALSE(vision::samePixels(a, b));
+  EXPECT_FALSE(vision::samePixels(a, a(cv::Rect(0, 0, 63, 48))));
+  EXPECT_FALSE(vision::samePixels(a, cv::Mat(48, 64, CV_8UC4, cv::Scalar::all(9))));
+}
+
+TEST(FrozenCheck, NeedsAStandingPictureAndAMovingState) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  vision::FrozenCheck check(kSecond);
+  EXPECT_FALSE(check.frozen(10 * kSecond));  // no picture yet
+  check.pictureChanged(10 * kSecond);
+  EXPECT_FALSE(check.frozen(12 * kSecond));  // nothing moves: the picture may stand
+  check.stateMoved(12 * kSecond);
+  EXPECT_TRUE(check.frozen(12 * kSecond + 1));
+  check.pictureChanged(12 * kSecond + 2);
+  EXPECT_FALSE(check.frozen(12 * kSecond + 3));
+  check.stateMoved(12 * kSecond + 4);
+  EXPECT_FALSE(check.frozen(12 * kSecond + 5));  // not standing long enough
+  EXPECT_FALSE(check.frozen(14 * kSecond));      // and the state stopped
+  check.stateMoved(14 * kSecond);
+  EXPECT_TRUE(check.frozen(14 * kSecond));
+}

@@ -1,0 +1,370 @@
+#include "xplane_bridge/vision/x11_window_source.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <stdexcept>
+#include <thread>
+
+#include "xvfb.hpp"
+
+namespace vision = xplane_bridge::vision;
+using std::chrono::milliseconds;
+using vision::Change;
+using vision::ChangeDetection;
+using vision::GrabResult;
+using vision::Picture;
+using vision::WaitResult;
+using vision::X11SourceOptions;
+using vision::X11WindowSource;
+using xplane_bridge::test::TestWindow;
+using xplane_bridge::test::Xvfb;
+
+namespace {
+
+std::int64_t steadyNow() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+constexpr milliseconds kDeadline{10000};
+constexpr milliseconds kShort{50};
+
+cv::Vec3b pixelAt(const cv::Mat& picture, int x, int y) {
+  const std::uint8_t* pixel = picture.ptr<std::uint8_t>(y) + static_cast<std::ptrdiff_t>(x) * picture.channels();
+  return {pixel[0], pixel[1], pixel[2]};
+}
+
+/// Takes pictures until one is new; false at the deadline.
+bool nextPicture(X11WindowSource& source, Picture& picture) {
+  const auto deadline = std::chrono::steady_clock::now() + kDeadline;
+  while (std::chrono::steady_clock::now() < deadline) {
+    Change change;
+    if (source.waitChange(kShort, change) != WaitResult::kChange) continue;
+    if (source.grab(change, picture) == GrabResult::kNew) return true;
+  }
+  return false;
+}
+
+/// Waits until the source reports that there is nothing to capture.
+bool becomesLost(X11WindowSource& source) {
+  const auto deadline = std::chrono::steady_clock::now() + kDeadline;
+  while (std::chrono::steady_clock::now() < deadline) {
+    Change change;
+    Picture picture;
+    const WaitResult result = source.waitChange(kShort, change);
+    if (result == WaitResult::kLost) return true;
+    if (result == WaitResult::kChange && source.grab(change, picture) == GrabResult::kLost) return true;
+  }
+  return false;
+}
+
+/// True when no new picture comes within a while.
+bool staysQuiet(X11WindowSource& source) {
+  Change change;
+  Picture picture;
+  const auto until = std::chrono::steady_clock::now() + milliseconds(100);
+  while (std::chrono::steady_clock::now() < until) {
+    if (source.waitChange(milliseconds(20), change) != WaitResult::kChange) continue;
+    if (source.grab(change, picture) == GrabResult::kNew) return false;
+  }
+  return true;
+}
+
+X11SourceOptions titled(const Xvfb& server, const std::string& title = "X-System") {
+  X11SourceOptions options;
+  options.display = server.display();
+  options.title = title;
+  options.search_period = 0.02;
+  return options;
+}
+
+const cv::Vec3b kRed(0, 0, 255);
+const cv::Vec3b kGreen(0, 255, 0);
+const cv::Vec3b kBlue(255, 0, 0);
+
+}  // namespace
+
+TEST(X11SourceOptions, RefusesContradictions) {
+  X11SourceOptions options;
+  EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
+  options.title = "a";
+  options.class_name = "b";
+  EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
+  options.class_name.clear();
+  options.poll_period = 0.0;
+  EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
+  options.poll_period = 0.002;
+  options.title = "(";
+  options.title_is_regex = true;
+  EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
+  options.title_is_regex = false;
+  EXPECT_NO_THROW(X11WindowSource(options, steadyNow));
+  EXPECT_THROW((void)vision::changeDetectionFromName("xdamage"), std::invalid_argument);
+}
+
+class X11WindowSourceTest : public ::testing::Test {
+ protected:
+  Xvfb server_;
+  Picture picture_;
+};
+
+TEST_F(X11WindowSourceTest, ReadsAWindowByTitleAndSeesEveryChangeOnce) {
+  TestWindow other(server_.display(), "something else", 300, 300, 400, 100);
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  window.fill(0xff0000);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+  EXPECT_EQ(picture_.bgr.size(), cv::Size(320, 240));
+  EXPECT_EQ(pixelAt(picture_.bgr, 0, 0), kRed);
+  EXPECT_FALSE(picture_.display_time_known);  // it was there before us
+  EXPECT_EQ(source.window(), window.id());
+  EXPECT_TRUE(source.usesDamage());
+  EXPECT_TRUE(source.usesSharedMemory());
+  for (int i = 1; i <= 5; ++i) {
+    const std::int64_t before = steadyNow();
+    window.fill(0x00ff00, 0, 0, 20 * i, 240);
+    ASSERT_TRUE(nextPicture(source, picture_));
+    EXPECT_EQ(pixelAt(picture_.bgr, 20 * i - 1, 100), kGreen);
+    EXPECT_EQ(pixelAt(picture_.bgr, 20 * i, 100), kRed);
+    EXPECT_TRUE(picture_.display_time_known);
+    EXPECT_GE(picture_.grab_time_ns, picture_.display_time_ns);
+    EXPECT_GE(picture_.display_time_ns, before - 1'000'000);  // the server's stamp has milliseconds
+    EXPECT_TRUE(staysQuiet(source));
+  }
+}
+
+TEST_F(X11WindowSourceTest, SeesAWindowThatIsCovered) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  window.fill(0xff0000);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  TestWindow cover(server_.display(), "cover", 500, 500, 0, 0);
+  cover.fill(0x0000ff);
+  window.fill(0x00ff00);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kGreen);
+}
+
+TEST_F(X11WindowSourceTest, WithoutCompositeThePictureIsWhatTheScreenShows) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  window.fill(0xff0000);
+  TestWindow cover(server_.display(), "cover", 500, 500, 0, 0);
+  cover.fill(0x0000ff);
+  X11SourceOptions options = titled(server_);
+  options.use_composite = false;
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_NE(pixelAt(picture_.bgr, 100, 100), kRed);
+}
+
+TEST_F(X11WindowSourceTest, FollowsMovesResizesBordersClosingAndComingBack) {
+  auto window = std::make_unique<TestWindow>(server_.display(), "X-System", 320, 240, 10, 10, 7);
+  window->fill(0xff0000);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(picture_.bgr.size(), cv::Size(320, 240));
+  EXPECT_EQ(pixelAt(picture_.bgr, 0, 0), kRed);  // not the border
+  EXPECT_EQ(pixelAt(picture_.bgr, 319, 239), kRed);
+
+  window->move(300, 200);
+  window->fill(0x00ff00);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(pixelAt(picture_.bgr, 0, 0), kGreen);
+
+  window->move(700, 500);  // mostly off the screen
+  window->fill(0x0000ff);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(pixelAt(picture_.bgr, 319, 239), kBlue);
+
+  window->resize(400, 300);
+  window->fill(0xff0000);
+  do {
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+  } while (picture_.bgr.size() != cv::Size(400, 300) || pixelAt(picture_.bgr, 399, 299) != kRed);
+
+  window->unmap();
+  EXPECT_TRUE(becomesLost(source));
+  EXPECT_NE(source.problem().find("X-System"), std::string::npos);
+  window->map();
+  window->fill(0x00ff00);
+  do {
+    ASSERT_TRUE(nextPicture(source, picture_));
+  } while (pixelAt(picture_.bgr, 0, 0) != kGreen);
+  EXPECT_EQ(source.problem(), "");
+
+  window->destroy();
+  EXPECT_TRUE(becomesLost(source));
+  EXPECT_FALSE(source.window().has_value());
+  window = std::make_unique<TestWindow>(server_.display(), "X-System", 200, 100);
+  window->fill(0x0000ff);
+  do {
+    ASSERT_TRUE(nextPicture(source, picture_));
+  } while (pixelAt(picture_.bgr, 0, 0) != kBlue);
+  EXPECT_EQ(picture_.bgr.size(), cv::Size(200, 100));
+}
+
+TEST_F(X11WindowSourceTest, AWindowThatVanishesBetweenChangeAndGrabIsLostAndNoMore) {
+  auto window = std::make_unique<TestWindow>(server_.display(), "X-System", 320, 240);
+  X11SourceOptions options = titled(server_);
+  options.use_composite = false;
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  window->fill(0xff0000);
+  Change change;
+  ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);
+  window->destroy();
+  EXPECT_EQ(source.grab(change, picture_), GrabResult::kLost);
+  EXPECT_TRUE(becomesLost(source));
+}
+
+TEST_F(X11WindowSourceTest, FindsByClassIdExpressionAndRegion) {
+  TestWindow window(server_.display(), "X-Plane 11.55 X-System", 320, 240, 30, 40);
+  window.fill(0xff0000);
+  X11SourceOptions by_class = titled(server_, "");
+  by_class.class_name = "XpClass";
+  X11SourceOptions by_id = titled(server_, "");
+  by_id.window_id = window.id();
+  X11SourceOptions by_expression = titled(server_, "^X-Plane 1[12].*X-System$");
+  by_expression.title_is_regex = true;
+  X11SourceOptions by_region = titled(server_, "");
+  by_region.region = cv::Rect(30, 40, 64, 48);
+  for (const auto& options : {by_class, by_id, by_expression, by_region}) {
+    X11WindowSource source(options, steadyNow);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+    EXPECT_EQ(pixelAt(picture_.bgr, 5, 5), kRed) << source.describe();
+  }
+  EXPECT_EQ(picture_.bgr.size(), cv::Size(64, 48));
+  by_region.region = cv::Rect(700, 500, 640, 480);
+  X11WindowSource beyond(by_region, steadyNow);
+  EXPECT_TRUE(becomesLost(beyond));
+  EXPECT_NE(beyond.problem().find("800x600"), std::string::npos) << beyond.problem();
+}
+
+TEST_F(X11WindowSourceTest, PrefersTheExactTitleThenTheLargest) {
+  TestWindow editor(server_.display(), "notes on X-System - editor", 600, 500);
+  TestWindow small(server_.display(), "X-System", 100, 80);
+  TestWindow large(server_.display(), "X-System", 320, 240);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(source.window(), large.id());
+}
+
+TEST_F(X11WindowSourceTest, WorksThroughTheSocketWithoutSharedMemory) {
+  TestWindow window(server_.display(), "X-System", 321, 241);
+  window.fill(0xff0000);
+  X11SourceOptions options = titled(server_);
+  options.use_shared_memory = false;
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_FALSE(source.usesSharedMemory());
+  window.fill(0x00ff00, 0, 240, 321, 1);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(pixelAt(picture_.bgr, 320, 239), kRed);
+  EXPECT_EQ(pixelAt(picture_.bgr, 320, 240), kGreen);
+}
+
+TEST_F(X11WindowSourceTest, ChecksumSeesChangesWhereNoEventsAreAskedFor) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11SourceOptions options = titled(server_);
+  options.change_detection = ChangeDetection::kChecksum;
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_FALSE(source.usesDamage());
+  EXPECT_TRUE(staysQuiet(source));  // also takes the checksum that the change is measured against
+  window.fill(0x00ff00);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kGreen);
+  EXPECT_TRUE(picture_.display_time_known);
+}
+
+TEST_F(X11WindowSourceTest, WithoutDetectionTheDisplayTimeIsUnknown) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11SourceOptions options = titled(server_);
+  options.change_detection = ChangeDetection::kNone;
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  window.fill(0x00ff00);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_FALSE(picture_.display_time_known);
+}
+
+TEST(X11WindowSource, WorksWithoutTheDamageAndCompositeExtensions) {
+  const Xvfb server(24, {"-extension", "DAMAGE", "-extension", "Composite", "-extension", "MIT-SHM"});
+  TestWindow window(server.display(), "X-System", 320, 240);
+  window.fill(0xff0000);
+  X11WindowSource source(titled(server), steadyNow);
+  Picture picture;
+  ASSERT_TRUE(nextPicture(source, picture));
+  EXPECT_FALSE(source.usesDamage());
+  EXPECT_FALSE(source.usesSharedMemory());
+  EXPECT_TRUE(staysQuiet(source));
+  window.fill(0x00ff00);
+  ASSERT_TRUE(nextPicture(source, picture));
+  EXPECT_EQ(pixelAt(picture.bgr, 100, 100), kGreen);
+}
+
+TEST(X11WindowSource, ConvertsSixteenAndThirtyBitScreens) {
+  for (const auto& [depth, pixel] : {std::pair<int, std::uint32_t>{16, 0xf81f}, {30, 0x3ff003ff}}) {
+    const Xvfb server(depth);
+    TestWindow window(server.display(), "X-System", 321, 240);
+    window.fill(pixel);
+    X11WindowSource source(titled(server), steadyNow);
+    Picture picture;
+    ASSERT_TRUE(nextPicture(source, picture)) << depth << ": " << source.problem();
+    const cv::Vec3b magenta = pixelAt(picture.bgr, 320, 239);
+    EXPECT_GE(magenta[0], 247) << depth;
+    EXPECT_EQ(magenta[1], 0) << depth;
+    EXPECT_GE(magenta[2], 247) << depth;
+  }
+}
+
+TEST(X11WindowSource, RefusesAPaletteScreenInWords) {
+  const Xvfb server(8);
+  TestWindow window(server.display(), "X-System", 320, 240);
+  X11WindowSource source(titled(server), steadyNow);
+  Change change;
+  EXPECT_EQ(source.waitChange(kShort, change), WaitResult::kLost);
+  EXPECT_NE(source.problem().find("depth 8"), std::string::npos) << source.problem();
+}
+
+TEST(X11WindowSource, SurvivesTheServerAndFindsItAgain) {
+  auto server = std::make_unique<Xvfb>();
+  const std::string display = server->display();
+  X11SourceOptions options;
+  options.display = display;
+  options.title = "X-System";
+  options.search_period = 0.02;
+  X11WindowSource source(options, steadyNow);
+  Picture picture;
+  {
+    TestWindow window(display, "X-System", 320, 240);
+    ASSERT_TRUE(nextPicture(source, picture));
+  }
+  server.reset();
+  EXPECT_TRUE(becomesLost(source));
+  EXPECT_NE(source.problem(), "");
+  server = std::make_unique<Xvfb>(24, std::vector<std::string>{}, display);
+  TestWindow window(display, "X-System", 100, 80);
+  window.fill(0xff0000);
+  ASSERT_TRUE(nextPicture(source, picture));
+  EXPECT_EQ(picture.bgr.size(), cv::Size(100, 80));
+}
+
+TEST(X11WindowSource, SaysWhatIsMissing) {
+  X11SourceOptions options;
+  options.display = ":9999";
+  options.title = "X-System";
+  X11WindowSource source(options, steadyNow);
+  Change change;
+  EXPECT_EQ(source.waitChange(milliseconds(1), change), WaitResult::kLost);
+  EXPECT_NE(source.problem().find(":9999"), std::string::npos);
+
+  const Xvfb server;
+  X11WindowSource nowhere(titled(server), steadyNow);
+  EXPECT_EQ(nowhere.waitChange(milliseconds(1), change), WaitResult::kLost);
+  EXPECT_NE(nowhere.problem().find("no visible window whose title contains \"X-System\""), std::string::npos)
+      << nowhere.problem();
+}
