@@ -1,0 +1,151 @@
+"""Does the recorded flight obey physics? Finds swapped axes, degrees taken for radians, wrong signs.
+
+The same four relations that the bridge's live monitor watches, over a whole recording, plus odometry against itself.
+"""
+
+from __future__ import annotations
+
+from typing import Mapping, NamedTuple
+
+import numpy as np
+
+GRAVITY = 9.80665  #: [m/s^2]
+
+
+class Check(NamedTuple):
+    """One relation between recorded quantities."""
+
+    name: str
+    unit: str
+    error: float  #: median absolute difference of the two sides, of the worst axis
+    scale: float  #: typical size (root mean square) of the observed side
+    limit: float  #: largest error that is still noise
+    samples: int
+
+    @property
+    def ok(self) -> bool:
+        """Whether the relation holds; true when there is nothing to compare."""
+        return self.samples == 0 or self.error <= self.limit
+
+
+def check_flight(columns: Mapping[str, np.ndarray], parts: list[slice]) -> list[Check]:
+    """Check the columns of FlightState against each other, in simulator time.
+
+    Args:
+        columns: Of FlightState.
+        parts: Segments of the samples; nothing is differenced across their edges.
+    """
+    use = _neighbours(columns, parts)
+    dt = _sim_steps(columns, use)
+    return [
+        _rates(columns, use, dt),
+        _force(columns, use, dt),
+        _airspeed(columns),
+        _climb(columns, use, dt),
+    ]
+
+
+def check_odometry(time: np.ndarray, position: np.ndarray, velocity: np.ndarray, parts: list[slice]) -> Check:
+    """Check that the odometry's position moves as its twist says.
+
+    Args:
+        time: int64 [ns], shape (n,).
+        position: `map` [m], shape (n, 3).
+        velocity: Twist turned into `map` [m/s], shape (n, 3).
+        parts: Segments of `time`.
+
+    Returns:
+        The difference over steps of about 1 s.
+    """
+    errors = []
+    for part in parts:
+        t = (time[part] - time[part][0]) / 1e9
+        if len(t) < 3:
+            continue
+        step = max(1, round(1.0 / float(np.median(np.diff(t)))))
+        if len(t) <= step:
+            continue
+        dt = np.diff(t)[:, None]
+        flown = np.concatenate(
+            [np.zeros((1, 3)), np.cumsum((velocity[part][1:] + velocity[part][:-1]) / 2 * dt, axis=0)]
+        )
+        moved = position[part]
+        span = (t[step:] - t[:-step])[:, None]
+        errors.append(((moved[step:] - moved[:-step]) - (flown[step:] - flown[:-step])) / span)
+    return _check("odometry: position against twist", "m/s", errors, velocity, 0.02)
+
+
+def _neighbours(columns: Mapping[str, np.ndarray], parts: list[slice]) -> np.ndarray:
+    """Give the indices k whose successor k + 1 is of the same segment and a later frame."""
+    pairs = [np.arange(part.start, part.stop - 1) for part in parts if part.stop - part.start > 1]
+    index = np.concatenate(pairs) if pairs else np.empty(0, dtype=int)
+    sim = columns["sim_time_unwrapped"]
+    return index[sim[index + 1] > sim[index]]
+
+
+def _sim_steps(columns: Mapping[str, np.ndarray], use: np.ndarray) -> np.ndarray:
+    sim = columns["sim_time_unwrapped"]
+    return sim[use + 1] - sim[use]
+
+
+def _vector(columns: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    return np.stack([columns[f"{name}.{axis}"] for axis in "xyz"], axis=1)
+
+
+def _matrix(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Give R_ned_frd of every sample, shape (n, 3, 3), from the recorded quaternion."""
+    x, y, z, w = (columns[f"orientation.{axis}"] for axis in "xyzw")
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
+            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1),
+            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1),
+        ],
+        axis=1,
+    )
+
+
+def _rates(columns: Mapping[str, np.ndarray], use: np.ndarray, dt: np.ndarray) -> Check:
+    turn = _matrix(columns)
+    step = np.einsum("nji,njk->nik", turn[use], turn[use + 1])
+    skew = np.stack(
+        [step[:, 2, 1] - step[:, 1, 2], step[:, 0, 2] - step[:, 2, 0], step[:, 1, 0] - step[:, 0, 1]], axis=1
+    )
+    seen = skew / 2 / dt[:, None]
+    said = _vector(columns, "angular_velocity")
+    mean = (said[use] + said[use + 1]) / 2
+    return _check("attitude against p, q, r", "rad/s", [seen - mean], seen, 0.02, share=0.05)
+
+
+def _force(columns: Mapping[str, np.ndarray], use: np.ndarray, dt: np.ndarray) -> Check:
+    velocity = _vector(columns, "velocity_ned")
+    acceleration = (velocity[use + 1] - velocity[use]) / dt[:, None]
+    turn = _matrix(columns)
+    felt = np.einsum("nij,nj->ni", turn, _vector(columns, "specific_force"))
+    mean = (felt[use] + felt[use + 1]) / 2 + np.array([0.0, 0.0, GRAVITY])
+    return _check("specific force against dv/dt", "m/s^2", [acceleration - mean], acceleration, 0.3, share=0.1)
+
+
+def _airspeed(columns: Mapping[str, np.ndarray]) -> Check:
+    air = np.linalg.norm(_vector(columns, "velocity_ned") - _vector(columns, "wind_ned"), axis=1)
+    said = columns["true_airspeed"].astype(np.float64)
+    return _check("|velocity - wind| against true airspeed", "m/s", [air - said], air, 0.5)
+
+
+def _climb(columns: Mapping[str, np.ndarray], use: np.ndarray, dt: np.ndarray) -> Check:
+    height = columns["altitude_msl"]
+    seen = (height[use + 1] - height[use]) / dt
+    down = columns["velocity_ned.z"]
+    return _check("climb against -v_down", "m/s", [seen + (down[use] + down[use + 1]) / 2], seen, 0.3)
+
+
+def _check(
+    name: str, unit: str, errors: list[np.ndarray], quantity: np.ndarray, limit: float, share: float = 0.0
+) -> Check:
+    """Make a check of the worst axis; the limit is at least `share` of the size of `quantity`, the observed side."""
+    rows = np.concatenate([e.reshape(len(e), -1) for e in errors]) if errors else np.empty((0, 1))
+    rows = np.abs(rows[np.isfinite(rows).all(axis=1)])
+    finite = quantity[np.isfinite(quantity)]
+    scale = float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0
+    error = float(np.median(rows, axis=0).max()) if len(rows) else float("nan")
+    return Check(name, unit, error, scale, max(limit, share * scale), len(rows))

@@ -1,0 +1,51 @@
+"""Latched labels as stretches of time: modes, failures, excitations, link states."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Sequence
+
+import numpy as np
+
+
+class Episode(NamedTuple):
+    """A stretch of time with a label."""
+
+    start: int  #: [ns]
+    end: int  #: [ns]
+    label: str
+
+
+def from_values(time: np.ndarray, labels: Sequence[str], end: int) -> list[Episode]:
+    """Join equal neighbours of a latched value into episodes; an empty label is none.
+
+    Args:
+        time: int64 [ns] of each message, non-decreasing.
+        labels: One a message.
+        end: [ns] where the recording ends.
+    """
+    out: list[Episode] = []
+    for k, label in enumerate(labels):
+        start = int(time[k])
+        stop = int(time[k + 1]) if k + 1 < len(time) else max(end, start)
+        if not label:
+            continue
+        if out and out[-1].label == label and out[-1].end == start:
+            out[-1] = out[-1]._replace(end=stop)
+        else:
+            out.append(Episode(start, stop, label))
+    return out
+
+
+def from_sets(time: np.ndarray, sets: Sequence[Sequence[str]], end: int) -> list[Episode]:
+    """Turn lists of what is active (failures) into one episode for each, from its first to its last message."""
+    out: list[Episode] = []
+    running: dict[str, int] = {}
+    for k, active in enumerate(sets):
+        now = int(time[k])
+        for label in list(running):
+            if label not in active:
+                out.append(Episode(running.pop(label), now, label))
+        for label in active:
+            running.setdefault(label, now)
+    out += [Episode(start, max(end, start), label) for label, start in running.items()]
+    return sorted(out)

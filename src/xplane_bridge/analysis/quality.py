@@ -1,0 +1,101 @@
+"""How good a recording is: rates, gaps and jitter of a topic, validity of the state, pairing of the images."""
+
+from __future__ import annotations
+
+from typing import Mapping, NamedTuple
+
+import numpy as np
+
+#: A pause of more than this many median periods counts as a gap.
+GAP_FACTOR = 3.0
+
+
+class Timing(NamedTuple):
+    """When the messages of a topic came."""
+
+    count: int
+    duration: float  #: [s] first to last
+    rate: float  #: [1/s] mean; NaN with fewer than two messages
+    period: float  #: [s] median; NaN with fewer than two messages
+    jitter: float  #: [s] standard deviation of the periods, gaps left out
+    gaps: int  #: pauses longer than `GAP_FACTOR` periods
+    longest_gap: float  #: [s] the longest pause between two messages
+    backward: int  #: steps back in time
+
+
+def timing(time: np.ndarray) -> Timing:
+    """Describe when messages came.
+
+    Args:
+        time: int64 [ns], shape (n,), in the order of arrival.
+    """
+    count = len(time)
+    if count < 2:
+        return Timing(count, 0.0, float("nan"), float("nan"), float("nan"), 0, float("nan"), 0)
+    periods = np.diff(time) / 1e9
+    median = float(np.median(periods))
+    gaps = periods > GAP_FACTOR * median if median > 0 else np.zeros(len(periods), dtype=bool)
+    duration = float((time[-1] - time[0]) / 1e9)
+    kept = periods[~gaps]
+    return Timing(
+        count,
+        duration,
+        (count - 1) / duration if duration > 0 else float("nan"),
+        median,
+        float(np.std(kept)) if len(kept) else float("nan"),
+        int(gaps.sum()),
+        float(periods.max()),
+        int((periods < 0).sum()),
+    )
+
+
+def bit_shares(values: np.ndarray, constants: Mapping[str, int], prefix: str) -> dict[str, float]:
+    """Give for each single-bit constant (``VALID_POSITION``) the share of messages that have it set, 0 to 1."""
+    out = {}
+    for name, bit in constants.items():
+        if name.startswith(prefix) and bit > 0 and bit & (bit - 1) == 0:
+            share = np.mean((values.astype(np.int64) & bit) != 0) if len(values) else float("nan")
+            out[name[len(prefix) :]] = float(share)
+    return out
+
+
+class Pairing(NamedTuple):
+    """How images and states were paired."""
+
+    images: int
+    perfect: float  #: share of images with quality 0
+    with_state: float  #: share of images with a state
+    error_p50: float  #: [s] |simulator time of the state - of the picture|
+    error_p95: float  #: [s]
+    error_max: float  #: [s]
+    dropped: int  #: pictures seen but not published
+    frozen: int  #: images flagged frozen
+
+
+def pairing(
+    quality: np.ndarray, sim_time_error: np.ndarray, dropped: np.ndarray, frozen: np.ndarray, missing_bit: int
+) -> Pairing:
+    """Describe the pairing of a camera's images.
+
+    Args:
+        quality: FrameState.quality, shape (n,).
+        sim_time_error: [s], NaN without a state, shape (n,).
+        dropped: Counter, shape (n,).
+        frozen: Counter, shape (n,).
+        missing_bit: FrameState.QUALITY_STATE_MISSING.
+    """
+    nan = float("nan")
+    if not len(quality):
+        return Pairing(0, nan, nan, nan, nan, nan, 0, 0)
+    error = np.abs(sim_time_error[np.isfinite(sim_time_error)])
+    p50, p95, worst = np.percentile(error, [50, 95, 100]) if len(error) else (nan, nan, nan)
+    return Pairing(
+        len(quality),
+        float(np.mean(quality == 0)),
+        float(np.mean((quality.astype(np.int64) & missing_bit) == 0)),
+        float(p50),
+        float(p95),
+        float(worst),
+        int(dropped[-1]),
+        int(frozen[-1]),
+    )

@@ -1,0 +1,178 @@
+"""The analysis core against flights whose numbers are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xplane_bridge.analysis.consistency import GRAVITY, check_flight, check_odometry
+from xplane_bridge.analysis.decimation import min_max
+from xplane_bridge.analysis.episodes import Episode, from_sets, from_values
+from xplane_bridge.analysis.quality import bit_shares, pairing, timing
+from xplane_bridge.analysis.summary import distance, summary
+
+S = 10**9
+
+
+def turn(rate: float = 100.0, seconds: float = 20.0) -> dict:
+    """A steady level turn: bank 30 deg, 60 m/s, wind 5 m/s to the east; all by hand.
+
+    Turn rate g tan(30 deg) / V = 0.09436 rad/s; in the body p = 0, q = Omega sin(bank), r = Omega cos(bank); specific
+    force (0, 0, -g / cos(bank)); velocity over ground = air velocity + wind.
+    """
+    bank, speed = np.radians(30.0), 60.0
+    omega = GRAVITY * np.tan(bank) / speed
+    t = np.arange(round(seconds * rate)) / rate
+    psi = omega * t
+    ones = np.ones_like(t)
+    half_roll, half_psi = bank / 2, psi / 2
+    return {
+        "sim_time_unwrapped": t,
+        "orientation.w": np.cos(half_roll) * np.cos(half_psi),
+        "orientation.x": np.sin(half_roll) * np.cos(half_psi),
+        "orientation.y": np.sin(half_roll) * np.sin(half_psi),
+        "orientation.z": np.cos(half_roll) * np.sin(half_psi),
+        "angular_velocity.x": 0 * t,
+        "angular_velocity.y": ones * omega * np.sin(bank),
+        "angular_velocity.z": ones * omega * np.cos(bank),
+        "velocity_ned.x": speed * np.cos(psi),
+        "velocity_ned.y": speed * np.sin(psi) + 5.0,
+        "velocity_ned.z": 0 * t,
+        "wind_ned.x": 0 * t,
+        "wind_ned.y": 5.0 * ones,
+        "wind_ned.z": 0 * t,
+        "specific_force.x": 0 * t,
+        "specific_force.y": 0 * t,
+        "specific_force.z": -ones * GRAVITY / np.cos(bank),
+        "true_airspeed": speed * ones,
+        "altitude_msl": 1000.0 * ones,
+        "ground_speed": np.hypot(speed * np.cos(psi), speed * np.sin(psi) + 5.0),
+    }
+
+
+def checks(columns: dict) -> dict:
+    count = len(columns["sim_time_unwrapped"])
+    return {c.name: c for c in check_flight(columns, [slice(0, count)])}
+
+
+def test_a_healthy_turn_raises_no_alarm() -> None:
+    for check in checks(turn()).values():
+        assert check.ok, check
+        assert check.samples > 1000
+        assert check.error < 0.01 * max(check.limit, 1e-9) + 1e-3
+
+
+def swap(columns: dict, a: str, b: str) -> dict:
+    return {**columns, a: columns[b], b: columns[a]}
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        (lambda c: swap(c, "angular_velocity.x", "angular_velocity.y"), "attitude against p, q, r"),
+        (lambda c: {**c, "angular_velocity.z": np.degrees(c["angular_velocity.z"])}, "attitude against p, q, r"),
+        (lambda c: {**c, "specific_force.z": -c["specific_force.z"]}, "specific force against dv/dt"),
+        (lambda c: swap(c, "specific_force.y", "specific_force.z"), "specific force against dv/dt"),
+        (lambda c: {**c, "wind_ned.y": -c["wind_ned.y"]}, "|velocity - wind| against true airspeed"),
+        (lambda c: {**c, "velocity_ned.z": c["velocity_ned.z"] + 3.0}, "climb against -v_down"),
+    ],
+)
+def test_each_fault_is_named(fault: object, name: str) -> None:
+    found = checks(fault(turn()))
+    assert not found[name].ok, found[name]
+
+
+def test_checks_do_not_cross_a_reset() -> None:
+    columns = turn()
+    jumped = {**columns, "altitude_msl": columns["altitude_msl"] + np.where(np.arange(2000) >= 1000, 500.0, 0.0)}
+    climb = check_flight(jumped, [slice(0, 1000), slice(1000, 2000)])[3]
+    assert climb.ok
+    assert climb.samples == 1998
+
+
+def test_missing_values_leave_nothing_to_compare() -> None:
+    columns = turn()
+    nan = {**columns, "true_airspeed": np.full(2000, np.nan)}
+    check = checks(nan)["|velocity - wind| against true airspeed"]
+    assert (check.samples, check.ok) == (0, True)
+
+
+def test_odometry_is_compared_over_a_second() -> None:
+    t = np.arange(500) / 50.0
+    time = np.round(t * S).astype(np.int64)
+    position = np.stack([10 * np.sin(t), 5 * t, 0 * t], axis=1)
+    velocity = np.stack([10 * np.cos(t), 5 + 0 * t, 0 * t], axis=1)
+    assert check_odometry(time, position, velocity, [slice(0, 500)]).error < 1e-3
+    wrong = check_odometry(time, position, velocity + 0.05, [slice(0, 500)])
+    assert wrong.error == pytest.approx(0.05, abs=1e-3)
+    assert not wrong.ok
+
+
+def test_timing_counts_gaps_and_jitter() -> None:
+    time = np.array([0, 10, 20, 30, 90, 100, 112, 108], dtype=np.int64) * 1_000_000
+    got = timing(time)
+    assert (got.count, got.gaps, got.backward) == (8, 1, 1)
+    assert got.longest_gap == pytest.approx(0.06)
+    assert got.period == pytest.approx(0.01)
+    assert got.rate == pytest.approx(7 / 0.108)
+    # periods without the gap: 10, 10, 10, 10, 12, -4 ms: mean 8, variance (4*4 + 16 + 144) / 6
+    assert got.jitter == pytest.approx(np.sqrt((4 * 4 + 16 + 144) / 6) * 1e-3)
+    assert timing(time[:1]).count == 1
+    assert np.isnan(timing(time[:1]).rate)
+
+
+def test_bit_shares_take_single_bits_only() -> None:
+    constants = {"VALID_A": 1, "VALID_B": 2, "VALID_ALL": 3, "OTHER": 4}
+    assert bit_shares(np.array([1, 3, 0, 2], dtype=np.uint32), constants, "VALID_") == {"A": 0.5, "B": 0.5}
+
+
+def test_pairing_numbers() -> None:
+    got = pairing(
+        np.array([0, 0, 1, 8]),
+        np.array([0.0, -0.002, np.nan, 0.004]),
+        np.array([0, 1, 1, 2]),
+        np.array([0, 0, 0, 1]),
+        1,
+    )
+    assert (got.images, got.perfect, got.with_state, got.dropped, got.frozen) == (4, 0.5, 0.75, 2, 1)
+    assert (got.error_p50, got.error_max) == pytest.approx((0.002, 0.004))
+
+
+def test_distance_is_the_integral_inside_segments() -> None:
+    time = np.array([0, 1, 2, 10, 11]) * S
+    speed = np.array([10.0, 20.0, 20.0, 4.0, 6.0])
+    assert distance(time, speed, [slice(0, 3), slice(3, 5)]) == pytest.approx(15 + 20 + 5)
+
+
+def test_summary_names_extremes_with_units() -> None:
+    time = np.array([0, 1]) * S
+    got = summary(time, {"roll_deg": np.array([-20.0, 31.0]), "alpha_deg": np.array([np.nan, np.nan])}, [slice(0, 2)])
+    assert [(q.name, q.value, q.unit) for q in got] == [
+        ("duration", 1.0, "s"),
+        ("lowest roll", -20.0, "deg"),
+        ("highest roll", 31.0, "deg"),
+    ]
+
+
+def test_episodes_from_latched_values_and_sets() -> None:
+    time = np.array([10, 20, 30, 40])
+    assert from_values(time, ["auto", "auto", "", "manual"], 99) == [Episode(10, 30, "auto"), Episode(40, 99, "manual")]
+    got = from_sets(time, [["a"], ["a", "b"], ["b"], []], 99)
+    assert got == [Episode(10, 30, "a"), Episode(20, 40, "b")]
+    assert from_sets(time[:1], [["a"]], 99) == [Episode(10, 99, "a")]
+
+
+def test_decimation_keeps_every_peak() -> None:
+    time = np.arange(100_000.0)
+    values = np.sin(time / 500)
+    values[77_777] = 9.0
+    values[12_345] = -9.0
+    t, v = min_max(time, values, 1000)
+    assert len(v) <= 1000
+    assert (v.max(), v.min()) == (9.0, -9.0)
+    assert (np.diff(t) > 0).all()
+    short = min_max(time[:10], values[:10], 1000)
+    assert len(short[0]) == 10
+    gap = values.copy()
+    gap[40_000:60_000] = np.nan
+    assert np.isnan(min_max(time, gap, 1000)[1]).any()
