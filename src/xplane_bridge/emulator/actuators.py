@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Dict, Sequence
+from typing import Sequence
 
 from xplane_bridge.emulator.flight_model import (
     Controls,
@@ -23,7 +23,7 @@ FLOAT_RATE_DEG_S = 90.0
 class SurfaceActuator:
     """One surface. ``position_deg`` is what X-Plane would report, ``effective_deg`` what the air feels."""
 
-    __slots__ = ("spec", "position_deg", "effective_deg", "_stuck_deg")
+    __slots__ = ("_stuck_deg", "effective_deg", "position_deg", "spec")
 
     def __init__(self, spec: SurfaceSpec) -> None:
         self.spec = spec
@@ -45,7 +45,9 @@ class SurfaceActuator:
         self.effective_deg = self.position_deg
         self._stuck_deg = None
 
-    def step_broken(self, target_deg: float, dt: float, fault: SurfaceFault, alpha_deg: float, overridden: bool) -> None:
+    def step_broken(
+        self, target_deg: float, dt: float, fault: SurfaceFault, alpha_deg: float, overridden: bool
+    ) -> None:
         """The same with a fault. ``overridden``: ``target_deg`` was written by a client and acts at once."""
         spec, kind = self.spec, fault.kind
         if kind is not SurfaceFaultKind.STUCK:
@@ -87,7 +89,7 @@ class SurfaceSet:
 
     def __init__(self, specs: Sequence[SurfaceSpec]) -> None:
         self.actuators = [SurfaceActuator(spec) for spec in specs]
-        self.by_name: Dict[str, SurfaceActuator] = {a.spec.name: a for a in self.actuators}
+        self.by_name: dict[str, SurfaceActuator] = {a.spec.name: a for a in self.actuators}
 
     def check(self, controls: Controls) -> None:
         """Raises ``FlightModelError`` for an unknown surface or a fault whose value makes no sense."""
@@ -97,7 +99,9 @@ class SurfaceSet:
         for name, fault in controls.surface_faults.items():
             if fault.kind in (SurfaceFaultKind.REDUCED, SurfaceFaultKind.SLOW):
                 if fault.value is None or not 0.0 <= fault.value <= 1.0:
-                    raise FlightModelError(f"fault {fault.kind.value} of '{name}' has value {fault.value}, expected 0..1")
+                    raise FlightModelError(
+                        f"fault {fault.kind.value} of '{name}' has value {fault.value}, expected 0..1"
+                    )
 
     def step(self, targets_deg: Sequence[float], dt: float, controls: Controls, alpha_deg: float) -> None:
         """Moves every surface; ``targets_deg`` in the order of the specifications."""

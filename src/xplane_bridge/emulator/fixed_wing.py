@@ -31,11 +31,19 @@ ROLL_TRIM, PITCH_TRIM, YAW_TRIM = 0.3, 0.7, 0.4
 
 STALL_WARNING_RAD = math.radians(12.5)
 CRUISE_MPS = 75.0
+CRUISE_PROPELLER = 0.75
 #: Height of the centre of gravity and pitch attitude of the aircraft standing on its wheels, where the settling starts.
 STANDING_HEIGHT_M, STANDING_PITCH_RAD = 1.14, -0.01
 
 #: Three blades, 1.9 m; solidity and pitch range as usual for this power (our own estimate).
-PROPELLER = dict(forward_m=1.1, down_m=0.05, radius_m=0.95, blade_area_m2=0.31, inertia_kg_m2=1.6, edgewise_drag=0.05)
+PROPELLER = {
+    "forward_m": 1.1,
+    "down_m": 0.05,
+    "radius_m": 0.95,
+    "blade_area_m2": 0.31,
+    "inertia_kg_m2": 1.6,
+    "edgewise_drag": 0.05,
+}
 GOVERNOR = GovernorSpec(minimum_rpm=1400.0, maximum_rpm=2700.0, fine_deg=13.0, coarse_deg=38.0)
 ENGINE = PistonSpec(rated_power_w=134.2e3, rated_rpm=2700.0)
 ENGINE_ARM_M = 1.7
@@ -91,7 +99,9 @@ class FixedWing(JsbsimModel):
 
     # ---- one step
 
-    def _advance(self, dt: float, controls: Controls, air: Sequence[float], rates: Sequence[float], density: float) -> None:
+    def _advance(
+        self, dt: float, controls: Controls, air: Sequence[float], rates: Sequence[float], density: float
+    ) -> None:
         alpha_deg = math.degrees(self._state_getters[26]())
         self._surface_set.step(self._mix(controls), dt, controls, alpha_deg)
         pressure, temperature = self._outside_air()
@@ -176,7 +186,13 @@ class FixedWing(JsbsimModel):
                 governor.step(dt, rotor, controls.propeller[i])
                 rotor.air_loads(dt, (speed, 0.0, 0.0), (0.0, 0.0, 0.0), density)
                 torque = engine.torque(
-                    dt, rotor.omega, controls.throttle[i], controls.mixture[i], pressure, temperature, self._fuel_kg[i] > 0.0
+                    dt,
+                    rotor.omega,
+                    controls.throttle[i],
+                    controls.mixture[i],
+                    pressure,
+                    temperature,
+                    self._fuel_kg[i] > 0.0,
                 )
                 rotor.turn(dt, torque, (0.0, 0.0, 0.0))
             engine.warm_up(temperature, max(engine.power / ENGINE.rated_power_w, 0.0))
@@ -193,7 +209,6 @@ class FixedWing(JsbsimModel):
         for i, engine in enumerate(self._engines):
             engine.running = initial.engines_running
             self._rotors[i].omega = ENGINE.rated_rpm * math.pi / 30.0 if initial.engines_running else 60.0
-            controls.propeller[i] = 0.75
 
         def fly(x: Sequence[float]) -> Sequence[float]:
             theta, pitch_trim, throttle, roll, roll_trim, yaw_trim = (float(value) for value in x)
@@ -214,10 +229,17 @@ class FixedWing(JsbsimModel):
             return ahead, aside, s.acceleration_down_mps2, s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2
 
         start = (0.02, 0.0, 0.6, 0.0, 0.0, 0.0)
+        differences = (1e-3, 1e-2, 1e-2, 1e-3, 1e-2, 1e-2)
         limits = ((-0.2, 0.3), (-1.0, 1.0), (0.0, 1.0), (-0.3, 0.3), (-1.0, 1.0), (-1.0, 1.0))
-        solution = trim.newton(
-            fly, start, (1e-3, 1e-2, 1e-2, 1e-3, 1e-2, 1e-2), limits, tolerance=1e-5, what=f"level flight at {speed:.1f} m/s"
-        )
+        what = f"level flight at {speed:.1f} m/s"
+        for lever in (CRUISE_PROPELLER, 1.0):
+            controls.propeller[0] = controls.propeller[1] = lever
+            try:
+                solution = trim.newton(fly, start, differences, limits, tolerance=1e-5, what=what)
+                break
+            except FlightModelError:
+                if lever == 1.0:
+                    raise
         fly(solution)
         return controls
 

@@ -15,7 +15,7 @@ import copy
 import enum
 import importlib
 from dataclasses import dataclass, field
-from typing import Dict, List, Optional, Protocol, Sequence, Tuple
+from typing import Protocol, Sequence
 
 EARTH_RADIUS_M = 6378145.0
 GRAVITY_MPS2 = 9.80665
@@ -71,7 +71,7 @@ class SurfaceFaultKind(enum.Enum):
 @dataclass(frozen=True)
 class SurfaceFault:
     kind: SurfaceFaultKind
-    value: Optional[float] = None
+    value: float | None = None
 
 
 class EngineFault(enum.Enum):
@@ -87,9 +87,9 @@ class Controls:
     roll: float = 0.0  #: stick, -1..1
     pitch: float = 0.0
     yaw: float = 0.0
-    throttle: List[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: levers, 0..1
-    propeller: List[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = highest speed)
-    mixture: List[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = rich)
+    throttle: list[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: levers, 0..1
+    propeller: list[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = highest speed)
+    mixture: list[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = rich)
     roll_trim: float = 0.0  #: -1..1
     pitch_trim: float = 0.0
     yaw_trim: float = 0.0
@@ -103,15 +103,17 @@ class Controls:
     artificial_stability: bool = True  #: the stabilisation inside the model, where it has one
 
     override_surfaces: bool = False  #: X-Plane's override_control_surfaces: only ``surface_deg`` drives any surface
-    surface_deg: Dict[str, float] = field(default_factory=dict)  #: used while overridden; those not named stay as they are
+    surface_deg: dict[str, float] = field(
+        default_factory=dict
+    )  #: used while overridden; those not named stay as they are
     override_throttles: bool = False  #: engines obey ``throttle_use`` alone, without levers, mixing and stabilisation
-    throttle_use: List[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: per engine or motor, -1..1
+    throttle_use: list[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: per engine or motor, -1..1
 
-    surface_faults: Dict[str, SurfaceFault] = field(default_factory=dict)  #: by surface name
-    engine_faults: List[EngineFault] = field(default_factory=lambda: [EngineFault.NONE] * MAX_ENGINES)
+    surface_faults: dict[str, SurfaceFault] = field(default_factory=dict)  #: by surface name
+    engine_faults: list[EngineFault] = field(default_factory=lambda: [EngineFault.NONE] * MAX_ENGINES)
     stability_fault: bool = False  #: the artificial stability has failed, whatever the switch says
 
-    def copy(self) -> "Controls":
+    def copy(self) -> Controls:
         return copy.deepcopy(self)
 
 
@@ -163,7 +165,7 @@ class ModelState:
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
     heading_rad: float = 0.0  #: true, 0..2 pi
-    quaternion: Tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)  #: w x y z, rotates FRD vectors into local NED
+    quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)  #: w x y z, rotates FRD vectors into local NED
     p_rad_s: float = 0.0
     q_rad_s: float = 0.0
     r_rad_s: float = 0.0
@@ -202,7 +204,7 @@ class ModelState:
     pressure_altitude_m: float = 0.0
     stall_warning: bool = False
 
-    surfaces_deg: Dict[str, float] = field(default_factory=dict)  #: every surface of ``FlightModel.surfaces``
+    surfaces_deg: dict[str, float] = field(default_factory=dict)  #: every surface of ``FlightModel.surfaces``
     roll_ratio: float = 0.0  #: the command that reaches mixing, after artificial stability, -1..1
     pitch_ratio: float = 0.0
     yaw_ratio: float = 0.0
@@ -211,8 +213,8 @@ class ModelState:
     speed_brake_ratio: float = 0.0
     thrust_vector_ratio: float = 0.0  #: where the nacelles are
 
-    engines: List[EngineState] = field(default_factory=list)
-    fuel_kg: List[float] = field(default_factory=list)  #: per tank
+    engines: list[EngineState] = field(default_factory=list)
+    fuel_kg: list[float] = field(default_factory=list)  #: per tank
     payload_kg: float = 0.0
     empty_mass_kg: float = 0.0
     mass_kg: float = 0.0
@@ -227,12 +229,12 @@ class ModelState:
     aero_pitch_nm: float = 0.0
     aero_yaw_nm: float = 0.0
 
-    gear: List[GearState] = field(default_factory=list)
+    gear: list[GearState] = field(default_factory=list)
     on_ground_any: bool = False
     on_ground_all: bool = False
     crashed: bool = False
 
-    def copy(self) -> "ModelState":
+    def copy(self) -> ModelState:
         return copy.deepcopy(self)
 
 
@@ -245,7 +247,7 @@ class InitialState:
     heading_deg: float = 0.0
     on_ground: bool = False
     altitude_m: float = 1000.0  #: MSL; ignored on the ground
-    airspeed_mps: Optional[float] = None  #: true; None: the aircraft's usual cruise (0 for a hover)
+    airspeed_mps: float | None = None  #: true; None: the aircraft's usual cruise (0 for a hover)
     terrain_elevation_m: float = 0.0
     engines_running: bool = True
     sim_time_s: float = 0.0
@@ -259,13 +261,13 @@ class ModelInfo:
     description: str
     icao: str
     engine_count: int
-    propeller_direction: Tuple[int, ...]  #: +1 clockwise seen from behind (rotors: from above), -1 the other way
+    propeller_direction: tuple[int, ...]  #: +1 clockwise seen from behind (rotors: from above), -1 the other way
     tank_count: int
-    gear_names: Tuple[str, ...]
+    gear_names: tuple[str, ...]
     retractable_gear: bool
     max_throttle: float = 1.0
     min_throttle: float = 0.0  #: < 0 where the engine reverses
-    hover_thrust_vector: Optional[float] = None  #: tiltrotor only
+    hover_thrust_vector: float | None = None  #: tiltrotor only
     maximum_power_w: float = 0.0  #: per engine
     maximum_rpm: float = 0.0
     never_exceed_mps: float = 0.0  #: indicated
@@ -275,14 +277,14 @@ class ModelInfo:
     eye_forward_m: float = 0.0  #: pilot's eye (or camera) from the reference point, FRD
     eye_down_m: float = 0.0
     standing_height_m: float = 0.0  #: of the centre of gravity above the ground, parked at the default loading
-    trim_deg: Tuple[Tuple[str, float], ...] = ()  #: surface kind -> deflection at full trim
+    trim_deg: tuple[tuple[str, float], ...] = ()  #: surface kind -> deflection at full trim
 
 
 class FlightModel(Protocol):
     """A flying aircraft. Not thread-safe; never looks at a clock; the same calls with the same seed: the same flight."""
 
     info: ModelInfo
-    surfaces: Tuple[SurfaceSpec, ...]
+    surfaces: tuple[SurfaceSpec, ...]
 
     @property
     def state(self) -> ModelState:
@@ -300,14 +302,14 @@ class FlightModel(Protocol):
 
     def place(
         self,
-        latitude_deg: Optional[float] = None,
-        longitude_deg: Optional[float] = None,
-        altitude_m: Optional[float] = None,
-        roll_rad: Optional[float] = None,
-        pitch_rad: Optional[float] = None,
-        heading_rad: Optional[float] = None,
-        v_ned_mps: Optional[Sequence[float]] = None,
-        pqr_rad_s: Optional[Sequence[float]] = None,
+        latitude_deg: float | None = None,
+        longitude_deg: float | None = None,
+        altitude_m: float | None = None,
+        roll_rad: float | None = None,
+        pitch_rad: float | None = None,
+        heading_rad: float | None = None,
+        v_ned_mps: Sequence[float] | None = None,
+        pqr_rad_s: Sequence[float] | None = None,
     ) -> ModelState:
         """Moves the aircraft at once (PREL, VEHS, writes to position, q, velocity, rates). What is None stays as it is."""
 
@@ -320,7 +322,7 @@ class FlightModel(Protocol):
     def set_wind(self, north_mps: float, east_mps: float, down_mps: float = 0.0) -> None:
         """Steady velocity of the air (a wind from the north has north_mps < 0)."""
 
-    def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
+    def set_turbulence(self, intensity_mps: float, seed: int | None = None) -> None:
         """Dryden turbulence, this standard deviation of the vertical gust [m/s]; 0 ends it. ``seed`` restarts the sequence."""
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
@@ -329,7 +331,7 @@ class FlightModel(Protocol):
     def set_terrain(self, elevation_m: float) -> None:
         """Height of the ground above the sphere below the aircraft."""
 
-    def set_loading(self, fuel_kg: Optional[Sequence[float]] = None, payload_kg: Optional[float] = None) -> None:
+    def set_loading(self, fuel_kg: Sequence[float] | None = None, payload_kg: float | None = None) -> None:
         """Fuel per tank and payload; what is None stays as it is."""
 
     def set_engine_running(self, engine: int, running: bool) -> None:
@@ -343,7 +345,7 @@ _MODELS = {
 }
 
 
-def model_names() -> Tuple[str, ...]:
+def model_names() -> tuple[str, ...]:
     """The aircraft that ``create_model`` knows."""
     return tuple(_MODELS)
 

@@ -11,7 +11,7 @@ import math
 import os
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Sequence
 
 import jsbsim
 
@@ -123,7 +123,7 @@ _LOADS = (
 )
 
 
-def quaternion_from_euler(roll: float, pitch: float, heading: float) -> Tuple[float, float, float, float]:
+def quaternion_from_euler(roll: float, pitch: float, heading: float) -> tuple[float, float, float, float]:
     """w, x, y, z of the rotation of FRD vectors into NED (heading, then pitch, then roll)."""
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
     cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
@@ -158,9 +158,9 @@ class JsbsimModel:
     """
 
     info: ModelInfo
-    surfaces: Tuple[SurfaceSpec, ...] = ()
-    fuel_capacity_kg: Tuple[float, ...] = ()
-    default_fuel_kg: Tuple[float, ...] = ()
+    surfaces: tuple[SurfaceSpec, ...] = ()
+    fuel_capacity_kg: tuple[float, ...] = ()
+    default_fuel_kg: tuple[float, ...] = ()
     default_payload_kg: float = 0.0
     max_payload_kg: float = 0.0
     gear_time_s: float = 6.0
@@ -174,7 +174,7 @@ class JsbsimModel:
         self._fuel_kg = list(self.default_fuel_kg)
         self._payload_kg = self.default_payload_kg
         self._trimmed = Controls()
-        self._trim_cache: Dict[tuple, bytes] = {}
+        self._trim_cache: dict[tuple, bytes] = {}
         self.state = ModelState()
         self._start_jsbsim()
 
@@ -198,7 +198,9 @@ class JsbsimModel:
             raise FlightModelError("JSBSim cannot read aircraft/planet.xml: is the package installed completely?")
         fdm.set_aircraft_path("aircraft")
         if not fdm.load_model(name):
-            raise FlightModelError(f"JSBSim cannot read aircraft/{name}/{name}.xml: is the package installed completely?")
+            raise FlightModelError(
+                f"JSBSim cannot read aircraft/{name}/{name}.xml: is the package installed completely?"
+            )
         fdm["simulation/gravity-model"] = 0
         self._substep = MAX_SUBSTEP_S
         fdm.set_dt(MAX_SUBSTEP_S)
@@ -238,7 +240,7 @@ class JsbsimModel:
         self._gear_position = 1.0
         self._crashed = False
         self._gravity_force = (0.0, 0.0, 0.0)
-        self._rotors: List[Rotor] = []
+        self._rotors: list[Rotor] = []
         state = ModelState()
         state.surfaces_deg = {spec.name: 0.0 for spec in self.surfaces}
         state.engines = [EngineState() for _ in range(self.info.engine_count)]
@@ -254,7 +256,9 @@ class JsbsimModel:
         """Makes rotors (``self._rotors``), engines, and whatever else has a state."""
         raise NotImplementedError
 
-    def _advance(self, dt: float, controls: Controls, air: Sequence[float], rates: Sequence[float], density: float) -> None:
+    def _advance(
+        self, dt: float, controls: Controls, air: Sequence[float], rates: Sequence[float], density: float
+    ) -> None:
         """One JSBSim step's worth of controls, actuators, engines and rotors. ``air``: velocity through the air, FRD [m/s]."""
         raise NotImplementedError
 
@@ -294,7 +298,9 @@ class JsbsimModel:
 
     def step(self, dt: float, controls: Controls) -> ModelState:
         if not 0.0 < dt <= MAX_STEP_S:
-            raise FlightModelError(f"step of {dt} s: expected more than 0 and at most {MAX_STEP_S} s; fly longer times in pieces")
+            raise FlightModelError(
+                f"step of {dt} s: expected more than 0 and at most {MAX_STEP_S} s; fly longer times in pieces"
+            )
         self._surface_set.check(controls)
         self._fly(dt, controls)
         self._time += dt
@@ -329,7 +335,7 @@ class JsbsimModel:
         for (setter, factor), load in zip(self._load_setters, loads):
             setter(load * factor)
 
-    def _outside_air(self) -> Tuple[float, float]:
+    def _outside_air(self) -> tuple[float, float]:
         """Pressure [Pa] and temperature [K]."""
         return self._state_getters[35]() * PSF_PA, self._state_getters[36]() * RANKINE_K
 
@@ -353,7 +359,11 @@ class JsbsimModel:
         force = missing * self._state_getters[22]() * SLUG_KG
         roll, pitch = self._state_getters[4](), self._state_getters[5]()
         cosine = math.cos(pitch)
-        self._gravity_force = (-force * math.sin(pitch), force * math.sin(roll) * cosine, force * math.cos(roll) * cosine)
+        self._gravity_force = (
+            -force * math.sin(pitch),
+            force * math.sin(roll) * cosine,
+            force * math.cos(roll) * cosine,
+        )
 
     def _blow(self, dt: float) -> None:
         heading = self._state_getters[6]()
@@ -405,7 +415,11 @@ class JsbsimModel:
         s.true_airspeed_mps = tas * FOOT_M
         s.equivalent_airspeed_mps, s.calibrated_airspeed_mps = eas * KNOT_MPS, cas * KNOT_MPS
         s.dynamic_pressure_pa, s.air_density_kg_m3 = qbar * PSF_PA, rho * SLUG_FT3_KG_M3
-        s.pressure_pa, s.temperature_k, s.speed_of_sound_mps = pressure * PSF_PA, temperature * RANKINE_K, sound * FOOT_M
+        s.pressure_pa, s.temperature_k, s.speed_of_sound_mps = (
+            pressure * PSF_PA,
+            temperature * RANKINE_K,
+            sound * FOOT_M,
+        )
         s.pressure_altitude_m = pressure_altitude * FOOT_M
         s.cg_forward_m, s.cg_right_m, s.cg_down_m = -cg_x * INCH_M, cg_y * INCH_M, -cg_z * INCH_M
         s.drag_n, s.side_force_n, s.lift_n = wind_x * POUND_FORCE_N, wind_y * POUND_FORCE_N, wind_z * POUND_FORCE_N
@@ -421,7 +435,9 @@ class JsbsimModel:
             gear.on_ground = contact.wow() > 0.5
             gear.compression_m = contact.compression() * FOOT_M if gear.on_ground else 0.0
             rate = contact.compression_rate() * FOOT_M
-            gear.vertical_force_n = max(contact.spring * gear.compression_m + contact.damping * rate, 0.0) if gear.on_ground else 0.0
+            gear.vertical_force_n = (
+                max(contact.spring * gear.compression_m + contact.damping * rate, 0.0) if gear.on_ground else 0.0
+            )
             gear.steer_deg = contact.max_steer_deg * self._steer
             standing += gear.on_ground
         s.on_ground_any, s.on_ground_all = standing > 0, standing == len(self._gear)
@@ -435,14 +451,14 @@ class JsbsimModel:
 
     def place(
         self,
-        latitude_deg: Optional[float] = None,
-        longitude_deg: Optional[float] = None,
-        altitude_m: Optional[float] = None,
-        roll_rad: Optional[float] = None,
-        pitch_rad: Optional[float] = None,
-        heading_rad: Optional[float] = None,
-        v_ned_mps: Optional[Sequence[float]] = None,
-        pqr_rad_s: Optional[Sequence[float]] = None,
+        latitude_deg: float | None = None,
+        longitude_deg: float | None = None,
+        altitude_m: float | None = None,
+        roll_rad: float | None = None,
+        pitch_rad: float | None = None,
+        heading_rad: float | None = None,
+        v_ned_mps: Sequence[float] | None = None,
+        pqr_rad_s: Sequence[float] | None = None,
     ) -> ModelState:
         s = self.state
 
@@ -473,7 +489,9 @@ class JsbsimModel:
         if not all(math.isfinite(value) for value in values):
             raise FlightModelError(f"cannot place the aircraft at {values}: every number must be finite")
         if abs(latitude_deg) > 89.9:
-            raise FlightModelError(f"latitude {latitude_deg} deg: expected -89.9..89.9 (the local level has no north at a pole)")
+            raise FlightModelError(
+                f"latitude {latitude_deg} deg: expected -89.9..89.9 (the local level has no north at a pole)"
+            )
         fdm = self._fdm
         fdm["ic/terrain-elevation-ft"] = self._terrain_m / FOOT_M
         fdm["ic/lat-geod-deg"] = latitude_deg
@@ -553,7 +571,9 @@ class JsbsimModel:
         self._time, self._crashed = saved["time"], saved["crashed"]
         return self._read_state(self._trimmed)
 
-    def _put(self, position: Sequence[float], euler: Sequence[float], v_ned: Sequence[float], pqr: Sequence[float]) -> None:
+    def _put(
+        self, position: Sequence[float], euler: Sequence[float], v_ned: Sequence[float], pqr: Sequence[float]
+    ) -> None:
         """Sets the motion and lets the loads of surfaces and rotors as they are act on it from the first instant."""
         self._set_motion(*position, euler, v_ned, pqr)
         for setter, actuator in zip(self._surface_setters, self._surface_set.actuators):
@@ -579,7 +599,7 @@ class JsbsimModel:
         for setter, wind in zip(self._wind_setters, self._wind):
             setter(wind / FOOT_M)
 
-    def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
+    def set_turbulence(self, intensity_mps: float, seed: int | None = None) -> None:
         if not 0.0 <= intensity_mps <= 20.0:
             raise FlightModelError(f"turbulence of {intensity_mps} m/s: expected 0..20 (light 1, moderate 2, severe 4)")
         self._turbulence.start(intensity_mps, seed)
@@ -603,7 +623,7 @@ class JsbsimModel:
         self._terrain_m = elevation_m
         self._fdm["position/terrain-elevation-asl-ft"] = elevation_m / FOOT_M
 
-    def set_loading(self, fuel_kg: Optional[Sequence[float]] = None, payload_kg: Optional[float] = None) -> None:
+    def set_loading(self, fuel_kg: Sequence[float] | None = None, payload_kg: float | None = None) -> None:
         if fuel_kg is not None:
             capacity = self.fuel_capacity_kg
             if len(fuel_kg) != len(capacity) or not all(0.0 <= f <= c for f, c in zip(fuel_kg, capacity)):
@@ -622,7 +642,9 @@ class JsbsimModel:
         speed = 0.0 if initial.airspeed_mps is None else initial.airspeed_mps
         numbers = (initial.latitude_deg, initial.longitude_deg, initial.heading_deg, initial.altitude_m, speed)
         if not all(math.isfinite(number) for number in numbers) or abs(initial.latitude_deg) > 89.9:
-            raise FlightModelError(f"cannot start at {initial}: numbers must be finite, the latitude within -89.9..89.9 deg")
+            raise FlightModelError(
+                f"cannot start at {initial}: numbers must be finite, the latitude within -89.9..89.9 deg"
+            )
         if not initial.on_ground and initial.altitude_m < initial.terrain_elevation_m + 1.0:
             raise FlightModelError(
                 f"cannot start in the air at {initial.altitude_m} m: the ground is at {initial.terrain_elevation_m} m; "

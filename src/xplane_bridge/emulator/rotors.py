@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import List, Sequence
+from typing import Sequence
 
 #: Share of the disc's blade area that, at the speed of the 75 % section, has the thrust of the whole: int (r/R)^2 d(r/R) / 0.75^2.
 SECTION_AREA = (1.0 / 3.0) / 0.75**2
@@ -41,8 +41,21 @@ class Rotor:
     """State and loads of one rotor. ``axis``: thrust direction in FRD, (cos nacelle, 0, -sin nacelle)."""
 
     __slots__ = (
-        "spec", "omega", "blade_rad", "inflow", "thrust", "torque", "shaft_torque", "axis_x", "axis_z",
-        "force_x", "force_y", "force_z", "moment_x", "moment_y", "moment_z",
+        "axis_x",
+        "axis_z",
+        "blade_rad",
+        "force_x",
+        "force_y",
+        "force_z",
+        "inflow",
+        "moment_x",
+        "moment_y",
+        "moment_z",
+        "omega",
+        "shaft_torque",
+        "spec",
+        "thrust",
+        "torque",
     )  # fmt: skip
 
     def __init__(self, spec: RotorSpec, blade_deg: float) -> None:
@@ -114,13 +127,31 @@ class Rotor:
         self.moment_z += reaction * self.axis_z + q * hx
 
     def save(self) -> list:
-        return [self.omega, self.blade_rad, self.inflow, self.thrust, self.torque, self.shaft_torque, self.axis_x, self.axis_z]
+        return [
+            self.omega,
+            self.blade_rad,
+            self.inflow,
+            self.thrust,
+            self.torque,
+            self.shaft_torque,
+            self.axis_x,
+            self.axis_z,
+        ]
 
     def restore(self, saved: Sequence[float]) -> None:
-        (self.omega, self.blade_rad, self.inflow, self.thrust, self.torque, self.shaft_torque, self.axis_x, self.axis_z) = saved
+        (
+            self.omega,
+            self.blade_rad,
+            self.inflow,
+            self.thrust,
+            self.torque,
+            self.shaft_torque,
+            self.axis_x,
+            self.axis_z,
+        ) = saved
 
 
-def sum_loads(rotors: Sequence[Rotor]) -> List[float]:
+def sum_loads(rotors: Sequence[Rotor]) -> list[float]:
     """Forces [N] and moments about the reference point [N m] of all rotors, FRD."""
     total = [0.0] * 6
     for rotor in rotors:
@@ -149,7 +180,7 @@ class GovernorSpec:
 class Governor:
     """Proportional-integral governor without wind-up (the integral is the blade angle less the proportional part)."""
 
-    __slots__ = ("spec", "integral_deg")
+    __slots__ = ("integral_deg", "spec")
 
     def __init__(self, spec: GovernorSpec) -> None:
         self.spec = spec
@@ -181,7 +212,7 @@ class PistonSpec:
 class PistonEngine:
     """Shaft torque, fuel and instruments of one piston engine."""
 
-    __slots__ = ("spec", "running", "manifold_pa", "egt_k", "cht_k", "oil_k", "oil_pa", "fuel_flow", "power")
+    __slots__ = ("cht_k", "egt_k", "fuel_flow", "manifold_pa", "oil_k", "oil_pa", "power", "running", "spec")
 
     STANDARD_PA = 101325.0
 
@@ -193,7 +224,14 @@ class PistonEngine:
         self.oil_pa = self.fuel_flow = self.power = 0.0
 
     def torque(
-        self, dt: float, omega: float, throttle: float, mixture: float, pressure_pa: float, temperature_k: float, fuel: bool
+        self,
+        dt: float,
+        omega: float,
+        throttle: float,
+        mixture: float,
+        pressure_pa: float,
+        temperature_k: float,
+        fuel: bool,
     ) -> float:
         """Torque on the shaft [N m] (negative: friction), and the instruments ``dt`` later."""
         spec = self.spec
@@ -216,7 +254,9 @@ class PistonEngine:
             indicated = 1.235 * rated_torque * charge * max(richness, 0.0)
         torque = indicated + drag
         self.power = torque * omega
-        self.fuel_flow = indicated * omega * spec.fuel_kg_per_joule * (0.7 + 0.375 * min(mixture, 1.0)) if self.running else 0.0
+        self.fuel_flow = (
+            indicated * omega * spec.fuel_kg_per_joule * (0.7 + 0.375 * min(mixture, 1.0)) if self.running else 0.0
+        )
         load = max(self.power / spec.rated_power_w, 0.0)
         hot = 1.0 if self.running else 0.0
         self._lag("egt_k", temperature_k + hot * (560.0 + 340.0 * load + 80.0 * (0.8 - mixture)), dt, 3.0)
@@ -236,7 +276,16 @@ class PistonEngine:
         self.oil_k = temperature_k + 45.0 + 35.0 * load
 
     def save(self) -> list:
-        return [self.running, self.manifold_pa, self.egt_k, self.cht_k, self.oil_k, self.oil_pa, self.fuel_flow, self.power]
+        return [
+            self.running,
+            self.manifold_pa,
+            self.egt_k,
+            self.cht_k,
+            self.oil_k,
+            self.oil_pa,
+            self.fuel_flow,
+            self.power,
+        ]
 
     def restore(self, saved: Sequence) -> None:
         (

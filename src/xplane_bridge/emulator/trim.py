@@ -49,4 +49,6 @@ def newton(
         x, value = candidate, candidate_value
     if np.max(np.abs(value)) < 1e3 * tolerance:
         return x
-    raise FlightModelError(f"{what}: no steady flight found; choose another speed, height or weight (best left {value.round(5)})")
+    raise FlightModelError(
+        f"{what}: no steady flight found; choose another speed, height or weight (best left {value.round(5)})"
+    )

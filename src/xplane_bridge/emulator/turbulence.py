@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from typing import Tuple
 
 #: Air passes a hovering aircraft too: floor of the speed at which the gust field goes by [m/s].
 MINIMUM_SPEED_MPS = 5.0
@@ -21,7 +20,7 @@ class DrydenTurbulence:
         self._random = random.Random(seed)
         self._state = [0.0] * 5
 
-    def start(self, intensity_mps: float, seed: int = None) -> None:
+    def start(self, intensity_mps: float, seed: int | None = None) -> None:
         """Standard deviation of the vertical gust; 0 ends it. ``seed`` restarts the sequence."""
         self.intensity_mps = intensity_mps
         if seed is not None:
@@ -30,7 +29,7 @@ class DrydenTurbulence:
         if intensity_mps == 0.0:
             self._state = [0.0] * 5
 
-    def step(self, dt: float, speed_mps: float, agl_m: float) -> Tuple[float, float, float]:
+    def step(self, dt: float, speed_mps: float, agl_m: float) -> tuple[float, float, float]:
         """Next gusts [m/s]: along the horizontal path, to its right, down. Exact first-order discretisation at constant speed."""
         speed = max(speed_mps, MINIMUM_SPEED_MPS)
         height_ft = min(max(agl_m / 0.3048, 10.0), 1000.0)
