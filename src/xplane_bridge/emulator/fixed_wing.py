@@ -18,7 +18,7 @@ from xplane_bridge.emulator.flight_model import (
     Side,
     SurfaceKind,
 )
-from xplane_bridge.emulator.jsbsim_model import SLUG_FT3_KG_M3, JsbsimModel
+from xplane_bridge.emulator.jsbsim_model import FOOT_M, SLUG_FT3_KG_M3, JsbsimModel
 from xplane_bridge.emulator.rotors import Governor, GovernorSpec, PistonEngine, PistonSpec, Rotor, RotorSpec
 
 AILERON_UP_DEG, AILERON_DOWN_DEG = 25.0, 15.0
@@ -177,14 +177,16 @@ class FixedWing(JsbsimModel):
 
     # ---- starts
 
-    def _settle_engines(self, controls: Controls, speed: float, density: float, seconds: float) -> None:
-        """Runs the engines alone in a steady wind from ahead, until they are steady."""
+    def _settle_engines(self, controls: Controls, seconds: float) -> None:
+        """Runs the engines alone in the air as it passes now, until they are steady."""
+        u, v, w, p, q, r, density = [get() for get in self._air_getters]
+        air, rates, density = (u * FOOT_M, v * FOOT_M, w * FOOT_M), (p, q, r), density * SLUG_FT3_KG_M3
         pressure, temperature = self._outside_air()
         dt = 1.0 / 60.0
         for i, (engine, governor, rotor) in enumerate(zip(self._engines, self._governors, self._rotors)):
             for _ in range(int(seconds / dt)):
                 governor.step(dt, rotor, controls.propeller[i])
-                rotor.air_loads(dt, (speed, 0.0, 0.0), (0.0, 0.0, 0.0), density)
+                rotor.air_loads(dt, air, rates, density)
                 torque = engine.torque(
                     dt,
                     rotor.omega,
@@ -194,7 +196,7 @@ class FixedWing(JsbsimModel):
                     temperature,
                     self._fuel_kg[i] > 0.0,
                 )
-                rotor.turn(dt, torque, (0.0, 0.0, 0.0))
+                rotor.turn(dt, torque, rates)
             engine.warm_up(temperature, max(engine.power / ENGINE.rated_power_w, 0.0))
 
     def _start_in_air(self, initial: InitialState) -> Controls:
@@ -221,7 +223,7 @@ class FixedWing(JsbsimModel):
             turning = speed / (EARTH_RADIUS_M + initial.altitude_m)
             position = (initial.latitude_deg, initial.longitude_deg, initial.altitude_m)
             self._set_motion(*position, (roll, theta, heading), v_ned, (0.0, -turning, 0.0))
-            self._settle_engines(controls, speed, self._air_getters[6]() * SLUG_FT3_KG_M3, 2.0)
+            self._settle_engines(controls, 3.0)
             self._put(position, (roll, theta, heading), v_ned, (0.0, -turning, 0.0))
             s = self._read_state(controls)
             ahead = s.acceleration_north_mps2 * course[0] + s.acceleration_east_mps2 * course[1]

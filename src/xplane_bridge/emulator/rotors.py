@@ -174,7 +174,7 @@ class GovernorSpec:
     coarse_deg: float
     rate_deg_s: float = 12.0
     proportional: float = 0.06  #: deg per rad/s
-    integral: float = 0.05  #: deg/s per rad/s
+    integral: float = 0.08  #: deg/s per rad/s
 
 
 class Governor:
