@@ -1,0 +1,98 @@
+// The smallest node that uses everything BaseNode offers; it has nothing to do with X-Plane's state, which shows that
+// the base class is reusable. Driven by test_base_node.py.
+
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include <std_msgs/Float64.h>
+#include <std_msgs/String.h>
+
+#include "xplane_bridge/GetDataref.h"
+#include "xplane_bridge/base_node.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+class TinyNode : public BaseNode {
+ protected:
+  bool usesLink() const override { return false; }
+
+  void loadParameters(const ParamLoader& own) override {
+    gain_ = own.number("gain", {0.0, 10.0}, 1.0);
+    mode_ = own.choice("mode", {"calm", "fail_at_start", "hang_in_undo", "fail_later"}, "calm");
+    trace_.open(own.text("trace_file"));
+    const ParamLoader limits = own.section("limits");
+    limit_ = limits.number("upper", {}, 100.0);
+  }
+
+  void advertise() override {
+    pong_ = advertiseTopic<std_msgs::Float64>("pong", 1);
+    last_word_ = advertiseTopic<std_msgs::String>("last_word", 1, true);
+    addDiagnostics("tiny", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::OK, "alive");
+      status.add("Gain (-)", gain_);
+    });
+    advertiseService<GetDataref::Request, GetDataref::Response>(
+        "slow_echo", [](const GetDataref::Request& request, GetDataref::Response& response) {
+          std::this_thread::sleep_for(std::chrono::duration<double>(request.timeout));
+          response.success = true;
+          response.result.message = request.name;
+        });
+  }
+
+  void subscribe() override {
+    subscribeTopic<std_msgs::Float64>("ping", 1, [this](const std_msgs::Float64ConstPtr& ping) {
+      std_msgs::Float64 pong;
+      pong.data = std::min(gain_ * ping->data, limit_);
+      pong_.publish(pong);
+      if (mode_ == "fail_later") {
+        requestStop("the test wanted it", ExitCode::kRuntimeError);
+      }
+    });
+  }
+
+  void start() override {
+    if (mode_ == "fail_at_start") {
+      throw std::runtime_error("port 49003 is in use");
+    }
+    say("running");
+    trace("start");
+  }
+
+  void stopInputs() override { trace("stop_inputs"); }
+
+  void undo(Deadline) override {
+    trace(ros::ok() ? "undo" : "undo_after_ros");
+    if (mode_ == "hang_in_undo") {
+      std::this_thread::sleep_for(std::chrono::hours(1));
+    }
+  }
+
+  void publishFinalState() override {
+    say("undone");
+    trace("final_state");
+  }
+
+  void joinThreads() override { trace(ros::ok() ? "join_before_ros" : "join"); }
+
+ private:
+  void say(const std::string& word) {
+    std_msgs::String message;
+    message.data = word;
+    last_word_.publish(message);
+  }
+  void trace(const std::string& step) { trace_ << step << std::endl; }
+
+  double gain_ = 1.0;
+  double limit_ = 0.0;
+  std::string mode_;
+  std::ofstream trace_;
+  ros::Publisher pong_;
+  ros::Publisher last_word_;
+};
+
+}  // namespace
+}  // namespace xplane_bridge
+
+int main(int argc, char** argv) { return xplane_bridge::runNode<xplane_bridge::TinyNode>(argc, argv, "tiny_node"); }
