@@ -6,10 +6,12 @@ import os
 import sys
 from pathlib import Path
 
+from xplane_bridge.errors import XplaneBridgeError
+
 _PACKAGE = Path(__file__).resolve().parent
 
 
-class ResourceError(FileNotFoundError):
+class ResourceError(XplaneBridgeError):
     """A file that belongs to the package is not there; the text says where it was looked for."""
 
 

@@ -12,6 +12,8 @@ import time
 from pathlib import Path
 from typing import Callable, Mapping, Sequence, TypeVar
 
+from xplane_bridge.errors import XplaneBridgeError
+
 _POLL_S = 0.02
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None, use_errno=True)
@@ -19,7 +21,7 @@ _LIBC = ctypes.CDLL(None, use_errno=True)
 T = TypeVar("T")
 
 
-class HarnessError(Exception):
+class HarnessError(XplaneBridgeError):
     """Something that was started did not do its part; the text says what, and shows the end of its log."""
 
 

@@ -1,0 +1,130 @@
+"""demo: a scripted flight from X-Plane's stand-in through the bridge into a bag, and a table of what came in."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import List, Optional, Sequence
+
+from tqdm import tqdm
+
+from xplane_bridge.cli.entry import guarded
+from xplane_bridge.harness import flight_check
+from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
+from xplane_bridge.resources import config_file
+
+_FPS = 60
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(
+        prog="demo",
+        description=(
+            "Flies a scripted flight with the emulator (no X-Plane needed), records it through the bridge into "
+            "DIR/flight.bag and checks the recording. Exit code 0: all of it worked."
+        ),
+    )
+    p.add_argument(
+        "--duration", type=_duration, default=60.0, metavar="S", help="length of the recording [s] (%(default)g)"
+    )
+    p.add_argument("--output", type=Path, default=Path("out"), metavar="DIR", help="where to write (%(default)s)")
+    p.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help="aircraft to fly (%(default)s)")
+    p.add_argument("--transport", choices=("rref", "data"), default="rref", help="how to ask X-Plane (%(default)s)")
+    p.add_argument("--fps", type=int, default=_FPS, metavar="N", help="the emulator's frame rate [1/s] (%(default)s)")
+    p.add_argument("--headless", action="store_true", help="open no window")
+    p.add_argument(
+        "launch_args", nargs="*", metavar="KEY:=VALUE", help="passed on to demo.launch, e.g. transport:=data"
+    )
+    return p
+
+
+def _duration(text: str) -> float:
+    value = float(text)
+    if not 5.0 <= value < float("inf"):
+        msg = f"{text} s: a flight takes at least 5 s"
+        raise argparse.ArgumentTypeError(msg)
+    return value
+
+
+def _plan(args: argparse.Namespace) -> FlightPlan:
+    launch_args = {}
+    for text in args.launch_args:
+        key, separator, value = text.partition(":=")
+        if not separator or not key:
+            parser().error(f"{text!r} is neither an option nor KEY:=VALUE for demo.launch")
+        launch_args[key] = value
+    transport = launch_args.pop("transport", args.transport)
+    options: List[str] = ["--fps", str(args.fps), "--pilot", str(config_file("scenarios", "demo.yaml"))]
+    return FlightPlan(args.output, args.duration, args.aircraft, transport, options, launch_args)
+
+
+class _Progress:
+    """A progress bar with the newest state beside it; a line now and then where there is no terminal."""
+
+    _EVERY_S = 5.0
+
+    def __init__(self, duration: float) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._next_line = 0.0
+        form = "{desc}|{bar}| {n:.0f}/{total:.0f} s {postfix}"
+        self._bar = tqdm(total=duration, desc="flying", bar_format=form, disable=not self._terminal, leave=True)
+
+    def __call__(self, flight: RunningFlight) -> None:
+        self._bar.n = min(flight.elapsed, self._bar.total)
+        self._bar.set_postfix_str(self._text(flight), refresh=True)
+        if not self._terminal and flight.elapsed >= self._next_line:
+            self._next_line += self._EVERY_S
+            print(f"demo: {flight.elapsed:3.0f}/{self._bar.total:.0f} s  {self._text(flight)}", file=sys.stderr)
+
+    @staticmethod
+    def _text(flight: RunningFlight) -> str:
+        state = flight.last
+        return (
+            f"{flight.states} states, {state.altitude_msl:.0f} m, {state.true_airspeed:.0f} m/s, "
+            f"roll {state.roll_deg:+.0f} deg, heading {state.heading_true_deg:03.0f} deg"
+        )
+
+    def close(self) -> None:
+        self._bar.close()
+
+
+def _interrupt(_number: int, _frame: Optional[FrameType]) -> None:
+    """Ends the flight in good order, once: what comes while it ends does not cut that short."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    print("\ndemo: ending", file=sys.stderr)
+    raise KeyboardInterrupt
+
+
+@guarded
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Runs the program."""
+    plan = _plan(parser().parse_args(argv))
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _interrupt)
+    progress = _Progress(plan.duration)
+    try:
+        fly(plan, progress, lambda text: progress_line(text))
+    finally:
+        progress.close()
+    print(flight_check.render(flight_check.summarise(plan.bag)))
+    print()
+    verdicts = flight_check.judge(plan.bag, plan.truth)
+    for verdict in verdicts:
+        print(f"{'ok    ' if verdict.passed else 'FAILED'}  {verdict.name:10} {verdict.text}")
+    failed = [verdict.name for verdict in verdicts if not verdict.passed]
+    print()
+    if failed:
+        print(f"demo: failed: {', '.join(failed)}; logs: {plan.logs}", file=sys.stderr)
+        return 1
+    print(f"demo: all well; the recording is {plan.bag}")
+    return 0
+
+
+def progress_line(text: str) -> None:
+    """Says what happens, without tearing the progress bar."""
+    tqdm.write(f"demo: {text}", file=sys.stderr)

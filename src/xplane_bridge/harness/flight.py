@@ -1,0 +1,175 @@
+"""One recorded flight: X-Plane's stand-in, a ROS master, the bridge and a bag, from start to orderly end."""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Callable, Dict, List
+
+from xplane_bridge.harness.emulator import EmulatorProcess
+from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
+from xplane_bridge.harness.ros import RosMaster, roslaunch
+
+#: Namespace that the launch files put the bridge's topics in.
+NAMESPACE = "/xplane"
+
+_READY_TIMEOUT_S = 60.0
+_SILENCE_S = 10.0  # without a flight state for this long, a flight has failed
+
+
+@dataclass
+class FlightPlan:
+    """What is to be flown and recorded, and how."""
+
+    output: Path  #: folder of everything that is written
+    duration: float  #: [s] of flight to record
+    aircraft: str = "fixed_wing"
+    transport: str = "rref"
+    emulator_options: List[str] = field(default_factory=list)
+    launch_args: Dict[str, Any] = field(default_factory=dict)
+    #: Silences that belong to the plan, e.g. a restart of the emulator, are not failures.
+    silence_allowed: float = _SILENCE_S  #: [s]
+
+    @property
+    def bag(self) -> Path:
+        """The recording."""
+        return self.output / "flight.bag"
+
+    @property
+    def truth(self) -> Path:
+        """What the emulator really flew, frame by frame."""
+        return self.output / "truth.csv"
+
+    @property
+    def logs(self) -> Path:
+        """Folder of the logs of all programs."""
+        return self.output / "logs"
+
+
+@dataclass
+class RunningFlight:
+    """What a flight's observer may look at, and shake."""
+
+    emulator: EmulatorProcess
+    master: RosMaster
+    bridge: ManagedProcess
+    elapsed: float = 0.0  #: [s] of flight recorded so far
+    states: int = 0  #: flight states received so far
+    last: Any = None  #: the newest xplane_bridge/FlightState
+
+
+Observer = Callable[[RunningFlight], None]
+
+
+def _ignore(_: object) -> None:
+    """Does nothing with what it is told."""
+
+
+def fly(plan: FlightPlan, observer: Observer = _ignore, say: Callable[[str], None] = _ignore) -> None:
+    """Flies `plan`; afterwards its bag and its truth file are complete and nothing that was started still runs.
+
+    Args:
+        plan: the flight.
+        observer: called about ten times a second while it is recorded; may stop and restart the emulator.
+        say: called with a line on what happens.
+
+    Raises:
+        HarnessError: A program failed, or flight states stopped coming.
+    """
+    plan.logs.mkdir(parents=True, exist_ok=True)
+    for old in (plan.bag, plan.bag.with_suffix(".bag.active"), plan.truth):
+        old.unlink() if old.exists() else None
+    with ExitStack() as stack:
+        say("starting the emulator")
+        options = ["--aircraft", plan.aircraft, "--truth", str(plan.truth.resolve()), *plan.emulator_options]
+        emulator = EmulatorProcess(plan.logs, options)
+        stack.enter_context(emulator)
+        say(f"starting ROS and the bridge (X-Plane's port: {emulator.port})")
+        master = RosMaster(plan.logs)
+        stack.enter_context(master)
+        bridge = roslaunch(
+            master,
+            plan.logs,
+            "demo.launch",
+            name="bridge",
+            host="127.0.0.1",
+            port=emulator.port,
+            transport=plan.transport,
+            aircraft=plan.aircraft,
+            bag=plan.bag.resolve(),
+            **plan.launch_args,
+        )
+        stack.enter_context(bridge)
+        flight = RunningFlight(emulator, master, bridge)
+        stack.enter_context(_StateListener(flight))
+        _wait_for_state(flight)
+        say(f"flying; to watch, in a second shell: export ROS_MASTER_URI={master.uri}")
+        _record(plan, flight, observer)
+        say("ending the recording")
+        bridge.stop()
+        if bridge.returncode != 0:
+            raise HarnessError(bridge.describe(f"ended with status {bridge.returncode}"))
+    if not plan.bag.is_file():
+        msg = f"{plan.bag} was not written; logs: {plan.logs}"
+        raise HarnessError(msg)
+
+
+def _wait_for_state(flight: RunningFlight) -> None:
+    def state_or_failure() -> bool:
+        flight.emulator.check_running()
+        flight.bridge.check_running()
+        return flight.states > 0
+
+    try:
+        wait_until(state_or_failure, _READY_TIMEOUT_S, f"message on {NAMESPACE}/flight_state")
+    except HarnessError as err:
+        raise HarnessError(flight.bridge.describe(str(err))) from None
+
+
+def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None:
+    began = last_new = time.monotonic()
+    seen = 0
+    while flight.elapsed < plan.duration:
+        flight.bridge.check_running()
+        now = time.monotonic()
+        flight.elapsed = now - began
+        if flight.states != seen:
+            seen, last_new = flight.states, now
+        elif now - last_new > plan.silence_allowed:
+            raise HarnessError(
+                flight.emulator.describe(f"or the bridge is silent: no flight state for {now - last_new:.0f} s")
+            )
+        observer(flight)
+        time.sleep(0.1)
+
+
+class _StateListener:
+    """Counts flight states. rospy is imported and used only here, in the program's one ROS node."""
+
+    def __init__(self, flight: RunningFlight) -> None:
+        self._flight = flight
+        self._subscriber: Any = None
+
+    def __enter__(self) -> _StateListener:
+        self._flight.master.use_here()
+        import rospy
+
+        from xplane_bridge.msg import FlightState
+
+        if not rospy.core.is_initialized():
+            rospy.init_node("xplane_bridge_observer", anonymous=True, disable_signals=True, disable_rosout=True)
+        self._subscriber = rospy.Subscriber(f"{NAMESPACE}/flight_state", FlightState, self._received, tcp_nodelay=True)
+        return self
+
+    def _received(self, state: Any) -> None:
+        self._flight.last = state
+        self._flight.states += 1
+
+    def __exit__(self, *_: object) -> None:
+        # Unregistering asks the master, which may be gone by now; that must not hold up the end.
+        done = threading.Thread(target=self._subscriber.unregister, daemon=True)
+        done.start()
+        done.join(2.0)
