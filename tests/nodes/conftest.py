@@ -1,0 +1,197 @@
+"""What node tests share: a ROS master of their own, real nodes under it, and an eye on topics."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from pathlib import Path
+from typing import Any, Callable, Iterator
+
+import pytest
+
+from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
+
+_ANSWER_S = 15.0  # a machine busy with other work is slow, a node that hangs is silent for ever
+_numbers = itertools.count(1)
+
+
+@pytest.fixture(scope="session")
+def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RosMaster]:
+    """A ROS master for the whole run; this process is a node under it."""
+    with RosMaster(tmp_path_factory.mktemp("master")) as running:
+        running.use_here()
+        import rospy
+
+        rospy.init_node("tests", anonymous=True, disable_signals=True)
+        yield running
+        rospy.signal_shutdown("tests are over")
+
+
+class TopicLog:
+    """Keeps what a topic brought."""
+
+    def __init__(self, topic: str, message_type: type, queue_size: int = 1000) -> None:
+        import rospy
+
+        self.topic = topic
+        self.messages: list[Any] = []
+        self._subscriber = rospy.Subscriber(
+            topic, message_type, self.messages.append, queue_size=queue_size, tcp_nodelay=True
+        )
+
+    @property
+    def last(self) -> Any:
+        """The newest message; None before the first."""
+        return self.messages[-1] if self.messages else None
+
+    def wait_for(
+        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S, what: str = ""
+    ) -> Any:
+        """Waits for a message, from the first one on, that fulfils `condition`, and returns it."""
+        return self._find(0, condition, timeout, what)
+
+    def wait_for_next(
+        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S, what: str = ""
+    ) -> Any:
+        """The same, among the messages that come from now on."""
+        return self._find(len(self.messages), condition, timeout, what)
+
+    def wait_for_count(self, count: int, timeout: float = _ANSWER_S) -> list[Any]:
+        """Waits until `count` more messages have come, and returns those."""
+        first = len(self.messages)
+        wait_until(lambda: len(self.messages) >= first + count, timeout, f"{count} messages on {self.topic}")
+        return self.messages[first : first + count]
+
+    def _find(self, first: int, condition: Callable[[Any], bool], timeout: float, what: str) -> Any:
+        position = itertools.count(first)
+        index = next(position)
+        found: list[Any] = []
+
+        def look() -> bool:
+            nonlocal index
+            while index < len(self.messages):
+                message = self.messages[index]
+                index = next(position)
+                if condition(message):
+                    found.append(message)
+                    return True
+            return False
+
+        wait_until(look, timeout, f"{what or 'fitting message'} on {self.topic}")
+        return found[0]
+
+    def close(self) -> None:
+        """Ends the subscription."""
+        self._subscriber.unregister()
+
+
+class World:
+    """One test's namespace under the master, with the nodes and the emulators started in it.
+
+    Args:
+        master: the running master.
+        folder: of logs and files of this test.
+    """
+
+    def __init__(self, master: RosMaster, folder: Path) -> None:
+        self.master = master
+        self.folder = folder
+        self.namespace = f"/test{next(_numbers)}"
+        self._processes: list[ManagedProcess] = []
+        self._logs: list[TopicLog] = []
+
+    @property
+    def env(self) -> dict[str, str]:
+        """The environment of nodes: their journal is this test's own."""
+        return {**self.master.env, "ROS_HOME": str(self.folder / "ros_home")}
+
+    def set_param(self, key: str, value: object) -> None:
+        """Sets a parameter below this test's namespace."""
+        import rospy
+
+        rospy.set_param(f"{self.namespace}/{key}", value)
+
+    def program(self, name: str) -> Path:
+        """One of the package's compiled programs."""
+        for prefix in self.env.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
+            path = Path(prefix) / "lib" / "xplane_bridge" / name
+            if path.is_file():
+                return path
+        pytest.fail(f"{name} is not built; scripts/test builds it")
+
+    def start(self, program: str, params: dict[str, object] | None = None, log: str = "") -> ManagedProcess:
+        """Starts a node with these private parameters; its name is the program's. Does not wait for it."""
+        for key, value in (params or {}).items():
+            self.set_param(f"{program}/{key}", value)
+        process = ManagedProcess(
+            log or f"{program}_{next(_numbers)}",
+            [self.program(program), f"__ns:={self.namespace}"],
+            self.folder,
+            env=self.env,
+        )
+        process.start()
+        self._processes.append(process)
+        return process
+
+    def emulator(self, *options: str | Path | int | float, port: int = 0) -> EmulatorProcess:
+        """Starts X-Plane's stand-in and makes it the X-Plane of this namespace's nodes (`host` and `port`)."""
+        process = EmulatorProcess(
+            self.folder, [str(option) for option in options], name=f"xplane_emulator_{next(_numbers)}", port=port
+        )
+        process.start()
+        self._processes.append(process)
+        self.point_to(process.port)
+        return process
+
+    def point_to(self, port: int) -> None:
+        """Lets this namespace's nodes look for X-Plane on a port of this machine."""
+        self.set_param("host", "127.0.0.1")
+        self.set_param("port", port)
+        self.set_param("listen_for_beacon", False)
+
+    def watch(self, topic: str, message_type: type) -> TopicLog:
+        """Keeps what comes on a topic of this namespace; a name with a leading slash is taken as it is."""
+        log = TopicLog(topic if topic.startswith("/") else f"{self.namespace}/{topic}", message_type)
+        self._logs.append(log)
+        return log
+
+    def wait_for_diagnostics(
+        self, name: str, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S
+    ) -> Any:
+        """Waits for a status of one of this namespace's nodes whose name ends in `name`; returns it."""
+        from diagnostic_msgs.msg import DiagnosticArray
+
+        log = self.watch("/diagnostics", DiagnosticArray)
+        prefix = self.namespace.lstrip("/") + "/"
+        found: list[Any] = []
+
+        def fits(array: Any) -> bool:
+            for status in array.status:
+                ours = status.name.lstrip("/").startswith(prefix)
+                if ours and status.name.endswith(name) and condition(status):
+                    found.append(status)
+            return bool(found)
+
+        log.wait_for(fits, timeout, f"status {name!r}")
+        log.close()
+        return found[0]
+
+    @staticmethod
+    def values_of(status: Any) -> dict[str, str]:
+        """The key-value pairs of a diagnostic status."""
+        return {pair.key: pair.value for pair in status.values}
+
+    def close(self) -> None:
+        """Ends everything, last started first."""
+        for log in self._logs:
+            log.close()
+        for process in reversed(self._processes):
+            process.stop()
+
+
+@pytest.fixture
+def world(master: RosMaster, tmp_path: Path) -> Iterator[World]:
+    """A namespace, a folder and processes of this test's own."""
+    own = World(master, tmp_path)
+    yield own
+    own.close()

@@ -1,0 +1,195 @@
+"""BaseNode, by the tiny node of tiny_node.cpp: parameters, callbacks, services, diagnostics, and above all its end."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import xmlrpc.client
+
+import pytest
+
+from xplane_bridge.harness import ManagedProcess, RosMaster, wait_until
+from xplane_bridge.harness.ros import free_tcp_port
+
+STOP_ORDER = ["start", "stop_inputs", "undo", "final_state", "join"]
+
+
+@pytest.fixture
+def tiny(world):
+    """Starts the tiny node with further parameters and waits until it runs."""
+
+    def start(wait=True, **params):
+        from std_msgs.msg import String
+
+        world.trace = world.folder / "trace"
+        node = world.start("tiny_node", {"trace_file": str(world.trace), **params})
+        if wait:
+            world.last_word = world.watch("last_word", String)
+            world.last_word.wait_for(lambda word: word.data == "running")
+        return node
+
+    return start
+
+
+def trace(world):
+    """The steps the node went through."""
+    return world.trace.read_text(encoding="utf-8").split()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_signal_ends_it_in_order(world, tiny, number):
+    node = tiny()
+    node.send_signal(number)
+    assert node.wait(10) == 0
+    assert trace(world) == STOP_ORDER
+    assert world.last_word.wait_for(lambda word: word.data == "undone")
+    assert f"stopping: {number.name}" in node.output()
+
+
+def test_master_shutdown_request_ends_it_in_order(world, tiny):
+    """What `rosnode kill` does, and the master itself when a node of the same name registers."""
+    node = tiny()
+    with xmlrpc.client.ServerProxy(world.master.uri) as master:
+        uri = master.lookupNode("/tests", f"{world.namespace}/tiny_node")[2]
+    with xmlrpc.client.ServerProxy(uri) as slave:
+        assert slave.shutdown("/tests", "user request")[0] == 1
+    assert node.wait(10) == 0
+    assert trace(world) == STOP_ORDER
+    assert "shutdown request: user request" in node.output()
+
+
+def test_second_node_of_the_same_name_replaces_the_first_in_order(world, tiny):
+    first = tiny()
+    world.trace.rename(world.folder / "first")
+    second = tiny()
+    assert first.wait(10) == 0
+    assert (world.folder / "first").read_text(encoding="utf-8").split() == STOP_ORDER
+    assert second.running
+
+
+def test_ending_needs_no_master(world, tmp_path):
+    with RosMaster(tmp_path / "other") as other:
+        node = ManagedProcess(
+            "tiny", [world.program("tiny_node"), f"_trace_file:={tmp_path / 'trace'}"], tmp_path, env=other.env
+        )
+        node.start()
+        other_trace = tmp_path / "trace"
+        wait_until(lambda: other_trace.exists() and "start" in other_trace.read_text(), 15, "start of the node")
+    node.send_signal(signal.SIGINT)
+    assert node.wait(10) == 0
+    assert other_trace.read_text(encoding="utf-8").split() == STOP_ORDER
+
+
+def test_ctrl_c_while_waiting_for_a_master(world, tmp_path):
+    env = {**world.env, "ROS_MASTER_URI": f"http://127.0.0.1:{free_tcp_port()}"}
+    with ManagedProcess("tiny", [world.program("tiny_node")], tmp_path, env=env) as node:
+        node.wait_for_line("no ROS master at .* waiting", 10)
+        node.send_signal(signal.SIGINT)
+        assert node.wait(5) == 0
+
+
+def test_hanging_end_is_cut_off_and_named(tiny):
+    node = tiny(mode="hang_in_undo")
+    node.send_signal(signal.SIGTERM)
+    assert node.wait(15) == 3
+    assert "hangs in: undo in X-Plane" in node.output()
+
+
+def test_failing_start_ends_it_in_order_with_its_own_status(world, tiny):
+    node = tiny(wait=False, mode="fail_at_start")
+    assert node.wait(10) == 1
+    assert "port 49003 is in use" in node.output()
+    assert trace(world) == STOP_ORDER[1:]
+
+
+def test_failure_later_has_its_own_status(world, tiny):
+    import rospy
+    from std_msgs.msg import Float64
+
+    node = tiny(mode="fail_later")
+    rospy.Publisher(f"{world.namespace}/ping", Float64, queue_size=1, latch=True).publish(1.0)
+    assert node.wait(10) == 2
+    assert "the test wanted it" in node.output()
+    assert trace(world) == STOP_ORDER
+
+
+@pytest.mark.parametrize(
+    ("params", "parts"),
+    [
+        ({"gian": 2.0}, ["/tiny_node/gian", "did you mean gain?"]),
+        ({"gain": 11}, ["/tiny_node/gain is 11", "from 0 to 10"]),
+        ({"gain": "much"}, ['gain is "much"', "a number from 0 to 10"]),
+        ({"mode": "wild"}, ['mode is "wild"', "one of: calm"]),
+        ({"limits": {"uper": 1}}, ["/tiny_node/limits/uper", "did you mean upper?"]),
+        ({"trace_file": 3}, ["trace_file is 3", "a text"]),
+    ],
+)
+def test_wrong_parameters_are_refused_in_words(tiny, params, parts):
+    node = tiny(wait=False, **params)
+    assert node.wait(10) == 1
+    for part in parts:
+        assert part in node.output()
+
+
+def test_wrong_shared_parameter_is_refused(world, tiny):
+    world.set_param("hots", "192.168.1.2")
+    node = tiny(wait=False)
+    assert node.wait(10) == 1
+    assert f"{world.namespace}/hots (did you mean host?)" in node.output()
+
+
+def test_missing_required_parameter_is_named(world):
+    node = world.start("tiny_node")
+    assert node.wait(10) == 1
+    assert f"{world.namespace}/tiny_node/trace_file is required" in node.output()
+
+
+def test_integer_does_for_a_double_and_callbacks_run(world, tiny):
+    import rospy
+    from std_msgs.msg import Float64
+
+    tiny(gain=3)
+    pong = world.watch("pong", Float64)
+    ping = rospy.Publisher(f"{world.namespace}/ping", Float64, queue_size=1, latch=True)
+    ping.publish(2.0)
+    assert pong.wait_for().data == 6.0
+
+
+def test_diagnostics_tick_at_one_hertz(world, tiny):
+    tiny(gain=3)
+    status = world.wait_for_diagnostics("tiny")
+    assert status.message == "alive"
+    assert float(world.values_of(status)["Gain (-)"]) == 3.0
+    world.wait_for_diagnostics("tiny")
+
+
+def test_waiting_service_does_not_delay_callbacks_nor_the_end(world, tiny):
+    import rospy
+    from std_msgs.msg import Float64
+    from xplane_bridge.srv import GetDataref
+
+    node = tiny()
+    rospy.wait_for_service(f"{world.namespace}/slow_echo", 10)
+    call = rospy.ServiceProxy(f"{world.namespace}/slow_echo", GetDataref)
+    answers = []
+
+    def wait_long():
+        try:
+            answers.append(call("x", 3.0))
+        except rospy.ServiceException as err:
+            answers.append(err)
+
+    waiting = threading.Thread(target=wait_long)
+    waiting.start()
+    pong = world.watch("pong", Float64)
+    ping = rospy.Publisher(f"{world.namespace}/ping", Float64, queue_size=1, latch=True)
+    ping.publish(2.0)
+    pong.wait_for()
+    assert not answers, "the callback ran only after the service"
+    begin = time.monotonic()
+    node.send_signal(signal.SIGINT)
+    assert node.wait(10) == 0
+    assert trace(world) == STOP_ORDER
+    waiting.join(10)
+    assert time.monotonic() - begin < 5.0
