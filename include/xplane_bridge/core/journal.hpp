@@ -52,6 +52,7 @@ struct JournalOwner {
   std::int64_t pid = 0;
   std::int64_t start_ticks = 0;  ///< start time of the process, /proc/<pid>/stat field 22
   std::string boot_id;           ///< /proc/sys/kernel/random/boot_id
+  std::string computer;          ///< host name
 
   friend bool operator==(const JournalOwner& a, const JournalOwner& b) {
     return a.pid == b.pid && a.start_ticks == b.start_ticks && a.boot_id == b.boot_id;
@@ -61,7 +62,8 @@ struct JournalOwner {
 
 /// This process, under the name `node`.
 JournalOwner thisProcess(const std::string& node);
-/// Whether the process that wrote the entry still runs on this computer.
+/// Whether the process that wrote the entry still runs. A process of another computer (other host name and boot id; the
+/// file may lie on a shared disk) is taken to run: its changes are not ours to undo.
 bool isAlive(const JournalOwner& owner);
 
 /// One thing that was changed.
@@ -96,7 +98,8 @@ class Journal {
   std::vector<JournalEntry> own() const;
 
   /// Adds an entry in the name of this process, or replaces the one with the same id. Returns once it is on disk: only
-  /// then may X-Plane be changed. Refuses to replace an entry of another process that still runs.
+  /// then may X-Plane be changed. Refuses to replace an entry of another process that still runs; the entry of one that
+  /// is gone is replaced, so look at orphans() first.
   void record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo);
   /// Removes entries by id; unknown ids are no error. The file goes with its last entry.
   void remove(const std::vector<std::string>& ids);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <stdexcept>
@@ -61,7 +62,7 @@ struct UdpCounters {
   std::uint64_t dropped = 0;    ///< datagrams the kernel dropped because nobody read them (SO_RXQ_OVFL)
   std::uint64_t sent = 0;
   std::uint64_t sent_bytes = 0;
-  std::uint64_t send_failures = 0;  ///< sendto refused; the reason is in SendResult
+  std::uint64_t send_failures = 0;  ///< datagrams the kernel refused to send
   std::uint64_t refused = 0;        ///< ICMP "port unreachable": the computer is there, nothing listens on the port
 };
 
@@ -93,8 +94,9 @@ class UdpSocket {
   int receiveBuffer() const { return receive_buffer_; }
 
   /// Joins a multicast group (host byte order) on every interface that is up, loopback included. May be called again to
-  /// catch new interfaces. Returns the interfaces joined so far.
-  const std::vector<std::string>& joinOnAllInterfaces(std::uint32_t group);
+  /// catch new interfaces. Returns the names of the interfaces joined so far; none is no error. Throws SocketError when
+  /// the interfaces cannot be listed.
+  std::vector<std::string> joinOnAllInterfaces(std::uint32_t group);
 
   /// Sends one datagram. False, with `error_number` set if given, when the kernel refused it.
   bool sendTo(ByteView bytes, const Endpoint& to, int* error_number = nullptr);
@@ -115,9 +117,12 @@ class UdpSocket {
   std::uint16_t local_port_ = 0;
   int receive_buffer_ = 0;
   std::uint32_t last_drop_count_ = 0;
-  UdpCounters counters_;
-  std::vector<std::string> joined_interfaces_;
-  std::vector<unsigned> joined_indices_;
+  UdpCounters received_;  // its receiving half; the other half is counted by any thread:
+  std::atomic<std::uint64_t> sent_{0};
+  std::atomic<std::uint64_t> sent_bytes_{0};
+  std::atomic<std::uint64_t> send_failures_{0};
+  std::atomic<std::uint64_t> refused_{0};
+  std::vector<std::string> joined_;
 };
 
 }  // namespace xplane_bridge::core
