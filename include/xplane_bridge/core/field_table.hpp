@@ -61,6 +61,7 @@ struct DatarefSource {
   const char* path11 = nullptr;  ///< null: no dataref
   const char* path12 = nullptr;  ///< null: as path11
   Conversion conversion{};
+  Conversion conversion12{};  ///< of path12
 };
 
 /// Slots of a DATA row: element i is in slot + i * stride.
@@ -71,8 +72,9 @@ struct RowSource {
   int slot12 = 0;
   Conversion conversion11{};
   Conversion conversion12{};
-  int count = 0;              ///< elements carried
-  int stride = 1;             ///< 0: one slot for all elements
+  int count = 0;  ///< elements carried
+  int stride = 1;
+  bool bitfield = false;      ///< one slot for all elements: element i is bit i of the number in it
   bool may_be_blank = false;  ///< -999 in this slot means unused (it is a value in all others)
 };
 
@@ -81,16 +83,18 @@ using FieldStore = void (*)(void* target, int element, double value);
 
 /// One line of the table.
 struct FieldSpec {
-  FieldGroup group;
-  const char* field;    ///< name in the message, or of the input that fields are computed from
-  int count;            ///< elements
-  const char* unit;     ///< SI unit of the stored value
-  std::uint32_t valid;  ///< bit(s) of the message's `valid` it counts for; 0: none by itself
-  FieldStore store;     ///< null: computed (derivation says how)
-  DatarefSource dataref;
-  RowSource row;
-  const char* derivation;  ///< how it is computed, or what an input is for; "" for plain fields
-  const char* remark;      ///< source notes; [?] marks what only a live simulator can settle
+  FieldGroup group = FieldGroup::kFlight;
+  const char* field = "";      ///< name in the message, or of the input that fields are computed from
+  int count = 1;               ///< elements
+  const char* unit = "";       ///< of the stored value
+  std::uint32_t valid = 0;     ///< bit of the message's `valid` it counts for; 0: none by itself
+  FieldStore store = nullptr;  ///< null: computed (derivation says how)
+  DatarefSource dataref{};
+  RowSource row{};
+  const char* derivation = "";   ///< how it is computed, or what an input is for; "" for plain fields
+  const char* remark = "";       ///< on the sources; [?] marks what only a live simulator can settle
+  bool per_engine = false;       ///< elements at or beyond the engine count are not known
+  bool is_engine_count = false;  ///< is that count; comes before the fields it bounds
 };
 
 /// All lines, in the messages' order.

@@ -101,15 +101,18 @@ class FlightStateAssembler {
     bool known = false;
   };
 
-  const FlightState* assemble(std::int64_t receive_ns);
-  PositionFix choosePosition(const FlightInputs& inputs, std::int64_t receive_ns);
-  PositionFix fromAid(const Aid& aid, PositionSource source, const FlightInputs& inputs, std::int64_t receive_ns) const;
+  std::unique_ptr<RrefFrameAssembler> makeFrames() const;
+  const std::vector<float>& unknown(std::size_t size);
+  const FlightState* assemble(std::int64_t receive_ns, AttitudeReference attitude_reference);
+  PositionFix choosePosition(std::int64_t receive_ns);
+  PositionFix fromAid(const Aid& aid, PositionSource source, std::int64_t receive_ns) const;
   bool jumped(const FlightState& state) const;
-  void noteOriginShift(const FlightInputs& inputs);
+  void noteOriginShift();
 
   Options options_;
   StateDecoder decoder_;
   std::unique_ptr<RrefFrameAssembler> frames_;
+  std::vector<float> unknown_;
   RowStore row_store_;
   ClockFilter clock_;
   PositionCheck position_check_;

@@ -100,6 +100,7 @@ class StateDecoder {
   struct Step {
     int element;
     bool from_row;
+    bool bitfield;
     bool may_be_blank;
     std::int32_t source;  ///< index, or kDataSlots * row + slot
     double factor;
