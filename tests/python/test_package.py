@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
-from catkin_pkg.changelog import get_changelog_from_path
+from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 
 import xplane_bridge
 
@@ -115,12 +115,12 @@ def test_python_imports_ros_only_inside_functions():
     assert not wrong
 
 
-def test_only_bags_imports_rosbags():
+def test_only_bags_reads_bags():
     wrong = [
         str(path.relative_to(ROOT))
         for path in sources("src/xplane_bridge", suffixes=(".py",))
-        if "bags" not in path.relative_to(ROOT / "src/xplane_bridge").parts[0]
-        and re.search(r"^\s*(import|from)\s+rosbags\b", path.read_text(encoding="utf-8"), re.MULTILINE)
+        if path.parent != ROOT / "src/xplane_bridge/bags"
+        and re.search(r"^\s*(import|from)\s+rosbags\b.*Reader", path.read_text(encoding="utf-8"), re.MULTILINE)
     ]
     assert not wrong
 
@@ -177,8 +177,11 @@ def test_the_version_is_the_same_everywhere():
 
 
 def test_the_changelog_is_as_rep_132_wants_it():
-    changelog = get_changelog_from_path(str(ROOT / "CHANGELOG.rst"), "xplane_bridge")
-    assert changelog is not None
+    text = (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8")
+    # The parser passes over what is not released yet; it is to be right as well.
+    text = text.replace("Forthcoming\n-----------", "999.0.0 (2099-12-31)\n--------------------")
+    changelog = Changelog("xplane_bridge")
+    populate_changelog_from_rst(changelog, text)
     assert list(changelog.foreach_version())
     for version, _, entries in changelog.foreach_version():
         assert entries, f"section {version} is empty"
