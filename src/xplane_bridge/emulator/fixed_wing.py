@@ -253,9 +253,5 @@ class FixedWing(JsbsimModel):
         altitude = initial.terrain_elevation_m + STANDING_HEIGHT_M
         euler = (0.0, STANDING_PITCH_RAD, math.radians(initial.heading_deg))
         self._set_motion(initial.latitude_deg, initial.longitude_deg, altitude, euler, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        turbulence = self._turbulence.intensity_mps
-        self._turbulence.intensity_mps = 0.0
-        for _ in range(8):
-            self._fly(0.5, controls)
-        self._turbulence.intensity_mps = turbulence
+        self._settle_on_ground(controls, 4.0)
         return controls

@@ -518,6 +518,13 @@ class JsbsimModel:
             self._fdm.run()
         self._fdm.resume_integration()
 
+    def _settle_on_ground(self, controls: Controls, seconds: float) -> None:
+        """Lets the aircraft come to rest on its gear, without gusts."""
+        intensity, self._turbulence.intensity_mps = self._turbulence.intensity_mps, 0.0
+        for _ in range(math.ceil(seconds / 0.5)):
+            self._fly(0.5, controls)
+        self._turbulence.intensity_mps = intensity
+
     def save(self) -> bytes:
         s = self.state
         return json.dumps(
