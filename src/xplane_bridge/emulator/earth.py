@@ -1,0 +1,165 @@
+"""X-Plane's earth: a sphere, and the tilted local frame that it simulates in.
+
+Local (OpenGL) frame: X east, Y up, Z south, metres, tangent to the sphere at the origin (lat_ref, lon_ref) with Y = 0 at
+sea level. Away from the origin its axes are tilted against the local level, which is why X-Plane has two sets of
+angles (`theta` and `true_theta`) and why its local velocities are not north/east/down ones.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Tuple
+
+import numpy as np
+
+#: Radius of X-Plane's earth, solved from a captured pair of rows 20 and 21 (`sim/physics/earth_radius_m`).
+EARTH_RADIUS_M = 6378145.0
+#: Sea-level gravity of the simulated planet (constant with height) [m/s^2].
+GRAVITY_MPS2 = 9.80665
+#: How far the aircraft must be beyond the line where the origin changes before it jumps, so that flying along that
+#: line does not make it jump every frame [deg].
+ORIGIN_HYSTERESIS_DEG = 0.001
+
+
+def wrap_degrees(angle_deg: float) -> float:
+    """Angle in [0, 360)."""
+    wrapped = math.fmod(angle_deg, 360.0)
+    if wrapped < 0.0:
+        wrapped += 360.0
+    return 0.0 if wrapped >= 360.0 else wrapped
+
+
+def wrap_longitude(longitude_deg: float) -> float:
+    """Longitude in [-180, 180)."""
+    return wrap_degrees(longitude_deg + 180.0) - 180.0
+
+
+def nominal_origin(latitude_deg: float, longitude_deg: float) -> Tuple[float, float]:
+    """Where X-Plane 11 puts the local frame's origin: floor(latitude) + 0.5, nearest whole degree of longitude."""
+    latitude = min(max(math.floor(latitude_deg) + 0.5, -89.5), 89.5)
+    return latitude, wrap_longitude(math.floor(longitude_deg + 0.5))
+
+
+def level_axes(latitude_deg: float, longitude_deg: float) -> np.ndarray:
+    """Rows: unit vectors north, east, down at a place, in earth-centred axes (x to 0 N 0 E, z to the north pole)."""
+    lat, lon = math.radians(latitude_deg), math.radians(longitude_deg)
+    sin_lat, cos_lat, sin_lon, cos_lon = math.sin(lat), math.cos(lat), math.sin(lon), math.cos(lon)
+    return np.array(
+        (
+            (-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat),
+            (-sin_lon, cos_lon, 0.0),
+            (-cos_lat * cos_lon, -cos_lat * sin_lon, -sin_lat),
+        )
+    )
+
+
+def body_to_level(roll_deg: float, pitch_deg: float, heading_deg: float) -> np.ndarray:
+    """Rotation from body (FRD) to level (NED) axes for roll, pitch and true heading in the usual order."""
+    phi, theta, psi = math.radians(roll_deg), math.radians(pitch_deg), math.radians(heading_deg)
+    s_phi, c_phi, s_theta, c_theta = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
+    s_psi, c_psi = math.sin(psi), math.cos(psi)
+    return np.array(
+        (
+            (c_theta * c_psi, s_phi * s_theta * c_psi - c_phi * s_psi, c_phi * s_theta * c_psi + s_phi * s_psi),
+            (c_theta * s_psi, s_phi * s_theta * s_psi + c_phi * c_psi, c_phi * s_theta * s_psi - s_phi * c_psi),
+            (-s_theta, s_phi * c_theta, c_phi * c_theta),
+        )
+    )
+
+
+def euler_degrees(rotation: np.ndarray) -> Tuple[float, float, float]:
+    """Roll, pitch, heading (0..360) of a body-to-level rotation, in degrees."""
+    roll = math.degrees(math.atan2(rotation[2, 1], rotation[2, 2]))
+    pitch = math.degrees(math.asin(min(max(-rotation[2, 0], -1.0), 1.0)))
+    heading = wrap_degrees(math.degrees(math.atan2(rotation[1, 0], rotation[0, 0])))
+    return roll, pitch, heading
+
+
+def quaternion(rotation: np.ndarray) -> Tuple[float, float, float, float]:
+    """Unit quaternion (w, x, y, z), w >= 0, of a rotation matrix (Shepperd's method: no loss near 180 degrees)."""
+    m = rotation
+    trace = m[0, 0] + m[1, 1] + m[2, 2]
+    diagonal = (trace, m[0, 0], m[1, 1], m[2, 2])
+    largest = max(range(4), key=diagonal.__getitem__)
+    if largest == 0:
+        q = [1.0 + trace, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]
+    elif largest == 1:
+        q = [m[2, 1] - m[1, 2], 1.0 + 2.0 * m[0, 0] - trace, m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]]
+    elif largest == 2:
+        q = [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], 1.0 + 2.0 * m[1, 1] - trace, m[1, 2] + m[2, 1]]
+    else:
+        q = [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], 1.0 + 2.0 * m[2, 2] - trace]
+    scale = math.copysign(1.0 / math.sqrt(sum(x * x for x in q)), q[0])
+    return tuple(float(x * scale) for x in q)  # type: ignore[return-value]
+
+
+def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> np.ndarray:
+    """Rotation matrix of a quaternion of any non-zero length.
+
+    Raises:
+        ValueError: All four components are zero.
+    """
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    if norm == 0.0:
+        raise ValueError("a quaternion of four zeros describes no attitude")
+    w, x, y, z = w / norm, x / norm, y / norm, z / norm
+    return np.array(
+        (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+        )
+    )
+
+
+class LocalFrame:
+    """X-Plane's local frame; follows the aircraft by jumping from origin to origin.
+
+    Attributes:
+        lat_ref, lon_ref: Origin [deg].
+        origin_axes: Rows north, east, down of the origin in earth-centred axes.
+    """
+
+    def __init__(self, latitude_deg: float, longitude_deg: float) -> None:
+        self.lat_ref = 0.0
+        self.lon_ref = 0.0
+        self.origin_axes = level_axes(0.0, 0.0)
+        self._move_to(*nominal_origin(latitude_deg, longitude_deg))
+
+    def follow(self, latitude_deg: float, longitude_deg: float) -> bool:
+        """Moves the origin if the aircraft has left its area.
+
+        Returns:
+            Whether the origin jumped.
+        """
+        north = latitude_deg - self.lat_ref
+        east = wrap_longitude(longitude_deg - self.lon_ref)
+        limit = 0.5 + ORIGIN_HYSTERESIS_DEG
+        if abs(north) <= limit and abs(east) <= limit:
+            return False
+        origin = nominal_origin(latitude_deg, longitude_deg)
+        if origin == (self.lat_ref, self.lon_ref):  # beyond the outermost origin, at a pole
+            return False
+        self._move_to(*origin)
+        return True
+
+    def to_local(self, latitude_deg: float, longitude_deg: float, elevation_m: float) -> Tuple[float, float, float]:
+        """X east, Y up, Z south [m] of a place."""
+        radial = -level_axes(latitude_deg, longitude_deg)[2] * (EARTH_RADIUS_M + elevation_m)
+        north, east, down = self.origin_axes @ radial
+        return float(east), float(-down - EARTH_RADIUS_M), float(-north)
+
+    def to_geodetic(self, x: float, y: float, z: float) -> Tuple[float, float, float]:
+        """Latitude, longitude [deg] and elevation [m MSL] of a local position."""
+        point = self.origin_axes.T @ np.array((-z, x, -(EARTH_RADIUS_M + y)))
+        radius = math.sqrt(float(point @ point))
+        latitude = math.degrees(math.asin(min(max(point[2] / radius, -1.0), 1.0)))
+        return latitude, math.degrees(math.atan2(point[1], point[0])), radius - EARTH_RADIUS_M
+
+    def from_level(self, latitude_deg: float, longitude_deg: float) -> np.ndarray:
+        """Rotation from the local level (NED) at a place to the origin's north, east, down axes."""
+        return self.origin_axes @ level_axes(latitude_deg, longitude_deg).T
+
+    def _move_to(self, lat_ref: float, lon_ref: float) -> None:
+        self.lat_ref, self.lon_ref = lat_ref, lon_ref
+        self.origin_axes = level_axes(lat_ref, lon_ref)

@@ -1,0 +1,59 @@
+"""X-Plane's UDP protocol: messages, their bytes, and the rows of the Data Output table.
+
+Written from the protocol reference alone, independently of the C++ codec; both are held to the same golden packets.
+"""
+
+from .constants import *  # noqa: F401,F403
+from .messages import (
+    AircraftLoad,
+    AircraftLoadAndPlacement,
+    Beacon,
+    CommandRequest,
+    DataPacket,
+    DecodeError,
+    DrefWrite,
+    NetworkTarget,
+    Placement,
+    RecoverAll,
+    Request,
+    RowSelection,
+    RposRequest,
+    RposResponse,
+    RrefRequest,
+    Situation,
+    VehiclePose,
+    decode_beacon,
+    decode_data,
+    decode_dref_response,
+    decode_request,
+    decode_rpos_response,
+    decode_rref_response,
+    encode_rref_response,
+)
+
+__all__ = [
+    "AircraftLoad",
+    "AircraftLoadAndPlacement",
+    "Beacon",
+    "CommandRequest",
+    "DataPacket",
+    "DecodeError",
+    "DrefWrite",
+    "NetworkTarget",
+    "Placement",
+    "RecoverAll",
+    "Request",
+    "RowSelection",
+    "RposRequest",
+    "RposResponse",
+    "RrefRequest",
+    "Situation",
+    "VehiclePose",
+    "decode_beacon",
+    "decode_data",
+    "decode_dref_response",
+    "decode_request",
+    "decode_rpos_response",
+    "decode_rref_response",
+    "encode_rref_response",
+]
