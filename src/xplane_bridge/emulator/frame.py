@@ -61,7 +61,19 @@ class Clocks:
     simulated_period: float = 1.0 / 60.0  #: time that this frame advanced the simulation, or would have
     wall_period: float = 1.0 / 60.0  #: time between this frame and the one before
     work: float = 0.0  #: time that computing the last frame took
+    elapsed: float = 0.0  #: simulated time since the emulator started, also without a flight
     paused: bool = False
+
+    def advance(self, dt: float, flying: bool) -> None:
+        """Simulated time passes."""
+        self.elapsed += dt
+        self.running += dt
+        if flying:
+            self.flight += dt
+            self.zulu += dt
+            if self.zulu >= 86400.0:
+                self.zulu -= 86400.0
+                self.date_days = (self.date_days + 1) % 366
 
 
 @dataclass

@@ -36,7 +36,7 @@ class Server:
 
     Attributes:
         port: The port it listens on.
-        ignored: Datagrams ignored, by reason (a decode reason, `version`, `dataref`, `flood`, `target`).
+        ignored: Datagrams ignored, by reason (a decode reason, or what the handler says: `dataref`, `command`, `version`, ...).
     """
 
     def __init__(
@@ -44,7 +44,6 @@ class Server:
         bind: str,
         port: int,
         handlers: Dict[type, Callable],
-        version: int,
         subscriptions: Subscriptions,
         channel: FaultyChannel,
         request_limit: int = RREF_REQUESTS_PER_FRAME,
@@ -52,12 +51,11 @@ class Server:
         self.subscriptions = subscriptions
         self.ignored: Counter = Counter()
         self._handlers = handlers
-        self._version = version
         self._channel = channel
         self._request_limit = request_limit
         self._socket = _bound_socket(bind, port)
         self.port = self._socket.getsockname()[1]
-        self._data_socket = _data_socket(bind)
+        self._data_socket = _data_socket(bind, port)
         self.data_target: Optional[Address] = None
         self._data_pacer: Optional[Pacer] = None
         self._data_rate = 0
@@ -219,9 +217,9 @@ def _bound_socket(bind: str, port: int) -> socket.socket:
     return sock
 
 
-def _data_socket(bind: str) -> socket.socket:
-    """The socket DATA leaves from: X-Plane's is port 49001; another one where that is taken (several emulators)."""
-    for port in (protocol.DATA_SOURCE_PORT, 0):
+def _data_socket(bind: str, listening: int) -> socket.socket:
+    """The socket DATA leaves from: X-Plane's is port 49001; any other for an emulator that is one of several."""
+    for port in (protocol.DATA_SOURCE_PORT, 0) if listening == protocol.DEFAULT_PORT else (0,):
         sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             sock.bind((bind, port))

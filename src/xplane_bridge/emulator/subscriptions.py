@@ -32,6 +32,8 @@ class Pacer:
         """Whether to send in the frame at `now` [s]; to be asked once a frame."""
         if now < self._next - _EARLY * frame_period:
             return False
+        if self._next == float("-inf"):
+            self._next = now
         self._next = max(self._next + self.period, now - frame_period + self.period)
         return True
 

@@ -248,7 +248,7 @@ def _time(t: Table, sim: Simulator) -> None:
     t.value("sim/time/total_running_time_sec", lambda _: clock.running, always=True)
     t.value("sim/time/total_flight_time_sec", lambda _: clock.flight, writable=True)
     t.value("sim/time/timer_elapsed_time_sec", lambda _: clock.flight)
-    t.value("sim/time/zulu_time_sec", lambda _: clock.zulu % 86400.0, writable=True)
+    t.value("sim/time/zulu_time_sec", lambda _: clock.zulu, writable=True)
     t.value("sim/time/local_time_sec", lambda f: _local_time(clock.zulu, f.m.longitude_deg))
     t.value("sim/time/local_date_days", lambda _: clock.date_days, INT)
     t.value("sim/time/hobbs_time", lambda _: clock.flight / 3600.0)
@@ -263,7 +263,7 @@ def _time(t: Table, sim: Simulator) -> None:
     t.value("_emulator/frame_rate", lambda _: 1.0 / max(clock.wall_period, 1e-6), always=True)
     t.value("_emulator/simulated_rate", lambda _: 1.0 / max(clock.simulated_period, 1e-6), always=True)
     t.value("_emulator/cpu_time", lambda _: clock.work, always=True)
-    t.value("_emulator/zulu_hours", lambda _: clock.zulu % 86400.0 / 3600.0)
+    t.value("_emulator/zulu_hours", lambda _: clock.zulu / 3600.0)
     t.value("_emulator/local_hours", lambda f: _local_time(clock.zulu, f.m.longitude_deg) / 3600.0)
 
 

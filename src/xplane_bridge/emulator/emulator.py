@@ -1,0 +1,341 @@
+"""The whole emulator: a simulator, its sockets, and X-Plane's loop around them.
+
+One rendered frame: take what clients sent, fly the frame's time, send what is due, then show the picture (frame listeners).
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+import os
+import socket
+import sys
+import time
+from typing import Callable, List, Optional, TextIO
+
+import numpy as np
+
+from .. import protocol
+from ..scenario import ScenarioPilot, load_scenario
+from .faults import FaultyChannel
+from .flight_model import FlightModel, create_model
+from .kinematic import KinematicModel
+from .options import KINEMATIC, Options
+from .server import Beacon, Server
+from .simulator import INTERNAL_VERSIONS, Simulator
+from .subscriptions import Address, Subscriptions
+from .truth import TruthFile
+
+#: Periods of the newest frames are kept for the closing statistics.
+_KEPT_PERIODS = 100_000
+#: Frames between two collections of cyclic garbage, which nothing in a frame should make.
+_COLLECT_EVERY = 3600
+
+FrameListener = Callable[[Simulator], None]
+
+
+class Emulator:
+    """See the module's text.
+
+    Attributes:
+        sim: The simulator; another object after a restart.
+        port: The port it listens on.
+        frame_listeners: Called after each frame's packets, with the simulator (a picture is drawn from here).
+    """
+
+    def __init__(self, options: Options) -> None:
+        self.options = options
+        self.period = 1.0 / options.fps
+        self.frame_listeners: List[FrameListener] = []
+        self.stopping = False
+        self._channel = FaultyChannel(options.fault, options.seed)
+        self.sim = self._new_simulator()
+        self._server: Optional[Server] = self._new_server(options.port)
+        self.port = self._server.port
+        self._beacon = self._new_beacon()
+        self._truth = TruthFile(options.truth, self.sim.model) if options.truth is not None else None
+        self._frames = 0
+        self._sent_at: List[float] = []
+
+    # --- construction -------------------------------------------------------------------------------------------------
+
+    def _make_model(self, name: str) -> FlightModel:
+        return KinematicModel(self.options.seed) if name == KINEMATIC else create_model(name, self.options.seed)
+
+    def _new_simulator(self) -> Simulator:
+        o = self.options
+        pilot = ScenarioPilot(load_scenario(o.pilot)) if o.pilot is not None else None
+        sim = Simulator(
+            self._make_model,
+            o.aircraft,
+            version=o.version,
+            initial=o.initial,
+            sim_time_start=o.sim_time_start,
+            data_rate=o.rate,
+            level_angles=o.angle_axes == "level",
+            load_time=o.load_time,
+            pilot=pilot,
+            window_size=o.window_size,
+        )
+        sim.set_weather(*o.wind, o.turbulence, o.seed)
+        return sim
+
+    def _new_server(self, port: int) -> Server:
+        sim = self.sim
+        handlers = {
+            protocol.RrefRequest: self._on_rref,
+            protocol.RposRequest: self._on_rpos,
+            protocol.NetworkTarget: self._on_target,
+            protocol.RecoverAll: lambda _request, _sender: sim.repair_all(),
+            protocol.DrefWrite: lambda request, _: sim.on_dref(request),
+            protocol.DataPacket: lambda request, _: sim.on_data(request),
+            protocol.CommandRequest: lambda request, _: sim.on_command(request),
+            protocol.RowSelection: lambda request, _: sim.on_rows(request),
+            protocol.Placement: lambda request, _: sim.on_placement(request),
+            protocol.AircraftLoad: lambda request, _: sim.on_aircraft(request),
+            protocol.AircraftLoadAndPlacement: lambda request, _: (
+                sim.on_aircraft(request.load) or sim.on_placement(request.placement)
+            ),
+            protocol.Situation: lambda request, _: sim.on_situation(request),
+            protocol.VehiclePose: lambda request, _: sim.on_vehicle(request),
+        }
+        o = self.options
+        return Server(o.bind, port, handlers, Subscriptions(o.rref_split), self._channel, o.request_limit)
+
+    def _new_beacon(self) -> Optional[Beacon]:
+        o = self.options
+        if not o.beacon:
+            return None
+        message = protocol.Beacon(INTERNAL_VERSIONS[o.version], self.port, socket.gethostname())
+        return Beacon(o.bind, message, o.beacon_group, o.beacon_port)
+
+    # --- requests that concern the wire -------------------------------------------------------------------------------
+
+    def _on_rref(self, request: protocol.RrefRequest, sender: Address) -> Optional[str]:
+        subscriptions = self.server.subscriptions
+        if request.rate_hz <= 0:
+            subscriptions.stop_rref(sender, request.index)
+            return None
+        slot = self.sim.store.slot(request.path)
+        if slot is None:
+            if self.options.unknown_datarefs == "omit":
+                return "dataref"
+            slot = self.sim.unknown_slot
+        subscriptions.request_rref(sender, request.index, request.rate_hz, slot)
+        return None
+
+    def _on_rpos(self, request: protocol.RposRequest, sender: Address) -> Optional[str]:
+        self.server.subscriptions.request_rpos(sender, request.rate_hz)
+        return None
+
+    def _on_target(self, request: protocol.NetworkTarget, _sender: Address) -> Optional[str]:
+        if request.index != protocol.DATA_OUTPUT_TARGET:
+            return "target"
+        try:
+            socket.inet_aton(request.host)
+        except OSError:
+            return "target"
+        good = request.enabled and request.port > 0
+        self.server.data_target = (request.host, request.port) if good else None
+        return None
+
+    @property
+    def server(self) -> Server:
+        """The sockets; RuntimeError while X-Plane is away (restart)."""
+        if self._server is None:
+            raise RuntimeError("the emulator is between two runs")
+        return self._server
+
+    # --- one frame ----------------------------------------------------------------------------------------------------
+
+    def run_frame(self, period: float, now: float, host_time: float = math.nan) -> None:
+        """One rendered frame.
+
+        Args:
+            period: Time since the frame before [s].
+            now: Time of this frame on the loop's clock [s].
+            host_time: Host time for the truth file [s].
+        """
+        server, sim = self.server, self.sim
+        server.receive()
+        sim.step(period)
+        if self.options.send_while_paused or not sim.clocks.paused:
+            server.send_frame(
+                now, self.period, sim.rows, sim.store.values, sim.selected_rows, sim.data_rate, self._rpos_packet
+            )
+        server.flush_delayed(now)
+        if self._truth is not None and sim.flying:
+            self._truth.write(sim.frame, host_time)
+        for listener in self.frame_listeners:
+            listener(sim)
+        self._frames += 1
+
+    def _rpos_packet(self) -> bytes:
+        return self.sim.position().encode()
+
+    # --- loops --------------------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Flies until `stopping` is set or the duration is over."""
+        try:
+            if self.options.stepped == "fast":
+                self._run_fast()
+            elif self.options.stepped == "lines":
+                self._run_lines(sys.stdin, sys.stdout)
+            else:
+                self._run_real_time()
+        finally:
+            self.close()
+
+    def _run_real_time(self) -> None:
+        clock, o = time.monotonic, self.options
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        start = deadline = clock()
+        last = start - self.period
+        while not self.stopping:
+            self._wait_until(deadline)
+            begin = clock()
+            elapsed = begin - start
+            if o.duration is not None and elapsed >= o.duration:
+                break
+            if self._pause_for_faults(elapsed):
+                deadline = clock()
+                continue
+            # A frame that came too late lasts whole periods, as with vertical synchronisation: time stays on its grid.
+            missed = int((begin - deadline) / self.period)
+            deadline += missed * self.period
+            period, last = deadline - last, deadline
+            if self._beacon is not None:
+                self._beacon.poll(begin)
+            self.run_frame(period, begin, time.time())
+            end = clock()
+            self.sim.clocks.work = end - begin
+            if len(self._sent_at) < _KEPT_PERIODS:
+                self._sent_at.append(begin)
+            if self._frames % _COLLECT_EVERY == 0:
+                gc.collect()
+            deadline += self.period
+
+    def _wait_until(self, deadline: float) -> None:
+        """Sleeps until the deadline; sends delayed datagrams on the way."""
+        while not self.stopping:
+            now = time.monotonic()
+            due = self._channel.next_due()
+            if due <= now and self._server is not None:
+                self._server.flush_delayed(now)
+                continue
+            remaining = min(deadline, due) - now
+            if remaining <= 0.0:
+                return
+            time.sleep(min(remaining, 0.25))
+
+    def _pause_for_faults(self, elapsed: float) -> bool:
+        """Sits out a freeze; goes away and comes back for a restart. Returns whether it did either."""
+        freeze, restart = self.options.fault.freeze, self.options.fault.restart
+        if freeze is not None and freeze.covers(elapsed):
+            self._wait_until(time.monotonic() + freeze.start_s + freeze.duration_s - elapsed)
+            return True
+        if restart is not None and restart.covers(elapsed):
+            self.leave()
+            self._wait_until(time.monotonic() + restart.start_s + restart.duration_s - elapsed)
+            self.come_back()
+            return True
+        return False
+
+    def leave(self) -> None:
+        """What clients see when X-Plane is quit: the port is closed, the beacon gone."""
+        self.server.close()
+        self._server = None
+        if self._beacon is not None:
+            self._beacon.close()
+            self._beacon = None
+
+    def come_back(self) -> None:
+        """Starts anew on the same port: no subscriptions, no targets, no overrides, a new flight."""
+        self.sim = self._new_simulator()
+        self._server = self._new_server(self.port)
+        self._beacon = self._new_beacon()
+
+    def step_frames(self, count: int) -> None:
+        """Stepped mode: `count` frames of the nominal period, whatever the wall clock says."""
+        for _ in range(count):
+            elapsed = self._frames * self.period
+            if not self._stepped_fault(elapsed):
+                self.run_frame(self.period, elapsed)
+            else:
+                self._frames += 1
+
+    def _stepped_fault(self, elapsed: float) -> bool:
+        """Faults by frame time: whether this frame does not happen."""
+        freeze, restart = self.options.fault.freeze, self.options.fault.restart
+        away = restart is not None and restart.covers(elapsed)
+        if away and self._server is not None:
+            self.leave()
+        elif not away and self._server is None:
+            self.come_back()
+        return away or (freeze is not None and freeze.covers(elapsed))
+
+    def _run_fast(self) -> None:
+        frames = round((self.options.duration or 0.0) * self.options.fps)
+        while self._frames < frames and not self.stopping:
+            self.step_frames(1)
+
+    def _run_lines(self, lines: TextIO, answers: TextIO) -> None:
+        """The stepping protocol: a line with a number of frames in, a line `STEPPED {json}` out; `quit` or the end ends it."""
+        for line in lines:
+            text = line.strip()
+            if text == "quit" or self.stopping:
+                break
+            if not text:
+                continue
+            if not text.isdigit():
+                print(f"stepping: expected a number of frames or 'quit', got '{text}'", file=sys.stderr, flush=True)
+                continue
+            self.step_frames(int(text))
+            report = {"frame": self.sim.clocks.frame, "sim_time": self.sim.clocks.running}
+            print("STEPPED " + json.dumps(report), file=answers, flush=True)
+
+    # --- reports ------------------------------------------------------------------------------------------------------
+
+    def describe(self) -> dict:
+        """What the READY line says."""
+        o = self.options
+        return {
+            "port": self.port,
+            "bind": o.bind,
+            "pid": os.getpid(),
+            "version": o.version,
+            "aircraft": o.aircraft,
+            "fps": o.fps,
+            "beacon": o.beacon,
+            "stepped": o.stepped is not None,
+            "pipeline_delay": o.pipeline_delay,
+        }
+
+    def statistics(self) -> dict:
+        """What the closing line says; periods [ms] are those between the starts of frames."""
+        report = {"frames": self._frames, "sim_time": self.sim.clocks.running}
+        if self._server is not None:
+            report["ignored"] = dict(self._server.ignored)
+        if len(self._sent_at) > 2:
+            errors = np.abs(np.diff(self._sent_at) - self.period) * 1e3
+            report["period_error_ms"] = {
+                "p50": round(float(np.percentile(errors, 50)), 3),
+                "p99": round(float(np.percentile(errors, 99)), 3),
+                "max": round(float(errors.max()), 3),
+            }
+        return report
+
+    def close(self) -> None:
+        """Closes sockets and files; may be called again."""
+        if self._server is not None:
+            self._server.close()
+        if self._beacon is not None:
+            self._beacon.close()
+            self._beacon = None
+        if self._truth is not None:
+            self._truth.close()
+            self._truth = None

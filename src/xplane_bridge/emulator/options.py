@@ -1,0 +1,226 @@
+"""The emulator's options, and its command line."""
+
+from __future__ import annotations
+
+import argparse
+import ipaddress
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import List, Optional, Sequence, Tuple
+
+from .. import protocol
+from .earth import wrap_degrees, wrap_longitude
+from .faults import FaultPlan, FaultSyntaxError, parse_faults
+from .flight_model import InitialState, model_names
+from .server import RREF_REQUESTS_PER_FRAME
+
+KINEMATIC = "kinematic"
+
+
+class OptionError(ValueError):
+    """An option that makes no sense; the message names it, what was given, and what is expected."""
+
+
+@dataclass
+class Options:
+    """How to run an emulator. The defaults are those of the command line."""
+
+    aircraft: str = "fixed_wing"
+    version: int = 11
+    initial: InitialState = field(default_factory=lambda: InitialState(engines_running=True))
+    bind: str = "0.0.0.0"
+    port: int = protocol.DEFAULT_PORT
+    fps: float = 60.0
+    rate: int = 20
+    seed: int = 0
+    sim_time_start: float = 0.0
+    load_time: float = 0.0
+    pilot: Optional[Path] = None
+    truth: Optional[Path] = None
+    duration: Optional[float] = None
+    stepped: Optional[str] = None  #: None: real time; "lines": frames on request; "fast": as fast as it goes
+    beacon: bool = True
+    beacon_group: str = protocol.BEACON_GROUP
+    beacon_port: int = protocol.BEACON_PORT
+    rref_split: int = protocol.RREF_MAX_PAIRS
+    request_limit: int = RREF_REQUESTS_PER_FRAME
+    unknown_datarefs: str = "omit"
+    angle_axes: str = "level"
+    send_while_paused: bool = True
+    wind: Tuple[float, float] = (0.0, 0.0)  #: from [deg], speed [m/s]
+    turbulence: float = 0.0
+    pipeline_delay: float = 0.0
+    window_size: Tuple[int, int] = (1024, 768)
+    fault: FaultPlan = field(default_factory=FaultPlan)
+    verbose: bool = False
+
+
+#: roslaunch adds arguments like `__name:=emulator` and `__log:=...`; remappings look the same.
+_ROS_ARGUMENT = re.compile(r"[A-Za-z_~/][\w~/]*:=.*")
+
+
+def drop_ros_arguments(arguments: Sequence[str]) -> List[str]:
+    """The arguments without those that roslaunch adds."""
+    return [argument for argument in arguments if not _ROS_ARGUMENT.fullmatch(argument)]
+
+
+def parse(arguments: Sequence[str]) -> Options:
+    """Reads a command line; exits with a message on a wrong one, as argparse does."""
+    parser = _parser()
+    given = parser.parse_args(drop_ros_arguments(arguments))
+    try:
+        return _options(given)
+    except OptionError as error:
+        parser.error(str(error))
+
+
+def _parser() -> argparse.ArgumentParser:
+    p = argparse.ArgumentParser(
+        prog="xplane_emulator",
+        description="Speaks X-Plane's UDP protocol and flies aircraft of its own. Prints one line `READY {json}` with its port.",
+        epilog="docs/emulator.md tells what is modelled, the faults, and the stepping protocol.",
+    )
+    flight = p.add_argument_group("flight")
+    flight.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help=f"{', '.join(model_names())}")
+    flight.add_argument("--model", choices=("jsbsim", KINEMATIC), default="jsbsim", help="kinematic: needs no JSBSim")
+    flight.add_argument("--version", type=int, choices=(11, 12), default=11, help="X-Plane version (default 11)")
+    flight.add_argument("--start", choices=("ground", "air"), default="air", help="(default air)")
+    flight.add_argument("--lat", type=float, default=37.4602, metavar="DEG", help="latitude (default 37.4602)")
+    flight.add_argument("--lon", type=float, default=126.4407, metavar="DEG", help="longitude (default 126.4407)")
+    flight.add_argument("--alt", type=float, default=1000.0, metavar="M", help="altitude MSL in the air (default 1000)")
+    flight.add_argument("--heading", type=float, default=0.0, metavar="DEG", help="true heading (default 0)")
+    flight.add_argument("--speed", type=float, metavar="M/S", help="true airspeed in the air (default: the aircraft's)")
+    flight.add_argument("--terrain", type=float, default=0.0, metavar="M", help="height of the ground MSL (default 0)")
+    flight.add_argument("--engines-off", action="store_true", help="start with the engines stopped")
+    flight.add_argument("--pilot", type=Path, metavar="FILE", help="scenario that flies until a client does")
+    flight.add_argument("--wind", default="0/0", metavar="FROM/SPEED", help="degrees true / m/s, e.g. 270/8")
+    flight.add_argument("--turbulence", type=float, default=0.0, metavar="M/S", help="standard deviation of the vertical gust")
+    flight.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
+
+    loop = p.add_argument_group("loop")
+    loop.add_argument("--fps", type=float, default=60.0, help="rendered frames a second (default 60)")
+    loop.add_argument("--sim-time-start", type=float, default=0.0, metavar="S", help="total_running_time_sec at the start")
+    loop.add_argument("--load-time", type=float, default=0.0, metavar="S", help="zeros for so long, then the flight is loaded")
+    loop.add_argument("--duration", type=float, metavar="S", help="end after so long")
+    loop.add_argument(
+        "--stepped",
+        nargs="?",
+        const="lines",
+        choices=("lines", "fast"),
+        help="not in real time: frames on request by lines on stdin (default), or as fast as it goes (needs --duration)",
+    )
+    loop.add_argument("--pipeline-delay", default="0", metavar="TIME", help="picture later than its packets, e.g. 50ms")
+    loop.add_argument("--truth", type=Path, metavar="FILE", help="CSV of every frame, in doubles")
+
+    wire = p.add_argument_group("wire")
+    wire.add_argument("--bind", default="0.0.0.0", metavar="IP", help="address to listen on (default all)")
+    wire.add_argument("--port", type=int, default=protocol.DEFAULT_PORT, help="UDP port (default 49000; 0: any free one)")
+    wire.add_argument("--rate", type=int, default=20, metavar="HZ", help="network_data_rate at the start (default 20)")
+    wire.add_argument("--no-beacon", dest="beacon", action="store_false", help="do not announce on multicast")
+    wire.add_argument("--beacon-target", default=f"{protocol.BEACON_GROUP}:{protocol.BEACON_PORT}", metavar="IP:PORT", help=argparse.SUPPRESS)
+    wire.add_argument("--rref-split", type=int, default=protocol.RREF_MAX_PAIRS, metavar="N", help="values a datagram (default 183)")
+    wire.add_argument(
+        "--request-limit",
+        type=int,
+        default=RREF_REQUESTS_PER_FRAME,
+        metavar="N",
+        help=f"RREF requests taken a frame, more are lost (default {RREF_REQUESTS_PER_FRAME})",
+    )
+    wire.add_argument("--unknown-datarefs", choices=("omit", "zero"), default="omit", help="(default omit)")
+    wire.add_argument("--angle-axes", choices=("level", "origin"), default="level", help="of row 17 and RPOS (default level)")
+    wire.add_argument("--paused-output", choices=("on", "off"), default="on", help="send while paused (default on)")
+    wire.add_argument("--fault", default="", metavar="LIST", help="e.g. drop=0.1,delay=20ms,dup,reorder,truncate,freeze=2s@10,restart=3s@20")
+    wire.add_argument("-v", "--verbose", action="store_true", help="log what is ignored and why")
+    return p
+
+
+def _options(given: argparse.Namespace) -> Options:
+    finite = ("lat", "lon", "alt", "heading", "terrain", "turbulence", "fps", "sim_time_start", "load_time")
+    for name in finite:
+        _require(math.isfinite(getattr(given, name)), f"--{name.replace('_', '-')}", getattr(given, name), "a finite number")
+    _require(-90.0 <= given.lat <= 90.0, "--lat", given.lat, "-90..90")
+    _require(-180.0 <= given.lon <= 360.0, "--lon", given.lon, "-180..180")
+    _require(1.0 <= given.fps <= 500.0, "--fps", given.fps, "1..500")
+    _require(0 <= given.port <= 65535, "--port", given.port, "0..65535")
+    _require(1 <= given.rref_split <= protocol.RREF_MAX_PAIRS, "--rref-split", given.rref_split, "1..183")
+    _require(given.request_limit >= 1, "--request-limit", given.request_limit, "1 or more")
+    _require(0 <= given.rate <= 99, "--rate", given.rate, "0..99")
+    _require(0.0 <= given.turbulence <= 20.0, "--turbulence", given.turbulence, "0..20")
+    _require(given.load_time >= 0.0, "--load-time", given.load_time, "0 or more")
+    _require(given.duration is None or given.duration > 0.0, "--duration", given.duration, "more than 0")
+    _require(given.speed is None or 0.0 <= given.speed <= 300.0, "--speed", given.speed, "0..300")
+    _require(given.stepped != "fast" or given.duration is not None, "--stepped", "fast", "--duration with it")
+    _require(given.pilot is None or given.pilot.is_file(), "--pilot", given.pilot, "an existing file")
+    try:
+        ipaddress.IPv4Address(given.bind)
+    except ValueError:
+        raise OptionError(f"--bind {given.bind}: expected an IPv4 address of this machine, or 0.0.0.0 for all") from None
+    if given.model == KINEMATIC:
+        aircraft = KINEMATIC
+    else:
+        aircraft = given.aircraft
+        known = (*model_names(), KINEMATIC)
+        _require(aircraft in known, "--aircraft", aircraft, "one of " + ", ".join(known))
+    try:
+        fault = parse_faults(given.fault)
+        delay = parse_faults(f"delay={given.pipeline_delay}").delay_s
+    except FaultSyntaxError as error:
+        raise OptionError(str(error)) from None
+    group, _, beacon_port = given.beacon_target.partition(":")
+    initial = InitialState(
+        latitude_deg=given.lat,
+        longitude_deg=wrap_longitude(given.lon),
+        heading_deg=wrap_degrees(given.heading),
+        on_ground=given.start == "ground",
+        altitude_m=given.alt,
+        airspeed_mps=given.speed,
+        terrain_elevation_m=given.terrain,
+        engines_running=not given.engines_off,
+    )
+    return Options(
+        aircraft=aircraft,
+        version=given.version,
+        initial=initial,
+        bind=given.bind,
+        port=given.port,
+        fps=given.fps,
+        rate=given.rate,
+        seed=given.seed,
+        sim_time_start=given.sim_time_start,
+        load_time=given.load_time,
+        pilot=given.pilot,
+        truth=given.truth,
+        duration=given.duration,
+        stepped=given.stepped,
+        beacon=given.beacon,
+        beacon_group=group,
+        beacon_port=int(beacon_port),
+        rref_split=given.rref_split,
+        request_limit=given.request_limit,
+        unknown_datarefs=given.unknown_datarefs,
+        angle_axes=given.angle_axes,
+        send_while_paused=given.paused_output == "on",
+        wind=_wind(given.wind),
+        turbulence=given.turbulence,
+        pipeline_delay=delay,
+        fault=fault,
+        verbose=given.verbose,
+    )
+
+
+def _wind(text: str) -> Tuple[float, float]:
+    direction, slash, speed = text.partition("/")
+    try:
+        wind = float(direction), float(speed)
+    except ValueError:
+        wind = (math.nan, math.nan)
+    if not slash or not all(map(math.isfinite, wind)) or not 0.0 <= wind[1] <= 60.0:
+        raise OptionError(f"--wind {text}: expected FROM/SPEED in degrees true and m/s (0..60), e.g. 270/8")
+    return wrap_degrees(wind[0]), wind[1]
+
+
+def _require(good: bool, option: str, given: object, expected: str) -> None:
+    if not good:
+        raise OptionError(f"{option} {given}: expected {expected}")

@@ -1,0 +1,414 @@
+"""One running X-Plane: the aircraft, its datarefs, and what clients' requests do to them. No sockets, no clock of its own."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Callable, Dict, List, Optional, Set, Tuple
+
+import numpy as np
+
+from .. import protocol
+from . import commands, data_rows, tables
+from .aircraft_systems import INHG_PA, Electrics, Instruments, Weather
+from .control_inputs import ControlInputs, Pilot
+from .datarefs import DatarefStore
+from .failure_effects import FailureEffects
+from .flight_model import Controls, FlightModel, FlightModelError, InitialState
+from .frame import Clocks, Frame
+from .placement import Placements
+from .tables.controls import surface_dataref
+
+_LOG = logging.getLogger(__name__)
+
+#: Version as datarefs and beacon give it.
+INTERNAL_VERSIONS = {11: 115501, 12: 122015}
+#: Below this frame rate X-Plane slows simulated time instead of taking larger steps [1/s].
+MIN_FRAME_RATE = 19.9
+#: Vertical gust per unit of X-Plane's turbulence, which goes from 0 to 10 [m/s].
+TURBULENCE_MPS_PER_UNIT = 0.5
+
+_SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot"
+_SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
+_SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
+_IDENTITY = "sim/aircraft/view/"
+_ELECTRICAL = "sim/cockpit2/electrical/"
+
+ModelFactory = Callable[[str], FlightModel]
+
+
+class Simulator:
+    """See the module's text.
+
+    Args:
+        make_model: Builds the flight model of an aircraft by name; raises FlightModelError for an unknown one.
+        aircraft: Which aircraft to load first.
+        version: 11 or 12.
+        initial: Where flights start.
+        sim_time_start: Running time at the start [s].
+        data_rate: `network_data_rate` at the start [1/s].
+        level_angles: Whether row 17 and RPOS give angles relative to the local level ([?]: else to the origin's axes).
+        load_time: Time before the first flight is loaded; until then its values are zeros [s].
+        pilot: Flies until a client does.
+        window_size: Width and height of the window that the view is drawn in [px].
+    """
+
+    def __init__(
+        self,
+        make_model: ModelFactory,
+        aircraft: str,
+        version: int = 11,
+        initial: Optional[InitialState] = None,
+        sim_time_start: float = 0.0,
+        data_rate: int = 20,
+        level_angles: bool = True,
+        load_time: float = 0.0,
+        pilot: Optional[Pilot] = None,
+        window_size: Tuple[int, int] = (1024, 768),
+    ) -> None:
+        self.version = version
+        self.internal_version = INTERNAL_VERSIONS[version]
+        self.initial = InitialState() if initial is None else initial
+        self.initial_data_rate = data_rate
+        self.window_size = window_size
+        self._make_model = make_model
+        self.aircraft = aircraft
+        self.model = make_model(aircraft)
+        self.store = DatarefStore()
+        self.clocks = Clocks(running=sim_time_start)
+        self.frame = Frame(self.model.info, self.clocks)
+        self.controls = Controls()
+        self.electrics, self.instruments, self.weather = Electrics(), Instruments(), Weather()
+        self.flying = False
+        self.frozen = False  #: by VEHX: the flight model stands still until an aircraft or a flight is loaded
+        self.last_situation = ""
+        self._load_time = load_time
+        self._situations: Dict[str, Tuple[str, bytes, Dict[str, np.ndarray]]] = {}
+        self._failed: Set[str] = set()
+        self._failures_dirty = True
+        self._surface_slots = np.zeros(0, dtype=int)
+        self._surface_names: List[str] = []
+        self.inputs = ControlInputs(self.store, pilot)
+        self.table = tables.build(self)
+        self.rows = data_rows.DataRows(self.store, version, level_angles)
+        self._level_angles = level_angles
+        #: What unknown datarefs are sent from where they are sent as 0.
+        self.unknown_slot = int(self.store.add("_emulator/unknown").slots[0])
+        self._placements = Placements(self.store)
+        self._failures = FailureEffects(self.store, version)
+        self.inputs.connect(self)
+        self._connect_settings()
+        self._bind_aircraft()
+        if load_time <= 0.0:
+            self.start_flight(self.initial)
+        self.table.publish(self.frame, self.flying)
+
+    # --- one frame ----------------------------------------------------------------------------------------------------
+
+    def step(self, period: float) -> None:
+        """Advances by one rendered frame of `period` [s] of wall time, after the requests of that frame were handled."""
+        clocks = self.clocks
+        clocks.frame += 1
+        clocks.wall_period = period
+        clocks.simulated_period = min(period, 1.0 / MIN_FRAME_RATE)
+        dt = 0.0 if clocks.paused else clocks.simulated_period * max(self.store.get("sim/time/sim_speed"), 0.0)
+        clocks.advance(dt, self.flying)
+        if self.flying:
+            self._fly(dt)
+        elif clocks.elapsed >= self._load_time:
+            self.start_flight(self.initial)
+        self.table.publish(self.frame, self.flying)
+        if self.flying:
+            self._publish_surfaces()
+
+    def _fly(self, dt: float) -> None:
+        if self._failures_dirty:
+            self._failed = self._failures.active()
+            self._failures_dirty = False
+        self._placements.apply(self.model, self.frame)
+        state = self.model.state
+        if dt > 0.0:
+            self.inputs.read(self.controls, self.model, self.frame)
+            self._failures.apply(self.controls, self._failed, self.model, dt)
+            if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
+                state = self.model.step(dt, self.controls)
+        self.frame.update(state, self.store.get(_SETTING) * INHG_PA)
+        self.frame.distance += self.frame.ground_speed * dt
+        self.electrics.update(dt, self.store, self.frame, self.failed)
+        self.instruments.update(self.frame, self.store.get(_SETTING), self.failed)
+
+    def _publish_surfaces(self) -> None:
+        deflections = self.model.state.surfaces_deg
+        self.store.values[self._surface_slots] = [deflections.get(name, 0.0) for name in self._surface_names]
+
+    # --- what the tables and commands use -----------------------------------------------------------------------------
+
+    def failed(self, leaf: str) -> bool:
+        """Whether a failure dataref (`rel_...`) stands at "failed now"."""
+        return leaf in self._failed
+
+    def failures_changed(self) -> None:
+        self._failures_dirty = True
+
+    def repair_all(self) -> None:
+        self._failures.repair_all()
+        self._failures_dirty = True
+
+    def hydraulic_pressure_psi(self, system: int) -> float:
+        """Pressure of system 1 or 2, driven by engine 1 or 2."""
+        engines = self.frame.m.engines
+        running = system <= len(engines) and engines[system - 1].running
+        pump = "rel_hydpmp" if system == 1 else "rel_hydpmp2"
+        return 3000.0 if running and not self.failed(pump) else 0.0
+
+    def pause(self, paused: bool) -> None:
+        self.clocks.paused = paused
+
+    def watch_surface(self, name: str) -> None:
+        self.inputs.watch_surface(name)
+
+    def move_throttles(self, step: float) -> None:
+        """Moves all levers by `step`, within 0..1."""
+        slots = self.store.dataref("sim/cockpit2/engine/actuators/throttle_ratio").slots
+        slots = slots[: self.model.info.engine_count]
+        self.store.values[slots] = np.clip(self.store.values[slots] + step, 0.0, 1.0)
+
+    def run_engine(self, engine: int, running: bool) -> None:
+        self.model.set_engine_running(engine, running)
+
+    def run_engines(self, running: bool) -> None:
+        for engine in range(self.model.info.engine_count):
+            self.model.set_engine_running(engine, running)
+
+    # --- flights, aircraft, situations --------------------------------------------------------------------------------
+
+    def start_flight(self, initial: InitialState) -> None:
+        """Begins a flight: levers and trims as the flight needs them, the origin where the aircraft is."""
+        self.controls = self.model.reset(initial)
+        self.inputs.start(self.controls, self.model)
+        self.frozen, self.flying = False, True
+        self.clocks.flight = 0.0
+        self._placements.clear()
+        self.instruments, self.electrics = Instruments(), Electrics()
+        powered = float(initial.engines_running)
+        for name in ("battery_on", "generator_on", "inverter_on"):
+            self.store.set(_ELECTRICAL + name, powered)
+        self.store.set("sim/cockpit2/switches/avionics_power_on", powered)
+        self.frame.start(self.model.state)
+        self.frame.update(self.model.state, self.store.get(_SETTING) * INHG_PA)
+        self.instruments.update(self.frame, self.store.get(_SETTING), self.failed)
+        self.electrics.update(0.0, self.store, self.frame, self.failed)
+        self._publish_surfaces()
+
+    def load_aircraft(self, name: str) -> None:
+        """Loads another aircraft where the present one is; raises FlightModelError if there is none of that name."""
+        before = self.model.state
+        self.model = self._make_model(name)
+        self.aircraft = name
+        self.frame.info = self.model.info
+        self.inputs.release_data()
+        self._bind_aircraft()
+        start = InitialState(
+            latitude_deg=before.latitude_deg,
+            longitude_deg=before.longitude_deg,
+            heading_deg=math.degrees(before.heading_rad),
+            on_ground=before.on_ground_any,
+            altitude_m=before.altitude_m,
+            terrain_elevation_m=before.terrain_elevation_m,
+        )
+        self.start_flight(start)
+
+    def save_situation(self, path: str) -> None:
+        self._situations[path] = (self.aircraft, self.model.save(), self.inputs.save())
+        self.last_situation = path
+
+    def load_situation(self, path: str) -> bool:
+        """Returns whether there is a situation of that name."""
+        if path not in self._situations:
+            return False
+        aircraft, situation, levers = self._situations[path]
+        if aircraft != self.aircraft:
+            self.load_aircraft(aircraft)
+        self.model.restore(situation)
+        self.inputs.restore(levers)
+        self.frozen = False
+        self.clocks.flight = 0.0
+        self.frame.start(self.model.state)
+        return True
+
+    def _bind_aircraft(self) -> None:
+        """Gives the datarefs the loaded aircraft's surfaces, names and loading."""
+        info = self.model.info
+        self.store.values[self._surface_slots] = 0.0  # of the aircraft before
+        self._surface_names = [spec.name for spec in self.model.surfaces]
+        paths = [surface_dataref(spec) for spec in self.model.surfaces]
+        slots = [self.store.slot(path) for path in paths]
+        missing = [path for path, slot in zip(paths, slots) if slot is None]
+        if missing:
+            raise FlightModelError(f"aircraft {info.name}: X-Plane has no datarefs {', '.join(missing)} for its surfaces")
+        self._surface_slots = np.array(slots, dtype=int)
+        self.inputs.bind_surfaces(dict(zip(self._surface_names, map(int, self._surface_slots))))
+        self.store.set_text(_IDENTITY + "acf_ICAO", info.icao)
+        self.store.set_text(_IDENTITY + "acf_descrip", info.description)
+        self.store.set_text(_IDENTITY + "acf_ui_name", info.description)
+        self.store.set_text(_IDENTITY + "acf_author", "xplane_bridge")
+        self.store.set_text(_IDENTITY + "acf_tailnum", "N0XPB")
+        self.store.set_text(_IDENTITY + "acf_relative_path", aircraft_path(info.name))
+        self._commands = commands.commands(self)
+
+    # --- requests -----------------------------------------------------------------------------------------------------
+
+    def on_dref(self, request: protocol.DrefWrite) -> Optional[str]:
+        return None if self.store.write(request.path, request.value) else "dataref"
+
+    def on_data(self, request: protocol.DataPacket) -> Optional[str]:
+        for row, slots in request.rows:
+            self.inputs.take_row(row, slots)
+        return None
+
+    def on_command(self, request: protocol.CommandRequest) -> Optional[str]:
+        action = self._commands.get(request.path)
+        if action is None:
+            return "command"
+        action()
+        return None
+
+    def on_placement(self, request: protocol.Placement) -> Optional[str]:
+        """PREL: a new flight. Only start type 6 has a place of its own; the others begin where the emulator began."""
+        if request.aircraft != 0:
+            return "aircraft"
+        if request.start_type != Placements.START_AT_PLACE:
+            self.start_flight(self.initial)
+            return None
+        initial = Placements.initial_state(request, self.model.state.terrain_elevation_m)
+        if initial is None:
+            return "value"
+        self.start_flight(initial)
+        return None
+
+    def on_aircraft(self, request: protocol.AircraftLoad) -> Optional[str]:
+        if request.aircraft != 0:
+            return "aircraft"
+        name = request.path.replace("\\", "/").rsplit("/", 1)[-1]
+        name = name[:-4] if name.endswith(".acf") else name
+        try:
+            self.load_aircraft(name)
+        except FlightModelError as error:
+            _LOG.info("ACFN %s: %s", request.path, error)
+            return "aircraft"
+        return None
+
+    def on_situation(self, request: protocol.Situation) -> Optional[str]:
+        if request.action == protocol.Situation.SAVE:
+            self.save_situation(request.path)
+            return None
+        if request.action == protocol.Situation.LOAD:
+            return None if self.load_situation(request.path) else "situation"
+        return "movie"
+
+    def on_vehicle(self, request: protocol.VehiclePose) -> Optional[str]:
+        """VEHX holds the aircraft at the pose without a flight model; VEHS (X-Plane 12) puts it there once."""
+        if request.label == "VEHS" and self.version < 12:
+            return "version"
+        if request.aircraft != 0:
+            return "aircraft"
+        if not Placements.place_vehicle(self.model, request):
+            return "value"
+        self.frozen = self.frozen or request.label == "VEHX"
+        return None
+
+    def on_rows(self, request: protocol.RowSelection) -> Optional[str]:
+        """DSEL, USEL (network), DCOC, UCOC (cockpit display): the numbers are the rows' indices."""
+        name = "data_to_internet" if request.label in ("DSEL", "USEL") else "data_to_cockpit"
+        slots = self.store.dataref("sim/network/dataout/" + name).slots
+        for row in request.rows:
+            if 0 <= row < protocol.ROW_COUNT:
+                self.store.values[slots[row]] = float(request.label in ("DSEL", "DCOC"))
+        return None
+
+    # --- what goes out ------------------------------------------------------------------------------------------------
+
+    def selected_rows(self) -> np.ndarray:
+        """Indices of the rows selected for the network, ascending."""
+        selected = self.store.array("sim/network/dataout/data_to_internet")[: protocol.ROW_COUNT]
+        return np.flatnonzero(selected)
+
+    @property
+    def data_rate(self) -> int:
+        """DATA datagrams a second."""
+        return int(self.store.get("sim/network/dataout/network_data_rate"))
+
+    def position(self) -> protocol.RposResponse:
+        """What RPOS says now."""
+        if not self.flying:
+            return protocol.RposResponse(*([0.0] * 13))
+        f, m = self.frame, self.frame.m
+        level = self._level_angles
+        return protocol.RposResponse(
+            m.longitude_deg,
+            m.latitude_deg,
+            m.altitude_m,
+            m.agl_m,
+            f.true_theta if level else f.theta,
+            f.true_psi if level else f.psi,
+            f.true_phi if level else f.phi,
+            *f.velocity,
+            m.p_rad_s,
+            m.q_rad_s,
+            m.r_rad_s,
+        )
+
+    # --- settings that reach the model --------------------------------------------------------------------------------
+
+    def _connect_settings(self) -> None:
+        store = self.store
+
+        def set_clock(attribute: str) -> Callable[[int, float], None]:
+            return lambda _index, value: setattr(self.clocks, attribute, value)
+
+        store.on_write("sim/time/total_flight_time_sec", set_clock("flight"))
+        store.on_write("sim/time/zulu_time_sec", lambda _i, value: setattr(self.clocks, "zulu", value % 86400.0))
+        store.on_write("sim/flightmodel/weight/m_fixed", lambda _i, value: self.model.set_loading(payload_kg=value))
+        store.on_write("sim/flightmodel/weight/m_fuel", self._set_fuel)
+        for name in (_SEA_LEVEL, _SEA_LEVEL_TEMPERATURE):
+            store.on_write(name, lambda _i, _v: self._set_atmosphere())
+        if self.version < 12:
+            layer = "sim/weather/{}[0]"
+            names = (layer.format("wind_direction_degt"), layer.format("wind_speed_kt"), layer.format("turbulence"))
+            factor = 1852.0 / 3600.0  # the layers' speed is in knots, unlike the present wind's
+        else:
+            region = "sim/weather/region/"
+            names = (region + "wind_direction_degt", region + "wind_speed_msc", region + "turbulence")
+            factor = 1.0
+        direction, speed, turbulence = names
+
+        def set_wind(_index: int, _value: float) -> None:
+            self.weather.set_wind(self.model, store.get(direction), store.get(speed) * factor)
+
+        store.on_write(direction, set_wind)
+        store.on_write(speed, set_wind)
+        store.on_write(
+            turbulence,
+            lambda _i, _v: self.weather.set_turbulence(self.model, store.get(turbulence) * TURBULENCE_MPS_PER_UNIT),
+        )
+
+    def set_weather(self, wind_from_deg: float, wind_mps: float, turbulence_mps: float, seed: int) -> None:
+        """Wind and turbulence of the command line."""
+        self.weather.set_wind(self.model, wind_from_deg, wind_mps)
+        self.weather.set_turbulence(self.model, turbulence_mps, seed)
+
+    def _set_fuel(self, _index: int, _value: float) -> None:
+        tanks = self.model.info.tank_count
+        fuel = self.store.array("sim/flightmodel/weight/m_fuel")[:tanks]
+        self.model.set_loading(fuel_kg=[max(0.0, float(kg)) for kg in fuel])
+
+    def _set_atmosphere(self) -> None:
+        self.model.set_atmosphere(
+            temperature_offset_k=self.store.get(_SEA_LEVEL_TEMPERATURE) - 15.0,
+            sea_level_pressure_pa=self.store.get(_SEA_LEVEL) * INHG_PA,
+        )
+
+
+def aircraft_path(name: str) -> str:
+    """`acf_relative_path` of an emulated aircraft, and what ACFN takes."""
+    return f"Aircraft/xplane_bridge/{name}/{name}.acf"

@@ -1,0 +1,22 @@
+"""Scripted flights: one YAML schema (config/scenarios/README.md), one player, used by emulator, tests and failure scenarios."""
+
+from .holds import HoldGains, Targets
+from .loader import load_scenario, parse_scenario
+from .pilot import ScenarioPilot
+from .player import Action, Commands, FlightSample, Player
+from .schema import Event, Scenario, ScenarioError
+
+__all__ = [
+    "Action",
+    "Commands",
+    "Event",
+    "FlightSample",
+    "HoldGains",
+    "Player",
+    "Scenario",
+    "ScenarioError",
+    "ScenarioPilot",
+    "Targets",
+    "load_scenario",
+    "parse_scenario",
+]

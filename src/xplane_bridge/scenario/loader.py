@@ -1,0 +1,302 @@
+"""Reads and checks scenarios. Nothing unknown is accepted: a misspelt key is an error, not a flight without its failure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
+
+import yaml
+
+from .holds import HoldGains
+from .schema import (
+    EXCITATION_KINDS,
+    FAILURE_KINDS,
+    HANDLES,
+    HOLDS,
+    MODES,
+    STICK_AXES,
+    VARIABLES,
+    Condition,
+    Event,
+    Scenario,
+    ScenarioError,
+)
+
+_TOP = ("name", "description", "aircraft", "repeat_every", "start", "gains", "criteria", "events")
+_START = {
+    "latitude": (-90.0, 90.0),
+    "longitude": (-180.0, 180.0),
+    "altitude": (-500.0, 20000.0),
+    "heading": (-360.0, 360.0),
+    "speed": (0.0, 300.0),
+}
+_TIMING = ("at", "after", "when", "timeout", "over")
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Reads a scenario file.
+
+    Raises:
+        ScenarioError: The file cannot be read, is no YAML, or is no scenario.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror or error}") from None
+    try:
+        document = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ScenarioError(f"{path}: is not valid YAML: {error}") from None
+    try:
+        return parse_scenario(document)
+    except ScenarioError as error:
+        raise ScenarioError(f"{path}: {error}") from None
+
+
+def parse_scenario(document: Any) -> Scenario:
+    """Checks a scenario that is already a mapping.
+
+    Raises:
+        ScenarioError: Says the key's path, what was given, and what was expected.
+    """
+    top = _mapping(document, "scenario", _TOP)
+    name = _text(top, "name", "")
+    if not name:
+        raise ScenarioError("name: missing; expected a short name of the scenario")
+    aircraft = top.get("aircraft", [])
+    aircraft = [aircraft] if isinstance(aircraft, str) else aircraft
+    if not isinstance(aircraft, list) or not all(isinstance(item, str) for item in aircraft):
+        raise ScenarioError(f"aircraft: {aircraft!r}; expected a name or a list of names")
+    gains = _mapping(top.get("gains", {}), "gains", [item.name for item in fields(HoldGains)])
+    for key in gains:
+        _number(gains[key], f"gains.{key}", 0.0, math.inf)
+    start = _ranged(top.get("start", {}), "start", _START)
+    repeat = top.get("repeat_every")
+    if repeat is not None:
+        repeat = _number(repeat, "repeat_every", 1.0, 86400.0)
+    criteria = top.get("criteria", {})
+    if not isinstance(criteria, dict):
+        raise ScenarioError(f"criteria: {criteria!r}; expected a mapping")
+    events = top.get("events")
+    if not isinstance(events, list) or not events:
+        raise ScenarioError(f"events: {_short(events)}; expected a list of at least one event")
+    parsed = tuple(_event(item, f"events[{i}]") for i, item in enumerate(events))
+    _check_times(parsed, repeat)
+    return Scenario(
+        name, _text(top, "description", ""), tuple(aircraft), repeat, start, gains, criteria, parsed
+    )
+
+
+def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:
+    last = 0.0
+    for i, event in enumerate(events):
+        if event.at is None:
+            continue
+        if event.at < last:
+            raise ScenarioError(f"events[{i}].at: {event.at}; expected {last} or more: events stand in the order of their time")
+        if repeat is not None and event.at >= repeat:
+            raise ScenarioError(f"events[{i}].at: {event.at}; expected less than repeat_every ({repeat})")
+        last = event.at
+
+
+def _event(item: Any, path: str) -> Event:
+    known = (*_TIMING, *_ACTIONS)
+    event = _mapping(item, path, known)
+    if "at" in event and "after" in event:
+        raise ScenarioError(f"{path}: has both 'at' and 'after'; expected one of them")
+    timing: Dict[str, Any] = {}
+    for key, low in (("at", 0.0), ("after", 0.0), ("timeout", 0.0), ("over", 0.0)):
+        if key in event:
+            timing[key] = _number(event[key], f"{path}.{key}", low, 1e6)
+    if "when" in event:
+        timing["when"] = _conditions(event["when"], f"{path}.when")
+    if "timeout" in event and "when" not in event:
+        raise ScenarioError(f"{path}.timeout: without 'when'; expected a condition to wait for")
+    actions = tuple((key, _ACTIONS[key](value, f"{path}.{key}")) for key, value in event.items() if key in _ACTIONS)
+    if not actions and not timing:
+        raise ScenarioError(f"{path}: is empty; expected a time, a condition or an action of {', '.join(_ACTIONS)}")
+    return Event(actions=actions, **timing)
+
+
+def _conditions(item: Any, path: str) -> Tuple[Condition, ...]:
+    conditions = []
+    for variable, bounds in _mapping(item, path, VARIABLES).items():
+        place = f"{path}.{variable}"
+        if variable == "mode":
+            if bounds not in MODES:
+                raise ScenarioError(f"{place}: {bounds!r}; expected one of {', '.join(MODES)}")
+            conditions.append(Condition(variable, MODES[bounds] - 0.5, MODES[bounds] + 0.5))
+        elif isinstance(bounds, bool):
+            conditions.append(Condition(variable, above=0.5) if bounds else Condition(variable, below=0.5))
+        elif isinstance(bounds, list):
+            if len(bounds) != 2:
+                raise ScenarioError(f"{place}: {bounds!r}; expected two bounds [low, high]")
+            low, high = (_number(bound, place, -math.inf, math.inf) for bound in bounds)
+            conditions.append(Condition(variable, low, high))
+        else:
+            limits = _mapping(bounds, place, ("above", "below"))
+            if not limits:
+                raise ScenarioError(f"{place}: {_short(bounds)}; expected above and/or below")
+            numbers = {key: _number(value, f"{place}.{key}", -math.inf, math.inf) for key, value in limits.items()}
+            conditions.append(Condition(variable, **numbers))
+    return tuple(conditions)
+
+
+# --- actions: each checks its value and returns it in its final form ---------------------------------------------------
+
+
+def _stick(item: Any, path: str) -> Dict[str, float]:
+    return _ranged(item, path, STICK_AXES, some=True)
+
+
+def _hold(item: Any, path: str) -> Dict[str, Optional[float]]:
+    """Targets; null lets one go, and the word `none` all of them."""
+    if item is None or item == "none":
+        return {key: None for key in HOLDS}
+    given = _mapping(item, path, HOLDS)
+    if not given:
+        raise ScenarioError(f"{path}: is empty; expected targets of {', '.join(HOLDS)}")
+    targets: Dict[str, Optional[float]] = {}
+    for key, value in given.items():
+        targets[key] = None if value is None else _number(value, f"{path}.{key}", *HOLDS[key])
+    return targets
+
+
+def _handles(item: Any, path: str) -> Dict[str, float]:
+    return _ranged(item, path, HANDLES, some=True)
+
+
+def _buttons(item: Any, path: str) -> Dict[str, List[int]]:
+    given = _mapping(item, path, ("press", "release", "tap"))
+    out = {}
+    for key, value in given.items():
+        numbers = value if isinstance(value, list) else [value]
+        if not numbers or not all(isinstance(n, int) and not isinstance(n, bool) and 0 <= n < 64 for n in numbers):
+            raise ScenarioError(f"{path}.{key}: {value!r}; expected button numbers 0..63")
+        out[key] = numbers
+    return out
+
+
+def _hat(item: Any, path: str) -> Dict[str, float]:
+    return _ranged(item, path, {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}, some=True)
+
+
+def _mode(item: Any, path: str) -> int:
+    if item not in MODES:
+        raise ScenarioError(f"{path}: {item!r}; expected one of {', '.join(MODES)}")
+    return MODES[item]
+
+
+def _failure(item: Any, path: str) -> Dict[str, Any]:
+    given = _mapping(item, path, ("name", "kind", "value", "clear"))
+    name, kind = _text(given, "name", "", path), _text(given, "kind", "failed", path)
+    if not name:
+        raise ScenarioError(f"{path}.name: missing; expected a surface, a system, or a rel_* dataref")
+    if kind not in FAILURE_KINDS:
+        raise ScenarioError(f"{path}.kind: {kind!r}; expected one of {', '.join(FAILURE_KINDS)}")
+    value = given.get("value")
+    if value is not None:
+        value = _number(value, f"{path}.value", -180.0, 180.0)
+    clear = given.get("clear", False)
+    if not isinstance(clear, bool):
+        raise ScenarioError(f"{path}.clear: {clear!r}; expected true or false")
+    return {"name": name, "kind": kind, "value": value, "clear": clear}
+
+
+def _excitation(item: Any, path: str) -> Dict[str, Any]:
+    known = ("kind", "target", "amplitude", "duration", "frequency", "frequency_end", "seed")
+    given = _mapping(item, path, known)
+    kind, target = _text(given, "kind", "", path), _text(given, "target", "", path)
+    if kind not in EXCITATION_KINDS:
+        raise ScenarioError(f"{path}.kind: {kind!r}; expected one of {', '.join(EXCITATION_KINDS)}")
+    if not target:
+        raise ScenarioError(f"{path}.target: missing; expected roll, pitch, yaw, throttle or a surface's name")
+    out: Dict[str, Any] = {"kind": kind, "target": target, "seed": given.get("seed", 0)}
+    for key, default, low, high in (
+        ("amplitude", None, 0.0, 45.0),
+        ("duration", None, 0.1, 600.0),
+        ("frequency", 0.1, 0.01, 10.0),
+        ("frequency_end", 2.0, 0.01, 10.0),
+    ):
+        if key not in given and default is None:
+            raise ScenarioError(f"{path}.{key}: missing; expected a number from {low} to {high}")
+        out[key] = _number(given.get(key, default), f"{path}.{key}", low, high)
+    if not isinstance(out["seed"], int):
+        raise ScenarioError(f"{path}.seed: {out['seed']!r}; expected a whole number")
+    return out
+
+
+def _datarefs(item: Any, path: str) -> Dict[str, float]:
+    if not isinstance(item, dict) or not item:
+        raise ScenarioError(f"{path}: {_short(item)}; expected datarefs with their values")
+    return {str(key): _number(value, f"{path}.{key}", -math.inf, math.inf) for key, value in item.items()}
+
+
+def _word(item: Any, path: str) -> str:
+    if not isinstance(item, str) or not item:
+        raise ScenarioError(f"{path}: {item!r}; expected a text")
+    return item
+
+
+def _true(item: Any, path: str) -> bool:
+    if item is not True:
+        raise ScenarioError(f"{path}: {item!r}; expected true")
+    return True
+
+
+_ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
+    "stick": _stick,
+    "hold": _hold,
+    "handles": _handles,
+    "buttons": _buttons,
+    "hat": _hat,
+    "mode": _mode,
+    "failure": _failure,
+    "clear_failures": _true,
+    "excitation": _excitation,
+    "dataref": _datarefs,
+    "command": _word,
+    "label": _word,
+    "end": _true,
+}
+
+
+# --- helpers -----------------------------------------------------------------------------------------------------------
+
+
+def _mapping(item: Any, path: str, known: Any) -> Dict[str, Any]:
+    if not isinstance(item, Mapping):
+        raise ScenarioError(f"{path}: {_short(item)}; expected a mapping")
+    for key in item:
+        if key not in known:
+            raise ScenarioError(f"{path}.{key}: unknown key; expected one of {', '.join(known)}")
+    return dict(item)
+
+
+def _ranged(item: Any, path: str, ranges: Mapping[str, Tuple[float, float]], some: bool = False) -> Dict[str, float]:
+    given = _mapping(item, path, ranges)
+    if some and not given:
+        raise ScenarioError(f"{path}: is empty; expected some of {', '.join(ranges)}")
+    return {key: _number(value, f"{path}.{key}", *ranges[key]) for key, value in given.items()}
+
+
+def _number(value: Any, path: str, low: float, high: float) -> float:
+    good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and low <= value <= high
+    if not good:
+        bounds = "a number" if math.isinf(low) and math.isinf(high) else f"a number from {low:g} to {high:g}"
+        raise ScenarioError(f"{path}: {_short(value)}; expected {bounds}")
+    return float(value)
+
+
+def _text(mapping: Mapping[str, Any], key: str, default: str, path: str = "") -> str:
+    value = mapping.get(key, default)
+    if not isinstance(value, str):
+        raise ScenarioError(f"{path + '.' if path else ''}{key}: {value!r}; expected a text")
+    return value
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

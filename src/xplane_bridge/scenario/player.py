@@ -1,0 +1,227 @@
+"""Plays a scenario: time and state in, stick, handles and actions out. Pure: no clock, no input or output, no ROS."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Optional, Set, Tuple
+
+from . import excitations
+from .holds import HoldAutopilot, HoldGains, Targets
+from .schema import STICK_AXES, Event, Scenario
+
+#: Longest time step that the holds integrate over; after a gap they go on as if nothing had happened [s].
+_MAX_STEP_S = 0.1
+
+
+@dataclass(frozen=True)
+class FlightSample:
+    """What the player looks at. Angles in degrees, rates in degrees/s; altitude and agl in m, climb and speed (calibrated) in m/s."""
+
+    roll: float = 0.0
+    pitch: float = 0.0
+    heading: float = 0.0
+    altitude: float = 0.0
+    agl: float = 0.0
+    climb: float = 0.0
+    speed: float = 0.0
+    alpha: float = 0.0
+    beta: float = 0.0
+    roll_rate: float = 0.0
+    pitch_rate: float = 0.0
+    yaw_rate: float = 0.0
+    load_factor: float = 1.0
+    on_ground: bool = False
+    mode: int = 1  #: MANUAL 1, AUTO 2; 1 where there is no arbiter
+
+
+@dataclass(frozen=True)
+class Action:
+    """Something for the caller to do once: `mode`, `failure`, `clear_failures`, `excitation`, `dataref`, `command`, `label`."""
+
+    kind: str
+    value: Any
+    time: float  #: scenario time at which it happened [s]
+
+
+@dataclass
+class Commands:
+    """What the scenario wants now."""
+
+    stick: Dict[str, float] = field(default_factory=lambda: {"roll": 0.0, "pitch": 0.0, "yaw": 0.0})
+    throttle: Optional[float] = None  #: None: never said, leave it
+    handles: Dict[str, float] = field(default_factory=dict)  #: those said so far
+    buttons: Set[int] = field(default_factory=set)  #: pressed ones
+    hat: Tuple[float, float] = (0.0, 0.0)
+    actions: List[Action] = field(default_factory=list)  #: new ones, in order
+    finished: bool = False
+
+
+@dataclass
+class _Ramp:
+    start_time: float
+    duration: float
+    start: float
+    end: float
+
+    def at(self, time: float) -> float:
+        if self.duration <= 0.0:
+            return self.end
+        part = min(max((time - self.start_time) / self.duration, 0.0), 1.0)
+        return self.start + part * (self.end - self.start)
+
+
+class Player:
+    """Plays one scenario from the first call of `step` on.
+
+    Args:
+        scenario: What to play.
+        apply_excitations: Whether excitations of stick axes are added to the stick here (else they are only actions).
+    """
+
+    def __init__(self, scenario: Scenario, apply_excitations: bool = False) -> None:
+        self.scenario = scenario
+        self.targets = Targets()
+        self._apply_excitations = apply_excitations
+        self._autopilot = HoldAutopilot(dataclasses.replace(HoldGains(), **scenario.gains))
+        self._axes: Dict[str, _Ramp] = {}
+        self._handles: Dict[str, float] = {}
+        self._buttons: Set[int] = set()
+        self._taps: Set[int] = set()
+        self._hat = (0.0, 0.0)
+        self._running: List[Tuple[float, Dict[str, Any]]] = []
+        self._next = 0
+        self._start: Optional[float] = None
+        self._round_start = 0.0
+        self._last_fired = 0.0
+        self._last_time: Optional[float] = None
+        self._waiting_since: Optional[float] = None
+        self._finished = False
+        self._throttle: Optional[float] = None
+
+    @property
+    def time(self) -> float:
+        """Scenario time of the last step, from the start of the first round [s]."""
+        return 0.0 if self._start is None or self._last_time is None else self._last_time - self._start
+
+    def step(self, sim_time: float, sample: FlightSample) -> Commands:
+        """Goes on to `sim_time` [s]. The first call is scenario time 0; time that runs backwards starts the scenario anew."""
+        if self._start is None or (self._last_time is not None and sim_time < self._last_time):
+            self.__init__(self.scenario, self._apply_excitations)  # type: ignore[misc]
+            self._start = sim_time
+        dt = 0.0 if self._last_time is None else min(sim_time - self._last_time, _MAX_STEP_S)
+        self._last_time = sim_time
+        now = sim_time - self._start
+        commands = Commands()
+        self._taps.clear()
+        self._fire(now, sample, commands.actions)
+        self._fly(now, dt, sample, commands)
+        commands.handles = dict(self._handles)
+        commands.buttons = self._buttons | self._taps
+        commands.hat = self._hat
+        commands.finished = self._finished
+        return commands
+
+    # --- events -------------------------------------------------------------------------------------------------------
+
+    def _fire(self, now: float, sample: FlightSample, actions: List[Action]) -> None:
+        events, repeat = self.scenario.events, self.scenario.repeat_every
+        while not self._finished:
+            if self._next >= len(events):
+                if repeat is None:
+                    self._finished = True
+                    return
+                if now < self._round_start + repeat:
+                    return
+                # a round that waited longer than its length begins again at once
+                self._round_start = max(self._round_start + repeat, now - repeat)
+                self._last_fired = self._round_start
+                self._next = 0
+            elif repeat is not None and now >= self._round_start + repeat:
+                self._next = len(events)
+                self._waiting_since = None
+                continue
+            event = events[self._next]
+            due = self._last_fired + event.after if event.at is None else self._round_start + event.at
+            if now < due or not self._ready(event, now, due, sample):
+                return
+            self._last_fired = due if not event.when else now
+            self._waiting_since = None
+            self._next += 1
+            for kind, value in event.actions:
+                self._act(kind, value, event, now, actions)
+
+    def _ready(self, event: Event, now: float, due: float, sample: FlightSample) -> bool:
+        if not event.when:
+            return True
+        values = {**dataclasses.asdict(sample), "time": now - self._round_start, "on_ground": float(sample.on_ground)}
+        if all(condition.holds(values) for condition in event.when):
+            return True
+        if self._waiting_since is None:
+            self._waiting_since = due
+        return event.timeout is not None and now - self._waiting_since >= event.timeout
+
+    def _act(self, kind: str, value: Any, event: Event, now: float, actions: List[Action]) -> None:
+        if kind == "stick":
+            for axis, target in value.items():
+                present = self._axes[axis].at(now) if axis in self._axes else self._present(axis)
+                self._axes[axis] = _Ramp(now, event.over, present, target)
+                self._release(axis)
+        elif kind == "hold":
+            self.targets.update(value)
+        elif kind == "handles":
+            self._handles.update(value)
+        elif kind == "buttons":
+            self._buttons |= set(value.get("press", ()))
+            self._buttons -= set(value.get("release", ()))
+            self._taps |= set(value.get("tap", ()))
+        elif kind == "hat":
+            self._hat = (value.get("x", self._hat[0]), value.get("y", self._hat[1]))
+        elif kind == "end":
+            self._finished = True
+        else:
+            if kind == "excitation":
+                self._running.append((now, value))
+            actions.append(Action(kind, value, now))
+
+    def _present(self, axis: str) -> float:
+        return self._throttle or 0.0 if axis == "throttle" else 0.0
+
+    def _release(self, axis: str) -> None:
+        """A stick movement ends the holds of its axis."""
+        for key in {
+            "roll": ("roll", "heading"),
+            "pitch": ("pitch", "climb", "altitude"),
+            "yaw": ("yaw_rate",),
+            "throttle": ("speed",),
+        }[axis]:
+            setattr(self.targets, key, None)
+
+    # --- flying -------------------------------------------------------------------------------------------------------
+
+    def _fly(self, now: float, dt: float, s: FlightSample, commands: Commands) -> None:
+        autopilot, targets = self._autopilot, self.targets
+        held = {
+            "roll": autopilot.roll(targets, s.roll, s.roll_rate, s.heading),
+            "pitch": autopilot.pitch(targets, dt, s.pitch, s.pitch_rate, s.roll, s.climb, s.altitude),
+            "yaw": autopilot.yaw(targets, s.yaw_rate),
+            "throttle": autopilot.throttle(targets, dt, s.speed, 0.5 if self._throttle is None else self._throttle),
+        }
+        for axis, (low, high) in STICK_AXES.items():
+            value = held[axis]
+            if value is None and axis in self._axes:
+                value = self._axes[axis].at(now)
+            if axis == "throttle":
+                self._throttle = self._throttle if value is None else value
+                commands.throttle = self._throttle
+            else:
+                value = (value or 0.0) + self._excitation(axis, now)
+                commands.stick[axis] = min(max(value, low), high)
+
+    def _excitation(self, axis: str, now: float) -> float:
+        if not self._apply_excitations:
+            return 0.0
+        self._running = [(start, p) for start, p in self._running if now - start < p["duration"]]
+        total = sum(excitations.value(p, now - start) for start, p in self._running if p["target"] == axis)
+        return total if math.isfinite(total) else 0.0
