@@ -22,7 +22,7 @@ class EmulatorProcess(ManagedProcess):
         port: UDP port to listen on; 0 for a free one.
     """
 
-    _READY = r"^READY\b.*?\bport[ =:]+(\d+)"
+    _READY = r"^READY\b.*?\bport\W+(\d+)"
     _START_TIMEOUT_S = 60.0
 
     def __init__(
