@@ -375,4 +375,12 @@ std::string journalPath(const std::string& folder, const std::string& host, std:
   return (fs::path(folder) / (name + "_" + std::to_string(port) + ".json")).string();
 }
 
+JournalFactory journalsIn(const std::string& folder, const std::string& node) {
+  return [folder, node](const Endpoint& peer) {
+    // One file whatever loopback address the X-Plane of this computer is called by.
+    const Endpoint named{isSameHost(peer.address, kLoopbackAddress) ? kLoopbackAddress : peer.address, peer.port};
+    return std::make_shared<Journal>(journalPath(folder, named.addressString(), named.port), thisProcess(node));
+  };
+}
+
 }  // namespace xplane_bridge::core

@@ -219,6 +219,13 @@ TEST(JournalPath, HoldsOnlyFileCharacters) {
   EXPECT_EQ(journalPath("/f", "../sim pc", 1), "/f/..-sim-pc_1.json");
 }
 
+TEST(JournalsIn, NamesTheFileAfterThePeer) {
+  const JournalFactory journals = journalsIn("/f", "/node");
+  EXPECT_EQ(journals({0xC0A80105U, 49000})->path(), "/f/192.168.1.5_49000.json");
+  EXPECT_EQ(journals({0x7F000101U, 49000})->path(), "/f/127.0.0.1_49000.json");
+  EXPECT_EQ(journals({0x7F000101U, 49000})->self().node, "/node");
+}
+
 TEST(EncodeUndo, GivesTheMessages) {
   std::array<std::uint8_t, kMaxUndoSize> buffer{};
   const auto label = [&buffer] { return std::string(buffer.begin(), buffer.begin() + 4); };

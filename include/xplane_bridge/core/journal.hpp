@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "xplane_bridge/core/packets.hpp"
+#include "xplane_bridge/core/udp_socket.hpp"
 
 /// What we changed in X-Plane, written down before it is changed, so that it can be undone by whoever comes next: the
 /// same node on exit, its guardian, its next start, or scripts/release_overrides. Format: docs/journal.md.
@@ -113,5 +115,10 @@ class Journal {
 /// "<folder>/<host>_<port>.json" with characters that do not belong in a file name replaced by '-'.
 /// By convention the folder is ~/.ros/xplane_bridge.
 std::string journalPath(const std::string& folder, const std::string& host, std::uint16_t port);
+
+/// Opens the journal of the X-Plane at `peer`, once that is known.
+using JournalFactory = std::function<std::shared_ptr<Journal>(const Endpoint& peer)>;
+/// Journals in `folder` (by convention ~/.ros/xplane_bridge) in the name of this process as `node`.
+JournalFactory journalsIn(const std::string& folder, const std::string& node);
 
 }  // namespace xplane_bridge::core

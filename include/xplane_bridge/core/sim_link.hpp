@@ -37,6 +37,7 @@ struct DataOutputOptions {
   bool enabled = false;
   std::uint16_t port = kDefaultDataPort;  ///< ours; 0: any free one (needs `configure`); never 49001
   bool configure = true;                  ///< set rows, rate and target in X-Plane; false: the user has done it
+  bool restore_leftovers = false;         ///< undo what a crashed run left in Data Output, also without `enabled`
   std::vector<std::int32_t> rows;         ///< rows wanted
   std::int32_t rate_hz = 99;              ///< network_data_rate while we run
   std::string address;                    ///< where X-Plane shall send to; empty: our address towards X-Plane
@@ -145,10 +146,10 @@ using DatarefValue = std::optional<float>;
 /// may be called from any thread; those that wait say so and must not be called from a callback.
 class SimLink {
  public:
-  /// `journal` may be null when neither Data Output is configured nor leftovers are to be restored.
+  /// `journals` may be empty when neither Data Output is configured nor leftovers are to be restored.
   /// Throws std::invalid_argument (an option out of range) and SocketError (a port is taken).
   SimLink(SimLinkOptions options, SimLinkCallbacks callbacks, Clock clock, LogFunction log,
-          std::shared_ptr<Journal> journal = nullptr);
+          JournalFactory journals = {});
   /// stop(), if it has not been called.
   ~SimLink();
   SimLink(const SimLink&) = delete;
@@ -177,6 +178,8 @@ class SimLink {
   LinkCounters counters() const;
   /// Datarefs that were asked for repeatedly and never answered while others were: unknown to this X-Plane.
   std::vector<std::string> unansweredDatarefs() const;
+  /// The journal of the X-Plane found; null before, or without a factory.
+  std::shared_ptr<Journal> journal() const;
   /// Port on which DATA is received; 0 without DATA transport.
   std::uint16_t dataPort() const;
   /// Port on which beacons are received; 0 when not listening.
