@@ -155,6 +155,11 @@ class Bags:
                 )
         return infos
 
+    def times(self, topic: str) -> np.ndarray:
+        """Give the receive times of a topic's messages, int64 [ns], sorted; read from the index, not from the data."""
+        found = [[entry.time for entry in reader.indexes[c.id]] for reader, c in self._connections(topic)]
+        return np.sort(np.concatenate([np.array(times, dtype=np.int64) for times in found]))
+
     def topic_of_type(self, msgtype: str, suffix: str = "") -> str | None:
         """Find the topic of a message type (``package/Name``); of several, the first whose name ends in `suffix`."""
         for info in sorted(self.topics.values()):

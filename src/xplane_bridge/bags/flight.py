@@ -1,0 +1,93 @@
+"""A recorded flight as a whole: every topic of the bridge that the bag has, found by message type."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xplane_bridge.analysis.resampling import segments
+from xplane_bridge.bags import BagError, Bags, Table, TopicInfo
+
+if TYPE_CHECKING:
+    from xplane_bridge.bags.units import Unit
+
+#: Role in a flight to message type.
+ROLES = {
+    "state": "xplane_bridge/FlightState",
+    "controls": "xplane_bridge/ControlStates",
+    "surfaces": "xplane_bridge/SurfaceStates",
+    "engines": "xplane_bridge/EngineStates",
+    "fuel": "xplane_bridge/FuelState",
+    "sim": "xplane_bridge/SimStatus",
+    "applied": "xplane_bridge/AppliedCommand",
+    "mode": "xplane_bridge/ControlMode",
+    "failures": "xplane_bridge/FailureState",
+    "excitation": "xplane_bridge/ExcitationState",
+    "link": "xplane_bridge/LinkState",
+    "events": "xplane_bridge/EventList",
+    "frames": "xplane_bridge/FrameState",
+    "odom": "nav_msgs/Odometry",
+}
+
+
+@dataclass
+class Flight:
+    """Tables by role; a role without messages in the bag is absent."""
+
+    name: str
+    topics: dict[str, TopicInfo]
+    times: dict[str, np.ndarray]  #: receive times [ns] of every topic that has messages
+    tables: dict[str, Table] = field(default_factory=dict)
+    units: dict[str, dict[str, Unit]] = field(default_factory=dict)
+    constants: dict[str, dict[str, Any]] = field(default_factory=dict)
+    parts: list[slice] = field(default_factory=list)  #: segments of the state: not to be bridged
+
+    @property
+    def start(self) -> int:
+        """[ns] stamp of the first state, or of the first message where there is no state."""
+        if "state" in self.tables:
+            return int(self.tables["state"].stamp[0])
+        return min(int(t[0]) for t in self.times.values())
+
+    @property
+    def end(self) -> int:
+        """[ns] stamp of the last state, or of the last message."""
+        if "state" in self.tables:
+            return int(self.tables["state"].stamp[-1])
+        return max(int(t[-1]) for t in self.times.values())
+
+
+def read_flight(bags: Bags) -> Flight:
+    """Read everything but images.
+
+    Raises:
+        BagError: The bags hold no message at all, or are damaged.
+    """
+    topics = bags.topics
+    filled = [name for name, info in topics.items() if info.count]
+    if not filled:
+        names = ", ".join(str(path) for path in bags.paths)
+        msg = f"{names}: no message in it; nothing was recorded"
+        raise BagError(msg)
+    flight = Flight(bags.paths[0].stem, topics, {name: bags.times(name) for name in filled})
+    for role, msgtype in ROLES.items():
+        topic = bags.topic_of_type(msgtype)
+        if topic is None or not topics[topic].count:
+            continue
+        flight.tables[role] = _sorted(bags.read(topic))
+        flight.units[role] = bags.units(topic)
+        flight.constants[role] = bags.constants(topic)
+    if "state" in flight.tables:
+        state = flight.tables["state"]
+        flight.parts = segments(state.stamp, state["epoch"])
+    return flight
+
+
+def _sorted(table: Table) -> Table:
+    stamp = table.stamp
+    if (np.diff(stamp) >= 0).all():
+        return table
+    order = np.argsort(stamp, kind="stable")
+    return Table(table.topic, table.msgtype, table.time[order], {k: v[order] for k, v in table.columns.items()})

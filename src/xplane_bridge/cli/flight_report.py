@@ -1,0 +1,67 @@
+"""flight_report: one HTML page about a recorded flight."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Sequence
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.cli.entry import guarded
+from xplane_bridge.errors import XplaneBridgeError
+
+
+class ReportError(XplaneBridgeError):
+    """The report cannot be written."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    p = argparse.ArgumentParser(prog="flight_report", description="Makes one self-contained HTML page about a flight.")
+    p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
+    p.add_argument("-o", "--output", default="report.html", metavar="FILE", help="default: %(default)s")
+    p.add_argument("--png", metavar="DIR", help="also write each figure as a PNG there")
+    return p
+
+
+@guarded
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    args = parser().parse_args(argv)
+    path = write_report(args.bags, Path(args.output), Path(args.png) if args.png else None)
+    print(path)
+    return 0
+
+
+def write_report(bag_paths: Sequence[str | Path], output: Path, png: Path | None = None) -> Path:
+    """Write the report of one flight; the function behind the program, for other programs.
+
+    Args:
+        bag_paths: The flight's bag or split bags.
+        output: The HTML file.
+        png: Folder for the figures as PNG; none when omitted.
+
+    Returns:
+        The file written.
+
+    Raises:
+        BagError: The bags cannot be read.
+        ReportError: The file cannot be written.
+    """
+    from xplane_bridge.bags.flight import read_flight
+    from xplane_bridge.plotting import report, static
+
+    with Bags(list(bag_paths)) as bags:
+        flight = read_flight(bags)
+        page, figures = report.build(bags, flight)
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        output.write_text(page, encoding="utf-8")
+        if png is not None:
+            png.mkdir(parents=True, exist_ok=True)
+            for figure in figures:
+                static.save(figure, flight.start, png / f"{figure.key}.png")
+    except OSError as err:
+        msg = f"{err.filename or output}: {err.strerror}"
+        raise ReportError(msg) from None
+    return output

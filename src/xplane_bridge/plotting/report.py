@@ -1,0 +1,332 @@
+"""A flight as one HTML page that needs no network: figures, images with their state, and how good the recording is."""
+
+from __future__ import annotations
+
+import base64
+import datetime
+import html
+from typing import TYPE_CHECKING, Any, Iterable, Sequence
+
+import numpy as np
+
+from xplane_bridge import __version__
+from xplane_bridge.analysis.consistency import check_flight, check_odometry
+from xplane_bridge.analysis.episodes import from_values
+from xplane_bridge.analysis.quality import bit_shares, pairing, timing
+from xplane_bridge.analysis.summary import summary
+from xplane_bridge.plotting import interactive
+from xplane_bridge.plotting.flight_figures import MissingError, all_figures
+
+if TYPE_CHECKING:
+    from xplane_bridge.bags import Bags
+    from xplane_bridge.bags.flight import Flight
+    from xplane_bridge.plotting.spec import PathFigure, TimeFigure
+
+#: Images on the strip, evenly spread over the flight.
+STRIP_IMAGES = 12
+_THUMBNAIL_WIDTH = 320
+_LINK_STATES = ("searching", "connected", "paused", "stale", "lost")
+
+_STYLE = """
+:root { --ink: #1d2733; --soft: #5c6b7a; --line: #dde3e9; --back: #f6f8fa; }
+* { box-sizing: border-box; }
+body { font: 15px/1.45 system-ui, sans-serif; color: var(--ink); background: var(--back); margin: 0; }
+header { background: #14324f; color: #fff; padding: 22px 32px; }
+header h1 { margin: 0 0 4px; font-size: 24px; } header p { margin: 0; opacity: .8; }
+nav { position: sticky; top: 0; z-index: 5; background: #fff; border-bottom: 1px solid var(--line); padding: 8px 32px;
+  display: flex; flex-wrap: wrap; gap: 2px 16px; }
+nav a { color: #0b5cad; text-decoration: none; white-space: nowrap; }
+main { max-width: 1240px; margin: 0 auto; padding: 16px 24px 60px; }
+section { background: #fff; border: 1px solid var(--line); border-radius: 8px; padding: 14px 18px; margin: 18px 0;
+  scroll-margin-top: 52px; }
+h2 { margin: 2px 0 10px; font-size: 19px; } h3 { margin: 18px 0 6px; font-size: 15px; }
+.cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(170px, 1fr)); gap: 10px; }
+.card { border: 1px solid var(--line); border-radius: 6px; padding: 8px 12px; }
+.card b { display: block; font-size: 19px; } .card span { color: var(--soft); font-size: 13px; }
+table { border-collapse: collapse; width: 100%; font-size: 13.5px; }
+th, td { text-align: left; padding: 4px 10px 4px 0; border-bottom: 1px solid var(--line); vertical-align: top; }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
+.missing { color: var(--soft); font-style: italic; }
+.bad { color: #b3261e; font-weight: 600; } .good { color: #1b7f3b; }
+.strip { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 12px; }
+.strip figure { margin: 0; border: 1px solid var(--line); border-radius: 6px; overflow: hidden; }
+.strip img { width: 100%; display: block; }
+.strip figcaption { padding: 6px 9px; font-size: 12.5px; color: var(--soft); }
+"""
+
+#: Zooming one time axis zooms all; the guard keeps the echo of our own change out.
+_LINK = """
+const figures = [...document.querySelectorAll('[data-time] .plotly-graph-div')];
+let busy = false;
+figures.forEach(source => source.on('plotly_relayout', change => {
+  if (busy) return;
+  const key = Object.keys(change).find(k => /^xaxis\\d*\\.(range(\\[0\\])?|autorange)$/.test(k));
+  if (!key) return;
+  const axis = key.split('.')[0];
+  busy = true;
+  const jobs = figures.filter(f => f !== source).map(f => {
+    const wanted = {};
+    Object.keys(f.layout).filter(k => /^xaxis/.test(k)).forEach(k => {
+      if (key.endsWith('autorange')) wanted[k + '.autorange'] = true;
+      else wanted[k + '.range'] = source.layout[axis].range.slice();
+    });
+    return Plotly.relayout(f, wanted);
+  });
+  Promise.all(jobs).finally(() => { busy = false; });
+}));
+document.body.dataset.linked = figures.length;
+"""
+
+
+def build(bags: Bags, flight: Flight) -> tuple[str, list[TimeFigure | PathFigure]]:
+    """Make the report.
+
+    Args:
+        bags: Open; images are streamed from them.
+        flight: Read from `bags`.
+
+    Returns:
+        The page, and the figures on it (for PNG files).
+    """
+    made: list[TimeFigure | PathFigure] = []
+    sections: list[tuple[str, str, str]] = [("summary", "Summary", _summary(flight))]
+    for key, title, make in all_figures():
+        try:
+            figure = make(flight)
+        except MissingError as err:
+            sections.append((key, title, _missing(str(err))))
+            continue
+        made.append(figure)
+        linked = " data-time" if hasattr(figure, "panels") else ""
+        sections.append((key, title, f"<div{linked}>{interactive.draw(figure, flight.start)}</div>"))
+    sections.append(("images", "Images and their state", _strip(bags, flight)))
+    sections.append(("quality", "Data quality", _quality(flight)))
+    return _page(flight, bags, sections), made
+
+
+def _page(flight: Flight, bags: Bags, sections: Sequence[tuple[str, str, str]]) -> str:
+    day = datetime.datetime.fromtimestamp(flight.start / 1e9, tz=datetime.timezone.utc)
+    names = ", ".join(path.name for path in bags.paths)
+    nav = "".join(f'<a href="#{key}">{html.escape(title.split(":")[0])}</a>' for key, title, _ in sections)
+    body = "".join(
+        f'<section id="{key}"><h2>{html.escape(title)}</h2>{text}</section>' for key, title, text in sections
+    )
+    return (
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>Flight report: {html.escape(flight.name)}</title><style>{_STYLE}</style>"
+        f"<script>{interactive.script()}</script></head><body>"
+        f"<header><h1>Flight report: {html.escape(flight.name)}</h1>"
+        f"<p>{html.escape(names)} &middot; {day:%Y-%m-%d %H:%M:%S} UTC &middot; xplane_bridge {__version__}</p>"
+        "</header>"
+        f"<nav>{nav}</nav><main>{body}</main><script>{_LINK}</script></body></html>\n"
+    )
+
+
+def _missing(text: str) -> str:
+    return f'<p class="missing">Not shown: {html.escape(text)}.</p>'
+
+
+def _number(value: Any, digits: int = 4) -> str:
+    number = float(value)
+    if not np.isfinite(number):
+        return "&ndash;"
+    return f"{number:.{digits}g}" if abs(number) < 10**digits else f"{number:,.0f}"
+
+
+def _rows(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """Make a table; cells are HTML already, `numbers` are the columns set to the right."""
+
+    def cell(tag: str, k: int, text: str) -> str:
+        return f"<{tag}{' class=n' if k in numbers else ''}>{text}</{tag}>"
+
+    top = "".join(cell("th", k, html.escape(text)) for k, text in enumerate(head))
+    body = "".join("<tr>" + "".join(cell("td", k, text) for k, text in enumerate(row)) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _summary(flight: Flight) -> str:
+    if "state" not in flight.tables:
+        return _missing("the bag has no flight_state")
+    state = flight.tables["state"]
+    cards = [
+        f'<div class="card"><b>{_number(q.value)} {html.escape(q.unit)}</b><span>{html.escape(q.name)}</span></div>'
+        for q in summary(state.stamp, state.columns, flight.parts)
+    ]
+    rate = timing(state.stamp)
+    cards.append(f'<div class="card"><b>{_number(rate.rate)} /s</b><span>flight states</span></div>')
+    text = f'<div class="cards">{"".join(cards)}</div>'
+    return text + _links(flight) + _events(flight)
+
+
+def _links(flight: Flight) -> str:
+    if "link" not in flight.tables:
+        return ""
+    table = flight.tables["link"]
+    names = [_LINK_STATES[k] if k < len(_LINK_STATES) else str(k) for k in table["state"]]
+    rows = [
+        (_seconds(e.start, flight), f"{(e.end - e.start) / 1e9:.1f}", html.escape(e.label))
+        for e in from_values(table.stamp, names, max(flight.end, int(table.stamp[-1])))
+    ]
+    return "<h3>Link to X-Plane</h3>" + _rows(("at [s]", "for [s]", "state"), rows, (0, 1))
+
+
+def _events(flight: Flight) -> str:
+    if "events" not in flight.tables:
+        return ""
+    seen: dict[int, Any] = {}
+    for events in flight.tables["events"]["events"]:
+        for event in events:
+            seen[event.number] = event
+    rows = []
+    for number in sorted(seen):
+        event = seen[number]
+        stamp = event.stamp.sec * 1_000_000_000 + event.stamp.nanosec
+        rows.append((_seconds(stamp, flight), html.escape(event.text), html.escape(event.requested_by)))
+    if not rows:
+        return ""
+    return "<h3>Events</h3>" + _rows(("at [s]", "what", "asked by"), rows, (0,))
+
+
+def _seconds(stamp: int, flight: Flight) -> str:
+    return f"{(stamp - flight.start) / 1e9:.1f}"
+
+
+def _strip(bags: Bags, flight: Flight) -> str:
+    topic = bags.topic_of_type("sensor_msgs/CompressedImage")
+    if topic is None or not bags.topics[topic].count:
+        return _missing("the bag has no compressed camera images")
+    if "frames" not in flight.tables:
+        return _missing("the bag has no camera/frame_state")
+    frames = flight.tables["frames"]
+    row_of = {int(stamp): k for k, stamp in enumerate(frames.stamp)}
+    count = bags.topics[topic].count
+    wanted = set(np.unique(np.linspace(0, count - 1, min(STRIP_IMAGES, count)).astype(int)).tolist())
+    figures = []
+    for k, (_, message) in enumerate(bags.messages(topic)):
+        if k not in wanted:
+            continue
+        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        picture = _thumbnail(message.data)
+        if picture is None:
+            continue
+        caption = _caption(frames, row_of.get(stamp), _seconds(stamp, flight))
+        figures.append(
+            f'<figure><img alt="cockpit view" src="data:image/jpeg;base64,{picture}">'
+            f"<figcaption>{caption}</figcaption></figure>"
+        )
+    return f'<div class="strip">{"".join(figures)}</div>' if figures else _missing("no image could be decoded")
+
+
+def _thumbnail(data: np.ndarray) -> str | None:
+    import cv2
+
+    image = cv2.imdecode(np.frombuffer(data.tobytes(), dtype=np.uint8), cv2.IMREAD_COLOR)
+    if image is None:
+        return None
+    height = max(1, round(image.shape[0] * _THUMBNAIL_WIDTH / image.shape[1]))
+    small = cv2.resize(image, (_THUMBNAIL_WIDTH, height), interpolation=cv2.INTER_AREA)
+    return base64.b64encode(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()).decode("ascii")
+
+
+def _caption(frames: Any, row: int | None, at: str) -> str:
+    if row is None:
+        return f"{at} s &middot; no state"
+    names = ("roll_deg", "pitch_deg", "heading_true_deg", "altitude_msl", "indicated_airspeed")
+    value = {name: frames[f"state.{name}"][row] for name in names}
+    quality = int(frames["quality"][row])
+    return (
+        f"{at} s &middot; roll {value['roll_deg']:.1f}&deg; &middot; pitch {value['pitch_deg']:.1f}&deg; &middot; "
+        f"true heading {value['heading_true_deg']:.1f}&deg;<br>{value['altitude_msl']:.0f} m MSL &middot; "
+        f"IAS {value['indicated_airspeed']:.1f} m/s &middot; time error {frames['sim_time_error'][row] * 1e3:.1f} ms"
+        + (f' &middot; <span class="bad">quality {quality}</span>' if quality else "")
+    )
+
+
+def _quality(flight: Flight) -> str:
+    rows = []
+    for topic in sorted(flight.times):
+        t = timing(flight.times[topic])
+        gaps = f'<span class="bad">{t.gaps}</span>' if t.gaps else "0"
+        jitter, longest = _number(t.jitter * 1e3, 3), _number(t.longest_gap, 3)
+        rows.append((html.escape(topic), str(t.count), _number(t.rate), jitter, gaps, longest))
+    head = ("topic", "messages", "rate [1/s]", "jitter [ms]", "gaps", "longest pause [s]")
+    text = "<h3>Rates, as received</h3>" + _rows(head, rows, (1, 2, 3, 4, 5))
+    if "state" in flight.tables:
+        text += _clock(flight) + _validity(flight) + _physics(flight)
+    return text + _images_quality(flight)
+
+
+def _clock(flight: Flight) -> str:
+    state = flight.tables["state"]
+    uncertainty = state["stamp_uncertainty"][np.isfinite(state["stamp_uncertainty"])]
+    epochs = len(np.unique(state["epoch"]))
+    worst = _number(np.max(uncertainty) * 1e3, 3) if len(uncertainty) else "&ndash;"
+    median = _number(np.median(uncertainty) * 1e3, 3) if len(uncertainty) else "&ndash;"
+    return (
+        f"<h3>Clock</h3><p>Stamps known within {median} ms (median), {worst} ms (worst); {epochs} "
+        f"epoch{'s' if epochs != 1 else ''}, {len(flight.parts)} stretch{'es' if len(flight.parts) != 1 else ''} "
+        "without a gap.</p>"
+    )
+
+
+def _validity(flight: Flight) -> str:
+    state = flight.tables["state"]
+    shares = bit_shares(state["valid"], flight.constants["state"], "VALID_")
+    poor = {name: share for name, share in shares.items() if share < 1.0}
+    if not poor:
+        return '<h3>Validity</h3><p class="good">Every group of the flight state is valid in every message.</p>'
+    rows = [
+        (html.escape(name.lower()), f'<span class="bad">{share * 100:.1f} %</span>') for name, share in poor.items()
+    ]
+    return "<h3>Validity</h3>" + _rows(("group of the flight state", "valid in"), rows, (1,))
+
+
+def _physics(flight: Flight) -> str:
+    state = flight.tables["state"]
+    checks = check_flight(state.columns, flight.parts)
+    if "odom" in flight.tables:
+        checks.append(_odometry(flight))
+    rows = []
+    for check in checks:
+        if not check.samples:
+            verdict = '<span class="missing">nothing to compare</span>'
+        elif check.ok:
+            verdict = '<span class="good">holds</span>'
+        else:
+            verdict = '<span class="bad">violated</span>'
+        error = f"{_number(check.error, 3)} {check.unit}"
+        rows.append((html.escape(check.name), error, f"{_number(check.limit, 3)} {check.unit}", verdict))
+    return "<h3>Physics</h3>" + _rows(("relation", "median error", "limit", ""), rows, (1, 2))
+
+
+def _odometry(flight: Flight) -> Any:
+    t = flight.tables["odom"]
+    position = np.stack([t[f"pose.pose.position.{axis}"] for axis in "xyz"], axis=1)
+    body = np.stack([t[f"twist.twist.linear.{axis}"] for axis in "xyz"], axis=1)
+    q = np.stack([t[f"pose.pose.orientation.{axis}"] for axis in "xyzw"], axis=1)
+    cross = np.cross(q[:, :3], body)
+    velocity = body + 2 * (q[:, 3:] * cross + np.cross(q[:, :3], cross))
+    state = flight.tables["state"]
+    edges = [int(state.stamp[part.start]) for part in flight.parts[1:]]
+    cuts = [0, *np.searchsorted(t.stamp, edges).tolist(), len(t)]
+    parts = [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:]) if b > a]
+    return check_odometry(t.stamp, position, velocity, parts)
+
+
+def _images_quality(flight: Flight) -> str:
+    if "frames" not in flight.tables:
+        return ""
+    t, constants = flight.tables["frames"], flight.constants["frames"]
+    p = pairing(t["quality"], t["sim_time_error"], t["dropped"], t["frozen"], int(constants["QUALITY_STATE_MISSING"]))
+    shares = bit_shares(t["quality"], constants, "QUALITY_")
+    rows = [
+        (html.escape(name.lower().replace("_", " ")), f"{share * 100:.1f} %") for name, share in shares.items() if share
+    ]
+    text = (
+        f"<h3>Images</h3><p>{p.images} images, {p.with_state * 100:.1f} % with a state, {p.perfect * 100:.1f} % without "
+        f"any remark; time error {_number(p.error_p50 * 1e3, 3)} ms (median), "
+        f"{_number(p.error_p95 * 1e3, 3)} ms (95 %), {_number(p.error_max * 1e3, 3)} ms (worst); "
+        f"{p.dropped} pictures not published, {p.frozen} frozen.</p>"
+    )
+    return text + (_rows(("remark", "images"), rows, (1,)) if rows else "")
