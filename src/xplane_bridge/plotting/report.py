@@ -324,8 +324,8 @@ def _images_quality(flight: Flight) -> str:
         (html.escape(name.lower().replace("_", " ")), f"{share * 100:.1f} %") for name, share in shares.items() if share
     ]
     text = (
-        f"<h3>Images</h3><p>{p.images} images, {p.with_state * 100:.1f} % with a state, {p.perfect * 100:.1f} % without "
-        f"any remark; time error {_number(p.error_p50 * 1e3, 3)} ms (median), "
+        f"<h3>Images</h3><p>{p.images} images, {p.with_state * 100:.1f} % with a state, {p.perfect * 100:.1f} % "
+        f"without any remark; time error {_number(p.error_p50 * 1e3, 3)} ms (median), "
         f"{_number(p.error_p95 * 1e3, 3)} ms (95 %), {_number(p.error_max * 1e3, 3)} ms (worst); "
         f"{p.dropped} pictures not published, {p.frozen} frozen.</p>"
     )
