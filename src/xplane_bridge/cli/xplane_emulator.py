@@ -6,12 +6,16 @@ import json
 import logging
 import signal
 import sys
-from typing import Optional, Sequence
+from typing import TYPE_CHECKING, Optional, Sequence
 
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.flight_model import FlightModelError
-from xplane_bridge.emulator.options import parse
+from xplane_bridge.emulator.options import Options, parse
+from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.scenario import ScenarioError
+
+if TYPE_CHECKING:
+    from xplane_bridge.emulator.cockpit_view import CockpitView
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
@@ -24,7 +28,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     logging.basicConfig(level=logging.DEBUG if options.verbose else logging.WARNING, format="%(levelname)s %(message)s")
     try:
         emulator = Emulator(options)
-    except (OSError, FlightModelError, ScenarioError) as error:
+        view = _open_view(options, emulator)
+    except (OSError, FlightModelError, ScenarioError, XplaneBridgeError) as error:
         print(f"xplane_emulator: {error.strerror if isinstance(error, OSError) and error.strerror else error}", file=sys.stderr)
         return 1
 
@@ -40,5 +45,19 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         emulator.run()
     except KeyboardInterrupt:
         pass
-    print("STOPPED " + json.dumps(emulator.statistics()), flush=True)
+    statistics = emulator.statistics()
+    if view is not None:
+        statistics["pictures_dropped"] = view.close()
+    print("STOPPED " + json.dumps(statistics), flush=True)
     return 0
+
+
+def _open_view(options: Options, emulator: Emulator) -> Optional[CockpitView]:
+    """Opens the cockpit view's window, if one is wanted."""
+    if not options.window:
+        return None
+    from xplane_bridge.emulator.cockpit_view import CockpitView  # late: without a window, OpenCV is not needed
+
+    view = CockpitView(options)
+    emulator.frame_listeners.append(view)
+    return view

@@ -52,7 +52,11 @@ class Options:
     wind: Tuple[float, float] = (0.0, 0.0)  #: from [deg], speed [m/s]
     turbulence: float = 0.0
     pipeline_delay: float = 0.0
-    window_size: Tuple[int, int] = (1024, 768)
+    window: bool = False  #: whether the cockpit view is drawn
+    window_size: Tuple[int, int] = (640, 480)
+    hud: bool = False
+    strip: bool = True
+    swap_log: Optional[Path] = None
     fault: FaultPlan = field(default_factory=FaultPlan)
     verbose: bool = False
 
@@ -111,8 +115,16 @@ def _parser() -> argparse.ArgumentParser:
         choices=("lines", "fast"),
         help="not in real time: frames on request by lines on stdin (default), or as fast as it goes (needs --duration)",
     )
-    loop.add_argument("--pipeline-delay", default="0", metavar="TIME", help="picture later than its packets, e.g. 50ms")
+    loop.add_argument("--pipeline-delay", default="0", metavar="TIME", help="picture later than its packets, 0..200ms")
     loop.add_argument("--truth", type=Path, metavar="FILE", help="CSV of every frame, in doubles")
+
+    window = p.add_argument_group("cockpit view")
+    window.add_argument(
+        "--window", nargs="?", const="640x480", metavar="WxH", help="draw it into a window \"X-System\" (default 640x480)"
+    )
+    window.add_argument("--hud", action="store_true", help="with a head-up display")
+    window.add_argument("--no-strip", dest="strip", action="store_false", help="without the machine-readable strip")
+    window.add_argument("--swap-log", type=Path, metavar="FILE", help="CSV of when each picture was shown")
 
     wire = p.add_argument_group("wire")
     wire.add_argument("--bind", default="0.0.0.0", metavar="IP", help="address to listen on (default all)")
@@ -168,6 +180,8 @@ def _options(given: argparse.Namespace) -> Options:
         delay = parse_faults(f"delay={given.pipeline_delay}").delay_s
     except FaultSyntaxError as error:
         raise OptionError(str(error)) from None
+    size = re.fullmatch(r"(\d{3,4})x(\d{3,4})", given.window or "640x480")
+    _require(size is not None, "--window", given.window, "WIDTHxHEIGHT, e.g. 640x480")
     group, _, beacon_port = given.beacon_target.partition(":")
     initial = InitialState(
         latitude_deg=given.lat,
@@ -205,6 +219,11 @@ def _options(given: argparse.Namespace) -> Options:
         wind=_wind(given.wind),
         turbulence=given.turbulence,
         pipeline_delay=delay,
+        window=given.window is not None,
+        window_size=(int(size.group(1)), int(size.group(2))),
+        hud=given.hud,
+        strip=given.strip,
+        swap_log=given.swap_log,
         fault=fault,
         verbose=given.verbose,
     )
