@@ -1,0 +1,162 @@
+"""live_plot: live curves of message fields, for machines without rqt_plot."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from typing import Any, Callable, NamedTuple, Sequence
+
+from xplane_bridge.cli.entry import guarded
+from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.plotting.live import LiveWindow, RollingSeries
+
+_TOPIC_POLL_S = 0.2
+_PART = re.compile(r"^(\w+)(?:\[(\d+)\])?$")
+
+
+class LivePlotError(XplaneBridgeError):
+    """A field cannot be plotted."""
+
+
+class Field(NamedTuple):
+    """One curve: a topic and the path of a number in its messages."""
+
+    topic: str
+    path: str  #: e.g. ``angular_velocity/x``, ``engine_speed[0]``
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    p = argparse.ArgumentParser(
+        prog="live_plot",
+        description="Plots fields of live topics. Each argument is a pair of axes; commas put curves into the same one.",
+        epilog="example: live_plot /xplane/flight_state/roll_deg,pitch_deg /xplane/mission/engines/engine_speed[0]",
+    )
+    p.add_argument("fields", nargs="+", metavar="TOPIC/FIELD[,FIELD...]", help="as for rqt_plot")
+    p.add_argument("--window", type=float, default=60.0, metavar="S", help="width of the time axis (%(default)g s)")
+    p.add_argument("--wait", type=float, default=30.0, metavar="S", help="for the topics to appear (%(default)g s)")
+    p.add_argument("--png", default="live_plot.png", metavar="FILE", help="what the s key writes (%(default)s)")
+    p.add_argument("--after", type=float, metavar="S", help="write the PNG by itself after so long, and end")
+    return p
+
+
+def split(argument: str) -> list[str]:
+    """Split ``TOPIC/FIELD,FIELD2`` into full names; what follows a comma shares the first one's parent."""
+    first, *others = argument.split(",")
+    parent = first.rpartition("/")[0]
+    return [first, *(other if other.startswith("/") else f"{parent}/{other}" for other in others)]
+
+
+def locate(name: str, topics: Sequence[str]) -> Field | None:
+    """Divide a full name into topic and path by the longest published topic that begins it."""
+    fitting = [topic for topic in topics if name.startswith(topic + "/")]
+    if not fitting:
+        return None
+    topic = max(fitting, key=len)
+    return Field(topic, name[len(topic) + 1 :])
+
+
+def getter(path: str, message_type: Any) -> Callable[[Any], float]:
+    """Make the function that takes the number at `path` out of a message.
+
+    Raises:
+        LivePlotError: No such field, or it is no number; the text lists the fields there are.
+    """
+    steps: list[tuple[str, int | None]] = []
+    sample = message_type()
+    for part in path.split("/"):
+        match = _PART.match(part)
+        name, index = (match.group(1), match.group(2)) if match else ("", None)
+        if name not in getattr(sample, "__slots__", []):
+            have = ", ".join(getattr(sample, "__slots__", [])) or "nothing below it"
+            msg = f"{message_type._type} has no field {path!r}: at {part!r} there is {have}"
+            raise LivePlotError(msg)
+        sample = getattr(sample, name)
+        steps.append((name, None if index is None else int(index)))
+        if index is not None:
+            if not isinstance(sample, (list, tuple, bytes)):
+                msg = f"{message_type._type}: {name} is no array, so [{index}] does not apply"
+                raise LivePlotError(msg)
+            sample = sample[int(index)] if int(index) < len(sample) else 0.0
+    if not isinstance(sample, (int, float)):
+        msg = f"{message_type._type}: {path} is no number ({type(sample).__name__}); give an element or a field of it"
+        raise LivePlotError(msg)
+
+    def get(message: Any) -> float:
+        for name, index in steps:
+            message = getattr(message, name)
+            if index is not None:
+                message = message[index] if index < len(message) else float("nan")
+        return float(message)
+
+    return get
+
+
+@guarded
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    try:
+        import rospy
+    except ModuleNotFoundError:
+        msg = "rospy is not there: source ROS's setup.bash (on Debian: apt-get install python3-rospy)"
+        raise LivePlotError(msg) from None
+    p = parser()
+    args = p.parse_args(rospy.myargv(argv)[1:] if argv is None else list(argv))
+    if not args.window > 0:
+        p.error(f"--window {args.window:g}: must be positive")
+    rospy.init_node("live_plot", anonymous=True, disable_signals=True)
+    names = [[rospy.resolve_name(name) for name in split(argument)] for argument in args.fields]
+    found = _wait_for([name for group in names for name in group], args.wait)
+    groups = [(_label(group), [RollingSeries(_short(name, group), args.window) for name in group]) for group in names]
+    for group, (_, series) in zip(names, groups):
+        for name, one in zip(group, series):
+            _subscribe(found[name], one)
+    window = LiveWindow(groups, args.window, args.png)
+    window.run(args.after)
+    rospy.signal_shutdown("closed")
+    return 0
+
+
+def _wait_for(names: Sequence[str], timeout: float) -> dict[str, Field]:
+    import rospy
+
+    deadline = time.monotonic() + timeout
+    while True:
+        topics = [topic for topic, _ in rospy.get_published_topics()]
+        found = {name: locate(name, topics) for name in names}
+        missing = [name for name, where in found.items() if where is None]
+        if not missing:
+            return {name: where for name, where in found.items() if where is not None}
+        if time.monotonic() > deadline:
+            have = ", ".join(sorted(topics)) or "no topic"
+            msg = f"no topic begins {missing[0]} after {timeout:g} s; published: {have}"
+            raise LivePlotError(msg)
+        time.sleep(_TOPIC_POLL_S)
+
+
+def _subscribe(field: Field, series: RollingSeries) -> None:
+    import roslib.message
+    import rospy
+
+    types = dict(rospy.get_published_topics())
+    message_type = roslib.message.get_message_class(types[field.topic])
+    if message_type is None:
+        msg = f"{field.topic}: messages of type {types[field.topic]} are not built here; source their workspace"
+        raise LivePlotError(msg)
+    get = getter(field.path, message_type)
+
+    def take(message: Any) -> None:
+        stamp = message.header.stamp.to_sec() if message._has_header else 0.0
+        series.add(stamp or rospy.get_time(), get(message))
+
+    rospy.Subscriber(field.topic, message_type, take, queue_size=100, tcp_nodelay=True)
+
+
+def _label(group: Sequence[str]) -> str:
+    return group[0].rpartition("/")[2] if len(group) == 1 else group[0].rpartition("/")[0].rpartition("/")[2]
+
+
+def _short(name: str, group: Sequence[str]) -> str:
+    parents = {other.rpartition("/")[0] for other in group}
+    return name.rpartition("/")[2] if len(parents) == 1 else name

@@ -1,0 +1,135 @@
+"""A window with live curves: several axes over one rolling time window, pause, PNG."""
+
+from __future__ import annotations
+
+import collections
+import threading
+from typing import Sequence
+
+import matplotlib
+import numpy as np
+
+from xplane_bridge.plotting.spec import COLOURS
+
+_REFRESH_MS = 50
+
+
+class RollingSeries:
+    """The newest samples of one quantity; written by one thread, read by another.
+
+    Args:
+        name: Shown in the legend.
+        window: [s] how much to keep.
+    """
+
+    def __init__(self, name: str, window: float) -> None:
+        self.name = name
+        self._window = window
+        self._samples: collections.deque[tuple[float, float]] = collections.deque()
+        self._lock = threading.Lock()
+
+    def add(self, time: float, value: float) -> None:
+        """Add a sample; one from before the newest [s] begins anew (the source was restarted)."""
+        with self._lock:
+            if self._samples and time < self._samples[-1][0]:
+                self._samples.clear()
+            self._samples.append((time, value))
+            while self._samples[0][0] < time - self._window:
+                self._samples.popleft()
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Give times [s] and values, shapes (n,)."""
+        with self._lock:
+            pairs = np.array(self._samples, dtype=np.float64).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
+
+class LiveWindow:
+    """The window. Space pauses and goes on, s writes a PNG, q closes.
+
+    Args:
+        groups: One list of series for each pair of axes, with the axes' label.
+        window: [s] width of the time axis.
+        png: File that the s key writes.
+    """
+
+    def __init__(self, groups: Sequence[tuple[str, Sequence[RollingSeries]]], window: float, png: str) -> None:
+        from matplotlib import pyplot
+
+        for key in ("keymap.quit", "keymap.save"):
+            matplotlib.rcParams[key] = []
+        self._window = window
+        self._png = png
+        self._paused = False
+        self._pyplot = pyplot
+        self._groups = groups
+        self.figure, axes = pyplot.subplots(
+            len(groups), 1, sharex=True, squeeze=False, figsize=(9, 1.2 + 2.2 * len(groups)), layout="constrained"
+        )
+        self._axes = axes[:, 0]
+        self._lines = []
+        for ax, (label, series) in zip(self._axes, groups):
+            self._lines.append(
+                [ax.plot([], [], color=COLOURS[k % len(COLOURS)], label=s.name)[0] for k, s in enumerate(series)]
+            )
+            ax.set_ylabel(label)
+            ax.grid(alpha=0.3)
+            ax.legend(loc="upper left", fontsize=8)
+        self._axes[-1].set_xlabel("time [s], 0 is now")
+        self._title()
+        self.figure.canvas.mpl_connect("key_press_event", self._key)
+
+    def run(self, seconds: float | None = None) -> None:
+        """Show the window until it is closed; or for so long [s], and write the PNG then."""
+        timer = self.figure.canvas.new_timer(interval=_REFRESH_MS)
+        timer.add_callback(self.refresh)
+        timer.start()
+        end = self.figure.canvas.new_timer(interval=round(1000 * (seconds or 0)) or 1)
+        if seconds is not None:
+            end.single_shot = True
+            end.add_callback(self._save_and_close)
+            end.start()
+        self._pyplot.show()
+
+    def _save_and_close(self) -> None:
+        self.refresh()
+        self.save(self._png)
+        self._pyplot.close(self.figure)
+
+    def refresh(self) -> None:
+        """Draw the newest samples, unless paused."""
+        if self._paused:
+            return
+        now = max((times[-1] for times, _ in self._all() if len(times)), default=0.0)
+        for ax, lines, (_, group) in zip(self._axes, self._lines, self._groups):
+            for line, series in zip(lines, group):
+                times, values = series.arrays()
+                line.set_data(times - now, values)
+            ax.relim()
+            ax.autoscale_view(scalex=False)
+        self._axes[-1].set_xlim(-self._window, 0.0)
+        self.figure.canvas.draw_idle()
+
+    def save(self, path: str) -> None:
+        """Write what the window shows as PNG."""
+        self.figure.savefig(path, dpi=120)
+
+    def _all(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        return [series.arrays() for _, group in self._groups for series in group]
+
+    def _title(self) -> None:
+        state = "paused" if self._paused else "live"
+        manager = self.figure.canvas.manager
+        if manager is not None:
+            manager.set_window_title(f"live_plot ({state}; space: pause, s: PNG, q: quit)")
+
+    def _key(self, event: object) -> None:
+        key = getattr(event, "key", None)
+        if key == " ":
+            self._paused = not self._paused
+            self._title()
+        elif key == "s":
+            self.save(self._png)
+            print(f"wrote {self._png}", flush=True)
+        elif key == "q":
+            self._pyplot.close(self.figure)
