@@ -30,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
     """Build the command line."""
     p = argparse.ArgumentParser(
         prog="live_plot",
-        description="Plots fields of live topics. Each argument is a pair of axes; commas put curves into the same one.",
+        description="Plots fields of live topics. Each argument is a pair of axes; commas share one pair of axes.",
         epilog="example: live_plot /xplane/flight_state/roll_deg,pitch_deg /xplane/mission/engines/engine_speed[0]",
     )
     p.add_argument("fields", nargs="+", metavar="TOPIC/FIELD[,FIELD...]", help="as for rqt_plot")
