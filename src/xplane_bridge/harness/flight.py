@@ -13,9 +13,6 @@ from xplane_bridge.harness.emulator import EmulatorProcess
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.harness.ros import RosMaster, roslaunch
 
-#: Namespace that the launch files put the bridge's topics in.
-NAMESPACE = "/xplane"
-
 _READY_TIMEOUT_S = 60.0
 _SILENCE_S = 10.0  # without a flight state for this long, a flight has failed
 

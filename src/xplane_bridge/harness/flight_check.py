@@ -12,7 +12,7 @@ import numpy as np
 
 from xplane_bridge.bags import Bags, Table
 from xplane_bridge.errors import XplaneBridgeError
-from xplane_bridge.harness.flight import NAMESPACE
+from xplane_bridge.topics import NAMESPACE
 
 #: Topics without which a flight has not been recorded.
 REQUIRED_TOPICS = tuple(

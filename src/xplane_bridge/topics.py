@@ -1,0 +1,40 @@
+"""The bridge's topics, relative to its namespace, and their types: for programs that run without a bridge."""
+
+from __future__ import annotations
+
+#: Namespace under which the launch files put everything.
+NAMESPACE = "/xplane"
+
+#: Relative name to ROS 1 type.
+TOPICS = {
+    "flight_state": "xplane_bridge/FlightState",
+    "mission/engines": "xplane_bridge/EngineStates",
+    "mission/surfaces": "xplane_bridge/SurfaceStates",
+    "mission/controls": "xplane_bridge/ControlStates",
+    "mission/electrical": "xplane_bridge/ElectricalState",
+    "mission/autopilot": "xplane_bridge/AutopilotState",
+    "mission/warnings": "xplane_bridge/WarningState",
+    "mission/fuel": "xplane_bridge/FuelState",
+    "mission/sim": "xplane_bridge/SimStatus",
+    "odom": "nav_msgs/Odometry",
+    "imu/data": "sensor_msgs/Imu",
+    "global_position/global": "sensor_msgs/NavSatFix",
+    "wind": "geometry_msgs/TwistWithCovarianceStamped",
+    "datarefs": "xplane_bridge/DatarefValues",
+    "data_rows": "xplane_bridge/DataRows",
+    "link_state": "xplane_bridge/LinkState",
+    "origin": "sensor_msgs/NavSatFix",
+    "control/manual": "xplane_bridge/ControlCommand",
+    "control/auto": "xplane_bridge/ControlCommand",
+    "control/surfaces": "xplane_bridge/SurfaceCommand",
+    "control/mode_request": "xplane_bridge/ModeRequest",
+    "control/mode": "xplane_bridge/ControlMode",
+    "control/applied": "xplane_bridge/AppliedCommand",
+    "failures/state": "xplane_bridge/FailureState",
+    "excitation/state": "xplane_bridge/ExcitationState",
+    "events": "xplane_bridge/EventList",
+    "camera/image_raw": "sensor_msgs/Image",
+    "camera/image_raw/compressed": "sensor_msgs/CompressedImage",
+    "camera/camera_info": "sensor_msgs/CameraInfo",
+    "camera/frame_state": "xplane_bridge/FrameState",
+}
