@@ -12,6 +12,7 @@ from typing import Any, Callable, Dict, List
 from xplane_bridge.harness.emulator import EmulatorProcess
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.harness.ros import RosMaster, roslaunch
+from xplane_bridge.topics import NAMESPACE
 
 _READY_TIMEOUT_S = 60.0
 _SILENCE_S = 10.0  # without a flight state for this long, a flight has failed
