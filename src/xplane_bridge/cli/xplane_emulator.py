@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import signal
@@ -30,7 +31,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         emulator = Emulator(options)
         view = _open_view(options, emulator)
     except (OSError, FlightModelError, ScenarioError, XplaneBridgeError) as error:
-        print(f"xplane_emulator: {error.strerror if isinstance(error, OSError) and error.strerror else error}", file=sys.stderr)
+        text = error.strerror if isinstance(error, OSError) and error.strerror else error
+        print(f"xplane_emulator: {text}", file=sys.stderr)
         return 1
 
     def stop(_signal: int, _frame: object) -> None:
@@ -41,10 +43,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop)
     print("READY " + json.dumps(emulator.describe()), flush=True)
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         emulator.run()
-    except KeyboardInterrupt:
-        pass
     statistics = emulator.statistics()
     if view is not None:
         statistics["pictures_dropped"] = view.close()

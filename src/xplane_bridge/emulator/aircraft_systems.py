@@ -1,7 +1,7 @@
-"""The aircraft's systems that no flight model has: electrics, instruments with their failures, weather as set by clients.
+"""The aircraft's systems that no flight model has: electrics, instruments and their failures, weather as set.
 
-Simple, but of one piece: buses are fed by generators of running engines, else by batteries that are switched on; a blocked pitot
-tube keeps the pressure it had; switches and failures act on what hangs on them.
+Simple, but of one piece: buses are fed by generators of running engines, else by batteries that are switched on; a
+blocked pitot tube keeps the pressure it had; switches and failures act on what hangs on them.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Callable, List, Optional
 
 from .datarefs import DatarefStore
 from .flight_model import FlightModel
-from .frame import MPS_TO_FPM, MPS_TO_KT, Frame, indicated_altitude_m
 from .frame import M_TO_FT as _M_TO_FT
+from .frame import MPS_TO_FPM, MPS_TO_KT, Frame, indicated_altitude_m
 
 _BATTERY_VOLTS = 24.0
 _GENERATOR_VOLTS = 28.0
@@ -48,6 +48,7 @@ class Electrics:
     charge_ah: float = _FULL_CHARGE_AH
 
     def update(self, dt: float, store: DatarefStore, frame: Frame, failed: Failed) -> None:
+        """Takes a new frame."""
         load = _BASE_LOAD_A + sum(amps for name, amps in _LOADS.items() if store.get(name) != 0.0)
         switches = store.array("sim/cockpit2/electrical/generator_on")
         working = []
@@ -88,6 +89,7 @@ class Instruments:
     _trapped_static_pa: Optional[float] = None
 
     def update(self, frame: Frame, setting_inhg: float, failed: Failed) -> None:
+        """Takes a new frame."""
         m = frame.m
         impact = m.pressure_pa * ((1.0 + 0.2 * m.mach**2) ** 3.5 - 1.0)
         total, static = m.pressure_pa + impact, m.pressure_pa
@@ -120,9 +122,11 @@ class Weather:
     turbulence_mps: float = 0.0
 
     def set_wind(self, model: FlightModel, from_deg: float, speed_mps: float) -> None:
+        """Sets the wind that blows at every height."""
         direction = math.radians(from_deg)
         model.set_wind(-speed_mps * math.cos(direction), -speed_mps * math.sin(direction), 0.0)
 
     def set_turbulence(self, model: FlightModel, intensity_mps: float, seed: Optional[int] = None) -> None:
+        """Sets the standard deviation of the vertical gust [m/s]."""
         self.turbulence_mps = max(0.0, intensity_mps)
         model.set_turbulence(self.turbulence_mps, seed)

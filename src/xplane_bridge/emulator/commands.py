@@ -13,7 +13,7 @@ _FLAP_STEP = 0.25
 _TRIM_STEP = 0.01
 _THROTTLE_STEP = 0.05
 
-#: [?] View commands: (view_type, external, head heading, head pitch). The numbers of view_type are not in Laminar's list of
+#: [?] View commands: (view_type, external, head heading, head pitch). The numbers of view_type are in no list of
 #: datarefs; what a client can rely on is that they differ, and the head angles.
 VIEWS: Dict[str, Tuple[int, bool, float, float]] = {
     "default_view": (1000, False, 0.0, 0.0),

@@ -1,4 +1,4 @@
-"""Who moves the controls: clients (overrides, DREF, DATA rows), the scripted pilot, or nobody; and what reaches the model."""
+"""Who moves the controls: clients (overrides, DREF, DATA rows), the scripted pilot, or nobody."""
 
 from __future__ import annotations
 
@@ -79,8 +79,8 @@ Pilot = Callable[[float, Frame], PilotCommands]
 class ControlInputs:
     """Turns what was written into `Controls`, once a frame.
 
-    The order of power on the stick: a DATA row that holds it, `override_joystick` (what was written to the yoke datarefs stays),
-    the pilot, and last the centred stick. Levers stay where they were put last.
+    The order of power on the stick: a DATA row that holds it, `override_joystick` (what was written to the yoke
+    datarefs stays), the pilot, and last the centred stick. Levers stay where they were put last.
     """
 
     def __init__(self, store: DatarefStore, pilot: Optional[Pilot]) -> None:
@@ -119,7 +119,11 @@ class ControlInputs:
     def start(self, controls: Controls, model: FlightModel) -> None:
         """A flight begins: levers as `controls` has them."""
         engines = model.info.engine_count
-        levers = (("throttle_ratio", controls.throttle), ("prop_ratio", controls.propeller), ("mixture_ratio", controls.mixture))
+        levers = (
+            ("throttle_ratio", controls.throttle),
+            ("prop_ratio", controls.propeller),
+            ("mixture_ratio", controls.mixture),
+        )
         for name, values in levers:
             slots = self._store.dataref(_ACTUATORS + name).slots[:engines]
             self._store.values[slots] = values[:engines]
@@ -136,9 +140,11 @@ class ControlInputs:
             self._store.set(name, value)
 
     def save(self) -> Dict[str, np.ndarray]:
+        """Levers and handles, for a situation."""
         return {name: self._store.array(name) for name in _LEVERS}
 
     def restore(self, levers: Dict[str, np.ndarray]) -> None:
+        """Puts back what `save` gave."""
         for name, values in levers.items():
             self._store.set(name, values)
 
@@ -181,9 +187,9 @@ class ControlInputs:
             elif not joystick and not self._overrides("joystick_" + axis):
                 store.set(name, 0.0 if commands is None else getattr(commands, attribute))
             setattr(controls, attribute, _clip(store.get(name), -1.0, 1.0))
-        self._read_handles(controls, commands)
+        self._read_handles(controls)
         self._read_engines(controls, model)
-        self._read_surfaces(controls, model)
+        self._read_surfaces(controls)
 
     def _overrides(self, name: str) -> bool:
         return self._store.get(_OVERRIDE + name) != 0.0
@@ -214,7 +220,7 @@ class ControlInputs:
             if value is not None:
                 store.set(_COCKPIT + name, float(value))
 
-    def _read_handles(self, controls: Controls, commands: Optional[PilotCommands]) -> None:
+    def _read_handles(self, controls: Controls) -> None:
         store = self._store
         controls.pitch_trim = _clip(store.get(_COCKPIT + "elevator_trim"), -1.0, 1.0)
         controls.roll_trim = _clip(store.get(_COCKPIT + "aileron_trim"), -1.0, 1.0)
@@ -229,9 +235,9 @@ class ControlInputs:
                 store.set(name, 0.0)  # pedals that nobody presses
             setattr(controls, f"brake_{side}", _clip(store.get(name), 0.0, 1.0))
         controls.thrust_vector = max(store.get(_COCKPIT + "thrust_vector_ratio"), 0.0)
-        controls.artificial_stability = (
-            store.get("sim/cockpit2/switches/artificial_stability_on") != 0.0 and not self._overrides("artstab")
-        )
+        controls.artificial_stability = store.get(
+            "sim/cockpit2/switches/artificial_stability_on"
+        ) != 0.0 and not self._overrides("artstab")
 
     def _read_engines(self, controls: Controls, model: FlightModel) -> None:
         store, info = self._store, model.info
@@ -249,16 +255,14 @@ class ControlInputs:
         if not controls.override_throttles:
             self._throttle_commands.clear()
 
-    def _read_surfaces(self, controls: Controls, model: FlightModel) -> None:
+    def _read_surfaces(self, controls: Controls) -> None:
         controls.override_surfaces = self._overrides("control_surfaces")
         if not controls.override_surfaces:
             self._surface_commands.clear()
             controls.surface_deg = {}
             return
         commands = self._surface_commands
-        controls.surface_deg = {
-            name: commands[slot] for name, slot in self._surface_slots.items() if slot in commands
-        }
+        controls.surface_deg = {name: commands[slot] for name, slot in self._surface_slots.items() if slot in commands}
 
     def bind_surfaces(self, slots: Dict[str, int]) -> None:
         """Which slot shows which surface of the loaded aircraft."""

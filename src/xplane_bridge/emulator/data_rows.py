@@ -1,7 +1,7 @@
 """The rows of the Data Output table, as datarefs times factors.
 
-A row is eight slots; a slot is None (unused, -999 on the wire), a number, or a source with a factor. `DataRows.values` gives all
-139 rows of a frame in one numpy operation; `DataRows.packet` cuts the selected ones out of it.
+A row is eight slots; a slot is None (unused, -999 on the wire), a number, or a source with a factor. `DataRows.values`
+gives all 139 rows of a frame in one numpy operation; `DataRows.packet` cuts the selected ones out of it.
 """
 
 from __future__ import annotations
@@ -126,7 +126,11 @@ def layout(version: int, level_angles: bool) -> Dict[int, Sequence[Source]]:
         7: ("sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot", 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         8: ("sim/joystick/yoke_pitch_ratio", "sim/joystick/yoke_roll_ratio", "sim/joystick/yoke_heading_ratio"),
         9: (_C + "thrust_vector_ratio", _C + "wingsweep_ratio", _C + "incidence_ratio", _C + "dihedral_ratio", 0.0),
-        10: ("sim/joystick/artstab_pitch_ratio", "sim/joystick/artstab_roll_ratio", "sim/joystick/artstab_heading_ratio"),
+        10: (
+            "sim/joystick/artstab_pitch_ratio",
+            "sim/joystick/artstab_roll_ratio",
+            "sim/joystick/artstab_heading_ratio",
+        ),
         11: (
             _C + "total_pitch_ratio",
             _C + "total_roll_ratio",

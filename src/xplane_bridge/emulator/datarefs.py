@@ -1,8 +1,9 @@
 """The emulator's datarefs: one vector of values, with names, types and write access as in X-Plane.
 
-Every element of every dataref is a slot of `DatarefStore.values`; a subscription is an array of slot numbers, so that a frame's
-answer to a client is one numpy gather. Reading through RREF is always float32, which the sender does; here values are doubles,
-except that integer datarefs hold whole numbers and float datarefs lose nothing before they are sent.
+Every element of every dataref is a slot of `DatarefStore.values`; a subscription is an array of slot numbers, so that a
+frame's answer to a client is one numpy gather. Reading through RREF is always float32, which the sender does; here
+values are doubles, except that integer datarefs hold whole numbers and float datarefs lose nothing before they are
+sent.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Callable, Dict, List, Optional, Sequence, Union
 
 import numpy as np
 
-#: Names that start with this are the emulator's own intermediate values (sources of DATA rows); clients cannot see them.
+#: Names that start with this are the emulator's own values (sources of DATA rows); clients cannot see them.
 HIDDEN_PREFIX = "_emulator/"
 
 _INDEXED = re.compile(r"(.+)\[(\d{1,4})\]")

@@ -1,7 +1,7 @@
 """X-Plane's earth: a sphere, and the tilted local frame that it simulates in.
 
-Local (OpenGL) frame: X east, Y up, Z south, metres, tangent to the sphere at the origin (lat_ref, lon_ref) with Y = 0 at
-sea level. Away from the origin its axes are tilted against the local level, which is why X-Plane has two sets of
+Local (OpenGL) frame: X east, Y up, Z south, metres, tangent to the sphere at the origin (lat_ref, lon_ref) with Y = 0
+at sea level. Away from the origin its axes are tilted against the local level, which is why X-Plane has two sets of
 angles (`theta` and `true_theta`) and why its local velocities are not north/east/down ones.
 """
 

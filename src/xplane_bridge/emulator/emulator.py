@@ -1,6 +1,7 @@
 """The whole emulator: a simulator, its sockets, and X-Plane's loop around them.
 
-One rendered frame: take what clients sent, fly the frame's time, send what is due, then show the picture (frame listeners).
+One rendered frame: take what clients sent, fly the frame's time, send what is due, then show the picture (frame
+listeners).
 """
 
 from __future__ import annotations
@@ -284,7 +285,7 @@ class Emulator:
             self.step_frames(1)
 
     def _run_lines(self, lines: TextIO, answers: TextIO) -> None:
-        """The stepping protocol: a line with a number of frames in, a line `STEPPED {json}` out; `quit` or the end ends it."""
+        """The stepping protocol: a line with a number of frames in, `STEPPED {json}` out; `quit` or the end ends it."""
         for line in lines:
             text = line.strip()
             if text == "quit" or self.stopping:

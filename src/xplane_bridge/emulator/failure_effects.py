@@ -1,7 +1,7 @@
 """What failed equipment (`rel_*` = 6) does to the controls that reach the flight model.
 
-Electrical and instrument failures act in `aircraft_systems`. Triggers other than "failed now" (2 to 5: at a time, speed, height or
-key press) are kept and read back but never fire.
+Electrical and instrument failures act in `aircraft_systems`. Triggers other than "failed now" (2 to 5: at a time,
+speed, height or key press) are kept and read back but never fire.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ class FailureEffects:
         return {self._leaves[i] for i in np.flatnonzero(self._store.values[self._slots] == FAILED_NOW)}
 
     def repair_all(self) -> None:
+        """Repairs everything (RESE)."""
         self._store.values[self._slots] = 0.0
 
     def apply(self, controls: Controls, failed: Set[str], model: FlightModel, dt: float) -> None:
@@ -140,4 +141,3 @@ class FailureEffects:
 
 def _matches(name: str, leaf: str) -> bool:
     return name.endswith("_" + leaf)
-

@@ -9,8 +9,8 @@
     dup=P           each datagram is sent twice with probability P (`dup` alone: 0.1)
     reorder=P       a datagram changes places with the next one (`reorder` alone: 0.1)
     truncate=P      a datagram is cut at a random length (`truncate` alone: 0.05)
-    freeze=T@S      at S seconds after the start nothing happens for T (as at a scenery load); `freeze=T` alone: once, at 5 s
-    restart=T@S     at S X-Plane goes away for T and comes back with everything reset; `restart=T` alone: at 5 s
+    freeze=T@S      at S seconds after the start nothing happens for T (a scenery load); `freeze=T` alone: at 5 s
+    restart=T@S     at S X-Plane goes away for T and comes back reset; `restart=T` alone: at 5 s
 
 Times of freeze and restart are wall times from the start (frames, in stepped mode). All chances come from the seed.
 """
@@ -41,6 +41,7 @@ class Outage:
     duration_s: float
 
     def covers(self, time_s: float) -> bool:
+        """Whether this time is within the outage."""
         return self.start_s <= time_s < self.start_s + self.duration_s
 
 
@@ -119,11 +120,10 @@ class FaultyChannel:
         self._queue: List[Tuple[float, int, bytes, Address]] = []
         self._count = 0
         self._held: Optional[Tuple[bytes, Address]] = None
-        self.active = any(
-            (plan.drop, plan.delay_s, plan.jitter_s, plan.duplicate, plan.reorder, plan.truncate)
-        )
+        self.active = any((plan.drop, plan.delay_s, plan.jitter_s, plan.duplicate, plan.reorder, plan.truncate))
 
     def loses_incoming(self) -> bool:
+        """Whether the datagram that has just come is lost."""
         return self.plan.incoming_drop > 0.0 and self._random.random() < self.plan.incoming_drop
 
     def put(self, now: float, datagram: bytes, target: Address) -> None:

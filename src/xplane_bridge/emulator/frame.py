@@ -24,8 +24,8 @@ PA_TO_PSI = 1.0 / 6894.757293168
 SEA_LEVEL_DENSITY = 1.225
 SEA_LEVEL_PRESSURE_PA = 101325.0
 
-#: [?] Laminar: hpath + beta = psi, which makes beta positive when the nose points right of the path (wind from the left): the
-#: opposite of the aerospace sign. Working programs disagree; set to +1.0 for the other reading.
+#: [?] Laminar: hpath + beta = psi, which makes beta positive when the nose points right of the path (wind from the
+#: left): the opposite of the aerospace sign. Working programs disagree; set to +1.0 for the other reading.
 BETA_SIGN = -1.0
 #: Below this speed over ground hpath is noise [m/s].
 PATH_NOISE_BELOW_MPS = 0.1
@@ -44,9 +44,9 @@ def magnetic_declination(latitude_deg: float, longitude_deg: float) -> float:
 
 def indicated_altitude_m(static_pressure_pa: float, setting_pa: float) -> float:
     """What an altimeter with this setting shows."""
-    return ((setting_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263 - (static_pressure_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263) * (
-        288.15 / 0.0065
-    )
+    return (
+        (setting_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263 - (static_pressure_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263
+    ) * (288.15 / 0.0065)
 
 
 @dataclass
@@ -147,6 +147,7 @@ class Frame:
 
     @property
     def mag_psi(self) -> float:
+        """Magnetic heading."""
         return earth.wrap_degrees(self.true_psi - self.declination)
 
 

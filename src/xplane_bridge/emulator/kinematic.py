@@ -1,8 +1,9 @@
-"""A flight model without dynamics: coordinated flight from the positions of the surfaces. Deterministic, fast, needs nothing.
+"""A flight model without dynamics: coordinated flight from the positions of the surfaces.
 
-For tests of the wire and for machines without JSBSim (`--model kinematic`). It is no aircraft: bank follows the ailerons as a rate,
-the flight path follows the elevator as a rate, speed follows thrust minus a quadratic drag. What it does keep is consistency:
-rates are those of its attitude, specific force is acceleration minus gravity, air velocity is ground velocity minus wind.
+Deterministic and fast: for tests of the wire and for machines without JSBSim (`--model kinematic`). It is no aircraft:
+bank follows the ailerons as a rate, the flight path follows the elevator as a rate, speed follows thrust minus a
+quadratic drag. What it does keep is consistency: rates are those of its attitude, specific force is acceleration minus
+gravity, air velocity is ground velocity minus wind.
 """
 
 from __future__ import annotations
@@ -100,6 +101,7 @@ class KinematicModel:
         self.reset(InitialState())
 
     def reset(self, initial: InitialState) -> Controls:
+        """Starts a flight."""
         self._terrain_m = initial.terrain_elevation_m
         self._running = [initial.engines_running] * _ENGINES
         self._surface_deg = {spec.name: 0.0 for spec in self.surfaces}
@@ -127,6 +129,7 @@ class KinematicModel:
         return controls.copy()
 
     def step(self, dt: float, controls: Controls) -> ModelState:
+        """Flies on."""
         if not dt > 0.0:
             raise FlightModelError(f"step of {dt} s; expected more than 0")
         count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-9))
@@ -143,8 +146,9 @@ class KinematicModel:
         pitch_rad: Optional[float] = None,
         heading_rad: Optional[float] = None,
         v_ned_mps: Optional[Sequence[float]] = None,
-        pqr_rad_s: Optional[Sequence[float]] = None,
+        pqr_rad_s: Optional[Sequence[float]] = None,  # noqa: ARG002 (the interface has it)
     ) -> ModelState:
+        """Moves the aircraft; rates follow from its path, so `pqr_rad_s` is not used."""
         self._lat = self._lat if latitude_deg is None else latitude_deg
         self._lon = self._lon if longitude_deg is None else longitude_deg
         self._alt = self._alt if altitude_m is None else altitude_m
@@ -164,10 +168,12 @@ class KinematicModel:
         return self.state
 
     def save(self) -> bytes:
+        """Levers and handles, for a situation."""
         names = [name for name in vars(self) if name not in ("_specs",)]
         return pickle.dumps(("kinematic", 1, {name: vars(self)[name] for name in names}))
 
     def restore(self, situation: bytes) -> ModelState:
+        """Puts back what `save` gave."""
         try:
             kind, version, values = pickle.loads(situation)
         except Exception as error:
@@ -178,27 +184,33 @@ class KinematicModel:
         return self.state
 
     def set_wind(self, north_mps: float, east_mps: float, down_mps: float = 0.0) -> None:
+        """Sets the wind that blows at every height."""
         self._wind = np.array((north_mps, east_mps, down_mps))
 
     def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
+        """Sets the standard deviation of the vertical gust [m/s]."""
         self._turbulence_mps = intensity_mps
         if seed is not None:
             self._random = np.random.default_rng(seed)
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
+        """Sets the day."""
         self._temperature_offset_k = temperature_offset_k
         self._sea_level_pressure_pa = sea_level_pressure_pa
 
     def set_terrain(self, elevation_m: float) -> None:
+        """Sets the height of the ground."""
         self._terrain_m = elevation_m
 
     def set_loading(self, fuel_kg: Optional[Sequence[float]] = None, payload_kg: Optional[float] = None) -> None:
+        """Sets fuel and payload."""
         if fuel_kg is not None:
             self._fuel_kg = [max(0.0, float(x)) for x in fuel_kg][:2]
         if payload_kg is not None:
             self._payload_kg = max(0.0, float(payload_kg))
 
     def set_engine_running(self, engine: int, running: bool) -> None:
+        """Starts or stops an engine."""
         if not 0 <= engine < _ENGINES:
             raise FlightModelError(f"engine {engine}; the kinematic model has engines 0 and 1")
         self._running[engine] = running
@@ -319,7 +331,11 @@ class KinematicModel:
         self._publish_air(air if not on_ground else air - wind)
         # body axes: the air path turned by bank, then pitched up by the angle of attack
         lift = 1.0 / max(math.cos(self._bank), 0.2)
-        alpha = 0.0 if on_ground else min(lift * earth.GRAVITY_MPS2 * 1400.0 / max(s.dynamic_pressure_pa, 200.0) / 90.0, 0.3)
+        alpha = (
+            0.0
+            if on_ground
+            else min(lift * earth.GRAVITY_MPS2 * 1400.0 / max(s.dynamic_pressure_pa, 200.0) / 90.0, 0.3)
+        )
         path = earth.body_to_level(math.degrees(self._bank), math.degrees(self._path), math.degrees(self._track))
         rotation = path @ earth.body_to_level(0.0, math.degrees(alpha), 0.0)
         roll, pitch, heading = earth.euler_degrees(rotation)
@@ -328,7 +344,9 @@ class KinematicModel:
         if self._previous is not None:
             before, velocity = self._previous
             delta = before.T @ rotation
-            rates = np.array((delta[2, 1] - delta[1, 2], delta[0, 2] - delta[2, 0], delta[1, 0] - delta[0, 1])) / (2 * dt)
+            rates = np.array((delta[2, 1] - delta[1, 2], delta[0, 2] - delta[2, 0], delta[1, 0] - delta[0, 1])) / (
+                2 * dt
+            )
             acceleration = (ground - velocity) / dt
         old = np.array((s.p_rad_s, s.q_rad_s, s.r_rad_s))
         s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2 = map(float, (rates - old) / dt)

@@ -83,7 +83,7 @@ def parse(arguments: Sequence[str]) -> Options:
 def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="xplane_emulator",
-        description="Speaks X-Plane's UDP protocol and flies aircraft of its own. Prints one line `READY {json}` with its port.",
+        description="Speaks X-Plane's UDP protocol and flies aircraft of its own. Prints `READY {json}` with its port.",
         epilog="docs/emulator.md tells what is modelled, the faults, and the stepping protocol.",
     )
     flight = p.add_argument_group("flight")
@@ -100,20 +100,26 @@ def _parser() -> argparse.ArgumentParser:
     flight.add_argument("--engines-off", action="store_true", help="start with the engines stopped")
     flight.add_argument("--pilot", type=Path, metavar="FILE", help="scenario that flies until a client does")
     flight.add_argument("--wind", default="0/0", metavar="FROM/SPEED", help="degrees true / m/s, e.g. 270/8")
-    flight.add_argument("--turbulence", type=float, default=0.0, metavar="M/S", help="standard deviation of the vertical gust")
+    flight.add_argument(
+        "--turbulence", type=float, default=0.0, metavar="M/S", help="standard deviation of the vertical gust"
+    )
     flight.add_argument("--seed", type=int, default=0, help="of everything random (default 0)")
 
     loop = p.add_argument_group("loop")
     loop.add_argument("--fps", type=float, default=60.0, help="rendered frames a second (default 60)")
-    loop.add_argument("--sim-time-start", type=float, default=0.0, metavar="S", help="total_running_time_sec at the start")
-    loop.add_argument("--load-time", type=float, default=0.0, metavar="S", help="zeros for so long, then the flight is loaded")
+    loop.add_argument(
+        "--sim-time-start", type=float, default=0.0, metavar="S", help="total_running_time_sec at the start"
+    )
+    loop.add_argument(
+        "--load-time", type=float, default=0.0, metavar="S", help="zeros for so long, then the flight is loaded"
+    )
     loop.add_argument("--duration", type=float, metavar="S", help="end after so long")
     loop.add_argument(
         "--stepped",
         nargs="?",
         const="lines",
         choices=("lines", "fast"),
-        help="not in real time: frames on request by lines on stdin (default), or as fast as it goes (needs --duration)",
+        help="not in real time: frames on request by lines on stdin, or as fast as it goes (needs --duration)",
     )
     loop.add_argument("--pipeline-delay", default="0", metavar="TIME", help="picture later than its packets, 0..200ms")
     loop.add_argument("--truth", type=Path, metavar="FILE", help="CSV of every frame, in doubles")
@@ -128,11 +134,20 @@ def _parser() -> argparse.ArgumentParser:
 
     wire = p.add_argument_group("wire")
     wire.add_argument("--bind", default="0.0.0.0", metavar="IP", help="address to listen on (default all)")
-    wire.add_argument("--port", type=int, default=protocol.DEFAULT_PORT, help="UDP port (default 49000; 0: any free one)")
+    wire.add_argument(
+        "--port", type=int, default=protocol.DEFAULT_PORT, help="UDP port (default 49000; 0: any free one)"
+    )
     wire.add_argument("--rate", type=int, default=20, metavar="HZ", help="network_data_rate at the start (default 20)")
     wire.add_argument("--no-beacon", dest="beacon", action="store_false", help="do not announce on multicast")
-    wire.add_argument("--beacon-target", default=f"{protocol.BEACON_GROUP}:{protocol.BEACON_PORT}", metavar="IP:PORT", help=argparse.SUPPRESS)
-    wire.add_argument("--rref-split", type=int, default=protocol.RREF_MAX_PAIRS, metavar="N", help="values a datagram (default 183)")
+    wire.add_argument(
+        "--beacon-target",
+        default=f"{protocol.BEACON_GROUP}:{protocol.BEACON_PORT}",
+        metavar="IP:PORT",
+        help=argparse.SUPPRESS,
+    )
+    wire.add_argument(
+        "--rref-split", type=int, default=protocol.RREF_MAX_PAIRS, metavar="N", help="values a datagram (default 183)"
+    )
     wire.add_argument(
         "--request-limit",
         type=int,
@@ -141,9 +156,16 @@ def _parser() -> argparse.ArgumentParser:
         help=f"RREF requests taken a frame, more are lost (default {RREF_REQUESTS_PER_FRAME})",
     )
     wire.add_argument("--unknown-datarefs", choices=("omit", "zero"), default="omit", help="(default omit)")
-    wire.add_argument("--angle-axes", choices=("level", "origin"), default="level", help="of row 17 and RPOS (default level)")
+    wire.add_argument(
+        "--angle-axes", choices=("level", "origin"), default="level", help="of row 17 and RPOS (default level)"
+    )
     wire.add_argument("--paused-output", choices=("on", "off"), default="on", help="send while paused (default on)")
-    wire.add_argument("--fault", default="", metavar="LIST", help="e.g. drop=0.1,delay=20ms,dup,reorder,truncate,freeze=2s@10,restart=3s@20")
+    wire.add_argument(
+        "--fault",
+        default="",
+        metavar="LIST",
+        help="e.g. drop=0.1,delay=20ms,dup,reorder,truncate,freeze=2s@10,restart=3s@20",
+    )
     wire.add_argument("-v", "--verbose", action="store_true", help="log what is ignored and why")
     return p
 
@@ -151,7 +173,9 @@ def _parser() -> argparse.ArgumentParser:
 def _options(given: argparse.Namespace) -> Options:
     finite = ("lat", "lon", "alt", "heading", "terrain", "turbulence", "fps", "sim_time_start", "load_time")
     for name in finite:
-        _require(math.isfinite(getattr(given, name)), f"--{name.replace('_', '-')}", getattr(given, name), "a finite number")
+        _require(
+            math.isfinite(getattr(given, name)), f"--{name.replace('_', '-')}", getattr(given, name), "a finite number"
+        )
     _require(-90.0 <= given.lat <= 90.0, "--lat", given.lat, "-90..90")
     _require(-180.0 <= given.lon <= 360.0, "--lon", given.lon, "-180..180")
     _require(1.0 <= given.fps <= 500.0, "--fps", given.fps, "1..500")
@@ -168,7 +192,9 @@ def _options(given: argparse.Namespace) -> Options:
     try:
         ipaddress.IPv4Address(given.bind)
     except ValueError:
-        raise OptionError(f"--bind {given.bind}: expected an IPv4 address of this machine, or 0.0.0.0 for all") from None
+        raise OptionError(
+            f"--bind {given.bind}: expected an IPv4 address of this machine, or 0.0.0.0 for all"
+        ) from None
     if given.model == KINEMATIC:
         aircraft = KINEMATIC
     else:

@@ -14,9 +14,23 @@ from .flight_model import FlightModel, InitialState
 from .frame import Frame
 
 _POSITION = "sim/flightmodel/position/"
-_WRITABLE = (
-    "local_x local_y local_z local_vx local_vy local_vz theta phi psi P Q R Prad Qrad Rrad".split()
-)
+_WRITABLE = [
+    "local_x",
+    "local_y",
+    "local_z",
+    "local_vx",
+    "local_vy",
+    "local_vz",
+    "theta",
+    "phi",
+    "psi",
+    "P",
+    "Q",
+    "R",
+    "Prad",
+    "Qrad",
+    "Rrad",
+]
 
 
 class Placements:
@@ -38,6 +52,7 @@ class Placements:
         store.on_write(_POSITION + "q", lambda i, value: self._pending.__setitem__(f"q{i}", value))
 
     def clear(self) -> None:
+        """Forgets what was written."""
         self._pending.clear()
 
     def apply(self, model: FlightModel, frame: Frame) -> None:
@@ -96,7 +111,7 @@ class Placements:
 
     @staticmethod
     def place_vehicle(model: FlightModel, request: protocol.VehiclePose) -> bool:
-        """Puts the aircraft at VEHX's or VEHS's pose, keeping its velocity along its own axes and stopping its rotation.
+        """Puts the aircraft at VEHX's or VEHS's pose; it keeps its velocity along its own axes and stops turning.
 
         Returns:
             False if the numbers are none of a pose.

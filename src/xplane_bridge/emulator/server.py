@@ -1,7 +1,8 @@
 """X-Plane's sockets: takes requests, hands them to the simulator, sends what each client is due.
 
-Everything runs in the emulator's one thread, once a frame, as in X-Plane: requests are read at the frame's start, packets go out
-after the flight model. Nothing a client sends can raise out of here; what X-Plane would ignore is counted and ignored.
+Everything runs in the emulator's one thread, once a frame, as in X-Plane: requests are read at the frame's start,
+packets go out after the flight model. Nothing a client sends can raise out of here; what X-Plane would ignore is
+counted and ignored.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class Server:
 
     Attributes:
         port: The port it listens on.
-        ignored: Datagrams ignored, by reason (a decode reason, or what the handler says: `dataref`, `command`, `version`, ...).
+        ignored: Datagrams ignored, by reason: a decode reason, or what the handler says (`dataref`, `command`, ...).
     """
 
     def __init__(
@@ -61,10 +62,12 @@ class Server:
         self._data_rate = 0
 
     def close(self) -> None:
+        """Closes it."""
         self._socket.close()
         self._data_socket.close()
 
     def fileno(self) -> int:
+        """For select."""
         return self._socket.fileno()
 
     # --- in -----------------------------------------------------------------------------------------------------------
@@ -160,6 +163,7 @@ class Server:
             self._send_now(packet, target, self._socket)
 
     def next_delayed(self) -> float:
+        """When the next held-back datagram is due."""
         return self._channel.next_due()
 
     def _send_now(self, packet: bytes, target: Address, source: socket.socket) -> None:
@@ -196,6 +200,7 @@ class Beacon:
                 _LOG.debug("no beacon on %s: %s", interface, error)
 
     def close(self) -> None:
+        """Closes it."""
         self._socket.close()
 
 

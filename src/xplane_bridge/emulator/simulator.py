@@ -1,4 +1,4 @@
-"""One running X-Plane: the aircraft, its datarefs, and what clients' requests do to them. No sockets, no clock of its own."""
+"""One running X-Plane: the aircraft, its datarefs, and what clients' requests do to them."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Simulator:
     # --- one frame ----------------------------------------------------------------------------------------------------
 
     def step(self, period: float) -> None:
-        """Advances by one rendered frame of `period` [s] of wall time, after the requests of that frame were handled."""
+        """Advances by one rendered frame of `period` [s] of wall time; its requests were handled before."""
         clocks = self.clocks
         clocks.frame += 1
         clocks.wall_period = period
@@ -148,9 +148,11 @@ class Simulator:
         return leaf in self._failed
 
     def failures_changed(self) -> None:
+        """To be called when a failure dataref was written."""
         self._failures_dirty = True
 
     def repair_all(self) -> None:
+        """Repairs everything (RESE)."""
         self._failures.repair_all()
         self._failures_dirty = True
 
@@ -162,9 +164,11 @@ class Simulator:
         return 3000.0 if running and not self.failed(pump) else 0.0
 
     def pause(self, paused: bool) -> None:
+        """Stops or continues simulated time."""
         self.clocks.paused = paused
 
     def watch_surface(self, name: str) -> None:
+        """See `ControlInputs.watch_surface`."""
         self.inputs.watch_surface(name)
 
     def move_throttles(self, step: float) -> None:
@@ -174,9 +178,11 @@ class Simulator:
         self.store.values[slots] = np.clip(self.store.values[slots] + step, 0.0, 1.0)
 
     def run_engine(self, engine: int, running: bool) -> None:
+        """Starts or stops one engine."""
         self.model.set_engine_running(engine, running)
 
     def run_engines(self, running: bool) -> None:
+        """Starts or stops all engines."""
         for engine in range(self.model.info.engine_count):
             self.model.set_engine_running(engine, running)
 
@@ -219,6 +225,7 @@ class Simulator:
         self.start_flight(start)
 
     def save_situation(self, path: str) -> None:
+        """Keeps the whole flight under a name."""
         self._situations[path] = (self.aircraft, self.model.save(), self.inputs.save())
         self.last_situation = path
 
@@ -245,7 +252,9 @@ class Simulator:
         slots = [self.store.slot(path) for path in paths]
         missing = [path for path, slot in zip(paths, slots) if slot is None]
         if missing:
-            raise FlightModelError(f"aircraft {info.name}: X-Plane has no datarefs {', '.join(missing)} for its surfaces")
+            raise FlightModelError(
+                f"aircraft {info.name}: X-Plane has no datarefs {', '.join(missing)} for its surfaces"
+            )
         self._surface_slots = np.array(slots, dtype=int)
         self.inputs.bind_surfaces(dict(zip(self._surface_names, map(int, self._surface_slots))))
         self.store.set_text(_IDENTITY + "acf_ICAO", info.icao)
@@ -259,14 +268,17 @@ class Simulator:
     # --- requests -----------------------------------------------------------------------------------------------------
 
     def on_dref(self, request: protocol.DrefWrite) -> Optional[str]:
+        """DREF: writes a dataref; errors are silent."""
         return None if self.store.write(request.path, request.value) else "dataref"
 
     def on_data(self, request: protocol.DataPacket) -> Optional[str]:
+        """DATA: rows that control something take hold of it."""
         for row, slots in request.rows:
             self.inputs.take_row(row, slots)
         return None
 
     def on_command(self, request: protocol.CommandRequest) -> Optional[str]:
+        """CMND."""
         action = self._commands.get(request.path)
         if action is None:
             return "command"
@@ -287,6 +299,7 @@ class Simulator:
         return None
 
     def on_aircraft(self, request: protocol.AircraftLoad) -> Optional[str]:
+        """ACFN: loads the aircraft named by the path; other aircraft than the user's are ignored."""
         if request.aircraft != 0:
             return "aircraft"
         name = request.path.replace("\\", "/").rsplit("/", 1)[-1]
@@ -299,6 +312,7 @@ class Simulator:
         return None
 
     def on_situation(self, request: protocol.Situation) -> Optional[str]:
+        """SIMO: situations live in memory, by path; movies are not supported."""
         if request.action == protocol.Situation.SAVE:
             self.save_situation(request.path)
             return None

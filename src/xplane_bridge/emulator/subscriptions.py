@@ -1,7 +1,7 @@
 """RREF and RPOS subscriptions of all clients: who gets what in which frame.
 
-Each sender (address, port) has its own set. Values that are due in the same frame for the same client share datagrams of up to
-183 pairs, or fewer with `split`.
+Each sender (address, port) has its own set. Values that are due in the same frame for the same client share datagrams
+of up to 183 pairs, or fewer with `split`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..protocol import FIFTH_BYTE, RREF_MAX_PAIRS
 
 Address = Tuple[str, int]
 
-#: [?] A request for an index that is in use replaces it, whatever its path (what client authors found); False keeps the first.
+#: [?] A request for an index in use replaces it, whatever its path (what client authors found); False keeps the first.
 SAME_INDEX_REPLACES = True
 #: A due time may lie this part of a frame ahead and still belong to this frame.
 _EARLY = 0.01
@@ -58,6 +58,7 @@ class RrefClient:
         return len(self._rates)
 
     def subscribe(self, index: int, rate_hz: int, slot: int) -> None:
+        """Adds or replaces the subscription with this index."""
         if index in self._rates and not SAME_INDEX_REPLACES:
             return
         self.unsubscribe(index)
@@ -66,6 +67,7 @@ class RrefClient:
         self._gathers.clear()
 
     def unsubscribe(self, index: int) -> None:
+        """Ends the subscription with this index."""
         rate = self._rates.pop(index, None)
         if rate is None:
             return
@@ -109,9 +111,11 @@ class Subscriptions:
         self.rpos: Dict[Address, Pacer] = {}
 
     def request_rref(self, client: Address, index: int, rate_hz: int, slot: int) -> None:
+        """A client subscribes to a slot."""
         self.rref.setdefault(client, RrefClient()).subscribe(index, rate_hz, slot)
 
     def stop_rref(self, client: Address, index: int) -> None:
+        """A client ends a subscription."""
         subscriptions = self.rref.get(client)
         if subscriptions is not None:
             subscriptions.unsubscribe(index)
@@ -119,6 +123,7 @@ class Subscriptions:
                 del self.rref[client]
 
     def request_rpos(self, client: Address, rate_hz: int) -> None:
+        """A client asks for the position stream; rate 0 ends it."""
         if rate_hz > 0:
             self.rpos[client] = Pacer(rate_hz)
         else:

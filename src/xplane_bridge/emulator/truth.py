@@ -14,7 +14,7 @@ _FLUSH_EVERY = 10
 
 _Source = Callable[[Frame], float]
 
-#: Column name (with unit) and source. SI, angles in degrees where the name says so; attitude relative to the local level.
+#: Column name (with unit) and source. Attitude is relative to the local level.
 COLUMNS: Tuple[Tuple[str, _Source], ...] = (
     ("frame", lambda f: f.clocks.frame),
     ("sim_time", lambda f: f.clocks.running),
@@ -70,8 +70,8 @@ COLUMNS: Tuple[Tuple[str, _Source], ...] = (
 class TruthFile:
     """Writes one CSV line a frame, from the first flight on.
 
-    Columns: those of `COLUMNS`, one `surface_<name>_deg` for each surface of the first aircraft, and `host_time`: host time (since
-    1970, s) at which the frame's packets went out, nan in stepped mode.
+    Columns: those of `COLUMNS`, one `surface_<name>_deg` for each surface of the first aircraft, and `host_time`: host
+    time (since 1970, s) at which the frame began, nan in stepped mode.
     """
 
     def __init__(self, path: Path, model: FlightModel) -> None:
@@ -86,6 +86,7 @@ class TruthFile:
         self._lines = 0
 
     def write(self, frame: Frame, host_time: float) -> None:
+        """Writes one line."""
         values: Sequence[float] = [source(frame) for _, source in COLUMNS]
         surfaces = [frame.m.surfaces_deg.get(name, math.nan) for name in self._surfaces]
         self._file.write(",".join(map(repr, map(_plain, [*values, *surfaces, host_time]))) + "\n")
@@ -94,6 +95,7 @@ class TruthFile:
             self._file.flush()
 
     def close(self) -> None:
+        """Closes it."""
         self._file.close()
 
 

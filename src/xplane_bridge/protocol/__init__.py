@@ -3,7 +3,7 @@
 Written from the protocol reference alone, independently of the C++ codec; both are held to the same golden packets.
 """
 
-from .constants import *  # noqa: F401,F403
+from .constants import *  # noqa: F403
 from .messages import (
     AircraftLoad,
     AircraftLoadAndPlacement,

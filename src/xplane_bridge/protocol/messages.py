@@ -56,6 +56,7 @@ class RrefRequest:
     path: str
 
     def encode(self) -> bytes:
+        """The datagram."""
         return _RREF_REQUEST.pack(b"RREF", self.rate_hz, self.index, _pad(self.path, c.RREF_PATH_SIZE))
 
 
@@ -66,6 +67,7 @@ class RposRequest:
     rate_hz: int
 
     def encode(self) -> bytes:
+        """The datagram."""
         return b"RPOS\0" + str(self.rate_hz).encode("ascii") + b"\0"
 
 
@@ -77,9 +79,12 @@ class DrefWrite:
     value: float
 
     def encode(self, fifth: int = 0) -> bytes:
+        """The datagram."""
         text = self.path.encode("ascii") + b"\0"
         if len(text) > c.DREF_PATH_SIZE:
-            raise ValueError(f"dataref path of {len(text) - 1} characters; at most {c.DREF_PATH_SIZE - 1} fit: {self.path!r}")
+            raise ValueError(
+                f"dataref path of {len(text) - 1} characters; at most {c.DREF_PATH_SIZE - 1} fit: {self.path!r}"
+            )
         return _DREF.pack(b"DREF", fifth, self.value, text.ljust(c.DREF_PATH_SIZE, b" "))
 
 
@@ -90,6 +95,7 @@ class DataPacket:
     rows: Tuple[Tuple[int, Tuple[float, ...]], ...]
 
     def encode(self, fifth: int = 0) -> bytes:
+        """The datagram."""
         return b"DATA" + bytes([fifth]) + b"".join(_ROW.pack(index, *slots) for index, slots in self.rows)
 
     def as_dict(self) -> Dict[int, Tuple[float, ...]]:
@@ -104,6 +110,7 @@ class CommandRequest:
     path: str
 
     def encode(self) -> bytes:
+        """The datagram."""
         return b"CMND\0" + self.path.encode("ascii") + b"\0"
 
 
@@ -119,6 +126,7 @@ class RowSelection:
     rows: Tuple[int, ...]
 
     def encode(self) -> bytes:
+        """The datagram."""
         return self.label.encode("ascii") + b"\0" + struct.pack(f"<{len(self.rows)}i", *self.rows)
 
 
@@ -132,6 +140,7 @@ class NetworkTarget:
     enabled: bool
 
     def encode(self) -> bytes:
+        """The datagram."""
         return _ISE4.pack(b"ISE4", self.index, _pad(self.host, 16), _pad(str(self.port), 8), int(self.enabled))
 
 
@@ -151,6 +160,7 @@ class Placement:
     speed_mps: float = 0.0
 
     def encode_body(self) -> bytes:
+        """The 64 bytes behind the header (also part of ACPR)."""
         return _PLACEMENT.pack(
             self.start_type,
             self.aircraft,
@@ -165,10 +175,12 @@ class Placement:
         )
 
     def encode(self) -> bytes:
+        """The datagram."""
         return _PREL.pack(b"PREL", self.encode_body())
 
     @classmethod
     def decode_body(cls, body: bytes) -> Placement:
+        """Reads what `encode_body` makes."""
         start, aircraft, airport, runway, direction, lat, lon, ele, heading, speed = _PLACEMENT.unpack(body)
         return cls(start, aircraft, _text(airport, "PREL airport"), runway, direction, lat, lon, ele, heading, speed)
 
@@ -182,6 +194,7 @@ class AircraftLoad:
     livery: int = 0
 
     def encode(self) -> bytes:
+        """The datagram."""
         return _ACFN.pack(b"ACFN", self.aircraft, _pad(self.path, 150), self.livery)
 
 
@@ -193,6 +206,7 @@ class AircraftLoadAndPlacement:
     placement: Placement
 
     def encode(self) -> bytes:
+        """The datagram."""
         return _ACPR.pack(b"ACPR", self.load.encode()[c.HEADER_SIZE :], self.placement.encode_body())
 
 
@@ -207,6 +221,7 @@ class Situation:
     path: str
 
     def encode(self) -> bytes:
+        """The datagram."""
         return _SIMO.pack(b"SIMO", self.action, _pad(self.path, 150))
 
 
@@ -224,6 +239,7 @@ class VehiclePose:
     roll_deg: float
 
     def encode(self) -> bytes:
+        """The datagram."""
         return _VEHICLE.pack(
             self.label.encode("ascii"),
             self.aircraft,
@@ -241,6 +257,7 @@ class RecoverAll:
     """RESE: repair every failure."""
 
     def encode(self) -> bytes:
+        """The datagram."""
         return b"RESE\0"
 
 
@@ -409,6 +426,7 @@ class RposResponse:
     r_radps: float
 
     def encode(self, fifth: int = c.FIFTH_BYTE[b"RPOS"]) -> bytes:
+        """The datagram."""
         return _RPOS.pack(
             b"RPOS",
             fifth,
@@ -442,6 +460,7 @@ class Beacon:
     raknet_port: int = c.RAKNET_PORT
 
     def encode(self) -> bytes:
+        """The datagram."""
         head = _BEACON.pack(
             b"BECN", 0, self.major, self.minor, self.host_id, self.version, self.role, self.port
         ) + self.host_name.encode("utf-8", "replace").replace(b"\0", b"")

@@ -1,4 +1,4 @@
-"""Scripted flights: one YAML schema (config/scenarios/README.md), one player, used by emulator, tests and failure scenarios."""
+"""Scripted flights: one YAML schema (config/scenarios/README.md) and one player."""
 
 from .holds import HoldGains, Targets
 from .loader import load_scenario, parse_scenario

@@ -14,7 +14,7 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
     """The input at `time_s` after its start, within +-amplitude; 0 before and after.
 
     Args:
-        parameters: A checked `excitation` of a scenario: kind, amplitude, duration [s], frequency, frequency_end [Hz], seed.
+        parameters: A checked `excitation`: kind, amplitude, duration [s], frequency, frequency_end [Hz], seed.
         time_s: Time since the start [s].
     """
     duration, amplitude = parameters["duration"], parameters["amplitude"]

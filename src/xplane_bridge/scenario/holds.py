@@ -1,7 +1,7 @@
 """A simple autopilot for scripted flights of a fixed wing: roll, pitch, heading, climb, altitude and speed holds.
 
-Meant to fly a demonstration, not to be studied: attitude loops with rate damping and an integrator on pitch, outer loops that
-give attitude targets. Output is stick and throttle as a pilot would move them.
+Meant to fly a demonstration, not to be studied: attitude loops with rate damping and an integrator on pitch, outer
+loops that give attitude targets. Output is stick and throttle as a pilot would move them.
 """
 
 from __future__ import annotations
@@ -34,8 +34,11 @@ class HoldGains:
 
 @dataclass
 class Targets:
-    """What to hold; None is flown by the stick of the scenario. Of roll and heading, and of pitch, climb and altitude, one counts:
-    heading before roll, altitude before climb before pitch."""
+    """What to hold; None is flown by the stick of the scenario.
+
+    Of roll and heading, and of pitch, climb and altitude, one counts: heading before roll, altitude before climb before
+    pitch.
+    """
 
     roll: Optional[float] = None
     pitch: Optional[float] = None
@@ -77,7 +80,14 @@ class HoldAutopilot:
         return _clip(self._g.roll * error - self._g.roll_rate * roll_rate_dps, -1.0, 1.0)
 
     def pitch(
-        self, targets: Targets, dt: float, pitch_deg: float, pitch_rate_dps: float, roll_deg: float, climb: float, altitude: float
+        self,
+        targets: Targets,
+        dt: float,
+        pitch_deg: float,
+        pitch_rate_dps: float,
+        roll_deg: float,
+        climb: float,
+        altitude: float,
     ) -> Optional[float]:
         """Stick, nose up +; None if nothing is to be held."""
         g = self._g

@@ -1,4 +1,4 @@
-"""Reads and checks scenarios. Nothing unknown is accepted: a misspelt key is an error, not a flight without its failure."""
+"""Reads and checks scenarios: a misspelt key is an error, not a flight without its failure."""
 
 from __future__ import annotations
 
@@ -84,9 +84,7 @@ def parse_scenario(document: Any) -> Scenario:
         raise ScenarioError(f"events: {_short(events)}; expected a list of at least one event")
     parsed = tuple(_event(item, f"events[{i}]") for i, item in enumerate(events))
     _check_times(parsed, repeat)
-    return Scenario(
-        name, _text(top, "description", ""), tuple(aircraft), repeat, start, gains, criteria, parsed
-    )
+    return Scenario(name, _text(top, "description", ""), tuple(aircraft), repeat, start, gains, criteria, parsed)
 
 
 def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:
@@ -95,7 +93,9 @@ def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:
         if event.at is None:
             continue
         if event.at < last:
-            raise ScenarioError(f"events[{i}].at: {event.at}; expected {last} or more: events stand in the order of their time")
+            raise ScenarioError(
+                f"events[{i}].at: {event.at}; expected {last} or more: events stand in the order of their time"
+            )
         if repeat is not None and event.at >= repeat:
             raise ScenarioError(f"events[{i}].at: {event.at}; expected less than repeat_every ({repeat})")
         last = event.at
@@ -144,7 +144,7 @@ def _conditions(item: Any, path: str) -> Tuple[Condition, ...]:
     return tuple(conditions)
 
 
-# --- actions: each checks its value and returns it in its final form ---------------------------------------------------
+# --- actions: each checks its value and returns it in its final form ---
 
 
 def _stick(item: Any, path: str) -> Dict[str, float]:
@@ -154,7 +154,7 @@ def _stick(item: Any, path: str) -> Dict[str, float]:
 def _hold(item: Any, path: str) -> Dict[str, Optional[float]]:
     """Targets; null lets one go, and the word `none` all of them."""
     if item is None or item == "none":
-        return {key: None for key in HOLDS}
+        return dict.fromkeys(HOLDS)
     given = _mapping(item, path, HOLDS)
     if not given:
         raise ScenarioError(f"{path}: is empty; expected targets of {', '.join(HOLDS)}")
@@ -263,7 +263,7 @@ _ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
 }
 
 
-# --- helpers -----------------------------------------------------------------------------------------------------------
+# --- helpers ---
 
 
 def _mapping(item: Any, path: str, known: Any) -> Dict[str, Any]:
@@ -283,7 +283,12 @@ def _ranged(item: Any, path: str, ranges: Mapping[str, Tuple[float, float]], som
 
 
 def _number(value: Any, path: str, low: float, high: float) -> float:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and low <= value <= high
+    good = (
+        isinstance(value, (int, float))
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+        and low <= value <= high
+    )
     if not good:
         bounds = "a number" if math.isinf(low) and math.isinf(high) else f"a number from {low:g} to {high:g}"
         raise ScenarioError(f"{path}: {_short(value)}; expected {bounds}")

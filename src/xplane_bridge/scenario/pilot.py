@@ -33,6 +33,7 @@ class ScenarioPilot:
         self._failed: List[str] = []
 
     def __call__(self, flight_time: float, frame: Frame) -> PilotCommands:
+        """What the scenario wants at this flight time [s]."""
         from ..emulator.control_inputs import PilotCommands  # the emulator imports this module
 
         commands = self.player.step(flight_time, sample_of(frame))
@@ -83,8 +84,8 @@ def failure_dataref(name: str) -> str:
     if system in _SYSTEMS and number.isdigit() and int(number) >= 1:
         return _SYSTEMS[system].format(int(number) - 1)
     raise ScenarioError(
-        f"failure {name!r}: the emulator's pilot can only fail rel_* datarefs, engine_N, generator_N, battery_N, bus_N, pitot_N, "
-        f"static_N and gyro_N; surfaces fail through tx_node (set_failure)"
+        f"failure {name!r}: the emulator's pilot can only fail rel_* datarefs, engine_N, generator_N, battery_N, "
+        f"bus_N, pitot_N, static_N and gyro_N; surfaces fail through tx_node (set_failure)"
     )
 
 

@@ -17,7 +17,7 @@ _MAX_STEP_S = 0.1
 
 @dataclass(frozen=True)
 class FlightSample:
-    """What the player looks at. Angles in degrees, rates in degrees/s; altitude and agl in m, climb and speed (calibrated) in m/s."""
+    """What the player looks at: degrees, degrees/s, metres, m/s (`speed` is calibrated airspeed)."""
 
     roll: float = 0.0
     pitch: float = 0.0
@@ -38,7 +38,7 @@ class FlightSample:
 
 @dataclass(frozen=True)
 class Action:
-    """Something for the caller to do once: `mode`, `failure`, `clear_failures`, `excitation`, `dataref`, `command`, `label`."""
+    """For the caller to do once: `mode`, `failure`, `clear_failures`, `excitation`, `dataref`, `command`, `label`."""
 
     kind: str
     value: Any
@@ -106,7 +106,7 @@ class Player:
         return 0.0 if self._start is None or self._last_time is None else self._last_time - self._start
 
     def step(self, sim_time: float, sample: FlightSample) -> Commands:
-        """Goes on to `sim_time` [s]. The first call is scenario time 0; time that runs backwards starts the scenario anew."""
+        """Goes on to `sim_time` [s]. The first call is scenario time 0; time that runs backwards starts it anew."""
         if self._start is None or (self._last_time is not None and sim_time < self._last_time):
             self.__init__(self.scenario, self._apply_excitations)  # type: ignore[misc]
             self._start = sim_time

@@ -80,6 +80,7 @@ class Condition:
     below: Optional[float] = None
 
     def holds(self, values: Mapping[str, float]) -> bool:
+        """Whether it is true of these values."""
         value = values[self.variable]
         return (self.above is None or value > self.above) and (self.below is None or value < self.below)
 

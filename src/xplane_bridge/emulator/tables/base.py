@@ -20,8 +20,8 @@ BOTH = (11, 12)
 class Table:
     """Datarefs with their sources.
 
-    `value` and `array` define datarefs that the simulator computes each frame; `setting` defines those that keep what was last
-    written. Definitions for another X-Plane version than the running one are left out, as that version would not know the name.
+    `value` and `array` define datarefs that the simulator computes each frame; `setting` defines those that keep what
+    was written last. Definitions for another X-Plane version than the running one are left out: it would not know the name.
     """
 
     def __init__(self, store: DatarefStore, version: int) -> None:

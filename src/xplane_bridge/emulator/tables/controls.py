@@ -100,6 +100,7 @@ def surface_dataref(spec: SurfaceSpec) -> str:
 
 
 def define(table: Table, sim: Simulator) -> None:
+    """Defines this subject's datarefs."""
     _surfaces(table, sim)
     _stick(table, sim)
     _handles(table)
@@ -132,7 +133,9 @@ def _surfaces(t: Table, sim: Simulator) -> None:
         sim.watch_surface(array)
         if leaf in _OLD_ARRAYS:
             start = _FIRST_PART + {"elv": 8, "rud": 10}.get(leaf[:3], 0)
-            t.store.add_view(_CONTROLS + _OLD_ARRAYS[leaf], FLOAT, _padded(single[leaf], start, _PART_ARRAY), writable=True)
+            t.store.add_view(
+                _CONTROLS + _OLD_ARRAYS[leaf], FLOAT, _padded(single[leaf], start, _PART_ARRAY), writable=True
+            )
             sim.watch_surface(_CONTROLS + _OLD_ARRAYS[leaf])
     for leaf in ("ail1", "ail2", "spo1", "spo2", "fla1", "fla2", "yawb", "elv1", "elv2", "rud1", "rud2"):
         for name in single[leaf]:
@@ -165,7 +168,9 @@ def _stick(t: Table, sim: Simulator) -> None:
     ):
         t.setting(f"sim/joystick/yoke_{axis}_ratio")
         t.alias(f"{_COCKPIT}yoke_{axis}_ratio", f"sim/joystick/yoke_{axis}_ratio")
-        t.value(f"sim/joystick/artstab_{axis}_ratio", lambda f, total=total, stick=stick: total(f) - stick(), writable=True)
+        t.value(
+            f"sim/joystick/artstab_{axis}_ratio", lambda f, total=total, stick=stick: total(f) - stick(), writable=True
+        )
         t.setting(f"sim/joystick/servo_{axis}_ratio")
         t.value(f"{_COCKPIT}total_{axis}_ratio", total)
         t.value(f"{_CONTROLS2}{axis}_ratio", total, writable=True)

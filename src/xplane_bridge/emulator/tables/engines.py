@@ -22,10 +22,12 @@ _FUEL_PRESSURE_PSI = 24.0
 
 
 def each(source: Callable[[EngineState], float]) -> Callable[[Frame], List[float]]:
+    """Makes an array source from a source for one engine."""
     return lambda f: [source(engine) for engine in f.m.engines]
 
 
 def define(t: Table, sim: Simulator) -> None:
+    """Defines this subject's datarefs."""
     size = t.engines
     t.value("sim/aircraft/engine/acf_num_engines", lambda f: f.info.engine_count, INT)
     t.value("sim/aircraft/engine/acf_RSC_redline_eng", lambda f: f.info.maximum_rpm * RPM_TO_RAD_S)

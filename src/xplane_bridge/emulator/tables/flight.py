@@ -26,6 +26,7 @@ _FORCES = "sim/flightmodel/forces/"
 
 
 def define(table: Table, sim: Simulator) -> None:
+    """Defines this subject's datarefs."""
     _position(table)
     _attitude_and_rates(table)
     _air_data(table, sim)
@@ -202,7 +203,7 @@ def _weather(t: Table, sim: Simulator) -> None:
     t.value("_emulator/temperature_le_c", lambda f: _total_temperature_c(f))
     t.setting("sim/weather/barometer_sealevel_inhg", 29.92)
     t.setting("sim/weather/temperature_sealevel_c", 15.0)
-    # what clients set; layer 0 blows at every height here (names with brackets are X-Plane 11's own, layers are no array there)
+    # what clients set; layer 0 blows at every height here (the brackets are part of X-Plane 11's names)
     t.setting("sim/weather/use_real_weather_bool", 0, INT, versions=X11)
     for layer in range(3):
         t.setting(f"sim/weather/wind_altitude_msl_m[{layer}]", 0.0, versions=X11)
@@ -234,7 +235,9 @@ def _weights(t: Table) -> None:
     t.value(weight + "m_total", lambda f: f.m.mass_kg)
     t.setting(weight + "m_jettison", 0.0)
     t.value("sim/aircraft/weight/acf_m_empty", lambda f: f.m.empty_mass_kg)
-    t.value("sim/aircraft/weight/acf_m_max", lambda f: 1.15 * f.m.mass_kg if f.m.empty_mass_kg == 0 else _maximum_mass(f))
+    t.value(
+        "sim/aircraft/weight/acf_m_max", lambda f: 1.15 * f.m.mass_kg if f.m.empty_mass_kg == 0 else _maximum_mass(f)
+    )
     t.value("sim/flightmodel/misc/cgz_ref_to_default", lambda f: -f.m.cg_forward_m)
     t.value("sim/flightmodel2/misc/cg_offset_z", lambda f: -f.m.cg_forward_m, versions=X12)
 
@@ -270,5 +273,3 @@ def _time(t: Table, sim: Simulator) -> None:
 def _local_time(zulu: float, longitude_deg: float) -> float:
     """Zone time: whole hours by longitude."""
     return (zulu + 3600.0 * round(longitude_deg / 15.0)) % 86400.0
-
-

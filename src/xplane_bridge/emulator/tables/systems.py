@@ -18,6 +18,7 @@ _VIEW = "sim/graphics/view/"
 
 
 def define(t: Table, sim: Simulator) -> None:
+    """Defines this subject's datarefs."""
     _version_and_network(t, sim)
     _identity(t)
     _electrical(t, sim)
