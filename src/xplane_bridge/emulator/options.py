@@ -126,7 +126,11 @@ def _parser() -> argparse.ArgumentParser:
 
     window = p.add_argument_group("cockpit view")
     window.add_argument(
-        "--window", nargs="?", const="640x480", metavar="WxH", help="draw it into a window \"X-System\" (default 640x480)"
+        "--window",
+        nargs="?",
+        const="640x480",
+        metavar="WxH",
+        help="draw it in a window named X-System (default 640x480)",
     )
     window.add_argument("--hud", action="store_true", help="with a head-up display")
     window.add_argument("--no-strip", dest="strip", action="store_false", help="without the machine-readable strip")

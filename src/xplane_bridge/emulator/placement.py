@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Dict, Optional
+from typing import Dict, Optional, Sequence
 
 import numpy as np
 
@@ -38,6 +38,11 @@ class Placements:
 
     A client that sets a position sends several DREFs; applied one by one they would pass through places in between.
     """
+
+    #: Moves beyond these are not made: X-Plane has no such places, and no flight model flies there.
+    MAX_SPEED_MPS = 600.0
+    MAX_RATE_RAD_S = 20.0
+    ELEVATION_M = (-1000.0, 30000.0)
 
     #: PREL start type "latitude, longitude, elevation".
     START_AT_PLACE = 6
@@ -83,7 +88,19 @@ class Placements:
             rates[i] = pending.get(axis + "rad", rates[i])
         if any(leaf[0] in "PQR" for leaf in pending):
             changes["pqr_rad_s"] = rates
-        model.place(**changes)  # type: ignore[arg-type]
+        if self._is_flyable(changes):
+            model.place(**changes)  # type: ignore[arg-type]
+
+    @classmethod
+    def _is_flyable(cls, changes: Dict[str, object]) -> bool:
+        elevation: float = changes.get("altitude_m", 0.0)  # type: ignore[assignment]
+        velocity: Sequence[float] = changes.get("v_ned_mps", (0.0,))  # type: ignore[assignment]
+        rates: Sequence[float] = changes.get("pqr_rad_s", (0.0,))  # type: ignore[assignment]
+        return (
+            cls.ELEVATION_M[0] <= elevation <= cls.ELEVATION_M[1]
+            and max(map(abs, velocity)) <= cls.MAX_SPEED_MPS
+            and max(map(abs, rates)) <= cls.MAX_RATE_RAD_S
+        )
 
     @staticmethod
     def initial_state(request: protocol.Placement, terrain_m: float) -> Optional[InitialState]:
@@ -95,7 +112,7 @@ class Placements:
             request.heading_deg,
             request.speed_mps,
         )
-        if not all(map(math.isfinite, numbers)) or abs(request.latitude_deg) > 90.0:
+        if not (_is_place(numbers) and 0.0 <= request.speed_mps <= Placements.MAX_SPEED_MPS):
             return None
         height = request.elevation_m - terrain_m
         on_ground = height < Placements.GROUND_HEIGHT_M and request.speed_mps < Placements.GROUND_SPEED_MPS
@@ -124,7 +141,7 @@ class Placements:
             request.pitch_deg,
             request.roll_deg,
         )
-        if not all(map(math.isfinite, numbers)) or abs(request.latitude_deg) > 90.0:
+        if not _is_place(numbers):
             return False
         state = model.state
         rotation = earth.body_to_level(request.roll_deg, request.pitch_deg, request.heading_deg)
@@ -140,6 +157,15 @@ class Placements:
             pqr_rad_s=(0.0, 0.0, 0.0),
         )
         return True
+
+
+def _is_place(numbers: Sequence[float]) -> bool:
+    """Whether latitude, longitude, elevation, and finite further numbers, are those of a place on X-Plane's earth."""
+    if not all(map(math.isfinite, numbers)):
+        return False
+    latitude, longitude, elevation = numbers[:3]
+    low, high = Placements.ELEVATION_M
+    return abs(latitude) <= 90.0 and abs(longitude) <= 360.0 and low <= elevation <= high
 
 
 def _attitude(pending: Dict[str, float], frame: Frame) -> Optional[np.ndarray]:

@@ -14,7 +14,7 @@ from .aircraft_systems import INHG_PA, Electrics, Instruments, Weather
 from .control_inputs import ControlInputs, Pilot
 from .datarefs import DatarefStore
 from .failure_effects import FailureEffects
-from .flight_model import Controls, FlightModel, FlightModelError, InitialState
+from .flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
 from .frame import Clocks, Frame
 from .placement import Placements
 from .tables.controls import surface_dataref
@@ -27,6 +27,15 @@ INTERNAL_VERSIONS = {11: 115501, 12: 122015}
 MIN_FRAME_RATE = 19.9
 #: Vertical gust per unit of X-Plane's turbulence, which goes from 0 to 10 [m/s].
 TURBULENCE_MPS_PER_UNIT = 0.5
+
+#: Fastest simulated time; `sim_speed` beyond it counts as this.
+MAX_SIM_SPEED = 16.0
+#: What clients may make of the air and the loading; values beyond are cut to these.
+_TEMPERATURE_C = (-45.0, 75.0)
+_PRESSURE_INHG = (25.5, 32.0)
+_MAX_WIND_MPS = 100.0
+_MAX_TURBULENCE_MPS = 10.0
+_MAX_LOAD_KG = 5000.0
 
 _SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot"
 _SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
@@ -111,7 +120,11 @@ class Simulator:
         clocks.frame += 1
         clocks.wall_period = period
         clocks.simulated_period = min(period, 1.0 / MIN_FRAME_RATE)
-        dt = 0.0 if clocks.paused else clocks.simulated_period * max(self.store.get("sim/time/sim_speed"), 0.0)
+        dt = (
+            0.0
+            if clocks.paused
+            else clocks.simulated_period * _clip(self.store.get("sim/time/sim_speed"), 0.0, MAX_SIM_SPEED)
+        )
         clocks.advance(dt, self.flying)
         if self.flying:
             self._fly(dt)
@@ -125,17 +138,26 @@ class Simulator:
         if self._failures_dirty:
             self._failed = self._failures.active()
             self._failures_dirty = False
-        self._placements.apply(self.model, self.frame)
-        state = self.model.state
-        if dt > 0.0:
-            self.inputs.read(self.controls, self.model, self.frame)
-            self._failures.apply(self.controls, self._failed, self.model, dt)
-            if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
-                state = self.model.step(dt, self.controls)
-        self.frame.update(state, self.store.get(_SETTING) * INHG_PA)
+        try:
+            self._placements.apply(self.model, self.frame)
+            if dt > 0.0:
+                self.inputs.read(self.controls, self.model, self.frame)
+                self._failures.apply(self.controls, self._failed, self.model, dt)
+                if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
+                    self.model.step(dt, self.controls)
+            if not _is_sane(self.model.state):
+                raise FlightModelError("its state is no longer a number")
+        except (FlightModelError, ArithmeticError, ValueError) as error:
+            # an aircraft that broke apart: X-Plane too starts the flight again
+            _LOG.warning("the flight model gave up (%s): the flight starts again", error)
+            self.start_flight(self.initial)
+        self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
         self.frame.distance += self.frame.ground_speed * dt
         self.electrics.update(dt, self.store, self.frame, self.failed)
-        self.instruments.update(self.frame, self.store.get(_SETTING), self.failed)
+        self.instruments.update(self.frame, self._altimeter_inhg(), self.failed)
+
+    def _altimeter_inhg(self) -> float:
+        return _clip(self.store.get(_SETTING), *_PRESSURE_INHG)
 
     def _publish_surfaces(self) -> None:
         deflections = self.model.state.surfaces_deg
@@ -201,8 +223,8 @@ class Simulator:
             self.store.set(_ELECTRICAL + name, powered)
         self.store.set("sim/cockpit2/switches/avionics_power_on", powered)
         self.frame.start(self.model.state)
-        self.frame.update(self.model.state, self.store.get(_SETTING) * INHG_PA)
-        self.instruments.update(self.frame, self.store.get(_SETTING), self.failed)
+        self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
+        self.instruments.update(self.frame, self._altimeter_inhg(), self.failed)
         self.electrics.update(0.0, self.store, self.frame, self.failed)
         self._publish_surfaces()
 
@@ -269,7 +291,11 @@ class Simulator:
 
     def on_dref(self, request: protocol.DrefWrite) -> Optional[str]:
         """DREF: writes a dataref; errors are silent."""
-        return None if self.store.write(request.path, request.value) else "dataref"
+        try:
+            return None if self.store.write(request.path, request.value) else "dataref"
+        except FlightModelError as error:  # a loading or weather that the aircraft cannot have
+            _LOG.info("DREF %s %g: %s", request.path, request.value, error)
+            return "value"
 
     def on_data(self, request: protocol.DataPacket) -> Optional[str]:
         """DATA: rows that control something take hold of it."""
@@ -382,7 +408,7 @@ class Simulator:
 
         store.on_write("sim/time/total_flight_time_sec", set_clock("flight"))
         store.on_write("sim/time/zulu_time_sec", lambda _i, value: setattr(self.clocks, "zulu", value % 86400.0))
-        store.on_write("sim/flightmodel/weight/m_fixed", lambda _i, value: self.model.set_loading(payload_kg=value))
+        store.on_write("sim/flightmodel/weight/m_fixed", self._set_payload)
         store.on_write("sim/flightmodel/weight/m_fuel", self._set_fuel)
         for name in (_SEA_LEVEL, _SEA_LEVEL_TEMPERATURE):
             store.on_write(name, lambda _i, _v: self._set_atmosphere())
@@ -397,14 +423,17 @@ class Simulator:
         direction, speed, turbulence = names
 
         def set_wind(_index: int, _value: float) -> None:
-            self.weather.set_wind(self.model, store.get(direction), store.get(speed) * factor)
+            strength = _clip(store.get(speed) * factor, 0.0, _MAX_WIND_MPS)
+            self.weather.set_wind(self.model, math.fmod(store.get(direction), 360.0), strength)
 
         store.on_write(direction, set_wind)
         store.on_write(speed, set_wind)
-        store.on_write(
-            turbulence,
-            lambda _i, _v: self.weather.set_turbulence(self.model, store.get(turbulence) * TURBULENCE_MPS_PER_UNIT),
-        )
+
+        def set_turbulence(_index: int, _value: float) -> None:
+            gust = _clip(store.get(turbulence) * TURBULENCE_MPS_PER_UNIT, 0.0, _MAX_TURBULENCE_MPS)
+            self.weather.set_turbulence(self.model, gust)
+
+        store.on_write(turbulence, set_turbulence)
 
     def set_weather(self, wind_from_deg: float, wind_mps: float, turbulence_mps: float, seed: int) -> None:
         """Wind and turbulence of the command line."""
@@ -414,13 +443,27 @@ class Simulator:
     def _set_fuel(self, _index: int, _value: float) -> None:
         tanks = self.model.info.tank_count
         fuel = self.store.array("sim/flightmodel/weight/m_fuel")[:tanks]
-        self.model.set_loading(fuel_kg=[max(0.0, float(kg)) for kg in fuel])
+        self.model.set_loading(fuel_kg=[_clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in fuel])
+
+    def _set_payload(self, _index: int, value: float) -> None:
+        self.model.set_loading(payload_kg=_clip(value, 0.0, _MAX_LOAD_KG))
 
     def _set_atmosphere(self) -> None:
         self.model.set_atmosphere(
-            temperature_offset_k=self.store.get(_SEA_LEVEL_TEMPERATURE) - 15.0,
-            sea_level_pressure_pa=self.store.get(_SEA_LEVEL) * INHG_PA,
+            temperature_offset_k=_clip(self.store.get(_SEA_LEVEL_TEMPERATURE), *_TEMPERATURE_C) - 15.0,
+            sea_level_pressure_pa=_clip(self.store.get(_SEA_LEVEL), *_PRESSURE_INHG) * INHG_PA,
         )
+
+
+def _is_sane(state: ModelState) -> bool:
+    total = state.latitude_deg + state.longitude_deg + state.altitude_m + sum(state.quaternion)
+    return math.isfinite(
+        total + state.u_mps + state.v_mps + state.w_mps + state.p_rad_s + state.q_rad_s + state.r_rad_s
+    )
+
+
+def _clip(value: float, low: float, high: float) -> float:
+    return min(max(value, low), high)
 
 
 def aircraft_path(name: str) -> str:

@@ -21,7 +21,7 @@ class Table:
     """Datarefs with their sources.
 
     `value` and `array` define datarefs that the simulator computes each frame; `setting` defines those that keep what
-    was written last. Definitions for another X-Plane version than the running one are left out: it would not know the name.
+    was written last. Definitions for another X-Plane version are left out: the running one would not know the name.
     """
 
     def __init__(self, store: DatarefStore, version: int) -> None:

@@ -1,0 +1,130 @@
+"""An emulator in this process that flies only when told to, and clients of it: for tests that must not depend on time."""
+
+from __future__ import annotations
+
+import socket
+from typing import Dict, List, Optional, Sequence, Union
+
+from xplane_bridge import protocol
+from xplane_bridge.emulator.emulator import Emulator
+from xplane_bridge.emulator.options import KINEMATIC, Options
+from xplane_bridge.emulator.simulator import Simulator
+
+
+class XPlaneClient:
+    """One UDP socket on the loopback interface that talks to an X-Plane on this machine.
+
+    Args:
+        port: X-Plane's port.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        self.socket.bind(("127.0.0.1", 0))
+        #: The port it receives on.
+        self.port = self.socket.getsockname()[1]
+        self._target = ("127.0.0.1", port)
+
+    def send(self, message: Union[bytes, protocol.Request]) -> None:
+        """Sends a request, or any bytes."""
+        self.socket.sendto(message if isinstance(message, bytes) else message.encode(), self._target)
+
+    def subscribe(self, paths: Sequence[str], rate_hz: int = 100, first_index: int = 0) -> None:
+        """Subscribes to datarefs; they answer with indices counted from `first_index`."""
+        for index, path in enumerate(paths, first_index):
+            self.send(protocol.RrefRequest(rate_hz, index, path))
+
+    def received(self) -> List[bytes]:
+        """All that has arrived. Over loopback, a datagram has arrived when the sender's call returns."""
+        packets = []
+        while True:
+            try:
+                packets.append(self.socket.recv(protocol.MAX_DATAGRAM, socket.MSG_DONTWAIT))
+            except (BlockingIOError, ConnectionRefusedError):
+                return packets
+
+    def wait(self, timeout_s: float = 10.0) -> Optional[bytes]:
+        """The next datagram, or None if none comes in time."""
+        self.socket.settimeout(timeout_s)
+        try:
+            return self.socket.recv(protocol.MAX_DATAGRAM)
+        except (socket.timeout, ConnectionRefusedError):
+            return None
+        finally:
+            self.socket.settimeout(None)
+
+    def values(self) -> Dict[int, float]:
+        """The newest value by index among the RREF datagrams that have arrived."""
+        newest: Dict[int, float] = {}
+        for packet in self.received():
+            if packet[:4] == b"RREF":
+                newest.update(protocol.decode_rref_response(packet))
+        return newest
+
+    def close(self) -> None:
+        """Closes the socket."""
+        self.socket.close()
+
+
+class EmulatorBench:
+    """A stepped emulator on a free loopback port, without a beacon. A context manager.
+
+    Args:
+        options: Fields of `Options`; the aircraft is the kinematic one unless given.
+    """
+
+    def __init__(self, **options: object) -> None:
+        options.setdefault("aircraft", KINEMATIC)
+        chosen = Options(bind="127.0.0.1", port=0, beacon=False, stepped="lines", **options)  # type: ignore[arg-type]
+        self.emulator = Emulator(chosen)
+        self._clients: List[XPlaneClient] = []
+
+    def __enter__(self) -> EmulatorBench:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def sim(self) -> Simulator:
+        """The simulator; another object after a restart."""
+        return self.emulator.sim
+
+    def client(self) -> XPlaneClient:
+        """A new client."""
+        client = XPlaneClient(self.emulator.port)
+        self._clients.append(client)
+        return client
+
+    def step(self, frames: int = 1) -> None:
+        """Flies so many frames."""
+        self.emulator.step_frames(frames)
+
+    def read(self, *paths: str) -> List[float]:
+        """Values as a fresh client gets them in the next frame."""
+        client = XPlaneClient(self.emulator.port)
+        try:
+            client.subscribe(paths)
+            self.step()
+            values = client.values()
+            for index in range(len(paths)):
+                client.send(protocol.RrefRequest(0, index, ""))
+            self.emulator.server.receive()
+            return [values[index] for index in range(len(paths))]
+        finally:
+            client.close()
+
+    def write(self, values: Dict[str, float]) -> None:
+        """Sends a DREF for each dataref; they act in the next frame."""
+        client = XPlaneClient(self.emulator.port)
+        for path, value in values.items():
+            client.send(protocol.DrefWrite(path, value))
+        self.emulator.server.receive()
+        client.close()
+
+    def close(self) -> None:
+        """Closes all sockets."""
+        self.emulator.close()
+        for client in self._clients:
+            client.close()
