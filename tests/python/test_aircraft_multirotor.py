@@ -36,7 +36,9 @@ class PositionLoop:
         controls.pitch = max(min(-math.degrees(ahead / 9.81) / 30.0, 1.0), -1.0)
         controls.roll = max(min(math.degrees(right / 9.81) / 30.0, 1.0), -1.0)
         controls.yaw = max(min(1.5 * math.remainder(self.heading - state.heading_rad, 2 * math.pi), 1.0), -1.0)
-        throttle = self.hover * (1.0 + up_acceleration / 9.81) / max(math.cos(state.roll_rad) * math.cos(state.pitch_rad), 0.5)
+        throttle = (
+            self.hover * (1.0 + up_acceleration / 9.81) / max(math.cos(state.roll_rad) * math.cos(state.pitch_rad), 0.5)
+        )
         controls.throttle = [max(min(throttle, 1.0), 0.05)] * 8
 
 

@@ -130,7 +130,9 @@ class EngineState:
     torque_nm: float = 0.0
     fuel_flow_kg_s: float = 0.0
     manifold_pressure_pa: float = 0.0
-    exhaust_gas_temperature_k: float = 0.0
+    n1_percent: float = 0.0  #: turbines: gas generator
+    n2_percent: float = 0.0  #: turbines: power turbine
+    exhaust_gas_temperature_k: float = 0.0  #: turbines: between the turbines
     cylinder_head_temperature_k: float = 0.0
     oil_temperature_k: float = 0.0
     oil_pressure_pa: float = 0.0
@@ -247,7 +249,7 @@ class InitialState:
     heading_deg: float = 0.0
     on_ground: bool = False
     altitude_m: float = 1000.0  #: MSL; ignored on the ground
-    airspeed_mps: float | None = None  #: true; None: the aircraft's usual cruise (0 for a hover)
+    airspeed_mps: float | None = None  #: true; None: cruise, or hover of what can
     terrain_elevation_m: float = 0.0
     engines_running: bool = True
     sim_time_s: float = 0.0
@@ -261,7 +263,7 @@ class ModelInfo:
     description: str
     icao: str
     engine_count: int
-    propeller_direction: tuple[int, ...]  #: +1 clockwise seen from behind (rotors: from above), -1 the other way
+    propeller_direction: tuple[int, ...]  #: +1 clockwise seen along the thrust, -1 the other way
     tank_count: int
     gear_names: tuple[str, ...]
     retractable_gear: bool

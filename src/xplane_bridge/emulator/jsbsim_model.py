@@ -168,6 +168,7 @@ class JsbsimModel:
     def __init__(self, seed: int = 0) -> None:
         self._seed = seed
         self._wind = [0.0, 0.0, 0.0]
+        self._gusts = [0.0, 0.0, 0.0]
         self._turbulence = DrydenTurbulence(seed)
         self._atmosphere = (0.0, 101325.0)
         self._terrain_m = 0.0
@@ -218,8 +219,8 @@ class JsbsimModel:
         self._load_setters = [(node(path).set_double_value, 1.0 / unit) for path, unit in _LOADS]
         self._surface_set = SurfaceSet(self.surfaces)
         self._surface_setters = [node(f"surface/{spec.name}").set_double_value for spec in self.surfaces]
-        axes = ("north", "east", "down")
-        self._wind_setters = [node(f"atmosphere/wind-{axis}-fps").set_double_value for axis in axes]
+        axes = ("north", "east", "down")  # as JSBSim's gust, because starting a motion takes its wind away
+        self._wind_setters = [node(f"atmosphere/gust-{axis}-fps").set_double_value for axis in axes]
         self._gear_setter = node("gear/gear-pos-norm").set_double_value
         self._brake_setters = [node(f"fcs/{side}-brake-cmd-norm").set_double_value for side in ("left", "right")]
         self._steer_setter = node("fcs/steer-cmd-norm").set_double_value
@@ -249,6 +250,7 @@ class JsbsimModel:
         self._build()
         self._apply_loading()
         self._apply_atmosphere()
+        self._apply_wind()
 
     # ---- for the subclass
 
@@ -287,6 +289,7 @@ class JsbsimModel:
     def reset(self, initial: InitialState) -> Controls:
         self._check_initial(initial)
         self._terrain_m = initial.terrain_elevation_m
+        self._gusts = [0.0, 0.0, 0.0]
         turbulence = self._turbulence.save()
         self._start_jsbsim()
         self._trimmed = self._start_on_ground(initial) if initial.on_ground else self._start_in_air(initial)
@@ -327,13 +330,7 @@ class JsbsimModel:
         self._advance(
             dt, controls, (u * FOOT_M, v * FOOT_M, w * FOOT_M), (p, q, r), max(density * SLUG_FT3_KG_M3, 1e-3)
         )
-        for setter, actuator in zip(self._surface_setters, self._surface_set.actuators):
-            setter(actuator.effective_deg)
-        loads = sum_loads(self._rotors)
-        for axis in range(3):
-            loads[axis] += self._gravity_force[axis]
-        for (setter, factor), load in zip(self._load_setters, loads):
-            setter(load * factor)
+        self._apply_loads()
 
     def _outside_air(self) -> tuple[float, float]:
         """Pressure [Pa] and temperature [K]."""
@@ -370,9 +367,8 @@ class JsbsimModel:
         speed, agl = self._state_getters[29]() * FOOT_M, self._state_getters[3]() * FOOT_M
         along, across, down = self._turbulence.step(dt, speed, agl)
         sine, cosine = math.sin(heading), math.cos(heading)
-        gusts = (along * cosine - across * sine, along * sine + across * cosine, down)
-        for setter, wind, gust in zip(self._wind_setters, self._wind, gusts):
-            setter((wind + gust) / FOOT_M)
+        self._gusts = [along * cosine - across * sine, along * sine + across * cosine, down]
+        self._apply_wind()
 
     def _watch_crash(self) -> None:
         if self._state_getters[3]() * FOOT_M > 20.0:
@@ -465,10 +461,12 @@ class JsbsimModel:
         def chosen(new, old):
             return old if new is None else new
 
-        self._set_motion(
-            chosen(latitude_deg, s.latitude_deg),
-            chosen(longitude_deg, s.longitude_deg),
-            chosen(altitude_m, s.altitude_m),
+        self._put(
+            (
+                chosen(latitude_deg, s.latitude_deg),
+                chosen(longitude_deg, s.longitude_deg),
+                chosen(altitude_m, s.altitude_m),
+            ),
             (chosen(roll_rad, s.roll_rad), chosen(pitch_rad, s.pitch_rad), chosen(heading_rad, s.heading_rad)),
             chosen(v_ned_mps, (s.v_north_mps, s.v_east_mps, s.v_down_mps)),
             chosen(pqr_rad_s, (s.p_rad_s, s.q_rad_s, s.r_rad_s)),
@@ -506,17 +504,6 @@ class JsbsimModel:
         for axis, rate in zip("pqr", pqr_rad_s):
             fdm[f"ic/{axis}-rad_sec"] = rate
         fdm.run_ic()
-        # Starting puts JSBSim's wind back to none.
-        self._apply_wind()
-        self._settle_derivatives()
-
-    def _settle_derivatives(self) -> None:
-        """Runs JSBSim without time until its multistep integrators have forgotten what was before."""
-        self._correct_gravity()
-        self._fdm.suspend_integration()
-        for _ in range(4):
-            self._fdm.run()
-        self._fdm.resume_integration()
 
     def _settle_on_ground(self, controls: Controls, seconds: float) -> None:
         """Lets the aircraft come to rest on its gear, without gusts."""
@@ -538,6 +525,7 @@ class JsbsimModel:
                 "pqr": [s.p_rad_s, s.q_rad_s, s.r_rad_s],
                 "terrain": self._terrain_m,
                 "wind": self._wind,
+                "gusts": self._gusts,
                 "turbulence": self._turbulence.save(),
                 "atmosphere": self._atmosphere,
                 "fuel": self._fuel_kg,
@@ -561,7 +549,7 @@ class JsbsimModel:
                 f"situation of '{model}', version {version}: '{self.info.name}', version {SITUATION_VERSION} is loaded"
             )
         self._start_jsbsim()
-        self._terrain_m, self._wind = saved["terrain"], list(saved["wind"])
+        self._terrain_m, self._wind, self._gusts = saved["terrain"], list(saved["wind"]), list(saved["gusts"])
         self._turbulence.restore(saved["turbulence"])
         self._atmosphere = tuple(saved["atmosphere"])
         self._fuel_kg, self._payload_kg = list(saved["fuel"]), saved["payload"]
@@ -573,6 +561,7 @@ class JsbsimModel:
         self._restore_more(saved["more"])
         self._apply_loading()
         self._apply_atmosphere()
+        self._apply_wind()
         self._gear_setter(self._gear_position)
         self._put(saved["position"], saved["euler"], saved["v_ned"], saved["pqr"])
         self._time, self._crashed = saved["time"], saved["crashed"]
@@ -581,20 +570,24 @@ class JsbsimModel:
     def _put(
         self, position: Sequence[float], euler: Sequence[float], v_ned: Sequence[float], pqr: Sequence[float]
     ) -> None:
-        """Sets the motion and lets the loads of surfaces and rotors as they are act on it from the first instant."""
+        """Sets the motion, with the loads of surfaces and rotors as they are acting from the first instant."""
         self._set_motion(*position, euler, v_ned, pqr)
-        for setter, actuator in zip(self._surface_setters, self._surface_set.actuators):
-            setter(actuator.effective_deg)
+        self._correct_gravity()
         u, v, w, p, q, r, density = [get() for get in self._air_getters]
         for rotor in self._rotors:
             rotor.air_loads(0.0, (u * FOOT_M, v * FOOT_M, w * FOOT_M), (p, q, r), density * SLUG_FT3_KG_M3)
             rotor.turn(0.0, rotor.shaft_torque, (p, q, r))
+        self._apply_loads()
+        self._fdm.run_ic()  # again: the integrators start from the accelerations of now
+
+    def _apply_loads(self) -> None:
+        for setter, actuator in zip(self._surface_setters, self._surface_set.actuators):
+            setter(actuator.effective_deg)
         loads = sum_loads(self._rotors)
         for axis in range(3):
             loads[axis] += self._gravity_force[axis]
         for (setter, factor), load in zip(self._load_setters, loads):
             setter(load * factor)
-        self._settle_derivatives()
 
     # ---- surroundings, loading
 
@@ -603,14 +596,15 @@ class JsbsimModel:
         self._apply_wind()
 
     def _apply_wind(self) -> None:
-        for setter, wind in zip(self._wind_setters, self._wind):
-            setter(wind / FOOT_M)
+        for setter, wind, gust in zip(self._wind_setters, self._wind, self._gusts):
+            setter((wind + gust) / FOOT_M)
 
     def set_turbulence(self, intensity_mps: float, seed: int | None = None) -> None:
         if not 0.0 <= intensity_mps <= 20.0:
             raise FlightModelError(f"turbulence of {intensity_mps} m/s: expected 0..20 (light 1, moderate 2, severe 4)")
         self._turbulence.start(intensity_mps, seed)
         if intensity_mps == 0.0:
+            self._gusts = [0.0, 0.0, 0.0]
             self._apply_wind()
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:

@@ -42,9 +42,9 @@ IDLE_OMEGA = 60.0
 MOTOR_LAG_S = 0.035
 MAXIMUM_TORQUE_NM = 0.2
 
+MAXIMUM_TILT_RAD = math.radians(30.0)
+MAXIMUM_YAW_RATE_RAD_S = math.radians(100.0)
 STABILISATION = StabilisationSpec(
-    maximum_tilt_rad=math.radians(30.0),
-    maximum_yaw_rate_rad_s=math.radians(100.0),
     attitude=6.0,
     maximum_rate_rad_s=math.radians(200.0),
     rate=(0.022, 0.026, 0.15),
@@ -103,7 +103,8 @@ class Multirotor(JsbsimModel):
                 if max(controls.throttle[:4]) < 0.02:  # on the ground with idling motors nothing may wind up
                     self._stabilisation.integrals = [0.0, 0.0, 0.0]
                 attitude = (self._state_getters[4](), self._state_getters[5]())
-                self._commands = self._stabilisation.step(dt, stick, attitude, rates)
+                wanted = (stick[0] * MAXIMUM_TILT_RAD, stick[1] * MAXIMUM_TILT_RAD, stick[2] * MAXIMUM_YAW_RATE_RAD_S)
+                self._commands = self._stabilisation.step(dt, wanted, attitude, rates)
             else:
                 self._commands = [value * share for value, share in zip(stick, RAW_STICK)]
             self._used = self._mix(controls.throttle, self._commands)
@@ -161,18 +162,24 @@ class Multirotor(JsbsimModel):
     def _start_in_air(self, initial: InitialState) -> Controls:
         speed = 0.0 if initial.airspeed_mps is None else initial.airspeed_mps
         if not 0.0 <= speed <= MAXIMUM_SPEED_MPS:
-            raise FlightModelError(f"airspeed {speed} m/s: the quadrotor starts in the air at 0..{MAXIMUM_SPEED_MPS} m/s")
+            raise FlightModelError(
+                f"airspeed {speed} m/s: the quadrotor starts in the air at 0..{MAXIMUM_SPEED_MPS} m/s"
+            )
         controls = Controls()
         heading = math.radians(initial.heading_deg)
         position = (initial.latitude_deg, initial.longitude_deg, initial.altitude_m)
         v_ned = [0.0, 0.0, 0.0]  # a hover stands over the ground, whatever the wind
         if speed > 0.0:
-            v_ned = [speed * math.cos(heading) + self._wind[0], speed * math.sin(heading) + self._wind[1], self._wind[2]]
+            v_ned = [
+                speed * math.cos(heading) + self._wind[0],
+                speed * math.sin(heading) + self._wind[1],
+                self._wind[2],
+            ]
         self._running = [initial.engines_running] * 4
 
         def fly(x: Sequence[float]) -> Sequence[float]:
             roll, pitch, throttle, *commands = (float(value) for value in x)
-            controls.roll, controls.pitch = (angle / STABILISATION.maximum_tilt_rad for angle in (roll, pitch))
+            controls.roll, controls.pitch = (angle / MAXIMUM_TILT_RAD for angle in (roll, pitch))
             controls.throttle = [throttle] * len(controls.throttle)
             self._stabilisation.integrals = list(commands)
             self._used = self._mix(controls.throttle, commands)

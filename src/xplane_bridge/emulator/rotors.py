@@ -56,7 +56,11 @@ class Rotor:
         "spec",
         "thrust",
         "torque",
-    )  # fmt: skip
+        "x",
+        "y",
+        "z",
+    )
+    _SAVED = ("omega", "blade_rad", "inflow", "thrust", "torque", "shaft_torque", "axis_x", "axis_z", "x", "y", "z")
 
     def __init__(self, spec: RotorSpec, blade_deg: float) -> None:
         self.spec = spec
@@ -65,6 +69,7 @@ class Rotor:
         self.inflow = 0.0  #: induced velocity, m/s
         self.thrust = self.torque = self.shaft_torque = 0.0
         self.axis_x, self.axis_z = 1.0, 0.0
+        self.x, self.y, self.z = spec.forward_m, spec.right_m, spec.down_m  #: of the hub; a nacelle moves it
         self.force_x = self.force_y = self.force_z = 0.0
         self.moment_x = self.moment_y = self.moment_z = 0.0
 
@@ -80,7 +85,7 @@ class Rotor:
         """
         spec, ax, az = self.spec, self.axis_x, self.axis_z
         p, q, r = rates
-        x, y, z = spec.forward_m, spec.right_m, spec.down_m
+        x, y, z = self.x, self.y, self.z
         u = air[0] + q * z - r * y
         v = air[1] + r * x - p * z
         w = air[2] + p * y - q * x
@@ -127,28 +132,13 @@ class Rotor:
         self.moment_z += reaction * self.axis_z + q * hx
 
     def save(self) -> list:
-        return [
-            self.omega,
-            self.blade_rad,
-            self.inflow,
-            self.thrust,
-            self.torque,
-            self.shaft_torque,
-            self.axis_x,
-            self.axis_z,
-        ]
+        """What ``restore`` needs."""
+        return [getattr(self, name) for name in self._SAVED]
 
     def restore(self, saved: Sequence[float]) -> None:
-        (
-            self.omega,
-            self.blade_rad,
-            self.inflow,
-            self.thrust,
-            self.torque,
-            self.shaft_torque,
-            self.axis_x,
-            self.axis_z,
-        ) = saved
+        """Puts the rotor back into the state of ``save``."""
+        for name, value in zip(self._SAVED, saved):
+            setattr(self, name, value)
 
 
 def sum_loads(rotors: Sequence[Rotor]) -> list[float]:
@@ -214,6 +204,7 @@ class PistonEngine:
 
     __slots__ = ("cht_k", "egt_k", "fuel_flow", "manifold_pa", "oil_k", "oil_pa", "power", "running", "spec")
 
+    _SAVED = ("running", "manifold_pa", "egt_k", "cht_k", "oil_k", "oil_pa", "fuel_flow", "power")
     STANDARD_PA = 101325.0
 
     def __init__(self, spec: PistonSpec) -> None:
@@ -276,21 +267,13 @@ class PistonEngine:
         self.oil_k = temperature_k + 45.0 + 35.0 * load
 
     def save(self) -> list:
-        return [
-            self.running,
-            self.manifold_pa,
-            self.egt_k,
-            self.cht_k,
-            self.oil_k,
-            self.oil_pa,
-            self.fuel_flow,
-            self.power,
-        ]
+        """What ``restore`` needs."""
+        return [getattr(self, name) for name in self._SAVED]
 
     def restore(self, saved: Sequence) -> None:
-        (
-            self.running, self.manifold_pa, self.egt_k, self.cht_k, self.oil_k, self.oil_pa, self.fuel_flow, self.power,
-        ) = saved  # fmt: skip
+        """Puts the engine back into the state of ``save``."""
+        for name, value in zip(self._SAVED, saved):
+            setattr(self, name, value)
 
 
 def electric_torque(rotor: Rotor, dt: float, wanted_omega: float, lag_s: float, maximum_torque: float) -> float:
