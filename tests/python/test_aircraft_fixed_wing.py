@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from xplane_bridge.emulator.flight_model import (
     EngineFault,
     InitialState,

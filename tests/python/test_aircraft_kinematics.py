@@ -4,6 +4,7 @@ import json
 import math
 
 import pytest
+
 from xplane_bridge.emulator.flight_model import (
     Controls,
     FlightModelError,
@@ -214,7 +215,7 @@ def test_wind_from_the_right_gives_positive_sideslip_and_dryden_has_its_size():
 
 
 def test_bad_calls_say_what_was_wrong():
-    with pytest.raises(FlightModelError, match="'glider'.*fixed_wing"):
+    with pytest.raises(FlightModelError, match=r"'glider'.*fixed_wing"):
         create_model("glider")
     model = create_model("fixed_wing")
     controls = model.reset(InitialState())

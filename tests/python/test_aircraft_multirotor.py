@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from xplane_bridge.emulator.flight_model import EngineFault, InitialState, create_model
 
 RADIUS = 6378145.0
@@ -10,7 +11,7 @@ FRAME = 1 / 60
 
 
 class PositionLoop:
-    """What a user's controller would do: position and velocity to stick and throttle, nothing the bridge could not know."""
+    """What a user's controller would do: position and velocity to stick and throttle."""
 
     def __init__(self, state, throttle, heading_rad):
         self.latitude, self.longitude, self.altitude = state.latitude_deg, state.longitude_deg, state.altitude_m

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from xplane_bridge.emulator.flight_model import (
     EngineFault,
     FlightModelError,
@@ -35,7 +36,7 @@ def limited(value, low=-1.0, high=1.0):
 
 
 class Pilot:
-    """Holds height, heading and speed with stick, throttle and nacelles: rotors upright by attitude, on the wing like an aeroplane."""
+    """Holds height, heading and speed with stick, throttle and nacelles."""
 
     def __init__(self, state, throttle, speed_mps):
         self.altitude, self.heading, self.speed = state.altitude_m, state.heading_rad, speed_mps

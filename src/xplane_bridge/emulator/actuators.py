@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Sequence
 
 from xplane_bridge.emulator.flight_model import (
@@ -78,9 +79,11 @@ class SurfaceActuator:
         self.position_deg += min(max(target_deg - self.position_deg, -reach_deg), reach_deg)
 
     def save(self) -> list:
+        """What ``restore`` needs."""
         return [self.position_deg, self.effective_deg, self._stuck_deg]
 
     def restore(self, saved: Sequence) -> None:
+        """Puts the actuator back into the state of ``save``."""
         self.position_deg, self.effective_deg, self._stuck_deg = saved
 
 
@@ -97,11 +100,16 @@ class SurfaceSet:
             if name not in self.by_name:
                 raise FlightModelError(f"no surface '{name}': this aircraft has {', '.join(self.by_name) or 'none'}")
         for name, fault in controls.surface_faults.items():
-            if fault.kind in (SurfaceFaultKind.REDUCED, SurfaceFaultKind.SLOW):
-                if fault.value is None or not 0.0 <= fault.value <= 1.0:
-                    raise FlightModelError(
-                        f"fault {fault.kind.value} of '{name}' has value {fault.value}, expected 0..1"
-                    )
+            is_share = fault.kind in (SurfaceFaultKind.REDUCED, SurfaceFaultKind.SLOW)
+            if is_share and (fault.value is None or not 0.0 <= fault.value <= 1.0):
+                raise FlightModelError(f"fault {fault.kind.value} of '{name}' has value {fault.value}, expected 0..1")
+            if fault.value is not None and not math.isfinite(fault.value):
+                raise FlightModelError(
+                    f"fault {fault.kind.value} of '{name}' has value {fault.value}, expected degrees"
+                )
+        for name, angle in controls.surface_deg.items():
+            if not math.isfinite(angle):
+                raise FlightModelError(f"surface '{name}' is commanded to {angle}, expected degrees")
 
     def step(self, targets_deg: Sequence[float], dt: float, controls: Controls, alpha_deg: float) -> None:
         """Moves every surface; ``targets_deg`` in the order of the specifications."""
@@ -124,7 +132,7 @@ class SurfaceSet:
 
 
 def asymmetric(command: float, up_deg: float, down_deg: float) -> float:
-    """Deflection for a command -1..1 that is + for trailing edge down, with different stops (both given positive) [deg]."""
+    """Deflection [deg] for a command -1..1, + for trailing edge down, with stops of their own (both positive)."""
     return command * (down_deg if command > 0.0 else up_deg)
 
 

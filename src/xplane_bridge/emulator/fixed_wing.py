@@ -50,7 +50,7 @@ ENGINE_ARM_M = 1.7
 
 
 class FixedWing(JsbsimModel):
-    """Twin with counter-rotating constant-speed propellers and every surface driven on its own. No artificial stability."""
+    """Twin with counter-rotating constant-speed propellers, every surface driven on its own, nothing stabilised."""
 
     info = ModelInfo(
         name="fixed_wing",
@@ -102,7 +102,7 @@ class FixedWing(JsbsimModel):
     def _advance(
         self, dt: float, controls: Controls, air: Sequence[float], rates: Sequence[float], density: float
     ) -> None:
-        alpha_deg = math.degrees(self._state_getters[26]())
+        alpha_deg = math.degrees(self._alpha())
         self._surface_set.step(self._mix(controls), dt, controls, alpha_deg)
         pressure, temperature = self._outside_air()
         for i, (engine, governor, rotor) in enumerate(zip(self._engines, self._governors, self._rotors)):
@@ -160,6 +160,7 @@ class FixedWing(JsbsimModel):
             out.blade_pitch_deg = math.degrees(rotor.blade_rad)
 
     def set_engine_running(self, engine: int, running: bool) -> None:
+        """Starts (at once) or stops an engine."""
         if engine not in (0, 1):
             raise FlightModelError(f"engine {engine}: this aircraft has engines 0 and 1")
         self._engines[engine].running = running

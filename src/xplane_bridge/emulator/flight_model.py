@@ -1,12 +1,12 @@
 """What the emulator's UDP side and its flight models say to each other.
 
-Everything here is SI unless a name says otherwise. Axes: NED for the earth, FRD for the body. The planet is X-Plane's: a
-sphere of 6 378 145 m that does not turn, with the same gravity everywhere. Signs of commands: roll + right, pitch + nose up,
-yaw + nose right. Surfaces as X-Plane reports them: degrees, trailing edge down +, rudder trailing edge right +, spoilers and
-speed brakes up +.
+Everything here is SI unless a name says otherwise. Axes: NED for the earth, FRD for the body. The planet is
+X-Plane's: a sphere of 6 378 145 m that does not turn, with the same gravity everywhere. Signs of commands: roll +
+right, pitch + nose up, yaw + nose right. Surfaces as X-Plane reports them: degrees, trailing edge down +, rudder
+trailing edge right +, spoilers and speed brakes up +.
 
 A surface is named as the leaf of X-Plane's ``sim/flightmodel/controls/<name>def`` dataref without ``def``:
-``wing2l_ail1``, ``hstab1_elv1``, ``vstab1_rud1``. ``hstab1`` is the left and ``hstab2`` the right half of the tailplane.
+``wing2l_ail1``, ``hstab1_elv1``, ``vstab1_rud1``. ``hstab1`` is the left, ``hstab2`` the right half of the tailplane.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ EARTH_RADIUS_M = 6378145.0
 GRAVITY_MPS2 = 9.80665
 MAX_ENGINES = 8
 
-#: Longest integration step of a flight model [s]; ``step`` divides what it is given into equal parts no longer than this.
+#: Longest integration step of a flight model [s]; ``step`` divides what it is given into equal parts no longer.
 MAX_SUBSTEP_S = 1.0 / 240.0
 #: Longest time one ``step`` may fly [s].
 MAX_STEP_S = 1.0
@@ -32,6 +32,8 @@ class FlightModelError(ValueError):
 
 
 class SurfaceKind(enum.Enum):
+    """What a surface is for."""
+
     AILERON = "aileron"
     ELEVATOR = "elevator"
     RUDDER = "rudder"
@@ -40,6 +42,8 @@ class SurfaceKind(enum.Enum):
 
 
 class Side(enum.Enum):
+    """Where it is."""
+
     LEFT = "left"
     RIGHT = "right"
     CENTRE = "centre"
@@ -58,6 +62,8 @@ class SurfaceSpec:
 
 
 class SurfaceFaultKind(enum.Enum):
+    """How a surface can be broken."""
+
     STUCK = "stuck"  #: at ``value`` [deg], any angle; at the present one where ``value`` is None
     CENTRED = "centred"
     HARD_OVER_UP = "hard_over_up"  #: trailing edge fully up (rudder: left)
@@ -70,11 +76,15 @@ class SurfaceFaultKind(enum.Enum):
 
 @dataclass(frozen=True)
 class SurfaceFault:
+    """One broken surface; see ``SurfaceFaultKind`` for what ``value`` means."""
+
     kind: SurfaceFaultKind
     value: float | None = None
 
 
 class EngineFault(enum.Enum):
+    """How an engine or motor can be broken."""
+
     NONE = "none"
     STOPPED = "stopped"  #: no combustion (or no current): windmills
     SEIZED = "seized"  #: the shaft does not turn
@@ -82,7 +92,7 @@ class EngineFault(enum.Enum):
 
 @dataclass
 class Controls:
-    """Everything that can be commanded. The caller keeps one, changes it, and passes it to ``step``; the model reads it."""
+    """Everything that can be commanded. The caller keeps one, changes it, passes it to ``step``; the model reads it."""
 
     roll: float = 0.0  #: stick, -1..1
     pitch: float = 0.0
@@ -114,6 +124,7 @@ class Controls:
     stability_fault: bool = False  #: the artificial stability has failed, whatever the switch says
 
     def copy(self) -> Controls:
+        """Independent of this one."""
         return copy.deepcopy(self)
 
 
@@ -154,7 +165,7 @@ class GearState:
 
 @dataclass
 class ModelState:
-    """The aircraft after a step: one coherent instant. ``FlightModel.state`` is overwritten by the next; ``copy`` keeps one."""
+    """The aircraft after a step: one instant. The next step overwrites ``FlightModel.state``; ``copy`` keeps one."""
 
     sim_time_s: float = 0.0
 
@@ -237,6 +248,7 @@ class ModelState:
     crashed: bool = False
 
     def copy(self) -> ModelState:
+        """Independent of this one."""
         return copy.deepcopy(self)
 
 
@@ -283,7 +295,7 @@ class ModelInfo:
 
 
 class FlightModel(Protocol):
-    """A flying aircraft. Not thread-safe; never looks at a clock; the same calls with the same seed: the same flight."""
+    """A flying aircraft. Not thread-safe; never looks at a clock; same calls, same seed: the same flight."""
 
     info: ModelInfo
     surfaces: tuple[SurfaceSpec, ...]
@@ -313,10 +325,10 @@ class FlightModel(Protocol):
         v_ned_mps: Sequence[float] | None = None,
         pqr_rad_s: Sequence[float] | None = None,
     ) -> ModelState:
-        """Moves the aircraft at once (PREL, VEHS, writes to position, q, velocity, rates). What is None stays as it is."""
+        """Moves the aircraft at once (PREL, VEHS, writes to position, q, velocity, rates). None: stays as it is."""
 
     def save(self) -> bytes:
-        """The whole situation but the controls (SIMO): after ``restore`` the flight goes on as it would have, to millimetres."""
+        """The whole situation but the controls (SIMO); restored, it flies on as it would have, to millimetres."""
 
     def restore(self, situation: bytes) -> ModelState:
         """Raises ``FlightModelError`` for a situation of another model or version."""
@@ -325,7 +337,7 @@ class FlightModel(Protocol):
         """Steady velocity of the air (a wind from the north has north_mps < 0)."""
 
     def set_turbulence(self, intensity_mps: float, seed: int | None = None) -> None:
-        """Dryden turbulence, this standard deviation of the vertical gust [m/s]; 0 ends it. ``seed`` restarts the sequence."""
+        """Dryden turbulence: standard deviation of the vertical gust [m/s]; 0 ends it. ``seed``: starts anew."""
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
         """The day's difference from the standard atmosphere."""

@@ -1,7 +1,8 @@
 """What all the emulator's aircraft share: JSBSim on X-Plane's sphere, and its state in our units.
 
-JSBSim integrates the rigid body and gives atmosphere, aerodynamics (the aircraft's XML), mass and gear. Surfaces, engines, rotors and
-stabilisation are Python, stepped once per JSBSim step, so that every fault can be expressed and every state saved.
+JSBSim integrates the rigid body and gives atmosphere, aerodynamics (the aircraft's XML), mass and gear. Surfaces,
+engines, rotors and stabilisation are Python, stepped once per JSBSim step, so that every fault can be expressed and
+every state saved.
 """
 
 from __future__ import annotations
@@ -153,8 +154,10 @@ class _Contact:
 
 
 class JsbsimModel:
-    """Base of the aircraft. A subclass sets the class attributes, builds its rotors and engines in ``_build``, and flies them in
-    ``_advance``; see ``FixedWing`` for the pattern. Implements ``flight_model.FlightModel``.
+    """Base of the aircraft; implements ``flight_model.FlightModel``, where the public methods are described.
+
+    A subclass sets the class attributes, builds its rotors and engines in ``_build`` and flies them in ``_advance``;
+    ``FixedWing`` shows the pattern.
     """
 
     info: ModelInfo
@@ -215,6 +218,16 @@ class JsbsimModel:
             return found
 
         self._state_getters = [node(path).get_double_value for path in _STATE_PROPERTIES]
+        self._height = node("position/h-sl-ft").get_double_value
+        self._agl = node("position/h-agl-ft").get_double_value
+        self._roll = node("attitude/phi-rad").get_double_value
+        self._pitch = node("attitude/theta-rad").get_double_value
+        self._heading = node("attitude/psi-rad").get_double_value
+        self._alpha = node("aero/alpha-rad").get_double_value
+        self._airspeed = node("velocities/vt-fps").get_double_value
+        self._mass = node("inertia/mass-slugs").get_double_value
+        self._pressure = node("atmosphere/P-psf").get_double_value
+        self._temperature = node("atmosphere/T-R").get_double_value
         self._air_getters = [node(path).get_double_value for path in _AIR_PROPERTIES]
         self._load_setters = [(node(path).set_double_value, 1.0 / unit) for path, unit in _LOADS]
         self._surface_set = SurfaceSet(self.surfaces)
@@ -261,7 +274,7 @@ class JsbsimModel:
     def _advance(
         self, dt: float, controls: Controls, air: Sequence[float], rates: Sequence[float], density: float
     ) -> None:
-        """One JSBSim step's worth of controls, actuators, engines and rotors. ``air``: velocity through the air, FRD [m/s]."""
+        """One JSBSim step of controls, actuators, engines and rotors. ``air``: velocity through the air, FRD [m/s]."""
         raise NotImplementedError
 
     def _fill_state(self, state: ModelState, controls: Controls) -> None:
@@ -284,9 +297,11 @@ class JsbsimModel:
 
     @property
     def trim_controls(self) -> Controls:
+        """A copy of the controls that keep the aircraft as ``reset`` left it."""
         return self._trimmed.copy()
 
     def reset(self, initial: InitialState) -> Controls:
+        """Starts a flight."""
         self._check_initial(initial)
         self._terrain_m = initial.terrain_elevation_m
         self._gusts = [0.0, 0.0, 0.0]
@@ -300,6 +315,7 @@ class JsbsimModel:
         return self.trim_controls
 
     def step(self, dt: float, controls: Controls) -> ModelState:
+        """Flies on."""
         if not 0.0 < dt <= MAX_STEP_S:
             raise FlightModelError(
                 f"step of {dt} s: expected more than 0 and at most {MAX_STEP_S} s; fly longer times in pieces"
@@ -334,7 +350,7 @@ class JsbsimModel:
 
     def _outside_air(self) -> tuple[float, float]:
         """Pressure [Pa] and temperature [K]."""
-        return self._state_getters[35]() * PSF_PA, self._state_getters[36]() * RANKINE_K
+        return self._pressure() * PSF_PA, self._temperature() * RANKINE_K
 
     def _move_gear(self, dt: float, controls: Controls) -> None:
         if self.info.retractable_gear:
@@ -350,11 +366,11 @@ class JsbsimModel:
         self._steer_setter(self._steer)
 
     def _correct_gravity(self) -> None:
-        """JSBSim's gravity falls off with height; X-Plane's is taken as constant: the difference, as a force at the reference point."""
-        height = self._state_getters[2]() * FOOT_M
+        """X-Plane's gravity is constant, JSBSim's falls off with height: the difference, as a force."""
+        height = self._height() * FOOT_M
         missing = GRAVITY_MPS2 * (1.0 - (EARTH_RADIUS_M / (EARTH_RADIUS_M + height)) ** 2)
-        force = missing * self._state_getters[22]() * SLUG_KG
-        roll, pitch = self._state_getters[4](), self._state_getters[5]()
+        force = missing * self._mass() * SLUG_KG
+        roll, pitch = self._roll(), self._pitch()
         cosine = math.cos(pitch)
         self._gravity_force = (
             -force * math.sin(pitch),
@@ -363,15 +379,15 @@ class JsbsimModel:
         )
 
     def _blow(self, dt: float) -> None:
-        heading = self._state_getters[6]()
-        speed, agl = self._state_getters[29]() * FOOT_M, self._state_getters[3]() * FOOT_M
+        heading = self._heading()
+        speed, agl = self._airspeed() * FOOT_M, self._agl() * FOOT_M
         along, across, down = self._turbulence.step(dt, speed, agl)
         sine, cosine = math.sin(heading), math.cos(heading)
         self._gusts = [along * cosine - across * sine, along * sine + across * cosine, down]
         self._apply_wind()
 
     def _watch_crash(self) -> None:
-        if self._state_getters[3]() * FOOT_M > 20.0:
+        if self._agl() * FOOT_M > 20.0:
             return
         for contact in self._contacts:
             if contact.wow() > 0.5:
@@ -382,8 +398,9 @@ class JsbsimModel:
     def _read_state(self, controls: Controls) -> ModelState:
         s = self.state
         (
-            s.latitude_deg, s.longitude_deg, altitude, agl, s.roll_rad, s.pitch_rad, heading, s.p_rad_s, s.q_rad_s, s.r_rad_s,
-            s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2, north, east, down, u, v, w, fx, fy, fz, mass, wind_n, wind_e, wind_d,
+            s.latitude_deg, s.longitude_deg, altitude, agl, s.roll_rad, s.pitch_rad, heading, s.p_rad_s, s.q_rad_s,
+            s.r_rad_s, s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2, north, east, down, u, v, w, fx, fy, fz, mass,
+            wind_n, wind_e, wind_d,
             s.alpha_rad, s.beta_rad, s.alpha_dot_rad_s, tas, eas, cas, s.mach, qbar, rho, pressure, temperature, sound,
             pressure_altitude, cg_x, cg_y, cg_z, wind_x, wind_y, wind_z, roll_moment, pitch_moment, yaw_moment,
         ) = [get() for get in self._state_getters]  # fmt: skip
@@ -456,6 +473,7 @@ class JsbsimModel:
         v_ned_mps: Sequence[float] | None = None,
         pqr_rad_s: Sequence[float] | None = None,
     ) -> ModelState:
+        """Moves the aircraft at once."""
         s = self.state
 
         def chosen(new, old):
@@ -513,6 +531,7 @@ class JsbsimModel:
         self._turbulence.intensity_mps = intensity
 
     def save(self) -> bytes:
+        """The whole situation but the controls."""
         s = self.state
         return json.dumps(
             {
@@ -539,6 +558,7 @@ class JsbsimModel:
         ).encode()
 
     def restore(self, situation: bytes) -> ModelState:
+        """Goes on from a saved situation."""
         try:
             saved = json.loads(situation.decode())
             model, version = saved["model"], saved["version"]
@@ -592,6 +612,7 @@ class JsbsimModel:
     # ---- surroundings, loading
 
     def set_wind(self, north_mps: float, east_mps: float, down_mps: float = 0.0) -> None:
+        """Steady wind."""
         self._wind = [north_mps, east_mps, down_mps]
         self._apply_wind()
 
@@ -600,6 +621,7 @@ class JsbsimModel:
             setter((wind + gust) / FOOT_M)
 
     def set_turbulence(self, intensity_mps: float, seed: int | None = None) -> None:
+        """Dryden turbulence."""
         if not 0.0 <= intensity_mps <= 20.0:
             raise FlightModelError(f"turbulence of {intensity_mps} m/s: expected 0..20 (light 1, moderate 2, severe 4)")
         self._turbulence.start(intensity_mps, seed)
@@ -608,9 +630,11 @@ class JsbsimModel:
             self._apply_wind()
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
+        """The day."""
         if not (abs(temperature_offset_k) <= 60.0 and 85000.0 <= sea_level_pressure_pa <= 110000.0):
             raise FlightModelError(
-                f"atmosphere {temperature_offset_k} K off standard, {sea_level_pressure_pa} Pa: expected -60..60 K, 85000..110000 Pa"
+                f"atmosphere {temperature_offset_k} K off standard, {sea_level_pressure_pa} Pa at sea level: "
+                "expected -60..60 K, 85000..110000 Pa"
             )
         self._atmosphere = (temperature_offset_k, sea_level_pressure_pa)
         self._apply_atmosphere()
@@ -621,10 +645,12 @@ class JsbsimModel:
         self._fdm["atmosphere/P-sl-psf"] = pressure / PSF_PA
 
     def set_terrain(self, elevation_m: float) -> None:
+        """Height of the ground."""
         self._terrain_m = elevation_m
         self._fdm["position/terrain-elevation-asl-ft"] = elevation_m / FOOT_M
 
     def set_loading(self, fuel_kg: Sequence[float] | None = None, payload_kg: float | None = None) -> None:
+        """Fuel and payload."""
         if fuel_kg is not None:
             capacity = self.fuel_capacity_kg
             if len(fuel_kg) != len(capacity) or not all(0.0 <= f <= c for f, c in zip(fuel_kg, capacity)):

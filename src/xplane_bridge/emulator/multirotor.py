@@ -1,7 +1,7 @@
 """The quadrotor. Mass, body drag and legs: aircraft/multirotor/multirotor.xml.
 
-Motors, in the order of the engine arrays: 0 front right, 1 rear left, 2 front left, 3 rear right; 0 and 1 turn anticlockwise seen from
-above, 2 and 3 clockwise.
+Motors, in the order of the engine arrays: 0 front right, 1 rear left, 2 front left, 3 rear right; 0 and 1 turn
+anticlockwise seen from above, 2 and 3 clockwise.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Multirotor(JsbsimModel):
             if controls.artificial_stability and not controls.stability_fault:
                 if max(controls.throttle[:4]) < 0.02:  # on the ground with idling motors nothing may wind up
                     self._stabilisation.integrals = [0.0, 0.0, 0.0]
-                attitude = (self._state_getters[4](), self._state_getters[5]())
+                attitude = (self._roll(), self._pitch())
                 wanted = (stick[0] * MAXIMUM_TILT_RAD, stick[1] * MAXIMUM_TILT_RAD, stick[2] * MAXIMUM_YAW_RATE_RAD_S)
                 self._commands = self._stabilisation.step(dt, wanted, attitude, rates)
             else:
@@ -122,7 +122,7 @@ class Multirotor(JsbsimModel):
 
     @staticmethod
     def _mix(throttle: Sequence[float], commands: Sequence[float]) -> list[float]:
-        """Motor commands 0..1. Levers at idle stay idle; where a motor would saturate, yaw gives way first, then height."""
+        """Motor commands 0..1. Levers at idle stay idle; where a motor would saturate, yaw gives way, then height."""
         roll, pitch, yaw = commands
         if max(throttle[:4]) < 0.02:
             return [0.0] * 4

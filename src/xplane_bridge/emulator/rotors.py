@@ -1,8 +1,9 @@
 """Propellers, rotors, and what turns them.
 
-One model serves the twin's propellers, the quadrotor's rotors and the tiltrotor's proprotors: a representative blade section at 75 %
-radius with true inflow angles (so high advance ratios and windmilling come out right), momentum theory with Glauert's formula for the
-induced velocity, and first-order dynamic inflow. It is cheap (no iteration inside a step) and all of its state can be saved.
+One model serves the twin's propellers, the quadrotor's rotors and the tiltrotor's proprotors: a representative blade
+section at 75 % radius with true inflow angles (so high advance ratios and windmilling come out right), momentum
+theory with Glauert's formula for the induced velocity, and first-order dynamic inflow. It is cheap (no iteration
+inside a step) and all of its state can be saved.
 
 Not modelled: vortex ring state beyond what Glauert's formula gives, blade flapping, compressibility.
 """
@@ -13,7 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import Sequence
 
-#: Share of the disc's blade area that, at the speed of the 75 % section, has the thrust of the whole: int (r/R)^2 d(r/R) / 0.75^2.
+#: Share of the blade area that at the 75 % section's speed gives the whole thrust: int (r/R)^2 d(r/R) / 0.75^2.
 SECTION_AREA = (1.0 / 3.0) / 0.75**2
 #: Dynamic inflow lag [s] (Pitt and Peters give 0.85 R / (4 v_i): 0.02 to 0.1 s for rotors of these sizes).
 INFLOW_LAG_S = 0.04
@@ -21,7 +22,7 @@ INFLOW_LAG_S = 0.04
 
 @dataclass(frozen=True)
 class RotorSpec:
-    """A rotor. Position from the model's reference point, FRD. ``direction`` +1: clockwise seen from behind (below the thrust)."""
+    """A rotor. Position from the model's reference point, FRD. ``direction`` +1: clockwise seen along the thrust."""
 
     forward_m: float
     right_m: float
@@ -74,14 +75,17 @@ class Rotor:
         self.moment_x = self.moment_y = self.moment_z = 0.0
 
     def tilt(self, nacelle_rad: float) -> None:
+        """Turns the thrust: 0 forward, pi / 2 up."""
         self.axis_x, self.axis_z = math.cos(nacelle_rad), -math.sin(nacelle_rad)
 
     def air_loads(self, dt: float, air: Sequence[float], rates: Sequence[float], density: float) -> None:
         """Thrust and aerodynamic torque at the present speed and blade angle; the induced velocity moves on by ``dt``.
 
         Args:
+            dt: [s].
             air: velocity of the aircraft's reference point through the air, FRD [m/s].
             rates: p, q, r [rad/s].
+            density: of the air [kg/m3].
         """
         spec, ax, az = self.spec, self.axis_x, self.axis_z
         p, q, r = rates
@@ -118,7 +122,7 @@ class Rotor:
         self.moment_x, self.moment_y, self.moment_z = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
     def turn(self, dt: float, shaft_torque: float, rates: Sequence[float]) -> None:
-        """Speeds the shaft up by ``shaft_torque`` less the air's; adds the reaction and the gyroscopic moment to the loads."""
+        """Speeds the shaft up by ``shaft_torque`` less the air's; adds reaction and gyroscopic moment to the loads."""
         spec = self.spec
         self.shaft_torque = shaft_torque
         self.omega = max(self.omega + (shaft_torque - self.torque) / spec.inertia_kg_m2 * dt, 0.0)
@@ -177,6 +181,7 @@ class Governor:
         self.integral_deg = spec.fine_deg
 
     def step(self, dt: float, rotor: Rotor, lever: float) -> None:
+        """Moves the rotor's blades; ``lever`` 0..1."""
         spec = self.spec
         wanted = spec.minimum_rpm + (spec.maximum_rpm - spec.minimum_rpm) * min(max(lever, 0.0), 1.0)
         error = rotor.omega - wanted * (math.pi / 30.0)
@@ -189,7 +194,7 @@ class Governor:
 
 @dataclass(frozen=True)
 class PistonSpec:
-    """A normally aspirated four-stroke. Constants are of the size of a 180 hp aero engine's handbook (our own estimates)."""
+    """A normally aspirated four-stroke; constants of the size of a 180 hp engine's handbook (our own estimates)."""
 
     rated_power_w: float
     rated_rpm: float
@@ -239,7 +244,7 @@ class PistonEngine:
         drag = -friction * rated_torque * min(omega / 2.0, 1.0)
         indicated = 0.0
         if self.running:
-            # Air is what limits: manifold pressure over the root of the temperature. Best power at mixture 0.8, 8 % less full rich.
+            # Air limits: manifold pressure over the root of temperature. Best power at mixture 0.8, 8 % less rich.
             charge = self.manifold_pa / self.STANDARD_PA * math.sqrt(288.15 / temperature_k)
             richness = 1.0 - 2.0 * (min(mixture, 1.0) - 0.8) ** 2
             indicated = 1.235 * rated_torque * charge * max(richness, 0.0)
@@ -277,9 +282,9 @@ class PistonEngine:
 
 
 def electric_torque(rotor: Rotor, dt: float, wanted_omega: float, lag_s: float, maximum_torque: float) -> float:
-    """Shaft torque of a motor whose speed controller reaches ``wanted_omega`` with a first-order lag, within its torque limit.
+    """Shaft torque of a motor whose speed controller reaches ``wanted_omega`` with a first-order lag, within its limit.
 
-    A controller of the usual kind drives but does not brake: it never pulls the shaft back by more than a small share.
+    A controller of the usual kind drives but hardly brakes: backwards it has a tenth of its torque.
     """
     inertia = rotor.spec.inertia_kg_m2
     wanted = rotor.torque + inertia * (wanted_omega - rotor.omega) / max(lag_s, dt)

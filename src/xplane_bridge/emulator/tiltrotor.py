@@ -1,8 +1,9 @@
 """The tiltrotor. Aerodynamics, mass and gear: aircraft/tiltrotor/tiltrotor.xml.
 
-``thrust_vector`` 0 puts the nacelles forward, 0.9 upright, 1 ten degrees aft of that; they follow at 8 deg/s. The throttle is a
-thrust lever: the collective pitch follows the air that comes through the rotor, so that thrust answers the lever in hover and in
-cruise; the engines hold the rotor speed as long as their power lasts. One shaft joins both rotors: one engine can drive both.
+``thrust_vector`` 0 puts the nacelles forward, 0.9 upright, 1 ten degrees aft of that; they follow at 8 deg/s. The
+throttle is a thrust lever: the collective pitch follows the air that comes through the rotor, so that thrust answers
+the lever in hover and in cruise; the engines hold the rotor speed as long as their power lasts. One shaft joins both
+rotors: one engine can drive both.
 """
 
 from __future__ import annotations
@@ -153,7 +154,7 @@ class Tiltrotor(JsbsimModel):
             self._mix(self._commands, controls.flap_request, dynamic_pressure),
             dt,
             controls,
-            math.degrees(self._state_getters[26]()),
+            math.degrees(self._alpha()),
         )
         if controls.override_throttles:
             levers, commands = controls.throttle_use, (0.0, 0.0, 0.0)
@@ -168,10 +169,10 @@ class Tiltrotor(JsbsimModel):
     def _stabilise(
         self, dt: float, stick: Sequence[float], controls: Controls, rates: Sequence[float], upright: float
     ) -> list[float]:
-        if self._state_getters[3]() * FOOT_M < STANDING_HEIGHT_M + 0.1:  # standing: nothing may wind up
+        if self._agl() * FOOT_M < STANDING_HEIGHT_M + 0.1:  # standing: nothing may wind up
             self._stabilisation.integrals = [0.0, 0.0, 0.0]
-        roll, pitch = self._state_getters[4](), self._state_getters[5]()
-        speed = max(self._state_getters[29]() * FOOT_M, 25.0)
+        roll, pitch = self._roll(), self._pitch()
+        speed = max(self._airspeed() * FOOT_M, 25.0)
         wanted_roll = stick[0] * MAXIMUM_ROLL_RAD
         # On the wing a bank turns; the pedals then only add to the turn.
         turn = (1.0 - upright) * GRAVITY_MPS2 / speed * math.tan(min(max(roll, -1.0), 1.0))
@@ -198,7 +199,7 @@ class Tiltrotor(JsbsimModel):
         u, w = self._air_getters[0]() * FOOT_M, self._air_getters[2]() * FOOT_M
         through = max(u * math.cos(nacelle) - w * math.sin(nacelle), 0.0)
         for i, (side, rotor) in enumerate(zip((-1.0, 1.0), self._rotors)):
-            # Left rotor: more thrust rolls right; tilted aft, it pulls the nose left, so for a right turn it goes forward.
+            # Left rotor: more thrust rolls right; tilted aft it pulls the nose left: forward for a right turn.
             cyclic = upright * (PITCH_CYCLIC_DEG * pitch + side * YAW_CYCLIC_DEG * yaw)
             reach = CYCLIC_RATE_DEG_S * dt
             self._cyclic_deg[i] += min(max(cyclic - self._cyclic_deg[i], -reach), reach)

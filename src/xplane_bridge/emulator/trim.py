@@ -21,8 +21,13 @@ def newton(
     """Solves ``residual(x) = 0`` with as many equations as unknowns.
 
     Args:
+        residual: the equations.
+        start: first guess.
         steps: differences for the derivatives, about 0.01 of each unknown's range.
         limits: (lowest, highest) per unknown.
+        tolerance: largest residual that counts as none.
+        iterations: at most.
+        what: for the message.
 
     Raises:
         FlightModelError: no solution within the limits.

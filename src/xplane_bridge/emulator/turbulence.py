@@ -10,7 +10,7 @@ MINIMUM_SPEED_MPS = 5.0
 
 
 class DrydenTurbulence:
-    """Gusts along, across and vertical to the path (MIL-F-8785C scales), as first-order (along) and second-order shaping filters.
+    """Gusts along, across and vertical to the path, MIL-F-8785C scales, as shaping filters of first and second order.
 
     Rotational gusts are not modelled.
     """
@@ -30,7 +30,7 @@ class DrydenTurbulence:
             self._state = [0.0] * 5
 
     def step(self, dt: float, speed_mps: float, agl_m: float) -> tuple[float, float, float]:
-        """Next gusts [m/s]: along the horizontal path, to its right, down. Exact first-order discretisation at constant speed."""
+        """Next gusts [m/s]: along the horizontal path, to its right, down. Exact for any ``dt`` at constant speed."""
         speed = max(speed_mps, MINIMUM_SPEED_MPS)
         height_ft = min(max(agl_m / 0.3048, 10.0), 1000.0)
         shape = 0.177 + 0.000823 * height_ft
@@ -43,9 +43,8 @@ class DrydenTurbulence:
         decay = math.exp(-speed * dt / scale_u)
         s[0] = decay * s[0] + sigma_u * math.sqrt(1.0 - decay * decay) * gauss(0.0, 1.0)
         along = s[0]
-        # (1 + sqrt(3) T s) / (1 + T s)^2 = sqrt(3) / (1 + T s) + (1 - sqrt(3)) / (1 + T s)^2, driven by one noise. With z of
-        # variance 1 behind the first lag, the sum below has variance 1 (3 + 2 sqrt3 (1 - sqrt3) / 2 + (1 - sqrt3)^2 / 2 = 2).
-        decay = math.exp(-speed * dt / scale_u)
+        # (1 + sqrt3 T s) / (1 + T s)^2 = sqrt3 / (1 + T s) + (1 - sqrt3) / (1 + T s)^2, driven by one noise. With
+        # variance 1 behind the first lag the sum has 3 + sqrt3 (1 - sqrt3) + (1 - sqrt3)^2 / 2 = 2: the root below.
         root = math.sqrt(1.0 - decay * decay)
         s[1] = decay * s[1] + root * gauss(0.0, 1.0)
         s[2] = decay * s[2] + (1.0 - decay) * s[1]
@@ -58,9 +57,11 @@ class DrydenTurbulence:
         return along, across, down
 
     def save(self) -> list:
+        """What ``restore`` needs, the random generator included."""
         version, internal, gauss_next = self._random.getstate()
         return [self.intensity_mps, list(self._state), version, list(internal), gauss_next]
 
     def restore(self, saved: list) -> None:
+        """Goes on from the state of ``save``."""
         self.intensity_mps, self._state = saved[0], list(saved[1])
         self._random.setstate((saved[2], tuple(saved[3]), saved[4]))

@@ -163,4 +163,3 @@ def _text(value: Any) -> str:
     if isinstance(value, np.floating):
         return "" if np.isnan(value) else np.format_float_positional(value, unique=True, trim="-")
     return str(value)
-
