@@ -294,6 +294,22 @@ TEST(ClockFilter, OneVeryLateDatagramDoesNotMoveTheStamps) {
   EXPECT_LT(std::abs(estimate.stamp_ns - true_host), ns(1e-3));
 }
 
+// A congested link gets free: the fit moves 50 ms earlier, three frames at once. Stamps must not step back.
+TEST(ClockFilter, StampsIncreaseWhenTheDelayDrops) {
+  ClockFilter filter;
+  Simulator simulator({});
+  std::int64_t last = 0;
+  for (int i = 0; i < 300; ++i) {
+    ClockSample sample = simulator.frame();
+    if (i < 200) sample.receive_ns += ns(0.05 * std::min(1.0, (200 - i) / 10.0));
+    const ClockEstimate estimate = filter.update(sample);
+    ASSERT_TRUE(estimate.usable);
+    ASSERT_GT(estimate.stamp_ns, last) << i;
+    last = estimate.stamp_ns;
+  }
+  EXPECT_NEAR(static_cast<double>(last - simulator.trueHost()) * 1e-9, 1e-4, 1e-4);
+}
+
 TEST(ClockFilter, PauseRestartsTheFitWithinTheEpoch) {
   ClockFilter filter;
   Simulator simulator({});
