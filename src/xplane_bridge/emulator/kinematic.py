@@ -152,17 +152,16 @@ class KinematicModel:
         self._lat = self._lat if latitude_deg is None else latitude_deg
         self._lon = self._lon if longitude_deg is None else longitude_deg
         self._alt = self._alt if altitude_m is None else altitude_m
-        self._bank = self._bank if roll_rad is None else roll_rad
-        self._track = self._track if heading_rad is None else heading_rad
-        if pitch_rad is not None:
-            self._path = pitch_rad - self.state.alpha_rad
         if v_ned_mps is not None:
             air = np.asarray(v_ned_mps, dtype=float) - self._wind
             self._speed = float(np.linalg.norm(air))
             if self._speed > 1.0:
                 self._path = math.asin(-air[2] / self._speed)
-                if heading_rad is None:
-                    self._track = math.atan2(air[1], air[0])
+                self._track = math.atan2(air[1], air[0])
+        if roll_rad is not None or pitch_rad is not None or heading_rad is not None:
+            present = (self.state.roll_rad, self.state.pitch_rad, self.state.heading_rad)
+            wanted = (p if a is None else a for a, p in zip((roll_rad, pitch_rad, heading_rad), present))
+            self._turn_to(earth.body_to_level(*map(math.degrees, wanted)))
         self._previous = None
         self._publish(MAX_SUBSTEP_S, self.trim_controls, (0.0, 0.0, 0.0))
         return self.state
@@ -214,6 +213,20 @@ class KinematicModel:
         if not 0 <= engine < _ENGINES:
             raise FlightModelError(f"engine {engine}; the kinematic model has engines 0 and 1")
         self._running[engine] = running
+
+    def _turn_to(self, attitude: np.ndarray) -> None:
+        """Takes the path that goes with an attitude: here the nose stands above the path by the angle of attack alone."""
+        self._publish_air(self._air_velocity())
+        for _ in range(10):  # the angle depends on the bank
+            path = attitude @ earth.body_to_level(0.0, math.degrees(self._alpha()), 0.0).T
+            self._bank, self._path, self._track = map(math.radians, earth.euler_degrees(path))
+
+    def _alpha(self) -> float:
+        if self._alt <= self._terrain_m + _GROUND_HEIGHT_M + 1e-6:
+            return 0.0
+        lift = 1.0 / max(math.cos(self._bank), 0.2)
+        weight = 1400.0 * earth.GRAVITY_MPS2
+        return min(lift * weight / max(self.state.dynamic_pressure_pa, 200.0) / 90.0, 0.3)
 
     # --- motion -------------------------------------------------------------------------------------------------------
 
@@ -330,12 +343,7 @@ class KinematicModel:
         ground = air if on_ground else air + wind
         self._publish_air(air if not on_ground else air - wind)
         # body axes: the air path turned by bank, then pitched up by the angle of attack
-        lift = 1.0 / max(math.cos(self._bank), 0.2)
-        alpha = (
-            0.0
-            if on_ground
-            else min(lift * earth.GRAVITY_MPS2 * 1400.0 / max(s.dynamic_pressure_pa, 200.0) / 90.0, 0.3)
-        )
+        alpha = self._alpha()
         path = earth.body_to_level(math.degrees(self._bank), math.degrees(self._path), math.degrees(self._track))
         rotation = path @ earth.body_to_level(0.0, math.degrees(alpha), 0.0)
         roll, pitch, heading = earth.euler_degrees(rotation)

@@ -15,8 +15,8 @@ from typing import Dict, Optional
 class HoldGains:
     """Gains; stick per degree, degrees per second of rate, and so on. A scenario's `gains` overrides single ones."""
 
-    roll: float = 0.015  #: stick per degree of roll error
-    roll_rate: float = 0.006  #: stick per degree/s
+    roll: float = 0.035  #: stick per degree of roll error
+    roll_rate: float = 0.012  #: stick per degree/s
     pitch: float = 0.03  #: stick per degree of pitch error
     pitch_rate: float = 0.015  #: stick per degree/s
     pitch_integral: float = 0.015  #: stick per degree and second

@@ -107,4 +107,5 @@ def sample_of(frame: Frame) -> FlightSample:
         yaw_rate=math.degrees(m.r_rad_s),
         load_factor=-m.specific_force_z_mps2 / 9.80665,
         on_ground=m.on_ground_any,
+        stall_warning=m.stall_warning,
     )

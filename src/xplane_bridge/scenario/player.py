@@ -33,6 +33,7 @@ class FlightSample:
     yaw_rate: float = 0.0
     load_factor: float = 1.0
     on_ground: bool = False
+    stall_warning: bool = False
     mode: int = 1  #: MANUAL 1, AUTO 2; 1 where there is no arbiter
 
 

@@ -50,6 +50,7 @@ VARIABLES = (
     "yaw_rate",
     "load_factor",
     "on_ground",
+    "stall_warning",
     "mode",
 )
 FAILURE_KINDS = (
