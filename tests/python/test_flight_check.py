@@ -33,7 +33,13 @@ def states(**changed):
 
 def truth(table):
     """What the emulator would have written for such a flight."""
-    return {name: np.array(table[name]) for name in ("sim_time", "latitude", "longitude", "altitude_msl")}
+    names = {
+        "sim_time": "sim_time",
+        "latitude_deg": "latitude",
+        "longitude_deg": "longitude",
+        "altitude_m": "altitude_msl",
+    }
+    return {theirs: np.array(table[ours]) for theirs, ours in names.items()}
 
 
 def odom(velocity_error=0.0, tilt=True):

@@ -257,11 +257,11 @@ def check_positions(states: Table, truth: Mapping[str, np.ndarray]) -> Verdict:
     if not same.all():
         text = f"{int((~same).sum())} flight states carry a simulator time that the emulator never had"
         return Verdict("positions", False, text)
-    radius = _EARTH_RADIUS_M + truth["altitude_msl"][index]
-    north = np.radians(states["latitude"] - truth["latitude"][index]) * radius
-    east = np.radians(states["longitude"] - truth["longitude"][index]) * radius
-    east *= np.cos(np.radians(truth["latitude"][index]))
-    up = states["altitude_msl"] - truth["altitude_msl"][index]
+    radius = _EARTH_RADIUS_M + truth["altitude_m"][index]
+    north = np.radians(states["latitude"] - truth["latitude_deg"][index]) * radius
+    east = np.radians(states["longitude"] - truth["longitude_deg"][index]) * radius
+    east *= np.cos(np.radians(truth["latitude_deg"][index]))
+    up = states["altitude_msl"] - truth["altitude_m"][index]
     worst = float(np.sqrt(north**2 + east**2 + up**2).max())
     text = f"at most {worst * 1e3:.1f} mm from the truth (wanted {POSITION_TOLERANCE_M * 1e3:.0f} mm)"
     return Verdict("positions", worst <= POSITION_TOLERANCE_M, text)
@@ -303,7 +303,7 @@ def read_truth(path: Path) -> Dict[str, np.ndarray]:
     Raises:
         CheckError: It is not there, or not such a file.
     """
-    wanted = ("sim_time", "latitude", "longitude", "altitude_msl")
+    wanted = ("sim_time", "latitude_deg", "longitude_deg", "altitude_m")
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
