@@ -11,9 +11,9 @@
 #include <optional>
 #include <string>
 
-namespace xplane_bridge::core {
+#include "xplane_bridge/core/limits.hpp"
 
-constexpr int kMaxEngines = 8;
+namespace xplane_bridge::core {
 
 /// Bits of ControlCommand.msg's `fields`.
 enum Field : std::uint32_t {

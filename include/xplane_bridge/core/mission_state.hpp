@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "xplane_bridge/core/flight_state.hpp"
+#include "xplane_bridge/core/limits.hpp"
 
 namespace xplane_bridge::core {
 
@@ -27,7 +28,6 @@ struct MissionHeader {
   std::uint32_t valid = 0;  ///< bits as in the message
 };
 
-inline constexpr int kMaxEngines = 8;
 inline constexpr int kMaxWings = 8;
 inline constexpr int kMaxGears = 10;
 inline constexpr int kMaxTanks = 9;
