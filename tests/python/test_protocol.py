@@ -59,7 +59,7 @@ REQUESTS = {
     ),
     "ACFN": lambda d: protocol.AircraftLoad(d["aircraft"], d["path"], d["livery"]),
     "SIMO": lambda d: protocol.Situation(d["action"], d["path"]),
-    "RESE": lambda d: protocol.RecoverAll(),
+    "RESE": lambda _: protocol.RecoverAll(),
 }
 for _label in ("VEHX", "VEHS"):
     REQUESTS[_label] = lambda d, label=_label: protocol.VehiclePose(

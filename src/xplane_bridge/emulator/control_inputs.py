@@ -102,7 +102,7 @@ class ControlInputs:
     def connect(self, sim: Simulator) -> None:
         """Connects the datarefs that act on others."""
         store = self._store
-        for name in ("throttle_ratio", "mixture_ratio", "prop_ratio"):
+        for name in ("throttle_ratio", "throttle_jet_rev_ratio", "mixture_ratio", "prop_ratio"):
             store.on_write(f"{_ACTUATORS}{name}_all", lambda _i, value, name=name: store.set(_ACTUATORS + name, value))
 
         def set_speed(index: int, value: float) -> None:

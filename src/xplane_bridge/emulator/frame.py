@@ -29,7 +29,7 @@ SEA_LEVEL_PRESSURE_PA = 101325.0
 BETA_SIGN = -1.0
 #: Below this speed over ground hpath is noise [m/s].
 PATH_NOISE_BELOW_MPS = 0.1
-#: The simulated magnetic pole (a dipole: good to a few degrees at mid latitudes).
+#: The simulated magnetic pole: a dipole's, so the declination is of the right kind but up to 20 degrees off.
 _MAGNETIC_POLE_DEG = (80.7, -72.7)
 
 

@@ -215,7 +215,7 @@ class KinematicModel:
         self._running[engine] = running
 
     def _turn_to(self, attitude: np.ndarray) -> None:
-        """Takes the path that goes with an attitude: here the nose stands above the path by the angle of attack alone."""
+        """Takes the path of an attitude: here the nose stands above the path by the angle of attack alone."""
         self._publish_air(self._air_velocity())
         for _ in range(10):  # the angle depends on the bank
             path = attitude @ earth.body_to_level(0.0, math.degrees(self._alpha()), 0.0).T

@@ -38,7 +38,10 @@ def define(t: Table, sim: Simulator) -> None:
     # levers
     t.setting(_ACTUATORS + "throttle_ratio", size=size)
     t.alias(_ENGINE + "ENGN_thro", _ACTUATORS + "throttle_ratio")
-    t.setting(_ACTUATORS + "throttle_ratio_all")
+    # reverse is the negative part of the lever by every name; X-Plane has a mode of its own for it
+    t.alias(_ACTUATORS + "throttle_jet_rev_ratio", _ACTUATORS + "throttle_ratio")
+    for name in ("throttle_ratio_all", "throttle_jet_rev_ratio_all"):
+        t.setting(_ACTUATORS + name)
     t.setting(_ACTUATORS + "mixture_ratio", size=size)
     t.alias(_ENGINE + "ENGN_mixt", _ACTUATORS + "mixture_ratio")
     t.setting(_ACTUATORS + "mixture_ratio_all")

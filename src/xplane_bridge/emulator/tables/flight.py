@@ -197,6 +197,7 @@ def _weather(t: Table, sim: Simulator) -> None:
     t.value("sim/weather/barometer_current_inhg", lambda f: f.m.pressure_pa * PA_TO_INHG)
     t.value("sim/weather/speed_sound_ms", lambda f: f.m.speed_of_sound_mps)
     t.value("sim/weather/aircraft/ambient_temperature_celsius", lambda f: f.m.temperature_k - 273.15, versions=X12)
+    t.value("sim/weather/aircraft/barometer_current_pas", lambda f: f.m.pressure_pa, versions=X12)
     t.value("sim/weather/aircraft/ambient_pressure_pas", lambda f: f.m.pressure_pa, versions=X12)
     t.value("sim/weather/aircraft/rho", lambda f: f.m.air_density_kg_m3, versions=X12)
     t.value("_emulator/density_ratio", lambda f: f.m.air_density_kg_m3 / SEA_LEVEL_DENSITY)
