@@ -1,0 +1,5 @@
+#include "xplane_bridge/joystick_mapper_node.hpp"
+
+int main(int argc, char** argv) {
+  return xplane_bridge::runNode<xplane_bridge::JoystickMapperNode>(argc, argv, "joystick_mapper_node");
+}
