@@ -11,10 +11,10 @@ core::JoyTarget targetOf(const ParamLoader& in, const std::string& name) {
   const std::string text = in.text("target", name);
   const auto target = core::joyTargetFrom(text);
   if (!target) {
-    in.refuse("target",
-              "one of roll, pitch, yaw, throttle, trim_roll, trim_pitch, trim_yaw, flaps, speedbrake, gear, "
-              "parking_brake, brakes, left_brake, right_brake, thrust_vector (by default the section's name, here " +
-                  name + ")");
+    throw ParamError("parameter " + in.fullKey("target") + ": \"" + text +
+                     "\" (by default the section's name) is no target; allowed: roll, pitch, yaw, throttle, trim_roll, "
+                     "trim_pitch, trim_yaw, flaps, speedbrake, gear, parking_brake, brakes, left_brake, right_brake, "
+                     "thrust_vector");
   }
   return *target;
 }
@@ -94,7 +94,7 @@ core::JoystickOptions loadJoystickOptions(const ParamLoader& own) {
   out.mode.manual = mode.integer("manual", kIndexOrNone, -1);
   out.mode.automatic = mode.integer("auto", kIndexOrNone, -1);
   out.mode.toggle = mode.integer("toggle", kIndexOrNone, -1);
-  if (const auto wrong = core::validate(out)) throw ParamError(own.fullKey("") + *wrong);
+  if (const auto wrong = core::validate(out)) throw ParamError("parameter " + own.fullKey(*wrong));
   return out;
 }
 
