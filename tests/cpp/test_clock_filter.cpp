@@ -310,6 +310,17 @@ TEST(ClockFilter, StampsIncreaseWhenTheDelayDrops) {
   EXPECT_NEAR(static_cast<double>(last - simulator.trueHost()) * 1e-9, 1e-4, 1e-4);
 }
 
+// 1000 frames a second under 20 ms of jitter: the fit moves by more than a frame now and then.
+TEST(ClockFilter, StampsIncreaseWhereTheFitMovesByMoreThanAFrame) {
+  ClockFilter filter;
+  Simulator::Options options;
+  options.fps = 1000.0;
+  options.jitter = 0.02;
+  options.period_jitter = 0.3;
+  Simulator simulator(options);
+  run(simulator, filter, 20.0, 1000.0);
+}
+
 TEST(ClockFilter, PauseRestartsTheFitWithinTheEpoch) {
   ClockFilter filter;
   Simulator simulator({});
