@@ -51,6 +51,16 @@ void setOption(int fd, int level, int name, int value, const char* label) {
   }
 }
 
+using InterfaceList = std::unique_ptr<ifaddrs, decltype(&freeifaddrs)>;
+
+InterfaceList listInterfaces() {
+  ifaddrs* interfaces = nullptr;
+  if (getifaddrs(&interfaces) != 0) {
+    throwSocketError("cannot list the network interfaces");
+  }
+  return {interfaces, &freeifaddrs};
+}
+
 }  // namespace
 
 std::string Endpoint::addressString() const { return addressText(address); }
@@ -97,6 +107,20 @@ std::uint32_t localAddressTowards(const Endpoint& peer) {
     throw SocketError("no route to " + peer.toString() + ": " + errorText(error_number), error_number);
   }
   return toEndpoint(local).address;
+}
+
+bool isOwnAddress(std::uint32_t address) {
+  const InterfaceList interfaces = listInterfaces();
+  for (const ifaddrs* each = interfaces.get(); each != nullptr; each = each->ifa_next) {
+    if (each->ifa_addr != nullptr && each->ifa_addr->sa_family == AF_INET) {
+      sockaddr_in own{};
+      std::memcpy(&own, each->ifa_addr, sizeof(own));
+      if (isSameHost(toEndpoint(own).address, address)) {
+        return true;
+      }
+    }
+  }
+  return false;
 }
 
 UdpSocket::UdpSocket(const UdpSocketOptions& options) {
@@ -171,12 +195,8 @@ void UdpSocket::close() {
 }
 
 std::vector<std::string> UdpSocket::joinOnAllInterfaces(std::uint32_t group) {
-  ifaddrs* interfaces = nullptr;
-  if (getifaddrs(&interfaces) != 0) {
-    throwSocketError("cannot list the network interfaces");
-  }
-  const std::unique_ptr<ifaddrs, decltype(&freeifaddrs)> owner(interfaces, &freeifaddrs);
-  for (const ifaddrs* each = interfaces; each != nullptr; each = each->ifa_next) {
+  const InterfaceList interfaces = listInterfaces();
+  for (const ifaddrs* each = interfaces.get(); each != nullptr; each = each->ifa_next) {
     const bool usable = each->ifa_addr != nullptr && each->ifa_addr->sa_family == AF_INET &&
                         (each->ifa_flags & IFF_UP) != 0 &&
                         (each->ifa_flags & (static_cast<unsigned>(IFF_MULTICAST) | IFF_LOOPBACK)) != 0;

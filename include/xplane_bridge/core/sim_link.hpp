@@ -8,40 +8,18 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/beacon_tracker.hpp"
 #include "xplane_bridge/core/clock.hpp"
+#include "xplane_bridge/core/data_output.hpp"
+#include "xplane_bridge/core/dataref_reader.hpp"
 #include "xplane_bridge/core/journal.hpp"
+#include "xplane_bridge/core/link_monitor.hpp"
+#include "xplane_bridge/core/log.hpp"
 #include "xplane_bridge/core/packets.hpp"
+#include "xplane_bridge/core/rref_subscription.hpp"
 #include "xplane_bridge/core/udp_socket.hpp"
 
 namespace xplane_bridge::core {
-
-/// RREF rate that means "every frame": X-Plane never sends more than one value a frame, so any number above every
-/// frame rate does. [?] on a live X-Plane: that it accepts numbers above 99.
-constexpr std::int32_t kEveryFrameRateHz = 1000;
-
-enum class LinkState : std::uint8_t {
-  kSearching = 0,  ///< no answer yet, or no X-Plane found
-  kConnected = 1,  ///< answers arrive
-  kPaused = 2,     ///< answers arrive, simulator time stands
-  kStale = 3,      ///< silence longer than `stale_after_s`: scenery load or menu; everything is kept
-  kLost = 4,       ///< silence, and the beacon is gone too or it lasts longer than `lost_after_s`
-};
-/// "SEARCHING" ... "LOST"
-const char* toString(LinkState state);
-
-enum class LogLevel : std::uint8_t { kDebug, kInfo, kWarn, kError };
-using LogFunction = std::function<void(LogLevel, const std::string&)>;
-
-/// DATA transport: what the bridge wants from X-Plane's Data Output.
-struct DataOutputOptions {
-  bool enabled = false;
-  std::uint16_t port = kDefaultDataPort;  ///< ours; 0: any free one (needs `configure`); never 49001
-  bool configure = true;                  ///< set rows, rate and target in X-Plane; false: the user has done it
-  bool restore_leftovers = false;         ///< undo what a crashed run left in Data Output, also without `enabled`
-  std::vector<std::int32_t> rows;         ///< rows wanted
-  std::int32_t rate_hz = 99;              ///< network_data_rate while we run
-  std::string address;                    ///< where X-Plane shall send to; empty: our address towards X-Plane
-};
 
 /// Where X-Plane is and how long to wait for it. Checked by SimLink's constructor.
 struct SimLinkOptions {
@@ -64,13 +42,6 @@ struct SimLinkOptions {
   DataOutputOptions data_output;
 };
 
-/// Datarefs received together on a socket of their own. Values come back with the position in `datarefs` as index.
-struct RrefGroup {
-  std::string name;  ///< for messages: "flight"
-  std::vector<std::string> datarefs;
-  std::int32_t rate_hz = kEveryFrameRateHz;
-  int priority = 0;  ///< higher is subscribed first
-};
 using GroupId = std::int32_t;
 
 /// What is known of a datagram besides its bytes.
@@ -80,13 +51,6 @@ struct ReceiveInfo {
   std::int64_t steady_ns = 0;    ///< [ns] the injected steady clock when it was read
   std::uint32_t link_epoch = 0;  ///< LinkStatus::epoch at that moment
   Endpoint from;
-};
-
-/// An X-Plane that announces itself.
-struct BeaconSighting {
-  Endpoint endpoint;  ///< where it listens
-  std::int32_t version = 0;
-  std::string computer_name;
 };
 
 struct LinkStatus {
@@ -115,9 +79,10 @@ struct LinkCounters {
   std::uint64_t rref_datagrams = 0;
   std::uint64_t rpos_datagrams = 0;
   std::uint64_t beacons = 0;
-  std::uint64_t requests = 0;         ///< subscription requests sent
-  std::uint64_t resubscriptions = 0;  ///< groups asked for again because of silence or a new link
-  int receive_buffer = 0;             ///< [bytes] smallest receive buffer the kernel granted
+  std::uint64_t requests = 0;           ///< subscription requests sent
+  std::uint64_t resubscriptions = 0;    ///< groups asked for anew because the link came up or X-Plane was silent
+  std::uint64_t repeated_requests = 0;  ///< datarefs asked for again because they did not answer
+  int receive_buffer = 0;               ///< [bytes] smallest receive buffer the kernel granted
 };
 
 /// Called from the link's thread; must return quickly. Views are valid during the call only.
@@ -135,9 +100,6 @@ enum class SendStatus : std::uint8_t {
   kSocketError,  ///< the kernel refused it
 };
 const char* toString(SendStatus status);
-
-/// One value of a read: empty when X-Plane did not answer in time.
-using DatarefValue = std::optional<float>;
 
 /// The link to one X-Plane: finds it, keeps subscriptions alive whatever happens to it, says in which state it is,
 /// reads and writes datarefs.

@@ -45,6 +45,9 @@ class SocketError : public std::runtime_error {
 /// Throws SocketError with the name and the resolver's reason.
 std::uint32_t resolveHost(const std::string& host);
 
+/// Whether an address is one of this computer's interfaces, loopback included.
+bool isOwnAddress(std::uint32_t address);
+
 /// The local address from which datagrams to `peer` leave. Throws SocketError when there is no route.
 std::uint32_t localAddressTowards(const Endpoint& peer);
 
