@@ -18,7 +18,7 @@ from typing import Callable, List, Optional, TextIO
 import numpy as np
 
 from .. import protocol
-from ..scenario import ScenarioPilot, load_scenario
+from ..scenario import ScenarioError, ScenarioPilot, load_scenario
 from .faults import FaultyChannel
 from .flight_model import FlightModel, create_model
 from .kinematic import KinematicModel
@@ -66,7 +66,7 @@ class Emulator:
 
     def _new_simulator(self) -> Simulator:
         o = self.options
-        pilot = ScenarioPilot(load_scenario(o.pilot)) if o.pilot is not None else None
+        pilot = self._new_pilot()
         sim = Simulator(
             self._make_model,
             o.aircraft,
@@ -81,6 +81,16 @@ class Emulator:
         )
         sim.set_weather(*o.wind, o.turbulence, o.seed)
         return sim
+
+    def _new_pilot(self) -> Optional[ScenarioPilot]:
+        path, aircraft = self.options.pilot, self.options.aircraft
+        if path is None:
+            return None
+        scenario = load_scenario(path)
+        if scenario.aircraft and aircraft not in (*scenario.aircraft, KINEMATIC):
+            fits = ", ".join(scenario.aircraft)
+            raise ScenarioError(f"{path}: is a scenario for {fits}, not for {aircraft}: choose --aircraft {fits}")
+        return ScenarioPilot(scenario)
 
     def _new_server(self, port: int) -> Server:
         sim = self.sim

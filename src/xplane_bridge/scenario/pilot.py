@@ -26,9 +26,17 @@ _NUMBERED.update({"static_1": "rel_static", "static_2": "rel_static2", "gyro_1":
 
 
 class ScenarioPilot:
-    """Callable that the emulator asks once a frame: (flight time, frame) -> PilotCommands."""
+    """Callable that the emulator asks once a frame: (flight time, frame) -> PilotCommands.
+
+    Raises:
+        ScenarioError: The scenario has a failure that only a client can bring about.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
+        for event in scenario.events:
+            for kind, value in event.actions:
+                if kind == "failure":
+                    failure_dataref(value["name"])
         self.player = Player(scenario, apply_excitations=True)
         self._failed: List[str] = []
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Dict, Mapping, Optional, Tuple
 
+from ..errors import XplaneBridgeError
+
 #: Stick axes and their ranges; throttle is a lever.
 STICK_AXES: Dict[str, Tuple[float, float]] = {
     "roll": (-1.0, 1.0),
@@ -68,7 +70,7 @@ EXCITATION_KINDS = ("doublet", "3211", "multisine", "chirp")
 MODES = {"manual": 1, "auto": 2}
 
 
-class ScenarioError(ValueError):
+class ScenarioError(XplaneBridgeError, ValueError):
     """A scenario that cannot be used: says where (key path), what was given and what is expected."""
 
 
