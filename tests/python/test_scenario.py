@@ -24,7 +24,10 @@ def scenario(*events, **more):
     return parse_scenario({"name": "test", "events": list(events), **more})
 
 
-def play(player, until, sample=FlightSample(), step=0.1):
+LEVEL = FlightSample()
+
+
+def play(player, until, sample=LEVEL, step=0.1):
     """Steps the player up to a time; gives (time, commands) of all steps."""
     out = []
     start = 0 if player.time == 0.0 else round(player.time / step) + 1
@@ -171,7 +174,7 @@ def test_stick_moves_at_once_or_over_a_time():
     player = Player(
         scenario({"at": 1, "stick": {"roll": 0.5}}, {"at": 2, "stick": {"roll": -0.5, "throttle": 1.0}, "over": 1})
     )
-    steps = dict((round(t, 1), c) for t, c in play(player, 4.0))
+    steps = {round(t, 1): c for t, c in play(player, 4.0)}
     assert steps[0.9].stick["roll"] == 0.0
     assert steps[1.0].stick["roll"] == 0.5
     assert steps[2.5].stick["roll"] == pytest.approx(0.0, abs=1e-9)
@@ -188,7 +191,7 @@ def test_buttons_hat_and_handles():
             {"at": 2, "buttons": {"release": 2}, "hat": {"y": 0}, "handles": {"flaps": 0.5, "gear": 0}},
         )
     )
-    steps = dict((round(t, 1), c) for t, c in play(player, 3.0))
+    steps = {round(t, 1): c for t, c in play(player, 3.0)}
     assert steps[0.5].buttons == set()
     assert steps[1.0].buttons == {2, 5}
     assert steps[1.1].buttons == {2}

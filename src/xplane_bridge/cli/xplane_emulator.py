@@ -40,11 +40,12 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         if options.stepped == "lines":
             raise KeyboardInterrupt  # reading a line is not interrupted otherwise
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, stop)
-    print("READY " + json.dumps(emulator.describe()), flush=True)
     with contextlib.suppress(KeyboardInterrupt):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, stop)
+        print("READY " + json.dumps(emulator.describe()), flush=True)
         emulator.run()
+    emulator.close()
     statistics = emulator.statistics()
     if view is not None:
         statistics["pictures_dropped"] = view.close()
