@@ -18,7 +18,8 @@ from xplane_bridge.emulator.flight_model import (
     Side,
     SurfaceKind,
 )
-from xplane_bridge.emulator.jsbsim_model import FOOT_M, SLUG_FT3_KG_M3, JsbsimModel
+from xplane_bridge.emulator.jsbsim_model import JsbsimModel
+from xplane_bridge.emulator.jsbsim_state import FOOT_M, SLUG_FT3_KG_M3
 from xplane_bridge.emulator.rotors import Governor, GovernorSpec, PistonEngine, PistonSpec, Rotor, RotorSpec
 
 AILERON_UP_DEG, AILERON_DOWN_DEG = 25.0, 15.0

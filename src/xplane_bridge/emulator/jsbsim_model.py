@@ -17,6 +17,7 @@ from typing import Sequence
 import jsbsim
 
 from xplane_bridge.emulator.actuators import SurfaceSet
+from xplane_bridge.emulator.contacts import Contacts
 from xplane_bridge.emulator.flight_model import (
     EARTH_RADIUS_M,
     GRAVITY_MPS2,
@@ -25,84 +26,31 @@ from xplane_bridge.emulator.flight_model import (
     Controls,
     EngineState,
     FlightModelError,
-    GearState,
     InitialState,
     ModelInfo,
     ModelState,
     SurfaceSpec,
 )
+from xplane_bridge.emulator.jsbsim_state import (
+    FOOT_M,
+    POUND_FOOT_NM,
+    POUND_FORCE_N,
+    POUND_KG,
+    PSF_PA,
+    RANKINE_K,
+    SLUG_FT3_KG_M3,
+    SLUG_KG,
+    Properties,
+    StateReader,
+)
 from xplane_bridge.emulator.rotors import Rotor, sum_loads
 from xplane_bridge.emulator.turbulence import DrydenTurbulence
 
-FOOT_M = 0.3048
-POUND_FORCE_N = 4.4482216152605
-POUND_KG = 0.45359237
-SLUG_KG = 14.593902937206364
-KNOT_MPS = 1852.0 / 3600.0
-PSF_PA = POUND_FORCE_N / FOOT_M**2
-SLUG_FT3_KG_M3 = SLUG_KG / FOOT_M**3
-POUND_FOOT_NM = POUND_FORCE_N * FOOT_M
-INCH_M = 0.0254
-RANKINE_K = 1.0 / 1.8
-
-#: A structural part that meets the ground faster than this, or gear faster than the second, is a crash [m/s].
-CRASH_STRUCTURE_MPS = 2.0
-CRASH_GEAR_MPS = 6.0
-
 SITUATION_VERSION = 1
+#: Height below which contact with the ground is looked for.
+CRASH_WATCH_M = 20.0
 
 _ROOT = Path(__file__).resolve().parent
-
-_STATE_PROPERTIES = (
-    "position/lat-geod-deg",
-    "position/long-gc-deg",
-    "position/h-sl-ft",
-    "position/h-agl-ft",
-    "attitude/phi-rad",
-    "attitude/theta-rad",
-    "attitude/psi-rad",
-    "velocities/p-rad_sec",
-    "velocities/q-rad_sec",
-    "velocities/r-rad_sec",
-    "accelerations/pdot-rad_sec2",
-    "accelerations/qdot-rad_sec2",
-    "accelerations/rdot-rad_sec2",
-    "velocities/v-north-fps",
-    "velocities/v-east-fps",
-    "velocities/v-down-fps",
-    "velocities/u-fps",
-    "velocities/v-fps",
-    "velocities/w-fps",
-    "forces/fbx-total-lbs",
-    "forces/fby-total-lbs",
-    "forces/fbz-total-lbs",
-    "inertia/mass-slugs",
-    "atmosphere/total-wind-north-fps",
-    "atmosphere/total-wind-east-fps",
-    "atmosphere/total-wind-down-fps",
-    "aero/alpha-rad",
-    "aero/beta-rad",
-    "aero/alphadot-rad_sec",
-    "velocities/vt-fps",
-    "velocities/ve-kts",
-    "velocities/vc-kts",
-    "velocities/mach",
-    "aero/qbar-psf",
-    "atmosphere/rho-slugs_ft3",
-    "atmosphere/P-psf",
-    "atmosphere/T-R",
-    "atmosphere/a-fps",
-    "atmosphere/pressure-altitude",
-    "inertia/cg-x-in",
-    "inertia/cg-y-in",
-    "inertia/cg-z-in",
-    "forces/fwx-aero-lbs",
-    "forces/fwy-aero-lbs",
-    "forces/fwz-aero-lbs",
-    "moments/l-aero-lbsft",
-    "moments/m-aero-lbsft",
-    "moments/n-aero-lbsft",
-)
 
 _AIR_PROPERTIES = (
     "velocities/u-aero-fps",
@@ -124,35 +72,6 @@ _LOADS = (
 )
 
 
-def quaternion_from_euler(roll: float, pitch: float, heading: float) -> tuple[float, float, float, float]:
-    """w, x, y, z of the rotation of FRD vectors into NED (heading, then pitch, then roll)."""
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(heading / 2), math.sin(heading / 2)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-
-
-class _Contact:
-    """A contact point of the aircraft's XML."""
-
-    def __init__(self, element: ElementTree.Element, index: int) -> None:
-        def value(tag: str) -> float:
-            return float(element.findtext(tag, "0"))
-
-        self.name = element.get("name", "")
-        self.index = index
-        self.is_gear = element.get("type") == "BOGEY"
-        self.spring = value("spring_coeff")
-        self.damping = value("damping_coeff")
-        self.max_steer_deg = value("max_steer")
-        self.wow = self.compression = self.compression_rate = None
-
-
 class JsbsimModel:
     """Base of the aircraft; implements ``flight_model.FlightModel``, where the public methods are described.
 
@@ -167,18 +86,20 @@ class JsbsimModel:
     default_payload_kg: float = 0.0
     max_payload_kg: float = 0.0
     gear_time_s: float = 6.0
+    #: Below this height JSBSim runs this often per step: a light aircraft on stiff legs needs finer steps.
+    contact_height_m: float = 0.0
+    contact_runs: int = 1
 
     def __init__(self, seed: int = 0) -> None:
-        self._seed = seed
         self._wind = [0.0, 0.0, 0.0]
         self._gusts = [0.0, 0.0, 0.0]
         self._turbulence = DrydenTurbulence(seed)
         self._atmosphere = (0.0, 101325.0)
         self._terrain_m = 0.0
-        self._fuel_kg = list(self.default_fuel_kg)
+        self._loaded_fuel_kg = list(self.default_fuel_kg)
+        self._fuel_kg = list(self._loaded_fuel_kg)
         self._payload_kg = self.default_payload_kg
         self._trimmed = Controls()
-        self._trim_cache: dict[tuple, bytes] = {}
         self.state = ModelState()
         self._start_jsbsim()
 
@@ -206,64 +127,54 @@ class JsbsimModel:
                 f"JSBSim cannot read aircraft/{name}/{name}.xml: is the package installed completely?"
             )
         fdm["simulation/gravity-model"] = 0
-        self._substep = MAX_SUBSTEP_S
+        self._fdm_step = MAX_SUBSTEP_S
         fdm.set_dt(MAX_SUBSTEP_S)
 
-        manager = fdm.get_property_manager()
-
-        def node(path: str):
-            found = manager.get_node(path)
-            if found is None:
-                raise FlightModelError(f"this JSBSim has no property '{path}': jsbsim 1.2 or later is needed")
-            return found
-
-        self._state_getters = [node(path).get_double_value for path in _STATE_PROPERTIES]
-        self._height = node("position/h-sl-ft").get_double_value
-        self._agl = node("position/h-agl-ft").get_double_value
-        self._roll = node("attitude/phi-rad").get_double_value
-        self._pitch = node("attitude/theta-rad").get_double_value
-        self._heading = node("attitude/psi-rad").get_double_value
-        self._alpha = node("aero/alpha-rad").get_double_value
-        self._airspeed = node("velocities/vt-fps").get_double_value
-        self._mass = node("inertia/mass-slugs").get_double_value
-        self._pressure = node("atmosphere/P-psf").get_double_value
-        self._temperature = node("atmosphere/T-R").get_double_value
-        self._air_getters = [node(path).get_double_value for path in _AIR_PROPERTIES]
-        self._load_setters = [(node(path).set_double_value, 1.0 / unit) for path, unit in _LOADS]
+        self._find_properties(Properties(fdm.get_property_manager()))
         self._surface_set = SurfaceSet(self.surfaces)
-        self._surface_setters = [node(f"surface/{spec.name}").set_double_value for spec in self.surfaces]
-        axes = ("north", "east", "down")  # as JSBSim's gust, because starting a motion takes its wind away
-        self._wind_setters = [node(f"atmosphere/gust-{axis}-fps").set_double_value for axis in axes]
-        self._gear_setter = node("gear/gear-pos-norm").set_double_value
-        self._brake_setters = [node(f"fcs/{side}-brake-cmd-norm").set_double_value for side in ("left", "right")]
-        self._steer_setter = node("fcs/steer-cmd-norm").set_double_value
-        masses = len(self.fuel_capacity_kg) + 1
-        self._mass_setters = [node(f"inertia/pointmass-weight-lbs[{i}]").set_double_value for i in range(masses)]
-
-        tree = ElementTree.parse(_ROOT / "aircraft" / name / f"{name}.xml").getroot()
-        self._empty_mass_kg = float(tree.findtext("mass_balance/emptywt", "0"))
-        self._contacts = [_Contact(e, i) for i, e in enumerate(tree.findall("ground_reactions/contact"))]
-        for contact in self._contacts:
-            unit = f"{'gear' if contact.is_gear else 'contact'}/unit[{contact.index}]"
-            contact.wow = node(f"{unit}/WOW").get_double_value
-            contact.compression = node(f"{unit}/compression-ft").get_double_value
-            contact.compression_rate = node(f"{unit}/compression-velocity-fps").get_double_value
-        self._gear = [contact for contact in self._contacts if contact.is_gear]
-
         self._time = 0.0
         self._gear_position = 1.0
+        self._steer = 0.0
         self._crashed = False
         self._gravity_force = (0.0, 0.0, 0.0)
         self._rotors: list[Rotor] = []
         state = ModelState()
         state.surfaces_deg = {spec.name: 0.0 for spec in self.surfaces}
         state.engines = [EngineState() for _ in range(self.info.engine_count)]
-        state.gear = [GearState(name=contact.name) for contact in self._gear]
+        state.gear = self._contacts.new_states()
         self.state = state
         self._build()
         self._apply_loading()
         self._apply_atmosphere()
         self._apply_wind()
+
+    def _find_properties(self, properties: Properties) -> None:
+        getter, setter = properties.getter, properties.setter
+        self._reader = StateReader(properties)
+        self._height = getter("position/h-sl-ft")
+        self._agl = getter("position/h-agl-ft")
+        self._roll = getter("attitude/phi-rad")
+        self._pitch = getter("attitude/theta-rad")
+        self._heading = getter("attitude/psi-rad")
+        self._alpha = getter("aero/alpha-rad")
+        self._airspeed = getter("velocities/vt-fps")
+        self._mass = getter("inertia/mass-slugs")
+        self._pressure = getter("atmosphere/P-psf")
+        self._temperature = getter("atmosphere/T-R")
+        self._air_getters = [getter(path) for path in _AIR_PROPERTIES]
+        self._load_setters = [(setter(path), 1.0 / unit) for path, unit in _LOADS]
+        self._surface_setters = [setter(f"surface/{spec.name}") for spec in self.surfaces]
+        # As JSBSim's gust, because starting a motion takes its wind away.
+        self._wind_setters = [setter(f"atmosphere/gust-{axis}-fps") for axis in ("north", "east", "down")]
+        self._gear_setter = setter("gear/gear-pos-norm")
+        self._brake_setters = [setter(f"fcs/{side}-brake-cmd-norm") for side in ("left", "right")]
+        self._steer_setter = setter("fcs/steer-cmd-norm")
+        masses = len(self.fuel_capacity_kg) + 1
+        self._mass_setters = [setter(f"inertia/pointmass-weight-lbs[{i}]") for i in range(masses)]
+        name = self.info.name
+        tree = ElementTree.parse(_ROOT / "aircraft" / name / f"{name}.xml").getroot()
+        self._empty_mass_kg = float(tree.findtext("mass_balance/emptywt", "0"))
+        self._contacts = Contacts(tree, self.info.gear_names, properties)
 
     # ---- for the subclass
 
@@ -305,6 +216,7 @@ class JsbsimModel:
         self._check_initial(initial)
         self._terrain_m = initial.terrain_elevation_m
         self._gusts = [0.0, 0.0, 0.0]
+        self._fuel_kg = list(self._loaded_fuel_kg)
         turbulence = self._turbulence.save()
         self._start_jsbsim()
         self._trimmed = self._start_on_ground(initial) if initial.on_ground else self._start_in_air(initial)
@@ -328,9 +240,6 @@ class JsbsimModel:
     def _fly(self, dt: float, controls: Controls) -> None:
         count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-6))
         substep = dt / count
-        if abs(substep - self._substep) > 1e-12:
-            self._substep = substep
-            self._fdm.set_dt(substep)
         self._move_gear(dt, controls)
         self._correct_gravity()
         run = self._fdm.run
@@ -338,8 +247,14 @@ class JsbsimModel:
             if self._turbulence.intensity_mps > 0.0:
                 self._blow(substep)
             self._load(substep, controls)
-            run()
-            self._watch_crash()
+            runs = 1 if self._agl() * FOOT_M > self.contact_height_m else self.contact_runs
+            if abs(substep / runs - self._fdm_step) > 1e-12:
+                self._fdm_step = substep / runs
+                self._fdm.set_dt(self._fdm_step)
+            for _ in range(runs):
+                run()
+            if self._agl() * FOOT_M < CRASH_WATCH_M and self._contacts.hit():
+                self._crashed = True
 
     def _load(self, dt: float, controls: Controls) -> None:
         u, v, w, p, q, r, density = [get() for get in self._air_getters]
@@ -386,81 +301,20 @@ class JsbsimModel:
         self._gusts = [along * cosine - across * sine, along * sine + across * cosine, down]
         self._apply_wind()
 
-    def _watch_crash(self) -> None:
-        if self._agl() * FOOT_M > 20.0:
-            return
-        for contact in self._contacts:
-            if contact.wow() > 0.5:
-                limit = CRASH_GEAR_MPS if contact.is_gear else CRASH_STRUCTURE_MPS
-                if contact.compression_rate() * FOOT_M > limit:
-                    self._crashed = True
-
     def _read_state(self, controls: Controls) -> ModelState:
         s = self.state
-        (
-            s.latitude_deg, s.longitude_deg, altitude, agl, s.roll_rad, s.pitch_rad, heading, s.p_rad_s, s.q_rad_s,
-            s.r_rad_s, s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2, north, east, down, u, v, w, fx, fy, fz, mass,
-            wind_n, wind_e, wind_d,
-            s.alpha_rad, s.beta_rad, s.alpha_dot_rad_s, tas, eas, cas, s.mach, qbar, rho, pressure, temperature, sound,
-            pressure_altitude, cg_x, cg_y, cg_z, wind_x, wind_y, wind_z, roll_moment, pitch_moment, yaw_moment,
-        ) = [get() for get in self._state_getters]  # fmt: skip
-        s.sim_time_s = self._time
-        s.altitude_m, s.agl_m, s.terrain_elevation_m = altitude * FOOT_M, agl * FOOT_M, self._terrain_m
-        s.heading_rad = heading % (2.0 * math.pi)
-        s.quaternion = w_, x_, y_, z_ = quaternion_from_euler(s.roll_rad, s.pitch_rad, heading)
-        s.v_north_mps, s.v_east_mps, s.v_down_mps = vn, ve, vd = north * FOOT_M, east * FOOT_M, down * FOOT_M
-        s.u_mps, s.v_mps, s.w_mps = u * FOOT_M, v * FOOT_M, w * FOOT_M
-        s.mass_kg = mass * SLUG_KG
-        gx, gy, gz = self._gravity_force
-        s.specific_force_x_mps2 = ax = (fx * POUND_FORCE_N - gx) / s.mass_kg
-        s.specific_force_y_mps2 = ay = (fy * POUND_FORCE_N - gy) / s.mass_kg
-        s.specific_force_z_mps2 = az = (fz * POUND_FORCE_N - gz) / s.mass_kg
-        # Specific force in NED plus gravity, less what the turning of the local level takes (planet at rest).
-        an = (1 - 2 * (y_ * y_ + z_ * z_)) * ax + 2 * (x_ * y_ - w_ * z_) * ay + 2 * (x_ * z_ + w_ * y_) * az
-        ae = 2 * (x_ * y_ + w_ * z_) * ax + (1 - 2 * (x_ * x_ + z_ * z_)) * ay + 2 * (y_ * z_ - w_ * x_) * az
-        ad = 2 * (x_ * z_ - w_ * y_) * ax + 2 * (y_ * z_ + w_ * x_) * ay + (1 - 2 * (x_ * x_ + y_ * y_)) * az
-        radius = EARTH_RADIUS_M + s.altitude_m
-        tangent = math.tan(math.radians(s.latitude_deg))
-        s.acceleration_north_mps2 = an + (vn * vd - ve * ve * tangent) / radius
-        s.acceleration_east_mps2 = ae + (ve * vd + ve * vn * tangent) / radius
-        s.acceleration_down_mps2 = ad + GRAVITY_MPS2 - (vn * vn + ve * ve) / radius
-        s.wind_north_mps, s.wind_east_mps, s.wind_down_mps = wind_n * FOOT_M, wind_e * FOOT_M, wind_d * FOOT_M
-        s.true_airspeed_mps = tas * FOOT_M
-        s.equivalent_airspeed_mps, s.calibrated_airspeed_mps = eas * KNOT_MPS, cas * KNOT_MPS
-        s.dynamic_pressure_pa, s.air_density_kg_m3 = qbar * PSF_PA, rho * SLUG_FT3_KG_M3
-        s.pressure_pa, s.temperature_k, s.speed_of_sound_mps = (
-            pressure * PSF_PA,
-            temperature * RANKINE_K,
-            sound * FOOT_M,
-        )
-        s.pressure_altitude_m = pressure_altitude * FOOT_M
-        s.cg_forward_m, s.cg_right_m, s.cg_down_m = -cg_x * INCH_M, cg_y * INCH_M, -cg_z * INCH_M
-        s.drag_n, s.side_force_n, s.lift_n = wind_x * POUND_FORCE_N, wind_y * POUND_FORCE_N, wind_z * POUND_FORCE_N
-        s.aero_roll_nm, s.aero_pitch_nm = roll_moment * POUND_FOOT_NM, pitch_moment * POUND_FOOT_NM
-        s.aero_yaw_nm = yaw_moment * POUND_FOOT_NM
+        s.sim_time_s, s.terrain_elevation_m = self._time, self._terrain_m
+        self._reader.read(s, self._gravity_force)
         for actuator in self._surface_set.actuators:
             s.surfaces_deg[actuator.spec.name] = actuator.position_deg
         s.fuel_kg = list(self._fuel_kg)
         s.payload_kg, s.empty_mass_kg = self._payload_kg, self._empty_mass_kg
-        standing = 0
-        for contact, gear in zip(self._gear, s.gear):
-            gear.extended = self._gear_position
-            gear.on_ground = contact.wow() > 0.5
-            gear.compression_m = contact.compression() * FOOT_M if gear.on_ground else 0.0
-            rate = contact.compression_rate() * FOOT_M
-            gear.vertical_force_n = (
-                max(contact.spring * gear.compression_m + contact.damping * rate, 0.0) if gear.on_ground else 0.0
-            )
-            gear.steer_deg = contact.max_steer_deg * self._steer
-            standing += gear.on_ground
-        s.on_ground_any, s.on_ground_all = standing > 0, standing == len(self._gear)
+        self._contacts.read(s, self._gear_position, self._steer)
         s.crashed = self._crashed
         self._fill_state(s, controls)
         return s
 
     # ---- placing, saving
-
-    _steer = 0.0
 
     def place(
         self,
@@ -657,7 +511,8 @@ class JsbsimModel:
                 raise FlightModelError(f"fuel {list(fuel_kg)} kg: expected one value per tank, 0..{list(capacity)}")
         if payload_kg is not None and not 0.0 <= payload_kg <= self.max_payload_kg:
             raise FlightModelError(f"payload {payload_kg} kg: expected 0..{self.max_payload_kg}")
-        self._fuel_kg = self._fuel_kg if fuel_kg is None else list(fuel_kg)
+        if fuel_kg is not None:
+            self._loaded_fuel_kg, self._fuel_kg = list(fuel_kg), list(fuel_kg)
         self._payload_kg = self._payload_kg if payload_kg is None else payload_kg
         self._apply_loading()
 

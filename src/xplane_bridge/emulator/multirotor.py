@@ -18,7 +18,8 @@ from xplane_bridge.emulator.flight_model import (
     ModelInfo,
     ModelState,
 )
-from xplane_bridge.emulator.jsbsim_model import FOOT_M, SLUG_FT3_KG_M3, JsbsimModel
+from xplane_bridge.emulator.jsbsim_model import JsbsimModel
+from xplane_bridge.emulator.jsbsim_state import FOOT_M, SLUG_FT3_KG_M3
 from xplane_bridge.emulator.rotors import Rotor, RotorSpec, electric_torque
 from xplane_bridge.emulator.stabilisation import Stabilisation, StabilisationSpec
 
@@ -78,6 +79,8 @@ class Multirotor(JsbsimModel):
         standing_height_m=STANDING_HEIGHT_M,
     )
     max_payload_kg = 0.3
+    contact_height_m = 1.0
+    contact_runs = 2
 
     def _build(self) -> None:
         self._rotors = [

@@ -25,7 +25,8 @@ from xplane_bridge.emulator.flight_model import (
     Side,
     SurfaceKind,
 )
-from xplane_bridge.emulator.jsbsim_model import FOOT_M, SLUG_FT3_KG_M3, JsbsimModel
+from xplane_bridge.emulator.jsbsim_model import JsbsimModel
+from xplane_bridge.emulator.jsbsim_state import FOOT_M, SLUG_FT3_KG_M3
 from xplane_bridge.emulator.rotors import Rotor, RotorSpec
 from xplane_bridge.emulator.stabilisation import Stabilisation, StabilisationSpec
 
