@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import yaml
 
+from .criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
 from .holds import HoldGains
 from .schema import (
     EXCITATION_KINDS,
@@ -76,14 +77,12 @@ def parse_scenario(document: Any) -> Scenario:
     repeat = top.get("repeat_every")
     if repeat is not None:
         repeat = _number(repeat, "repeat_every", 1.0, 86400.0)
-    criteria = top.get("criteria", {})
-    if not isinstance(criteria, dict):
-        raise ScenarioError(f"criteria: {criteria!r}; expected a mapping")
     events = top.get("events")
     if not isinstance(events, list) or not events:
         raise ScenarioError(f"events: {_short(events)}; expected a list of at least one event")
     parsed = tuple(_event(item, f"events[{i}]") for i, item in enumerate(events))
     _check_times(parsed, repeat)
+    criteria = _criteria(top.get("criteria", {}), parsed)
     return Scenario(name, _text(top, "description", ""), tuple(aircraft), repeat, start, gains, criteria, parsed)
 
 
@@ -99,6 +98,52 @@ def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:
         if repeat is not None and event.at >= repeat:
             raise ScenarioError(f"events[{i}].at: {event.at}; expected less than repeat_every ({repeat})")
         last = event.at
+
+
+def _criteria(item: Any, events: Sequence[Event]) -> Tuple[Criterion, ...]:
+    if not isinstance(item, Mapping):
+        raise ScenarioError(f"criteria: {_short(item)}; expected a mapping of names to criteria")
+    labels = [value for event in events for kind, value in event.actions if kind == "label"]
+    return tuple(_criterion(str(name), value, f"criteria.{name}", labels) for name, value in item.items())
+
+
+def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criterion:
+    given = _mapping(item, path, ("measure", "of", "target", "from", "to", "band", "above", "below"))
+    measure = given.get("measure")
+    if measure not in MEASURES:
+        raise ScenarioError(f"{path}.measure: {measure!r}; expected one of {', '.join(MEASURES)}")
+    bounds = {
+        key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("above", "below") if key in given
+    }
+    if not bounds:
+        raise ScenarioError(f"{path}: no bound; expected above and/or below")
+    if measure in CAMERA:
+        surplus = [key for key in ("of", "target", "from", "to", "band") if key in given]
+        if surplus:
+            raise ScenarioError(f"{path}.{surplus[0]}: does not go with {measure}; expected bounds only")
+        return Criterion(name, measure, **bounds)
+    variable = given.get("of")
+    if variable not in SCORED:
+        raise ScenarioError(f"{path}.of: {variable!r}; expected one of {', '.join(SCORED)}")
+    if measure in TARGETED and "target" not in given:
+        raise ScenarioError(f"{path}.target: missing; expected what {measure} compares with")
+    if measure == "settling" and "band" not in given:
+        raise ScenarioError(f"{path}.band: missing; expected the largest |{variable} - target| that counts as settled")
+    numbers = {
+        key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("target", "band") if key in given
+    }
+    start = _edge(given.get("from", 0.0), f"{path}.from", labels)
+    end = _edge(given["to"], f"{path}.to", labels) if "to" in given else None
+    return Criterion(name, measure, variable, start=start, end=end, **numbers, **bounds)
+
+
+def _edge(value: Any, path: str, labels: Sequence[str]) -> Union[float, str]:
+    if isinstance(value, str):
+        if value not in labels:
+            have = ", ".join(repr(label) for label in labels) or "none"
+            raise ScenarioError(f"{path}: {value!r}; expected seconds, or the label of an event (there is {have})")
+        return value
+    return _number(value, path, 0.0, 1e6)
 
 
 def _event(item: Any, path: str) -> Event:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Dict, Mapping, Optional, Tuple
 
 from ..errors import XplaneBridgeError
+from .criteria import Criterion
 
 #: Stick axes and their ranges; throttle is a lever.
 STICK_AXES: Dict[str, Tuple[float, float]] = {
@@ -119,5 +120,5 @@ class Scenario:
     repeat_every: Optional[float] = None  #: start over after so long [s]
     start: Mapping[str, float] = field(default_factory=dict)  #: where it means to begin; for those who can arrange it
     gains: Mapping[str, float] = field(default_factory=dict)
-    criteria: Mapping[str, Any] = field(default_factory=dict)  #: for run_scenario, which checks them
+    criteria: Tuple[Criterion, ...] = ()  #: for run_scenario, which checks them
     events: Tuple[Event, ...] = ()

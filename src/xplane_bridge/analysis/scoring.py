@@ -1,0 +1,114 @@
+"""Scores a flight against the criteria of its scenario."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Mapping, NamedTuple, Sequence
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from xplane_bridge.scenario.criteria import Criterion
+
+#: Variables that wrap at 360 degrees.
+_WRAPPING = ("roll", "heading")
+
+
+class Score(NamedTuple):
+    """What one criterion measured."""
+
+    name: str
+    measure: str
+    value: float  #: NaN when it could not be measured, infinite for a settling that never came
+    passed: bool
+    text: str  #: bounds, and why it could not be measured
+
+
+def score(
+    criteria: Sequence[Criterion],
+    time: np.ndarray,
+    values: Mapping[str, np.ndarray],
+    labels: Mapping[str, float],
+    camera: Mapping[str, float],
+) -> list[Score]:
+    """Measure every criterion.
+
+    Args:
+        criteria: Of the scenario.
+        time: Scenario time [s] of each sample, shape (n,), increasing.
+        values: Variable to samples, shape (n,), in the units of scenarios.
+        labels: Event label to the scenario time [s] at which it first happened.
+        camera: ``paired`` and ``perfect`` shares; empty without camera.
+
+    Returns:
+        A score each. One that cannot be measured has not passed.
+    """
+    return [_score(criterion, time, values, labels, camera) for criterion in criteria]
+
+
+def _score(
+    criterion: Criterion,
+    time: np.ndarray,
+    values: Mapping[str, np.ndarray],
+    labels: Mapping[str, float],
+    camera: Mapping[str, float],
+) -> Score:
+    if criterion.measure in ("paired", "perfect"):
+        if criterion.measure not in camera:
+            return _unmeasured(criterion, "no images were recorded")
+        return _judged(criterion, float(camera[criterion.measure]))
+    for label in criterion.labels:
+        if label not in labels:
+            return _unmeasured(criterion, f"the event {label!r} never happened")
+    start = labels[criterion.start] if isinstance(criterion.start, str) else criterion.start
+    if criterion.end is None:
+        end = float(time[-1]) if len(time) else start
+    else:
+        end = labels[criterion.end] if isinstance(criterion.end, str) else criterion.end
+    inside = (time >= start) & (time <= end)
+    window, samples = time[inside], values[criterion.variable][inside]
+    good = np.isfinite(samples)
+    window, samples = window[good], samples[good]
+    if len(samples) < 2:
+        return _unmeasured(criterion, f"no samples between {start:g} s and {end:g} s")
+    return _judged(criterion, _measure(criterion, window, samples))
+
+
+def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> float:
+    error = values - criterion.target
+    if criterion.variable in _WRAPPING:
+        error = (error + 180.0) % 360.0 - 180.0
+    if criterion.measure == "rms":
+        return float(np.sqrt(np.mean(error**2)))
+    if criterion.measure == "peak":
+        return float(np.abs(error).max())
+    if criterion.measure == "overshoot":
+        return max(0.0, float((-np.sign(error[0]) * error).max()))
+    if criterion.measure == "settling":
+        outside = np.flatnonzero(np.abs(error) > criterion.band)
+        if not len(outside):
+            return 0.0
+        if outside[-1] == len(error) - 1:
+            return float("inf")
+        return float(time[outside[-1] + 1] - time[0])
+    if criterion.measure == "final":
+        return float(np.mean(values[time >= time[-1] - 1.0]))
+    return float(values.min() if criterion.measure == "minimum" else values.max())
+
+
+def _judged(criterion: Criterion, value: float) -> Score:
+    above = criterion.above is None or value > criterion.above
+    below = criterion.below is None or value < criterion.below
+    return Score(criterion.name, criterion.measure, value, above and below, _bounds(criterion))
+
+
+def _unmeasured(criterion: Criterion, why: str) -> Score:
+    return Score(criterion.name, criterion.measure, float("nan"), False, f"{_bounds(criterion)}; {why}")
+
+
+def _bounds(criterion: Criterion) -> str:
+    texts = []
+    if criterion.above is not None:
+        texts.append(f"above {criterion.above:g}")
+    if criterion.below is not None:
+        texts.append(f"below {criterion.below:g}")
+    return ", ".join(texts)
