@@ -6,12 +6,16 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <map>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -38,7 +42,10 @@ class FakeXPlane {
       datarefs[rowPath(row)] = 0.0F;
     }
   }
-  ~FakeXPlane() { close(fd_); }
+  ~FakeXPlane() {
+    stopThread();
+    close(fd_);
+  }
   FakeXPlane(const FakeXPlane&) = delete;
   FakeXPlane& operator=(const FakeXPlane&) = delete;
 
@@ -56,6 +63,24 @@ class FakeXPlane {
     for (const Address& client : rpos_clients) {
       send(client, rposBytes());
     }
+  }
+
+  /// Renders by itself from now on, for calls of the code under test that wait. Hands off the state until stopThread().
+  void startThread() {
+    running_ = true;
+    thread_ = std::thread([this] {
+      while (running_) {
+        pump();
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      }
+    });
+  }
+  void stopThread() {
+    running_ = false;
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+    takeRequests();  // what was still under way
   }
 
   /// Reads requests without answering: busy loading scenery.
@@ -231,4 +256,6 @@ class FakeXPlane {
 
   int fd_ = -1;
   std::uint16_t port_ = 0;
+  std::atomic<bool> running_{false};
+  std::thread thread_;
 };

@@ -25,6 +25,7 @@ class SimLinkRig : public testing::Test {
     folder_ = mkdtemp(pattern.data());
   }
   ~SimLinkRig() override {
+    tick_ns_ = 50 * kNanosecondsPerMillisecond;  // nobody answers any more: let the link's last words time out quickly
     link_.reset();
     std::filesystem::remove_all(folder_);
   }
@@ -44,7 +45,8 @@ class SimLinkRig : public testing::Test {
   }
 
   Clock clock() {
-    return {[this] { return now_ns_.load(); }, [this] { return now_ns_.load() + 1'000'000 * kNanosecondsPerSecond; }};
+    return {[this] { return now_ns_ += tick_ns_; },
+            [this] { return now_ns_.load() + 1'000'000 * kNanosecondsPerSecond; }};
   }
 
   void makeLink(const SimLinkOptions& options) {
@@ -119,6 +121,7 @@ class SimLinkRig : public testing::Test {
   }
 
   std::atomic<std::int64_t> now_ns_{5'000 * kNanosecondsPerSecond};
+  std::int64_t tick_ns_ = 0;  // by how much reading the clock moves it
   std::string folder_;
   std::unique_ptr<SimLink> link_;
   bool beacons_ = false;

@@ -574,23 +574,12 @@ class ThreadedSimLink : public testing::Test {
     options.port = sim_.port();
     options.listen_for_beacon = false;
     link_ = std::make_unique<SimLink>(options, SimLinkCallbacks{}, hostClock(), LogFunction{});
-    frames_ = std::thread([this] {
-      while (!quit_) {
-        sim_.pump(0.005F);
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      }
-    });
+    sim_.startThread();
   }
-  ~ThreadedSimLink() override {
-    link_.reset();
-    quit_ = true;
-    frames_.join();
-  }
+  ~ThreadedSimLink() override { link_.reset(); }
 
-  FakeXPlane sim_;  // touched by its thread only, once that runs
+  FakeXPlane sim_;
   std::unique_ptr<SimLink> link_;
-  std::atomic<bool> quit_{false};
-  std::thread frames_;
 };
 
 TEST_F(ThreadedSimLink, WritesAreReadBack) {
@@ -613,9 +602,7 @@ TEST_F(ThreadedSimLink, WritesAreReadBack) {
 
 TEST_F(ThreadedSimLink, StopsAlsoWhenNobodyAnswers) {
   link_->start();
-  quit_ = true;
-  frames_.join();
-  frames_ = std::thread([] {});
+  sim_.stopThread();
   link_->stop(0.5);
   EXPECT_THROW(link_->readDatarefs({"a/b"}, 0.1), std::logic_error);
 }
