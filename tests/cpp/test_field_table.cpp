@@ -13,9 +13,9 @@
 namespace xplane_bridge::core {
 namespace {
 
-const std::vector<FieldGroup> kAllGroups = {FieldGroup::kFlight,     FieldGroup::kEngines,   FieldGroup::kSurfaces,
-                                            FieldGroup::kControls,   FieldGroup::kElectrical, FieldGroup::kAutopilot,
-                                            FieldGroup::kWarnings,   FieldGroup::kFuel,      FieldGroup::kSim};
+const std::vector<FieldGroup> kAllGroups = {FieldGroup::kFlight,   FieldGroup::kEngines,    FieldGroup::kSurfaces,
+                                            FieldGroup::kControls, FieldGroup::kElectrical, FieldGroup::kAutopilot,
+                                            FieldGroup::kWarnings, FieldGroup::kFuel,       FieldGroup::kSim};
 
 std::string readFile(const std::string& path) {
   std::ifstream file(path);
@@ -49,13 +49,14 @@ TEST(FieldTable, FlightGroupFitsOneDatagram) {
 
 TEST(FieldTable, FlightGroupCarriesItsTime) {
   const auto flight = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::k11);
-  for (const char* path : {"sim/time/total_running_time_sec", "sim/operation/misc/frame_rate_period",
-                           "sim/time/paused", "sim/time/is_in_replay"}) {
+  for (const char* path : {"sim/time/total_running_time_sec", "sim/operation/misc/frame_rate_period", "sim/time/paused",
+                           "sim/time/is_in_replay"}) {
     EXPECT_EQ(flight.count(path), 1U) << path;
   }
 }
 
-// X-Plane answers one sender's request of an index once: a path twice in a group is a waste, never an error to overlook.
+// X-Plane answers one sender's request of an index once: a path twice in a group is a waste, never an error to
+// overlook.
 TEST(FieldTable, NoGroupAsksTwice) {
   for (const FieldGroup group : kAllGroups) {
     for (const XPlaneVersion version : {XPlaneVersion::k11, XPlaneVersion::k12}) {
