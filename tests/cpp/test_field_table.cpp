@@ -71,7 +71,9 @@ TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
     SCOPED_TRACE(std::string(toString(field.group)) + "." + field.field);
     const bool sourced = field.dataref.path11 != nullptr || field.dataref.path12 != nullptr || field.row.row11 >= 0;
     EXPECT_EQ(sourced, field.store != nullptr);
-    if (!sourced) EXPECT_STRNE(field.derivation, "");
+    if (!sourced) {
+      EXPECT_STRNE(field.derivation, "");
+    }
     EXPECT_GE(field.count, 1);
     EXPECT_STRNE(field.unit, "");
     if (field.dataref.path11 != nullptr && field.store != nullptr) {
@@ -160,7 +162,8 @@ TEST(XPlaneVersionNumber, IsTakenApart) {
   EXPECT_EQ(xplaneVersion(122015), XPlaneVersion::k12);
 }
 
-// tests/data/datarefs.txt: name, type in 11.10, type in 12.08 of Laminar's published lists; "-" is not in that list.
+// tests/data/datarefs.txt: name, type in 11.10, type in 12.08 of Laminar's published lists; "-" not in that list, "?"
+// not looked up there.
 class DatarefList : public testing::Test {
  protected:
   struct Entry {
@@ -196,8 +199,11 @@ class DatarefList : public testing::Test {
       EXPECT_TRUE(noted) << "not in the list of that version, and the table's remark does not say so";
       return;
     }
+    if (type == "?") return;
     EXPECT_EQ(type.find('[') != std::string::npos, open != std::string::npos) << type;
-    if (open != std::string::npos) EXPECT_LT(std::stoi(path.substr(open + 1)), elements(type)) << type;
+    if (open != std::string::npos) {
+      EXPECT_LT(std::stoi(path.substr(open + 1)), elements(type)) << type;
+    }
   }
 
   std::map<std::string, Entry> entries_;

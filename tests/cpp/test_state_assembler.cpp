@@ -2,25 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <new>
+#include <memory>
 
+#include "allocation_counter.hpp"
 #include "recorded_flight.hpp"
 #include "xplane_bridge/core/units.hpp"
-
-namespace {
-std::size_t allocations = 0;
-}  // namespace
-
-// Counts allocations of the whole program, for "no allocation in steady state".
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* p = std::malloc(size)) return p;
-  throw std::bad_alloc();
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 
 namespace xplane_bridge::core {
 namespace {
@@ -183,12 +171,12 @@ TEST_P(EveryTransport, NothingIsAllocatedPerDatagram) {
   const Datagram data = feed.flight.data(feed.flight.size() - 1);
   const RrefView rref_view = rref.rref();
   const DataView data_view = data.data();
-  const std::size_t before = allocations;
+  const std::size_t before = allocationCount();
   for (int i = 0; i < 100; ++i) {
     feed.assembler->onRref(rref_view, feed.now + i * kFrame);
     feed.assembler->onData(data_view, feed.now + i * kFrame);
   }
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(allocationCount(), before);
 }
 
 // --- what goes wrong on the way ---
