@@ -347,6 +347,19 @@ void toMessage(const core::SimStatus& state, const std::string& frame, SimStatus
   message->window_height = state.window_height;
 }
 
+void toMessage(const core::LinkStatus& link, const std::string& transport, LinkState* message) {
+  message->state = static_cast<std::uint8_t>(link.state);
+  message->state_name = core::toString(link.state);
+  message->reason = link.reason;
+  message->link_epoch = link.epoch;
+  message->host = link.peer.address != 0 ? link.peer.addressString() : "";
+  message->port = link.peer.port;
+  message->transport = transport;
+  message->xplane_version = link.version.value_or(0);
+  message->host_name = link.computer_name;
+  message->silence = link.silence_s;
+}
+
 bool toOdometry(const core::FlightState& state, const core::TangentFrame& map, const FrameNames& frames,
                 nav_msgs::Odometry* message) {
   if (!state.has(core::FlightState::kValidPosition | core::FlightState::kValidAttitude |

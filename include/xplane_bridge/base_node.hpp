@@ -16,7 +16,6 @@
 #include <boost/make_shared.hpp>
 
 #include "xplane_bridge/common_options.hpp"
-#include "xplane_bridge/core/journal.hpp"
 #include "xplane_bridge/core/sim_link.hpp"
 #include "xplane_bridge/param_loader.hpp"
 
@@ -102,10 +101,9 @@ class BaseNode {
   virtual void joinThreads() {}
 
   const CommonOptions& common() const { return common_; }
-  /// Valid from start() to the end of undo(); only with usesLink().
+  /// Valid from start() to the end of undo(), only with usesLink(). What a node changes in X-Plane it records in
+  /// link().journal() first.
   core::SimLink& link() { return *link_; }
-  /// What was changed in X-Plane, for whoever has to undo it after a crash. As link().
-  const std::shared_ptr<core::Journal>& journal() const { return journal_; }
   /// Relative names: topics, services.
   ros::NodeHandle& handle() { return handle_; }
   /// The node's full name.
@@ -174,8 +172,7 @@ class BaseNode {
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
 
-  std::shared_ptr<core::Journal> journal_;
-  std::shared_ptr<core::SimLink> link_;
+  std::unique_ptr<core::SimLink> link_;
 
   std::mutex service_mutex_;
   std::condition_variable service_idle_;

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
+import socket
 from pathlib import Path
 from typing import Any, Callable, Iterator
 
 import pytest
 
+from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 
 _ANSWER_S = 15.0  # a machine busy with other work is slow, a node that hangs is silent for ever
@@ -85,6 +88,41 @@ class TopicLog:
         self._subscriber.unregister()
 
 
+class Wire:
+    """Another client of X-Plane, as any program beside the bridge: writes and reads on its own socket.
+
+    Args:
+        port: X-Plane's, on this machine.
+    """
+
+    def __init__(self, port: int) -> None:
+        self._to = ("127.0.0.1", port)
+        self._index = itertools.count(1)
+
+    def send(self, *messages: Any) -> None:
+        """Sends messages of xplane_bridge.protocol."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for message in messages:
+                sender.sendto(message.encode(), self._to)
+
+    def read(self, path: str) -> float:
+        """The value of a dataref."""
+        index = next(self._index)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker:
+            asker.settimeout(0.5)
+            for _ in range(20):
+                asker.sendto(protocol.RrefRequest(20, index, path).encode(), self._to)
+                with contextlib.suppress(socket.timeout):
+                    values = dict(protocol.decode_rref_response(asker.recv(65536)))
+                    asker.sendto(protocol.RrefRequest(0, index, path).encode(), self._to)
+                    return values[index]
+        pytest.fail(f"{path} does not answer")
+
+    def wait_until_reads(self, path: str, value: float) -> None:
+        """Waits until a dataref has a value."""
+        wait_until(lambda: self.read(path) == value, _ANSWER_S, f"{path} = {value:g}")
+
+
 class World:
     """One test's namespace under the master, with the nodes and the emulators started in it.
 
@@ -142,6 +180,19 @@ class World:
         self._processes.append(process)
         self.point_to(process.port)
         return process
+
+    @staticmethod
+    def wire(port: int) -> Wire:
+        """Another client of the X-Plane on a port of this machine."""
+        return Wire(port)
+
+    def call(self, service: str, service_type: type, *args: Any, **kwargs: Any) -> Any:
+        """Calls a service of this namespace once it is there."""
+        import rospy
+
+        name = f"{self.namespace}/{service}"
+        rospy.wait_for_service(name, _ANSWER_S)
+        return rospy.ServiceProxy(name, service_type)(*args, **kwargs)
 
     def point_to(self, port: int) -> None:
         """Lets this namespace's nodes look for X-Plane on a port of this machine."""

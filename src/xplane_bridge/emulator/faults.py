@@ -21,10 +21,9 @@ import heapq
 import random
 import re
 from dataclasses import dataclass
-from typing import Generic, List, Optional, Tuple, TypeVar
+from typing import List, Optional, Tuple
 
-#: Where a datagram goes to; of no concern here.
-Target = TypeVar("Target")
+from .subscriptions import Address
 
 _DEFAULT_START_S = 5.0
 _TIME = re.compile(r"(\d+(?:\.\d*)?|\.\d+)(ms|s)?")
@@ -112,22 +111,22 @@ def _seconds(item: str, text: str) -> float:
     return float(match.group(1)) * (0.001 if match.group(2) == "ms" else 1.0)
 
 
-class FaultyChannel(Generic[Target]):
+class FaultyChannel:
     """Applies the plan to outgoing datagrams; hands them out when their time has come."""
 
     def __init__(self, plan: FaultPlan, seed: int) -> None:
         self.plan = plan
         self._random = random.Random(seed)
-        self._queue: List[Tuple[float, int, bytes, Target]] = []
+        self._queue: List[Tuple[float, int, bytes, Address]] = []
         self._count = 0
-        self._held: Optional[Tuple[bytes, Target]] = None
+        self._held: Optional[Tuple[bytes, Address]] = None
         self.active = any((plan.drop, plan.delay_s, plan.jitter_s, plan.duplicate, plan.reorder, plan.truncate))
 
     def loses_incoming(self) -> bool:
         """Whether the datagram that has just come is lost."""
         return self.plan.incoming_drop > 0.0 and self._random.random() < self.plan.incoming_drop
 
-    def put(self, now: float, datagram: bytes, target: Target) -> None:
+    def put(self, now: float, datagram: bytes, target: Address) -> None:
         """Takes a datagram that X-Plane sends at `now` [s]."""
         chance, plan = self._random.random, self.plan
         if chance() < plan.drop:
@@ -146,7 +145,7 @@ class FaultyChannel(Generic[Target]):
                 heapq.heappush(self._queue, (due, self._count, *item))
                 self._count += 1
 
-    def ready(self, now: float) -> List[Tuple[bytes, Target]]:
+    def ready(self, now: float) -> List[Tuple[bytes, Address]]:
         """Datagrams to send by now, in the order of their time."""
         out = []
         while self._queue and self._queue[0][0] <= now:

@@ -11,7 +11,7 @@ import errno
 import logging
 import socket
 from collections import Counter
-from typing import Callable, Dict, Optional, Tuple
+from typing import Callable, Dict, Optional
 
 import numpy as np
 
@@ -26,10 +26,6 @@ _RECEIVE_BUFFER = 4 << 20
 #: RREF requests X-Plane takes in one frame; more are lost (Laminar: up to about 148, clients send batches of 100).
 RREF_REQUESTS_PER_FRAME = 148
 BEACON_PERIOD_S = 1.0
-
-
-#: A datagram's target and the socket it leaves from.
-Route = Tuple[Address, socket.socket]
 
 
 class PortInUseError(OSError):
@@ -50,7 +46,7 @@ class Server:
         port: int,
         handlers: Dict[type, Callable],
         subscriptions: Subscriptions,
-        channel: FaultyChannel[Route],
+        channel: FaultyChannel,
         request_limit: int = RREF_REQUESTS_PER_FRAME,
     ) -> None:
         self.subscriptions = subscriptions
@@ -156,16 +152,15 @@ class Server:
 
     def send(self, now: float, packet: bytes, target: Address, source: Optional[socket.socket] = None) -> None:
         """Sends one datagram, through the faults if there are any."""
-        source = source or self._socket
         if self._channel.active:
-            self._channel.put(now, packet, (target, source))
+            self._channel.put(now, packet, target)
         else:
-            self._send_now(packet, target, source)
+            self._send_now(packet, target, source or self._socket)
 
     def flush_delayed(self, now: float) -> None:
         """Sends held-back datagrams whose time has come."""
-        for packet, (target, source) in self._channel.ready(now):
-            self._send_now(packet, target, source)
+        for packet, target in self._channel.ready(now):
+            self._send_now(packet, target, self._socket)
 
     def next_delayed(self) -> float:
         """When the next held-back datagram is due."""

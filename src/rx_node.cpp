@@ -1,0 +1,3 @@
+#include "xplane_bridge/rx_node.hpp"
+
+int main(int argc, char** argv) { return xplane_bridge::runNode<xplane_bridge::RxNode>(argc, argv, "rx_node"); }
