@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from contextlib import ExitStack
@@ -11,10 +12,11 @@ from typing import Any, Callable, Dict, List
 
 from xplane_bridge.harness.emulator import EmulatorProcess
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
-from xplane_bridge.harness.ros import RosMaster, roslaunch
+from xplane_bridge.harness.ros import RosMaster, free_port, roslaunch
 from xplane_bridge.topics import NAMESPACE
 
 _READY_TIMEOUT_S = 60.0
+_RECORDING = "flight.bag"
 _SILENCE_S = 10.0  # without a flight state for this long, a flight has failed
 
 
@@ -78,8 +80,9 @@ def fly(plan: FlightPlan, observer: Observer = _ignore, say: Callable[[str], Non
         HarnessError: A program failed, or flight states stopped coming.
     """
     plan.logs.mkdir(parents=True, exist_ok=True)
-    for old in (plan.bag, plan.bag.with_suffix(".bag.active"), plan.truth):
-        old.unlink() if old.exists() else None
+    for old in (plan.bag, plan.truth):
+        if old.exists():
+            old.unlink()
     with ExitStack() as stack:
         say("starting the emulator")
         options = ["--aircraft", plan.aircraft, "--truth", str(plan.truth.resolve()), *plan.emulator_options]
@@ -97,7 +100,9 @@ def fly(plan: FlightPlan, observer: Observer = _ignore, say: Callable[[str], Non
             port=emulator.port,
             transport=plan.transport,
             aircraft=plan.aircraft,
-            bag=plan.bag.resolve(),
+            data_port=free_port(socket.SOCK_DGRAM),
+            listen_for_beacon=False,
+            bag=_RECORDING,  # in ROS_HOME: a path with a space in it cannot be passed through a launch file
             **plan.launch_args,
         )
         stack.enter_context(bridge)
@@ -110,9 +115,11 @@ def fly(plan: FlightPlan, observer: Observer = _ignore, say: Callable[[str], Non
         bridge.stop()
         if bridge.returncode != 0:
             raise HarnessError(bridge.describe(f"ended with status {bridge.returncode}"))
-    if not plan.bag.is_file():
-        msg = f"{plan.bag} was not written; logs: {plan.logs}"
-        raise HarnessError(msg)
+        recording = master.ros_home / _RECORDING
+        if not recording.is_file():
+            msg = f"the recorder has not finished {recording}; logs: {plan.logs}"
+            raise HarnessError(msg)
+        recording.replace(plan.bag)
 
 
 def _wait_for_state(flight: RunningFlight) -> None:

@@ -17,9 +17,9 @@ from xplane_bridge.resources import clone_dir
 _MASTER_TIMEOUT_S = 30.0
 
 
-def free_tcp_port() -> int:
-    """A TCP port of the loopback interface that nobody uses now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
+    """A port of the loopback interface that nobody uses now: TCP, or UDP with `socket.SOCK_DGRAM`."""
+    with socket.socket(socket.AF_INET, kind) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
 
@@ -73,7 +73,8 @@ class RosMaster(ManagedProcess):
     _ATTEMPTS = 5  # of finding a port that nobody takes in the meantime
 
     def __init__(self, log_dir: Path) -> None:
-        self._ros_home = Path(log_dir).resolve() / "ros"
+        #: ROS_HOME of this master and of all that runs under it; nodes start in this folder.
+        self.ros_home = Path(log_dir).resolve() / "ros"
         self._base = ros_environment()
         #: ROS_MASTER_URI of this master; known after `start`.
         self.uri = ""
@@ -87,8 +88,8 @@ class RosMaster(ManagedProcess):
             "ROS_MASTER_URI": self.uri,
             "ROS_IP": "127.0.0.1",
             "ROS_HOSTNAME": "127.0.0.1",
-            "ROS_HOME": str(self._ros_home),
-            "ROS_LOG_DIR": str(self._ros_home / "log"),
+            "ROS_HOME": str(self.ros_home),
+            "ROS_LOG_DIR": str(self.ros_home / "log"),
             "PYTHONUNBUFFERED": "1",
         }
 
@@ -98,9 +99,9 @@ class RosMaster(ManagedProcess):
         Raises:
             HarnessError: It does not come up.
         """
-        self._ros_home.mkdir(parents=True, exist_ok=True)
+        self.ros_home.mkdir(parents=True, exist_ok=True)
         for attempt in range(self._ATTEMPTS):
-            port = free_tcp_port()
+            port = free_port()
             self.uri = f"http://127.0.0.1:{port}"
             self.command = ["roscore", "-p", str(port)]
             self._env = self.env
