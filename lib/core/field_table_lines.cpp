@@ -306,7 +306,7 @@ void addEngines(Lines& t) {
   add(XPB_FIELD(manifold_pressure, "Pa", 0).ref("sim/flightmodel/engine/ENGN_MPR[*]", kInchesOfMercury).row(43, 0, kInchesOfMercury).note("[?] unit of the dataref is not in the list; taken as inHg"));
   add(XPB_FIELD(engine_pressure_ratio, "-", 0).ref("sim/flightmodel/engine/ENGN_EPR[*]").row(44, 0));
   add(XPB_FIELD(torque, "N m", 0).ref("sim/flightmodel/engine/ENGN_TRQ[*]").row(36, 0, kFootPounds));
-  add(XPB_FIELD(thrust, "N", 0).ref("sim/flightmodel/engine/POINT_thrust[*]").row(35, 0, kPoundsForce).note("[?] unit of the dataref is not in the list; taken as N"));
+  add(XPB_FIELD(thrust, "N", 0).ref("sim/flightmodel/engine/POINT_thrust[*]").row(35, 0, kPoundsForce));
   add(XPB_FIELD(power, "W", 0).ref("sim/flightmodel/engine/ENGN_power[*]").row(34, 0, kHorsepower).note("[?] unit of the dataref is not in the list; taken as W"));
   add(XPB_FIELD(fuel_flow, "kg/s", 0).ref("sim/flightmodel/engine/ENGN_FF_[*]").row(45, 0, kPoundsPerHour));
   add(XPB_FIELD(itt, temperature, 0).ref("sim/flightmodel/engine/ENGN_ITT_c[*]").row(46, 0));
@@ -348,9 +348,9 @@ void addControls(Lines& t) {
   t.push_back(XPB_FIELD(augmentation_roll, "-1..1", S::kValidAugmentation).ref("sim/joystick/artstab_roll_ratio").row(10, 1));
   t.push_back(XPB_FIELD(augmentation_pitch, "-1..1", S::kValidAugmentation).ref("sim/joystick/artstab_pitch_ratio").row(10, 0));
   t.push_back(XPB_FIELD(augmentation_yaw, "-1..1", S::kValidAugmentation).ref("sim/joystick/artstab_heading_ratio").row(10, 2));
-  t.push_back(XPB_FIELD(total_roll, "-1..1", S::kValidTotal).ref("sim/cockpit2/controls/total_roll_ratio").row(11, 1).note("not in the 11.10 list, in 11.40's"));
-  t.push_back(XPB_FIELD(total_pitch, "-1..1", S::kValidTotal).ref("sim/cockpit2/controls/total_pitch_ratio").row(11, 0).note("as total_roll"));
-  t.push_back(XPB_FIELD(total_yaw, "-1..1", S::kValidTotal).ref("sim/cockpit2/controls/total_heading_ratio").row(11, 2).note("as total_roll"));
+  t.push_back(XPB_FIELD(total_roll, "-1..1", S::kValidTotal).ref("sim/cockpit2/controls/total_roll_ratio").row(11, 1).note("not in the 11.10 list, in that of 11.40"));
+  t.push_back(XPB_FIELD(total_pitch, "-1..1", S::kValidTotal).ref("sim/cockpit2/controls/total_pitch_ratio").row(11, 0).note("not in the 11.10 list, as total_roll"));
+  t.push_back(XPB_FIELD(total_yaw, "-1..1", S::kValidTotal).ref("sim/cockpit2/controls/total_heading_ratio").row(11, 2).note("not in the 11.10 list, as total_roll"));
   t.push_back(XPB_FIELD(trim_roll, "-1..1", S::kValidTrim).ref("sim/cockpit2/controls/aileron_trim").row(13, 1));
   t.push_back(XPB_FIELD(trim_pitch, "-1..1", S::kValidTrim).ref("sim/cockpit2/controls/elevator_trim").row(13, 0));
   t.push_back(XPB_FIELD(trim_yaw, "-1..1", S::kValidTrim).ref("sim/cockpit2/controls/rudder_trim").row(13, 2));
@@ -447,7 +447,7 @@ void addWarnings(Lines& t) {
   t.push_back(XPB_FIELD(stall, "0, 1", S::kValidFlight).ref("sim/cockpit2/annunciators/stall_warning").row(127, 6));
   t.push_back(XPB_FIELD(gear_unsafe, "0, 1", S::kValidFlight).ref("sim/cockpit2/annunciators/gear_unsafe").row(127, 5));
   t.push_back(XPB_FIELD(overspeed, "0, 1", S::kValidFlight).ref("sim/flightmodel/failures/over_vne"));
-  t.push_back(XPB_FIELD(crashed, "0, 1", S::kValidFlight).ref("sim/flightmodel2/misc/has_crashed").note("not in the 11.10 list, in 11.40's"));
+  t.push_back(XPB_FIELD(crashed, "0, 1", S::kValidFlight).ref("sim/flightmodel2/misc/has_crashed").note("not in the 11.10 list, in that of 11.40"));
 }
 
 void addFuel(Lines& t) {

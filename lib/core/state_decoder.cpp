@@ -7,6 +7,9 @@
 namespace xplane_bridge::core {
 namespace {
 
+/// A bit for each of 8 engines; larger numbers are no bit fields, and must not reach the cast.
+constexpr float kLargestBitfield = 255.0F;
+
 bool isMarkedUnused(float value) {
   std::uint32_t bits = 0;
   std::memcpy(&bits, &value, sizeof bits);
@@ -59,12 +62,12 @@ StateDecoder::StateDecoder(FieldGroup group, Transport transport, XPlaneVersion 
                           row.conversion.offset});
       }
     }
-    // Requests are in the table's order, so those of this field are next.
     const bool newer = field.dataref.path12 != nullptr && version == XPlaneVersion::k12;
     const Conversion& conversion = newer ? field.dataref.conversion12 : field.dataref.conversion;
+    // Requests are in the table's order, so those of this field are next.
     while (next_request < requests_.size() && requests_[next_request].field == &field) {
       steps_.push_back({requests_[next_request].element, false, false, false, static_cast<std::int32_t>(next_request),
-                        field.dataref.conversion.factor, conversion.offset});
+                        conversion.factor, conversion.offset});
       ++next_request;
     }
     plan.count = steps_.size() - plan.first;
@@ -82,7 +85,8 @@ double StateDecoder::read(const Step& step, const std::vector<float>& dataref_va
   if (rows == nullptr || !rows->has(row) || rows->receiveTime(row) < oldest_ns) return kNaN;
   const float value = rows->value(row, static_cast<std::size_t>(step.source) % kDataSlots);
   if (!std::isfinite(value) || (step.may_be_blank && isMarkedUnused(value))) return kNaN;
-  if (step.bitfield) return (static_cast<std::uint32_t>(std::max(value, 0.0F)) >> step.element) & 1U;
+  if (step.bitfield)
+    return (static_cast<std::uint32_t>(std::clamp(value, 0.0F, kLargestBitfield)) >> step.element) & 1U;
   return static_cast<double>(value) * step.factor + step.offset;
 }
 

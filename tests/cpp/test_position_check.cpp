@@ -83,7 +83,9 @@ TEST(PositionCheck, ChangesItsMind) {
     const Vector3d here(i, 0.0, 500.0);
     check.addComputed(kThere.geoPoint(here));
     check.addReference(kThere.geoPoint(here + Vector3d(0, 0, i < 200 ? 0.0 : 1.0)));
-    if (i == 199) EXPECT_EQ(check.verdict(), PositionCheck::Verdict::kAgrees);
+    if (i == 199) {
+      EXPECT_EQ(check.verdict(), PositionCheck::Verdict::kAgrees);
+    }
   }
   EXPECT_EQ(check.verdict(), PositionCheck::Verdict::kDisagrees);
 }

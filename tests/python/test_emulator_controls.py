@@ -198,6 +198,11 @@ def test_engines_obey_thro_use_only_under_the_override(bench):
     emulator.write({OVERRIDE + "throttles": 0.0})
     emulator.step(2)
     assert emulator.read(THRO_USE) == [pytest.approx(lever)]
+    emulator.write(
+        {OVERRIDE + "throttles": 1.0}
+    )  # a new override starts from what the engines have, not from the old one
+    emulator.step(2)
+    assert emulator.read(THRO_USE) == [pytest.approx(lever)]
 
 
 def test_throttle_override_of_one_engine_is_released_by_minus_two(bench):
@@ -354,10 +359,11 @@ def test_attitude_and_velocity_are_set_by_their_datarefs(bench):
     emulator.write({f"{POSITION}q[{i}]": value for i, value in enumerate(q)})
     emulator.write({POSITION + "local_vx": 42.4264, POSITION + "local_vy": 0.0, POSITION + "local_vz": -42.4264})
     emulator.step()
-    phi, theta, psi, vx = emulator.read(*(POSITION + name for name in ("phi", "theta", "psi", "local_vx")))
+    names = ("phi", "theta", "psi", "local_vx", "local_vz")
+    phi, theta, psi, vx, vz = emulator.read(*(POSITION + name for name in names))
     assert phi == pytest.approx(30.0, abs=0.1)
     assert psi == pytest.approx(45.0, abs=0.1)
-    assert vx == pytest.approx(42.4264, abs=0.01)
+    assert (vx, vz) == (pytest.approx(42.4264, abs=0.01), pytest.approx(-42.4264, abs=0.01))
     assert theta == pytest.approx(0.0, abs=0.1)
 
 

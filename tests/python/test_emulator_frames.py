@@ -154,6 +154,21 @@ def test_velocity_is_the_derivative_of_the_local_position(bench):
     assert measured == pytest.approx((velocity + np.array(frame.velocity)) / 2, abs=0.02)
 
 
+def test_acceleration_is_the_derivative_of_the_local_velocity(bench):
+    emulator = bench(
+        aircraft="fixed_wing", initial=InitialState(latitude_deg=37.9, longitude_deg=126.4, heading_deg=40.0)
+    )
+    emulator.write({"sim/operation/override/override_joystick": 1.0, "sim/joystick/yoke_pitch_ratio": 0.3})
+    emulator.write({"sim/joystick/yoke_roll_ratio": 0.3})
+    emulator.step(60)
+    frame = emulator.sim.frame
+    before, acceleration = np.array(frame.velocity), np.array(frame.acceleration)
+    emulator.step(1)
+    measured = (np.array(frame.velocity) - before) * 60.0
+    assert float(np.linalg.norm(measured)) > 2.0
+    assert measured == pytest.approx((acceleration + np.array(frame.acceleration)) / 2, abs=0.15)
+
+
 def test_origin_jumps_at_the_whole_degree_and_the_place_does_not(bench):
     emulator = bench(initial=InitialState(latitude_deg=37.998, longitude_deg=126.2, heading_deg=0.0), fps=60.0)
     client = emulator.client()

@@ -284,12 +284,13 @@ def test_cmnd_gear_flaps_and_views(bench):
     client = emulator.client()
     for command in ("flight_controls/landing_gear_up", "flight_controls/flaps_down", "view/chase"):
         client.send(protocol.CommandRequest("sim/" + command))
-    gear, flaps, external = emulator.read(
+    values = emulator.read(
         "sim/cockpit2/controls/gear_handle_down",
         "sim/cockpit2/controls/flap_ratio",
+        "sim/graphics/view/view_type",
         "sim/graphics/view/view_is_external",
     )
-    assert (gear, flaps, external) == (0.0, 0.25, 1.0)
+    assert values == [0.0, 0.25, 1017.0, 1.0]
 
 
 # --- pause ---

@@ -40,17 +40,24 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         if options.stepped == "lines":
             raise KeyboardInterrupt  # reading a line is not interrupted otherwise
 
-    with contextlib.suppress(KeyboardInterrupt):
+    failed = 0
+    try:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, stop)
         print("READY " + json.dumps(emulator.describe()), flush=True)
         emulator.run()
+    except KeyboardInterrupt:
+        pass
+    except OSError as error:  # the port was taken while a restart was played
+        print(f"xplane_emulator: {error.strerror or error}", file=sys.stderr)
+        failed = 1
     emulator.close()
     statistics = emulator.statistics()
     if view is not None:
         statistics["pictures_dropped"] = view.close()
-    print("STOPPED " + json.dumps(statistics), flush=True)
-    return 0
+    with contextlib.suppress(BrokenPipeError):  # whoever started it does not listen any more
+        print("STOPPED " + json.dumps(statistics), flush=True)
+    return failed
 
 
 def _open_view(options: Options, emulator: Emulator) -> Optional[CockpitView]:

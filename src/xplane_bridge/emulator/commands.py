@@ -13,22 +13,21 @@ _FLAP_STEP = 0.25
 _TRIM_STEP = 0.01
 _THROTTLE_STEP = 0.05
 
-#: [?] View commands: (view_type, external, head heading, head pitch). The numbers of view_type are in no list of
-#: datarefs; what a client can rely on is that they differ, and the head angles.
-VIEWS: Dict[str, Tuple[int, bool, float, float]] = {
-    "default_view": (1000, False, 0.0, 0.0),
-    "forward_with_2d_panel": (1000, False, 0.0, 0.0),
-    "forward_with_hud": (1023, False, 0.0, 0.0),
-    "forward_with_nothing": (1024, False, 0.0, 0.0),
-    "3d_cockpit_cmnd_look": (1026, False, 0.0, 0.0),
-    "glance_left": (1026, False, -45.0, 0.0),
-    "glance_right": (1026, False, 45.0, 0.0),
-    "chase": (1017, True, 0.0, 0.0),
-    "circle": (1018, True, 0.0, 0.0),
-    "tower": (1014, True, 0.0, 0.0),
-    "runway": (1015, True, 0.0, 0.0),
-    "still_spot": (1020, True, 0.0, 0.0),
-    "linear_spot": (1021, True, 0.0, 0.0),
+#: View commands: (view_type, whether external). The numbers are in no list of Laminar's; X-Plane plugins use these.
+VIEWS: Dict[str, Tuple[int, bool]] = {
+    "default_view": (1000, False),
+    "forward_with_2d_panel": (1000, False),
+    "forward_with_hud": (1023, False),
+    "forward_with_nothing": (1024, False),
+    "3d_cockpit_cmnd_look": (1026, False),
+    "tower": (1014, True),
+    "runway": (1015, True),
+    "chase": (1017, True),
+    "circle": (1018, True),
+    "still_spot": (1020, True),
+    "linear_spot": (1021, True),
+    "free_camera": (1028, True),
+    "ridealong": (1031, True),
 }
 
 
@@ -91,13 +90,14 @@ def commands(sim: Simulator) -> Dict[str, Callable[[], None]]:
     for engine in range(sim.model.info.engine_count):
         table[f"sim/starters/engage_starter_{engine + 1}"] = lambda i=engine: sim.run_engine(i, True)
         table[f"sim/magnetos/magnetos_off_{engine + 1}"] = lambda i=engine: sim.run_engine(i, False)
-    for name, (view, external, heading, pitch) in VIEWS.items():
-        table[f"sim/view/{name}"] = lambda v=(view, external, heading, pitch): _look(sim, *v)
+    for name, (view, external) in VIEWS.items():
+        table[f"sim/view/{name}"] = lambda view=view, external=external: _look(sim, view, external)
     return table
 
 
-def _look(sim: Simulator, view: int, external: bool, heading: float, pitch: float) -> None:
+def _look(sim: Simulator, view: int, external: bool) -> None:
+    """A new view, straight ahead."""
     sim.store.set(_VIEW + "view_type", view)
     sim.store.set(_VIEW + "view_is_external", float(external))
-    sim.store.set(_VIEW + "pilots_head_psi", heading)
-    sim.store.set(_VIEW + "pilots_head_the", pitch)
+    sim.store.set(_VIEW + "pilots_head_psi", 0.0)
+    sim.store.set(_VIEW + "pilots_head_the", 0.0)

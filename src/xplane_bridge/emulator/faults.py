@@ -21,9 +21,10 @@ import heapq
 import random
 import re
 from dataclasses import dataclass
-from typing import List, Optional, Tuple
+from typing import Generic, List, Optional, Tuple, TypeVar
 
-from .subscriptions import Address
+#: Where a datagram goes to; of no concern here.
+Target = TypeVar("Target")
 
 _DEFAULT_START_S = 5.0
 _TIME = re.compile(r"(\d+(?:\.\d*)?|\.\d+)(ms|s)?")
@@ -111,22 +112,22 @@ def _seconds(item: str, text: str) -> float:
     return float(match.group(1)) * (0.001 if match.group(2) == "ms" else 1.0)
 
 
-class FaultyChannel:
+class FaultyChannel(Generic[Target]):
     """Applies the plan to outgoing datagrams; hands them out when their time has come."""
 
     def __init__(self, plan: FaultPlan, seed: int) -> None:
         self.plan = plan
         self._random = random.Random(seed)
-        self._queue: List[Tuple[float, int, bytes, Address]] = []
+        self._queue: List[Tuple[float, int, bytes, Target]] = []
         self._count = 0
-        self._held: Optional[Tuple[bytes, Address]] = None
+        self._held: Optional[Tuple[bytes, Target]] = None
         self.active = any((plan.drop, plan.delay_s, plan.jitter_s, plan.duplicate, plan.reorder, plan.truncate))
 
     def loses_incoming(self) -> bool:
         """Whether the datagram that has just come is lost."""
         return self.plan.incoming_drop > 0.0 and self._random.random() < self.plan.incoming_drop
 
-    def put(self, now: float, datagram: bytes, target: Address) -> None:
+    def put(self, now: float, datagram: bytes, target: Target) -> None:
         """Takes a datagram that X-Plane sends at `now` [s]."""
         chance, plan = self._random.random, self.plan
         if chance() < plan.drop:
@@ -145,7 +146,7 @@ class FaultyChannel:
                 heapq.heappush(self._queue, (due, self._count, *item))
                 self._count += 1
 
-    def ready(self, now: float) -> List[Tuple[bytes, Address]]:
+    def ready(self, now: float) -> List[Tuple[bytes, Target]]:
         """Datagrams to send by now, in the order of their time."""
         out = []
         while self._queue and self._queue[0][0] <= now:

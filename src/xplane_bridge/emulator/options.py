@@ -58,6 +58,7 @@ class Options:
     strip: bool = True
     swap_log: Optional[Path] = None
     fault: FaultPlan = field(default_factory=FaultPlan)
+    realtime: bool = True  #: whether to ask for real-time priority
     verbose: bool = False
 
 
@@ -120,6 +121,12 @@ def _parser() -> argparse.ArgumentParser:
         const="lines",
         choices=("lines", "fast"),
         help="not in real time: frames on request by lines on stdin, or as fast as it goes (needs --duration)",
+    )
+    loop.add_argument(
+        "--priority",
+        choices=("realtime", "normal"),
+        default="realtime",
+        help="real-time priority where the system grants it, so that frames are punctual on a busy machine (default)",
     )
     loop.add_argument("--pipeline-delay", default="0", metavar="TIME", help="picture later than its packets, 0..200ms")
     loop.add_argument("--truth", type=Path, metavar="FILE", help="CSV of every frame, in doubles")
@@ -255,6 +262,7 @@ def _options(given: argparse.Namespace) -> Options:
         strip=given.strip,
         swap_log=given.swap_log,
         fault=fault,
+        realtime=given.priority == "realtime",
         verbose=given.verbose,
     )
 

@@ -11,7 +11,7 @@ import errno
 import logging
 import socket
 from collections import Counter
-from typing import Callable, Dict, Optional
+from typing import Callable, Dict, Optional, Tuple
 
 import numpy as np
 
@@ -26,6 +26,10 @@ _RECEIVE_BUFFER = 4 << 20
 #: RREF requests X-Plane takes in one frame; more are lost (Laminar: up to about 148, clients send batches of 100).
 RREF_REQUESTS_PER_FRAME = 148
 BEACON_PERIOD_S = 1.0
+
+
+#: A datagram's target and the socket it leaves from.
+Route = Tuple[Address, socket.socket]
 
 
 class PortInUseError(OSError):
@@ -46,7 +50,7 @@ class Server:
         port: int,
         handlers: Dict[type, Callable],
         subscriptions: Subscriptions,
-        channel: FaultyChannel,
+        channel: FaultyChannel[Route],
         request_limit: int = RREF_REQUESTS_PER_FRAME,
     ) -> None:
         self.subscriptions = subscriptions
@@ -152,15 +156,16 @@ class Server:
 
     def send(self, now: float, packet: bytes, target: Address, source: Optional[socket.socket] = None) -> None:
         """Sends one datagram, through the faults if there are any."""
+        source = source or self._socket
         if self._channel.active:
-            self._channel.put(now, packet, target)
+            self._channel.put(now, packet, (target, source))
         else:
-            self._send_now(packet, target, source or self._socket)
+            self._send_now(packet, target, source)
 
     def flush_delayed(self, now: float) -> None:
         """Sends held-back datagrams whose time has come."""
-        for packet, target in self._channel.ready(now):
-            self._send_now(packet, target, self._socket)
+        for packet, (target, source) in self._channel.ready(now):
+            self._send_now(packet, target, source)
 
     def next_delayed(self) -> float:
         """When the next held-back datagram is due."""

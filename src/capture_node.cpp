@@ -1,0 +1,5 @@
+#include "xplane_bridge/capture_node.hpp"
+
+int main(int argc, char** argv) {
+  return xplane_bridge::runNode<xplane_bridge::CaptureNode>(argc, argv, "capture_node");
+}

@@ -1,0 +1,277 @@
+"""capture_node with rx_node, the emulator's window and a screen of the tests' own."""
+
+from __future__ import annotations
+
+import csv
+import math
+import socket
+from pathlib import Path
+from typing import Iterator
+
+import numpy as np
+import pytest
+
+from xplane_bridge import protocol
+from xplane_bridge.emulator.renderer import read_strip
+from xplane_bridge.harness import HarnessError, wait_until
+from xplane_bridge.harness.display import VirtualDisplay
+
+FOCAL_60_DEG = 554.256  # 320 / tan(30 deg)
+HEAD_PSI = "sim/graphics/view/pilots_head_psi"
+HEAD_THE = "sim/graphics/view/pilots_head_the"
+FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
+#: Longer than any drawing here takes, so that pictures appear when they are due.
+PIPELINE_DELAY_S = 0.15
+FPS = 20
+
+
+@pytest.fixture(scope="module")
+def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with VirtualDisplay(tmp_path_factory.mktemp("display")) as server:
+        yield server.display
+
+
+@pytest.fixture(autouse=True)
+def _screen(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DISPLAY", display)
+
+
+def window(world, *options: str):
+    """Starts the emulator with its window."""
+    return world.emulator("--window", "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", *options)
+
+
+def capture(world, display: str, **params: object):
+    return world.start("capture_node", {"window": {"display": display, "search_period": 0.05}, **params})
+
+
+def pixels(image) -> np.ndarray:
+    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
+
+
+def write_dataref(port: int, path: str, value: float) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(protocol.DrefWrite(path, value).encode(), ("127.0.0.1", port))
+
+
+def topics() -> dict:
+    from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+    from xplane_bridge.msg import FrameState
+
+    return {
+        "image": ("camera/image_raw", Image),
+        "jpeg": ("camera/image_raw/compressed", CompressedImage),
+        "info": ("camera/camera_info", CameraInfo),
+        "state": ("camera/frame_state", FrameState),
+    }
+
+
+def watch(world, *names: str) -> list:
+    known = topics()
+    return [world.watch(*known[name]) for name in names]
+
+
+def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, tmp_path: Path) -> None:
+    from xplane_bridge.msg import FrameState
+
+    swaps = tmp_path / "swaps.csv"
+    emulator = window(world, "--swap-log", swaps)
+    world.set_param("display_delay", PIPELINE_DELAY_S)
+    world.start("rx_node")
+    capture(world, display)
+    images, infos, states = watch(world, "image", "info", "state")
+    states.wait_for(lambda state: state.quality == 0, what="a perfectly paired picture")
+    first = len(images.messages)
+    images.wait_for_count(100, timeout=60.0)
+    wait_until(lambda: len(states.messages) > first + 100, 10.0, "states of the pictures")
+    emulator.stop()
+
+    by_stamp = {state.header.stamp: state for state in states.messages}
+    assert len(by_stamp) == len(states.messages)
+    info_by_stamp = {info.header.stamp: info for info in infos.messages}
+    taken = images.messages[first : first + 100]
+    frames = [read_strip(pixels(image)) for image in taken]
+    assert all(b.frame > a.frame for a, b in zip(frames, frames[1:])), "a picture came twice"
+
+    with swaps.open() as file:
+        late = {int(row["frame"]): _lateness(row) for row in csv.DictReader(file)}
+    compared = 0
+    for image, shown in zip(taken, frames):
+        assert (image.width, image.height, image.encoding, image.step) == (640, 480, "bgr8", 1920)
+        assert image.header.frame_id == "camera_forward_optical"
+        info, state = info_by_stamp[image.header.stamp], by_stamp[image.header.stamp]
+        assert info.header.frame_id == state.header.frame_id == image.header.frame_id
+        assert pytest.approx((FOCAL_60_DEG, 0, 319.5, 0, FOCAL_60_DEG, 239.5, 0, 0, 1), abs=5e-4) == info.K
+        assert state.view == FrameState.VIEW_FORWARD
+        assert state.field_of_view_deg == pytest.approx(60.0, abs=1e-3)
+        assert state.display_delay == pytest.approx(PIPELINE_DELAY_S)
+        assert not state.quality & FrameState.QUALITY_STATE_MISSING
+        assert not state.quality & FrameState.QUALITY_INTERPOLATED
+        assert state.grab_time >= state.display_time
+        # A picture that appeared late because the machine was busy says nothing about the pairing.
+        if abs(late[shown.frame]) > 0.2 / FPS or state.quality:
+            continue
+        compared += 1
+        assert state.state.sim_time == np.float32(shown.sim_time), f"frame {shown.frame}"
+        assert state.sim_time_error == pytest.approx(0.0, abs=1e-6)
+    assert compared >= 50
+
+
+def _lateness(row: dict) -> float:
+    """How much later than due a picture was shown [s]; the log has frame times on the monotonic clock."""
+    import time
+
+    offset = time.time_ns() - time.monotonic_ns()
+    return (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9 - PIPELINE_DELAY_S
+
+
+def test_views_and_field_of_view_are_read_back(world, display) -> None:
+    from xplane_bridge.msg import FrameState
+
+    emulator = window(world)
+    capture(world, display)
+    infos, states = watch(world, "info", "state")
+    states.wait_for(lambda state: state.view == FrameState.VIEW_FORWARD)
+    write_dataref(emulator.port, HEAD_PSI, 180.0)
+    state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_REAR)
+    assert state.header.frame_id == "camera_rear_optical"
+    write_dataref(emulator.port, HEAD_PSI, 0.0)
+    write_dataref(emulator.port, HEAD_THE, -90.0)
+    state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_DOWN)
+    assert state.header.frame_id == "camera_down_optical"
+    write_dataref(emulator.port, HEAD_THE, -30.0)
+    state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_UNKNOWN)
+    assert state.quality & FrameState.QUALITY_VIEW_UNKNOWN
+    write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
+    state = states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3)
+    assert not state.quality & FrameState.QUALITY_FOV_ASSUMED
+    info = infos.wait_for_next()
+    assert info.K[0] == pytest.approx(320.0, abs=1e-3)  # 320 / tan(45 deg)
+
+
+def test_three_static_frames(world, display) -> None:
+    from tf2_msgs.msg import TFMessage
+
+    capture(world, display)
+    static = world.watch("/tf_static", TFMessage)
+    expected = {  # rotation from the optical frame to base_link, by hand: (x, y, z, w)
+        "camera_forward_optical": (0.5, -0.5, 0.5, -0.5),
+        "camera_rear_optical": (0.5, 0.5, -0.5, -0.5),
+        "camera_down_optical": (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0),
+    }
+
+    def has_all(message: TFMessage) -> bool:
+        return {transform.child_frame_id for transform in message.transforms} >= set(expected)
+
+    for transform in static.wait_for(has_all).transforms:
+        assert transform.header.frame_id == "base_link"
+        q = transform.transform.rotation
+        got, wanted = np.array((q.x, q.y, q.z, q.w)), np.array(expected[transform.child_frame_id])
+        assert min(np.abs(got - wanted).max(), np.abs(got + wanted).max()) < 1e-9, transform.child_frame_id
+
+
+def test_one_advertiser_of_compressed_and_it_decodes(world, display) -> None:
+    import cv2
+    import rosgraph
+
+    window(world)
+    capture(world, display)
+    (jpegs,) = watch(world, "jpeg")
+    message = jpegs.wait_for()
+    assert "jpeg" in message.format
+    decoded = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+    assert decoded.shape == (480, 640, 3)
+    read_strip(decoded)
+    publishers = dict(rosgraph.Master("/tests").getSystemState()[0])
+    assert publishers[f"{world.namespace}/camera/image_raw/compressed"] == [f"{world.namespace}/capture_node"]
+
+
+def test_lost_window_is_said_and_found_again(world, display) -> None:
+    emulator = window(world)
+    node = capture(world, display)
+    images, states = watch(world, "image", "state")
+    images.wait_for()
+    emulator.kill()
+    status = world.wait_for_diagnostics("capture", lambda status: status.level == 2, timeout=30.0)
+    assert "X-System" in status.message
+    emulator.restart()
+    images.wait_for_next(timeout=30.0)
+    states.wait_for_next(timeout=30.0)
+    node.check_running()
+
+
+def test_works_alone_on_any_window(world, display) -> None:
+    from xplane_bridge.msg import FrameState
+
+    emulator = window(world)
+    world.point_to(9)  # nothing answers there
+    capture(world, display, field_of_view_deg=90.0, max_wait=0.05)
+    images, states = watch(world, "image", "state")
+    images.wait_for()
+    state = states.wait_for()
+    wanted = (
+        FrameState.QUALITY_STATE_MISSING
+        | FrameState.QUALITY_VIEW_UNKNOWN
+        | FrameState.QUALITY_FOV_ASSUMED
+        | FrameState.QUALITY_DELAY_ASSUMED
+    )
+    assert state.quality & wanted == wanted
+    assert state.state.valid == 0
+    assert math.isnan(state.state.latitude)
+    assert math.isnan(state.sim_time_error)
+    assert state.field_of_view_deg == pytest.approx(90.0)
+    assert emulator.running
+
+
+def test_field_of_view_is_set_and_given_back(world, display) -> None:
+    emulator = window(world)
+    write_dataref(emulator.port, FIELD_OF_VIEW, 72.0)
+    node = capture(world, display, field_of_view_deg=40.0, set_field_of_view=True)
+    (states,) = watch(world, "state")
+    states.wait_for(lambda state: abs(state.field_of_view_deg - 40.0) < 1e-3, timeout=30.0)
+    node.stop()
+    capture(world, display, field_of_view_deg=40.0, set_field_of_view=False)
+    states.wait_for_next(lambda state: abs(state.field_of_view_deg - 72.0) < 1e-3, timeout=30.0)
+
+
+def test_states_below_the_frame_rate_are_interpolated(world, display) -> None:
+    from xplane_bridge.msg import FrameState
+
+    window(world)
+    world.set_param("display_delay", PIPELINE_DELAY_S)
+    world.start("rx_node", {"max_publish_rate": 5.0})
+    capture(world, display)
+    (states,) = watch(world, "state")
+    state = states.wait_for(lambda state: state.quality & FrameState.QUALITY_INTERPOLATED, timeout=30.0)
+    assert state.state.sim_time == pytest.approx(state.frame_sim_time, abs=2e-3)
+    assert state.sim_time_error == 0.0
+
+
+@pytest.mark.parametrize(
+    ("params", "text"),
+    [
+        ({"max_rate": -1.0}, "max_rate"),
+        ({"fit": "zoom"}, "crop"),
+        ({"window": {"title": "a", "class": "b"}}, "exactly one"),
+        ({"window": {"region": [1, 2, 3]}}, "region"),
+        ({"source": "video"}, "address"),
+        ({"widht": 320}, "width"),
+    ],
+)
+def test_wrong_parameters_are_refused_in_words(world, params: dict, text: str) -> None:
+    node = world.start("capture_node", params)
+    assert node.wait(20.0) == 1
+    assert text in node.output()
+
+
+def test_scaled_output(world, display) -> None:
+    window(world)
+    capture(world, display, width=320, height=160, fit="crop", max_rate=10.0)
+    images, infos = watch(world, "image", "info")
+    image, info = images.wait_for(), infos.wait_for()
+    assert pixels(image).shape == (160, 320, 3)
+    # 640x480 cropped to 640x320, halved: f = 554.256 / 2.
+    assert info.K[0] == pytest.approx(FOCAL_60_DEG / 2, abs=5e-4)
+    assert info.K[5] == pytest.approx(79.5)
+    with pytest.raises(HarnessError):
+        images.wait_for_count(60, timeout=3.0)  # at most 30 in that time
