@@ -7,7 +7,7 @@ set(XPLANE_BRIDGE_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. ad
 # xplane_bridge_configure_target(<target>): C++17 without extensions, the project's warnings, the chosen sanitizers.
 function(xplane_bridge_configure_target target)
   target_compile_features(${target} PUBLIC cxx_std_17)
-  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(${target} PROPERTIES CXX_STANDARD 17 CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast -Wnon-virtual-dtor
     -Woverloaded-virtual -Wcast-align -Wformat=2

@@ -294,7 +294,8 @@ bool DataOutput::forget(const std::string& id) {
   }
 }
 
-void DataOutput::undoEntry(const JournalEntry& entry, double timeout_s, std::function<void(bool)> done, int attempt) {
+void DataOutput::undoEntry(const JournalEntry& entry, double timeout_s, const std::function<void(bool)>& done,
+                           int attempt) {
   constexpr int kAttempts = 2;  // a datagram may be lost
   std::vector<std::string> paths;
   std::vector<float> expected;

@@ -46,9 +46,10 @@ RrefSubscription::RrefSubscription(RrefGroup group) : group_(std::move(group)), 
     std::array<std::uint8_t, kRrefRequestSize> buffer;
     const EncodeResult encoded = encodeRref(buffer, path, group_.rate_hz, 0);
     if (!encoded.ok()) {
-      throw std::invalid_argument(name + "'" + path + "' is no dataref (" + toString(encoded.error()) +
-                                  "); expected a path such as sim/time/paused or sim/x/y[3], at most " +
-                                  std::to_string(kRrefPathSize - 1) + " characters");
+      throw std::invalid_argument(
+          std::string(name).append("'").append(path).append("' is no dataref (").append(toString(encoded.error())) +
+          "); expected a path such as sim/time/paused or sim/x/y[3], at most " + std::to_string(kRrefPathSize - 1) +
+          " characters");
     }
   }
   patience_ns_ = std::max(kMinPatienceNs, kPeriodsMissed * kNanosecondsPerSecond / group_.rate_hz);

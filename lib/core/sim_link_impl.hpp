@@ -16,7 +16,21 @@
 
 namespace xplane_bridge::core {
 
-/// The loop of SimLink. Functions under "any thread" lock; everything else belongs to the thread that calls step().
+/// Datarefs of the link's own subscription; the index is the position.
+constexpr const char* kStatusDatarefs[] = {"sim/version/xplane_internal_version", "sim/time/paused",
+                                           "sim/time/total_running_time_sec"};
+constexpr std::int32_t kVersionIndex = 0;
+constexpr std::int32_t kPausedIndex = 1;
+constexpr std::int32_t kSimTimeIndex = 2;
+constexpr std::int32_t kFirstReadIndex = 1000;  ///< of one-shot reads, on the same socket
+
+inline std::int64_t nanoseconds(double seconds) {
+  return static_cast<std::int64_t>(seconds * static_cast<double>(kNanosecondsPerSecond));
+}
+
+/// The loop of SimLink. Its parts: sim_link_impl.cpp (life cycle, calls of any thread), sim_link_receive.cpp (what
+/// arrives), sim_link_upkeep.cpp (what is due), sim_link_status.cpp (what is said). Functions under "any thread" lock;
+/// everything else belongs to the thread that calls step().
 class SimLink::Impl {
  public:
   Impl(SimLinkOptions options, SimLinkCallbacks callbacks, Clock clock, LogFunction log, JournalFactory journals);

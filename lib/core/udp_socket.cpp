@@ -72,6 +72,18 @@ bool isSameHost(std::uint32_t a, std::uint32_t b) {
   return a == b || ((a >> 24) == kLoopbackNet && (b >> 24) == kLoopbackNet);
 }
 
+UdpCounters& UdpCounters::operator+=(const UdpCounters& more) {
+  received += more.received;
+  received_bytes += more.received_bytes;
+  truncated += more.truncated;
+  dropped += more.dropped;
+  sent += more.sent;
+  sent_bytes += more.sent_bytes;
+  send_failures += more.send_failures;
+  refused += more.refused;
+  return *this;
+}
+
 std::uint32_t resolveHost(const std::string& host) {
   addrinfo hints{};
   hints.ai_family = AF_INET;

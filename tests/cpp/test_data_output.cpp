@@ -75,7 +75,7 @@ TEST_F(DataOutputTest, SetsRowsRateAndTargetAndPutsThemBack) {
 
 TEST_F(DataOutputTest, NothingIsChangedBeforeItIsWrittenDown) {
   FakeXPlane sim;
-  std::filesystem::create_directories(journalFile(sim));  // a folder where the file should be
+  std::filesystem::create_directories(journalFile(sim) + ".new");  // where the file has to be written first
   makeLink(withRows(sim, {17}));
   run(3.0, {&sim});
   EXPECT_FALSE(isSelected(&sim, 17));

@@ -72,7 +72,7 @@ class DataOutput {
   bool forget(const std::string& id);
   /// The entry that an earlier run, or an earlier link of this one, has left.
   std::optional<JournalEntry> previousEntry() const;
-  void undoEntry(const JournalEntry& entry, double timeout_s, std::function<void(bool)> done, int attempt = 0);
+  void undoEntry(const JournalEntry& entry, double timeout_s, const std::function<void(bool)>& done, int attempt = 0);
 
   DataOutputOptions options_;
   double read_timeout_s_;

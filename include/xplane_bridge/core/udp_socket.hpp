@@ -67,6 +67,8 @@ struct UdpCounters {
   std::uint64_t sent_bytes = 0;
   std::uint64_t send_failures = 0;  ///< datagrams the kernel refused to send
   std::uint64_t refused = 0;        ///< ICMP "port unreachable": the computer is there, nothing listens on the port
+
+  UdpCounters& operator+=(const UdpCounters& more);
 };
 
 /// What came with a datagram.

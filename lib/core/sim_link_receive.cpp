@@ -1,0 +1,222 @@
+#include "sim_link_impl.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace xplane_bridge::core {
+namespace {
+
+constexpr int kMaxDatagramsAtOnce = 64;  // of one socket, before the others have their turn
+constexpr std::int64_t kRposSilenceNs = 500 * kNanosecondsPerMillisecond;
+
+}  // namespace
+
+void SimLink::Impl::waitForInput(int timeout_ms) {
+  poll_.clear();
+  poll_.push_back({wake_fd_, POLLIN, 0});
+  poll_.push_back({control_socket_->fd(), POLLIN, 0});
+  for (const SocketPtr& socket : {beacon_socket_, data_socket_, rpos_socket_}) {
+    if (socket != nullptr) {
+      poll_.push_back({socket->fd(), POLLIN, 0});
+    }
+  }
+  for (const Group& group : groups_) {
+    poll_.push_back({group.socket->fd(), POLLIN, 0});
+  }
+  poll(poll_.data(), poll_.size(), timeout_ms);
+  if ((poll_[0].revents & POLLIN) != 0) {
+    std::uint64_t count = 0;
+    [[maybe_unused]] const ssize_t size = ::read(wake_fd_, &count, sizeof(count));
+  }
+}
+
+void SimLink::Impl::runCommands() {
+  std::vector<std::function<void()>> commands;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    commands.swap(commands_);
+  }
+  for (const std::function<void()>& command : commands) {
+    command();
+  }
+}
+
+template <typename Handler>
+void SimLink::Impl::drain(UdpSocket* socket, const Handler& handle) {
+  if (socket == nullptr) {
+    return;
+  }
+  Received received;
+  for (int i = 0; i < kMaxDatagramsAtOnce; ++i) {
+    if (socket->receive(buffer_, &received) != ReceiveStatus::kReceived) {
+      return;
+    }
+    handle(ByteView(buffer_.data(), received.size), received);
+  }
+}
+
+bool SimLink::Impl::isFromPeer(const Received& received) {
+  // By address only: X-Plane may answer from another port than the one it listens on.
+  if (peer_.valid() && isSameHost(received.from.address, peer_.address)) {
+    return true;
+  }
+  ++live_counters_.strangers;
+  return false;
+}
+
+void SimLink::Impl::heardPeer() {
+  monitor_.heard(now_ns_);
+  last_heard_ns_ = now_ns_;
+}
+
+ReceiveInfo SimLink::Impl::infoOf(const Received& received) {
+  ReceiveInfo info;
+  info.kernel_stamp = received.kernel_stamp_ns != 0;
+  info.stamp_ns = info.kernel_stamp ? received.kernel_stamp_ns : clock_.system_ns();
+  info.steady_ns = now_ns_;
+  info.link_epoch = monitor_.epoch();
+  info.from = received.from;
+  return info;
+}
+
+void SimLink::Impl::countDecodeError(DecodeError error) {
+  ++live_counters_.decode_errors[static_cast<std::size_t>(error)];
+}
+
+void SimLink::Impl::receiveControl() {
+  drain(control_socket_.get(), [this](ByteView bytes, const Received& received) {
+    if (!isFromPeer(received)) {
+      return;
+    }
+    const DecodeResult<RrefView> rref = decodeRref(bytes);
+    if (!rref.ok()) {
+      countDecodeError(classify(bytes) == MessageKind::kUnknown ? DecodeError::kUnknownLabel : rref.error());
+      return;
+    }
+    ++live_counters_.rref_datagrams;
+    heardPeer();
+    for (std::size_t i = 0; i < rref->size(); ++i) {
+      const RrefPair pair = (*rref)[i];
+      if (pair.index >= 0 && pair.index < kFirstReadIndex) {
+        takeStatus(pair);
+      } else if (!reader_.answered(pair, now_ns_)) {
+        ++live_counters_.unknown_indices;
+      }
+    }
+    status_subscription_.answered(*rref, now_ns_);
+  });
+}
+
+void SimLink::Impl::takeStatus(const RrefPair& pair) {
+  if (!std::isfinite(pair.value)) {
+    ++live_counters_.non_finite_values;
+    return;
+  }
+  switch (pair.index) {
+    case kVersionIndex:
+      if (pair.value > 0.0F) {  // zero before a flight is loaded
+        version_ = static_cast<std::int32_t>(std::lround(pair.value));
+      }
+      break;
+    case kPausedIndex:
+      paused_ = pair.value != 0.0F;
+      monitor_.setPaused(*paused_);
+      break;
+    case kSimTimeIndex:
+      sim_time_s_ = pair.value;
+      monitor_.setSimTime(pair.value);
+      break;
+    default:
+      ++live_counters_.unknown_indices;
+      break;
+  }
+}
+
+void SimLink::Impl::receiveGroup(Group* group) {
+  drain(group->socket.get(), [this, group](ByteView bytes, const Received& received) {
+    if (!isFromPeer(received)) {
+      return;
+    }
+    const DecodeResult<RrefView> rref = decodeRref(bytes);
+    if (!rref.ok()) {
+      countDecodeError(classify(bytes) == MessageKind::kUnknown ? DecodeError::kUnknownLabel : rref.error());
+      return;
+    }
+    ++live_counters_.rref_datagrams;
+    heardPeer();
+    for (std::size_t i = 0; i < rref->size(); ++i) {
+      live_counters_.non_finite_values += std::isfinite((*rref)[i].value) ? 0U : 1U;
+    }
+    live_counters_.unknown_indices += group->subscription.answered(*rref, now_ns_);
+    if (callbacks_.on_rref) {
+      callbacks_.on_rref(group->id, *rref, infoOf(received));
+    }
+  });
+}
+
+void SimLink::Impl::receiveData() {
+  drain(data_socket_.get(), [this](ByteView bytes, const Received& received) {
+    if (!isFromPeer(received)) {
+      return;
+    }
+    const DecodeResult<DataView> data = decodeData(bytes);
+    if (!data.ok()) {
+      countDecodeError(classify(bytes) == MessageKind::kUnknown ? DecodeError::kUnknownLabel : data.error());
+      return;
+    }
+    ++live_counters_.data_datagrams;
+    heardPeer();
+    const DataAnomalies anomalies = inspect(*data);
+    live_counters_.unknown_rows += anomalies.unknown_rows;
+    live_counters_.non_finite_values += anomalies.non_finite_values;
+    data_output_.heard(*data, now_ns_);
+    if (callbacks_.on_data) {
+      callbacks_.on_data(*data, infoOf(received));
+    }
+  });
+}
+
+void SimLink::Impl::receiveRpos() {
+  drain(rpos_socket_.get(), [this](ByteView bytes, const Received& received) {
+    if (!isFromPeer(received)) {
+      return;
+    }
+    const DecodeResult<Rpos> rpos = decodeRpos(bytes);
+    if (!rpos.ok()) {
+      countDecodeError(classify(bytes) == MessageKind::kUnknown ? DecodeError::kUnknownLabel : rpos.error());
+      return;
+    }
+    ++live_counters_.rpos_datagrams;
+    heardPeer();
+    next_rpos_request_ns_ = now_ns_ + jitter_.around(kRposSilenceNs);
+    if (callbacks_.on_rpos && rpos_rate_hz_ > 0) {
+      callbacks_.on_rpos(*rpos, infoOf(received));
+    }
+  });
+}
+
+void SimLink::Impl::receiveBeacons() {
+  drain(beacon_socket_.get(), [this](ByteView bytes, const Received& received) {
+    const DecodeResult<Beacon> beacon = decodeBeacon(bytes);
+    if (!beacon.ok()) {
+      countDecodeError(beacon.error());
+      return;
+    }
+    ++live_counters_.beacons;
+    const bool peer_was_away = peer_.valid() && !beacons_.at(peer_, now_ns_).has_value();
+    if (!beacons_.heard(*beacon, received.from.address, now_ns_)) {
+      return;
+    }
+    if (const std::optional<BeaconSighting> sighting = beacons_.at(peer_, now_ns_)) {
+      monitor_.beaconHeard(now_ns_);
+      peer_name_ = sighting->computer_name;
+      if (peer_was_away && !monitor_.alive()) {
+        next_probe_ns_ = now_ns_;  // it is back: ask at once
+      }
+    }
+  });
+}
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,251 @@
+#include "sim_link_impl.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace xplane_bridge::core {
+namespace {
+
+constexpr std::int64_t kResolveNs = 5 * kNanosecondsPerSecond;
+constexpr std::int64_t kJoinNs = 5 * kNanosecondsPerSecond;
+constexpr std::int64_t kRposRetryNs = kNanosecondsPerSecond;
+
+}  // namespace
+
+void SimLink::Impl::housekeeping(std::int64_t now_ns) {
+  if (beacon_socket_ != nullptr && now_ns >= next_join_ns_) {
+    next_join_ns_ = now_ns + kJoinNs;
+    try {
+      beacon_socket_->joinOnAllInterfaces(resolveHost(options_.beacon_group));
+    } catch (const SocketError& error) {
+      beacon_failure_ = std::string("X-Plane's beacon cannot be heard: ") + error.what();
+    }
+  }
+  if (stop_phase_ == StopPhase::kRunning) {
+    findPeer(now_ns);
+  }
+  refreshLink(now_ns);
+  if (peer_.valid() && !monitor_.alive() && now_ns >= next_probe_ns_) {
+    next_probe_ns_ = now_ns + jitter_.around(nanoseconds(options_.probe_period_s));
+    status_subscription_.restart(now_ns);
+  }
+  data_output_.update(monitor_.state() == LinkState::kConnected, now_ns);
+  updateRpos(now_ns);
+  publish(now_ns);
+}
+
+void SimLink::Impl::findPeer(std::int64_t now_ns) {
+  if (!options_.host.empty()) {
+    if (!monitor_.alive() && now_ns >= next_resolve_ns_) {
+      resolve(now_ns);
+    }
+    return;
+  }
+  if (monitor_.alive()) {
+    return;
+  }
+  const bool answered_once = last_heard_ns_ >= 0;
+  if (!peer_.valid() || !answered_once) {
+    // A peer that has been chosen but never answered gives way as soon as another is the only one.
+    const std::optional<BeaconSighting> only = beacons_.onlyOne(now_ns);
+    if (only.has_value() && only->endpoint != peer_) {
+      setPeer(only->endpoint, "found by its beacon: " + toString(*only));
+    }
+    return;
+  }
+  // The X-Plane we knew is silent. Only one that has begun to announce itself since may be it: never jump to another
+  // computer's that has been there all along.
+  if (now_ns - beacons_.lastHeard(peer_) < nanoseconds(options_.beacon_settle_s)) {
+    return;
+  }
+  const std::optional<BeaconSighting> restarted = beacons_.onlyNewSince(last_heard_ns_, now_ns);
+  if (restarted.has_value() && restarted->endpoint != peer_) {
+    setPeer(restarted->endpoint, "come back as " + toString(*restarted));
+  }
+}
+
+void SimLink::Impl::resolve(std::int64_t now_ns) {
+  next_resolve_ns_ = now_ns + kResolveNs;
+  try {
+    const Endpoint found{resolveHost(options_.host), options_.port};
+    resolve_failure_.clear();
+    if (found != peer_) {
+      setPeer(found, "host '" + options_.host + "'");
+    }
+  } catch (const SocketError& error) {
+    if (resolve_failure_ != error.what()) {
+      resolve_failure_ = error.what();
+      log_(LogLevel::kError, resolve_failure_);
+    }
+  }
+}
+
+void SimLink::Impl::setPeer(const Endpoint& peer, const std::string& why) {
+  log_(LogLevel::kInfo, "talking to X-Plane at " + peer.toString() + ", " + why);
+  peer_ = peer;
+  packed_peer_ = (std::uint64_t{peer.address} << 16) | peer.port;
+  peer_name_.clear();
+  if (const std::optional<BeaconSighting> sighting = beacons_.at(peer, now_ns_)) {
+    peer_name_ = sighting->computer_name;
+  }
+  version_.reset();
+  paused_.reset();
+  sim_time_s_.reset();
+  monitor_.newPeer();
+  if (beacons_.lastHeard(peer) > 0) {
+    monitor_.beaconHeard(beacons_.lastHeard(peer));
+  }
+  next_probe_ns_ = now_ns_;
+  std::shared_ptr<Journal> journal = journals_ ? journals_(peer) : nullptr;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  journal_ = std::move(journal);
+}
+
+void SimLink::Impl::refreshLink(std::int64_t now_ns) {
+  monitor_.update(now_ns);
+  const bool alive = monitor_.alive();
+  const bool came_up = alive && monitor_.epoch() != seen_epoch_;
+  if (alive && (!was_alive_ || came_up)) {
+    restartSubscriptions(now_ns);
+  } else if (!alive && was_alive_) {
+    for (Group& group : groups_) {
+      group.subscription.suspend();
+    }
+    next_probe_ns_ = now_ns;
+  }
+  const bool changed = alive != was_alive_ || came_up;
+  was_alive_ = alive;
+  if (came_up) {
+    seen_epoch_ = monitor_.epoch();
+    if (stop_phase_ == StopPhase::kRunning) {
+      updateDataOutput(now_ns);
+    }
+  }
+  if (changed) {
+    publish(now_ns);
+  }
+}
+
+void SimLink::Impl::restartSubscriptions(std::int64_t now_ns) {
+  for (Group& group : groups_) {
+    group.subscription.restart(now_ns);
+    ++live_counters_.resubscriptions;
+  }
+  status_subscription_.restart(now_ns);
+  next_rpos_request_ns_ = now_ns;
+}
+
+void SimLink::Impl::updateDataOutput(std::int64_t now_ns) {
+  Endpoint target{0, dataPort()};
+  try {
+    target.address =
+        options_.data_output.address.empty() ? localAddressTowards(peer_) : resolveHost(options_.data_output.address);
+  } catch (const SocketError& error) {
+    log_(LogLevel::kError, std::string("Data Output has no target: ") + error.what());
+    return;
+  }
+  data_output_.linkUp(journal(), target, now_ns);
+}
+
+void SimLink::Impl::updateRpos(std::int64_t now_ns) {
+  if (rpos_socket_ == nullptr || rpos_rate_hz_ == 0 || !monitor_.alive() || now_ns < next_rpos_request_ns_ ||
+      stop_phase_ != StopPhase::kRunning) {
+    return;
+  }
+  std::array<std::uint8_t, kRposRequestSize> buffer;
+  if (const EncodeResult size = encodeRpos(buffer, rpos_rate_hz_)) {
+    rpos_socket_->sendTo({buffer.data(), *size}, peer_);
+    ++live_counters_.requests;
+  }
+  next_rpos_request_ns_ = now_ns + jitter_.around(kRposRetryNs);
+}
+
+void SimLink::Impl::flushRequests(std::int64_t now_ns) {
+  if (!peer_.valid()) {
+    return;
+  }
+  std::size_t allowance = pacer_.allowance(now_ns, &jitter_);
+  const std::size_t before = allowance;
+  const auto flush = [&](RrefSubscription* subscription, UdpSocket* socket) {
+    while (allowance > 0) {
+      const std::optional<std::size_t> index = subscription->nextRequest(now_ns, &jitter_);
+      if (!index.has_value()) {
+        return;
+      }
+      sendRequest(socket, subscription->group().datarefs[*index], subscription->group().rate_hz,
+                  static_cast<std::int32_t>(*index));
+      --allowance;
+    }
+  };
+  const bool subscribing = stop_phase_ == StopPhase::kRunning || stop_phase_ == StopPhase::kReleasing;
+  if (subscribing) {
+    flush(&status_subscription_, control_socket_.get());
+  }
+  for (; allowance > 0 && !requests_.empty(); --allowance) {
+    const Request& request = requests_.front();
+    sendRequest(request.socket.get(), request.path, request.rate_hz, request.index);
+    requests_.pop_front();
+  }
+  if (subscribing) {
+    for (Group& group : groups_) {
+      flush(&group.subscription, group.socket.get());
+    }
+  }
+  pacer_.spend(before - allowance);
+}
+
+void SimLink::Impl::sendRequest(UdpSocket* socket, const std::string& path, std::int32_t rate_hz, std::int32_t index) {
+  std::array<std::uint8_t, kRrefRequestSize> buffer;
+  if (const EncodeResult size = encodeRref(buffer, path, rate_hz, index)) {
+    socket->sendTo({buffer.data(), *size}, peer_);
+    ++live_counters_.requests;
+  }
+}
+
+void SimLink::Impl::stopGroup(const Group& group) {
+  retired_udp_ += group.socket->counters();
+  if (!monitor_.alive()) {
+    return;  // X-Plane has forgotten us, or will find nobody on that port
+  }
+  const RrefGroup& stopped = group.subscription.group();
+  for (std::size_t i = 0; i < stopped.datarefs.size(); ++i) {
+    requests_.push_back({group.socket, stopped.datarefs[i], 0, static_cast<std::int32_t>(i)});
+  }
+}
+
+void SimLink::Impl::stopSubscriptions() {
+  if (!monitor_.alive()) {
+    return;
+  }
+  for (const Group& group : groups_) {
+    stopGroup(group);
+  }
+  groups_.clear();
+  for (std::int32_t i = 0; i <= kSimTimeIndex; ++i) {
+    requests_.push_back({control_socket_, kStatusDatarefs[i], 0, i});
+  }
+  if (rpos_socket_ != nullptr && rpos_rate_hz_ > 0) {
+    std::array<std::uint8_t, kRposRequestSize> buffer;
+    if (const EncodeResult size = encodeRpos(buffer, 0)) {
+      rpos_socket_->sendTo({buffer.data(), *size}, peer_);
+    }
+  }
+}
+
+void SimLink::Impl::updateStop(std::int64_t now_ns) {
+  const bool late = now_ns >= stop_deadline_ns_;
+  if (stop_phase_ == StopPhase::kReleasing && late) {
+    reader_.cancelAll();
+    stop_phase_ = StopPhase::kUnsubscribing;
+  }
+  if (stop_phase_ == StopPhase::kUnsubscribing && (requests_.empty() || late)) {
+    stop_phase_ = StopPhase::kDone;
+  }
+  if (stop_phase_ == StopPhase::kDone) {
+    reader_.cancelAll();
+    quit_ = true;
+  }
+}
+
+}  // namespace xplane_bridge::core
