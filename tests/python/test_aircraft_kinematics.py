@@ -2,6 +2,7 @@
 
 import json
 import math
+import random
 
 import pytest
 
@@ -212,6 +213,32 @@ def test_wind_from_the_right_gives_positive_sideslip_and_dryden_has_its_size():
     mean = sum(gusts) / len(gusts)
     deviation = math.sqrt(sum((gust - mean) ** 2 for gust in gusts) / len(gusts))
     assert deviation == pytest.approx(2.0, rel=0.35)
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_tumbling_over_the_ground_gains_no_energy(name):
+    """Thrown at the ground in any attitude it stays a falling body: no contact gives back more than it took."""
+    model = create_model(name)
+    generator = random.Random(7)
+    hard = 0
+    for _ in range(12):
+        controls = model.reset(InitialState(on_ground=True, engines_running=False))
+        controls.throttle, controls.parking_brake = [0.0] * 8, 0.0
+        height = model.info.wing_span_m
+        model.place(
+            altitude_m=height,
+            roll_rad=generator.uniform(-3.0, 3.0),
+            pitch_rad=generator.uniform(-1.5, 1.5),
+            v_ned_mps=[generator.uniform(-8.0, 8.0), generator.uniform(-8.0, 8.0), generator.uniform(0.0, 8.0)],
+            pqr_rad_s=[generator.uniform(-2.0, 2.0) for _ in range(3)],
+        )
+        allowed = 0.5 * 3 * 8.0**2 + GRAVITY * height + 50.0
+        for _ in range(180):
+            state = model.step(1 / 60, controls)
+            speed = math.sqrt(state.v_north_mps**2 + state.v_east_mps**2 + state.v_down_mps**2)
+            assert 0.5 * speed**2 + GRAVITY * state.agl_m < allowed
+        hard += state.crashed
+    assert hard > 6
 
 
 def test_bad_calls_say_what_was_wrong():

@@ -49,6 +49,8 @@ from xplane_bridge.emulator.turbulence import DrydenTurbulence
 SITUATION_VERSION = 1
 #: Height below which contact with the ground is looked for.
 CRASH_WATCH_M = 20.0
+#: Cosine of the tilt beyond which the wheels no longer carry.
+STRUTS_WORK_COSINE = 0.5
 
 _ROOT = Path(__file__).resolve().parent
 
@@ -233,7 +235,12 @@ class JsbsimModel:
                 f"step of {dt} s: expected more than 0 and at most {MAX_STEP_S} s; fly longer times in pieces"
             )
         self._surface_set.check(controls)
-        self._fly(dt, controls)
+        try:
+            self._fly(dt, controls)
+        except jsbsim.BaseError as error:
+            raise FlightModelError(f"JSBSim gave up: {error}; reset the flight") from error
+        if not math.isfinite(self._height() + self._airspeed()):
+            raise FlightModelError("the aircraft's motion is no longer finite: reset the flight")
         self._time += dt
         return self._read_state(controls)
 
@@ -251,10 +258,11 @@ class JsbsimModel:
             if abs(substep / runs - self._fdm_step) > 1e-12:
                 self._fdm_step = substep / runs
                 self._fdm.set_dt(self._fdm_step)
+            self._set_struts()
             for _ in range(runs):
                 run()
-            if self._agl() * FOOT_M < CRASH_WATCH_M and self._contacts.hit():
-                self._crashed = True
+            if self._agl() * FOOT_M < CRASH_WATCH_M:
+                self._crashed = self._crashed or self._contacts.hit()
 
     def _load(self, dt: float, controls: Controls) -> None:
         u, v, w, p, q, r, density = [get() for get in self._air_getters]
@@ -262,6 +270,11 @@ class JsbsimModel:
             dt, controls, (u * FOOT_M, v * FOOT_M, w * FOOT_M), (p, q, r), max(density * SLUG_FT3_KG_M3, 1e-3)
         )
         self._apply_loads()
+
+    def _set_struts(self) -> None:
+        """JSBSim measures compression along the strut: on its side an aircraft would stand on metres of it."""
+        tilted = math.cos(self._roll()) * math.cos(self._pitch()) < STRUTS_WORK_COSINE
+        self._gear_setter(0.0 if tilted and self._agl() * FOOT_M < CRASH_WATCH_M else self._gear_position)
 
     def _outside_air(self) -> tuple[float, float]:
         """Pressure [Pa] and temperature [K]."""
@@ -271,7 +284,6 @@ class JsbsimModel:
         if self.info.retractable_gear:
             wanted, reach = (1.0 if controls.gear_down else 0.0), dt / self.gear_time_s
             self._gear_position += min(max(wanted - self._gear_position, -reach), reach)
-        self._gear_setter(self._gear_position)
         parking = controls.parking_brake
         for setter, brake in zip(self._brake_setters, (controls.brake_left, controls.brake_right)):
             setter(min(max(brake, parking, 0.0), 1.0))
