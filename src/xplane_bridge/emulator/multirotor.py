@@ -41,7 +41,8 @@ BLADE_DEG = 10.5
 MAXIMUM_OMEGA = 900.0
 IDLE_OMEGA = 60.0
 MOTOR_LAG_S = 0.035
-MAXIMUM_TORQUE_NM = 0.2
+MAXIMUM_TORQUE_NM = 0.5
+MAXIMUM_POWER_W = 80.0
 
 MAXIMUM_TILT_RAD = math.radians(30.0)
 MAXIMUM_YAW_RATE_RAD_S = math.radians(100.0)
@@ -70,7 +71,7 @@ class Multirotor(JsbsimModel):
         tank_count=0,
         gear_names=("front_left", "front_right", "rear_left", "rear_right"),
         retractable_gear=False,
-        maximum_power_w=MAXIMUM_TORQUE_NM * MAXIMUM_OMEGA,
+        maximum_power_w=MAXIMUM_POWER_W,
         maximum_rpm=MAXIMUM_OMEGA * 30.0 / math.pi,
         never_exceed_mps=20.0,
         wing_span_m=0.354,
