@@ -320,7 +320,7 @@ class KinematicModel:
     def _travel(self, dt: float) -> None:
         air = self._air_velocity()
         on_ground = self._alt <= self._terrain_m + _GROUND_HEIGHT_M + 1e-6 and air[2] >= 0.0
-        north, east, down = air if on_ground else air + self._wind + self._gust
+        north, east, down = map(float, air if on_ground else air + self._wind + self._gust)
         radius = earth.EARTH_RADIUS_M + self._alt
         self._lat += math.degrees(north / radius) * dt
         self._lon = earth.wrap_longitude(
