@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <type_traits>
 #include <utility>
@@ -68,19 +69,21 @@ struct ElementCount<Eigen::Vector3d> {
 };
 
 template <typename State, auto Member>
-void storeMember(void* target, int element, double value) {
+void storeMember(void* target, const double* values, int count) {
   using Type = typename MemberOf<decltype(Member)>::Type;
   auto& member = static_cast<State*>(target)->*Member;
   if constexpr (std::is_same_v<Type, bool>) {
-    member = value > 0.5;
-  } else if constexpr (std::is_arithmetic_v<Type>) {
-    member = static_cast<Type>(value);
+    member = *values > 0.5;
+  } else if constexpr (std::is_integral_v<Type>) {
+    member = std::isfinite(*values) ? static_cast<Type>(*values) : Type{};
+  } else if constexpr (std::is_floating_point_v<Type>) {
+    member = static_cast<Type>(*values);
   } else if constexpr (std::is_same_v<Type, Eigen::Vector3d>) {
-    member(element) = value;
+    for (int i = 0; i < count; ++i) member(i) = values[i];
   } else {
-    member[static_cast<std::size_t>(element)] = static_cast<float>(value);
+    for (int i = 0; i < count; ++i) member[static_cast<std::size_t>(i)] = static_cast<float>(values[i]);
   }
-  static_cast<void>(element);
+  static_cast<void>(count);
 }
 
 // --- a line, written as a sentence ---

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace xplane_bridge::core {
 namespace {
@@ -14,6 +15,10 @@ bool isMarkedUnused(float value) {
   std::uint32_t bits = 0;
   std::memcpy(&bits, &value, sizeof bits);
   return bits == kUnusedSlotBits;
+}
+
+double bit(float bits, int element) {
+  return (static_cast<std::uint32_t>(std::clamp(bits, 0.0F, kLargestBitfield)) >> element) & 1U;
 }
 
 struct ResolvedRow {
@@ -39,7 +44,8 @@ void RowStore::update(const DataView& data, std::int64_t receive_ns) {
     if (!row.hasKnownIndex()) continue;
     const auto index = static_cast<std::size_t>(row.index());
     times_[index] = receive_ns;
-    for (std::size_t slot = 0; slot < kDataSlots; ++slot) values_[index * kDataSlots + slot] = row.value(slot);
+    float* values = &values_[index * kDataSlots];
+    for (std::size_t slot = 0; slot < kDataSlots; ++slot) values[slot] = row.value(slot);
   }
 }
 
@@ -52,63 +58,70 @@ StateDecoder::StateDecoder(FieldGroup group, Transport transport, XPlaneVersion 
     if (field.group != group) continue;
     all_bits_ |= field.valid;
     if (field.store == nullptr) continue;
-    FieldPlan plan{&field, steps_.size(), 0};
+    Plan plan;
+    plan.field = &field;
     const ResolvedRow row = transport == Transport::kData ? resolve(field.row, version) : ResolvedRow{};
     if (row.row >= 0) {
-      for (int i = 0; i < field.row.count; ++i) {
-        const int slot = field.row.bitfield ? row.slot : row.slot + i * field.row.stride;
-        steps_.push_back({i, true, field.row.bitfield, field.row.may_be_blank,
-                          row.row * static_cast<std::int32_t>(kDataSlots) + slot, row.conversion.factor,
-                          row.conversion.offset});
-      }
+      plan.row = row.row;
+      plan.first = static_cast<std::size_t>(row.slot);
+      plan.special = field.row.bitfield || field.row.may_be_blank || field.row.stride != 1;
+      plan.count = field.row.count;
+      plan.conversion = row.conversion;
+    } else {
+      const bool newer = field.dataref.path12 != nullptr && version == XPlaneVersion::k12;
+      plan.conversion = newer ? field.dataref.conversion12 : field.dataref.conversion;
+      // Requests are in the table's order, so those of this field are next.
+      plan.first = next_request;
+      while (next_request < requests_.size() && requests_[next_request].field == &field) ++next_request;
+      plan.count = static_cast<int>(next_request - plan.first);
     }
-    const bool newer = field.dataref.path12 != nullptr && version == XPlaneVersion::k12;
-    const Conversion& conversion = newer ? field.dataref.conversion12 : field.dataref.conversion;
-    // Requests are in the table's order, so those of this field are next.
-    while (next_request < requests_.size() && requests_[next_request].field == &field) {
-      steps_.push_back({requests_[next_request].element, false, false, false, static_cast<std::int32_t>(next_request),
-                        conversion.factor, conversion.offset});
-      ++next_request;
-    }
-    plan.count = steps_.size() - plan.first;
     plans_.push_back(plan);
   }
   if (transport == Transport::kData) rows_ = dataRows({group}, version);
 }
 
-double StateDecoder::read(const Step& step, const std::vector<float>& dataref_values, const RowStore* rows,
-                          std::int64_t oldest_ns) const {
-  if (!step.from_row) {
-    return static_cast<double>(dataref_values[static_cast<std::size_t>(step.source)]) * step.factor + step.offset;
+int StateDecoder::convert(const Plan& plan, const float* wire, int count, double* values) const {
+  const double factor = plan.conversion.factor, offset = plan.conversion.offset;
+  int known = 0;
+  if (!plan.special) {
+    for (int element = 0; element < count; ++element) {
+      const double value = static_cast<double>(wire[element]) * factor + offset;
+      const bool finite = std::abs(value) <= std::numeric_limits<double>::max();  // also false for NaN
+      values[element] = finite ? value : kNaN;
+      known += finite ? 1 : 0;
+    }
+    return known;
   }
-  const std::int32_t row = step.source / static_cast<std::int32_t>(kDataSlots);
-  if (rows == nullptr || !rows->has(row) || rows->receiveTime(row) < oldest_ns) return kNaN;
-  const float value = rows->value(row, static_cast<std::size_t>(step.source) % kDataSlots);
-  if (!std::isfinite(value) || (step.may_be_blank && isMarkedUnused(value))) return kNaN;
-  if (step.bitfield)
-    return (static_cast<std::uint32_t>(std::clamp(value, 0.0F, kLargestBitfield)) >> step.element) & 1U;
-  return static_cast<double>(value) * step.factor + step.offset;
+  const RowSource& row = plan.field->row;
+  for (int element = 0; element < count; ++element, wire += row.bitfield ? 0 : row.stride) {
+    values[element] = kNaN;
+    if (!std::isfinite(*wire) || (row.may_be_blank && isMarkedUnused(*wire))) continue;
+    values[element] = row.bitfield ? bit(*wire, element) : static_cast<double>(*wire) * factor + offset;
+    ++known;
+  }
+  return known;
 }
 
 std::uint32_t StateDecoder::decode(const std::vector<float>& dataref_values, const RowStore* rows,
                                    std::int64_t oldest_ns, void* target) const {
   std::uint32_t known_bits = all_bits_;
   int engines = kMaxEngines;
-  for (const FieldPlan& plan : plans_) {
+  for (const Plan& plan : plans_) {
     const FieldSpec& field = *plan.field;
-    std::size_t known = 0;
-    std::size_t wanted = 0;
-    for (std::size_t i = plan.first; i < plan.first + plan.count; ++i) {
-      const Step& step = steps_[i];
-      if (field.per_engine && step.element >= engines) continue;
-      ++wanted;
-      const double value = read(step, dataref_values, rows, oldest_ns);
-      if (!std::isfinite(value)) continue;
-      ++known;
-      field.store(target, step.element, value);
-      if (field.is_engine_count) engines = static_cast<int>(std::clamp(std::lround(value), 0L, long{kMaxEngines}));
+    const bool from_row = plan.row >= 0;
+    const bool arrived =
+        !from_row || (rows != nullptr && rows->has(plan.row) && rows->receiveTime(plan.row) >= oldest_ns);
+    const int wanted = field.per_engine ? std::min(plan.count, engines) : plan.count;
+    std::array<double, kMaxFieldElements> values;
+    int known = 0;
+    if (arrived && wanted > 0) {
+      const float* wire = (from_row ? rows->values(plan.row) : dataref_values.data()) + plan.first;
+      known = convert(plan, wire, wanted, values.data());
+      field.store(target, values.data(), wanted);
     }
-    if (field.is_engine_count && known == 0) engines = 0;
+    if (field.is_engine_count) {
+      engines = known > 0 ? static_cast<int>(std::clamp(values[0], 0.0, static_cast<double>(kMaxEngines))) : 0;
+    }
     // Of an array by engine every engine must be known; other arrays may be longer than what the aircraft has.
     const bool complete = field.per_engine ? (known > 0 && known == wanted) : known > 0;
     if (!complete) known_bits &= ~field.valid;

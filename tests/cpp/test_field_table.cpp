@@ -75,6 +75,7 @@ TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
       EXPECT_STRNE(field.derivation, "");
     }
     EXPECT_GE(field.count, 1);
+    EXPECT_LE(field.count, kMaxFieldElements);
     EXPECT_STRNE(field.unit, "");
     if (field.dataref.path11 != nullptr && field.store != nullptr) {
       EXPECT_EQ(expandDatarefPath(field.dataref.path11, field.count).size(), static_cast<std::size_t>(field.count));

@@ -32,9 +32,9 @@ TEST(RowStore, KeepsTheNewestByIndex) {
   EXPECT_TRUE(rows.has(17));
   EXPECT_EQ(rows.receiveTime(17), 10);
   EXPECT_EQ(rows.receiveTime(3), 20);
-  EXPECT_EQ(rows.value(17, 2), 3.0F);
-  EXPECT_EQ(rows.value(3, 0), 6.0F);
-  EXPECT_EQ(rows.value(3, 1), -999.0F);
+  EXPECT_EQ(rows.values(17)[2], 3.0F);
+  EXPECT_EQ(rows.values(3)[0], 6.0F);
+  EXPECT_EQ(rows.values(3)[1], -999.0F);
   rows.clear();
   EXPECT_FALSE(rows.has(17));
 }
@@ -42,7 +42,7 @@ TEST(RowStore, KeepsTheNewestByIndex) {
 TEST(RowStore, IgnoresRowsThatCannotBe) {
   RowStore rows;
   rows.update(Datagram::labelled("DATA*").row(-1, {1}).row(200, {1}).row(2147483647, {1}).row(5, {7}).data(), 10);
-  EXPECT_EQ(rows.value(5, 0), 7.0F);
+  EXPECT_EQ(rows.values(5)[0], 7.0F);
 }
 
 // A captured packet (packets of real X-Planes, number 05): in flight over Brazil, X-Plane 11.

@@ -78,8 +78,10 @@ struct RowSource {
   bool may_be_blank = false;  ///< -999 in this slot means unused (it is a value in all others)
 };
 
-/// Writes one SI value into its field. `target` is the group's struct.
-using FieldStore = void (*)(void* target, int element, double value);
+/// Writes a field's first `count` elements, SI values; NaN is unknown. `target` is the group's struct.
+using FieldStore = void (*)(void* target, const double* values, int count);
+/// No field has more elements.
+inline constexpr int kMaxFieldElements = 16;
 
 /// One line of the table.
 struct FieldSpec {

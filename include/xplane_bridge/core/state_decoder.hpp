@@ -21,10 +21,8 @@ class RowStore {
   /// Receive time of the row [ns]; kNever when it never came.
   std::int64_t receiveTime(std::int32_t row) const { return times_[static_cast<std::size_t>(row)]; }
   bool has(std::int32_t row) const { return receiveTime(row) != kNever; }
-  /// Raw wire value. row in 0..199, slot in 0..7.
-  float value(std::int32_t row, std::size_t slot) const {
-    return values_[static_cast<std::size_t>(row) * kDataSlots + slot];
-  }
+  /// The 8 raw wire values of a row in 0..199.
+  const float* values(std::int32_t row) const { return &values_[static_cast<std::size_t>(row) * kDataSlots]; }
   void clear();
 
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
@@ -97,28 +95,23 @@ class StateDecoder {
                        void* target) const;
 
  private:
-  struct Step {
-    int element;
-    bool from_row;
-    bool bitfield;
-    bool may_be_blank;
-    std::int32_t source;  ///< index, or kDataSlots * row + slot
-    double factor;
-    double offset;
+  /// How one field is filled: its elements follow each other in a row or among the requests.
+  struct Plan {
+    const FieldSpec* field = nullptr;
+    std::int32_t row = -1;  ///< -1: from datarefs
+    std::size_t first = 0;  ///< slot, or index
+    bool special = false;   ///< bit field, blanks or a stride: not plain numbers side by side
+    int count = 0;          ///< 0: nothing carries it
+    Conversion conversion;
   };
-  struct FieldPlan {
-    const FieldSpec* field;
-    std::size_t first;
-    std::size_t count;
-  };
-  double read(const Step& step, const std::vector<float>& dataref_values, const RowStore* rows,
-              std::int64_t oldest_ns) const;
+
+  /// @return how many of the elements are known
+  int convert(const Plan& plan, const float* wire, int count, double* values) const;
 
   FieldGroup group_;
   std::vector<DatarefRequest> requests_;
   std::vector<std::int32_t> rows_;
-  std::vector<Step> steps_;
-  std::vector<FieldPlan> plans_;
+  std::vector<Plan> plans_;
   std::uint32_t all_bits_ = 0;
 };
 
