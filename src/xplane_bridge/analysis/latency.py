@@ -102,8 +102,13 @@ def fit_delay(
     return Delay(delay, sigma, low, high, float(gain), float(drift), correlation, len(begin), coarse, relative)
 
 
-def require_usable(result: Delay, what: str) -> None:
+def require_usable(result: Delay, what: str, gain_range: tuple[float, float] | None = GAIN_RANGE) -> None:
     """Refuse a result that the recording does not support.
+
+    Args:
+        result: Of `fit_delay`.
+        what: The late signal, for the message.
+        gain_range: What the gain must lie in; None: anything.
 
     Raises:
         LatencyError: The motion is too small, or the signals do not belong together.
@@ -121,7 +126,7 @@ def require_usable(result: Delay, what: str) -> None:
             "roll doublets or multisines (inject_excitation); about 14 deg/s^2 rms of roll acceleration is needed"
         )
         raise LatencyError(msg)
-    if not GAIN_RANGE[0] <= result.gain <= GAIN_RANGE[1]:
+    if gain_range is not None and not gain_range[0] <= result.gain <= gain_range[1]:
         msg = (
             f"{what}: the late signal is {result.gain:.2f} times the leading one, expected about 1: wrong view, or "
             "something else than the flight is shown"

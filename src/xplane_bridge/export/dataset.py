@@ -17,10 +17,8 @@ import numpy as np
 
 from xplane_bridge.analysis.columns import named
 from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags.pictures import COMPRESSED, RAW, image_topic
 from xplane_bridge.export.flight import FRAME_STATE, labels, topic_of
-
-COMPRESSED = "sensor_msgs/CompressedImage"
-RAW = "sensor_msgs/Image"
 
 #: Frames with one of these bits are left out unless asked for. The others only say what was assumed.
 BAD_QUALITY = (
@@ -68,7 +66,7 @@ def export_images(bags: Bags, folder: Path, options: Options, train_flight: bool
     Raises:
         BagError: No images or no frame states in the bag, or an image encoding that cannot be written.
     """
-    topic = _image_topic(bags)
+    topic = image_topic(bags, (COMPRESSED, RAW))
     frame_topic = topic_of(bags, FRAME_STATE)
     table, units = bags.read(frame_topic), bags.units(frame_topic)
     constants = bags.constants(frame_topic)
@@ -112,16 +110,6 @@ def _split_stamp(stamp: np.ndarray, options: Options) -> int:
         return 0
     first, last = int(stamp.min()), int(stamp.max())
     return first + round((last - first) * options.train_share) + (1 if options.train_share >= 1 else 0)
-
-
-def _image_topic(bags: Bags) -> str:
-    for msgtype in (COMPRESSED, RAW):
-        topic = bags.topic_of_type(msgtype)
-        if topic is not None and bags.topics[topic].count:
-            return topic
-    names = ", ".join(str(path) for path in bags.paths)
-    msg = f"{names}: no camera images; record camera/image_raw/compressed (launch/record.launch does)"
-    raise BagError(msg)
 
 
 def _images(bags: Bags, topic: str) -> Iterator[tuple[int, str, bytes]]:

@@ -1,0 +1,190 @@
+"""estimate_latency: the display delay, and how fast surfaces follow commands, measured from a recorded flight."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Iterator, Sequence
+
+import numpy as np
+
+from xplane_bridge.analysis.latency import (
+    Delay,
+    LatencyError,
+    accumulated_rotation,
+    fit_delay,
+    require_usable,
+    value_motion,
+)
+from xplane_bridge.bags import Bags
+from xplane_bridge.cli.entry import guarded
+
+if TYPE_CHECKING:
+    from xplane_bridge.bags import Table
+
+#: Line of sight in body axes (forward, right, down), by FrameState.view.
+_AXES = {1: (1.0, 0.0, 0.0), 2: (-1.0, 0.0, 0.0), 3: (0.0, 0.0, 1.0)}
+_VIEWS = {"forward": 1, "rear": 2, "down": 3}
+#: FrameState bits of pictures that say nothing about the delay: display unknown, frozen, black, external view.
+_USELESS = 8 | 32 | 64 | 2048
+#: Command and the surface that follows it.
+_RESPONSES = (("roll", "delta_aileron"), ("pitch", "delta_elevator"), ("yaw", "delta_rudder"))
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    p = argparse.ArgumentParser(
+        prog="estimate_latency",
+        description="Measures the display delay from the pictures' own rotation against the recorded rates, and the "
+        "delay from commands to surfaces. Record 60 s with roll doublets or multisines (inject_excitation).",
+        epilog="Put the result into the shared parameter display_delay (config/common.yaml).",
+    )
+    p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
+    p.add_argument("--view", choices=sorted(_VIEWS), help="where camera/frame_state does not say it")
+    p.add_argument(
+        "--ignore-bottom",
+        type=float,
+        default=0.05,
+        metavar="0..1",
+        help="share of the picture at its lower edge that does not show the scene (default: %(default)s)",
+    )
+    p.add_argument("--plot", type=Path, metavar="FILE", help="figure of cost and fit, e.g. delay.png")
+    p.add_argument("--json", type=Path, metavar="FILE", help="the numbers as JSON")
+    return p
+
+
+@guarded
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    p = parser()
+    args = p.parse_args(argv)
+    if not 0.0 <= args.ignore_bottom < 0.9:
+        p.error(f"--ignore-bottom {args.ignore_bottom}: expected 0 to 0.9")
+    with Bags(args.bags) as bags:
+        display = display_delay(bags, _VIEWS[args.view] if args.view else None, args.ignore_bottom)
+        responses = command_responses(bags)
+    require_usable(display, "pictures")
+    print(f"display delay       {_text(display)}   gain {display.gain:.3f}, {display.samples} pairs of pictures")
+    for name, result in responses.items():
+        try:
+            require_usable(result, name, gain_range=None)
+        except LatencyError as err:
+            print(f"{name:<19} not determined: {err}")
+        else:
+            print(f"{name:<19} {_text(result)}")
+    if args.plot:
+        from xplane_bridge.plotting.latency import save
+
+        save({"display delay": display, **responses}, args.plot)
+        print(args.plot)
+    if args.json:
+        results = {"display_delay": display, **responses}
+        args.json.write_text(json.dumps({name: _numbers(value) for name, value in results.items()}, indent=2) + "\n")
+    return 0
+
+
+def display_delay(bags: Bags, view: int | None = None, ignore_bottom: float = 0.05) -> Delay:
+    """Delay from a simulator frame to its display: mean of picture stamp minus host time of the frame shown.
+
+    Args:
+        bags: Open bags with camera pictures and flight_state.
+        view: FrameState.view; None: as recorded.
+        ignore_bottom: Share of the picture at its lower edge that does not show the scene.
+
+    Raises:
+        BagError: No pictures or states.
+        LatencyError: The recording cannot tell.
+    """
+    from xplane_bridge.analysis.image_rotation import rotation_motion
+    from xplane_bridge.bags.pictures import grey_pictures, image_topic
+
+    time, rates = _rates(bags)
+    topic = image_topic(bags)
+    useful, recorded_view = _frame_states(bags)
+    if view is None:
+        view = recorded_view
+    if view not in _AXES:
+        msg = "the recorded view is none of forward, rear and down: give --view"
+        raise LatencyError(msg)
+    zero = time[0]
+
+    def chosen() -> Iterator[tuple[float, np.ndarray]]:
+        for stamp, picture in grey_pictures(bags, topic):
+            if useful is None or stamp in useful:
+                yield 1e-9 * (stamp - zero), picture
+
+    motion = rotation_motion(chosen(), ignore_bottom)
+    seconds = 1e-9 * (time - zero)
+    return fit_delay(motion, seconds, accumulated_rotation(seconds, rates, np.array(_AXES[view])))
+
+
+def command_responses(bags: Bags) -> dict[str, Delay]:
+    """Delay from each command sent to the surface that follows it, where both were recorded and moved."""
+    commands = _first_of_type(bags, "xplane_bridge/AppliedCommand")
+    surfaces = _first_of_type(bags, "xplane_bridge/SurfaceStates")
+    results: dict[str, Delay] = {}
+    if commands is None or surfaces is None:
+        return results
+    zero = commands.stamp[0]
+    lead_time, late_time = 1e-9 * (commands.stamp - zero), 1e-9 * (surfaces.stamp - zero)
+    order, late_order = _increasing(lead_time), _increasing(late_time)
+    for command, surface in _RESPONSES:
+        lead, late = commands[command][order], surfaces[surface][late_order]
+        known, known_late = np.isfinite(lead), np.isfinite(late)
+        if known.sum() < 2 or np.ptp(lead[known]) < 0.02 or known_late.sum() < 2:
+            continue
+        motion = value_motion(late_time[late_order][known_late], late[known_late])
+        try:
+            results[f"{command} command"] = fit_delay(motion, lead_time[order][known], lead[known])
+        except LatencyError:
+            continue  # too short; the display delay has said so already
+    return results
+
+
+def _rates(bags: Bags) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps [ns] and body rates [rad/s] of the longest stretch of one epoch that is not paused."""
+    table = _first_of_type(bags, "xplane_bridge/FlightState")
+    if table is None:
+        msg = "no flight states: record flight_state too (launch/record.launch does)"
+        raise LatencyError(msg)
+    rates = np.column_stack([table[f"angular_velocity.{axis}"] for axis in "xyz"])
+    epochs, counts = np.unique(table["epoch"], return_counts=True)
+    use = (table["epoch"] == epochs[np.argmax(counts)]) & ~table["paused"].astype(bool) & np.isfinite(rates).all(axis=1)
+    time = table.stamp[use]
+    order = _increasing(time)
+    if len(order) < 2:
+        msg = "no flight states with body rates"
+        raise LatencyError(msg)
+    return time[order], rates[use][order]
+
+
+def _frame_states(bags: Bags) -> tuple[set[int] | None, int]:
+    """Stamps [ns] of the pictures to use (None: all), and the view of most of them."""
+    table = _first_of_type(bags, "xplane_bridge/FrameState")
+    if table is None:
+        return None, 0
+    views, counts = np.unique(table["view"], return_counts=True)
+    view = int(views[np.argmax(counts)])
+    use = ((table["quality"] & _USELESS) == 0) & (table["view"] == view)
+    return {int(stamp) for stamp in table.stamp[use]}, view
+
+
+def _first_of_type(bags: Bags, msgtype: str) -> Table | None:
+    topic = bags.topic_of_type(msgtype)
+    return bags.read(topic) if topic is not None and bags.topics[topic].count else None
+
+
+def _increasing(time: np.ndarray) -> np.ndarray:
+    """Indices of the samples in strictly increasing time."""
+    return np.unique(time, return_index=True)[1]
+
+
+def _text(result: Delay) -> str:
+    low, high = 1e3 * result.low, 1e3 * result.high
+    return f"{1e3 * result.delay:7.1f} ms   95 % interval {low:.1f} .. {high:.1f} ms"
+
+
+def _numbers(result: Delay) -> dict[str, float]:
+    names = ("delay", "sigma", "low", "high", "gain", "drift", "correlation", "samples")
+    return {name: getattr(result, name) for name in names}
