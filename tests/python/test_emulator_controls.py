@@ -375,6 +375,27 @@ def test_local_position_is_set_by_its_datarefs_at_once(bench):
     assert got == pytest.approx([x + 1000.0, y, z - 500.0], abs=0.01)
 
 
+def test_reset_of_x_plane_11_pause_place_attitude_velocity_go(bench):
+    emulator = bench(aircraft="fixed_wing")
+    client = emulator.client()
+    emulator.step(120)
+    client.send(protocol.CommandRequest("sim/operation/pause_on"))
+    client.send(protocol.Placement(6, latitude_deg=37.5, longitude_deg=127.0, elevation_m=1200.0, speed_mps=65.0))
+    emulator.step()
+    half = math.radians(20.0) / 2
+    emulator.write({f"{POSITION}q[{i}]": value for i, value in enumerate((math.cos(half), math.sin(half), 0.0, 0.0))})
+    emulator.write({POSITION + "local_vx": 0.0, POSITION + "local_vy": 2.0, POSITION + "local_vz": -65.0})
+    emulator.write({POSITION + "Prad": 0.0, POSITION + "Qrad": 0.0, POSITION + "Rrad": 0.05})
+    names = ("true_phi", "true_psi", "local_vy", "local_vz", "Rrad", "latitude")
+    for _ in range(3):  # it stands there until it goes on
+        values = emulator.read(*(POSITION + name for name in names))
+        assert values[:5] == pytest.approx([20.0, 0.0, 2.0, -65.0, 0.05], abs=0.01)
+        assert values[5] == pytest.approx(37.5, abs=1e-5)
+    client.send(protocol.CommandRequest("sim/operation/pause_off"))
+    emulator.step(60)
+    assert emulator.sim.model.state.latitude_deg == pytest.approx(37.5 + math.degrees(65.0 / 6379345.0), abs=1e-4)
+
+
 # --- aircraft and situations ---
 
 

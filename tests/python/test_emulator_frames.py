@@ -217,6 +217,14 @@ def test_wind_from_the_west_is_felt_and_shown(bench):
     assert beta == pytest.approx(-math.degrees(state.beta_rad), abs=1e-4)  # Laminar's sign: nose right of the path +
 
 
+def test_height_above_ground_of_a_parked_aircraft_is_a_quarter_of_a_foot(bench):
+    emulator = bench(aircraft="fixed_wing", initial=InitialState(on_ground=True, terrain_elevation_m=300.0))
+    emulator.step(60)
+    agl, msl = emulator.read(POSITION + "y_agl", POSITION + "elevation")
+    assert agl == pytest.approx(0.25 * 0.3048, abs=0.02)
+    assert msl == pytest.approx(301.1, abs=0.1)
+
+
 def test_hpath_is_noise_when_parked(bench):
     emulator = bench(initial=InitialState(on_ground=True, heading_deg=200.0))
     values = {round(emulator.read(POSITION + "hpath")[0]) for _ in range(5)}
@@ -257,7 +265,8 @@ def test_rows_20_and_21_belong_together(bench):
     assert f32(latitude) == pytest.approx(rows[20][0], abs=4e-6)
     assert f32(longitude) == pytest.approx(rows[20][1], abs=8e-6)
     assert height == pytest.approx(rows[20][2] * 0.3048, abs=0.002)
-    assert rows[20][3] == pytest.approx(emulator.sim.model.state.agl_m / 0.3048, rel=1e-6)
+    # measured from the wheels: 1.2 m below the centre of gravity, and 3 inches when parked
+    assert rows[20][3] == pytest.approx((emulator.sim.model.state.agl_m - 1.2 + 0.076) / 0.3048, rel=1e-5)
 
 
 @pytest.mark.parametrize("version", [11, 12])

@@ -27,6 +27,9 @@ SEA_LEVEL_PRESSURE_PA = 101325.0
 #: [?] Laminar: hpath + beta = psi, which makes beta positive when the nose points right of the path (wind from the
 #: left): the opposite of the aerospace sign. Working programs disagree; set to +1.0 for the other reading.
 BETA_SIGN = -1.0
+#: [?] Height above ground that X-Plane shows for a parked aircraft: it measures from about the wheels, not from the centre
+#: of gravity (captured: 0.25 and 0.23 ft) [m].
+PARKED_HEIGHT_M = 0.076
 #: Below this speed over ground hpath is noise [m/s].
 PATH_NOISE_BELOW_MPS = 0.1
 #: The simulated magnetic pole: a dipole's, so the declination is of the right kind but up to 20 degrees off.
@@ -144,6 +147,11 @@ class Frame:
             else 0.0
         )
         self.altimeter_ft = indicated_altitude_m(state.pressure_pa, altimeter_setting_pa) * M_TO_FT
+
+    @property
+    def height(self) -> float:
+        """Height above ground as X-Plane gives it [m]; ModelState's is that of the centre of gravity."""
+        return self.m.agl_m - self.info.standing_height_m + PARKED_HEIGHT_M
 
     @property
     def mag_psi(self) -> float:

@@ -70,6 +70,7 @@ class KinematicModel:
         stall_mps=30.0,
         wing_span_m=12.0,
         length_m=9.0,
+        standing_height_m=_GROUND_HEIGHT_M,
         eye_forward_m=1.0,
         eye_down_m=-0.5,
     )

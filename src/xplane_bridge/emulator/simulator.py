@@ -388,7 +388,7 @@ class Simulator:
             m.longitude_deg,
             m.latitude_deg,
             m.altitude_m,
-            m.agl_m,
+            f.height,
             f.true_theta if level else f.theta,
             f.true_psi if level else f.psi,
             f.true_phi if level else f.phi,

@@ -24,7 +24,7 @@ COLUMNS: Tuple[Tuple[str, _Source], ...] = (
     ("latitude_deg", lambda f: f.m.latitude_deg),
     ("longitude_deg", lambda f: f.m.longitude_deg),
     ("altitude_m", lambda f: f.m.altitude_m),
-    ("agl_m", lambda f: f.m.agl_m),
+    ("agl_m", lambda f: f.height),
     ("lat_ref_deg", lambda f: f.local.lat_ref),
     ("lon_ref_deg", lambda f: f.local.lon_ref),
     ("local_x_m", lambda f: f.position[0]),

@@ -105,7 +105,7 @@ def sample_of(frame: Frame) -> FlightSample:
         pitch=frame.true_theta,
         heading=frame.true_psi,
         altitude=m.altitude_m,
-        agl=m.agl_m,
+        agl=frame.height,
         climb=-m.v_down_mps,
         speed=m.calibrated_airspeed_mps,
         alpha=math.degrees(m.alpha_rad),

@@ -173,7 +173,7 @@ def _failed(sim: Simulator, stem: str) -> List[bool]:
 def _gear_warning(f: Frame) -> bool:
     """Slow, low, and the wheels are up."""
     up = any(wheel.extended < 0.5 for wheel in f.m.gear)
-    return up and f.m.agl_m < 150.0 and f.m.calibrated_airspeed_mps < 1.5 * max(f.info.stall_mps, 1.0)
+    return up and f.height < 150.0 and f.m.calibrated_airspeed_mps < 1.5 * max(f.info.stall_mps, 1.0)
 
 
 def _master_caution(f: Frame, sim: Simulator) -> bool:
