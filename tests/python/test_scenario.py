@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -313,6 +314,17 @@ def test_demo_turns_climbs_stalls_and_recovers_within_twenty_seconds():
         bench.step(180 * 60)  # and it goes on without ever getting into trouble
         assert not bench.sim.model.state.crashed
         assert 500.0 < bench.sim.model.state.altitude_m < 2000.0
+
+
+def test_multisine_shakes_enough_to_measure_a_delay_by_and_stays_where_it_is():
+    with EmulatorBench(aircraft="fixed_wing", pilot=SCENARIOS / "multisine.yaml", fps=60.0) as bench:
+        accelerations = []
+        for _ in range(60 * 23):
+            bench.step()
+            accelerations.append(math.degrees(bench.sim.model.state.p_dot_rad_s2))
+        tail = accelerations[60 * 3 :]
+        assert math.sqrt(sum(a * a for a in tail) / len(tail)) > 2 * 14.0
+        assert bench.sim.model.state.altitude_m == pytest.approx(1000.0, abs=10.0)
 
 
 def test_pilot_holds_what_it_is_told(tmp_path):

@@ -27,8 +27,8 @@ SEA_LEVEL_PRESSURE_PA = 101325.0
 #: [?] Laminar: hpath + beta = psi, which makes beta positive when the nose points right of the path (wind from the
 #: left): the opposite of the aerospace sign. Working programs disagree; set to +1.0 for the other reading.
 BETA_SIGN = -1.0
-#: [?] Height above ground that X-Plane shows for a parked aircraft: it measures from about the wheels, not from the centre
-#: of gravity (captured: 0.25 and 0.23 ft) [m].
+#: [?] Height above ground that X-Plane shows for a parked aircraft: it measures from about the wheels, not from the
+#: centre of gravity (captured: 0.25 and 0.23 ft) [m].
 PARKED_HEIGHT_M = 0.076
 #: Below this speed over ground hpath is noise [m/s].
 PATH_NOISE_BELOW_MPS = 0.1
