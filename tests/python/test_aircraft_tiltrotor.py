@@ -57,7 +57,7 @@ class Pilot:
         # Upright: thrust holds height, attitude the speed. On the wing: attitude holds height, thrust the speed.
         thrust = upright * (0.06 * up - 0.06 * climb + 0.015 * self.sum_up)
         thrust += (1.0 - upright) * (0.02 * off_speed + 0.002 * self.sum_speed)
-        level = self.throttle * upright + 0.45 * (1.0 - upright)
+        level = self.throttle * upright + 0.68 * (1.0 - upright)
         controls.throttle = [limited(level + thrust, 0.0, 1.0)] * 8
         pitch = upright * limited(-2.0 * off_speed - 0.15 * self.sum_speed, -8.0, 12.0)
         pitch += (1.0 - upright) * (5.0 + limited(1.2 * up - 2.0 * climb + 0.3 * self.sum_up, -10.0, 10.0))
@@ -129,6 +129,16 @@ def test_starts_trimmed_at_any_speed(tiltrotor, speed):
     assert state.altitude_m == pytest.approx(500.0, abs=0.6)
     assert state.true_airspeed_mps == pytest.approx(speed, abs=0.15)
     assert abs(math.degrees(state.roll_rad)) < 0.5
+
+
+def test_climb_is_damped_upright(tiltrotor):
+    """The rotors' own damping: more thrust ends in a steady climb, not in an ever faster one."""
+    controls = tiltrotor.reset(InitialState(altitude_m=500.0))
+    controls.throttle = [controls.throttle[0] + 0.05] * 8
+    early = -fly(tiltrotor, controls, 15.0).v_down_mps
+    late = -fly(tiltrotor, controls, 15.0).v_down_mps
+    assert 1.0 < early < 8.0
+    assert late == pytest.approx(early, rel=0.1)
 
 
 def test_nacelles_turn_at_their_pace_and_beyond_upright(tiltrotor):

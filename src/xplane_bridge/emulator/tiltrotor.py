@@ -1,9 +1,9 @@
 """The tiltrotor. Aerodynamics, mass and gear: aircraft/tiltrotor/tiltrotor.xml.
 
 ``thrust_vector`` 0 puts the nacelles forward, 0.9 upright, 1 ten degrees aft of that; they follow at 8 deg/s. The
-throttle is a thrust lever: the collective pitch follows the air that comes through the rotor, so that thrust answers
-the lever in hover and in cruise; the engines hold the rotor speed as long as their power lasts. One shaft joins both
-rotors: one engine can drive both.
+throttle is a thrust lever: the collective pitch follows the air that forward flight sends through the rotor, so that
+thrust answers the lever in hover and in cruise; the engines hold the rotor speed as long as their power lasts. One
+shaft joins both rotors: one engine can drive both.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ ROTOR = {
 #: Rotor speed upright and forward [rad/s]: 1430 and 1200 rpm.
 HOVER_OMEGA, CRUISE_OMEGA = 150.0, 126.0
 #: Collective beyond the inflow's own angle at idle, and what full throttle adds upright and forward [deg].
-COLLECTIVE_IDLE_DEG, COLLECTIVE_HOVER_DEG, COLLECTIVE_CRUISE_DEG = -2.5, 18.0, 4.0
+COLLECTIVE_IDLE_DEG, COLLECTIVE_HOVER_DEG, COLLECTIVE_CRUISE_DEG = -5.0, 20.5, 6.5
 COLLECTIVE_RATE_DEG_S = 40.0
 #: What full commands add: differential collective for roll, cyclic for pitch, differential cyclic for yaw [deg].
 ROLL_COLLECTIVE_DEG, PITCH_CYCLIC_DEG, YAW_CYCLIC_DEG = 4.0, 12.0, 9.0
@@ -197,8 +197,8 @@ class Tiltrotor(JsbsimModel):
         roll, pitch, yaw = commands
         travel = COLLECTIVE_CRUISE_DEG + (COLLECTIVE_HOVER_DEG - COLLECTIVE_CRUISE_DEG) * upright
         nacelle = math.radians(self._nacelle_deg)
-        u, w = self._air_getters[0]() * FOOT_M, self._air_getters[2]() * FOOT_M
-        through = max(u * math.cos(nacelle) - w * math.sin(nacelle), 0.0)
+        # The blades follow forward flight only: climbing upright, the rotors keep the damping that nature gives them.
+        through = max(self._air_getters[0]() * FOOT_M * math.cos(nacelle), 0.0)
         for i, (side, rotor) in enumerate(zip((-1.0, 1.0), self._rotors)):
             # Left rotor: more thrust rolls right; tilted aft it pulls the nose left: forward for a right turn.
             cyclic = upright * (PITCH_CYCLIC_DEG * pitch + side * YAW_CYCLIC_DEG * yaw)
