@@ -317,6 +317,23 @@ def test_prel_starts_a_flight_at_a_place(bench):
     assert emulator.read(POSITION + "lat_ref", POSITION + "lon_ref") == [47.5, 9.0]
 
 
+def test_prel_on_a_runway_and_again(bench):
+    emulator = bench(aircraft="fixed_wing")
+    client = emulator.client()
+    for _ in range(2):
+        client.send(protocol.Placement(11, airport="RKSI"))
+        emulator.step()
+        state = emulator.sim.model.state
+        assert state.on_ground_all
+        assert state.latitude_deg == pytest.approx(37.4602, abs=1e-6)
+        client.send(protocol.Placement(6, latitude_deg=38.0, longitude_deg=127.0, elevation_m=900.0, speed_mps=70.0))
+        emulator.step(60)
+        client.send(protocol.Placement(5))
+        emulator.step()
+        assert emulator.sim.model.state.latitude_deg == pytest.approx(38.0, abs=1e-4)
+        assert emulator.read("sim/time/total_flight_time_sec")[0] < 0.1
+
+
 def test_vehx_stops_the_flight_model_until_an_aircraft_is_loaded(bench):
     emulator = bench()
     client = emulator.client()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import replace
 from typing import Callable, Dict, List, Optional, Set, Tuple
 
 import numpy as np
@@ -91,6 +92,7 @@ class Simulator:
         self.flying = False
         self.frozen = False  #: by VEHX: the flight model stands still until an aircraft or a flight is loaded
         self.last_situation = ""
+        self._last_start = self.initial
         self._load_time = load_time
         self._situations: Dict[str, Tuple[str, bytes, Dict[str, np.ndarray]]] = {}
         self._failed: Set[str] = set()
@@ -212,6 +214,7 @@ class Simulator:
 
     def start_flight(self, initial: InitialState) -> None:
         """Begins a flight: levers and trims as the flight needs them, the origin where the aircraft is."""
+        self._last_start = initial
         self.controls = self.model.reset(initial)
         self.inputs.start(self.controls, self.model)
         self.frozen, self.flying = False, True
@@ -312,13 +315,17 @@ class Simulator:
         return None
 
     def on_placement(self, request: protocol.Placement) -> Optional[str]:
-        """PREL: a new flight. Only start type 6 has a place of its own; the others begin where the emulator began."""
+        """PREL: a new flight. Airports are not modelled: only start type 6 has a place of its own."""
         if request.aircraft != 0:
             return "aircraft"
-        if request.start_type != Placements.START_AT_PLACE:
-            self.start_flight(self.initial)
-            return None
-        initial = Placements.initial_state(request, self.model.state.terrain_elevation_m)
+        if request.start_type == Placements.REPEAT_LAST:
+            initial: Optional[InitialState] = self._last_start
+        elif request.start_type == Placements.START_AT_PLACE:
+            initial = Placements.initial_state(request, self.model.state.terrain_elevation_m)
+        elif request.start_type in Placements.ON_GROUND:
+            initial = replace(self.initial, on_ground=True)
+        else:
+            initial = self.initial
         if initial is None:
             return "value"
         self.start_flight(initial)
