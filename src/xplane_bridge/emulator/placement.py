@@ -44,7 +44,7 @@ class Placements:
     MAX_RATE_RAD_S = 20.0
     ELEVATION_M = (-1000.0, 30000.0)
 
-    #: PREL start types: repeat the last one; at latitude, longitude, elevation; those on a ramp, runway or other ground.
+    #: PREL start types: repeat the last one; latitude, longitude, elevation; those on a ramp, runway or other ground.
     REPEAT_LAST = 5
     START_AT_PLACE = 6
     ON_GROUND = (10, 11, 14, 15, 16, 17, 18)

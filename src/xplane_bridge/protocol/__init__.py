@@ -4,13 +4,12 @@ Written from the protocol reference alone, independently of the C++ codec; both 
 """
 
 from .constants import *  # noqa: F403
-from .messages import (
+from .fields import DecodeError
+from .requests import (
     AircraftLoad,
     AircraftLoadAndPlacement,
-    Beacon,
     CommandRequest,
     DataPacket,
-    DecodeError,
     DrefWrite,
     NetworkTarget,
     Placement,
@@ -18,14 +17,17 @@ from .messages import (
     Request,
     RowSelection,
     RposRequest,
-    RposResponse,
     RrefRequest,
     Situation,
     VehiclePose,
-    decode_beacon,
     decode_data,
-    decode_dref_response,
     decode_request,
+)
+from .responses import (
+    Beacon,
+    RposResponse,
+    decode_beacon,
+    decode_dref_response,
     decode_rpos_response,
     decode_rref_response,
     encode_rref_response,
