@@ -1,6 +1,6 @@
 """What clients send to X-Plane, as values with their encoding, and DATA, which goes both ways.
 
-Everything is little-endian and unpadded except where a field is named padding. Every decoding failure is a `DecodeError`
+All is little-endian and unpadded except where a field is named padding. Every failure to decode is a `DecodeError`
 that names the message, what was given and what was expected; no other exception leaves `decode_request`.
 """
 
