@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
+import yaml
 
 from xplane_bridge.harness.emulator_bench import EmulatorBench
 from xplane_bridge.scenario import (
@@ -49,6 +50,12 @@ def labels(steps):
 @pytest.mark.parametrize("path", sorted(SCENARIOS.glob("*.yaml")), ids=lambda path: path.name)
 def test_every_scenario_of_the_package_loads(path):
     assert load_scenario(path).events
+
+
+def test_the_example_of_the_manual_is_a_scenario():
+    manual = (SCENARIOS / "README.md").read_text(encoding="utf-8")
+    example = manual.split("```yaml")[1].split("```")[0]
+    assert parse_scenario(yaml.safe_load(example)).name == "left_aileron_stuck"
 
 
 @pytest.mark.parametrize(
