@@ -180,6 +180,31 @@ def test_place_sets_exactly_what_it_is_given(name):
         model.place(altitude_m=math.nan)
 
 
+@pytest.mark.parametrize("name", model_names())
+def test_place_never_puts_it_under_ground(name):
+    model = create_model(name)
+    controls = model.reset(InitialState(on_ground=True, engines_running=False))
+    model.place(altitude_m=-50.0, roll_rad=math.radians(-45.0), pitch_rad=math.radians(80.0), v_ned_mps=(0.0, 0.0, 0.0))
+    for _ in range(120):
+        state = model.step(1 / 60, controls)
+        assert math.hypot(state.v_north_mps, state.v_east_mps, state.v_down_mps) < 25.0
+    assert -1.0 < state.agl_m < 10.0
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_starts_with_dead_engines_and_where_the_air_is_thin(name):
+    model = create_model(name)
+    controls = model.reset(InitialState(altitude_m=1500.0, engines_running=False))
+    for _ in range(120):
+        state = model.step(1 / 60, controls)
+    assert not any(engine.running for engine in state.engines)
+    assert state.v_down_mps > 0.5
+    model.reset(InitialState(altitude_m=5000.0))
+    assert model.state.altitude_m == pytest.approx(5000.0)
+    with pytest.raises(FlightModelError, match=r"and 15000 m.*no steady flight"):
+        model.reset(InitialState(altitude_m=15000.0, airspeed_mps=75.0 if name != "multirotor" else 15.0))
+
+
 def test_quaternion_rotates_body_vectors_into_ned():
     model = create_model("fixed_wing")
     model.reset(InitialState())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ElementTree
 
 from xplane_bridge.emulator.flight_model import GearState, ModelState
@@ -20,6 +21,10 @@ class Contact:
             return float(element.findtext(tag, "0"))
 
         self.name = element.get("name", "")
+        # From JSBSim's structural frame (aft, right, up) to FRD.
+        self.forward_m = -float(element.findtext("location/x", "0"))
+        self.right_m = float(element.findtext("location/y", "0"))
+        self.down_m = -float(element.findtext("location/z", "0"))
         self.is_gear = self.name in gear_names
         self.spring = value("spring_coeff")
         self.damping = value("damping_coeff")
@@ -41,6 +46,13 @@ class Contacts:
     def new_states(self) -> list[GearState]:
         """One state per wheel or leg, to be filled in by ``read``."""
         return [GearState(name=contact.name) for contact in self._gear]
+
+    def depth(self, roll_rad: float, pitch_rad: float) -> float:
+        """How far the lowest point is below the reference point in this attitude [m]."""
+        forward = -math.sin(pitch_rad)
+        right = math.sin(roll_rad) * math.cos(pitch_rad)
+        down = math.cos(roll_rad) * math.cos(pitch_rad)
+        return max(forward * c.forward_m + right * c.right_m + down * c.down_m for c in self._all)
 
     def hit(self) -> bool:
         """Whether something touches the ground right now harder than it can take."""

@@ -31,7 +31,6 @@ SPEED_BRAKE_DEG = 60.0
 ROLL_TRIM, PITCH_TRIM, YAW_TRIM = 0.3, 0.7, 0.4
 
 STALL_WARNING_RAD = math.radians(12.5)
-CRUISE_MPS = 75.0
 CRUISE_PROPELLER = 0.75
 #: Height of the centre of gravity and pitch attitude of the aircraft standing on its wheels, where the settling starts.
 STANDING_HEIGHT_M, STANDING_PITCH_RAD = 1.14, -0.01
@@ -88,6 +87,7 @@ class FixedWing(JsbsimModel):
     default_fuel_kg = (100.0, 100.0)
     default_payload_kg = 210.0
     max_payload_kg = 500.0
+    usual_speeds_mps = (75.0, 66.0, 60.0)
 
     def _build(self) -> None:
         self._rotors = [
@@ -202,7 +202,7 @@ class FixedWing(JsbsimModel):
             engine.warm_up(temperature, max(engine.power / ENGINE.rated_power_w, 0.0))
 
     def _start_in_air(self, initial: InitialState) -> Controls:
-        speed = CRUISE_MPS if initial.airspeed_mps is None else initial.airspeed_mps
+        speed = initial.airspeed_mps
         if not 30.0 <= speed <= 110.0:
             raise FlightModelError(f"airspeed {speed} m/s: the twin starts in the air at 30..110 m/s")
         controls = Controls(gear_down=False)
@@ -211,8 +211,8 @@ class FixedWing(JsbsimModel):
         heading = math.radians(initial.heading_deg)
         course = (math.cos(heading), math.sin(heading))
         for i, engine in enumerate(self._engines):
-            engine.running = initial.engines_running
-            self._rotors[i].omega = ENGINE.rated_rpm * math.pi / 30.0 if initial.engines_running else 60.0
+            engine.running = True
+            self._rotors[i].omega = ENGINE.rated_rpm * math.pi / 30.0
 
         def fly(x: Sequence[float]) -> Sequence[float]:
             theta, pitch_trim, throttle, roll, roll_trim, yaw_trim = (float(value) for value in x)
@@ -235,7 +235,7 @@ class FixedWing(JsbsimModel):
         start = (0.02, 0.0, 0.6, 0.0, 0.0, 0.0)
         differences = (1e-3, 1e-2, 1e-2, 1e-3, 1e-2, 1e-2)
         limits = ((-0.2, 0.3), (-1.0, 1.0), (0.0, 1.0), (-0.3, 0.3), (-1.0, 1.0), (-1.0, 1.0))
-        what = f"level flight at {speed:.1f} m/s"
+        what = f"level flight of the twin at {speed:.1f} m/s and {initial.altitude_m:.0f} m"
         for lever in (CRUISE_PROPELLER, 1.0):
             controls.propeller[0] = controls.propeller[1] = lever
             try:

@@ -11,6 +11,7 @@ import json
 import math
 import os
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 from typing import Sequence
 
@@ -49,6 +50,8 @@ from xplane_bridge.emulator.turbulence import DrydenTurbulence
 SITUATION_VERSION = 1
 #: Height below which contact with the ground is looked for.
 CRASH_WATCH_M = 20.0
+#: How deep in the ground the lowest point of a placed aircraft may be: the travel of its springs.
+DEEPEST_PLACE_M = 0.25
 #: Cosine of the tilt beyond which the wheels no longer carry.
 STRUTS_WORK_COSINE = 0.5
 
@@ -88,6 +91,8 @@ class JsbsimModel:
     default_payload_kg: float = 0.0
     max_payload_kg: float = 0.0
     gear_time_s: float = 6.0
+    #: True airspeeds of a start in the air that names none, the most usual first.
+    usual_speeds_mps: tuple[float, ...] = ()
     #: Below this height JSBSim runs this often per step: a light aircraft on stiff legs needs finer steps.
     contact_height_m: float = 0.0
     contact_runs: int = 1
@@ -201,9 +206,14 @@ class JsbsimModel:
         raise NotImplementedError
 
     def _start_in_air(self, initial: InitialState) -> Controls:
+        """Trims at ``initial.airspeed_mps`` with running engines."""
         raise NotImplementedError
 
     def _start_on_ground(self, initial: InitialState) -> Controls:
+        raise NotImplementedError
+
+    def set_engine_running(self, engine: int, running: bool) -> None:
+        """Starts or stops an engine."""
         raise NotImplementedError
 
     # ---- flying
@@ -221,12 +231,27 @@ class JsbsimModel:
         self._fuel_kg = list(self._loaded_fuel_kg)
         turbulence = self._turbulence.save()
         self._start_jsbsim()
-        self._trimmed = self._start_on_ground(initial) if initial.on_ground else self._start_in_air(initial)
+        self._trimmed = self._start_on_ground(initial) if initial.on_ground else self._trim(initial)
         self._turbulence.restore(turbulence)
         self._time = initial.sim_time_s
         self._crashed = False
         self._read_state(self._trimmed)
         return self.trim_controls
+
+    def _trim(self, initial: InitialState) -> Controls:
+        """Starts in the air; without a speed at the first of the usual ones that the air up there allows."""
+        speeds = self.usual_speeds_mps if initial.airspeed_mps is None else (initial.airspeed_mps,)
+        for speed in speeds:
+            try:
+                controls = self._start_in_air(replace(initial, airspeed_mps=speed))
+                break
+            except FlightModelError:
+                if speed == speeds[-1]:
+                    raise
+        if not initial.engines_running:
+            for engine in range(self.info.engine_count):
+                self.set_engine_running(engine, False)
+        return controls
 
     def step(self, dt: float, controls: Controls) -> ModelState:
         """Flies on."""
@@ -339,19 +364,22 @@ class JsbsimModel:
         v_ned_mps: Sequence[float] | None = None,
         pqr_rad_s: Sequence[float] | None = None,
     ) -> ModelState:
-        """Moves the aircraft at once."""
+        """Moves the aircraft at once, but not into the ground: it is lifted until its lowest point is on it."""
         s = self.state
 
         def chosen(new, old):
             return old if new is None else new
 
+        roll, pitch = chosen(roll_rad, s.roll_rad), chosen(pitch_rad, s.pitch_rad)
+        # Springs pushed metres into the ground would fling the aircraft away.
+        lowest = self._terrain_m + self._contacts.depth(roll, pitch) - DEEPEST_PLACE_M
         self._put(
             (
                 chosen(latitude_deg, s.latitude_deg),
                 chosen(longitude_deg, s.longitude_deg),
-                chosen(altitude_m, s.altitude_m),
+                max(chosen(altitude_m, s.altitude_m), lowest),
             ),
-            (chosen(roll_rad, s.roll_rad), chosen(pitch_rad, s.pitch_rad), chosen(heading_rad, s.heading_rad)),
+            (roll, pitch, chosen(heading_rad, s.heading_rad)),
             chosen(v_ned_mps, (s.v_north_mps, s.v_east_mps, s.v_down_mps)),
             chosen(pqr_rad_s, (s.p_rad_s, s.q_rad_s, s.r_rad_s)),
         )

@@ -80,6 +80,7 @@ class Multirotor(JsbsimModel):
         standing_height_m=STANDING_HEIGHT_M,
     )
     max_payload_kg = 0.3
+    usual_speeds_mps = (0.0,)
     contact_height_m = 1.0
     contact_runs = 2
 
@@ -164,7 +165,7 @@ class Multirotor(JsbsimModel):
         self._stabilisation.integrals = list(saved["integrals"])
 
     def _start_in_air(self, initial: InitialState) -> Controls:
-        speed = 0.0 if initial.airspeed_mps is None else initial.airspeed_mps
+        speed = initial.airspeed_mps
         if not 0.0 <= speed <= MAXIMUM_SPEED_MPS:
             raise FlightModelError(
                 f"airspeed {speed} m/s: the quadrotor starts in the air at 0..{MAXIMUM_SPEED_MPS} m/s"
@@ -179,7 +180,7 @@ class Multirotor(JsbsimModel):
                 speed * math.sin(heading) + self._wind[1],
                 self._wind[2],
             ]
-        self._running = [initial.engines_running] * 4
+        self._running = [True] * 4
 
         def fly(x: Sequence[float]) -> Sequence[float]:
             roll, pitch, throttle, *commands = (float(value) for value in x)
@@ -211,7 +212,7 @@ class Multirotor(JsbsimModel):
             (1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4),
             ((-0.5, 0.5), (-0.5, 0.5), (0.05, 0.95), (-0.2, 0.2), (-0.2, 0.2), (-0.2, 0.2)),
             tolerance=1e-4,
-            what=f"flight of the quadrotor at {speed:.1f} m/s in this wind",
+            what=f"flight of the quadrotor at {speed:.1f} m/s and {initial.altitude_m:.0f} m in this wind",
         )
         fly(solution)
         return controls

@@ -113,6 +113,7 @@ class Tiltrotor(JsbsimModel):
     default_fuel_kg = (150.0,)
     default_payload_kg = 80.0
     max_payload_kg = 200.0
+    usual_speeds_mps = (0.0, 85.0)
 
     def _build(self) -> None:
         self._rotors = [
@@ -295,7 +296,7 @@ class Tiltrotor(JsbsimModel):
     # ---- starts
 
     def _start_in_air(self, initial: InitialState) -> Controls:
-        speed = 0.0 if initial.airspeed_mps is None else initial.airspeed_mps
+        speed = initial.airspeed_mps
         if not 0.0 <= speed <= MAXIMUM_SPEED_MPS:
             raise FlightModelError(
                 f"airspeed {speed} m/s: the tiltrotor starts in the air at 0..{MAXIMUM_SPEED_MPS} m/s"
@@ -306,7 +307,7 @@ class Tiltrotor(JsbsimModel):
         self._gear_position = 1.0 if controls.gear_down else 0.0
         self._gear_setter(self._gear_position)
         self._nacelle_deg = NACELLE_DEG_PER_RATIO * ratio
-        self._running = [initial.engines_running] * 2
+        self._running = [True] * 2
         upright = self._upright()
         omega = CRUISE_OMEGA + (HOVER_OMEGA - CRUISE_OMEGA) * upright
         heading = math.radians(initial.heading_deg)
@@ -355,7 +356,7 @@ class Tiltrotor(JsbsimModel):
             (1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3),
             ((-0.4, 0.4), (-0.3, 0.3), (0.0, 1.0), (-1.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)),
             tolerance=1e-5,
-            what=f"flight of the tiltrotor at {speed:.1f} m/s in this wind",
+            what=f"flight of the tiltrotor at {speed:.1f} m/s and {initial.altitude_m:.0f} m in this wind",
         )
         fly(solution)
         self._gas_temperature_k = 600.0 + 480.0 * self._power_w / (2.0 * ENGINE_POWER_W)

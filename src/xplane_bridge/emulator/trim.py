@@ -55,5 +55,6 @@ def newton(
     if np.max(np.abs(value)) < 1e3 * tolerance:
         return x
     raise FlightModelError(
-        f"{what}: no steady flight found; choose another speed, height or weight (best left {value.round(5)})"
+        f"{what}: no steady flight found; choose another speed, height or weight "
+        f"(the best try leaves accelerations of {', '.join(f'{v:.3g}' for v in value)})"
     )
