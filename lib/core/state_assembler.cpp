@@ -85,7 +85,6 @@ const FlightState* FlightStateAssembler::onRref(const RrefView& datagram, std::i
 
 const FlightState* FlightStateAssembler::onData(const DataView& datagram, std::int64_t receive_ns) {
   if (options_.transport != Transport::kData) return nullptr;
-  row_store_.clear();
   row_store_.update(datagram, receive_ns);
   inputs_ = FlightInputs{};
   const bool fresh =

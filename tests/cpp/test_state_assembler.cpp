@@ -340,6 +340,26 @@ TEST(FlightStateAssembler, RposTakesOverWhereTheSphereDoesNot) {
   EXPECT_EQ(hand.send(1.0)->position_source, PositionSource::kFloat32);
 }
 
+TEST(FlightStateAssembler, CheckAgainstRposDecidesOnTheSource) {
+  for (const bool right : {true, false}) {
+    Hand hand;
+    const FlightState first = *hand.send();
+    EXPECT_EQ(first.position_source, PositionSource::kLocalUnchecked);
+    Rpos rpos;
+    rpos.latitude_deg = first.latitude;
+    rpos.longitude_deg = first.longitude;
+    rpos.elevation_m = first.altitude_msl + (right ? 0.01 : 0.2);
+    const FlightState* s = nullptr;
+    for (int i = 0; i < 60; ++i) {
+      hand.assembler.onRpos(rpos, hand.now);
+      s = hand.send();
+    }
+    ASSERT_NE(s, nullptr);
+    EXPECT_EQ(s->position_source, right ? PositionSource::kLocal : PositionSource::kRpos);
+    EXPECT_EQ(s->epoch, first.epoch);
+  }
+}
+
 TEST(FlightStateAssembler, PositionModesAreObeyed) {
   auto options = Hand::withVersion();
   options.position = PositionMode::kFloat32;
