@@ -325,7 +325,7 @@ class FlightModel(Protocol):
         v_ned_mps: Sequence[float] | None = None,
         pqr_rad_s: Sequence[float] | None = None,
     ) -> ModelState:
-        """Moves the aircraft at once (PREL, VEHS, writes to position, q, velocity, rates). None: stays. Never below ground."""
+        """Moves the aircraft at once (PREL, VEHS, writes to position, q, ...), never into the ground. None: stays."""
 
     def save(self) -> bytes:
         """The whole situation but the controls (SIMO); restored, it flies on as it would have, to millimetres."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
@@ -43,6 +42,7 @@ from xplane_bridge.emulator.jsbsim_state import (
     SLUG_KG,
     Properties,
     StateReader,
+    new_jsbsim,
 )
 from xplane_bridge.emulator.rotors import Rotor, sum_loads
 from xplane_bridge.emulator.turbulence import DrydenTurbulence
@@ -114,29 +114,9 @@ class JsbsimModel:
 
     def _start_jsbsim(self) -> None:
         """A fresh JSBSim, so that no flight inherits anything from the one before."""
-        name = self.info.name
-        # JSBSim reads this when it is made, and fills the terminal otherwise.
-        before = os.environ.get("JSBSIM_DEBUG")
-        os.environ["JSBSIM_DEBUG"] = "0"
-        try:
-            self._fdm = fdm = jsbsim.FGFDMExec(str(_ROOT))
-        finally:
-            if before is None:
-                del os.environ["JSBSIM_DEBUG"]
-            else:
-                os.environ["JSBSIM_DEBUG"] = before
-        fdm.set_debug_level(0)
-        if not fdm.load_planet(str(_ROOT / "aircraft" / "planet.xml"), False):
-            raise FlightModelError("JSBSim cannot read aircraft/planet.xml: is the package installed completely?")
-        fdm.set_aircraft_path("aircraft")
-        if not fdm.load_model(name):
-            raise FlightModelError(
-                f"JSBSim cannot read aircraft/{name}/{name}.xml: is the package installed completely?"
-            )
-        fdm["simulation/gravity-model"] = 0
+        self._fdm = fdm = new_jsbsim(_ROOT, self.info.name)
         self._fdm_step = MAX_SUBSTEP_S
         fdm.set_dt(MAX_SUBSTEP_S)
-
         self._find_properties(Properties(fdm.get_property_manager()))
         self._surface_set = SurfaceSet(self.surfaces)
         self._time = 0.0

@@ -1,9 +1,13 @@
-"""JSBSim's properties as our state: SI, X-Plane's planet."""
+"""A JSBSim on X-Plane's planet, and its properties as our state in SI."""
 
 from __future__ import annotations
 
 import math
+import os
+from pathlib import Path
 from typing import Callable, Sequence
+
+import jsbsim
 
 from xplane_bridge.emulator.flight_model import EARTH_RADIUS_M, GRAVITY_MPS2, FlightModelError, ModelState
 
@@ -81,6 +85,31 @@ def quaternion_from_euler(roll: float, pitch: float, heading: float) -> tuple[fl
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
+
+
+def new_jsbsim(root: Path, aircraft: str) -> jsbsim.FGFDMExec:
+    """A JSBSim on X-Plane's planet with ``root``/aircraft/<aircraft> loaded."""
+    # JSBSim reads this when it is made, and fills the terminal otherwise.
+    before = os.environ.get("JSBSIM_DEBUG")
+    os.environ["JSBSIM_DEBUG"] = "0"
+    try:
+        fdm = jsbsim.FGFDMExec(str(root))
+    finally:
+        if before is None:
+            del os.environ["JSBSIM_DEBUG"]
+        else:
+            os.environ["JSBSIM_DEBUG"] = before
+    fdm.set_debug_level(0)
+    # The planet first: an aircraft keeps the one it was loaded on.
+    if not fdm.load_planet(str(root / "aircraft" / "planet.xml"), False):
+        raise FlightModelError("JSBSim cannot read aircraft/planet.xml: is the package installed completely?")
+    fdm.set_aircraft_path("aircraft")
+    if not fdm.load_model(aircraft):
+        raise FlightModelError(
+            f"JSBSim cannot read aircraft/{aircraft}/{aircraft}.xml: is the package installed completely?"
+        )
+    fdm["simulation/gravity-model"] = 0
+    return fdm
 
 
 class Properties:
