@@ -110,7 +110,8 @@ bool ViewStream::add(const RrefView& datagram, std::int64_t receive_ns) {
     if (std::isnan(value)) continue;
     const FieldSpec& field = *requests_[i].field;
     const Conversion& unit = field.dataref.conversion;
-    field.store(&status_, requests_[i].element, static_cast<double>(value) * unit.factor + unit.offset);
+    const double si = static_cast<double>(value) * unit.factor + unit.offset;
+    field.store(&status_, &si, 1);  // all of them are single numbers
   }
   return true;
 }
