@@ -29,7 +29,7 @@ std::vector<std::string> SimLink::Impl::findProblems(std::int64_t now_ns) const 
   const std::vector<BeaconSighting> sightings = beacons_.sightings(now_ns);
   const double searched_s = static_cast<double>(now_ns - started_ns_) / 1e9;
   if (!monitor_.alive() && options_.host.empty()) {
-    if (sightings.size() > 1) {
+    if (sightings.size() > 1 && !beacons_.at(peer_, now_ns).has_value()) {
       problems.push_back("several X-Planes announce themselves: " + namesOf(sightings) +
                          "; set the parameter host (and port) to the one that is meant");
     } else if (!peer_.valid() && sightings.empty() && searched_s > kPatienceS) {
@@ -73,7 +73,11 @@ std::string SimLink::Impl::reasonOf(LinkState state) const {
       return "X-Plane has been silent for more than " + std::to_string(options_.stale_after_s).substr(0, 4) +
              " s: loading, in a menu, or gone";
     case LinkState::kLost:
-      return monitor_.beaconGone(now_ns_) ? "X-Plane is silent and its beacon is gone" : "X-Plane is silent for long";
+      if (monitor_.silence(now_ns_) > options_.lost_after_s) {
+        return "X-Plane has been silent for long";
+      }
+      return monitor_.beaconGone(now_ns_) ? "X-Plane is silent and its beacon is gone"
+                                          : "X-Plane has moved to " + peer_.toString();
   }
   return {};
 }
