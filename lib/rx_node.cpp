@@ -164,6 +164,7 @@ std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
     datarefs_->reset();
     aircraft_.reset();
     rows_.clear();
+    consistency_.reset();
     last_state_.reset();
   }
   const std::int64_t wall_ns = clock_.system_ns();
@@ -211,6 +212,7 @@ void RxNode::publishState(const core::FlightState* state, std::int64_t receive_n
   }
   last_state_ = *state;
   last_state_received_ns_ = receive_ns;
+  consistency_.add(*state);
   if (flight_->map()) {
     flight_publisher_->publish(*state, *flight_->map(), receive_ns);
   }

@@ -1,5 +1,6 @@
 // What rx_node says in /diagnostics, beside the link's own status (link_diagnostics.cpp).
 
+#include <array>
 #include <limits>
 #include <string>
 #include <utility>
@@ -80,6 +81,7 @@ void RxNode::addAllDiagnostics() {
   addDiagnostics("flight state", [this](auto& status) { diagnoseFlight(&status); });
   addDiagnostics("clock", [this](auto& status) { diagnoseClock(&status); });
   addDiagnostics("position", [this](auto& status) { diagnosePosition(&status); });
+  addDiagnostics("physics", [this](auto& status) { diagnosePhysics(&status); });
   if (!missions_.empty()) {
     addDiagnostics("mission state", [this](auto& status) { diagnoseMission(&status); });
   }
@@ -163,6 +165,32 @@ void RxNode::diagnosePosition(diagnostic_updater::DiagnosticStatusWrapper* statu
   status->addf("Height error at the last comparison (m)", "%.4f", check.heightError());
   status->addf("Cross-track error at the last comparison (m)", "%.4f", check.crossTrackError());
   status->add("Position epoch (-)", flight_->positionEpoch());
+}
+
+void RxNode::diagnosePhysics(diagnostic_updater::DiagnosticStatusWrapper* status) {
+  std::array<core::ConsistencyResult, core::kConsistencyCheckCount> results;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    results = consistency_.evaluate();
+  }
+  std::size_t consistent = 0;
+  status->summary(DiagnosticStatus::OK, "");
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const core::ConsistencyResult& result = results[i];
+    const std::string check = core::toString(static_cast<core::ConsistencyCheck>(i));
+    consistent += result.verdict == core::ConsistencyVerdict::kConsistent ? 1U : 0U;
+    if (result.verdict == core::ConsistencyVerdict::kInconsistent) {
+      status->mergeSummary(DiagnosticStatus::WARN, check + " disagree: " + core::toString(result.fault));
+    }
+    status->add(check, core::toString(result.verdict));
+    status->addf(check + ", disagreement (SI units)", "%.4f", result.error);
+    status->addf(check + ", tolerated (SI units)", "%.4f", result.tolerance);
+  }
+  if (status->level == DiagnosticStatus::OK) {
+    status->summary(DiagnosticStatus::OK, consistent == results.size()
+                                              ? "all quantities agree"
+                                              : "nothing disagrees; the flight does not tell about all quantities");
+  }
 }
 
 void RxNode::diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status) {

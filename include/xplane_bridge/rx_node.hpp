@@ -15,6 +15,7 @@
 #include "xplane_bridge/base_node.hpp"
 #include "xplane_bridge/core/aircraft_identity.hpp"
 #include "xplane_bridge/core/clock_filter.hpp"
+#include "xplane_bridge/core/consistency_monitor.hpp"
 #include "xplane_bridge/core/state_assembler.hpp"
 #include "xplane_bridge/dataref_publisher.hpp"
 #include "xplane_bridge/flight_publisher.hpp"
@@ -78,6 +79,7 @@ class RxNode : public BaseNode {
   void diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status);
   void diagnoseClock(diagnostic_updater::DiagnosticStatusWrapper* status);
   void diagnosePosition(diagnostic_updater::DiagnosticStatusWrapper* status);
+  void diagnosePhysics(diagnostic_updater::DiagnosticStatusWrapper* status);
   void diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status);
 
   RxOptions options_;
@@ -91,6 +93,7 @@ class RxNode : public BaseNode {
   core::AircraftIdentityReader aircraft_;
   core::RowStore rows_;
   core::ReceiveClock receive_clock_;
+  core::ConsistencyMonitor consistency_;
   std::vector<Subscription> subscriptions_;
   std::uint32_t link_epoch_ = 0;
   std::optional<core::FlightState> last_state_;

@@ -670,7 +670,7 @@ def test_diagnostics_cover_every_concern(world, rx):
     world.emulator(*KINEMATIC)
     rx()
     world.states.wait_for_count(60)
-    for name in ("link to X-Plane", "flight state", "clock", "position", "mission state"):
+    for name in ("link to X-Plane", "flight state", "clock", "position", "physics", "mission state"):
         status = world.wait_for_diagnostics(name, lambda s: s.level == 0, 30.0)
         assert status.values
     wait_until(
