@@ -97,6 +97,7 @@ std::vector<std::string> expandDatarefPath(std::string_view pattern, int count) 
   const std::size_t star = pattern.find("[*]");
   if (star == std::string_view::npos) return {std::string(pattern)};
   std::vector<std::string> expanded;
+  expanded.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     expanded.push_back(std::string(pattern.substr(0, star)) + "[" + std::to_string(i) + "]");
   }
