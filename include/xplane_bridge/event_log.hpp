@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+#include <ros/publisher.h>
+
+#include "xplane_bridge/EventList.h"
+
+namespace xplane_bridge {
+
+/// The last hundred events on a latched topic, numbered without gaps. Thread-safe.
+class EventLog {
+ public:
+  static constexpr std::size_t kKept = 100;
+
+  void setPublisher(const ros::Publisher& publisher) { publisher_ = publisher; }
+
+  /// Adds and publishes. `kind` is one of Event's. Returns the event's number.
+  std::uint32_t add(std::uint8_t kind, const std::string& text, double sim_time, const std::string& requested_by = "",
+                    bool success = true);
+
+ private:
+  std::mutex mutex_;
+  ros::Publisher publisher_;
+  EventList list_;
+  std::uint32_t number_ = 0;
+};
+
+}  // namespace xplane_bridge

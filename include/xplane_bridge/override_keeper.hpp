@@ -1,0 +1,63 @@
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/sim_link.hpp"
+
+namespace xplane_bridge {
+
+/// The overrides this node has set in X-Plane, and nothing else's: each is in the journal before it is set, and taken
+/// out after it is released and read back. Thread-safe. Functions that wait for X-Plane say so; those that write to the
+/// journal throw core::JournalError.
+class OverrideKeeper {
+ public:
+  /// `report(text, success)`: what happened, for events and the log.
+  using Report = std::function<void(const std::string& text, bool success)>;
+
+  OverrideKeeper(core::SimLink* link, Report report);
+
+  /// Sets what of `wanted` is not set yet, and gives back what was set by an earlier call and is not in `wanted` any
+  /// more (its journal entry stays until confirmReleases() has read it back). Writes to the disk when something is new;
+  /// without a journal (X-Plane has not been found) nothing is set.
+  void require(const std::vector<std::string>& wanted);
+  /// Sets one for as long as the node runs, whatever require() says (set_dataref).
+  void hold(const std::string& dataref);
+  /// Gives one back that hold() has set.
+  void unhold(const std::string& dataref);
+  /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted.
+  void refresh();
+  /// True while a release has not been read back.
+  bool releasesPending() const;
+  /// Reads pending releases back, sending them again where needed. Waits up to `timeout_s`.
+  void confirmReleases(double timeout_s);
+  /// Releases everything. Waits up to `timeout_s`. Returns whether X-Plane has shown all of it; what it has not stays
+  /// in the journal.
+  bool releaseAll(double timeout_s);
+  /// Releases what a crashed run has left. Waits up to `timeout_s`. Returns whether nothing is left.
+  bool releaseLeftovers(double timeout_s);
+
+  /// Set now.
+  std::vector<std::string> active() const;
+
+ private:
+  bool set(const std::string& dataref);
+  void release(const std::string& dataref);
+  bool confirm(const std::vector<std::string>& ids, const std::vector<core::UndoOperation>& operations,
+               double timeout_s, const std::string& what);
+
+  core::SimLink* link_;
+  Report report_;
+  mutable std::mutex mutex_;
+  std::set<std::string> required_;
+  std::set<std::string> held_;
+  std::set<std::string> releasing_;
+};
+
+/// Journal purpose of tx_node's entries.
+extern const char* const kOverridePurpose;
+
+}  // namespace xplane_bridge

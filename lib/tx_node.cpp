@@ -1,0 +1,434 @@
+#include "xplane_bridge/tx_node.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "xplane_bridge/ControlMode.h"
+#include "xplane_bridge/Event.h"
+#include "xplane_bridge/control_conversions.hpp"
+#include "xplane_bridge/core/journal.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr double kOverrideRefresh = 1.0;  // [s] a lost datagram must not leave the stick with X-Plane
+constexpr double kHandleRepeat = 0.3;     // [s] in which a changed handle is sent with every refresh
+constexpr std::size_t kUnseenKept = 16;
+constexpr double kWorkPeriod = 0.2;     // [s]
+constexpr double kReleaseWait = 1.0;    // [s] of one attempt
+constexpr double kDoesNotFollow = 1.0;  // [s] without read-back until it is said
+
+ros::Time stampNow() { return ros::Time(ros::WallTime::now().toSec()); }
+
+}  // namespace
+
+double TxNode::now() const { return static_cast<double>(clock_.steady_ns()) * 1e-9; }
+
+void TxNode::loadParameters(const ParamLoader& own) {
+  options_ = loadTxOptions(own, common().aircraft);
+  arbiter_ = std::make_unique<core::ControlArbiter>(options_.arbiter, now());
+  arbiter_->setFlowing(false, now());
+  encoder_ = std::make_unique<core::ControlEncoder>(
+      core::EncoderOptions{core::SimulatorGeneration::k11, options_.aircraft.reverse_thrust});
+}
+
+void TxNode::advertise() {
+  events_.setPublisher(advertiseTopic<EventList>("events", 1, true));
+  mode_publisher_ = advertiseTopic<ControlMode>("control/mode", 10, true);
+  applied_publisher_ = advertiseTopic<AppliedCommand>("control/applied", 100);
+  advertiseServices();
+  addDiagnostics("control", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { fillDiagnostics(&status); });
+}
+
+void TxNode::subscribe() {
+  subscribeTopic<ControlCommand>("control/manual", 1, [this](const ControlCommandConstPtr& command) {
+    onCommand(core::FlightMode::kManual, *command);
+  });
+  subscribeTopic<ControlCommand>("control/auto", 1, [this](const ControlCommandConstPtr& command) {
+    onCommand(core::FlightMode::kAuto, *command);
+  });
+  // Requests are few and none may be lost.
+  subscribeTopic<ModeRequest>("control/mode_request", 20,
+                              [this](const ModeRequestConstPtr& request) { onModeRequest(*request); });
+  addTimer(1.0 / options_.rate, [this] { onTimer(); });
+}
+
+core::SimLinkCallbacks TxNode::linkCallbacks() {
+  core::SimLinkCallbacks callbacks;
+  callbacks.on_state = [this](const core::LinkStatus& status) { onLinkState(status); };
+  callbacks.on_rref = [this](core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info) {
+    onRref(group, view, info);
+  };
+  return callbacks;
+}
+
+void TxNode::start() {
+  guardian_.start();
+  overrides_ = std::make_unique<OverrideKeeper>(&link(), [this](const std::string& text, bool success) {
+    logEvent(Event::OVERRIDE, "overrides: " + text, "", success);
+  });
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    watch_group_ = link().addGroup({"flight watch", core::flightWatchDatarefs(), core::kEveryFrameRateHz, 2});
+    identity_group_ = link().addGroup(
+        {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1});
+    publishMode();
+  }
+  worker_ = std::thread([this] { work(); });
+}
+
+void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
+  const double time = now();
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (const auto refusal = arbiter_->onCommand(from, toCore(message), time)) {
+    ROS_WARN_THROTTLE(1.0, "control/%s is refused: %s", from == core::FlightMode::kManual ? "manual" : "auto",
+                      refusal->text.c_str());
+    return;
+  }
+  last_command_ = time;
+  if (from != arbiter_->status().mode) return;
+  if (time - last_send_ < 1.0 / options_.max_rate) {
+    send_pending_ = true;  // the timer takes it
+    return;
+  }
+  sendControls(time);
+}
+
+void TxNode::onModeRequest(const ModeRequest& message) {
+  const double time = now();
+  std::lock_guard<std::mutex> lock(mutex_);
+  const core::FlightMode before = arbiter_->status().mode;
+  const auto outcome =
+      arbiter_->onModeRequest({message.sequence, message.mode, message.requester, message.header.stamp.toSec()}, time);
+  if (outcome == core::RequestOutcome::kIgnored) return;
+  if (arbiter_->status().mode != before) {
+    sendControls(time);
+  } else {
+    publishMode();
+  }
+}
+
+void TxNode::onTimer() {
+  const double time = now();
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!overrides_) return;
+  if (came_back_) startAfresh(time);
+  if (linkIsUp() && time - last_refresh_ > kOverrideRefresh) {
+    overrides_->refresh();
+    last_refresh_ = time;
+  }
+  if (!send_pending_ && time - last_send_ < 0.5 / options_.rate) return;
+  sendControls(time);
+}
+
+void TxNode::startAfresh(double time) {
+  came_back_ = false;
+  unseen_.clear();
+  if (time - last_command_ <= options_.arbiter.command_timeout) {
+    overrides_->refresh();
+    return;
+  }
+  // Nobody flies any more, so X-Plane, which may be another one now, is not taken over.
+  const core::FlightMode mode = arbiter_->status().mode;
+  core::ArbiterOptions options = options_.arbiter;
+  options.initial_mode = mode;
+  arbiter_ = std::make_unique<core::ControlArbiter>(options, time);
+  arbiter_->setFlowing(link_status_.state == core::LinkState::kConnected, time);
+  published_revision_.reset();
+  ever_sent_.reset();
+  overrides_->require({});
+}
+
+std::string TxNode::refusalToFly() const {
+  if (link_status_.state == core::LinkState::kSearching || link_status_.state == core::LinkState::kLost) {
+    return "X-Plane is not connected";
+  }
+  if (options_.aircraft.identity.empty()) return "";
+  if (!identity_.known()) return "X-Plane has not told which aircraft is loaded";
+  if (options_.aircraft.fits(identity_.identity())) return "";
+  std::string expected;
+  for (const std::string& icao : options_.aircraft.identity) expected += (expected.empty() ? "" : ", ") + icao;
+  return "the aircraft loaded is " + identity_.identity().icao + " (" + identity_.identity().description +
+         "), but config/aircraft/" + common().aircraft + ".yaml is for " + expected;
+}
+
+bool TxNode::mayFly() const { return refusalToFly().empty(); }
+
+core::ChannelSet TxNode::channelsToSend(const core::ArbitratedControls& controls, double time) {
+  core::ChannelSet out;
+  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+    if (!controls.active.test(i)) continue;
+    const auto channel = static_cast<core::Channel>(i);
+    if (core::channelWire(channel, encoder_->options()).refresh == core::Refresh::kOnChange) {
+      if (!ever_sent_.test(i) || last_values_[i] != controls.values[i]) changed_at_[i] = time;
+      last_values_[i] = controls.values[i];
+      // Said a few times, because a datagram may be lost; then it may be moved in the cockpit.
+      if (time - changed_at_[i] > kHandleRepeat) continue;
+    }
+    ever_sent_.set(i);
+    out.set(i);
+  }
+  return out;
+}
+
+void TxNode::sendControls(double time) {
+  send_pending_ = false;
+  const core::ArbitratedControls& controls = arbiter_->step(time);
+  publishMode();
+  if (controls.active.none() || !overrides_) return;
+  const std::string refusal = refusalToFly();
+  if (refusal != refusal_said_) {
+    refusal_said_ = refusal;
+    if (!refusal.empty()) ROS_WARN("commands are not sent: %s", refusal.c_str());
+  }
+  try {
+    if (!refusal.empty()) {
+      if (link_status_.state == core::LinkState::kConnected) overrides_->require({});
+      return;
+    }
+    overrides_->require(core::requiredOverrides(controls.active, encoder_->options()));
+  } catch (const core::JournalError& error) {
+    ROS_ERROR_THROTTLE(5.0, "commands are not sent, because overrides could not be given back after a crash: %s",
+                       error.what());
+    return;
+  }
+  writes_.clear();
+  encoder_->encode(controls.values, channelsToSend(controls, time), writes_);
+  for (const core::DatarefWrite& write : writes_) link().sendDref(write.dataref, write.value);
+  last_send_ = time;
+  publishApplied(controls, time);
+  watchReadBack(controls.active);
+}
+
+void TxNode::publishMode() {
+  const core::ModeStatus& status = arbiter_->status();
+  if (published_revision_ == status.revision) return;
+  ControlMode message;
+  message.header.stamp = stampNow();
+  message.mode = static_cast<std::uint8_t>(status.mode);
+  message.previous = status.previous ? static_cast<std::uint8_t>(*status.previous) : std::uint8_t{0};
+  message.requested_by = status.requested_by;
+  message.reason = status.reason;
+  message.request_sequence = status.request_sequence;
+  message.accepted = status.accepted;
+  message.sim_time = static_cast<float>(watch_.sim_time);
+  message.manual_alive = status.manual_alive;
+  message.auto_alive = status.auto_alive;
+  message.failsafe = status.failsafe;
+  mode_publisher_.publish(message);
+  published_revision_ = status.revision;
+}
+
+void TxNode::publishApplied(const core::ArbitratedControls& controls, double time) {
+  Sent sent;
+  toMessage(controls, &sent.message);
+  sent.message.header.stamp = stampNow();
+  sent.message.read_back_sim_time = std::nanf("");
+  sent.message.read_back_frames = std::nanf("");
+  sent.values = controls.values;
+  sent.channels = controls.active;
+  sent.sim_time = watch_.sim_time;
+  sent.time = time;
+  applied_publisher_.publish(sent.message);
+  unseen_.push_back(std::move(sent));
+  if (unseen_.size() > kUnseenKept) unseen_.pop_front();
+}
+
+void TxNode::watchReadBack(const core::ChannelSet& channels) {
+  if (channels == read_back_channels_) return;
+  read_back_channels_ = channels;
+  read_back_order_.clear();
+  shown_known_.reset();
+  core::RrefGroup group{"read-back", {core::flightWatchDatarefs().front()}, core::kEveryFrameRateHz, 1};
+  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+    if (!channels.test(i)) continue;
+    read_back_order_.push_back(static_cast<core::Channel>(i));
+    group.datarefs.push_back(core::readBackDataref(static_cast<core::Channel>(i), encoder_->options()));
+  }
+  if (read_back_group_ < 0) {
+    read_back_group_ = link().addGroup(group);
+  } else {
+    link().replaceGroup(read_back_group_, group);
+  }
+}
+
+void TxNode::onLinkState(const core::LinkStatus& status) {
+  std::string text;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const double time = now();
+    if (status.state != link_status_.state) text = std::string(core::toString(status.state)) + ": " + status.reason;
+    if (status.epoch != link_status_.epoch) {
+      identity_.reset();
+      if (status.epoch > 1) came_back_ = true;
+    }
+    link_status_ = status;
+    arbiter_->setFlowing(status.state == core::LinkState::kConnected, time);
+    if (status.version) {
+      const auto generation = core::generationOf(*status.version);
+      if (generation != encoder_->options().generation) {
+        encoder_ =
+            std::make_unique<core::ControlEncoder>(core::EncoderOptions{generation, options_.aircraft.reverse_thrust});
+        read_back_channels_.reset();
+      }
+    }
+    const auto journal = link().journal();
+    if (status.peer.valid() && journal) guardian_.setPeer(status.peer, journal->path());
+    work_wanted_.notify_all();
+  }
+  if (!text.empty()) logEvent(Event::LINK, text);
+}
+
+void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (group == watch_group_) {
+    const bool crashed = watch_.crashed;
+    core::updateFlightWatch(view, &watch_);
+    sim_time_ = watch_.sim_time;
+    if (watch_.crashed && !crashed) logEvent(Event::CRASH, "the aircraft has crashed");
+  } else if (group == identity_group_) {
+    if (identity_.add(view, info.stamp_ns)) onIdentity();
+  } else if (group == read_back_group_) {
+    onReadBack(view);
+  }
+}
+
+void TxNode::onIdentity() {
+  const core::AircraftIdentity& loaded = identity_.identity();
+  logEvent(Event::AIRCRAFT, "aircraft: " + loaded.icao + " (" + loaded.description + ")" +
+                                (options_.aircraft.fits(loaded) ? "" : "; not the one of the configuration"));
+}
+
+void TxNode::onReadBack(const core::RrefView& view) {
+  double sim_time = watch_.sim_time;
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const core::RrefPair pair = view[i];
+    if (pair.index == 0) sim_time = static_cast<double>(pair.value);
+    if (pair.index < 1 || static_cast<std::size_t>(pair.index) > read_back_order_.size()) continue;
+    const std::size_t channel = core::index(read_back_order_[static_cast<std::size_t>(pair.index) - 1]);
+    shown_[channel] = static_cast<double>(pair.value);
+    shown_known_.set(channel);
+  }
+  // The newest that fits: older ones were overtaken.
+  for (auto it = unseen_.rbegin(); it != unseen_.rend(); ++it) {
+    bool all = true;
+    for (std::size_t i = 0; i < core::kChannelCount && all; ++i) {
+      if (!it->channels.test(i)) continue;
+      all = shown_known_.test(i) && encoder_->shows(static_cast<core::Channel>(i), it->values[i], shown_[i]);
+    }
+    if (!all) continue;
+    AppliedCommand message = it->message;
+    message.read_back = true;
+    message.read_back_sim_time = static_cast<float>(sim_time);
+    message.read_back_frames = static_cast<float>((sim_time - it->sim_time) / watch_.frame_period);
+    applied_publisher_.publish(message);
+    last_seen_ = now();
+    unseen_.erase(unseen_.begin(), it.base());
+    return;
+  }
+}
+
+void TxNode::work() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!worker_ends_) {
+    work_wanted_.wait_for(lock, std::chrono::duration<double>(kWorkPeriod));
+    if (worker_ends_ || !linkIsUp()) continue;
+    const std::uint32_t epoch = link_status_.epoch;
+    lock.unlock();
+    try {
+      if (leftovers_of_epoch_ != epoch && overrides_->releaseLeftovers(kReleaseWait)) leftovers_of_epoch_ = epoch;
+      if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseWait);
+    } catch (const core::JournalError& error) {
+      ROS_ERROR_THROTTLE(5.0, "%s", error.what());
+    }
+    lock.lock();
+  }
+}
+
+void TxNode::stopInputs() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    worker_ends_ = true;
+  }
+  work_wanted_.notify_all();
+  if (worker_.joinable()) worker_.join();
+}
+
+void TxNode::undo(Deadline deadline) {
+  if (!overrides_) return;
+  const double left = std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count();
+  // Left undone, the guardian tries once more, and the journal keeps it for the next start.
+  if (overrides_->releaseAll(std::max(0.1, left))) guardian_.dismiss();
+}
+
+void TxNode::publishFinalState() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  publishMode();
+}
+
+void TxNode::joinThreads() {}
+
+bool TxNode::linkIsUp() const {
+  return link_status_.state == core::LinkState::kConnected || link_status_.state == core::LinkState::kPaused;
+}
+
+std::uint32_t TxNode::logEvent(std::uint8_t kind, const std::string& text, const std::string& who, bool success) {
+  if (success) {
+    ROS_INFO("%s", text.c_str());
+  } else {
+    ROS_ERROR("%s", text.c_str());
+  }
+  return events_.add(kind, text, sim_time_, who, success);
+}
+
+void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  std::lock_guard<std::mutex> lock(mutex_);
+  const core::ModeStatus& mode = arbiter_->status();
+  const double time = now();
+  const bool flying = ever_sent_.any();
+  const std::string refusal = refusalToFly();
+  std::string unseen;
+  if (flying && !unseen_.empty() && link_status_.state == core::LinkState::kConnected &&
+      time - last_seen_ > kDoesNotFollow) {
+    const Sent& last = unseen_.back();
+    for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+      const auto channel = static_cast<core::Channel>(i);
+      if (!last.channels.test(i) || (shown_known_.test(i) && encoder_->shows(channel, last.values[i], shown_[i])))
+        continue;
+      unseen += (unseen.empty() ? "" : ", ") + core::channelName(channel);
+    }
+  }
+  if (!refusal.empty()) {
+    status->summary(Level::WARN, "commands are not sent: " + refusal);
+  } else if (mode.failsafe) {
+    status->summary(Level::WARN, std::string(core::toString(mode.mode)) + ", failsafe: " + mode.reason);
+  } else if (!unseen.empty()) {
+    status->summary(Level::WARN, "X-Plane does not show what is sent: " + unseen);
+  } else {
+    status->summary(Level::OK, core::toString(mode.mode));
+  }
+  status->add("Mode", core::toString(mode.mode));
+  status->add("Reason", mode.reason);
+  for (const auto source : {core::FlightMode::kManual, core::FlightMode::kAuto}) {
+    const std::string name = source == core::FlightMode::kManual ? "control/manual" : "control/auto";
+    const core::SourceStatistics& statistics = arbiter_->statistics(source);
+    status->add(name + " accepted (-)", statistics.accepted);
+    status->add(name + " refused (-)", statistics.refusedTotal());
+    for (std::size_t i = 0; i < statistics.refused.size(); ++i) {
+      if (statistics.refused[i] == 0) continue;
+      status->add(name + " refused, " + core::toString(static_cast<core::Refusal>(i)) + " (-)", statistics.refused[i]);
+    }
+    if (!statistics.last_refusal.empty()) status->add(name + " last refusal", statistics.last_refusal);
+  }
+  std::string active;
+  if (overrides_) {
+    for (const std::string& name : overrides_->active()) {
+      active += (active.empty() ? "" : ", ") + name.substr(name.rfind('/') + 1);
+    }
+  }
+  status->add("Overrides set", active.empty() ? "none" : active);
+  status->add("Aircraft loaded", identity_.identity().icao);
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,395 @@
+"""tx_node against the emulator: commands, modes, refusals, overrides and their release however it ends."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import threading
+from pathlib import Path
+
+import pytest
+import yaml
+
+from xplane_bridge.harness import ManagedProcess, wait_until
+from xplane_bridge.harness.emulator_bench import XPlaneClient
+
+ROOT = Path(__file__).resolve().parents[2]
+MANUAL, AUTO = 1, 2
+ROLL, PITCH, YAW, THROTTLE, FLAPS, GEAR = 1, 2, 4, 8, 512, 2048
+STICK = "sim/joystick/yoke_roll_ratio"
+OVERRIDE = "sim/operation/override/override_joystick"
+THROTTLES = "sim/operation/override/override_throttles"
+LEVER = "sim/cockpit2/engine/actuators/throttle_ratio[0]"
+FLAP_HANDLE = "sim/cockpit2/controls/flap_ratio"
+
+
+class Wire:
+    """X-Plane's datarefs, watched from outside the bridge."""
+
+    def __init__(self, port, *paths):
+        self.paths = list(paths)
+        self._client = XPlaneClient(port)
+        self._client.subscribe(self.paths, rate_hz=50, first_index=0)
+        self._known = {}
+
+    def value(self, path):
+        self._known.update(self._client.values())
+        return self._known.get(self.paths.index(path), math.nan)
+
+    def wait(self, path, expected, timeout=10.0, tolerance=1e-4):
+        wait_until(lambda: abs(self.value(path) - expected) <= tolerance, timeout, f"{path} = {expected}")
+
+    def close(self):
+        self._client.close()
+
+
+class Source:
+    """Publishes a command again and again, as a stick or a controller does."""
+
+    def __init__(self, world, topic):
+        import rospy
+        from xplane_bridge.msg import ControlCommand
+
+        self.command = ControlCommand()
+        self._publisher = rospy.Publisher(f"{world.namespace}/{topic}", ControlCommand, queue_size=1)
+        self._ended = threading.Event()
+        self._thread = None
+
+    def once(self, **values):
+        for key, value in values.items():
+            setattr(self.command, key, value)
+        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+        self._publisher.publish(self.command)
+
+    def fly(self, **values):
+        self.once(**values)
+        if self._thread is None:
+            self._ended.clear()
+            self._thread = threading.Thread(target=self._repeat, daemon=True)
+            self._thread.start()
+
+    def _repeat(self):
+        while not self._ended.wait(0.02):
+            self.command.sequence += 1
+            self._publisher.publish(self.command)
+
+    def stop(self):
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join(10)
+            self._thread = None
+
+
+@pytest.fixture
+def tx(world):
+    """Starts emulator and tx_node; gives what a test needs on `world`."""
+    from xplane_bridge.msg import AppliedCommand, ControlMode, EventList
+
+    opened = []
+
+    def start(*emulator_options, aircraft="fixed_wing", **params):
+        world.xplane = world.emulator("--no-beacon", "--start", "air", *emulator_options)
+        world.wire = Wire(world.xplane.port, OVERRIDE, THROTTLES, STICK, LEVER, FLAP_HANDLE)
+        opened.append(world.wire)
+        world.applied = world.watch("control/applied", AppliedCommand)
+        world.mode = world.watch("control/mode", ControlMode)
+        world.events = world.watch("events", EventList)
+        world.params = tx_params(aircraft, **params)
+        world.set_param("aircraft", aircraft)
+        world.node = world.start("tx_node", world.params)
+        world.mode.wait_for()
+        return world.node
+
+    world.manual = Source(world, "control/manual")
+    world.auto = Source(world, "control/auto")
+    yield start
+    world.manual.stop()
+    world.auto.stop()
+    for wire in opened:
+        wire.close()
+
+
+def tx_params(aircraft="fixed_wing", **params):
+    options = yaml.safe_load((ROOT / "config" / "tx.yaml").read_text(encoding="utf-8"))
+    options["aircraft"] = yaml.safe_load(
+        (ROOT / "config" / "aircraft" / f"{aircraft}.yaml").read_text(encoding="utf-8")
+    )
+    options.update(params)
+    return options
+
+
+def journal(world):
+    files = list((world.folder / "ros_home" / "xplane_bridge").glob("*.json"))
+    return [entry["id"] for file in files for entry in json.loads(file.read_text(encoding="utf-8"))["entries"]]
+
+
+def request_mode(world, mode, sequence=1, requester="test"):
+    import rospy
+    from xplane_bridge.msg import ModeRequest
+
+    publisher = rospy.Publisher(f"{world.namespace}/control/mode_request", ModeRequest, queue_size=10)
+    wait_until(lambda: publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+    publisher.publish(ModeRequest(mode=mode, sequence=sequence, requester=requester))
+
+
+def call(world, service, kind, **request):
+    import rospy
+    import xplane_bridge.srv
+
+    name = f"{world.namespace}/tx_node/{service}"
+    rospy.wait_for_service(name, timeout=15)
+    return rospy.ServiceProxy(name, getattr(xplane_bridge.srv, kind))(**request)
+
+
+def test_nothing_is_touched_before_the_first_command(tx, world):
+    tx()
+    world.wait_for_diagnostics("control", lambda s: s.level == 0 and "DA62" in world.values_of(s)["Aircraft loaded"])
+    world.wire.wait(OVERRIDE, 0.0)
+    assert not world.applied.messages
+    assert not journal(world)
+
+
+def test_command_reaches_xplane_and_is_read_back(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL | PITCH | YAW | THROTTLE, roll=0.25, pitch=-0.125, throttle=0.75)
+    world.wire.wait(STICK, 0.25)
+    world.wire.wait(LEVER, 0.75)
+    assert world.wire.value(OVERRIDE) == 1.0
+    assert world.wire.value(THROTTLES) == 0.0, "levers need no override"
+    seen = world.applied.wait_for(lambda a: a.read_back and a.sequence > 0)
+    assert seen.fields == ROLL | PITCH | YAW | THROTTLE
+    assert (seen.roll, seen.pitch, seen.engine_count) == (0.25, -0.125, 2)
+    assert seen.mode == seen.source == MANUAL
+    assert 0.0 <= seen.read_back_frames < 60.0
+    assert seen.read_back_sim_time > 0.0
+    assert "override:" + OVERRIDE in journal(world)
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_overrides_are_released_however_it_ends(tx, world, end):
+    node = tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    node.send_signal(end)
+    world.wire.wait(OVERRIDE, 0.0)
+    code = node.wait(10)
+    if end != signal.SIGKILL:
+        assert code == 0
+    wait_until(lambda: not journal(world), 10, "an empty journal")
+
+
+def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
+    node = tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    world.manual.stop()
+    guardian = next(
+        int(path.parent.name)
+        for path in Path("/proc").glob("[0-9]*/cmdline")
+        if f"override_guardian\0{node.pid}\0".encode() in _read(path)
+    )
+    os.kill(guardian, signal.SIGKILL)
+    node.send_signal(signal.SIGKILL)
+    node.wait(10)
+    assert world.wire.value(OVERRIDE) == 1.0
+    assert journal(world)
+    world.start("tx_node", world.params)
+    world.wire.wait(OVERRIDE, 0.0)
+    wait_until(lambda: not journal(world), 10, "an empty journal")
+
+
+def _read(path):
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def test_release_overrides_frees_what_a_crash_left(tx, world):
+    node = tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    world.manual.stop()
+    node.send_signal(signal.SIGSTOP)  # it hangs: nobody is gone, nothing releases by itself
+    panic = ManagedProcess(
+        "release", ["/usr/bin/python3", ROOT / "scripts" / "release_overrides"], world.folder, env=world.env
+    )
+    panic.start()
+    assert panic.wait(20) == 0, panic.output()
+    world.wire.wait(OVERRIDE, 0.0)
+    assert not journal(world)
+    node.send_signal(signal.SIGKILL)
+
+
+def test_modes_are_switched_by_request_and_said(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL, roll=0.125)
+    world.auto.fly(fields=ROLL, roll=-0.25)
+    world.wire.wait(STICK, 0.125)
+    request_mode(world, AUTO, sequence=7)
+    mode = world.mode.wait_for(lambda m: m.mode == AUTO)
+    assert (mode.previous, mode.requested_by, mode.request_sequence, mode.accepted) == (MANUAL, "test", 7, True)
+    world.wire.wait(STICK, -0.25)
+    response = call(world, "set_mode", "SetMode", mode=MANUAL)
+    assert response.success and response.mode == MANUAL
+    world.wire.wait(STICK, 0.125)
+
+
+def test_auto_without_a_source_is_zero(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL | THROTTLE, roll=0.2, throttle=0.5)
+    world.wire.wait(STICK, 0.2)
+    request_mode(world, AUTO)
+    world.wire.wait(STICK, 0.0)
+    world.wire.wait(LEVER, 0.0)
+    assert world.mode.wait_for(lambda m: m.mode == AUTO and m.failsafe).auto_alive is False
+    assert world.applied.last.source == 3
+
+
+def test_stick_takes_over(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL, roll=0.1)
+    world.auto.fly(fields=ROLL, roll=-0.2)
+    request_mode(world, AUTO)
+    world.wire.wait(STICK, -0.2)
+    world.manual.fly(roll=0.6)
+    mode = world.mode.wait_for_next(lambda m: m.mode == MANUAL)
+    assert mode.reason.startswith("stick take-over")
+    world.wire.wait(STICK, 0.6)
+
+
+def test_silent_stick_goes_to_its_failsafe(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL, roll=0.4)
+    world.wire.wait(STICK, 0.4)
+    world.manual.stop()
+    world.wire.wait(STICK, 0.0)
+    assert world.mode.wait_for(lambda m: m.failsafe).reason == "timeout of control/manual"
+    world.wait_for_diagnostics("control", lambda s: s.level == 1 and "failsafe" in s.message)
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"fields": ROLL, "roll": math.nan}, "roll is nan"),
+        ({"fields": ROLL | PITCH, "roll": 0.9, "pitch": 1.5}, "pitch is 1.5"),
+        ({"fields": 1 << 20}, "0x100000"),
+    ],
+)
+def test_refused_command_changes_nothing_and_is_named(tx, world, values, named):
+    tx()
+    world.auto.fly(fields=ROLL, roll=0.0)  # the other source's commands are judged as well
+    world.manual.fly(fields=ROLL, roll=0.3)
+    world.wire.wait(STICK, 0.3)
+    other = Source(world, "control/manual")
+    other.once(**values)
+    status = world.wait_for_diagnostics(
+        "control", lambda s: named in world.values_of(s).get("control/manual last refusal", "")
+    )
+    assert world.values_of(status)["control/manual refused (-)"] == "1"
+    assert all(a.roll <= 0.3 + 1e-6 for a in world.applied.messages)
+    world.wire.wait(STICK, 0.3)
+
+
+def test_pause_stops_the_timers(tx, world):
+    import rospy
+    from std_srvs.srv import SetBool
+
+    tx(resume_grace=0.3)
+    pause = rospy.ServiceProxy(f"{world.namespace}/tx_node/pause", SetBool)
+    world.manual.fly(fields=ROLL, roll=0.4)
+    world.wire.wait(STICK, 0.4)
+    assert pause(True).success
+    world.manual.stop()
+    world.applied.wait_for_count(50)  # a second of refreshes, twice the time-out
+    assert not world.mode.last.failsafe
+    assert pause(False).success
+    world.mode.wait_for_next(lambda m: m.failsafe)
+    world.wire.wait(STICK, 0.0)
+
+
+def test_another_aircraft_is_not_flown(tx, world):
+    tx("--aircraft", "multirotor", aircraft="fixed_wing")
+    world.manual.fly(fields=ROLL, roll=0.4)
+    status = world.wait_for_diagnostics("control", lambda s: "QUAD" in s.message)
+    assert "config/aircraft/fixed_wing.yaml is for DA62" in status.message
+    assert not world.applied.messages
+    assert world.wire.value(OVERRIDE) == 0.0
+
+
+def test_motors_take_the_throttle_override_and_give_it_back(tx, world):
+    tx("--aircraft", "multirotor", aircraft="multirotor")
+    world.auto.fly(fields=32, engine_count=4, motors=[0.5] * 4 + [0.0] * 4)
+    world.manual.fly(fields=THROTTLE, throttle=0.5)
+    request_mode(world, AUTO)
+    world.wire.wait(THROTTLES, 1.0)
+    request_mode(world, MANUAL, sequence=2)
+    world.wire.wait(THROTTLES, 0.0)
+    wait_until(lambda: "override:" + THROTTLES not in journal(world), 10, "the journal entry's end")
+
+
+def test_handles_are_sent_on_change_only(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL | FLAPS, flaps=0.5)
+    world.wire.wait(FLAP_HANDLE, 0.5, tolerance=0.02)
+    world.applied.wait_for_count(50)
+    response = call(world, "set_dataref", "SetDataref", name=FLAP_HANDLE, values=[0.0])
+    assert response.success, response.result.message
+    world.applied.wait_for_count(50)
+    assert world.wire.value(FLAP_HANDLE) == pytest.approx(0.0, abs=0.02), "moved in the cockpit, it stays moved"
+    world.manual.fly(flaps=1.0)
+    world.wire.wait(FLAP_HANDLE, 1.0, tolerance=0.02)
+
+
+def test_restarted_xplane_is_flown_on(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL, roll=0.3)
+    world.wire.wait(OVERRIDE, 1.0)
+    world.xplane.restart()
+    wire = Wire(world.xplane.port, OVERRIDE, STICK)
+    wire.wait(OVERRIDE, 1.0, timeout=20)
+    wire.wait(STICK, 0.3)
+    wire.close()
+
+
+def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL, roll=0.3)
+    world.wire.wait(OVERRIDE, 1.0)
+    world.manual.stop()
+    world.xplane.restart()
+    world.events.wait_for_next(lambda e: "CONNECTED" in e.events[-1].text, timeout=20)
+    wire = Wire(world.xplane.port, OVERRIDE)
+    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
+    wire.wait(OVERRIDE, 0.0)
+    wire.close()
+
+
+def test_override_set_by_service_is_given_back(tx, world):
+    node = tx()
+    response = call(world, "set_dataref", "SetDataref", name=THROTTLES, values=[1.0])
+    assert response.success and list(response.values) == [1.0]
+    assert "override:" + THROTTLES in journal(world)
+    node.send_signal(signal.SIGINT)
+    world.wire.wait(THROTTLES, 0.0)
+
+
+def test_services_say_what_is_wrong(tx, world):
+    tx(service_timeout=0.5)
+    refused = call(world, "set_dataref", "SetDataref", name="nonsense", values=[1.0])
+    assert (refused.success, refused.result.code) == (False, 2)
+    assert "nonsense" in refused.result.message
+    silent = call(world, "set_dataref", "SetDataref", name="sim/no/such/dataref", values=[1.0])
+    assert (silent.success, silent.result.code) == (False, 5)
+    assert call(world, "set_view", "SetView", view=9).result.code == 2
+    assert call(world, "set_view", "SetView", view=3).success
+    assert call(world, "run_command", "RunCommand", name="sim/operation/pause_toggle").result.code == 1
+    assert call(world, "set_mode", "SetMode", mode=5).result.code == 2
+
+
+def test_aircraft_file_is_required(world):
+    node = world.start("tx_node", {"rate": 50.0})
+    assert node.wait(15) == 1
+    assert "tx_node/aircraft is missing" in node.output()
