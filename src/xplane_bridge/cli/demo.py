@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
 import signal
 import sys
 from pathlib import Path
 from types import FrameType
-from typing import List, Optional, Sequence
+from typing import Iterator, List, Optional, Sequence
 
 from tqdm import tqdm
 
 from xplane_bridge.cli.entry import guarded
 from xplane_bridge.harness import flight_check
+from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
 from xplane_bridge.resources import config_file
 
@@ -35,7 +38,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help="aircraft to fly (%(default)s)")
     p.add_argument("--transport", choices=("rref", "data"), default="rref", help="how to ask X-Plane (%(default)s)")
     p.add_argument("--fps", type=int, default=_FPS, metavar="N", help="the emulator's frame rate [1/s] (%(default)s)")
-    p.add_argument("--headless", action="store_true", help="open no window")
+    p.add_argument("--headless", action="store_true", help="draw the cockpit view, but not on this screen")
     p.add_argument(
         "launch_args", nargs="*", metavar="KEY:=VALUE", help="passed on to demo.launch, e.g. transport:=data"
     )
@@ -58,7 +61,7 @@ def _plan(args: argparse.Namespace) -> FlightPlan:
             parser().error(f"{text!r} is neither an option nor KEY:=VALUE for demo.launch")
         launch_args[key] = value
     transport = launch_args.pop("transport", args.transport)
-    options: List[str] = ["--fps", str(args.fps), "--pilot", str(config_file("scenarios", "demo.yaml"))]
+    options: List[str] = ["--window", "--fps", str(args.fps), "--pilot", str(config_file("scenarios", "demo.yaml"))]
     return FlightPlan(args.output, args.duration, args.aircraft, transport, options, launch_args)
 
 
@@ -100,18 +103,39 @@ def _interrupt(_number: int, _frame: Optional[FrameType]) -> None:
     raise KeyboardInterrupt
 
 
+@contextlib.contextmanager
+def _screen(logs: Path, headless: bool) -> Iterator[None]:
+    """A screen for the cockpit view: the user's, or one of our own where there is none or none is wanted."""
+    if os.environ.get("DISPLAY") and not headless:
+        yield
+        return
+    with VirtualDisplay(logs) as display:
+        before = os.environ.get("DISPLAY")
+        os.environ["DISPLAY"] = display.display
+        try:
+            yield
+        finally:
+            del os.environ["DISPLAY"]
+            if before is not None:
+                os.environ["DISPLAY"] = before
+
+
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
-    plan = _plan(parser().parse_args(argv))
+    args = parser().parse_args(argv)
+    plan = _plan(args)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _interrupt)
     progress = _Progress(plan.duration)
     try:
-        fly(plan, progress, lambda text: progress_line(text))
+        with _screen(plan.logs, args.headless):
+            fly(plan, progress, lambda text: progress_line(text))
     finally:
         progress.close()
     print(flight_check.render(flight_check.summarise(plan.bag)))
+    print()
+    print(flight_check.pairing_text(plan.bag))
     print()
     verdicts = flight_check.judge(plan.bag, plan.truth)
     for verdict in verdicts:

@@ -172,6 +172,24 @@ def render(summaries: Sequence[TopicSummary]) -> str:
     return "\n".join([line_of(head), line_of(["-" * width for width in widths]), *map(line_of, rows)])
 
 
+def pairing_text(bag: Path) -> str:
+    """One line on the camera pictures of a bag and their states.
+
+    Raises:
+        BagError: The bag cannot be read.
+    """
+    with Bags(bag) as bags:
+        topic = bags.topic_of_type("xplane_bridge/FrameState")
+        if topic is None or not bags.topics[topic].count:
+            return "no pictures: there is no camera/frame_state"
+        bits = bags.constants(topic)
+        quality = bags.read(topic, ["quality"])["quality"]
+    missing = (quality & bits["QUALITY_STATE_MISSING"]) != 0
+    other = (quality & (bits["QUALITY_OFF_FRAME"] | bits["QUALITY_INTERPOLATED"])) != 0
+    share = 100.0 * float(np.mean(~missing & ~other))
+    return f"pictures: {len(quality)}, {share:.1f} % with the state of their frame, {missing.sum()} without a state"
+
+
 # ------------------------------------------------------------------------------------------------------- the checks
 
 

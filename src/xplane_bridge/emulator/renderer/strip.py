@@ -59,8 +59,9 @@ def read_strip(picture: np.ndarray) -> StripReading:
         StripError: The checksum is wrong: no strip, cropped, or too small.
     """
     height, width = picture.shape[:2]
-    grey = picture if picture.ndim == 2 else picture[..., :3].mean(axis=2)
-    top = height * (1.0 - ROWS * ROW_SHARE)
+    first = int(height * (1.0 - ROWS * ROW_SHARE))
+    grey = picture[first:] if picture.ndim == 2 else picture[first:, :, :3].mean(axis=2)
+    top = height * (1.0 - ROWS * ROW_SHARE) - first
     bits = np.empty(_BITS, np.uint8)
     for row in range(ROWS):
         y0, y1 = _inner(top + row * height * ROW_SHARE, height * ROW_SHARE)
