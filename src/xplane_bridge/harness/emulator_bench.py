@@ -20,6 +20,8 @@ class XPlaneClient:
 
     def __init__(self, port: int) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        # rospy sets a default timeout, under which Python waits even for MSG_DONTWAIT.
+        self.socket.settimeout(None)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
         self.socket.bind(("127.0.0.1", 0))
         #: The port it receives on.
