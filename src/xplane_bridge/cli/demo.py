@@ -14,6 +14,7 @@ from typing import Iterator, List, Optional, Sequence
 from tqdm import tqdm
 
 from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.flight_report import write_report
 from xplane_bridge.harness import flight_check
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
@@ -140,12 +141,13 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     verdicts = flight_check.judge(plan.bag, plan.truth)
     for verdict in verdicts:
         print(f"{'ok    ' if verdict.passed else 'FAILED'}  {verdict.name:10} {verdict.text}")
+    report = write_report([plan.bag], plan.output / "report.html")
     failed = [verdict.name for verdict in verdicts if not verdict.passed]
     print()
     if failed:
         print(f"demo: failed: {', '.join(failed)}; logs: {plan.logs}", file=sys.stderr)
         return 1
-    print(f"demo: all well; the recording is {plan.bag}")
+    print(f"demo: all well; the recording is {plan.bag}, the report on it {report}")
     return 0
 
 
