@@ -20,6 +20,9 @@ constexpr double kSameFrame = 0.25;
 constexpr double kSparseRatio = 1.5;
 // Share of a period within which the border between two frames is too near to trust.
 constexpr double kBorder = 0.1;
+// Share of a period up to which the running offset is followed. At half a period or more it could hold itself: pictures
+// that were late for a while would leave all later ones one frame off.
+constexpr double kLargestOffset = 0.3;
 
 double median(std::vector<double>& values) {
   if (values.empty()) return 0.0;
@@ -142,8 +145,8 @@ double ImageAssociator::stateToFrameRatio() const {
 double ImageAssociator::runningOffset() const {
   if (offsets_.size() < kMinimumOffsets) return 0.0;
   std::vector<double> values(offsets_.begin(), offsets_.end());
-  const double half = 0.5 * framePeriod();
-  return std::clamp(median(values), -half, half);
+  const double largest = kLargestOffset * framePeriod();
+  return std::clamp(median(values), -largest, largest);
 }
 
 std::optional<ImageAssociator::FrameChoice> ImageAssociator::chooseFrame(const ImageMoment& moment) const {

@@ -235,6 +235,23 @@ TEST(ImageAssociator, KeepsPairingOneWayWhenTheDelayIsOffByAlmostHalfAFrame) {
   EXPECT_LE(wrong, 3);  // without the running offset about a quarter of the 540 would be off
 }
 
+TEST(ImageAssociator, RecoversFromPicturesThatWereLateForAWhile) {
+  core::ImageAssociator associator;
+  std::mt19937 random(2);
+  std::normal_distribution<double> jitter(0.0, 0.001);
+  int wrong = 0;
+  for (int k = 0; k < 600; ++k) {
+    associator.addFrame(frameAt(k / 60.0));
+    associator.addState(stateAt(static_cast<std::uint64_t>(k), k / 60.0));
+    if (k < 5) continue;
+    // More and more late, up to nine tenths of a frame, then a little early.
+    const double late = (k < 200 ? 0.9 * std::max(0, k - 100) / 100.0 : -0.1) / 60.0;
+    const auto answer = associator.associate(momentAt((k - 3) / 60.0 + late + jitter(random)), true);
+    if (k >= 220 && answer.id != static_cast<std::uint64_t>(k - 3)) ++wrong;
+  }
+  EXPECT_EQ(wrong, 0);
+}
+
 /// A whole flight: the frame every picture really shows is known, swaps jitter, datagrams and states get lost.
 struct FlightCase {
   double fps;
