@@ -131,6 +131,7 @@ void RxNode::advertise() {
 }
 
 void RxNode::configureLink(core::SimLinkOptions* options) {
+  options->data_output.restore_leftovers = true;
   if (common().transport != core::Transport::kData) {
     return;
   }
@@ -191,7 +192,7 @@ void RxNode::onData(const core::DataView& datagram, const core::ReceiveInfo& inf
     mission->onRows(rows_, receive_ns, flight_->clock());
   }
   if (rows_publisher_.getNumSubscribers() > 0) {
-    publishRows(datagram, receive_ns);
+    publishRows(datagram, info, receive_ns);
   }
 }
 
@@ -218,8 +219,9 @@ void RxNode::publishState(const core::FlightState* state, std::int64_t receive_n
   }
 }
 
-void RxNode::publishRows(const core::DataView& datagram, std::int64_t receive_ns) {
+void RxNode::publishRows(const core::DataView& datagram, const core::ReceiveInfo& info, std::int64_t receive_ns) {
   rows_message_.header.stamp = toRosTime(receive_ns);
+  rows_message_.label.assign(info.label.begin(), info.label.end());
   rows_message_.index.clear();
   rows_message_.values.clear();
   for (std::size_t k = 0; k < datagram.size(); ++k) {

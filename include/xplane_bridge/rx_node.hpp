@@ -58,7 +58,7 @@ class RxNode : public BaseNode {
   /// Begins every callback: the time of receipt, after noticing that the link came up anew.
   std::int64_t begin(const core::ReceiveInfo& info);
   void publishState(const core::FlightState* state, std::int64_t receive_ns);
-  void publishRows(const core::DataView& datagram, std::int64_t receive_ns);
+  void publishRows(const core::DataView& datagram, const core::ReceiveInfo& info, std::int64_t receive_ns);
 
   // Timer.
   void supervise();

@@ -173,7 +173,9 @@ void SimLink::Impl::receiveData() {
     live_counters_.non_finite_values += anomalies.non_finite_values;
     data_output_.heard(*data, now_ns_);
     if (callbacks_.on_data) {
-      callbacks_.on_data(*data, infoOf(received));
+      ReceiveInfo info = infoOf(received);
+      std::copy_n(bytes.data(), info.label.size(), info.label.begin());  // as long as every DATA message, at least
+      callbacks_.on_data(*data, info);
     }
   });
 }

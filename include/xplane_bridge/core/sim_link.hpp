@@ -51,6 +51,7 @@ struct ReceiveInfo {
   std::int64_t steady_ns = 0;    ///< [ns] the injected steady clock when it was read
   std::uint32_t link_epoch = 0;  ///< LinkStatus::epoch at that moment
   Endpoint from;
+  std::array<std::uint8_t, kHeaderSize> label{};  ///< the datagram's first bytes; DATA only
 };
 
 struct LinkStatus {
