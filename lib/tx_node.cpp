@@ -16,6 +16,7 @@ constexpr double kHandleRepeat = 0.3;     // [s] in which a changed handle is se
 constexpr std::size_t kUnseenKept = 16;
 constexpr double kWorkPeriod = 0.2;     // [s]
 constexpr double kReleaseWait = 1.0;    // [s] of one attempt
+constexpr double kRestartStep = 0.25;   // [s] backwards in total running time, more than datagrams overtake each other
 constexpr double kDoesNotFollow = 1.0;  // [s] without read-back until it is said
 
 ros::Time stampNow() { return ros::Time(ros::WallTime::now().toSec()); }
@@ -283,7 +284,10 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
   std::lock_guard<std::mutex> lock(mutex_);
   if (group == watch_group_) {
     const bool crashed = watch_.crashed;
+    const double before = watch_.sim_time;
     core::updateFlightWatch(view, &watch_);
+    // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
+    if (watch_.sim_time < before - kRestartStep) came_back_ = true;
     sim_time_ = watch_.sim_time;
     if (watch_.crashed && !crashed) logEvent(Event::CRASH, "the aircraft has crashed");
   } else if (group == identity_group_) {

@@ -100,6 +100,7 @@ def tx(world):
         world.set_param("aircraft", aircraft)
         world.node = world.start("tx_node", world.params)
         world.mode.wait_for()
+        world.events.wait_for(lambda e: any("CONNECTED" in event.text for event in e.events))
         return world.node
 
     world.manual = Source(world, "control/manual")
