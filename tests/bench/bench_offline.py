@@ -1,0 +1,73 @@
+"""Benchmarks that need no ROS master: decoding, and how even the emulator's frames are."""
+
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+import time
+from pathlib import Path
+from statistics import median
+from typing import List
+
+from registry import Context, Measure, benchmark
+
+from xplane_bridge.harness import EmulatorProcess, HarnessError
+from xplane_bridge.resources import config_file
+
+_PACKET = Path(__file__).parents[1] / "data" / "packets" / "20-data-139-rows.hex"
+
+
+def cpp_program(name: str) -> Path:
+    """A program built from tests/bench/<name>.cpp.
+
+    Raises:
+        HarnessError: It has not been built.
+    """
+    path = Path(__file__).resolve().parents[2] / ".workspace" / "devel" / "lib" / "xplane_bridge" / name
+    if not path.is_file():
+        msg = f"{path} has not been built; run scripts/setup --test"
+        raise HarnessError(msg)
+    return path
+
+
+@benchmark
+def decode(_: Context) -> List[Measure]:
+    """A DATA packet of 139 rows, wire to SI, against Python's struct that only unpacks it."""
+    ours = json.loads(subprocess.run([cpp_program("bench_decode")], stdout=subprocess.PIPE, check=True).stdout)
+    packet = bytes.fromhex(_PACKET.read_text(encoding="ascii"))
+    assert len(packet) == ours["bytes"]
+    row = struct.Struct("<i8f")
+    times = []
+    for _batch in range(50):
+        began = time.perf_counter()
+        for _packet in range(20):
+            list(row.iter_unpack(packet[5:]))
+        times.append((time.perf_counter() - began) / 20)
+    python_us = median(times) * 1e6
+    return [
+        Measure("wire to rows", ours["rows_ns"] / 1e3, "us"),
+        Measure("wire to SI, flight group", ours["flight_ns"] / 1e3, "us"),
+        Measure("wire to SI, all groups", ours["all_groups_ns"] / 1e3, "us", budget=2.0),
+        Measure("Python's struct, unpacking only", python_us, "us"),
+        Measure("struct / ours", python_us / (ours["all_groups_ns"] / 1e3), "times"),
+    ]
+
+
+@benchmark
+def emulator_period(context: Context) -> List[Measure]:
+    """Error of the emulator's frame period at 60 fps, flying the demonstration."""
+    options = ["--fps", "60", "--pilot", config_file("scenarios", "demo.yaml"), "--duration", f"{context.seconds:g}"]
+    emulator = EmulatorProcess(context.folder, options)
+    with emulator:
+        emulator.wait(context.seconds + 60.0)
+    report = emulator.output().strip().splitlines()[-1]
+    if not report.startswith("STOPPED "):
+        raise HarnessError(emulator.describe("did not report its frames"))
+    statistics = json.loads(report[len("STOPPED ") :])
+    error = statistics["period_error_ms"]
+    return [
+        Measure("period error, median", error["p50"], "ms"),
+        Measure("period error, p99", error["p99"], "ms", budget=2.0),
+        Measure("period error, largest", error["max"], "ms"),
+    ]
