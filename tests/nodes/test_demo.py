@@ -1,0 +1,111 @@
+"""The demo as a user runs it, judged from outside; and a flight whose simulator dies and comes back in the middle."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.harness import ManagedProcess, flight_check, wait_until
+from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
+from xplane_bridge.resources import config_file, program
+
+CONNECTED, STALE, LOST = 1, 3, 4
+DEMO_TIMEOUT_S = 240.0
+
+
+def demo(folder: Path, *options: str) -> ManagedProcess:
+    return ManagedProcess("demo", [program("demo"), "--output", folder / "out", "--headless", *options], folder)
+
+
+@pytest.mark.parametrize("transport", ["rref", "data"])
+def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: str) -> None:
+    with demo(tmp_path, "--duration", "12", f"transport:={transport}") as run:
+        assert run.wait(DEMO_TIMEOUT_S) == 0, run.output()
+    out = tmp_path / "out"
+    verdicts = {v.name: v for v in flight_check.judge(out / "flight.bag", out / "truth.csv")}
+    assert all(v.passed for v in verdicts.values()), verdicts
+    assert {"topics", "validity", "numbers", "rate", "positions", "odometry"} <= set(verdicts)
+    with Bags(out / "flight.bag") as bags:
+        links = bags.read("/xplane/link_state")
+        states = bags.read("/xplane/flight_state", ["roll_deg", "altitude_msl"])
+    assert links["transport"][-1] == transport
+    assert np.ptp(states["roll_deg"]) > 20, "the demo's flight is lively"
+    assert "all well" in run.output()
+    report = (out / "report.html").read_text()
+    for key in ("attitude", "surfaces", "engines", "images"):
+        section = report[report.index(f'<section id="{key}">') :].split("</section>")[0]
+        assert "Not shown" not in section, key
+
+
+def test_ctrl_c_ends_the_demo_and_all_it_has_started(tmp_path: Path) -> None:
+    with demo(tmp_path, "--duration", "60") as run:
+        run.wait_for_line(r"demo: +[1-9]\d*/60 s", DEMO_TIMEOUT_S)
+        children = descendants(run.pid)
+        assert len(children) >= 4, "emulator, master, roslaunch and nodes"
+        run.send_signal(signal.SIGINT)
+        assert run.wait(60.0) == 130, run.output()
+        wait_until(lambda: not [pid for pid in children if alive(pid)], 10.0, "end of all children")
+
+
+def test_the_bridge_survives_the_death_and_return_of_its_simulator(tmp_path: Path) -> None:
+    died: list = []
+    returned: list = []
+
+    def shake(flight: RunningFlight) -> None:
+        if not died and flight.elapsed > 4.0:
+            flight.emulator.kill()
+            died.append(flight.states)
+        elif died and not returned and flight.elapsed > 6.0:
+            flight.emulator.start()
+            returned.append(flight.elapsed)
+
+    pilot = str(config_file("scenarios", "demo.yaml"))
+    plan = FlightPlan(
+        tmp_path / "out", 14.0, emulator_options=["--fps", "60", "--pilot", pilot], silence_allowed=60.0,
+        launch_args={"capture": False},
+    )  # fmt: skip
+    fly(plan, shake)
+    assert returned
+    with Bags(plan.bag) as bags:
+        links = bags.read("/xplane/link_state")
+        states = bags.read("/xplane/flight_state", ["header.stamp", "epoch", "valid"])
+        valid_all = bags.constants("/xplane/flight_state")["VALID_ALL"]
+    seen = [int(state) for state in links["state"]]
+    first_loss = next(k for k, state in enumerate(seen) if state in (STALE, LOST))
+    assert CONNECTED in seen[:first_loss]
+    assert seen[-1] == CONNECTED or CONNECTED in seen[first_loss:], seen
+    assert links["link_epoch"][-1] > links["link_epoch"][first_loss - 1], "a restarted X-Plane is a new link epoch"
+    silent = np.diff(states.stamp).argmax()
+    assert len(states) - silent > 60, "states flow again after the return"
+    assert states["epoch"][-1] > states["epoch"][silent], "histories must not cross the restart"
+    assert int(states["valid"][-1]) & valid_all == valid_all
+
+
+def descendants(pid: int) -> list:
+    """All processes below `pid`, by /proc."""
+    parents = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                stat = (entry / "stat").read_text()
+            except OSError:
+                continue
+            parents[int(entry.name)] = int(stat.rpartition(")")[2].split()[1])
+    found, level = [], [pid]
+    while level:
+        level = [child for child, parent in parents.items() if parent in level]
+        found += level
+    return found
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
