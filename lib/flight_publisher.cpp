@@ -2,12 +2,17 @@
 
 #include <ros/node_handle.h>
 
+#include "xplane_bridge/core/clock_filter.hpp"
+
 namespace xplane_bridge {
 namespace {
 
 // A slow subscriber loses old states rather than delaying new ones.
 constexpr std::uint32_t kQueueSize = 100;
 constexpr std::int64_t kCompletionTime_ns = 1'000'000'000;
+// Before the clock filter has its fit (a quarter of a second), stamps are receive times with all their jitter: a velocity
+// differenced from the first positions would be wrong.
+const double kUnsettledClock = core::ClockFilter::Options{}.unfitted_uncertainty;
 constexpr std::uint32_t kNeededToStart =
     core::FlightState::kValidAttitude | core::FlightState::kValidPosition | core::FlightState::kValidRates;
 
@@ -53,7 +58,9 @@ bool FlightPublisher::mayStart(const core::FlightState& state, std::int64_t rece
   if (!startable_since_ns_) {
     startable_since_ns_ = receive_ns;
   }
-  return state.has(core::FlightState::kValidAll) || receive_ns - *startable_since_ns_ >= kCompletionTime_ns;
+  const bool complete = state.has(core::FlightState::kValidAll);
+  const bool clock_settled = state.stamp_uncertainty < kUnsettledClock;
+  return (complete && clock_settled) || receive_ns - *startable_since_ns_ >= kCompletionTime_ns;
 }
 
 void FlightPublisher::publish(const core::FlightState& state, const core::TangentFrame& map, std::int64_t receive_ns) {
