@@ -10,8 +10,8 @@ namespace {
 // A slow subscriber loses old states rather than delaying new ones.
 constexpr std::uint32_t kQueueSize = 100;
 constexpr std::int64_t kCompletionTime_ns = 1'000'000'000;
-// Before the clock filter has its fit (a quarter of a second), stamps are receive times with all their jitter: a velocity
-// differenced from the first positions would be wrong.
+// Before the clock filter has its fit (a quarter of a second), stamps are receive times with all their jitter: a
+// velocity differenced from the first positions would be wrong.
 const double kUnsettledClock = core::ClockFilter::Options{}.unfitted_uncertainty;
 constexpr std::uint32_t kNeededToStart =
     core::FlightState::kValidAttitude | core::FlightState::kValidPosition | core::FlightState::kValidRates;
