@@ -234,7 +234,8 @@ def test_modes_are_switched_by_request_and_said(tx, world):
     assert (mode.previous, mode.requested_by, mode.request_sequence, mode.accepted) == (MANUAL, "test", 7, True)
     world.wire.wait(STICK, -0.25)
     response = call(world, "set_mode", "SetMode", mode=MANUAL)
-    assert response.success and response.mode == MANUAL
+    assert response.success
+    assert response.mode == MANUAL
     world.wire.wait(STICK, 0.125)
 
 
@@ -371,7 +372,8 @@ def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
 def test_override_set_by_service_is_given_back(tx, world):
     node = tx()
     response = call(world, "set_dataref", "SetDataref", name=THROTTLES, values=[1.0])
-    assert response.success and list(response.values) == [1.0]
+    assert response.success
+    assert list(response.values) == [1.0]
     assert "override:" + THROTTLES in journal(world)
     node.send_signal(signal.SIGINT)
     world.wire.wait(THROTTLES, 0.0)
