@@ -1,0 +1,87 @@
+"""Benchmark of reading bags: an hour at 100 Hz into arrays, against the rosbag API and against plain rosbags."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from pathlib import Path
+from typing import List
+
+import numpy as np
+from registry import Context, Measure, benchmark
+from rosbags.highlevel import AnyReader
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.harness import HarnessError
+from xplane_bridge.harness.synthetic_flight import FlightBag, stamp_ns
+
+_TOPIC = "/xplane/flight_state"
+#: One hour at 100 Hz is 360 000 messages; the peers read a tenth of it, which is long enough for a rate.
+_HOUR_S = 3600.0
+_PEER_SHARE = 10
+
+
+@benchmark
+def bags(context: Context) -> List[Measure]:
+    """One hour of flight states at 100 Hz to arrays of all columns, messages a second."""
+    if importlib.util.find_spec("rosbag") is None:
+        msg = "the rosbag API is not there to compare with: apt-get install python3-rosbag (scripts/setup does)"
+        raise HarnessError(msg)
+    hour, short = context.folder / "hour.bag", context.folder / "short.bag"
+    _write(hour, round(_HOUR_S * 100))
+    _write(short, round(_HOUR_S * 100) // _PEER_SHARE)
+    began = time.perf_counter()
+    with Bags(hour) as reader:
+        table = reader.read(_TOPIC)
+    hour_s = time.perf_counter() - began
+    ours = len(table) / hour_s
+    rosbag_api, rosbags = _rosbag_api(short, table.columns), _rosbags(short, table.columns)
+    return [
+        Measure("one hour at 100 Hz to arrays, all columns", hour_s, "s"),
+        Measure("ours / rosbag Python API", ours / rosbag_api, "times", budget=3.0, at_least=True),
+        Measure("ours / plain rosbags deserialisation", ours / rosbags, "times", budget=2.5, at_least=True),
+    ]
+
+
+def _write(path: Path, count: int) -> None:
+    path.unlink(missing_ok=True)
+    with FlightBag(path) as bag:
+        bag.add(_TOPIC, "xplane_bridge/FlightState", stamp_ns(0.0), bag.state(0.0, 0))
+        name = "xplane_bridge/msg/FlightState"
+        message = bag.definitions.message(name, bag.state(0.0, 0))
+        for k in range(1, count):
+            message.header.seq, message.sim_time_unwrapped, message.roll_deg = k, k / 100, float(k % 90)
+            raw = bytes(bag.definitions.store.serialize_ros1(message, name))
+            bag.add_raw(_TOPIC, "xplane_bridge/FlightState", stamp_ns(k / 100), raw)
+
+
+def _value(message: object, path: str) -> object:
+    for part in path.split("."):
+        message = getattr(message, part)
+    return message
+
+
+def _collect(messages: object, columns: object) -> int:
+    """What a user of message objects does: all columns into lists, then into arrays."""
+    paths = [path for path in columns if not path.startswith("header.")]
+    rows = [[_value(message, path) for path in paths] for message in messages]
+    arrays = [np.array(column) for column in zip(*rows)]
+    assert len(arrays) == len(paths)
+    return len(rows)
+
+
+def _rosbag_api(path: Path, columns: object) -> float:
+    import rosbag
+
+    began = time.perf_counter()
+    with rosbag.Bag(str(path)) as bag:
+        count = _collect((message for _, message, _ in bag.read_messages(topics=[_TOPIC])), columns)
+    return count / (time.perf_counter() - began)
+
+
+def _rosbags(path: Path, columns: object) -> float:
+    began = time.perf_counter()
+    with AnyReader([path]) as reader:
+        messages = (reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages())
+        count = _collect(messages, columns)
+    return count / (time.perf_counter() - began)
