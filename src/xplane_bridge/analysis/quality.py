@@ -9,6 +9,20 @@ import numpy as np
 #: A pause of more than this many median periods counts as a gap.
 GAP_FACTOR = 3.0
 
+#: FrameState's bits that make an image unfit for learning. The others only say what was assumed.
+BAD_QUALITY = (
+    "QUALITY_STATE_MISSING",
+    "QUALITY_OFF_FRAME",
+    "QUALITY_DISPLAY_UNKNOWN",
+    "QUALITY_CLOCK_UNSURE",
+    "QUALITY_FROZEN",
+    "QUALITY_BLACK",
+    "QUALITY_PAUSED",
+    "QUALITY_REPLAY",
+    "QUALITY_EXTERNAL_VIEW",
+    "QUALITY_EPOCH_EDGE",
+)
+
 
 class Timing(NamedTuple):
     """When the messages of a topic came."""

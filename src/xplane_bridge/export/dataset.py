@@ -16,23 +16,10 @@ from typing import Any, Iterator, NamedTuple
 import numpy as np
 
 from xplane_bridge.analysis.columns import named
+from xplane_bridge.analysis.quality import BAD_QUALITY
 from xplane_bridge.bags import BagError, Bags
 from xplane_bridge.bags.pictures import COMPRESSED, RAW, image_topic
 from xplane_bridge.export.flight import FRAME_STATE, labels, topic_of
-
-#: Frames with one of these bits are left out unless asked for. The others only say what was assumed.
-BAD_QUALITY = (
-    "QUALITY_STATE_MISSING",
-    "QUALITY_OFF_FRAME",
-    "QUALITY_DISPLAY_UNKNOWN",
-    "QUALITY_CLOCK_UNSURE",
-    "QUALITY_FROZEN",
-    "QUALITY_BLACK",
-    "QUALITY_PAUSED",
-    "QUALITY_REPLAY",
-    "QUALITY_EXTERNAL_VIEW",
-    "QUALITY_EPOCH_EDGE",
-)
 
 
 class Options(NamedTuple):

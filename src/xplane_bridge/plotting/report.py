@@ -5,14 +5,14 @@ from __future__ import annotations
 import base64
 import datetime
 import html
-from typing import TYPE_CHECKING, Any, Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from xplane_bridge import __version__
 from xplane_bridge.analysis.consistency import check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values
-from xplane_bridge.analysis.quality import bit_shares, pairing, timing
+from xplane_bridge.analysis.quality import BAD_QUALITY, bit_shares, pairing, timing
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.plotting import interactive
 from xplane_bridge.plotting.flight_figures import MissingError, all_figures
@@ -210,7 +210,7 @@ def _strip(bags: Bags, flight: Flight) -> str:
         picture = _thumbnail(message.data)
         if picture is None:
             continue
-        caption = _caption(frames, row_of.get(stamp), _seconds(stamp, flight))
+        caption = _caption(frames, row_of.get(stamp), _seconds(stamp, flight), flight.constants["frames"])
         figures.append(
             f'<figure><img alt="cockpit view" src="data:image/jpeg;base64,{picture}">'
             f"<figcaption>{caption}</figcaption></figure>"
@@ -229,17 +229,26 @@ def _thumbnail(data: np.ndarray) -> str | None:
     return base64.b64encode(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()).decode("ascii")
 
 
-def _caption(frames: Any, row: int | None, at: str) -> str:
+def _remarks(quality: int, constants: Mapping[str, Any]) -> str:
+    """Name the quality bits that are set; those that make an image unfit in red."""
+    names = [name for name, bit in constants.items() if name.startswith("QUALITY_") and quality & int(bit)]
+    return "".join(
+        f' &middot; <span class="{"bad" if name in BAD_QUALITY else "note"}">'
+        f"{name[len('QUALITY_') :].lower().replace('_', ' ')}</span>"
+        for name in names
+    )
+
+
+def _caption(frames: Any, row: int | None, at: str, constants: Mapping[str, Any]) -> str:
     if row is None:
         return f"{at} s &middot; no state"
     names = ("roll_deg", "pitch_deg", "heading_true_deg", "altitude_msl", "indicated_airspeed")
     value = {name: frames[f"state.{name}"][row] for name in names}
-    quality = int(frames["quality"][row])
     return (
         f"{at} s &middot; roll {value['roll_deg']:.1f}&deg; &middot; pitch {value['pitch_deg']:.1f}&deg; &middot; "
         f"true heading {value['heading_true_deg']:.1f}&deg;<br>{value['altitude_msl']:.0f} m MSL &middot; "
         f"IAS {value['indicated_airspeed']:.1f} m/s &middot; time error {frames['sim_time_error'][row] * 1e3:.1f} ms"
-        + (f' &middot; <span class="bad">quality {quality}</span>' if quality else "")
+        + _remarks(int(frames["quality"][row]), constants)
     )
 
 
