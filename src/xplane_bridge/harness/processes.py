@@ -99,6 +99,7 @@ class ManagedProcess:
 
         def end_with_parent() -> None:
             _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells ignore it for what they run in the background
             if os.getppid() != parent:
                 os._exit(1)
 
