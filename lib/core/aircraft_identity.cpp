@@ -10,11 +10,11 @@ namespace {
 constexpr std::size_t kIcaoLength = 8;
 constexpr std::size_t kDescriptionLength = 64;
 // X-Plane may answer the characters in different frames of a period.
-constexpr double kJoinWindow_s = 1.5 / AircraftIdentityReader::kRateHz;
+constexpr double kJoinWindow = 1.5 / AircraftIdentityReader::kRateHz;
 
 RrefFrameAssembler::Options frameOptions() {
   RrefFrameAssembler::Options options;
-  options.join_window = kJoinWindow_s;
+  options.join_window = kJoinWindow;
   return options;
 }
 

@@ -15,7 +15,7 @@ std::vector<DatarefWrite> viewWrites(CameraView view) {
 }
 
 std::vector<std::string> consecutiveElements(const std::string& name, std::size_t count) {
-  const std::vector<std::string> first = datarefElements(name);
+  std::vector<std::string> first = datarefElements(name);
   if (first.size() != 1) throw std::invalid_argument("\"" + name + "\" is a range: expected path or path[i]");
   if (count == 1) return first;
   const std::size_t bracket = name.find('[');

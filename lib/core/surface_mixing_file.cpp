@@ -41,8 +41,10 @@ SurfaceLaw lawFromJson(const std::string& name, const Json& json) {
   law.residual_deg = finite(json.at("residual_deg"), name + ".residual_deg");
   law.low_deg = finite(json.at("low_deg"), name + ".low_deg");
   law.high_deg = finite(json.at("high_deg"), name + ".high_deg");
+  const std::string slopes = name + ".slopes_deg.";
   for (const auto& [term, slope] : json.at("slopes_deg").items()) {
-    law.slopes[static_cast<Eigen::Index>(termNumber(term))] = finite(slope, name + ".slopes_deg." + term);
+    std::string path = slopes;
+    law.slopes[static_cast<Eigen::Index>(termNumber(term))] = finite(slope, path.append(term));
   }
   return law;
 }
