@@ -16,7 +16,7 @@ constexpr int kBackwardSamplesForReset = 10;
 /// A line of slope 1 is preferred while its mean delay is within this of the best line's: X-Plane takes its frame
 /// periods from the same kind of clock as the host, so another slope must be seen to be believed.
 constexpr double kUnitSlopeFactor = 1.5;
-constexpr double kUnitSlopeMargin = 5e-5;  // [s]
+constexpr double kUnitSlopeMargin = 3e-4;  // [s] what the jitter of a quarter of a second can feign
 
 double floatStep(float value) {
   const float magnitude = std::abs(value);
