@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,7 @@ import pytest
 
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import ManagedProcess, flight_check, wait_until
-from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
-from xplane_bridge.resources import config_file, program
+from xplane_bridge.resources import program
 
 CONNECTED, STALE, LOST = 1, 3, 4
 DEMO_TIMEOUT_S = 240.0
@@ -52,26 +52,36 @@ def test_ctrl_c_ends_the_demo_and_all_it_has_started(tmp_path: Path) -> None:
         wait_until(lambda: not [pid for pid in children if alive(pid)], 10.0, "end of all children")
 
 
+#: Flies in a process of its own: rospy knows one master a process, and the tests' process has its own already.
+DEATH_AND_RETURN = """
+import sys
+from pathlib import Path
+from xplane_bridge.harness.flight import FlightPlan, fly
+from xplane_bridge.resources import config_file
+
+died, returned = [], []
+
+def shake(flight):
+    if not died and flight.elapsed > 4.0:
+        flight.emulator.kill()
+        died.append(flight.elapsed)
+    elif died and not returned and flight.elapsed > 6.0:
+        flight.emulator.start()
+        returned.append(flight.elapsed)
+
+options = ["--fps", "60", "--pilot", str(config_file("scenarios", "demo.yaml"))]
+args = {"capture": False, "tx": False}
+fly(FlightPlan(Path(sys.argv[1]), 14.0, emulator_options=options, silence_allowed=60.0, launch_args=args), shake)
+assert returned
+"""
+
+
 def test_the_bridge_survives_the_death_and_return_of_its_simulator(tmp_path: Path) -> None:
-    died: list = []
-    returned: list = []
-
-    def shake(flight: RunningFlight) -> None:
-        if not died and flight.elapsed > 4.0:
-            flight.emulator.kill()
-            died.append(flight.states)
-        elif died and not returned and flight.elapsed > 6.0:
-            flight.emulator.start()
-            returned.append(flight.elapsed)
-
-    pilot = str(config_file("scenarios", "demo.yaml"))
-    plan = FlightPlan(
-        tmp_path / "out", 14.0, emulator_options=["--fps", "60", "--pilot", pilot], silence_allowed=60.0,
-        launch_args={"capture": False},
-    )  # fmt: skip
-    fly(plan, shake)
-    assert returned
-    with Bags(plan.bag) as bags:
+    out = tmp_path / "out"
+    flight = ManagedProcess("flight", [sys.executable, "-c", DEATH_AND_RETURN, out], tmp_path, env=flight_env())
+    with flight:
+        assert flight.wait(DEMO_TIMEOUT_S) == 0, flight.output()
+    with Bags(out / "flight.bag") as bags:
         links = bags.read("/xplane/link_state")
         states = bags.read("/xplane/flight_state", ["header.stamp", "epoch", "valid"])
         valid_all = bags.constants("/xplane/flight_state")["VALID_ALL"]
@@ -84,6 +94,11 @@ def test_the_bridge_survives_the_death_and_return_of_its_simulator(tmp_path: Pat
     assert len(states) - silent > 60, "states flow again after the return"
     assert states["epoch"][-1] > states["epoch"][silent], "histories must not cross the restart"
     assert int(states["valid"][-1]) & valid_all == valid_all
+
+
+def flight_env() -> dict:
+    """The environment of a flight: this one, with all that this process can import."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 
 
 def descendants(pid: int) -> list:
