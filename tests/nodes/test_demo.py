@@ -12,6 +12,7 @@ import pytest
 
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import ManagedProcess, flight_check, wait_until
+from xplane_bridge.harness.ros import ros_environment
 from xplane_bridge.resources import program
 
 CONNECTED, STALE, LOST = 1, 3, 4
@@ -78,7 +79,7 @@ assert returned
 
 def test_the_bridge_survives_the_death_and_return_of_its_simulator(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    flight = ManagedProcess("flight", [sys.executable, "-c", DEATH_AND_RETURN, out], tmp_path, env=flight_env())
+    flight = ManagedProcess("flight", [sys.executable, "-c", DEATH_AND_RETURN, out], tmp_path, env=ros_environment())
     with flight:
         assert flight.wait(DEMO_TIMEOUT_S) == 0, flight.output()
     with Bags(out / "flight.bag") as bags:
@@ -94,11 +95,6 @@ def test_the_bridge_survives_the_death_and_return_of_its_simulator(tmp_path: Pat
     assert len(states) - silent > 60, "states flow again after the return"
     assert states["epoch"][-1] > states["epoch"][silent], "histories must not cross the restart"
     assert int(states["valid"][-1]) & valid_all == valid_all
-
-
-def flight_env() -> dict:
-    """The environment of a flight: this one, with all that this process can import."""
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 
 
 def descendants(pid: int) -> list:

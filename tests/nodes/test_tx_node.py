@@ -361,6 +361,7 @@ def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
     world.manual.fly(fields=ROLL, roll=0.3)
     world.wire.wait(OVERRIDE, 1.0)
     world.manual.stop()
+    world.mode.wait_for(lambda m: m.failsafe)  # X-Plane may be back before the last command has timed out
     world.xplane.restart()
     world.events.wait_for_next(lambda e: "CONNECTED" in e.events[-1].text, timeout=20)
     wire = Wire(world.xplane.port, OVERRIDE)
