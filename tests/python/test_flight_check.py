@@ -179,3 +179,13 @@ def test_the_table_shows_rate_gaps_and_ends():
     assert line.longest == pytest.approx(0.12)
     assert "alt 1000" in line.first
     assert "alt 1000" in flight_check.render([line])
+
+
+def test_odometry_is_judged_in_simulator_time_and_only_where_a_state_gives_it():
+    stamps = np.array([10, 20, 30, 40], dtype=np.int64)
+    flown = Table("s", "t", stamps[1:], {"header.stamp": stamps[1:], "sim_time_unwrapped": np.array([1.0, 2.0, 4.0])})
+    heard = Table("o", "t", stamps + 5, {"header.stamp": np.array([10, 20, 35, 40]), "x": np.arange(4.0)})
+    table, time = flight_check.with_simulator_time(heard, flown)
+    np.testing.assert_array_equal(time, [1.0, 4.0])
+    np.testing.assert_array_equal(table["x"], [1.0, 3.0])
+    np.testing.assert_array_equal(table.stamp, [20, 40])
