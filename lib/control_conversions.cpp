@@ -107,4 +107,13 @@ void toMessage(const core::ArbitratedControls& controls, AppliedCommand* message
   message->thrust_vector = value(Channel::kThrustVector);
 }
 
+void fillSurfaces(const std::vector<core::SurfaceDeflection>& surfaces, AppliedCommand* message) {
+  message->surface_names.clear();
+  message->surface_deflections_deg.clear();
+  for (const core::SurfaceDeflection& surface : surfaces) {
+    message->surface_names.push_back(core::surfaceTable()[surface.surface].name);
+    message->surface_deflections_deg.push_back(static_cast<float>(surface.deflection_deg));
+  }
+}
+
 }  // namespace xplane_bridge

@@ -27,13 +27,13 @@ const char* const kOverridePurpose = "override";
 
 OverrideKeeper::OverrideKeeper(core::SimLink* link, Report report) : link_(link), report_(std::move(report)) {}
 
-bool OverrideKeeper::set(const std::string& dataref) {
+bool OverrideKeeper::set(const std::string& dataref, float value) {
   const auto journal = link_->journal();
   if (!journal) return false;
   // On disk first: a crash right after the datagram must find it there.
   journal->record(entryId(dataref), kOverridePurpose, {undoOf(dataref)});
   releasing_.erase(dataref);
-  link_->sendDref(dataref, 1.0F);
+  link_->sendDref(dataref, value);
   return true;
 }
 
@@ -49,7 +49,7 @@ void OverrideKeeper::require(const std::vector<std::string>& wanted) {
     std::lock_guard<std::mutex> lock(mutex_);
     for (const std::string& dataref : wanted) {
       if (required_.count(dataref) != 0) continue;
-      if (held_.count(dataref) == 0 && !set(dataref)) continue;
+      if (held_.count(dataref) == 0 && !set(dataref, 1.0F)) continue;
       required_.insert(dataref);
       taken.insert(dataref);
     }
@@ -68,9 +68,11 @@ void OverrideKeeper::require(const std::vector<std::string>& wanted) {
   if (!given.empty()) report_("gave back " + joined(given), true);
 }
 
-void OverrideKeeper::hold(const std::string& dataref) {
+bool OverrideKeeper::hold(const std::string& dataref, float value, bool refreshed) {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (required_.count(dataref) != 0 || set(dataref)) held_.insert(dataref);
+  if (required_.count(dataref) == 0 && !set(dataref, value)) return false;
+  held_[dataref] = {value, refreshed};
+  return true;
 }
 
 void OverrideKeeper::unhold(const std::string& dataref) {
@@ -81,7 +83,9 @@ void OverrideKeeper::unhold(const std::string& dataref) {
 void OverrideKeeper::refresh() {
   std::lock_guard<std::mutex> lock(mutex_);
   for (const std::string& dataref : required_) link_->sendDref(dataref, 1.0F);
-  for (const std::string& dataref : held_) link_->sendDref(dataref, 1.0F);
+  for (const auto& [dataref, held] : held_) {
+    if (held.refreshed) link_->sendDref(dataref, held.value);
+  }
 }
 
 bool OverrideKeeper::releasesPending() const {
@@ -125,7 +129,7 @@ bool OverrideKeeper::releaseAll(double timeout_s) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
     all = required_;
-    all.insert(held_.begin(), held_.end());
+    for (const auto& [dataref, held] : held_) all.insert(dataref);
     all.insert(releasing_.begin(), releasing_.end());
     required_.clear();
     held_.clear();
@@ -160,7 +164,9 @@ bool OverrideKeeper::releaseLeftovers(double timeout_s) {
 std::vector<std::string> OverrideKeeper::active() const {
   std::lock_guard<std::mutex> lock(mutex_);
   std::set<std::string> all = required_;
-  all.insert(held_.begin(), held_.end());
+  for (const auto& [dataref, held] : held_) {
+    if (held.refreshed) all.insert(dataref);
+  }
   return {all.begin(), all.end()};
 }
 

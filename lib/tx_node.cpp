@@ -37,6 +37,7 @@ void TxNode::advertise() {
   events_.setPublisher(advertiseTopic<EventList>("events", 1, true));
   mode_publisher_ = advertiseTopic<ControlMode>("control/mode", 10, true);
   applied_publisher_ = advertiseTopic<AppliedCommand>("control/applied", 100);
+  failure_publisher_ = advertiseTopic<FailureState>("failures/state", 10, true);
   advertiseServices();
   addDiagnostics("control", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { fillDiagnostics(&status); });
 }
@@ -51,6 +52,8 @@ void TxNode::subscribe() {
   // Requests are few and none may be lost.
   subscribeTopic<ModeRequest>("control/mode_request", 20,
                               [this](const ModeRequestConstPtr& request) { onModeRequest(*request); });
+  subscribeTopic<SurfaceCommand>("control/surfaces", 1,
+                                 [this](const SurfaceCommandConstPtr& command) { onSurfaceCommand(*command); });
   addTimer(1.0 / options_.rate, [this] { onTimer(); });
 }
 
@@ -73,6 +76,7 @@ void TxNode::start() {
     watch_group_ = link().addGroup({"flight watch", core::flightWatchDatarefs(), core::kEveryFrameRateHz, 2});
     identity_group_ = link().addGroup(
         {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1});
+    makeSurfaceControl();
     publishMode();
   }
   worker_ = std::thread([this] { work(); });
@@ -113,6 +117,8 @@ void TxNode::onTimer() {
   const double time = now();
   std::lock_guard<std::mutex> lock(mutex_);
   if (!overrides_) return;
+  surfaces_->tick(time, refusalToFly());
+  failures_->tick(time);
   if (came_back_) startAfresh(time);
   if (linkIsUp() && time - last_refresh_ > kOverrideRefresh) {
     overrides_->refresh();
@@ -176,7 +182,9 @@ void TxNode::sendControls(double time) {
   send_pending_ = false;
   const core::ArbitratedControls& controls = arbiter_->step(time);
   publishMode();
-  if (controls.active.none() || !overrides_) return;
+  if (!overrides_) return;
+  tellStick(nullptr);  // until it is sent
+  if (controls.active.none()) return;
   const std::string refusal = refusalToFly();
   if (refusal != refusal_said_) {
     refusal_said_ = refusal;
@@ -197,6 +205,7 @@ void TxNode::sendControls(double time) {
   encoder_->encode(controls.values, channelsToSend(controls, time), writes_);
   for (const core::DatarefWrite& write : writes_) link().sendDref(write.dataref, write.value);
   last_send_ = time;
+  tellStick(&controls);
   publishApplied(controls, time);
   watchReadBack(controls.active);
 }
@@ -224,6 +233,7 @@ void TxNode::publishApplied(const core::ArbitratedControls& controls, double tim
   Sent sent;
   toMessage(controls, &sent.message);
   sent.message.header.stamp = stampNow();
+  fillSurfaces(surfaces_->sentOneByOne(), &sent.message);
   sent.message.read_back_sim_time = std::nanf("");
   sent.message.read_back_frames = std::nanf("");
   sent.values = controls.values;
@@ -264,6 +274,8 @@ void TxNode::onLinkState(const core::LinkStatus& status) {
       if (status.epoch > 1) came_back_ = true;
     }
     link_status_ = status;
+    surfaces_->onLink(status);
+    failures_->onLink(status);
     arbiter_->setFlowing(status.state == core::LinkState::kConnected, time);
     if (status.version) {
       const auto generation = core::generationOf(*status.version);
@@ -289,11 +301,16 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
     // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
     if (watch_.sim_time < before - kRestartStep) came_back_ = true;
     sim_time_ = watch_.sim_time;
+    failures_->onFrame(watch_);
     if (watch_.crashed && !crashed) logEvent(Event::CRASH, "the aircraft has crashed");
   } else if (group == identity_group_) {
     if (identity_.add(view, info.stamp_ns)) onIdentity();
   } else if (group == read_back_group_) {
     onReadBack(view);
+  } else if (surfaces_->onRref(group, view, info)) {
+    publishSurfacesApplied();
+  } else {
+    failures_->onRref(group, view);
   }
 }
 
@@ -301,6 +318,7 @@ void TxNode::onIdentity() {
   const core::AircraftIdentity& loaded = identity_.identity();
   logEvent(Event::AIRCRAFT, "aircraft: " + loaded.icao + " (" + loaded.description + ")" +
                                 (options_.aircraft.fits(loaded) ? "" : "; not the one of the configuration"));
+  surfaces_->onAircraft(loaded.icao.empty() ? loaded.description : loaded.icao);
 }
 
 void TxNode::onReadBack(const core::RrefView& view) {
@@ -356,6 +374,8 @@ void TxNode::stopInputs() {
   }
   work_wanted_.notify_all();
   if (worker_.joinable()) worker_.join();
+  if (surfaces_) surfaces_->stop();
+  if (failures_) failures_->stop();
 }
 
 void TxNode::undo(Deadline deadline) {
@@ -368,6 +388,7 @@ void TxNode::undo(Deadline deadline) {
 void TxNode::publishFinalState() {
   std::lock_guard<std::mutex> lock(mutex_);
   publishMode();
+  if (failures_) failures_->publish();
 }
 
 void TxNode::joinThreads() {}

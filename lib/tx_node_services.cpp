@@ -46,6 +46,7 @@ void TxNode::advertiseServices() {
       [this](const std_srvs::SetBool::Request& q, std_srvs::SetBool::Response& r) { servePause(q.data != 0, &r); });
   advertiseService<SetView::Request, SetView::Response>(
       name() + "/set_view", [this](const SetView::Request& q, SetView::Response& r) { serveSetView(q, &r); });
+  advertiseFailureServices();
 }
 
 void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* response) {

@@ -68,6 +68,8 @@ AircraftOptions loadAircraft(const ParamLoader& in, core::ArbiterOptions* arbite
   out.surfaces.rate_deg_s = surfaces.number("rate_deg_s", {1.0, 1000.0}, out.surfaces.rate_deg_s);
   out.surfaces.floating_gain = surfaces.number("floating_gain", {0.0, 2.0}, out.surfaces.floating_gain);
   out.surfaces.floating_time = surfaces.number("floating_time", {0.01, 10.0}, out.surfaces.floating_time);
+  out.flap_rate = surfaces.number("flap_rate", {0.001, 100.0}, out.flap_rate);
+  out.speedbrake_rate = surfaces.number("speedbrake_rate", {0.001, 100.0}, out.speedbrake_rate);
   return out;
 }
 

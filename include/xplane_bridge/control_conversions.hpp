@@ -7,6 +7,7 @@
 #include "xplane_bridge/ControlCommand.h"
 #include "xplane_bridge/core/control_arbiter.hpp"
 #include "xplane_bridge/core/control_command.hpp"
+#include "xplane_bridge/core/surfaces.hpp"
 
 namespace xplane_bridge {
 
@@ -16,5 +17,7 @@ void toMessage(const core::ControlCommand& command, ControlCommand* message);
 
 /// Fills everything the arbiter knows: all but header, surfaces and read-back.
 void toMessage(const core::ArbitratedControls& controls, AppliedCommand* message);
+/// Fills the surfaces sent one by one.
+void fillSurfaces(const std::vector<core::SurfaceDeflection>& surfaces, AppliedCommand* message);
 
 }  // namespace xplane_bridge

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <mutex>
 #include <set>
 #include <string>
@@ -24,9 +25,11 @@ class OverrideKeeper {
   /// more (its journal entry stays until confirmReleases() has read it back). Writes to the disk when something is new;
   /// without a journal (X-Plane has not been found) nothing is set.
   void require(const std::vector<std::string>& wanted);
-  /// Sets one for as long as the node runs, whatever require() says (set_dataref).
-  void hold(const std::string& dataref);
-  /// Gives one back that hold() has set.
+  /// Sets one, until unhold() or the end of the node, whatever require() says. Not only overrides: whatever is 0 (or
+  /// core::releaseOf()) where nobody sets it. Without `refreshed`, refresh() leaves it alone, so that it can be taken
+  /// back in the simulator. Returns whether it was set: not without a journal.
+  bool hold(const std::string& dataref, float value = 1.0F, bool refreshed = true);
+  /// Gives one back that hold() has set; another one stays as it is.
   void unhold(const std::string& dataref);
   /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted.
   void refresh();
@@ -40,11 +43,16 @@ class OverrideKeeper {
   /// Releases what a crashed run has left. Waits up to `timeout_s`. Returns whether nothing is left.
   bool releaseLeftovers(double timeout_s);
 
-  /// Set now.
+  /// Set now, by name; those that refresh() repeats.
   std::vector<std::string> active() const;
 
  private:
-  bool set(const std::string& dataref);
+  struct Held {
+    float value = 1.0F;
+    bool refreshed = true;
+  };
+
+  bool set(const std::string& dataref, float value);
   void release(const std::string& dataref);
   bool confirm(const std::vector<std::string>& ids, const std::vector<core::UndoOperation>& operations,
                double timeout_s, const std::string& what);
@@ -53,7 +61,7 @@ class OverrideKeeper {
   Report report_;
   mutable std::mutex mutex_;
   std::set<std::string> required_;
-  std::set<std::string> held_;
+  std::map<std::string, Held> held_;
   std::set<std::string> releasing_;
 };
 

@@ -21,14 +21,17 @@
 #include "xplane_bridge/SetDataref.h"
 #include "xplane_bridge/SetMode.h"
 #include "xplane_bridge/SetView.h"
+#include "xplane_bridge/SurfaceCommand.h"
 #include "xplane_bridge/base_node.hpp"
 #include "xplane_bridge/core/aircraft_identity.hpp"
 #include "xplane_bridge/core/control_arbiter.hpp"
 #include "xplane_bridge/core/control_channels.hpp"
 #include "xplane_bridge/core/flight_watch.hpp"
 #include "xplane_bridge/event_log.hpp"
+#include "xplane_bridge/failure_keeper.hpp"
 #include "xplane_bridge/guardian.hpp"
 #include "xplane_bridge/override_keeper.hpp"
+#include "xplane_bridge/surface_control.hpp"
 #include "xplane_bridge/tx_options.hpp"
 
 namespace xplane_bridge {
@@ -66,6 +69,7 @@ class TxNode : public BaseNode {
   // Control path.
   void onCommand(core::FlightMode from, const ControlCommand& message);
   void onModeRequest(const ModeRequest& message);
+  void onSurfaceCommand(const SurfaceCommand& message);
   void onTimer();
   void sendControls(double time);
   bool mayFly() const;
@@ -82,6 +86,12 @@ class TxNode : public BaseNode {
   void onReadBack(const core::RrefView& view);
   void onIdentity();
   void work();
+
+  // Single surfaces and failures (tx_node_surfaces.cpp).
+  void makeSurfaceControl();
+  void tellStick(const core::ArbitratedControls* sent);
+  void publishSurfacesApplied();
+  void advertiseFailureServices();
 
   // Services (tx_node_services.cpp).
   void advertiseServices();
@@ -102,6 +112,8 @@ class TxNode : public BaseNode {
   std::atomic<double> sim_time_{std::nan("")};  // [s] raw simulator time, for events of any thread
   Guardian guardian_;
   std::unique_ptr<OverrideKeeper> overrides_;
+  std::unique_ptr<SurfaceControl> surfaces_;
+  std::unique_ptr<FailureKeeper> failures_;
 
   mutable std::mutex mutex_;
   std::unique_ptr<core::ControlArbiter> arbiter_;
@@ -133,6 +145,7 @@ class TxNode : public BaseNode {
 
   ros::Publisher applied_publisher_;
   ros::Publisher mode_publisher_;
+  ros::Publisher failure_publisher_;
 
   std::thread worker_;
   std::condition_variable work_wanted_;

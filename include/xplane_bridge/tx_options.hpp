@@ -18,6 +18,8 @@ struct AircraftOptions {
   double max_roll_deg = 45.0;  ///< [deg] at which an excitation is aborted unless the request says otherwise
   double max_pitch_deg = 20.0;
   core::DriverOptions surfaces;
+  double flap_rate = 0.15;       ///< [1/s] of full travel, while surfaces are driven one by one
+  double speedbrake_rate = 1.0;  ///< [1/s] of full travel
 
   /// Whether the file is for the aircraft loaded.
   bool fits(const core::AircraftIdentity& loaded) const;

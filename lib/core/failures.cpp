@@ -137,14 +137,17 @@ std::string failureDataref(const std::string& name) {
   return name.compare(0, kFolder.size(), kFolder) == 0 ? name : kFolder + name;
 }
 
+std::string failureName(const std::string& name) {
+  return name.compare(0, kFolder.size(), kFolder) == 0 ? name.substr(kFolder.size()) : name;
+}
+
 FailurePlanResult planFailure(const FailureRequest& request, SimulatorGeneration generation) {
   if (const auto wrong = checkTrigger(request)) return refuse(FailureError::kInvalid, *wrong);
   if (const auto surface = surfaceNumber(request.name)) return planSurface(request, *surface, generation);
 
   FailurePlanResult out;
   out.plan = {request.name, request.kind, std::nullopt, {}, std::nullopt};
-  const std::string bare =
-      request.name.compare(0, kFolder.size(), kFolder) == 0 ? request.name.substr(kFolder.size()) : request.name;
+  const std::string bare = failureName(request.name);
   if (bare.compare(0, 4, "rel_") == 0 && bare.size() > 4) {
     out.plan.name = bare;
     out.plan.datarefs.push_back(failureDataref(bare));
@@ -201,6 +204,11 @@ void FailureBook::confirm(const std::string& name, bool shown) {
   if (it != entries_.end()) it->second.confirmed = shown;
 }
 
+void FailureBook::setValue(const std::string& name, double value) {
+  const auto it = entries_.find(name);
+  if (it != entries_.end()) it->second.plan.value = value;
+}
+
 bool FailureBook::observe(const std::string& dataref, double value, double sim_time) {
   const bool failed = value == kFailedNow;
   for (auto it = entries_.begin(); it != entries_.end(); ++it) {
@@ -218,7 +226,7 @@ bool FailureBook::observe(const std::string& dataref, double value, double sim_t
   }
   if (!failed) return false;
   Entry entry;
-  entry.plan.name = dataref.compare(0, kFolder.size(), kFolder) == 0 ? dataref.substr(kFolder.size()) : dataref;
+  entry.plan.name = failureName(dataref);
   entry.plan.kind = "failed";
   entry.plan.datarefs = {dataref};
   entry.by_bridge = false;
@@ -267,6 +275,17 @@ std::vector<SurfaceFailure> FailureBook::drivenSurfaces() const {
     if (entry.active && entry.driven && entry.plan.surface) out.push_back(*entry.plan.surface);
   }
   return out;
+}
+
+bool FailureBook::isDriven(const std::string& name) const {
+  const auto it = entries_.find(name);
+  return it != entries_.end() && it->second.driven;
+}
+
+std::vector<std::string> FailureBook::datarefsOf(const std::string& name) const {
+  const auto it = entries_.find(name);
+  if (it == entries_.end() || !it->second.active || it->second.driven) return {};
+  return it->second.plan.datarefs;
 }
 
 void FailureBook::useDriver(const std::string& name) {

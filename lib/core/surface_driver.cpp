@@ -67,7 +67,7 @@ SurfaceDriver::SurfaceDriver(MixingModel model, DriverOptions options) : model_(
   if (!(options.floating_time > 0.0)) throw std::invalid_argument("surfaces.floating_time: expected above 0 s");
 }
 
-void SurfaceDriver::engage(const std::vector<double>& shown_deg) {
+void SurfaceDriver::engage(const std::vector<double>& shown_deg, const std::vector<double>& bias_deg) {
   std::vector<Driven> driven;
   for (std::size_t i = 0; i < surfaceTable().size(); ++i) {
     const SurfaceLaw* law = model_.lawOf(i);
@@ -80,6 +80,7 @@ void SurfaceDriver::engage(const std::vector<double>& shown_deg) {
     d.surface = i;
     d.law = law;
     d.held_deg = d.now_deg = shown;
+    if (i < bias_deg.size()) d.bias_deg = bias_deg[i];
     driven.push_back(d);
   }
   driven_ = std::move(driven);
@@ -121,10 +122,10 @@ void SurfaceDriver::setOffset(std::size_t surface, double offset_deg) {
 }
 
 double SurfaceDriver::target(const Driven& d, const MixingVector& terms) const {
-  const double healthy = d.command_deg ? *d.command_deg : d.law ? d.law->deflection(terms) : d.held_deg;
+  const double healthy = d.command_deg ? *d.command_deg : d.law ? d.law->deflection(terms) + d.bias_deg : d.held_deg;
   const double bounded = d.command_deg || !d.law ? healthy : std::clamp(healthy, d.law->low_deg, d.law->high_deg);
   if (!d.failure) return bounded;
-  const double neutral = d.law ? d.law->neutral() : 0.0;
+  const double neutral = d.law ? d.law->neutral() + d.bias_deg : 0.0;
   switch (d.failure->fault) {
     case SurfaceFault::kStuck:
       return d.stuck_deg;

@@ -196,6 +196,12 @@ MixingIdentifier::Solution MixingIdentifier::solve(const std::string& aircraft) 
       law.low_deg = std::min(law.low_deg, law.deflection(full));
       law.high_deg = std::max(law.high_deg, law.deflection(full));
     }
+    // Flaps and brakes that were moved a little can go all the way.
+    for (const MixingTerm handle : {MixingTerm::kFlap1, MixingTerm::kSpeedbrake, MixingTerm::kFlap2}) {
+      const auto j = static_cast<Eigen::Index>(handle);
+      law.low_deg = std::min(law.low_deg, law.slopes[0] + law.slopes[j]);
+      law.high_deg = std::max(law.high_deg, law.slopes[0] + law.slopes[j]);
+    }
     if (law.residual_deg > quality.worst_residual_deg) {
       quality.worst_residual_deg = law.residual_deg;
       quality.worst_surface = surfaceTable()[s].name;

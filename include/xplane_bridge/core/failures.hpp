@@ -84,6 +84,8 @@ class FailureBook {
 
   /// X-Plane does (not) show the failure.
   void confirm(const std::string& name, bool shown);
+  /// The label's value, e.g. the angle at which a surface was when it got stuck.
+  void setValue(const std::string& name, double value);
 
   /// A failure dataref's value as read. Failures somebody set in the simulator's menu appear and go by this.
   /// Returns true when the labels changed.
@@ -98,6 +100,10 @@ class FailureBook {
   Cleared clear(const std::vector<std::string>& names, bool include_simulator);
 
   bool knows(const std::string& name) const { return entries_.count(name) != 0; }
+  /// SurfaceDriver flies it, or will when it comes true.
+  bool isDriven(const std::string& name) const;
+  /// Datarefs that show an active failure; none for one that SurfaceDriver flies, or an unknown name.
+  std::vector<std::string> datarefsOf(const std::string& name) const;
   std::vector<FailureLabel> labels() const;
   /// Active failures that SurfaceDriver flies; planned with datarefs ones only after useDriver().
   std::vector<SurfaceFailure> drivenSurfaces() const;
@@ -117,5 +123,7 @@ class FailureBook {
 
 /// Full dataref of a rel_* name: "rel_pitot" or the full path.
 std::string failureDataref(const std::string& name);
+/// The name without the folder of the rel_* datarefs, as failures are labelled.
+std::string failureName(const std::string& name);
 
 }  // namespace xplane_bridge::core

@@ -56,9 +56,10 @@ class SurfaceDriver {
   SurfaceDriver& operator=(const SurfaceDriver&) = delete;
 
   /// Takes over from the deflections shown now (one per surfaceTable() entry, NaN: unknown), so that nothing jumps.
-  /// Surfaces known to the model and those that are not at 0 are driven from now on. Throws std::invalid_argument when
-  /// a surface of the model has no known deflection.
-  void engage(const std::vector<double>& shown_deg);
+  /// Surfaces known to the model and those that are not at 0 are driven from now on. `bias_deg`, by surface, is added
+  /// to the laws (MixingWatch::bias()); empty: none. Throws std::invalid_argument when a surface of the model has no
+  /// known deflection.
+  void engage(const std::vector<double>& shown_deg, const std::vector<double>& bias_deg = {});
   void disengage() { driven_.clear(); }
   bool engaged() const { return !driven_.empty(); }
 
@@ -80,6 +81,7 @@ class SurfaceDriver {
     std::size_t surface = 0;
     const SurfaceLaw* law = nullptr;  // none: held where it was
     double held_deg = 0.0;            // engaged value of a surface without a law
+    double bias_deg = 0.0;            // added to the law
     double now_deg = 0.0;             // without the offset
     double offset_deg = 0.0;
     std::optional<SurfaceFailure> failure;

@@ -1,0 +1,81 @@
+// tx_node's side of single surfaces and failures: topics and services to SurfaceControl and FailureKeeper.
+
+#include <cmath>
+
+#include "xplane_bridge/Event.h"
+#include "xplane_bridge/control_conversions.hpp"
+#include "xplane_bridge/tx_node.hpp"
+#include "xplane_bridge/user_folder.hpp"
+
+namespace xplane_bridge {
+
+void TxNode::makeSurfaceControl() {
+  SurfaceControlOptions options;
+  options.mixing = options_.mixing;
+  options.mixing_folder = userFolder() + "/mixing";
+  options.driver = options_.aircraft.surfaces;
+  options.flap_rate = options_.aircraft.flap_rate;
+  options.speedbrake_rate = options_.aircraft.speedbrake_rate;
+  options.command_timeout = options_.arbiter.command_timeout;
+  surfaces_ = std::make_unique<SurfaceControl>(
+      &link(), overrides_.get(), options,
+      [this](const std::string& text, bool success) { logEvent(Event::OVERRIDE, text, "", success); });
+  failures_ = std::make_unique<FailureKeeper>(&link(), overrides_.get(), surfaces_.get(), options_.service_timeout,
+                                              failure_publisher_,
+                                              [this](const std::string& text, const std::string& who, bool success) {
+                                                logEvent(Event::FAILURE, text, who, success);
+                                              });
+}
+
+void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!surfaces_) return;
+  if (const auto refusal = surfaces_->command(message.names, message.deflections_deg, message.sequence)) {
+    ROS_WARN_THROTTLE(1.0, "control/surfaces is refused: %s", refusal->c_str());
+  }
+}
+
+void TxNode::tellStick(const core::ArbitratedControls* sent) {
+  std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
+  if (sent) {
+    const core::Channel axes[] = {core::Channel::kRoll, core::Channel::kPitch, core::Channel::kYaw};
+    for (std::size_t i = 0; i < stick.size(); ++i) {
+      if (sent->active.test(core::index(axes[i]))) stick[i] = sent->values[core::index(axes[i])];
+    }
+  }
+  surfaces_->setStick(stick);
+}
+
+void TxNode::publishSurfacesApplied() {
+  while (const auto echo = surfaces_->takeEcho()) {
+    AppliedCommand message;
+    message.header.stamp = ros::Time(ros::WallTime::now().toSec());
+    message.mode = static_cast<std::uint8_t>(arbiter_->status().mode);
+    message.source = AppliedCommand::SOURCE_NONE;
+    message.sequence = echo->sequence;
+    fillSurfaces(surfaces_->sentOneByOne(), &message);
+    message.read_back = echo->read_back;
+    message.read_back_sim_time = static_cast<float>(echo->sim_time);
+    message.read_back_frames = static_cast<float>(echo->frames);
+    applied_publisher_.publish(message);
+  }
+}
+
+void TxNode::advertiseFailureServices() {
+  advertiseService<SetFailure::Request, SetFailure::Response>(
+      name() + "/set_failure", [this](const SetFailure::Request& request, SetFailure::Response& response) {
+        failures_->set(request, name() + "/set_failure", &response);
+      });
+  advertiseService<ClearFailures::Request, ClearFailures::Response>(
+      name() + "/clear_failures", [this](const ClearFailures::Request& request, ClearFailures::Response& response) {
+        failures_->clear(request, name() + "/clear_failures", &response);
+      });
+  addDiagnostics("surfaces", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+    if (surfaces_) surfaces_->fillDiagnostics(&status);
+  });
+  addDiagnostics("failures", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+    if (failures_) failures_->fillDiagnostics(&status);
+  });
+}
+
+}  // namespace xplane_bridge
