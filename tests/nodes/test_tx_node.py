@@ -2,84 +2,36 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import signal
-import threading
 from pathlib import Path
 
 import pytest
-import yaml
 
 from xplane_bridge.harness import ManagedProcess, wait_until
-from xplane_bridge.harness.emulator_bench import XPlaneClient
+from xplane_bridge.harness.tx_bench import (
+    AUTO,
+    FLAPS,
+    MANUAL,
+    PITCH,
+    ROLL,
+    THROTTLE,
+    YAW,
+    CommandSource,
+    WatchedDatarefs,
+    call,
+    journal_entries,
+    tx_params,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
-MANUAL, AUTO = 1, 2
-ROLL, PITCH, YAW, THROTTLE, FLAPS, GEAR = 1, 2, 4, 8, 512, 2048
+
 STICK = "sim/joystick/yoke_roll_ratio"
 OVERRIDE = "sim/operation/override/override_joystick"
 THROTTLES = "sim/operation/override/override_throttles"
 LEVER = "sim/cockpit2/engine/actuators/throttle_ratio[0]"
 FLAP_HANDLE = "sim/cockpit2/controls/flap_ratio"
-
-
-class Wire:
-    """X-Plane's datarefs, watched from outside the bridge."""
-
-    def __init__(self, port, *paths):
-        self.paths = list(paths)
-        self._client = XPlaneClient(port)
-        self._client.subscribe(self.paths, rate_hz=50, first_index=0)
-        self._known = {}
-
-    def value(self, path):
-        self._known.update(self._client.values())
-        return self._known.get(self.paths.index(path), math.nan)
-
-    def wait(self, path, expected, timeout=10.0, tolerance=1e-4):
-        wait_until(lambda: abs(self.value(path) - expected) <= tolerance, timeout, f"{path} = {expected}")
-
-    def close(self):
-        self._client.close()
-
-
-class Source:
-    """Publishes a command again and again, as a stick or a controller does."""
-
-    def __init__(self, world, topic):
-        import rospy
-        from xplane_bridge.msg import ControlCommand
-
-        self.command = ControlCommand()
-        self._publisher = rospy.Publisher(f"{world.namespace}/{topic}", ControlCommand, queue_size=1)
-        self._ended = threading.Event()
-        self._thread = None
-
-    def once(self, **values):
-        for key, value in values.items():
-            setattr(self.command, key, value)
-        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "tx_node's subscription")
-        self._publisher.publish(self.command)
-
-    def fly(self, **values):
-        self.once(**values)
-        if self._thread is None:
-            self._ended.clear()
-            self._thread = threading.Thread(target=self._repeat, daemon=True)
-            self._thread.start()
-
-    def _repeat(self):
-        while not self._ended.wait(0.02):
-            self.command.sequence += 1
-            self._publisher.publish(self.command)
-
-    def stop(self):
-        self._ended.set()
-        if self._thread is not None:
-            self._thread.join(10)
-            self._thread = None
 
 
 @pytest.fixture
@@ -91,7 +43,7 @@ def tx(world):
 
     def start(*emulator_options, aircraft="fixed_wing", **params):
         world.xplane = world.emulator("--no-beacon", "--start", "air", *emulator_options)
-        world.wire = Wire(world.xplane.port, OVERRIDE, THROTTLES, STICK, LEVER, FLAP_HANDLE)
+        world.wire = WatchedDatarefs(world.xplane.port, OVERRIDE, THROTTLES, STICK, LEVER, FLAP_HANDLE)
         opened.append(world.wire)
         world.applied = world.watch("control/applied", AppliedCommand)
         world.mode = world.watch("control/mode", ControlMode)
@@ -103,27 +55,13 @@ def tx(world):
         world.events.wait_for(lambda e: any("CONNECTED" in event.text for event in e.events))
         return world.node
 
-    world.manual = Source(world, "control/manual")
-    world.auto = Source(world, "control/auto")
+    world.manual = CommandSource(world, "control/manual")
+    world.auto = CommandSource(world, "control/auto")
     yield start
     world.manual.stop()
     world.auto.stop()
     for wire in opened:
         wire.close()
-
-
-def tx_params(aircraft="fixed_wing", **params):
-    options = yaml.safe_load((ROOT / "config" / "tx.yaml").read_text(encoding="utf-8"))
-    options["aircraft"] = yaml.safe_load(
-        (ROOT / "config" / "aircraft" / f"{aircraft}.yaml").read_text(encoding="utf-8")
-    )
-    options.update(params)
-    return options
-
-
-def journal(world):
-    files = list((world.folder / "ros_home" / "xplane_bridge").glob("*.json"))
-    return [entry["id"] for file in files for entry in json.loads(file.read_text(encoding="utf-8"))["entries"]]
 
 
 def request_mode(world, mode, sequence=1, requester="test"):
@@ -135,21 +73,12 @@ def request_mode(world, mode, sequence=1, requester="test"):
     publisher.publish(ModeRequest(mode=mode, sequence=sequence, requester=requester))
 
 
-def call(world, service, kind, **request):
-    import rospy
-    import xplane_bridge.srv
-
-    name = f"{world.namespace}/tx_node/{service}"
-    rospy.wait_for_service(name, timeout=15)
-    return rospy.ServiceProxy(name, getattr(xplane_bridge.srv, kind))(**request)
-
-
 def test_nothing_is_touched_before_the_first_command(tx, world):
     tx()
     world.wait_for_diagnostics("control", lambda s: s.level == 0 and "DA62" in world.values_of(s)["Aircraft loaded"])
     world.wire.wait(OVERRIDE, 0.0)
     assert not world.applied.messages
-    assert not journal(world)
+    assert not journal_entries(world)
 
 
 def test_command_reaches_xplane_and_is_read_back(tx, world):
@@ -165,7 +94,7 @@ def test_command_reaches_xplane_and_is_read_back(tx, world):
     assert seen.mode == seen.source == MANUAL
     assert 0.0 <= seen.read_back_frames < 60.0
     assert seen.read_back_sim_time > 0.0
-    assert "override:" + OVERRIDE in journal(world)
+    assert "override:" + OVERRIDE in journal_entries(world)
 
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
@@ -178,7 +107,7 @@ def test_overrides_are_released_however_it_ends(tx, world, end):
     code = node.wait(10)
     if end != signal.SIGKILL:
         assert code == 0
-    wait_until(lambda: not journal(world), 10, "an empty journal")
+    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
 
 
 def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
@@ -195,10 +124,10 @@ def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
     node.send_signal(signal.SIGKILL)
     node.wait(10)
     assert world.wire.value(OVERRIDE) == 1.0
-    assert journal(world)
+    assert journal_entries(world)
     world.start("tx_node", world.params)
     world.wire.wait(OVERRIDE, 0.0)
-    wait_until(lambda: not journal(world), 10, "an empty journal")
+    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
 
 
 def _read(path):
@@ -220,7 +149,7 @@ def test_release_overrides_frees_what_a_crash_left(tx, world):
     panic.start()
     assert panic.wait(20) == 0, panic.output()
     world.wire.wait(OVERRIDE, 0.0)
-    assert not journal(world)
+    assert not journal_entries(world)
     node.send_signal(signal.SIGKILL)
 
 
@@ -285,7 +214,7 @@ def test_refused_command_changes_nothing_and_is_named(tx, world, values, named):
     world.auto.fly(fields=ROLL, roll=0.0)  # the other source's commands are judged as well
     world.manual.fly(fields=ROLL, roll=0.3)
     world.wire.wait(STICK, 0.3)
-    other = Source(world, "control/manual")
+    other = CommandSource(world, "control/manual")
     other.once(**values)
     status = world.wait_for_diagnostics(
         "control", lambda s: named in world.values_of(s).get("control/manual last refusal", "")
@@ -329,7 +258,7 @@ def test_motors_take_the_throttle_override_and_give_it_back(tx, world):
     world.wire.wait(THROTTLES, 1.0)
     request_mode(world, MANUAL, sequence=2)
     world.wire.wait(THROTTLES, 0.0)
-    wait_until(lambda: "override:" + THROTTLES not in journal(world), 10, "the journal entry's end")
+    wait_until(lambda: "override:" + THROTTLES not in journal_entries(world), 10, "the journal entry's end")
 
 
 def test_handles_are_sent_on_change_only(tx, world):
@@ -350,7 +279,7 @@ def test_restarted_xplane_is_flown_on(tx, world):
     world.manual.fly(fields=ROLL, roll=0.3)
     world.wire.wait(OVERRIDE, 1.0)
     world.xplane.restart()
-    wire = Wire(world.xplane.port, OVERRIDE, STICK)
+    wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK)
     wire.wait(OVERRIDE, 1.0, timeout=20)
     wire.wait(STICK, 0.3)
     wire.close()
@@ -364,7 +293,7 @@ def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
     world.mode.wait_for(lambda m: m.failsafe)  # X-Plane may be back before the last command has timed out
     world.xplane.restart()
     world.events.wait_for_next(lambda e: "CONNECTED" in e.events[-1].text, timeout=20)
-    wire = Wire(world.xplane.port, OVERRIDE)
+    wire = WatchedDatarefs(world.xplane.port, OVERRIDE)
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
     wire.wait(OVERRIDE, 0.0)
     wire.close()
@@ -375,7 +304,7 @@ def test_override_set_by_service_is_given_back(tx, world):
     response = call(world, "set_dataref", "SetDataref", name=THROTTLES, values=[1.0])
     assert response.success
     assert list(response.values) == [1.0]
-    assert "override:" + THROTTLES in journal(world)
+    assert "override:" + THROTTLES in journal_entries(world)
     node.send_signal(signal.SIGINT)
     world.wire.wait(THROTTLES, 0.0)
 

@@ -1,0 +1,117 @@
+"""What tests of tx_node share: X-Plane's datarefs seen from outside, sticks, parameters, services.
+
+`world` is a test's namespace of nodes (tests/nodes/conftest.py).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from pathlib import Path
+from typing import Any
+
+from xplane_bridge.harness.emulator_bench import XPlaneClient
+from xplane_bridge.harness.processes import wait_until
+from xplane_bridge.resources import config_file
+
+MANUAL, AUTO = 1, 2
+#: Bits of ControlCommand.fields.
+ROLL, PITCH, YAW, THROTTLE, FLAPS, GEAR = 1, 2, 4, 8, 512, 2048
+
+
+class WatchedDatarefs:
+    """X-Plane's datarefs, watched from outside the bridge.
+
+    Args:
+        port: X-Plane's, on this machine.
+        paths: what to watch.
+    """
+
+    def __init__(self, port: int, *paths: str) -> None:
+        self.paths = list(paths)
+        self._client = XPlaneClient(port)
+        self._client.subscribe(self.paths, rate_hz=50, first_index=0)
+        self._known: dict[int, float] = {}
+
+    def value(self, path: str) -> float:
+        """The newest value; nan before the first."""
+        self._known.update(self._client.values())
+        return self._known.get(self.paths.index(path), math.nan)
+
+    def wait(self, path: str, expected: float, timeout: float = 10.0, tolerance: float = 1e-4) -> None:
+        """Waits until a dataref has a value."""
+        wait_until(lambda: abs(self.value(path) - expected) <= tolerance, timeout, f"{path} = {expected}")
+
+    def close(self) -> None:
+        """Ends it."""
+        self._client.close()
+
+
+class CommandSource:
+    """Publishes a ControlCommand again and again, as a stick or a controller does.
+
+    Args:
+        world: the test's namespace.
+        topic: control/manual or control/auto.
+    """
+
+    def __init__(self, world: Any, topic: str) -> None:
+        import rospy
+
+        from xplane_bridge.msg import ControlCommand
+
+        self.command = ControlCommand()
+        self._publisher = rospy.Publisher(f"{world.namespace}/{topic}", ControlCommand, queue_size=1)
+        self._ended = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def once(self, **values: Any) -> None:
+        """Changes fields of the command and publishes it."""
+        for key, value in values.items():
+            setattr(self.command, key, value)
+        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+        self._publisher.publish(self.command)
+
+    def fly(self, **values: Any) -> None:
+        """Changes fields of the command, and publishes it 50 times a second from now on."""
+        self.once(**values)
+        if self._thread is None:
+            self._ended.clear()
+            self._thread = threading.Thread(target=self._repeat, daemon=True)
+            self._thread.start()
+
+    def _repeat(self) -> None:
+        while not self._ended.wait(0.02):
+            self.command.sequence += 1
+            self._publisher.publish(self.command)
+
+    def stop(self) -> None:
+        """Is silent from now on."""
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join(10)
+            self._thread = None
+
+
+def tx_params(aircraft: str = "fixed_wing", **params: Any) -> dict[str, Any]:
+    """tx_node's private parameters as tx.launch loads them, with changes."""
+    import yaml
+
+    options = yaml.safe_load(config_file("tx.yaml").read_text(encoding="utf-8"))
+    options["aircraft"] = yaml.safe_load(config_file("aircraft", f"{aircraft}.yaml").read_text(encoding="utf-8"))
+    options.update(params)
+    return options
+
+
+def journal_entries(world: Any) -> list[str]:
+    """What the journals of the world's nodes say is to be undone."""
+    files: list[Path] = list((world.folder / "ros_home" / "xplane_bridge").glob("*.json"))
+    return [entry["id"] for file in files for entry in json.loads(file.read_text(encoding="utf-8"))["entries"]]
+
+
+def call(world: Any, service: str, kind: str, **request: Any) -> Any:
+    """Calls one of tx_node's services, of a type of xplane_bridge.srv."""
+    import xplane_bridge.srv
+
+    return world.call(f"tx_node/{service}", getattr(xplane_bridge.srv, kind), **request)
