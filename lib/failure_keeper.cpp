@@ -16,6 +16,7 @@ constexpr double kPublishPeriod = 1.0;  // [s]
 constexpr double kBehaviourWait = 1.0;  // [s] in which X-Plane's own failure must move the surface as it says
 constexpr double kBehaviourDeg = 2.0;   // [deg] off that counts as obeyed
 constexpr double kRepairedAfter = 0.5;  // [s] without it until a failure counts as repaired in the simulator
+constexpr double kRepairWait = 0.5;     // [s] in which values from before a repair may still come
 constexpr double kWaitSlack = 1.0;      // [s] a service waits beyond what ends by itself
 
 ServiceResult result(std::uint8_t code, const std::string& message) {
@@ -103,6 +104,9 @@ void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core
     const core::RrefPair pair = view[i];
     if (pair.index < 0 || static_cast<std::size_t>(pair.index) >= datarefs.size()) continue;
     const std::string& dataref = datarefs[static_cast<std::size_t>(pair.index)];
+    // What was on its way when it was repaired here says nothing.
+    const auto undone = undone_.find(dataref);
+    if (undone != undone_.end() && tick_time_ - undone->second < kRepairWait) continue;
     const std::string name = core::failureName(dataref);
     const bool known = book_.knows(name);
     if (!book_.observe(dataref, static_cast<double>(pair.value), now_.sim_time)) continue;
@@ -147,6 +151,7 @@ void FailureKeeper::carryOut(const core::FailurePlan& plan) {
   try {
     for (const std::string& dataref : plan.datarefs) {
       overrides_->hold(dataref, static_cast<float>(core::kFailedNow), false);
+      undone_.erase(dataref);
     }
   } catch (const core::JournalError& error) {
     giveUp(plan.name, std::string("it could not be repaired after a crash: ") + error.what());
@@ -188,12 +193,17 @@ void FailureKeeper::watchOwn() {
 void FailureKeeper::undo(const core::FailurePlan& plan) {
   pending_.erase(plan.name);
   repaired_since_.erase(plan.name);
-  for (const std::string& dataref : plan.datarefs) {
+  repair(plan.datarefs);
+}
+
+void FailureKeeper::repair(const std::vector<std::string>& datarefs) {
+  for (const std::string& dataref : datarefs) {
     try {
       overrides_->unhold(dataref);
     } catch (const core::JournalError& error) {
       report_(error.what(), "", false);
     }
+    undone_[dataref] = tick_time_;
     // One of the simulator's menu is not held.
     link_->sendDref(dataref, static_cast<float>(core::kWorking));
   }
@@ -210,13 +220,7 @@ void FailureKeeper::giveUp(const std::string& name, const std::string& why) {
 }
 
 void FailureKeeper::useDriver(const Pending& pending) {
-  for (const std::string& dataref : pending.plan.datarefs) {
-    try {
-      overrides_->unhold(dataref);
-    } catch (const core::JournalError& error) {
-      report_(error.what(), "", false);
-    }
-  }
+  repair(pending.plan.datarefs);
   book_.useDriver(pending.plan.name);
   report_(pending.plan.name + ": X-Plane's own failure does not act as it says, so that tx_node drives the surfaces",
           pending.who, true);

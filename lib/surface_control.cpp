@@ -242,7 +242,7 @@ void SurfaceControl::drop(const std::string& why) {
   commands_.clear();
   offset_deg_ = 0.0;
   dropped_ = why;
-  watch_.interrupt();
+  watch_.recheck();
   if (!was) return;
   giveBack();
   report_("the surfaces are given back: " + why, true);

@@ -71,6 +71,7 @@ class FailureKeeper {
   void watchPending();
   void watchRepairs();
   void undo(const core::FailurePlan& plan);
+  void repair(const std::vector<std::string>& datarefs);
   void giveUp(const std::string& name, const std::string& why);
   void applySurfaces();
   void observe(const std::vector<std::string>& datarefs, const core::RrefView& view);
@@ -100,6 +101,7 @@ class FailureKeeper {
   std::map<std::string, Pending> pending_;
   std::map<std::string, std::string> asked_by_;   // by name: who asked for it
   std::map<std::string, std::string> not_shown_;  // by name: those X-Plane did not show, and why; for await()
+  std::map<std::string, double> undone_;          // [s] steady, by dataref: when it was repaired here
   std::map<std::string, double> repaired_since_;  // [s] steady, by name: ours that X-Plane does not show any more
 
   core::GroupId menu_group_ = -1;

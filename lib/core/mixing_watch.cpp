@@ -7,7 +7,8 @@ namespace xplane_bridge::core {
 namespace {
 
 constexpr double kSamplePeriod = 0.0999;  // [s] ten a second; float32 time rounds
-constexpr double kFastest = 1.0;          // [1/s] of full stick: surfaces of a real rate follow that
+constexpr double kFastest = 1.5;          // [1/s] of full stick: surfaces of a real rate follow that
+constexpr double kSpeedWindow = 0.1;      // [s] over which that is measured: commands come in steps
 constexpr double kSettling = 0.5;         // [s] after a faster movement
 constexpr double kGap = 0.5;              // [s] between frames from which on they are no longer neighbours
 constexpr double kSmoothing = 0.1;        // weight of a sample: one second
@@ -39,11 +40,13 @@ void MixingWatch::reset(const std::string& aircraft) {
 void MixingWatch::adopt(const MixingModel& model) {
   model_ = model;
   solved_samples_ = 0;
-  interrupt();
+  recheck();
 }
 
-void MixingWatch::interrupt() {
-  last_time_ = fast_time_ = used_time_ = std::nan("");
+void MixingWatch::interrupt() { last_time_ = fast_time_ = used_time_ = std::nan(""); }
+
+void MixingWatch::recheck() {
+  interrupt();
   off_.assign(off_.size(), 0.0);
   off_count_ = 0;
 }
@@ -55,9 +58,14 @@ void MixingWatch::add(const SurfaceSample& sample) {
   if (dt == 0.0) return;  // paused
   if (dt < 0.0 || dt > kGap) interrupt();
   // The first frame after a gap does not tell how fast the stick is.
-  if (!std::isfinite(last_time_) || fastest(sample.inputs, last_inputs_) > kFastest * dt) fast_time_ = time;
+  const bool first = !std::isfinite(last_time_);
   last_time_ = time;
-  last_inputs_ = sample.inputs;
+  const double window = std::max(time - speed_time_, kSpeedWindow);
+  if (first || fastest(sample.inputs, speed_inputs_) > kFastest * window) fast_time_ = time;
+  if (first || time - speed_time_ >= kSpeedWindow) {
+    speed_time_ = time;
+    speed_inputs_ = sample.inputs;
+  }
   if (time - fast_time_ < kSettling || time - used_time_ < kSamplePeriod) return;
   if (!identifier_.addSample(sample.inputs, sample.deflections_deg)) return;
   used_time_ = time;
@@ -87,8 +95,7 @@ bool MixingWatch::solve() {
   if (!quality_.good || !replaces(solution.model)) return false;
   model_ = solution.model;
   solved_samples_ = solution.model.samples;
-  off_.assign(off_.size(), 0.0);
-  off_count_ = 0;
+  recheck();
   return true;
 }
 

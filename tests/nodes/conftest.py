@@ -240,6 +240,12 @@ class World:
             process.stop()
 
 
+@pytest.fixture(scope="session")
+def new_world(master: RosMaster) -> Callable[[Path], World]:
+    """Makes a World in a folder, for tests that share one; who makes it closes it."""
+    return lambda folder: World(master, folder)
+
+
 @pytest.fixture
 def world(master: RosMaster, tmp_path: Path) -> Iterator[World]:
     """A namespace, a folder and processes of this test's own."""

@@ -23,8 +23,10 @@ class MixingWatch {
   /// Every frame in which X-Plane drives the surfaces itself and nothing is broken. Ten samples a second of simulator
   /// time are used, and none while the stick is faster than surfaces can follow.
   void add(const SurfaceSample& sample);
-  /// The time line was broken (surfaces driven, pause, reset): what was flown before says nothing about now.
+  /// The time line was broken (surfaces driven, a gap): the next frame is no neighbour of the last one.
   void interrupt();
+  /// The mixing has to be seen to hold once more (X-Plane was restarted).
+  void recheck();
 
   /// Solves for the mixing with what was flown; worth a call a second. True when a new mixing was adopted, which is
   /// worth keeping.
@@ -54,12 +56,13 @@ class MixingWatch {
   std::string aircraft_;
   std::optional<MixingModel> model_;
   std::size_t solved_samples_ = 0;  // of the identification the model came from; 0: a file
-  MixingInputs last_inputs_, used_inputs_;
-  double last_time_ = std::nan("");  // [s] of the previous frame
-  double fast_time_ = std::nan("");  // [s] when the stick was last too fast
-  double used_time_ = std::nan("");  // [s] of the last sample used
-  std::vector<double> off_;          // [deg] smoothed, shown less law, by surface; NaN: unknown
-  int off_count_ = 0;                // samples in off_
+  MixingInputs speed_inputs_, used_inputs_;
+  double last_time_ = std::nan("");   // [s] of the previous frame
+  double speed_time_ = std::nan("");  // [s] from which the stick's speed is measured
+  double fast_time_ = std::nan("");   // [s] when the stick was last too fast
+  double used_time_ = std::nan("");   // [s] of the last sample used
+  std::vector<double> off_;           // [deg] smoothed, shown less law, by surface; NaN: unknown
+  int off_count_ = 0;                 // samples in off_
 };
 
 }  // namespace xplane_bridge::core

@@ -110,7 +110,7 @@ def journal_entries(world: Any) -> list[str]:
     return [entry["id"] for file in files for entry in json.loads(file.read_text(encoding="utf-8"))["entries"]]
 
 
-def call(world: Any, service: str, kind: str, **request: Any) -> Any:
+def call(world: Any, service: str, kind: str, /, **request: Any) -> Any:
     """Calls one of tx_node's services, of a type of xplane_bridge.srv."""
     import xplane_bridge.srv
 
