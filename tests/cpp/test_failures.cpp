@@ -183,5 +183,24 @@ TEST(FailureBook, SecondRequestOfANameReplacesTheFirst) {
   EXPECT_EQ(book.drivenSurfaces()[0].value, 10.0);
 }
 
+TEST(FailureBook, TellsWhatIsDrivenAndWhatShowsAFailure) {
+  FailureBook book;
+  const auto stuck = request("aileron1_wing2_left", "stuck");
+  book.add(stuck, planFailure(stuck, k12).plan, at(1.0));
+  EXPECT_TRUE(book.datarefsOf("aileron1_wing2_left").empty()) << "armed";
+  book.due(at(1.0));
+  EXPECT_FALSE(book.isDriven("aileron1_wing2_left"));
+  EXPECT_EQ(book.datarefsOf("aileron1_wing2_left").front(), "sim/operation/failures/rel_fcon_ailn_1_lft_lock");
+  book.setValue("aileron1_wing2_left", 4.5);
+  EXPECT_EQ(book.labels().front().value, 4.5);
+  book.useDriver("aileron1_wing2_left");
+  EXPECT_TRUE(book.isDriven("aileron1_wing2_left"));
+  EXPECT_TRUE(book.datarefsOf("aileron1_wing2_left").empty());
+  EXPECT_FALSE(book.drivenSurfaces().front().value) << "the label's value is no wish";
+  EXPECT_FALSE(book.isDriven("engine_1"));
+  EXPECT_EQ(failureName("sim/operation/failures/rel_otto"), "rel_otto");
+  EXPECT_EQ(failureName("engine_1"), "engine_1");
+}
+
 }  // namespace
 }  // namespace xplane_bridge::core

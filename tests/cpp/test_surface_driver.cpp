@@ -72,6 +72,16 @@ TEST(SurfaceDriver, TakesOverWithoutAJumpAndFollowsTheLawAtItsRate) {
   EXPECT_DOUBLE_EQ(sent(out, kFlap), 12.5);
 }
 
+TEST(SurfaceDriver, ABiasIsAddedToTheLawAndToItsNeutral) {
+  SurfaceDriver driver(model());
+  std::vector<double> bias(surfaceTable().size(), 0.0);
+  bias[kLeft] = 2.0;
+  driver.engage(shown({{kLeft, 3.0}}), bias);
+  EXPECT_NEAR(sent(driver.step(stick(0.5), {}, kLong), kLeft), 10.5, 1e-9);  // 1 + 7.5 + 2
+  driver.setFailures({{kLeft, SurfaceFault::kCentred, {}}});
+  EXPECT_NEAR(sent(driver.step(stick(0.5), {}, kLong), kLeft), 3.0, 1e-9);
+}
+
 TEST(SurfaceDriver, RefusesToTakeOverFromAnUnknownDeflection) {
   SurfaceDriver driver(model());
   auto unknown = shown();

@@ -92,6 +92,16 @@ TEST(SurfaceMixing, PredictsBeyondWhatWasFlown) {
   EXPECT_NEAR(solution.model.lawOf(numberOf("elevator1_left"))->high_deg, 19.5, 1e-6);
 }
 
+TEST(SurfaceMixing, FlapsThatWereMovedALittleCanGoAllTheWay) {
+  const auto solution = flown(600, 0.6, [](int i, double reach) {
+                          MixingInputs in = flying(i, reach);
+                          in.flap1 = 0.4 * in.flap1;
+                          in.flap2 = 0.0;
+                          return in;
+                        }).solve("TEST");
+  EXPECT_NEAR(solution.model.lawOf(numberOf("flap1_wing1_left"))->high_deg, 30.0, 1e-6);
+}
+
 TEST(SurfaceMixing, ToleratesTheRoundingAndNoiseOfALink) {
   MixingIdentifier identifier;
   std::mt19937 random(1);
