@@ -221,7 +221,7 @@ void FailureKeeper::giveUp(const std::string& name, const std::string& why) {
 
 void FailureKeeper::useDriver(const Pending& pending) {
   repair(pending.plan.datarefs);
-  book_.useDriver(pending.plan.name);
+  book_.useDriver(pending.plan.name, pending.expected_deg);
   report_(pending.plan.name + ": X-Plane's own failure does not act as it says, so that tx_node drives the surfaces",
           pending.who, true);
   dirty_ = true;

@@ -142,7 +142,7 @@ void SurfaceControl::onSample() {
   }
 }
 
-bool SurfaceControl::wanted() const { return !failures_.empty() || !commands_.empty() || offset_deg_ != 0.0; }
+bool SurfaceControl::wanted() const { return !failures_.empty() || !commands_.empty() || offset_; }
 
 void SurfaceControl::take() {
   const core::MixingModel* model = watch_.model();
@@ -181,7 +181,7 @@ void SurfaceControl::take() {
 void SurfaceControl::drive(double dt) {
   driver_->setFailures(failures_);
   driver_->setCommands(commands_);
-  driver_->setOffset(offset_surface_, offset_deg_);
+  driver_->setOffset(offset_ ? offset_->surface : 0, offset_ ? offset_->deflection_deg : 0.0);
   const core::MixingInputs inputs = inputs_.step(sample_, stick_, dt);
   const auto& out = driver_->step(inputs, {sample_.alpha_deg, sample_.beta_deg}, dt);
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -240,7 +240,7 @@ void SurfaceControl::drop(const std::string& why) {
   const bool was = state_ == State::kTaking || state_ == State::kDriving;
   failures_.clear();
   commands_.clear();
-  offset_deg_ = 0.0;
+  offset_.reset();
   dropped_ = why;
   watch_.recheck();
   if (!was) return;
@@ -351,8 +351,12 @@ std::optional<std::string> SurfaceControl::command(const std::vector<std::string
 
 void SurfaceControl::setOffset(std::size_t surface, double offset_deg) {
   std::lock_guard<std::mutex> lock(mutex_);
-  offset_surface_ = surface;
-  offset_deg_ = offset_deg;
+  offset_ = core::SurfaceDeflection{surface, offset_deg};
+}
+
+void SurfaceControl::clearOffset() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  offset_.reset();
 }
 
 std::string SurfaceControl::refusalLocked() const {
@@ -417,8 +421,7 @@ std::vector<core::SurfaceDeflection> SurfaceControl::sentOneByOne() const {
   for (const core::SurfaceDeflection& sent : sent_) {
     const auto is_it = [&sent](const auto& other) { return other.surface == sent.surface; };
     if (std::any_of(failures_.begin(), failures_.end(), is_it) ||
-        std::any_of(commands_.begin(), commands_.end(), is_it) ||
-        (offset_deg_ != 0.0 && offset_surface_ == sent.surface)) {
+        std::any_of(commands_.begin(), commands_.end(), is_it) || (offset_ && is_it(*offset_))) {
       out.push_back(sent);
     }
   }

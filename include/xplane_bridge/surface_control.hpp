@@ -66,8 +66,11 @@ class SurfaceControl {
   /// control/surfaces; an empty list gives all back. Returns why it is refused as a whole; nullopt: taken.
   std::optional<std::string> command(const std::vector<std::string>& names, const std::vector<float>& deflections_deg,
                                      std::uint32_t sequence);
-  /// Excitation: adds degrees to one surface from the next frame on, until the next call; 0 ends it. One at a time.
+  /// Excitation: adds degrees to one surface from the next frame on, until the next call; the surfaces are driven for
+  /// as long, also at 0 deg. One at a time. Check refusal() first.
   void setOffset(std::size_t surface, double offset_deg);
+  /// The excitation is over.
+  void clearOffset();
 
   // What is.
 
@@ -161,8 +164,7 @@ class SurfaceControl {
   std::deque<Echo> echoes_;
   std::uint64_t commands_accepted_ = 0, commands_refused_ = 0;
   std::string last_refusal_;
-  std::size_t offset_surface_ = 0;
-  double offset_deg_ = 0.0;
+  std::optional<core::SurfaceDeflection> offset_;
 
   struct Sent {
     double sim_time;  // [s] of the frame it was worked out from

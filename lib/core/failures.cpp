@@ -288,9 +288,12 @@ std::vector<std::string> FailureBook::datarefsOf(const std::string& name) const 
   return it->second.plan.datarefs;
 }
 
-void FailureBook::useDriver(const std::string& name) {
+void FailureBook::useDriver(const std::string& name, std::optional<double> stuck_deg) {
   const auto it = entries_.find(name);
-  if (it != entries_.end() && it->second.plan.surface) it->second.driven = true;
+  if (it == entries_.end() || !it->second.plan.surface) return;
+  it->second.driven = true;
+  SurfaceFailure& failure = *it->second.plan.surface;
+  if (failure.fault == SurfaceFault::kStuck && !failure.value) failure.value = stuck_deg;
 }
 
 }  // namespace xplane_bridge::core

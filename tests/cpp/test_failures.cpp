@@ -197,6 +197,8 @@ TEST(FailureBook, TellsWhatIsDrivenAndWhatShowsAFailure) {
   EXPECT_TRUE(book.isDriven("aileron1_wing2_left"));
   EXPECT_TRUE(book.datarefsOf("aileron1_wing2_left").empty());
   EXPECT_FALSE(book.drivenSurfaces().front().value) << "the label's value is no wish";
+  book.useDriver("aileron1_wing2_left", 4.5);
+  EXPECT_EQ(book.drivenSurfaces().front().value, 4.5);
   EXPECT_FALSE(book.isDriven("engine_1"));
   EXPECT_EQ(failureName("sim/operation/failures/rel_otto"), "rel_otto");
   EXPECT_EQ(failureName("engine_1"), "engine_1");

@@ -508,3 +508,57 @@ def test_xplane_12_breaks_its_surfaces_itself(new_world, tmp_path):
     fcon.wait(FAILURES + "rel_fcon_ailn_1_lft_gone", 6.0)
     fcon.close()
     close(world)
+
+
+def test_xplane_12_whose_own_failure_does_not_act(new_world, tmp_path):
+    world = fly(new_world(tmp_path), "--version", "12", "--surface-failures", "ignored")
+    wire, name = world.wire, "aileron1_wing2_left"
+    fcon = WatchedDatarefs(world.xplane.port, FAILURES + "rel_fcon_ailn_1_lft_mxup")
+    done = fail(world, name, "hard_over_up")
+    assert done.result.code == OK, done.result.message
+    wire.wait(LEFT, -25.0)
+    assert wire.value(SURFACES) == 1.0
+    fcon.wait(FAILURES + "rel_fcon_ailn_1_lft_mxup", 0.0)
+    said(world, "X-Plane's own failure does not act")
+    wait_for_label(world, name, active=True, confirmed=True, kinds="hard_over_up")
+    fcon.close()
+    close(world)
+
+
+def test_pause_restart_and_a_total_that_stands_still(new_world, tmp_path):
+    from std_srvs.srv import SetBool
+
+    world = fly(new_world(tmp_path), "--overridden-totals", "frozen")
+    wire, name = world.wire, "aileron1_wing2_left"
+    assert fail(world, name, "stuck", 3.0).success
+    wire.wait(LEFT, 3.0)
+    world.manual.fly(fields=ROLL, roll=-0.4)
+    wait_until(lambda: wire.value(RIGHT) == pytest.approx(15.0 * 0.4, abs=1.0), 5, "the stick instead of the total")
+
+    assert world.call("tx_node/pause", SetBool, True).success
+    world.state.wait_for_next()
+    world.state.wait_for_next()
+    assert (wire.value(SURFACES), wire.value(LEFT)) == (1.0, 3.0)
+    assert world.call("tx_node/pause", SetBool, False).success
+    world.manual.fly(roll=-0.2)
+    wait_until(lambda: wire.value(RIGHT) == pytest.approx(15.0 * 0.2, abs=1.0), 5, "the right aileron to go on")
+    wait_for_label(world, name, active=True, confirmed=True)
+
+    # Another X-Plane has no failure; nothing is broken in it without being asked for.
+    world.manual.stop()
+    world.xplane.restart()
+    said(world, f"failure of {name} has ended: X-Plane was restarted")
+    again = WatchedDatarefs(world.xplane.port, SURFACES)
+    again.wait(SURFACES, 0.0)
+    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
+    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), 5, "the journal's entry to go")
+    again.close()
+    close(world)
+
+
+def test_surfaces_of_another_aircraft_are_left_alone(new_world, tmp_path):
+    world = fly(new_world(tmp_path), "--aircraft", "tiltrotor", mixing=False)
+    done = fail(world, "aileron1_wing2_left", "stuck", 5.0)
+    assert (done.success, done.result.code) == (False, REFUSED)
+    assert "config/aircraft/fixed_wing.yaml is for DA62" in done.result.message
+    close(world)

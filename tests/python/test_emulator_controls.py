@@ -500,3 +500,30 @@ def test_wind_set_by_a_client_blows(bench, version, direction, speed, value, rea
     emulator.write({direction: 270.0, speed: value})  # from the west: the air moves east, X +
     emulator.step(5)
     assert emulator.read(read)[0] == pytest.approx(10.0, abs=0.1)
+
+
+# --- what only a live X-Plane can settle ---
+
+
+@pytest.mark.parametrize(("mode", "angle"), [("act", -20.0), ("ignored", 0.0)])
+def test_failures_of_single_surfaces_act_or_are_ignored(bench, mode, angle):
+    emulator = bench(version=12, surface_failures=mode)
+    emulator.write({FAILURES + "rel_fcon_ailn_1_lft_mxup": 6.0})
+    emulator.step(120)
+    left, right, failure = emulator.read(LEFT_AILERON, RIGHT_AILERON, FAILURES + "rel_fcon_ailn_1_lft_mxup")
+    assert (left, right, failure) == (pytest.approx(angle), 0.0, 6.0)
+
+
+@pytest.mark.parametrize(("mode", "expected"), [("move", 0.5), ("frozen", 0.25)])
+def test_total_stick_under_the_surface_override(bench, mode, expected):
+    emulator = bench(overridden_totals=mode)
+    total = "sim/cockpit2/controls/total_roll_ratio"
+    emulator.write({OVERRIDE + "joystick": 1.0, YOKE_ROLL: 0.25})
+    emulator.step(60)
+    assert emulator.read(total) == [0.25]
+    emulator.write({OVERRIDE + "control_surfaces": 1.0, YOKE_ROLL: 0.5})
+    emulator.step(60)
+    assert emulator.read(total, YOKE_ROLL) == [expected, 0.5]
+    emulator.write({OVERRIDE + "control_surfaces": 0.0})
+    emulator.step(60)
+    assert emulator.read(total) == [0.5]

@@ -107,8 +107,8 @@ class FailureBook {
   std::vector<FailureLabel> labels() const;
   /// Active failures that SurfaceDriver flies; planned with datarefs ones only after useDriver().
   std::vector<SurfaceFailure> drivenSurfaces() const;
-  /// X-Plane did not obey the datarefs: SurfaceDriver takes this one.
-  void useDriver(const std::string& name);
+  /// X-Plane did not obey the datarefs: SurfaceDriver takes this one. `stuck_deg`: where a surface got stuck meanwhile.
+  void useDriver(const std::string& name, std::optional<double> stuck_deg = std::nullopt);
 
  private:
   struct Entry {

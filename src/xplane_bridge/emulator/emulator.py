@@ -81,6 +81,8 @@ class Emulator:
             sim_time_start=o.sim_time_start,
             data_rate=o.rate,
             level_angles=o.angle_axes == "level",
+            surface_failures=o.surface_failures == "act",
+            totals_move=o.overridden_totals == "move",
             load_time=o.load_time,
             pilot=pilot,
             window_size=o.window_size,

@@ -31,7 +31,8 @@ _SIDES = {"lft": Side.LEFT, "rgt": Side.RIGHT, "ctr": Side.CENTRE}
 class FailureEffects:
     """Reads the failure datarefs and applies what they mean."""
 
-    def __init__(self, store: DatarefStore, version: int) -> None:
+    def __init__(self, store: DatarefStore, version: int, surfaces_break: bool = True) -> None:
+        self._surfaces_break = surfaces_break
         self._leaves = names(version)
         self._store = store
         self._slots = np.array([store.dataref(PREFIX + leaf).slots[0] for leaf in self._leaves])
@@ -47,7 +48,8 @@ class FailureEffects:
 
     def apply(self, controls: Controls, failed: Set[str], model: FlightModel, dt: float) -> None:
         """Changes the frame's controls as the failures do."""
-        controls.surface_faults = self._surface_faults(failed, model)
+        acting = failed if self._surfaces_break else {leaf for leaf in failed if not leaf.startswith("rel_fcon_")}
+        controls.surface_faults = self._surface_faults(acting, model)
         engines = model.info.engine_count
         controls.engine_faults = [self._engine_fault(i, failed) for i in range(len(controls.engine_faults))]
         controls.stability_fault = "rel_stbaug" in failed

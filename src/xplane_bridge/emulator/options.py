@@ -48,6 +48,8 @@ class Options:
     request_limit: int = RREF_REQUESTS_PER_FRAME
     unknown_datarefs: str = "omit"
     angle_axes: str = "level"
+    surface_failures: str = "act"
+    overridden_totals: str = "move"
     send_while_paused: bool = True
     wind: Tuple[float, float] = (0.0, 0.0)  #: from [deg], speed [m/s]
     turbulence: float = 0.0
@@ -170,6 +172,18 @@ def _parser() -> argparse.ArgumentParser:
     wire.add_argument(
         "--angle-axes", choices=("level", "origin"), default="level", help="of row 17 and RPOS (default level)"
     )
+    wire.add_argument(
+        "--surface-failures",
+        choices=("act", "ignored"),
+        default="act",
+        help="rel_fcon_* of version 12: ignored where an aircraft moves its surfaces itself (default act)",
+    )
+    wire.add_argument(
+        "--overridden-totals",
+        choices=("move", "frozen"),
+        default="move",
+        help="total_*_ratio under override_control_surfaces (default move)",
+    )
     wire.add_argument("--paused-output", choices=("on", "off"), default="on", help="send while paused (default on)")
     wire.add_argument(
         "--fault",
@@ -252,6 +266,8 @@ def _options(given: argparse.Namespace) -> Options:
         request_limit=given.request_limit,
         unknown_datarefs=given.unknown_datarefs,
         angle_axes=given.angle_axes,
+        surface_failures=given.surface_failures,
+        overridden_totals=given.overridden_totals,
         send_while_paused=given.paused_output == "on",
         wind=_wind(given.wind),
         turbulence=given.turbulence,

@@ -58,6 +58,8 @@ class Simulator:
         sim_time_start: Running time at the start [s].
         data_rate: `network_data_rate` at the start [1/s].
         level_angles: Whether row 17 and RPOS give angles relative to the local level ([?]: else to the origin's axes).
+        surface_failures: Whether `rel_fcon_*` act ([?]: not on every aircraft).
+        totals_move: Whether `total_*_ratio` follow the stick under `override_control_surfaces` ([?]).
         load_time: Time before the first flight is loaded; until then its values are zeros [s].
         pilot: Flies until a client does.
         window_size: Width and height of the window that the view is drawn in [px].
@@ -72,11 +74,14 @@ class Simulator:
         sim_time_start: float = 0.0,
         data_rate: int = 20,
         level_angles: bool = True,
+        surface_failures: bool = True,
+        totals_move: bool = True,
         load_time: float = 0.0,
         pilot: Optional[Pilot] = None,
         window_size: Tuple[int, int] = (1024, 768),
     ) -> None:
         self.version = version
+        self.totals_move = totals_move
         self.internal_version = INTERNAL_VERSIONS[version]
         self.initial = InitialState() if initial is None else initial
         self.initial_data_rate = data_rate
@@ -106,7 +111,7 @@ class Simulator:
         #: What unknown datarefs are sent from where they are sent as 0.
         self.unknown_slot = int(self.store.add("_emulator/unknown").slots[0])
         self._placements = Placements(self.store)
-        self._failures = FailureEffects(self.store, version)
+        self._failures = FailureEffects(self.store, version, surface_failures)
         self.inputs.connect(self)
         self._connect_settings()
         self._bind_aircraft()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Dict, List, Optional
+from typing import TYPE_CHECKING, Callable, Dict, List, Optional
 
 from ..flight_model import SurfaceKind, SurfaceSpec
 from .base import FLOAT, INT, X12, Table
 
 if TYPE_CHECKING:
+    from ..frame import Frame
     from ..simulator import Simulator
 
 _CONTROLS = "sim/flightmodel/controls/"
@@ -172,7 +173,7 @@ def _stick(t: Table, sim: Simulator) -> None:
             f"sim/joystick/artstab_{axis}_ratio", lambda f, total=total, stick=stick: total(f) - stick(), writable=True
         )
         t.setting(f"sim/joystick/servo_{axis}_ratio")
-        t.value(f"{_COCKPIT}total_{axis}_ratio", total)
+        t.value(f"{_COCKPIT}total_{axis}_ratio", _total(sim, total))
         t.value(f"{_CONTROLS2}{axis}_ratio", total, writable=True)
         t.setting(f"{_COCKPIT}{trim}_trim")
         t.alias(f"{_CONTROLS2}{trim}_trim", f"{_COCKPIT}{trim}_trim")
@@ -180,6 +181,18 @@ def _stick(t: Table, sim: Simulator) -> None:
     t.setting("sim/cockpit2/switches/artificial_stability_on", 1, INT)
     t.setting("sim/cockpit2/switches/yaw_damper_on", 0, INT)
     t.setting("sim/joystick/joystick_axis_values", size=500, writable=False)
+
+
+def _total(sim: Simulator, total: Callable[[Frame], float]) -> Callable[[Frame], float]:
+    """The stick that the surfaces get; with `--overridden-totals frozen` it stands while a client has taken them."""
+    held = [0.0]
+
+    def shown(frame: Frame) -> float:
+        if sim.totals_move or not sim.controls.override_surfaces:
+            held[0] = total(frame)
+        return held[0]
+
+    return shown
 
 
 def _handles(t: Table) -> None:
