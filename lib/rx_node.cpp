@@ -211,12 +211,12 @@ void RxNode::publishState(const core::FlightState* state, std::int64_t receive_n
   if (state == nullptr) {
     return;
   }
-  last_state_ = *state;
-  last_state_received_ns_ = receive_ns;
-  consistency_.add(*state);
   if (flight_->map()) {
     flight_publisher_->publish(*state, *flight_->map(), receive_ns);
   }
+  last_state_ = *state;
+  last_state_received_ns_ = receive_ns;
+  consistency_.add(*state);
 }
 
 void RxNode::publishRows(const core::DataView& datagram, const core::ReceiveInfo& info, std::int64_t receive_ns) {

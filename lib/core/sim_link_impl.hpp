@@ -76,6 +76,7 @@ class SimLink::Impl {
 
   // Receiving.
   void waitForInput(int timeout_ms);
+  bool hasInput(int fd) const;  // as the last waitForInput() found it
   void runCommands();
   void post(std::function<void()> command);
   void wake();

@@ -25,7 +25,10 @@ void SimLink::Impl::waitForInput(int timeout_ms) {
   for (const Group& group : groups_) {
     poll_.push_back({group.socket->fd(), POLLIN, 0});
   }
-  poll(poll_.data(), poll_.size(), timeout_ms);
+  if (poll(poll_.data(), poll_.size(), timeout_ms) <= 0) {
+    poll_.clear();  // interrupted: what it holds is not an answer
+    return;
+  }
   if ((poll_[0].revents & POLLIN) != 0) {
     std::uint64_t count = 0;
     [[maybe_unused]] const ssize_t size = ::read(wake_fd_, &count, sizeof(count));
@@ -43,9 +46,15 @@ void SimLink::Impl::runCommands() {
   }
 }
 
+bool SimLink::Impl::hasInput(int fd) const {
+  const auto found = std::find_if(poll_.begin(), poll_.end(), [fd](const pollfd& entry) { return entry.fd == fd; });
+  return found != poll_.end() && found->revents != 0;
+}
+
 template <typename Handler>
 void SimLink::Impl::drain(UdpSocket* socket, const Handler& handle) {
-  if (socket == nullptr) {
+  // Asking every socket in vain would cost a flight state more time than all its computing.
+  if (socket == nullptr || !hasInput(socket->fd())) {
     return;
   }
   Received received;
