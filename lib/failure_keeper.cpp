@@ -17,6 +17,7 @@ constexpr double kBehaviourWait = 1.0;  // [s] in which X-Plane's own failure mu
 constexpr double kBehaviourDeg = 2.0;   // [deg] off that counts as obeyed
 constexpr double kRepairedAfter = 0.5;  // [s] without it until a failure counts as repaired in the simulator
 constexpr double kRepairWait = 0.5;     // [s] in which values from before a repair may still come
+constexpr double kSendAgain = 0.3;      // [s] until what X-Plane does not show is sent once more
 constexpr double kWaitSlack = 1.0;      // [s] a service waits beyond what ends by itself
 
 ServiceResult result(std::uint8_t code, const std::string& message) {
@@ -142,7 +143,7 @@ void FailureKeeper::carryOut(const core::FailurePlan& plan) {
   Pending pending;
   pending.plan = plan;
   pending.who = asked_by_[plan.name];
-  pending.since = tick_time_;
+  pending.since = pending.sent = tick_time_;
   if (plan.surface) {
     const double shown = surfaces_->shown(plan.surface->surface);
     if (plan.surface->fault == core::SurfaceFault::kStuck && !plan.value) book_.setValue(plan.name, shown);
@@ -249,7 +250,13 @@ bool FailureKeeper::settled(Pending* pending) {
     });
     if (shown) {
       pending->confirmed = tick_time_;
-    } else if (age > timeout_) {
+    } else if (age <= timeout_) {
+      if (tick_time_ - pending->sent < kSendAgain) return false;
+      pending->sent = tick_time_;  // a datagram may have been lost
+      for (const std::string& dataref : pending->plan.datarefs) {
+        link_->sendDref(dataref, static_cast<float>(core::kFailedNow));
+      }
+    } else {
       if (pending->plan.surface) {
         pending->since = tick_time_;
         useDriver(*pending);

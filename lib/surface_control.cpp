@@ -109,6 +109,7 @@ void SurfaceControl::onSample() {
       break;
     case State::kTaking:
       drive(dt);
+      link_->sendDref(core::kSurfaceOverride, 1.0F);  // it is held; a datagram may have been lost
       if (overridden) {
         enter(State::kDriving);
         report_("the surfaces are driven by their identified mixing", true);

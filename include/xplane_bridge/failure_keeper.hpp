@@ -60,6 +60,7 @@ class FailureKeeper {
     core::FailurePlan plan;
     std::string who;
     double since = 0.0;                  // [s] steady
+    double sent = 0.0;                   // [s] steady, last
     double confirmed = -1.0;             // [s] steady: the dataref shows it; < 0: not yet
     std::optional<double> expected_deg;  // where X-Plane's own failure must bring the surface
   };
