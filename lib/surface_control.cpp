@@ -20,6 +20,8 @@ constexpr double kLongestFrame = 0.1;     // [s] X-Plane slows its time beyond 1
 constexpr double kRestartStep = 0.25;     // [s] backwards in total running time: another X-Plane
 constexpr double kTravelMarginDeg = 1.0;  // [deg] a command may go beyond the identified travel
 constexpr double kMovementDeg = 0.05;     // [deg] of a step by which the lag is measured
+constexpr double kFollowsAgain = 0.5;     // [s] after the release until X-Plane must move the surfaces
+constexpr double kOffLawDeg = 2.0;        // [deg] off the law that tells a surface left standing
 constexpr double kLagSmoothing = 0.1;
 constexpr std::size_t kUnseenKept = 64;
 
@@ -99,6 +101,7 @@ void SurfaceControl::onSample() {
       if (!flowing_ || overridden) {
         watch_.interrupt();
       } else if (!disturbed_) {
+        checkLeft();
         watch_.add(sample_);
         if (!(time - solved_time_ < kSolvePeriod)) {
           solved_time_ = time;
@@ -133,6 +136,8 @@ void SurfaceControl::onSample() {
       if (wanted()) {
         take();
       } else if (!overridden) {
+        left_ = sent_;
+        left_time_ = time;
         enter(State::kIdle);
         report_("X-Plane drives the surfaces again", true);
       } else if (tick_time_ - state_since_ > kReleaseWait) {
@@ -226,6 +231,21 @@ void SurfaceControl::watchCommand() {
   command_shown_ = true;
   echoes_.push_back(
       {command_sequence_, true, sample_.sim_time, (sample_.sim_time - command_sim_time_) / sample_.frame_period});
+}
+
+void SurfaceControl::checkLeft() {
+  if (left_.empty() || sample_.sim_time < left_time_ + kFollowsAgain) return;
+  const core::MixingVector terms = core::mixingTerms(sample_.inputs);
+  std::string standing;
+  for (const core::SurfaceDeflection& left : left_) {
+    const core::SurfaceLaw* law = watch_.model() ? watch_.model()->lawOf(left.surface) : nullptr;
+    const double shown = sample_.deflections_deg[left.surface];
+    const bool stands = std::abs(shown - left.deflection_deg) <= kFollowsDeg;
+    if (!law || !stands || std::abs(law->deflection(terms) - shown) <= kOffLawDeg) continue;
+    standing += (standing.empty() ? "" : ", ") + core::surfaceTable()[left.surface].name;
+  }
+  left_.clear();
+  if (!standing.empty()) report_("X-Plane does not drive again: " + standing, false);
 }
 
 void SurfaceControl::giveBack() {

@@ -114,6 +114,7 @@ class SurfaceControl {
   void take();
   void drive(double dt);
   void giveBack();
+  void checkLeft();
   void drop(const std::string& why);
   void enter(State state);
   void measureLag();
@@ -152,7 +153,9 @@ class SurfaceControl {
   core::DrivenInputs inputs_;
   std::array<double, 3> stick_;
   std::vector<core::SurfaceDeflection> sent_;
-  std::vector<double> not_following_;  // [s] simulator time for which each surface has not shown what was sent
+  std::vector<core::SurfaceDeflection> left_;  // as sent last before they were given back, until that is checked
+  double left_time_ = 0.0;                     // [s] simulator time
+  std::vector<double> not_following_;          // [s] simulator time for which each surface has not shown what was sent
 
   std::vector<core::SurfaceFailure> failures_;
   std::optional<std::string> dropped_;
