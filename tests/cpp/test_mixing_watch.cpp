@@ -95,7 +95,7 @@ TEST(MixingWatch, AStickCommandedInStepsIsNotFast) {
   const std::size_t before = watch.samples();
   for (int i = 0; i < 128; ++i, time += kFrame) {  // 1/s, in steps of two frames
     MixingInputs in;
-    in.roll = (i / 2 * 2) * kFrame * 0.5;
+    in.roll = (i / 2 * 2) * kFrame;
     watch.add(sampleOf(time, in));
   }
   EXPECT_GT(watch.samples(), before + 15);
