@@ -9,6 +9,7 @@ import signal
 import pytest
 
 from xplane_bridge import protocol
+from xplane_bridge.emulator.simulator import aircraft_path
 from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.tx_bench import (
     PITCH,
@@ -557,8 +558,15 @@ def test_pause_restart_and_a_total_that_stands_still(new_world, tmp_path):
 
 
 def test_surfaces_of_another_aircraft_are_left_alone(new_world, tmp_path):
-    world = fly(new_world(tmp_path), "--aircraft", "tiltrotor", known=False)
-    done = fail(world, "aileron1_wing2_left", "stuck", 5.0)
+    world = fly(new_world(tmp_path))
+    name = "aileron1_wing2_left"
+    assert fail(world, name, "stuck", 5.0).success
+    world.wire.wait(LEFT, 5.0)
+    type(world).wire(world.xplane.port).send(protocol.AircraftLoad(0, aircraft_path("tiltrotor")))
+    said(world, f"failure of {name} has ended: another aircraft was loaded")
+    world.wire.wait(SURFACES, 0.0)
+    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
+    done = fail(world, name, "stuck", 5.0)
     assert (done.success, done.result.code) == (False, REFUSED)
     assert "config/aircraft/fixed_wing.yaml is for DA62" in done.result.message
     close(world)
