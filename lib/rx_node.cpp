@@ -132,6 +132,9 @@ void RxNode::advertise() {
 
 void RxNode::configureLink(core::SimLinkOptions* options) {
   options->data_output.restore_leftovers = true;
+  if (options_.position_source == core::PositionMode::kXpc) {
+    options->xpc_port = static_cast<std::uint16_t>(options_.xpc_port);
+  }
   if (common().transport != core::Transport::kData) {
     return;
   }
@@ -150,6 +153,9 @@ core::SimLinkCallbacks RxNode::linkCallbacks() {
   };
   callbacks.on_data = [this](const core::DataView& datagram, const core::ReceiveInfo& info) { onData(datagram, info); };
   callbacks.on_rpos = [this](const core::Rpos& position, const core::ReceiveInfo& info) { onRpos(position, info); };
+  callbacks.on_xpc = [this](const core::XpcPosition& position, const core::ReceiveInfo& info) {
+    onXpc(position, info);
+  };
   callbacks.on_state = [this](const core::LinkStatus& status) { onLinkState(status); };
   return callbacks;
 }
@@ -199,6 +205,11 @@ void RxNode::onData(const core::DataView& datagram, const core::ReceiveInfo& inf
 void RxNode::onRpos(const core::Rpos& position, const core::ReceiveInfo& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
   flight_->onRpos(position, begin(info));
+}
+
+void RxNode::onXpc(const core::XpcPosition& position, const core::ReceiveInfo& info) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  flight_->onXpc(position, begin(info));
 }
 
 void RxNode::onLinkState(const core::LinkStatus& status) {

@@ -160,6 +160,11 @@ void RxNode::diagnosePosition(diagnostic_updater::DiagnosticStatusWrapper* statu
   if (source == core::PositionSource::kFloat32 && options_.position_source != core::PositionMode::kFloat32) {
     status->mergeSummary(DiagnosticStatus::WARN, "coarse: neither scenery coordinates nor RPOS can be used");
   }
+  if (options_.position_source == core::PositionMode::kXpc && link().counters().xpc_datagrams == 0) {
+    status->mergeSummary(DiagnosticStatus::WARN, "X-Plane Connect does not answer on UDP port " +
+                                                     std::to_string(options_.xpc_port) +
+                                                     ": is the plugin installed, and position_source meant?");
+  }
   status->add("Source", nameOf(source));
   status->add("Comparisons with RPOS (-)", check.comparisons());
   status->addf("Height error at the last comparison (m)", "%.4f", check.heightError());

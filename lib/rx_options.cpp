@@ -16,9 +16,10 @@ namespace {
 constexpr double kHighestPublishRate = 10000.0;
 
 core::PositionMode positionMode(const ParamLoader& own) {
-  const std::string name = own.choice("position_source", {"auto", "local", "rpos", "float32"}, "auto");
+  const std::string name = own.choice("position_source", {"auto", "local", "rpos", "xpc", "float32"}, "auto");
   if (name == "local") return core::PositionMode::kLocal;
   if (name == "rpos") return core::PositionMode::kRpos;
+  if (name == "xpc") return core::PositionMode::kXpc;
   if (name == "float32") return core::PositionMode::kFloat32;
   return core::PositionMode::kAuto;
 }
@@ -75,6 +76,7 @@ RxOptions loadRxOptions(const ParamLoader& own) {
   }
   options.wind_rate = rates.number("wind", {0.1, kHighestPublishRate}, options.wind_rate);
   options.position_source = positionMode(own);
+  options.xpc_port = own.integer("xpc_port", {1, 65535}, options.xpc_port);
   options.origin = loadOrigin(own);
   options.geoid_undulation = own.number("geoid_undulation", {-200.0, 200.0}, options.geoid_undulation);
   options.publish_tf = own.boolean("publish_tf", options.publish_tf);

@@ -54,6 +54,7 @@ class RxNode : public BaseNode {
   void onRref(core::GroupId id, const core::RrefView& datagram, const core::ReceiveInfo& info);
   void onData(const core::DataView& datagram, const core::ReceiveInfo& info);
   void onRpos(const core::Rpos& position, const core::ReceiveInfo& info);
+  void onXpc(const core::XpcPosition& position, const core::ReceiveInfo& info);
   void onLinkState(const core::LinkStatus& status);
   /// Begins every callback: the time of receipt, after noticing that the link came up anew.
   std::int64_t begin(const core::ReceiveInfo& info);

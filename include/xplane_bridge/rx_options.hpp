@@ -8,6 +8,7 @@
 
 #include "xplane_bridge/core/field_table.hpp"
 #include "xplane_bridge/core/frames.hpp"
+#include "xplane_bridge/core/packets.hpp"
 #include "xplane_bridge/core/state_assembler.hpp"
 #include "xplane_bridge/param_loader.hpp"
 
@@ -28,6 +29,7 @@ struct RxOptions {
   /// of flight_state as long as X-Plane renders that fast.
   std::array<int, core::kFieldGroupCount> rates{};
   core::PositionMode position_source = core::PositionMode::kAuto;
+  int xpc_port = core::kXpcPort;
   std::optional<core::GeoPoint> origin;  ///< of `map`; empty: the first valid position
   double geoid_undulation = 0.0;         ///< [m] added to NavSatFix altitudes
   bool publish_tf = false;               ///< map -> base_link on /tf

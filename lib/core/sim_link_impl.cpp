@@ -58,6 +58,7 @@ SimLinkOptions checked(SimLinkOptions options, const Clock& clock, const Journal
   requireRange("batch_spacing_s", options.batch_spacing_s, 0.0, kHour);
   requireRange("request_timeout_s", options.request_timeout_s, 0.01, kHour);
   requireRange("rpos_rate_hz", options.rpos_rate_hz, 0, kEveryFrameRateHz);
+  require(options.xpc_rate_hz > 0.0 && options.xpc_rate_hz <= 1000.0, "xpc_rate_hz must be above 0 and at most 1000");
   const DataOutputOptions& data = options.data_output;
   require(data.port != kXPlaneSendPort, "data_port 49001 is X-Plane's own sending port; choose another, such as 49003");
   requireRows(data.rows);
@@ -115,6 +116,9 @@ SimLink::Impl::Impl(SimLinkOptions options, SimLinkCallbacks callbacks, Clock cl
   }
   if (rpos_rate_hz_ > 0) {
     rpos_socket_ = openSocket();
+  }
+  if (options_.xpc_port != 0) {
+    xpc_socket_ = openSocket();
   }
   listenForBeacon();
   wake_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -342,6 +346,8 @@ void SimLink::Impl::step(int timeout_ms) {
   }
   receiveData();
   receiveRpos();
+  receiveXpc();
+  askXpc(now_ns_);
   receiveBeacons();
   refreshLink(now_ns_);
   if (!reader_.idle()) {

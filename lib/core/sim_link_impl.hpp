@@ -90,6 +90,7 @@ class SimLink::Impl {
   void receiveGroup(Group* group);
   void receiveData();
   void receiveRpos();
+  void receiveXpc();
   void receiveBeacons();
   void takeStatus(const RrefPair& pair);
 
@@ -103,6 +104,7 @@ class SimLink::Impl {
   void restartSubscriptions(std::int64_t now_ns);
   void updateDataOutput(std::int64_t now_ns);
   void updateRpos(std::int64_t now_ns);
+  void askXpc(std::int64_t now_ns);
   void flushRequests(std::int64_t now_ns);
   void sendRequest(UdpSocket* socket, const std::string& path, std::int32_t rate_hz, std::int32_t index);
   void stopGroup(const Group& group);
@@ -144,6 +146,7 @@ class SimLink::Impl {
   SocketPtr beacon_socket_;
   SocketPtr data_socket_;
   SocketPtr rpos_socket_;
+  SocketPtr xpc_socket_;
   std::string beacon_failure_;
 
   Endpoint peer_;
@@ -170,6 +173,7 @@ class SimLink::Impl {
 
   std::int32_t rpos_rate_hz_ = 0;
   std::int64_t next_rpos_request_ns_ = 0;
+  std::int64_t next_xpc_request_ns_ = 0;
 
   std::optional<std::int32_t> version_;
   std::optional<bool> paused_;

@@ -17,7 +17,7 @@ void SimLink::Impl::waitForInput(int timeout_ms) {
   poll_.clear();
   poll_.push_back({wake_fd_, POLLIN, 0});
   poll_.push_back({control_socket_->fd(), POLLIN, 0});
-  for (const SocketPtr& socket : {beacon_socket_, data_socket_, rpos_socket_}) {
+  for (const SocketPtr& socket : {beacon_socket_, data_socket_, rpos_socket_, xpc_socket_}) {
     if (socket != nullptr) {
       poll_.push_back({socket->fd(), POLLIN, 0});
     }
@@ -204,6 +204,24 @@ void SimLink::Impl::receiveRpos() {
     next_rpos_request_ns_ = now_ns_ + jitter_.around(kRposSilenceNs);
     if (callbacks_.on_rpos && rpos_rate_hz_ > 0) {
       callbacks_.on_rpos(*rpos, infoOf(received));
+    }
+  });
+}
+
+void SimLink::Impl::receiveXpc() {
+  drain(xpc_socket_.get(), [this](ByteView bytes, const Received& received) {
+    if (!isFromPeer(received)) {
+      return;
+    }
+    const DecodeResult<XpcPosition> position = decodePosi(bytes);
+    if (!position.ok()) {
+      countDecodeError(classify(bytes) == MessageKind::kUnknown ? DecodeError::kUnknownLabel : position.error());
+      return;
+    }
+    // Not heardPeer(): the plugin answers also while X-Plane's own sender is silent.
+    ++live_counters_.xpc_datagrams;
+    if (callbacks_.on_xpc) {
+      callbacks_.on_xpc(*position, infoOf(received));
     }
   });
 }

@@ -93,7 +93,7 @@ void SimLink::Impl::publish(std::int64_t now_ns) {
       counters.receive_buffer = std::min(counters.receive_buffer, socket->receiveBuffer());
     }
   };
-  for (const SocketPtr& socket : {control_socket_, beacon_socket_, data_socket_, rpos_socket_}) {
+  for (const SocketPtr& socket : {control_socket_, beacon_socket_, data_socket_, rpos_socket_, xpc_socket_}) {
     count(socket);
   }
   for (const Group& group : groups_) {

@@ -161,6 +161,19 @@ void SimLink::Impl::updateRpos(std::int64_t now_ns) {
   next_rpos_request_ns_ = now_ns + jitter_.around(kRposRetryNs);
 }
 
+void SimLink::Impl::askXpc(std::int64_t now_ns) {
+  if (xpc_socket_ == nullptr || !peer_.valid() || !monitor_.alive() || now_ns < next_xpc_request_ns_ ||
+      stop_phase_ != StopPhase::kRunning) {
+    return;
+  }
+  constexpr std::uint8_t kOwnAircraft = 0;
+  std::array<std::uint8_t, kGetpSize> buffer;
+  if (const EncodeResult size = encodeGetp(buffer, kOwnAircraft)) {
+    xpc_socket_->sendTo({buffer.data(), *size}, {peer_.address, options_.xpc_port});
+  }
+  next_xpc_request_ns_ = now_ns + nanoseconds(1.0 / options_.xpc_rate_hz);
+}
+
 void SimLink::Impl::flushRequests(std::int64_t now_ns) {
   if (!peer_.valid()) {
     return;

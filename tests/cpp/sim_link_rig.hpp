@@ -64,6 +64,10 @@ class SimLinkRig : public testing::Test {
         rows_[data[i].index()] = data[i].value(0);
       }
     };
+    callbacks.on_xpc = [this](const XpcPosition& position, const ReceiveInfo&) {
+      ++xpc_datagrams_;
+      last_xpc_ = position;
+    };
     callbacks.on_rpos = [this](const Rpos& rpos, const ReceiveInfo&) {
       ++rpos_datagrams_;
       last_rpos_ = rpos;
@@ -136,6 +140,8 @@ class SimLinkRig : public testing::Test {
   std::map<std::int32_t, float> rows_;
   int rpos_datagrams_ = 0;
   Rpos last_rpos_;
+  int xpc_datagrams_ = 0;
+  XpcPosition last_xpc_;
   std::vector<LinkState> states_;
   std::vector<std::string> log_;
 };

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -469,6 +471,38 @@ TEST_F(SimLinkTest, RposFlowsStopsAndComesBack) {
   run(0.1, {&sim});
   EXPECT_TRUE(sim.rpos_clients.empty());
   EXPECT_THROW(link_->setRposRate(-1), std::invalid_argument);
+}
+
+TEST_F(SimLinkTest, XPlaneConnectIsAskedForThePosition) {
+  FakeXPlane sim;
+  UdpSocket plugin{UdpSocketOptions{}};
+  SimLinkOptions options = optionsFor(sim);
+  options.xpc_port = plugin.localPort();
+  makeLink(options);
+  std::vector<std::uint8_t> question(64);
+  Received received;
+  const auto asked = [&] {
+    return plugin.receive({question.data(), question.size()}, &received) == ReceiveStatus::kReceived;
+  };
+  ASSERT_GE(runUntil(asked, 2.0, {&sim}), 0.0);
+  ASSERT_EQ(received.size, 6U);
+  EXPECT_EQ(std::string(question.begin(), question.begin() + 4), "GETP");
+  EXPECT_EQ(question[5], 0) << "the user's own aircraft";
+  std::vector<std::uint8_t> answer(46, 0);
+  std::memcpy(answer.data(), "POSI", 4);
+  const double latitude = 47.463627123456;
+  std::memcpy(&answer[6], &latitude, sizeof latitude);
+  plugin.sendTo({answer.data(), answer.size()}, received.from);
+  ASSERT_GE(runUntil([&] { return xpc_datagrams_ > 0; }, 1.0, {&sim}), 0.0);
+  EXPECT_EQ(last_xpc_.latitude_deg, latitude);
+  EXPECT_GE(runUntil([&] { return link_->counters().xpc_datagrams == 1; }, 1.0, {&sim}), 0.0);
+  plugin.sendTo({answer.data(), 45}, received.from);
+  const auto short_one = [&] {
+    const auto errors = link_->counters().decode_errors;
+    return std::any_of(errors.begin(), errors.end(), [](std::uint64_t count) { return count > 0; });
+  };
+  EXPECT_GE(runUntil(short_one, 1.0, {&sim}), 0.0);
+  EXPECT_EQ(xpc_datagrams_, 1);
 }
 
 // ------------------------------------------------------------------------------------------------ hostile input

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 import signal
 import socket
 import sys
@@ -273,6 +274,27 @@ def test_wind_comes_slower(world, rx):
     assert first.header.frame_id == "map"
     assert (first.twist.twist.linear.x, first.twist.twist.linear.y) == pytest.approx((10.0, 0.0), abs=0.01)
     assert (second.header.stamp - first.header.stamp).to_sec() == pytest.approx(0.2, abs=0.05)
+
+
+def test_position_from_plane_connect(world, rx):
+    from xplane_bridge.msg import FlightState
+
+    emulator = world.emulator("--start", "ground", "--xpc-port", 0)
+    plugin = int(re.search(r'"xpc_port": (\d+)', emulator.output()).group(1))
+    rx(position_source="xpc", xpc_port=plugin)
+    state = world.states.wait_for()
+    assert state.position_source == FlightState.POSITION_XPC
+    assert state.valid & FlightState.VALID_POSITION
+    wire = world.wire(emulator.port)
+    assert state.latitude == pytest.approx(wire.read("sim/flightmodel/position/latitude"), abs=1e-5)  # float32 there
+    assert state.longitude == pytest.approx(wire.read("sim/flightmodel/position/longitude"), abs=2e-5)
+    assert state.altitude_msl == pytest.approx(wire.read("sim/flightmodel/position/elevation"), abs=0.01)
+
+
+def test_plane_connect_that_is_not_installed_is_said(world, rx):
+    world.emulator("--start", "ground")
+    rx(position_source="xpc", xpc_port=free_udp_port())
+    world.wait_for_diagnostics("position", lambda status: "X-Plane Connect does not answer" in status.message)
 
 
 def test_listed_datarefs_and_scalar_topics(world, rx):
@@ -639,7 +661,7 @@ def test_nothing_is_configured_when_the_user_has_done_it(world, rx, users_data_o
         ({"max_publsh_rate": 5}, ["max_publsh_rate", "did you mean max_publish_rate?"]),
         ({"rates": {"engine": 5}}, ["rates/engine", "did you mean engines?"]),
         ({"rates": {"flight": 0}}, ["rates/flight is 0", "from 1 to 1000"]),
-        ({"position_source": "gps"}, ['"gps"', "one of: auto, local, rpos, float32"]),
+        ({"position_source": "gps"}, ['"gps"', "one of: auto, local, rpos, xpc, float32"]),
         ({"origin": {"latitude": 10.0}}, ["origin/longitude is required"]),
         ({"datarefs": [{"name": "paused"}]}, ["datarefs[0]/name", "sim/cockpit2/controls/flap_ratio"]),
         ({"datarefs": [{"name": "sim/a[0:3]", "topic": "a"}]}, ["datarefs[0]/topic", "a scalar topic carries one"]),

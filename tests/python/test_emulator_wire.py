@@ -13,7 +13,7 @@ from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.flight_model import InitialState
 from xplane_bridge.emulator.options import Options
 from xplane_bridge.emulator.server import PortInUseError
-from xplane_bridge.harness.emulator_bench import EmulatorBench
+from xplane_bridge.harness.emulator_bench import EmulatorBench, XPlaneClient
 
 POSITION = "sim/flightmodel/position/"
 LATITUDE, LONGITUDE, THETA = POSITION + "latitude", POSITION + "longitude", POSITION + "theta"
@@ -208,6 +208,27 @@ def test_rpos_gives_doubles(bench):
     assert position.heading_deg == pytest.approx(90.0, abs=0.01)
     assert position.pitch_deg == pytest.approx(math.degrees(state.pitch_rad), abs=1e-5)
     assert position.vx_mps == pytest.approx(70.0, abs=0.1)  # flying east
+
+
+def test_plane_connect_answers_in_doubles(bench):
+    emulator = bench(plane_connect_port=0)
+    client = XPlaneClient(emulator.emulator.describe()["xpc_port"])
+    client.send(b"GETP\0\0")
+    client.send(struct.pack("<5sB3d", b"GETT\0", 0, -998.0, -998.0, -998.0))
+    client.send(b"GETP\0")  # too short: no answer
+    emulator.step()
+    position, terrain = client.received()
+    state = emulator.sim.model.state
+    assert position[:4] == b"POSI"
+    assert len(position) == 46
+    assert struct.unpack_from("<3d", position, 6) == (state.latitude_deg, state.longitude_deg, state.altitude_m)
+    assert struct.unpack_from("<3f", position, 30)[2] == pytest.approx(90.0, abs=0.01)
+    assert terrain[:4] == b"TERR"
+    assert len(terrain) == 62
+    assert struct.unpack_from("<2d", terrain, 6) == (state.latitude_deg, state.longitude_deg)
+    height_agl = emulator.read("sim/flightmodel/position/y_agl")[0]
+    assert struct.unpack_from("<d", terrain, 22)[0] == pytest.approx(state.altitude_m - height_agl, abs=0.5)
+    client.close()
 
 
 def test_rpos_stops_at_zero_and_answers_several(bench):

@@ -39,6 +39,8 @@ struct SimLinkOptions {
   double request_timeout_s = 2.0;    ///< [s] deadline of the link's own read-backs
   std::uint32_t jitter_seed = 1;     ///< retries are spread by up to 20 %
   std::int32_t rpos_rate_hz = 0;     ///< RPOS stream; 0: none
+  std::uint16_t xpc_port = 0;        ///< where the X-Plane Connect plugin is asked for the position; 0: not at all
+  double xpc_rate_hz = 60.0;         ///< of these questions (each has one answer), up to 1000
   DataOutputOptions data_output;
 };
 
@@ -79,6 +81,7 @@ struct LinkCounters {
   std::uint64_t data_datagrams = 0;
   std::uint64_t rref_datagrams = 0;
   std::uint64_t rpos_datagrams = 0;
+  std::uint64_t xpc_datagrams = 0;
   std::uint64_t beacons = 0;
   std::uint64_t requests = 0;           ///< subscription requests sent
   std::uint64_t resubscriptions = 0;    ///< groups asked for anew because the link came up or X-Plane was silent
@@ -91,6 +94,7 @@ struct SimLinkCallbacks {
   std::function<void(GroupId, const RrefView&, const ReceiveInfo&)> on_rref;
   std::function<void(const DataView&, const ReceiveInfo&)> on_data;
   std::function<void(const Rpos&, const ReceiveInfo&)> on_rpos;
+  std::function<void(const XpcPosition&, const ReceiveInfo&)> on_xpc;
   std::function<void(const LinkStatus&)> on_state;  ///< state, epoch, peer, version or problems changed
 };
 

@@ -24,6 +24,7 @@ from .faults import FaultyChannel
 from .flight_model import FlightModel, create_model
 from .kinematic import KinematicModel
 from .options import KINEMATIC, Options
+from .plane_connect import PlaneConnect
 from .server import Beacon, Server
 from .simulator import INTERNAL_VERSIONS, Simulator
 from .subscriptions import Address, Subscriptions
@@ -60,6 +61,7 @@ class Emulator:
         self.sim = self._new_simulator()
         self._server: Optional[Server] = self._new_server(options.port)
         self.port = self._server.port
+        self._plane_connect = self._new_plane_connect()
         self._beacon = self._new_beacon()
         self._truth = TruthFile(options.truth, self.sim.model) if options.truth is not None else None
         self._frames = 0
@@ -69,6 +71,10 @@ class Emulator:
 
     def _make_model(self, name: str) -> FlightModel:
         return KinematicModel(self.options.seed) if name == KINEMATIC else create_model(name, self.options.seed)
+
+    def _new_plane_connect(self) -> Optional[PlaneConnect]:
+        port = self.options.plane_connect_port
+        return None if port is None else PlaneConnect(self.options.bind, port, lambda: self.sim.position())
 
     def _new_simulator(self) -> Simulator:
         o = self.options
@@ -184,6 +190,8 @@ class Emulator:
                 now, self.period, sim.rows, sim.store.values, sim.selected_rows, sim.data_rate, self._rpos_packet
             )
         server.flush_delayed(now)
+        if self._plane_connect is not None:
+            self._plane_connect.answer()
         if self._truth is not None and sim.flying:
             self._truth.write(sim.frame, host_time)
         for listener in self.frame_listeners:
@@ -270,6 +278,7 @@ class Emulator:
         """What clients see when X-Plane is quit: the port is closed, the beacon gone."""
         self.server.close()
         self._server = None
+        self._close_plane_connect()
         if self._beacon is not None:
             self._beacon.close()
             self._beacon = None
@@ -278,6 +287,7 @@ class Emulator:
         """Starts anew on the same port: no subscriptions, no targets, no overrides, a new flight."""
         self.sim = self._new_simulator()
         self._server = self._new_server(self.port)
+        self._plane_connect = self._new_plane_connect()
         self._beacon = self._new_beacon()
 
     def step_frames(self, count: int) -> None:
@@ -332,6 +342,7 @@ class Emulator:
             "aircraft": o.aircraft,
             "fps": o.fps,
             "beacon": o.beacon,
+            "xpc_port": None if self._plane_connect is None else self._plane_connect.port,
             "stepped": o.stepped is not None,
             "pipeline_delay": o.pipeline_delay,
         }
@@ -350,6 +361,11 @@ class Emulator:
             }
         return report
 
+    def _close_plane_connect(self) -> None:
+        if self._plane_connect is not None:
+            self._plane_connect.close()
+            self._plane_connect = None
+
     def close(self) -> None:
         """Closes sockets and files; may be called again."""
         if self._server is not None:
@@ -357,6 +373,7 @@ class Emulator:
         if self._beacon is not None:
             self._beacon.close()
             self._beacon = None
+        self._close_plane_connect()
         if self._truth is not None:
             self._truth.close()
             self._truth = None

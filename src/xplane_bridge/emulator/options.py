@@ -41,6 +41,7 @@ class Options:
     truth: Optional[Path] = None
     duration: Optional[float] = None
     stepped: Optional[str] = None  #: None: real time; "lines": frames on request; "fast": as fast as it goes
+    plane_connect_port: Optional[int] = None
     beacon: bool = True
     beacon_group: str = protocol.BEACON_GROUP
     beacon_port: int = protocol.BEACON_PORT
@@ -151,6 +152,12 @@ def _parser() -> argparse.ArgumentParser:
         "--port", type=int, default=protocol.DEFAULT_PORT, help="UDP port (default 49000; 0: any free one)"
     )
     wire.add_argument("--rate", type=int, default=20, metavar="HZ", help="network_data_rate at the start (default 20)")
+    wire.add_argument(
+        "--xpc-port",
+        type=int,
+        metavar="PORT",
+        help="answer there as the X-Plane Connect plugin (the real one: 49009; 0: a free one; default: none)",
+    )
     wire.add_argument("--no-beacon", dest="beacon", action="store_false", help="do not announce on multicast")
     wire.add_argument(
         "--beacon-target",
@@ -232,6 +239,8 @@ def _options(given: argparse.Namespace) -> Options:
     except FaultSyntaxError as error:
         raise OptionError(str(error)) from None
     size = re.fullmatch(r"(\d{3,4})x(\d{3,4})", given.window or "640x480")
+    xpc_port = given.xpc_port
+    _require(xpc_port is None or 0 <= xpc_port <= 65535, "--xpc-port", xpc_port, "0 to 65535")
     _require(size is not None, "--window", given.window, "WIDTHxHEIGHT, e.g. 640x480")
     group, _, beacon_port = given.beacon_target.partition(":")
     initial = InitialState(
@@ -259,6 +268,7 @@ def _options(given: argparse.Namespace) -> Options:
         truth=given.truth,
         duration=given.duration,
         stepped=given.stepped,
+        plane_connect_port=given.xpc_port,
         beacon=given.beacon,
         beacon_group=group,
         beacon_port=int(beacon_port),
