@@ -126,6 +126,9 @@ void SurfaceControl::onSample() {
     case State::kDriving:
       if (!wanted()) {
         giveBack();
+      } else if (!overridden) {
+        // The panic tool, or another client: it is not taken again.
+        drop("somebody else has released the surface override");
       } else if (may_not_.empty()) {
         drive(dt);
         measureLag();

@@ -99,7 +99,8 @@ class SurfaceControl {
     double frames = std::nan("");    ///< since it was sent
   };
   std::optional<Echo> takeEcho();
-  /// Why all failures and commands were dropped (another aircraft, X-Plane restarted), once after it happened.
+  /// Why all failures and commands were dropped (another aircraft, X-Plane restarted, the override released by somebody
+  /// else), once after it happened.
   std::optional<std::string> takeDropped();
 
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const;
