@@ -79,12 +79,8 @@ void FailureKeeper::onLink(const core::LinkStatus& status) {
   if (menu_group_ >= 0 && generation == generation_) return;
   generation_ = generation;
   menu_datarefs_ = core::simulatorFailures(generation);
-  core::RrefGroup group{"failures", menu_datarefs_, kMenuRate, 0};
-  if (menu_group_ < 0) {
-    menu_group_ = link_->addGroup(std::move(group));
-  } else {
-    link_->replaceGroup(menu_group_, std::move(group));
-  }
+  if (menu_group_ >= 0) link_->removeGroup(menu_group_);
+  menu_group_ = link_->addGroup({"failures", menu_datarefs_, kMenuRate, 0});
 }
 
 bool FailureKeeper::onRref(core::GroupId group, const core::RrefView& view) {
@@ -178,17 +174,9 @@ void FailureKeeper::watchOwn() {
   }
   if (datarefs == own_datarefs_) return;
   own_datarefs_ = datarefs;
-  if (own_datarefs_.empty()) {
-    link_->removeGroup(own_group_);
-    own_group_ = -1;
-    return;
-  }
-  core::RrefGroup group{"failures set", own_datarefs_, kOwnRate, 1};
-  if (own_group_ < 0) {
-    own_group_ = link_->addGroup(std::move(group));
-  } else {
-    link_->replaceGroup(own_group_, std::move(group));
-  }
+  // A group of its own each time: answers to the old list must not be taken for the new one's.
+  if (own_group_ >= 0) link_->removeGroup(own_group_);
+  own_group_ = own_datarefs_.empty() ? -1 : link_->addGroup({"failures set", own_datarefs_, kOwnRate, 1});
 }
 
 void FailureKeeper::undo(const core::FailurePlan& plan) {
