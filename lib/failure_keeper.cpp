@@ -398,7 +398,7 @@ void FailureKeeper::set(const SetFailure::Request& request, const std::string& w
       const auto values = link_->readDatarefs(planned.plan.datarefs, timeout_);
       answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
     }
-    const std::string refusal = planned.plan.surface ? surfaces_->refusal() : "";
+    const std::string refusal = planned.plan.surface ? surfaces_->refusal(planned.plan.surface->surface) : "";
     lock.lock();
     if (!answered && !planned.plan.surface) {
       response->result =

@@ -136,7 +136,7 @@ void SurfaceControl::onSample() {
       }
       break;
     case State::kReleasing:
-      if (wanted()) {
+      if (wanted() && refusalLocked().empty()) {
         take();
       } else if (!overridden) {
         left_ = sent_;
@@ -269,6 +269,7 @@ void SurfaceControl::drop(const std::string& why) {
   watch_.recheck();
   if (!was) return;
   giveBack();
+  driver_.reset();  // it is not gone on with
   report_("the surfaces are given back: " + why, true);
 }
 
@@ -349,12 +350,15 @@ std::optional<std::string> SurfaceControl::command(const std::vector<std::string
   std::optional<std::string> wrong;
   if (checked.refusal) {
     wrong = checked.refusal->text;
-  } else if (!names.empty() && !refusalLocked().empty()) {
-    wrong = refusalLocked();
   }
   for (const core::SurfaceDeflection& surface : checked.surfaces) {
-    const core::SurfaceLaw* law = watch_.model() ? watch_.model()->lawOf(surface.surface) : nullptr;
-    if (wrong || !law) continue;
+    if (wrong) break;
+    const std::string refusal = refusalOf(surface.surface);
+    if (!refusal.empty()) {
+      wrong = refusal;
+      break;
+    }
+    const core::SurfaceLaw* law = watch_.model()->lawOf(surface.surface);
     const double low = law->low_deg - kTravelMarginDeg, high = law->high_deg + kTravelMarginDeg;
     if (surface.deflection_deg >= low && surface.deflection_deg <= high) continue;
     wrong = core::surfaceTable()[surface.surface].name + " is " + degrees(surface.deflection_deg) +
@@ -399,6 +403,25 @@ std::string SurfaceControl::refusalLocked() const {
 std::string SurfaceControl::refusal() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return refusalLocked();
+}
+
+std::string SurfaceControl::refusal(std::size_t surface) const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return refusalOf(surface);
+}
+
+std::string SurfaceControl::refusalOf(std::size_t surface) const {
+  const std::string refusal = refusalLocked();
+  const core::MixingModel* model = watch_.model();
+  if (!refusal.empty() || !model || model->lawOf(surface)) return refusal;
+  std::string moved;
+  for (const core::SurfaceLaw& law : model->laws) {
+    moved += (moved.empty() ? "" : ", ") + core::surfaceTable()[law.surface].name;
+  }
+  return core::surfaceTable()[surface].name +
+         " has not been seen to move: either this aircraft has none, or its handle has to be moved once; those that "
+         "moved: " +
+         moved;
 }
 
 bool SurfaceControl::driving() const {

@@ -76,6 +76,8 @@ class SurfaceControl {
 
   /// Why surfaces cannot be driven now, in words that say what to do; empty: they can, or are.
   std::string refusal() const;
+  /// The same for one surface, which the mixing has to know.
+  std::string refusal(std::size_t surface) const;
   /// The surface override is set, or being taken or given back.
   bool driving() const;
   /// Nothing needs the surfaces any more, but X-Plane has not shown yet that it drives them.
@@ -123,6 +125,7 @@ class SurfaceControl {
   void loadModel();
   void saveModel();
   std::string refusalLocked() const;
+  std::string refusalOf(std::size_t surface) const;
   bool followsLocked(std::size_t surface) const;
   void subscribe();
 

@@ -311,6 +311,7 @@ def test_systems_fail_and_are_repaired(healthy, name, leaf, where, shows):
         ({"name": "engine_9"}, REFUSED, "engine_1 to engine_8"),
         ({"name": "aileron1_wing2_left", "kind": "bent"}, REFUSED, "expected stuck"),
         ({"name": "aileron1_wing2_left", "kind": "reduced", "value": 2.0}, REFUSED, "0..1"),
+        ({"name": "aileron1_wing4_left", "kind": "stuck"}, REFUSED, "has not been seen to move"),
         ({"name": "engine_1", "trigger": 9}, REFUSED, "trigger is 9"),
         ({"name": "aileron1_wing2_left", "kind": "gone"}, NOT_SUPPORTED, "X-Plane 11"),
         ({"name": "rel_no_such_thing"}, NOT_SUPPORTED, "rel_no_such_thing"),
@@ -397,6 +398,7 @@ def test_single_surfaces_by_command(healthy):
     refusals = (
         ({"aileron1_wing2_left": 3.0, "wing": 1.0}, "no surface"),
         ({"aileron1_wing2_left": 3.0, "rudder1_fin1": math.nan}, "rudder1_fin1 is nan"),
+        ({"aileron1_wing2_left": 3.0, "aileron1_wing1_left": 0.0}, "has not been seen to move"),
         ({"aileron1_wing2_left": 3.0, "elevator1_left": 40.0}, "its travel, -19.0..14.0"),
     )
     for deflections, text in refusals:
