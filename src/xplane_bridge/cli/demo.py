@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
-import signal
 import sys
 from pathlib import Path
-from types import FrameType
-from typing import Iterator, List, Optional, Sequence
+from typing import List, Optional, Sequence
 
 from tqdm import tqdm
 
 from xplane_bridge.cli.entry import guarded
 from xplane_bridge.cli.flight_report import write_report
 from xplane_bridge.harness import flight_check
-from xplane_bridge.harness.display import VirtualDisplay
+from xplane_bridge.harness.display import screen
 from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
+from xplane_bridge.harness.processes import interrupted_by_signals
 from xplane_bridge.resources import config_file
 
 _FPS = 60
@@ -96,41 +93,14 @@ class _Progress:
         self._bar.close()
 
 
-def _interrupt(_number: int, _frame: Optional[FrameType]) -> None:
-    """Ends the flight in good order, once: what comes while it ends does not cut that short."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    print("\ndemo: ending", file=sys.stderr)
-    raise KeyboardInterrupt
-
-
-@contextlib.contextmanager
-def _screen(logs: Path, headless: bool) -> Iterator[None]:
-    """A screen for the cockpit view: the user's, or one of our own where there is none or none is wanted."""
-    if os.environ.get("DISPLAY") and not headless:
-        yield
-        return
-    with VirtualDisplay(logs) as display:
-        before = os.environ.get("DISPLAY")
-        os.environ["DISPLAY"] = display.display
-        try:
-            yield
-        finally:
-            del os.environ["DISPLAY"]
-            if before is not None:
-                os.environ["DISPLAY"] = before
-
-
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
     args = parser().parse_args(argv)
     plan = _plan(args)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _interrupt)
     progress = _Progress(plan.duration)
     try:
-        with _screen(plan.logs, args.headless):
+        with interrupted_by_signals("demo"), screen(plan.logs, args.headless):
             fly(plan, progress, lambda text: progress_line(text))
     finally:
         progress.close()

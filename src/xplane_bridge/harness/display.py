@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import shutil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Iterator
 
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess
 
@@ -44,3 +46,20 @@ class VirtualDisplay(ManagedProcess):
             raise HarnessError(msg)
         super().start()
         self._number = self.wait_for_line(r"^(\d+)$", _START_TIMEOUT_S).group(1)
+
+
+@contextlib.contextmanager
+def screen(log_dir: Path, headless: bool) -> Iterator[None]:
+    """A screen (DISPLAY) for windows: the user's, or one of our own where there is none or `headless` wants none."""
+    if os.environ.get("DISPLAY") and not headless:
+        yield
+        return
+    with VirtualDisplay(log_dir) as display:
+        before = os.environ.get("DISPLAY")
+        os.environ["DISPLAY"] = display.display
+        try:
+            yield
+        finally:
+            del os.environ["DISPLAY"]
+            if before is not None:
+                os.environ["DISPLAY"] = before

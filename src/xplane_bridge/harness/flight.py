@@ -30,6 +30,10 @@ class FlightPlan:
     transport: str = "rref"
     emulator_options: List[str] = field(default_factory=list)
     launch_args: Dict[str, Any] = field(default_factory=dict)
+    #: Programs that fly beside the bridge, by name (of their logs): started once states flow, in the given order.
+    programs: Dict[str, List[str]] = field(default_factory=dict)
+    #: The one of `programs` whose end is the end of the recording, before `duration` at the latest; empty: none.
+    player: str = ""
     #: Silences that belong to the plan, e.g. a restart of the emulator, are not failures.
     silence_allowed: float = _SILENCE_S  #: [s]
 
@@ -58,6 +62,7 @@ class RunningFlight:
     bridge: ManagedProcess
     elapsed: float = 0.0  #: [s] of flight recorded so far
     states: int = 0  #: flight states received so far
+    programs: Dict[str, ManagedProcess] = field(default_factory=dict)
     last: Any = None  #: the newest xplane_bridge/FlightState
 
 
@@ -109,9 +114,14 @@ def fly(plan: FlightPlan, observer: Observer = _ignore, say: Callable[[str], Non
         flight = RunningFlight(emulator, master, bridge)
         stack.enter_context(_StateListener(flight))
         _wait_for_state(flight)
+        for name, command in plan.programs.items():
+            flight.programs[name] = ManagedProcess(name, command, plan.logs, env=master.env)
+            stack.enter_context(flight.programs[name])
         say(f"flying; to watch, in a second shell: export ROS_MASTER_URI={master.uri}")
         _record(plan, flight, observer)
         say("ending the recording")
+        for program in reversed(list(flight.programs.values())):
+            program.stop()
         bridge.stop()
         if bridge.returncode != 0:
             raise HarnessError(bridge.describe(f"ended with status {bridge.returncode}"))
@@ -139,6 +149,8 @@ def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None
     seen = 0
     while flight.elapsed < plan.duration:
         flight.bridge.check_running()
+        if _is_over(plan, flight):
+            return
         now = time.monotonic()
         flight.elapsed = now - began
         if flight.states != seen:
@@ -149,6 +161,17 @@ def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None
             )
         observer(flight)
         time.sleep(0.1)
+
+
+def _is_over(plan: FlightPlan, flight: RunningFlight) -> bool:
+    """Whether the player has ended; any other program that has, and a player that failed, is an error."""
+    for name, program in flight.programs.items():
+        if program.running:
+            continue
+        if name == plan.player and program.returncode == 0:
+            return True
+        raise HarnessError(program.describe(f"ended with status {program.returncode}"))
+    return False
 
 
 class _StateListener:

@@ -8,9 +8,11 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
-from typing import Callable, Mapping, Sequence, TypeVar
+from types import FrameType
+from typing import Callable, Iterator, Mapping, Sequence, TypeVar
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -45,6 +47,27 @@ def wait_until(condition: Callable[[], T], timeout: float, what: str) -> T:
             msg = f"no {what} within {timeout:g} s"
             raise HarnessError(msg)
         time.sleep(_POLL_S)
+
+
+@contextlib.contextmanager
+def interrupted_by_signals(name: str) -> Iterator[None]:
+    """Within it, Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt, once: later ones do not cut the orderly end short.
+
+    Args:
+        name: the program's, for the line that says it ends.
+    """
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        for number in numbers:
+            signal.signal(number, signal.SIG_IGN)
+        print(f"\n{name}: ending", file=sys.stderr)
+        raise KeyboardInterrupt
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, interrupt) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before):
+        signal.signal(number, handler)
 
 
 class ManagedProcess:

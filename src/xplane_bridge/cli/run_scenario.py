@@ -1,0 +1,110 @@
+"""run_scenario: flies a scenario with the emulator and the bridge, records it, and judges it by its criteria."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Sequence
+
+from xplane_bridge.analysis.scoring import Score
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.flight import read_flight
+from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.scenario_player import scenario_of
+from xplane_bridge.harness.display import screen
+from xplane_bridge.harness.flight import FlightPlan, fly
+from xplane_bridge.harness.processes import interrupted_by_signals
+from xplane_bridge.resources import config_file, program
+from xplane_bridge.scenario import Scenario, ScenarioError
+from xplane_bridge.scenario.judging import judge
+
+_PLAYER = "scenario_player"
+#: `start` of a scenario to the emulator's options.
+_START = {"latitude": "--lat", "longitude": "--lon", "altitude": "--alt", "heading": "--heading", "speed": "--speed"}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(
+        prog="run_scenario",
+        description=(
+            "Flies a scenario (config/scenarios/README.md) with the emulator through the bridge, records "
+            "DIR/flight.bag and measures the scenario's criteria in it. Exit code 0: every criterion is met; 1: one is missed, or "
+            "something the scenario asked for was refused."
+        ),
+    )
+    p.add_argument("scenario", metavar="SCENARIO", help="file, or stem of a file in config/scenarios")
+    p.add_argument("--output", type=Path, metavar="DIR", help="where to write (default: scenario_<name>)")
+    p.add_argument("--aircraft", metavar="NAME", help="aircraft to fly (default: the scenario's first)")
+    p.add_argument("--transport", choices=("rref", "data"), default="rref", help="how to ask X-Plane (%(default)s)")
+    p.add_argument("--joystick", metavar="NAME", help="fly through joystick_mapper_node as this device")
+    p.add_argument("--controller", metavar="COMMAND", help="program that flies in mode auto, started beside the bridge")
+    p.add_argument("--camera", action="store_true", help="draw and record the cockpit view")
+    p.add_argument("--headless", action="store_true", help="draw it, but not on this screen")
+    p.add_argument("--timeout", type=float, default=600.0, metavar="S", help="longest flight [s] (%(default)g)")
+    p.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulator's turbulence and faults")
+    return p
+
+
+def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
+    """What to start for a scenario."""
+    output = args.output or Path(f"scenario_{scenario.name}")
+    aircraft = args.aircraft or (scenario.aircraft[0] if scenario.aircraft else "fixed_wing")
+    if scenario.aircraft and aircraft not in scenario.aircraft:
+        raise ScenarioError(f"{scenario.name} is for {', '.join(scenario.aircraft)}, not for {aircraft}")
+    if scenario.repeat_every is not None:
+        raise ScenarioError(f"{scenario.name} repeats for ever (repeat_every); run_scenario needs one that ends")
+    options: List[str] = ["--fps", "60", "--seed", str(args.seed)]
+    for key, value in scenario.start.items():
+        options += [_START[key], f"{value:g}"]
+    launch_args: Dict[str, Any] = {"capture": False}
+    if args.camera:
+        options.append("--window")
+        launch_args = {}
+    command = [str(program("scenario_player")), args.scenario, "--log", str((output / "played.json").resolve())]
+    programs: Dict[str, List[str]] = {}
+    if args.controller:
+        programs["controller"] = ["sh", "-c", f"exec {args.controller}"]
+    if args.joystick:
+        file = config_file("joysticks", f"{args.joystick}.yaml")
+        launch_args["joy_config"] = args.joystick
+        programs["joystick"] = ["roslaunch", "xplane_bridge", "joystick.launch", f"joy_config_file:={file}"]
+        command += ["--joystick", "--joy-config", args.joystick]
+    programs[_PLAYER] = command
+    return FlightPlan(
+        output, args.timeout, aircraft, args.transport, options, launch_args, programs=programs, player=_PLAYER
+    )
+
+
+def render(scores: Sequence[Score]) -> str:
+    """A line for each criterion."""
+    width = max([len(s.name) for s in scores] + [9])
+    lines = []
+    for s in scores:
+        verdict = "met   " if s.passed else "MISSED"
+        lines.append(f"{verdict}  {s.name:{width}}  {s.measure:10} {s.value:10.3f}  {s.text}")
+    return "\n".join(lines)
+
+
+@guarded
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Runs the program."""
+    args = parser().parse_args(argv)
+    scenario = scenario_of(args.scenario)
+    path = Path(args.scenario)
+    if path.exists():
+        args.scenario = str(path.resolve())
+    plan = plan_of(scenario, args)
+    with interrupted_by_signals("run_scenario"), screen(plan.logs, args.headless or not args.camera):
+        fly(plan, say=lambda text: print(f"run_scenario: {text}", file=sys.stderr))
+    played = json.loads((plan.output / "played.json").read_text(encoding="utf-8"))
+    with Bags(plan.bag) as bags:
+        scores = judge(scenario, read_flight(bags), played)
+    report = {"scenario": scenario.name, "played": played, "criteria": [s._asdict() for s in scores]}
+    (plan.output / "scores.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    missed = [s.name for s in scores if not s.passed]
+    print(render(scores) if scores else f"{scenario.name} has no criteria")
+    print(f"{scenario.name}: {len(scores) - len(missed)} of {len(scores)} criteria met; the recording is {plan.bag}")
+    return 1 if missed else 0

@@ -1,0 +1,84 @@
+"""scenario_player: plays a scenario through a running bridge; launch/failure.launch starts it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import List, Optional, Sequence
+
+from xplane_bridge.cli.entry import guarded
+from xplane_bridge.resources import config_file
+from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
+from xplane_bridge.scenario.ros_player import RosPlayer
+from xplane_bridge.scenario.virtual_stick import load_stick
+from xplane_bridge.topics import NAMESPACE
+
+
+def scenario_of(name: str) -> Scenario:
+    """A scenario by the stem of a file in config/scenarios, or by a path.
+
+    Raises:
+        ScenarioError: There is none, or it is not one.
+    """
+    path = Path(name)
+    if path.suffix not in (".yaml", ".yml"):
+        path = config_file("scenarios", f"{name}.yaml")
+    if not path.is_file():
+        known = ", ".join(sorted(file.stem for file in config_file("scenarios", "README.md").parent.glob("*.yaml")))
+        raise ScenarioError(f"there is no scenario {name}; expected a file, or one of: {known}")
+    return load_scenario(path)
+
+
+def ros_arguments(argv: Optional[Sequence[str]]) -> List[str]:
+    """Arguments without those that roslaunch adds (`__name:=...`)."""
+    given = list(sys.argv[1:] if argv is None else argv)
+    return [word for word in given if ":=" not in word]
+
+
+def add_stick_options(p: argparse.ArgumentParser) -> None:
+    """Options of programs that play as a joystick."""
+    p.add_argument(
+        "--joy-config",
+        metavar="NAME",
+        default="logitech_extreme_3d_pro",
+        help="device to play: stem of a file in config/joysticks, or a file (%(default)s)",
+    )
+    p.add_argument("--stick-mode", type=int, choices=(1, 2), help="1: pitch left, throttle right; 2: the other way")
+
+
+def play(
+    args: argparse.Namespace, argv: Optional[Sequence[str]], node: str, joystick: bool, log: Optional[Path] = None
+) -> int:
+    """Plays `args.scenario` in a ROS node of this process; returns the exit code."""
+    scenario = scenario_of(args.scenario)
+    stick = None
+    if joystick:
+        file = Path(args.joy_config)
+        if file.suffix != ".yaml":
+            file = config_file("joysticks", f"{args.joy_config}.yaml")
+        stick = load_stick(file, args.stick_mode)
+    import rospy
+
+    rospy.init_node(node, argv=None if argv is None else list(argv))
+    RosPlayer(scenario, args.namespace, stick, log, say=lambda text: print(text, flush=True)).run()
+    return 0
+
+
+@guarded
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Runs the program."""
+    p = argparse.ArgumentParser(
+        prog="scenario_player",
+        description=(
+            "Plays a scenario (config/scenarios/README.md) through a running bridge: stick and handles on "
+            "control/manual, modes, failures and excitations by tx_node. Exit code 1: something it asked for was refused."
+        ),
+    )
+    p.add_argument("scenario", metavar="SCENARIO", help="file, or stem of a file in config/scenarios")
+    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--joystick", action="store_true", help="fly by messages on joy, through joystick_mapper_node")
+    add_stick_options(p)
+    p.add_argument("--log", type=Path, metavar="FILE", help="write there when what happened (JSON)")
+    args = p.parse_args(ros_arguments(argv))
+    return play(args, argv, "scenario_player", args.joystick, args.log)

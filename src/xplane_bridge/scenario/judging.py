@@ -1,0 +1,64 @@
+"""Measures the criteria of a scenario in a recorded flight."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping
+
+import numpy as np
+
+from xplane_bridge.analysis.scoring import Score, score
+
+from .schema import Scenario, ScenarioError
+
+if TYPE_CHECKING:
+    from xplane_bridge.bags.flight import Flight
+
+#: Scenario variables (units of scenarios) by FlightState columns (SI, angles in degrees).
+_COLUMNS = {
+    "roll": "roll_deg",
+    "pitch": "pitch_deg",
+    "heading": "heading_true_deg",
+    "altitude": "altitude_msl",
+    "agl": "altitude_agl",
+    "climb": "vertical_speed",
+    "speed": "calibrated_airspeed",
+    "alpha": "alpha_deg",
+    "beta": "beta_deg",
+    "load_factor": "load_factor_normal",
+}
+_RATES = {"roll_rate": "angular_velocity.x", "pitch_rate": "angular_velocity.y", "yaw_rate": "angular_velocity.z"}
+
+
+def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any]) -> List[Score]:
+    """Scores a flight that was flown by a `RosPlayer`.
+
+    Args:
+        scenario: What was flown.
+        flight: The recording.
+        played: The player's log: `begin` (epoch and sim_time_unwrapped of its first state) and `labels` [s].
+
+    Raises:
+        ScenarioError: The recording has no state of the time the scenario was played in.
+    """
+    if "state" not in flight.tables or not played.get("begin"):
+        raise ScenarioError(f"{scenario.name}: no flight state was recorded while it was played")
+    state = flight.tables["state"]
+    epoch, sim_time = state["epoch"], state["sim_time_unwrapped"]
+    steps = np.where(np.diff(epoch) == 0, np.maximum(np.diff(sim_time), 0.0), 0.0)
+    elapsed = np.concatenate(([0.0], np.cumsum(steps)))
+    begin = played["begin"]
+    first = np.flatnonzero((epoch == begin["epoch"]) & (sim_time >= begin["sim_time_unwrapped"] - 1e-6))
+    if not len(first):
+        raise ScenarioError(f"{scenario.name}: the state it began with was not recorded")
+    time = elapsed[first[0] :] - elapsed[first[0]]
+    values = {name: np.asarray(state[column][first[0] :], dtype=float) for name, column in _COLUMNS.items()}
+    values.update({name: np.degrees(state[column][first[0] :]) for name, column in _RATES.items()})
+    return score(scenario.criteria, time, values, played["labels"], _camera(flight))
+
+
+def _camera(flight: Flight) -> Dict[str, float]:
+    if "frames" not in flight.tables:
+        return {}
+    quality = flight.tables["frames"]["quality"]
+    missing = quality & flight.constants["frames"]["QUALITY_STATE_MISSING"]
+    return {"paired": float(np.mean(missing == 0)), "perfect": float(np.mean(quality == 0))}

@@ -1,0 +1,339 @@
+"""Plays a scenario from outside, through the bridge: stick and handles as commands or as a joystick, modes, failures and
+excitations as requests and service calls. rospy is imported where it is used: the rest of the package needs no ROS.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import threading
+import time
+from pathlib import Path
+from typing import Any, Callable, Dict, Optional
+
+from .player import Action, Commands, FlightSample, Player
+from .schema import Scenario, ScenarioError
+from .virtual_stick import VirtualStick
+
+#: Rate of the stick's messages [1/s]; they go on while the simulator is silent, as a real stick's do.
+STICK_RATE = 50.0
+_SERVICE_WAIT_S = 15.0
+_MODE_WAIT_S = 5.0
+_TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
+_MODES = {"manual": 1, "auto": 2}
+#: Player handles to fields of ControlCommand.
+_HANDLES = {
+    "flaps": ("FLAPS", ("flaps",)),
+    "gear": ("GEAR", ("gear",)),
+    "speed_brake": ("SPEEDBRAKE", ("speedbrake",)),
+    "thrust_vector": ("THRUST_VECTOR", ("thrust_vector",)),
+    "brakes": ("TOE_BRAKES", ("left_brake", "right_brake")),
+    "roll_trim": ("TRIM_ROLL", ("trim_roll",)),
+    "pitch_trim": ("TRIM_PITCH", ("trim_pitch",)),
+    "yaw_trim": ("TRIM_YAW", ("trim_yaw",)),
+}
+
+
+def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
+    """The player's view of a FlightState; what is unknown there is NaN here, and no condition on it holds."""
+    return FlightSample(
+        roll=state.roll_deg,
+        pitch=state.pitch_deg,
+        heading=state.heading_true_deg,
+        altitude=state.altitude_msl,
+        agl=state.altitude_agl,
+        climb=state.vertical_speed,
+        speed=state.calibrated_airspeed,
+        alpha=state.alpha_deg,
+        beta=state.beta_deg,
+        roll_rate=math.degrees(state.angular_velocity.x),
+        pitch_rate=math.degrees(state.angular_velocity.y),
+        yaw_rate=math.degrees(state.angular_velocity.z),
+        load_factor=state.load_factor_normal,
+        on_ground=state.on_ground,
+        stall_warning=stall_warning,
+        mode=mode,
+    )
+
+
+def fill_command(commands: Commands, message: Any) -> None:
+    """Stick, throttle and handles into a ControlCommand; nothing else is commanded."""
+    message.fields = message.ROLL | message.PITCH | message.YAW
+    message.roll, message.pitch, message.yaw = (commands.stick[axis] for axis in ("roll", "pitch", "yaw"))
+    if commands.throttle is not None:
+        message.fields |= message.THROTTLE
+        message.throttle = commands.throttle
+    for handle, value in commands.handles.items():
+        bit, names = _HANDLES[handle]
+        message.fields |= getattr(message, bit)
+        for name in names:
+            setattr(message, name, value)
+
+
+class ScenarioClock:
+    """Scenario time from flight states: simulator time that goes on over epochs and stands in pauses."""
+
+    def __init__(self) -> None:
+        self.now = 0.0  #: [s]
+        self._last: Optional[tuple] = None
+
+    def update(self, epoch: int, sim_time: float) -> float:
+        """Takes a state's `epoch` and `sim_time_unwrapped` [s]; gives the scenario time [s]."""
+        if self._last is not None and self._last[0] == epoch:
+            self.now += max(0.0, sim_time - self._last[1])
+        self._last = (epoch, sim_time)
+        return self.now
+
+
+class RosPlayer:
+    """Plays one scenario in the ROS node of this process.
+
+    Args:
+        scenario: What to play.
+        namespace: Of the bridge, e.g. "/xplane".
+        stick: The device to play as, on `joy`; None: commands on `control/manual`.
+        log: Where to write, at the end, when what happened (JSON); None: nowhere.
+        say: Called with a line on each event.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        namespace: str,
+        stick: Optional[VirtualStick] = None,
+        log: Optional[Path] = None,
+        say: Callable[[str], None] = print,
+    ) -> None:
+        self._player = Player(scenario)
+        self._namespace = namespace.rstrip("/")
+        self._stick = stick
+        self._log = log
+        self._say = say
+        self._clock = ScenarioClock()
+        self._begin: Optional[Dict[str, float]] = None
+        self._labels: Dict[str, float] = {}
+        self._lock = threading.Lock()
+        self._commands: Optional[Commands] = None
+        self._mode, self._stall = 1, False
+        self._sequence = self._mode_sequence = 0
+        self._tapped: Dict[int, float] = {}  # button to the time of its release
+        self._actions: queue.Queue[Optional[Action]] = queue.Queue()
+        self._finished = threading.Event()
+        self._error: Optional[str] = None
+
+    def run(self) -> None:
+        """Plays to the end.
+
+        Raises:
+            ScenarioError: Something the scenario asked for was refused or did not come about.
+        """
+        import rospy
+        from sensor_msgs.msg import Joy
+        from std_msgs.msg import String
+
+        from xplane_bridge.msg import ControlCommand, ControlMode, FlightState, ModeRequest, WarningState
+
+        topic = self._namespace + "/"
+        self._label_publisher = rospy.Publisher(topic + "scenario/label", String, queue_size=10, latch=True)
+        self._mode_publisher = rospy.Publisher(topic + "control/mode_request", ModeRequest, queue_size=10)
+        if self._stick is None:
+            publisher = rospy.Publisher(topic + "control/manual", ControlCommand, queue_size=1, tcp_nodelay=True)
+        else:
+            publisher = rospy.Publisher(topic + "joy", Joy, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber(topic + "control/mode", ControlMode, self._on_mode)
+        rospy.Subscriber(topic + "mission/warnings", WarningState, self._on_warnings)
+        rospy.Subscriber(topic + "flight_state", FlightState, self._on_state, tcp_nodelay=True)
+        worker = threading.Thread(target=self._act_all, daemon=True)
+        worker.start()
+        try:
+            while not rospy.is_shutdown() and not self._finished.is_set():
+                self._publish(publisher)
+                self._finished.wait(1.0 / STICK_RATE)
+            self._actions.put(None)
+            # What the last events asked for is still seen through, while the stick is held.
+            while worker.is_alive() and not rospy.is_shutdown():
+                self._publish(publisher)
+                worker.join(1.0 / STICK_RATE)
+        finally:
+            self._write_log()
+        if self._error is not None:
+            raise ScenarioError(self._error)
+        if not self._finished.is_set():
+            raise ScenarioError(f"{self._player.scenario.name}: ended by ROS after {self._clock.now:.1f} s")
+
+    # --- in -----------------------------------------------------------------------------------------------------------
+
+    def _on_mode(self, message: Any) -> None:
+        self._mode = message.mode
+
+    def _on_warnings(self, message: Any) -> None:
+        self._stall = message.stall >= 0.5
+
+    def _on_state(self, state: Any) -> None:
+        if self._finished.is_set():
+            return
+        now = self._clock.update(state.epoch, state.sim_time_unwrapped)
+        if self._begin is None:
+            self._begin = {"epoch": int(state.epoch), "sim_time_unwrapped": float(state.sim_time_unwrapped)}
+        with self._lock:
+            self._commands = self._player.step(now, sample_of(state, self._mode, self._stall))
+            commands = self._commands
+        for action in commands.actions:
+            self._actions.put(action)
+        if commands.finished:
+            self._finished.set()
+
+    # --- out ----------------------------------------------------------------------------------------------------------
+
+    def _publish(self, publisher: Any) -> None:
+        import rospy
+
+        with self._lock:
+            commands = self._commands
+        if commands is None:
+            return
+        message = publisher.data_class()
+        message.header.stamp = rospy.Time.from_sec(time.time())
+        if self._stick is None:
+            self._sequence += 1
+            message.sequence = self._sequence
+            fill_command(commands, message)
+        else:
+            axes, buttons = self._stick.joy(commands)
+            now = time.monotonic()
+            for button, released in list(self._tapped.items()):
+                buttons[button] = int(now < released)
+            message.axes, message.buttons = axes, buttons
+        publisher.publish(message)
+
+    def _act_all(self) -> None:
+        while True:
+            action = self._actions.get()
+            if action is None:
+                return
+            try:
+                self._act(action)
+            except ScenarioError as error:
+                self._error = f"{self._player.scenario.name}, at {action.time:.1f} s: {error}"
+                self._finished.set()
+                return
+
+    def _act(self, action: Action) -> None:
+        if action.kind == "label":
+            self._labels.setdefault(action.value, action.time)
+            self._label_publisher.publish(str(action.value))
+            self._say(f"{action.time:6.1f} s  {action.value}")
+            return
+        if action.kind == "mode":
+            self._request_mode(action.value)
+            return
+        calls = {
+            "failure": self._failure,
+            "clear_failures": self._clear_failures,
+            "excitation": self._excitation,
+            "dataref": self._datarefs,
+            "command": self._command,
+        }
+        calls[action.kind](action.value)
+
+    def _request_mode(self, mode: str) -> None:
+        wanted = _MODES[mode]
+        if self._stick is None:
+            import rospy
+
+            from xplane_bridge.msg import ModeRequest
+
+            self._mode_sequence += 1
+            request = ModeRequest(sequence=self._mode_sequence, mode=wanted, requester=rospy.get_name())
+            request.header.stamp = rospy.Time.from_sec(time.time())
+            self._mode_publisher.publish(request)
+        else:
+            present = "auto" if self._mode == _MODES["auto"] else "manual"
+            button = self._stick.mode_button(mode, present)
+            if button is not None:
+                self._tapped[button] = time.monotonic() + _TAP_S
+        deadline = time.monotonic() + _MODE_WAIT_S
+        while self._mode != wanted:
+            if time.monotonic() > deadline:
+                raise ScenarioError(
+                    f"mode {mode} was asked for, but control/mode did not show it in {_MODE_WAIT_S:g} s"
+                )
+            time.sleep(0.01)
+
+    def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
+        import rospy
+
+        name = f"{self._namespace}/tx_node/{service}"
+        try:
+            rospy.wait_for_service(name, _SERVICE_WAIT_S)
+            response = rospy.ServiceProxy(name, service_type)(**fields)
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            raise ScenarioError(f"{what}: {name} cannot be called: {error}") from None
+        if not response.success:
+            raise ScenarioError(f"{what}: {response.result.message}")
+
+    def _failure(self, value: Dict[str, Any]) -> None:
+        from xplane_bridge.srv import ClearFailures, SetFailure
+
+        name = value["name"]
+        if value["clear"]:
+            self._call("clear_failures", ClearFailures, f"repairing {name}", names=[name])
+            return
+        number = value["value"]
+        self._call(
+            "set_failure",
+            SetFailure,
+            f"failure of {name}",
+            name=name,
+            kind=value["kind"],
+            has_value=number is not None,
+            value=0.0 if number is None else number,
+        )
+
+    def _clear_failures(self, _: Any) -> None:
+        from xplane_bridge.srv import ClearFailures
+
+        self._call("clear_failures", ClearFailures, "repairing everything", names=[], include_simulator=False)
+
+    def _excitation(self, value: Dict[str, Any]) -> None:
+        from xplane_bridge.srv import InjectExcitation
+
+        self._call(
+            "inject_excitation",
+            InjectExcitation,
+            f"excitation of {value['target']}",
+            kind=value["kind"],
+            target=value["target"],
+            amplitude=value["amplitude"],
+            duration=value["duration"],
+            frequency_min=value["frequency"],
+            frequency_max=value["frequency_end"],
+            seed=value["seed"],
+        )
+
+    def _datarefs(self, values: Dict[str, float]) -> None:
+        from xplane_bridge.srv import SetDataref
+
+        for path, number in values.items():
+            self._call("set_dataref", SetDataref, f"dataref {path}", name=path, values=[number])
+
+    def _command(self, name: str) -> None:
+        from xplane_bridge.srv import RunCommand
+
+        self._call("run_command", RunCommand, f"command {name}", name=name)
+
+    # --- afterwards ---------------------------------------------------------------------------------------------------
+
+    def _write_log(self) -> None:
+        if self._log is None:
+            return
+        report: Dict[str, Any] = {
+            "scenario": self._player.scenario.name,
+            "begin": self._begin,
+            "labels": self._labels,
+            "duration": self._clock.now,
+            "finished": self._finished.is_set() and self._error is None,
+            "error": self._error,
+        }
+        self._log.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")

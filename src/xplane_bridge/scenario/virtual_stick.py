@@ -1,0 +1,132 @@
+"""A joystick that is not there: turns what a scenario's stick does into axes and buttons of a device's YAML.
+
+The joystick mapper turns them back, so that a scripted flight passes through the same equations as a hand on the stick.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Tuple
+
+import numpy as np
+import yaml
+
+from .player import Commands
+from .schema import ScenarioError
+
+AXIS_COUNT, BUTTON_COUNT = 8, 12
+_GRID = np.linspace(0.0, 1.0, 2001)
+#: Handles that a device moves while something is pressed, not to a value: a script cannot say them through a stick.
+_SPRUNG = 0.0
+
+
+class VirtualStick:
+    """One device.
+
+    Args:
+        device: The content of a file of config/joysticks.
+        stick_mode: 1 or 2; None: the device's own.
+
+    Raises:
+        ScenarioError: The device lacks what every stick needs.
+    """
+
+    def __init__(self, device: Dict[str, Any], stick_mode: Optional[int] = None) -> None:
+        self.name = str(device.get("device", "joystick"))
+        mode = stick_mode or int(device.get("stick_mode", 2))
+        direct = device.get("direct", {})
+        self._axes: Dict[str, Tuple[int, Dict[str, Any]]] = {}
+        for axis in ("roll", "pitch", "yaw", "throttle"):
+            if axis in direct:
+                entry = direct[axis]
+                index = entry.get("axis", entry.get(f"axis_mode_{mode}"))
+                if index is None:
+                    raise ScenarioError(f"{self.name}: direct.{axis} names no axis")
+                self._axes[axis] = (int(index), entry)
+        for axis in ("roll", "pitch", "yaw"):
+            if axis not in self._axes:
+                raise ScenarioError(f"{self.name}: direct.{axis} is missing; a virtual stick needs it")
+        self._buttons = {key: int(entry["button"]) for key, entry in device.get("buttons", {}).items()}
+        self._mode_buttons = {key: int(value) for key, value in device.get("mode", {}).items()}
+        self._throttle_axis_known = "throttle" in self._axes
+
+    def mode_button(self, mode: str, present: str) -> Optional[int]:
+        """The button that asks for a mode; None when nothing has to be pressed.
+
+        Raises:
+            ScenarioError: The device has no button for it.
+        """
+        if mode in self._mode_buttons:
+            return self._mode_buttons[mode]
+        if "toggle" not in self._mode_buttons:
+            raise ScenarioError(f"{self.name}: there is no button for mode {mode}")
+        return None if mode == present else self._mode_buttons["toggle"]
+
+    def joy(self, commands: Commands) -> Tuple[List[float], List[int]]:
+        """Axes [-1..1] and buttons of a sensor_msgs/Joy.
+
+        Raises:
+            ScenarioError: The scenario moves something that this device cannot move to a value.
+        """
+        axes, buttons = [0.0] * AXIS_COUNT, [0] * BUTTON_COUNT
+        for axis, value in commands.stick.items():
+            index, entry = self._axes[axis]
+            axes[index] = _inverse(value, entry)
+        if commands.throttle is not None:
+            if not self._throttle_axis_known:
+                raise ScenarioError(
+                    f"{self.name}: its throttle is integrated; a scenario can only fly one with a lever"
+                )
+            index, entry = self._axes["throttle"]
+            axes[index] = _inverse(commands.throttle, entry)
+        pressed = set(commands.buttons)
+        for handle, value in commands.handles.items():
+            button = self._handle_button(handle, value)
+            if button is not None:
+                pressed.add(button)
+        for button in pressed:
+            if not 0 <= button < BUTTON_COUNT:
+                raise ScenarioError(f"{self.name}: button {button}; expected 0 to {BUTTON_COUNT - 1}")
+            buttons[button] = 1
+        return axes, buttons
+
+    def _handle_button(self, handle: str, value: float) -> Optional[int]:
+        if handle == "gear":
+            return self._buttons.get("gear_down" if value >= 0.5 else "gear_up")
+        if handle == "brakes" and "brakes" in self._buttons:
+            return self._buttons["brakes"] if value > 0.5 else None
+        if value == _SPRUNG:
+            return None
+        raise ScenarioError(
+            f"{self.name}: {handle} is moved by a hat as long as that is pressed, not to a value; "
+            "fly this scenario with commands instead of a stick"
+        )
+
+
+def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:
+    """The device of a file of config/joysticks.
+
+    Raises:
+        ScenarioError: There is no such file, or it is not a device.
+    """
+    try:
+        device = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"{file}: {error.strerror}; expected a file of config/joysticks") from None
+    except yaml.YAMLError as error:
+        raise ScenarioError(f"{file}: not YAML: {error}") from None
+    if not isinstance(device, dict):
+        raise ScenarioError(f"{file}: expected a mapping with device, direct, ...")
+    return VirtualStick(device, stick_mode)
+
+
+def _inverse(value: float, entry: Dict[str, Any]) -> float:
+    """The axis that equation (1) turns into `value`."""
+    dead_zone, expo = float(entry.get("dead_zone", 0.0)), float(entry.get("expo", 0.0))
+    # `full`: the whole travel becomes 0..1
+    delta = 2.0 * value - 1.0 if entry.get("travel") == "full" else value
+    shaped = delta / float(entry.get("scale", 1.0))
+    curve = (1.0 - expo) * _GRID + expo * _GRID**3
+    beyond = float(np.interp(min(abs(shaped), 1.0), curve, _GRID))
+    magnitude = 0.0 if beyond == 0.0 else dead_zone + beyond * (1.0 - dead_zone)
+    return float(np.copysign(magnitude, shaped))
