@@ -31,8 +31,8 @@ def parser() -> argparse.ArgumentParser:
         prog="run_scenario",
         description=(
             "Flies a scenario (config/scenarios/README.md) with the emulator through the bridge, records "
-            "DIR/flight.bag and measures the scenario's criteria in it. Exit code 0: every criterion is met; 1: one is missed, or "
-            "something the scenario asked for was refused."
+            "DIR/flight.bag and measures the scenario's criteria in it. Exit code 0: every criterion is met; 1: one is "
+            "missed, or something the scenario asked for was refused."
         ),
     )
     p.add_argument("scenario", metavar="SCENARIO", help="file, or stem of a file in config/scenarios")

@@ -72,7 +72,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         prog="scenario_player",
         description=(
             "Plays a scenario (config/scenarios/README.md) through a running bridge: stick and handles on "
-            "control/manual, modes, failures and excitations by tx_node. Exit code 1: something it asked for was refused."
+            "control/manual, modes, failures and excitations by tx_node. Exit code 1: something it asked for was "
+            "refused."
         ),
     )
     p.add_argument("scenario", metavar="SCENARIO", help="file, or stem of a file in config/scenarios")

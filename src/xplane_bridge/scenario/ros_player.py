@@ -1,5 +1,6 @@
-"""Plays a scenario from outside, through the bridge: stick and handles as commands or as a joystick, modes, failures and
-excitations as requests and service calls. rospy is imported where it is used: the rest of the package needs no ROS.
+"""Plays a scenario from outside, through the bridge.
+
+Stick and handles become commands or a joystick; modes, failures and excitations become requests and service calls.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ STICK_RATE = 50.0
 _SERVICE_WAIT_S = 15.0
 _MODE_WAIT_S = 5.0
 _TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
-_MODES = {"manual": 1, "auto": 2}
+_MODE_NAMES = {1: "manual", 2: "auto"}
 #: Player handles to fields of ControlCommand.
 _HANDLES = {
     "flaps": ("FLAPS", ("flaps",)),
@@ -218,6 +219,10 @@ class RosPlayer:
                 self._error = f"{self._player.scenario.name}, at {action.time:.1f} s: {error}"
                 self._finished.set()
                 return
+            except BaseException as error:  # a thread of its own must not die unheard
+                self._error = f"{action.kind}: {error!r}"
+                self._finished.set()
+                raise
 
     def _act(self, action: Action) -> None:
         if action.kind == "label":
@@ -237,8 +242,8 @@ class RosPlayer:
         }
         calls[action.kind](action.value)
 
-    def _request_mode(self, mode: str) -> None:
-        wanted = _MODES[mode]
+    def _request_mode(self, wanted: int) -> None:
+        mode = _MODE_NAMES[wanted]
         if self._stick is None:
             import rospy
 
@@ -249,8 +254,7 @@ class RosPlayer:
             request.header.stamp = rospy.Time.from_sec(time.time())
             self._mode_publisher.publish(request)
         else:
-            present = "auto" if self._mode == _MODES["auto"] else "manual"
-            button = self._stick.mode_button(mode, present)
+            button = self._stick.mode_button(mode, _MODE_NAMES.get(self._mode, ""))
             if button is not None:
                 self._tapped[button] = time.monotonic() + _TAP_S
         deadline = time.monotonic() + _MODE_WAIT_S
