@@ -38,6 +38,7 @@ void TxNode::advertise() {
   mode_publisher_ = advertiseTopic<ControlMode>("control/mode", 10, true);
   applied_publisher_ = advertiseTopic<AppliedCommand>("control/applied", 100);
   failure_publisher_ = advertiseTopic<FailureState>("failures/state", 10, true);
+  excitation_publisher_ = advertiseTopic<ExcitationState>("excitation/state", 10, true);
   advertiseServices();
   addDiagnostics("control", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { fillDiagnostics(&status); });
 }
@@ -107,6 +108,7 @@ void TxNode::onModeRequest(const ModeRequest& message) {
       arbiter_->onModeRequest({message.sequence, message.mode, message.requester, message.header.stamp.toSec()}, time);
   if (outcome == core::RequestOutcome::kIgnored) return;
   if (arbiter_->status().mode != before) {
+    if (excitation_) excitation_->abort("the mode changed");
     sendControls(time);
   } else {
     publishMode();
@@ -180,7 +182,14 @@ core::ChannelSet TxNode::channelsToSend(const core::ArbitratedControls& controls
 
 void TxNode::sendControls(double time) {
   send_pending_ = false;
-  const core::ArbitratedControls& controls = arbiter_->step(time);
+  const core::FlightMode before = arbiter_->status().mode;
+  const core::ArbitratedControls& controls =
+      arbiter_->step(time, excitation_ ? excitation_->excitation() : core::ChannelExcitation{});
+  if (excitation_ && excitation_->running()) {
+    const core::ChannelSet excited = excitation_->channels();
+    if (arbiter_->status().mode != before) excitation_->abort("the mode changed");
+    if (excited.any() && (excited & controls.active).none()) excitation_->abort("nobody commands the axis any more");
+  }
   publishMode();
   if (!overrides_) return;
   tellStick(nullptr);  // until it is sent
@@ -276,6 +285,7 @@ void TxNode::onLinkState(const core::LinkStatus& status) {
     link_status_ = status;
     surfaces_->onLink(status);
     failures_->onLink(status);
+    if (status.state == core::LinkState::kLost) excitation_->abort("the link is lost");
     arbiter_->setFlowing(status.state == core::LinkState::kConnected, time);
     if (status.version) {
       const auto generation = core::generationOf(*status.version);
@@ -302,6 +312,8 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
     if (watch_.sim_time < before - kRestartStep) came_back_ = true;
     sim_time_ = watch_.sim_time;
     failures_->onFrame(watch_);
+    // The signal goes out with every frame, however rarely commands come.
+    if (excitation_->onFrame(watch_)) sendControls(now());
     if (watch_.crashed && !crashed) logEvent(Event::CRASH, "the aircraft has crashed");
   } else if (group == identity_group_) {
     if (identity_.add(view, info.stamp_ns)) onIdentity();
@@ -371,6 +383,7 @@ void TxNode::stopInputs() {
   {
     std::lock_guard<std::mutex> lock(mutex_);
     worker_ends_ = true;
+    if (excitation_) excitation_->abort("tx_node ends");
   }
   work_wanted_.notify_all();
   if (worker_.joinable()) worker_.join();
@@ -389,6 +402,7 @@ void TxNode::publishFinalState() {
   std::lock_guard<std::mutex> lock(mutex_);
   publishMode();
   if (failures_) failures_->publish();
+  if (excitation_) excitation_->publish();
 }
 
 void TxNode::joinThreads() {}

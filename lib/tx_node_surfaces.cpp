@@ -1,4 +1,5 @@
-// tx_node's side of single surfaces and failures: topics and services to SurfaceControl and FailureKeeper.
+// tx_node's side of single surfaces, failures and excitations: topics and services to SurfaceControl, FailureKeeper and
+// ExcitationKeeper.
 
 #include <cmath>
 
@@ -25,6 +26,17 @@ void TxNode::makeSurfaceControl() {
                                               [this](const std::string& text, const std::string& who, bool success) {
                                                 logEvent(Event::FAILURE, text, who, success);
                                               });
+  excitation_ = std::make_unique<ExcitationKeeper>(
+      surfaces_.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg, excitation_publisher_,
+      [this](const std::string& text, const std::string& who, bool success) {
+        logEvent(Event::EXCITATION, text, who, success);
+      });
+}
+
+void TxNode::serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!excitation_) return;
+  excitation_->inject(request, name() + "/inject_excitation", watch_, refusalToFly(), read_back_channels_, response);
 }
 
 void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
@@ -69,6 +81,11 @@ void TxNode::advertiseFailureServices() {
   advertiseService<ClearFailures::Request, ClearFailures::Response>(
       name() + "/clear_failures", [this](const ClearFailures::Request& request, ClearFailures::Response& response) {
         failures_->clear(request, name() + "/clear_failures", &response);
+      });
+  advertiseService<InjectExcitation::Request, InjectExcitation::Response>(
+      name() + "/inject_excitation",
+      [this](const InjectExcitation::Request& request, InjectExcitation::Response& response) {
+        serveInjectExcitation(request, &response);
       });
   addDiagnostics("surfaces", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
     if (surfaces_) surfaces_->fillDiagnostics(&status);

@@ -28,6 +28,7 @@
 #include "xplane_bridge/core/control_channels.hpp"
 #include "xplane_bridge/core/flight_watch.hpp"
 #include "xplane_bridge/event_log.hpp"
+#include "xplane_bridge/excitation_keeper.hpp"
 #include "xplane_bridge/failure_keeper.hpp"
 #include "xplane_bridge/guardian.hpp"
 #include "xplane_bridge/override_keeper.hpp"
@@ -92,6 +93,7 @@ class TxNode : public BaseNode {
   void tellStick(const core::ArbitratedControls* sent);
   void publishSurfacesApplied();
   void advertiseFailureServices();
+  void serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response);
 
   // Services (tx_node_services.cpp).
   void advertiseServices();
@@ -114,6 +116,7 @@ class TxNode : public BaseNode {
   std::unique_ptr<OverrideKeeper> overrides_;
   std::unique_ptr<SurfaceControl> surfaces_;
   std::unique_ptr<FailureKeeper> failures_;
+  std::unique_ptr<ExcitationKeeper> excitation_;  // guarded by mutex_
 
   mutable std::mutex mutex_;
   std::unique_ptr<core::ControlArbiter> arbiter_;
@@ -146,6 +149,7 @@ class TxNode : public BaseNode {
   ros::Publisher applied_publisher_;
   ros::Publisher mode_publisher_;
   ros::Publisher failure_publisher_;
+  ros::Publisher excitation_publisher_;
 
   std::thread worker_;
   std::condition_variable work_wanted_;

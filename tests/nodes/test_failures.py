@@ -20,6 +20,7 @@ from xplane_bridge.harness.tx_bench import (
     call,
     journal_entries,
     tx_params,
+    write_mixing,
 )
 
 OK, ACCEPTED, REFUSED, NOT_SUPPORTED, NO_LINK, TIMEOUT = range(6)
@@ -57,37 +58,6 @@ WATCHED = (
     GENERATOR,
     BATTERY,
 )
-
-#: How the emulator's twin moves its surfaces (docs/emulator.md), by hand: 15 deg down and 25 up, 13 and 18, 27.
-LAW = {  # name: slopes, travel
-    "aileron1_wing2_left": ({"roll+": 15.0, "roll-": 25.0}, (-25.0, 15.0)),
-    "aileron1_wing2_right": ({"roll+": -25.0, "roll-": -15.0}, (-25.0, 15.0)),
-    "elevator1_left": ({"pitch+": -18.0, "pitch-": -13.0}, (-18.0, 13.0)),
-    "elevator1_right": ({"pitch+": -18.0, "pitch-": -13.0}, (-18.0, 13.0)),
-    "rudder1_fin1": ({"yaw+": 27.0, "yaw-": 27.0}, (-27.0, 27.0)),
-    "flap1_wing1_left": ({"flap1": 42.0}, (0.0, 42.0)),
-    "flap1_wing1_right": ({"flap1": 42.0}, (0.0, 42.0)),
-}
-
-
-def write_mixing(world):
-    """The mixing file of the emulator's twin, as docs/mixing_file.md describes it."""
-    folder = world.folder / "ros_home" / "xplane_bridge" / "mixing"
-    folder.mkdir(parents=True)
-    surfaces = {
-        name: {"slopes_deg": slopes, "residual_deg": 0.01, "low_deg": travel[0], "high_deg": travel[1]}
-        for name, (slopes, travel) in LAW.items()
-    }
-    model = {
-        "format": "xplane_bridge mixing",
-        "version": 1,
-        "aircraft": "DA62",
-        "samples": 300,
-        "level": {"trim_roll": 0.0, "trim_pitch": 0.0, "trim_yaw": 0.0, "speedbrake": 0.0, "flap2": 0.0},
-        "surfaces": surfaces,
-    }
-    (folder / "DA62.yaml").write_text(json.dumps(model), encoding="utf-8")
-    return folder / "DA62.yaml"
 
 
 def fly(world, *emulator_options, known=True, **params):

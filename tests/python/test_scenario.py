@@ -273,7 +273,7 @@ def test_a_stick_movement_ends_the_hold_of_its_axis_and_a_hold_the_one_of_its_gr
     ("kind", "times", "values"),
     [
         ("doublet", (0.0, 0.9, 1.1, 1.9, 2.1), (1, 1, -1, -1, 0)),
-        ("3211", (0.1, 0.8, 0.9, 1.4, 1.5, 1.7, 1.75, 1.99), (1, 1, -1, -1, 1, 1, -1, -1)),
+        ("3-2-1-1", (0.1, 0.8, 0.9, 1.4, 1.5, 1.7, 1.75, 1.99), (1, 1, -1, -1, 1, 1, -1, -1)),
     ],
 )
 def test_steps(kind, times, values):

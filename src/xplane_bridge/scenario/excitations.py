@@ -24,7 +24,7 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
     kind = parameters["kind"]
     if kind == "doublet":
         return amplitude if part < 0.5 else -amplitude
-    if kind == "3211":
+    if kind == "3-2-1-1":
         return amplitude if part < 3 / 7 or 5 / 7 <= part < 6 / 7 else -amplitude
     low, high = parameters["frequency"], parameters["frequency_end"]
     if kind == "chirp":

@@ -67,7 +67,7 @@ FAILURE_KINDS = (
     "gone",
     "failed",
 )
-EXCITATION_KINDS = ("doublet", "3211", "multisine", "chirp")
+EXCITATION_KINDS = ("doublet", "3-2-1-1", "multisine", "chirp")
 MODES = {"manual": 1, "auto": 2}
 
 
