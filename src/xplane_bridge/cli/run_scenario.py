@@ -21,6 +21,7 @@ from xplane_bridge.scenario import Scenario, ScenarioError
 from xplane_bridge.scenario.judging import judge
 
 _PLAYER = "scenario_player"
+_LONGEST_S = 600.0  # a scenario that has not ended by then waits for something that never comes
 #: `start` of a scenario to the emulator's options.
 _START = {"latitude": "--lat", "longitude": "--lon", "altitude": "--alt", "heading": "--heading", "speed": "--speed"}
 
@@ -43,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--controller", metavar="COMMAND", help="program that flies in mode auto, started beside the bridge")
     p.add_argument("--camera", action="store_true", help="draw and record the cockpit view")
     p.add_argument("--headless", action="store_true", help="draw it, but not on this screen")
-    p.add_argument("--timeout", type=float, default=600.0, metavar="S", help="longest flight [s] (%(default)g)")
+    p.add_argument("--duration", type=float, metavar="S", help="end after so long; needed where a scenario repeats")
     p.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulator's turbulence and faults")
     return p
 
@@ -54,8 +55,8 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
     aircraft = args.aircraft or (scenario.aircraft[0] if scenario.aircraft else "fixed_wing")
     if scenario.aircraft and aircraft not in scenario.aircraft:
         raise ScenarioError(f"{scenario.name} is for {', '.join(scenario.aircraft)}, not for {aircraft}")
-    if scenario.repeat_every is not None:
-        raise ScenarioError(f"{scenario.name} repeats for ever (repeat_every); run_scenario needs one that ends")
+    if scenario.repeat_every is not None and args.duration is None:
+        raise ScenarioError(f"{scenario.name} repeats for ever (repeat_every): give --duration")
     options: List[str] = ["--fps", "60", "--seed", str(args.seed)]
     for key, value in scenario.start.items():
         options += [_START[key], f"{value:g}"]
@@ -74,7 +75,14 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
         command += ["--joystick", "--joy-config", args.joystick]
     programs[_PLAYER] = command
     return FlightPlan(
-        output, args.timeout, aircraft, args.transport, options, launch_args, programs=programs, player=_PLAYER
+        output,
+        args.duration or _LONGEST_S,
+        aircraft,
+        args.transport,
+        options,
+        launch_args,
+        programs=programs,
+        player=_PLAYER,
     )
 
 
@@ -100,6 +108,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     with interrupted_by_signals("run_scenario"), screen(plan.logs, args.headless or not args.camera):
         fly(plan, say=lambda text: print(f"run_scenario: {text}", file=sys.stderr))
     played = json.loads((plan.output / "played.json").read_text(encoding="utf-8"))
+    if not played["finished"] and args.duration is None:
+        raise ScenarioError(f"{scenario.name} has not ended within {_LONGEST_S:g} s")
     with Bags(plan.bag) as bags:
         scores = judge(scenario, read_flight(bags), played)
     report = {"scenario": scenario.name, "played": played, "criteria": [s._asdict() for s in scores]}

@@ -74,9 +74,7 @@ class VirtualStick:
             axes[index] = _inverse(value, entry)
         if commands.throttle is not None:
             if not self._throttle_axis_known:
-                raise ScenarioError(
-                    f"{self.name}: its throttle is integrated; a scenario can only fly one with a lever"
-                )
+                raise ScenarioError(f"{self.name}: its throttle has no lever, which a scenario needs")
             index, entry = self._axes["throttle"]
             axes[index] = _inverse(commands.throttle, entry)
         pressed = set(commands.buttons)

@@ -1,0 +1,92 @@
+"""run_scenario as a control researcher's CI calls it: exit codes, the recording, the scores."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.resources import program
+
+MET = """
+name: short
+aircraft: fixed_wing
+start: {altitude: 800, speed: 65, heading: 90}
+criteria:
+  turns:   {measure: maximum, of: roll, from: turn, to: back, above: 15}
+  levels:  {measure: settling, of: roll, target: 0, band: 5, from: back, below: 5}
+  begins:  {measure: maximum, of: altitude, to: turn, below: 830}
+events:
+  - {at: 0, mode: manual, hold: {roll: 0, climb: 0, speed: 65}}
+  - {at: 2, hold: {roll: 25}, label: turn}
+  - {at: 5, excitation: {kind: doublet, target: pitch, amplitude: 0.05, duration: 1}}
+  - {at: 6, failure: {name: pitot_1}, hold: {roll: 0}, label: back}
+  - {at: 8, clear_failures: true, mode: auto}
+  - {at: 9, mode: manual}
+  - {at: 12, end: true}
+"""
+MISSED = """
+name: missed
+criteria:
+  climbs: {measure: maximum, of: altitude, above: 5000}
+events: [{at: 0, hold: {roll: 0, climb: 0}}, {at: 2, end: true}]
+"""
+REFUSED = """
+name: refused
+events:
+  - {at: 1, failure: {name: aileron1_wing2_left, kind: stuck, value: 5}}
+  - {at: 3, end: true}
+"""
+
+
+def run(tmp_path, text, *options):
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text(text, encoding="utf-8")
+    command = [sys.executable, str(program("run_scenario")), str(scenario), "--output", str(tmp_path / "out"), *options]
+    # In a process of its own: one process is one ROS node.
+    return subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
+
+
+@pytest.mark.parametrize("options", [(), ("--joystick", "logitech_extreme_3d_pro")], ids=["commands", "joystick"])
+def test_a_flight_that_meets_its_criteria(tmp_path, options):
+    done = run(tmp_path, MET, *options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "short: 3 of 3 criteria met" in done.stdout
+    report = json.loads((tmp_path / "out" / "scores.json").read_text(encoding="utf-8"))
+    assert report["played"]["finished"]
+    assert report["played"]["labels"]["turn"] == pytest.approx(2.0, abs=0.1)
+    assert {c["name"]: c["passed"] for c in report["criteria"]} == {"turns": True, "levels": True, "begins": True}
+    with Bags(tmp_path / "out" / "flight.bag") as bags:
+        failures = bags.read("/xplane/failures/state")["names"]
+        assert any("pitot_1" in names for names in failures)
+        assert len(failures[-1]) == 0
+        kinds = bags.read("/xplane/excitation/state")
+        assert "doublet" in list(kinds["kind"])
+        assert list(kinds["result"])[-1] == "done"
+        assert set(bags.read("/xplane/control/mode")["mode"]) >= {1, 2}
+
+
+def test_a_missed_criterion_is_exit_code_1(tmp_path):
+    done = run(tmp_path, MISSED)
+    assert done.returncode == 1
+    assert "MISSED  climbs" in done.stdout
+
+
+def test_a_refused_request_is_exit_code_1_and_said(tmp_path):
+    done = run(tmp_path, REFUSED)
+    assert done.returncode == 1
+    assert "not identified yet" in done.stderr
+
+
+def test_what_cannot_be_flown_is_said(tmp_path):
+    done = run(tmp_path, MISSED.replace("name: missed", "name: missed\nrepeat_every: 10"))
+    assert done.returncode == 1
+    assert "give --duration" in done.stderr
+    done = run(
+        tmp_path, MISSED.replace("name: missed", "name: missed\naircraft: fixed_wing"), "--aircraft", "multirotor"
+    )
+    assert done.returncode == 1
+    assert "is for fixed_wing, not for multirotor" in done.stderr

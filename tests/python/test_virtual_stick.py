@@ -1,0 +1,90 @@
+"""The joystick that is not there: its axes must come out of the mapper's equation (1) as what the scenario wants."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from xplane_bridge.resources import config_file
+from xplane_bridge.scenario import Commands, ScenarioError
+from xplane_bridge.scenario.virtual_stick import VirtualStick, load_stick
+
+DEVICES = sorted(file.stem for file in config_file("joysticks", "README.md").parent.glob("*.yaml"))
+LEVER = "logitech_extreme_3d_pro"
+
+
+def device(name):
+    return yaml.safe_load(config_file("joysticks", f"{name}.yaml").read_text(encoding="utf-8"))
+
+
+def equation_1(j, entry):
+    """delta = xi * j after dead zone and expo, and the travel it is mapped to (config/joysticks/README.md)."""
+    dead_zone, expo = entry.get("dead_zone", 0.0), entry.get("expo", 0.0)
+    beyond = max(0.0, abs(j) - dead_zone) / (1.0 - dead_zone)
+    shaped = ((1.0 - expo) * beyond + expo * beyond**3) * (1.0 if j >= 0.0 else -1.0)
+    delta = entry.get("scale", 1.0) * shaped
+    return 0.5 * (1.0 + delta) if entry.get("travel") == "full" else delta
+
+
+@pytest.mark.parametrize("name", DEVICES)
+@pytest.mark.parametrize("mode", [1, 2])
+@pytest.mark.parametrize("value", [-1.0, -0.37, 0.0, 0.02, 0.5, 1.0])
+def test_axes_are_the_inverse_of_the_mappers_equation(name, mode, value):
+    content = device(name)
+    stick = VirtualStick(content, mode)
+    axes, _ = stick.joy(Commands(stick={"roll": value, "pitch": -value, "yaw": 0.5 * value}))
+    for axis, wanted in (("roll", value), ("pitch", -value), ("yaw", 0.5 * value)):
+        entry = content["direct"][axis]
+        index = entry.get("axis", entry.get(f"axis_mode_{mode}"))
+        assert equation_1(axes[index], entry) == pytest.approx(wanted, abs=2e-3)
+
+
+@pytest.mark.parametrize("throttle", [0.0, 0.3, 1.0])
+def test_a_lever_is_moved_over_its_whole_travel(throttle):
+    content = device(LEVER)
+    axes, _ = VirtualStick(content).joy(Commands(throttle=throttle))
+    entry = content["direct"]["throttle"]
+    assert equation_1(axes[entry["axis"]], entry) == pytest.approx(throttle, abs=2e-3)
+
+
+def test_buttons_for_modes_gear_and_brakes():
+    stick = VirtualStick(device(LEVER))
+    assert stick.mode_button("auto", "manual") == 11
+    assert stick.mode_button("manual", "auto") == 10
+    _, buttons = stick.joy(Commands(handles={"gear": 1.0, "brakes": 1.0}, buttons={3}))
+    assert [i for i, pressed in enumerate(buttons) if pressed] == [1, 3, 7]
+    toggling = VirtualStick({**device(LEVER), "mode": {"toggle": 0}})
+    assert toggling.mode_button("auto", "manual") == 0
+    assert toggling.mode_button("auto", "auto") is None
+
+
+@pytest.mark.parametrize(
+    ("content", "commands", "part"),
+    [
+        ({"mode": {}}, None, "no button for mode auto"),
+        ({"direct": {"roll": {"axis": 0}}}, None, "direct.pitch is missing"),
+        ({}, Commands(handles={"flaps": 0.5}), "flaps is moved by a hat"),
+        ({}, Commands(buttons={40}), "button 40"),
+    ],
+)
+def test_what_a_device_cannot_do_is_said(content, commands, part):
+    def use():
+        stick = VirtualStick({**device(LEVER), **content})
+        return stick.mode_button("auto", "manual") if commands is None else stick.joy(commands)
+
+    with pytest.raises(ScenarioError, match=part):
+        use()
+
+
+def test_a_throttle_without_a_lever_is_said():
+    stick = VirtualStick(device("xbox"))
+    with pytest.raises(ScenarioError, match="throttle has no lever"):
+        stick.joy(Commands(throttle=0.5))
+
+
+def test_files_that_are_no_devices_are_said(tmp_path):
+    with pytest.raises(ScenarioError, match=r"missing\.yaml"):
+        load_stick(tmp_path / "missing.yaml")
+    (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
+    with pytest.raises(ScenarioError, match="expected a mapping"):
+        load_stick(tmp_path / "list.yaml")
