@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
+import pandas as pd
 import pytest
 
 from xplane_bridge.bags import Bags
+from xplane_bridge.emulator.renderer import StripError, read_strip
 from xplane_bridge.harness import ManagedProcess, flight_check, wait_until
 from xplane_bridge.harness.ros import ros_environment
 from xplane_bridge.resources import program
@@ -41,6 +46,73 @@ def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: st
     for key in ("attitude", "surfaces", "engines", "images"):
         section = report[report.index(f'<section id="{key}">') :].split("</section>")[0]
         assert "Not shown" not in section, key
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A demo's bag, for tests that read it."""
+    folder = tmp_path_factory.mktemp("recording")
+    with demo(folder, "--duration", "6") as run:
+        assert run.wait(DEMO_TIMEOUT_S) == 0, run.output()
+    return folder / "out" / "flight.bag"
+
+
+def export(bag: Path, form: str, out: Path) -> Path:
+    command = [sys.executable, str(program("bag_export")), str(bag), "--format", form, "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return out
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_tables_of_the_demo_read_back_with_pandas(recording: Path, tmp_path: Path, form: str) -> None:
+    file = export(recording, form, tmp_path / form) / f"flight.{form}"
+    frame = pd.read_csv(file, float_precision="round_trip") if form == "csv" else pd.read_parquet(file)
+    with Bags(recording) as bags:
+        states = bags.read("/xplane/flight_state", ["header.stamp", "roll_deg", "altitude_msl", "sim_time"])
+    assert frame["stamp_ns"].tolist() == states.stamp.tolist()
+    np.testing.assert_array_equal(frame["roll_deg"], states["roll_deg"])
+    np.testing.assert_array_equal(frame["altitude_msl_m"], states["altitude_msl"])
+    norms = sum(frame[f"orientation_{axis}"] ** 2 for axis in "xyzw")
+    np.testing.assert_allclose(norms, 1.0, atol=1e-9)
+
+
+def test_trajectories_of_the_demo_are_what_evo_reads(recording: Path, tmp_path: Path) -> None:
+    file_interface = pytest.importorskip("evo.tools.file_interface", reason="evo needs Python 3.10")
+    tum = file_interface.read_tum_trajectory_file(str(export(recording, "tum", tmp_path / "tum") / "flight.tum"))
+    euroc = file_interface.read_euroc_csv_trajectory(str(export(recording, "euroc", tmp_path / "euroc") / "flight.csv"))
+    with Bags(recording) as bags:
+        odom = bags.read("/xplane/odom", [f"pose.pose.position.{axis}" for axis in "xyz"])
+    positions = np.stack([odom[f"pose.pose.position.{axis}"] for axis in "xyz"], axis=1)
+    for trajectory in (tum, euroc):
+        assert trajectory.check()[0]
+        # A few states before the first or after the last odometry message may be in the one and not in the other.
+        assert abs(len(trajectory.timestamps) - len(positions)) <= 3
+        length = trajectory.path_length
+        flown = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+        assert length == pytest.approx(flown, rel=0.02)
+        assert length > 200.0, "70 m/s for some seconds"
+
+
+def test_images_of_the_demo_read_back_with_opencv_and_carry_their_states(recording: Path, tmp_path: Path) -> None:
+    out = export(recording, "images", tmp_path / "images")
+    labels = pd.read_csv(out / "flight" / "labels.csv", float_precision="round_trip")
+    assert len(labels) > 60
+    assert set(labels["split"]) == {"train", "validation"}
+    errors = []
+    for file, sim_time in zip(labels["file"], labels["state_sim_time_s"]):
+        image = cv2.imread(str(out / "flight" / file))
+        assert image.shape == (480, 640, 3)
+        with contextlib.suppress(StripError):
+            errors.append(abs(read_strip(image).sim_time - sim_time))
+    assert len(errors) > 0.9 * len(labels), "the strip survives JPEG and the way through the bag"
+    # How far a picture lags behind its frame depends on how busy the machine is; test_capture_node.py looks at that.
+    assert np.median(errors) < 0.5
+    with Bags(recording) as bags:
+        frames = bags.read("/xplane/camera/frame_state", ["header.stamp", "state.sim_time", "state.roll_deg"])
+    rows = np.searchsorted(frames.stamp, labels["stamp_ns"])
+    np.testing.assert_array_equal(frames.stamp[rows], labels["stamp_ns"])
+    np.testing.assert_array_equal(frames["state.roll_deg"][rows], labels["state_roll_deg"])
 
 
 def test_ctrl_c_ends_the_demo_and_all_it_has_started(tmp_path: Path) -> None:
