@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import os
 import sys
-from typing import Callable, Sequence
+from typing import Any, Callable, Sequence
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -33,3 +34,20 @@ def guarded(main: Main) -> Main:
             return 0
 
     return wrapped
+
+
+class NoRosError(XplaneBridgeError):
+    """A program that is a ROS node was started where there is no ROS."""
+
+
+def rospy_module() -> Any:
+    """The module rospy.
+
+    Raises:
+        NoRosError: It is not there.
+    """
+    try:
+        return importlib.import_module("rospy")
+    except ModuleNotFoundError:
+        msg = "rospy is not there: source ROS's setup.bash (on Debian: apt-get install python3-rospy)"
+        raise NoRosError(msg) from None

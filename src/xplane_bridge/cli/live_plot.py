@@ -7,7 +7,7 @@ import re
 import time
 from typing import Any, Callable, NamedTuple, Sequence
 
-from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.entry import guarded, rospy_module
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.plotting.live import LiveWindow, RollingSeries
 
@@ -96,11 +96,7 @@ def getter(path: str, message_type: Any) -> Callable[[Any], float]:
 @guarded
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program."""
-    try:
-        import rospy
-    except ModuleNotFoundError:
-        msg = "rospy is not there: source ROS's setup.bash (on Debian: apt-get install python3-rospy)"
-        raise LivePlotError(msg) from None
+    rospy = rospy_module()
     p = parser()
     args = p.parse_args(rospy.myargv(argv)[1:] if argv is None else list(argv))
     if not args.window > 0:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import List, Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.entry import guarded, rospy_module
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
 from xplane_bridge.scenario.ros_player import RosPlayer
@@ -58,9 +58,7 @@ def play(
         if file.suffix != ".yaml":
             file = config_file("joysticks", f"{args.joy_config}.yaml")
         stick = load_stick(file, args.stick_mode)
-    import rospy
-
-    rospy.init_node(node, argv=None if argv is None else list(argv))
+    rospy_module().init_node(node, argv=None if argv is None else list(argv))
     RosPlayer(scenario, args.namespace, stick, log, say=lambda text: print(text, flush=True)).run()
     return 0
 
