@@ -125,6 +125,18 @@ SimLink::Impl::Impl(SimLinkOptions options, SimLinkCallbacks callbacks, Clock cl
   if (wake_fd_ < 0) {
     throw SocketError(std::string("cannot make an eventfd: ") + std::strerror(errno), errno);
   }
+  epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
+  if (epoll_fd_ < 0) {
+    const int error_number = errno;
+    close(wake_fd_);
+    throw SocketError(std::string("cannot make an epoll: ") + std::strerror(error_number), error_number);
+  }
+  watch(wake_fd_);
+  for (const SocketPtr& socket : {control_socket_, beacon_socket_, data_socket_, rpos_socket_, xpc_socket_}) {
+    if (socket != nullptr) {
+      watch(socket->fd());
+    }
+  }
   started_ns_ = clock_.steady_ns();
   now_ns_ = started_ns_;
 }
@@ -132,6 +144,9 @@ SimLink::Impl::Impl(SimLinkOptions options, SimLinkCallbacks callbacks, Clock cl
 SimLink::Impl::~Impl() {
   if (wake_fd_ >= 0) {
     close(wake_fd_);
+  }
+  if (epoll_fd_ >= 0) {
+    close(epoll_fd_);
   }
 }
 
@@ -221,8 +236,10 @@ void SimLink::Impl::replaceGroup(GroupId id, RrefGroup group) {
         std::find_if(groups_.begin(), groups_.end(), [&](const Group& each) { return each.id == added->id; });
     if (old != groups_.end()) {
       stopGroup(*old);
+      unwatch(old->socket->fd());
       groups_.erase(old);
     }
+    watch(added->socket->fd());
     if (monitor_.alive()) {
       added->subscription.restart(now_ns_);
     }
@@ -239,6 +256,7 @@ void SimLink::Impl::removeGroup(GroupId id) {
     const auto old = std::find_if(groups_.begin(), groups_.end(), [id](const Group& each) { return each.id == id; });
     if (old != groups_.end()) {
       stopGroup(*old);
+      unwatch(old->socket->fd());
       groups_.erase(old);
     }
   });
@@ -250,6 +268,7 @@ void SimLink::Impl::setRposRate(std::int32_t rate_hz) {
   post([this, rate_hz, socket] {
     if (rpos_socket_ == nullptr) {
       rpos_socket_ = socket;
+      watch(socket->fd());
     }
     rpos_rate_hz_ = rate_hz;
     next_rpos_request_ns_ = now_ns_;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <poll.h>
+#include <sys/epoll.h>
 
 #include <atomic>
 #include <deque>
@@ -77,6 +77,8 @@ class SimLink::Impl {
   // Receiving.
   void waitForInput(int timeout_ms);
   bool hasInput(int fd) const;  // as the last waitForInput() found it
+  void watch(int fd);
+  void unwatch(int fd);
   void runCommands();
   void post(std::function<void()> command);
   void wake();
@@ -141,7 +143,8 @@ class SimLink::Impl {
   int wake_fd_ = -1;
   std::thread thread_;
   std::vector<std::uint8_t> buffer_;
-  std::vector<pollfd> poll_;
+  int epoll_fd_ = -1;
+  std::vector<epoll_event> ready_;  // as the last waitForInput() found them
   SocketPtr control_socket_;
   SocketPtr beacon_socket_;
   SocketPtr data_socket_;

@@ -1,9 +1,13 @@
 #include "sim_link_impl.hpp"
 
+#include <sys/epoll.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <string>
 
 namespace xplane_bridge::core {
 namespace {
@@ -13,25 +17,26 @@ constexpr std::int64_t kRposSilenceNs = 500 * kNanosecondsPerMillisecond;
 
 }  // namespace
 
+void SimLink::Impl::watch(int fd) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.fd = fd;
+  if (epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, fd, &event) != 0) {
+    log_(LogLevel::kError, std::string("a socket cannot be waited for: ") + std::strerror(errno));
+  }
+}
+
+// A removed group's socket may live on for requests that are still to be sent; nobody reads it any more.
+void SimLink::Impl::unwatch(int fd) { epoll_ctl(epoll_fd_, EPOLL_CTL_DEL, fd, nullptr); }
+
 void SimLink::Impl::waitForInput(int timeout_ms) {
-  poll_.clear();
-  poll_.push_back({wake_fd_, POLLIN, 0});
-  poll_.push_back({control_socket_->fd(), POLLIN, 0});
-  for (const SocketPtr& socket : {beacon_socket_, data_socket_, rpos_socket_, xpc_socket_}) {
-    if (socket != nullptr) {
-      poll_.push_back({socket->fd(), POLLIN, 0});
-    }
-  }
-  for (const Group& group : groups_) {
-    poll_.push_back({group.socket->fd(), POLLIN, 0});
-  }
-  if (poll(poll_.data(), poll_.size(), timeout_ms) <= 0) {
-    poll_.clear();  // interrupted: what it holds is not an answer
-    return;
-  }
-  if ((poll_[0].revents & POLLIN) != 0) {
-    std::uint64_t count = 0;
-    [[maybe_unused]] const ssize_t size = ::read(wake_fd_, &count, sizeof(count));
+  constexpr std::size_t kMostAtOnce = 64;
+  ready_.resize(kMostAtOnce);
+  const int count = epoll_wait(epoll_fd_, ready_.data(), static_cast<int>(ready_.size()), timeout_ms);
+  ready_.resize(static_cast<std::size_t>(std::max(0, count)));  // interrupted: nothing
+  if (hasInput(wake_fd_)) {
+    std::uint64_t woken = 0;
+    [[maybe_unused]] const ssize_t size = ::read(wake_fd_, &woken, sizeof(woken));
   }
 }
 
@@ -47,8 +52,7 @@ void SimLink::Impl::runCommands() {
 }
 
 bool SimLink::Impl::hasInput(int fd) const {
-  const auto found = std::find_if(poll_.begin(), poll_.end(), [fd](const pollfd& entry) { return entry.fd == fd; });
-  return found != poll_.end() && found->revents != 0;
+  return std::any_of(ready_.begin(), ready_.end(), [fd](const epoll_event& event) { return event.data.fd == fd; });
 }
 
 template <typename Handler>

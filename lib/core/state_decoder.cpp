@@ -60,6 +60,10 @@ StateDecoder::StateDecoder(FieldGroup group, Transport transport, XPlaneVersion 
     if (field.store == nullptr) continue;
     Plan plan;
     plan.field = &field;
+    plan.store = field.store;
+    plan.valid = field.valid;
+    plan.per_engine = field.per_engine;
+    plan.is_engine_count = field.is_engine_count;
     const ResolvedRow row = transport == Transport::kData ? resolve(field.row, version) : ResolvedRow{};
     if (row.row >= 0) {
       plan.row = row.row;
@@ -107,24 +111,23 @@ std::uint32_t StateDecoder::decode(const std::vector<float>& dataref_values, con
   std::uint32_t known_bits = all_bits_;
   int engines = kMaxEngines;
   for (const Plan& plan : plans_) {
-    const FieldSpec& field = *plan.field;
     const bool from_row = plan.row >= 0;
     const bool arrived =
         !from_row || (rows != nullptr && rows->has(plan.row) && rows->receiveTime(plan.row) >= oldest_ns);
-    const int wanted = field.per_engine ? std::min(plan.count, engines) : plan.count;
+    const int wanted = plan.per_engine ? std::min(plan.count, engines) : plan.count;
     std::array<double, kMaxFieldElements> values;
     int known = 0;
     if (arrived && wanted > 0) {
       const float* wire = (from_row ? rows->values(plan.row) : dataref_values.data()) + plan.first;
       known = convert(plan, wire, wanted, values.data());
-      field.store(target, values.data(), wanted);
+      plan.store(target, values.data(), wanted);
     }
-    if (field.is_engine_count) {
+    if (plan.is_engine_count) {
       engines = known > 0 ? static_cast<int>(std::clamp(values[0], 0.0, static_cast<double>(kMaxEngines))) : 0;
     }
     // Of an array by engine every engine must be known; other arrays may be longer than what the aircraft has.
-    const bool complete = field.per_engine ? (known > 0 && known == wanted) : known > 0;
-    if (!complete) known_bits &= ~field.valid;
+    const bool complete = plan.per_engine ? (known > 0 && known == wanted) : known > 0;
+    if (!complete) known_bits &= ~plan.valid;
   }
   return known_bits;
 }

@@ -103,6 +103,11 @@ class StateDecoder {
     bool special = false;   ///< bit field, blanks or a stride: not plain numbers side by side
     int count = 0;          ///< 0: nothing carries it
     Conversion conversion;
+    // Of the field, side by side with the rest: a decoder walks its plans for every frame.
+    FieldStore store = nullptr;
+    std::uint32_t valid = 0;
+    bool per_engine = false;
+    bool is_engine_count = false;
   };
 
   /// @return how many of the elements are known
