@@ -1,0 +1,125 @@
+"""attitude_hold: a controller to start from. Holds roll or heading, pitch or altitude, and airspeed of the light twin.
+
+Copy it, and put your own law into `AttitudeHold.fly`. It listens to flight_state and answers each with a ControlCommand
+on control/auto; tx_node sends that while the mode is AUTO. When states stop coming, commands stop with them, and the
+failsafe of config/aircraft/<name>.yaml takes over.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import Any, Dict, Optional, Sequence
+
+from xplane_bridge.cli.entry import guarded, rospy_module
+from xplane_bridge.cli.scenario_player import ros_arguments
+from xplane_bridge.topics import NAMESPACE
+
+_LONGEST_STEP_S = 0.1  # over a longer gap integrators do not go on
+
+
+def clip(value: float, low: float, high: float) -> float:
+    """The value, or the nearer bound."""
+    return min(max(value, low), high)
+
+
+class AttitudeHold:
+    """Cascaded loops: heading -> roll -> stick, altitude -> climb -> pitch -> stick, airspeed -> throttle.
+
+    Args:
+        targets: `roll`, `heading`, `pitch` [deg], `altitude` [m MSL], `speed` [m/s calibrated]. Heading goes before
+            roll, pitch before altitude. What is missing: wings level, the altitude and speed of the first state.
+    """
+
+    def __init__(self, targets: Dict[str, Optional[float]]) -> None:
+        self.targets = targets
+        self._time: Optional[float] = None
+        self._epoch: Optional[int] = None
+        # Integrators: pitch attitude [deg], elevator, throttle. They start from what is flown: nothing jumps.
+        self._pitch, self._elevator, self._throttle = 0.0, 0.0, 0.5
+
+    def fly(self, state: Any) -> Dict[str, float]:
+        """Stick and throttle [-1..1; right, nose up, 0..1] for a FlightState."""
+        dt = self._step(state)
+        t = self.targets
+        if t.get("heading") is None:
+            wanted_roll = t.get("roll") or 0.0
+        else:
+            wanted_roll = clip(1.2 * math.remainder(t["heading"] - state.heading_true_deg, 360.0), -25.0, 25.0)
+        roll_rate = math.degrees(state.angular_velocity.x)
+        roll = clip(0.035 * (wanted_roll - state.roll_deg) - 0.012 * roll_rate, -1.0, 1.0)
+
+        if t.get("pitch") is None:
+            climb = clip(0.2 * (t["altitude"] - state.altitude_msl), -5.0, 5.0)
+            error = climb - state.vertical_speed
+            self._pitch = clip(self._pitch + 0.3 * error * dt, -15.0, 15.0)
+            lean = 1.0 / max(math.cos(math.radians(state.roll_deg)), 0.3) - 1.0
+            wanted_pitch = clip(self._pitch + 1.2 * error + 10.0 * lean, -15.0, 20.0)
+        else:
+            wanted_pitch = t["pitch"]
+        error = wanted_pitch - state.pitch_deg
+        self._elevator = clip(self._elevator + 0.015 * error * dt, -0.6, 0.6)
+        pitch = clip(0.03 * error - 0.015 * math.degrees(state.angular_velocity.y) + self._elevator, -1.0, 1.0)
+
+        error = t["speed"] - state.calibrated_airspeed
+        self._throttle = clip(self._throttle + 0.006 * error * dt, 0.0, 1.0)
+        return {"roll": roll, "pitch": pitch, "throttle": clip(self._throttle + 0.03 * error, 0.0, 1.0)}
+
+    def _step(self, state: Any) -> float:
+        """Simulator time since the last state [s]; a first state, or one after a reset, starts everything."""
+        if self._epoch != state.epoch:
+            self._epoch, self._time = state.epoch, state.sim_time_unwrapped
+            self._pitch, self._elevator, self._throttle = state.pitch_deg, state.control_pitch, state.control_throttle
+            for name, value in (("altitude", state.altitude_msl), ("speed", state.calibrated_airspeed)):
+                if self.targets.get(name) is None:
+                    self.targets[name] = value
+        step = clip(state.sim_time_unwrapped - self._time, 0.0, _LONGEST_STEP_S)
+        self._time = state.sim_time_unwrapped
+        return step
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(
+        prog="attitude_hold",
+        description="A controller to start from: holds attitude, altitude and airspeed of the twin on control/auto.",
+    )
+    p.add_argument("--roll", type=float, metavar="DEG", help="right + (default: wings level)")
+    p.add_argument("--heading", type=float, metavar="DEG", help="true; instead of roll")
+    p.add_argument("--pitch", type=float, metavar="DEG", help="nose up +; instead of altitude")
+    p.add_argument("--altitude", type=float, metavar="M", help="MSL (default: the present one)")
+    p.add_argument("--speed", type=float, metavar="M/S", help="calibrated airspeed (default: the present one)")
+    p.add_argument("--engage", action="store_true", help="ask for mode AUTO")
+    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    return p
+
+
+@guarded
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Runs until ROS ends."""
+    args = parser().parse_args(ros_arguments(argv))
+    rospy = rospy_module()
+    rospy.init_node("attitude_hold")
+    from xplane_bridge.msg import ControlCommand, FlightState
+    from xplane_bridge.srv import SetMode
+
+    topic = args.namespace.rstrip("/") + "/"
+    hold = AttitudeHold({name: getattr(args, name) for name in ("roll", "heading", "pitch", "altitude", "speed")})
+    publisher = rospy.Publisher(topic + "control/auto", ControlCommand, queue_size=1, tcp_nodelay=True)
+    fields = ControlCommand.ROLL | ControlCommand.PITCH | ControlCommand.YAW | ControlCommand.THROTTLE
+    needed = FlightState.VALID_ATTITUDE | FlightState.VALID_RATES | FlightState.VALID_POSITION
+    needed |= FlightState.VALID_VELOCITY | FlightState.VALID_AIRSPEEDS
+
+    def on_state(state: Any) -> None:
+        if state.paused or state.valid & needed != needed:
+            return
+        command = ControlCommand(fields=fields, sequence=state.frame_count, **hold.fly(state))
+        command.header.stamp = state.header.stamp
+        publisher.publish(command)
+
+    rospy.Subscriber(topic + "flight_state", FlightState, on_state, queue_size=1, tcp_nodelay=True)
+    if args.engage:
+        rospy.wait_for_service(topic + "tx_node/set_mode")
+        rospy.ServiceProxy(topic + "tx_node/set_mode", SetMode)(mode=SetMode._request_class.AUTO)
+    rospy.spin()
+    return 0
