@@ -14,6 +14,7 @@ import pytest
 
 from xplane_bridge.cli import flight_report
 from xplane_bridge.harness.synthetic_flight import FlightBag, stamp_ns, write_states
+from xplane_bridge.plotting.spec import Panel, Series
 
 RATE = 50.0
 
@@ -238,3 +239,11 @@ def test_errors_are_one_line(
     err = capsys.readouterr().err
     assert text in err
     assert err.count("\n") == 1
+
+
+def test_a_value_that_only_rounds_does_not_fill_its_axes_with_noise() -> None:
+    time = np.arange(4, dtype=np.int64)
+    still = Panel("wind [m/s]", [Series("wind speed", time, np.array([2.0, 2.0 + 1e-12, np.nan, 2.0]))])
+    assert still.flat_range() == pytest.approx((1.5, 2.5))
+    assert Panel("roll [deg]", [Series("roll", time, np.array([0.0, 0.1, 0.2, 0.1]))]).flat_range() is None
+    assert Panel("empty", [Series("none", time, np.full(4, np.nan))]).flat_range() is None

@@ -46,6 +46,9 @@ def _time(figure: TimeFigure, start: int) -> go.Figure:
         for k, series in enumerate(panel.series):
             made.add_trace(_line(series, start, k, panel.label), row=row, col=1)
         made.update_yaxes(title_text=panel.label, title_font_size=12, row=row, col=1, zeroline=False)
+        flat = panel.flat_range()
+        if flat is not None:
+            made.update_yaxes(range=flat, row=row, col=1)
     named: list[tuple[str, str]] = []
     for kind, episode in figure.shades:
         made.add_vrect(

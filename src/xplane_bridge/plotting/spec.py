@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
+import numpy as np
 
+if TYPE_CHECKING:
     from xplane_bridge.analysis.episodes import Episode
 
 #: Colours of series in the order they are added to a panel; distinguishable with colour-blind eyes (Okabe-Ito).
@@ -16,6 +16,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#9
 SHADES = {"auto": "#56b4e9", "manual": "#bbbbbb", "failure": "#d62728", "excitation": "#e69f00"}
 #: Episodes overlap: each only tints.
 SHADE_OPACITY = 0.12
+_FLAT = 1e-6  # of any unit that is plotted: less is rounding
 
 
 @dataclass
@@ -35,6 +36,15 @@ class Panel:
 
     label: str  #: quantity and unit, e.g. ``roll [deg]``
     series: list[Series]
+
+    def flat_range(self) -> tuple[float, float] | None:
+        """Bounds for values that do not move but for rounding, which would fill the axes with noise; else None."""
+        values = np.concatenate([np.asarray(s.values, dtype=float) for s in self.series])
+        values = values[np.isfinite(values)]
+        if not values.size or np.ptp(values) > _FLAT:
+            return None
+        middle = float(np.mean(values))
+        return middle - 0.5, middle + 0.5
 
 
 @dataclass

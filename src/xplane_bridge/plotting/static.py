@@ -55,6 +55,9 @@ def _time(figure: TimeFigure, start: int) -> Figure:
                 linewidth=0,
             )
         axes.set_ylabel(panel.label)
+        flat = panel.flat_range()
+        if flat is not None:
+            axes.set_ylim(flat)
         axes.legend(loc="upper right", fontsize=8, ncol=min(3, len(panel.series)))
     all_axes[0].set_title(figure.title)
     all_axes[-1].set_xlabel("time [s]")
