@@ -33,6 +33,7 @@ TOPICS = {
     "failures/state": "xplane_bridge/FailureState",
     "excitation/state": "xplane_bridge/ExcitationState",
     "events": "xplane_bridge/EventList",
+    "scenario/label": "std_msgs/String",
     "camera/image_raw": "sensor_msgs/Image",
     "camera/image_raw/compressed": "sensor_msgs/CompressedImage",
     "camera/camera_info": "sensor_msgs/CameraInfo",
