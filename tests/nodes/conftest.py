@@ -38,6 +38,7 @@ class TopicLog:
 
         self.topic = topic
         self.messages: list[Any] = []
+        self._after_found = 0
         self._subscriber = rospy.Subscriber(
             topic, message_type, self.messages.append, queue_size=queue_size, tcp_nodelay=True
         )
@@ -56,8 +57,21 @@ class TopicLog:
     def wait_for_next(
         self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S, what: str = ""
     ) -> Any:
-        """The same, among the messages that come from now on."""
+        """The same, among the messages that come from now on: for topics that stream."""
         return self._find(len(self.messages), condition, timeout, what)
+
+    def then_wait_for(
+        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S, what: str = ""
+    ) -> Any:
+        """The same, among the messages after the one found last (or the ones before skip_to_now()).
+
+        For topics that tell of changes: the change may be told before the test asks for it.
+        """
+        return self._find(self._after_found, condition, timeout, what)
+
+    def skip_to_now(self) -> None:
+        """What has come until now is not what then_wait_for() looks for."""
+        self._after_found = len(self.messages)
 
     def wait_for_count(self, count: int, timeout: float = _ANSWER_S) -> list[Any]:
         """Waits until `count` more messages have come, and returns those."""
@@ -77,6 +91,7 @@ class TopicLog:
                 index = next(position)
                 if condition(message):
                     found.append(message)
+                    self._after_found = index
                     return True
             return False
 

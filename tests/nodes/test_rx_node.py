@@ -57,10 +57,9 @@ def rx(world):
     return start
 
 
-def wait_for_link(world, name, new=True):
-    """Waits for a state of the link, by name; returns the message."""
-    wait = world.links.wait_for_next if new else world.links.wait_for
-    return wait(lambda link: link.state_name == name, 20.0, f"link state {name}")
+def wait_for_link(world, name):
+    """Waits for a state of the link, by name, after the one waited for last; returns the message."""
+    return world.links.then_wait_for(lambda link: link.state_name == name, 20.0, f"link state {name}")
 
 
 def free_udp_port():
@@ -440,7 +439,7 @@ def test_bridge_first(world, rx):
     port = free_udp_port()
     world.point_to(port)
     rx()
-    link = wait_for_link(world, "SEARCHING", new=False)
+    link = wait_for_link(world, "SEARCHING")
     assert link.reason
     assert not world.states.messages
     world.emulator(*KINEMATIC, port=port)
@@ -465,11 +464,11 @@ def test_x_plane_killed_and_restarted(world, rx):
     rx()
     # A restart is told from a gap by simulator time that runs anew.
     before = world.states.wait_for(lambda state: state.sim_time > 5.0, 30.0)
-    epoch = wait_for_link(world, "CONNECTED", new=False).link_epoch
+    epoch = wait_for_link(world, "CONNECTED").link_epoch
     emulator.kill()
     wait_for_link(world, "STALE")
     emulator.start()
-    world.links.wait_for_next(lambda link: link.state_name == "CONNECTED" and link.link_epoch > epoch, 20.0)
+    world.links.then_wait_for(lambda link: link.state_name == "CONNECTED" and link.link_epoch > epoch, 20.0)
     after = world.states.wait_for_next(lambda state: state.valid == ALL_VALID and state.sim_time < before.sim_time)
     assert after.epoch > before.epoch
     world.states.wait_for_count(20)
@@ -501,7 +500,7 @@ def test_found_by_beacon_and_again_on_another_port(world, rx):
     first, first_port = x_plane("first")
     try:
         rx()
-        assert wait_for_link(world, "CONNECTED", new=False).port == first_port
+        assert wait_for_link(world, "CONNECTED").port == first_port
         world.states.wait_for()
         first.kill()
         wait_for_link(world, "LOST")
@@ -509,7 +508,7 @@ def test_found_by_beacon_and_again_on_another_port(world, rx):
         first.stop()
     second, second_port = x_plane("second")
     try:
-        link = world.links.wait_for_next(lambda m: m.state_name == "CONNECTED" and m.port == second_port, 30.0)
+        link = world.links.then_wait_for(lambda m: m.state_name == "CONNECTED" and m.port == second_port, 30.0)
         assert link.host == "127.0.0.1"
         world.states.wait_for_next(timeout=30.0)
     finally:
@@ -538,7 +537,7 @@ def test_another_aircraft_is_told_and_starts_an_epoch(world, rx):
     link = world.links.wait_for(lambda m: m.aircraft_icao)
     before = world.states.wait_for()
     world.wire(emulator.port).send(protocol.AircraftLoad(0, "Aircraft/xplane_bridge/multirotor/multirotor.acf"))
-    other = world.links.wait_for_next(lambda m: m.aircraft_icao not in ("", link.aircraft_icao), 30.0)
+    other = world.links.then_wait_for(lambda m: m.aircraft_icao not in ("", link.aircraft_icao), 30.0)
     assert other.aircraft_description != link.aircraft_description
     world.states.wait_for_next(lambda state: state.epoch > before.epoch, 30.0)
 
@@ -547,7 +546,7 @@ def test_another_aircraft_is_told_and_starts_an_epoch(world, rx):
 def test_gap_of_seconds_is_survived(world, rx):
     world.emulator(*KINEMATIC, "--fault", "freeze=2s@8")
     rx()
-    wait_for_link(world, "STALE", new=False)
+    wait_for_link(world, "STALE")
     wait_for_link(world, "CONNECTED")
     state = world.states.wait_for_next(lambda s: s.valid == ALL_VALID)
     stamps = [s.header.stamp.to_sec() for s in world.states.messages if s.epoch == state.epoch]
@@ -606,7 +605,7 @@ def test_data_output_is_restored_at_the_end(world, rx, users_data_output, how):
     assert users_data_output.read(ROW_3) == 1.0
     assert users_data_output.read(ROW_133) == 1.0
     assert users_data_output.read(ROW_21) == 0.0
-    last = wait_for_link(world, "LOST", new=False)
+    last = wait_for_link(world, "LOST")
     assert last.reason == "rx_node has stopped"
     assert not list(world.folder.glob("ros_home/xplane_bridge/*.json"))
 

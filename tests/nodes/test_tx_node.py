@@ -185,8 +185,9 @@ def test_stick_takes_over(tx, world):
     world.auto.fly(fields=ROLL, roll=-0.2)
     request_mode(world, AUTO)
     world.wire.wait(STICK, -0.2)
+    world.mode.skip_to_now()
     world.manual.fly(roll=0.6)
-    mode = world.mode.wait_for_next(lambda m: m.mode == MANUAL)
+    mode = world.mode.then_wait_for(lambda m: m.mode == MANUAL)
     assert mode.reason.startswith("stick take-over")
     world.wire.wait(STICK, 0.6)
 
@@ -236,8 +237,9 @@ def test_pause_stops_the_timers(tx, world):
     world.manual.stop()
     world.applied.wait_for_count(50)  # a second of refreshes, twice the time-out
     assert not world.mode.last.failsafe
+    world.mode.skip_to_now()
     assert pause(False).success
-    world.mode.wait_for_next(lambda m: m.failsafe)
+    world.mode.then_wait_for(lambda m: m.failsafe)
     world.wire.wait(STICK, 0.0)
 
 
@@ -291,8 +293,9 @@ def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
     world.wire.wait(OVERRIDE, 1.0)
     world.manual.stop()
     world.mode.wait_for(lambda m: m.failsafe)  # X-Plane may be back before the last command has timed out
+    world.events.skip_to_now()
     world.xplane.restart()
-    world.events.wait_for_next(lambda e: "CONNECTED" in e.events[-1].text, timeout=20)
+    world.events.then_wait_for(lambda e: "CONNECTED" in e.events[-1].text, timeout=20)
     wire = WatchedDatarefs(world.xplane.port, OVERRIDE)
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
     wire.wait(OVERRIDE, 0.0)

@@ -106,8 +106,14 @@ def tx_params(aircraft: str = "fixed_wing", **params: Any) -> dict[str, Any]:
 
 def journal_entries(world: Any) -> list[str]:
     """What the journals of the world's nodes say is to be undone."""
-    files: list[Path] = list((world.folder / "ros_home" / "xplane_bridge").glob("*.json"))
-    return [entry["id"] for file in files for entry in json.loads(file.read_text(encoding="utf-8"))["entries"]]
+    entries: list[str] = []
+    for file in (world.folder / "ros_home" / "xplane_bridge").glob("*.json"):
+        try:
+            text = file.read_text(encoding="utf-8")
+        except FileNotFoundError:  # removed since it was listed: nothing is to be undone any more
+            continue
+        entries += [entry["id"] for entry in json.loads(text)["entries"]]
+    return entries
 
 
 def call(world: Any, service: str, kind: str, /, **request: Any) -> Any:
