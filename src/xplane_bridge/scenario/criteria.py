@@ -21,7 +21,7 @@ MEASURES: Dict[str, str] = {
 TARGETED = ("rms", "peak", "overshoot", "settling")
 #: Measures of the camera, not of a variable.
 CAMERA = ("paired", "perfect")
-#: Variables that can be measured: those of conditions that are continuous.
+#: Variables that can be measured: those that change continuously; conditions can look at them as well.
 SCORED = (
     "roll",
     "pitch",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Dict, Mapping, Optional, Tuple
 
 from ..errors import XplaneBridgeError
-from .criteria import Criterion
+from .criteria import SCORED, Criterion
 
 #: Stick axes and their ranges; throttle is a lever.
 STICK_AXES: Dict[str, Tuple[float, float]] = {
@@ -37,25 +37,7 @@ HOLDS: Dict[str, Tuple[float, float]] = {
     "yaw_rate": (-90.0, 90.0),
 }
 #: What conditions can look at.
-VARIABLES = (
-    "time",
-    "roll",
-    "pitch",
-    "heading",
-    "altitude",
-    "agl",
-    "climb",
-    "speed",
-    "alpha",
-    "beta",
-    "roll_rate",
-    "pitch_rate",
-    "yaw_rate",
-    "load_factor",
-    "on_ground",
-    "stall_warning",
-    "mode",
-)
+VARIABLES = ("time", *SCORED, "on_ground", "stall_warning", "mode")
 FAILURE_KINDS = (
     "stuck",
     "hard_over_up",
