@@ -7,38 +7,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from xplane_bridge.harness import wait_until
+from xplane_bridge.harness.tx_bench import RepeatedJoy
 
 JOYSTICKS = Path(__file__).resolve().parents[2] / "config" / "joysticks"
 ROLL, PITCH, YAW, THROTTLE = 1, 2, 4, 8
-
-
-class Stick:
-    """A joystick that repeats what it shows, as joy_node with autorepeat does."""
-
-    def __init__(self, world, axes, buttons):
-        import rospy
-        from sensor_msgs.msg import Joy
-
-        self.axes, self.buttons = [0.0] * axes, [0] * buttons
-        self._message = Joy
-        self._publisher = rospy.Publisher(f"{world.namespace}/joy", Joy, queue_size=1)
-        self._timer = None
-
-    def send(self):
-        self._publisher.publish(self._message(axes=self.axes, buttons=self.buttons))
-
-    def plug_in(self):
-        import rospy
-
-        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "the mapper's subscription")
-        self._timer = rospy.Timer(rospy.Duration(0.02), lambda _: self.send())
-
-    def pull_out(self):
-        if self._timer:
-            self._timer.shutdown()
-            self._timer.join()
-            self._timer = None
 
 
 @pytest.fixture
@@ -54,7 +26,7 @@ def mapper(world):
         world.commands = world.watch("control/manual", ControlCommand)
         world.requests = world.watch("control/mode_request", ModeRequest)
         world.node = world.start("joystick_mapper_node", options)
-        stick = Stick(world, axes, buttons)
+        stick = RepeatedJoy(world, axes, buttons)
         sticks.append(stick)
         stick.plug_in()
         return stick

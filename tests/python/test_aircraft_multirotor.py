@@ -5,46 +5,20 @@ import math
 import pytest
 
 from xplane_bridge.emulator.flight_model import EngineFault, InitialState, create_model
+from xplane_bridge.harness.position_loop import PositionLoop
 
-RADIUS = 6378145.0
 FRAME = 1 / 60
 
 
-class PositionLoop:
-    """What a user's controller would do: position and velocity to stick and throttle."""
+def pilot_of(loop):
+    """Lets a position loop move the model's controls."""
 
-    def __init__(self, state, throttle, heading_rad):
-        self.latitude, self.longitude, self.altitude = state.latitude_deg, state.longitude_deg, state.altitude_m
-        self.heading, self.hover = heading_rad, throttle
-        self.sum_north = self.sum_east = self.sum_up = 0.0
+    def pilot(state, controls):
+        sticks = loop.step(state, FRAME)
+        controls.roll, controls.pitch, controls.yaw = sticks.roll, sticks.pitch, sticks.yaw
+        controls.throttle = [sticks.throttle] * 8
 
-    def error(self, state):
-        north = math.radians(self.latitude - state.latitude_deg) * RADIUS
-        east = math.radians(self.longitude - state.longitude_deg) * RADIUS * math.cos(math.radians(self.latitude))
-        return north, east, self.altitude - state.altitude_m
-
-    def __call__(self, state, controls):
-        north, east, up = self.error(state)
-        self.sum_north += north * FRAME
-        self.sum_east += east * FRAME
-        self.sum_up += up * FRAME
-        north_acceleration = 1.6 * north - 2.2 * state.v_north_mps + 0.5 * self.sum_north
-        east_acceleration = 1.6 * east - 2.2 * state.v_east_mps + 0.5 * self.sum_east
-        up_acceleration = 3.0 * up + 3.0 * state.v_down_mps + 1.0 * self.sum_up
-        sine, cosine = math.sin(state.heading_rad), math.cos(state.heading_rad)
-        ahead = north_acceleration * cosine + east_acceleration * sine
-        right = -north_acceleration * sine + east_acceleration * cosine
-        controls.pitch = max(min(-math.degrees(ahead / 9.81) / 30.0, 1.0), -1.0)
-        controls.roll = max(min(math.degrees(right / 9.81) / 30.0, 1.0), -1.0)
-        controls.yaw = max(min(1.5 * math.remainder(self.heading - state.heading_rad, 2 * math.pi), 1.0), -1.0)
-        throttle = (
-            self.hover * (1.0 + up_acceleration / 9.81) / max(math.cos(state.roll_rad) * math.cos(state.pitch_rad), 0.5)
-        )
-        controls.throttle = [max(min(throttle, 1.0), 0.05)] * 8
-
-
-def distance(loop, state):
-    return math.sqrt(sum(error * error for error in loop.error(state)))
+    return pilot
 
 
 @pytest.fixture(name="quad")
@@ -68,8 +42,8 @@ def test_hovers_60_s_within_a_metre(quad, wind):
     quad.set_turbulence(0.5)
     farthest = 0.0
     for _ in range(60 * 60):
-        state = fly(quad, controls, FRAME, loop)
-        farthest = max(farthest, distance(loop, state))
+        state = fly(quad, controls, FRAME, pilot_of(loop))
+        farthest = max(farthest, loop.distance(state))
     assert farthest < 1.0
     assert math.degrees(state.heading_rad) == pytest.approx(70.0, abs=2.0)
 
@@ -78,19 +52,19 @@ def test_survives_gusts_of_5_m_per_s(quad):
     """Sudden gusts from changing sides, two seconds each: it tilts, gives way by less than 3 m, and comes back."""
     controls = quad.reset(InitialState(altitude_m=120.0))
     loop = PositionLoop(quad.state, controls.throttle[0], 0.0)
-    fly(quad, controls, 2.0, loop)
+    fly(quad, controls, 2.0, pilot_of(loop))
     farthest = steepest = 0.0
     for gust in ((5.0, 0.0), (-5.0, 0.0), (0.0, 5.0), (3.5, -3.5), (0.0, 0.0, 5.0), (0.0, 0.0, -5.0)):
         quad.set_wind(*gust)
         for _ in range(120):
-            state = fly(quad, controls, FRAME, loop)
-            farthest = max(farthest, distance(loop, state))
+            state = fly(quad, controls, FRAME, pilot_of(loop))
+            farthest = max(farthest, loop.distance(state))
             steepest = max(steepest, abs(state.roll_rad), abs(state.pitch_rad))
     quad.set_wind(0.0, 0.0)
-    state = fly(quad, controls, 8.0, loop)
+    state = fly(quad, controls, 8.0, pilot_of(loop))
     assert farthest < 3.0
     assert math.radians(3.0) < steepest < math.radians(45.0)
-    assert distance(loop, state) < 0.3
+    assert loop.distance(state) < 0.3
 
 
 def test_trimmed_hover_stands_still_hands_off(quad):
@@ -173,7 +147,7 @@ def test_a_dead_motor_brings_it_down(quad):
     controls = quad.reset(InitialState(altitude_m=30.0))
     loop = PositionLoop(quad.state, controls.throttle[0], 0.0)
     controls.engine_faults[3] = EngineFault.STOPPED
-    state = fly(quad, controls, 6.0, loop)
+    state = fly(quad, controls, 6.0, pilot_of(loop))
     assert not state.engines[3].running
     assert state.agl_m < 1.0
     assert state.crashed
@@ -183,14 +157,12 @@ def test_stands_lifts_off_and_lands(quad):
     controls = quad.reset(InitialState(on_ground=True))
     assert quad.state.on_ground_all
     loop = PositionLoop(quad.state, 0.394, 0.0)
-    loop.altitude += 2.0
-    state = fly(quad, controls, 8.0, loop)
+    loop.climb(2.0)
+    state = fly(quad, controls, 8.0, pilot_of(loop))
     assert state.agl_m == pytest.approx(2.05, abs=0.2)
-    loop.sum_up = 0.0
     for _ in range(60 * 10):
-        loop.altitude -= 0.5 * FRAME
-        loop.sum_up = 0.0
-        state = fly(quad, controls, FRAME, loop)
+        loop.climb(-0.5 * FRAME)
+        state = fly(quad, controls, FRAME, pilot_of(loop))
         if state.on_ground_all:
             break
     controls.throttle = [0.0] * 8

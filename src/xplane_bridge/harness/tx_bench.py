@@ -94,6 +94,43 @@ class CommandSource:
             self._thread = None
 
 
+class RepeatedJoy:
+    """A joystick that repeats what it shows 50 times a second, as joy_node with autorepeat does.
+
+    Args:
+        world: the test's namespace.
+        axes: how many the device has; `axes` are changed in place, -1..1, left, up and forward positive.
+        buttons: likewise; 1 is pressed.
+    """
+
+    def __init__(self, world: Any, axes: int, buttons: int) -> None:
+        import rospy
+        from sensor_msgs.msg import Joy
+
+        self.axes, self.buttons = [0.0] * axes, [0] * buttons
+        self._message = Joy
+        self._publisher = rospy.Publisher(f"{world.namespace}/joy", Joy, queue_size=1)
+        self._timer: Any = None
+
+    def send(self) -> None:
+        """Shows it once."""
+        self._publisher.publish(self._message(axes=self.axes, buttons=self.buttons))
+
+    def plug_in(self) -> None:
+        """Repeats it from now on."""
+        import rospy
+
+        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "the mapper's subscription")
+        self._timer = rospy.Timer(rospy.Duration(0.02), lambda _: self.send())
+
+    def pull_out(self) -> None:
+        """Is silent from now on."""
+        if self._timer:
+            self._timer.shutdown()
+            self._timer.join()
+            self._timer = None
+
+
 def tx_params(aircraft: str = "fixed_wing", **params: Any) -> dict[str, Any]:
     """tx_node's private parameters as tx.launch loads them, with changes."""
     import yaml
