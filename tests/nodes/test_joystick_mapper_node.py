@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.tx_bench import RepeatedJoy
 
 JOYSTICKS = Path(__file__).resolve().parents[2] / "config" / "joysticks"
