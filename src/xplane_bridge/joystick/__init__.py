@@ -1,0 +1,1 @@
+"""Joysticks: reading a device with SDL, and what a file of config/joysticks makes of it."""
