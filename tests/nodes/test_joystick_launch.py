@@ -1,0 +1,126 @@
+"""joystick.launch, and the joystick in bridge.launch: who is started by which argument, and what wrong ones meet."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from xplane_bridge.harness import ManagedProcess, wait_until
+from xplane_bridge.resources import config_file
+
+SCENARIO = """
+name: stick
+description: right
+events:
+  - {at: 0, stick: {roll: 0.5}}
+  - {at: 300, end: true}
+"""
+
+
+def load(master, file, *arguments):
+    """The nodes a launch file starts: name to node."""
+    assert master.uri
+    import roslaunch
+
+    roslaunch.substitution_args._rospack = None  # it remembers which packages there were
+    config = roslaunch.config.ROSLaunchConfig()
+    path = str(config_file("common.yaml").parents[1] / "launch" / file)
+    roslaunch.xmlloader.XmlLoader().load(path, config, argv=list(arguments), verbose=False)
+    return {node.name: node for node in config.nodes}, {key: param.value for key, param in config.params.items()}
+
+
+def test_the_mapper_alone_where_somebody_else_reads_the_device(master):
+    nodes, params = load(master, "joystick.launch", "joy_config:=xbox", "stick_mode:=1")
+    assert set(nodes) == {"joystick_mapper_node"}
+    assert params["/xplane/joystick_mapper_node/device"] == "Xbox-type gamepad"
+    assert params["/xplane/joystick_mapper_node/stick_mode"] == 1
+
+
+@pytest.mark.parametrize(("given", "device"), [((), ""), (("device:=Extreme 3D",), "Extreme 3D")])
+def test_driver_sdl_is_our_reader(master, given, device):
+    nodes, _ = load(master, "joystick.launch", "driver:=sdl", "ns:=lab", *given)
+    assert set(nodes) == {"joystick_mapper_node", "joy_reader"}
+    reader = nodes["joy_reader"]
+    assert (reader.package, reader.type, reader.namespace) == ("xplane_bridge", "joy_reader", "/lab/")
+    words = shlex.split(reader.args)
+    assert words[words.index("--namespace") + 1] == "/lab"
+    assert words[words.index("--device") + 1] == device
+
+
+def test_driver_virtual_plays_a_scenario_as_the_same_device(master):
+    nodes, _ = load(master, "joystick.launch", "driver:=virtual", "joy_config:=playstation", "scenario:=multisine")
+    assert set(nodes) == {"joystick_mapper_node", "virtual_joystick"}
+    words = shlex.split(nodes["virtual_joystick"].args)
+    assert words[0] == "multisine"
+    assert words[words.index("--joy-config") + 1].endswith("config/joysticks/playstation.yaml")
+    assert words[words.index("--stick-mode") + 1] == "2"
+
+
+def test_driver_joy_is_ros_joy_node_where_it_is_installed(master, tmp_path, monkeypatch):
+    package = tmp_path / "joy"
+    package.mkdir()
+    (package / "package.xml").write_text(
+        "<package format='2'><name>joy</name><version>1.0.0</version><description>d</description>"
+        "<maintainer email='a@b.cd'>m</maintainer><license>BSD</license></package>",
+        encoding="utf-8",
+    )
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path), prepend=":")
+    nodes, params = load(master, "joystick.launch", "driver:=joy")
+    assert set(nodes) == {"joystick_mapper_node", "joy_node"}
+    assert nodes["joy_node"].package == "joy"
+    assert params["/xplane/joy_node/dev"] == "/dev/input/js0"
+    assert params["/xplane/joy_node/autorepeat_rate"] == 50
+    _, params = load(master, "joystick.launch", "driver:=joy", "device:=/dev/input/js3")
+    assert params["/xplane/joy_node/dev"] == "/dev/input/js3"
+
+
+def test_driver_joy_without_ros_joy_says_what_to_take(master, monkeypatch):
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(config_file("common.yaml").parents[1]))
+    with pytest.raises(Exception, match=r"(?s)joy.*install ros-noetic-joy, or take driver:=sdl"):
+        load(master, "joystick.launch", "driver:=joy")
+
+
+@pytest.mark.parametrize(
+    ("file", "argument"), [("joystick.launch", "driver:=bluetooth"), ("bridge.launch", "joystick:=bluetooth")]
+)
+def test_an_unknown_driver_is_named(master, file, argument):
+    with pytest.raises(Exception, match="driver:=bluetooth is unknown: expected joy, sdl, virtual or none"):
+        load(master, file, argument)
+
+
+@pytest.mark.parametrize(
+    ("joystick", "started"),
+    [
+        ("none", set()),
+        ("mapper", {"joystick_mapper_node"}),
+        ("sdl", {"joystick_mapper_node", "joy_reader"}),
+        ("virtual", {"joystick_mapper_node", "virtual_joystick"}),
+    ],
+)
+def test_the_bridge_with_a_joystick(master, joystick, started):
+    nodes, params = load(master, "bridge.launch", f"joystick:={joystick}", "joy_config:=logitech_f710")
+    assert set(nodes) == {"rx_node", "tx_node", "capture_node"} | started
+    assert ("/xplane/joystick_mapper_node/device" in params) == bool(started)
+    without, _ = load(master, "bridge.launch")
+    assert set(without) == {"rx_node", "tx_node", "capture_node"}
+
+
+def test_a_scenario_flies_the_whole_bridge_as_a_joystick(world):
+    from xplane_bridge.msg import AppliedCommand, ControlCommand
+
+    scenario = world.folder / "stick.yaml"
+    scenario.write_text(SCENARIO, encoding="utf-8")
+    emulator = world.emulator("--no-beacon")
+    commands = world.watch("control/manual", ControlCommand)
+    applied = world.watch("control/applied", AppliedCommand)
+    arguments = [f"ns:={world.namespace.lstrip('/')}", "host:=127.0.0.1", f"port:={emulator.port}", "capture:=false"]
+    arguments += ["listen_for_beacon:=false", "joystick:=virtual", f"scenario:={scenario}"]
+    command = ["roslaunch", "xplane_bridge", "bridge.launch", *arguments]
+    with ManagedProcess("roslaunch", command, world.folder, env=world.env) as launch:
+        try:
+            commands.wait_for(lambda c: c.roll == pytest.approx(0.5, abs=0.01), timeout=60)
+            applied.wait_for(lambda a: a.roll == pytest.approx(0.5, abs=0.01))
+        except Exception:
+            pytest.fail(launch.describe("no flight"))
+    wait_until(lambda: not launch.running, 15, "end of the launch")
