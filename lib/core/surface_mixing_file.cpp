@@ -10,7 +10,7 @@ namespace xplane_bridge::core {
 namespace {
 
 constexpr int kVersion = 1;
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::json;
 
 Json termsToJson(const MixingVector& values, const std::array<bool, kMixingTerms>& chosen) {
   Json out = Json::object();
