@@ -433,11 +433,12 @@ void CaptureNode::diagnosePairing(diagnostic_updater::DiagnosticStatusWrapper* s
     status->summary(diagnostic_msgs::DiagnosticStatus::OK, "no picture paired yet");
   } else if (!report.clock_fitted) {
     status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "the simulator's clock is not known here");
-  } else if (counters.without_state * 10 > counters.images) {
-    status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "many pictures have no state");
+  } else if ((counters.without_state - reported_.without_state) * 10 > counters.images - reported_.images) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "many pictures have no state: does rx_node run?");
   } else {
     status->summary(diagnostic_msgs::DiagnosticStatus::OK, "paired");
   }
+  reported_ = counters;
   status->add("Pictures", counters.images);
   status->add("With the state of their frame", counters.by_frame);
   status->add("With the nearest state", counters.by_nearest);

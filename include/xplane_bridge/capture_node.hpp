@@ -136,6 +136,8 @@ class CaptureNode : public BaseNode {
   // Publisher thread only.
   std::uint32_t image_count_ = 0;
   std::uint32_t frozen_count_ = 0;
+
+  core::AssociationCounters reported_;  // diagnostics only: as of the last report
 };
 
 }  // namespace xplane_bridge
