@@ -1,12 +1,19 @@
 #include "xplane_bridge/joystick_mapper_node.hpp"
 
-#include <sstream>
-
 #include "xplane_bridge/ControlCommand.h"
 #include "xplane_bridge/ModeRequest.h"
 #include "xplane_bridge/control_conversions.hpp"
 
 namespace xplane_bridge {
+namespace {
+
+std::string listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+}  // namespace
 
 // Counting from the seconds of the clock, a restarted mapper is not mistaken for an old message.
 JoystickMapperNode::JoystickMapperNode()
@@ -93,10 +100,8 @@ void JoystickMapperNode::reportProblems() {
 void JoystickMapperNode::reportSelection() {
   auto selection = mapper_->selected();
   if (selection == reported_selection_) return;
-  std::ostringstream text;
-  for (const std::string& key : selection) text << " " << key;
-  ROS_INFO("selected:%s", text.str().c_str());
   reported_selection_ = std::move(selection);
+  ROS_INFO("selected: %s", listed(reported_selection_).c_str());
 }
 
 void JoystickMapperNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {
@@ -115,6 +120,7 @@ void JoystickMapperNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWra
   status->add("Messages dropped (-)", mapper_->dropped());
   if (last_joy_ > 0.0) status->add("Silence (s)", time - last_joy_);
   status->add("Commands published (-)", command_sequence_);
+  status->add("Selected (-)", listed(mapper_->selected()));
 }
 
 }  // namespace xplane_bridge

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Mapping
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -71,4 +72,24 @@ def program(name: str) -> Path:
             return folder / name
     looked = ", ".join(str(folder) for folder in folders)
     msg = f"the program {name} was not found; looked in {looked}"
+    raise ResourceError(msg)
+
+
+def node_program(name: str, env: Mapping[str, str]) -> Path:
+    """The path of one of the package's compiled programs, e.g. ``node_program("rx_node", os.environ)``.
+
+    Args:
+        name: of the program.
+        env: an environment with a ROS workspace in it.
+
+    Raises:
+        ResourceError: It is in none of the workspace's folders.
+    """
+    prefixes = [prefix for prefix in env.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix]
+    for prefix in prefixes:
+        path = Path(prefix) / "lib" / "xplane_bridge" / name
+        if os.access(path, os.X_OK):
+            return path
+    looked = ", ".join(prefixes) or "nothing"
+    msg = f"{name} is not built, or the setup.bash of its workspace is not sourced; looked in {looked}"
     raise ResourceError(msg)

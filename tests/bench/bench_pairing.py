@@ -24,6 +24,7 @@ import numpy as np
 from xplane_bridge.emulator.renderer import StripError, read_strip
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
+from xplane_bridge.resources import node_program
 
 _BUDGET_SHARE = 0.99
 _BUDGET_TIME_S = 0.002
@@ -104,9 +105,8 @@ def report(fps: int, duration: float, shown: dict, paired: dict, unreadable: int
 
 
 def _node(name: str, namespace: str, folder: Path, env: dict[str, str]) -> ManagedProcess:
-    prefixes = env["CMAKE_PREFIX_PATH"].split(os.pathsep)
-    program = next(path for path in (Path(p) / "lib/xplane_bridge" / name for p in prefixes) if path.is_file())
-    node = ManagedProcess(f"{name}{namespace[1:]}", [str(program), f"__ns:={namespace}"], folder, env=env)
+    command = [node_program(name, env), f"__ns:={namespace}"]
+    node = ManagedProcess(f"{name}{namespace[1:]}", command, folder, env=env)
     node.start()
     return node
 

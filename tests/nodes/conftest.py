@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import os
 import socket
 from pathlib import Path
 from typing import Any, Callable, Iterator
@@ -13,6 +12,7 @@ import pytest
 
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
+from xplane_bridge.resources import node_program
 
 _ANSWER_S = 15.0  # a machine busy with other work is slow, a node that hangs is silent for ever
 _numbers = itertools.count(1)
@@ -166,11 +166,7 @@ class World:
 
     def program(self, name: str) -> Path:
         """One of the package's compiled programs."""
-        for prefix in self.env.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
-            path = Path(prefix) / "lib" / "xplane_bridge" / name
-            if path.is_file():
-                return path
-        pytest.fail(f"{name} is not built; scripts/test builds it")
+        return node_program(name, self.env)
 
     def start(self, program: str, params: dict[str, object] | None = None, log: str = "") -> ManagedProcess:
         """Starts a node with these private parameters; its name is the program's. Does not wait for it."""
