@@ -297,8 +297,9 @@ bool JoystickMapper::onJoy(const std::vector<float>& axes, const std::vector<std
   axes_.assign(axes.begin(), axes.end());
   buttons_.resize(buttons.size());
   for (std::size_t i = 0; i < buttons.size(); ++i) buttons_[i].raw = buttons[i] != 0;
-  // What is held down when the device appears was not pressed for us.
+  // What is held down when the device appears was not pressed for us, and its levers read 0 until they are touched.
   settleButtons(now, !first);
+  if (first) std::fill(direct_moved_.begin(), direct_moved_.end(), '\0');
   for (std::size_t i = 0; i < options_.direct.size(); ++i) {
     const auto value = axis(options_.direct[i].axis.of(options_.stick_mode));
     if (value && *value != 0.0) direct_moved_[i] = 1;

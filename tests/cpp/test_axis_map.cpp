@@ -97,6 +97,34 @@ TEST(AxisMap, LeverThatReadsZeroUntilTouchedCommandsNothingUntilThen) {
   EXPECT_DOUBLE_EQ(out.command.throttle, 0.5);
 }
 
+TEST(AxisMap, LeverOfADeviceThatWasPulledOutCommandsNothingUntilItIsTouchedAgain) {
+  JoystickOptions o = options();
+  o.direct = {direct(JoyTarget::kThrottle, 0, 1.0), direct(JoyTarget::kRoll, 1)};
+  o.direct[0].travel = AxisTravel::kFull;
+  o.direct[0].silent_until_moved = true;
+  JoystickMapper mapper(o);
+  mapper.onJoy({-1.0f, 0.0f}, {}, 0.0);
+  EXPECT_DOUBLE_EQ(mapper.update(0.0).command.throttle, 0.0);
+  mapper.onJoy({0.0f, 0.0f}, {}, 5.0);  // back, at idle, yet read as half
+  EXPECT_EQ(mapper.update(5.0).command.fields, static_cast<std::uint32_t>(kFieldRoll));
+  mapper.onJoy({-0.5f, 0.0f}, {}, 5.1);
+  EXPECT_DOUBLE_EQ(mapper.update(5.1).command.throttle, 0.25);
+}
+
+TEST(AxisMap, TriggerThatReadsZeroUntilTouchedIsNotHalfPulled) {
+  JoystickOptions o = options();
+  o.direct = {direct(JoyTarget::kBrakes, 0, -1.0)};  // rests at 1, pulled -1
+  o.direct[0].travel = AxisTravel::kFull;
+  o.direct[0].silent_until_moved = true;
+  JoystickMapper mapper(o);
+  mapper.onJoy({0.0f}, {}, 0.0);
+  EXPECT_EQ(mapper.update(0.0).command.fields, 0u);
+  mapper.onJoy({1.0f}, {}, 0.1);
+  EXPECT_DOUBLE_EQ(mapper.update(0.1).command.left_brake, 0.0);
+  mapper.onJoy({-1.0f}, {}, 0.2);
+  EXPECT_DOUBLE_EQ(mapper.update(0.2).command.right_brake, 1.0);
+}
+
 TEST(AxisMap, EquationTwoIntegratesOverRealTime) {
   JoystickOptions o = options();
   o.integrated = {integrated(JoyTarget::kTrimPitch, 0, 0.25)};  // travel -1..1: 0.5 units a second
@@ -334,6 +362,39 @@ TEST(AxisMap, MessageWithABadAxisIsDroppedSoThatTheDeviceDies) {
   EXPECT_FALSE(mapper.update(0.55).alive);
   EXPECT_TRUE(mapper.onJoy({1.0005f, 0.0f}, {}, 0.6)) << "drivers round a little above full travel";
   EXPECT_DOUBLE_EQ(mapper.update(0.6).command.roll, 1.0);
+}
+
+TEST(AxisMap, HatThatIsNotANumberMovesNothing) {
+  JoystickOptions o = options();
+  o.integrated = {integrated(JoyTarget::kFlaps, 0, 0.5, 0.0, 1.0)};
+  JoystickMapper mapper(o);
+  mapper.onJoy({1.0f}, {}, 0.0);
+  EXPECT_NEAR(mapper.update(0.2).command.flaps, 0.1, 1e-12);
+  for (const float bad : {kNan, -std::numeric_limits<float>::infinity(), 7.0f}) {
+    EXPECT_FALSE(mapper.onJoy({bad}, {}, 0.4));
+    ASSERT_EQ(mapper.problems().size(), 1u);
+    EXPECT_EQ(mapper.problems()[0].key, "channels.flaps.axis");
+  }
+  // The last good message goes on for joy_timeout, 0.5 s, and no further.
+  EXPECT_FALSE(mapper.update(9.0).alive);
+  mapper.onJoy({0.0f}, {}, 10.0);
+  EXPECT_NEAR(mapper.update(10.0).command.flaps, 0.25, 1e-12);
+}
+
+TEST(AxisMap, TheLaterOfTwoSelectButtonsWins) {
+  JoystickOptions o = options();
+  o.joy_timeout = 100.0;
+  o.integrated = {integrated(JoyTarget::kTrimPitch, 0, 0.25), integrated(JoyTarget::kFlaps, 0, 0.5, 0.0, 1.0)};
+  o.integrated[0].select_button = 0;
+  o.integrated[1].select_button = 1;
+  JoystickMapper mapper(o);
+  mapper.onJoy({0.0f}, {0, 0}, 0.0);
+  mapper.onJoy({0.0f}, {0, 1}, 1.0);
+  mapper.onJoy({0.0f}, {1, 0}, 1.001);  // both at once for a moment: the later one wins
+  EXPECT_EQ(mapper.selected(), std::vector<std::string>{"channels.trim_pitch"});
+  mapper.onJoy({0.0f}, {0, 0}, 1.01);  // released within the debounce time: no second press when it settles
+  mapper.update(1.2);
+  EXPECT_EQ(mapper.selected(), std::vector<std::string>{"channels.trim_pitch"});
 }
 
 TEST(AxisMap, DeviceThatComesBackSmallerDoesNotCrash) {

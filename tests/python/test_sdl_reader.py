@@ -149,6 +149,19 @@ def test_a_joystick_is_looked_for_read_lost_and_read_again(pygame):
     assert played.settle().buttons == [0, 1]
 
 
+def test_a_loose_plug_is_heard_as_a_silence(pygame):
+    played = Played(pygame)
+    device = SdlDevice(axes=2, buttons=1, hats=0)
+    played.settle()
+    device.pull_out()
+    SdlDevice(axes=2, buttons=1, hats=0)
+    assert played.step() == []
+    assert played.reader.name, "it is back at once"
+    assert played.step(0.9) == []
+    assert played.reader.patience(played.now) <= 0.1
+    assert played.step(0.2)[-1].axes == [0.0, 0.0]
+
+
 def test_another_device_does_not_disturb(pygame):
     first = SdlDevice(axes=2, buttons=1, hats=0)
     played = Played(pygame, wanted="0")

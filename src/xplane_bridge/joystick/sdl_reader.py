@@ -23,6 +23,9 @@ SDL_ENVIRONMENT = {
     "SDL_NO_SIGNAL_HANDLERS": "1",  # Ctrl-C is ROS's
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",
 }
+#: For so long after a joystick was lost nothing is published, though it be back at once, so that whoever listens has
+#: seen it go: its levers read 0 until they are touched, which is not where they stood before [s].
+_REST_S = 1.0
 
 
 class JoystickError(XplaneBridgeError):
@@ -145,6 +148,7 @@ class JoyReader:
         self._hats_from = 0
         self._changed_at: Optional[float] = None  # of the oldest axis change that has not been published
         self._published_at = 0.0
+        self._rests_until = 0.0
         #: What a user should know about the device now; changes whenever there is something new to say.
         self.notice = ""
         self._look()
@@ -171,19 +175,21 @@ class JoyReader:
                 if self._is_ours(event):
                     # Just before, SDL has let every axis and button go; nobody did that.
                     out.clear()
-                    self._lose()
+                    self._lose(now)
                 elif self._device is None:
                     self._look()
             elif self._is_ours(event) and self._apply(event, now):
                 out.append(self._take(now))
+        if now < self._rests_until:
+            return []
         if self._device is not None and not out and self._is_due(now):
             out.append(self._take(now))
         return out
 
     def patience(self, now: float) -> float:
         """How long nothing has to be published if no event comes [s]."""
-        if self._device is None:
-            return 0.5
+        if self._device is None or now < self._rests_until:
+            return 0.1
         until = self._published_at + self._repeat
         if self._changed_at is not None:
             until = min(until, self._changed_at + self._coalesce)
@@ -248,8 +254,9 @@ class JoyReader:
             return same[0], ""
         return None, problem or "looking for it; to read another one, start again"
 
-    def _lose(self) -> None:
+    def _lose(self, now: float) -> None:
         name = self.name
+        self._rests_until = now + _REST_S
         self._device.quit()
         self._device = None
         self._look()
