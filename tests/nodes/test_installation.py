@@ -179,3 +179,9 @@ def test_without_ros_programs_start_or_say_that_they_need_it(name, wheel_folder,
     else:
         assert done.returncode == 0, done.stderr
         assert "usage:" in done.stdout
+
+
+def test_environment_leaves_the_arguments_of_a_script_alone(tmp_path):
+    """catkin's setup.bash takes the arguments of whoever sources it, and answers --help itself."""
+    script = f'set -- --help; source "{WORKSPACE}/env.bash"; echo "arguments: $*"'
+    assert run(["bash", "-c", script], env={"HOME": str(tmp_path), "PATH": "/usr/bin:/bin"}) == "arguments: --help\n"
