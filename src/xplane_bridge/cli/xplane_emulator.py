@@ -52,11 +52,10 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         print(f"xplane_emulator: {error.strerror or error}", file=sys.stderr)
         failed = 1
     emulator.close()
-    statistics = emulator.statistics()
     if view is not None:
-        statistics["pictures_dropped"] = view.close()
+        view.close()
     with contextlib.suppress(BrokenPipeError):  # whoever started it does not listen any more
-        print("STOPPED " + json.dumps(statistics), flush=True)
+        print("STOPPED " + json.dumps(emulator.statistics()), flush=True)
     return failed
 
 
@@ -67,5 +66,5 @@ def _open_view(options: Options, emulator: Emulator) -> Optional[CockpitView]:
     from xplane_bridge.emulator.cockpit_view import CockpitView  # late: without a window, OpenCV is not needed
 
     view = CockpitView(options)
-    emulator.frame_listeners.append(view)
+    emulator.view = view
     return view

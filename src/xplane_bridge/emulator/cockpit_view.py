@@ -13,7 +13,7 @@ _VIEW = "sim/graphics/view/"
 
 
 class CockpitView:
-    """A frame listener of the emulator that shows what the pilot sees.
+    """What the pilot sees, in a window; see `emulator.View`.
 
     The aerodrome lies where the flight starts, its runway along the first heading.
 
@@ -33,11 +33,12 @@ class CockpitView:
                 hud=options.hud,
                 strip=options.strip,
                 swap_log=options.swap_log,
+                realtime=options.realtime,
             )
         )
 
-    def __call__(self, sim: Simulator) -> None:
-        """Shows the frame that was just sent."""
+    def show(self, sim: Simulator) -> None:
+        """Has the frame drawn whose packets were just sent."""
         frame, get = sim.frame, sim.store.get
         self._renderer.show(
             Scene(
@@ -60,7 +61,10 @@ class CockpitView:
             )
         )
 
-    def close(self) -> int:
-        """Closes the window. Returns how many frames it was too slow for."""
+    def drawn(self, timeout_s: float) -> bool:
+        """Whether that is done (or the window gone); waits for it so long."""
+        return self._renderer.drawn(timeout_s)
+
+    def close(self) -> None:
+        """Closes the window."""
         self._renderer.close()
-        return self._renderer.dropped

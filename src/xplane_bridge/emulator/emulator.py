@@ -1,7 +1,7 @@
 """The whole emulator: a simulator, its sockets, and X-Plane's loop around them.
 
-One rendered frame: take what clients sent, fly the frame's time, send what is due, then show the picture (frame
-listeners).
+One rendered frame: take what clients sent, fly the frame's time, send what is due, then draw the picture (`View`). The
+next frame does not begin before the picture is drawn.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import os
 import socket
 import sys
 import time
-from typing import Callable, List, Optional, TextIO
+from typing import List, Optional, Protocol, TextIO
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from .flight_model import FlightModel, create_model
 from .kinematic import KinematicModel
 from .options import KINEMATIC, Options
 from .plane_connect import PlaneConnect
+from .priority import take_realtime_priority
 from .server import Beacon, Server
 from .simulator import INTERNAL_VERSIONS, Simulator
 from .subscriptions import Address, Subscriptions
@@ -37,10 +38,20 @@ _KEPT_PERIODS = 100_000
 #: Frames between two collections of cyclic garbage, which nothing in a frame should make.
 _COLLECT_EVERY = 3600
 
-#: Lowest real-time priority: above all normal processes, below everything else that asked for it.
-_PRIORITY = 1
+#: Frames that begin later than this last as long as they really do [s].
+_SCHEDULER_JITTER_S = 0.001
+#: Longest wait without looking whether to stop [s].
+_PATIENCE_S = 0.25
 
-FrameListener = Callable[[Simulator], None]
+
+class View(Protocol):
+    """Where the pictures go."""
+
+    def show(self, sim: Simulator) -> None:
+        """Has the frame drawn whose packets were just sent."""
+
+    def drawn(self, timeout_s: float) -> bool:
+        """Whether that is done; waits for it so long."""
 
 
 class Emulator:
@@ -49,13 +60,13 @@ class Emulator:
     Attributes:
         sim: The simulator; another object after a restart.
         port: The port it listens on.
-        frame_listeners: Called after each frame's packets, with the simulator (a picture is drawn from here).
+        view: What draws the pictures; None: nobody sees any.
     """
 
     def __init__(self, options: Options) -> None:
         self.options = options
         self.period = 1.0 / options.fps
-        self.frame_listeners: List[FrameListener] = []
+        self.view: Optional[View] = None
         self.stopping = False
         self._channel = FaultyChannel(options.fault, options.seed)
         self.sim = self._new_simulator()
@@ -194,9 +205,20 @@ class Emulator:
             self._plane_connect.answer()
         if self._truth is not None and sim.flying:
             self._truth.write(sim.frame, host_time)
-        for listener in self.frame_listeners:
-            listener(sim)
+        if self.view is not None:
+            self.view.show(sim)
+            self._wait_for_picture(self.view)
         self._frames += 1
+
+    def _wait_for_picture(self, view: View) -> None:
+        """Waits as X-Plane's loop does until the frame is drawn; sends delayed datagrams on the way."""
+        stepped = self.options.stepped is not None
+        while not self.stopping:
+            due = math.inf if stepped else self._channel.next_due()
+            if view.drawn(min(max(due - time.monotonic(), 0.0), _PATIENCE_S)):
+                return
+            if not stepped and self._server is not None:
+                self._server.flush_delayed(time.monotonic())
 
     def _rpos_packet(self) -> bytes:
         return self.sim.position().encode()
@@ -218,7 +240,7 @@ class Emulator:
     def _run_real_time(self) -> None:
         clock, o = time.monotonic, self.options
         if o.realtime:
-            _take_realtime_priority()
+            take_realtime_priority()
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -233,10 +255,9 @@ class Emulator:
             if self._pause_for_faults(elapsed):
                 deadline = clock()
                 continue
-            # A frame that came too late lasts whole periods, as with vertical synchronisation: time stays on its grid.
-            missed = int((begin - deadline) / self.period)
-            deadline += missed * self.period
-            period, last = deadline - last, deadline
+            # Simulated time is the time that passed; what the scheduler adds to every wait is kept out of it.
+            started = begin if begin - deadline > _SCHEDULER_JITTER_S else deadline
+            period, last = started - last, started
             if self._beacon is not None:
                 self._beacon.poll(begin)
             self.run_frame(period, begin, time.time())
@@ -246,7 +267,8 @@ class Emulator:
                 self._sent_at.append(begin)
             if self._frames % _COLLECT_EVERY == 0:
                 gc.collect()
-            deadline += self.period
+            # A frame that takes too long (its picture, mostly) makes the next one late, and the frame rate fall.
+            deadline = max(deadline + self.period, end)
 
     def _wait_until(self, deadline: float) -> None:
         """Sleeps until the deadline; sends delayed datagrams on the way."""
@@ -259,7 +281,7 @@ class Emulator:
             remaining = min(deadline, due) - now
             if remaining <= 0.0:
                 return
-            time.sleep(min(remaining, 0.25))
+            time.sleep(min(remaining, _PATIENCE_S))
 
     def _pause_for_faults(self, elapsed: float) -> bool:
         """Sits out a freeze; goes away and comes back for a restart. Returns whether it did either."""
@@ -377,15 +399,3 @@ class Emulator:
         if self._truth is not None:
             self._truth.close()
             self._truth = None
-
-
-def _take_realtime_priority() -> None:
-    """Makes this process, not its children, punctual on a busy machine; a system that does not grant it is no error.
-
-    A frame takes well under a millisecond of processor time, so nobody else is kept waiting.
-    """
-    try:
-        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, policy, os.sched_param(_PRIORITY))
-    except (AttributeError, OSError) as error:
-        _LOG.debug("no real-time priority: %s", error)

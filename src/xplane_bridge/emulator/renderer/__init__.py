@@ -1,6 +1,6 @@
 """The emulator's cockpit view: drawn in software into a window titled like X-Plane's, in a process of its own.
 
-The emulator's loop says what to draw (`Scene`), a `RendererProcess` takes it there and never holds the loop up. Each
+The emulator's loop says what to draw (`Scene`), a `RendererProcess` takes it there and says when it is drawn. Each
 picture carries a strip (`strip`) with its frame number and simulator time that programs can read back.
 """
 

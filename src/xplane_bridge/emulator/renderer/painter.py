@@ -19,6 +19,8 @@ _MOUNTAIN = np.array((168, 146, 124), np.float32)
 _HAZE_M = 22000.0
 #: Coarse grid for what varies slowly over the picture.
 _GRID = 16
+#: Width of the columns that the ground is drawn in [px].
+_TILE = 80
 #: A texture level is used up to where its texel is this many pixels' footprints small.
 _SHARPNESS = 1.4
 _SHIFT = 4  # sub-pixel bits of OpenCV's polygon coordinates
@@ -185,12 +187,22 @@ class Painter:
         band = self._band(at_corners, falling, max(lowest, 0.8 / camera.focal), steepest)
         if band is None:
             return
-        region, area = band
-        x, y, width, height = area
+        region, (x, y, width, height) = band
         mask = self._mask[y : y + height, x : x + width]
         mask.fill(0)
         cv2.fillConvexPoly(mask, np.round((region - (x, y)) * (1 << _SHIFT)).astype(np.int32), 255, cv2.LINE_8, _SHIFT)
-        cv2.copyTo(self._warp(camera, texture, size, area), mask, self._picture[y : y + height, x : x + width])
+        # Column by column: the box around a band that lies askew is mostly outside it.
+        for left in range(x, x + width, _TILE):
+            right = min(left + _TILE, x + width)
+            part = clip(region, region[:, 0] - left)
+            part = clip(part, right - part[:, 0]) if len(part) >= 3 else part
+            if len(part) < 3:
+                continue
+            top = max(math.floor(part[:, 1].min()) - 1, y)
+            bottom = min(math.ceil(part[:, 1].max()) + 2, y + height)
+            seen = self._warp(camera, texture, size, (left, top, right - left, bottom - top))
+            inside = mask[top - y : bottom - y, left - x : right - x]
+            cv2.copyTo(seen, inside, self._picture[top:bottom, left:right])
 
     def _paint_grain(self, camera: Camera) -> None:
         falling = -camera.rays[2]

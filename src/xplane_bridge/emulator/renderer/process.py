@@ -1,9 +1,9 @@
-"""The renderer as a child process that never holds the emulator's loop up."""
+"""The renderer as a child process of the emulator."""
 
 from __future__ import annotations
 
-import fcntl
 import os
+import select
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -35,6 +35,7 @@ class RendererOptions:
         pipeline_delay: From the frame (`Scene.time_ns`) to its display [s], 0..0.2; 0: as soon as it is drawn.
         hud, strip: Whether the head-up display and the machine-readable strip are drawn.
         swap_log: CSV file for frame, simulator time, frame time and swap time of each picture shown.
+        realtime: Whether the thread that swaps asks for real-time priority.
         display: X display; None: `DISPLAY`.
     """
 
@@ -46,6 +47,7 @@ class RendererOptions:
     hud: bool = False
     strip: bool = True
     swap_log: Path | None = None
+    realtime: bool = False
     display: str | None = None
 
     def __post_init__(self) -> None:
@@ -63,6 +65,7 @@ class RendererOptions:
         words += ["--hud"] if self.hud else []
         words += [] if self.strip else ["--no-strip"]
         words += ["--swap-log", self.swap_log] if self.swap_log else []
+        words += ["--realtime"] if self.realtime else []
         return [str(word) for word in words]
 
 
@@ -84,10 +87,9 @@ class RendererProcess:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
+            bufsize=0,
             env=environment,
         )
-        #: Scenes that the window was too slow for.
-        self.dropped = 0
         assert self._child.stdin is not None
         assert self._child.stdout is not None
         if self._child.stdout.readline().strip() != b"READY":
@@ -96,10 +98,8 @@ class RendererProcess:
             lines = self._child.stderr.read().decode(errors="replace").strip().splitlines()
             msg = f"the window could not be opened: {lines[-1] if lines else 'the renderer ended without a word'}"
             raise RendererError(msg)
-        self._pipe = self._child.stdin.fileno()
-        os.set_blocking(self._pipe, False)
-        if hasattr(fcntl, "F_SETPIPE_SZ"):  # a backlog helps nobody: what is not drawn soon is dropped
-            fcntl.fcntl(self._pipe, fcntl.F_SETPIPE_SZ, 4096)
+        self._scenes, self._answers = self._child.stdin.fileno(), self._child.stdout.fileno()
+        self._in_work = 0
 
     @property
     def alive(self) -> bool:
@@ -107,15 +107,21 @@ class RendererProcess:
         return self._child.poll() is None
 
     def show(self, scene: Scene) -> None:
-        """Hands a frame over; never waits. Frames that the window is too slow for are dropped and counted."""
+        """Hands a frame over; not before the last one is drawn."""
         record = scene.pack()
         assert len(record) == RECORD_BYTES
         try:
-            os.write(self._pipe, record)  # all or nothing: shorter than PIPE_BUF
-        except BlockingIOError:
-            self.dropped += 1
+            os.write(self._scenes, record)  # all or nothing: shorter than PIPE_BUF
+            self._in_work += 1
         except BrokenPipeError:
-            self.dropped += 1  # the window was closed; X-Plane's packets go on
+            self._in_work = 0  # the window was closed; X-Plane's packets go on
+
+    def drawn(self, timeout_s: float) -> bool:
+        """Whether all frames handed over are drawn (or the window gone); waits for it so long."""
+        if self._in_work and select.select((self._answers,), (), (), timeout_s)[0]:
+            answers = os.read(self._answers, 4096)
+            self._in_work = self._in_work - len(answers) if answers else 0
+        return self._in_work == 0
 
     def close(self) -> None:
         """Closes the window."""
