@@ -93,6 +93,15 @@ void ImagePairing::map(core::ImageMoment* moment) const {
   moment->epoch = clock_.epoch();
 }
 
+void ImagePairing::mapAnew(Waiting* picture) const {
+  core::ImageMoment& moment = picture->moment;
+  if (moment.paused) return;
+  const bool slipped = picture->slips != clock_.slips() && moment.epoch == clock_.epoch() && !clock_.paused();
+  if (moment.sim_time.has_value() && !slipped) return;
+  map(&moment);
+  picture->slips = clock_.slips();
+}
+
 void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Waiting waiting;
@@ -105,6 +114,7 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns) {
   waiting.moment.host_time_ns = static_cast<std::int64_t>(picture.header.stamp.toNSec()) - nanoseconds(display_delay_);
   waiting.deadline_ns = now_ns + max_wait_ns_;
   map(&waiting.moment);
+  waiting.slips = clock_.slips();
   waiting_.push_back(std::move(waiting));
   flushLocked(now_ns);
 }
@@ -118,7 +128,7 @@ void ImagePairing::flushLocked(std::int64_t now_ns) {
   while (!waiting_.empty()) {
     Waiting& picture = waiting_.front();
     const bool final = now_ns >= picture.deadline_ns;
-    if (!picture.moment.sim_time.has_value() && !picture.moment.paused) map(&picture.moment);
+    mapAnew(&picture);
     // Without the simulator's clock the pairing is a makeshift: not before the deadline, the clock may come.
     const bool clock_missing = !picture.moment.sim_time.has_value() && !picture.moment.paused;
     if (clock_missing && !final) return;

@@ -54,6 +54,7 @@ class ImagePairing {
     FrameState answer;
     core::ImageMoment moment;
     std::int64_t deadline_ns;
+    std::uint32_t slips = 0;  ///< of the clock when `moment` was mapped
   };
   struct KnownState {
     FlightState::ConstPtr message;
@@ -61,6 +62,8 @@ class ImagePairing {
   };
 
   void map(core::ImageMoment* moment) const;
+  /// Maps again where the clock has come, or learnt of a slip, since.
+  void mapAnew(Waiting* picture) const;
   void flushLocked(std::int64_t now_ns);
   void complete(const core::Association& association, std::int64_t now_ns, Waiting* picture);
   void forgetOldStates();

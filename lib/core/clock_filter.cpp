@@ -64,6 +64,8 @@ const char* toString(ClockEvent event) {
       return "gap";
     case ClockEvent::kRateChanged:
       return "rate_changed";
+    case ClockEvent::kSlipped:
+      return "slipped";
     case ClockEvent::kReset:
       return "reset";
     case ClockEvent::kReplayStarted:
@@ -111,6 +113,7 @@ ClockEstimate ClockFilter::update(const ClockSample& sample) {
     startEpoch(sample);
   } else {
     backward_samples_ = 0;
+    sim_time_before_ = sim_time_;
     advanceSimTime(sample);
     if (sample.paused != paused_) {
       event = sample.paused ? ClockEvent::kPaused : ClockEvent::kResumed;
@@ -141,13 +144,31 @@ void ClockFilter::reset() {
 std::optional<double> ClockFilter::simTime(std::int64_t host_ns) const {
   if (!fitted_ || paused_) return std::nullopt;
   const double host = static_cast<double>(host_ns - host_reference_ns_) * kSecondsPerNs;
-  return sim_reference_ + (host - offset_) / slope_;
+  double sim = (host - offset_) / slope_;
+  for (std::size_t i = 0; i < slips_kept_; ++i) {
+    const Slip& slip = newestSlip(i);
+    if (host >= slip.host_border) break;
+    sim = std::min(sim + slip.length / slope_, slip.before);
+  }
+  return sim_reference_ + sim;
 }
 
 std::optional<std::int64_t> ClockFilter::hostTime(double sim_time) const {
   if (!fitted_ || paused_) return std::nullopt;
-  return host_reference_ns_ +
-         static_cast<std::int64_t>(std::llround((offset_ + slope_ * (sim_time - sim_reference_)) * kNsPerSecond));
+  const double sim = sim_time - sim_reference_;
+  double host = offset_ + slope_ * sim;
+  for (std::size_t i = 0; i < slips_kept_ && sim <= newestSlip(i).before; ++i) host -= newestSlip(i).length;
+  return host_reference_ns_ + static_cast<std::int64_t>(std::llround(host * kNsPerSecond));
+}
+
+double ClockFilter::timeRatio() const {
+  if (!fitted_) return 1.0;
+  const double span = bucket(count_ - 1).sim - bucket(0).sim;
+  double slipped = 0.0;
+  for (std::size_t i = 0; i < slips_kept_ && newestSlip(i).before >= bucket(0).sim; ++i) {
+    slipped += newestSlip(i).length;
+  }
+  return span / (slope_ * span + slipped);
 }
 
 double ClockFilter::uncertainty() const {
@@ -178,6 +199,8 @@ void ClockFilter::restartFit(const ClockSample& sample) {
   first_ = count_ = 0;
   fitted_ = false;
   late_ = false;
+  late_run_.active = false;
+  slips_kept_ = 0;
 }
 
 void ClockFilter::advanceSimTime(const ClockSample& sample) {
@@ -209,13 +232,17 @@ ClockEvent ClockFilter::judgeDelay(const ClockSample& sample, double host_step) 
     return ClockEvent::kGap;
   }
   const Point point = relative(sample);
+  if (host_step > options_.gap && delay(point) > options_.rate_change) {
+    restartFit(sample);
+    return ClockEvent::kGap;
+  }
+  if (judgeSlip(sample, point)) {
+    late_ = false;
+    return ClockEvent::kSlipped;
+  }
   if (delay(point) <= options_.rate_change) {
     late_ = false;
     return ClockEvent::kNone;
-  }
-  if (host_step > options_.gap) {
-    restartFit(sample);
-    return ClockEvent::kGap;
   }
   if (!late_) {
     late_ = true;
@@ -225,6 +252,43 @@ ClockEvent ClockFilter::judgeDelay(const ClockSample& sample, double host_step) 
   late_ = false;
   dropBucketsBefore(late_since_);
   return ClockEvent::kRateChanged;
+}
+
+bool ClockFilter::judgeSlip(const ClockSample& sample, const Point& point) {
+  const double late = delay(point);
+  if (late <= options_.slip + fit_spread_) {
+    late_run_.active = false;
+    return false;
+  }
+  const double before = sim_time_before_ - sim_reference_;
+  // Such a frame says itself that it may have lasted longer; a datagram that was late only moves the line back soon.
+  if (isKnownPeriod(sample.frame_period) && static_cast<double>(sample.frame_period) >= options_.longest_frame) {
+    slip(point, before, late);
+    return true;
+  }
+  const bool even = late_run_.active && std::max(late_run_.most, late) - std::min(late_run_.least, late) <=
+                                            options_.slip_evenness + fit_spread_;
+  if (!even) {
+    late_run_ = {true, point, before, late, late};
+    return false;
+  }
+  late_run_.least = std::min(late_run_.least, late);
+  late_run_.most = std::max(late_run_.most, late);
+  if (point.host - late_run_.first.host < options_.slip_after) return false;
+  slip(late_run_.first, late_run_.before, late_run_.least);
+  return true;
+}
+
+void ClockFilter::slip(const Point& first, double before, double length) {
+  for (std::size_t i = 0; i < count_; ++i) {
+    Point& p = buckets_[(first_ + i) % kBuckets];
+    if (p.sim < first.sim) p.host += length;
+  }
+  offset_ += length;
+  const double half_frame = 0.5 * slope_ * (first.sim - before);
+  slips_[slip_count_++ % kSlips] = {before, offset_ + slope_ * first.sim - half_frame, length};
+  slips_kept_ = std::min(slips_kept_ + 1, kSlips);
+  late_run_.active = false;
 }
 
 void ClockFilter::dropBucketsBefore(double host) {

@@ -187,7 +187,9 @@ std::optional<ImageAssociator::FrameChoice> ImageAssociator::chooseFrame(const I
       if (std::abs(wanted - nearest.frame.sim_time) > period) return std::nullopt;
       return choose(nearest, 0.0, false, true);
     }
-    const double steps = period > 0.0 ? std::max(1.0, std::round(gap / period)) : 1.0;
+    // The later frame knows how long it lasted: a long one is no sign of a lost one before it.
+    const double one = after->frame.frame_period > 0.0 ? after->frame.frame_period : period;
+    const double steps = one > 0.0 ? std::max(1.0, std::round(gap / one)) : 1.0;
     const double step = gap / steps;
     const double index = std::round(way / step);
     if (period <= 0.0 || steps < 2.0) period = gap;

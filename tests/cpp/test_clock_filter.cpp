@@ -48,6 +48,14 @@ class Simulator {
     sample.replay = replay;
     return sample;
   }
+  /// A frame that takes longer than the simulator flies in it.
+  ClockSample stutter(double simulated, double lasted) {
+    host_ += lasted - 1.0 / options_.fps;
+    sim_ += simulated - options_.ratio / options_.fps;
+    ClockSample sample = frame();
+    sample.frame_period = options_.periods ? static_cast<float>(simulated) : 0.0F;
+    return sample;
+  }
   std::int64_t trueHost() const { return kStart + ns(host_); }
   double trueSim() const { return sim_; }
   void wait(double seconds) { host_ += seconds; }
@@ -174,6 +182,74 @@ TEST(ClockFilter, RateChangeIsSeenWithinASecond) {
   bool seen = false;
   for (int i = 0; i < 60 && !seen; ++i) seen = filter.update(simulator.frame()).event == ClockEvent::kRateChanged;
   EXPECT_TRUE(seen);
+}
+
+// X-Plane simulates 50 ms of a frame that lasts 90: from there on every simulator time comes 40 ms later.
+TEST(ClockFilter, StutterMovesTheLineAtOnceAndOnlyFromThereOn) {
+  ClockFilter filter;
+  Simulator::Options options;
+  options.jitter = 2e-4;
+  Simulator simulator(options);
+  run(simulator, filter, 10.0);
+  const double sim_before = simulator.trueSim();
+  const std::int64_t host_before = simulator.trueHost();
+  const ClockEstimate estimate = filter.update(simulator.stutter(0.05, 0.09));
+  EXPECT_EQ(estimate.event, ClockEvent::kSlipped);
+  EXPECT_EQ(filter.slips(), 1U);
+  EXPECT_NEAR(static_cast<double>(estimate.stamp_ns - simulator.trueHost()), 1e-4 * 1e9, 1e6);
+  EXPECT_NEAR(*filter.simTime(simulator.trueHost()), simulator.trueSim(), 1e-3);
+  // Three frames before, where pictures of now come from: as before.
+  EXPECT_NEAR(*filter.simTime(host_before - ns(0.05)), sim_before - 0.05, 1e-3);
+  EXPECT_NEAR(static_cast<double>(*filter.hostTime(sim_before - 0.05) - (host_before - ns(0.05))), 1e-4 * 1e9, 1e6);
+  // A picture that the stutter held up still shows the frame before it.
+  EXPECT_NEAR(*filter.simTime(host_before + ns(0.02)), sim_before, 1e-3);
+  EXPECT_LT(largest(run(simulator, filter, 5.0), 0), 1e-3);
+  EXPECT_EQ(filter.slips(), 1U);
+  EXPECT_EQ(filter.epoch(), 0U);
+}
+
+// 12 frames/s for two seconds, 50 ms of simulator time each: ratio 12 * 0.05 = 0.6.
+TEST(ClockFilter, FollowsFramesThatAllLastLongerThanTheySimulate) {
+  ClockFilter filter;
+  Simulator simulator({});
+  run(simulator, filter, 10.0);
+  for (int i = 0; i < 60; ++i) {
+    const ClockEstimate estimate = filter.update(simulator.stutter(0.05, 1.0 / 12.0));
+    ASSERT_TRUE(estimate.usable);
+    EXPECT_NEAR(static_cast<double>(estimate.stamp_ns - simulator.trueHost()), 1e-4 * 1e9, 1e6);
+  }
+  EXPECT_NEAR(filter.timeRatio(), 0.6, 0.02);
+  run(simulator, filter, 6.0);
+  EXPECT_NEAR(filter.timeRatio(), 1.0, 1e-3);
+}
+
+// Without frame periods a slip shows only in that all later samples are late by the same.
+TEST(ClockFilter, SlipIsSeenByItsEvennessWhereNoPeriodTellsIt) {
+  ClockFilter filter;
+  Simulator::Options options;
+  options.periods = false;
+  options.jitter = 2e-4;
+  Simulator simulator(options);
+  run(simulator, filter, 10.0);
+  const std::int64_t host_before = simulator.trueHost();
+  const double sim_before = simulator.trueSim();
+  filter.update(simulator.stutter(1.0 / 60.0, 1.0 / 60.0 + 0.008));  // half a frame is left out
+  EXPECT_EQ(filter.slips(), 0U);
+  for (int i = 0; i < 7; ++i) filter.update(simulator.frame());  // 117 ms
+  EXPECT_EQ(filter.slips(), 1U);
+  EXPECT_NEAR(*filter.simTime(simulator.trueHost()), simulator.trueSim(), 1e-3);
+  EXPECT_NEAR(*filter.simTime(host_before - ns(0.05)), sim_before - 0.05, 1e-3);
+  EXPECT_LT(largest(run(simulator, filter, 5.0), 0), 1e-3);
+}
+
+// A wireless link: late by up to tens of milliseconds in a row, but unevenly. The line stays where it is.
+TEST(ClockFilter, JitterIsNoSlip) {
+  ClockFilter filter;
+  Simulator::Options options;
+  options.jitter = 8e-3;
+  Simulator simulator(options);
+  const auto errors = run(simulator, filter, 60.0);
+  EXPECT_LT(largest(errors, 240), 6e-3);
 }
 
 // After nine hours float32 steps by 3.9 ms; at 120 fps that is half a frame. Unwrapped time must keep its even steps.

@@ -105,6 +105,22 @@ TEST(ImageAssociator, InfersAFrameWhoseDatagramWasLost) {
   EXPECT_TRUE(answer.frame_inferred);
 }
 
+TEST(ImageAssociator, TakesALongFrameForOneFrame) {
+  core::ImageAssociator associator;
+  // The 31st frame took 30 ms: nearly two of the others, but none was lost.
+  for (int k = 0; k < 60; ++k) {
+    const double t = k / 60.0 + (k > 30 ? 0.030 - 1.0 / 60.0 : 0.0);
+    associator.addFrame(frameAt(t, k == 31 ? 0.030 : 1.0 / 60.0));
+    associator.addState(stateAt(static_cast<std::uint64_t>(k), t));
+  }
+  for (const double late : {0.0, 0.009, 0.014}) {
+    const auto answer = associator.associate(momentAt(0.5 + late), false);
+    EXPECT_EQ(answer.method, PairingMethod::kFrame);
+    EXPECT_EQ(answer.id, 30U);
+    EXPECT_FALSE(answer.frame_inferred);
+  }
+}
+
 TEST(ImageAssociator, NeverMixesWhileStatesComeEveryFrame) {
   core::ImageAssociator associator;
   for (int k = 0; k < 60; ++k) {

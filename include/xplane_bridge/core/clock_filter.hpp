@@ -52,6 +52,7 @@ enum class ClockEvent : std::uint8_t {
   kResumed,        ///< runs again; the fit starts anew
   kGap,            ///< nothing was heard for a while and the old fit does not hold; the fit starts anew
   kRateChanged,    ///< simulator time runs at another rate (frame rate too low, time acceleration); the fit starts anew
+  kSlipped,        ///< simulator time stood still for a moment, as in a frame longer than X-Plane simulates
   kReset,          ///< simulator time jumped, or the caller reported a jump: new epoch
   kReplayStarted,  ///< new epoch
   kReplayEnded,    ///< new epoch
@@ -76,6 +77,9 @@ struct ClockEstimate {
 /// each bucket, so an update costs the same at any rate. Simulator time arrives as float32 (steps of 3.9 ms after nine
 /// hours); it is rebuilt from the frame periods and kept within one step of the raw value.
 ///
+/// A stutter of X-Plane is a slip: the frame lasts longer than the simulator flies in it, so that simulator time stays
+/// behind by what was left out. The line moves by that much from this frame on; before it, times map as before.
+///
 /// Has no clock of its own and allocates nothing. One thread calls, or the caller locks.
 class ClockFilter {
  public:
@@ -85,6 +89,11 @@ class ClockFilter {
     double gap = 0.5;           ///< silence after which a fit that no longer holds is given up [s]
     double rate_change = 0.02;  ///< every recent sample this much later than the fit: the rate has changed [s]
     double rate_change_after = 0.25;  ///< ... for this long [s]
+    double slip = 0.004;  ///< samples evenly later than the fit by more than this: simulator time has stood still [s]
+    double slip_after = 0.1;          ///< ... for this long [s]
+    double slip_evenness = 0.002;     ///< ... within this [s]
+    double longest_frame = 0.0495;    ///< frames of this much simulator time may have lasted longer: X-Plane simulates
+                                      ///< at most about 1/19.9 s; one that is late has slipped at once [s]
     double backward_tolerance = 1.0;  ///< older samples within this are late datagrams, not a reset [s]
     double forward_jump = 2.0;        ///< simulator time ahead of `max_time_ratio` times host time by this: a reset [s]
     double max_time_ratio = 20.0;     ///< fastest time acceleration taken for real
@@ -112,7 +121,10 @@ class ClockFilter {
   bool paused() const { return paused_; }
   /// Half width of the mapping [s], see ClockEstimate.
   double uncertainty() const;
-  double timeRatio() const { return fitted_ ? 1.0 / slope_ : 1.0; }
+  /// Simulator time over host time, slips included.
+  double timeRatio() const;
+  /// Slips seen so far; simTime() of moments near the newest slip may have changed.
+  std::uint32_t slips() const { return slip_count_; }
   std::uint32_t epoch() const { return epoch_; }
 
  private:
@@ -121,7 +133,22 @@ class ClockFilter {
     double sim = 0.0;   ///< [s]
     double host = 0.0;  ///< [s]
   };
+  /// Simulator time stood still between the frames `before` and `first`.
+  struct Slip {
+    double before = 0.0;       ///< simulator time of the last frame on the old line, relative [s]
+    double host_border = 0.0;  ///< host time from which on the new line holds, relative [s]
+    double length = 0.0;       ///< [s] of host time
+  };
+  /// Late samples in a row.
+  struct LateRun {
+    bool active = false;
+    Point first;
+    double before = 0.0;  ///< simulator time of the sample before `first`, relative [s]
+    double least = 0.0;   ///< delay [s]
+    double most = 0.0;
+  };
   static constexpr std::size_t kBuckets = 32;
+  static constexpr std::size_t kSlips = 64;
   static constexpr std::size_t kMinBuckets = 3;
 
   bool isForwardJump(const ClockSample& sample, double host_step) const;
@@ -130,12 +157,16 @@ class ClockFilter {
   void advanceSimTime(const ClockSample& sample);
   /// Gives up what of the fit no longer holds. @return kGap, kRateChanged or kNone.
   ClockEvent judgeDelay(const ClockSample& sample, double host_step);
+  /// Whether simulator time has stood still before this sample or a few earlier ones; moves the line if so.
+  bool judgeSlip(const ClockSample& sample, const Point& point);
+  void slip(const Point& first, double before, double length);
   void dropBucketsBefore(double host);
   void addToFit(const Point& point);
   void fit();
   Point relative(const ClockSample& sample) const;
   double delay(const Point& point) const { return point.host - (offset_ + slope_ * point.sim); }
   const Point& bucket(std::size_t i) const { return buckets_[(first_ + i) % kBuckets]; }
+  const Slip& newestSlip(std::size_t i) const { return slips_[(slip_count_ - 1 - i) % kSlips]; }
   std::int64_t stampOf(const ClockSample& sample);
 
   Options options_;
@@ -151,7 +182,8 @@ class ClockFilter {
   std::int64_t last_stamp_ns_ = 0;
   int backward_samples_ = 0;
   double sim_time_ = 0.0;
-  double sim_time_step_ = 0.0;  ///< float32 step that sim_time_ shows, 0 when rebuilt from frame periods [s]
+  double sim_time_before_ = 0.0;  ///< of the sample before [s]
+  double sim_time_step_ = 0.0;    ///< float32 step that sim_time_ shows, 0 when rebuilt from frame periods [s]
 
   std::int64_t host_reference_ns_ = 0;
   double sim_reference_ = 0.0;
@@ -163,6 +195,11 @@ class ClockFilter {
   double offset_ = 0.0;
   double slope_ = 1.0;
   double fit_spread_ = 0.0;  ///< twice the rms delay of the buckets [s]
+
+  std::array<Slip, kSlips> slips_{};  ///< of this fit, a ring
+  std::size_t slips_kept_ = 0;
+  std::uint32_t slip_count_ = 0;
+  LateRun late_run_;
 
   double late_since_ = 0.0;  ///< host time since which every sample has been late, relative [s]
   bool late_ = false;
