@@ -1,142 +1,116 @@
-#!/usr/bin/env python3
-"""Truth bench of the pairing: is each picture paired with the very frame it shows?
-
-Flies the emulator with its window, decodes the strip of every image that capture_node publishes, and compares it with
-the state that camera/frame_state pairs it with. Run it in the environment of scripts/setup (.workspace/env.bash), on a
-quiet machine:
-
-    python tests/bench/bench_pairing.py [--duration 60] [--fps 30 60] [--pipeline-delay 0.05]
-
-Exit code 1 when a budget is missed: 99 % with the very frame, never more than one frame off, time error p95 2 ms.
-"""
+"""Truth bench of the pairing: is each picture paired with the very frame it shows?"""
 
 from __future__ import annotations
 
-import argparse
-import os
+import csv
+import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
+from typing import Dict, List, NamedTuple
 
 import numpy as np
+from pairing_run import COLUMNS
+from registry import Context, Measure, benchmark
 
-from xplane_bridge.emulator.renderer import StripError, read_strip
-from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
-from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.resources import node_program
+from xplane_bridge.harness import HarnessError
 
-_BUDGET_SHARE = 0.99
-_BUDGET_TIME_S = 0.002
-
-
-def run(fps: int, duration: float, delay: float, folder: Path, env: dict[str, str]) -> dict[str, float]:
-    """Flies once. Returns the numbers of the report."""
-    import rospy
-    from sensor_msgs.msg import Image
-    from xplane_bridge.msg import FrameState
-
-    namespace = f"/bench{fps}"
-    with EmulatorProcess(folder, ["--window", "--fps", str(fps), "--pipeline-delay", f"{delay}s"]) as emulator:
-        shared = {"host": "127.0.0.1", "port": emulator.port, "listen_for_beacon": False, "display_delay": delay}
-        rospy.set_param(namespace, {**shared, "capture_node": {"max_rate": 0.0}})
-        nodes = [_node(name, namespace, folder, env) for name in ("rx_node", "capture_node")]
-        shown: dict[int, tuple[int, float]] = {}
-        paired: dict[int, FrameState] = {}
-        unreadable = 0
-
-        def on_image(image: Image) -> None:
-            nonlocal unreadable
-            try:
-                strip = read_strip(np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3))
-            except StripError:
-                unreadable += 1
-                return
-            shown[image.header.stamp.to_nsec()] = (strip.frame, strip.sim_time)
-
-        def on_state(state: FrameState) -> None:
-            paired[state.header.stamp.to_nsec()] = state
-
-        try:
-            topics = [
-                rospy.Subscriber(f"{namespace}/camera/image_raw", Image, on_image, queue_size=100, buff_size=2**26),
-                rospy.Subscriber(f"{namespace}/camera/frame_state", FrameState, on_state, queue_size=1000),
-            ]
-            wait_until(lambda: any(not state.quality for state in list(paired.values())), 30.0, "paired picture")
-            shown.clear()
-            time.sleep(duration)
-            taken = dict(shown)
-            wait_until(lambda: all(stamp in paired for stamp in taken), 5.0, "states of all pictures")
-            for topic in topics:
-                topic.unregister()
-        finally:
-            for node in nodes:
-                node.stop()
-    return report(fps, duration, taken, paired, unreadable)
+#: Of the emulator: from a frame to its display; longer than any drawing takes.
+_PIPELINE_DELAY_S = 0.05
+#: Each flight is this many measurements long: the minute that the budget is for, by default.
+_LENGTHS = 3.0
+#: A picture that appeared, or was noticed, this much off its time is a cause of its own [share of a frame].
+_OFF_TIME = 0.3
 
 
-def report(fps: int, duration: float, shown: dict, paired: dict, unreadable: int) -> dict[str, float]:
-    """Compares what was shown with what it was paired with."""
-    from xplane_bridge.msg import FrameState
+class Run(NamedTuple):
+    """One flight; arrays have an element for each picture with a readable strip."""
 
-    errors, ages, missing = [], [], 0
-    for stamp, (_, sim_time) in shown.items():
-        state = paired[stamp]
-        if state.quality & FrameState.QUALITY_STATE_MISSING:
-            missing += 1
-            continue
-        errors.append(state.state.sim_time - sim_time)
-        ages.append((state.grab_time - state.display_time).to_sec())
-    error = np.abs(errors)
-    frames = np.round(error * fps)
-    return {
-        "pictures/s": len(shown) / duration,
-        "very frame %": 100.0 * float(np.mean(frames == 0)),
-        "worst (frames)": float(frames.max()),
-        "error p50 (ms)": 1e3 * float(np.percentile(error, 50)),
-        "error p95 (ms)": 1e3 * float(np.percentile(error, 95)),
-        "error max (ms)": 1e3 * float(error.max()),
-        "no state": missing,
-        "no strip": unreadable,
-        "repeated": len(shown) - len({frame for frame, _ in shown.values()}),
-        "change to grab p50 (ms)": 1e3 * float(np.percentile(ages, 50)),
-        "change to grab p95 (ms)": 1e3 * float(np.percentile(ages, 95)),
-    }
+    pictures: int
+    unreadable: int
+    frame: np.ndarray  #: shown
+    error: np.ndarray  #: [s] simulator time of the state - of the frame shown; nan: no state
+    frame_error: np.ndarray  #: the same in frames
+    display_late: np.ndarray  #: [s] shown by the emulator after its time
+    noticed_late: np.ndarray  #: [s] display time as published - as it was
+    grab_age: np.ndarray  #: [s] display to grab
+    quality: np.ndarray
+    frames_drawn: int  #: of the emulator, from the first picture to the last
 
 
-def _node(name: str, namespace: str, folder: Path, env: dict[str, str]) -> ManagedProcess:
-    command = [node_program(name, env), f"__ns:={namespace}"]
-    node = ManagedProcess(f"{name}{namespace[1:]}", command, folder, env=env)
-    node.start()
-    return node
+def read_run(folder: Path, delay: float) -> Run:
+    """Puts together what `pairing_run.py` and the emulator have written."""
+    with np.load(folder / "pictures.npz") as arrays:
+        columns: Dict[str, np.ndarray] = {name: arrays[name] for name in COLUMNS}
+    pictures = len(columns["shown_frame"])
+    readable = columns["shown_frame"] >= 0
+    columns = {name: values[readable] for name, values in columns.items()}
+    with (folder / "truth.csv").open() as file:
+        frame_at = {np.float32(row["sim_time"]): int(row["frame"]) for row in csv.DictReader(file)}
+    to_host = time.time_ns() - time.monotonic_ns()
+    with (folder / "swaps.csv").open() as file:
+        swaps = {
+            int(row["frame"]): (int(row["frame_monotonic_ns"]) + to_host, int(row["swap_end_ns"]))
+            for row in csv.DictReader(file)
+        }
+    frame = columns["shown_frame"]
+    began, swapped = np.array([swaps[number] for number in frame]).T
+    paired = np.array([frame_at.get(np.float32(sim_time), np.nan) for sim_time in columns["state_sim_time"]])
+    return Run(
+        pictures,
+        int((~readable).sum()),
+        frame,
+        columns["state_sim_time"] - columns["shown_sim_time"],
+        paired - frame,
+        1e-9 * (swapped - began) - delay,
+        1e-9 * (columns["display_ns"] - swapped),
+        1e-9 * (columns["grab_ns"] - columns["display_ns"]),
+        columns["quality"],
+        int(frame[-1] - frame[0]) + 1,
+    )
 
 
-def main() -> int:
-    """Runs the bench."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--duration", type=float, default=60.0, metavar="S")
-    parser.add_argument("--fps", type=int, nargs="+", default=[30, 60])
-    parser.add_argument("--pipeline-delay", type=float, default=0.05, metavar="S")
-    args = parser.parse_args()
-    good = True
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        with VirtualDisplay(folder) as display, RosMaster(folder) as master:
-            os.environ["DISPLAY"] = display.display
-            master.use_here()
-            import rospy
+def measures(run: Run, fps: float, seconds: float) -> List[Measure]:
+    """What is wanted of a flight."""
+    known = np.isfinite(run.error)
+    error = np.abs(run.error[known])
+    wrong = known & (run.error != 0.0)
+    late = wrong & (np.abs(run.display_late) > _OFF_TIME / fps)
+    unnoticed = wrong & ~late & (np.abs(run.noticed_late) > _OFF_TIME / fps)
+    flagged = wrong & (run.quality != 0)
+    name = f"{fps:g} frames/s: "
+    return [
+        Measure(name + "pictures", run.pictures / seconds, "/s"),
+        Measure(name + "pictures / frames drawn", 100.0 * run.pictures / run.frames_drawn, "%"),
+        Measure(
+            name + "paired with the very frame", 100.0 * float(np.mean(run.error == 0.0)), "%", 99.0, at_least=True
+        ),
+        Measure(name + "largest error", float(np.abs(run.frame_error[known]).max(initial=0.0)), "frames", 1.0),
+        Measure(name + "time error, p50", 1e3 * float(np.percentile(error, 50)), "ms"),
+        Measure(name + "time error, p95", 1e3 * float(np.percentile(error, 95)), "ms", 2.0),
+        Measure(name + "time error, largest", 1e3 * float(error.max()), "ms"),
+        Measure(name + "images without a state", int((~known).sum()), "-", 0.0),
+        Measure(name + "images without a readable strip", run.unreadable, "-", 0.0),
+        Measure(name + "images of a frame seen before", len(run.frame) - len(set(run.frame)), "-", 0.0),
+        Measure(name + "change to grab, p95", 1e3 * float(np.percentile(run.grab_age, 95)), "ms", 3.0),
+        Measure(name + "wrong, as the emulator showed it late", int(late.sum()), "-"),
+        Measure(name + "wrong, as the change was seen late", int(unnoticed.sum()), "-"),
+        Measure(name + "wrong by the pairing itself", int((wrong & ~late & ~unnoticed).sum()), "-"),
+        Measure(name + "wrong and flagged", int(flagged.sum()), "-"),
+    ]
 
-            rospy.init_node("bench", disable_signals=True)
-            env = {**master.env, "DISPLAY": display.display, "ROS_HOME": str(folder)}
-            for fps in args.fps:
-                numbers = run(fps, args.duration, args.pipeline_delay, folder, env)
-                print(f"{fps} frames/s, pipeline delay {1e3 * args.pipeline_delay:g} ms")
-                print("\n".join(f"  {key:<26}{value:9.2f}" for key, value in numbers.items()))
-                good = good and numbers["very frame %"] >= 100.0 * _BUDGET_SHARE
-                good = good and numbers["worst (frames)"] <= 1 and numbers["error p95 (ms)"] <= 1e3 * _BUDGET_TIME_S
-            rospy.signal_shutdown("done")
-    return 0 if good else 1
 
-
-if __name__ == "__main__":
-    sys.exit(main())
+@benchmark
+def pairing(context: Context) -> List[Measure]:
+    """Images paired with the very frame they show, at 30 and 60 frames/s, by the strip drawn into them."""
+    seconds = _LENGTHS * context.seconds
+    result: List[Measure] = []
+    for fps in (30.0, 60.0):
+        folder = context.folder / f"{fps:g}"
+        command = [sys.executable, Path(__file__).with_name("pairing_run.py"), folder, "--fps", fps]
+        command += ["--seconds", seconds, "--pipeline-delay", _PIPELINE_DELAY_S]
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise HarnessError(f"the flight at {fps:g} frames/s failed:\n{done.stderr.strip()}")
+        result += measures(read_run(folder, _PIPELINE_DELAY_S), fps, seconds)
+    return result

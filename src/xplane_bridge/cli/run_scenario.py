@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import sys
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence
@@ -45,6 +46,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--camera", action="store_true", help="draw and record the cockpit view")
     p.add_argument("--headless", action="store_true", help="draw it, but not on this screen")
     p.add_argument("--duration", type=float, metavar="S", help="end after so long; needed where a scenario repeats")
+    p.add_argument(
+        "--emulator",
+        default="",
+        metavar="OPTIONS",
+        help='further options of xplane_emulator, e.g. --emulator="--pipeline-delay 50ms --fps 30"',
+    )
     p.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulator's turbulence and faults")
     return p
 
@@ -64,6 +71,7 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
     if args.camera:
         options.append("--window")
         launch_args = {}
+    options += shlex.split(args.emulator)
     command = [str(program("scenario_player")), args.scenario, "--log", str((output / "played.json").resolve())]
     programs: Dict[str, List[str]] = {}
     if args.controller:
