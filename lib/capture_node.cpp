@@ -11,6 +11,7 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/distortion_models.h>
 #include <sensor_msgs/image_encodings.h>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "xplane_bridge/conversions.hpp"
@@ -19,7 +20,9 @@ namespace xplane_bridge {
 namespace {
 
 constexpr std::chrono::milliseconds kSourceWait{50};
-constexpr double kPairingPeriod = 0.005;               // [s] between looks at overdue pictures
+// [s] between looks at overdue pictures; the others are answered when their frame or state comes. Each look wakes two
+// of roscpp's threads: with 5 ms they took a quarter of the node's time at 640x480.
+constexpr double kOverduePeriod = 0.02;
 constexpr std::int64_t kFrozenRepeat = 1'000'000'000;  // [ns] between repetitions of a frozen picture
 constexpr std::size_t kPicturesWaiting = 2;            // for scaling, and for JPEG: more would only be older
 constexpr std::size_t kSpareBuffers = 4;
@@ -92,7 +95,7 @@ void CaptureNode::broadcastFrames() {
 void CaptureNode::subscribe() {
   subscribeTopic<FlightState>("flight_state", kStateQueue,
                               [this](const FlightState::ConstPtr& state) { onState(state); });
-  addTimer(kPairingPeriod, [this] { pairing_->flush(clock_.system_ns()); });
+  addTimer(kOverduePeriod, [this] { pairing_->flush(clock_.system_ns()); });
 }
 
 core::SimLinkCallbacks CaptureNode::linkCallbacks() {
@@ -105,6 +108,8 @@ core::SimLinkCallbacks CaptureNode::linkCallbacks() {
 }
 
 void CaptureNode::start() {
+  // A picture is converted in a fraction of its period; OpenCV's workers would spend more on waiting for each other.
+  cv::setNumThreads(1);
   view_group_ = link().addGroup(view_stream_.group());
   publisher_ =
       std::make_unique<LatestWorker<Grabbed>>(kPicturesWaiting, [this](Grabbed& grabbed) { publishPicture(&grabbed); });
@@ -335,13 +340,8 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
     black_ = black;
   }
   if (raw || jpeg) {
-    const auto image = boost::make_shared<sensor_msgs::Image>();
+    const sensor_msgs::ImagePtr image = takeMessage();
     image->header = state.header;
-    image->width = static_cast<std::uint32_t>(options_.width);
-    image->height = static_cast<std::uint32_t>(options_.height);
-    image->encoding = sensor_msgs::image_encodings::BGR8;
-    image->step = image->width * 3;
-    image->data.resize(static_cast<std::size_t>(image->step) * image->height);
     cv::Mat pixels(options_.height, options_.width, CV_8UC3, image->data.data());
     scaler_->scale(grabbed->pixels, pixels);
     if (raw) image_publisher_.publish(image);
@@ -350,6 +350,20 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   info_publisher_.publish(info);
   pairing_->addPicture(state, clock_.system_ns());
   if (!grabbed->frozen) giveBuffer(std::move(grabbed->pixels));
+}
+
+sensor_msgs::ImagePtr CaptureNode::takeMessage() {
+  for (const sensor_msgs::ImagePtr& message : messages_) {
+    if (message.unique()) return message;  // written, and encoded
+  }
+  const auto message = boost::make_shared<sensor_msgs::Image>();
+  message->width = static_cast<std::uint32_t>(options_.width);
+  message->height = static_cast<std::uint32_t>(options_.height);
+  message->encoding = sensor_msgs::image_encodings::BGR8;
+  message->step = message->width * 3;
+  message->data.resize(static_cast<std::size_t>(message->step) * message->height);
+  if (messages_.size() < kSpareBuffers) messages_.push_back(message);
+  return message;
 }
 
 void CaptureNode::publishJpeg(const sensor_msgs::Image& image) {

@@ -70,6 +70,7 @@ class CaptureNode : public BaseNode {
   void takePicture(vision::FrameSource* source, const vision::Change& change);
   void repeatFrozen(std::int64_t now_ns);
   void publishPicture(Grabbed* grabbed);
+  sensor_msgs::ImagePtr takeMessage();
   void publishJpeg(const sensor_msgs::Image& image);
   bool anybodyListens() const;
   CameraFacts cameraFacts() const;
@@ -134,6 +135,7 @@ class CaptureNode : public BaseNode {
   std::vector<cv::Mat> buffers_;
 
   // Publisher thread only.
+  std::vector<sensor_msgs::ImagePtr> messages_;  // used again once nobody else holds them: memory once touched is cheap
   std::uint32_t image_count_ = 0;
   std::uint32_t frozen_count_ = 0;
 

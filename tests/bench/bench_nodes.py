@@ -3,46 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import socket
 import sys
 from pathlib import Path
-from typing import Callable, Dict, Iterator, List, Sequence
+from typing import Callable, Dict, List, Sequence
 
 from bench_offline import cpp_program
+from measuring import measuring, report_of
 from registry import Context, Measure, benchmark
 
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.emulator_bench import EmulatorBench, XPlaneClient
 from xplane_bridge.harness.ros import free_port, roslaunch
-
-_PREFIX = "BENCH"
-_TICKS = os.sysconf("SC_CLK_TCK")
-
-
-class _Use:
-    """CPU time and memory of a process since it was made, from /proc."""
-
-    def __init__(self, pid: int) -> None:
-        self._pid = pid
-        self._began = self._cpu_s()
-
-    def _cpu_s(self) -> float:
-        fields = Path(f"/proc/{self._pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
-        return (int(fields[11]) + int(fields[12])) / _TICKS
-
-    def cpu_percent(self, elapsed_s: float) -> float:
-        """Of one core."""
-        return 100.0 * (self._cpu_s() - self._began) / elapsed_s
-
-    def memory_mb(self) -> float:
-        """Resident."""
-        for line in Path(f"/proc/{self._pid}/status").read_text(encoding="ascii").splitlines():
-            if line.startswith("VmRSS:"):
-                return int(line.split()[1]) / 1024.0
-        raise HarnessError(f"process {self._pid} has ended")
 
 
 def _socket_drops(pid: int) -> int:
@@ -141,21 +115,6 @@ class _Field:
         return self.start("bench_xplane", [cpp_program("bench_xplane"), *pairs])
 
 
-def _report(meter: ManagedProcess, timeout_s: float) -> Dict[str, object]:
-    if meter.wait(timeout_s) != 0:
-        raise HarnessError(meter.describe("failed"))
-    return json.loads(meter.output().strip().splitlines()[-1])
-
-
-@contextlib.contextmanager
-def _measuring(meter: ManagedProcess, processes: Sequence[ManagedProcess]) -> Iterator[List[_Use]]:
-    """Usage counters of processes over the measurement; the block runs at its end."""
-    meter.wait_for_line(r"^MEASURING", 90.0)
-    uses = [_Use(process.pid) for process in processes]
-    meter.wait_for_line(r"^MEASURED", 600.0)
-    yield uses
-
-
 @benchmark
 def flight_state(context: Context) -> List[Measure]:
     """Flight datagram to subscriber at 100 Hz, against a bare roscpp publish and the same node in rospy."""
@@ -165,10 +124,10 @@ def flight_state(context: Context) -> List[Measure]:
         )
         ours, peer = field.node("rx_node"), field.rospy_rx()
         field.bare()
-        with _measuring(meter, [ours, peer]) as (use, peer_use):
+        with measuring(meter, [ours, peer]) as (use, peer_use):
             cpu, peer_cpu = use.cpu_percent(context.seconds), peer_use.cpu_percent(context.seconds)
             memory, peer_memory = use.memory_mb(), peer_use.memory_mb()
-        report = _report(meter, 60.0)
+        report = report_of(meter, 60.0)
     rx, rospy_rx, bare = (report[key] for key in ("/bench/flight_state", "/peer/flight_state", "bare"))
     return [
         Measure("datagram to callback, p50", rx["p50_us"], "us"),
@@ -196,10 +155,10 @@ def packet_rate(context: Context) -> List[Measure]:
         ours = field.node("rx_node")
         meter.wait_for_line(r"^MEASURING", 90.0)
         drops = _socket_drops(ours.pid)
-        with _measuring(meter, [ours]) as (use,):
+        with measuring(meter, [ours]) as (use,):
             cpu = use.cpu_percent(context.seconds)
             drops = _socket_drops(ours.pid) - drops
-        report = _report(meter, 60.0)
+        report = report_of(meter, 60.0)
     received = report["/bench/flight_state"]["received"]
     return [
         Measure("packets offered", report["datagrams"] / report["elapsed_s"], "/s", budget=20000.0, at_least=True),
@@ -217,7 +176,7 @@ def link_return(context: Context) -> List[Measure]:
     with _Field(context, 60.0) as field:
         meter = field.meter(seconds=1.0, topics="/bench/flight_state", outages=outages, link_state="/bench/link_state")
         field.node("rx_node")
-        report = _report(meter, 120.0 + 12.0 * outages)
+        report = report_of(meter, 120.0 + 12.0 * outages)
     noticed, back = sorted(report["silence_noticed_s"]), sorted(report["link_back_s"])
     return [
         Measure("silence noticed, median", noticed[len(noticed) // 2], "s"),
@@ -254,7 +213,7 @@ def control(context: Context) -> List[Measure]:
         )
         field.launch("tx.launch")
         field.launch("joystick.launch", joy_config="xbox")
-        report = _report(meter, 120.0 + context.seconds)
+        report = report_of(meter, 120.0 + context.seconds)
     ours, bare = report["bridge"], report["bare"]
     return [
         Measure("joy to datagram, p50", ours["p50_us"], "us"),

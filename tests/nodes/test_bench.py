@@ -13,7 +13,7 @@ _RUN = Path(__file__).parents[1] / "bench" / "run.py"
 def test_benchmarks_of_the_nodes_measure(tmp_path: Path) -> None:
     """Each gives figures that can be: everything that was sent arrives, nothing takes no time."""
     result = tmp_path / "result.json"
-    names = ["flight_state", "control", "link_return"]
+    names = ["flight_state", "control", "link_return", "capture"]
     done = subprocess.run(
         [sys.executable, str(_RUN), "--seconds", "1", "--json", str(result), *names],
         stdout=subprocess.PIPE,
@@ -30,3 +30,6 @@ def test_benchmarks_of_the_nodes_measure(tmp_path: Path) -> None:
     assert measures["flight_state: bare roscpp publish, p50"] > 1.0
     assert measures["control: joy to datagram, p50"] > 1.0
     assert measures["link_return: states flow again, median"] < 10.0
+    for grabber in ("capture_node", "ffmpeg", "mss", "GetImage"):
+        assert measures[f"capture: 640x480 {grabber}: distinct pictures"] > 1.0
+        assert measures[f"capture: 640x480 {grabber}: age at the subscriber, p50"] > 0.0
