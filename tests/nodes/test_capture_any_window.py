@@ -1,0 +1,87 @@
+"""capture.launch alone: an ordinary window of the desktop as images, without X-Plane and without any other node."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Iterator
+
+import numpy as np
+import pytest
+
+from xplane_bridge.harness import ManagedProcess, RosMaster, roslaunch
+from xplane_bridge.harness.display import VirtualDisplay
+from xplane_bridge.harness.ros import free_port
+
+TITLE = "Field notes - page 7"
+#: Two halves, and each half of the other's colour a moment later. 400x300 is of the shape of 640x480.
+WINDOW = """
+import tkinter
+root = tkinter.Tk()
+root.title("{title}")
+canvas = tkinter.Canvas(root, width=400, height=300, highlightthickness=0)
+canvas.pack()
+halves = [canvas.create_rectangle(x, 0, x + 200, 300, width=0) for x in (0, 200)]
+colours = ["#ff8000", "#0040c0"]
+def paint():
+    for half, colour in zip(halves, colours):
+        canvas.itemconfig(half, fill=colour)
+    colours.reverse()
+    root.after(100, paint)
+paint()
+root.mainloop()
+"""
+ORANGE, BLUE = (0x00, 0x80, 0xFF), (0xC0, 0x40, 0x00)  # BGR
+
+
+@pytest.fixture
+def display(tmp_path: Path) -> Iterator[str]:
+    with VirtualDisplay(tmp_path) as server:
+        program = ["env", f"DISPLAY={server.display}", sys.executable, "-c", WINDOW.format(title=TITLE)]
+        with ManagedProcess("window", program, tmp_path):
+            yield server.display
+
+
+def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, tmp_path: Path) -> None:
+    from sensor_msgs.msg import CameraInfo, Image
+    from xplane_bridge.msg import FrameState
+
+    namespace = f"{world.namespace.lstrip('/')}/desktop"
+    nowhere = {"host": "127.0.0.1", "port": free_port(), "listen_for_beacon": False}
+    args = {"ns": namespace, "window_title": TITLE, "x_display": display, **nowhere}
+    with roslaunch(master, tmp_path, "capture.launch", **args) as launch:
+        images = world.watch("desktop/camera/image_raw", Image)
+        infos = world.watch("desktop/camera/camera_info", CameraInfo)
+        states = world.watch("desktop/camera/frame_state", FrameState)
+        images.wait_for(what="a picture", timeout=40.0)
+        status = world.wait_for_diagnostics("capture", lambda s: s.level == 0 and s.message == "capturing")
+        assert f'"{TITLE}"' in world.values_of(status)["Source"]
+        seen = {halves(image) for image in images.wait_for_count(10)}
+        assert seen == {(ORANGE, BLUE), (BLUE, ORANGE)}, "both, and no mixture of them"
+
+        first = images.messages[0]
+        assert (first.width, first.height, first.encoding) == (640, 480, "bgr8")
+        assert infos.wait_for().K[0] == pytest.approx(554.256, abs=1e-3)  # 320 / tan(30 deg), the parameter's
+        known = states.wait_for(lambda state: not state.quality & FrameState.QUALITY_DISPLAY_UNKNOWN)
+        assert known.quality == (
+            FrameState.QUALITY_STATE_MISSING
+            | FrameState.QUALITY_VIEW_UNKNOWN
+            | FrameState.QUALITY_FOV_ASSUMED
+            | FrameState.QUALITY_DELAY_ASSUMED
+        )
+        assert known.state.valid == 0
+        assert np.isnan(known.state.latitude)
+        assert known.header.stamp in {image.header.stamp for image in images.messages}
+        launch.check_running()
+
+
+def halves(image) -> tuple:
+    """The colours of the left and of the right half, each the same all over it; else what there is of them."""
+    picture = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
+    # Both edges of the middle are blurred by scaling.
+    return tuple(single_colour(part) for part in (picture[:, :315], picture[:, 325:]))
+
+
+def single_colour(part: np.ndarray) -> tuple:
+    low, high = part.min(axis=(0, 1)), part.max(axis=(0, 1))
+    return tuple(int(v) for v in low) if np.array_equal(low, high) else (tuple(low), tuple(high))
