@@ -74,19 +74,25 @@ class Xvfb {
 /// A window that draws what the test says.
 class TestWindow {
  public:
+  /// @param depth [bit] of its visual; 0: the screen's
   TestWindow(const std::string& display, const std::string& title, int width, int height, int x = 10, int y = 20,
-             int border = 0)
+             int border = 0, int depth = 0)
       : width_(width), height_(height) {
     connection_ = xcb_connect(display.c_str(), nullptr);
     if (xcb_connection_has_error(connection_) != 0) throw std::runtime_error("no connection to " + display);
     screen_ = xcb_setup_roots_iterator(xcb_get_setup(connection_)).data;
     window_ = xcb_generate_id(connection_);
-    const std::uint32_t values[] = {screen_->black_pixel, 1};
-    xcb_create_window(connection_, XCB_COPY_FROM_PARENT, window_, screen_->root, static_cast<std::int16_t>(x),
-                      static_cast<std::int16_t>(y), static_cast<std::uint16_t>(width),
-                      static_cast<std::uint16_t>(height), static_cast<std::uint16_t>(border),
-                      XCB_WINDOW_CLASS_INPUT_OUTPUT, screen_->root_visual, XCB_CW_BACK_PIXEL | XCB_CW_OVERRIDE_REDIRECT,
-                      values);
+    const xcb_visualid_t visual = depth == 0 ? screen_->root_visual : visualOf(depth);
+    const xcb_colormap_t colours = xcb_generate_id(connection_);
+    xcb_create_colormap(connection_, XCB_COLORMAP_ALLOC_NONE, colours, screen_->root, visual);
+    // A window of another depth than its parent's needs a border pixel and a colour map of its own.
+    const std::uint32_t values[] = {screen_->black_pixel, screen_->black_pixel, 1, colours};
+    xcb_create_window(connection_,
+                      depth == 0 ? static_cast<std::uint8_t>(XCB_COPY_FROM_PARENT) : static_cast<std::uint8_t>(depth),
+                      window_, screen_->root, static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
+                      static_cast<std::uint16_t>(width), static_cast<std::uint16_t>(height),
+                      static_cast<std::uint16_t>(border), XCB_WINDOW_CLASS_INPUT_OUTPUT, visual,
+                      XCB_CW_BACK_PIXEL | XCB_CW_BORDER_PIXEL | XCB_CW_OVERRIDE_REDIRECT | XCB_CW_COLORMAP, values);
     xcb_change_property(connection_, XCB_PROP_MODE_REPLACE, window_, XCB_ATOM_WM_NAME, XCB_ATOM_STRING, 8,
                         static_cast<std::uint32_t>(title.size()), title.data());
     const std::string klass = std::string("xp_instance") + '\0' + "XpClass" + '\0';
@@ -135,6 +141,13 @@ class TestWindow {
   void sync() { std::free(xcb_get_input_focus_reply(connection_, xcb_get_input_focus(connection_), nullptr)); }
 
  private:
+  xcb_visualid_t visualOf(int depth) const {
+    for (auto d = xcb_screen_allowed_depths_iterator(screen_); d.rem > 0; xcb_depth_next(&d)) {
+      if (d.data->depth == depth && d.data->visuals_len > 0) return xcb_depth_visuals(d.data)->visual_id;
+    }
+    throw std::runtime_error("the X server has no visual of depth " + std::to_string(depth));
+  }
+
   void configure(std::uint16_t mask, int first, int second) {
     const std::uint32_t values[] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(second)};
     xcb_configure_window(connection_, window_, mask, values);
