@@ -24,6 +24,7 @@ TOPICS = {
     "data_rows": "xplane_bridge/DataRows",
     "link_state": "xplane_bridge/LinkState",
     "origin": "sensor_msgs/NavSatFix",
+    "joy": "sensor_msgs/Joy",
     "control/manual": "xplane_bridge/ControlCommand",
     "control/auto": "xplane_bridge/ControlCommand",
     "control/surfaces": "xplane_bridge/SurfaceCommand",

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import cv2
@@ -14,6 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from xplane_bridge import protocol
 from xplane_bridge.bags import Bags
 from xplane_bridge.emulator.renderer import StripError, read_strip
 from xplane_bridge.harness import ManagedProcess, flight_check, wait_until
@@ -28,9 +32,10 @@ def demo(folder: Path, *options: str) -> ManagedProcess:
     return ManagedProcess("demo", [program("demo"), "--output", folder / "out", "--headless", *options], folder)
 
 
-@pytest.mark.parametrize("transport", ["rref", "data"])
-def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: str) -> None:
-    with demo(tmp_path, "--duration", "12", f"transport:={transport}") as run:
+#: The longer flight goes on until the left aileron has been stuck and repaired.
+@pytest.mark.parametrize(("transport", "seconds"), [("rref", 47), ("data", 12)])
+def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: str, seconds: int) -> None:
+    with demo(tmp_path, "--duration", str(seconds), f"transport:={transport}") as run:
         assert run.wait(DEMO_TIMEOUT_S) == 0, run.output()
     out = tmp_path / "out"
     verdicts = {v.name: v for v in flight_check.judge(out / "flight.bag", out / "truth.csv")}
@@ -41,7 +46,13 @@ def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: st
         states = bags.read("/xplane/flight_state", ["roll_deg", "altitude_msl"])
     assert links["transport"][-1] == transport
     assert np.ptp(states["roll_deg"]) > 20, "the demo's flight is lively"
-    assert "all well" in run.output()
+    output = run.output()
+    assert "all well" in output
+    assert re.search(r"^ok +stick +\d+ messages of the joystick", output, re.MULTILINE)
+    assert re.search(r"^ok +modes .* engaged by the joystick; back by moving the stick;", output, re.MULTILINE)
+    assert re.search(r"^ok +released .* all overrides are off; on during the flight: override_joystick", output, re.M)
+    broken = r"ok +failure +aileron1_wing2_left 0\.0\d deg off 5 deg" if seconds > 40 else "left aileron not judged"
+    assert re.search(broken, output)
     report = (out / "report.html").read_text()
     for key in ("attitude", "surfaces", "engines", "images"):
         section = report[report.index(f'<section id="{key}">') :].split("</section>")[0]
@@ -113,6 +124,21 @@ def test_images_of_the_demo_read_back_with_opencv_and_carry_their_states(recordi
     rows = np.searchsorted(frames.stamp, labels["stamp_ns"])
     np.testing.assert_array_equal(frames.stamp[rows], labels["stamp_ns"])
     np.testing.assert_array_equal(frames["state.roll_deg"][rows], labels["state_roll_deg"])
+
+
+def test_an_override_that_is_left_on_fails_the_demo(tmp_path: Path) -> None:
+    # Another client takes the stick again and again: also after the bridge has given it back.
+    taking = protocol.DrefWrite("sim/operation/override/override_joystick", 1.0).encode()
+    with demo(tmp_path, "--duration", "5") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        port = int(run.wait_for_line(r"X-Plane's port: (\d+)", DEMO_TIMEOUT_S).group(1))
+        deadline = time.monotonic() + DEMO_TIMEOUT_S
+        while run.running and time.monotonic() < deadline:
+            client.sendto(taking, ("127.0.0.1", port))
+            time.sleep(0.02)
+        assert run.returncode == 1, run.output()
+    assert re.search(r"^FAILED +released .* still on: override_joystick$", run.output(), re.MULTILINE)
+    assert "demo: failed: released" in run.output()
+    assert re.search(r"^ok +modes +not judged", run.output(), re.MULTILINE), "5 s are too short for that, and say so"
 
 
 def test_ctrl_c_ends_the_demo_and_all_it_has_started(tmp_path: Path) -> None:

@@ -27,16 +27,21 @@ class AttitudeHold:
     """Cascaded loops: heading -> roll -> stick, altitude -> climb -> pitch -> stick, airspeed -> throttle.
 
     Args:
-        targets: `roll`, `heading`, `pitch` [deg], `altitude` [m MSL], `speed` [m/s calibrated]. Heading goes before
+        wanted: `roll`, `heading`, `pitch` [deg], `altitude` [m MSL], `speed` [m/s calibrated]. Heading goes before
             roll, pitch before altitude. What is missing: wings level, the altitude and speed of the first state.
     """
 
-    def __init__(self, targets: Dict[str, Optional[float]]) -> None:
-        self.targets = targets
+    def __init__(self, wanted: Dict[str, Optional[float]]) -> None:
+        self._wanted = wanted
+        self.targets = dict(wanted)
         self._time: Optional[float] = None
         self._epoch: Optional[int] = None
         # Integrators: pitch attitude [deg], elevator, throttle. They start from what is flown: nothing jumps.
         self._pitch, self._elevator, self._throttle = 0.0, 0.0, 0.5
+
+    def restart(self) -> None:
+        """The next state is the first one: while somebody else flies, integrators must follow and not run away."""
+        self._epoch = None
 
     def fly(self, state: Any) -> Dict[str, float]:
         """Stick and throttle [-1..1; right, nose up, 0..1] for a FlightState."""
@@ -70,6 +75,7 @@ class AttitudeHold:
         if self._epoch != state.epoch:
             self._epoch, self._time = state.epoch, state.sim_time_unwrapped
             self._pitch, self._elevator, self._throttle = state.pitch_deg, state.control_pitch, state.control_throttle
+            self.targets = dict(self._wanted)
             for name, value in (("altitude", state.altitude_msl), ("speed", state.calibrated_airspeed)):
                 if self.targets.get(name) is None:
                     self.targets[name] = value
@@ -87,8 +93,8 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--roll", type=float, metavar="DEG", help="right + (default: wings level)")
     p.add_argument("--heading", type=float, metavar="DEG", help="true; instead of roll")
     p.add_argument("--pitch", type=float, metavar="DEG", help="nose up +; instead of altitude")
-    p.add_argument("--altitude", type=float, metavar="M", help="MSL (default: the present one)")
-    p.add_argument("--speed", type=float, metavar="M/S", help="calibrated airspeed (default: the present one)")
+    p.add_argument("--altitude", type=float, metavar="M", help="MSL (default: the one at engagement)")
+    p.add_argument("--speed", type=float, metavar="M/S", help="calibrated airspeed (default: as at engagement)")
     p.add_argument("--engage", action="store_true", help="ask for mode AUTO")
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     return p
@@ -100,7 +106,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(ros_arguments(argv))
     rospy = rospy_module()
     rospy.init_node("attitude_hold")
-    from xplane_bridge.msg import ControlCommand, FlightState
+    from xplane_bridge.msg import ControlCommand, ControlMode, FlightState
     from xplane_bridge.srv import SetMode
 
     topic = args.namespace.rstrip("/") + "/"
@@ -110,13 +116,25 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     needed = FlightState.VALID_ATTITUDE | FlightState.VALID_RATES | FlightState.VALID_POSITION
     needed |= FlightState.VALID_VELOCITY | FlightState.VALID_AIRSPEEDS
 
+    mode, began = ControlMode(), []
+
+    def on_mode(message: Any) -> None:
+        nonlocal mode
+        mode = message
+
     def on_state(state: Any) -> None:
         if state.paused or state.valid & needed != needed:
             return
+        if mode.mode != ControlMode.AUTO:
+            hold.restart()
         command = ControlCommand(fields=fields, sequence=state.frame_count, **hold.fly(state))
         command.header.stamp = state.header.stamp
         publisher.publish(command)
+        if not began:
+            began.append(True)
+            print(f"commanding on {publisher.resolved_name}", flush=True)
 
+    rospy.Subscriber(topic + "control/mode", ControlMode, on_mode, queue_size=1)
     rospy.Subscriber(topic + "flight_state", FlightState, on_state, queue_size=1, tcp_nodelay=True)
     if args.engage:
         rospy.wait_for_service(topic + "tx_node/set_mode")

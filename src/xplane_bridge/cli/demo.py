@@ -5,19 +5,25 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import List, Optional, Sequence
+from typing import Any, Dict, List, Optional, Sequence
 
 from tqdm import tqdm
 
 from xplane_bridge.cli.entry import guarded
 from xplane_bridge.cli.flight_report import write_report
-from xplane_bridge.harness import flight_check
+from xplane_bridge.cli.scenario_player import scenario_of
+from xplane_bridge.harness import control_check, flight_check
 from xplane_bridge.harness.display import screen
 from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
+from xplane_bridge.harness.override_watch import OverrideWatch
 from xplane_bridge.harness.processes import interrupted_by_signals
-from xplane_bridge.resources import config_file
+from xplane_bridge.harness.scenario_flight import scenario_plan
+from xplane_bridge.resources import program
 
 _FPS = 60
+_SCENARIO, _JOYSTICK = "demo_flight", "logitech_extreme_3d_pro"
+#: Labels of the scenario after which there is something to judge.
+_LABELS = {"back_by": "manual by the stick", "stuck": "left aileron stuck", "repaired": "repaired"}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -25,8 +31,9 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="demo",
         description=(
-            "Flies a scripted flight with the emulator (no X-Plane needed), records it through the bridge into "
-            "DIR/flight.bag and checks the recording. Exit code 0: all of it worked."
+            "Flies a scripted flight with the emulator (no X-Plane needed) by joystick and by a controller, breaks an "
+            "aileron (in flights of a minute and more), records it through the bridge into DIR/flight.bag and checks "
+            "the recording, and that X-Plane got everything back. Exit code 0: all of it worked."
         ),
     )
     p.add_argument(
@@ -52,15 +59,50 @@ def _duration(text: str) -> float:
 
 
 def _plan(args: argparse.Namespace) -> FlightPlan:
-    launch_args = {}
+    launch_args: Dict[str, Any] = {}
     for text in args.launch_args:
         key, separator, value = text.partition(":=")
         if not separator or not key:
             parser().error(f"{text!r} is neither an option nor KEY:=VALUE for demo.launch")
         launch_args[key] = value
     transport = launch_args.pop("transport", args.transport)
-    options: List[str] = ["--window", "--fps", str(args.fps), "--pilot", str(config_file("scenarios", "demo.yaml"))]
-    return FlightPlan(args.output, args.duration, args.aircraft, transport, options, launch_args)
+    return scenario_plan(
+        scenario_of(_SCENARIO),
+        _SCENARIO,
+        args.output,
+        args.duration,
+        aircraft=args.aircraft,
+        joystick=_JOYSTICK,
+        controller=[str(program("attitude_hold"))],
+        controller_ready=r"^commanding on",
+        emulator_options=["--window", "--fps", str(args.fps)],
+        launch_args=launch_args,
+        transport=transport,
+    )
+
+
+class _Overrides:
+    """X-Plane's overrides during the flight, and after it."""
+
+    def __init__(self) -> None:
+        self._watch: Optional[OverrideWatch] = None
+        self.verdicts: List[flight_check.Verdict] = []
+
+    def watch(self, flight: RunningFlight) -> None:
+        """Looks which are on."""
+        if self._watch is None:
+            self._watch = OverrideWatch(flight.emulator.port)
+        self._watch.poll()
+
+    def judge(self, _: RunningFlight) -> None:
+        """Looks whether all are off."""
+        if self._watch is not None:
+            self.verdicts.append(self._watch.judge_end())
+
+    def close(self) -> None:
+        """Ends it."""
+        if self._watch is not None:
+            self._watch.close()
 
 
 class _Progress:
@@ -99,16 +141,24 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(argv)
     plan = _plan(args)
     progress = _Progress(plan.duration)
+    overrides = _Overrides()
+
+    def observe(flight: RunningFlight) -> None:
+        overrides.watch(flight)
+        progress(flight)
+
     try:
         with interrupted_by_signals("demo"), screen(plan.logs, args.headless):
-            fly(plan, progress, lambda text: progress_line(text))
+            fly(plan, observe, progress_line, afterwards=overrides.judge)
     finally:
         progress.close()
+        overrides.close()
     print(flight_check.render(flight_check.summarise(plan.bag)))
     print()
     print(flight_check.pairing_text(plan.bag))
     print()
     verdicts = flight_check.judge(plan.bag, plan.truth)
+    verdicts += control_check.judge_control(plan.bag, **_LABELS) + overrides.verdicts
     for verdict in verdicts:
         print(f"{'ok    ' if verdict.passed else 'FAILED'}  {verdict.name:10} {verdict.text}")
     report = write_report([plan.bag], plan.output / "report.html")

@@ -7,7 +7,7 @@ import json
 import shlex
 import sys
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Optional, Sequence
 
 from xplane_bridge.analysis.scoring import Score
 from xplane_bridge.bags import Bags
@@ -17,14 +17,11 @@ from xplane_bridge.cli.scenario_player import scenario_of
 from xplane_bridge.harness.display import screen
 from xplane_bridge.harness.flight import FlightPlan, fly
 from xplane_bridge.harness.processes import interrupted_by_signals
-from xplane_bridge.resources import config_file, program
+from xplane_bridge.harness.scenario_flight import scenario_plan
 from xplane_bridge.scenario import Scenario, ScenarioError
 from xplane_bridge.scenario.judging import judge
 
-_PLAYER = "scenario_player"
 _LONGEST_S = 600.0  # a scenario that has not ended by then waits for something that never comes
-#: `start` of a scenario to the emulator's options.
-_START = {"latitude": "--lat", "longitude": "--lon", "altitude": "--alt", "heading": "--heading", "speed": "--speed"}
 
 
 def parser() -> argparse.ArgumentParser:
@@ -58,39 +55,20 @@ def parser() -> argparse.ArgumentParser:
 
 def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
     """What to start for a scenario."""
-    output = args.output or Path(f"scenario_{scenario.name}")
-    aircraft = args.aircraft or (scenario.aircraft[0] if scenario.aircraft else "fixed_wing")
-    if scenario.aircraft and aircraft not in scenario.aircraft:
-        raise ScenarioError(f"{scenario.name} is for {', '.join(scenario.aircraft)}, not for {aircraft}")
     if scenario.repeat_every is not None and args.duration is None:
         raise ScenarioError(f"{scenario.name} repeats for ever (repeat_every): give --duration")
-    options: List[str] = ["--fps", "60", "--seed", str(args.seed)]
-    for key, value in scenario.start.items():
-        options += [_START[key], f"{value:g}"]
-    launch_args: Dict[str, Any] = {"capture": False}
-    if args.camera:
-        options.append("--window")
-        launch_args = {}
-    options += shlex.split(args.emulator)
-    command = [str(program("scenario_player")), args.scenario, "--log", str((output / "played.json").resolve())]
-    programs: Dict[str, List[str]] = {}
-    if args.controller:
-        programs["controller"] = ["sh", "-c", f"exec {args.controller}"]
-    if args.joystick:
-        file = config_file("joysticks", f"{args.joystick}.yaml")
-        launch_args["joy_config"] = args.joystick
-        programs["joystick"] = ["roslaunch", "xplane_bridge", "joystick.launch", f"joy_config_file:={file}"]
-        command += ["--joystick", "--joy-config", args.joystick]
-    programs[_PLAYER] = command
-    return FlightPlan(
-        output,
+    options = ["--fps", "60", "--seed", str(args.seed), *(["--window"] if args.camera else [])]
+    return scenario_plan(
+        scenario,
+        args.scenario,
+        args.output or Path(f"scenario_{scenario.name}"),
         args.duration or _LONGEST_S,
-        aircraft,
-        args.transport,
-        options,
-        launch_args,
-        programs=programs,
-        player=_PLAYER,
+        aircraft=args.aircraft,
+        joystick=args.joystick,
+        controller=["sh", "-c", f"exec {args.controller}"] if args.controller else (),
+        emulator_options=[*options, *shlex.split(args.emulator)],
+        launch_args={} if args.camera else {"capture": False},
+        transport=args.transport,
     )
 
 

@@ -34,6 +34,8 @@ class FlightPlan:
     programs: Dict[str, List[str]] = field(default_factory=dict)
     #: The one of `programs` whose end is the end of the recording, before `duration` at the latest; empty: none.
     player: str = ""
+    #: For those of `programs` that the next one has to wait for: what they write when they are ready, as a pattern.
+    ready: Dict[str, str] = field(default_factory=dict)
     #: Silences that belong to the plan, e.g. a restart of the emulator, are not failures.
     silence_allowed: float = _SILENCE_S  #: [s]
 
@@ -73,13 +75,19 @@ def _ignore(_: object) -> None:
     """Does nothing with what it is told."""
 
 
-def fly(plan: FlightPlan, observer: Observer = _ignore, say: Callable[[str], None] = _ignore) -> None:
+def fly(
+    plan: FlightPlan,
+    observer: Observer = _ignore,
+    say: Callable[[str], None] = _ignore,
+    afterwards: Observer = _ignore,
+) -> None:
     """Flies `plan`; afterwards its bag and its truth file are complete and nothing that was started still runs.
 
     Args:
         plan: the flight.
         observer: called about ten times a second while it is recorded; may stop and restart the emulator.
         say: called with a line on what happens.
+        afterwards: called when the bridge has ended while the emulator still runs.
 
     Raises:
         HarnessError: A program failed, or flight states stopped coming.
@@ -117,14 +125,17 @@ def fly(plan: FlightPlan, observer: Observer = _ignore, say: Callable[[str], Non
         for name, command in plan.programs.items():
             flight.programs[name] = ManagedProcess(name, command, plan.logs, env=master.env)
             stack.enter_context(flight.programs[name])
+            if name in plan.ready:
+                flight.programs[name].wait_for_line(plan.ready[name], _READY_TIMEOUT_S)
         say(f"flying; to watch, in a second shell: export ROS_MASTER_URI={master.uri}")
         _record(plan, flight, observer)
         say("ending the recording")
-        for program in reversed(list(flight.programs.values())):
-            program.stop()
-        bridge.stop()
+        bridge.stop()  # first: the recording is not to show a stick that has fallen silent
         if bridge.returncode != 0:
             raise HarnessError(bridge.describe(f"ended with status {bridge.returncode}"))
+        afterwards(flight)
+        for program in reversed(list(flight.programs.values())):
+            program.stop()
         recording = master.ros_home / _RECORDING
         if not recording.is_file():
             msg = f"the recorder has not finished {recording}; logs: {plan.logs}"

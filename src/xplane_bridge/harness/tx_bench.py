@@ -11,8 +11,8 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from xplane_bridge.harness.emulator_bench import XPlaneClient
 from xplane_bridge.harness.processes import wait_until
+from xplane_bridge.harness.xplane_client import XPlaneClient
 from xplane_bridge.resources import config_file
 
 MANUAL, AUTO = 1, 2

@@ -177,6 +177,7 @@ class RosPlayer:
         now = self._clock.update(state.epoch, state.sim_time_unwrapped)
         if self._begin is None:
             self._begin = {"epoch": int(state.epoch), "sim_time_unwrapped": float(state.sim_time_unwrapped)}
+            self._say(f"playing {self._player.scenario.name}")
         with self._lock:
             self._commands = self._player.step(now, sample_of(state, self._mode, self._stall))
             commands = self._commands

@@ -1,0 +1,75 @@
+"""A scenario as a flight to start: emulator, bridge, player, and what else flies with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Sequence
+
+from xplane_bridge.harness.flight import FlightPlan
+from xplane_bridge.resources import config_file, program
+from xplane_bridge.scenario import Scenario, ScenarioError
+
+PLAYER, CONTROLLER = "scenario_player", "controller"
+#: What the player writes when it begins.
+_PLAYS = r"^playing "
+#: `start` of a scenario to the emulator's options.
+_START = {"latitude": "--lat", "longitude": "--lon", "altitude": "--alt", "heading": "--heading", "speed": "--speed"}
+
+
+def scenario_plan(
+    scenario: Scenario,
+    source: str,
+    output: Path,
+    duration: float,
+    aircraft: Optional[str] = None,
+    joystick: Optional[str] = None,
+    controller: Sequence[str] = (),
+    controller_ready: str = "",
+    emulator_options: Sequence[str] = (),
+    launch_args: Optional[Dict[str, Any]] = None,
+    transport: str = "rref",
+) -> FlightPlan:
+    """What to start for a scenario.
+
+    Args:
+        scenario: what to fly.
+        source: of the scenario: stem of a file in config/scenarios, or a path.
+        output: folder of everything that is written; the player writes `played.json` into it.
+        duration: [s] after which it ends at the latest.
+        aircraft: what to fly; the scenario's first when omitted.
+        joystick: device through which to fly; commands when omitted.
+        controller: program that flies in mode auto.
+        controller_ready: regular expression of what it writes when it can; empty: nobody waits for it.
+        emulator_options: beside those of the scenario's `start`, which they override.
+        launch_args: for demo.launch.
+        transport: rref or data.
+
+    Raises:
+        ScenarioError: It is for other aircraft.
+        ResourceError: There is no such joystick.
+    """
+    chosen = aircraft or (scenario.aircraft[0] if scenario.aircraft else "fixed_wing")
+    if scenario.aircraft and chosen not in scenario.aircraft:
+        raise ScenarioError(f"{scenario.name} is for {', '.join(scenario.aircraft)}, not for {chosen}")
+    options: List[str] = []
+    for key, value in scenario.start.items():
+        options += [_START[key], f"{value:g}"]
+    options += emulator_options
+    arguments = dict(launch_args or {})
+    player = [str(program("scenario_player")), source, "--log", str((output / "played.json").resolve())]
+    ready = {PLAYER: _PLAYS}
+    programs: Dict[str, List[str]] = {}
+    if joystick:
+        config_file(
+            "joysticks", f"{joystick}.yaml"
+        )  # there is one; its path may hold a space, which roslaunch cannot take
+        arguments.update(joystick="mapper", joy_config=joystick)
+        player += ["--joystick", "--joy-config", joystick]
+    if controller:
+        programs[CONTROLLER] = list(controller)
+        if controller_ready:
+            ready[CONTROLLER] = controller_ready
+    programs[PLAYER] = player  # last: it must not begin before the others can follow
+    return FlightPlan(
+        output, duration, chosen, transport, options, arguments, programs=programs, player=PLAYER, ready=ready
+    )
