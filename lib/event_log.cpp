@@ -3,10 +3,10 @@
 namespace xplane_bridge {
 
 std::uint32_t EventLog::add(std::uint8_t kind, const std::string& text, double sim_time,
-                            const std::string& requested_by, bool success) {
+                            const std::string& requested_by, bool success, std::uint32_t number) {
   std::lock_guard<std::mutex> lock(mutex_);
   Event event;
-  event.number = ++number_;
+  event.number = number != 0 ? number : ++number_;
   event.stamp = ros::Time(ros::WallTime::now().toSec());
   event.sim_time = static_cast<float>(sim_time);
   event.kind = kind;
@@ -18,6 +18,11 @@ std::uint32_t EventLog::add(std::uint8_t kind, const std::string& text, double s
   list_.header.stamp = event.stamp;
   publisher_.publish(list_);
   return event.number;
+}
+
+std::uint32_t EventLog::reserve() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return ++number_;
 }
 
 }  // namespace xplane_bridge

@@ -292,6 +292,11 @@ void SurfaceControl::onAircraft(const std::string& aircraft) {
   loadModel();
 }
 
+void SurfaceControl::release(const std::string& why) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  drop(why);
+}
+
 void SurfaceControl::loadModel() {
   file_problem_.clear();
   try {

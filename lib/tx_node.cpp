@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "xplane_bridge/ControlMode.h"
 #include "xplane_bridge/Event.h"
@@ -17,6 +18,7 @@ constexpr std::size_t kUnseenKept = 16;
 constexpr double kWorkPeriod = 0.2;     // [s]
 constexpr double kReleaseWait = 1.0;    // [s] of one attempt
 constexpr double kRestartStep = 0.25;   // [s] backwards in total running time, more than datagrams overtake each other
+constexpr double kIdentityWait = 2.0;   // [s] of asking for it once
 constexpr double kDoesNotFollow = 1.0;  // [s] without read-back until it is said
 
 ros::Time stampNow() { return ros::Time(ros::WallTime::now().toSec()); }
@@ -80,6 +82,7 @@ void TxNode::start() {
     makeSurfaceControl();
     publishMode();
   }
+  makeFlightJobs();
   worker_ = std::thread([this] { work(); });
 }
 
@@ -152,13 +155,14 @@ std::string TxNode::refusalToFly() const {
   if (link_status_.state == core::LinkState::kSearching || link_status_.state == core::LinkState::kLost) {
     return "X-Plane is not connected";
   }
+  if (!grounded_.empty()) return grounded_;
   if (options_.aircraft.identity.empty()) return "";
   if (!identity_.known()) return "X-Plane has not told which aircraft is loaded";
   if (options_.aircraft.fits(identity_.identity())) return "";
   std::string expected;
   for (const std::string& icao : options_.aircraft.identity) expected += (expected.empty() ? "" : ", ") + icao;
-  return "the aircraft loaded is " + identity_.identity().icao + " (" + identity_.identity().description +
-         "), but config/aircraft/" + common().aircraft + ".yaml is for " + expected;
+  return "the aircraft loaded is " + described(identity_.identity()) + ", but config/aircraft/" + common().aircraft +
+         ".yaml is for " + expected;
 }
 
 bool TxNode::mayFly() const { return refusalToFly().empty(); }
@@ -201,7 +205,7 @@ void TxNode::sendControls(double time) {
   }
   try {
     if (!refusal.empty()) {
-      if (link_status_.state == core::LinkState::kConnected) overrides_->require({});
+      if (linkIsUp()) overrides_->require({});
       return;
     }
     overrides_->require(core::requiredOverrides(controls.active, encoder_->options()));
@@ -274,12 +278,17 @@ void TxNode::watchReadBack(const core::ChannelSet& channels) {
 
 void TxNode::onLinkState(const core::LinkStatus& status) {
   std::string text;
+  std::optional<std::string> pause_by;
   {
     std::lock_guard<std::mutex> lock(mutex_);
     const double time = now();
+    if (status.paused && link_status_.paused && status.paused != link_status_.paused) {
+      pause_by = std::exchange(pause_by_, "");
+    }
     if (status.state != link_status_.state) text = std::string(core::toString(status.state)) + ": " + status.reason;
     if (status.epoch != link_status_.epoch) {
       identity_.reset();
+      reset_detector_.restart();
       if (status.epoch > 1) came_back_ = true;
     }
     link_status_ = status;
@@ -300,6 +309,7 @@ void TxNode::onLinkState(const core::LinkStatus& status) {
     work_wanted_.notify_all();
   }
   if (!text.empty()) logEvent(Event::LINK, text);
+  if (pause_by) logEvent(Event::PAUSE, *status.paused ? "paused" : "resumed", *pause_by);
 }
 
 void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info) {
@@ -309,7 +319,11 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
     const double before = watch_.sim_time;
     core::updateFlightWatch(view, &watch_);
     // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
-    if (watch_.sim_time < before - kRestartStep) came_back_ = true;
+    if (watch_.sim_time < before - kRestartStep) {
+      came_back_ = true;
+      reset_detector_.restart();
+    }
+    if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
     sim_time_ = watch_.sim_time;
     failures_->onFrame(watch_);
     // The signal goes out with every frame, however rarely commands come.
@@ -328,9 +342,28 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
 
 void TxNode::onIdentity() {
   const core::AircraftIdentity& loaded = identity_.identity();
-  logEvent(Event::AIRCRAFT, "aircraft: " + loaded.icao + " (" + loaded.description + ")" +
-                                (options_.aircraft.fits(loaded) ? "" : "; not the one of the configuration"));
+  logEvent(
+      Event::AIRCRAFT,
+      "aircraft: " + described(loaded) + (options_.aircraft.fits(loaded) ? "" : "; not the one of the configuration"),
+      jobs_ ? jobs_->mover() : "");
   surfaces_->onAircraft(loaded.icao.empty() ? loaded.description : loaded.icao);
+}
+
+void TxNode::askIdentity() {
+  link().readDatarefs(core::AircraftIdentityReader::datarefs(), kIdentityWait,
+                      [this](const std::vector<core::DatarefValue>& values) {
+                        std::lock_guard<std::mutex> lock(mutex_);
+                        if (identity_.add(values)) onIdentity();
+                      });
+}
+
+void TxNode::onReset(const std::string& how) {
+  ++resets_;
+  excitation_->abort("the flight was reset");
+  // Perhaps with another aircraft, which must not be flown until the subscription tells.
+  askIdentity();
+  // What was asked for is told with its outcome.
+  if (!jobs_ || jobs_->mover().empty()) logEvent(Event::RESET, how);
 }
 
 void TxNode::onReadBack(const core::RrefView& view) {
@@ -385,6 +418,7 @@ void TxNode::stopInputs() {
     worker_ends_ = true;
     if (excitation_) excitation_->abort("tx_node ends");
   }
+  if (jobs_) jobs_->stop();
   work_wanted_.notify_all();
   if (worker_.joinable()) worker_.join();
   if (surfaces_) surfaces_->stop();
@@ -411,13 +445,14 @@ bool TxNode::linkIsUp() const {
   return link_status_.state == core::LinkState::kConnected || link_status_.state == core::LinkState::kPaused;
 }
 
-std::uint32_t TxNode::logEvent(std::uint8_t kind, const std::string& text, const std::string& who, bool success) {
+std::uint32_t TxNode::logEvent(std::uint8_t kind, const std::string& text, const std::string& who, bool success,
+                               std::uint32_t number) {
   if (success) {
     ROS_INFO("%s", text.c_str());
   } else {
     ROS_ERROR("%s", text.c_str());
   }
-  return events_.add(kind, text, sim_time_, who, success);
+  return events_.add(kind, text, sim_time_, who, success, number);
 }
 
 void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {

@@ -47,6 +47,7 @@ void TxNode::advertiseServices() {
   advertiseService<SetView::Request, SetView::Response>(
       name() + "/set_view", [this](const SetView::Request& q, SetView::Response& r) { serveSetView(q, &r); });
   advertiseFailureServices();
+  advertiseFlightServices();
 }
 
 void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* response) {
@@ -151,6 +152,11 @@ void TxNode::servePause(bool pause, std_srvs::SetBool::Response* response) {
     response->message = noLink().message;
     return;
   }
+  const std::string who = name() + "/pause";
+  if (paused() != pause) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    pause_by_ = who;
+  }
   link().sendCommand(core::pauseCommand(pause));
   const auto deadline = Clock::now() + std::chrono::duration<double>(options_.service_timeout);
   while (paused() != pause && Clock::now() < deadline && !stopping()) {
@@ -158,8 +164,13 @@ void TxNode::servePause(bool pause, std_srvs::SetBool::Response* response) {
   }
   response->success = paused() == pause;
   response->message = response->success ? (pause ? "paused" : "running") : "X-Plane did not follow in time";
+  if (response->success) return;  // told when it happened
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    pause_by_.clear();
+  }
   logEvent(Event::PAUSE, pause ? "pause asked for: " + response->message : "resume asked for: " + response->message,
-           name() + "/pause", response->success);
+           who, false);
 }
 
 void TxNode::serveSetView(const SetView::Request& request, SetView::Response* response) {

@@ -84,6 +84,8 @@ TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
   out.rate = own.number("rate", {1.0, 500.0}, out.rate);
   out.max_rate = own.number("max_rate", {1.0, 2000.0}, out.max_rate);
   out.service_timeout = own.number("service_timeout", {0.1, 10.0}, out.service_timeout);
+  out.setting_timeout = own.number("setting_timeout", {0.5, 300.0}, out.setting_timeout);
+  out.load_timeout = own.number("load_timeout", {0.5, 3600.0}, out.load_timeout);
   core::ArbiterOptions& arbiter = out.arbiter;
   arbiter.command_timeout = own.number("command_timeout", {0.02, 60.0}, arbiter.command_timeout);
   arbiter.resume_grace = own.number("resume_grace", {0.0, 60.0}, arbiter.resume_grace);

@@ -17,9 +17,12 @@ class EventLog {
 
   void setPublisher(const ros::Publisher& publisher) { publisher_ = publisher; }
 
-  /// Adds and publishes. `kind` is one of Event's. Returns the event's number.
+  /// Adds and publishes. `kind` is one of Event's. Returns the event's number: the next one, or `number`, which
+  /// reserve() has given.
   std::uint32_t add(std::uint8_t kind, const std::string& text, double sim_time, const std::string& requested_by = "",
-                    bool success = true);
+                    bool success = true, std::uint32_t number = 0);
+  /// A number for an event that will happen later.
+  std::uint32_t reserve();
 
  private:
   std::mutex mutex_;

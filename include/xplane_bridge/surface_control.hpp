@@ -50,6 +50,8 @@ class SurfaceControl {
   bool onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info);
   /// Another aircraft is loaded: whatever was driven ends, its mixing file is read.
   void onAircraft(const std::string& aircraft);
+  /// Whatever is driven ends, failures and commands too.
+  void release(const std::string& why);
   /// At least ten times a second; `time` [s] steady. `refusal`: why nothing may be sent to X-Plane now; empty: it may.
   void tick(double time, const std::string& refusal);
   /// Ends all driving; overrides are the keeper's to give back.

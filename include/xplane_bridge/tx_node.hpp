@@ -3,6 +3,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -15,21 +16,28 @@
 
 #include "xplane_bridge/AppliedCommand.h"
 #include "xplane_bridge/ControlCommand.h"
+#include "xplane_bridge/LoadAircraft.h"
 #include "xplane_bridge/ModeRequest.h"
+#include "xplane_bridge/ResetFlight.h"
 #include "xplane_bridge/RunCommand.h"
 #include "xplane_bridge/ServiceResult.h"
 #include "xplane_bridge/SetDataref.h"
+#include "xplane_bridge/SetLoading.h"
 #include "xplane_bridge/SetMode.h"
 #include "xplane_bridge/SetView.h"
+#include "xplane_bridge/SetWind.h"
+#include "xplane_bridge/Situation.h"
 #include "xplane_bridge/SurfaceCommand.h"
 #include "xplane_bridge/base_node.hpp"
 #include "xplane_bridge/core/aircraft_identity.hpp"
 #include "xplane_bridge/core/control_arbiter.hpp"
 #include "xplane_bridge/core/control_channels.hpp"
 #include "xplane_bridge/core/flight_watch.hpp"
+#include "xplane_bridge/core/reset_detector.hpp"
 #include "xplane_bridge/event_log.hpp"
 #include "xplane_bridge/excitation_keeper.hpp"
 #include "xplane_bridge/failure_keeper.hpp"
+#include "xplane_bridge/flight_jobs.hpp"
 #include "xplane_bridge/guardian.hpp"
 #include "xplane_bridge/override_keeper.hpp"
 #include "xplane_bridge/surface_control.hpp"
@@ -86,6 +94,8 @@ class TxNode : public BaseNode {
   void onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info);
   void onReadBack(const core::RrefView& view);
   void onIdentity();
+  void askIdentity();
+  void onReset(const std::string& how);
   void work();
 
   // Single surfaces and failures (tx_node_surfaces.cpp).
@@ -94,6 +104,17 @@ class TxNode : public BaseNode {
   void publishSurfacesApplied();
   void advertiseFailureServices();
   void serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response);
+
+  // Flight services: accepted, then told on `events` (tx_node_flight.cpp).
+  void makeFlightJobs();
+  void advertiseFlightServices();
+  void ground(const std::string& why);
+  /// Why a flight service is not accepted; `wrong`: what the request itself says. nullopt: it is.
+  std::optional<ServiceResult> refusalOfJob(const std::optional<std::string>& wrong) const;
+  /// Answers a flight service: refused, or accepted and begun with `begin(number of the event, who)`.
+  template <class Response>
+  void serveJob(const std::string& service, const std::optional<std::string>& wrong, Response* response,
+                const std::function<void(std::uint32_t, const std::string&)>& begin);
 
   // Services (tx_node_services.cpp).
   void advertiseServices();
@@ -105,7 +126,8 @@ class TxNode : public BaseNode {
   /// Writes datarefs and waits until X-Plane shows them.
   ServiceResult writeAndConfirm(const std::vector<core::DatarefWrite>& writes);
   bool linkIsUp() const;
-  std::uint32_t logEvent(std::uint8_t kind, const std::string& text, const std::string& who = "", bool success = true);
+  std::uint32_t logEvent(std::uint8_t kind, const std::string& text, const std::string& who = "", bool success = true,
+                         std::uint32_t number = 0);
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status);
 
   TxOptions options_;
@@ -117,6 +139,7 @@ class TxNode : public BaseNode {
   std::unique_ptr<SurfaceControl> surfaces_;
   std::unique_ptr<FailureKeeper> failures_;
   std::unique_ptr<ExcitationKeeper> excitation_;  // guarded by mutex_
+  std::unique_ptr<FlightJobs> jobs_;
 
   mutable std::mutex mutex_;
   std::unique_ptr<core::ControlArbiter> arbiter_;
@@ -124,6 +147,10 @@ class TxNode : public BaseNode {
   core::LinkStatus link_status_;
   core::AircraftIdentityReader identity_;
   core::FlightWatch watch_;
+  core::ResetDetector reset_detector_;
+  unsigned resets_ = 0;         // of the flight, since the start
+  std::string grounded_;        // why nothing is flown for a while; empty: it is
+  std::string pause_by_;        // who has asked for a pause or its end that has not come yet
   bool came_back_ = false;      // the link came up anew: commands from before count only if somebody still flies
   double last_command_ = -1e9;  // [s] steady, of any source
   double last_send_ = -1e9;     // [s] steady

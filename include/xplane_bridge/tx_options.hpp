@@ -27,9 +27,11 @@ struct AircraftOptions {
 
 /// config/tx.yaml and the aircraft's file.
 struct TxOptions {
-  double rate = 50.0;            ///< [Hz] of refreshing
-  double max_rate = 200.0;       ///< [Hz] of sending on arrival
-  double service_timeout = 2.0;  ///< [s] until X-Plane must have shown what a service asked for
+  double rate = 50.0;             ///< [Hz] of refreshing
+  double max_rate = 200.0;        ///< [Hz] of sending on arrival
+  double setting_timeout = 10.0;  ///< [s] until X-Plane must show what was accepted
+  double load_timeout = 120.0;    ///< [s] the same where it loads files
+  double service_timeout = 2.0;   ///< [s] until X-Plane must have shown what a service asked for
   core::ArbiterOptions arbiter;
   AircraftOptions aircraft;
   core::MixingRequirements mixing;

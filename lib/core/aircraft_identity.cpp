@@ -37,6 +37,8 @@ std::string textFrom(const std::vector<float>& values, std::size_t first, std::s
 
 }  // namespace
 
+std::string described(const AircraftIdentity& aircraft) { return aircraft.icao + " (" + aircraft.description + ")"; }
+
 AircraftIdentityReader::AircraftIdentityReader() : frames_(datarefs().size(), 0, frameOptions()) {}
 
 const std::vector<std::string>& AircraftIdentityReader::datarefs() {
@@ -57,8 +59,23 @@ bool AircraftIdentityReader::add(const RrefView& datagram, std::int64_t receive_
   if (!frames_.add(datagram, receive_ns)) {
     return false;
   }
-  AircraftIdentity identity{textFrom(frames_.values(), 0, kIcaoLength),
-                            textFrom(frames_.values(), kIcaoLength, kDescriptionLength)};
+  return take(frames_.values());
+}
+
+bool AircraftIdentityReader::add(const std::vector<DatarefValue>& values) {
+  if (values.size() != datarefs().size()) return false;
+  std::vector<float> characters;
+  for (const DatarefValue& value : values) {
+    if (!value) return false;
+    characters.push_back(*value);
+  }
+  return take(characters);
+}
+
+bool AircraftIdentityReader::take(const std::vector<float>& characters) {
+  AircraftIdentity identity{textFrom(characters, 0, kIcaoLength),
+                            textFrom(characters, kIcaoLength, kDescriptionLength)};
+  ++told_;
   if (identity == identity_) {
     return false;
   }

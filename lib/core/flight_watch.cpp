@@ -19,6 +19,11 @@ constexpr Row kRows[] = {
     {"sim/flightmodel/position/true_theta", &FlightWatch::pitch_deg, 1.0},
     {"sim/flightmodel/position/alpha", &FlightWatch::alpha_deg, 1.0},
     {"sim/flightmodel/position/beta", &FlightWatch::beta_deg, 1.0},
+    {"sim/time/total_flight_time_sec", &FlightWatch::flight_time, 1.0},
+    {"sim/flightmodel/position/latitude", &FlightWatch::latitude_deg, 1.0},
+    {"sim/flightmodel/position/longitude", &FlightWatch::longitude_deg, 1.0},
+    {"sim/flightmodel/position/elevation", &FlightWatch::elevation, 1.0},
+    {"sim/flightmodel/position/groundspeed", &FlightWatch::ground_speed, 1.0},
 };
 constexpr std::size_t kRowCount = sizeof kRows / sizeof kRows[0];
 constexpr const char* kCrashed = "sim/flightmodel2/misc/has_crashed";

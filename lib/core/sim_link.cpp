@@ -87,6 +87,11 @@ std::vector<DatarefValue> SimLink::readDatarefs(std::vector<std::string> paths, 
   return impl_->readAndWait(std::move(paths), timeout_s, {});
 }
 
+std::vector<DatarefValue> SimLink::readDatarefsUntil(std::vector<std::string> paths, double timeout_s,
+                                                     DatarefReader::Accept fits) {
+  return impl_->readAndWait(std::move(paths), timeout_s, std::move(fits));
+}
+
 std::pair<bool, DatarefValue> SimLink::waitForDataref(const std::string& path, float expected, float tolerance,
                                                       double timeout_s) {
   const auto fits = [expected, tolerance](const std::vector<DatarefValue>& values) {

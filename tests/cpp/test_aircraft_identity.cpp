@@ -56,6 +56,22 @@ TEST(AircraftIdentity, readsBothStringsAndSaysWhenTheyChange) {
   feeder.set("sim/aircraft/view/acf_ICAO", "BE58");
   EXPECT_TRUE(feeder.feed(&reader));
   EXPECT_EQ(reader.identity().icao, "BE58");
+  EXPECT_EQ(reader.told(), 3u);
+}
+
+TEST(AircraftIdentity, takesAnAnswerReadAtOnceLikeOneOfTheStream) {
+  AircraftIdentityReader reader;
+  std::vector<DatarefValue> values(AircraftIdentityReader::datarefs().size(), 0.0F);
+  values[0] = static_cast<float>('Q');
+  values[8] = static_cast<float>('x');
+  EXPECT_TRUE(reader.add(values));
+  EXPECT_EQ(reader.identity().icao, "Q");
+  EXPECT_EQ(reader.identity().description, "x");
+  EXPECT_FALSE(reader.add(values)) << "the same again";
+  values[0] = static_cast<float>('R');
+  values[3].reset();
+  EXPECT_FALSE(reader.add(values)) << "one character is missing";
+  EXPECT_EQ(reader.told(), 2u);
 }
 
 TEST(AircraftIdentity, charactersOutsideAsciiAreMarked) {

@@ -317,6 +317,53 @@ def test_prel_starts_a_flight_at_a_place(bench):
     assert emulator.read(POSITION + "lat_ref", POSITION + "lon_ref") == [47.5, 9.0]
 
 
+def test_prel_gives_a_speed_that_cannot_be_trimmed(bench):
+    emulator = bench(aircraft="fixed_wing")
+    place = {"latitude_deg": 37.4, "longitude_deg": 127.6, "elevation_m": 1500.0, "heading_deg": 270.0}
+    emulator.client().send(protocol.Placement(6, speed_mps=20.0, **place))  # half its stalling speed
+    emulator.step()
+    state = emulator.sim.model.state
+    assert (state.latitude_deg, state.altitude_m) == (pytest.approx(37.4, abs=1e-4), pytest.approx(1500.0, abs=1.0))
+    assert (state.v_east_mps, state.v_north_mps) == pytest.approx((-20.0, 0.0), abs=0.5)
+
+
+def test_prel_into_the_ground_is_not_flown(bench):
+    emulator = bench(aircraft="fixed_wing")
+    before = emulator.sim.model.state.altitude_m
+    emulator.client().send(
+        protocol.Placement(6, latitude_deg=37.4, longitude_deg=127.6, elevation_m=-400, speed_mps=75.0)
+    )
+    emulator.step()
+    assert emulator.sim.model.state.altitude_m == pytest.approx(before, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("version", "name"), [(11, "sim/flightmodel/misc/cgz_ref_to_default"), (12, "sim/flightmodel2/misc/cg_offset_z")]
+)
+def test_balance_is_moved_by_the_payload_and_pitches_the_aircraft(bench, version, name):
+    emulator = bench(aircraft="fixed_wing", version=version)
+    pitch, mass = "sim/flightmodel/position/Q_dot", "sim/flightmodel/weight/m_total"
+    emulator.step(60)
+    (before, kilograms) = emulator.read(pitch, mass)
+    emulator.write({name: 0.1})
+    assert emulator.read(name) == [pytest.approx(0.1, abs=1e-3)]
+    assert emulator.read(mass) == [pytest.approx(kilograms, abs=0.1)]
+    # 2000 kg of lift act 0.1 m ahead of the centre of gravity: 1962 N m on about 3300 kg m2 are 34 deg/s2
+    assert emulator.read(pitch)[0] - before == pytest.approx(34.0, rel=0.3)
+    emulator.write({name: 1.0})  # farther than the payload can be moved
+    assert emulator.read(name) == [pytest.approx(0.1, abs=1e-3)]
+
+
+def test_loading_is_shown_while_the_flight_stands(bench):
+    emulator = bench(aircraft="fixed_wing")
+    weight = "sim/flightmodel/weight/"
+    (before,) = emulator.read(weight + "m_total")
+    emulator.client().send(protocol.CommandRequest("sim/operation/pause_on"))
+    emulator.write({weight + "m_fuel[0]": 60.0, weight + "m_fixed": 300.0})
+    shown = emulator.read(weight + "m_fuel[0]", weight + "m_fixed", weight + "m_total")
+    assert shown == pytest.approx([60.0, 300.0, before - 40.0 + 90.0], abs=0.1)
+
+
 def test_prel_on_a_runway_and_again(bench):
     emulator = bench(aircraft="fixed_wing")
     client = emulator.client()

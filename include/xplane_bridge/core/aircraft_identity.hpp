@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/dataref_reader.hpp"
 #include "xplane_bridge/core/rref_frame_assembler.hpp"
 
 namespace xplane_bridge::core {
@@ -19,6 +20,9 @@ struct AircraftIdentity {
   friend bool operator!=(const AircraftIdentity& a, const AircraftIdentity& b) { return !(a == b); }
 };
 
+/// For people: "BE58 (Baron)".
+std::string described(const AircraftIdentity& aircraft);
+
 /// Puts the identity together from RREF replies: X-Plane sends a byte[] dataref one character a value.
 class AircraftIdentityReader {
  public:
@@ -32,14 +36,21 @@ class AircraftIdentityReader {
   bool add(const RrefView& datagram, std::int64_t receive_ns);
   /// Both strings empty before the first.
   const AircraftIdentity& identity() const { return identity_; }
+  /// The same, from single values of datarefs(), in that order; false while one is missing.
+  bool add(const std::vector<DatarefValue>& values);
+  /// Answers that have told an identity, the same or another.
+  unsigned told() const { return told_; }
   /// An identity with at least one character has come.
   bool known() const { return !identity_.icao.empty() || !identity_.description.empty(); }
   /// The subscription starts anew; the identity is kept until another one comes.
   void reset() { frames_.reset(); }
 
  private:
+  bool take(const std::vector<float>& characters);
+
   RrefFrameAssembler frames_;
   AircraftIdentity identity_;
+  unsigned told_ = 0;
 };
 
 }  // namespace xplane_bridge::core

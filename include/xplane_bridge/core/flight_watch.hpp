@@ -1,5 +1,5 @@
-/// The few quantities tx_node watches every frame: triggers, attitude limits, read-back times. Not a state source:
-/// that is the state assembler's (field_table.hpp).
+/// The few quantities tx_node watches every frame: triggers, attitude limits, read-back times, resets. Not a state
+/// source: that is the state assembler's (field_table.hpp).
 #pragma once
 
 #include <cmath>
@@ -19,6 +19,11 @@ struct FlightWatch {
   double pitch_deg = std::nan("");           ///< nose up +
   double alpha_deg = std::nan("");           ///< nose up +
   double beta_deg = std::nan("");            ///< as X-Plane has it [?]: only floating surfaces use it
+  double flight_time = std::nan("");         ///< [s] since the flight began
+  double latitude_deg = std::nan("");        ///< to a metre: X-Plane sends it as float32
+  double longitude_deg = std::nan("");
+  double elevation = std::nan("");     ///< [m] MSL
+  double ground_speed = std::nan("");  ///< [m/s]
   bool crashed = false;
 };
 

@@ -345,8 +345,16 @@ class FlightModel(Protocol):
     def set_terrain(self, elevation_m: float) -> None:
         """Height of the ground above the sphere below the aircraft."""
 
-    def set_loading(self, fuel_kg: Sequence[float] | None = None, payload_kg: float | None = None) -> None:
-        """Fuel per tank and payload; what is None stays as it is."""
+    def set_loading(
+        self,
+        fuel_kg: Sequence[float] | None = None,
+        payload_kg: float | None = None,
+        cg_aft_m: float | None = None,
+    ) -> None:
+        """Fuel per tank, payload, and where the centre of gravity is now; what is None stays as it is.
+
+        The payload is moved to bring the centre of gravity there, and stays where it was put.
+        """
 
     def set_engine_running(self, engine: int, running: bool) -> None:
         """Starts (at once, at working speed) or stops an engine."""

@@ -33,6 +33,7 @@ from xplane_bridge.emulator.flight_model import (
 )
 from xplane_bridge.emulator.jsbsim_state import (
     FOOT_M,
+    INCH_M,
     POUND_FOOT_NM,
     POUND_FORCE_N,
     POUND_KG,
@@ -47,7 +48,7 @@ from xplane_bridge.emulator.jsbsim_state import (
 from xplane_bridge.emulator.rotors import Rotor, sum_loads
 from xplane_bridge.emulator.turbulence import DrydenTurbulence
 
-SITUATION_VERSION = 1
+SITUATION_VERSION = 2
 #: Height below which contact with the ground is looked for.
 CRASH_WATCH_M = 20.0
 #: How deep in the ground the lowest point of a placed aircraft may be: the travel of its springs.
@@ -90,6 +91,8 @@ class JsbsimModel:
     default_fuel_kg: tuple[float, ...] = ()
     default_payload_kg: float = 0.0
     max_payload_kg: float = 0.0
+    #: How far ahead of and behind the reference point the payload can be put.
+    payload_reach_m: float = 2.0
     gear_time_s: float = 6.0
     #: True airspeeds of a start in the air that names none, the most usual first.
     usual_speeds_mps: tuple[float, ...] = ()
@@ -106,6 +109,7 @@ class JsbsimModel:
         self._loaded_fuel_kg = list(self.default_fuel_kg)
         self._fuel_kg = list(self._loaded_fuel_kg)
         self._payload_kg = self.default_payload_kg
+        self._payload_aft_m = 0.0
         self._trimmed = Controls()
         self.state = ModelState()
         self._start_jsbsim()
@@ -158,6 +162,7 @@ class JsbsimModel:
         self._steer_setter = setter("fcs/steer-cmd-norm")
         masses = len(self.fuel_capacity_kg) + 1
         self._mass_setters = [setter(f"inertia/pointmass-weight-lbs[{i}]") for i in range(masses)]
+        self._payload_aft_setter = setter(f"inertia/pointmass-location-X-inches[{masses - 1}]")
         name = self.info.name
         tree = ElementTree.parse(_ROOT / "aircraft" / name / f"{name}.xml").getroot()
         self._empty_mass_kg = float(tree.findtext("mass_balance/emptywt", "0"))
@@ -423,6 +428,7 @@ class JsbsimModel:
                 "atmosphere": self._atmosphere,
                 "fuel": self._fuel_kg,
                 "payload": self._payload_kg,
+                "payload_aft": self._payload_aft_m,
                 "gear": self._gear_position,
                 "crashed": self._crashed,
                 "surfaces": [actuator.save() for actuator in self._surface_set.actuators],
@@ -447,6 +453,7 @@ class JsbsimModel:
         self._turbulence.restore(saved["turbulence"])
         self._atmosphere = tuple(saved["atmosphere"])
         self._fuel_kg, self._payload_kg = list(saved["fuel"]), saved["payload"]
+        self._payload_aft_m = saved["payload_aft"]
         self._gear_position = saved["gear"]
         for actuator, values in zip(self._surface_set.actuators, saved["surfaces"]):
             actuator.restore(values)
@@ -523,22 +530,44 @@ class JsbsimModel:
         self._terrain_m = elevation_m
         self._fdm["position/terrain-elevation-asl-ft"] = elevation_m / FOOT_M
 
-    def set_loading(self, fuel_kg: Sequence[float] | None = None, payload_kg: float | None = None) -> None:
-        """Fuel and payload."""
+    def set_loading(
+        self,
+        fuel_kg: Sequence[float] | None = None,
+        payload_kg: float | None = None,
+        cg_aft_m: float | None = None,
+    ) -> None:
+        """Fuel, payload, balance."""
         if fuel_kg is not None:
             capacity = self.fuel_capacity_kg
             if len(fuel_kg) != len(capacity) or not all(0.0 <= f <= c for f, c in zip(fuel_kg, capacity)):
                 raise FlightModelError(f"fuel {list(fuel_kg)} kg: expected one value per tank, 0..{list(capacity)}")
         if payload_kg is not None and not 0.0 <= payload_kg <= self.max_payload_kg:
             raise FlightModelError(f"payload {payload_kg} kg: expected 0..{self.max_payload_kg}")
+        payload = self._payload_kg if payload_kg is None else payload_kg
+        fuel = self._fuel_kg if fuel_kg is None else list(fuel_kg)
+        aft = self._payload_aft_m
+        if cg_aft_m is not None:
+            # Everything else has its centre of gravity at the reference point.
+            moment = cg_aft_m * (self._empty_mass_kg + sum(fuel) + payload)
+            if abs(moment) > self.payload_reach_m * payload:
+                raise FlightModelError(
+                    f"centre of gravity {cg_aft_m} m aft: the payload of {payload} kg can be moved by "
+                    f"{self.payload_reach_m} m only; load more, or ask for less"
+                )
+            aft = moment / payload if payload > 0.0 else 0.0
         if fuel_kg is not None:
-            self._loaded_fuel_kg, self._fuel_kg = list(fuel_kg), list(fuel_kg)
-        self._payload_kg = self._payload_kg if payload_kg is None else payload_kg
+            self._loaded_fuel_kg = list(fuel)
+        self._fuel_kg, self._payload_kg, self._payload_aft_m = fuel, payload, aft
         self._apply_loading()
+        state = self.state  # shown at once, also while the flight stands
+        state.fuel_kg, state.payload_kg = list(fuel), payload
+        state.mass_kg = self._empty_mass_kg + sum(fuel) + payload
+        state.cg_forward_m = -aft * payload / state.mass_kg
 
     def _apply_loading(self) -> None:
         for setter, mass in zip(self._mass_setters, [*self._fuel_kg, self._payload_kg]):
             setter(mass / POUND_KG)
+        self._payload_aft_setter(self._payload_aft_m / INCH_M)
 
     def _check_initial(self, initial: InitialState) -> None:
         speed = 0.0 if initial.airspeed_mps is None else initial.airspeed_mps

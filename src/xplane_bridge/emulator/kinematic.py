@@ -202,8 +202,15 @@ class KinematicModel:
         """Sets the height of the ground."""
         self._terrain_m = elevation_m
 
-    def set_loading(self, fuel_kg: Optional[Sequence[float]] = None, payload_kg: Optional[float] = None) -> None:
-        """Sets fuel and payload."""
+    def set_loading(
+        self,
+        fuel_kg: Optional[Sequence[float]] = None,
+        payload_kg: Optional[float] = None,
+        cg_aft_m: Optional[float] = None,
+    ) -> None:
+        """Sets fuel and payload; the centre of gravity stays where it is."""
+        if cg_aft_m is not None:
+            raise FlightModelError("the kinematic model has no centre of gravity to move")
         if fuel_kg is not None:
             self._fuel_kg = [max(0.0, float(x)) for x in fuel_kg][:2]
         if payload_kg is not None:

@@ -129,6 +129,13 @@ class Placements:
         )
 
     @staticmethod
+    def set_speed(model: FlightModel, initial: InitialState) -> None:
+        """Gives an aircraft that was started elsewise the speed of `initial`, level and straight ahead."""
+        speed = initial.airspeed_mps or 0.0
+        heading = math.radians(initial.heading_deg)
+        model.place(v_ned_mps=[speed * math.cos(heading), speed * math.sin(heading), 0.0], pqr_rad_s=(0.0, 0.0, 0.0))
+
+    @staticmethod
     def place_vehicle(model: FlightModel, request: protocol.VehiclePose) -> bool:
         """Puts the aircraft at VEHX's or VEHS's pose; it keeps its velocity along its own axes and stops turning.
 

@@ -38,6 +38,8 @@ _MAX_WIND_MPS = 100.0
 _MAX_TURBULENCE_MPS = 10.0
 _MAX_LOAD_KG = 5000.0
 
+#: Where the centre of gravity is set, by version.
+CG_OFFSET = {11: "sim/flightmodel/misc/cgz_ref_to_default", 12: "sim/flightmodel2/misc/cg_offset_z"}
 _SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot"
 _SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
 _SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
@@ -333,8 +335,23 @@ class Simulator:
             initial = self.initial
         if initial is None:
             return "value"
-        self.start_flight(initial)
+        try:
+            self._start_at(initial)
+        except FlightModelError as error:  # no place to fly from
+            _LOG.info("PREL: %s", error)
+            return "value"
         return None
+
+    def _start_at(self, initial: InitialState) -> None:
+        """X-Plane trims nothing: the aircraft is there with the speed asked for, whatever it then does."""
+        try:
+            self.start_flight(initial)
+        except FlightModelError:
+            if initial.airspeed_mps is None:
+                raise
+            self.start_flight(replace(initial, airspeed_mps=None))
+            Placements.set_speed(self.model, initial)
+            self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
 
     def on_aircraft(self, request: protocol.AircraftLoad) -> Optional[str]:
         """ACFN: loads the aircraft named by the path; other aircraft than the user's are ignored."""
@@ -422,6 +439,7 @@ class Simulator:
         store.on_write("sim/time/zulu_time_sec", lambda _i, value: setattr(self.clocks, "zulu", value % 86400.0))
         store.on_write("sim/flightmodel/weight/m_fixed", self._set_payload)
         store.on_write("sim/flightmodel/weight/m_fuel", self._set_fuel)
+        store.on_write(CG_OFFSET[self.version], self._set_balance)
         for name in (_SEA_LEVEL, _SEA_LEVEL_TEMPERATURE):
             store.on_write(name, lambda _i, _v: self._set_atmosphere())
         if self.version < 12:
@@ -454,11 +472,16 @@ class Simulator:
 
     def _set_fuel(self, _index: int, _value: float) -> None:
         tanks = self.model.info.tank_count
-        fuel = self.store.array("sim/flightmodel/weight/m_fuel")[:tanks]
+        slots = self.store.dataref("sim/flightmodel/weight/m_fuel").slots
+        self.store.values[slots[tanks:]] = 0.0  # no such tanks
+        fuel = self.store.values[slots[:tanks]]
         self.model.set_loading(fuel_kg=[_clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in fuel])
 
     def _set_payload(self, _index: int, value: float) -> None:
         self.model.set_loading(payload_kg=_clip(value, 0.0, _MAX_LOAD_KG))
+
+    def _set_balance(self, _index: int, value: float) -> None:
+        self.model.set_loading(cg_aft_m=value)
 
     def _set_atmosphere(self) -> None:
         self.model.set_atmosphere(

@@ -217,6 +217,7 @@ def _weather(t: Table, sim: Simulator) -> None:
     region = "sim/weather/region/"
     t.setting(region + "update_immediately", 0, INT, versions=X12)
     t.setting(region + "change_mode", 3, INT, versions=X12)
+    t.setting(region + "variability_pct", 0.0, versions=X12)
     for name in ("wind_altitude_msl_m", "wind_direction_degt", "wind_speed_msc", "shear_speed_msc", "turbulence"):
         t.setting(region + name, 0.0, size=13, versions=X12)
     t.setting(region + "sealevel_pressure_pas", 101325.0, versions=X12)
@@ -239,8 +240,9 @@ def _weights(t: Table) -> None:
     t.value(
         "sim/aircraft/weight/acf_m_max", lambda f: 1.15 * f.m.mass_kg if f.m.empty_mass_kg == 0 else _maximum_mass(f)
     )
-    t.value("sim/flightmodel/misc/cgz_ref_to_default", lambda f: -f.m.cg_forward_m)
-    t.value("sim/flightmodel2/misc/cg_offset_z", lambda f: -f.m.cg_forward_m, versions=X12)
+    # version 12 has a new name; its list marks the old one as replaced
+    t.value("sim/flightmodel/misc/cgz_ref_to_default", lambda f: -f.m.cg_forward_m, writable=t.version < 12)
+    t.value("sim/flightmodel2/misc/cg_offset_z", lambda f: -f.m.cg_forward_m, versions=X12, writable=True)
 
 
 def _maximum_mass(f: Frame) -> float:
