@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "xplane_bridge/Event.h"
@@ -23,6 +24,20 @@ bool sendMessage(core::SimLink* link, Encode encode) {
   std::array<std::uint8_t, Size> buffer;
   const core::EncodeResult encoded = encode(core::ByteSpan(buffer));
   return encoded.ok() && link->send({buffer.data(), encoded.value()}) == core::SendStatus::kSent;
+}
+
+/// Empty: all is shown.
+std::string loadingDifference(const std::vector<core::DatarefWrite>& writes,
+                              const std::vector<core::DatarefValue>& values) {
+  std::string out;
+  for (std::size_t i = 0; i < writes.size(); ++i) {
+    const bool answered = i < values.size() && values[i];
+    if (answered && core::shows(writes[i], static_cast<double>(*values[i]))) continue;
+    out += (out.empty() ? "" : ", ") + writes[i].dataref +
+           (answered ? " is " + std::to_string(*values[i]) + ", not " + std::to_string(writes[i].value)
+                     : " does not answer");
+  }
+  return out;
 }
 
 }  // namespace
@@ -189,25 +204,25 @@ std::string FlightJobs::placed(const core::FlightStart& start) {
   }
   if (!shown) return "it does not show where it is" + excuse();
   if (!core::isNear(start, *shown)) return core::differenceOf(start, *shown) + excuse();
-  std::string difference;
+  // The link may look at values after a wait was given up: what it calls owns what it uses.
+  const auto fits = [start](const std::vector<core::DatarefValue>& values) {
+    const auto now = core::shownFlightFrom(values);
+    return now && core::differenceOf(start, *now).empty();
+  };
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
     write(core::motionWrites(start, *shown));
-    const auto fits = [&](const std::vector<core::DatarefValue>& values) {
-      const auto now = core::shownFlightFrom(values);
-      if (now) shown = now;
-      difference = core::differenceOf(start, *shown);
-      return now && difference.empty();
-    };
-    if (fits(link_->readDatarefsUntil(core::shownFlightDatarefs(generation()), kPoll, fits))) break;
+    const auto values = link_->readDatarefsUntil(core::shownFlightDatarefs(generation()), kPoll, fits);
+    if (const auto now = core::shownFlightFrom(values)) shown = now;
+    if (fits(values)) return "";
   }
-  return difference.empty() ? "" : difference + excuse();
+  return core::differenceOf(start, *shown) + excuse();
 }
 
 // --- settings ---
 
 FlightJobs::Outcome FlightJobs::blow(const core::UniformWind& wind) {
   const auto names = core::shownWindDatarefs(generation());
-  const auto fits = [&](const std::vector<core::DatarefValue>& values) { return core::shows(wind, values); };
+  const auto fits = [wind](const std::vector<core::DatarefValue>& values) { return core::shows(wind, values); };
   std::vector<core::DatarefValue> values;
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
     write(core::windWrites(wind, generation()));
@@ -227,32 +242,26 @@ FlightJobs::Outcome FlightJobs::load(const core::Loading& loading) {
   const auto writes = core::loadingWrites(loading, generation());
   std::vector<std::string> names;
   for (const core::DatarefWrite& each : writes) names.push_back(each.dataref);
-  std::string difference;
+  const auto fits = [writes](const std::vector<core::DatarefValue>& values) {
+    return loadingDifference(writes, values).empty();
+  };
+  std::vector<core::DatarefValue> values;
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
     write(writes);
-    const auto fits = [&](const std::vector<core::DatarefValue>& values) {
-      difference.clear();
-      for (std::size_t i = 0; i < writes.size(); ++i) {
-        if (values[i] && core::shows(writes[i], static_cast<double>(*values[i]))) continue;
-        difference += (difference.empty() ? "" : ", ") + names[i] +
-                      (values[i] ? " is " + std::to_string(*values[i]) + ", not " + std::to_string(writes[i].value)
-                                 : " does not answer");
-      }
-      return difference.empty();
-    };
-    if (fits(link_->readDatarefsUntil(names, kWriteAgain, fits))) {
-      return {Event::SETTING, "the aircraft is loaded as asked for", true};
-    }
+    values = link_->readDatarefsUntil(names, kWriteAgain, fits);
+    if (fits(values)) return {Event::SETTING, "the aircraft is loaded as asked for", true};
   }
-  return {Event::SETTING, "set_loading: " + difference + excuse(), false};
+  return {Event::SETTING, "set_loading: " + loadingDifference(writes, values) + excuse(), false};
 }
 
 // --- files ---
 
 FlightJobs::Outcome FlightJobs::change(const std::string& path, std::int32_t livery) {
+  const auto fly = [this](void*) { hooks_.ground(""); };
+  std::unique_ptr<void, decltype(fly)> grounded(this, fly);
   hooks_.ground(kLoading);
   const std::string problem = changed(path, livery);
-  hooks_.ground("");
+  grounded.reset();
   if (!problem.empty()) return {Event::AIRCRAFT, "load_aircraft " + path + ": " + problem + excuse(), false};
   return {Event::AIRCRAFT, "loaded " + path + ": " + hooks_.aircraft(), true};
 }

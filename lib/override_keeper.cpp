@@ -1,6 +1,8 @@
 #include "xplane_bridge/override_keeper.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "xplane_bridge/core/control_channels.hpp"
 #include "xplane_bridge/core/journal.hpp"
@@ -21,6 +23,11 @@ std::string joined(const std::set<std::string>& names) {
   return out;
 }
 
+constexpr std::int32_t kWatchRate = 10;  // [Hz]
+// Answers in a row that show a release: half a second, in which a restarted X-Plane is known to be one.
+constexpr int kReleasedAnswers = 5;
+constexpr float kSame = 1e-3F;
+
 }  // namespace
 
 const char* const kOverridePurpose = "override";
@@ -35,6 +42,74 @@ bool OverrideKeeper::set(const std::string& dataref, float value) {
   releasing_.erase(dataref);
   link_->sendDref(dataref, value);
   return true;
+}
+
+void OverrideKeeper::watch() {
+  std::set<std::string> wanted = required_;
+  for (const auto& [dataref, held] : held_) {
+    if (held.refreshed && dataref != core::kSurfaceOverride) wanted.insert(dataref);
+  }
+  const std::vector<std::string> list(wanted.begin(), wanted.end());
+  if (list == watched_) return;
+  for (const std::string& dataref : watched_) {
+    if (wanted.count(dataref) == 0) shown_.erase(dataref);
+  }
+  watched_ = list;
+  if (list.empty()) {
+    if (group_ >= 0) link_->removeGroup(std::exchange(group_, -1));
+    return;
+  }
+  core::RrefGroup group{"overrides", list, kWatchRate, 1};
+  if (group_ < 0) {
+    group_ = link_->addGroup(std::move(group));
+  } else {
+    link_->replaceGroup(group_, std::move(group));
+  }
+}
+
+bool OverrideKeeper::onRref(core::GroupId group, const core::RrefView& view) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (group != group_) return false;
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const core::RrefPair pair = view[i];
+    if (pair.index < 0 || static_cast<std::size_t>(pair.index) >= watched_.size()) continue;
+    const std::string& dataref = watched_[static_cast<std::size_t>(pair.index)];
+    const auto held = held_.find(dataref);
+    Shown& shown = shown_[dataref];
+    if (std::abs(pair.value - (held == held_.end() ? 1.0F : held->second.value)) <= kSame) {
+      shown.set = true;
+      shown.released = 0;
+    } else if (shown.set) {
+      ++shown.released;
+    }
+  }
+  return true;
+}
+
+std::vector<std::string> OverrideKeeper::releasedByOthers() {
+  std::vector<std::string> stopped;
+  std::set<std::string> all;
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    for (const auto& [dataref, shown] : shown_) {
+      if (shown.released >= kReleasedAnswers) all.insert(dataref);
+    }
+    if (all.empty()) return stopped;
+    const auto journal = link_->journal();
+    for (const std::string& dataref : all) {
+      if (required_.erase(dataref) != 0) stopped.push_back(dataref);
+      held_.erase(dataref);
+      if (journal) journal->remove({entryId(dataref)});
+    }
+    watch();
+  }
+  report_(joined(all) + " was released by somebody else", true);
+  return stopped;
+}
+
+void OverrideKeeper::forgetShown() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  for (const std::string& dataref : watched_) shown_[dataref] = {false, 0, false};
 }
 
 void OverrideKeeper::release(const std::string& dataref) {
@@ -64,6 +139,10 @@ void OverrideKeeper::require(const std::vector<std::string>& wanted) {
       given.insert(dataref);
     }
   }
+  if (!taken.empty() || !given.empty()) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    watch();
+  }
   if (!taken.empty()) report_("set " + joined(taken), true);
   if (!given.empty()) report_("gave back " + joined(given), true);
 }
@@ -72,19 +151,37 @@ bool OverrideKeeper::hold(const std::string& dataref, float value, bool refreshe
   std::lock_guard<std::mutex> lock(mutex_);
   if (required_.count(dataref) == 0 && !set(dataref, value)) return false;
   held_[dataref] = {value, refreshed};
+  watch();
   return true;
 }
 
 void OverrideKeeper::unhold(const std::string& dataref) {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (held_.erase(dataref) != 0) release(dataref);
+  if (held_.erase(dataref) == 0) return;
+  release(dataref);
+  watch();
 }
 
 void OverrideKeeper::refresh() {
   std::lock_guard<std::mutex> lock(mutex_);
-  for (const std::string& dataref : required_) link_->sendDref(dataref, 1.0F);
+  for (const std::string& dataref : required_) send(dataref, 1.0F);
   for (const auto& [dataref, held] : held_) {
-    if (held.refreshed) link_->sendDref(dataref, held.value);
+    if (held.refreshed) send(dataref, held.value);
+  }
+}
+
+void OverrideKeeper::send(const std::string& dataref, float value) {
+  const auto found = shown_.find(dataref);
+  if (found != shown_.end() && found->second.released > 0) return;  // by whom is not known yet
+  if (found == shown_.end() || found->second.in_journal) {
+    link_->sendDref(dataref, value);
+    return;
+  }
+  // It may be that the panic tool has taken the entry out.
+  try {
+    found->second.in_journal = set(dataref, value);
+  } catch (const core::JournalError& error) {
+    report_(error.what(), false);
   }
 }
 
@@ -133,6 +230,7 @@ bool OverrideKeeper::releaseAll(double timeout_s) {
     all.insert(releasing_.begin(), releasing_.end());
     required_.clear();
     held_.clear();
+    watch();
     releasing_ = all;
   }
   std::vector<std::string> ids;

@@ -15,11 +15,10 @@ namespace {
 constexpr double kOverrideRefresh = 1.0;  // [s] a lost datagram must not leave the stick with X-Plane
 constexpr double kHandleRepeat = 0.3;     // [s] in which a changed handle is sent with every refresh
 constexpr std::size_t kUnseenKept = 16;
-constexpr double kWorkPeriod = 0.2;     // [s]
-constexpr double kReleaseWait = 1.0;    // [s] of one attempt
-constexpr double kRestartStep = 0.25;   // [s] backwards in total running time, more than datagrams overtake each other
-constexpr double kIdentityWait = 2.0;   // [s] of asking for it once
-constexpr double kDoesNotFollow = 1.0;  // [s] without read-back until it is said
+constexpr double kWorkPeriod = 0.2;    // [s]
+constexpr double kReleaseWait = 1.0;   // [s] of one attempt
+constexpr double kRestartStep = 0.25;  // [s] backwards in total running time, more than datagrams overtake each other
+constexpr double kIdentityWait = 2.0;  // [s] of asking for it once
 
 ros::Time stampNow() { return ros::Time(ros::WallTime::now().toSec()); }
 
@@ -110,6 +109,7 @@ void TxNode::onModeRequest(const ModeRequest& message) {
   const auto outcome =
       arbiter_->onModeRequest({message.sequence, message.mode, message.requester, message.header.stamp.toSec()}, time);
   if (outcome == core::RequestOutcome::kIgnored) return;
+  if (outcome != core::RequestOutcome::kRefused) released_.clear();
   if (arbiter_->status().mode != before) {
     if (excitation_) excitation_->abort("the mode changed");
     sendControls(time);
@@ -125,6 +125,7 @@ void TxNode::onTimer() {
   surfaces_->tick(time, refusalToFly());
   failures_->tick(time);
   if (came_back_) startAfresh(time);
+  watchReleases(time);
   if (linkIsUp() && time - last_refresh_ > kOverrideRefresh) {
     overrides_->refresh();
     last_refresh_ = time;
@@ -133,8 +134,23 @@ void TxNode::onTimer() {
   sendControls(time);
 }
 
+void TxNode::watchReleases(double time) {
+  try {
+    const std::vector<std::string> released = overrides_->releasedByOthers();
+    if (released.empty()) return;
+    released_ = "somebody else has released " + released.front() + ": ask for a mode to fly on";
+  } catch (const core::JournalError& error) {
+    ROS_ERROR_THROTTLE(5.0, "%s", error.what());
+    return;
+  }
+  excitation_->abort(released_);
+  logEvent(Event::OVERRIDE, "nothing is sent any more: " + released_);
+  sendControls(time);
+}
+
 void TxNode::startAfresh(double time) {
   came_back_ = false;
+  overrides_->forgetShown();
   unseen_.clear();
   if (time - last_command_ <= options_.arbiter.command_timeout) {
     overrides_->refresh();
@@ -156,6 +172,7 @@ std::string TxNode::refusalToFly() const {
     return "X-Plane is not connected";
   }
   if (!grounded_.empty()) return grounded_;
+  if (!released_.empty()) return released_;
   if (options_.aircraft.identity.empty()) return "";
   if (!identity_.known()) return "X-Plane has not told which aircraft is loaded";
   if (options_.aircraft.fits(identity_.identity())) return "";
@@ -333,6 +350,8 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
     if (identity_.add(view, info.stamp_ns)) onIdentity();
   } else if (group == read_back_group_) {
     onReadBack(view);
+  } else if (overrides_->onRref(group, view)) {
+    return;
   } else if (surfaces_->onRref(group, view, info)) {
     publishSurfacesApplied();
   } else {
@@ -342,6 +361,7 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
 
 void TxNode::onIdentity() {
   const core::AircraftIdentity& loaded = identity_.identity();
+  overrides_->forgetShown();
   logEvent(
       Event::AIRCRAFT,
       "aircraft: " + described(loaded) + (options_.aircraft.fits(loaded) ? "" : "; not the one of the configuration"),
@@ -360,6 +380,7 @@ void TxNode::askIdentity() {
 void TxNode::onReset(const std::string& how) {
   ++resets_;
   excitation_->abort("the flight was reset");
+  overrides_->forgetShown();
   // Perhaps with another aircraft, which must not be flown until the subscription tells.
   askIdentity();
   // What was asked for is told with its outcome.
@@ -453,56 +474,6 @@ std::uint32_t TxNode::logEvent(std::uint8_t kind, const std::string& text, const
     ROS_ERROR("%s", text.c_str());
   }
   return events_.add(kind, text, sim_time_, who, success, number);
-}
-
-void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {
-  using Level = diagnostic_msgs::DiagnosticStatus;
-  std::lock_guard<std::mutex> lock(mutex_);
-  const core::ModeStatus& mode = arbiter_->status();
-  const double time = now();
-  const bool flying = ever_sent_.any();
-  const std::string refusal = refusalToFly();
-  std::string unseen;
-  if (flying && !unseen_.empty() && link_status_.state == core::LinkState::kConnected &&
-      time - last_seen_ > kDoesNotFollow) {
-    const Sent& last = unseen_.back();
-    for (std::size_t i = 0; i < core::kChannelCount; ++i) {
-      const auto channel = static_cast<core::Channel>(i);
-      if (!last.channels.test(i) || (shown_known_.test(i) && encoder_->shows(channel, last.values[i], shown_[i])))
-        continue;
-      unseen += (unseen.empty() ? "" : ", ") + core::channelName(channel);
-    }
-  }
-  if (!refusal.empty()) {
-    status->summary(Level::WARN, "commands are not sent: " + refusal);
-  } else if (mode.failsafe) {
-    status->summary(Level::WARN, std::string(core::toString(mode.mode)) + ", failsafe: " + mode.reason);
-  } else if (!unseen.empty()) {
-    status->summary(Level::WARN, "X-Plane does not show what is sent: " + unseen);
-  } else {
-    status->summary(Level::OK, core::toString(mode.mode));
-  }
-  status->add("Mode", core::toString(mode.mode));
-  status->add("Reason", mode.reason);
-  for (const auto source : {core::FlightMode::kManual, core::FlightMode::kAuto}) {
-    const std::string name = source == core::FlightMode::kManual ? "control/manual" : "control/auto";
-    const core::SourceStatistics& statistics = arbiter_->statistics(source);
-    status->add(name + " accepted (-)", statistics.accepted);
-    status->add(name + " refused (-)", statistics.refusedTotal());
-    for (std::size_t i = 0; i < statistics.refused.size(); ++i) {
-      if (statistics.refused[i] == 0) continue;
-      status->add(name + " refused, " + core::toString(static_cast<core::Refusal>(i)) + " (-)", statistics.refused[i]);
-    }
-    if (!statistics.last_refusal.empty()) status->add(name + " last refusal", statistics.last_refusal);
-  }
-  std::string active;
-  if (overrides_) {
-    for (const std::string& name : overrides_->active()) {
-      active += (active.empty() ? "" : ", ") + name.substr(name.rfind('/') + 1);
-    }
-  }
-  status->add("Overrides set", active.empty() ? "none" : active);
-  status->add("Aircraft loaded", identity_.identity().icao);
 }
 
 }  // namespace xplane_bridge

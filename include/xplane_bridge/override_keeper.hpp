@@ -31,8 +31,17 @@ class OverrideKeeper {
   bool hold(const std::string& dataref, float value = 1.0F, bool refreshed = true);
   /// Gives one back that hold() has set; another one stays as it is.
   void unhold(const std::string& dataref);
-  /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted.
+  /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted. Not those that
+  /// X-Plane shows released.
   void refresh();
+  /// Whether the group is this one's. From the link's thread.
+  bool onRref(core::GroupId group, const core::RrefView& view);
+  /// What somebody else has released (the panic tool, another client) since the last call, after X-Plane had shown it
+  /// set. Its journal entry goes, and it is not set again by itself. Of what require() has set; what hold() has set is
+  /// reported and let go as well, but for the surface override, which its holder watches.
+  std::vector<std::string> releasedByOthers();
+  /// X-Plane may have released everything by itself (restarted, another aircraft): that is not somebody else.
+  void forgetShown();
   /// True while a release has not been read back.
   bool releasesPending() const;
   /// Reads pending releases back, sending them again where needed. Waits up to `timeout_s`.
@@ -52,7 +61,16 @@ class OverrideKeeper {
     bool refreshed = true;
   };
 
+  /// What X-Plane shows of one that is set.
+  struct Shown {
+    bool set = false;        // it has been shown as set
+    int released = 0;        // answers since then that show it released
+    bool in_journal = true;  // its entry is known to be there
+  };
+
   bool set(const std::string& dataref, float value);
+  void send(const std::string& dataref, float value);
+  void watch();
   void release(const std::string& dataref);
   bool confirm(const std::vector<std::string>& ids, const std::vector<core::UndoOperation>& operations,
                double timeout_s, const std::string& what);
@@ -63,6 +81,9 @@ class OverrideKeeper {
   std::set<std::string> required_;
   std::map<std::string, Held> held_;
   std::set<std::string> releasing_;
+  core::GroupId group_ = -1;
+  std::vector<std::string> watched_;  // datarefs of the group
+  std::map<std::string, Shown> shown_;
 };
 
 /// Journal purpose of tx_node's entries.

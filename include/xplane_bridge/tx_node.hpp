@@ -96,6 +96,7 @@ class TxNode : public BaseNode {
   void onIdentity();
   void askIdentity();
   void onReset(const std::string& how);
+  void watchReleases(double time);
   void work();
 
   // Single surfaces and failures (tx_node_surfaces.cpp).
@@ -150,6 +151,7 @@ class TxNode : public BaseNode {
   core::ResetDetector reset_detector_;
   unsigned resets_ = 0;         // of the flight, since the start
   std::string grounded_;        // why nothing is flown for a while; empty: it is
+  std::string released_;        // what somebody else has released, and what to do; empty: nothing
   std::string pause_by_;        // who has asked for a pause or its end that has not come yet
   bool came_back_ = false;      // the link came up anew: commands from before count only if somebody still flies
   double last_command_ = -1e9;  // [s] steady, of any source

@@ -116,7 +116,8 @@ bool SimLink::undo(const std::vector<UndoOperation>& operations, double timeout_
   if (paths.empty() || !sent) {
     return sent;
   }
-  const auto fits = [&expected](const std::vector<DatarefValue>& values) {
+  // By value: the link may look at values after the wait was given up.
+  const auto fits = [expected](const std::vector<DatarefValue>& values) {
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!values[i].has_value() || !(std::abs(*values[i] - expected[i]) <= kTolerance)) {
         return false;

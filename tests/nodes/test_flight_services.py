@@ -1,16 +1,22 @@
-"""Flight services of tx_node: accepted, then told on `events`; and what the simulator does by itself, told there too."""
+"""Flight services of tx_node, accepted and then told on `events`; and what the simulator does by itself, told there."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+import socket
+import struct
+import threading
+import time
 
 import pytest
 
 from xplane_bridge import protocol
 from xplane_bridge.emulator.simulator import aircraft_path
+from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.tx_bench import ROLL, CommandSource, WatchedDatarefs, call, journal_entries, tx_params
 
-ACCEPTED, REFUSED, NO_LINK = 1, 2, 4
+ACCEPTED, REFUSED, NOT_SUPPORTED, NO_LINK = 1, 2, 3, 4
 RESET, CRASH, AIRCRAFT, PAUSE, SITUATION, SETTING = 1, 2, 3, 4, 10, 11
 POSITION = "sim/flightmodel/position/"
 WEIGHT = "sim/flightmodel/weight/"
@@ -210,6 +216,9 @@ def test_aircraft_is_loaded_and_flown_only_if_it_is_the_one_configured(flight):
     event = done(flight, "load_aircraft", "LoadAircraft", path=aircraft_path("multirotor"))
     assert event.kind == AIRCRAFT
     assert "QUAD" in event.text
+    texts = [e.text for e in flight.events.last.events]
+    given = max(i for i, text in enumerate(texts) if text == "overrides: gave back override_joystick")
+    assert given < next(i for i, text in enumerate(texts) if text.startswith("aircraft: QUAD")), "before it was loaded"
     assert flight.seen.value(OVERRIDE) == 0.0
     assert "override:" + OVERRIDE not in journal_entries(flight)
     flight.wait_for_diagnostics("control", lambda s: "QUAD" in s.message)
@@ -224,6 +233,7 @@ def test_aircraft_is_loaded_and_flown_only_if_it_is_the_one_configured(flight):
     flight.manual.stop()
 
 
+@pytest.mark.parametrize("flight", [11], indirect=True)  # it waits for two time-outs
 def test_files_that_are_not_there_are_told(flight):
     flight.manual.fly(fields=ROLL, roll=0.125)
     flight.seen.wait(STICK, 0.125)
@@ -249,6 +259,54 @@ def test_without_x_plane_nothing_is_accepted(world):
     ):
         response = call(world, service, kind, **request)
         assert (response.success, response.result.code) == (False, NO_LINK)
+
+
+class XPlane10:
+    """Answers what it is asked, and says that it is X-Plane 10."""
+
+    def __init__(self):
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", 0))
+        self._socket.settimeout(0.02)
+        self.port = self._socket.getsockname()[1]
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._answer, daemon=True)
+        self._thread.start()
+
+    def _answer(self):
+        asked = {}
+        while not self._ended.is_set():
+            with contextlib.suppress(socket.timeout):
+                datagram, sender = self._socket.recvfrom(65536)
+                if datagram[:4] == b"RREF":
+                    _, index = struct.unpack_from("<ii", datagram, 5)
+                    asked[sender, index] = datagram[13:].split(b"\0")[0]
+            values = {b"sim/version/xplane_internal_version": 105105.0}
+            values[b"sim/time/total_running_time_sec"] = time.monotonic() % 1000.0
+            for (client, index), path in list(asked.items()):
+                self._socket.sendto(b"RREFO" + struct.pack("<if", index, values.get(path, 0.0)), client)
+
+    def close(self):
+        self._ended.set()
+        self._thread.join(5)
+        self._socket.close()
+
+
+def test_x_plane_10_is_not_supported_and_why(world):
+    old = XPlane10()
+    world.point_to(old.port)
+    world.set_param("aircraft", "fixed_wing")
+    world.start("tx_node", tx_params())
+
+    def not_supported():
+        response = call(world, "set_wind", "SetWind", speed=5.0)
+        assert not response.success
+        return response.result.message if response.result.code == NOT_SUPPORTED else ""
+
+    message = wait_until(not_supported, 15, "the version to be known")
+    assert "this is X-Plane 105105" in message
+    assert "before 11.00" in message
+    old.close()
 
 
 # --- in the simulator's own menu ---

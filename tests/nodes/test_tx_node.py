@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from xplane_bridge import protocol
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.tx_bench import (
     AUTO,
@@ -31,6 +32,7 @@ STICK = "sim/joystick/yoke_roll_ratio"
 OVERRIDE = "sim/operation/override/override_joystick"
 THROTTLES = "sim/operation/override/override_throttles"
 LEVER = "sim/cockpit2/engine/actuators/throttle_ratio[0]"
+HEAD = "sim/graphics/view/pilots_head_the"
 FLAP_HANDLE = "sim/cockpit2/controls/flap_ratio"
 
 
@@ -97,17 +99,41 @@ def test_command_reaches_xplane_and_is_read_back(tx, world):
     assert "override:" + OVERRIDE in journal_entries(world)
 
 
-@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL, "rosnode kill"])
 def test_overrides_are_released_however_it_ends(tx, world, end):
     node = tx()
     world.manual.fly(fields=ROLL, roll=0.5)
     world.wire.wait(OVERRIDE, 1.0)
-    node.send_signal(end)
+    if end == "rosnode kill":
+        kill = ManagedProcess("kill", ["rosnode", "kill", f"{world.namespace}/tx_node"], world.folder, env=world.env)
+        kill.start()
+        assert kill.wait(20) == 0, kill.output()
+    else:
+        node.send_signal(end)
     world.wire.wait(OVERRIDE, 0.0)
     code = node.wait(10)
     if end != signal.SIGKILL:
         assert code == 0
     wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+
+
+def test_overrides_are_released_on_ctrl_c_of_roslaunch(world):
+    world.xplane = world.emulator("--no-beacon", "--start", "air")
+    wire = WatchedDatarefs(world.xplane.port, OVERRIDE)
+    args = {"ns": world.namespace.lstrip("/"), "host": "127.0.0.1", "port": world.xplane.port, "required": "true"}
+    assignments = [f"{key}:={value}" for key, value in {**args, "listen_for_beacon": "false"}.items()]
+    command = ["roslaunch", "--wait", "xplane_bridge", "tx.launch", *assignments]
+    launch = ManagedProcess("roslaunch", command, world.folder, env=world.env)
+    launch.start()
+    manual = CommandSource(world, "control/manual")
+    manual.fly(fields=ROLL, roll=0.5)
+    wire.wait(OVERRIDE, 1.0, timeout=30.0)
+    launch.send_signal(signal.SIGINT)
+    wire.wait(OVERRIDE, 0.0)
+    assert launch.wait(20) == 0, launch.output()
+    assert not journal_entries(world)
+    manual.stop()
+    wire.close()
 
 
 def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
@@ -137,20 +163,61 @@ def _read(path):
         return b""
 
 
+def release_overrides(world):
+    """Runs the panic tool."""
+    panic = ManagedProcess(
+        "release", ["/usr/bin/python3", ROOT / "scripts" / "release_overrides"], world.folder, env=world.env
+    )
+    panic.start()
+    assert panic.wait(20) == 0, panic.output()
+
+
 def test_release_overrides_frees_what_a_crash_left(tx, world):
     node = tx()
     world.manual.fly(fields=ROLL, roll=0.5)
     world.wire.wait(OVERRIDE, 1.0)
     world.manual.stop()
     node.send_signal(signal.SIGSTOP)  # it hangs: nobody is gone, nothing releases by itself
-    panic = ManagedProcess(
-        "release", ["/usr/bin/python3", ROOT / "scripts" / "release_overrides"], world.folder, env=world.env
-    )
-    panic.start()
-    assert panic.wait(20) == 0, panic.output()
+    release_overrides(world)
     world.wire.wait(OVERRIDE, 0.0)
     assert not journal_entries(world)
     node.send_signal(signal.SIGKILL)
+
+
+def test_release_overrides_stops_a_node_that_flies_until_a_mode_is_asked_for(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL | FLAPS, roll=0.5, flaps=0.0)
+    world.wire.wait(OVERRIDE, 1.0)
+    # Shown as set for a while, as it is when somebody panics.
+    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick")
+    release_overrides(world)
+    world.events.wait_for(lambda e: "override_joystick was released by somebody else" in e.events[-1].text)
+    told = world.events.wait_for(lambda e: "nothing is sent any more" in e.events[-1].text)
+    assert "ask for a mode" in told.events[-1].text
+    count = len(world.applied.messages)
+    for _ in range(2):  # longer than overrides take to be sent again, with commands coming all the time
+        status = world.wait_for_diagnostics("control", lambda s: s.level == 1)
+        assert "somebody else has released" in status.message
+    assert world.wire.value(OVERRIDE) == 0.0
+    assert not journal_entries(world)
+    assert len(world.applied.messages) == count
+    assert call(world, "set_mode", "SetMode", mode=MANUAL).success
+    world.wire.wait(OVERRIDE, 1.0)
+    world.wire.wait(STICK, 0.5)
+    assert "override:" + OVERRIDE in journal_entries(world)
+
+
+def test_what_x_plane_releases_with_a_new_flight_is_taken_again(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick")
+    other = type(world).wire(world.xplane.port)
+    other.send(protocol.CommandRequest("sim/operation/reset_flight"), protocol.DrefWrite(OVERRIDE, 0.0))
+    world.wire.wait(OVERRIDE, 0.0)
+    world.wire.wait(OVERRIDE, 1.0)
+    assert "override:" + OVERRIDE in journal_entries(world)
+    world.wire.wait(STICK, 0.5)
 
 
 def test_modes_are_switched_by_request_and_said(tx, world):
@@ -300,6 +367,28 @@ def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
     wire.wait(OVERRIDE, 0.0)
     wire.close()
+
+
+def test_x_plane_12_takes_commands_view_and_pause(tx, world):
+    from std_srvs.srv import SetBool
+
+    tx("--version", "12")
+    other = WatchedDatarefs(
+        world.xplane.port, HEAD, "sim/time/paused", "sim/cockpit2/controls/flap_handle_request_ratio"
+    )
+    world.manual.fly(fields=ROLL | PITCH | THROTTLE | FLAPS, roll=0.25, pitch=-0.125, throttle=0.75, flaps=0.5)
+    world.wire.wait(STICK, 0.25)
+    world.wire.wait(LEVER, 0.75)
+    other.wait("sim/cockpit2/controls/flap_handle_request_ratio", 0.5)
+    assert world.applied.wait_for(lambda a: a.read_back and a.sequence > 0).flaps == 0.5
+    assert call(world, "set_view", "SetView", view=3).success
+    other.wait(HEAD, -90.0)
+    assert call(world, "set_view", "SetView", view=1).success
+    other.wait(HEAD, 0.0)
+    for paused in (True, False):
+        assert world.call("tx_node/pause", SetBool, paused).success
+        other.wait("sim/time/paused", float(paused))
+    other.close()
 
 
 def test_override_set_by_service_is_given_back(tx, world):
