@@ -88,16 +88,35 @@ def test_a_stick_that_falls_silent_at_the_end_is_no_fault():
 # -------------------------------------------------------------------------------------------------------------- stick
 
 
-def test_commands_of_a_stick_are_seen_in_xplane():
+def sent(*rows):
+    """control/applied: (time, source, sequence, read back)."""
+    time, source, sequence, shown = zip(*rows)
+    return table(time, source=source, sequence=sequence, read_back=shown)
+
+
+def frames(*time):
+    return table(time, sim_time=time)
+
+
+def test_a_command_is_told_when_it_is_sent_and_again_when_it_is_shown():
     joy = table([0.0, 1.0], axes=[0, 1])
-    # Each command is told when it is sent and again when it is shown.
-    sent = table([0.0, 0.1, 0.2, 0.3], source=[1, 1, 1, 1], sequence=[1, 1, 2, 2], read_back=[0, 1, 0, 1])
-    assert check_stick(joy, joy, sent).passed
-    sent = table([0.0, 0.1, 0.2, 0.3], source=[1, 1, 1, 2], sequence=[1, 2, 3, 4], read_back=[1, 0, 0, 1])
-    verdict = check_stick(joy, joy, sent)
+    told = sent((0.0, 1, 1, 0), (0.01, 1, 1, 1), (0.02, 1, 2, 0), (0.03, 1, 2, 1))
+    verdict = check_stick(joy, joy, told, frames(-0.1, 0.005, 0.015, 0.025))
+    assert verdict.passed
+    assert "2 commands of it sent, 2 seen in X-Plane within 3 frames (wanted 1)" in verdict.text
+    assert not check_stick(table([], axes=[]), joy, told, frames(0.005)).passed
+
+
+def test_commands_that_xplane_does_not_show_are_found():
+    joy = table([0.0, 1.0], axes=[0, 1])
+    told = [(0.01 * k, 1, k, int(k == 0)) for k in range(8)] + [(0.09, 2, 9, 1)]
+    every_frame = frames(*(0.01 * k + 0.005 for k in range(8)), 0.1)
+    verdict = check_stick(joy, joy, sent(*told), every_frame)
     assert not verdict.passed
-    assert "3 commands sent, 33% of them seen" in verdict.text
-    assert not check_stick(table([], axes=[]), joy, sent).passed
+    assert "8 commands of it sent, 1 seen in X-Plane within 8 frames (wanted 4)" in verdict.text
+    # A simulator of two frames cannot show eight commands.
+    assert check_stick(joy, joy, sent(*told), frames(0.005, 0.045)).passed
+    assert not check_stick(joy, joy, sent(*((t, s, n, 0) for t, s, n, _ in told)), frames(0.005)).passed
 
 
 # ------------------------------------------------------------------------------------------------------------ failure

@@ -46,17 +46,28 @@ def spells(modes: Table, end: float) -> List[Spell]:
     return [Spell(mode, time, until, who, why) for (time, mode, who, why), until in zip(changes, ends)]
 
 
-def check_stick(joy: Table, manual: Table, applied: Table) -> Verdict:
-    """The stick's messages became commands, and X-Plane showed those that were sent."""
+def check_stick(joy: Table, manual: Table, applied: Table, states: Table) -> Verdict:
+    """The stick's messages became commands, and X-Plane showed those that were sent, as far as it had frames for them.
+
+    Args:
+        joy: joy.
+        manual: control/manual.
+        applied: control/applied.
+        states: flight_state, one for each frame.
+    """
     if not len(joy) or not len(manual) or not len(applied):
         text = f"{len(joy)} messages of the joystick, {len(manual)} commands from it, {len(applied)} sent"
         return Verdict("stick", False, text)
     sent = applied["source"] == _SOURCE_OF[MANUAL]
     sequences = np.unique(applied["sequence"][sent])
     shown = np.unique(applied["sequence"][sent & applied["read_back"].astype(bool)])
-    share = len(shown) / max(len(sequences), 1)
-    text = f"{len(joy)} messages of the joystick, {len(sequences)} commands sent, {share:.0%} of them seen in X-Plane"
-    return Verdict("stick", share >= _READ_BACK_SHARE, f"{text} (wanted {_READ_BACK_SHARE:.0%})")
+    # Frames while the stick flew: those to which the newest command sent was the stick's.
+    newest = np.searchsorted(applied.time, states.time, side="right") - 1
+    frames = int(np.count_nonzero(sent[newest[newest >= 0]]))
+    wanted = int(_READ_BACK_SHARE * min(len(sequences), frames))
+    text = f"{len(joy)} messages of the joystick, {len(sequences)} commands of it sent, {len(shown)} seen in X-Plane "
+    text += f"within {frames} frames (wanted {wanted})"
+    return Verdict("stick", 0 < len(shown) >= wanted, text)
 
 
 def check_modes(modes: Table, applied: Table, joystick: str) -> Verdict:
@@ -153,12 +164,15 @@ def judge_control(bag: Path, back_by: str, stuck: str, repaired: str) -> List[Ve
         CheckError: Nothing was commanded in it.
     """
     with Bags(bag) as bags:
-        missing = [t for t in ("joy", "control/manual", "control/applied", "control/mode") if not _has(bags, t)]
+        missing = [
+            t for t in ("flight_state", "joy", "control/manual", "control/applied", "control/mode") if not _has(bags, t)
+        ]
         if missing:
             raise CheckError(f"{bag}: nothing on {', '.join(missing)}")
         labels = played_labels(bags)
         applied = bags.read(f"{NAMESPACE}/control/applied")
-        verdicts = [check_stick(bags.read(f"{NAMESPACE}/joy"), bags.read(f"{NAMESPACE}/control/manual"), applied)]
+        joy, manual = bags.read(f"{NAMESPACE}/joy"), bags.read(f"{NAMESPACE}/control/manual")
+        verdicts = [check_stick(joy, manual, applied, bags.read(f"{NAMESPACE}/flight_state", ["sim_time"]))]
         if back_by in labels:
             modes = bags.read(f"{NAMESPACE}/control/mode")
             verdicts.append(check_modes(modes, applied, f"{NAMESPACE}/joystick_mapper_node"))
