@@ -62,10 +62,18 @@ def test_master_shutdown_request_ends_it_in_order(world, tiny):
 def test_second_node_of_the_same_name_replaces_the_first_in_order(world, tiny):
     first = tiny()
     world.trace.rename(world.folder / "first")
-    second = tiny()
+    second = tiny(wait=False)
     assert first.wait(10) == 0
     assert (world.folder / "first").read_text(encoding="utf-8").split() == STOP_ORDER
+    words = world.last_word.messages
+    wait_until(lambda: [word.data for word in words].count("running") == 2, 15, "the second node's first word")
+    for _ in range(2):
+        world.wait_for_diagnostics("tiny")
     assert second.running
+    with xmlrpc.client.ServerProxy(world.master.uri) as master:
+        code, _, uri = master.lookupNode("/tests", f"{world.namespace}/tiny_node")
+    with xmlrpc.client.ServerProxy(uri) as slave:
+        assert (code, slave.getPid("/tests")[2]) == (1, second.pid)
 
 
 def test_ending_needs_no_master(world, tmp_path):
