@@ -76,8 +76,8 @@ void BaseNode::initialize() {
   own.refuseUnknown();
 
   takeOverShutdownRequest();
-  // With its first log line roscpp registers the node once more, for a cached parameter. Were that the line that says why
-  // it ends, the master would take the old node for a new one and end the node that has replaced it.
+  // With its first log line roscpp registers the node once more, for a cached parameter. Were that the line that says
+  // why it ends, the master would take the old node for a new one and end the node that has replaced it.
   ROS_INFO("%s starts", ros::this_node::getName().c_str());
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(handle_, private_handle_);
   diagnostics_->setHardwareID("none");
