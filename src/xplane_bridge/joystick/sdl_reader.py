@@ -2,7 +2,8 @@
 
 joy_node reads the kernel's joystick interface: axes in the kernel's order with each hat as two more axes behind them;
 left, up and forward are +; an axis reads 0 until it is first moved. SDL's evdev driver has the same order, but keeps
-hats apart, and right, down and backward are +, except that a hat's up is +.
+hats apart, and right, down and backward are +, except that a hat's up is +. (The rare axes whose event codes lie behind
+those of the hats come before the hats here.)
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ SDL_ENVIRONMENT = {
     "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",
     # SDL's own drivers for some gamepads number axes and buttons differently from the kernel.
     "SDL_JOYSTICK_HIDAPI": "0",
+    "SDL_LINUX_JOYSTICK_DEADZONES": "1",  # the small ones a driver tells of: the kernel's interface has them
     "SDL_NO_SIGNAL_HANDLERS": "1",  # Ctrl-C is ROS's
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",
 }
