@@ -25,7 +25,7 @@ def roll_and_rate(t: float, scale: float) -> tuple[float, float]:
     return scale * roll, scale * rate
 
 
-def write_bag(path: Path, delay: float, scale: float = 1.0, pictures: bool = True) -> None:
+def write_bag(path: Path, delay: float, scale: float = 1.0, pictures: bool = True, refresh: bool = False) -> None:
     painter = Painter(320, 240, (47.02, 8.0))
     with FlightBag(path) as bag:
         for k in range(round(DURATION_S * 60)):
@@ -33,9 +33,11 @@ def write_bag(path: Path, delay: float, scale: float = 1.0, pictures: bool = Tru
             state = bag.state(t, k)
             state["angular_velocity"] = {"x": roll_and_rate(t, scale)[1], "y": 0.0, "z": 0.0}
             bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
-            if k % 3 == 0:  # the aileron follows the stick by 45 ms
-                command = {"header": bag.header(stamp_ns(t), ""), "roll": math.sin(2.1 * t)}
+            if k % 3 == 0 or refresh:
+                new = k // 3 * 3 / 60  # when this value was sent for the first time
+                command = {"header": bag.header(stamp_ns(t), ""), "roll": math.sin(2.1 * new)}
                 bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", stamp_ns(t), command)
+            if k % 3 == 0:  # the aileron follows the stick by 45 ms
                 surface = {"header": bag.header(stamp_ns(t), ""), "delta_aileron": 15.0 * math.sin(2.1 * (t - 0.045))}
                 bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", stamp_ns(t), surface)
             if pictures and k % 2 == 0 and t > 0.5:
@@ -70,6 +72,13 @@ def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.C
     assert results["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
     assert results["roll command"]["gain"] == pytest.approx(15.0, abs=0.1)
     assert plot.stat().st_size > 5000
+
+
+def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Path) -> None:
+    bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
+    write_bag(bag, delay=0.05, refresh=True)
+    assert main([str(bag), "--json", str(numbers)]) == 0
+    assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
 
 
 def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

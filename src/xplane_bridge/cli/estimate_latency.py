@@ -28,6 +28,8 @@ _AXES = {1: (1.0, 0.0, 0.0), 2: (-1.0, 0.0, 0.0), 3: (0.0, 0.0, 1.0)}
 _VIEWS = {"forward": 1, "rear": 2, "down": 3}
 #: FrameState bits of pictures that say nothing about the delay: display unknown, frozen, black, external view.
 _USELESS = 8 | 32 | 64 | 2048
+#: A command that stays the same for longer rests; until then it may be on its way from one value to the next [s].
+_MOVING_S = 0.06
 #: Command and the surface that follows it.
 _RESPONSES = (("roll", "delta_aileron"), ("pitch", "delta_elevator"), ("yaw", "delta_rudder"))
 
@@ -120,7 +122,10 @@ def display_delay(bags: Bags, view: int | None = None, ignore_bottom: float = 0.
 
 
 def command_responses(bags: Bags) -> dict[str, Delay]:
-    """Delay from each command sent to the surface that follows it, where both were recorded and moved."""
+    """Delay from each new command sent to the surface that follows it, where both were recorded and moved.
+
+    A moving command is sent again until its next value comes; only the first sending of a value counts.
+    """
     commands = _first_of_type(bags, "xplane_bridge/AppliedCommand")
     surfaces = _first_of_type(bags, "xplane_bridge/SurfaceStates")
     results: dict[str, Delay] = {}
@@ -135,11 +140,20 @@ def command_responses(bags: Bags) -> dict[str, Delay]:
         if known.sum() < 2 or np.ptp(lead[known]) < 0.02 or known_late.sum() < 2:
             continue
         motion = value_motion(late_time[late_order][known_late], late[known_late])
+        sent, value = lead_time[order][known], lead[known]
+        news = ~_refreshes(sent, value)
         try:
-            results[f"{command} command"] = fit_delay(motion, lead_time[order][known], lead[known])
+            results[f"{command} command"] = fit_delay(motion, sent[news], value[news])
         except LatencyError:
             continue  # too short; the display delay has said so already
     return results
+
+
+def _refreshes(sent: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Which samples only repeat what was sent shortly before [bool]; those of a command that rests are kept."""
+    first = np.append(True, np.diff(value) != 0.0)
+    since = sent - sent[np.maximum.accumulate(np.where(first, np.arange(len(first)), 0))]
+    return ~first & (since < _MOVING_S)
 
 
 def _rates(bags: Bags) -> tuple[np.ndarray, np.ndarray]:
