@@ -24,6 +24,8 @@ _FPS = 60
 _SCENARIO, _JOYSTICK = "demo_flight", "logitech_extreme_3d_pro"
 #: Labels of the scenario after which there is something to judge.
 _LABELS = {"back_by": "manual by the stick", "stuck": "left aileron stuck", "repaired": "repaired"}
+#: From a frame to its picture on the screen [s]: longer than drawing takes, and said to both sides.
+_DISPLAY_DELAY_S = 0.05
 
 
 def parser() -> argparse.ArgumentParser:
@@ -59,7 +61,7 @@ def _duration(text: str) -> float:
 
 
 def _plan(args: argparse.Namespace) -> FlightPlan:
-    launch_args: Dict[str, Any] = {}
+    launch_args: Dict[str, Any] = {"display_delay": _DISPLAY_DELAY_S}
     for text in args.launch_args:
         key, separator, value = text.partition(":=")
         if not separator or not key:
@@ -75,7 +77,7 @@ def _plan(args: argparse.Namespace) -> FlightPlan:
         joystick=_JOYSTICK,
         controller=[str(program("attitude_hold"))],
         controller_ready=r"^commanding on",
-        emulator_options=["--window", "--fps", str(args.fps)],
+        emulator_options=["--window", "--fps", str(args.fps), "--pipeline-delay", f"{_DISPLAY_DELAY_S}s"],
         launch_args=launch_args,
         transport=transport,
     )
