@@ -60,7 +60,7 @@ class TopicSummary:
     topic: str
     msgtype: str
     count: int
-    rate: float  #: [1/s]; NaN for less than two messages
+    rate: float  #: [1/s]; NaN for less than three messages
     gaps: int  #: intervals longer than one and a half of the usual (median) one
     longest: float  #: [s] longest interval; NaN for less than two messages
     first: str  #: telling values of the first message
@@ -78,6 +78,8 @@ _TELLING: Mapping[str, Sequence[tuple]] = {
         ("TAS", "true_airspeed", 1.0, 1),
     ),
     "xplane_bridge/LinkState": (("", "state_name", None, 0),),
+    "xplane_bridge/ControlMode": (("", "reason", None, 0),),
+    "xplane_bridge/FrameState": (("frame", "frame_sim_time", 1.0, 2), ("age", "state_age", 1.0, 3)),
     "nav_msgs/Odometry": (
         ("x", "pose.pose.position.x", 1.0, 1),
         ("y", "pose.pose.position.y", 1.0, 1),
@@ -121,7 +123,7 @@ def summarise_table(table: Table) -> TopicSummary:
     rate = longest = math.nan
     gaps = 0
     if len(steps) and table.time[-1] > table.time[0]:
-        rate = len(steps) / ((table.time[-1] - table.time[0]) / 1e9)
+        rate = len(steps) / ((table.time[-1] - table.time[0]) / 1e9) if len(steps) > 1 else math.nan
         longest = float(steps.max())
         gaps = int(np.count_nonzero(steps > 1.5 * np.median(steps)))
     first, last = (_telling(table, row) for row in (0, -1))
@@ -134,7 +136,7 @@ def _telling(table: Table, row: int) -> str:
         or [
             (name.rsplit(".", 1)[-1], name, 1.0, 2)
             for name, column in table.columns.items()
-            if column.ndim == 1 and column.dtype.kind == "f" and not name.startswith(_NOT_JUDGED)
+            if column.ndim == 1 and column.dtype.kind == "f" and not name.startswith((*_NOT_JUDGED, "sim_time"))
         ][:_SHOWN_COLUMNS]
     )
     words = []
@@ -142,6 +144,8 @@ def _telling(table: Table, row: int) -> str:
         if column not in table:
             continue
         value = table[column][row]
+        if isinstance(value, np.floating) and math.isnan(value):
+            continue
         text = str(value) if factor is None else f"{value * factor:.{digits}f}"
         words.append(f"{label} {text}".strip())
     return ", ".join(words)
