@@ -59,7 +59,10 @@ class Targets:
 
 
 class HoldAutopilot:
-    """Flies `Targets`. Stateful: integrators, which start from the stick in use so that taking over is smooth."""
+    """Flies `Targets`. Stateful: integrators, which start from the stick in use so that taking over is smooth.
+
+    What is not known (NaN) gives a stick of NaN for as long as that lasts, and no longer.
+    """
 
     def __init__(self, gains: HoldGains) -> None:
         self._g = gains
@@ -95,10 +98,12 @@ class HoldAutopilot:
         if targets.altitude is not None:
             wanted_climb = _clip(g.altitude * (targets.altitude - altitude), -g.max_climb, g.max_climb)
         if wanted_climb is not None:
-            if self._climb_integral is None:
-                self._climb_integral = pitch_deg
             error = wanted_climb - climb
-            self._climb_integral = _clip(self._climb_integral + g.climb_integral * error * dt, -20.0, 20.0)
+            if self._climb_integral is None:
+                if not math.isfinite(pitch_deg):
+                    return math.nan
+                self._climb_integral = pitch_deg
+            self._climb_integral = _integrate(self._climb_integral, g.climb_integral * error * dt, -20.0, 20.0)
             wanted = _clip(self._climb_integral + g.climb * error, -20.0, 20.0)
         elif targets.pitch is not None:
             self._climb_integral = None
@@ -109,7 +114,7 @@ class HoldAutopilot:
         lean = 1.0 / max(math.cos(math.radians(roll_deg)), 0.3) - 1.0
         wanted += g.turn_compensation * 10.0 * lean if wanted_climb is not None else 0.0
         error = wanted - pitch_deg
-        self._pitch_integral = _clip(self._pitch_integral + g.pitch_integral * error * dt, -0.6, 0.6)
+        self._pitch_integral = _integrate(self._pitch_integral, g.pitch_integral * error * dt, -0.6, 0.6)
         return _clip(g.pitch * error - g.pitch_rate * pitch_rate_dps + self._pitch_integral, -1.0, 1.0)
 
     def yaw(self, targets: Targets, yaw_rate_dps: float) -> Optional[float]:
@@ -126,9 +131,13 @@ class HoldAutopilot:
         if self._throttle_integral is None:
             self._throttle_integral = present
         error = targets.speed - speed
-        self._throttle_integral = _clip(self._throttle_integral + self._g.speed_integral * error * dt, 0.0, 1.0)
+        self._throttle_integral = _integrate(self._throttle_integral, self._g.speed_integral * error * dt, 0.0, 1.0)
         return _clip(self._throttle_integral + self._g.speed * error, 0.0, 1.0)
 
 
 def _clip(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
+
+
+def _integrate(integral: float, step: float, low: float, high: float) -> float:
+    return _clip(integral + step, low, high) if math.isfinite(step) else integral

@@ -214,7 +214,8 @@ class Player:
             if value is None and axis in self._axes:
                 value = self._axes[axis].at(now)
             if axis == "throttle":
-                self._throttle = self._throttle if value is None else value
+                if value is not None and math.isfinite(value):
+                    self._throttle = value
                 commands.throttle = self._throttle
             else:
                 value = (value or 0.0) + self._excitation(axis, now)

@@ -17,8 +17,9 @@ from .player import Action, Commands, FlightSample, Player
 from .schema import Scenario, ScenarioError
 from .virtual_stick import VirtualStick
 
-#: Rate of the stick's messages [1/s]; they go on while the simulator is silent, as a real stick's do.
+#: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
 STICK_RATE = 50.0
+_BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_node's failsafe knows better
 _SERVICE_WAIT_S = 15.0
 _MODE_WAIT_S = 5.0
 _TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
@@ -116,7 +117,9 @@ class RosPlayer:
         self._labels: Dict[str, float] = {}
         self._lock = threading.Lock()
         self._commands: Optional[Commands] = None
-        self._mode, self._stall = 1, False
+        self._heard = -math.inf  # when the last flight state came
+        self._mode: Optional[int] = None
+        self._stall = False
         self._sequence = self._mode_sequence = 0
         self._tapped: Dict[int, float] = {}  # button to the time of its release
         self._actions: queue.Queue[Optional[Action]] = queue.Queue()
@@ -172,14 +175,26 @@ class RosPlayer:
         self._stall = message.stall >= 0.5
 
     def _on_state(self, state: Any) -> None:
+        self._heard = time.monotonic()
         if self._finished.is_set():
             return
+        try:
+            self._play_on(state)
+        except Exception as error:  # rospy would log it, and the stick stay where it is
+            self._fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error!r}")
+            raise
+
+    def _fail(self, error: str) -> None:
+        self._error = error
+        self._finished.set()
+
+    def _play_on(self, state: Any) -> None:
         now = self._clock.update(state.epoch, state.sim_time_unwrapped)
         if self._begin is None:
             self._begin = {"epoch": int(state.epoch), "sim_time_unwrapped": float(state.sim_time_unwrapped)}
             self._say(f"playing {self._player.scenario.name}")
         with self._lock:
-            self._commands = self._player.step(now, sample_of(state, self._mode, self._stall))
+            self._commands = self._player.step(now, sample_of(state, self._mode or 1, self._stall))
             commands = self._commands
         for action in commands.actions:
             self._actions.put(action)
@@ -188,11 +203,15 @@ class RosPlayer:
 
     # --- out ----------------------------------------------------------------------------------------------------------
 
+    def _to_send(self) -> Optional[Commands]:
+        """What the stick shows now; None when it is not held: nothing is known yet, or not any more."""
+        with self._lock:
+            return self._commands if time.monotonic() - self._heard < _BLIND_S else None
+
     def _publish(self, publisher: Any) -> None:
         import rospy
 
-        with self._lock:
-            commands = self._commands
+        commands = self._to_send()
         if commands is None:
             return
         message = publisher.data_class()
@@ -217,12 +236,10 @@ class RosPlayer:
             try:
                 self._act(action)
             except ScenarioError as error:
-                self._error = f"{self._player.scenario.name}, at {action.time:.1f} s: {error}"
-                self._finished.set()
+                self._fail(f"{self._player.scenario.name}, at {action.time:.1f} s: {error}")
                 return
             except BaseException as error:  # a thread of its own must not die unheard
-                self._error = f"{action.kind}: {error!r}"
-                self._finished.set()
+                self._fail(f"{action.kind}: {error!r}")
                 raise
 
     def _act(self, action: Action) -> None:
@@ -245,26 +262,32 @@ class RosPlayer:
 
     def _request_mode(self, wanted: int) -> None:
         mode = _MODE_NAMES[wanted]
+        deadline = time.monotonic() + _MODE_WAIT_S
+
+        def wait_for(condition: Callable[[], bool]) -> None:
+            while not condition():
+                if time.monotonic() > deadline:
+                    raise ScenarioError(
+                        f"mode {mode} was asked for, but control/mode did not show it in {_MODE_WAIT_S:g} s"
+                    )
+                time.sleep(0.01)
+
+        wait_for(lambda: self._mode is not None)
         if self._stick is None:
             import rospy
 
             from xplane_bridge.msg import ModeRequest
 
+            wait_for(lambda: self._mode_publisher.get_num_connections() > 0)
             self._mode_sequence += 1
             request = ModeRequest(sequence=self._mode_sequence, mode=wanted, requester=rospy.get_name())
             request.header.stamp = rospy.Time.from_sec(time.time())
             self._mode_publisher.publish(request)
         else:
-            button = self._stick.mode_button(mode, _MODE_NAMES.get(self._mode, ""))
+            button = self._stick.mode_button(mode, _MODE_NAMES.get(self._mode or 0, ""))
             if button is not None:
                 self._tapped[button] = time.monotonic() + _TAP_S
-        deadline = time.monotonic() + _MODE_WAIT_S
-        while self._mode != wanted:
-            if time.monotonic() > deadline:
-                raise ScenarioError(
-                    f"mode {mode} was asked for, but control/mode did not show it in {_MODE_WAIT_S:g} s"
-                )
-            time.sleep(0.01)
+        wait_for(lambda: self._mode == wanted)
 
     def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
         import rospy

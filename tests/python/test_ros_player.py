@@ -1,0 +1,64 @@
+"""The player on the bridge's side: what it does with flight states, without ROS."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from xplane_bridge.scenario import parse_scenario, ros_player
+from xplane_bridge.scenario.ros_player import RosPlayer
+
+
+def state(sim_time, **values):
+    known = dict.fromkeys(
+        "roll_deg pitch_deg heading_true_deg altitude_msl altitude_agl vertical_speed calibrated_airspeed alpha_deg "
+        "beta_deg load_factor_normal".split(),
+        0.0,
+    )
+    rates = SimpleNamespace(x=0.0, y=0.0, z=0.0)
+    return SimpleNamespace(
+        **{**known, "epoch": 1, "sim_time_unwrapped": sim_time, "angular_velocity": rates, "on_ground": False, **values}
+    )
+
+
+def player(*events):
+    return RosPlayer(parse_scenario({"name": "test", "events": list(events)}), "/xplane")
+
+
+def test_the_stick_is_let_go_when_flight_states_end(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(ros_player.time, "monotonic", lambda: now[0])
+    flying = player({"at": 0, "stick": {"roll": 0.5}}, {"at": 60, "end": True})
+    assert flying._to_send() is None, "nothing is known yet"
+    flying._on_state(state(10.0))
+    now[0] += 0.9
+    assert flying._to_send().stick["roll"] == 0.5
+    now[0] += 0.2
+    assert flying._to_send() is None, "rx_node may be gone; tx_node's failsafe must have its chance"
+    flying._on_state(state(10.1))
+    assert flying._to_send().stick["roll"] == 0.5
+
+
+def test_a_state_that_cannot_be_played_ends_it_and_is_said():
+    flying = player({"at": 0, "hold": {"roll": 0}}, {"at": 60, "end": True})
+    flying._on_state(state(10.0))
+    with pytest.raises(TypeError):
+        flying._on_state(state(10.1, roll_deg="left"))
+    assert flying._finished.is_set()
+    assert "test, at 0.1 s: TypeError" in flying._error
+
+
+def test_what_is_unknown_for_a_moment_is_forgotten_after_it():
+    flying = player({"at": 0, "hold": {"roll": 0, "climb": 0, "speed": 60}}, {"at": 60, "end": True})
+    flying._on_state(state(10.0, calibrated_airspeed=50.0))
+    before = flying._to_send()
+    flying._on_state(state(10.1, calibrated_airspeed=math.nan, vertical_speed=math.nan, roll_deg=math.nan))
+    unknown = flying._to_send()
+    assert math.isnan(unknown.stick["roll"]), "tx_node refuses and counts it"
+    assert unknown.throttle == before.throttle
+    flying._on_state(state(10.2, calibrated_airspeed=50.0))
+    after = flying._to_send()
+    assert after.throttle == pytest.approx(before.throttle, abs=0.05)
+    assert all(math.isfinite(value) for value in after.stick.values())
