@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "xplane_bridge/core/clock.hpp"
 #include "xplane_bridge/core/failure_names.hpp"
 #include "xplane_bridge/core/journal.hpp"
 
@@ -19,6 +20,7 @@ constexpr double kRepairedAfter = 0.5;  // [s] without it until a failure counts
 constexpr double kRepairWait = 0.5;     // [s] in which values from before a repair may still come
 constexpr double kSendAgain = 0.3;      // [s] until what X-Plane does not show is sent once more
 constexpr double kWaitSlack = 1.0;      // [s] a service waits beyond what ends by itself
+constexpr double kReadWait = 0.5;       // [s] for one dataref, however late it is
 
 ServiceResult result(std::uint8_t code, const std::string& message) {
   ServiceResult out;
@@ -119,8 +121,10 @@ void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core
 
 void FailureKeeper::onFrame(const core::FlightWatch& watch) {
   std::lock_guard<std::mutex> lock(mutex_);
+  const double before = now_.sim_time;
   now_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
   if (stopped_) return;
+  if (now_.sim_time < before - core::kOvertaking) end(false, "X-Plane was restarted");
   for (const core::FailurePlan& plan : book_.due(now_)) carryOut(plan);
 }
 
@@ -208,9 +212,22 @@ void FailureKeeper::giveUp(const std::string& name, const std::string& why) {
   changed_.notify_all();
 }
 
+void FailureKeeper::end(bool driven_only, const std::string& why) {
+  for (const core::FailureLabel& label : book_.labels()) {
+    if (!label.by_bridge || (driven_only && !book_.isDriven(label.name))) continue;
+    for (const core::FailurePlan& plan : book_.clear({label.name}, false).undo) undo(plan);
+    not_shown_[label.name] = why;
+    report_("failure of " + label.name + " has ended: " + why, "", true);
+    dirty_ = true;
+  }
+  watchOwn();
+  applySurfaces();  // which may have been told of them again meanwhile
+  changed_.notify_all();
+}
+
 void FailureKeeper::useDriver(const Pending& pending) {
   repair(pending.plan.datarefs);
-  book_.useDriver(pending.plan.name, pending.expected_deg);
+  book_.useDriver(pending.plan.name, now_.sim_time, pending.expected_deg);
   report_(pending.plan.name + ": X-Plane's own failure does not act as it says, so that tx_node drives the surfaces",
           pending.who, true);
   dirty_ = true;
@@ -220,11 +237,19 @@ void FailureKeeper::useDriver(const Pending& pending) {
 
 bool FailureKeeper::settled(Pending* pending) {
   const std::string& name = pending->plan.name;
+  const auto settle = [this, pending, &name] {
+    const auto& surface = pending->plan.surface;
+    // Where it got stuck is known only now.
+    if (surface && surface->fault == core::SurfaceFault::kStuck && !surface->value) {
+      book_.setValue(name, surfaces_->shown(surface->surface));
+    }
+    return true;
+  };
   const double age = tick_time_ - pending->since;
   if (book_.isDriven(name)) {
     if (surfaces_->follows(pending->plan.surface->surface)) {
       book_.confirm(name, true);
-      return true;
+      return settle();
     }
     if (age < timeout_) return false;
     const std::string refusal = surfaces_->refusal();
@@ -255,10 +280,10 @@ bool FailureKeeper::settled(Pending* pending) {
     }
     return false;
   }
-  if (!pending->plan.surface || !pending->expected_deg) return true;
+  if (!pending->plan.surface || !pending->expected_deg) return settle();
   const double off = surfaces_->shown(pending->plan.surface->surface) - *pending->expected_deg;
   if (tick_time_ - pending->confirmed < kBehaviourWait) return false;
-  if (std::abs(off) <= kBehaviourDeg) return true;
+  if (std::abs(off) <= kBehaviourDeg) return settle();
   pending->since = tick_time_;
   useDriver(*pending);
   return false;
@@ -297,21 +322,16 @@ void FailureKeeper::tick(double time) {
   const auto dropped = surfaces_->takeDropped();
   std::lock_guard<std::mutex> lock(mutex_);
   tick_time_ = time;
-  if (dropped) {
-    for (const core::FailureLabel& label : book_.labels()) {
-      if (!book_.isDriven(label.name)) continue;
-      for (const core::FailurePlan& plan : book_.clear({label.name}, false).undo) undo(plan);
-      report_("failure of " + label.name + " has ended: " + *dropped, "", true);
-      dirty_ = true;
-    }
-    watchOwn();
-  }
+  if (dropped) end(true, *dropped);
   if (link_status_.state == core::LinkState::kConnected) {
     watchPending();
     watchRepairs();
   } else {
     // Time stands still for what X-Plane has to show.
-    for (auto& [name, pending] : pending_) pending.since = tick_time_;
+    for (auto& [name, pending] : pending_) {
+      pending.since = tick_time_;
+      if (pending.confirmed >= 0.0) pending.confirmed = tick_time_;
+    }
   }
   if (dirty_ || published_driving_ != surfaces_->driving() || time - publish_time_ >= kPublishPeriod) publishLocked();
   changed_.notify_all();  // services wait for what SurfaceControl does as well
@@ -321,6 +341,12 @@ void FailureKeeper::stop() {
   std::lock_guard<std::mutex> lock(mutex_);
   stopped_ = true;
   changed_.notify_all();
+}
+
+void FailureKeeper::repaired() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  book_.clear({}, false);
+  pending_.clear();
 }
 
 void FailureKeeper::publish() {
@@ -354,6 +380,12 @@ std::optional<ServiceResult> FailureKeeper::add(const core::FailureRequest& requ
   if (planned.error == core::FailureError::kInvalid) return result(ServiceResult::REFUSED, planned.text);
   if (planned.error != core::FailureError::kNone) return result(ServiceResult::NOT_SUPPORTED, planned.text);
   const std::string& name = planned.plan.name;
+  if (const auto same = book_.sameAs(planned.plan)) {
+    return result(ServiceResult::REFUSED, name + " is broken already as " + *same + ": clear that first");
+  }
+  if (request.trigger == static_cast<int>(core::FailureTrigger::kAtSimTime) && !std::isfinite(now_.sim_time)) {
+    return result(ServiceResult::NO_LINK, "X-Plane has not told its time yet");
+  }
   // A failure of the same name is replaced; a surface that stays driven goes from where it is.
   for (const core::FailurePlan& plan : book_.clear({name}, true).undo) undo(plan);
   not_shown_.erase(name);
@@ -370,12 +402,16 @@ std::optional<ServiceResult> FailureKeeper::add(const core::FailureRequest& requ
 
 ServiceResult FailureKeeper::await(std::unique_lock<std::mutex>* lock, const std::string& name) {
   const auto longest = std::chrono::duration<double>(2.0 * timeout_ + kBehaviourWait + kWaitSlack);
-  const auto over = [this, &name] { return stopped_ || pending_.count(name) == 0 || !isUp(link_status_); };
-  const bool paused = link_status_.state == core::LinkState::kPaused;
-  if (paused) return result(ServiceResult::ACCEPTED, "X-Plane is paused: it acts when it goes on");
+  const auto paused = [this] { return link_status_.state == core::LinkState::kPaused; };
+  // A short silence (STALE) is waited through: X-Plane loads scenery.
+  const auto gone = [this] {
+    return link_status_.state == core::LinkState::kLost || link_status_.state == core::LinkState::kSearching;
+  };
+  const auto over = [&] { return stopped_ || pending_.count(name) == 0 || paused() || gone(); };
   if (!changed_.wait_for(*lock, longest, over))
     return result(ServiceResult::TIMEOUT, "X-Plane did not show it in time");
-  if (stopped_ || !isUp(link_status_)) return result(ServiceResult::NO_LINK, "X-Plane is not connected any more");
+  if (stopped_ || gone()) return result(ServiceResult::NO_LINK, "X-Plane is not connected any more");
+  if (pending_.count(name) != 0) return result(ServiceResult::ACCEPTED, "X-Plane is paused: it acts when it goes on");
   const auto why = not_shown_.find(name);
   if (why != not_shown_.end()) return result(ServiceResult::TIMEOUT, why->second);
   return result(ServiceResult::OK, "X-Plane shows it");
@@ -436,6 +472,7 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
                                                           (broken.empty() ? "nothing, all is well" : broken));
     return;
   }
+  const bool driven = surfaces_->driving();
   const auto cleared = book_.clear(names, request.include_simulator);
   for (const std::string& name : names) {
     if (!book_.knows(name)) continue;
@@ -468,11 +505,17 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
     response->result = result(ServiceResult::TIMEOUT, "X-Plane still shows " + dataref);
     return;
   }
-  if (given_back && !cleared.undo.empty()) {
+  if (driven && given_back) {
     lock.lock();
-    changed_.wait_for(lock, std::chrono::duration<double>(left()),
-                      [this] { return stopped_ || !surfaces_->givingBack(); });
+    const bool back = changed_.wait_for(lock, std::chrono::duration<double>(left()),
+                                        [this] { return stopped_ || !surfaces_->givingBack(); });
     lock.unlock();
+    // It also ends by being given up.
+    if (!back || (!surfaces_->driving() &&
+                  !link_->waitForDataref(core::kSurfaceOverride, 0.0F, 0.0F, std::max(left(), kReadWait)).first)) {
+      response->result = result(ServiceResult::TIMEOUT, std::string("X-Plane still shows ") + core::kSurfaceOverride);
+      return;
+    }
   }
   response->success = true;
   response->result = result(ServiceResult::OK, cleared.names.empty() ? "nothing was broken" : "repaired");

@@ -36,7 +36,7 @@ OverrideKeeper::OverrideKeeper(core::SimLink* link, Report report) : link_(link)
 
 bool OverrideKeeper::set(const std::string& dataref, float value) {
   const auto journal = link_->journal();
-  if (!journal) return false;
+  if (!journal || ended_) return false;
   // On disk first: a crash right after the datagram must find it there.
   journal->record(entryId(dataref), kOverridePurpose, {undoOf(dataref)});
   releasing_.erase(dataref);
@@ -190,12 +190,12 @@ bool OverrideKeeper::releasesPending() const {
   return !releasing_.empty();
 }
 
-bool OverrideKeeper::confirm(const std::vector<std::string>& ids, const std::vector<core::UndoOperation>& operations,
-                             double timeout_s, const std::string& what) {
+bool OverrideKeeper::confirm(const std::vector<core::UndoOperation>& operations, double timeout_s,
+                             const std::string& what, const std::function<void(core::Journal&)>& remove) {
   if (operations.empty()) return true;
   const bool shown = link_->undo(operations, timeout_s);
   const auto journal = link_->journal();
-  if (shown && journal) journal->remove(ids);
+  if (shown && journal) remove(*journal);
   report_(shown ? "released " + what : what + " could not be seen released; it stays in the journal", shown);
   return shown;
 }
@@ -232,6 +232,7 @@ bool OverrideKeeper::releaseAll(double timeout_s) {
     held_.clear();
     watch();
     releasing_ = all;
+    ended_ = true;
   }
   std::vector<std::string> ids;
   std::vector<core::UndoOperation> operations;
@@ -239,7 +240,8 @@ bool OverrideKeeper::releaseAll(double timeout_s) {
     ids.push_back(entryId(dataref));
     operations.push_back(undoOf(dataref));
   }
-  if (!confirm(ids, operations, timeout_s, joined(all))) return false;
+  const auto remove = [&ids](core::Journal& journal) { journal.remove(ids); };
+  if (!confirm(operations, timeout_s, joined(all), remove)) return false;
   std::lock_guard<std::mutex> lock(mutex_);
   releasing_.clear();
   return true;
@@ -248,15 +250,16 @@ bool OverrideKeeper::releaseAll(double timeout_s) {
 bool OverrideKeeper::releaseLeftovers(double timeout_s) {
   const auto journal = link_->journal();
   if (!journal) return false;
-  std::vector<std::string> ids;
+  const std::vector<core::JournalEntry> left = journal->orphans(kOverridePurpose);
   std::vector<core::UndoOperation> operations;
   std::set<std::string> names;
-  for (const core::JournalEntry& entry : journal->orphans(kOverridePurpose)) {
-    ids.push_back(entry.id);
+  for (const core::JournalEntry& entry : left) {
     names.insert(entry.id);
     operations.insert(operations.end(), entry.undo.begin(), entry.undo.end());
   }
-  return confirm(ids, operations, timeout_s, joined(names) + " left by a run that crashed");
+  // This run may have set one of them anew meanwhile: that entry is not theirs.
+  return confirm(operations, timeout_s, joined(names) + " left by a run that crashed",
+                 [&left](core::Journal& journal_now) { journal_now.removeUndone(left); });
 }
 
 std::vector<std::string> OverrideKeeper::active() const {

@@ -46,6 +46,8 @@ class FailureKeeper {
   void tick(double time);
   /// Nothing is broken any more from here on; what is set is the OverrideKeeper's to repair.
   void stop();
+  /// All that the bridge had broken has been repaired by the OverrideKeeper.
+  void repaired();
   void publish();
 
   // Services: wait up to the time-out.
@@ -74,6 +76,7 @@ class FailureKeeper {
   void undo(const core::FailurePlan& plan);
   void repair(const std::vector<std::string>& datarefs);
   void giveUp(const std::string& name, const std::string& why);
+  void end(bool driven_only, const std::string& why);
   void applySurfaces();
   void observe(const std::vector<std::string>& datarefs, const core::RrefView& view);
   void watchOwn();

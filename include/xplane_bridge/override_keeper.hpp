@@ -23,11 +23,11 @@ class OverrideKeeper {
 
   /// Sets what of `wanted` is not set yet, and gives back what was set by an earlier call and is not in `wanted` any
   /// more (its journal entry stays until confirmReleases() has read it back). Writes to the disk when something is new;
-  /// without a journal (X-Plane has not been found) nothing is set.
+  /// without a journal (X-Plane has not been found), and after releaseAll(), nothing is set.
   void require(const std::vector<std::string>& wanted);
   /// Sets one, until unhold() or the end of the node, whatever require() says. Not only overrides: whatever is 0 (or
   /// core::releaseOf()) where nobody sets it. Without `refreshed`, refresh() leaves it alone, so that it can be taken
-  /// back in the simulator. Returns whether it was set: not without a journal.
+  /// back in the simulator. Returns whether it was set: as in require().
   bool hold(const std::string& dataref, float value = 1.0F, bool refreshed = true);
   /// Gives one back that hold() has set; another one stays as it is.
   void unhold(const std::string& dataref);
@@ -46,8 +46,8 @@ class OverrideKeeper {
   bool releasesPending() const;
   /// Reads pending releases back, sending them again where needed. Waits up to `timeout_s`.
   void confirmReleases(double timeout_s);
-  /// Releases everything. Waits up to `timeout_s`. Returns whether X-Plane has shown all of it; what it has not stays
-  /// in the journal.
+  /// Releases everything; nothing is set after that. Waits up to `timeout_s`. Returns whether X-Plane has shown all of
+  /// it; what it has not stays in the journal.
   bool releaseAll(double timeout_s);
   /// Releases what a crashed run has left. Waits up to `timeout_s`. Returns whether nothing is left.
   bool releaseLeftovers(double timeout_s);
@@ -72,8 +72,9 @@ class OverrideKeeper {
   void send(const std::string& dataref, float value);
   void watch();
   void release(const std::string& dataref);
-  bool confirm(const std::vector<std::string>& ids, const std::vector<core::UndoOperation>& operations,
-               double timeout_s, const std::string& what);
+  /// `remove`: takes what was undone out of the journal.
+  bool confirm(const std::vector<core::UndoOperation>& operations, double timeout_s, const std::string& what,
+               const std::function<void(core::Journal&)>& remove);
 
   core::SimLink* link_;
   Report report_;
@@ -84,6 +85,7 @@ class OverrideKeeper {
   core::GroupId group_ = -1;
   std::vector<std::string> watched_;  // datarefs of the group
   std::map<std::string, Shown> shown_;
+  bool ended_ = false;  // by releaseAll()
 };
 
 /// Journal purpose of tx_node's entries.

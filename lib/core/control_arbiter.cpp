@@ -10,6 +10,7 @@ namespace xplane_bridge::core {
 namespace {
 
 constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kRequestersKept = 100;  // whose sequence numbers are remembered
 constexpr std::array<Channel, 3> kStick = {Channel::kRoll, Channel::kPitch, Channel::kYaw};
 
 std::string wrong(const std::string& key, double given, const std::string& expected) {
@@ -151,6 +152,10 @@ RequestOutcome ControlArbiter::onModeRequest(const ModeRequest& request, double 
       if (request.sequence <= seen->second.sequence && !restarted) return RequestOutcome::kIgnored;
     }
     seen_requests_[request.requester] = {request.sequence, request.stamp};
+    if (seen_requests_.size() > kRequestersKept) {
+      seen_requests_.erase(std::min_element(seen_requests_.begin(), seen_requests_.end(),
+                                            [](auto& a, auto& b) { return a.second.stamp < b.second.stamp; }));
+    }
   }
   status_.requested_by = request.requester;
   status_.request_sequence = request.sequence;

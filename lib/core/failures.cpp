@@ -1,13 +1,17 @@
 #include "xplane_bridge/core/failures.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
+#include <utility>
 
 namespace xplane_bridge::core {
 namespace {
 
 const std::string kFolder = "sim/operation/failures/";
+constexpr std::size_t kLongestName = 100;  // of a rel_*: none is nearly as long
 
 // A system whose failures X-Plane has by number.
 struct SystemRow {
@@ -112,6 +116,12 @@ std::optional<std::string> checkTrigger(const FailureRequest& request) {
   return std::nullopt;
 }
 
+bool shareDataref(const FailurePlan& a, const FailurePlan& b) {
+  return std::any_of(a.datarefs.begin(), a.datarefs.end(), [&b](const std::string& dataref) {
+    return std::find(b.datarefs.begin(), b.datarefs.end(), dataref) != b.datarefs.end();
+  });
+}
+
 // True when the trigger has come; false also while what it looks at is unknown.
 bool hasCome(FailureTrigger trigger, double value, const FlightConditions& now) {
   switch (trigger) {
@@ -148,7 +158,9 @@ FailurePlanResult planFailure(const FailureRequest& request, SimulatorGeneration
   FailurePlanResult out;
   out.plan = {request.name, request.kind, std::nullopt, {}, std::nullopt};
   const std::string bare = failureName(request.name);
-  if (bare.compare(0, 4, "rel_") == 0 && bare.size() > 4) {
+  const bool wordy = bare.size() <= kLongestName &&
+                     std::all_of(bare.begin(), bare.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+  if (bare.compare(0, 4, "rel_") == 0 && bare.size() > 4 && wordy) {
     out.plan.name = bare;
     out.plan.datarefs.push_back(failureDataref(bare));
   } else {
@@ -178,7 +190,17 @@ FailurePlanResult planFailure(const FailureRequest& request, SimulatorGeneration
   return out;
 }
 
+std::optional<std::string> FailureBook::sameAs(const FailurePlan& plan) const {
+  for (const auto& [name, entry] : entries_) {
+    if (entry.by_bridge && name != plan.name && shareDataref(entry.plan, plan)) return name;
+  }
+  return std::nullopt;
+}
+
 void FailureBook::add(const FailureRequest& request, const FailurePlan& plan, const FlightConditions& now) {
+  for (auto it = entries_.begin(); it != entries_.end();) {
+    it = !it->second.by_bridge && shareDataref(it->second.plan, plan) ? entries_.erase(it) : std::next(it);
+  }
   Entry entry;
   entry.plan = plan;
   entry.trigger = static_cast<FailureTrigger>(request.trigger);
@@ -220,9 +242,13 @@ bool FailureBook::observe(const std::string& dataref, double value, double sim_t
       entries_.erase(it);
       return true;
     }
-    const bool changed = entry.confirmed != failed;
-    entry.confirmed = failed;
-    return changed;
+    if (failed) {
+      entry.shown.insert(dataref);
+    } else {
+      entry.shown.erase(dataref);
+    }
+    const bool all = entry.shown.size() == names.size();
+    return std::exchange(entry.confirmed, all) != all;
   }
   if (!failed) return false;
   Entry entry;
@@ -231,6 +257,7 @@ bool FailureBook::observe(const std::string& dataref, double value, double sim_t
   entry.plan.datarefs = {dataref};
   entry.by_bridge = false;
   entry.active = entry.confirmed = true;
+  entry.shown = {dataref};
   entry.since = sim_time;
   entries_[entry.plan.name] = entry;
   return true;
@@ -288,10 +315,12 @@ std::vector<std::string> FailureBook::datarefsOf(const std::string& name) const 
   return it->second.plan.datarefs;
 }
 
-void FailureBook::useDriver(const std::string& name, std::optional<double> stuck_deg) {
+void FailureBook::useDriver(const std::string& name, double sim_time, std::optional<double> stuck_deg) {
   const auto it = entries_.find(name);
   if (it == entries_.end() || !it->second.plan.surface) return;
   it->second.driven = true;
+  it->second.confirmed = false;
+  it->second.since = sim_time;
   SurfaceFailure& failure = *it->second.plan.surface;
   if (failure.fault == SurfaceFault::kStuck && !failure.value) failure.value = stuck_deg;
 }

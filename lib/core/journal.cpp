@@ -354,14 +354,21 @@ void Journal::record(const std::string& id, const std::string& purpose, std::vec
 }
 
 void Journal::remove(const std::vector<std::string>& ids) {
+  removeIf([&](const JournalEntry& entry) { return std::find(ids.begin(), ids.end(), entry.id) != ids.end(); });
+}
+
+void Journal::removeUndone(const std::vector<JournalEntry>& undone) {
+  removeIf([&](const JournalEntry& entry) {
+    return std::any_of(undone.begin(), undone.end(),
+                       [&](const JournalEntry& each) { return each.id == entry.id && each.owner == entry.owner; });
+  });
+}
+
+void Journal::removeIf(const std::function<bool(const JournalEntry&)>& chosen) {
   const Lock lock(path_);
   std::vector<JournalEntry> entries = read(path_);
   const std::size_t before = entries.size();
-  entries.erase(std::remove_if(entries.begin(), entries.end(),
-                               [&](const JournalEntry& entry) {
-                                 return std::find(ids.begin(), ids.end(), entry.id) != ids.end();
-                               }),
-                entries.end());
+  entries.erase(std::remove_if(entries.begin(), entries.end(), chosen), entries.end());
   if (entries.size() != before) {
     write(path_, entries);
   }

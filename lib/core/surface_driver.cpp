@@ -104,7 +104,7 @@ void SurfaceDriver::setFailures(const std::vector<SurfaceFailure>& failures) {
   }
   for (const SurfaceFailure& failure : failures) {
     Driven& d = driven(failure.surface);
-    const bool already_stuck_here = d.failure && d.failure->fault == SurfaceFault::kStuck &&
+    const bool already_stuck_here = d.failure && d.failure->fault == SurfaceFault::kStuck && !d.failure->value &&
                                     failure.fault == SurfaceFault::kStuck && !failure.value;
     if (!already_stuck_here) d.stuck_deg = failure.value.value_or(d.now_deg);
     d.failure = failure;
@@ -166,8 +166,13 @@ const std::vector<SurfaceDeflection>& SurfaceDriver::step(const MixingInputs& in
     const double wanted =
         broken && d.failure->fault == SurfaceFault::kFloating ? floating(d, flow, dt) : target(d, terms);
     if (std::isfinite(wanted)) d.now_deg = towards(d.now_deg, wanted, rate * dt);
-    // A broken surface does not answer to a test signal.
-    const double sent = d.now_deg + (broken ? 0.0 : d.offset_deg);
+    double sent = d.now_deg;
+    // A broken surface does not answer to a test signal, and none leaves its travel by one.
+    if (!broken && d.offset_deg != 0.0) {
+      const double low = d.law ? d.law->low_deg : -kMaxDeflectionDeg,
+                   high = d.law ? d.law->high_deg : kMaxDeflectionDeg;
+      sent = std::clamp(sent + d.offset_deg, std::min(low, sent), std::max(high, sent));
+    }
     out_.push_back({d.surface, std::clamp(sent, -kMaxDeflectionDeg, kMaxDeflectionDeg)});
   }
   return out_;

@@ -41,6 +41,7 @@ SurfaceLaw lawFromJson(const std::string& name, const Json& json) {
   law.residual_deg = finite(json.at("residual_deg"), name + ".residual_deg");
   law.low_deg = finite(json.at("low_deg"), name + ".low_deg");
   law.high_deg = finite(json.at("high_deg"), name + ".high_deg");
+  if (!(law.high_deg > law.low_deg)) throw MixingFileError("mixing file: " + name + ".high_deg is not above low_deg");
   const std::string slopes = name + ".slopes_deg.";
   for (const auto& [term, slope] : json.at("slopes_deg").items()) {
     std::string path = slopes;

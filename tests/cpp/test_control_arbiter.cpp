@@ -250,6 +250,16 @@ TEST(ControlArbiter, RestartedRequesterIsHeardAndUncountedRequestsAlwaysAre) {
   EXPECT_EQ(arbiter.onModeRequest(request(1, 0, "terminal"), 1.4), RequestOutcome::kChanged);
 }
 
+TEST(ControlArbiter, RemembersTheLastHundredRequesters) {
+  ControlArbiter arbiter(direct(), 0.0);
+  for (int i = 0; i < 101; ++i) {
+    arbiter.onModeRequest(request(2, 1, "node_" + std::to_string(i), 100.0 + i), 1.0);
+  }
+  EXPECT_EQ(arbiter.onModeRequest(request(2, 1, "node_1", 101.0), 2.0), RequestOutcome::kIgnored);
+  EXPECT_EQ(arbiter.onModeRequest(request(2, 1, "node_100", 200.0), 2.0), RequestOutcome::kIgnored);
+  EXPECT_EQ(arbiter.onModeRequest(request(2, 1, "node_0", 100.0), 2.0), RequestOutcome::kUnchanged) << "forgotten";
+}
+
 TEST(ControlArbiter, UnknownModeIsRefusedInWords) {
   ControlArbiter arbiter(direct(), 0.0);
   EXPECT_EQ(arbiter.onModeRequest(request(3, 1), 1.0), RequestOutcome::kRefused);

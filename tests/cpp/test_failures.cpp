@@ -53,6 +53,8 @@ TEST(Failures, UnknownNamesAndKindsAreRefusedInWords) {
   EXPECT_NE(text(request("pitot_3")).find("pitot_2"), std::string::npos);
   EXPECT_NE(text(request("wing")).find("name is \"wing\""), std::string::npos);
   EXPECT_NE(text(request("rel_")).find("name is"), std::string::npos);
+  EXPECT_NE(text(request("rel_pitot;rm")).find("name is"), std::string::npos);
+  EXPECT_NE(text(request("rel_" + std::string(500, 'x'))).find("name is"), std::string::npos);
   EXPECT_NE(text(request("engine_1", "stuck")).find("expected failed"), std::string::npos);
   EXPECT_NE(text(request("rudder1_fin1", "failed")).find("expected stuck"), std::string::npos);
   EXPECT_NE(text(request("rudder1_fin1", "reduced")).find("value is missing"), std::string::npos);
@@ -134,6 +136,36 @@ TEST(FailureBook, ConfirmsByReadBackAndSeesTheSimulatorsOwn) {
   EXPECT_EQ(book.labels().size(), 1u);
 }
 
+TEST(FailureBook, IsConfirmedWhenAllItsDatarefsShowIt) {
+  const std::string horizon = "sim/operation/failures/rel_ss_ahz", gyro = "sim/operation/failures/rel_ss_dgy";
+  FailureBook book;
+  const auto r = request("gyro_1");
+  book.add(r, planFailure(r, k11).plan, at(1.0));
+  book.due(at(1.0));
+  EXPECT_FALSE(book.observe(horizon, 6, 1.1));
+  EXPECT_FALSE(book.observe(gyro, 0, 1.1));
+  EXPECT_FALSE(book.labels()[0].confirmed) << "one of two";
+  EXPECT_TRUE(book.observe(gyro, 6, 1.2));
+  EXPECT_TRUE(book.labels()[0].confirmed);
+  EXPECT_TRUE(book.observe(horizon, 0, 1.3));
+  EXPECT_FALSE(book.labels()[0].confirmed);
+}
+
+TEST(FailureBook, OneDatarefHasOneName) {
+  FailureBook book;
+  book.observe("sim/operation/failures/rel_static", 6, 1.0);  // in the menu
+  const auto ours = planFailure(request("static_1"), k11).plan;
+  EXPECT_EQ(book.sameAs(ours), std::nullopt) << "what the simulator has failed may be failed";
+  book.add(request("static_1"), ours, at(2.0));
+  ASSERT_EQ(book.labels().size(), 1u) << "and is the bridge's from then on";
+  book.due(at(2.0));
+  EXPECT_TRUE(book.observe("sim/operation/failures/rel_static", 6, 2.1));
+  EXPECT_TRUE(book.labels()[0].confirmed);
+  EXPECT_EQ(book.sameAs(ours), std::nullopt) << "itself is replaced";
+  EXPECT_EQ(book.sameAs(planFailure(request("rel_static"), k11).plan), "static_1");
+  EXPECT_EQ(book.sameAs(planFailure(request("rel_pitot"), k11).plan), std::nullopt);
+}
+
 TEST(FailureBook, ClearsOnlyWhatItIsAskedTo) {
   FailureBook book;
   for (const char* name : {"engine_1", "engine_2"}) {
@@ -167,8 +199,12 @@ TEST(FailureBook, DriverFliesWhatXPlaneCannotOrDoesNot) {
   book.due(at(1.0));
   ASSERT_EQ(book.drivenSurfaces().size(), 1u);
   EXPECT_EQ(book.drivenSurfaces()[0].value, 5.0);
-  book.useDriver("rudder1_fin1");
+  book.confirm("rudder1_fin1", true);
+  book.useDriver("rudder1_fin1", 3.0);
   EXPECT_EQ(book.drivenSurfaces().size(), 2u);
+  // X-Plane has shown its own failure, but not this one yet, which begins now.
+  EXPECT_FALSE(book.labels()[1].confirmed);
+  EXPECT_DOUBLE_EQ(book.labels()[1].since_sim_time, 3.0);
 }
 
 TEST(FailureBook, SecondRequestOfANameReplacesTheFirst) {
@@ -193,11 +229,11 @@ TEST(FailureBook, TellsWhatIsDrivenAndWhatShowsAFailure) {
   EXPECT_EQ(book.datarefsOf("aileron1_wing2_left").front(), "sim/operation/failures/rel_fcon_ailn_1_lft_lock");
   book.setValue("aileron1_wing2_left", 4.5);
   EXPECT_EQ(book.labels().front().value, 4.5);
-  book.useDriver("aileron1_wing2_left");
+  book.useDriver("aileron1_wing2_left", 2.0);
   EXPECT_TRUE(book.isDriven("aileron1_wing2_left"));
   EXPECT_TRUE(book.datarefsOf("aileron1_wing2_left").empty());
   EXPECT_FALSE(book.drivenSurfaces().front().value) << "the label's value is no wish";
-  book.useDriver("aileron1_wing2_left", 4.5);
+  book.useDriver("aileron1_wing2_left", 2.0, 4.5);
   EXPECT_EQ(book.drivenSurfaces().front().value, 4.5);
   EXPECT_FALSE(book.isDriven("engine_1"));
   EXPECT_EQ(failureName("sim/operation/failures/rel_otto"), "rel_otto");

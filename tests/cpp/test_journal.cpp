@@ -138,6 +138,17 @@ TEST_F(JournalTest, EntryOfADeadProcessIsTakenOver) {
   EXPECT_EQ(journal().entries()[0].owner.node, "/next");
 }
 
+TEST_F(JournalTest, WhatWasUndoneIsRemovedUnlessSomebodyHasTakenItOver) {
+  for (const char* id : {"a", "b"}) Journal(path_, deadOwner()).record(id, "override", kReleaseJoystick);
+  const std::vector<JournalEntry> orphans = journal().orphans("override");
+  ASSERT_EQ(orphans.size(), 2U);
+  journal("/next").record("a", "override", kReleaseJoystick);  // while they are being undone
+  journal("/next").removeUndone(orphans);
+  ASSERT_EQ(journal().entries().size(), 1U);
+  EXPECT_EQ(journal().entries()[0].id, "a");
+  EXPECT_EQ(journal().entries()[0].owner.node, "/next");
+}
+
 TEST_F(JournalTest, DamagedFileIsSetAsideAndSaid) {
   for (const char* text : {"{\"format\": \"xplane_b", "[]", "{\"format\": \"something else\"}", "",
                            "{\"format\": \"xplane_bridge journal\", \"version\": 1, \"entries\": [{\"id\": 3}]}"}) {

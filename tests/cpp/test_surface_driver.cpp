@@ -176,6 +176,25 @@ TEST(SurfaceDriver, OffsetIsAddedToAHealthySurfaceOnly) {
   EXPECT_DOUBLE_EQ(sent(driver.step(stick(0.0, 0.5), {}, kLong), kRudder), 11.0);
 }
 
+TEST(SurfaceDriver, AnOffsetDoesNotLeaveTheTravel) {
+  SurfaceDriver driver(model());
+  driver.engage(shown());
+  driver.setOffset(kLeft, 50.0);
+  EXPECT_DOUBLE_EQ(sent(driver.step(stick(0.0), {}, kLong), kLeft), 16.0);
+  driver.setCommands({{kLeft, 30.0}});  // that may
+  EXPECT_DOUBLE_EQ(sent(driver.step(stick(0.0), {}, kLong), kLeft), 30.0);
+}
+
+TEST(SurfaceDriver, StuckWhereItIsAfterStuckAtAnAngleStops) {
+  SurfaceDriver driver(model());
+  driver.engage(shown());
+  driver.setFailures({{kLeft, SurfaceFault::kStuck, 13.0}});
+  const double on_its_way = sent(driver.step(stick(0.0), {}, 0.05), kLeft);
+  EXPECT_LT(on_its_way, 12.0);
+  driver.setFailures({{kLeft, SurfaceFault::kStuck, std::nullopt}});
+  EXPECT_DOUBLE_EQ(sent(driver.step(stick(0.0), {}, kLong), kLeft), on_its_way);
+}
+
 TEST(SurfaceDriver, UnknownInputsHoldTheSurface) {
   SurfaceDriver driver(model());
   driver.engage(shown());

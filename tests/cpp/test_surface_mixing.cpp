@@ -263,6 +263,9 @@ TEST(SurfaceMixing, FileErrorsAreSaid) {
   other = good;
   other.replace(other.find("rudder1_fin1"), 12, "rudder9_fin1");
   EXPECT_NE(error(other).find("rudder9_fin1"), std::string::npos);
+  other = good;
+  other.replace(other.find("\"high_deg\": "), 12, "\"high_deg\": -9");
+  EXPECT_NE(error(other).find("high_deg is not above low_deg"), std::string::npos) << error(other);
 }
 
 TEST(SurfaceMixing, FileNameIsSafe) {

@@ -7,6 +7,8 @@ namespace xplane_bridge::core {
 
 constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 constexpr std::int64_t kNanosecondsPerMillisecond = 1'000'000;
+/// [s] by which X-Plane's time may seem to run backwards, because datagrams overtake each other.
+constexpr double kOvertaking = 0.25;
 
 /// Time sources handed to whoever needs the time. Both functions may be called from any thread.
 struct Clock {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -76,6 +77,10 @@ struct FailureLabel {
 /// All failures that are armed or active, by name. The caller carries plans out and reports what X-Plane shows.
 class FailureBook {
  public:
+  /// The other failure of the bridge's that one of the plan's datarefs belongs to already; nullopt: none. One that was
+  /// set in the simulator's menu gives way.
+  std::optional<std::string> sameAs(const FailurePlan& plan) const;
+
   /// Arms a failure, replacing one of the same name. Its trigger is looked at by due(), also kNow.
   void add(const FailureRequest& request, const FailurePlan& plan, const FlightConditions& now);
 
@@ -107,8 +112,9 @@ class FailureBook {
   std::vector<FailureLabel> labels() const;
   /// Active failures that SurfaceDriver flies; planned with datarefs ones only after useDriver().
   std::vector<SurfaceFailure> drivenSurfaces() const;
-  /// X-Plane did not obey the datarefs: SurfaceDriver takes this one. `stuck_deg`: where a surface got stuck meanwhile.
-  void useDriver(const std::string& name, std::optional<double> stuck_deg = std::nullopt);
+  /// X-Plane did not obey the datarefs: SurfaceDriver takes this one, from `sim_time` [s] on. `stuck_deg`: where a
+  /// surface got stuck meanwhile.
+  void useDriver(const std::string& name, double sim_time, std::optional<double> stuck_deg = std::nullopt);
 
  private:
   struct Entry {
@@ -117,6 +123,7 @@ class FailureBook {
     double trigger_value = 0.0;
     bool by_bridge = true, active = false, confirmed = false, driven = false;
     double since = std::numeric_limits<double>::quiet_NaN();
+    std::set<std::string> shown;  // of the datarefs, those X-Plane shows failed
   };
   std::map<std::string, Entry> entries_;
 };

@@ -105,8 +105,12 @@ class Journal {
   void record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo);
   /// Removes entries by id; unknown ids are no error. The file goes with its last entry.
   void remove(const std::vector<std::string>& ids);
+  /// Removes what was found by orphans() and has been undone, but not what record() has taken over since.
+  void removeUndone(const std::vector<JournalEntry>& undone);
 
  private:
+  void removeIf(const std::function<bool(const JournalEntry&)>& chosen);
+
   std::string path_;
   JournalOwner self_;
   AliveFunction alive_;

@@ -60,7 +60,6 @@ class SurfaceDriver {
   /// to the laws (MixingWatch::bias()); empty: none. Throws std::invalid_argument when a surface of the model has no
   /// known deflection.
   void engage(const std::vector<double>& shown_deg, const std::vector<double>& bias_deg = {});
-  void disengage() { driven_.clear(); }
   bool engaged() const { return !driven_.empty(); }
 
   /// The broken surfaces, all of them; one failure a surface. A surface that stops being broken goes back to the law.
@@ -68,7 +67,7 @@ class SurfaceDriver {
   void setFailures(const std::vector<SurfaceFailure>& failures);
   /// Surfaces flown one by one (SurfaceCommand.msg), all of them. A failure of the same surface is stronger.
   void setCommands(const std::vector<SurfaceDeflection>& commands);
-  /// Added to one surface's deflection (excitation of a surface); 0 ends it.
+  /// Added to one surface's deflection (excitation of a surface) within its travel; 0 ends it.
   void setOffset(std::size_t surface, double offset_deg);
 
   /// Advances by `dt` [s] and gives what to send, every driven surface by rising number.
