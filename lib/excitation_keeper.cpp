@@ -19,6 +19,10 @@ std::optional<core::ExcitationShape> shapeFrom(const std::string& kind) {
   return std::nullopt;
 }
 
+bool hasBand(core::ExcitationShape shape) {
+  return shape == core::ExcitationShape::kMultisine || shape == core::ExcitationShape::kChirp;
+}
+
 core::ChannelSet channelsOf(const std::string& target) {
   core::ChannelSet out;
   if (target == "roll") out.set(core::index(core::Channel::kRoll));
@@ -45,7 +49,43 @@ ExcitationKeeper::ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg
   publish();
 }
 
-void ExcitationKeeper::inject(const InjectExcitation::Request& request, const std::string& who,
+ExcitationKeeper::Plan ExcitationKeeper::plan(const InjectExcitation::Request& request) const {
+  Plan out;
+  if (request.kind == "stop") return out;
+  const auto shape = shapeFrom(request.kind);
+  if (!shape) {
+    out.wrong = "kind is \"" + request.kind + "\"; expected doublet, 3-2-1-1, multisine, chirp or stop";
+    return out;
+  }
+  out.channels = channelsOf(request.target);
+  out.surface = core::surfaceNumber(request.target);
+  if (out.channels.none() && !out.surface) {
+    out.wrong =
+        "target is \"" + request.target + "\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md)";
+    return out;
+  }
+  core::ExcitationSpec spec;
+  spec.shape = *shape;
+  spec.amplitude = static_cast<double>(request.amplitude);
+  spec.duration = static_cast<double>(request.duration);
+  if (hasBand(*shape)) {
+    spec.frequency_min = static_cast<double>(request.frequency_min);
+    spec.frequency_max = static_cast<double>(request.frequency_max);
+  }
+  spec.seed = request.seed;
+  spec.roll_limit_deg = request.max_roll_deg == 0.0F ? max_roll_deg_ : static_cast<double>(request.max_roll_deg);
+  spec.pitch_limit_deg = request.max_pitch_deg == 0.0F ? max_pitch_deg_ : static_cast<double>(request.max_pitch_deg);
+  if (const auto problem = core::validate(spec)) {
+    out.wrong = *problem;
+  } else if (out.channels.any() && spec.amplitude > 1.0) {
+    out.wrong = "amplitude of an axis must be at most 1 (full travel)";
+  } else {
+    out.signal.emplace(spec);
+  }
+  return out;
+}
+
+void ExcitationKeeper::inject(const InjectExcitation::Request& request, const Plan& plan, const std::string& who,
                               const core::FlightWatch& watch, const std::string& refusal,
                               const core::ChannelSet& commanded, InjectExcitation::Response* response) {
   const auto answer = [&](std::uint8_t code, const std::string& text) {
@@ -54,51 +94,21 @@ void ExcitationKeeper::inject(const InjectExcitation::Request& request, const st
     response->id = state_.id;
     response->success = code == ServiceResult::ACCEPTED;
   };
-  if (request.kind == "stop") {
+  if (!plan.wrong.empty()) return answer(ServiceResult::REFUSED, plan.wrong);
+  if (!plan.signal) {
     if (!running()) return answer(ServiceResult::REFUSED, "no excitation runs");
     abort("stopped by " + who);
     return answer(ServiceResult::ACCEPTED, "excitation " + std::to_string(state_.id) + " is stopped");
   }
-  const auto shape = shapeFrom(request.kind);
-  if (!shape) {
-    return answer(ServiceResult::REFUSED,
-                  "kind is \"" + request.kind + "\"; expected doublet, 3-2-1-1, multisine, chirp or stop");
-  }
-  const core::ChannelSet channels = channelsOf(request.target);
-  const auto surface = core::surfaceNumber(request.target);
-  if (channels.none() && !surface) {
-    return answer(
-        ServiceResult::REFUSED,
-        "target is \"" + request.target + "\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md)");
-  }
-  core::ExcitationSpec spec;
-  spec.shape = *shape;
-  spec.amplitude = static_cast<double>(request.amplitude);
-  spec.duration = static_cast<double>(request.duration);
-  const bool has_band = *shape == core::ExcitationShape::kMultisine || *shape == core::ExcitationShape::kChirp;
-  if (has_band) {
-    spec.frequency_min = static_cast<double>(request.frequency_min);
-    spec.frequency_max = static_cast<double>(request.frequency_max);
-  }
-  spec.seed = request.seed;
-  spec.roll_limit_deg = request.max_roll_deg == 0.0F ? max_roll_deg_ : static_cast<double>(request.max_roll_deg);
-  spec.pitch_limit_deg = request.max_pitch_deg == 0.0F ? max_pitch_deg_ : static_cast<double>(request.max_pitch_deg);
-  if (const auto problem = core::validate(spec)) return answer(ServiceResult::REFUSED, *problem);
-  if (channels.any() && spec.amplitude > 1.0) {
-    return answer(ServiceResult::REFUSED, "amplitude of an axis must be at most 1 (full travel)");
-  }
+  const core::ExcitationSpec& spec = plan.signal->spec();
   if (!refusal.empty()) return answer(ServiceResult::NO_LINK, refusal);
   if (running()) {
     return answer(ServiceResult::REFUSED, "excitation " + std::to_string(state_.id) + " runs on " + state_.target +
                                               "; one at a time: wait for it, or stop it");
   }
-  if (channels.any() && (channels & commanded).none()) {
+  if (plan.channels.any() && (plan.channels & commanded).none()) {
     return answer(ServiceResult::REFUSED, "nobody commands " + request.target +
                                               ": an excitation is added to a command (control/manual or auto)");
-  }
-  if (surface) {
-    const std::string why = surfaces_->refusal(*surface);
-    if (!why.empty()) return answer(ServiceResult::REFUSED, why);
   }
   if (!std::isfinite(watch.sim_time) || !std::isfinite(watch.roll_deg) || !std::isfinite(watch.pitch_deg)) {
     return answer(ServiceResult::NO_LINK, "X-Plane has not told the attitude yet");
@@ -106,17 +116,21 @@ void ExcitationKeeper::inject(const InjectExcitation::Request& request, const st
   if (!(std::abs(watch.roll_deg) < spec.roll_limit_deg && std::abs(watch.pitch_deg) < spec.pitch_limit_deg)) {
     return answer(ServiceResult::REFUSED, "the attitude is beyond the limits of the excitation already");
   }
-  runner_.start(spec, watch.sim_time);
-  channels_ = channels;
-  surface_ = surface;
+  if (plan.surface) {
+    const std::string why = surfaces_->beginOffset(*plan.surface, spec.amplitude);
+    if (!why.empty()) return answer(ServiceResult::REFUSED, why);
+  }
+  runner_.start(*plan.signal, watch.sim_time);
+  channels_ = plan.channels;
+  surface_ = plan.surface;
   who_ = who;
-  if (surface_) surfaces_->setOffset(*surface_, 0.0);
   state_.active = true;
   ++state_.id;
   state_.kind = request.kind;
   state_.target = request.target;
   state_.amplitude = request.amplitude;
   state_.duration = request.duration;
+  const bool has_band = hasBand(spec.shape);
   state_.frequency_min = has_band ? request.frequency_min : 0.0F;
   state_.frequency_max = has_band ? request.frequency_max : 0.0F;
   state_.seed = request.seed;
@@ -138,7 +152,10 @@ bool ExcitationKeeper::onFrame(const core::FlightWatch& watch) {
     end();
     return channels_.any();
   }
-  if (surface_) surfaces_->setOffset(*surface_, value);
+  if (surface_) {
+    const std::string ended = surfaces_->setOffset(value);
+    if (!ended.empty()) abort(ended);
+  }
   return channels_.any();
 }
 

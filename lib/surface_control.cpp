@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "xplane_bridge/core/clock.hpp"
 #include "xplane_bridge/core/journal.hpp"
 #include "xplane_bridge/mixing_files.hpp"
 
@@ -17,7 +18,6 @@ constexpr double kRetry = 5.0;            // [s] after an attempt that failed
 constexpr double kFollowsDeg = 0.1;       // [deg] between sent and shown; X-Plane keeps float32
 constexpr double kDoesNotFollow = 1.0;    // [s] until it is said
 constexpr double kLongestFrame = 0.1;     // [s] X-Plane slows its time beyond 1/20 s
-constexpr double kRestartStep = 0.25;     // [s] backwards in total running time: another X-Plane
 constexpr double kTravelMarginDeg = 1.0;  // [deg] a command may go beyond the identified travel
 constexpr double kMovementDeg = 0.05;     // [deg] of a step by which the lag is measured
 constexpr double kFollowsAgain = 0.5;     // [s] after the release until X-Plane must move the surfaces
@@ -91,7 +91,7 @@ bool SurfaceControl::onRref(core::GroupId group, const core::RrefView& view, con
 
 void SurfaceControl::onSample() {
   const double time = sample_.sim_time;
-  if (time < last_time_ - kRestartStep) drop("X-Plane was restarted");
+  if (time < last_time_ - core::kOvertaking) drop("X-Plane was restarted");
   const double step = time > last_time_ ? std::min(sample_.frame_period, kLongestFrame) : 0.0;
   const double dt = std::isfinite(step) ? std::max(step, 0.0) : 0.0;
   last_time_ = time;
@@ -118,7 +118,8 @@ void SurfaceControl::onSample() {
         report_("the surfaces are driven by their identified mixing", true);
       } else if (tick_time_ - state_since_ > kTakeOverWait) {
         giveBack();
-        commands_.clear();
+        endCommands();
+        loseOffset("X-Plane does not show the surface override");
         not_before_ = tick_time_ + kRetry;
         report_("X-Plane does not show the surface override: the surfaces are given back", false);
       }
@@ -163,6 +164,7 @@ void SurfaceControl::take() {
     } catch (const std::invalid_argument& error) {
       driver_.reset();
       not_before_ = tick_time_ + kRetry;
+      loseOffset("the surfaces could not be taken over");
       report_(std::string("the surfaces are not taken over: ") + error.what(), false);
       return;
     }
@@ -183,6 +185,7 @@ void SurfaceControl::take() {
                 error.what(),
             false);
   }
+  loseOffset("the surfaces could not be taken over");
   enter(State::kIdle);
   not_before_ = tick_time_ + kRetry;
 }
@@ -207,7 +210,8 @@ void SurfaceControl::drive(double dt) {
   sent_ = out;
   if (!command_sent_) {
     command_sent_ = true;
-    command_sim_time_ = sample_.sim_time;
+    commands_unseen_.push_back({command_sequence_, sample_.sim_time, commands_});
+    if (commands_unseen_.size() > kUnseenKept) commands_unseen_.pop_front();
     echoes_.push_back({command_sequence_, false, std::nan(""), std::nan("")});
   }
 }
@@ -227,13 +231,21 @@ void SurfaceControl::measureLag() {
 }
 
 void SurfaceControl::watchCommand() {
-  if (command_shown_ || !command_sent_ || !(sample_.sim_time > command_sim_time_)) return;
-  for (const core::SurfaceDeflection& command : commands_) {
-    if (!(std::abs(sample_.deflections_deg[command.surface] - command.deflection_deg) <= kFollowsDeg)) return;
+  // The newest that fits: older ones were overtaken.
+  for (auto it = commands_unseen_.rbegin(); it != commands_unseen_.rend(); ++it) {
+    const bool shown = std::all_of(it->surfaces.begin(), it->surfaces.end(), [this](const auto& command) {
+      return std::abs(sample_.deflections_deg[command.surface] - command.deflection_deg) <= kFollowsDeg;
+    });
+    if (!shown || !(sample_.sim_time > it->sim_time)) continue;
+    echoes_.push_back({it->sequence, true, sample_.sim_time, (sample_.sim_time - it->sim_time) / sample_.frame_period});
+    commands_unseen_.erase(commands_unseen_.begin(), it.base());
+    return;
   }
-  command_shown_ = true;
-  echoes_.push_back(
-      {command_sequence_, true, sample_.sim_time, (sample_.sim_time - command_sim_time_) / sample_.frame_period});
+}
+
+void SurfaceControl::endCommands() {
+  commands_.clear();
+  commands_unseen_.clear();
 }
 
 void SurfaceControl::checkLeft() {
@@ -263,14 +275,20 @@ void SurfaceControl::giveBack() {
 void SurfaceControl::drop(const std::string& why) {
   const bool was = state_ == State::kTaking || state_ == State::kDriving;
   failures_.clear();
-  commands_.clear();
-  offset_.reset();
+  endCommands();
+  loseOffset(why);
   dropped_ = why;
   watch_.recheck();
+  if (was) giveBack();
+  driver_.reset();  // it is not gone on with, nor taken up again while it is being given back
   if (!was) return;
-  giveBack();
-  driver_.reset();  // it is not gone on with
   report_("the surfaces are given back: " + why, true);
+}
+
+void SurfaceControl::loseOffset(const std::string& why) {
+  if (!offset_) return;
+  offset_.reset();
+  offset_lost_ = why;
 }
 
 void SurfaceControl::enter(State state) {
@@ -325,12 +343,13 @@ void SurfaceControl::tick(double time, const std::string& refusal) {
   tick_time_ = time;
   may_not_ = refusal;
   if (flowing_) command_age_ += dt;
-  if (!commands_.empty() && command_age_ > options_.command_timeout) commands_.clear();
+  if (!commands_.empty() && command_age_ > options_.command_timeout) endCommands();
 }
 
 void SurfaceControl::stop() {
   std::lock_guard<std::mutex> lock(mutex_);
   stopped_ = true;
+  enter(State::kIdle);
 }
 
 void SurfaceControl::setStick(const std::array<double, 3>& stick) {
@@ -378,13 +397,35 @@ std::optional<std::string> SurfaceControl::command(const std::vector<std::string
   commands_ = std::move(checked.surfaces);
   command_sequence_ = sequence;
   command_age_ = 0.0;
-  command_sent_ = command_shown_ = commands_.empty();
+  command_sent_ = commands_.empty();
+  if (commands_.empty()) endCommands();
   return std::nullopt;
 }
 
-void SurfaceControl::setOffset(std::size_t surface, double offset_deg) {
+std::string SurfaceControl::beginOffset(std::size_t surface, double amplitude_deg) {
   std::lock_guard<std::mutex> lock(mutex_);
-  offset_ = core::SurfaceDeflection{surface, offset_deg};
+  const std::string refusal = refusalOf(surface);
+  if (!refusal.empty()) return refusal;
+  if (isBroken(surface)) return core::surfaceTable()[surface].name + " is broken";
+  const core::SurfaceLaw* law = watch_.model()->lawOf(surface);
+  const double half = 0.5 * (law->high_deg - law->low_deg);
+  if (amplitude_deg > half) {
+    return "amplitude is " + degrees(amplitude_deg) + " deg: expected at most half of its travel, " + degrees(half);
+  }
+  offset_ = core::SurfaceDeflection{surface, 0.0};
+  return "";
+}
+
+std::string SurfaceControl::setOffset(double offset_deg) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!offset_) return offset_lost_;
+  if (isBroken(offset_->surface)) return core::surfaceTable()[offset_->surface].name + " is broken";
+  offset_->deflection_deg = offset_deg;
+  return "";
+}
+
+bool SurfaceControl::isBroken(std::size_t surface) const {
+  return std::any_of(failures_.begin(), failures_.end(), [surface](const auto& f) { return f.surface == surface; });
 }
 
 void SurfaceControl::clearOffset() {

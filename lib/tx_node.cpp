@@ -88,12 +88,14 @@ void TxNode::start() {
 void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
   const double time = now();
   std::lock_guard<std::mutex> lock(mutex_);
+  const core::FlightMode before = arbiter_->status().mode;
   if (const auto refusal = arbiter_->onCommand(from, toCore(message), time)) {
     ROS_WARN_THROTTLE(1.0, "control/%s is refused: %s", from == core::FlightMode::kManual ? "manual" : "auto",
                       refusal->text.c_str());
     return;
   }
   last_command_ = time;
+  if (arbiter_->status().mode != before) onModeChange();
   if (from != arbiter_->status().mode) return;
   if (time - last_send_ < 1.0 / options_.max_rate) {
     send_pending_ = true;  // the timer takes it
@@ -111,18 +113,26 @@ void TxNode::onModeRequest(const ModeRequest& message) {
   if (outcome == core::RequestOutcome::kIgnored) return;
   if (outcome != core::RequestOutcome::kRefused) released_.clear();
   if (arbiter_->status().mode != before) {
-    if (excitation_) excitation_->abort("the mode changed");
+    onModeChange();
     sendControls(time);
   } else {
     publishMode();
   }
 }
 
+void TxNode::onModeChange() {
+  const core::ModeStatus& status = arbiter_->status();
+  if (excitation_) excitation_->abort("the mode changed");
+  logEvent(Event::MODE, std::string(core::toString(status.mode)) + ": " + status.reason, status.requested_by);
+}
+
 void TxNode::onTimer() {
   const double time = now();
   std::lock_guard<std::mutex> lock(mutex_);
   if (!overrides_) return;
-  surfaces_->tick(time, refusalToFly());
+  const std::string refusal = refusalToFly();
+  surfaces_->tick(time, refusal);
+  if (!refusal.empty()) excitation_->abort("nothing is sent: " + refusal);
   failures_->tick(time);
   if (came_back_) startAfresh(time);
   watchReleases(time);
@@ -152,6 +162,7 @@ void TxNode::startAfresh(double time) {
   came_back_ = false;
   overrides_->forgetShown();
   unseen_.clear();
+  ever_sent_.reset();  // another X-Plane does not know where the handles are
   if (time - last_command_ <= options_.arbiter.command_timeout) {
     overrides_->refresh();
     return;
@@ -163,7 +174,6 @@ void TxNode::startAfresh(double time) {
   arbiter_ = std::make_unique<core::ControlArbiter>(options, time);
   arbiter_->setFlowing(link_status_.state == core::LinkState::kConnected, time);
   published_revision_.reset();
-  ever_sent_.reset();
   overrides_->require({});
 }
 
@@ -181,8 +191,6 @@ std::string TxNode::refusalToFly() const {
   return "the aircraft loaded is " + described(identity_.identity()) + ", but config/aircraft/" + common().aircraft +
          ".yaml is for " + expected;
 }
-
-bool TxNode::mayFly() const { return refusalToFly().empty(); }
 
 core::ChannelSet TxNode::channelsToSend(const core::ArbitratedControls& controls, double time) {
   core::ChannelSet out;
@@ -203,13 +211,12 @@ core::ChannelSet TxNode::channelsToSend(const core::ArbitratedControls& controls
 
 void TxNode::sendControls(double time) {
   send_pending_ = false;
-  const core::FlightMode before = arbiter_->status().mode;
   const core::ArbitratedControls& controls =
       arbiter_->step(time, excitation_ ? excitation_->excitation() : core::ChannelExcitation{});
-  if (excitation_ && excitation_->running()) {
-    const core::ChannelSet excited = excitation_->channels();
-    if (arbiter_->status().mode != before) excitation_->abort("the mode changed");
-    if (excited.any() && (excited & controls.active).none()) excitation_->abort("nobody commands the axis any more");
+  const core::ChannelSet excited = excitation_ ? excitation_->channels() : core::ChannelSet{};
+  if (excited.any() && ((excited & controls.active).none() || arbiter_->status().failsafe)) {
+    excitation_->abort("nobody commands the axis any more");
+    arbiter_->step(time);  // `controls` without it
   }
   publishMode();
   if (!overrides_) return;
@@ -345,7 +352,10 @@ void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core:
     failures_->onFrame(watch_);
     // The signal goes out with every frame, however rarely commands come.
     if (excitation_->onFrame(watch_)) sendControls(now());
-    if (watch_.crashed && !crashed) logEvent(Event::CRASH, "the aircraft has crashed");
+    if (watch_.crashed && !crashed) {
+      excitation_->abort("the aircraft has crashed");
+      logEvent(Event::CRASH, "the aircraft has crashed");
+    }
   } else if (group == identity_group_) {
     if (identity_.add(view, info.stamp_ns)) onIdentity();
   } else if (group == read_back_group_) {
@@ -366,6 +376,7 @@ void TxNode::onIdentity() {
       Event::AIRCRAFT,
       "aircraft: " + described(loaded) + (options_.aircraft.fits(loaded) ? "" : "; not the one of the configuration"),
       jobs_ ? jobs_->mover() : "");
+  excitation_->abort("another aircraft was loaded");
   surfaces_->onAircraft(loaded.icao.empty() ? loaded.description : loaded.icao);
 }
 
@@ -404,7 +415,9 @@ void TxNode::onReadBack(const core::RrefView& view) {
       if (!it->channels.test(i)) continue;
       all = shown_known_.test(i) && encoder_->shows(static_cast<core::Channel>(i), it->values[i], shown_[i]);
     }
-    if (!all) continue;
+    // What stood there before the command reached X-Plane is not its doing.
+    const bool too_early = link_status_.state == core::LinkState::kConnected && sim_time <= it->sim_time;
+    if (!all || too_early) continue;
     AppliedCommand message = it->message;
     message.read_back = true;
     message.read_back_sim_time = static_cast<float>(sim_time);
@@ -450,7 +463,9 @@ void TxNode::undo(Deadline deadline) {
   if (!overrides_) return;
   const double left = std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count();
   // Left undone, the guardian tries once more, and the journal keeps it for the next start.
-  if (overrides_->releaseAll(std::max(0.1, left))) guardian_.dismiss();
+  if (!overrides_->releaseAll(std::max(0.1, left))) return;
+  guardian_.dismiss();
+  failures_->repaired();
 }
 
 void TxNode::publishFinalState() {

@@ -116,7 +116,7 @@ void TxNode::serveSetDataref(const SetDataref::Request& request, SetDataref::Res
     const auto release = core::releaseOf(write.dataref);
     if (!release) continue;
     if (write.value != release->value) {
-      overrides_->hold(write.dataref);
+      overrides_->hold(write.dataref, write.value);
     } else {
       overrides_->unhold(write.dataref);
     }

@@ -34,9 +34,11 @@ void TxNode::makeSurfaceControl() {
 }
 
 void TxNode::serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response) {
+  const ExcitationKeeper::Plan plan = excitation_->plan(request);
   std::lock_guard<std::mutex> lock(mutex_);
-  if (!excitation_) return;
-  excitation_->inject(request, name() + "/inject_excitation", watch_, refusalToFly(), read_back_channels_, response);
+  const bool flown = ever_sent_.any() && !arbiter_->status().failsafe;
+  excitation_->inject(request, plan, name() + "/inject_excitation", watch_, refusalToFly(),
+                      flown ? read_back_channels_ : core::ChannelSet{}, response);
 }
 
 void TxNode::onSurfaceCommand(const SurfaceCommand& message) {

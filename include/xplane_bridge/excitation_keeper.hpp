@@ -17,7 +17,8 @@
 namespace xplane_bridge {
 
 /// The one test signal that runs, on an axis (added to what is commanded) or on a surface (which is driven for as
-/// long), and its label (excitation/state). X-Plane's frames drive it. Not thread-safe: TxNode's mutex guards it.
+/// long), and its label (excitation/state). X-Plane's frames drive it. Not thread-safe: TxNode's mutex guards it, but
+/// for plan().
 class ExcitationKeeper {
  public:
   /// `report(text, who, success)`: what happened, for events and the log.
@@ -26,11 +27,22 @@ class ExcitationKeeper {
   ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, ros::Publisher publisher,
                    Report report);
 
+  /// What a request asks for, as far as it tells by itself.
+  struct Plan {
+    std::string wrong;  ///< with the request, in words; empty: nothing
+    core::ChannelSet channels;
+    std::optional<std::size_t> surface;
+    std::optional<core::ExcitationSignal> signal;  ///< none to stop the one that runs
+  };
+  /// Takes up to half a second. May be called without TxNode's mutex.
+  Plan plan(const InjectExcitation::Request& request) const;
   /// tx_node/inject_excitation.
+  /// @param plan of the request
   /// @param refusal why nothing may be sent to X-Plane now; empty: it may
   /// @param commanded the channels somebody commands now
-  void inject(const InjectExcitation::Request& request, const std::string& who, const core::FlightWatch& watch,
-              const std::string& refusal, const core::ChannelSet& commanded, InjectExcitation::Response* response);
+  void inject(const InjectExcitation::Request& request, const Plan& plan, const std::string& who,
+              const core::FlightWatch& watch, const std::string& refusal, const core::ChannelSet& commanded,
+              InjectExcitation::Response* response);
 
   /// Every frame. Returns whether an axis is excited, so that the controls have to be sent anew.
   bool onFrame(const core::FlightWatch& watch);

@@ -68,9 +68,12 @@ class SurfaceControl {
   /// control/surfaces; an empty list gives all back. Returns why it is refused as a whole; nullopt: taken.
   std::optional<std::string> command(const std::vector<std::string>& names, const std::vector<float>& deflections_deg,
                                      std::uint32_t sequence);
-  /// Excitation: adds degrees to one surface from the next frame on, until the next call; the surfaces are driven for
-  /// as long, also at 0 deg. One at a time. Check refusal() first.
-  void setOffset(std::size_t surface, double offset_deg);
+  /// Excitation of one surface by up to `amplitude_deg`: the surfaces are driven from now on. One at a time. Returns
+  /// why not, in words; empty: they are.
+  std::string beginOffset(std::size_t surface, double amplitude_deg);
+  /// Adds degrees to that surface from the next frame on. Returns why it does not answer any more (it broke, the
+  /// surfaces were given up), which ends the excitation; empty: it does.
+  std::string setOffset(double offset_deg);
   /// The excitation is over.
   void clearOffset();
 
@@ -121,6 +124,8 @@ class SurfaceControl {
   void giveBack();
   void checkLeft();
   void drop(const std::string& why);
+  void loseOffset(const std::string& why);
+  void endCommands();
   void enter(State state);
   void measureLag();
   void watchCommand();
@@ -129,6 +134,7 @@ class SurfaceControl {
   std::string refusalLocked() const;
   std::string refusalOf(std::size_t surface) const;
   bool followsLocked(std::size_t surface) const;
+  bool isBroken(std::size_t surface) const;
   void subscribe();
 
   core::SimLink* link_;
@@ -168,12 +174,18 @@ class SurfaceControl {
   std::vector<core::SurfaceDeflection> commands_;
   std::uint32_t command_sequence_ = 0;
   double command_age_ = 0.0;  // [s] while X-Plane runs
-  bool command_sent_ = true, command_shown_ = true;
-  double command_sim_time_ = std::nan("");
+  bool command_sent_ = true;
+  struct SentCommand {
+    std::uint32_t sequence = 0;
+    double sim_time = std::nan("");  // [s] of the frame in which it was sent
+    std::vector<core::SurfaceDeflection> surfaces;
+  };
+  std::deque<SentCommand> commands_unseen_;  // oldest first
   std::deque<Echo> echoes_;
   std::uint64_t commands_accepted_ = 0, commands_refused_ = 0;
   std::string last_refusal_;
   std::optional<core::SurfaceDeflection> offset_;
+  std::string offset_lost_;  // why, where an excitation's end was not asked for
 
   struct Sent {
     double sim_time;  // [s] of the frame it was worked out from

@@ -78,10 +78,10 @@ class TxNode : public BaseNode {
   // Control path.
   void onCommand(core::FlightMode from, const ControlCommand& message);
   void onModeRequest(const ModeRequest& message);
+  void onModeChange();
   void onSurfaceCommand(const SurfaceCommand& message);
   void onTimer();
   void sendControls(double time);
-  bool mayFly() const;
   std::string refusalToFly() const;
   core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
   void publishMode();

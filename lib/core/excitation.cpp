@@ -2,8 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstdio>
 #include <stdexcept>
+
+#include <unsupported/Eigen/FFT>
+
+#include "xplane_bridge/core/clock.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -11,6 +16,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kMaxDuration = 600.0;     // [s] longer ones are a mistake in the unit
 constexpr int kMaxComponents = 2000;       // bounds the work of one sample
+constexpr double kMaxHarmonic = 60000.0;   // 100 Hz for the longest duration; bounds the work of finding the peak
 constexpr int kPeakSamplesPerPeriod = 32;  // of the highest component; leaves the true peak within 0.5 %
 
 std::string complaint(const char* field, double given, const char* expected) {
@@ -35,6 +41,22 @@ double unitFromSeed(std::uint32_t seed) {
   z = (z ^ (z >> 13)) * 0xC2B2AE35u;
   z ^= z >> 16;
   return static_cast<double>(z) / 4294967296.0;
+}
+
+// Greatest magnitude of the sum of cosines of harmonics first, first + 1, ... with these phases.
+double peakOf(int first, const std::vector<double>& phases) {
+  const int wanted = kPeakSamplesPerPeriod * (first + static_cast<int>(phases.size()));
+  std::size_t samples = 1;
+  while (samples < static_cast<std::size_t>(wanted)) samples *= 2;
+  std::vector<std::complex<double>> lines(samples), sum;
+  for (std::size_t n = 0; n < phases.size(); ++n)
+    lines[static_cast<std::size_t>(first) + n] = std::polar(1.0, phases[n]);
+  Eigen::FFT<double> fft;
+  fft.SetFlag(Eigen::FFT<double>::Unscaled);
+  fft.inv(sum, lines);
+  double peak = 0.0;
+  for (const std::complex<double>& value : sum) peak = std::max(peak, std::abs(value.real()));
+  return peak;
 }
 
 }  // namespace
@@ -84,7 +106,9 @@ std::optional<std::string> validate(const ExcitationSpec& s) {
     return complaint("fade", s.fade, "0 to half the duration");
   }
   if (s.shape == ExcitationShape::kMultisine) {
-    if (s.frequency_max * s.duration > 1e6) return complaint("frequency_max", s.frequency_max, "a lower frequency");
+    if (s.frequency_max * s.duration > kMaxHarmonic) {
+      return complaint("frequency_max", s.frequency_max, "at most 60000 / duration");
+    }
     const int count = lastHarmonic(s) - firstHarmonic(s) + 1;
     if (count < 1) {
       return complaint("frequency_max", s.frequency_max, "a band that holds a multiple of 1/duration");
@@ -105,11 +129,7 @@ ExcitationSignal::ExcitationSignal(const ExcitationSpec& spec) : spec_(spec) {
     // Schroeder (1970) for a flat spectrum; the seed's time shift turns harmonic k by k times its angle.
     phases_.push_back(std::fmod(-kPi * n * (n + 1.0) / count + shift * (first + n), 2.0 * kPi));
   }
-  const int samples = kPeakSamplesPerPeriod * last;
-  double peak = 0.0;
-  scale_ = 1.0;
-  for (int i = 0; i < samples; ++i) peak = std::max(peak, std::abs(multisine(spec.duration * i / samples)));
-  scale_ = spec.amplitude / peak;
+  scale_ = spec.amplitude / peakOf(first, phases_);
 }
 
 double ExcitationSignal::multisine(double t) const {
@@ -149,13 +169,13 @@ double ExcitationSignal::value(double t) const {
   return 0.0;
 }
 
-void ExcitationRunner::start(const ExcitationSpec& spec, double sim_time) {
+void ExcitationRunner::start(const ExcitationSignal& signal, double sim_time) {
   if (phase_ == ExcitationPhase::kRunning) {
     throw std::logic_error(std::string("an excitation is running (") + toString(signal_->spec().shape) +
                            "): wait for its end or abort it first");
   }
   if (!std::isfinite(sim_time)) throw std::invalid_argument("excitation needs simulator time, which is not known");
-  signal_.emplace(spec);
+  signal_ = signal;
   phase_ = ExcitationPhase::kRunning;
   reason_.clear();
   start_time_ = last_time_ = sim_time;
@@ -166,7 +186,7 @@ double ExcitationRunner::step(double sim_time, double roll_deg, double pitch_deg
   if (phase_ != ExcitationPhase::kRunning) return value_ = 0.0;
   const ExcitationSpec& spec = signal_->spec();
   char text[120];
-  if (!std::isfinite(sim_time) || sim_time < last_time_) {
+  if (!std::isfinite(sim_time) || sim_time < last_time_ - kOvertaking) {
     abort("simulator time ran backwards or is unknown");
   } else if (!std::isfinite(roll_deg) || !std::isfinite(pitch_deg)) {
     abort("attitude is unknown");
@@ -179,10 +199,10 @@ double ExcitationRunner::step(double sim_time, double roll_deg, double pitch_deg
   } else if (sim_time - start_time_ >= signal_->duration()) {
     phase_ = ExcitationPhase::kDone;
     value_ = 0.0;
-  } else {
+  } else if (sim_time >= last_time_) {
     value_ = signal_->value(sim_time - start_time_);
+    last_time_ = sim_time;
   }
-  last_time_ = sim_time;
   return value_;
 }
 

@@ -155,6 +155,13 @@ TEST(Excitation, RefusesWhatCannotBePlayedAndNamesTheField) {
               s.duration = 0.0;
             }).find("duration is 0"),
             std::string::npos);
+  EXPECT_NE(wrong([](auto& s) {  // the work of it must end some time
+              s.frequency_min = 995.0;
+              s.frequency_max = 998.0;
+              s.duration = 600.0;
+            })
+                .find("frequency_max is 998"),
+            std::string::npos);
   EXPECT_THROW(ExcitationSignal([] {
                  ExcitationSpec s;
                  s.amplitude = -1.0;
@@ -166,14 +173,23 @@ TEST(Excitation, RefusesWhatCannotBePlayedAndNamesTheField) {
 TEST(ExcitationRunner, PlaysAgainstSimulatorTimeAndEnds) {
   ExcitationRunner runner;
   EXPECT_EQ(runner.phase(), ExcitationPhase::kIdle);
-  runner.start(specOf(ExcitationShape::kDoublet, 1.0), 100.0);
+  runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 100.0);
   EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0), 0.2);
   EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0), 0.2);  // paused: simulator time stands still
   EXPECT_DOUBLE_EQ(runner.step(100.7, 0.0, 0.0), -0.2);
-  EXPECT_THROW(runner.start(specOf(ExcitationShape::kDoublet, 1.0), 100.8), std::logic_error);
+  EXPECT_THROW(runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 100.8), std::logic_error);
   EXPECT_DOUBLE_EQ(runner.step(101.0, 0.0, 0.0), 0.0);
   EXPECT_EQ(runner.phase(), ExcitationPhase::kDone);
-  runner.start(specOf(ExcitationShape::kDoublet, 1.0), 102.0);
+  runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 102.0);
+  EXPECT_EQ(runner.phase(), ExcitationPhase::kRunning);
+}
+
+TEST(ExcitationRunner, GoesOnWhereDatagramsOvertakeEachOther) {
+  ExcitationRunner runner;
+  runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 10.0);
+  EXPECT_DOUBLE_EQ(runner.step(10.52, 0.0, 0.0), -0.2);
+  EXPECT_DOUBLE_EQ(runner.step(10.48, 0.0, 0.0), -0.2) << "the older one says nothing";
+  EXPECT_DOUBLE_EQ(runner.step(10.56, 0.0, 0.0), -0.2);
   EXPECT_EQ(runner.phase(), ExcitationPhase::kRunning);
 }
 
@@ -186,10 +202,10 @@ TEST(ExcitationRunner, AbortsOutsideTheAttitudeLimitsAndSaysWhy) {
                {10.2, -45.1, 0.0, "roll -45.1 deg"},
                {10.2, 0.0, -20.5, "pitch -20.5 deg"},
                {10.2, nan, 0.0, "attitude"},
-               {9.9, 0.0, 0.0, "backwards"}};
+               {9.5, 0.0, 0.0, "backwards"}};
   for (const auto& c : cases) {
     ExcitationRunner runner;
-    runner.start(specOf(ExcitationShape::kDoublet, 1.0), 10.0);
+    runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 10.0);
     EXPECT_DOUBLE_EQ(runner.step(10.1, 44.9, 19.9), 0.2);
     EXPECT_DOUBLE_EQ(runner.step(c.t, c.roll, c.pitch), 0.0);
     EXPECT_EQ(runner.phase(), ExcitationPhase::kAborted);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from xplane_bridge import protocol
 from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.tx_bench import AUTO, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
 
@@ -113,6 +114,59 @@ def test_a_change_of_mode_and_stop_end_it(flown):
     assert ended.result.startswith("aborted: stopped")
 
 
+def test_the_stick_that_takes_over_ends_it(flown):
+    controller = CommandSource(flown, "control/auto")
+    controller.fly(fields=ROLL, roll=0.0)
+    try:
+        assert call(flown, "set_mode", "SetMode", mode=AUTO).success
+        began = inject(flown, kind="multisine", duration=60.0, amplitude=0.05)
+        assert began.success
+        flown.manual.fly(roll=0.6)
+        ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
+        assert ended.result == "aborted: the mode changed"
+        assert flown.mode.last.reason.startswith("stick take-over")
+    finally:
+        controller.stop()
+
+
+def test_a_source_that_falls_silent_ends_it(flown):
+    began = inject(flown, kind="multisine", duration=60.0, amplitude=0.05)
+    assert began.success
+    flown.manual.stop()
+    ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
+    assert ended.result == "aborted: nobody commands the axis any more"
+    flown.mode.wait_for(lambda m: m.failsafe)
+    refused = inject(flown)
+    assert (refused.success, refused.result.code) == (False, REFUSED)
+    assert "nobody commands roll" in refused.result.message
+
+
+def test_a_surface_that_somebody_else_releases_is_not_taken_again(flown):
+    began = inject(flown, kind="chirp", target="aileron1_wing2_left", amplitude=1.0, duration=60.0)
+    assert began.success, began.result.message
+    flown.wire.wait(SURFACES, 1.0)
+    wait_until(lambda: abs(flown.wire.value(LEFT)) > 0.3, 10, "the left aileron to move")
+    type(flown).wire(flown.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
+    ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
+    assert ended.result == "aborted: somebody else has released the surface override"
+    flown.wire.wait(SURFACES, 0.0)
+    flown.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
+    assert flown.wire.value(SURFACES) == 0.0
+
+
+def test_a_surface_that_breaks_ends_it(flown):
+    rudder = {"kind": "chirp", "target": "rudder1_fin1", "amplitude": 1.0, "duration": 60.0}
+    began = inject(flown, **rudder)
+    assert began.success, began.result.message
+    broken = {"name": "rudder1_fin1", "kind": "stuck", "has_value": True, "value": 1.0}
+    assert call(flown, "set_failure", "SetFailure", **broken).success
+    ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
+    assert ended.result == "aborted: rudder1_fin1 is broken"
+    refused = inject(flown, **rudder)
+    assert (refused.success, refused.result.message) == (False, "rudder1_fin1 is broken")
+    assert call(flown, "clear_failures", "ClearFailures").success
+
+
 def test_one_surface_is_excited_while_the_others_fly(flown):
     began = inject(flown, target="aileron1_wing2_left", amplitude=4.0, duration=3.0)
     assert began.success, began.result.message
@@ -136,6 +190,7 @@ def test_one_surface_is_excited_while_the_others_fly(flown):
         ({"kind": "chirp", "frequency_min": 3.0}, "frequency"),
         ({"target": "pitch"}, "nobody commands pitch"),
         ({"target": "aileron2_wing4_left", "amplitude": 1.0}, "aileron2_wing4_left"),
+        ({"target": "aileron1_wing2_left", "amplitude": 21.0}, "expected at most half of its travel, 20.0"),
     ],
 )
 def test_wrong_requests_are_refused_in_words(flown, request_, part):

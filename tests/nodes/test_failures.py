@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import signal
+import threading
+import time
 
 import pytest
 
@@ -327,6 +330,16 @@ def test_the_simulators_menu(healthy):
     done = call(world, "clear_failures", "ClearFailures", include_simulator=True)
     assert list(done.cleared) == ["rel_genera0"]
     other.wait_until_reads(FAILURES + "rel_genera0", 0.0)
+    # What is failed there already can be taken over, under another name too; one dataref is one failure.
+    other.send(protocol.DrefWrite(FAILURES + "rel_static", 6.0))
+    wait_for_label(world, "rel_static", set_by="simulator")
+    assert fail(world, "static_1").success
+    wait_for_label(world, "static_1", set_by="bridge", confirmed=True)
+    assert not label_of(world, "rel_static")
+    refused = fail(world, "rel_static")
+    assert (refused.success, refused.result.code) == (False, REFUSED)
+    assert "broken already as static_1" in refused.result.message
+    assert call(world, "clear_failures", "ClearFailures", names=["static_1"]).success
     # What the bridge has set can be repaired in the menu.
     assert fail(world, "generator_1").success
     other.send(protocol.DrefWrite(FAILURES + "rel_genera0", 0.0))
@@ -389,6 +402,16 @@ def test_single_surfaces_by_command(healthy):
     assert list(seen.surface_names) == ["aileron1_wing2_left", "aileron1_wing2_right"]
     assert seen.read_back_frames > 0.9
     assert len(world.applied.messages) > count
+    # One of a stream faster than X-Plane's frames is seen to be shown, too.
+    numbers = itertools.count(80000)
+
+    def streamed():
+        for _ in range(10):
+            surfaces.send(next(numbers), aileron1_wing2_left=3.0)
+            time.sleep(0.002)
+        return any(a.sequence >= 80000 and a.read_back for a in world.applied.messages)
+
+    wait_until(streamed, 5, "a command of the stream")
     # Not repeated, the command ends after command_timeout, and the mixing flies again.
     wire.wait(SURFACES, 0.0)
     wait_until(lambda: follows(wire, LEFT) and follows(wire, RIGHT), 5, "the ailerons to follow again")
@@ -406,6 +429,10 @@ def test_overrides_and_failures_are_given_back_however_it_ends(new_world, tmp_pa
         world.wire.wait(SURFACES, 0.0)
         engine.wait(FAILURES + "rel_engfai1", 0.0)
         world.node.wait(10)
+        if end == signal.SIGINT:  # its last word must not label what comes after
+            wait_until(
+                lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "nothing broken"
+            )
         wait_until(lambda: not journal_entries(world), 10, "an empty journal")
         if end == signal.SIGINT:
             world.node = world.start("tx_node", world.params)
@@ -498,9 +525,20 @@ def test_xplane_12_whose_own_failure_does_not_act(new_world, tmp_path):
     world = fly(new_world(tmp_path), "--version", "12", "--surface-failures", "ignored")
     wire, name = world.wire, "aileron1_wing2_left"
     fcon = WatchedDatarefs(world.xplane.port, FAILURES + "rel_fcon_ailn_1_lft_mxup")
-    done = fail(world, name, "hard_over_up")
-    assert done.result.code == OK, done.result.message
+    answer = []
+    asking = threading.Thread(target=lambda: answer.append(fail(world, name, "hard_over_up")))
+    asking.start()
+    # A gap, as X-Plane has them while it loads scenery, ends nothing.
+    fcon.wait(FAILURES + "rel_fcon_ailn_1_lft_mxup", 6.0)
+    said_so = wire.value(TIME)
+    world.events.skip_to_now()
+    world.xplane.send_signal(signal.SIGSTOP)
+    world.events.then_wait_for(lambda e: "STALE" in e.events[-1].text)
+    world.xplane.send_signal(signal.SIGCONT)
+    asking.join(20)
+    assert answer[0].result.code == OK, answer[0].result.message
     wire.wait(LEFT, -25.0)
+    assert label_of(world, name)["since_sim_time"] > said_so, "not while X-Plane only said so"
     assert wire.value(SURFACES) == 1.0
     fcon.wait(FAILURES + "rel_fcon_ailn_1_lft_mxup", 0.0)
     said(world, "X-Plane's own failure does not act")
@@ -528,8 +566,10 @@ def test_pause_restart_and_a_total_that_stands_still(new_world, tmp_path):
     wait_until(lambda: wire.value(RIGHT) == pytest.approx(15.0 * 0.2, abs=1.0), 5, "the right aileron to go on")
     wait_for_label(world, name, active=True, confirmed=True)
 
-    # Another X-Plane has no failure; nothing is broken in it without being asked for.
+    # Another X-Plane has no failure; nothing is broken in it without being asked for, nor later.
     world.manual.stop()
+    assert fail(world, "bus_1", trigger=AT_SIM_TIME, trigger_value=5.0).success
+    wait_for_label(world, "bus_1", active=False)
     world.xplane.restart()
     said(world, f"failure of {name} has ended: X-Plane was restarted")
     again = WatchedDatarefs(world.xplane.port, SURFACES)
@@ -541,12 +581,22 @@ def test_pause_restart_and_a_total_that_stands_still(new_world, tmp_path):
 
 
 def test_surfaces_of_another_aircraft_are_left_alone(new_world, tmp_path):
+    from xplane_bridge.msg import ExcitationState
+
     world = fly(new_world(tmp_path))
     name = "aileron1_wing2_left"
     assert fail(world, name, "stuck", 5.0).success
     world.wire.wait(LEFT, 5.0)
+    world.manual.fly(fields=ROLL, roll=0.0)
+    world.wire.wait(STICK, 0.0)
+    excitation = world.watch("excitation/state", ExcitationState)
+    test_signal = {"kind": "chirp", "target": "roll", "amplitude": 0.05, "duration": 60.0}
+    band = {"frequency_min": 0.5, "frequency_max": 1.0, "max_roll_deg": 180.0, "max_pitch_deg": 90.0}
+    assert call(world, "inject_excitation", "InjectExcitation", **test_signal, **band).success
     type(world).wire(world.xplane.port).send(protocol.AircraftLoad(0, aircraft_path("tiltrotor")))
     said(world, f"failure of {name} has ended: another aircraft was loaded")
+    ended = excitation.wait_for(lambda s: s.id == 1 and not s.active)
+    assert ended.result in ("aborted: another aircraft was loaded", "aborted: the flight was reset")
     world.wire.wait(SURFACES, 0.0)
     wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
     done = fail(world, name, "stuck", 5.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -28,11 +29,13 @@ from xplane_bridge.harness.tx_bench import (
 
 ROOT = Path(__file__).resolve().parents[2]
 
+MODE = 6  # of Event.kind
 STICK = "sim/joystick/yoke_roll_ratio"
 OVERRIDE = "sim/operation/override/override_joystick"
 THROTTLES = "sim/operation/override/override_throttles"
 LEVER = "sim/cockpit2/engine/actuators/throttle_ratio[0]"
 HEAD = "sim/graphics/view/pilots_head_the"
+THROTTLE_OVERRIDE = "sim/flightmodel/engine/ENGN_thro_override[0]"
 FLAP_HANDLE = "sim/cockpit2/controls/flap_ratio"
 
 
@@ -94,7 +97,10 @@ def test_command_reaches_xplane_and_is_read_back(tx, world):
     assert seen.fields == ROLL | PITCH | YAW | THROTTLE
     assert (seen.roll, seen.pitch, seen.engine_count) == (0.25, -0.125, 2)
     assert seen.mode == seen.source == MANUAL
-    assert 0.0 <= seen.read_back_frames < 60.0
+    assert 0.0 < seen.read_back_frames < 60.0
+    again = [a for a in world.applied.wait_for_count(50) if a.read_back]
+    assert again
+    assert min(a.read_back_frames for a in again) > 0.0, "an unchanged command is not shown before it has arrived"
     assert seen.read_back_sim_time > 0.0
     assert "override:" + OVERRIDE in journal_entries(world)
 
@@ -256,6 +262,9 @@ def test_stick_takes_over(tx, world):
     world.manual.fly(roll=0.6)
     mode = world.mode.then_wait_for(lambda m: m.mode == MANUAL)
     assert mode.reason.startswith("stick take-over")
+    log = world.events.wait_for(lambda e: sum(event.kind == MODE for event in e.events) == 2)
+    told = [(e.text.split(":")[0], e.requested_by) for e in log.events if e.kind == MODE]
+    assert told == [("AUTO", "test"), ("MANUAL", "control/manual")]
     world.wire.wait(STICK, 0.6)
 
 
@@ -345,12 +354,14 @@ def test_handles_are_sent_on_change_only(tx, world):
 
 def test_restarted_xplane_is_flown_on(tx, world):
     tx()
-    world.manual.fly(fields=ROLL, roll=0.3)
+    world.manual.fly(fields=ROLL | FLAPS, roll=0.3, flaps=0.5)
     world.wire.wait(OVERRIDE, 1.0)
+    world.wire.wait(FLAP_HANDLE, 0.5, tolerance=0.02)
     world.xplane.restart()
-    wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK)
+    wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK, FLAP_HANDLE)
     wire.wait(OVERRIDE, 1.0, timeout=20)
     wire.wait(STICK, 0.3)
+    wire.wait(FLAP_HANDLE, 0.5, tolerance=0.02)
     wire.close()
 
 
@@ -397,8 +408,18 @@ def test_override_set_by_service_is_given_back(tx, world):
     assert response.success
     assert list(response.values) == [1.0]
     assert "override:" + THROTTLES in journal_entries(world)
+    # One that is not 1: it is kept up as it was given.
+    assert call(world, "set_dataref", "SetDataref", name=THROTTLE_OVERRIDE, values=[0.25]).success
+    wire = WatchedDatarefs(world.xplane.port, THROTTLE_OVERRIDE)
+    seen = {wire.value(THROTTLE_OVERRIDE)}
+    began = time.monotonic()
+    while time.monotonic() - began < 1.5:  # longer than a refresh
+        seen.add(wire.value(THROTTLE_OVERRIDE))
+    assert {value for value in seen if not math.isnan(value)} == {0.25}
     node.send_signal(signal.SIGINT)
     world.wire.wait(THROTTLES, 0.0)
+    wire.wait(THROTTLE_OVERRIDE, -2.0)
+    wire.close()
 
 
 def test_services_say_what_is_wrong(tx, world):

@@ -37,7 +37,7 @@ struct ExcitationSpec {
 /// First thing wrong with the specification (field, given value, expected), or nullopt.
 std::optional<std::string> validate(const ExcitationSpec& spec);
 
-/// A signal over time. Immutable.
+/// A signal over time. Immutable. Making a multisine takes up to half a second, for its peak.
 class ExcitationSignal {
  public:
   /// Throws std::invalid_argument with validate()'s text.
@@ -70,12 +70,12 @@ const char* toString(ExcitationPhase phase);
 /// Plays one signal at a time against simulator time and stops it where the aircraft leaves the allowed attitude.
 class ExcitationRunner {
  public:
-  /// Starts at simulator time `sim_time` [s]. Throws std::invalid_argument (specification) or std::logic_error (one is
+  /// Starts at simulator time `sim_time` [s]. Throws std::invalid_argument (time unknown) or std::logic_error (one is
   /// running already).
-  void start(const ExcitationSpec& spec, double sim_time);
+  void start(const ExcitationSignal& signal, double sim_time);
 
   /// Advances to `sim_time` [s] with the present attitude [deg] and returns the value to add to the target's command.
-  /// A non-finite attitude, or simulator time running backwards (reset, replay), aborts.
+  /// A non-finite attitude, or simulator time running backwards (reset, replay) by more than kOvertaking, aborts.
   double step(double sim_time, double roll_deg, double pitch_deg);
 
   /// Ends a running excitation; the reason is kept for the label. Without one running, nothing happens.
@@ -83,10 +83,7 @@ class ExcitationRunner {
 
   ExcitationPhase phase() const { return phase_; }
   const std::string& reason() const { return reason_; }  ///< why it was aborted; else empty
-  const ExcitationSpec* spec() const { return signal_ ? &signal_->spec() : nullptr; }
-  double startTime() const { return start_time_; }  ///< [s] simulator time
-  double duration() const { return signal_ ? signal_->duration() : 0.0; }
-  double value() const { return value_; }  ///< as returned by the last step
+  double value() const { return value_; }                ///< as returned by the last step
 
  private:
   std::optional<ExcitationSignal> signal_;
