@@ -20,9 +20,9 @@ namespace xplane_bridge {
 namespace {
 
 constexpr std::chrono::milliseconds kSourceWait{50};
-// [s] between looks at overdue pictures; the others are answered when their frame or state comes. Each look wakes two
-// of roscpp's threads: with 5 ms they took a quarter of the node's time at 640x480.
-constexpr double kOverduePeriod = 0.02;
+// [s] between looks at overdue pictures where no picture, frame or state comes, which all look by themselves. Each look
+// wakes two of roscpp's threads: with 5 ms they took a quarter of the node's time at 640x480.
+constexpr double kOverduePeriod = 0.05;
 constexpr std::int64_t kFrozenRepeat = 1'000'000'000;  // [ns] between repetitions of a frozen picture
 constexpr std::size_t kPicturesWaiting = 2;            // for scaling, and for JPEG: more would only be older
 constexpr std::size_t kSpareBuffers = 4;
