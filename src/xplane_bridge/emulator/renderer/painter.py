@@ -17,6 +17,8 @@ _HAZE = np.array((226, 210, 192), np.float32)
 _MOUNTAIN = np.array((168, 146, 124), np.float32)
 #: Distance at which the haze has taken 63 % of the contrast [m].
 _HAZE_M = 22000.0
+#: Thinner haze is not drawn [share of a full one].
+_LEAST_HAZE = 0.015
 #: Coarse grid for what varies slowly over the picture.
 _GRID = 16
 #: Width of the columns that the ground is drawn in [px].
@@ -230,21 +232,22 @@ class Painter:
         below = elevation < 0.0
         if not below.any() or clear[below].min() > 0.97:
             return
-        # Per pixel: a coarse grid would let the haze run over the horizon into the sky.
+        # Per pixel: a coarse grid would let the haze run over the horizon into the sky. Only where there is any.
         width, height = self._size
         toward = -camera.rays[2].astype(np.float32)
-        falling = toward[0] * np.arange(width, dtype=np.float32) + toward[2]
-        falling = falling + (toward[1] * np.arange(height, dtype=np.float32))[:, np.newaxis]
-        sky = falling <= 0.0
-        cv2.max(falling, 1e-7, dst=falling)
-        cv2.divide(-float(camera.eye[2]) / _HAZE_M, falling, dst=falling)
-        weight = cv2.exp(falling)
-        weight[sky] = 1.0
-        rows = np.nonzero(weight.min(axis=1) < 0.985)[0]
+        left = toward[1] * np.arange(height, dtype=np.float32) + toward[2]
+        right = left + toward[0] * (width - 1)
+        thickness = float(camera.eye[2]) / _HAZE_M  # over what falls away: the share of the haze's length
+        rows = np.nonzero((np.minimum(left, right) < thickness / _LEAST_HAZE) & (np.maximum(left, right) > 0.0))[0]
         if rows.size == 0:
             return
         part = slice(rows[0], rows[-1] + 1)
-        shares = weight[part]
+        falling = toward[0] * np.arange(width, dtype=np.float32) + left[part, np.newaxis]
+        sky = falling <= 0.0
+        cv2.max(falling, 1e-7, dst=falling)
+        cv2.divide(-thickness, falling, dst=falling)
+        shares = cv2.exp(falling)
+        shares[sky] = 1.0
         haze = np.empty_like(self._picture[part])
         haze[:] = _HAZE.astype(np.uint8)
         self._picture[part] = cv2.blendLinear(self._picture[part], haze, shares, 1.0 - shares)
