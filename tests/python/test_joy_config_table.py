@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 import yaml
 
+from xplane_bridge.cli import joy_config_check
 from xplane_bridge.cli.joy_config_check import complaint
 from xplane_bridge.joystick.config_table import JoyConfigError, Live, load_joy_config, screen, skeleton
 from xplane_bridge.resources import config_file
@@ -142,6 +143,21 @@ def test_a_skeleton_is_a_device_file_with_what_is_there(tmp_path, axes, buttons,
     assert load_joy_config(file).device == "Pad: the #1"
     if axes > 2:
         VirtualStick(content)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["nosuchpad", "--once"], "logitech_f710.yaml"),
+        (["nosuchpad.yaml"], "No such file"),
+        ([], "expected a joystick's file to check, or --skeleton FILE"),
+        (["xbox", "--skeleton", "new.yaml"], "expected a joystick's file to check, or --skeleton FILE"),
+    ],
+)
+def test_what_needs_no_ros_is_said_without_it(monkeypatch, capsys, arguments, part):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")  # nobody there; rospy would wait for ever
+    assert joy_config_check.main(arguments) == 1
+    assert part in capsys.readouterr().err
 
 
 def test_a_device_without_a_stick_has_no_skeleton():

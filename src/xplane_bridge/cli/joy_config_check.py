@@ -61,14 +61,18 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(ros_arguments(argv))
     if (args.joy_config is None) == (args.skeleton is None):
         raise JoyConfigError("expected a joystick's file to check, or --skeleton FILE; see --help")
+    file = Path(args.joy_config or "")
+    if args.skeleton is None:  # what can be said without ROS is said first
+        if file.suffix not in (".yaml", ".yml"):
+            file = config_file("joysticks", f"{args.joy_config}.yaml")
+        load_joy_config(file, args.stick_mode)
+    elif args.skeleton.exists():
+        raise JoyConfigError(f"{args.skeleton} exists; give another name, or remove it")
     rospy = rospy_module()
     rospy.init_node("joy_config_check", anonymous=True, disable_signals=True)
     device = _Device(rospy, args.namespace)
     if args.skeleton is not None:
         return _write_skeleton(device, args.skeleton, args.timeout)
-    file = Path(args.joy_config)
-    if file.suffix not in (".yaml", ".yml"):
-        file = config_file("joysticks", f"{args.joy_config}.yaml")
     with tempfile.TemporaryDirectory() as folder:
         check = _Check(rospy, device, file, args.stick_mode, Path(folder))
         try:
@@ -121,8 +125,6 @@ class _Device:
 
 
 def _write_skeleton(device: _Device, file: Path, timeout: float) -> int:
-    if file.exists():
-        raise JoyConfigError(f"{file} exists; give another name, or remove it")
     joy = device.wait(timeout)
     text = skeleton(joy.header.frame_id, len(joy.axes), len(joy.buttons))
     try:
