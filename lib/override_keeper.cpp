@@ -196,7 +196,10 @@ bool OverrideKeeper::confirm(const std::vector<core::UndoOperation>& operations,
   const bool shown = link_->undo(operations, timeout_s);
   const auto journal = link_->journal();
   if (shown && journal) remove(*journal);
-  report_(shown ? "released " + what : what + " could not be seen released; it stays in the journal", shown);
+  // It is tried again and again, but told once.
+  if (shown || std::exchange(unreleased_, what) != what) {
+    report_(shown ? "released " + what : what + " could not be seen released; it stays in the journal", shown);
+  }
   return shown;
 }
 

@@ -14,9 +14,9 @@ namespace {
 
 constexpr double kOverrideRefresh = 1.0;  // [s] a lost datagram must not leave the stick with X-Plane
 constexpr double kHandleRepeat = 0.3;     // [s] in which a changed handle is sent with every refresh
-constexpr std::size_t kUnseenKept = 16;
-constexpr double kWorkPeriod = 0.2;    // [s]
-constexpr double kReleaseWait = 1.0;   // [s] of one attempt
+constexpr std::size_t kUnseenKept = 64;   // two frames of 200 commands and 20 frames a second, three times
+constexpr double kWorkPeriod = 0.2;       // [s]
+constexpr double kReleaseWait = 1.0;      // [s] of one attempt
 constexpr double kRestartStep = 0.25;  // [s] backwards in total running time, more than datagrams overtake each other
 constexpr double kIdentityWait = 2.0;  // [s] of asking for it once
 
@@ -154,6 +154,7 @@ void TxNode::watchReleases(double time) {
     return;
   }
   excitation_->abort(released_);
+  surfaces_->release(released_);  // they would stand still: nothing is sent any more
   logEvent(Event::OVERRIDE, "nothing is sent any more: " + released_);
   sendControls(time);
 }
@@ -416,7 +417,7 @@ void TxNode::onReadBack(const core::RrefView& view) {
       all = shown_known_.test(i) && encoder_->shows(static_cast<core::Channel>(i), it->values[i], shown_[i]);
     }
     // What stood there before the command reached X-Plane is not its doing.
-    const bool too_early = link_status_.state == core::LinkState::kConnected && sim_time <= it->sim_time;
+    const bool too_early = link_status_.state != core::LinkState::kPaused && sim_time <= it->sim_time;
     if (!all || too_early) continue;
     AppliedCommand message = it->message;
     message.read_back = true;

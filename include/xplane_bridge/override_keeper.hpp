@@ -85,7 +85,8 @@ class OverrideKeeper {
   core::GroupId group_ = -1;
   std::vector<std::string> watched_;  // datarefs of the group
   std::map<std::string, Shown> shown_;
-  bool ended_ = false;  // by releaseAll()
+  bool ended_ = false;      // by releaseAll()
+  std::string unreleased_;  // what confirm() has told last of; of the one thread that waits
 };
 
 /// Journal purpose of tx_node's entries.

@@ -358,6 +358,21 @@ def test_override_that_somebody_else_releases_is_not_taken_again(healthy):
     assert world.wire.value(SURFACES) == 0.0
 
 
+def test_who_takes_the_stick_from_the_bridge_gets_the_surfaces_too(healthy):
+    world, name = healthy, "rudder1_fin1"
+    wait_ready(world)
+    world.manual.fly(fields=ROLL, roll=0.0)
+    assert fail(world, name, "stuck", 4.0).success
+    world.wire.wait(RUDDER, 4.0)
+    both = "override_control_surfaces, override_joystick"
+    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == both)
+    type(world).wire(world.xplane.port).send(protocol.DrefWrite("sim/operation/override/override_joystick", 0.0))
+    said(world, f"failure of {name} has ended: somebody else has released")
+    world.wire.wait(SURFACES, 0.0)
+    wait_until(lambda: not journal_entries(world), 5, "an empty journal")
+    assert call(world, "set_mode", "SetMode", mode=1).success  # flies on
+
+
 class Surfaces:
     """Publishes a SurfaceCommand."""
 

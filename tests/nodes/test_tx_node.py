@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import signal
+import socket
 import time
 from pathlib import Path
 
@@ -167,6 +169,28 @@ def _read(path):
         return path.read_bytes()
     except OSError:
         return b""
+
+
+def test_what_a_crash_left_and_xplane_does_not_know_is_said_once(world):
+    from xplane_bridge.msg import EventList
+
+    world.xplane = world.emulator("--no-beacon", "--start", "air")
+    folder = world.folder / "ros_home" / "xplane_bridge"
+    folder.mkdir(parents=True)
+    process = {"pid": 1, "start_ticks": 1, "boot_id": "another boot", "computer": socket.gethostname()}
+    undo = [{"op": "dref", "path": "sim/operation/failures/rel_of_another_version", "value": 0.0}]
+    owner = {"node": "/crashed", **process}
+    entry = {"id": "override:rel_of_another_version", "purpose": "override", "owner": owner, "undo": undo}
+    text = json.dumps({"format": "xplane_bridge journal", "version": 1, "entries": [entry]})
+    (folder / f"127.0.0.1_{world.xplane.port}.json").write_text(text, encoding="utf-8")
+    events = world.watch("events", EventList)
+    world.set_param("aircraft", "fixed_wing")
+    world.start("tx_node", tx_params())
+    events.wait_for(lambda e: any("could not be seen released" in event.text for event in e.events))
+    for _ in range(4):  # seconds, in which it is tried again
+        world.wait_for_diagnostics("control")
+    assert sum("could not be seen released" in event.text for event in events.last.events) == 1
+    assert journal_entries(world) == [entry["id"]]
 
 
 def release_overrides(world):
