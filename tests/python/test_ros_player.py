@@ -13,8 +13,18 @@ from xplane_bridge.scenario.ros_player import RosPlayer
 
 def state(sim_time, **values):
     known = dict.fromkeys(
-        "roll_deg pitch_deg heading_true_deg altitude_msl altitude_agl vertical_speed calibrated_airspeed alpha_deg "
-        "beta_deg load_factor_normal".split(),
+        [
+            "roll_deg",
+            "pitch_deg",
+            "heading_true_deg",
+            "altitude_msl",
+            "altitude_agl",
+            "vertical_speed",
+            "calibrated_airspeed",
+            "alpha_deg",
+            "beta_deg",
+            "load_factor_normal",
+        ],
         0.0,
     )
     rates = SimpleNamespace(x=0.0, y=0.0, z=0.0)
