@@ -241,6 +241,7 @@ FlightJobs::Outcome FlightJobs::blow(const core::UniformWind& wind) {
 FlightJobs::Outcome FlightJobs::load(const core::Loading& loading) {
   const auto writes = core::loadingWrites(loading, generation());
   std::vector<std::string> names;
+  names.reserve(writes.size());
   for (const core::DatarefWrite& each : writes) names.push_back(each.dataref);
   const auto fits = [writes](const std::vector<core::DatarefValue>& values) {
     return loadingDifference(writes, values).empty();

@@ -65,6 +65,7 @@ bool AircraftIdentityReader::add(const RrefView& datagram, std::int64_t receive_
 bool AircraftIdentityReader::add(const std::vector<DatarefValue>& values) {
   if (values.size() != datarefs().size()) return false;
   std::vector<float> characters;
+  characters.reserve(values.size());
   for (const DatarefValue& value : values) {
     if (!value) return false;
     characters.push_back(*value);

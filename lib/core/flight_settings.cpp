@@ -48,8 +48,8 @@ bool isCg(const std::string& dataref) { return dataref == kCg11 || dataref == kC
 }  // namespace
 
 std::optional<std::string> check(const UniformWind& wind) {
-  if (const auto wrong = outside("speed", wind.speed, 0.0, kMaxWind, "m/s")) return wrong;
-  if (const auto wrong = outside("from_deg", wind.from_deg, 0.0, 360.0, "deg true")) return wrong;
+  if (auto wrong = outside("speed", wind.speed, 0.0, kMaxWind, "m/s")) return wrong;
+  if (auto wrong = outside("from_deg", wind.from_deg, 0.0, 360.0, "deg true")) return wrong;
   return outside("turbulence", wind.turbulence, 0.0, 1.0, "-");
 }
 
@@ -101,10 +101,10 @@ std::optional<std::string> check(const Loading& loading) {
            std::to_string(kMaxTanks) + ", one a tank";
   }
   for (std::size_t i = 0; i < loading.fuel_tank.size(); ++i) {
-    if (const auto wrong = outside(element("fuel_tank", i), loading.fuel_tank[i], 0.0, kMaxMass, "kg")) return wrong;
+    if (auto wrong = outside(element("fuel_tank", i), loading.fuel_tank[i], 0.0, kMaxMass, "kg")) return wrong;
   }
   if (loading.payload_mass) {
-    if (const auto wrong = outside("payload_mass", *loading.payload_mass, 0.0, kMaxMass, "kg")) return wrong;
+    if (auto wrong = outside("payload_mass", *loading.payload_mass, 0.0, kMaxMass, "kg")) return wrong;
   }
   if (!loading.cg_offset) return std::nullopt;
   return outside("cg_offset", *loading.cg_offset, -kMaxCgOffset, kMaxCgOffset, "m, aft +");

@@ -88,8 +88,8 @@ std::vector<DatarefValue> SimLink::readDatarefs(std::vector<std::string> paths, 
 }
 
 std::vector<DatarefValue> SimLink::readDatarefsUntil(std::vector<std::string> paths, double timeout_s,
-                                                     DatarefReader::Accept fits) {
-  return impl_->readAndWait(std::move(paths), timeout_s, std::move(fits));
+                                                     const DatarefReader::Accept& fits) {
+  return impl_->readAndWait(std::move(paths), timeout_s, fits);
 }
 
 std::pair<bool, DatarefValue> SimLink::waitForDataref(const std::string& path, float expected, float tolerance,

@@ -243,11 +243,16 @@ def test_what_x_plane_releases_with_a_new_flight_is_taken_again(tx, world):
     world.wire.wait(OVERRIDE, 1.0)
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick")
     other = type(world).wire(world.xplane.port)
+    world.events.skip_to_now()
     other.send(protocol.CommandRequest("sim/operation/reset_flight"), protocol.DrefWrite(OVERRIDE, 0.0))
-    world.wire.wait(OVERRIDE, 0.0)
+    world.events.then_wait_for(lambda e: e.events[-1].text == "the flight began anew")
+    for _ in range(2):  # longer than it takes to see who has released it; 0 may be shown for one frame only
+        status = world.wait_for_diagnostics("control")
+        assert world.values_of(status)["Overrides set"] == "override_joystick", status.message
     world.wire.wait(OVERRIDE, 1.0)
     assert "override:" + OVERRIDE in journal_entries(world)
-    world.wire.wait(STICK, 0.5)
+    world.manual.fly(roll=0.25)
+    world.wire.wait(STICK, 0.25)
 
 
 def test_modes_are_switched_by_request_and_said(tx, world):

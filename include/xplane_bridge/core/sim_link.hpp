@@ -168,7 +168,7 @@ class SimLink {
   std::vector<DatarefValue> readDatarefs(std::vector<std::string> paths, double timeout_s);
   /// The same, waiting until `fits` likes the values; X-Plane sends them every frame. Not from a callback.
   std::vector<DatarefValue> readDatarefsUntil(std::vector<std::string> paths, double timeout_s,
-                                              DatarefReader::Accept fits);
+                                              const DatarefReader::Accept& fits);
   /// Waits until a dataref reads `expected` within `tolerance`; returns the last value seen (empty: none) and whether
   /// it fits. Not from a callback.
   std::pair<bool, DatarefValue> waitForDataref(const std::string& path, float expected, float tolerance,
