@@ -124,7 +124,7 @@ def test_the_stick_that_takes_over_ends_it(flown):
         flown.manual.fly(roll=0.6)
         ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
         assert ended.result == "aborted: the mode changed"
-        assert flown.mode.last.reason.startswith("stick take-over")
+        flown.mode.wait_for(lambda m: m.reason.startswith("stick take-over"))
     finally:
         controller.stop()
 
