@@ -28,6 +28,7 @@ def launch(name):
         program = importlib.import_module("xplane_bridge.cli." + name)
     except ModuleNotFoundError as error:
         sys.exit(_explain(error))
+    sys.argv[0] = os.path.join(_HERE, name)  # what its error messages begin with, also when a shell script calls this
     sys.exit(program.main())
 
 
