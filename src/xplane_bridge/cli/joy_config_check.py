@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any, Deque, Dict, List, Optional, Sequence
+from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
 from xplane_bridge.cli.entry import guarded, rospy_module
 from xplane_bridge.cli.scenario_player import ros_arguments
@@ -147,7 +147,7 @@ class _Check:
         self._namespace = f"/joy_config_check_{os.getpid()}"
         self._mapper: Optional[ManagedProcess] = None
         self._config = load_joy_config(file, stick_mode)
-        self._seen = 0.0
+        self._seen: Optional[Tuple[int, int, int]] = None
         self._error = ""
         self._command: Any = None
         self._status: Dict[str, str] = {}
@@ -222,24 +222,30 @@ class _Check:
 
     # --- the mapper ---------------------------------------------------------------------------------------------------
 
+    def _version(self) -> Tuple[int, int, int]:
+        """What is another after the file has been saved; the time alone has steps of milliseconds."""
+        status = self._file.stat()
+        return status.st_mtime_ns, status.st_size, status.st_ino
+
     def _reload(self) -> None:
         """Starts again with the file when it has been saved anew."""
         try:
-            changed = self._file.stat().st_mtime
+            version = self._version()
         except OSError:
             return  # an editor is writing it
-        if changed == self._seen:
+        if version == self._seen:
             return
+        self._seen = version  # before it is read: what is saved meanwhile is another version
         try:
             self._config = load_joy_config(self._file, self._stick_mode)
         except JoyConfigError as error:
-            self._seen, self._error = changed, str(error)
+            self._error = str(error)
             return
         self._start_mapper()
 
     def _start_mapper(self) -> None:
         self.close()
-        self._seen, self._error = self._file.stat().st_mtime, ""
+        self._error = ""
         self._command, self._problems, self._status = None, "", {}
         name = f"{self._namespace}/joystick_mapper_node"
         content = dict(self._config.content)
