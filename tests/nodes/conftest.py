@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import signal
 import socket
 from pathlib import Path
 from typing import Any, Callable, Iterator
@@ -16,6 +17,10 @@ from xplane_bridge.resources import node_program
 
 _ANSWER_S = 15.0  # a machine busy with other work is slow, a node that hangs is silent for ever
 _numbers = itertools.count(1)
+
+# Shells ignore SIGINT for what they run in the background, and programs would inherit that from here.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
