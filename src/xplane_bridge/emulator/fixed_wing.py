@@ -7,8 +7,8 @@ from typing import Sequence
 
 from xplane_bridge.emulator import trim
 from xplane_bridge.emulator.actuators import asymmetric, sided
+from xplane_bridge.emulator.earth import EARTH_RADIUS_M
 from xplane_bridge.emulator.flight_model import (
-    EARTH_RADIUS_M,
     Controls,
     EngineFault,
     FlightModelError,

@@ -17,8 +17,6 @@ import importlib
 from dataclasses import dataclass, field
 from typing import Protocol, Sequence
 
-EARTH_RADIUS_M = 6378145.0
-GRAVITY_MPS2 = 9.80665
 MAX_ENGINES = 8
 
 #: Longest integration step of a flight model [s]; ``step`` divides what it is given into equal parts no longer.

@@ -18,9 +18,8 @@ import jsbsim
 
 from xplane_bridge.emulator.actuators import SurfaceSet
 from xplane_bridge.emulator.contacts import Contacts
+from xplane_bridge.emulator.earth import EARTH_RADIUS_M, GRAVITY_MPS2
 from xplane_bridge.emulator.flight_model import (
-    EARTH_RADIUS_M,
-    GRAVITY_MPS2,
     MAX_STEP_S,
     MAX_SUBSTEP_S,
     Controls,

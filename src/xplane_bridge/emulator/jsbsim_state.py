@@ -9,7 +9,8 @@ from typing import Callable, Sequence
 
 import jsbsim
 
-from xplane_bridge.emulator.flight_model import EARTH_RADIUS_M, GRAVITY_MPS2, FlightModelError, ModelState
+from xplane_bridge.emulator.earth import EARTH_RADIUS_M, GRAVITY_MPS2
+from xplane_bridge.emulator.flight_model import FlightModelError, ModelState
 
 FOOT_M = 0.3048
 POUND_FORCE_N = 4.4482216152605

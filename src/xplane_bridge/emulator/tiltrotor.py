@@ -13,9 +13,8 @@ from typing import Sequence
 
 from xplane_bridge.emulator import trim
 from xplane_bridge.emulator.actuators import sided
+from xplane_bridge.emulator.earth import EARTH_RADIUS_M, GRAVITY_MPS2
 from xplane_bridge.emulator.flight_model import (
-    EARTH_RADIUS_M,
-    GRAVITY_MPS2,
     Controls,
     EngineFault,
     FlightModelError,

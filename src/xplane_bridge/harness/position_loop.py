@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Tuple
 
-_EARTH_RADIUS_M = 6378145.0
+from xplane_bridge.emulator.earth import EARTH_RADIUS_M
+
 _GRAVITY = 9.81
 #: What full stick tilts the stabilised quadrotor [deg].
 _FULL_TILT_DEG = 30.0
@@ -61,8 +62,8 @@ class PositionLoop:
     def error(self, motion: Motion) -> Tuple[float, float, float]:
         """How far the place is to the north, to the east and above [m]."""
         there = self._there
-        north = math.radians(there.latitude_deg - motion.latitude_deg) * _EARTH_RADIUS_M
-        east = math.radians(there.longitude_deg - motion.longitude_deg) * _EARTH_RADIUS_M
+        north = math.radians(there.latitude_deg - motion.latitude_deg) * EARTH_RADIUS_M
+        east = math.radians(there.longitude_deg - motion.longitude_deg) * EARTH_RADIUS_M
         return north, east * math.cos(math.radians(there.latitude_deg)), there.altitude_m - motion.altitude_m
 
     def distance(self, motion: Motion) -> float:

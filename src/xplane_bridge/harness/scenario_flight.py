@@ -60,9 +60,8 @@ def scenario_plan(
     ready = {PLAYER: _PLAYS}
     programs: Dict[str, List[str]] = {}
     if joystick:
-        config_file(
-            "joysticks", f"{joystick}.yaml"
-        )  # there is one; its path may hold a space, which roslaunch cannot take
+        # Only to see that there is one: its path may hold a space, which roslaunch cannot take.
+        config_file("joysticks", f"{joystick}.yaml")
         arguments.update(joystick="mapper", joy_config=joystick)
         player += ["--joystick", "--joy-config", joystick]
     if controller:
