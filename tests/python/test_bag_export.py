@@ -135,7 +135,7 @@ def test_trajectories_are_what_evo_reads(tmp_path: Path) -> None:
     assert export(bag, "--format", "tum", "-o", tmp_path / "tum") == 0
     assert export(bag, "--format", "euroc", "-o", tmp_path / "euroc") == 0
     tum = file_interface.read_tum_trajectory_file(str(tmp_path / "tum" / "flight.tum"))
-    euroc = file_interface.read_euroc_csv_trajectory(str(tmp_path / "euroc" / "flight.csv"))
+    euroc = file_interface.read_euroc_csv_trajectory(str(tmp_path / "euroc" / "flight.euroc.csv"))
     times = np.arange(200) / RATE + (np.arange(200) >= 100)
     for trajectory in (tum, euroc):
         assert trajectory.check()[0]
@@ -162,7 +162,7 @@ def test_data_sets_hold_good_frames_with_their_own_state(tmp_path: Path, raw_ima
         image = cv2.imread(str(out / "flight" / file))
         error = np.abs(image.astype(int) - picture(k).astype(int)).mean()
         assert error == 0 if raw_images else error < 3
-    record = json.loads((out / "manifest.json").read_text())["flights"]["flight"]
+    record = json.loads((out / "manifest.json").read_text())["exports"]["images"]["flight"]
     assert record["counts"]["left_out"] == {"QUALITY_FROZEN": 1, "no frame_state of the same stamp": 1}
     assert (record["counts"]["images"], record["counts"]["exported"]) == (20, 18)
 
@@ -213,6 +213,54 @@ def test_an_interrupted_export_goes_on_and_verify_finds_what_changed(
     ]
 
 
+def test_formats_share_a_folder_and_one_manifest(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    first = write_flight(tmp_path / "f1.bag", 1.0)
+    second = write_flight(tmp_path / "f2.bag", 1.0, offset=5.0)
+    out = tmp_path / "out"
+    assert export(first, "--format", "csv", "-o", out) == 0
+    table = (out / "f1.csv").read_bytes()
+    assert export(first, "--format", "euroc", "-o", out) == 0
+    assert export(first, "--format", "images", "-o", out) == 0
+    assert export(second, "--format", "csv", "--rate", "10", "-o", out) == 0
+    assert (out / "f1.csv").read_bytes() == table, "another format's file was overwritten"
+    assert (out / "f1.euroc.csv").read_text().startswith("#timestamp [ns],p_RS_R_x")
+    exports = json.loads((out / "manifest.json").read_text())["exports"]
+    assert {form: sorted(flights) for form, flights in exports.items()} == {
+        "csv": ["f1", "f2"],
+        "euroc": ["f1"],
+        "images": ["f1"],
+    }
+    assert [exports["csv"][name]["parameters"]["rate"] for name in ("f1", "f2")] == [None, 10.0]
+    assert export("--verify", "-o", out) == 0
+    (out / "f1.csv").write_bytes(table + b"1")
+    (out / "f1.euroc.csv").unlink()
+    capsys.readouterr()
+    assert export("--verify", "-o", out) == 1
+    assert capsys.readouterr().out.splitlines() == ["changed: f1.csv", "missing: f1.euroc.csv"]
+
+
+def test_a_flight_whose_name_ends_as_another_formats_files_does_not_take_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 0.2)
+    other = write_flight(tmp_path / "flight.euroc.bag", 0.2, offset=5.0)
+    folder = write_flight(tmp_path / "flight.csv.bag", 0.2, offset=9.0)
+    out = tmp_path / "out"
+    assert export(bag, "--format", "csv", "-o", out) == 0
+    assert export(bag, "--format", "euroc", "-o", out) == 0
+    before = files_of(out)
+    for arguments, owner in (
+        ([other, "--format", "csv"], "flight.euroc.csv belongs to the euroc export of flight"),
+        ([folder, "--format", "images"], "flight.csv belongs to the csv export of flight"),
+    ):
+        capsys.readouterr()
+        assert export(*arguments, "-o", out) == 1
+        err = capsys.readouterr().err
+        assert owner in err
+        assert "-o" in err
+    assert files_of(out) == before
+
+
 def test_a_dask_cluster_gives_the_same_bytes(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
     bags = [write_flight(tmp_path / f"f{k}.bag", 1.0, offset=10.0 * k) for k in range(3)]
@@ -233,7 +281,10 @@ def test_a_dask_cluster_gives_the_same_bytes(tmp_path: Path) -> None:
         (["a.bag", "./a.bag"], "is given twice"),
         (["a.bag", "--scheduler", "tcp://127.0.0.1:1"], "no Dask scheduler at tcp://127.0.0.1:1"),
         (["a.bag", "--topics", "engine"], "no topic /xplane/engine"),
-        (["--verify", "-o", "nowhere"], "no readable manifest.json"),
+        (["--verify", "-o", "nowhere"], "no readable manifest.json of this version; export first"),
+        (["a.bag", "-o", "a.bag"], "a.bag: File exists; -o takes a folder that can be written"),
+        (["a.bag", "-o", "a.bag/out"], "a.bag/out: Not a directory; -o takes a folder that can be written"),
+        (["a.bag", "-o", "/proc/export"], "/proc/export: No such file or directory; -o takes"),
     ],
 )
 def test_errors_are_one_line(

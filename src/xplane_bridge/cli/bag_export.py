@@ -82,13 +82,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.jobs < 1:
         p.error(f"--jobs {args.jobs}: at least 1 process is needed")
     jobs = _jobs(args, output)
+    campaign.make_folder(output)
     run = (
         partial(campaign.run_dask, address=args.scheduler)
         if args.scheduler
         else partial(campaign.run_local, workers=args.jobs)
     )
     failed = 0
-    outcomes = campaign.export(jobs, run, _parameters(args))
+    outcomes = campaign.export(jobs, run)
     bar = tqdm(outcomes, total=len(jobs), unit="flight", disable=not sys.stderr.isatty())
     for outcome in bar:
         if outcome.record is None:
@@ -110,11 +111,6 @@ def _jobs(args: argparse.Namespace, output: Path) -> list[campaign.Job]:
         )
         for name, bags in sorted(named.items())
     ]
-
-
-def _parameters(args: argparse.Namespace) -> dict[str, object]:
-    names = ("format", "rate", "topics", "split_by", "train_share", "seed", "keep_bad_frames")
-    return {name: getattr(args, name) for name in names}
 
 
 def _summary(outcome: campaign.Outcome) -> str:

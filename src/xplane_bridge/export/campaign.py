@@ -1,12 +1,14 @@
 """Many flights, exported side by side: here in processes, or on a Dask cluster; the same files either way.
 
-An export folder holds one entry a flight and ``manifest.json``: versions, parameters, counts, and the SHA-256 of every
-file. A flight is built under a temporary name and renamed when whole, so that an export that was cut off goes on where
-it stopped: flights whose record in ``.flights/`` fits the bags and parameters are not made again.
+An export folder holds one entry a flight and format, and ``manifest.json``: versions, parameters, counts, and the
+SHA-256 of every file exported there. A flight is built under a temporary name and renamed when whole, so that an export
+that was cut off goes on where it stopped: flights whose record in ``.flights/<format>/`` fits the bags and parameters
+are not made again. What another record names is never overwritten.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -21,10 +23,12 @@ from xplane_bridge.bags import BagError, Bags
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.export.dataset import Options, export_images
 
-SCHEMA = 1
+SCHEMA = 2  #: of the manifest and of the records; 1 knew one format a folder
 MANIFEST = "manifest.json"
 _RECORDS = ".flights"
-FORMATS = ("csv", "parquet", "tum", "euroc", "images")
+#: Format to the ending of a flight's file; "" is a folder.
+_ENDINGS = {"csv": ".csv", "parquet": ".parquet", "tum": ".tum", "euroc": ".euroc.csv", "images": ""}
+FORMATS = tuple(_ENDINGS)
 
 
 class ExportError(XplaneBridgeError):
@@ -42,6 +46,15 @@ class Job(NamedTuple):
     topics: tuple[str, ...]
     dataset: Options
     train_flight: bool
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What the user asked for that decides the content of this format."""
+        if self.format == "images":
+            return {**self.dataset._asdict(), "train_flight": self.train_flight}
+        if self.format in ("csv", "parquet"):
+            return {"rate": self.rate, "topics": list(self.topics)}
+        return {"rate": self.rate}
 
 
 class Outcome(NamedTuple):
@@ -96,7 +109,7 @@ def choose_training(names: Iterable[str], options: Options) -> set[str]:
 def export_flight(job: Job) -> Outcome:
     """Export one flight; the one function that local processes and cluster workers run."""
     output = Path(job.output)
-    record_file = output / _RECORDS / f"{job.name}.json"
+    record_file = output / _RECORDS / job.format / f"{job.name}.json"
     try:
         key = _key(job)
         old = _read_json(record_file)
@@ -113,11 +126,10 @@ def export_flight(job: Job) -> Outcome:
 
 
 def _export(job: Job, output: Path) -> dict[str, Any]:
-    suffix = {"csv": ".csv", "parquet": ".parquet", "tum": ".tum", "euroc": ".csv", "images": ""}[job.format]
-    final = output / f"{job.name}{suffix}"
-    building = output / f".{job.name}{suffix}.part"
+    final = output / f"{job.name}{_ENDINGS[job.format]}"
+    _refuse_foreign(final, job)
+    building = final.with_name(f".{final.name}.part")
     _remove(building)
-    output.mkdir(parents=True, exist_ok=True)
     counts: dict[str, Any]
     with Bags(job.bags) as bags:
         if job.format == "images":
@@ -139,10 +151,30 @@ def _export(job: Job, output: Path) -> dict[str, Any]:
     os.replace(building, final)
     files = sorted(p for p in final.rglob("*") if p.is_file()) if final.is_dir() else [final]
     return {
+        "xplane_bridge": __version__,
         "bags": [Path(path).name for path in job.bags],
+        "parameters": job.parameters,
         "counts": counts,
         "files": {p.relative_to(output).as_posix(): _sha256(p) for p in files},
     }
+
+
+def _refuse_foreign(final: Path, job: Job) -> None:
+    """Raise `ExportError` when what would be written is on another export's record."""
+    for form, flight, record in _records(Path(job.output)):
+        if (form, flight) == (job.format, job.name):
+            continue
+        if any(name.split("/")[0] == final.name for name in record["files"]):
+            msg = f"{final} belongs to the {form} export of {flight}; give another folder with -o"
+            raise ExportError(msg)
+
+
+def _records(output: Path) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Give format, flight and record of everything exported to the folder."""
+    for path in sorted((output / _RECORDS).glob("*/*.json")):
+        content = _read_json(path)
+        if content is not None and content["key"]["schema"] == SCHEMA:
+            yield path.parent.name, path.stem, content["record"]
 
 
 def run_local(jobs: Sequence[Job], workers: int) -> Iterator[Outcome]:
@@ -178,36 +210,49 @@ def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:
             yield future.result()
 
 
-def export(
-    jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]], parameters: dict[str, Any]
-) -> Iterator[Outcome]:
-    """Run all jobs, then write the manifest of those that succeeded.
+def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]]) -> Iterator[Outcome]:
+    """Run all jobs, then write the manifest of all that the folder holds.
 
     Args:
         jobs: One a flight, all to the same output folder.
         run: `run_local` or `run_dask`, bound to its own arguments.
-        parameters: What the user asked for; goes into the manifest.
 
     Yields:
         Every outcome, as it comes.
+
+    Raises:
+        ExportError: The manifest cannot be written.
     """
-    records: dict[str, Any] = {}
-    for outcome in run(jobs):
-        if outcome.record is not None:
-            records[outcome.name] = outcome.record
-        yield outcome
+    yield from run(jobs)
     output = Path(jobs[0].output)
-    output.mkdir(parents=True, exist_ok=True)
-    _write_json(
-        output / MANIFEST,
-        {
-            "schema": SCHEMA,
-            "xplane_bridge": __version__,
-            "parameters": parameters,
-            "counts": {"flights": len(records), "files": sum(len(r["files"]) for r in records.values())},
-            "flights": {name: records[name] for name in sorted(records)},
-        },
-    )
+    exports: dict[str, dict[str, Any]] = {}
+    for form, flight, record in _records(output):
+        exports.setdefault(form, {})[flight] = record
+    counts = {
+        form: {"flights": len(flights), "files": sum(len(record["files"]) for record in flights.values())}
+        for form, flights in exports.items()
+    }
+    content = {"schema": SCHEMA, "xplane_bridge": __version__, "counts": counts, "exports": exports}
+    try:
+        _write_json(output / MANIFEST, content)
+    except OSError as err:
+        msg = f"{output / MANIFEST}: {err.strerror}"
+        raise ExportError(msg) from None
+
+
+def make_folder(output: Path) -> None:
+    """Make the export's folder, before hours of work find that there is none.
+
+    Raises:
+        ExportError: It cannot be made, or not be written to.
+    """
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        if not os.access(output, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as err:
+        msg = f"{output}: {err.strerror}; -o takes a folder that can be written, or the name of a new one"
+        raise ExportError(msg) from None
 
 
 def verify(output: Path) -> list[str]:
@@ -220,19 +265,19 @@ def verify(output: Path) -> list[str]:
         ExportError: No manifest there.
     """
     manifest = _read_json(output / MANIFEST)
-    if manifest is None:
-        msg = f"{output}: no readable {MANIFEST}; export first"
+    if manifest is None or manifest.get("schema") != SCHEMA:
+        msg = f"{output}: no readable {MANIFEST} of this version; export first"
         raise ExportError(msg)
     problems = []
     known = {MANIFEST}
-    for flight in manifest["flights"].values():
-        for name, checksum in flight["files"].items():
-            known.add(name)
-            path = output / name
-            if not path.is_file():
-                problems.append(f"missing: {name}")
-            elif _sha256(path) != checksum:
-                problems.append(f"changed: {name}")
+    records = [record for flights in manifest["exports"].values() for record in flights.values()]
+    for name, checksum in (item for record in records for item in record["files"].items()):
+        known.add(name)
+        path = output / name
+        if not path.is_file():
+            problems.append(f"missing: {name}")
+        elif _sha256(path) != checksum:
+            problems.append(f"changed: {name}")
     for path in sorted(output.rglob("*")):
         name = path.relative_to(output).as_posix()
         if path.is_file() and name not in known and not name.startswith(_RECORDS + "/"):
@@ -254,11 +299,7 @@ def _key(job: Job) -> dict[str, Any]:
         "schema": SCHEMA,
         "xplane_bridge": __version__,
         "sources": sources,
-        "format": job.format,
-        "rate": job.rate,
-        "topics": list(job.topics),
-        "dataset": job.dataset._asdict(),
-        "train_flight": job.train_flight,
+        "parameters": job.parameters,
     }
 
 
