@@ -1,4 +1,4 @@
-#include "xplane_bridge/joystick_mapper_node.hpp"
+#include "xplane_bridge/nodes/joystick/joystick_mapper_node.hpp"
 
 int main(int argc, char** argv) {
   return xplane_bridge::runNode<xplane_bridge::JoystickMapperNode>(argc, argv, "joystick_mapper_node");

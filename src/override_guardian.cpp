@@ -1,3 +1,3 @@
-#include "xplane_bridge/guardian.hpp"
+#include "xplane_bridge/actuation/guardian.hpp"
 
 int main(int argc, char** argv) { return xplane_bridge::runGuardian(argc, argv); }

@@ -1,3 +1,3 @@
-#include "xplane_bridge/rx_node.hpp"
+#include "xplane_bridge/nodes/rx/rx_node.hpp"
 
 int main(int argc, char** argv) { return xplane_bridge::runNode<xplane_bridge::RxNode>(argc, argv, "rx_node"); }

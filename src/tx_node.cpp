@@ -1,3 +1,3 @@
-#include "xplane_bridge/tx_node.hpp"
+#include "xplane_bridge/nodes/tx/tx_node.hpp"
 
 int main(int argc, char** argv) { return xplane_bridge::runNode<xplane_bridge::TxNode>(argc, argv, "tx_node"); }

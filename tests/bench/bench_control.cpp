@@ -33,7 +33,7 @@
 #include <sensor_msgs/Joy.h>
 
 #include "bench_settings.hpp"
-#include "xplane_bridge/core/packets.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
 
 namespace xplane_bridge {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "xplane_bridge/core/state_assembler.hpp"
+#include "xplane_bridge/core/state/state_assembler.hpp"
 
 namespace xplane_bridge::core {
 namespace {

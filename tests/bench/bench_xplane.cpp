@@ -43,7 +43,7 @@
 #include "bench_settings.hpp"
 #include "xplane_bridge/FlightState.h"
 #include "xplane_bridge/LinkState.h"
-#include "xplane_bridge/core/packets.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
 
 namespace xplane_bridge {
 namespace {

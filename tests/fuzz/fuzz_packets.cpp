@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "xplane_bridge/core/packets.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
 
 namespace core = xplane_bridge::core;
 

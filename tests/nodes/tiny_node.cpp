@@ -9,7 +9,7 @@
 #include <std_msgs/String.h>
 
 #include "xplane_bridge/GetDataref.h"
-#include "xplane_bridge/base_node.hpp"
+#include "xplane_bridge/nodes/base/base_node.hpp"
 
 namespace xplane_bridge {
 namespace {

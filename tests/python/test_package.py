@@ -42,43 +42,89 @@ def tracked_files():
     return [ROOT / name for name in listing.stdout.split("\0") if name and (ROOT / name).is_file()]
 
 
-# ---------------------------------------------------------------------------------------------------------- layers
+# ----------------------------------------------------------------------------------------------------------- rooms
 
 ROS_HEADER = re.compile(
     r"^(ros|roscpp|rosconsole|tf2?|tf2_\w+|actionlib|diagnostic_\w+|image_transport|cv_bridge|camera_info_manager|"
     r"(\w+_msgs|std_srvs)|xplane_bridge/[A-Z]\w*\.h)(/|$)|^xplane_bridge/[A-Z]\w*\.h$"
 )
 GRAPHICS_HEADER = re.compile(r"^(opencv|opencv2|X11|xcb|turbojpeg)([/.]|$)")
-UPPER_LAYER = re.compile(r"^xplane_bridge/(vision/|[a-z]\w*\.hpp$)")
+OUR_HEADER = re.compile(r"^xplane_bridge/([a-z/]+)/\w+\.hpp$")
+TREES = ("include/xplane_bridge", "lib", "tests/cpp")
+MOST_FILES = 20
 
 
-def test_the_core_includes_nothing_of_ros_or_of_pictures():
-    files = sources("include/xplane_bridge/core", "lib/core")
-    assert files
+def room_table(heading):
+    """The table below a heading of docs/architecture.md: room to the rooms it may use."""
+    text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    section = text.split(f"\n## {heading}\n", 1)[1].split("\n## ", 1)[0]
+    rows = [line.strip("|").split("|") for line in section.splitlines() if line.startswith("| `")]
+    table = {re.findall(r"`([^`]+)`", row[0])[0]: set(re.findall(r"`([^`]+)`", row[2])) for row in rows}
+    assert table
+    return table
+
+
+def room_of(path):
+    """The room of a file below one of TREES."""
+    tree = next(tree for tree in TREES if (ROOT / tree) in path.parents)
+    return path.parent.relative_to(ROOT / tree).as_posix()
+
+
+def forbidden(room, header, table):
+    """Whether a file of this room may not include this header."""
+    ours = OUR_HEADER.search(header)
+    if ours:
+        return ours.group(1) != room and ours.group(1) not in table[room]
+    ros_allowed = room == "actuation" or room.startswith("nodes/")
+    if ROS_HEADER.search(header):
+        return not ros_allowed
+    return bool(GRAPHICS_HEADER.search(header)) and not (ros_allowed or room == "vision")
+
+
+def test_every_include_is_allowed_by_the_room_table():
+    table = room_table("C++ rooms")
     wrong = [
-        f"{path.relative_to(ROOT)}: {name}"
-        for path in files
-        for name in includes(path)
-        if ROS_HEADER.search(name) or GRAPHICS_HEADER.search(name) or UPPER_LAYER.search(name)
+        f"{path.relative_to(ROOT)}: {header}"
+        for path in sources("include/xplane_bridge", "lib")
+        for header in includes(path)
+        if forbidden(room_of(path), header, table)
     ]
     assert not wrong
 
 
-def test_vision_includes_nothing_of_ros():
-    wrong = [
-        f"{path.relative_to(ROOT)}: {name}"
-        for path in sources("include/xplane_bridge/vision", "lib/vision")
-        for name in includes(path)
-        if ROS_HEADER.search(name) or re.search(r"^xplane_bridge/[a-z]\w*\.hpp$", name)
-    ]
-    assert not wrong
+def test_the_room_table_names_the_rooms_there_are_and_they_form_floors():
+    table = room_table("C++ rooms")
+    assert set(table) == {room_of(path) for path in sources("include/xplane_bridge", "lib")}
+    placed = set()
+    while len(placed) < len(table):
+        floor = {room for room, below in table.items() if room not in placed and below <= placed}
+        assert floor, f"these rooms include each other: {sorted(set(table) - placed)}"
+        placed |= floor
+
+
+def test_the_room_table_allows_nothing_that_no_file_needs():
+    table = room_table("C++ rooms")
+    used = {room: set() for room in table}
+    for path in sources("include/xplane_bridge", "lib"):
+        used[room_of(path)] |= {m.group(1) for m in map(OUR_HEADER.search, includes(path)) if m}
+    assert {room: below - used[room] for room, below in table.items() if below - used[room]} == {}
+
+
+def test_rooms_are_small_and_tests_stand_in_the_room_of_what_they_test():
+    table = room_table("C++ rooms")
+    for tree in TREES:
+        for folder in {path.parent for path in sources(tree)}:
+            assert len(list(folder.glob("*.[ch]pp"))) <= MOST_FILES, folder
+    tests = sources("tests/cpp")
+    assert {room_of(path) for path in tests if path.name.startswith("test_")} <= set(table)
 
 
 def node_sources():
-    return [p for folder in ("include/xplane_bridge", "lib") for p in (ROOT / folder).glob("*.[ch]pp")]
+    return [p for p in sources("include/xplane_bridge", "lib") if room_of(p).startswith(("actuation", "nodes/"))]
 
 
 def test_the_nodes_name_no_dataref():
+    assert node_sources()
     wrong = [
         f"{path.relative_to(ROOT)}: {match}"
         for path in node_sources()
@@ -88,16 +134,17 @@ def test_the_nodes_name_no_dataref():
 
 
 @pytest.mark.parametrize(
-    ("header", "layer"),
-    [("ros/ros.h", ROS_HEADER), ("sensor_msgs/Joy.h", ROS_HEADER), ("xplane_bridge/FlightState.h", ROS_HEADER),
-     ("tf2_ros/transform_broadcaster.h", ROS_HEADER), ("opencv2/core.hpp", GRAPHICS_HEADER),
-     ("xcb/xcb.h", GRAPHICS_HEADER), ("xplane_bridge/base_node.hpp", UPPER_LAYER),
-     ("xplane_bridge/vision/window.hpp", UPPER_LAYER)],
+    ("room", "header"),
+    [("core/wire", "ros/ros.h"), ("core/state", "sensor_msgs/Joy.h"), ("core/base", "xplane_bridge/FlightState.h"),
+     ("vision", "tf2_ros/transform_broadcaster.h"), ("core/camera", "opencv2/core.hpp"), ("core/wire", "xcb/xcb.h"),
+     ("core/link", "xplane_bridge/nodes/base/base_node.hpp"), ("core/camera", "xplane_bridge/vision/window.hpp"),
+     ("core/wire", "xplane_bridge/core/link/journal.hpp"), ("nodes/rx", "xplane_bridge/nodes/tx/tx_node.hpp")],
 )  # fmt: skip
-def test_the_rules_know_what_they_forbid(header, layer):
-    assert layer.search(header)
-    allowed = ("xplane_bridge/core/frames.hpp", "Eigen/Core", "vector", "sys/socket.h", "nlohmann/json.hpp")
-    assert not any(layer.search(name) for name in allowed)
+def test_the_rules_know_what_they_forbid(room, header):
+    table = room_table("C++ rooms")
+    assert forbidden(room, header, table)
+    allowed = ("xplane_bridge/core/base/bytes.hpp", "Eigen/Core", "vector", "sys/socket.h", "nlohmann/json.hpp")
+    assert not any(forbidden("core/wire", name, table) for name in allowed)
 
 
 ROS_IMPORT = re.compile(
@@ -192,7 +239,7 @@ def test_the_changelog_is_as_rep_132_wants_it():
 
 def test_sources_in_lib_are_not_ignored():
     # Popular .gitignore templates ignore lib/, which holds C++ sources here.
-    for path in ("lib/core/new.cpp", "lib/new.cpp", "lib/vision/new.cpp", "src/xplane_bridge/new.py"):
+    for path in ("lib/core/base/new.cpp", "lib/nodes/rx/new.cpp", "lib/vision/new.cpp", "src/xplane_bridge/new.py"):
         assert git("check-ignore", "-q", path).returncode == 1, path
     assert git("check-ignore", "-q", "build/x").returncode == 0
 

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/link/sim_link.hpp"
+
+namespace xplane_bridge {
+
+/// The overrides this node has set in X-Plane, and nothing else's: each is in the journal before it is set, and taken
+/// out after it is released and read back. Thread-safe. Functions that wait for X-Plane say so; those that write to the
+/// journal throw core::JournalError.
+class OverrideKeeper {
+ public:
+  /// `report(text, success)`: what happened, for events and the log.
+  using Report = std::function<void(const std::string& text, bool success)>;
+
+  OverrideKeeper(core::SimLink* link, Report report);
+
+  /// Sets what of `wanted` is not set yet, and gives back what was set by an earlier call and is not in `wanted` any
+  /// more (its journal entry stays until confirmReleases() has read it back). Writes to the disk when something is new;
+  /// without a journal (X-Plane has not been found), and after releaseAll(), nothing is set.
+  void require(const std::vector<std::string>& wanted);
+  /// Sets one, until unhold() or the end of the node, whatever require() says. Not only overrides: whatever is 0 (or
+  /// core::releaseOf()) where nobody sets it. Without `refreshed`, refresh() leaves it alone, so that it can be taken
+  /// back in the simulator. Returns whether it was set: as in require().
+  bool hold(const std::string& dataref, float value = 1.0F, bool refreshed = true);
+  /// Gives one back that hold() has set; another one stays as it is.
+  void unhold(const std::string& dataref);
+  /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted. Not those that
+  /// X-Plane shows released.
+  void refresh();
+  /// Whether the group is this one's. From the link's thread.
+  bool onRref(core::GroupId group, const core::RrefView& view);
+  /// What somebody else has released (the panic tool, another client) since the last call, after X-Plane had shown it
+  /// set. Its journal entry goes, and it is not set again by itself. Of what require() has set; what hold() has set is
+  /// reported and let go as well, but for the surface override, which its holder watches.
+  std::vector<std::string> releasedByOthers();
+  /// X-Plane may have released everything by itself (restarted, another aircraft): that is not somebody else.
+  void forgetShown();
+  /// True while a release has not been read back.
+  bool releasesPending() const;
+  /// Reads pending releases back, sending them again where needed. Waits up to `timeout_s`.
+  void confirmReleases(double timeout_s);
+  /// Releases everything; nothing is set after that. Waits up to `timeout_s`. Returns whether X-Plane has shown all of
+  /// it; what it has not stays in the journal.
+  bool releaseAll(double timeout_s);
+  /// Releases what a crashed run has left. Waits up to `timeout_s`. Returns whether nothing is left.
+  bool releaseLeftovers(double timeout_s);
+
+  /// Set now, by name; those that refresh() repeats.
+  std::vector<std::string> active() const;
+
+ private:
+  struct Held {
+    float value = 1.0F;
+    bool refreshed = true;
+  };
+
+  /// What X-Plane shows of one that is set.
+  struct Shown {
+    bool set = false;        // it has been shown as set
+    int released = 0;        // answers since then that show it released
+    bool in_journal = true;  // its entry is known to be there
+  };
+
+  bool set(const std::string& dataref, float value);
+  void send(const std::string& dataref, float value);
+  void watch();
+  void release(const std::string& dataref);
+  /// `remove`: takes what was undone out of the journal.
+  bool confirm(const std::vector<core::UndoOperation>& operations, double timeout_s, const std::string& what,
+               const std::function<void(core::Journal&)>& remove);
+
+  core::SimLink* link_;
+  Report report_;
+  mutable std::mutex mutex_;
+  std::set<std::string> required_;
+  std::map<std::string, Held> held_;
+  std::set<std::string> releasing_;
+  core::GroupId group_ = -1;
+  std::vector<std::string> watched_;  // datarefs of the group
+  std::map<std::string, Shown> shown_;
+  bool ended_ = false;      // by releaseAll()
+  std::string unreleased_;  // what confirm() has told last of; of the one thread that waits
+};
+
+/// Journal purpose of tx_node's entries.
+extern const char* const kOverridePurpose;
+
+}  // namespace xplane_bridge

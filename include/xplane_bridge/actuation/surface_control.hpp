@@ -1,0 +1,199 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+
+#include "xplane_bridge/actuation/override_keeper.hpp"
+#include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/core/surfaces/mixing_watch.hpp"
+#include "xplane_bridge/core/surfaces/surface_driver.hpp"
+#include "xplane_bridge/core/surfaces/surface_watch.hpp"
+#include "xplane_bridge/core/wire/rref_frame_assembler.hpp"
+
+namespace xplane_bridge {
+
+struct SurfaceControlOptions {
+  core::MixingRequirements mixing;
+  std::string mixing_folder;  ///< of the mixing files (docs/mixing_file.md)
+  core::DriverOptions driver;
+  double flap_rate = 0.15;       ///< [1/s] of full travel, while they are driven
+  double speedbrake_rate = 1.0;  ///< [1/s] of full travel
+  double command_timeout = 0.5;  ///< [s] after which a SurfaceCommand that is not repeated ends
+};
+
+/// Every control surface, driven one by one while somebody needs that (a broken surface, a command to single surfaces,
+/// an excitation of one), and left to X-Plane otherwise. Learns the mixing that takes (docs/surfaces.md).
+///
+/// X-Plane's frames drive it: what is sent goes out on arrival of each. Thread-safe; nothing waits but for the
+/// journal's disk.
+class SurfaceControl {
+ public:
+  /// `report(text, success)`: what happened, for events and the log.
+  using Report = std::function<void(const std::string& text, bool success)>;
+
+  SurfaceControl(core::SimLink* link, OverrideKeeper* overrides, SurfaceControlOptions options, Report report);
+
+  // What drives it.
+
+  /// The link's state or version changed.
+  void onLink(const core::LinkStatus& status);
+  /// Whether the group is this one's. From the link's thread.
+  bool onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info);
+  /// Another aircraft is loaded: whatever was driven ends, its mixing file is read.
+  void onAircraft(const std::string& aircraft);
+  /// Whatever is driven ends, failures and commands too.
+  void release(const std::string& why);
+  /// At least ten times a second; `time` [s] steady. `refusal`: why nothing may be sent to X-Plane now; empty: it may.
+  void tick(double time, const std::string& refusal);
+  /// Ends all driving; overrides are the keeper's to give back.
+  void stop();
+
+  // What is wanted.
+
+  /// Roll, pitch and yaw as this node commands them; NaN for those that X-Plane's own stick flies.
+  void setStick(const std::array<double, 3>& stick);
+  /// Broken surfaces, all of them; a surface not named any more goes back to the law.
+  void setFailures(const std::vector<core::SurfaceFailure>& failures);
+  /// X-Plane itself has something broken, so that its surfaces say nothing about the mixing.
+  void setDisturbed(bool disturbed);
+  /// control/surfaces; an empty list gives all back. Returns why it is refused as a whole; nullopt: taken.
+  std::optional<std::string> command(const std::vector<std::string>& names, const std::vector<float>& deflections_deg,
+                                     std::uint32_t sequence);
+  /// Excitation of one surface by up to `amplitude_deg`: the surfaces are driven from now on. One at a time. Returns
+  /// why not, in words; empty: they are.
+  std::string beginOffset(std::size_t surface, double amplitude_deg);
+  /// Adds degrees to that surface from the next frame on. Returns why it does not answer any more (it broke, the
+  /// surfaces were given up), which ends the excitation; empty: it does.
+  std::string setOffset(double offset_deg);
+  /// The excitation is over.
+  void clearOffset();
+
+  // What is.
+
+  /// Why surfaces cannot be driven now, in words that say what to do; empty: they can, or are.
+  std::string refusal() const;
+  /// The same for one surface, which the mixing has to know.
+  std::string refusal(std::size_t surface) const;
+  /// The surface override is set, or being taken or given back.
+  bool driving() const;
+  /// Nothing needs the surfaces any more, but X-Plane has not shown yet that it drives them.
+  bool givingBack() const;
+  /// [frames] by which driven surfaces trail X-Plane's own, measured; NaN while nothing is driven.
+  double lagFrames() const;
+  /// X-Plane shows what was sent to this surface.
+  bool follows(std::size_t surface) const;
+  /// [deg] as X-Plane shows it; NaN: unknown.
+  double shown(std::size_t surface) const;
+  /// The law of a surface; nullopt where none is known.
+  std::optional<core::SurfaceLaw> lawOf(std::size_t surface) const;
+
+  /// Surfaces commanded one by one or broken, as sent last.
+  std::vector<core::SurfaceDeflection> sentOneByOne() const;
+  /// A command that was sent, or shown by X-Plane, since the last call.
+  struct Echo {
+    std::uint32_t sequence = 0;
+    bool read_back = false;
+    double sim_time = std::nan("");  ///< [s] of the frame that shows it
+    double frames = std::nan("");    ///< since it was sent
+  };
+  std::optional<Echo> takeEcho();
+  /// Why all failures and commands were dropped (another aircraft, X-Plane restarted, the override released by somebody
+  /// else), once after it happened.
+  std::optional<std::string> takeDropped();
+
+  void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const;
+
+ private:
+  enum class State : std::uint8_t { kIdle, kTaking, kDriving, kReleasing };
+  static const char* toString(State state);
+
+  // All with mutex_ held.
+  void onSample();
+  bool wanted() const;
+  void take();
+  void drive(double dt);
+  void giveBack();
+  void checkLeft();
+  void drop(const std::string& why);
+  void loseOffset(const std::string& why);
+  void endCommands();
+  void enter(State state);
+  void measureLag();
+  void watchCommand();
+  void loadModel();
+  void saveModel();
+  std::string refusalLocked() const;
+  std::string refusalOf(std::size_t surface) const;
+  bool followsLocked(std::size_t surface) const;
+  bool isBroken(std::size_t surface) const;
+  void subscribe();
+
+  core::SimLink* link_;
+  OverrideKeeper* overrides_;
+  SurfaceControlOptions options_;
+  Report report_;
+
+  mutable std::mutex mutex_;
+  core::SimulatorGeneration generation_ = core::SimulatorGeneration::k11;
+  core::GroupId group_ = -1;
+  std::unique_ptr<core::RrefFrameAssembler> frames_;
+  core::SurfaceSample sample_;
+  double last_time_ = std::nan("");    // [s] simulator time of the previous frame
+  double solved_time_ = std::nan("");  // [s] the same, of the last solution
+  bool flowing_ = false;
+  bool disturbed_ = false;
+  bool stopped_ = false;
+  std::string may_not_ = "X-Plane is not connected";
+  double tick_time_ = 0.0;  // [s] steady
+
+  core::MixingWatch watch_;
+  std::string file_problem_;
+
+  State state_ = State::kIdle;
+  double state_since_ = 0.0;  // [s] steady
+  double not_before_ = 0.0;   // [s] steady: after a failed attempt
+  std::unique_ptr<core::SurfaceDriver> driver_;
+  core::DrivenInputs inputs_;
+  std::array<double, 3> stick_;
+  std::vector<core::SurfaceDeflection> sent_;
+  std::vector<core::SurfaceDeflection> left_;  // as sent last before they were given back, until that is checked
+  double left_time_ = 0.0;                     // [s] simulator time
+  std::vector<double> not_following_;          // [s] simulator time for which each surface has not shown what was sent
+
+  std::vector<core::SurfaceFailure> failures_;
+  std::optional<std::string> dropped_;
+  std::vector<core::SurfaceDeflection> commands_;
+  std::uint32_t command_sequence_ = 0;
+  double command_age_ = 0.0;  // [s] while X-Plane runs
+  bool command_sent_ = true;
+  struct SentCommand {
+    std::uint32_t sequence = 0;
+    double sim_time = std::nan("");  // [s] of the frame in which it was sent
+    std::vector<core::SurfaceDeflection> surfaces;
+  };
+  std::deque<SentCommand> commands_unseen_;  // oldest first
+  std::deque<Echo> echoes_;
+  std::uint64_t commands_accepted_ = 0, commands_refused_ = 0;
+  std::string last_refusal_;
+  std::optional<core::SurfaceDeflection> offset_;
+  std::string offset_lost_;  // why, where an excitation's end was not asked for
+
+  struct Sent {
+    double sim_time;  // [s] of the frame it was worked out from
+    std::size_t surface;
+    double deflection_deg;
+  };
+  std::deque<Sent> unseen_;  // movements not shown yet, oldest first
+  double lag_frames_ = std::nan("");
+};
+
+}  // namespace xplane_bridge

@@ -1,0 +1,85 @@
+/// Channels to X-Plane's datarefs: the one place that knows their names (protocol.md 8.1).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/control/control_command.hpp"
+
+namespace xplane_bridge::core {
+
+/// X-Plane generations that differ in datarefs. 10 is treated as 11.
+enum class SimulatorGeneration : std::uint8_t { k11, k12 };
+
+/// From the internal version number of `sim/version/xplane_internal_version` or the beacon, e.g. 115501 or 122015.
+SimulatorGeneration generationOf(int internal_version);
+
+/// How often a channel has to be written.
+enum class Refresh : std::uint8_t {
+  kContinuous,  ///< owned through an override, or moved by others as well: sent at every refresh
+  kOnChange,    ///< a handle in the cockpit: sent when the command changes, so that it can be moved there in between
+};
+
+/// One dataref to write.
+struct DatarefWrite {
+  std::string dataref;  ///< with [i] for an element
+  float value = 0.0f;   ///< in the dataref's own unit
+};
+
+/// How one channel reaches X-Plane.
+struct ChannelWire {
+  const char* write = nullptr;          ///< dataref; engine channels get [engine]
+  const char* read_back = nullptr;      ///< dataref that shows the command once X-Plane took it
+  const char* override_name = nullptr;  ///< dataref that must be 1 for the write to have an effect; nullptr: none
+  Refresh refresh = Refresh::kContinuous;
+  double read_back_tolerance = 0.0;  ///< |shown - sent| that counts as shown
+};
+
+/// What decides between alternative datarefs.
+struct EncoderOptions {
+  SimulatorGeneration generation = SimulatorGeneration::k11;
+  /// Levers go through the dataref whose negative half is reverse thrust. Without it levers below 0 have no meaning and
+  /// the arbiter's limits must keep them at 0 and above.
+  bool reverse_thrust = false;
+};
+
+/// The wire of a channel.
+const ChannelWire& channelWire(Channel channel, const EncoderOptions& options);
+
+/// Dataref of `channel` to write, with [i] where it is an element.
+std::string writeDataref(Channel channel, const EncoderOptions& options);
+/// Dataref of `channel` to read back, with [i] where it is an element.
+std::string readBackDataref(Channel channel, const EncoderOptions& options);
+
+/// Overrides the commanded channels need, each once, in a fixed order.
+std::vector<std::string> requiredOverrides(const ChannelSet& channels, const EncoderOptions& options);
+
+/// Overrides whose effect is on all surfaces (protocol.md 8.2).
+extern const char* const kSurfaceOverride;
+
+/// The write that gives back what the bridge took: overrides to 0, ENGN_thro_override to -2 (X-Plane 11's own "not
+/// overridden"). Anything else is not the bridge's to release: nullopt.
+std::optional<DatarefWrite> releaseOf(const std::string& dataref);
+
+/// Turns channel values into writes. Holds the dataref names of one generation, so nothing is put together per command.
+class ControlEncoder {
+ public:
+  explicit ControlEncoder(const EncoderOptions& options);
+
+  const EncoderOptions& options() const { return options_; }
+
+  /// Appends one write for each channel of `channels`, in channel order.
+  void encode(const ChannelValues& values, const ChannelSet& channels, std::vector<DatarefWrite>& out) const;
+
+  /// True if X-Plane's `shown` is the `sent` value of `channel`.
+  bool shows(Channel channel, double sent, double shown) const;
+
+ private:
+  EncoderOptions options_;
+  std::array<std::string, kChannelCount> names_;
+};
+
+/// Value as written for a channel: gear becomes 0 or 1 (down from 0.5), everything else is passed on.
+float wireValue(Channel channel, double value);
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,128 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "xplane_bridge/core/wire/packets.hpp"
+#include "xplane_bridge/core/wire/udp_socket.hpp"
+
+/// What we changed in X-Plane, written down before it is changed, so that it can be undone by whoever comes next: the
+/// same node on exit, its guardian, its next start, or scripts/release_overrides. Format: docs/journal.md.
+namespace xplane_bridge::core {
+
+/// The journal could not be read or written. what() has the file and the cause.
+class JournalError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Writes `value` to a dataref (DREF).
+struct UndoDref {
+  std::string path;
+  float value = 0.0F;
+};
+/// Writes one DATA row; -999 gives a slot back (DATA).
+struct UndoData {
+  DataRow row;
+};
+/// Takes rows out of Data Output (USEL).
+struct UndoUsel {
+  std::vector<std::int32_t> rows;
+};
+/// Switches a network target off (ISE4).
+struct UndoIse4 {
+  std::int32_t target = kIse4DataOutput;
+  std::string address;  ///< dotted decimal
+  std::uint16_t port = 0;
+};
+using UndoOperation = std::variant<UndoDref, UndoData, UndoUsel, UndoIse4>;
+
+/// The datagram that carries out an operation.
+EncodeResult encodeUndo(ByteSpan out, const UndoOperation& operation);
+/// Room for any operation's datagram.
+constexpr std::size_t kMaxUndoSize = kMaxDselSize;
+
+/// The process that made a change. A process id alone may have been given to another process since.
+struct JournalOwner {
+  std::string node;  ///< for people: "/xplane/tx_node"
+  std::int64_t pid = 0;
+  std::int64_t start_ticks = 0;  ///< start time of the process, /proc/<pid>/stat field 22
+  std::string boot_id;           ///< /proc/sys/kernel/random/boot_id
+  std::string computer;          ///< host name
+
+  friend bool operator==(const JournalOwner& a, const JournalOwner& b) {
+    return a.pid == b.pid && a.start_ticks == b.start_ticks && a.boot_id == b.boot_id;
+  }
+  friend bool operator!=(const JournalOwner& a, const JournalOwner& b) { return !(a == b); }
+};
+
+/// This process, under the name `node`.
+JournalOwner thisProcess(const std::string& node);
+/// Whether the process that wrote the entry still runs. A process of another computer (other host name and boot id; the
+/// file may lie on a shared disk) is taken to run: its changes are not ours to undo.
+bool isAlive(const JournalOwner& owner);
+
+/// One thing that was changed.
+struct JournalEntry {
+  std::string id;       ///< unique in the file, e.g. "override:sim/operation/override/override_joystick"
+  std::string purpose;  ///< who looks after such entries: "data_output", "override", "field_of_view", ...
+  JournalOwner owner;
+  std::vector<UndoOperation> undo;  ///< in the order in which they are to be carried out
+};
+
+/// The journal of one X-Plane (host and port), shared by all nodes that use it.
+///
+/// Each call locks the file (flock on "<path>.lock"), reads it, changes it and replaces it atomically
+/// (write, fsync, rename), so that several processes use it safely and a crash leaves the old or the new file.
+/// All calls throw JournalError; a file that cannot be understood is moved to "<path>.damaged-<n>" and said so once
+/// through the exception, after which the journal is empty and usable. Thread-safe.
+class Journal {
+ public:
+  using AliveFunction = std::function<bool(const JournalOwner&)>;
+
+  /// `path`: see journalPath(). The folder is made when first needed. `self` owns what record() writes.
+  Journal(std::string path, JournalOwner self, AliveFunction alive = isAlive);
+
+  const std::string& path() const { return path_; }
+  const JournalOwner& self() const { return self_; }
+
+  /// Everything in the file; empty when there is none.
+  std::vector<JournalEntry> entries() const;
+  /// The entries of a purpose whose process is gone: to be undone, then removed.
+  std::vector<JournalEntry> orphans(const std::string& purpose) const;
+  /// The entries of this process.
+  std::vector<JournalEntry> own() const;
+
+  /// Adds an entry in the name of this process, or replaces the one with the same id. Returns once it is on disk: only
+  /// then may X-Plane be changed. Refuses to replace an entry of another process that still runs; the entry of one that
+  /// is gone is replaced, so look at orphans() first.
+  void record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo);
+  /// Removes entries by id; unknown ids are no error. The file goes with its last entry.
+  void remove(const std::vector<std::string>& ids);
+  /// Removes what was found by orphans() and has been undone, but not what record() has taken over since.
+  void removeUndone(const std::vector<JournalEntry>& undone);
+
+ private:
+  void removeIf(const std::function<bool(const JournalEntry&)>& chosen);
+
+  std::string path_;
+  JournalOwner self_;
+  AliveFunction alive_;
+};
+
+/// "<folder>/<host>_<port>.json" with characters that do not belong in a file name replaced by '-'.
+/// By convention the folder is ~/.ros/xplane_bridge.
+std::string journalPath(const std::string& folder, const std::string& host, std::uint16_t port);
+
+/// Opens the journal of the X-Plane at `peer`, once that is known.
+using JournalFactory = std::function<std::shared_ptr<Journal>(const Endpoint& peer)>;
+/// Journals in `folder` (by convention ~/.ros/xplane_bridge) in the name of this process as `node`.
+JournalFactory journalsIn(const std::string& folder, const std::string& node);
+
+}  // namespace xplane_bridge::core

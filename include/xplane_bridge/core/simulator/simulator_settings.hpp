@@ -1,0 +1,23 @@
+/// Commands and datarefs behind tx_node's services: pause and view.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/camera/camera_view.hpp"
+#include "xplane_bridge/core/control/control_channels.hpp"
+
+namespace xplane_bridge::core {
+
+/// Command that pauses or resumes.
+const char* pauseCommand(bool pause);
+
+/// Turns the pilot's head. X-Plane has no command for a vertical view (protocol.md 8.5); [?] that the 2-D cockpit views
+/// follow the head angles on a live simulator.
+std::vector<DatarefWrite> viewWrites(CameraView view);
+
+/// The names of `count` (1 and up) values beginning at `name`: the name itself for one, the elements that follow for
+/// several. Throws std::invalid_argument as datarefElements() does; `name` is one dataref or element, no range.
+std::vector<std::string> consecutiveElements(const std::string& name, std::size_t count);
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,125 @@
+#pragma once
+
+/// @file
+/// The one table that knows where every field of every state message comes from: dataref or DATA row and slot, for
+/// X-Plane 11 and 12, with units, factors and signs. Nothing else in the code names a dataref of a state field or a row
+/// number. docs/fields.md is generated from it (tests/cpp/support/field_table_doc.cpp).
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "xplane_bridge/core/base/units.hpp"
+
+namespace xplane_bridge::core {
+
+/// What of X-Plane's version decides about sources.
+enum class XPlaneVersion : std::uint8_t { kUnknown, k11, k12 };
+
+/// @param internal_version `sim/version/xplane_internal_version` or the beacon's, e.g. 115501; 0 unknown
+/// @return k11 also for 9 and 10, whose rows it shares except as docs/fields.md says
+XPlaneVersion xplaneVersion(std::int32_t internal_version);
+
+enum class Transport : std::uint8_t { kRref, kData };
+
+/// One group is one message, one set of requests, one rate.
+enum class FieldGroup : std::uint8_t {
+  kFlight,
+  kEngines,
+  kSurfaces,
+  kControls,
+  kElectrical,
+  kAutopilot,
+  kWarnings,
+  kFuel,
+  kSim,
+};
+inline constexpr std::size_t kFieldGroupCount = 9;
+/// `flight`, `engines`, ...: parameter and topic names.
+const char* toString(FieldGroup group);
+/// Name of the group's message type.
+const char* messageName(FieldGroup group);
+
+/// Requests per second that mean "every frame": X-Plane caps at its frame rate.
+inline constexpr int kEveryFrame = 999;
+/// Rate asked for unless a parameter says otherwise [1/s].
+int defaultRate(FieldGroup group);
+
+/// wire value * factor + offset = SI value.
+struct Conversion {
+  const char* wire_unit = "";
+  double factor = 1.0;
+  double offset = 0.0;
+};
+
+/// A dataref, or several: `{a,b}` is expanded as by a shell, leftmost slowest; `[*]` is every element of the field.
+struct DatarefSource {
+  const char* path11 = nullptr;  ///< null: no dataref
+  const char* path12 = nullptr;  ///< null: as path11
+  Conversion conversion{};
+  Conversion conversion12{};  ///< of path12
+};
+
+/// Slots of a DATA row: element i is in slot + i * stride.
+struct RowSource {
+  int row11 = -1;  ///< -1: no row carries it
+  int slot11 = 0;
+  int row12 = -1;
+  int slot12 = 0;
+  Conversion conversion11{};
+  Conversion conversion12{};
+  int count = 0;  ///< elements carried
+  int stride = 1;
+  bool bitfield = false;      ///< one slot for all elements: element i is bit i of the number in it
+  bool may_be_blank = false;  ///< -999 in this slot means unused (it is a value in all others)
+};
+
+/// Writes a field's first `count` elements, SI values; NaN is unknown. `target` is the group's struct.
+using FieldStore = void (*)(void* target, const double* values, int count);
+/// No field has more elements.
+inline constexpr int kMaxFieldElements = 16;
+
+/// One line of the table.
+struct FieldSpec {
+  FieldGroup group = FieldGroup::kFlight;
+  const char* field = "";      ///< name in the message, or of the input that fields are computed from
+  int count = 1;               ///< elements
+  const char* unit = "";       ///< of the stored value
+  std::uint32_t valid = 0;     ///< bit of the message's `valid` it counts for; 0: none by itself
+  FieldStore store = nullptr;  ///< null: computed (derivation says how)
+  DatarefSource dataref{};
+  RowSource row{};
+  const char* derivation = "";   ///< how it is computed, or what an input is for; "" for plain fields
+  const char* remark = "";       ///< on the sources; [?] marks what only a live simulator can settle
+  bool per_engine = false;       ///< elements at or beyond the engine count are not known
+  bool is_engine_count = false;  ///< is that count; comes before the fields it bounds
+};
+
+/// All lines, in the messages' order.
+const std::vector<FieldSpec>& fieldTable();
+
+/// One dataref element to be asked for.
+struct DatarefRequest {
+  std::string path;
+  const FieldSpec* field = nullptr;
+  int element = 0;
+};
+
+/// What to ask for, in index order: position in the list is the index to give X-Plane.
+/// @param transport with kData only what no row carries
+/// @param version with kUnknown, fields whose source differs between versions are left out
+/// @param engines elements asked for of fields by engine; X-Plane answers all 8, few aircraft have them
+std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, XPlaneVersion version,
+                                            int engines = 8);
+
+/// DATA rows that carry fields of these groups, ascending, each once. All rows of every version when it is unknown.
+std::vector<std::int32_t> dataRows(const std::vector<FieldGroup>& groups, XPlaneVersion version);
+
+/// Expands `{a,b}` and `[*]`. @param count elements of the field
+std::vector<std::string> expandDatarefPath(std::string_view pattern, int count);
+
+}  // namespace xplane_bridge::core

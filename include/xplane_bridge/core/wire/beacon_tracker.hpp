@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/wire/packets.hpp"
+#include "xplane_bridge/core/wire/udp_socket.hpp"
+
+namespace xplane_bridge::core {
+
+/// An X-Plane that announces itself.
+struct BeaconSighting {
+  Endpoint endpoint;  ///< where it listens
+  std::int32_t version = 0;
+  std::string computer_name;
+};
+
+/// "lab-pc-3 (192.168.1.5:49000, version 122015)"
+std::string toString(const BeaconSighting& sighting);
+
+/// Remembers which X-Planes announce themselves and chooses among them. Times are the steady clock's [ns].
+class BeaconTracker {
+ public:
+  /// `is_own`: whether an address is one of this computer's, whose X-Plane is heard under several.
+  BeaconTracker(double timeout_s, double settle_s, std::function<bool(std::uint32_t)> is_own);
+
+  /// Takes note of a beacon. Ignores what is not a master X-Plane (external visuals, instructor stations, Plane Maker);
+  /// returns whether it was noted.
+  bool heard(const Beacon& beacon, std::uint32_t from_address, std::int64_t now_ns);
+
+  /// Those heard within the timeout.
+  std::vector<BeaconSighting> sightings(std::int64_t now_ns) const;
+  /// The X-Plane at this place, if it has been heard within the timeout.
+  std::optional<BeaconSighting> at(const Endpoint& endpoint, std::int64_t now_ns) const;
+
+  /// Since when [ns] the X-Plane at this place has not announced itself; 0 when it never has.
+  std::int64_t lastHeard(const Endpoint& endpoint) const;
+
+  /// The only X-Plane there is, once nobody else has announced itself for the settling time. Empty while waiting, or
+  /// when there are several.
+  std::optional<BeaconSighting> onlyOne(std::int64_t now_ns) const;
+  /// The one X-Plane that has begun to announce itself after `since_ns`: the old one after a restart, as long as there
+  /// is no second new one.
+  std::optional<BeaconSighting> onlyNewSince(std::int64_t since_ns, std::int64_t now_ns) const;
+
+ private:
+  struct Known {
+    BeaconSighting sighting;
+    std::int64_t first_ns = 0;
+    std::int64_t last_ns = 0;
+  };
+  bool isFresh(const Known& known, std::int64_t now_ns) const { return now_ns - known.last_ns <= timeout_ns_; }
+  bool isSame(const Endpoint& a, const Endpoint& b) const;
+
+  std::int64_t timeout_ns_;
+  std::int64_t settle_ns_;
+  std::function<bool(std::uint32_t)> is_own_;
+  std::vector<Known> known_;
+};
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,202 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <boost/make_shared.hpp>
+
+#include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/nodes/base/common_options.hpp"
+#include "xplane_bridge/nodes/base/param_loader.hpp"
+
+namespace xplane_bridge {
+
+/// How a node's process ends.
+enum class ExitCode {
+  kOk = 0,            ///< stopped on request, everything undone
+  kSetupError = 1,    ///< parameters or resources were refused at start; the message says which
+  kRuntimeError = 2,  ///< had to stop by itself; the message says why
+  kStopTimeout = 3,   ///< the orderly stop hung and was cut off
+};
+
+/// What every node of this package is built on: life cycle, parameters, diagnostics and orderly shutdown.
+///
+/// Life cycle, each step once and in this order, checked:
+///
+///     constructor       stores handles only; no parameter, topic or virtual call
+///     initialize()      loadParameters() -> advertise() -> subscribe()
+///     run()             the link is made -> start() -> the link starts -> callbacks until a stop is requested
+///                       -> the stop sequence below -> exit code
+///
+/// Stop sequence, on SIGINT, SIGTERM, SIGHUP, `rosnode kill` (the master's shutdown request) or requestStop():
+/// subscriptions, timers and services end -> undo() and the link's own undoing (what was changed in X-Plane, on the
+/// node's own socket, at most kUndoTime; ROS is still there but is not needed) -> publishFinalState() (latched topics)
+/// -> ros::shutdown() -> joinThreads(). If it takes longer than kStopTime in all, the process ends with
+/// ExitCode::kStopTimeout and says where it hung.
+///
+/// Threads: subscriptions and timers are served one at a time by one thread; services by another one, so that a
+/// service waiting for X-Plane never delays a control callback; diagnostics by a third at a steady 1 Hz; the link by a
+/// fourth, which knows no ROS and calls linkCallbacks(). Hooks run on the thread that calls initialize() or run().
+/// SIGINT, SIGTERM and SIGHUP are blocked in all threads (see StopSignals): a child process must unblock them.
+class BaseNode {
+ public:
+  static constexpr std::chrono::milliseconds kUndoTime{1000};
+  static constexpr std::chrono::milliseconds kStopTime{5000};
+
+  BaseNode();
+  virtual ~BaseNode();
+  BaseNode(const BaseNode&) = delete;
+  BaseNode(BaseNode&&) = delete;
+  BaseNode& operator=(const BaseNode&) = delete;
+  BaseNode& operator=(BaseNode&&) = delete;
+
+  /// Reads and validates all parameters, then advertises and subscribes. Nothing is sent to X-Plane before run().
+  /// @throws ParamError on parameters, std::runtime_error on resources; std::logic_error when called twice
+  void initialize();
+
+  /// Blocks until a stop is requested and carried out. @throws std::logic_error unless initialized
+  ExitCode run();
+
+  /// Asks run() to end, from any thread; the first request counts. `reason` goes to the log.
+  void requestStop(const std::string& reason, ExitCode code = ExitCode::kOk);
+
+  /// True as soon as a stop is requested.
+  bool stopping() const { return stop_requested_; }
+
+ protected:
+  using Deadline = std::chrono::steady_clock::time_point;
+
+  // Hooks, in the order they are called.
+
+  /// Fill option structs from `own` (the node's private namespace), throw ParamError on anything wrong. Keys nobody
+  /// asked for are refused afterwards. The shared ones are in common() already.
+  virtual void loadParameters(const ParamLoader& own) = 0;
+  virtual void advertise() {}
+  virtual void subscribe() {}
+  /// Whether the node talks to X-Plane; false for one that only talks to other nodes.
+  virtual bool usesLink() const { return true; }
+  /// What the node wants of its link beyond the shared parameters.
+  virtual void configureLink(core::SimLinkOptions* options) { static_cast<void>(options); }
+  /// Called from the link's thread; must return quickly.
+  virtual core::SimLinkCallbacks linkCallbacks() { return {}; }
+  /// Subscribe datarefs with link(), open sockets, start threads. Callbacks come once this returns.
+  virtual void start() {}
+  /// Subscriptions, timers and services have ended; end the node's own inputs.
+  virtual void stopInputs() {}
+  /// Take back what was changed in X-Plane and read it back, until `deadline` at most.
+  virtual void undo(Deadline deadline) { static_cast<void>(deadline); }
+  /// Publish the last word on latched topics.
+  virtual void publishFinalState() {}
+  /// Join the node's own threads; ROS is down.
+  virtual void joinThreads() {}
+
+  const CommonOptions& common() const { return common_; }
+  /// Valid from start() to the end of undo(), only with usesLink(). What a node changes in X-Plane it records in
+  /// link().journal() first.
+  core::SimLink& link() { return *link_; }
+  /// Relative names: topics, services.
+  ros::NodeHandle& handle() { return handle_; }
+  /// The node's full name.
+  const std::string& name() const { return ros::this_node::getName(); }
+
+  template <class Message>
+  ros::Publisher advertiseTopic(const std::string& topic, uint32_t queue_size, bool latch = false) {
+    return handle_.advertise<Message>(topic, queue_size, latch);
+  }
+
+  /// Subscribes without Nagle's delay. Use queue size 1 for control topics: the newest command counts.
+  template <class Message>
+  void subscribeTopic(const std::string& topic, uint32_t queue_size,
+                      std::function<void(const boost::shared_ptr<const Message>&)> callback) {
+    subscribers_.push_back(handle_.subscribe<Message>(
+        topic, queue_size, boost::function<void(const boost::shared_ptr<const Message>&)>(std::move(callback)),
+        ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  }
+
+  /// Advertises a service on the service thread. While stopping, calls fail at once. An exception fails the call and
+  /// is logged.
+  template <class Request, class Response>
+  void advertiseService(const std::string& service, std::function<void(const Request&, Response&)> serve) {
+    ros::AdvertiseServiceOptions options;
+    options.init<Request, Response>(service, [this, service, serve](Request& request, Response& response) {
+      return guardedService(service, [&] { serve(request, response); });
+    });
+    options.callback_queue = &service_queue_;
+    services_.push_back(handle_.advertiseService(options));
+  }
+
+  /// Calls `callback` every `period` [s] of the steady clock, on the thread of the subscriptions.
+  void addTimer(double period, std::function<void()> callback);
+
+  /// Adds a status to /diagnostics, filled at 1 Hz on the diagnostics thread: `fill` must lock what it reads.
+  void addDiagnostics(const std::string& status_name,
+                      std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)> fill);
+  /// What the diagnostics are about, e.g. "X-Plane 11.55 at 192.168.1.20:49000".
+  void setHardwareId(const std::string& id);
+
+ private:
+  enum class State { kCreated, kInitialized, kRunning, kStopped };
+
+  void makeLink();
+  void startLink();
+  void stopLink(Deadline deadline);
+  void requireState(State wanted, const char* call) const;
+  bool guardedService(const std::string& service, const std::function<void()>& serve);
+  void takeOverShutdownRequest();
+  void waitForStopRequest();
+  void stop();
+  void endInputs();
+  void flushPublishers();
+  void diagnosticsLoop();
+
+  State state_ = State::kCreated;
+  bool started_ = false;
+  ros::NodeHandle handle_;
+  ros::NodeHandle private_handle_;
+  CommonOptions common_;
+
+  std::vector<ros::Subscriber> subscribers_;
+  std::vector<ros::ServiceServer> services_;
+  std::vector<ros::SteadyTimer> timers_;
+  ros::CallbackQueue service_queue_;
+  std::unique_ptr<ros::AsyncSpinner> spinner_;
+  std::unique_ptr<ros::AsyncSpinner> service_spinner_;
+
+  std::unique_ptr<core::SimLink> link_;
+
+  std::mutex service_mutex_;
+  std::condition_variable service_idle_;
+  bool service_busy_ = false;
+
+  std::mutex diagnostics_mutex_;
+  std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  std::thread diagnostics_thread_;
+
+  mutable std::mutex stop_mutex_;
+  std::condition_variable stop_changed_;
+  std::atomic<bool> stop_requested_{false};
+  std::string stop_reason_;
+  ExitCode exit_code_ = ExitCode::kOk;
+};
+
+/// The whole of a node's main(): initialises ROS without its own signal handler, waits for the master (Ctrl-C ends the
+/// wait), builds the node, initialises and runs it. Errors go to the log and stderr. Returns the process's exit code.
+int runNode(int argc, char** argv, const std::string& default_name,
+            const std::function<std::unique_ptr<BaseNode>()>& make_node);
+
+template <class Node>
+int runNode(int argc, char** argv, const std::string& default_name) {
+  return runNode(argc, argv, default_name, [] { return std::make_unique<Node>(); });
+}
+
+}  // namespace xplane_bridge

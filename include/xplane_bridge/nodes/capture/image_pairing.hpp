@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <mutex>
+
+#include "xplane_bridge/FlightState.h"
+#include "xplane_bridge/FrameState.h"
+#include "xplane_bridge/core/camera/image_association.hpp"
+#include "xplane_bridge/core/state/clock_filter.hpp"
+#include "xplane_bridge/core/state/mission_state.hpp"
+
+namespace xplane_bridge {
+
+/// Gives every picture its FrameState, in the order of the pictures, exactly one each.
+///
+/// Simulator frames come from the capture host's own subscription, states from wherever rx_node runs; both meet on the
+/// simulator's time axis (core/image_association.hpp). All functions may be called from any thread.
+class ImagePairing {
+ public:
+  using Publish = std::function<void(const FrameState&)>;
+
+  /// @param display_delay [s] from a simulator frame to its display; 0 counts as not measured
+  /// @param max_wait [s] after a picture at which it is paired with what is there
+  /// @param publish called under the lock, in order; must not call back
+  ImagePairing(double display_delay, double max_wait, Publish publish);
+
+  /// A frame heard on the capture host. @param receive_ns [ns] host time, running evenly
+  void addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns);
+  /// The link is new or gone: the simulator's clock is to be learnt anew.
+  void forgetClock();
+  /// @param arrival_ns [ns] host time
+  void addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns);
+  /// A published picture: its FrameState with everything the capture knows (header, times, view, counts, its quality
+  /// bits); the rest is filled in here.
+  void addPicture(const FrameState& picture, std::int64_t now_ns);
+  /// Publishes what is ready or overdue.
+  void flush(std::int64_t now_ns);
+
+  struct Report {
+    core::AssociationCounters counters;
+    double clock_uncertainty = 0.0;  ///< [s]
+    bool clock_fitted = false;
+    double state_to_frame_ratio = 0.0;
+    double mean_offset = 0.0;  ///< [s] of the last answers: display minus frame, beyond the display delay
+    std::size_t waiting = 0;   ///< pictures without an answer yet
+  };
+  [[nodiscard]] Report report() const;
+
+ private:
+  struct Waiting {
+    FrameState answer;
+    core::ImageMoment moment;
+    std::int64_t deadline_ns;
+    std::uint32_t slips = 0;  ///< of the clock when `moment` was mapped
+  };
+  struct KnownState {
+    FlightState::ConstPtr message;
+    std::int64_t arrival_ns;
+  };
+
+  void map(core::ImageMoment* moment) const;
+  /// Maps again where the clock has come, or learnt of a slip, since.
+  void mapAnew(Waiting* picture) const;
+  void flushLocked(std::int64_t now_ns);
+  void complete(const core::Association& association, std::int64_t now_ns, Waiting* picture);
+  void forgetOldStates();
+
+  const double display_delay_;
+  const std::int64_t max_wait_ns_;
+  const Publish publish_;
+
+  mutable std::mutex mutex_;
+  core::ClockFilter clock_;
+  core::ImageAssociator associator_;
+  core::SimStatus status_;
+  float frame_period_ = 0.0F;
+  std::map<std::uint64_t, KnownState> states_;
+  std::uint64_t next_state_id_ = 0;
+  std::deque<Waiting> waiting_;
+  std::uint32_t unpaired_ = 0;
+  double mean_offset_ = 0.0;
+};
+
+}  // namespace xplane_bridge

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/DataRows.h"
+#include "xplane_bridge/GetDataref.h"
+#include "xplane_bridge/SetOrigin.h"
+#include "xplane_bridge/core/state/aircraft_identity.hpp"
+#include "xplane_bridge/core/state/clock_filter.hpp"
+#include "xplane_bridge/core/state/consistency_monitor.hpp"
+#include "xplane_bridge/core/state/state_assembler.hpp"
+#include "xplane_bridge/nodes/base/base_node.hpp"
+#include "xplane_bridge/nodes/base/rate_meter.hpp"
+#include "xplane_bridge/nodes/rx/dataref_publisher.hpp"
+#include "xplane_bridge/nodes/rx/flight_publisher.hpp"
+#include "xplane_bridge/nodes/rx/mission_publisher.hpp"
+#include "xplane_bridge/nodes/rx/rx_options.hpp"
+
+namespace xplane_bridge {
+
+/// X-Plane -> ROS: flight state, mission state, standard messages, any dataref (docs/rx_node.md).
+///
+/// Data are published from the link's thread, as they arrive. A timer on the subscription thread looks after what is
+/// asked of X-Plane: it changes with X-Plane's version and with the aircraft. mutex_ guards everything both touch; it
+/// is never held while the link is called, except from the link's own callbacks.
+class RxNode : public BaseNode {
+ protected:
+  void loadParameters(const ParamLoader& own) override;
+  void advertise() override;
+  void configureLink(core::SimLinkOptions* options) override;
+  core::SimLinkCallbacks linkCallbacks() override;
+  void publishFinalState() override;
+
+ private:
+  /// One group of datarefs kept subscribed.
+  struct Subscription {
+    std::string name;
+    int rate = 0;
+    int priority = 0;
+    std::function<std::vector<std::string>()> requests;
+    std::function<void(const core::RrefView&, std::int64_t receive_ns)> receive;
+    std::optional<core::GroupId> id;
+    bool current = false;  ///< X-Plane was asked for requests(); else answers belong to an older list
+  };
+
+  // Link's thread.
+  void onRref(core::GroupId id, const core::RrefView& datagram, const core::ReceiveInfo& info);
+  void onData(const core::DataView& datagram, const core::ReceiveInfo& info);
+  void onRpos(const core::Rpos& position, const core::ReceiveInfo& info);
+  void onXpc(const core::XpcPosition& position, const core::ReceiveInfo& info);
+  void onLinkState(const core::LinkStatus& status);
+  /// Begins every callback: the time of receipt, after noticing that the link came up anew.
+  std::int64_t begin(const core::ReceiveInfo& info);
+  void publishState(const core::FlightState* state, std::int64_t receive_ns);
+  void publishRows(const core::DataView& datagram, const core::ReceiveInfo& info, std::int64_t receive_ns);
+
+  // Timer.
+  void supervise();
+  void adoptVersion(const core::LinkStatus& status);
+  void renewSubscriptions();
+  void supervisePositionCheck();
+  std::vector<std::int32_t> wantedRows() const;
+
+  void addSubscriptions();
+  void publishLinkState(const core::LinkStatus& status);
+  float nearSimTime(std::int64_t receive_ns) const;
+
+  void setOrigin(const SetOrigin::Request& request, SetOrigin::Response& response);
+  void getDataref(const GetDataref::Request& request, GetDataref::Response& response);
+
+  // Diagnostics (rx_node_diagnostics.cpp).
+  void addAllDiagnostics();
+  void diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status);
+  void diagnoseClock(diagnostic_updater::DiagnosticStatusWrapper* status);
+  void diagnosePosition(diagnostic_updater::DiagnosticStatusWrapper* status);
+  void diagnosePhysics(diagnostic_updater::DiagnosticStatusWrapper* status);
+  void diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status);
+
+  RxOptions options_;
+  core::Clock clock_ = core::hostClock();
+
+  std::mutex mutex_;
+  std::unique_ptr<core::FlightStateAssembler> flight_;
+  std::unique_ptr<FlightPublisher> flight_publisher_;
+  std::vector<std::unique_ptr<MissionPublisher>> missions_;
+  std::unique_ptr<DatarefPublisher> datarefs_;
+  core::AircraftIdentityReader aircraft_;
+  core::RowStore rows_;
+  core::ReceiveClock receive_clock_;
+  core::ConsistencyMonitor consistency_;
+  std::vector<Subscription> subscriptions_;
+  std::uint32_t link_epoch_ = 0;
+  std::optional<core::FlightState> last_state_;
+  std::int64_t last_state_received_ns_ = 0;
+  core::LinkStatus last_status_;
+
+  // Timer only.
+  std::optional<core::XPlaneVersion> adopted_version_;
+  std::optional<std::chrono::steady_clock::time_point> waiting_for_version_since_;
+  std::chrono::steady_clock::time_point last_search_word_{};
+  std::int32_t rpos_rate_ = 0;
+
+  // Diagnostics thread only.
+  RateMeter state_rate_;
+  std::vector<RateMeter> mission_rates_;
+
+  ros::Publisher link_state_publisher_;
+  ros::Publisher rows_publisher_;
+  DataRows rows_message_;
+};
+
+}  // namespace xplane_bridge

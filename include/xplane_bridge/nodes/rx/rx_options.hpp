@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/state/field_table.hpp"
+#include "xplane_bridge/core/state/frames.hpp"
+#include "xplane_bridge/core/state/state_assembler.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
+#include "xplane_bridge/nodes/base/param_loader.hpp"
+
+namespace xplane_bridge {
+
+/// One entry of rx_node's `datarefs` list.
+struct DatarefEntry {
+  std::vector<std::string> elements;  ///< single datarefs, in the order of their values
+  int rate = 10;                      ///< [1/s]
+  std::string topic;                  ///< scalar topic below `datarefs/`; empty: none. Only for a single element
+};
+
+/// What rx_node alone decides; what all nodes share is in CommonOptions.
+struct RxOptions {
+  double max_publish_rate = 0.0;  ///< [1/s] of flight_state and what goes with it; 0: every simulator frame
+  double wind_rate = 10.0;        ///< [1/s] highest
+  /// Requests [1/s] by group, index is core::FieldGroup; 0: the group is not asked for. The flight group's is the rate
+  /// of flight_state as long as X-Plane renders that fast.
+  std::array<int, core::kFieldGroupCount> rates{};
+  core::PositionMode position_source = core::PositionMode::kAuto;
+  int xpc_port = core::kXpcPort;
+  std::optional<core::GeoPoint> origin;  ///< of `map`; empty: the first valid position
+  double geoid_undulation = 0.0;         ///< [m] added to NavSatFix altitudes
+  bool publish_tf = false;               ///< map -> base_link on /tf
+  std::vector<DatarefEntry> datarefs;
+
+  // transport `data` only
+  bool configure_xplane = true;          ///< set rows, rate and target in X-Plane, and restore them
+  int data_output_rate = 99;             ///< [1/s] asked of X-Plane's Data Output while we run
+  std::string data_address;              ///< IPv4 address X-Plane shall send to; empty: ours, as X-Plane sees it
+  std::vector<std::int32_t> extra_rows;  ///< rows wanted on `data_rows` beyond those the state needs
+};
+
+/// Reads and checks rx_node's private parameters. @throws ParamError
+RxOptions loadRxOptions(const ParamLoader& own);
+
+}  // namespace xplane_bridge

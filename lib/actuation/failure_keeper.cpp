@@ -1,0 +1,543 @@
+#include "xplane_bridge/actuation/failure_keeper.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/failures/failure_names.hpp"
+#include "xplane_bridge/core/link/journal.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr std::int32_t kMenuRate = 1;   // [Hz] of all failure datarefs: what is set in the simulator's menu
+constexpr std::int32_t kOwnRate = 20;   // [Hz] of those set here
+constexpr double kPublishPeriod = 1.0;  // [s]
+constexpr double kBehaviourWait = 1.0;  // [s] in which X-Plane's own failure must move the surface as it says
+constexpr double kBehaviourDeg = 2.0;   // [deg] off that counts as obeyed
+constexpr double kRepairedAfter = 0.5;  // [s] without it until a failure counts as repaired in the simulator
+constexpr double kRepairWait = 0.5;     // [s] in which values from before a repair may still come
+constexpr double kSendAgain = 0.3;      // [s] until what X-Plane does not show is sent once more
+constexpr double kWaitSlack = 1.0;      // [s] a service waits beyond what ends by itself
+constexpr double kReadWait = 0.5;       // [s] for one dataref, however late it is
+
+ServiceResult result(std::uint8_t code, const std::string& message) {
+  ServiceResult out;
+  out.code = code;
+  out.message = message;
+  return out;
+}
+
+bool isUp(const core::LinkStatus& status) {
+  return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
+}
+
+std::string described(const core::FailurePlan& plan) {
+  std::string out = plan.name + " " + plan.kind;
+  if (!plan.value) return out;
+  char text[32];
+  std::snprintf(text, sizeof text, " at %g", *plan.value);
+  return out + text;
+}
+
+// Where X-Plane's own failure brings a surface; nullopt where that cannot be told from the law.
+std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double shown,
+                                    const std::optional<core::SurfaceLaw>& law) {
+  switch (failure.fault) {
+    case core::SurfaceFault::kStuck:
+      return shown;
+    case core::SurfaceFault::kHardOverUp:
+      return law ? std::optional<double>(law->low_deg) : std::nullopt;
+    case core::SurfaceFault::kHardOverDown:
+      return law ? std::optional<double>(law->high_deg) : std::nullopt;
+    case core::SurfaceFault::kCentred:
+      return law ? std::optional<double>(law->neutral()) : std::nullopt;
+    case core::SurfaceFault::kFloating:
+    case core::SurfaceFault::kReduced:
+    case core::SurfaceFault::kSlow:
+      return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+FailureKeeper::FailureKeeper(core::SimLink* link, OverrideKeeper* overrides, SurfaceControl* surfaces, double timeout,
+                             ros::Publisher publisher, Report report)
+    : link_(link),
+      overrides_(overrides),
+      surfaces_(surfaces),
+      timeout_(timeout),
+      publisher_(std::move(publisher)),
+      report_(std::move(report)) {}
+
+void FailureKeeper::onLink(const core::LinkStatus& status) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  link_status_ = status;
+  changed_.notify_all();
+  if (!status.version) return;
+  const core::SimulatorGeneration generation = core::generationOf(*status.version);
+  if (menu_group_ >= 0 && generation == generation_) return;
+  generation_ = generation;
+  menu_datarefs_ = core::simulatorFailures(generation);
+  if (menu_group_ >= 0) link_->removeGroup(menu_group_);
+  menu_group_ = link_->addGroup({"failures", menu_datarefs_, kMenuRate, 0});
+}
+
+bool FailureKeeper::onRref(core::GroupId group, const core::RrefView& view) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (group == menu_group_) {
+    observe(menu_datarefs_, view);
+  } else if (group == own_group_) {
+    observe(own_datarefs_, view);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core::RrefView& view) {
+  bool any = false;
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const core::RrefPair pair = view[i];
+    if (pair.index < 0 || static_cast<std::size_t>(pair.index) >= datarefs.size()) continue;
+    const std::string& dataref = datarefs[static_cast<std::size_t>(pair.index)];
+    // What was on its way when it was repaired here says nothing.
+    const auto undone = undone_.find(dataref);
+    if (undone != undone_.end() && tick_time_ - undone->second < kRepairWait) continue;
+    const std::string name = core::failureName(dataref);
+    const bool known = book_.knows(name);
+    if (!book_.observe(dataref, static_cast<double>(pair.value), now_.sim_time)) continue;
+    any = true;
+    if (known != book_.knows(name)) {
+      report_(known ? name + " was repaired in the simulator" : name + " was failed in the simulator", "", true);
+    }
+  }
+  if (!any) return;
+  dirty_ = true;
+  applySurfaces();
+}
+
+void FailureKeeper::onFrame(const core::FlightWatch& watch) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const double before = now_.sim_time;
+  now_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
+  if (stopped_) return;
+  if (now_.sim_time < before - core::kOvertaking) end(false, "X-Plane was restarted");
+  for (const core::FailurePlan& plan : book_.due(now_)) carryOut(plan);
+}
+
+void FailureKeeper::applySurfaces() {
+  surfaces_->setFailures(book_.drivenSurfaces());
+  bool disturbed = false;
+  for (const core::FailureLabel& label : book_.labels()) {
+    disturbed = disturbed || (label.active && core::touchesSurfaces(label.name));
+  }
+  for (const auto& dataref : own_datarefs_) disturbed = disturbed || core::touchesSurfaces(dataref);
+  surfaces_->setDisturbed(disturbed);
+}
+
+void FailureKeeper::carryOut(const core::FailurePlan& plan) {
+  dirty_ = true;
+  Pending pending;
+  pending.plan = plan;
+  pending.who = asked_by_[plan.name];
+  pending.since = pending.sent = tick_time_;
+  if (plan.surface) {
+    const double shown = surfaces_->shown(plan.surface->surface);
+    if (plan.surface->fault == core::SurfaceFault::kStuck && !plan.value) book_.setValue(plan.name, shown);
+    pending.expected_deg = expectedAngle(*plan.surface, shown, surfaces_->lawOf(plan.surface->surface));
+  }
+  try {
+    for (const std::string& dataref : plan.datarefs) {
+      overrides_->hold(dataref, static_cast<float>(core::kFailedNow), false);
+      undone_.erase(dataref);
+    }
+  } catch (const core::JournalError& error) {
+    giveUp(plan.name, std::string("it could not be repaired after a crash: ") + error.what());
+    return;
+  }
+  report_("failure: " + described(plan), pending.who, true);
+  pending_[plan.name] = pending;
+  watchOwn();
+  applySurfaces();
+}
+
+void FailureKeeper::watchOwn() {
+  std::vector<std::string> datarefs;
+  for (const auto& [name, pending] : pending_) {
+    if (!book_.isDriven(name)) {
+      datarefs.insert(datarefs.end(), pending.plan.datarefs.begin(), pending.plan.datarefs.end());
+    }
+  }
+  for (const core::FailureLabel& label : book_.labels()) {
+    if (!label.by_bridge || !label.active || pending_.count(label.name) != 0) continue;
+    const auto own = book_.datarefsOf(label.name);
+    datarefs.insert(datarefs.end(), own.begin(), own.end());
+  }
+  if (datarefs == own_datarefs_) return;
+  own_datarefs_ = datarefs;
+  // A group of its own each time: answers to the old list must not be taken for the new one's.
+  if (own_group_ >= 0) link_->removeGroup(own_group_);
+  own_group_ = own_datarefs_.empty() ? -1 : link_->addGroup({"failures set", own_datarefs_, kOwnRate, 1});
+}
+
+void FailureKeeper::undo(const core::FailurePlan& plan) {
+  pending_.erase(plan.name);
+  repaired_since_.erase(plan.name);
+  repair(plan.datarefs);
+}
+
+void FailureKeeper::repair(const std::vector<std::string>& datarefs) {
+  for (const std::string& dataref : datarefs) {
+    try {
+      overrides_->unhold(dataref);
+    } catch (const core::JournalError& error) {
+      report_(error.what(), "", false);
+    }
+    undone_[dataref] = tick_time_;
+    // One of the simulator's menu is not held.
+    link_->sendDref(dataref, static_cast<float>(core::kWorking));
+  }
+}
+
+void FailureKeeper::giveUp(const std::string& name, const std::string& why) {
+  for (const core::FailurePlan& plan : book_.clear({name}, false).undo) undo(plan);
+  not_shown_[name] = why;
+  report_("failure of " + name + " is given up: " + why, asked_by_[name], false);
+  dirty_ = true;
+  watchOwn();
+  applySurfaces();
+  changed_.notify_all();
+}
+
+void FailureKeeper::end(bool driven_only, const std::string& why) {
+  for (const core::FailureLabel& label : book_.labels()) {
+    if (!label.by_bridge || (driven_only && !book_.isDriven(label.name))) continue;
+    for (const core::FailurePlan& plan : book_.clear({label.name}, false).undo) undo(plan);
+    not_shown_[label.name] = why;
+    report_("failure of " + label.name + " has ended: " + why, "", true);
+    dirty_ = true;
+  }
+  watchOwn();
+  applySurfaces();  // which may have been told of them again meanwhile
+  changed_.notify_all();
+}
+
+void FailureKeeper::useDriver(const Pending& pending) {
+  repair(pending.plan.datarefs);
+  book_.useDriver(pending.plan.name, now_.sim_time, pending.expected_deg);
+  report_(pending.plan.name + ": X-Plane's own failure does not act as it says, so that tx_node drives the surfaces",
+          pending.who, true);
+  dirty_ = true;
+  watchOwn();
+  applySurfaces();
+}
+
+bool FailureKeeper::settled(Pending* pending) {
+  const std::string& name = pending->plan.name;
+  const auto settle = [this, pending, &name] {
+    const auto& surface = pending->plan.surface;
+    // Where it got stuck is known only now.
+    if (surface && surface->fault == core::SurfaceFault::kStuck && !surface->value) {
+      book_.setValue(name, surfaces_->shown(surface->surface));
+    }
+    return true;
+  };
+  const double age = tick_time_ - pending->since;
+  if (book_.isDriven(name)) {
+    if (surfaces_->follows(pending->plan.surface->surface)) {
+      book_.confirm(name, true);
+      return settle();
+    }
+    if (age < timeout_) return false;
+    const std::string refusal = surfaces_->refusal();
+    giveUp(name, refusal.empty() ? "X-Plane does not show what is sent to the surface" : refusal);
+    return true;
+  }
+  if (pending->confirmed < 0.0) {
+    const auto labels = book_.labels();
+    const bool shown = std::any_of(labels.begin(), labels.end(), [&name](const core::FailureLabel& label) {
+      return label.name == name && label.confirmed;
+    });
+    if (shown) {
+      pending->confirmed = tick_time_;
+    } else if (age <= timeout_) {
+      if (tick_time_ - pending->sent < kSendAgain) return false;
+      pending->sent = tick_time_;  // a datagram may have been lost
+      for (const std::string& dataref : pending->plan.datarefs) {
+        link_->sendDref(dataref, static_cast<float>(core::kFailedNow));
+      }
+    } else {
+      if (pending->plan.surface) {
+        pending->since = tick_time_;
+        useDriver(*pending);
+        return false;
+      }
+      giveUp(name, "X-Plane does not show it");
+      return true;
+    }
+    return false;
+  }
+  if (!pending->plan.surface || !pending->expected_deg) return settle();
+  const double off = surfaces_->shown(pending->plan.surface->surface) - *pending->expected_deg;
+  if (tick_time_ - pending->confirmed < kBehaviourWait) return false;
+  if (std::abs(off) <= kBehaviourDeg) return settle();
+  pending->since = tick_time_;
+  useDriver(*pending);
+  return false;
+}
+
+void FailureKeeper::watchPending() {
+  std::vector<std::string> names;
+  for (const auto& [name, pending] : pending_) names.push_back(name);
+  for (const std::string& name : names) {
+    const auto it = pending_.find(name);
+    if (it == pending_.end() || !settled(&it->second)) continue;
+    pending_.erase(name);
+    dirty_ = true;
+    changed_.notify_all();
+  }
+}
+
+void FailureKeeper::watchRepairs() {
+  for (const core::FailureLabel& label : book_.labels()) {
+    const bool ours = label.by_bridge && label.active && pending_.count(label.name) == 0;
+    if (!ours || label.confirmed) {
+      repaired_since_.erase(label.name);
+      continue;
+    }
+    const auto since = repaired_since_.emplace(label.name, tick_time_).first->second;
+    if (tick_time_ - since < kRepairedAfter) continue;
+    for (const core::FailurePlan& plan : book_.clear({label.name}, false).undo) undo(plan);
+    report_(label.name + " was repaired in the simulator", "", true);
+    dirty_ = true;
+    watchOwn();
+    applySurfaces();
+  }
+}
+
+void FailureKeeper::tick(double time) {
+  const auto dropped = surfaces_->takeDropped();
+  std::lock_guard<std::mutex> lock(mutex_);
+  tick_time_ = time;
+  if (dropped) end(true, *dropped);
+  if (link_status_.state == core::LinkState::kConnected) {
+    watchPending();
+    watchRepairs();
+  } else {
+    // Time stands still for what X-Plane has to show.
+    for (auto& [name, pending] : pending_) {
+      pending.since = tick_time_;
+      if (pending.confirmed >= 0.0) pending.confirmed = tick_time_;
+    }
+  }
+  if (dirty_ || published_driving_ != surfaces_->driving() || time - publish_time_ >= kPublishPeriod) publishLocked();
+  changed_.notify_all();  // services wait for what SurfaceControl does as well
+}
+
+void FailureKeeper::stop() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  stopped_ = true;
+  changed_.notify_all();
+}
+
+void FailureKeeper::repaired() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  book_.clear({}, false);
+  pending_.clear();
+}
+
+void FailureKeeper::publish() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  publishLocked();
+}
+
+void FailureKeeper::publishLocked() {
+  FailureState message;
+  message.header.stamp = ros::Time(ros::WallTime::now().toSec());
+  message.sim_time = static_cast<float>(now_.sim_time);
+  for (const core::FailureLabel& label : book_.labels()) {
+    message.names.push_back(label.name);
+    message.kinds.push_back(label.kind);
+    message.values.push_back(static_cast<float>(label.value));
+    message.set_by.emplace_back(label.by_bridge ? "bridge" : "simulator");
+    message.active.push_back(label.active);
+    message.confirmed.push_back(label.confirmed);
+    message.since_sim_time.push_back(static_cast<float>(label.since_sim_time));
+  }
+  published_driving_ = surfaces_->driving();
+  message.surrogate_mixing = published_driving_;
+  message.surrogate_lag_frames = static_cast<float>(surfaces_->lagFrames());
+  publisher_.publish(message);
+  publish_time_ = tick_time_;
+  dirty_ = false;
+}
+
+std::optional<ServiceResult> FailureKeeper::add(const core::FailureRequest& request, const std::string& who) {
+  const auto planned = core::planFailure(request, generation_);
+  if (planned.error == core::FailureError::kInvalid) return result(ServiceResult::REFUSED, planned.text);
+  if (planned.error != core::FailureError::kNone) return result(ServiceResult::NOT_SUPPORTED, planned.text);
+  const std::string& name = planned.plan.name;
+  if (const auto same = book_.sameAs(planned.plan)) {
+    return result(ServiceResult::REFUSED, name + " is broken already as " + *same + ": clear that first");
+  }
+  if (request.trigger == static_cast<int>(core::FailureTrigger::kAtSimTime) && !std::isfinite(now_.sim_time)) {
+    return result(ServiceResult::NO_LINK, "X-Plane has not told its time yet");
+  }
+  // A failure of the same name is replaced; a surface that stays driven goes from where it is.
+  for (const core::FailurePlan& plan : book_.clear({name}, true).undo) undo(plan);
+  not_shown_.erase(name);
+  asked_by_[name] = who;
+  book_.add(request, planned.plan, now_);
+  dirty_ = true;
+  if (request.trigger != 0) report_("failure armed: " + described(planned.plan), who, true);
+  if (!stopped_) {
+    for (const core::FailurePlan& plan : book_.due(now_)) carryOut(plan);
+  }
+  applySurfaces();
+  return std::nullopt;
+}
+
+ServiceResult FailureKeeper::await(std::unique_lock<std::mutex>* lock, const std::string& name) {
+  const auto longest = std::chrono::duration<double>(2.0 * timeout_ + kBehaviourWait + kWaitSlack);
+  const auto paused = [this] { return link_status_.state == core::LinkState::kPaused; };
+  // A short silence (STALE) is waited through: X-Plane loads scenery.
+  const auto gone = [this] {
+    return link_status_.state == core::LinkState::kLost || link_status_.state == core::LinkState::kSearching;
+  };
+  const auto over = [&] { return stopped_ || pending_.count(name) == 0 || paused() || gone(); };
+  if (!changed_.wait_for(*lock, longest, over))
+    return result(ServiceResult::TIMEOUT, "X-Plane did not show it in time");
+  if (stopped_ || gone()) return result(ServiceResult::NO_LINK, "X-Plane is not connected any more");
+  if (pending_.count(name) != 0) return result(ServiceResult::ACCEPTED, "X-Plane is paused: it acts when it goes on");
+  const auto why = not_shown_.find(name);
+  if (why != not_shown_.end()) return result(ServiceResult::TIMEOUT, why->second);
+  return result(ServiceResult::OK, "X-Plane shows it");
+}
+
+void FailureKeeper::set(const SetFailure::Request& request, const std::string& who, SetFailure::Response* response) {
+  core::FailureRequest wish{request.name, request.kind, std::nullopt, request.trigger,
+                            static_cast<double>(request.trigger_value)};
+  if (request.has_value) wish.value = static_cast<double>(request.value);
+  std::unique_lock<std::mutex> lock(mutex_);
+  if (!isUp(link_status_) || !link_status_.version) {
+    response->result = result(ServiceResult::NO_LINK, "X-Plane is not connected");
+    return;
+  }
+  const auto planned = core::planFailure(wish, generation_);
+  if (planned.error == core::FailureError::kNone) {
+    lock.unlock();
+    bool answered = true;
+    if (!planned.plan.datarefs.empty()) {
+      const auto values = link_->readDatarefs(planned.plan.datarefs, timeout_);
+      answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
+    }
+    const std::string refusal = planned.plan.surface ? surfaces_->refusal(planned.plan.surface->surface) : "";
+    lock.lock();
+    if (!answered && !planned.plan.surface) {
+      response->result =
+          result(ServiceResult::NOT_SUPPORTED,
+                 "this X-Plane does not answer to " + planned.plan.datarefs.front() + ": is the name right?");
+      return;
+    }
+    if ((planned.plan.datarefs.empty() || !answered) && !refusal.empty()) {
+      response->result = result(ServiceResult::REFUSED, request.name + " cannot be broken now: " + refusal);
+      return;
+    }
+  }
+  if (const auto refused = add(wish, who)) {
+    response->result = *refused;
+    return;
+  }
+  if (request.trigger != 0) {
+    response->result = result(ServiceResult::ACCEPTED, "armed; events and failures/state tell when it comes true");
+  } else {
+    response->result = await(&lock, planned.plan.name);
+  }
+  response->success = response->result.code == ServiceResult::OK || response->result.code == ServiceResult::ACCEPTED;
+}
+
+void FailureKeeper::clear(const ClearFailures::Request& request, const std::string& who,
+                          ClearFailures::Response* response) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  std::vector<std::string> names;
+  for (const std::string& name : request.names) {
+    names.push_back(core::failureName(name));
+    if (book_.knows(names.back())) continue;
+    std::string broken;
+    for (const core::FailureLabel& label : book_.labels()) broken += (broken.empty() ? "" : ", ") + label.name;
+    response->result = result(ServiceResult::REFUSED, "\"" + name + "\" is not broken: expected " +
+                                                          (broken.empty() ? "nothing, all is well" : broken));
+    return;
+  }
+  const bool driven = surfaces_->driving();
+  const auto cleared = book_.clear(names, request.include_simulator);
+  for (const std::string& name : names) {
+    if (!book_.knows(name)) continue;
+    response->result = result(ServiceResult::REFUSED, name + " was failed in the simulator: set include_simulator");
+  }
+  std::vector<std::string> datarefs;
+  for (const core::FailurePlan& plan : cleared.undo) {
+    undo(plan);
+    datarefs.insert(datarefs.end(), plan.datarefs.begin(), plan.datarefs.end());
+  }
+  for (const std::string& name : cleared.names) report_("cleared: " + name, who, true);
+  response->cleared = cleared.names;
+  dirty_ = true;
+  watchOwn();
+  applySurfaces();
+  const bool given_back = book_.drivenSurfaces().empty();
+  const bool up = isUp(link_status_);
+  lock.unlock();
+  if (response->result.code == ServiceResult::REFUSED) return;
+  if (!up) {
+    response->result = result(ServiceResult::NO_LINK, "X-Plane is not connected; it is repaired when it comes back");
+    return;
+  }
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_);
+  const auto left = [&deadline] {
+    return std::max(std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count(), 0.01);
+  };
+  for (const std::string& dataref : datarefs) {
+    if (link_->waitForDataref(dataref, static_cast<float>(core::kWorking), 0.0F, left()).first) continue;
+    response->result = result(ServiceResult::TIMEOUT, "X-Plane still shows " + dataref);
+    return;
+  }
+  if (driven && given_back) {
+    lock.lock();
+    const bool back = changed_.wait_for(lock, std::chrono::duration<double>(left()),
+                                        [this] { return stopped_ || !surfaces_->givingBack(); });
+    lock.unlock();
+    // It also ends by being given up.
+    if (!back || (!surfaces_->driving() &&
+                  !link_->waitForDataref(core::kSurfaceOverride, 0.0F, 0.0F, std::max(left(), kReadWait)).first)) {
+      response->result = result(ServiceResult::TIMEOUT, std::string("X-Plane still shows ") + core::kSurfaceOverride);
+      return;
+    }
+  }
+  response->success = true;
+  response->result = result(ServiceResult::OK, cleared.names.empty() ? "nothing was broken" : "repaired");
+}
+
+void FailureKeeper::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  std::lock_guard<std::mutex> lock(mutex_);
+  std::string broken, unconfirmed;
+  for (const core::FailureLabel& label : book_.labels()) {
+    broken += (broken.empty() ? "" : ", ") + label.name;
+    if (label.active && !label.confirmed) unconfirmed += (unconfirmed.empty() ? "" : ", ") + label.name;
+    status->add(label.name, label.kind + (label.by_bridge ? ", by the bridge" : ", by the simulator") +
+                                (!label.active     ? ", armed"
+                                 : label.confirmed ? ", seen"
+                                                   : ", not seen"));
+  }
+  if (!unconfirmed.empty()) {
+    status->summary(Level::WARN, "X-Plane does not show the failure of " + unconfirmed);
+  } else {
+    status->summary(Level::OK, broken.empty() ? "nothing is broken" : "broken: " + broken);
+  }
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,356 @@
+#include "xplane_bridge/core/control/axis_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+
+namespace xplane_bridge::core {
+namespace {
+
+// Drivers divide by 32767 or 32768, so full travel may come out a little above 1.
+constexpr double kAxisTolerance = 1e-3;
+
+struct TargetRow {
+  JoyTarget target;
+  const char* name;
+  std::uint32_t field;
+  double ControlCommand::*value;
+  Channel range;
+};
+constexpr TargetRow kTargets[] = {
+    {JoyTarget::kRoll, "roll", kFieldRoll, &ControlCommand::roll, Channel::kRoll},
+    {JoyTarget::kPitch, "pitch", kFieldPitch, &ControlCommand::pitch, Channel::kPitch},
+    {JoyTarget::kYaw, "yaw", kFieldYaw, &ControlCommand::yaw, Channel::kYaw},
+    {JoyTarget::kThrottle, "throttle", kFieldThrottle, &ControlCommand::throttle, Channel::kLever0},
+    {JoyTarget::kTrimRoll, "trim_roll", kFieldTrimRoll, &ControlCommand::trim_roll, Channel::kTrimRoll},
+    {JoyTarget::kTrimPitch, "trim_pitch", kFieldTrimPitch, &ControlCommand::trim_pitch, Channel::kTrimPitch},
+    {JoyTarget::kTrimYaw, "trim_yaw", kFieldTrimYaw, &ControlCommand::trim_yaw, Channel::kTrimYaw},
+    {JoyTarget::kFlaps, "flaps", kFieldFlaps, &ControlCommand::flaps, Channel::kFlaps},
+    {JoyTarget::kSpeedbrake, "speedbrake", kFieldSpeedbrake, &ControlCommand::speedbrake, Channel::kSpeedbrake},
+    {JoyTarget::kGear, "gear", kFieldGear, &ControlCommand::gear, Channel::kGear},
+    {JoyTarget::kParkingBrake, "parking_brake", kFieldParkingBrake, &ControlCommand::parking_brake,
+     Channel::kParkingBrake},
+    {JoyTarget::kBrakes, "brakes", kFieldToeBrakes, nullptr, Channel::kLeftBrake},
+    {JoyTarget::kLeftBrake, "left_brake", kFieldToeBrakes, &ControlCommand::left_brake, Channel::kLeftBrake},
+    {JoyTarget::kRightBrake, "right_brake", kFieldToeBrakes, &ControlCommand::right_brake, Channel::kRightBrake},
+    {JoyTarget::kThrustVector, "thrust_vector", kFieldThrustVector, &ControlCommand::thrust_vector,
+     Channel::kThrustVector},
+};
+
+const TargetRow& rowOf(JoyTarget target) {
+  return *std::find_if(std::begin(kTargets), std::end(kTargets),
+                       [&](const TargetRow& r) { return r.target == target; });
+}
+
+void command(JoyTarget target, double value, ControlCommand& out) {
+  const TargetRow& row = rowOf(target);
+  const ChannelRange range = commandRange(row.range);
+  const double saturated = std::clamp(value, range.low, range.high);
+  out.fields |= row.field;
+  if (target == JoyTarget::kBrakes) {
+    out.left_brake = out.right_brake = saturated;
+  } else {
+    out.*row.value = saturated;
+  }
+}
+
+std::string wrong(const std::string& key, double given, const std::string& expected) {
+  char number[32];
+  std::snprintf(number, sizeof number, "%g", given);
+  return key + " is " + number + ": expected " + expected;
+}
+
+std::string rangeText(ChannelRange range) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%g..%g", range.low, range.high);
+  return text;
+}
+
+bool inRange(double value, ChannelRange range) { return value >= range.low && value <= range.high; }
+
+std::optional<std::string> checkIntegrated(const IntegratedInput& in, StickMode mode) {
+  const bool has_axis = in.axis.of(mode) >= 0;
+  const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
+  if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
+  if (!std::isfinite(in.rate) || in.rate == 0.0) return wrong(in.key + ".rate", in.rate, "a rate other than 0 [1/s]");
+  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0)) return wrong(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
+  const ChannelRange range = commandRange(in.target);
+  if (!inRange(in.low, range)) return wrong(in.key + ".low", in.low, rangeText(range));
+  if (!inRange(in.high, range) || in.high <= in.low) {
+    return wrong(in.key + ".high", in.high, rangeText(range) + ", above low");
+  }
+  if (!inRange(in.initial, {in.low, in.high})) {
+    return wrong(in.key + ".initial", in.initial, rangeText({in.low, in.high}));
+  }
+  for (std::size_t i = 0; i < in.detents.size(); ++i) {
+    if (!inRange(in.detents[i], {in.low, in.high}) || (i > 0 && in.detents[i] <= in.detents[i - 1])) {
+      return wrong(in.key + ".detents", in.detents[i], "rising values within " + rangeText({in.low, in.high}));
+    }
+  }
+  return std::nullopt;
+}
+
+bool sameSource(const IntegratedInput& a, const IntegratedInput& b, StickMode mode) {
+  return a.axis.of(mode) == b.axis.of(mode) && a.increase_button == b.increase_button &&
+         a.decrease_button == b.decrease_button;
+}
+
+}  // namespace
+
+std::optional<JoyTarget> joyTargetFrom(const std::string& name) {
+  for (const auto& row : kTargets) {
+    if (name == row.name) return row.target;
+  }
+  return std::nullopt;
+}
+
+const char* toString(JoyTarget target) { return rowOf(target).name; }
+
+ChannelRange commandRange(JoyTarget target) { return commandRange(rowOf(target).range); }
+
+std::optional<std::string> validate(const JoystickOptions& o) {
+  if (!(o.joy_timeout > 0.0)) return wrong("joy_timeout", o.joy_timeout, "above 0 s");
+  if (!(o.debounce >= 0.0)) return wrong("debounce", o.debounce, "0 s or more");
+  for (const DirectInput& in : o.direct) {
+    if (in.axis.of(o.stick_mode) < 0) return wrong(in.key + ".axis", in.axis.of(o.stick_mode), "an index from 0");
+    if (!std::isfinite(in.scale) || in.scale == 0.0) return wrong(in.key + ".scale", in.scale, "a number other than 0");
+    if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0)) return wrong(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
+    if (!(in.expo >= 0.0 && in.expo <= 1.0)) return wrong(in.key + ".expo", in.expo, "0..1");
+  }
+  for (std::size_t i = 0; i < o.integrated.size(); ++i) {
+    if (auto text = checkIntegrated(o.integrated[i], o.stick_mode)) return text;
+    for (std::size_t k = 0; k < o.integrated.size(); ++k) {
+      if (k == i || !sameSource(o.integrated[i], o.integrated[k], o.stick_mode)) continue;
+      if (o.integrated[i].select_button < 0) {
+        return wrong(o.integrated[i].key + ".select_button", o.integrated[i].select_button,
+                     "a button, because " + o.integrated[k].key + " has the same axis or buttons");
+      }
+    }
+  }
+  for (const ButtonInput& in : o.buttons) {
+    if (in.button < 0) return wrong(in.key + ".button", in.button, "an index from 0");
+    const ChannelRange range = commandRange(in.target);
+    if (!inRange(in.value, range)) return wrong(in.key + ".value", in.value, rangeText(range));
+    if (in.released && !inRange(*in.released, range))
+      return wrong(in.key + ".released", *in.released, rangeText(range));
+  }
+  return std::nullopt;
+}
+
+double shapeAxis(double j, double dead_zone, double expo) {
+  const double saturated = std::clamp(j, -1.0, 1.0);
+  const double beyond = std::max(0.0, std::abs(saturated) - dead_zone) / (1.0 - dead_zone);
+  return std::copysign((1.0 - expo) * beyond + expo * beyond * beyond * beyond, saturated);
+}
+
+TravelIntegrator::TravelIntegrator(double low, double high, double initial, std::vector<double> detents)
+    : low_(low), high_(high), fraction_((initial - low) / (high - low)), detents_(std::move(detents)) {}
+
+void TravelIntegrator::integrate(double rate, double j, double dt) {
+  fraction_ = std::clamp(fraction_ + rate * j * dt, 0.0, 1.0);
+}
+
+double TravelIntegrator::value() const {
+  const double value = std::clamp(low_ + fraction_ * (high_ - low_), low_, high_);
+  if (detents_.empty()) return value;
+  return *std::min_element(detents_.begin(), detents_.end(),
+                           [value](double a, double b) { return std::abs(a - value) < std::abs(b - value); });
+}
+
+JoystickMapper::JoystickMapper(const JoystickOptions& options)
+    : options_(options), direct_moved_(options.direct.size(), 0), button_used_(options.buttons.size(), 0) {
+  if (const auto text = validate(options)) throw std::invalid_argument(*text);
+  for (std::size_t i = 0; i < options_.integrated.size(); ++i) {
+    const IntegratedInput& in = options_.integrated[i];
+    std::size_t group = selected_of_group_.size();
+    for (std::size_t k = 0; k < i; ++k) {
+      if (sameSource(in, options_.integrated[k], options_.stick_mode)) group = integrated_[k].group;
+    }
+    if (group == selected_of_group_.size()) selected_of_group_.push_back(i);
+    integrated_.push_back({TravelIntegrator(in.low, in.high, in.initial, in.detents), group});
+  }
+}
+
+void JoystickMapper::checkAxis(int axis, const std::string& key, const std::vector<float>& axes) {
+  if (axis < 0) return;
+  const auto report = [&](JoyProblem::Kind kind, const std::string& what) {
+    problems_.push_back(
+        {kind, axis, key, options_.device + ": axis " + std::to_string(axis) + " (" + key + ") " + what});
+  };
+  if (static_cast<std::size_t>(axis) >= axes.size()) {
+    report(JoyProblem::Kind::kAxisMissing,
+           "does not exist: the device has " + std::to_string(axes.size()) + " axes; it is not commanded");
+    return;
+  }
+  const auto value = static_cast<double>(axes[static_cast<std::size_t>(axis)]);
+  if (!std::isfinite(value)) {
+    report(JoyProblem::Kind::kNotFinite, "is not a finite number; the message is dropped");
+  } else if (std::abs(value) > 1.0 + kAxisTolerance) {
+    report(JoyProblem::Kind::kOutOfRange, "is " + std::to_string(value) + ", outside -1..1; the message is dropped");
+  }
+}
+
+void JoystickMapper::checkButton(int button, const std::string& key, std::size_t count) {
+  if (button < 0 || static_cast<std::size_t>(button) < count) return;
+  problems_.push_back({JoyProblem::Kind::kButtonMissing, button, key,
+                       options_.device + ": button " + std::to_string(button) + " (" + key +
+                           ") does not exist: the device has " + std::to_string(count) +
+                           " buttons; it counts as never pressed"});
+}
+
+bool JoystickMapper::check(const std::vector<float>& axes, std::size_t button_count) {
+  problems_.clear();
+  for (const auto& in : options_.direct) checkAxis(in.axis.of(options_.stick_mode), in.key + ".axis", axes);
+  for (const auto& in : options_.integrated) {
+    checkAxis(in.axis.of(options_.stick_mode), in.key + ".axis", axes);
+    checkButton(in.increase_button, in.key + ".increase_button", button_count);
+    checkButton(in.decrease_button, in.key + ".decrease_button", button_count);
+    checkButton(in.select_button, in.key + ".select_button", button_count);
+  }
+  for (const auto& in : options_.buttons) checkButton(in.button, in.key + ".button", button_count);
+  checkButton(options_.mode.manual, "mode.manual", button_count);
+  checkButton(options_.mode.automatic, "mode.auto", button_count);
+  checkButton(options_.mode.toggle, "mode.toggle", button_count);
+  return std::none_of(problems_.begin(), problems_.end(), [](const JoyProblem& p) {
+    return p.kind == JoyProblem::Kind::kNotFinite || p.kind == JoyProblem::Kind::kOutOfRange;
+  });
+}
+
+std::optional<double> JoystickMapper::axis(int index) const {
+  if (index < 0 || static_cast<std::size_t>(index) >= axes_.size()) return std::nullopt;
+  return axes_[static_cast<std::size_t>(index)];
+}
+
+bool JoystickMapper::held(int button) const {
+  return button >= 0 && static_cast<std::size_t>(button) < buttons_.size() &&
+         buttons_[static_cast<std::size_t>(button)].raw;
+}
+
+bool JoystickMapper::pressed(int button) const {
+  return button >= 0 && static_cast<std::size_t>(button) < buttons_.size() &&
+         buttons_[static_cast<std::size_t>(button)].pressed;
+}
+
+double JoystickMapper::source(const IntegratedInput& input) const {
+  const int index = input.axis.of(options_.stick_mode);
+  if (index >= 0) return shapeAxis(axis(index).value_or(0.0), input.dead_zone, 0.0);
+  return (held(input.increase_button) ? 1.0 : 0.0) - (held(input.decrease_button) ? 1.0 : 0.0);
+}
+
+void JoystickMapper::integrateUpTo(double now) {
+  // Beyond the last message's life nobody holds the hat any more.
+  const double end = std::min(now, last_joy_ + options_.joy_timeout);
+  const double dt = end - std::max(integrated_until_, last_joy_);
+  if (dt > 0.0) {
+    for (const std::size_t i : selected_of_group_) {
+      const double j = source(options_.integrated[i]);
+      integrated_[i].state.integrate(options_.integrated[i].rate, j, dt);
+      if (j != 0.0) integrated_[i].moved = true;
+    }
+  }
+  integrated_until_ = std::max(integrated_until_, now);
+}
+
+void JoystickMapper::settleButtons(double now, bool edges) {
+  for (std::size_t i = 0; i < buttons_.size(); ++i) {
+    Button& button = buttons_[i];
+    if (button.raw == button.pressed) continue;
+    if (edges && now - button.changed < options_.debounce) continue;
+    button.pressed = button.raw;
+    button.changed = now;
+    if (edges && button.pressed) onPress(static_cast<int>(i));
+  }
+}
+
+void JoystickMapper::onPress(int button) {
+  for (std::size_t i = 0; i < integrated_.size(); ++i) {
+    if (options_.integrated[i].select_button == button) selected_of_group_[integrated_[i].group] = i;
+  }
+  for (std::size_t i = 0; i < options_.buttons.size(); ++i) {
+    if (options_.buttons[i].button != button) continue;
+    // The newest press on a target decides it.
+    for (std::size_t k = 0; k < options_.buttons.size(); ++k) {
+      if (options_.buttons[k].target == options_.buttons[i].target) button_used_[k] = 0;
+    }
+    button_used_[i] = 1;
+  }
+  const auto ask = [this](FlightMode mode) {
+    requests_.push_back(mode);
+    mode_ = mode;
+  };
+  if (button == options_.mode.manual) ask(FlightMode::kManual);
+  if (button == options_.mode.automatic) ask(FlightMode::kAuto);
+  if (button == options_.mode.toggle) {
+    ask(mode_ == FlightMode::kManual ? FlightMode::kAuto : FlightMode::kManual);
+  }
+}
+
+bool JoystickMapper::onJoy(const std::vector<float>& axes, const std::vector<std::int32_t>& buttons, double now) {
+  if (!check(axes, buttons.size())) {
+    ++dropped_;
+    return false;
+  }
+  const bool first = !alive(now);
+  integrateUpTo(now);
+  last_joy_ = now;
+  axes_.assign(axes.begin(), axes.end());
+  buttons_.resize(buttons.size());
+  for (std::size_t i = 0; i < buttons.size(); ++i) buttons_[i].raw = buttons[i] != 0;
+  // What is held down when the device appears was not pressed for us, and its levers read 0 until they are touched.
+  settleButtons(now, !first);
+  if (first) std::fill(direct_moved_.begin(), direct_moved_.end(), '\0');
+  for (std::size_t i = 0; i < options_.direct.size(); ++i) {
+    const auto value = axis(options_.direct[i].axis.of(options_.stick_mode));
+    if (value && *value != 0.0) direct_moved_[i] = 1;
+  }
+  return true;
+}
+
+JoystickCommand JoystickMapper::update(double now) {
+  integrateUpTo(now);
+  JoystickCommand out;
+  out.alive = alive(now);
+  if (!out.alive) return out;
+  settleButtons(now, true);
+  for (std::size_t i = 0; i < options_.direct.size(); ++i) {
+    const DirectInput& in = options_.direct[i];
+    const auto j = axis(in.axis.of(options_.stick_mode));
+    if (!j || (in.silent_until_moved && !direct_moved_[i])) continue;
+    const double delta = in.scale * shapeAxis(*j, in.dead_zone, in.expo);
+    switch (in.travel) {
+      case AxisTravel::kSymmetric:
+        command(in.target, delta, out.command);
+        break;
+      case AxisTravel::kFull:
+        command(in.target, std::clamp(0.5 * (1.0 + delta), 0.0, 1.0), out.command);
+        break;
+      case AxisTravel::kPositive:
+        command(in.target, std::clamp(delta, 0.0, 1.0), out.command);
+        break;
+    }
+  }
+  for (std::size_t i = 0; i < integrated_.size(); ++i) {
+    if (integrated_[i].moved) command(options_.integrated[i].target, integrated_[i].state.value(), out.command);
+  }
+  for (std::size_t i = 0; i < options_.buttons.size(); ++i) {
+    const ButtonInput& in = options_.buttons[i];
+    if (!button_used_[i]) continue;
+    command(in.target, pressed(in.button) || !in.released ? in.value : *in.released, out.command);
+  }
+  return out;
+}
+
+std::vector<FlightMode> JoystickMapper::takeModeRequests() {
+  std::vector<FlightMode> out;
+  out.swap(requests_);
+  return out;
+}
+
+std::vector<std::string> JoystickMapper::selected() const {
+  std::vector<std::string> out;
+  for (const std::size_t i : selected_of_group_) out.push_back(options_.integrated[i].key);
+  return out;
+}
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,154 @@
+#include "xplane_bridge/core/control/control_command.hpp"
+
+#include <cmath>
+#include <cstdio>
+
+namespace xplane_bridge::core {
+namespace {
+
+struct ScalarChannel {
+  Channel channel;
+  std::uint32_t field;
+  const char* name;
+  double ControlCommand::*value;
+  ChannelRange range;
+};
+
+constexpr ScalarChannel kScalars[] = {
+    {Channel::kRoll, kFieldRoll, "roll", &ControlCommand::roll, {-1.0, 1.0}},
+    {Channel::kPitch, kFieldPitch, "pitch", &ControlCommand::pitch, {-1.0, 1.0}},
+    {Channel::kYaw, kFieldYaw, "yaw", &ControlCommand::yaw, {-1.0, 1.0}},
+    {Channel::kTrimRoll, kFieldTrimRoll, "trim_roll", &ControlCommand::trim_roll, {-1.0, 1.0}},
+    {Channel::kTrimPitch, kFieldTrimPitch, "trim_pitch", &ControlCommand::trim_pitch, {-1.0, 1.0}},
+    {Channel::kTrimYaw, kFieldTrimYaw, "trim_yaw", &ControlCommand::trim_yaw, {-1.0, 1.0}},
+    {Channel::kFlaps, kFieldFlaps, "flaps", &ControlCommand::flaps, {0.0, 1.0}},
+    {Channel::kSpeedbrake, kFieldSpeedbrake, "speedbrake", &ControlCommand::speedbrake, {-0.5, 1.0}},
+    {Channel::kGear, kFieldGear, "gear", &ControlCommand::gear, {0.0, 1.0}},
+    {Channel::kParkingBrake, kFieldParkingBrake, "parking_brake", &ControlCommand::parking_brake, {0.0, 1.0}},
+    {Channel::kLeftBrake, kFieldToeBrakes, "left_brake", &ControlCommand::left_brake, {0.0, 1.0}},
+    {Channel::kRightBrake, kFieldToeBrakes, "right_brake", &ControlCommand::right_brake, {0.0, 1.0}},
+    {Channel::kThrustVector, kFieldThrustVector, "thrust_vector", &ControlCommand::thrust_vector, {0.0, 1.0}},
+};
+constexpr ChannelRange kThrottleRange = {-1.0, 1.0};
+
+const ScalarChannel* scalarOf(Channel channel) {
+  for (const auto& row : kScalars) {
+    if (row.channel == channel) return &row;
+  }
+  return nullptr;
+}
+
+std::optional<CommandRefusal> checkValue(double value, ChannelRange range, const std::string& name) {
+  char text[160];
+  if (!std::isfinite(value)) {
+    std::snprintf(text, sizeof text, "%s is %g: expected a finite number", name.c_str(), value);
+    return CommandRefusal{Refusal::kNotFinite, text};
+  }
+  if (value < range.low || value > range.high) {
+    std::snprintf(text, sizeof text, "%s is %g: expected %g..%g", name.c_str(), value, range.low, range.high);
+    return CommandRefusal{Refusal::kOutOfRange, text};
+  }
+  return std::nullopt;
+}
+
+std::optional<CommandRefusal> checkEngines(const ControlCommand& command) {
+  const std::uint32_t kind = command.fields & kThrottleFields;
+  if ((kind & (kind - 1u)) != 0u) {
+    return CommandRefusal{Refusal::kThrottleConflict,
+                          "fields has more than one of THROTTLE, ENGINE_THROTTLES and MOTORS: command one of them"};
+  }
+  if (kind == kFieldThrottle) return checkValue(command.throttle, kThrottleRange, "throttle");
+  if (kind == 0u) return std::nullopt;
+  if (command.engine_count < 1 || command.engine_count > kMaxEngines) {
+    return CommandRefusal{Refusal::kEngineCount,
+                          "engine_count is " + std::to_string(command.engine_count) + ": expected 1..8"};
+  }
+  const bool motors = kind == kFieldMotors;
+  const auto& values = motors ? command.motors : command.engine_throttles;
+  for (int engine = 0; engine < command.engine_count; ++engine) {
+    const Channel channel = motors ? motorChannel(engine) : leverChannel(engine);
+    auto wrong = checkValue(values[static_cast<std::size_t>(engine)], kThrottleRange, channelName(channel));
+    if (wrong) return wrong;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+ChannelRange commandRange(Channel channel) {
+  const ScalarChannel* row = scalarOf(channel);
+  return row ? row->range : kThrottleRange;
+}
+
+std::uint32_t fieldOf(Channel channel) {
+  if (const ScalarChannel* row = scalarOf(channel)) return row->field;
+  return isMotor(channel) ? kFieldMotors : kFieldEngineThrottles;
+}
+
+std::string channelName(Channel channel) {
+  if (const ScalarChannel* row = scalarOf(channel)) return row->name;
+  const Channel first = isMotor(channel) ? Channel::kMotor0 : Channel::kLever0;
+  return (isMotor(channel) ? "motors[" : "engine_throttles[") + std::to_string(index(channel) - index(first)) + "]";
+}
+
+const char* toString(Refusal refusal) {
+  switch (refusal) {
+    case Refusal::kNone:
+      return "none";
+    case Refusal::kUnknownBits:
+      return "unknown bits";
+    case Refusal::kThrottleConflict:
+      return "throttle conflict";
+    case Refusal::kEngineCount:
+      return "engine count";
+    case Refusal::kNotFinite:
+      return "not finite";
+    case Refusal::kOutOfRange:
+      return "out of range";
+    case Refusal::kLengthMismatch:
+      return "length mismatch";
+    case Refusal::kUnknownSurface:
+      return "unknown surface";
+    case Refusal::kDuplicateSurface:
+      return "duplicate surface";
+    case Refusal::kCount:
+      break;
+  }
+  return "unknown";
+}
+
+std::optional<CommandRefusal> checkCommand(const ControlCommand& command) {
+  if ((command.fields & ~kAllFields) != 0u) {
+    char text[120];
+    std::snprintf(text, sizeof text, "fields is 0x%x: bits 0x%x have no meaning", command.fields,
+                  command.fields & ~kAllFields);
+    return CommandRefusal{Refusal::kUnknownBits, text};
+  }
+  for (const auto& row : kScalars) {
+    if ((command.fields & row.field) == 0u) continue;
+    if (auto wrong = checkValue(command.*row.value, row.range, row.name)) return wrong;
+  }
+  return checkEngines(command);
+}
+
+ExpandedCommand expand(const ControlCommand& command, int engines) {
+  ExpandedCommand out;
+  const auto set = [&out](Channel channel, double value) {
+    out.values[index(channel)] = value;
+    out.commanded.set(index(channel));
+  };
+  for (const auto& row : kScalars) {
+    if ((command.fields & row.field) != 0u) set(row.channel, command.*row.value);
+  }
+  if ((command.fields & kFieldThrottle) != 0u) {
+    for (int engine = 0; engine < engines; ++engine) set(leverChannel(engine), command.throttle);
+  }
+  for (int engine = 0; engine < command.engine_count; ++engine) {
+    const auto i = static_cast<std::size_t>(engine);
+    if ((command.fields & kFieldEngineThrottles) != 0u) set(leverChannel(engine), command.engine_throttles[i]);
+    if ((command.fields & kFieldMotors) != 0u) set(motorChannel(engine), command.motors[i]);
+  }
+  return out;
+}
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,328 @@
+#include "xplane_bridge/core/failures/failures.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <iterator>
+#include <utility>
+
+namespace xplane_bridge::core {
+namespace {
+
+const std::string kFolder = "sim/operation/failures/";
+constexpr std::size_t kLongestName = 100;  // of a rel_*: none is nearly as long
+
+// A system whose failures X-Plane has by number.
+struct SystemRow {
+  const char* name;  // "engine" of engine_1
+  int count;
+  std::vector<std::string> (*datarefs)(int number);  // number from 1
+};
+
+std::string zeroBased(const char* name, int number) { return name + std::to_string(number - 1); }
+// rel_esys, rel_esys2, rel_esys3: the first has no number.
+std::string firstBare(const char* name, int number) { return number == 1 ? name : name + std::to_string(number); }
+
+const SystemRow kSystems[] = {
+    {"engine", 8, [](int n) { return std::vector<std::string>{zeroBased("rel_engfai", n)}; }},
+    {"bus", 6, [](int n) { return std::vector<std::string>{firstBare("rel_esys", n)}; }},
+    {"generator", 8, [](int n) { return std::vector<std::string>{zeroBased("rel_genera", n)}; }},
+    {"battery", 8, [](int n) { return std::vector<std::string>{zeroBased("rel_batter", n)}; }},
+    {"pitot", 2, [](int n) { return std::vector<std::string>{firstBare("rel_pitot", n)}; }},
+    {"static", 2, [](int n) { return std::vector<std::string>{firstBare("rel_static", n)}; }},
+    // Artificial horizon and directional gyro; 1 the pilot's, 2 the copilot's.
+    {"gyro", 2,
+     [](int n) {
+       return n == 1 ? std::vector<std::string>{"rel_ss_ahz", "rel_ss_dgy"}
+                     : std::vector<std::string>{"rel_cop_ahz", "rel_cop_dgy"};
+     }},
+};
+
+FailurePlanResult refuse(FailureError error, const std::string& text) { return {error, text, {}}; }
+
+// X-Plane 12's own failure of a surface; empty where it cannot express the wish.
+std::string ownSurfaceFailure(const SurfaceInfo& surface, const std::string& kind, bool has_value) {
+  const char* suffix = kind == "stuck" && !has_value ? "_lock"
+                       : kind == "hard_over_up"      ? "_mxup"
+                       : kind == "hard_over_down"    ? "_mxdn"
+                       : kind == "centred"           ? "_cntr"
+                       : kind == "gone"              ? "_gone"
+                                                     : nullptr;
+  if (!suffix) return "";
+  const char* stem = nullptr;
+  switch (surface.kind) {
+    case SurfaceKind::kAileron:
+      stem = "ailn";
+      break;
+    case SurfaceKind::kElevator:
+      stem = "elev";
+      break;
+    case SurfaceKind::kRudder:
+      stem = "rudd";
+      break;
+    case SurfaceKind::kSpoiler:
+      stem = "rspo";
+      break;
+    case SurfaceKind::kSpeedbrake:
+      stem = "sbrk";
+      break;
+    case SurfaceKind::kFlap:
+      stem = "flap";
+      break;
+    case SurfaceKind::kYawBrake:
+      stem = "yawb";
+      break;
+  }
+  const std::string set = surface.kind == SurfaceKind::kYawBrake ? "x" : std::to_string(surface.set);
+  const std::string side = surface.kind == SurfaceKind::kRudder ? "ctr" : surface.place % 2 == 0 ? "lft" : "rgt";
+  return "rel_fcon_" + std::string(stem) + "_" + set + "_" + side + suffix;
+}
+
+FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface, SimulatorGeneration generation) {
+  FailurePlanResult out;
+  out.plan = {request.name, request.kind, request.value, {}, std::nullopt};
+  const auto fault = surfaceFaultFrom(request.kind);
+  if (!fault && request.kind != "gone") {
+    return refuse(FailureError::kInvalid,
+                  "kind is \"" + request.kind +
+                      "\": expected stuck, hard_over_up, hard_over_down, centred, floating, reduced, slow or gone");
+  }
+  if (fault) {
+    const SurfaceFailure failure{surface, *fault, request.value};
+    if (const auto wrong = validate(failure)) return refuse(FailureError::kInvalid, request.name + " " + *wrong);
+    out.plan.surface = failure;
+  }
+  if (generation == SimulatorGeneration::k12) {
+    const std::string own = ownSurfaceFailure(surfaceTable()[surface], request.kind, request.value.has_value());
+    if (!own.empty()) out.plan.datarefs.push_back(failureDataref(own));
+  }
+  if (out.plan.datarefs.empty() && !out.plan.surface) {
+    return refuse(FailureError::kNotSupported,
+                  "a lost surface (gone) cannot be expressed by X-Plane 11: use floating, or reduced with value 0");
+  }
+  return out;
+}
+
+std::optional<std::string> checkTrigger(const FailureRequest& request) {
+  if (request.trigger < 0 || request.trigger > static_cast<int>(FailureTrigger::kAtSpeedBelow)) {
+    return "trigger is " + std::to_string(request.trigger) + ": expected 0..5";
+  }
+  if (request.trigger == 0) return std::nullopt;
+  if (!std::isfinite(request.trigger_value)) return "trigger_value is not a finite number";
+  if (request.trigger == static_cast<int>(FailureTrigger::kAtSimTime) && request.trigger_value < 0.0) {
+    return "trigger_value is " + std::to_string(request.trigger_value) + ": expected 0 s or more from now";
+  }
+  return std::nullopt;
+}
+
+bool shareDataref(const FailurePlan& a, const FailurePlan& b) {
+  return std::any_of(a.datarefs.begin(), a.datarefs.end(), [&b](const std::string& dataref) {
+    return std::find(b.datarefs.begin(), b.datarefs.end(), dataref) != b.datarefs.end();
+  });
+}
+
+// True when the trigger has come; false also while what it looks at is unknown.
+bool hasCome(FailureTrigger trigger, double value, const FlightConditions& now) {
+  switch (trigger) {
+    case FailureTrigger::kNow:
+      return true;
+    case FailureTrigger::kAtSimTime:
+      return now.sim_time >= value;
+    case FailureTrigger::kAtAltitudeAbove:
+      return now.height_agl >= value;
+    case FailureTrigger::kAtAltitudeBelow:
+      return now.height_agl <= value;
+    case FailureTrigger::kAtSpeedAbove:
+      return now.indicated_airspeed >= value;
+    case FailureTrigger::kAtSpeedBelow:
+      return now.indicated_airspeed <= value;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string failureDataref(const std::string& name) {
+  return name.compare(0, kFolder.size(), kFolder) == 0 ? name : kFolder + name;
+}
+
+std::string failureName(const std::string& name) {
+  return name.compare(0, kFolder.size(), kFolder) == 0 ? name.substr(kFolder.size()) : name;
+}
+
+FailurePlanResult planFailure(const FailureRequest& request, SimulatorGeneration generation) {
+  if (const auto wrong = checkTrigger(request)) return refuse(FailureError::kInvalid, *wrong);
+  if (const auto surface = surfaceNumber(request.name)) return planSurface(request, *surface, generation);
+
+  FailurePlanResult out;
+  out.plan = {request.name, request.kind, std::nullopt, {}, std::nullopt};
+  const std::string bare = failureName(request.name);
+  const bool wordy = bare.size() <= kLongestName &&
+                     std::all_of(bare.begin(), bare.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+  if (bare.compare(0, 4, "rel_") == 0 && bare.size() > 4 && wordy) {
+    out.plan.name = bare;
+    out.plan.datarefs.push_back(failureDataref(bare));
+  } else {
+    const std::size_t underscore = request.name.rfind('_');
+    for (const SystemRow& row : kSystems) {
+      if (underscore == std::string::npos || request.name.substr(0, underscore) != row.name) continue;
+      const std::string digits = request.name.substr(underscore + 1);
+      const bool number = digits.size() == 1 && digits[0] >= '1' && digits[0] <= '9';
+      if (!number || digits[0] - '0' > row.count) {
+        return refuse(FailureError::kInvalid, "name is \"" + request.name + "\": expected " + row.name + "_1 to " +
+                                                  row.name + "_" + std::to_string(row.count));
+      }
+      for (const std::string& dataref : row.datarefs(digits[0] - '0')) {
+        out.plan.datarefs.push_back(failureDataref(dataref));
+      }
+    }
+  }
+  if (out.plan.datarefs.empty()) {
+    return refuse(FailureError::kInvalid,
+                  "name is \"" + request.name +
+                      "\": expected a surface (docs/surfaces.md), engine_<n>, bus_<n>, generator_<n>, battery_<n>, "
+                      "pitot_<n>, static_<n>, gyro_<n>, or a rel_* dataref");
+  }
+  if (request.kind != "failed") {
+    return refuse(FailureError::kInvalid, "kind is \"" + request.kind + "\": expected failed for " + request.name);
+  }
+  return out;
+}
+
+std::optional<std::string> FailureBook::sameAs(const FailurePlan& plan) const {
+  for (const auto& [name, entry] : entries_) {
+    if (entry.by_bridge && name != plan.name && shareDataref(entry.plan, plan)) return name;
+  }
+  return std::nullopt;
+}
+
+void FailureBook::add(const FailureRequest& request, const FailurePlan& plan, const FlightConditions& now) {
+  for (auto it = entries_.begin(); it != entries_.end();) {
+    it = !it->second.by_bridge && shareDataref(it->second.plan, plan) ? entries_.erase(it) : std::next(it);
+  }
+  Entry entry;
+  entry.plan = plan;
+  entry.trigger = static_cast<FailureTrigger>(request.trigger);
+  entry.trigger_value = request.trigger_value;
+  if (entry.trigger == FailureTrigger::kAtSimTime) entry.trigger_value += now.sim_time;
+  entry.driven = plan.datarefs.empty();
+  entries_[plan.name] = entry;
+}
+
+std::vector<FailurePlan> FailureBook::due(const FlightConditions& now) {
+  std::vector<FailurePlan> out;
+  for (auto& [name, entry] : entries_) {
+    if (entry.active || !hasCome(entry.trigger, entry.trigger_value, now)) continue;
+    entry.active = true;
+    entry.since = now.sim_time;
+    out.push_back(entry.plan);
+  }
+  return out;
+}
+
+void FailureBook::confirm(const std::string& name, bool shown) {
+  const auto it = entries_.find(name);
+  if (it != entries_.end()) it->second.confirmed = shown;
+}
+
+void FailureBook::setValue(const std::string& name, double value) {
+  const auto it = entries_.find(name);
+  if (it != entries_.end()) it->second.plan.value = value;
+}
+
+bool FailureBook::observe(const std::string& dataref, double value, double sim_time) {
+  const bool failed = value == kFailedNow;
+  for (auto it = entries_.begin(); it != entries_.end(); ++it) {
+    Entry& entry = it->second;
+    const auto& names = entry.plan.datarefs;
+    if (std::find(names.begin(), names.end(), dataref) == names.end()) continue;
+    if (!entry.active || entry.driven) return false;
+    if (!entry.by_bridge && !failed) {
+      entries_.erase(it);
+      return true;
+    }
+    if (failed) {
+      entry.shown.insert(dataref);
+    } else {
+      entry.shown.erase(dataref);
+    }
+    const bool all = entry.shown.size() == names.size();
+    return std::exchange(entry.confirmed, all) != all;
+  }
+  if (!failed) return false;
+  Entry entry;
+  entry.plan.name = failureName(dataref);
+  entry.plan.kind = "failed";
+  entry.plan.datarefs = {dataref};
+  entry.by_bridge = false;
+  entry.active = entry.confirmed = true;
+  entry.shown = {dataref};
+  entry.since = sim_time;
+  entries_[entry.plan.name] = entry;
+  return true;
+}
+
+FailureBook::Cleared FailureBook::clear(const std::vector<std::string>& names, bool include_simulator) {
+  Cleared out;
+  for (auto it = entries_.begin(); it != entries_.end();) {
+    const bool named = std::find(names.begin(), names.end(), it->first) != names.end();
+    const bool chosen = names.empty() ? it->second.by_bridge || include_simulator
+                                      : named && (it->second.by_bridge || include_simulator);
+    if (!chosen) {
+      ++it;
+      continue;
+    }
+    if (it->second.active) out.undo.push_back(it->second.plan);
+    out.names.push_back(it->first);
+    it = entries_.erase(it);
+  }
+  return out;
+}
+
+std::vector<FailureLabel> FailureBook::labels() const {
+  std::vector<FailureLabel> out;
+  for (const auto& [name, entry] : entries_) {
+    FailureLabel label;
+    label.name = name;
+    label.kind = entry.plan.kind;
+    if (entry.plan.value) label.value = *entry.plan.value;
+    label.by_bridge = entry.by_bridge;
+    label.active = entry.active;
+    label.confirmed = entry.confirmed;
+    label.since_sim_time = entry.since;
+    out.push_back(label);
+  }
+  return out;
+}
+
+std::vector<SurfaceFailure> FailureBook::drivenSurfaces() const {
+  std::vector<SurfaceFailure> out;
+  for (const auto& [name, entry] : entries_) {
+    if (entry.active && entry.driven && entry.plan.surface) out.push_back(*entry.plan.surface);
+  }
+  return out;
+}
+
+bool FailureBook::isDriven(const std::string& name) const {
+  const auto it = entries_.find(name);
+  return it != entries_.end() && it->second.driven;
+}
+
+std::vector<std::string> FailureBook::datarefsOf(const std::string& name) const {
+  const auto it = entries_.find(name);
+  if (it == entries_.end() || !it->second.active || it->second.driven) return {};
+  return it->second.plan.datarefs;
+}
+
+void FailureBook::useDriver(const std::string& name, double sim_time, std::optional<double> stuck_deg) {
+  const auto it = entries_.find(name);
+  if (it == entries_.end() || !it->second.plan.surface) return;
+  it->second.driven = true;
+  it->second.confirmed = false;
+  it->second.since = sim_time;
+  SurfaceFailure& failure = *it->second.plan.surface;
+  if (failure.fault == SurfaceFault::kStuck && !failure.value) failure.value = stuck_deg;
+}
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,393 @@
+#include "xplane_bridge/core/link/journal.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <utility>
+
+namespace xplane_bridge::core {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr const char* kFormat = "xplane_bridge journal";
+constexpr int kVersion = 1;
+
+[[noreturn]] void fail(const std::string& path, const std::string& what) {
+  throw JournalError("journal " + path + ": " + what);
+}
+
+[[noreturn]] void failErrno(const std::string& path, const std::string& what) {
+  fail(path, what + ": " + std::strerror(errno));
+}
+
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int fd) : fd_(fd) {}
+  ~FileDescriptor() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+    }
+  }
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+/// Holds flock on "<path>.lock" while it lives. The lock file is never deleted: that would race with those who wait.
+class Lock {
+ public:
+  explicit Lock(const std::string& path) : file_(openLockFile(path + ".lock")) {
+    while (flock(file_.get(), LOCK_EX) != 0) {
+      if (errno != EINTR) {
+        failErrno(path, "cannot be locked");
+      }
+    }
+  }
+
+ private:
+  static int openLockFile(const std::string& path) {
+    const fs::path folder = fs::path(path).parent_path();
+    std::error_code error;
+    if (!folder.empty()) {
+      fs::create_directories(folder, error);
+      if (error) {
+        fail(path, "its folder cannot be made: " + error.message());
+      }
+    }
+    const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (fd < 0) {
+      failErrno(path, "cannot be opened");
+    }
+    return fd;
+  }
+
+  FileDescriptor file_;
+};
+
+json toJson(const UndoOperation& operation) {
+  struct Writer {
+    json operator()(const UndoDref& dref) const { return {{"op", "dref"}, {"path", dref.path}, {"value", dref.value}}; }
+    json operator()(const UndoData& data) const {
+      return {{"op", "data"}, {"row", data.row.index}, {"values", data.row.values}};
+    }
+    json operator()(const UndoUsel& usel) const { return {{"op", "usel"}, {"rows", usel.rows}}; }
+    json operator()(const UndoIse4& ise4) const {
+      return {{"op", "ise4_off"}, {"target", ise4.target}, {"address", ise4.address}, {"port", ise4.port}};
+    }
+  };
+  return std::visit(Writer{}, operation);
+}
+
+UndoOperation operationFrom(const json& document) {
+  const std::string op = document.at("op");
+  if (op == "dref") {
+    return UndoDref{document.at("path"), document.at("value")};
+  }
+  if (op == "data") {
+    return UndoData{DataRow{document.at("row"), document.at("values")}};
+  }
+  if (op == "usel") {
+    return UndoUsel{document.at("rows").get<std::vector<std::int32_t>>()};
+  }
+  if (op == "ise4_off") {
+    return UndoIse4{document.at("target"), document.at("address"), document.at("port")};
+  }
+  throw JournalError("unknown operation '" + op + "'");
+}
+
+json toJson(const JournalEntry& entry) {
+  json undo = json::array();
+  for (const UndoOperation& operation : entry.undo) {
+    undo.push_back(toJson(operation));
+  }
+  return {{"id", entry.id},
+          {"purpose", entry.purpose},
+          {"owner",
+           {{"node", entry.owner.node},
+            {"pid", entry.owner.pid},
+            {"start_ticks", entry.owner.start_ticks},
+            {"boot_id", entry.owner.boot_id},
+            {"computer", entry.owner.computer}}},
+          {"undo", undo}};
+}
+
+JournalEntry entryFrom(const json& document) {
+  JournalEntry entry;
+  entry.id = document.at("id");
+  entry.purpose = document.at("purpose");
+  const json& owner = document.at("owner");
+  entry.owner.node = owner.at("node");
+  entry.owner.pid = owner.at("pid");
+  entry.owner.start_ticks = owner.at("start_ticks");
+  entry.owner.boot_id = owner.at("boot_id");
+  entry.owner.computer = owner.at("computer");
+  for (const json& operation : document.at("undo")) {
+    entry.undo.push_back(operationFrom(operation));
+  }
+  return entry;
+}
+
+/// Moves a file that cannot be understood out of the way.
+[[noreturn]] void setAside(const std::string& path, const std::string& why) {
+  std::string aside;
+  for (int n = 1;; ++n) {
+    aside = path + ".damaged-" + std::to_string(n);
+    if (!fs::exists(aside)) {
+      break;
+    }
+  }
+  std::error_code error;
+  fs::rename(path, aside, error);
+  fail(path, "cannot be understood (" + why + "); " +
+                 (error ? "moving it aside failed: " + error.message()
+                        : "it was moved to " + aside +
+                              ". What it held was not undone in X-Plane: look there, or restart X-Plane"));
+}
+
+std::vector<JournalEntry> read(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    if (errno == ENOENT || !fs::exists(path)) {
+      return {};
+    }
+    failErrno(path, "cannot be read");
+  }
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (file.bad()) {
+    fail(path, "cannot be read");
+  }
+  int version = 0;
+  std::vector<JournalEntry> entries;
+  std::string damage;
+  try {
+    const json document = json::parse(text.str());
+    if (document.at("format") != kFormat) {
+      damage = "format is not '" + std::string(kFormat) + "'";
+    } else {
+      version = document.at("version");
+    }
+    if (version == kVersion) {
+      for (const json& entry : document.at("entries")) {
+        entries.push_back(entryFrom(entry));
+      }
+    }
+  } catch (const json::exception& error) {
+    damage = error.what();
+  } catch (const JournalError& error) {
+    damage = error.what();
+  }
+  if (!damage.empty()) {
+    setAside(path, damage);
+  }
+  if (version != kVersion) {
+    fail(path, "has version " + std::to_string(version) + ", this program knows version " + std::to_string(kVersion) +
+                   " only: use the xplane_bridge that wrote it to undo its entries, or delete it");
+  }
+  return entries;
+}
+
+void writeAll(int fd, const std::string& text, const std::string& path) {
+  std::size_t done = 0;
+  while (done < text.size()) {
+    const ssize_t written = ::write(fd, text.data() + done, text.size() - done);
+    if (written < 0) {
+      if (errno == EINTR) {
+        continue;
+      }
+      failErrno(path, "cannot be written");
+    }
+    done += static_cast<std::size_t>(written);
+  }
+}
+
+void syncFolder(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  const FileDescriptor file(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file.get() < 0 || fsync(file.get()) != 0) {
+    failErrno(path, "its folder cannot be synchronised");
+  }
+}
+
+void write(const std::string& path, const std::vector<JournalEntry>& entries) {
+  if (entries.empty()) {
+    if (::unlink(path.c_str()) != 0 && errno != ENOENT) {
+      failErrno(path, "cannot be deleted");
+    }
+    syncFolder(path);
+    return;
+  }
+  json document = {{"format", kFormat}, {"version", kVersion}, {"entries", json::array()}};
+  for (const JournalEntry& entry : entries) {
+    document["entries"].push_back(toJson(entry));
+  }
+  const std::string temporary = path + ".new";
+  {
+    const FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (file.get() < 0) {
+      failErrno(temporary, "cannot be opened");
+    }
+    writeAll(file.get(), document.dump(2) + "\n", temporary);
+    if (fsync(file.get()) != 0) {
+      failErrno(temporary, "cannot be synchronised");
+    }
+  }
+  if (::rename(temporary.c_str(), path.c_str()) != 0) {
+    failErrno(path, "cannot be replaced");
+  }
+  syncFolder(path);
+}
+
+std::string firstLine(const char* path) {
+  std::ifstream file(path);
+  std::string line;
+  std::getline(file, line);
+  return line;
+}
+
+/// Start time of a process in clock ticks since boot; 0 when there is no such process.
+std::int64_t startTicks(std::int64_t pid) {
+  const std::string stat = firstLine(("/proc/" + std::to_string(pid) + "/stat").c_str());
+  // The second field is the program's name in brackets and may hold anything; fields are counted from behind it.
+  const std::size_t bracket = stat.rfind(')');
+  if (bracket == std::string::npos) {
+    return 0;
+  }
+  constexpr int kFieldsBetween = 19;  // of field 22, counted from field 3
+  std::istringstream fields(stat.substr(bracket + 1));
+  std::string skipped;
+  for (int i = 0; i < kFieldsBetween; ++i) {
+    fields >> skipped;
+  }
+  std::int64_t ticks = 0;
+  fields >> ticks;
+  return ticks;
+}
+
+}  // namespace
+
+EncodeResult encodeUndo(ByteSpan out, const UndoOperation& operation) {
+  struct Encoder {
+    ByteSpan out;
+    EncodeResult operator()(const UndoDref& dref) const { return encodeDref(out, dref.path, dref.value); }
+    EncodeResult operator()(const UndoData& data) const { return encodeData(out, &data.row, 1); }
+    EncodeResult operator()(const UndoUsel& usel) const { return encodeUsel(out, usel.rows.data(), usel.rows.size()); }
+    EncodeResult operator()(const UndoIse4& ise4) const {
+      return encodeIse4(out, ise4.target, ise4.address, ise4.port, false);
+    }
+  };
+  return std::visit(Encoder{out}, operation);
+}
+
+JournalOwner thisProcess(const std::string& node) {
+  std::array<char, 256> computer{};
+  if (gethostname(computer.data(), computer.size() - 1) != 0) {
+    computer[0] = '\0';
+  }
+  return {node, getpid(), startTicks(getpid()), firstLine("/proc/sys/kernel/random/boot_id"), computer.data()};
+}
+
+bool isAlive(const JournalOwner& owner) {
+  const JournalOwner here = thisProcess("");
+  if (owner.boot_id != here.boot_id) {
+    return owner.computer != here.computer;
+  }
+  return owner.start_ticks != 0 && startTicks(owner.pid) == owner.start_ticks;
+}
+
+Journal::Journal(std::string path, JournalOwner self, AliveFunction alive)
+    : path_(std::move(path)), self_(std::move(self)), alive_(std::move(alive)) {}
+
+std::vector<JournalEntry> Journal::entries() const {
+  const Lock lock(path_);
+  return read(path_);
+}
+
+std::vector<JournalEntry> Journal::orphans(const std::string& purpose) const {
+  std::vector<JournalEntry> found = entries();
+  found.erase(std::remove_if(found.begin(), found.end(),
+                             [&](const JournalEntry& entry) {
+                               return entry.purpose != purpose || entry.owner == self_ || alive_(entry.owner);
+                             }),
+              found.end());
+  return found;
+}
+
+std::vector<JournalEntry> Journal::own() const {
+  std::vector<JournalEntry> found = entries();
+  found.erase(
+      std::remove_if(found.begin(), found.end(), [&](const JournalEntry& entry) { return entry.owner != self_; }),
+      found.end());
+  return found;
+}
+
+void Journal::record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo) {
+  const Lock lock(path_);
+  std::vector<JournalEntry> entries = read(path_);
+  JournalEntry entry{id, purpose, self_, std::move(undo)};
+  const auto same =
+      std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == id; });
+  if (same == entries.end()) {
+    entries.push_back(std::move(entry));
+  } else if (same->owner != self_ && alive_(same->owner)) {
+    fail(path_, "'" + id + "' belongs to " + same->owner.node + " (process " + std::to_string(same->owner.pid) +
+                    " on " + same->owner.computer + "), which still runs: end it first");
+  } else {
+    *same = std::move(entry);
+  }
+  write(path_, entries);
+}
+
+void Journal::remove(const std::vector<std::string>& ids) {
+  removeIf([&](const JournalEntry& entry) { return std::find(ids.begin(), ids.end(), entry.id) != ids.end(); });
+}
+
+void Journal::removeUndone(const std::vector<JournalEntry>& undone) {
+  removeIf([&](const JournalEntry& entry) {
+    return std::any_of(undone.begin(), undone.end(),
+                       [&](const JournalEntry& each) { return each.id == entry.id && each.owner == entry.owner; });
+  });
+}
+
+void Journal::removeIf(const std::function<bool(const JournalEntry&)>& chosen) {
+  const Lock lock(path_);
+  std::vector<JournalEntry> entries = read(path_);
+  const std::size_t before = entries.size();
+  entries.erase(std::remove_if(entries.begin(), entries.end(), chosen), entries.end());
+  if (entries.size() != before) {
+    write(path_, entries);
+  }
+}
+
+std::string journalPath(const std::string& folder, const std::string& host, std::uint16_t port) {
+  std::string name = host;
+  std::replace_if(
+      name.begin(), name.end(),
+      [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-' && c != '_'; }, '-');
+  return (fs::path(folder) / (name + "_" + std::to_string(port) + ".json")).string();
+}
+
+JournalFactory journalsIn(const std::string& folder, const std::string& node) {
+  return [folder, node](const Endpoint& peer) {
+    // One file whatever loopback address the X-Plane of this computer is called by.
+    const Endpoint named{isSameHost(peer.address, kLoopbackAddress) ? kLoopbackAddress : peer.address, peer.port};
+    return std::make_shared<Journal>(journalPath(folder, named.addressString(), named.port), thisProcess(node));
+  };
+}
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,87 @@
+#include "xplane_bridge/core/state/aircraft_identity.hpp"
+
+#include <cmath>
+#include <utility>
+
+namespace xplane_bridge::core {
+namespace {
+
+// Both are longer in X-Plane (40 and 260); every character costs a request of 413 bytes.
+constexpr std::size_t kIcaoLength = 8;
+constexpr std::size_t kDescriptionLength = 64;
+// X-Plane may answer the characters in different frames of a period.
+constexpr double kJoinWindow = 1.5 / AircraftIdentityReader::kRateHz;
+
+RrefFrameAssembler::Options frameOptions() {
+  RrefFrameAssembler::Options options;
+  options.join_window = kJoinWindow;
+  return options;
+}
+
+std::string textFrom(const std::vector<float>& values, std::size_t first, std::size_t length) {
+  std::string text;
+  for (std::size_t i = first; i < first + length; ++i) {
+    const float value = values[i];
+    constexpr float kLastByte = 255.0F;
+    if (!(value >= 1.0F && value <= kLastByte)) {  // its end, or never answered
+      break;
+    }
+    const int code = static_cast<int>(value);
+    constexpr int kFirstPrintable = 32;
+    constexpr int kLastPrintable = 126;
+    text += code >= kFirstPrintable && code <= kLastPrintable ? static_cast<char>(code) : '?';
+  }
+  const std::size_t end = text.find_last_not_of(' ');
+  return end == std::string::npos ? "" : text.substr(0, end + 1);
+}
+
+}  // namespace
+
+std::string described(const AircraftIdentity& aircraft) { return aircraft.icao + " (" + aircraft.description + ")"; }
+
+AircraftIdentityReader::AircraftIdentityReader() : frames_(datarefs().size(), 0, frameOptions()) {}
+
+const std::vector<std::string>& AircraftIdentityReader::datarefs() {
+  static const std::vector<std::string> kDatarefs = [] {
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < kIcaoLength; ++i) {
+      names.push_back("sim/aircraft/view/acf_ICAO[" + std::to_string(i) + "]");
+    }
+    for (std::size_t i = 0; i < kDescriptionLength; ++i) {
+      names.push_back("sim/aircraft/view/acf_descrip[" + std::to_string(i) + "]");
+    }
+    return names;
+  }();
+  return kDatarefs;
+}
+
+bool AircraftIdentityReader::add(const RrefView& datagram, std::int64_t receive_ns) {
+  if (!frames_.add(datagram, receive_ns)) {
+    return false;
+  }
+  return take(frames_.values());
+}
+
+bool AircraftIdentityReader::add(const std::vector<DatarefValue>& values) {
+  if (values.size() != datarefs().size()) return false;
+  std::vector<float> characters;
+  characters.reserve(values.size());
+  for (const DatarefValue& value : values) {
+    if (!value) return false;
+    characters.push_back(*value);
+  }
+  return take(characters);
+}
+
+bool AircraftIdentityReader::take(const std::vector<float>& characters) {
+  AircraftIdentity identity{textFrom(characters, 0, kIcaoLength),
+                            textFrom(characters, kIcaoLength, kDescriptionLength)};
+  ++told_;
+  if (identity == identity_) {
+    return false;
+  }
+  identity_ = std::move(identity);
+  return true;
+}
+
+}  // namespace xplane_bridge::core

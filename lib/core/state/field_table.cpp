@@ -1,0 +1,137 @@
+#include "xplane_bridge/core/state/field_table.hpp"
+
+#include <algorithm>
+
+namespace xplane_bridge::core {
+
+XPlaneVersion xplaneVersion(std::int32_t internal_version) {
+  constexpr std::int32_t kFirstOf12 = 120000;
+  if (internal_version <= 0) return XPlaneVersion::kUnknown;
+  return internal_version >= kFirstOf12 ? XPlaneVersion::k12 : XPlaneVersion::k11;
+}
+
+const char* toString(FieldGroup group) {
+  switch (group) {
+    case FieldGroup::kFlight:
+      return "flight";
+    case FieldGroup::kEngines:
+      return "engines";
+    case FieldGroup::kSurfaces:
+      return "surfaces";
+    case FieldGroup::kControls:
+      return "controls";
+    case FieldGroup::kElectrical:
+      return "electrical";
+    case FieldGroup::kAutopilot:
+      return "autopilot";
+    case FieldGroup::kWarnings:
+      return "warnings";
+    case FieldGroup::kFuel:
+      return "fuel";
+    case FieldGroup::kSim:
+      return "sim";
+  }
+  return "unknown";
+}
+
+const char* messageName(FieldGroup group) {
+  switch (group) {
+    case FieldGroup::kFlight:
+      return "FlightState";
+    case FieldGroup::kEngines:
+      return "EngineStates";
+    case FieldGroup::kSurfaces:
+      return "SurfaceStates";
+    case FieldGroup::kControls:
+      return "ControlStates";
+    case FieldGroup::kElectrical:
+      return "ElectricalState";
+    case FieldGroup::kAutopilot:
+      return "AutopilotState";
+    case FieldGroup::kWarnings:
+      return "WarningState";
+    case FieldGroup::kFuel:
+      return "FuelState";
+    case FieldGroup::kSim:
+      return "SimStatus";
+  }
+  return "unknown";
+}
+
+int defaultRate(FieldGroup group) {
+  switch (group) {
+    case FieldGroup::kFlight:
+      return kEveryFrame;
+    case FieldGroup::kSurfaces:
+    case FieldGroup::kControls:
+      return 20;
+    case FieldGroup::kEngines:
+      return 10;
+    case FieldGroup::kAutopilot:
+    case FieldGroup::kWarnings:
+    case FieldGroup::kSim:
+      return 5;
+    case FieldGroup::kElectrical:
+      return 2;
+    case FieldGroup::kFuel:
+      return 1;
+  }
+  return 1;
+}
+
+std::vector<std::string> expandDatarefPath(std::string_view pattern, int count) {
+  const std::size_t open = pattern.find('{');
+  if (open != std::string_view::npos) {
+    const std::size_t close = pattern.find('}', open);
+    std::vector<std::string> expanded;
+    std::size_t begin = open + 1;
+    while (begin <= close) {
+      const std::size_t end = std::min(pattern.find(',', begin), close);
+      const std::string one = std::string(pattern.substr(0, open)) + std::string(pattern.substr(begin, end - begin)) +
+                              std::string(pattern.substr(close + 1));
+      for (std::string& path : expandDatarefPath(one, count)) expanded.push_back(std::move(path));
+      begin = end + 1;
+    }
+    return expanded;
+  }
+  const std::size_t star = pattern.find("[*]");
+  if (star == std::string_view::npos) return {std::string(pattern)};
+  std::vector<std::string> expanded;
+  expanded.reserve(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    expanded.push_back(std::string(pattern.substr(0, star)) + "[" + std::to_string(i) + "]");
+  }
+  return expanded;
+}
+
+std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, XPlaneVersion version, int engines) {
+  std::vector<DatarefRequest> requests;
+  for (const FieldSpec& field : fieldTable()) {
+    if (field.group != group || field.store == nullptr) continue;
+    if (transport == Transport::kData && field.row.row11 >= 0) continue;
+    const DatarefSource& source = field.dataref;
+    if (source.path12 != nullptr && version == XPlaneVersion::kUnknown) continue;
+    const char* path = source.path12 != nullptr && version == XPlaneVersion::k12 ? source.path12 : source.path11;
+    if (path == nullptr) continue;
+    const std::vector<std::string> paths = expandDatarefPath(path, field.count);
+    const int wanted = field.per_engine ? std::min(engines, field.count) : field.count;
+    for (int i = 0; i < std::min(wanted, static_cast<int>(paths.size())); ++i) {
+      requests.push_back({paths[static_cast<std::size_t>(i)], &field, i});
+    }
+  }
+  return requests;
+}
+
+std::vector<std::int32_t> dataRows(const std::vector<FieldGroup>& groups, XPlaneVersion version) {
+  std::vector<std::int32_t> rows;
+  for (const FieldSpec& field : fieldTable()) {
+    if (field.store == nullptr || std::find(groups.begin(), groups.end(), field.group) == groups.end()) continue;
+    if (version != XPlaneVersion::k12 && field.row.row11 >= 0) rows.push_back(field.row.row11);
+    if (version != XPlaneVersion::k11 && field.row.row12 >= 0) rows.push_back(field.row.row12);
+  }
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  return rows;
+}
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,299 @@
+#include "xplane_bridge/nodes/base/base_node.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <stdexcept>
+
+#include <ros/xmlrpc_manager.h>
+
+#include "xplane_bridge/nodes/base/stop_signals.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kDiagnosticsPeriod{1};
+constexpr std::chrono::milliseconds kServiceGrace{300};
+constexpr std::chrono::milliseconds kFlushTime{100};
+constexpr std::chrono::milliseconds kMasterPollPeriod{200};
+
+/// Ends the process when the stop sequence hangs; says in which step.
+class StopWatchdog {
+ public:
+  StopWatchdog() : thread_([this] { watch(); }) {}
+
+  ~StopWatchdog() {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      done_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+
+  void enter(const char* step) { step_ = step; }
+
+ private:
+  void watch() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (!changed_.wait_for(lock, BaseNode::kStopTime, [this] { return done_; })) {
+      std::fprintf(stderr, "the stop sequence hangs in: %s; ending the process\n", step_.load());
+      std::_Exit(static_cast<int>(ExitCode::kStopTimeout));
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool done_ = false;
+  std::atomic<const char*> step_{"start"};
+  std::thread thread_;
+};
+
+}  // namespace
+
+BaseNode::BaseNode() : private_handle_("~") {}
+
+BaseNode::~BaseNode() {
+  if (diagnostics_thread_.joinable()) {
+    requestStop("destroyed");
+    diagnostics_thread_.join();
+  }
+}
+
+void BaseNode::requireState(State wanted, const char* call) const {
+  if (state_ != wanted) {
+    throw std::logic_error(std::string(call) + " called out of order: the order is constructor, initialize, run");
+  }
+}
+
+void BaseNode::initialize() {
+  requireState(State::kCreated, "initialize");
+  common_ = loadCommonOptions(ParamLoader::fromServer(handle_.getNamespace()));
+  const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());
+  loadParameters(own);
+  own.refuseUnknown();
+
+  takeOverShutdownRequest();
+  // With its first log line roscpp registers the node once more, for a cached parameter. Were that the line that says
+  // why it ends, the master would take the old node for a new one and end the node that has replaced it.
+  ROS_INFO("%s starts", ros::this_node::getName().c_str());
+  diagnostics_ = std::make_unique<diagnostic_updater::Updater>(handle_, private_handle_);
+  diagnostics_->setHardwareID("none");
+  advertise();
+  subscribe();
+  state_ = State::kInitialized;
+}
+
+void BaseNode::takeOverShutdownRequest() {
+  // roscpp's own handler would call ros::shutdown() before anything is undone.
+  const ros::XMLRPCManagerPtr& manager = ros::XMLRPCManager::instance();
+  manager->unbind("shutdown");
+  manager->bind("shutdown", [this](XmlRpc::XmlRpcValue& request, XmlRpc::XmlRpcValue& response) {
+    std::string reason = "shutdown request";
+    if (request.getType() == XmlRpc::XmlRpcValue::TypeArray && request.size() > 1 &&
+        request[1].getType() == XmlRpc::XmlRpcValue::TypeString) {
+      reason += ": " + static_cast<std::string>(request[1]);
+    }
+    requestStop(reason);
+    response = ros::xmlrpc::responseInt(1, "", 0);
+  });
+}
+
+ExitCode BaseNode::run() {
+  requireState(State::kInitialized, "run");
+  state_ = State::kRunning;
+  try {
+    if (!stopping()) {
+      makeLink();
+      started_ = true;
+      start();
+      startLink();
+    }
+  } catch (const std::exception& error) {
+    requestStop(error.what(), ExitCode::kSetupError);
+  }
+  spinner_ = std::make_unique<ros::AsyncSpinner>(1);
+  service_spinner_ = std::make_unique<ros::AsyncSpinner>(1, &service_queue_);
+  if (!stopping()) {
+    spinner_->start();
+    service_spinner_->start();
+  }
+  diagnostics_thread_ = std::thread([this] { diagnosticsLoop(); });
+  waitForStopRequest();
+  stop();
+  state_ = State::kStopped;
+  return exit_code_;
+}
+
+void BaseNode::requestStop(const std::string& reason, ExitCode code) {
+  {
+    std::lock_guard<std::mutex> lock(stop_mutex_);
+    if (stop_requested_) {
+      return;
+    }
+    stop_reason_ = reason;
+    exit_code_ = code;
+    stop_requested_ = true;
+  }
+  stop_changed_.notify_all();
+}
+
+void BaseNode::waitForStopRequest() {
+  std::unique_lock<std::mutex> lock(stop_mutex_);
+  stop_changed_.wait(lock, [this] { return stop_requested_.load(); });
+  const std::string reason = stop_reason_;
+  const bool failed = exit_code_ != ExitCode::kOk;
+  lock.unlock();
+  if (failed) {
+    ROS_FATAL("stopping: %s", reason.c_str());
+  } else {
+    ROS_INFO("stopping: %s", reason.c_str());
+  }
+}
+
+void BaseNode::stop() {
+  StopWatchdog watchdog;
+  const auto step = [&watchdog](const char* step_name, const std::function<void()>& action) {
+    watchdog.enter(step_name);
+    try {
+      action();
+    } catch (const std::exception& error) {
+      ROS_ERROR("while stopping (%s): %s", step_name, error.what());
+    }
+  };
+  if (started_) {
+    step("end inputs", [this] { endInputs(); });
+    const Deadline deadline = steady_clock::now() + kUndoTime;
+    step("undo in X-Plane", [this, deadline] { undo(deadline); });
+    step("stop the link", [this, deadline] { stopLink(deadline); });
+    step("publish the final state", [this] {
+      publishFinalState();
+      flushPublishers();
+    });
+  }
+  step("shut ROS down", [] { ros::shutdown(); });
+  step("join threads", [this] {
+    diagnostics_thread_.join();
+    if (started_) {
+      joinThreads();
+    }
+    service_spinner_->stop();
+  });
+}
+
+void BaseNode::endInputs() {
+  for (ros::Subscriber& subscriber : subscribers_) {
+    subscriber.shutdown();
+  }
+  for (ros::SteadyTimer& timer : timers_) {
+    timer.stop();
+  }
+  spinner_->stop();
+  service_queue_.disable();
+  stopInputs();
+  std::unique_lock<std::mutex> lock(service_mutex_);
+  if (!service_idle_.wait_for(lock, kServiceGrace, [this] { return !service_busy_; })) {
+    ROS_WARN("a service call is still waiting for X-Plane; stopping without it");
+  }
+}
+
+void BaseNode::flushPublishers() {
+  // roscpp hands messages to its network thread and offers no way to learn when they are written.
+  std::this_thread::sleep_for(kFlushTime);
+}
+
+bool BaseNode::guardedService(const std::string& service, const std::function<void()>& serve) {
+  {
+    std::lock_guard<std::mutex> lock(service_mutex_);
+    if (stopping()) {
+      ROS_WARN("%s refused: the node is stopping", service.c_str());
+      return false;
+    }
+    service_busy_ = true;
+  }
+  bool served = false;
+  try {
+    serve();
+    served = true;
+  } catch (const std::exception& error) {
+    ROS_ERROR("%s failed: %s", service.c_str(), error.what());
+  }
+  {
+    std::lock_guard<std::mutex> lock(service_mutex_);
+    service_busy_ = false;
+  }
+  service_idle_.notify_all();
+  return served;
+}
+
+void BaseNode::addTimer(double period, std::function<void()> callback) {
+  timers_.push_back(handle_.createSteadyTimer(
+      ros::WallDuration(period), [callback = std::move(callback)](const ros::SteadyTimerEvent&) { callback(); }));
+}
+
+void BaseNode::addDiagnostics(const std::string& status_name,
+                              std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)> fill) {
+  std::lock_guard<std::mutex> lock(diagnostics_mutex_);
+  diagnostics_->add(status_name, fill);
+}
+
+void BaseNode::setHardwareId(const std::string& id) {
+  std::lock_guard<std::mutex> lock(diagnostics_mutex_);
+  diagnostics_->setHardwareID(id);
+}
+
+void BaseNode::diagnosticsLoop() {
+  auto next = steady_clock::now();
+  std::unique_lock<std::mutex> lock(stop_mutex_);
+  while (!stop_requested_) {
+    lock.unlock();
+    {
+      std::lock_guard<std::mutex> updating(diagnostics_mutex_);
+      diagnostics_->force_update();
+    }
+    lock.lock();
+    next += kDiagnosticsPeriod;
+    stop_changed_.wait_until(lock, next, [this] { return stop_requested_.load(); });
+  }
+}
+
+int runNode(int argc, char** argv, const std::string& default_name,
+            const std::function<std::unique_ptr<BaseNode>()>& make_node) {
+  // Outlives the signal thread, which refers to it.
+  std::unique_ptr<BaseNode> node;
+  std::atomic<BaseNode*> made{nullptr};
+  std::atomic<bool> initialized{false};
+  try {
+    const StopSignals signals([&](const std::string& signal) {
+      BaseNode* const target = made;
+      if (target == nullptr) {
+        std::_Exit(static_cast<int>(ExitCode::kOk));  // ros::init() may be waiting for a master; nothing to undo yet
+      }
+      target->requestStop(signal);
+      if (!initialized) {
+        ros::shutdown();  // initialize() may be waiting for a master that has gone
+      }
+    });
+    ros::init(argc, argv, default_name, ros::init_options::NoSigintHandler);
+    for (bool told = false; !ros::master::check(); told = true) {
+      if (!told) {
+        ROS_WARN("no ROS master at %s yet; waiting (start one with roslaunch or roscore)",
+                 ros::master::getURI().c_str());
+      }
+      std::this_thread::sleep_for(kMasterPollPeriod);
+    }
+    node = make_node();
+    made = node.get();
+    node->initialize();
+    initialized = true;
+    return static_cast<int>(node->run());
+  } catch (const std::exception& error) {
+    ROS_FATAL("%s", error.what());
+    ros::shutdown();
+    return static_cast<int>(ExitCode::kSetupError);
+  }
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,62 @@
+#include "xplane_bridge/nodes/base/common_options.hpp"
+
+#include <cstdint>
+
+namespace xplane_bridge {
+namespace {
+
+// X-Plane binds this port itself for sending; a client on the same machine must not listen on it.
+constexpr int kXPlaneSendingPort = 49001;
+
+std::string frameName(const ParamLoader& shared, const std::string& key, const std::string& fallback) {
+  const std::string frame = shared.text(key, fallback);
+  if (frame.empty() || frame.front() == '/') {
+    shared.refuse(key, "a text: a frame name, not empty and without a leading slash");
+  }
+  return frame;
+}
+
+}  // namespace
+
+CommonOptions loadCommonOptions(const ParamLoader& shared) {
+  CommonOptions options;
+  options.host = shared.text("host", options.host);
+  options.port = shared.integer("port", {1, 65535}, options.port);
+  options.data_port = shared.integer("data_port", {0, 65535}, options.data_port);
+  if (options.data_port == kXPlaneSendingPort) {
+    shared.refuse("data_port", "another port: X-Plane binds 49001 itself");
+  }
+  options.transport =
+      shared.choice("transport", {"rref", "data"}, "rref") == "data" ? core::Transport::kData : core::Transport::kRref;
+  options.aircraft = shared.text("aircraft", options.aircraft);
+  if (options.aircraft.empty()) {
+    shared.refuse("aircraft", "a text: the stem of a file in config/aircraft, such as fixed_wing");
+  }
+  options.frames.map = frameName(shared, "map_frame", options.frames.map);
+  options.frames.map_ned = frameName(shared, "map_ned_frame", options.frames.map_ned);
+  options.frames.base_link = frameName(shared, "base_link_frame", options.frames.base_link);
+  options.frames.base_link_frd = frameName(shared, "base_link_frd_frame", options.frames.base_link_frd);
+  options.display_delay = shared.number("display_delay", {0.0, 1.0}, options.display_delay);
+  options.stale_after = shared.number("stale_after", {0.1, 60.0}, options.stale_after);
+  options.lost_after = shared.number("lost_after", {options.stale_after, 3600.0}, options.lost_after);
+  options.listen_for_beacon = shared.boolean("listen_for_beacon", options.listen_for_beacon);
+  if (options.host.empty() && !options.listen_for_beacon) {
+    shared.refuse("listen_for_beacon", "true while `host` is empty: X-Plane is then found by its beacon");
+  }
+  options.beacon_port = shared.integer("beacon_port", {1, 65535}, options.beacon_port);
+  shared.refuseMisspelt();
+  return options;
+}
+
+core::SimLinkOptions linkOptions(const CommonOptions& options) {
+  core::SimLinkOptions link;
+  link.host = options.host;
+  link.port = static_cast<std::uint16_t>(options.port);
+  link.listen_for_beacon = options.listen_for_beacon;
+  link.beacon_port = static_cast<std::uint16_t>(options.beacon_port);
+  link.stale_after_s = options.stale_after;
+  link.lost_after_s = options.lost_after;
+  return link;
+}
+
+}  // namespace xplane_bridge

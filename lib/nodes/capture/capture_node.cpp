@@ -1,0 +1,471 @@
+#include "xplane_bridge/nodes/capture/capture_node.hpp"
+
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <geometry_msgs/TransformStamped.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/distortion_models.h>
+#include <sensor_msgs/image_encodings.h>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "xplane_bridge/nodes/messages/conversions.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr std::chrono::milliseconds kSourceWait{50};
+// [s] between looks at overdue pictures where no picture, frame or state comes, which all look by themselves. Each look
+// wakes two of roscpp's threads: with 5 ms they took a quarter of the node's time at 640x480.
+constexpr double kOverduePeriod = 0.05;
+constexpr std::int64_t kFrozenRepeat = 1'000'000'000;  // [ns] between repetitions of a frozen picture
+constexpr std::size_t kPicturesWaiting = 2;            // for scaling, and for JPEG: more would only be older
+constexpr std::size_t kSpareBuffers = 4;
+constexpr std::uint32_t kStateQueue = 200;  // states of a second and more: none may be lost for pairing
+constexpr std::uint32_t kImageQueue = 2;
+// What counts as motion that a camera would show.
+constexpr double kMovedDeg = 0.05;
+constexpr double kMovedMetres = 0.2;
+constexpr double kFieldOfViewTimeout = 2.0;  // [s]
+constexpr const char* kFieldOfViewPurpose = "field_of_view";
+
+ros::Time rosTime(std::int64_t stamp_ns) { return toRosTime(std::max<std::int64_t>(stamp_ns, 0)); }
+
+bool moved(const FlightState& from, const FlightState& to) {
+  const auto turned = [](double a, double b) { return std::abs(std::remainder(b - a, 360.0)) > kMovedDeg; };
+  if (turned(from.roll_deg, to.roll_deg) || turned(from.pitch_deg, to.pitch_deg) ||
+      turned(from.heading_true_deg, to.heading_true_deg)) {
+    return true;
+  }
+  return std::hypot(std::hypot(to.position_north - from.position_north, to.position_east - from.position_east),
+                    to.position_down - from.position_down) > kMovedMetres;
+}
+
+}  // namespace
+
+CaptureNode::CaptureNode() : clock_(core::hostClock()), frozen_check_(0) {}
+CaptureNode::~CaptureNode() = default;
+
+void CaptureNode::loadParameters(const ParamLoader& own) {
+  options_ = loadCaptureOptions(own);
+  scaler_ = std::make_unique<vision::PictureScaler>(options_.width, options_.height, options_.fit);
+  limiter_ = core::RateLimiter(options_.max_rate);
+  frozen_check_ = vision::FrozenCheck(static_cast<std::int64_t>(options_.frozen_after * 1e9));
+}
+
+void CaptureNode::advertise() {
+  // Plain topics, no image_transport: its plugins would advertise `compressed` a second time, and encode in our thread.
+  image_publisher_ = advertiseTopic<sensor_msgs::Image>("camera/image_raw", kImageQueue);
+  jpeg_publisher_ = advertiseTopic<sensor_msgs::CompressedImage>("camera/image_raw/compressed", kImageQueue);
+  info_publisher_ = advertiseTopic<sensor_msgs::CameraInfo>("camera/camera_info", kImageQueue);
+  frame_state_publisher_ = advertiseTopic<FrameState>("camera/frame_state", kStateQueue);
+  pairing_ = std::make_unique<ImagePairing>(common().display_delay, options_.max_wait,
+                                            [this](const FrameState& state) { frame_state_publisher_.publish(state); });
+  broadcastFrames();
+  addDiagnostics("capture", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnoseCapture(&status); });
+  addDiagnostics("pairing", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnosePairing(&status); });
+}
+
+void CaptureNode::broadcastFrames() {
+  std::vector<geometry_msgs::TransformStamped> frames;
+  for (const core::CameraView view : {core::CameraView::kForward, core::CameraView::kRear, core::CameraView::kDown}) {
+    geometry_msgs::TransformStamped frame;
+    frame.header.stamp = rosTime(clock_.system_ns());
+    frame.header.frame_id = common().frames.base_link;
+    frame.child_frame_id = options_.frame_ids[static_cast<std::size_t>(view)];
+    frame.transform.translation.x = options_.camera_offset[0];
+    frame.transform.translation.y = options_.camera_offset[1];
+    frame.transform.translation.z = options_.camera_offset[2];
+    const Eigen::Quaterniond q = core::opticalOrientation(view);
+    frame.transform.rotation.w = q.w();
+    frame.transform.rotation.x = q.x();
+    frame.transform.rotation.y = q.y();
+    frame.transform.rotation.z = q.z();
+    frames.push_back(frame);
+  }
+  static_frames_ = std::make_unique<tf2_ros::StaticTransformBroadcaster>();
+  static_frames_->sendTransform(frames);
+}
+
+void CaptureNode::subscribe() {
+  subscribeTopic<FlightState>("flight_state", kStateQueue,
+                              [this](const FlightState::ConstPtr& state) { onState(state); });
+  addTimer(kOverduePeriod, [this] { pairing_->flush(clock_.system_ns()); });
+}
+
+core::SimLinkCallbacks CaptureNode::linkCallbacks() {
+  core::SimLinkCallbacks callbacks;
+  callbacks.on_rref = [this](core::GroupId group, const core::RrefView& datagram, const core::ReceiveInfo& info) {
+    if (group == view_group_) onView(datagram, info);
+  };
+  callbacks.on_state = [this](const core::LinkStatus& status) { onLinkState(status); };
+  return callbacks;
+}
+
+void CaptureNode::start() {
+  // A picture is converted in a fraction of its period; OpenCV's workers would spend more on waiting for each other.
+  cv::setNumThreads(1);
+  view_group_ = link().addGroup(view_stream_.group());
+  publisher_ =
+      std::make_unique<LatestWorker<Grabbed>>(kPicturesWaiting, [this](Grabbed& grabbed) { publishPicture(&grabbed); });
+  encoder_ = std::make_unique<LatestWorker<sensor_msgs::ImageConstPtr>>(
+      kPicturesWaiting, [this](sensor_msgs::ImageConstPtr& image) { publishJpeg(*image); });
+  capture_thread_ = std::thread([this] { captureLoop(); });
+}
+
+void CaptureNode::stopInputs() { stop_ = true; }
+
+void CaptureNode::joinThreads() {
+  stop_ = true;
+  if (capture_thread_.joinable()) capture_thread_.join();
+  if (publisher_) publisher_->stop();
+  if (encoder_) encoder_->stop();
+}
+
+// --- X-Plane ---------------------------------------------------------------------------------------------------------
+
+void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo& info) {
+  // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
+  const std::int64_t receive_ns = receive_clock_.toHostTime(info.stamp_ns, clock_.system_ns(), clock_.steady_ns());
+  if (!view_stream_.add(datagram, receive_ns)) return;
+  {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    camera_known_ = true;
+    camera_status_ = view_stream_.status();
+  }
+  pairing_->addFrame(view_stream_.status(), view_stream_.simulatedFramePeriod(), view_stream_.receiveTime());
+}
+
+void CaptureNode::onLinkState(const core::LinkStatus& status) {
+  const bool known = status.state != core::LinkState::kSearching && status.state != core::LinkState::kLost;
+  if (!known) {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    camera_known_ = false;
+  }
+  if (status.epoch == link_epoch_) return;
+  link_epoch_ = status.epoch;
+  view_stream_.reset();
+  pairing_->forgetClock();
+  if (known && options_.set_field_of_view) changeFieldOfView();
+}
+
+void CaptureNode::changeFieldOfView() {
+  const std::string path = view_stream_.fieldOfViewDataref();
+  link().readDatarefs({path}, kFieldOfViewTimeout, [this, path](const std::vector<core::DatarefValue>& values) {
+    if (!values.front().has_value()) {
+      ROS_ERROR("X-Plane did not say its field of view within %.1f s; it is left as it is", kFieldOfViewTimeout);
+      return;
+    }
+    try {
+      const std::shared_ptr<core::Journal> journal = link().journal();
+      float before = *values.front();
+      // What a crashed run has left is not the user's own value; that is in the journal.
+      for (const core::JournalEntry& entry : journal->orphans(kFieldOfViewPurpose)) {
+        for (const core::UndoOperation& operation : entry.undo) {
+          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
+        }
+      }
+      for (const core::JournalEntry& entry : journal->own()) {
+        if (entry.purpose != kFieldOfViewPurpose) continue;
+        for (const core::UndoOperation& operation : entry.undo) {
+          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
+        }
+      }
+      journal->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {core::UndoDref{path, before}});
+      link().sendDref(path, static_cast<float>(options_.field_of_view_deg));
+    } catch (const core::JournalError& error) {
+      ROS_ERROR("X-Plane's field of view is left as it is, because it could not be restored later: %s", error.what());
+    }
+  });
+}
+
+void CaptureNode::undo(Deadline deadline) {
+  if (!options_.set_field_of_view || !link().journal()) return;
+  const double left = std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count();
+  try {
+    for (const core::JournalEntry& entry : link().journal()->own()) {
+      if (entry.purpose != kFieldOfViewPurpose) continue;
+      if (link().undo(entry.undo, std::max(left, 0.1))) link().journal()->remove({entry.id});
+    }
+  } catch (const core::JournalError& error) {
+    ROS_ERROR("X-Plane's field of view may not be restored: %s", error.what());
+  }
+}
+
+CaptureNode::CameraFacts CaptureNode::cameraFacts() const {
+  const std::lock_guard<std::mutex> lock(camera_mutex_);
+  CameraFacts facts;
+  facts.field_of_view_deg = options_.field_of_view_deg;
+  if (!camera_known_) return facts;
+  facts.view = core::classifyView(static_cast<double>(camera_status_.view_heading_deg),
+                                  static_cast<double>(camera_status_.view_pitch_deg), options_.view_tolerance_deg);
+  facts.external = camera_status_.view_external > 0.5F;
+  if (facts.external) facts.view = core::CameraView::kUnknown;
+  const auto field_of_view = static_cast<double>(camera_status_.field_of_view_deg);
+  if (field_of_view > 1.0 && field_of_view < 170.0) {
+    facts.field_of_view_deg = field_of_view;
+    facts.field_of_view_read = true;
+  }
+  return facts;
+}
+
+// --- pictures --------------------------------------------------------------------------------------------------------
+
+void CaptureNode::captureLoop() {
+  prctl(PR_SET_NAME, "capture");
+  const std::unique_ptr<vision::FrameSource> source = makeSource(options_, clock_.system_ns);
+  std::string problem_said;
+  while (!stop_) {
+    vision::Change change;
+    const vision::WaitResult result = source->waitChange(kSourceWait, change);
+    if (result == vision::WaitResult::kChange) takePicture(source.get(), change);
+    const std::string problem = source->problem();
+    if (problem != problem_said) {
+      if (problem.empty()) {
+        ROS_INFO_STREAM("capturing " << source->describe());
+      } else {
+        ROS_WARN_STREAM("no picture: " << problem);
+      }
+      problem_said = problem;
+    }
+    {
+      const std::lock_guard<std::mutex> lock(capture_mutex_);
+      source_problem_ = problem;
+      // Asking the window for its title costs a round trip; only where it may have changed.
+      if (result != vision::WaitResult::kChange || source_description_.empty()) {
+        source_description_ = source->describe();
+      }
+    }
+    repeatFrozen(clock_.system_ns());
+  }
+}
+
+void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change& change) {
+  const core::RateLimiter before = limiter_;
+  const bool due = anybodyListens() && limiter_.due(change.time_ns);
+  {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    ++changes_;
+    if (!due) {
+      ++skipped_;
+      return;
+    }
+  }
+  vision::Picture picture;
+  if (source->grab(change, picture) != vision::GrabResult::kNew) {
+    limiter_ = before;  // what was drawn was not a new picture: the next one is due still
+    return;
+  }
+  Grabbed grabbed;
+  grabbed.pixels = takeBuffer();
+  picture.bgr.copyTo(grabbed.pixels);
+  grabbed.display_ns = picture.display_time_ns;
+  grabbed.grab_ns = picture.grab_time_ns;
+  grabbed.display_known = picture.display_time_known;
+  {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    frozen_check_.pictureChanged(picture.grab_time_ns);
+    frozen_ = false;
+    ++grabbed_;
+    if (grabbed.display_known) {
+      const double age = static_cast<double>(grabbed.grab_ns - grabbed.display_ns) * 1e-9;
+      grab_age_sum_ += age;
+      grab_age_max_ = std::max(grab_age_max_, age);
+      ++grab_ages_;
+    }
+    dropped_ = skipped_ + static_cast<std::uint32_t>(publisher_->dropped());
+    grabbed.dropped = dropped_;
+  }
+  last_pixels_ = grabbed.pixels;
+  publisher_->giveDroppingOldest(std::move(grabbed));
+}
+
+void CaptureNode::repeatFrozen(std::int64_t now_ns) {
+  Grabbed grabbed;
+  {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    frozen_ = frozen_check_.frozen(now_ns);
+    if (!frozen_ || last_pixels_.empty() || now_ns - frozen_sent_ns_ < kFrozenRepeat) return;
+    grabbed.dropped = dropped_;
+  }
+  frozen_sent_ns_ = now_ns;
+  grabbed.pixels = last_pixels_.clone();  // its own buffer may be written to while this one waits
+  grabbed.display_ns = grabbed.grab_ns = now_ns;
+  grabbed.frozen = true;
+  publisher_->giveDroppingOldest(std::move(grabbed));
+}
+
+bool CaptureNode::anybodyListens() const {
+  return image_publisher_.getNumSubscribers() > 0 || jpeg_publisher_.getNumSubscribers() > 0 ||
+         info_publisher_.getNumSubscribers() > 0 || frame_state_publisher_.getNumSubscribers() > 0;
+}
+
+void CaptureNode::publishPicture(Grabbed* grabbed) {
+  const CameraFacts camera = cameraFacts();
+  FrameState state;
+  state.header.stamp = rosTime(grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns);
+  state.header.seq = image_count_;
+  const core::CameraView frame = camera.view == core::CameraView::kUnknown ? options_.assumed_view : camera.view;
+  state.header.frame_id = options_.frame_ids[static_cast<std::size_t>(frame)];
+  state.view = static_cast<std::uint8_t>(camera.view);
+  if (camera.view == core::CameraView::kUnknown) state.quality |= FrameState::QUALITY_VIEW_UNKNOWN;
+  if (camera.external) state.quality |= FrameState::QUALITY_EXTERNAL_VIEW;
+  if (!camera.field_of_view_read) state.quality |= FrameState::QUALITY_FOV_ASSUMED;
+  if (!grabbed->display_known) state.quality |= FrameState::QUALITY_DISPLAY_UNKNOWN;
+  if (grabbed->frozen) {
+    state.quality |= FrameState::QUALITY_FROZEN;
+    ++frozen_count_;
+  }
+  state.display_time = rosTime(grabbed->display_ns);
+  state.grab_time = rosTime(grabbed->grab_ns);
+  state.dropped = grabbed->dropped;
+  state.frozen = frozen_count_;
+  state.image_count = ++image_count_;
+
+  const sensor_msgs::CameraInfo info = cameraInfo(state.header, grabbed->pixels.size(), camera.field_of_view_deg);
+  state.field_of_view_deg =
+      static_cast<float>(scaler_->intrinsics(grabbed->pixels.size(), camera.field_of_view_deg).horizontal_fov_deg);
+
+  const bool raw = image_publisher_.getNumSubscribers() > 0;
+  const bool jpeg = jpeg_publisher_.getNumSubscribers() > 0;
+  const bool black = vision::isBlack(grabbed->pixels);
+  if (black) state.quality |= FrameState::QUALITY_BLACK;
+  {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    black_ = black;
+  }
+  if (raw || jpeg) {
+    const sensor_msgs::ImagePtr image = takeMessage();
+    image->header = state.header;
+    cv::Mat pixels(options_.height, options_.width, CV_8UC3, image->data.data());
+    scaler_->scale(grabbed->pixels, pixels);
+    if (raw) image_publisher_.publish(image);
+    if (jpeg) encoder_->giveDroppingOldest(image);
+  }
+  info_publisher_.publish(info);
+  pairing_->addPicture(state, clock_.system_ns());
+  if (!grabbed->frozen) giveBuffer(std::move(grabbed->pixels));
+}
+
+sensor_msgs::ImagePtr CaptureNode::takeMessage() {
+  for (const sensor_msgs::ImagePtr& message : messages_) {
+    if (message.unique()) return message;  // written, and encoded
+  }
+  const auto message = boost::make_shared<sensor_msgs::Image>();
+  message->width = static_cast<std::uint32_t>(options_.width);
+  message->height = static_cast<std::uint32_t>(options_.height);
+  message->encoding = sensor_msgs::image_encodings::BGR8;
+  message->step = message->width * 3;
+  message->data.resize(static_cast<std::size_t>(message->step) * message->height);
+  if (messages_.size() < kSpareBuffers) messages_.push_back(message);
+  return message;
+}
+
+void CaptureNode::publishJpeg(const sensor_msgs::Image& image) {
+  sensor_msgs::CompressedImage compressed;
+  compressed.header = image.header;
+  compressed.format = "bgr8; jpeg compressed bgr8";
+  // OpenCV reads the picture only.
+  const cv::Mat pixels(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC3,
+                       const_cast<std::uint8_t*>(image.data.data()));
+  cv::imencode(".jpg", pixels, compressed.data, {cv::IMWRITE_JPEG_QUALITY, options_.jpeg_quality});
+  jpeg_publisher_.publish(compressed);
+}
+
+sensor_msgs::CameraInfo CaptureNode::cameraInfo(const std_msgs::Header& header, cv::Size source,
+                                                double field_of_view_deg) const {
+  const vision::Intrinsics camera = scaler_->intrinsics(source, field_of_view_deg);
+  sensor_msgs::CameraInfo info;
+  info.header = header;
+  info.width = static_cast<std::uint32_t>(options_.width);
+  info.height = static_cast<std::uint32_t>(options_.height);
+  info.distortion_model = sensor_msgs::distortion_models::PLUMB_BOB;
+  info.D.assign(5, 0.0);
+  info.K = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
+  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  info.P = {camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0};
+  return info;
+}
+
+cv::Mat CaptureNode::takeBuffer() {
+  const std::lock_guard<std::mutex> lock(buffers_mutex_);
+  if (buffers_.empty()) return {};
+  cv::Mat buffer = std::move(buffers_.back());
+  buffers_.pop_back();
+  return buffer;
+}
+
+void CaptureNode::giveBuffer(cv::Mat buffer) {
+  const std::lock_guard<std::mutex> lock(buffers_mutex_);
+  if (buffers_.size() < kSpareBuffers) buffers_.push_back(std::move(buffer));
+}
+
+void CaptureNode::onState(const FlightState::ConstPtr& state) {
+  const std::int64_t now_ns = clock_.system_ns();
+  pairing_->addState(state, now_ns);
+  const std::lock_guard<std::mutex> lock(capture_mutex_);
+  if (!moved_from_ || moved(*moved_from_, *state)) {
+    if (moved_from_) frozen_check_.stateMoved(now_ns);
+    moved_from_ = state;
+  }
+}
+
+// --- diagnostics -----------------------------------------------------------------------------------------------------
+
+void CaptureNode::diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* status) {
+  const std::lock_guard<std::mutex> lock(capture_mutex_);
+  if (!source_problem_.empty()) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::ERROR, "no picture: " + source_problem_);
+  } else if (frozen_) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::ERROR, "frozen: the aircraft moves, the picture does not");
+  } else if (black_) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "the picture is black");
+  } else {
+    status->summary(diagnostic_msgs::DiagnosticStatus::OK, anybodyListens() ? "capturing" : "nobody listens");
+  }
+  status->add("Source", source_description_);
+  status->add("Changes of the picture", changes_);
+  status->add("Pictures taken", grabbed_);
+  status->add("Pictures left out (above max_rate, or nobody listens)", skipped_);
+  status->add("Pictures dropped (no time to scale)", publisher_ ? publisher_->dropped() : 0);
+  status->add("JPEG dropped (no time to encode)", encoder_ ? encoder_->dropped() : 0);
+  status->add("Change to grab, mean (ms)", grab_ages_ > 0 ? 1e3 * grab_age_sum_ / grab_ages_ : 0.0);
+  status->add("Change to grab, longest (ms)", 1e3 * grab_age_max_);
+  grab_age_sum_ = grab_age_max_ = 0.0;
+  grab_ages_ = 0;
+}
+
+void CaptureNode::diagnosePairing(diagnostic_updater::DiagnosticStatusWrapper* status) {
+  const ImagePairing::Report report = pairing_->report();
+  const core::AssociationCounters& counters = report.counters;
+  if (counters.images == 0) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::OK, "no picture paired yet");
+  } else if (!report.clock_fitted) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "the simulator's clock is not known here");
+  } else if ((counters.without_state - reported_.without_state) * 10 > counters.images - reported_.images) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "many pictures have no state: does rx_node run?");
+  } else {
+    status->summary(diagnostic_msgs::DiagnosticStatus::OK, "paired");
+  }
+  reported_ = counters;
+  status->add("Pictures", counters.images);
+  status->add("With the state of their frame", counters.by_frame);
+  status->add("With the nearest state", counters.by_nearest);
+  status->add("Interpolated", counters.interpolated);
+  status->add("By stamps alone", counters.by_stamp);
+  status->add("While paused", counters.paused);
+  status->add("Without a state", counters.without_state);
+  status->add("Half way between two frames", counters.ambiguous);
+  status->add("Frames put in for lost datagrams", counters.frames_inferred);
+  status->add("Display delay applied (ms)", 1e3 * common().display_delay);
+  status->add("Display beyond that, mean (ms)", 1e3 * report.mean_offset);
+  status->add("Clock uncertainty (ms)", 1e3 * report.clock_uncertainty);
+  status->add("State spacing over frame spacing (-)", report.state_to_frame_ratio);
+}
+
+}  // namespace xplane_bridge

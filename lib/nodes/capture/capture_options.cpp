@@ -1,0 +1,107 @@
+#include "xplane_bridge/nodes/capture/capture_options.hpp"
+
+#include <cerrno>
+#include <cstdlib>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace xplane_bridge {
+namespace {
+
+constexpr int kSmallestSide = 16;
+constexpr int kLargestSide = 8192;
+
+std::uint32_t windowId(const ParamLoader& window) {
+  const std::string text = window.text("id", "");
+  if (text.empty()) return 0;
+  char* end = nullptr;
+  errno = 0;
+  const unsigned long value = std::strtoul(text.c_str(), &end, 0);
+  if (errno != 0 || *end != '\0' || value == 0 || value > std::numeric_limits<std::uint32_t>::max()) {
+    window.refuse("id", "a window id as xwininfo prints it, in quotes, e.g. \"0x3a00007\"");
+  }
+  return static_cast<std::uint32_t>(value);
+}
+
+cv::Rect region(const ParamLoader& window) {
+  const std::vector<double> numbers = window.numbers("region", {0.0, 65535.0});
+  if (numbers.empty()) return {};
+  const auto whole = [](double number) { return static_cast<int>(number); };
+  if (numbers.size() != 4 || whole(numbers[2]) < 1 || whole(numbers[3]) < 1) {
+    window.refuse("region", "[x, y, width, height] in pixels of the screen, or []");
+  }
+  return {whole(numbers[0]), whole(numbers[1]), whole(numbers[2]), whole(numbers[3])};
+}
+
+vision::X11SourceOptions loadWindow(const ParamLoader& window) {
+  vision::X11SourceOptions x11;
+  x11.display = window.text("display", "");
+  x11.class_name = window.text("class", "");
+  x11.window_id = windowId(window);
+  x11.region = region(window);
+  const bool otherwise = !x11.class_name.empty() || x11.window_id != 0 || !x11.region.empty();
+  x11.title = window.text("title", otherwise ? "" : "X-System");
+  x11.title_is_regex = window.boolean("title_is_regex", false);
+  x11.change_detection = vision::changeDetectionFromName(
+      window.choice("change_detection", {"auto", "damage", "checksum", "none"}, "auto"));
+  x11.use_composite = window.boolean("composite", true);
+  x11.use_shared_memory = window.boolean("shared_memory", true);
+  x11.poll_period = window.number("poll_period", {0.0005, 1.0}, x11.poll_period);
+  x11.search_period = window.number("search_period", {0.01, 60.0}, x11.search_period);
+  return x11;
+}
+
+}  // namespace
+
+CaptureOptions loadCaptureOptions(const ParamLoader& own) {
+  CaptureOptions options;
+  options.from_video = own.choice("source", {"x11", "video"}, "x11") == "video";
+  options.x11 = loadWindow(own.section("window"));
+  const ParamLoader video = own.section("video");
+  options.video.address = video.text("address", "");
+  options.video.loop = video.boolean("loop", false);
+  options.video.retry_period = video.number("retry_period", {0.01, 60.0}, options.video.retry_period);
+  if (options.from_video && options.video.address.empty()) {
+    video.refuse("address", "a device, a file or a URL when `source` is video");
+  }
+
+  options.width = own.integer("width", {kSmallestSide, kLargestSide}, options.width);
+  options.height = own.integer("height", {kSmallestSide, kLargestSide}, options.height);
+  options.fit = vision::fitModeFromName(own.choice("fit", {"crop", "letterbox", "stretch"}, "crop"));
+  options.max_rate = own.number("max_rate", {0.0, 1000.0}, options.max_rate);
+  options.jpeg_quality = own.integer("jpeg_quality", {1, 100}, options.jpeg_quality);
+
+  options.field_of_view_deg = own.number("field_of_view_deg", {1.0, 170.0}, options.field_of_view_deg);
+  options.set_field_of_view = own.boolean("set_field_of_view", false);
+  const std::string view = own.choice("assumed_view", {"forward", "rear", "down"}, "forward");
+  for (const core::CameraView candidate :
+       {core::CameraView::kForward, core::CameraView::kRear, core::CameraView::kDown}) {
+    const std::string name = core::toString(candidate);
+    if (name == view) options.assumed_view = candidate;
+    options.frame_ids[static_cast<std::size_t>(candidate)] = own.text("frame_" + name, "camera_" + name + "_optical");
+  }
+  options.view_tolerance_deg = own.number("view_tolerance_deg", {0.0, 40.0}, options.view_tolerance_deg);
+  const std::vector<double> offset = own.numbers("camera_offset", {-100.0, 100.0});
+  if (!offset.empty()) {
+    if (offset.size() != options.camera_offset.size()) own.refuse("camera_offset", "[forward, left, up] in metres");
+    std::copy(offset.begin(), offset.end(), options.camera_offset.begin());
+  }
+
+  options.max_wait = own.number("max_wait", {0.0, 10.0}, options.max_wait);
+  options.frozen_after = own.number("frozen_after", {0.05, 3600.0}, options.frozen_after);
+  try {
+    (void)makeSource(options, [] { return std::int64_t{0}; });
+  } catch (const std::invalid_argument& error) {
+    throw ParamError(own.fullKey(options.from_video ? "video" : "window") + ": " + error.what());
+  }
+  return options;
+}
+
+std::unique_ptr<vision::FrameSource> makeSource(const CaptureOptions& options, vision::Clock clock) {
+  if (options.from_video) return std::make_unique<vision::VideoSource>(options.video, std::move(clock));
+  return std::make_unique<vision::X11WindowSource>(options.x11, std::move(clock));
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,178 @@
+#include "xplane_bridge/nodes/capture/image_pairing.hpp"
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/nodes/capture/flight_state_interpolation.hpp"
+#include "xplane_bridge/nodes/messages/conversions.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kOffsetSmoothing = 0.05;
+
+constexpr bool sameBit(std::uint32_t message, std::uint32_t ours) { return message == ours; }
+static_assert(sameBit(FrameState::QUALITY_STATE_MISSING, core::kStateMissing), "FrameState and core differ");
+static_assert(sameBit(FrameState::QUALITY_INTERPOLATED, core::kInterpolated), "FrameState and core differ");
+static_assert(sameBit(FrameState::QUALITY_OFF_FRAME, core::kOffFrame), "FrameState and core differ");
+static_assert(sameBit(FrameState::QUALITY_CLOCK_UNSURE, core::kClockUnsure), "FrameState and core differ");
+static_assert(sameBit(FrameState::QUALITY_PAUSED, core::kPaused), "FrameState and core differ");
+static_assert(sameBit(FrameState::QUALITY_EPOCH_EDGE, core::kEpochEdge), "FrameState and core differ");
+static_assert(sameBit(FrameState::QUALITY_BORDERLINE, core::kBorderline), "FrameState and core differ");
+
+std::int64_t nanoseconds(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
+double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
+
+/// A state that nothing is known of: valid = 0 and NaN, never zero for unknown.
+FlightState unknownState() {
+  FlightState message;
+  toMessage(core::FlightState(), "", &message);
+  return message;
+}
+
+}  // namespace
+
+ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish)
+    : display_delay_(display_delay), max_wait_ns_(nanoseconds(max_wait)), publish_(std::move(publish)) {}
+
+void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status_ = status;
+  frame_period_ = frame_period;
+  core::ClockSample sample;
+  sample.receive_ns = receive_ns;
+  sample.sim_time = static_cast<float>(status.sim_time);
+  sample.frame_period = frame_period;
+  sample.paused = status.paused;
+  sample.replay = status.replay;
+  const core::ClockEstimate estimate = clock_.update(sample);
+  if (!estimate.usable) return;
+  core::SimFrame frame;
+  frame.sim_time = estimate.sim_time;
+  frame.sim_time_raw = sample.sim_time;
+  frame.frame_period = static_cast<double>(frame_period);
+  frame.paused = status.paused || status.replay;
+  frame.epoch = estimate.epoch;
+  associator_.addFrame(frame);
+  flushLocked(receive_ns);
+}
+
+void ImagePairing::forgetClock() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clock_.reset();
+  status_ = core::SimStatus();
+  frame_period_ = 0.0F;
+}
+
+void ImagePairing::addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  core::StateKey key;
+  key.id = next_state_id_++;
+  key.sim_time_raw = state->sim_time;
+  key.stamp_ns = static_cast<std::int64_t>(state->header.stamp.toNSec());
+  key.epoch = state->epoch;
+  key.paused = state->paused || state->replay;
+  associator_.addState(key);
+  states_[key.id] = {state, arrival_ns};
+  flushLocked(arrival_ns);
+  forgetOldStates();
+}
+
+void ImagePairing::forgetOldStates() {
+  const auto oldest = associator_.oldestStateId();
+  states_.erase(states_.begin(), oldest.has_value() ? states_.lower_bound(*oldest) : states_.end());
+}
+
+void ImagePairing::map(core::ImageMoment* moment) const {
+  moment->paused = clock_.paused();
+  moment->sim_time = clock_.simTime(moment->host_time_ns);
+  moment->uncertainty = clock_.uncertainty();
+  moment->epoch = clock_.epoch();
+}
+
+void ImagePairing::mapAnew(Waiting* picture) const {
+  core::ImageMoment& moment = picture->moment;
+  if (moment.paused) return;
+  const bool slipped = picture->slips != clock_.slips() && moment.epoch == clock_.epoch() && !clock_.paused();
+  if (moment.sim_time.has_value() && !slipped) return;
+  map(&moment);
+  picture->slips = clock_.slips();
+}
+
+void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Waiting waiting;
+  waiting.answer = picture;
+  waiting.answer.display_delay = display_delay_;
+  if (display_delay_ == 0.0) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
+  if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
+  waiting.answer.clock_uncertainty = clock_.fitted() ? clock_.uncertainty() : kNaN;
+  waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : std::numeric_limits<float>::quiet_NaN();
+  waiting.moment.host_time_ns = static_cast<std::int64_t>(picture.header.stamp.toNSec()) - nanoseconds(display_delay_);
+  waiting.deadline_ns = now_ns + max_wait_ns_;
+  map(&waiting.moment);
+  waiting.slips = clock_.slips();
+  waiting_.push_back(std::move(waiting));
+  flushLocked(now_ns);
+}
+
+void ImagePairing::flush(std::int64_t now_ns) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  flushLocked(now_ns);
+}
+
+void ImagePairing::flushLocked(std::int64_t now_ns) {
+  while (!waiting_.empty()) {
+    Waiting& picture = waiting_.front();
+    const bool final = now_ns >= picture.deadline_ns;
+    mapAnew(&picture);
+    // Without the simulator's clock the pairing is a makeshift: not before the deadline, the clock may come.
+    const bool clock_missing = !picture.moment.sim_time.has_value() && !picture.moment.paused;
+    if (clock_missing && !final) return;
+    const core::Association association = associator_.associate(picture.moment, final);
+    if (association.pending) return;
+    complete(association, now_ns, &picture);
+    publish_(picture.answer);
+    waiting_.pop_front();
+  }
+}
+
+void ImagePairing::complete(const core::Association& association, std::int64_t now_ns, Waiting* picture) {
+  FrameState& answer = picture->answer;
+  answer.quality |= core::pairingQuality(picture->moment, association);
+  answer.frame_sim_time = association.frame_known ? association.frame_sim_time : kNaN;
+  answer.sim_time_error = kNaN;
+  answer.state_age = kNaN;
+  const auto state = states_.find(association.id);
+  const auto after = states_.find(association.id_after);
+  if (association.method == core::PairingMethod::kNone || state == states_.end() || after == states_.end()) {
+    answer.quality |= FrameState::QUALITY_STATE_MISSING;
+    answer.state = unknownState();
+    ++unpaired_;
+  } else {
+    answer.state = association.method == core::PairingMethod::kInterpolated
+                       ? interpolate(*state->second.message, *after->second.message, association.fraction)
+                       : *state->second.message;
+    answer.state_age = seconds(now_ns - after->second.arrival_ns);
+    if (association.frame_known) answer.sim_time_error = association.state_offset;
+  }
+  answer.unpaired = unpaired_;
+  if (association.frame_known) mean_offset_ += kOffsetSmoothing * (association.frame_offset - mean_offset_);
+}
+
+ImagePairing::Report ImagePairing::report() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Report report;
+  report.counters = associator_.counters();
+  report.clock_fitted = clock_.fitted();
+  report.clock_uncertainty = clock_.uncertainty();
+  report.state_to_frame_ratio = associator_.stateToFrameRatio();
+  report.mean_offset = mean_offset_;
+  report.waiting = waiting_.size();
+  return report;
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,126 @@
+#include "xplane_bridge/nodes/joystick/joystick_mapper_node.hpp"
+
+#include "xplane_bridge/ControlCommand.h"
+#include "xplane_bridge/ModeRequest.h"
+#include "xplane_bridge/nodes/messages/control_conversions.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+std::string listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+}  // namespace
+
+// Counting from the seconds of the clock, a restarted mapper is not mistaken for an old message.
+JoystickMapperNode::JoystickMapperNode()
+    : request_sequence_(static_cast<std::uint32_t>(clock_.system_ns() / core::kNanosecondsPerSecond)) {}
+
+double JoystickMapperNode::now() const { return static_cast<double>(clock_.steady_ns()) * 1e-9; }
+
+void JoystickMapperNode::loadParameters(const ParamLoader& own) {
+  period_ = 1.0 / own.number("rate", {1.0, 1000.0}, 50.0);
+  mapper_ = std::make_unique<core::JoystickMapper>(loadJoystickOptions(own));
+}
+
+void JoystickMapperNode::advertise() {
+  command_publisher_ = advertiseTopic<ControlCommand>("control/manual", 1);
+  request_publisher_ = advertiseTopic<ModeRequest>("control/mode_request", 10);
+  addDiagnostics("joystick", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { fillDiagnostics(&status); });
+  setHardwareId(mapper_->options().device);
+}
+
+void JoystickMapperNode::subscribe() {
+  subscribeTopic<sensor_msgs::Joy>("joy", 1, [this](const sensor_msgs::JoyConstPtr& joy) { onJoy(*joy); });
+  subscribeTopic<ControlMode>("control/mode", 1, [this](const ControlModeConstPtr& mode) {
+    if (mode->mode != ControlMode::MANUAL && mode->mode != ControlMode::AUTO) return;
+    std::lock_guard<std::mutex> lock(mutex_);
+    mapper_->setMode(static_cast<core::FlightMode>(mode->mode));
+  });
+  addTimer(period_, [this] { onTimer(); });
+}
+
+void JoystickMapperNode::onJoy(const sensor_msgs::Joy& joy) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const double time = now();
+  ++joy_count_;
+  if (mapper_->onJoy(joy.axes, joy.buttons, time)) {
+    last_joy_ = time;
+    publish(time);
+  }
+  reportProblems();
+}
+
+void JoystickMapperNode::onTimer() {
+  std::lock_guard<std::mutex> lock(mutex_);
+  const double time = now();
+  const bool alive = mapper_->alive(time);
+  if (was_alive_ && !alive) {
+    ROS_WARN("%s is silent: control/manual stops. Is it plugged in, and does the joy driver repeat (autorepeat_rate)?",
+             mapper_->options().device.c_str());
+  }
+  was_alive_ = alive;
+  // A message has just done it.
+  if (time - last_publication_ < 0.5 * period_) return;
+  publish(time);
+}
+
+void JoystickMapperNode::publish(double time) {
+  core::JoystickCommand command = mapper_->update(time);
+  const ros::Time stamp(ros::WallTime::now().toSec());
+  for (const core::FlightMode mode : mapper_->takeModeRequests()) {
+    ModeRequest request;
+    request.header.stamp = stamp;
+    request.sequence = ++request_sequence_;
+    request.mode = static_cast<std::uint8_t>(mode);
+    request.requester = name();
+    request_publisher_.publish(request);
+  }
+  if (!command.alive) return;
+  command.command.sequence = ++command_sequence_;
+  ControlCommand message;
+  message.header.stamp = stamp;
+  toMessage(command.command, &message);
+  command_publisher_.publish(message);
+  last_publication_ = time;
+  reportSelection();
+}
+
+void JoystickMapperNode::reportProblems() {
+  std::string text;
+  for (const core::JoyProblem& problem : mapper_->problems()) text += (text.empty() ? "" : "; ") + problem.text;
+  if (text == reported_problems_) return;
+  reported_problems_ = text;
+  if (!text.empty()) ROS_ERROR("%s", text.c_str());
+}
+
+void JoystickMapperNode::reportSelection() {
+  auto selection = mapper_->selected();
+  if (selection == reported_selection_) return;
+  reported_selection_ = std::move(selection);
+  ROS_INFO("selected: %s", listed(reported_selection_).c_str());
+}
+
+void JoystickMapperNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  std::lock_guard<std::mutex> lock(mutex_);
+  const double time = now();
+  if (!mapper_->problems().empty()) {
+    status->summary(Level::ERROR, reported_problems_);
+  } else if (mapper_->alive(time)) {
+    status->summary(Level::OK, mapper_->options().device + " is alive");
+  } else {
+    status->summary(Level::WARN,
+                    mapper_->options().device + (joy_count_ == 0 ? " has not been heard yet" : " is silent"));
+  }
+  status->add("Messages (-)", joy_count_);
+  status->add("Messages dropped (-)", mapper_->dropped());
+  if (last_joy_ > 0.0) status->add("Silence (s)", time - last_joy_);
+  status->add("Commands published (-)", command_sequence_);
+  status->add("Selected (-)", listed(mapper_->selected()));
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,141 @@
+#include "xplane_bridge/nodes/rx/mission_publisher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "xplane_bridge/core/base/rate_limiter.hpp"
+#include "xplane_bridge/nodes/messages/conversions.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr std::uint32_t kQueueSize = 10;
+// Asked for until the aircraft has said how many engines it has: two are enough for most.
+constexpr int kFirstGuessOfEngines = 2;
+
+template <class State, class Message>
+class TypedMissionPublisher : public MissionPublisher {
+ public:
+  TypedMissionPublisher(int rate, core::Transport transport, std::string frame)
+      : transport_(transport), rate_(rate), frame_(std::move(frame)), limiter_(rate) {
+    rebuild();
+  }
+
+  core::FieldGroup group() const override { return core::GroupOf<State>::kGroup; }
+  int rate() const override { return rate_; }
+
+  void advertise(ros::NodeHandle* handle) override {
+    publisher_ = handle->advertise<Message>(std::string("mission/") + core::toString(group()), kQueueSize);
+  }
+
+  void configure(core::XPlaneVersion version) override {
+    version_ = version;
+    rebuild();
+  }
+
+  std::vector<std::string> requests() const override {
+    std::vector<std::string> paths;
+    for (const core::DatarefRequest& request : assembler_->requests()) {
+      paths.push_back(request.path);
+    }
+    return paths;
+  }
+
+  const std::vector<std::int32_t>& rows() const override { return assembler_->rows(); }
+
+  bool onRref(const core::RrefView& datagram, std::int64_t receive_ns, const core::ClockFilter& clock) override {
+    if (!assembler_->add(datagram, receive_ns)) {
+      return false;
+    }
+    if (transport_ == core::Transport::kRref) {
+      publish(assembler_->assemble(nullptr, receive_ns, clock));
+    }
+    return adoptEngines();
+  }
+
+  void onRows(const core::RowStore& rows, std::int64_t receive_ns, const core::ClockFilter& clock) override {
+    if (limiter_.due(receive_ns)) {
+      publish(assembler_->assemble(&rows, receive_ns, clock));
+    }
+  }
+
+  void reset() override { assembler_->reset(); }
+
+ private:
+  void rebuild() {
+    typename core::MissionAssembler<State>::Options options;
+    options.transport = transport_;
+    options.version = version_;
+    options.rate = rate_;
+    options.engines = engines_;
+    assembler_ = std::make_unique<core::MissionAssembler<State>>(options);
+  }
+
+  void publish(const State& state) {
+    ++report_.published;
+    report_.missing = allBits() & ~state.valid;
+    report_.stamp_ns = state.stamp_ns;
+    noteEngines(state);
+    if (publisher_.getNumSubscribers() > 0) {
+      toMessage(state, frame_, &message_);
+      publisher_.publish(message_);
+    }
+  }
+
+  static std::uint32_t allBits() { return static_cast<std::uint32_t>(Message::VALID_ALL); }
+
+  void noteEngines(const core::EngineStates& state) {
+    if (state.count > 0) {
+      engines_seen_ = std::min<int>(state.count, core::kMaxEngines);
+    }
+  }
+  template <class Other>
+  void noteEngines(const Other&) {}
+
+  bool adoptEngines() {
+    if (engines_seen_ == 0 || engines_seen_ == engines_) {
+      return false;
+    }
+    engines_ = engines_seen_;
+    rebuild();
+    return true;
+  }
+
+  core::Transport transport_;
+  core::XPlaneVersion version_ = core::XPlaneVersion::kUnknown;
+  int rate_;
+  int engines_ = kFirstGuessOfEngines;
+  int engines_seen_ = 0;
+  std::string frame_;
+  core::RateLimiter limiter_;
+  std::unique_ptr<core::MissionAssembler<State>> assembler_;
+  ros::Publisher publisher_;
+  Message message_;
+};
+
+}  // namespace
+
+std::vector<std::unique_ptr<MissionPublisher>> makeMissionPublishers(
+    const std::array<int, core::kFieldGroupCount>& rates, core::Transport transport, const FrameNames& frames) {
+  std::vector<std::unique_ptr<MissionPublisher>> publishers;
+  const auto add = [&](auto* state, auto* message) {
+    using State = std::remove_pointer_t<decltype(state)>;
+    using Message = std::remove_pointer_t<decltype(message)>;
+    const int rate = rates[static_cast<std::size_t>(core::GroupOf<State>::kGroup)];
+    if (rate > 0) {
+      publishers.push_back(
+          std::make_unique<TypedMissionPublisher<State, Message>>(rate, transport, frames.base_link_frd));
+    }
+  };
+  add(static_cast<core::EngineStates*>(nullptr), static_cast<EngineStates*>(nullptr));
+  add(static_cast<core::SurfaceStates*>(nullptr), static_cast<SurfaceStates*>(nullptr));
+  add(static_cast<core::ControlStates*>(nullptr), static_cast<ControlStates*>(nullptr));
+  add(static_cast<core::ElectricalState*>(nullptr), static_cast<ElectricalState*>(nullptr));
+  add(static_cast<core::AutopilotState*>(nullptr), static_cast<AutopilotState*>(nullptr));
+  add(static_cast<core::WarningState*>(nullptr), static_cast<WarningState*>(nullptr));
+  add(static_cast<core::FuelState*>(nullptr), static_cast<FuelState*>(nullptr));
+  add(static_cast<core::SimStatus*>(nullptr), static_cast<SimStatus*>(nullptr));
+  return publishers;
+}
+
+}  // namespace xplane_bridge

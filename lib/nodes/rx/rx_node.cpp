@@ -1,0 +1,439 @@
+#include "xplane_bridge/nodes/rx/rx_node.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "xplane_bridge/LinkState.h"
+#include "xplane_bridge/core/wire/dataref_path.hpp"
+#include "xplane_bridge/nodes/messages/conversions.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr double kSupervisePeriod_s = 0.1;
+// An X-Plane that answers but does not say its version within this is treated as of unknown version.
+constexpr std::chrono::seconds kVersionPatience{2};
+constexpr std::chrono::seconds kSearchWordPeriod{1};
+constexpr std::int32_t kRposCheckRateHz = 20;
+// Further away, a flight state says nothing about the time of another datagram.
+constexpr double kNearState_s = 0.1;
+
+constexpr int kFlightPriority = 10;
+constexpr int kDatarefPriority = 1;
+constexpr int kMissionPriority = 0;
+constexpr int kIdentityPriority = -1;
+
+constexpr double kDefaultReadTimeout_s = 1.0;
+constexpr double kLongestReadTimeout_s = 10.0;
+
+constexpr std::uint32_t kRowsQueueSize = 100;
+
+std::vector<std::string> pathsOf(const std::vector<core::DatarefRequest>& requests) {
+  std::vector<std::string> paths;
+  for (const core::DatarefRequest& request : requests) {
+    paths.push_back(request.path);
+  }
+  return paths;
+}
+
+const char* nameOf(core::Transport transport) { return transport == core::Transport::kData ? "data" : "rref"; }
+
+ServiceResult result(std::uint8_t code, const std::string& message) {
+  ServiceResult made;
+  made.code = code;
+  made.message = message;
+  return made;
+}
+
+}  // namespace
+
+void RxNode::loadParameters(const ParamLoader& own) {
+  options_ = loadRxOptions(own);
+  if (common().transport == core::Transport::kData && common().data_port == 0 && !options_.configure_xplane) {
+    own.refuse("configure_xplane", "true while the shared parameter data_port is 0: X-Plane has to be told the port");
+  }
+  core::FlightStateAssembler::Options assembler;
+  assembler.transport = common().transport;
+  assembler.position = options_.position_source;
+  flight_ = std::make_unique<core::FlightStateAssembler>(assembler);
+  if (options_.origin) {
+    flight_->setMapOrigin(*options_.origin);
+  }
+  flight_publisher_ = std::make_unique<FlightPublisher>(options_, common().frames);
+  missions_ = makeMissionPublishers(options_.rates, common().transport, common().frames);
+  datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs);
+  addSubscriptions();
+}
+
+void RxNode::addSubscriptions() {
+  const auto add = [this](Subscription subscription) { subscriptions_.push_back(std::move(subscription)); };
+  add({"flight", options_.rates[static_cast<std::size_t>(core::FieldGroup::kFlight)], kFlightPriority,
+       [this] { return pathsOf(flight_->requests()); },
+       [this](const core::RrefView& datagram, std::int64_t receive_ns) {
+         publishState(flight_->onRref(datagram, receive_ns), receive_ns);
+       },
+       std::nullopt, false});
+  for (std::size_t i = 0; i < missions_.size(); ++i) {
+    MissionPublisher* const mission = missions_[i].get();
+    const std::size_t own_index = subscriptions_.size();
+    add({core::toString(mission->group()), mission->rate(), kMissionPriority, [mission] { return mission->requests(); },
+         [this, mission, own_index](const core::RrefView& datagram, std::int64_t receive_ns) {
+           if (mission->onRref(datagram, receive_ns, flight_->clock())) {
+             subscriptions_[own_index].current = false;
+           }
+         },
+         std::nullopt, false});
+  }
+  for (std::size_t batch = 0; batch < datarefs_->batches(); ++batch) {
+    add({"datarefs at " + std::to_string(datarefs_->rate(batch)) + " Hz", datarefs_->rate(batch), kDatarefPriority,
+         [this, batch] { return datarefs_->requests(batch); },
+         [this, batch](const core::RrefView& datagram, std::int64_t receive_ns) {
+           datarefs_->onRref(batch, datagram, receive_ns, nearSimTime(receive_ns), flight_->clock().epoch());
+         },
+         std::nullopt, false});
+  }
+  add({"aircraft", core::AircraftIdentityReader::kRateHz, kIdentityPriority,
+       [] { return core::AircraftIdentityReader::datarefs(); },
+       [this](const core::RrefView& datagram, std::int64_t receive_ns) {
+         const bool another = aircraft_.known();
+         if (aircraft_.add(datagram, receive_ns)) {
+           if (another) {
+             flight_->raiseEpoch();
+           }
+           publishLinkState(last_status_);
+         }
+       },
+       std::nullopt, false});
+}
+
+void RxNode::advertise() {
+  flight_publisher_->advertise(&handle());
+  for (const auto& mission : missions_) {
+    mission->advertise(&handle());
+  }
+  datarefs_->advertise(&handle());
+  if (common().transport == core::Transport::kData) {
+    rows_publisher_ = advertiseTopic<DataRows>("data_rows", kRowsQueueSize);
+  }
+  link_state_publisher_ = advertiseTopic<LinkState>("link_state", 1, true);
+  advertiseService<SetOrigin::Request, SetOrigin::Response>(
+      "set_origin", [this](const auto& request, auto& response) { setOrigin(request, response); });
+  advertiseService<GetDataref::Request, GetDataref::Response>(
+      "get_dataref", [this](const auto& request, auto& response) { getDataref(request, response); });
+  addTimer(kSupervisePeriod_s, [this] { supervise(); });
+  addAllDiagnostics();
+}
+
+void RxNode::configureLink(core::SimLinkOptions* options) {
+  options->data_output.restore_leftovers = true;
+  if (options_.position_source == core::PositionMode::kXpc) {
+    options->xpc_port = static_cast<std::uint16_t>(options_.xpc_port);
+  }
+  if (common().transport != core::Transport::kData) {
+    return;
+  }
+  options->data_output.enabled = true;
+  options->data_output.port = static_cast<std::uint16_t>(common().data_port);
+  options->data_output.configure = options_.configure_xplane;
+  options->data_output.rate_hz = options_.data_output_rate;
+  options->data_output.address = options_.data_address;
+  options->data_output.rows = wantedRows();
+}
+
+core::SimLinkCallbacks RxNode::linkCallbacks() {
+  core::SimLinkCallbacks callbacks;
+  callbacks.on_rref = [this](core::GroupId id, const core::RrefView& datagram, const core::ReceiveInfo& info) {
+    onRref(id, datagram, info);
+  };
+  callbacks.on_data = [this](const core::DataView& datagram, const core::ReceiveInfo& info) { onData(datagram, info); };
+  callbacks.on_rpos = [this](const core::Rpos& position, const core::ReceiveInfo& info) { onRpos(position, info); };
+  callbacks.on_xpc = [this](const core::XpcPosition& position, const core::ReceiveInfo& info) {
+    onXpc(position, info);
+  };
+  callbacks.on_state = [this](const core::LinkStatus& status) { onLinkState(status); };
+  return callbacks;
+}
+
+std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
+  if (info.link_epoch != link_epoch_) {
+    link_epoch_ = info.link_epoch;
+    flight_->reset();
+    flight_publisher_->restart();
+    for (const auto& mission : missions_) {
+      mission->reset();
+    }
+    datarefs_->reset();
+    aircraft_.reset();
+    rows_.clear();
+    consistency_.reset();
+    last_state_.reset();
+  }
+  const std::int64_t wall_ns = clock_.system_ns();
+  return receive_clock_.toHostTime(info.stamp_ns, wall_ns, clock_.steady_ns());
+}
+
+void RxNode::onRref(core::GroupId id, const core::RrefView& datagram, const core::ReceiveInfo& info) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::int64_t receive_ns = begin(info);
+  for (const Subscription& subscription : subscriptions_) {
+    if (subscription.id == id && subscription.current) {
+      subscription.receive(datagram, receive_ns);
+      return;
+    }
+  }
+}
+
+void RxNode::onData(const core::DataView& datagram, const core::ReceiveInfo& info) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::int64_t receive_ns = begin(info);
+  publishState(flight_->onData(datagram, receive_ns), receive_ns);
+  rows_.update(datagram, receive_ns);
+  for (const auto& mission : missions_) {
+    mission->onRows(rows_, receive_ns, flight_->clock());
+  }
+  if (rows_publisher_.getNumSubscribers() > 0) {
+    publishRows(datagram, info, receive_ns);
+  }
+}
+
+void RxNode::onRpos(const core::Rpos& position, const core::ReceiveInfo& info) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  flight_->onRpos(position, begin(info));
+}
+
+void RxNode::onXpc(const core::XpcPosition& position, const core::ReceiveInfo& info) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  flight_->onXpc(position, begin(info));
+}
+
+void RxNode::onLinkState(const core::LinkStatus& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  last_status_ = status;
+  publishLinkState(status);
+}
+
+void RxNode::publishState(const core::FlightState* state, std::int64_t receive_ns) {
+  if (state == nullptr) {
+    return;
+  }
+  if (flight_->map()) {
+    flight_publisher_->publish(*state, *flight_->map(), receive_ns);
+  }
+  last_state_ = *state;
+  last_state_received_ns_ = receive_ns;
+  consistency_.add(*state);
+}
+
+void RxNode::publishRows(const core::DataView& datagram, const core::ReceiveInfo& info, std::int64_t receive_ns) {
+  rows_message_.header.stamp = toRosTime(receive_ns);
+  rows_message_.label.assign(info.label.begin(), info.label.end());
+  rows_message_.index.clear();
+  rows_message_.values.clear();
+  for (std::size_t k = 0; k < datagram.size(); ++k) {
+    const core::DataRowView row = datagram[k];
+    rows_message_.index.push_back(row.index());
+    for (std::size_t slot = 0; slot < core::kDataSlots; ++slot) {
+      rows_message_.values.push_back(row.value(slot));
+    }
+  }
+  rows_publisher_.publish(rows_message_);
+}
+
+float RxNode::nearSimTime(std::int64_t receive_ns) const {
+  const double age = static_cast<double>(receive_ns - last_state_received_ns_) * 1e-9;
+  return last_state_ && std::abs(age) < kNearState_s ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
+}
+
+void RxNode::publishLinkState(const core::LinkStatus& status) {
+  LinkState message;
+  toMessage(status, nameOf(common().transport), &message);
+  message.header.stamp = toRosTime(clock_.system_ns());
+  message.aircraft_icao = aircraft_.identity().icao;
+  message.aircraft_description = aircraft_.identity().description;
+  link_state_publisher_.publish(message);
+}
+
+void RxNode::supervise() {
+  const core::LinkStatus status = link().status();
+  adoptVersion(status);
+  if (adopted_version_) {
+    renewSubscriptions();
+    supervisePositionCheck();
+  }
+  const auto now = steady_clock::now();
+  if (status.state == core::LinkState::kSearching && now - last_search_word_ >= kSearchWordPeriod) {
+    last_search_word_ = now;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    publishLinkState(status);
+  }
+}
+
+void RxNode::adoptVersion(const core::LinkStatus& status) {
+  core::XPlaneVersion version = core::XPlaneVersion::kUnknown;
+  if (status.version) {
+    version = core::xplaneVersion(*status.version);
+    waiting_for_version_since_.reset();
+  } else {
+    const bool answers = status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
+    const auto now = steady_clock::now();
+    if (!answers) {
+      waiting_for_version_since_.reset();
+      return;
+    }
+    if (!waiting_for_version_since_) {
+      waiting_for_version_since_ = now;
+    }
+    if (now - *waiting_for_version_since_ < kVersionPatience) {
+      return;
+    }
+  }
+  if (adopted_version_ == version) {
+    return;
+  }
+  adopted_version_ = version;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    flight_->setVersion(version);
+    for (const auto& mission : missions_) {
+      mission->configure(version);
+    }
+    for (Subscription& subscription : subscriptions_) {
+      subscription.current = false;
+    }
+  }
+  if (common().transport == core::Transport::kData) {
+    link().setDataRows(wantedRows());
+  }
+}
+
+void RxNode::renewSubscriptions() {
+  for (Subscription& subscription : subscriptions_) {
+    core::RrefGroup group;
+    std::optional<core::GroupId> id;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (subscription.current) {
+        continue;
+      }
+      group = {subscription.name, subscription.requests(), subscription.rate, subscription.priority};
+      id = subscription.id;
+    }
+    if (group.datarefs.empty()) {
+      if (id) {
+        link().removeGroup(*id);
+        id.reset();
+      }
+    } else if (id) {
+      link().replaceGroup(*id, group);
+    } else {
+      id = link().addGroup(group);
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    subscription.id = id;
+    subscription.current = true;
+  }
+}
+
+void RxNode::supervisePositionCheck() {
+  std::int32_t wanted = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto verdict = flight_->positionCheck().verdict();
+    if (options_.position_source == core::PositionMode::kRpos ||
+        (flight_->wantsRpos() && verdict == core::PositionCheck::Verdict::kDisagrees)) {
+      wanted = core::kEveryFrameRateHz;
+    } else if (flight_->wantsRpos() && verdict == core::PositionCheck::Verdict::kUnknown) {
+      wanted = kRposCheckRateHz;
+    }
+  }
+  if (wanted != rpos_rate_) {
+    rpos_rate_ = wanted;
+    link().setRposRate(wanted);
+  }
+}
+
+std::vector<std::int32_t> RxNode::wantedRows() const {
+  std::set<std::int32_t> rows(flight_->rows().begin(), flight_->rows().end());
+  for (const auto& mission : missions_) {
+    rows.insert(mission->rows().begin(), mission->rows().end());
+  }
+  rows.insert(options_.extra_rows.begin(), options_.extra_rows.end());
+  return {rows.begin(), rows.end()};
+}
+
+void RxNode::setOrigin(const SetOrigin::Request& request, SetOrigin::Response& response) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  response.position_epoch = flight_->positionEpoch();
+  core::GeoPoint origin{request.latitude, request.longitude, request.altitude_msl};
+  if (request.here) {
+    if (!last_state_ || !last_state_->has(core::FlightState::kValidPosition)) {
+      response.result = result(ServiceResult::REFUSED, "the aircraft's position is not known yet");
+      return;
+    }
+    origin = {last_state_->latitude, last_state_->longitude, last_state_->altitude_msl};
+  }
+  if (!(std::abs(origin.latitude_deg) <= 90.0 && std::abs(origin.longitude_deg) <= 180.0 &&
+        std::isfinite(origin.height))) {
+    response.result = result(ServiceResult::REFUSED,
+                             "latitude must be from -90 to 90, longitude from -180 to 180, altitude_msl finite");
+    return;
+  }
+  flight_->setMapOrigin(origin);
+  response.position_epoch = flight_->positionEpoch();
+  flight_publisher_->publishOrigin(*flight_->map(), response.position_epoch, clock_.system_ns());
+  response.result = result(ServiceResult::OK, "the next states refer to the new origin");
+  response.success = true;
+}
+
+void RxNode::getDataref(const GetDataref::Request& request, GetDataref::Response& response) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    response.sim_time = last_state_ ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
+  }
+  if (!(request.timeout >= 0.0 && request.timeout <= kLongestReadTimeout_s)) {
+    response.result = result(ServiceResult::REFUSED, "timeout must be from 0 (the default of 1 s) to 10 s");
+    return;
+  }
+  std::vector<std::string> paths;
+  try {
+    paths = core::datarefElements(request.name);
+  } catch (const std::invalid_argument& error) {
+    response.result = result(ServiceResult::REFUSED, error.what());
+    return;
+  }
+  if (!link().status().peer.valid()) {
+    response.result = result(ServiceResult::NO_LINK, "X-Plane has not been found");
+    return;
+  }
+  const double timeout = request.timeout > 0.0 ? request.timeout : kDefaultReadTimeout_s;
+  for (const core::DatarefValue& value : link().readDatarefs(paths, timeout)) {
+    response.values.push_back(value.value_or(std::numeric_limits<float>::quiet_NaN()));
+  }
+  const auto missing =
+      std::find_if(response.values.begin(), response.values.end(), [](float value) { return std::isnan(value); });
+  if (missing != response.values.end()) {
+    response.result =
+        result(ServiceResult::TIMEOUT, "X-Plane did not answer for " +
+                                           paths[static_cast<std::size_t>(missing - response.values.begin())] +
+                                           ": unknown to it, or the link is down");
+    return;
+  }
+  response.result = result(ServiceResult::OK, "read");
+  response.success = true;
+}
+
+void RxNode::publishFinalState() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  core::LinkStatus status = last_status_;
+  status.state = core::LinkState::kLost;
+  status.reason = "rx_node has stopped";
+  publishLinkState(status);
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,100 @@
+// tx_node's side of single surfaces, failures and excitations: topics and services to SurfaceControl, FailureKeeper and
+// ExcitationKeeper.
+
+#include <cmath>
+
+#include "xplane_bridge/Event.h"
+#include "xplane_bridge/nodes/base/user_folder.hpp"
+#include "xplane_bridge/nodes/messages/control_conversions.hpp"
+#include "xplane_bridge/nodes/tx/tx_node.hpp"
+
+namespace xplane_bridge {
+
+void TxNode::makeSurfaceControl() {
+  SurfaceControlOptions options;
+  options.mixing = options_.mixing;
+  options.mixing_folder = userFolder() + "/mixing";
+  options.driver = options_.aircraft.surfaces;
+  options.flap_rate = options_.aircraft.flap_rate;
+  options.speedbrake_rate = options_.aircraft.speedbrake_rate;
+  options.command_timeout = options_.arbiter.command_timeout;
+  surfaces_ = std::make_unique<SurfaceControl>(
+      &link(), overrides_.get(), options,
+      [this](const std::string& text, bool success) { logEvent(Event::OVERRIDE, text, "", success); });
+  failures_ = std::make_unique<FailureKeeper>(&link(), overrides_.get(), surfaces_.get(), options_.service_timeout,
+                                              failure_publisher_,
+                                              [this](const std::string& text, const std::string& who, bool success) {
+                                                logEvent(Event::FAILURE, text, who, success);
+                                              });
+  excitation_ = std::make_unique<ExcitationKeeper>(
+      surfaces_.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg, excitation_publisher_,
+      [this](const std::string& text, const std::string& who, bool success) {
+        logEvent(Event::EXCITATION, text, who, success);
+      });
+}
+
+void TxNode::serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response) {
+  const ExcitationKeeper::Plan plan = excitation_->plan(request);
+  std::lock_guard<std::mutex> lock(mutex_);
+  const bool flown = ever_sent_.any() && !arbiter_->status().failsafe;
+  excitation_->inject(request, plan, name() + "/inject_excitation", watch_, refusalToFly(),
+                      flown ? read_back_channels_ : core::ChannelSet{}, response);
+}
+
+void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!surfaces_) return;
+  if (const auto refusal = surfaces_->command(message.names, message.deflections_deg, message.sequence)) {
+    ROS_WARN_THROTTLE(1.0, "control/surfaces is refused: %s", refusal->c_str());
+  }
+}
+
+void TxNode::tellStick(const core::ArbitratedControls* sent) {
+  std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
+  if (sent) {
+    const core::Channel axes[] = {core::Channel::kRoll, core::Channel::kPitch, core::Channel::kYaw};
+    for (std::size_t i = 0; i < stick.size(); ++i) {
+      if (sent->active.test(core::index(axes[i]))) stick[i] = sent->values[core::index(axes[i])];
+    }
+  }
+  surfaces_->setStick(stick);
+}
+
+void TxNode::publishSurfacesApplied() {
+  while (const auto echo = surfaces_->takeEcho()) {
+    AppliedCommand message;
+    message.header.stamp = ros::Time(ros::WallTime::now().toSec());
+    message.mode = static_cast<std::uint8_t>(arbiter_->status().mode);
+    message.source = AppliedCommand::SOURCE_NONE;
+    message.sequence = echo->sequence;
+    fillSurfaces(surfaces_->sentOneByOne(), &message);
+    message.read_back = echo->read_back;
+    message.read_back_sim_time = static_cast<float>(echo->sim_time);
+    message.read_back_frames = static_cast<float>(echo->frames);
+    applied_publisher_.publish(message);
+  }
+}
+
+void TxNode::advertiseFailureServices() {
+  advertiseService<SetFailure::Request, SetFailure::Response>(
+      name() + "/set_failure", [this](const SetFailure::Request& request, SetFailure::Response& response) {
+        failures_->set(request, name() + "/set_failure", &response);
+      });
+  advertiseService<ClearFailures::Request, ClearFailures::Response>(
+      name() + "/clear_failures", [this](const ClearFailures::Request& request, ClearFailures::Response& response) {
+        failures_->clear(request, name() + "/clear_failures", &response);
+      });
+  advertiseService<InjectExcitation::Request, InjectExcitation::Response>(
+      name() + "/inject_excitation",
+      [this](const InjectExcitation::Request& request, InjectExcitation::Response& response) {
+        serveInjectExcitation(request, &response);
+      });
+  addDiagnostics("surfaces", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+    if (surfaces_) surfaces_->fillDiagnostics(&status);
+  });
+  addDiagnostics("failures", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+    if (failures_) failures_->fillDiagnostics(&status);
+  });
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,256 @@
+#include "xplane_bridge/core/link/journal.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace xplane_bridge::core {
+namespace {
+
+namespace fs = std::filesystem;
+
+class JournalTest : public testing::Test {
+ protected:
+  JournalTest() {
+    std::string pattern = (fs::temp_directory_path() / "journal-XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+    path_ = folder_ + "/nested/10.0.0.1_49000.json";
+  }
+  ~JournalTest() override { fs::remove_all(folder_); }
+
+  Journal journal(const std::string& node = "/rx") const { return Journal(path_, thisProcess(node)); }
+
+  void writeFile(const std::string& text) const {
+    fs::create_directories(fs::path(path_).parent_path());
+    std::ofstream(path_) << text;
+  }
+
+  nlohmann::json readFile() const { return nlohmann::json::parse(std::ifstream(path_)); }
+
+  std::string folder_;
+  std::string path_;
+};
+
+const std::vector<UndoOperation> kReleaseJoystick = {UndoDref{"sim/operation/override/override_joystick", 0.0F}};
+
+JournalOwner deadOwner() {
+  JournalOwner owner = thisProcess("/crashed");
+  owner.start_ticks += 1;  // the number belongs to another process now
+  return owner;
+}
+
+TEST_F(JournalTest, NoFileIsAnEmptyJournal) {
+  EXPECT_TRUE(journal().entries().empty());
+  EXPECT_FALSE(fs::exists(path_));
+}
+
+TEST_F(JournalTest, WritesTheDocumentedFormat) {
+  DataRow row;
+  row.index = 25;
+  row.values[0] = 0.5F;
+  journal("/tx").record(
+      "a", "override",
+      {UndoDref{"x/y[2]", -2.0F}, UndoData{row}, UndoUsel{{3, 17}}, UndoIse4{kIse4DataOutput, "192.168.1.7", 49003}});
+  const nlohmann::json document = readFile();
+  EXPECT_EQ(document.at("format"), "xplane_bridge journal");
+  EXPECT_EQ(document.at("version"), 1);
+  ASSERT_EQ(document.at("entries").size(), 1U);
+  const nlohmann::json& entry = document.at("entries").at(0);
+  EXPECT_EQ(entry.at("id"), "a");
+  EXPECT_EQ(entry.at("purpose"), "override");
+  EXPECT_EQ(entry.at("owner").at("node"), "/tx");
+  EXPECT_EQ(entry.at("owner").at("pid"), getpid());
+  EXPECT_EQ(entry.at("owner").at("boot_id").get<std::string>().size(), 36U);
+  const nlohmann::json expected = nlohmann::json::parse(R"([
+    {"op": "dref", "path": "x/y[2]", "value": -2.0},
+    {"op": "data", "row": 25, "values": [0.5, -999.0, -999.0, -999.0, -999.0, -999.0, -999.0, -999.0]},
+    {"op": "usel", "rows": [3, 17]},
+    {"op": "ise4_off", "target": 64, "address": "192.168.1.7", "port": 49003}])");
+  EXPECT_EQ(entry.at("undo"), expected);
+}
+
+TEST_F(JournalTest, ReadsWhatItWrote) {
+  journal().record("a", "data_output", {UndoUsel{{1}}, UndoDref{"rate", 20.5F}});
+  const std::vector<JournalEntry> entries = journal().entries();
+  ASSERT_EQ(entries.size(), 1U);
+  EXPECT_EQ(entries[0].purpose, "data_output");
+  EXPECT_EQ(entries[0].owner, thisProcess(""));
+  ASSERT_EQ(entries[0].undo.size(), 2U);
+  EXPECT_EQ(std::get<UndoUsel>(entries[0].undo[0]).rows, std::vector<std::int32_t>{1});
+  EXPECT_EQ(std::get<UndoDref>(entries[0].undo[1]).value, 20.5F);
+}
+
+TEST_F(JournalTest, ReplacesById) {
+  journal().record("a", "override", kReleaseJoystick);
+  journal().record("b", "override", kReleaseJoystick);
+  journal().record("a", "override", {UndoDref{"other", 1.0F}});
+  const std::vector<JournalEntry> entries = journal().entries();
+  ASSERT_EQ(entries.size(), 2U);
+  EXPECT_EQ(std::get<UndoDref>(entries[0].undo[0]).path, "other");
+}
+
+TEST_F(JournalTest, FileGoesWithItsLastEntry) {
+  journal().record("a", "override", kReleaseJoystick);
+  journal().record("b", "override", kReleaseJoystick);
+  journal().remove({"a", "never there"});
+  EXPECT_EQ(journal().entries().size(), 1U);
+  journal().remove({"b"});
+  EXPECT_FALSE(fs::exists(path_));
+}
+
+TEST_F(JournalTest, OrphansAreThoseOfDeadProcessesAndOnePurpose) {
+  Journal(path_, deadOwner()).record("dead", "override", kReleaseJoystick);
+  Journal(path_, deadOwner()).record("dead-other", "data_output", kReleaseJoystick);
+  journal().record("own", "override", kReleaseJoystick);
+  const Journal judge(path_, JournalOwner{"/next", 1, 2, "boot", "pc"});
+  const std::vector<JournalEntry> orphans = judge.orphans("override");
+  ASSERT_EQ(orphans.size(), 1U);
+  EXPECT_EQ(orphans[0].id, "dead");
+  EXPECT_EQ(orphans[0].owner.node, "/crashed");
+  ASSERT_EQ(journal().own().size(), 1U);
+  EXPECT_EQ(journal().own()[0].id, "own");
+}
+
+TEST_F(JournalTest, EntryOfARunningProcessIsNotTaken) {
+  journal("/first").record("a", "override", kReleaseJoystick);
+  Journal other(path_, JournalOwner{"/second", 1, 2, "boot", "pc"});
+  try {
+    other.record("a", "override", kReleaseJoystick);
+    FAIL() << "the entry's owner (this test) runs";
+  } catch (const JournalError& error) {
+    EXPECT_NE(std::string(error.what()).find("/first"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(journal().entries()[0].owner.node, "/first");
+}
+
+TEST_F(JournalTest, EntryOfADeadProcessIsTakenOver) {
+  Journal(path_, deadOwner()).record("a", "override", kReleaseJoystick);
+  journal("/next").record("a", "override", kReleaseJoystick);
+  ASSERT_EQ(journal().entries().size(), 1U);
+  EXPECT_EQ(journal().entries()[0].owner.node, "/next");
+}
+
+TEST_F(JournalTest, WhatWasUndoneIsRemovedUnlessSomebodyHasTakenItOver) {
+  for (const char* id : {"a", "b"}) Journal(path_, deadOwner()).record(id, "override", kReleaseJoystick);
+  const std::vector<JournalEntry> orphans = journal().orphans("override");
+  ASSERT_EQ(orphans.size(), 2U);
+  journal("/next").record("a", "override", kReleaseJoystick);  // while they are being undone
+  journal("/next").removeUndone(orphans);
+  ASSERT_EQ(journal().entries().size(), 1U);
+  EXPECT_EQ(journal().entries()[0].id, "a");
+  EXPECT_EQ(journal().entries()[0].owner.node, "/next");
+}
+
+TEST_F(JournalTest, DamagedFileIsSetAsideAndSaid) {
+  for (const char* text : {"{\"format\": \"xplane_b", "[]", "{\"format\": \"something else\"}", "",
+                           "{\"format\": \"xplane_bridge journal\", \"version\": 1, \"entries\": [{\"id\": 3}]}"}) {
+    writeFile(text);
+    const Journal damaged = journal();
+    try {
+      damaged.entries();
+      FAIL() << "accepted: " << text;
+    } catch (const JournalError& error) {
+      EXPECT_NE(std::string(error.what()).find(".damaged-"), std::string::npos) << error.what();
+    }
+    EXPECT_TRUE(damaged.entries().empty()) << "usable afterwards";
+  }
+  EXPECT_TRUE(fs::exists(path_ + ".damaged-1"));
+  EXPECT_TRUE(fs::exists(path_ + ".damaged-5"));
+}
+
+TEST_F(JournalTest, NewerVersionIsLeftAlone) {
+  writeFile(R"({"format": "xplane_bridge journal", "version": 2, "entries": []})");
+  EXPECT_THROW(journal().entries(), JournalError);
+  EXPECT_THROW(journal().record("a", "override", kReleaseJoystick), JournalError);
+  EXPECT_EQ(readFile().at("version"), 2);
+}
+
+TEST_F(JournalTest, UnwritableFolderIsSaid) {
+  std::ofstream(folder_ + "/nested") << "a file where the folder should be";
+  EXPECT_THROW(journal().record("a", "override", kReleaseJoystick), JournalError);
+}
+
+TEST_F(JournalTest, ProcessesDoNotLoseEachOthersEntries) {
+  constexpr int kProcesses = 4;
+  constexpr int kEach = 15;
+  std::vector<pid_t> children;
+  for (int process = 0; process < kProcesses; ++process) {
+    const pid_t child = fork();
+    if (child == 0) {
+      for (int i = 0; i < kEach; ++i) {
+        journal().record(std::to_string(process) + ":" + std::to_string(i), "override", kReleaseJoystick);
+      }
+      _exit(0);
+    }
+    children.push_back(child);
+  }
+  for (const pid_t child : children) {
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0);
+  }
+  std::set<std::string> ids;
+  for (const JournalEntry& entry : journal().entries()) {
+    ids.insert(entry.id);
+  }
+  EXPECT_EQ(ids.size(), static_cast<std::size_t>(kProcesses * kEach));
+  EXPECT_EQ(journal().orphans("override").size(), ids.size()) << "their processes have ended";
+}
+
+TEST(JournalOwner, AliveMeansTheSameProcess) {
+  const JournalOwner self = thisProcess("/me");
+  EXPECT_TRUE(isAlive(self));
+  JournalOwner reused = self;
+  reused.start_ticks += 5;
+  EXPECT_FALSE(isAlive(reused));
+  JournalOwner unknown = self;
+  unknown.pid = 0x7FFFFFF0;
+  EXPECT_FALSE(isAlive(unknown));
+  unknown.start_ticks = 0;
+  EXPECT_FALSE(isAlive(unknown));
+  JournalOwner before_reboot = self;
+  before_reboot.boot_id = "another";
+  EXPECT_FALSE(isAlive(before_reboot));
+  JournalOwner elsewhere = before_reboot;
+  elsewhere.computer = "another-computer";
+  EXPECT_TRUE(isAlive(elsewhere));
+}
+
+TEST(JournalPath, HoldsOnlyFileCharacters) {
+  EXPECT_EQ(journalPath("/home/u/.ros/xplane_bridge", "192.168.1.5", 49000),
+            "/home/u/.ros/xplane_bridge/192.168.1.5_49000.json");
+  EXPECT_EQ(journalPath("/f", "../sim pc", 1), "/f/..-sim-pc_1.json");
+}
+
+TEST(JournalsIn, NamesTheFileAfterThePeer) {
+  const JournalFactory journals = journalsIn("/f", "/node");
+  EXPECT_EQ(journals({0xC0A80105U, 49000})->path(), "/f/192.168.1.5_49000.json");
+  EXPECT_EQ(journals({0x7F000101U, 49000})->path(), "/f/127.0.0.1_49000.json");
+  EXPECT_EQ(journals({0x7F000101U, 49000})->self().node, "/node");
+}
+
+TEST(EncodeUndo, GivesTheMessages) {
+  std::array<std::uint8_t, kMaxUndoSize> buffer{};
+  const auto label = [&buffer] { return std::string(buffer.begin(), buffer.begin() + 4); };
+  EXPECT_EQ(*encodeUndo(buffer, UndoDref{"a/b", 1.0F}), 509U);
+  EXPECT_EQ(label(), "DREF");
+  EXPECT_EQ(*encodeUndo(buffer, UndoData{}), 41U);
+  EXPECT_EQ(label(), "DATA");
+  EXPECT_EQ(*encodeUndo(buffer, UndoUsel{{1, 2}}), 13U);
+  EXPECT_EQ(label(), "USEL");
+  EXPECT_EQ(*encodeUndo(buffer, UndoIse4{64, "1.2.3.4", 5}), 37U);
+  EXPECT_EQ(label(), "ISE4");
+  EXPECT_EQ(buffer[33], 0) << "switched off";
+  EXPECT_EQ(encodeUndo(buffer, UndoDref{"", 1.0F}).error(), EncodeError::kEmpty);
+}
+
+}  // namespace
+}  // namespace xplane_bridge::core

@@ -1,0 +1,34 @@
+#include "xplane_bridge/core/simulator/simulator_settings.hpp"
+
+#include <gtest/gtest.h>
+
+namespace xplane_bridge::core {
+namespace {
+
+TEST(SimulatorSettings, PausesByCommand) {
+  EXPECT_STREQ(pauseCommand(true), "sim/operation/pause_on");
+  EXPECT_STREQ(pauseCommand(false), "sim/operation/pause_off");
+}
+
+TEST(SimulatorSettings, ViewsTurnTheHead) {
+  const auto down = viewWrites(CameraView::kDown);
+  ASSERT_EQ(down.size(), 2u);
+  EXPECT_EQ(down[0].dataref, "sim/graphics/view/pilots_head_psi");
+  EXPECT_EQ(down[0].value, 0.0F);
+  EXPECT_EQ(down[1].value, -90.0F);
+  EXPECT_EQ(viewWrites(CameraView::kRear)[0].value, 180.0F);
+  EXPECT_EQ(viewWrites(CameraView::kForward)[0].value, 0.0F);
+}
+
+TEST(SimulatorSettings, SeveralValuesGoToTheElementsThatFollow) {
+  using List = std::vector<std::string>;
+  EXPECT_EQ(consecutiveElements("sim/a", 1), List{"sim/a"});
+  EXPECT_EQ(consecutiveElements("sim/a[2]", 1), List{"sim/a[2]"});
+  EXPECT_EQ(consecutiveElements("sim/a", 2), (List{"sim/a[0]", "sim/a[1]"}));
+  EXPECT_EQ(consecutiveElements("sim/a[3]", 2), (List{"sim/a[3]", "sim/a[4]"}));
+  EXPECT_THROW(consecutiveElements("nonsense", 1), std::invalid_argument);
+  EXPECT_THROW(consecutiveElements("sim/a[0:3]", 1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace xplane_bridge::core

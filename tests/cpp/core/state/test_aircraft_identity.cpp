@@ -1,0 +1,86 @@
+#include "xplane_bridge/core/state/aircraft_identity.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <map>
+
+namespace xplane_bridge::core {
+namespace {
+
+/// Feeds the reader as X-Plane would: one value a character, zeros after the end.
+class Feeder {
+ public:
+  void set(const std::string& dataref, const std::string& text) { texts_[dataref] = text; }
+
+  bool feed(AircraftIdentityReader* reader) {
+    std::vector<std::uint8_t> pairs;
+    std::int32_t index = 0;
+    for (const std::string& name : AircraftIdentityReader::datarefs()) {
+      const std::size_t bracket = name.find('[');
+      const std::string& text = texts_[name.substr(0, bracket)];
+      const std::size_t position = std::stoul(name.substr(bracket + 1));
+      const float value = position < text.size() ? static_cast<float>(text[position]) : 0.0F;
+      std::uint8_t pair[8];
+      std::memcpy(pair, &index, 4);
+      std::memcpy(pair + 4, &value, 4);
+      pairs.insert(pairs.end(), pair, pair + 8);
+      ++index;
+    }
+    now_ns_ += 1'000'000'000;
+    return reader->add(RrefView(pairs.data(), pairs.size() / 8), now_ns_);
+  }
+
+ private:
+  std::map<std::string, std::string> texts_;
+  std::int64_t now_ns_ = 0;
+};
+
+TEST(AircraftIdentity, asksForOneElementACharacter) {
+  const std::vector<std::string>& datarefs = AircraftIdentityReader::datarefs();
+  EXPECT_EQ(datarefs.front(), "sim/aircraft/view/acf_ICAO[0]");
+  EXPECT_EQ(datarefs.back(), "sim/aircraft/view/acf_descrip[63]");
+}
+
+TEST(AircraftIdentity, readsBothStringsAndSaysWhenTheyChange) {
+  AircraftIdentityReader reader;
+  Feeder feeder;
+  EXPECT_FALSE(reader.known());
+  feeder.set("sim/aircraft/view/acf_ICAO", "DA62");
+  feeder.set("sim/aircraft/view/acf_descrip", "Light twin  ");
+  EXPECT_TRUE(feeder.feed(&reader));
+  EXPECT_EQ(reader.identity().icao, "DA62");
+  EXPECT_EQ(reader.identity().description, "Light twin");
+  EXPECT_TRUE(reader.known());
+  EXPECT_FALSE(feeder.feed(&reader));
+  feeder.set("sim/aircraft/view/acf_ICAO", "BE58");
+  EXPECT_TRUE(feeder.feed(&reader));
+  EXPECT_EQ(reader.identity().icao, "BE58");
+  EXPECT_EQ(reader.told(), 3u);
+}
+
+TEST(AircraftIdentity, takesAnAnswerReadAtOnceLikeOneOfTheStream) {
+  AircraftIdentityReader reader;
+  std::vector<DatarefValue> values(AircraftIdentityReader::datarefs().size(), 0.0F);
+  values[0] = static_cast<float>('Q');
+  values[8] = static_cast<float>('x');
+  EXPECT_TRUE(reader.add(values));
+  EXPECT_EQ(reader.identity().icao, "Q");
+  EXPECT_EQ(reader.identity().description, "x");
+  EXPECT_FALSE(reader.add(values)) << "the same again";
+  values[0] = static_cast<float>('R');
+  values[3].reset();
+  EXPECT_FALSE(reader.add(values)) << "one character is missing";
+  EXPECT_EQ(reader.told(), 2u);
+}
+
+TEST(AircraftIdentity, charactersOutsideAsciiAreMarked) {
+  AircraftIdentityReader reader;
+  Feeder feeder;
+  feeder.set("sim/aircraft/view/acf_descrip", "a\x01z");
+  EXPECT_TRUE(feeder.feed(&reader));
+  EXPECT_EQ(reader.identity().description, "a?z");
+}
+
+}  // namespace
+}  // namespace xplane_bridge::core

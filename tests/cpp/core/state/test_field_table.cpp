@@ -1,0 +1,230 @@
+#include "xplane_bridge/core/state/field_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "field_table_markdown.hpp"
+
+namespace xplane_bridge::core {
+namespace {
+
+const std::vector<FieldGroup> kAllGroups = {FieldGroup::kFlight,   FieldGroup::kEngines,    FieldGroup::kSurfaces,
+                                            FieldGroup::kControls, FieldGroup::kElectrical, FieldGroup::kAutopilot,
+                                            FieldGroup::kWarnings, FieldGroup::kFuel,       FieldGroup::kSim};
+
+std::string readFile(const std::string& path) {
+  std::ifstream file(path);
+  EXPECT_TRUE(file) << path;
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+const FieldSpec& find(FieldGroup group, const std::string& name) {
+  for (const FieldSpec& field : fieldTable()) {
+    if (field.group == group && field.field == name) return field;
+  }
+  ADD_FAILURE() << "no field " << name;
+  return fieldTable().front();
+}
+
+std::set<std::string> paths(FieldGroup group, Transport transport, XPlaneVersion version) {
+  std::set<std::string> result;
+  for (const DatarefRequest& request : datarefRequests(group, transport, version)) result.insert(request.path);
+  return result;
+}
+
+TEST(FieldTable, FlightGroupFitsOneDatagram) {
+  for (const XPlaneVersion version : {XPlaneVersion::k11, XPlaneVersion::k12}) {
+    const std::size_t count = datarefRequests(FieldGroup::kFlight, Transport::kRref, version).size();
+    EXPECT_LE(count, 80U);
+    EXPECT_GT(count, 50U);
+  }
+}
+
+TEST(FieldTable, FlightGroupCarriesItsTime) {
+  const auto flight = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::k11);
+  for (const char* path : {"sim/time/total_running_time_sec", "sim/operation/misc/frame_rate_period", "sim/time/paused",
+                           "sim/time/is_in_replay"}) {
+    EXPECT_EQ(flight.count(path), 1U) << path;
+  }
+}
+
+// X-Plane answers one sender's request of an index once: a path twice in a group is a waste, never an error to
+// overlook.
+TEST(FieldTable, NoGroupAsksTwice) {
+  for (const FieldGroup group : kAllGroups) {
+    for (const XPlaneVersion version : {XPlaneVersion::k11, XPlaneVersion::k12}) {
+      const auto requests = datarefRequests(group, Transport::kRref, version);
+      EXPECT_EQ(requests.size(), paths(group, Transport::kRref, version).size()) << toString(group);
+    }
+  }
+}
+
+TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
+  for (const FieldSpec& field : fieldTable()) {
+    SCOPED_TRACE(std::string(toString(field.group)) + "." + field.field);
+    const bool sourced = field.dataref.path11 != nullptr || field.dataref.path12 != nullptr || field.row.row11 >= 0;
+    EXPECT_EQ(sourced, field.store != nullptr);
+    if (!sourced) {
+      EXPECT_STRNE(field.derivation, "");
+    }
+    EXPECT_GE(field.count, 1);
+    EXPECT_LE(field.count, kMaxFieldElements);
+    EXPECT_STRNE(field.unit, "");
+    if (field.dataref.path11 != nullptr && field.store != nullptr) {
+      EXPECT_EQ(expandDatarefPath(field.dataref.path11, field.count).size(), static_cast<std::size_t>(field.count));
+    }
+    if (field.row.row11 >= 0) {
+      EXPECT_LT(field.row.row11, 139);
+      EXPECT_GE(field.row.count, 1);
+      EXPECT_LE(field.row.count, field.count);
+      const int last = field.row.bitfield ? 0 : (field.row.count - 1) * field.row.stride;
+      EXPECT_LE(field.row.slot11 + last, 7);
+      EXPECT_LE(field.row.slot12 + last, 7);
+    }
+  }
+}
+
+// Row 16: X-Plane 9 to 11 Q, P, R in rad/s; 12 P, Q, R in deg/s (protocol reference 1.6).
+TEST(FieldTable, Row16DiffersBetweenVersions) {
+  const FieldSpec& p = find(FieldGroup::kFlight, "roll_rate");
+  EXPECT_EQ(p.row.row11, 16);
+  EXPECT_EQ(p.row.slot11, 1);
+  EXPECT_DOUBLE_EQ(p.row.conversion11.factor, 1.0);
+  EXPECT_EQ(p.row.slot12, 0);
+  EXPECT_NEAR(p.row.conversion12.factor, 0.0174532925, 1e-9);
+  const FieldSpec& q = find(FieldGroup::kFlight, "pitch_rate");
+  EXPECT_EQ(q.row.slot11, 0);
+  EXPECT_EQ(q.row.slot12, 1);
+  EXPECT_EQ(find(FieldGroup::kFlight, "yaw_rate").row.slot11, 2);
+}
+
+TEST(FieldTable, SignsOfLoadsFollowTheSource) {
+  const FieldSpec& axial = find(FieldGroup::kFlight, "load_factor_axial");
+  EXPECT_DOUBLE_EQ(axial.row.conversion11.factor, 1.0);
+  EXPECT_DOUBLE_EQ(axial.dataref.conversion.factor, -1.0);
+  EXPECT_DOUBLE_EQ(find(FieldGroup::kFlight, "declination_deg").row.conversion11.factor, -1.0);
+}
+
+TEST(FieldTable, VersionsHaveTheirOwnNames) {
+  const auto v11 = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::k11);
+  const auto v12 = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::k12);
+  EXPECT_EQ(v11.count("sim/weather/wind_now_x_msc"), 1U);
+  EXPECT_EQ(v12.count("sim/weather/aircraft/wind_now_x_msc"), 1U);
+  EXPECT_EQ(v12.count("sim/weather/wind_now_x_msc"), 0U);
+  EXPECT_EQ(v11.count("sim/flightmodel/position/equivalent_airspeed"), 0U);
+  EXPECT_EQ(v12.count("sim/flightmodel/position/equivalent_airspeed"), 1U);
+}
+
+TEST(FieldTable, UnknownVersionAsksOnlyWhatBothHave) {
+  const auto unknown = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::kUnknown);
+  EXPECT_EQ(unknown.count("sim/weather/wind_now_x_msc"), 0U);
+  EXPECT_EQ(unknown.count("sim/weather/aircraft/wind_now_x_msc"), 0U);
+  EXPECT_EQ(unknown.count("sim/flightmodel/position/true_phi"), 1U);
+}
+
+TEST(FieldTable, RowsOfTheFlightGroup) {
+  const std::vector<std::int32_t> rows = dataRows({FieldGroup::kFlight}, XPlaneVersion::k11);
+  EXPECT_EQ(rows, (std::vector<std::int32_t>{0, 1, 3, 4, 5, 6, 8, 16, 17, 18, 19, 20, 21, 25, 64}));
+}
+
+TEST(FieldTable, DataTransportAsksOnlyWhatNoRowCarries) {
+  const auto supplement = paths(FieldGroup::kFlight, Transport::kData, XPlaneVersion::k11);
+  EXPECT_EQ(supplement.count("sim/time/paused"), 1U);
+  EXPECT_EQ(supplement.count("sim/flightmodel/failures/onground_any"), 1U);
+  EXPECT_EQ(supplement.count("sim/flightmodel/position/true_phi"), 0U);
+  EXPECT_LE(supplement.size(), 15U);
+}
+
+TEST(FieldTable, EnginesLimitTheRequests) {
+  const auto two = datarefRequests(FieldGroup::kEngines, Transport::kRref, XPlaneVersion::k11, 2);
+  EXPECT_EQ(two.size(), 2U + 23U * 2U);
+  EXPECT_EQ(datarefRequests(FieldGroup::kEngines, Transport::kRref, XPlaneVersion::k11).size(), 2U + 23U * 8U);
+}
+
+TEST(DatarefPath, Expands) {
+  EXPECT_EQ(expandDatarefPath("a/b", 3), std::vector<std::string>{"a/b"});
+  EXPECT_EQ(expandDatarefPath("a[*]", 3), (std::vector<std::string>{"a[0]", "a[1]", "a[2]"}));
+  EXPECT_EQ(expandDatarefPath("w{1,2}{l,r}_d", 4), (std::vector<std::string>{"w1l_d", "w1r_d", "w2l_d", "w2r_d"}));
+}
+
+TEST(XPlaneVersionNumber, IsTakenApart) {
+  EXPECT_EQ(xplaneVersion(0), XPlaneVersion::kUnknown);
+  EXPECT_EQ(xplaneVersion(-1), XPlaneVersion::kUnknown);
+  EXPECT_EQ(xplaneVersion(115501), XPlaneVersion::k11);
+  EXPECT_EQ(xplaneVersion(105100), XPlaneVersion::k11);
+  EXPECT_EQ(xplaneVersion(120000), XPlaneVersion::k12);
+  EXPECT_EQ(xplaneVersion(122015), XPlaneVersion::k12);
+}
+
+// tests/data/datarefs.txt: name, type in 11.10, type in 12.08 of Laminar's published lists; "-" not in that list, "?"
+// not looked up there.
+class DatarefList : public testing::Test {
+ protected:
+  struct Entry {
+    std::string type11, type12;
+  };
+
+  DatarefList() {
+    std::istringstream lines(readFile(XPLANE_BRIDGE_TEST_DATA "/datarefs.txt"));
+    std::string line;
+    while (std::getline(lines, line)) {
+      if (line.empty() || line[0] == '#') continue;
+      std::istringstream words(line);
+      std::string name;
+      Entry entry;
+      words >> name >> entry.type11 >> entry.type12;
+      entries_[name] = entry;
+    }
+  }
+
+  /// Elements of a listed type: float[8] has 8, float 1.
+  static int elements(const std::string& type) {
+    const std::size_t open = type.find('[');
+    return open == std::string::npos ? 1 : std::stoi(type.substr(open + 1));
+  }
+
+  void check(const std::string& path, bool of12, bool noted) {
+    SCOPED_TRACE(path);
+    const std::size_t open = path.find('[');
+    const auto entry = entries_.find(path.substr(0, open));
+    ASSERT_NE(entry, entries_.end()) << "not in tests/data/datarefs.txt";
+    const std::string& type = of12 ? entry->second.type12 : entry->second.type11;
+    if (type == "-") {
+      EXPECT_TRUE(noted) << "not in the list of that version, and the table's remark does not say so";
+      return;
+    }
+    if (type == "?") return;
+    EXPECT_EQ(type.find('[') != std::string::npos, open != std::string::npos) << type;
+    if (open != std::string::npos) {
+      EXPECT_LT(std::stoi(path.substr(open + 1)), elements(type)) << type;
+    }
+  }
+
+  std::map<std::string, Entry> entries_;
+};
+
+TEST_F(DatarefList, HasEveryNameOfTheTable) {
+  for (const FieldGroup group : kAllGroups) {
+    for (const XPlaneVersion version : {XPlaneVersion::k11, XPlaneVersion::k12}) {
+      for (const DatarefRequest& request : datarefRequests(group, Transport::kRref, version)) {
+        const bool noted = std::string(request.field->remark).find("list") != std::string::npos;
+        check(request.path, version == XPlaneVersion::k12, noted);
+      }
+    }
+  }
+}
+
+TEST(FieldTableDoc, CommittedPageIsUpToDate) {
+  EXPECT_EQ(readFile(XPLANE_BRIDGE_TEST_DATA "/../../docs/fields.md"), fieldTableMarkdown())
+      << "run field_table_doc > docs/fields.md";
+}
+
+}  // namespace
+}  // namespace xplane_bridge::core

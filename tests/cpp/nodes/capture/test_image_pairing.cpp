@@ -1,0 +1,169 @@
+#include "xplane_bridge/nodes/capture/image_pairing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <boost/make_shared.hpp>
+
+namespace xplane_bridge {
+namespace {
+
+constexpr double kFps = 60.0;
+constexpr double kDelay = 0.05;                        // [s] from a frame to its display: three frames
+constexpr std::int64_t kStart = 1700000000'000000000;  // [ns] what a right clock shows at the start
+constexpr double kSimStart = 1000.0;                   // [s] float32 steps there by 0.06 ms
+
+std::int64_t ns(double seconds) { return static_cast<std::int64_t>(std::llround(seconds * 1e9)); }
+
+/// A clock that is wrong: shows start + offset + (1 + drift) t.
+struct HostClock {
+  double offset = 0.0;  ///< [s]
+  double drift = 0.0;   ///< 1e-4 = 100 ppm fast
+  std::int64_t at(double t) const { return kStart + ns(offset + (1.0 + drift) * t); }
+};
+
+struct Case {
+  const char* name;
+  HostClock capture;    ///< of the machine with the pictures, relative to the one that X-Plane keeps time with
+  HostClock rx;         ///< of the machine whose rx_node stamps the states
+  double jitter;        ///< [s] mean of the exponential part of every datagram's delay
+  double state_jitter;  ///< [s] the same, of the states' way to the capture host
+  double swap_jitter;   ///< [s] 1 sigma
+};
+
+/// Frames of a simulator, the states that another machine makes of them, and the pictures that show them.
+std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, double display_delay) {
+  std::map<std::uint32_t, FrameState> answers;  // by the number of the frame shown
+  ImagePairing pairing(display_delay, 0.2,
+                       [&answers](const FrameState& answer) { answers[answer.image_count] = answer; });
+  std::mt19937 random(11);
+  std::exponential_distribution<double> extra(1.0);
+  std::normal_distribution<double> swap(0.0, clocks.swap_jitter);
+  std::vector<std::pair<std::int64_t, std::function<void(std::int64_t)>>> events;  // by the capture host's clock
+  double last_arrival = 0.0, last_state = 0.0;
+  for (std::uint32_t k = 0; k < static_cast<std::uint32_t>(seconds * kFps); ++k) {
+    const double t = k / kFps;
+    core::SimStatus status;
+    status.sim_time = static_cast<float>(kSimStart + t);
+    last_arrival = std::max(last_arrival, t + 1e-4 + clocks.jitter * extra(random));
+    events.emplace_back(clocks.capture.at(last_arrival), [&pairing, status](std::int64_t now) {
+      pairing.addFrame(status, static_cast<float>(1.0 / kFps), now);
+    });
+    const auto state = boost::make_shared<FlightState>();
+    state->sim_time = static_cast<float>(kSimStart + t);
+    state->header.stamp.fromNSec(static_cast<std::uint64_t>(clocks.rx.at(t)));
+    last_state = std::max(last_state, t + 3e-4 + clocks.state_jitter * extra(random));
+    events.emplace_back(clocks.capture.at(last_state),
+                        [&pairing, state](std::int64_t now) { pairing.addState(state, now); });
+    FrameState picture;
+    picture.image_count = k;
+    const std::int64_t shown = clocks.capture.at(t + kDelay + swap(random));
+    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(shown));
+    events.emplace_back(shown, [&pairing, picture](std::int64_t now) { pairing.addPicture(picture, now + ns(0.001)); });
+    events.emplace_back(clocks.capture.at(t + 0.5 / kFps), [&pairing](std::int64_t now) { pairing.flush(now); });
+  }
+  std::stable_sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [now, event] : events) event(now);
+  return answers;
+}
+
+class TwoClocks : public ::testing::TestWithParam<Case> {};
+
+/// By hand: the picture of frame k appears kDelay after it, so its state is the one with sim_time 1000 + k / 60,
+/// whatever the clocks show. In two minutes 100 ppm are 12 ms, 0.7 of a frame; 200 ppm between the machines 1.4 frames.
+TEST_P(TwoClocks, EveryPictureGetsTheStateOfItsFrame) {
+  const Case& clocks = GetParam();
+  const auto answers = fly(clocks, 120.0, kDelay);
+  int judged = 0;
+  double worst_uncertainty = 0.0;
+  for (const auto& [k, answer] : answers) {
+    if (k < 60) continue;  // the first second: the clock is being learnt
+    ++judged;
+    ASSERT_EQ(answer.quality & (FrameState::QUALITY_STATE_MISSING | FrameState::QUALITY_INTERPOLATED |
+                                FrameState::QUALITY_OFF_FRAME | FrameState::QUALITY_CLOCK_UNSURE),
+              0U)
+        << "frame " << k;
+    ASSERT_FLOAT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + k / kFps)) << "frame " << k;
+    ASSERT_NEAR(answer.frame_sim_time, kSimStart + k / kFps, 1e-4);
+    ASSERT_NEAR(answer.sim_time_error, 0.0, 1e-4);
+    // The state keeps the stamp of the machine that made it.
+    ASSERT_EQ(static_cast<std::int64_t>(answer.state.header.stamp.toNSec()), clocks.rx.at(k / kFps));
+    worst_uncertainty = std::max(worst_uncertainty, answer.clock_uncertainty);
+  }
+  EXPECT_GE(judged, 7200 - 60 - 15);  // the last pictures of the flight find no end of it
+  EXPECT_LT(worst_uncertainty, 0.25 / kFps);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Clocks, TwoClocks,
+    ::testing::Values(Case{"one machine", {}, {}, 1e-4, 1e-4, 1e-3},
+                      Case{"rx seconds behind", {}, {-3.7, 0.0}, 2e-4, 5e-4, 1e-3},
+                      Case{"rx an hour ahead and fast", {}, {3600.0, 1e-4}, 2e-4, 5e-4, 1e-3},
+                      Case{"capture fast", {2.5, 1e-4}, {}, 3e-4, 5e-4, 1e-3},
+                      Case{"capture slow, rx fast", {-8.0, -1e-4}, {5.0, 1e-4}, 3e-4, 2e-3, 1e-3},
+                      Case{"capture fast, rx slow, a poor network", {1.0, 1e-4}, {-1.0, -1e-4}, 1e-3, 4e-3, 1e-3}),
+    [](const auto& instance) {
+      std::string name = instance.param.name;
+      name.erase(std::remove_if(name.begin(), name.end(), [](char c) { return c == ' ' || c == ','; }), name.end());
+      return name;
+    });
+
+/// A delay that is wrong by one frame pairs every picture with the frame beside it: nothing here is right by itself.
+TEST(ImagePairing, DelayWrongByOneFrameIsOneFrameOff) {
+  const auto answers = fly({"", {0.0, 1e-4}, {9.0, -1e-4}, 2e-4, 5e-4, 5e-4}, 20.0, kDelay + 1.0 / kFps);
+  int judged = 0;
+  for (const auto& [k, answer] : answers) {
+    if (k < 60) continue;
+    ++judged;
+    ASSERT_FLOAT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + (k - 1) / kFps)) << "frame " << k;
+  }
+  EXPECT_GT(judged, 1100);
+}
+
+/// X-Plane stutters: frame 600 lasts 90 ms but simulates 50 ms, frame 602 the same. By hand, sim time after frame 602
+/// is 2 x (50 - 16.7) ms more than 1000 + k / 60, and host time 2 x (90 - 16.7) ms.
+TEST(ImagePairing, StuttersDoNotShiftThePairing) {
+  std::map<std::uint32_t, FrameState> answers;
+  ImagePairing pairing(kDelay, 0.2, [&answers](const FrameState& answer) { answers[answer.image_count] = answer; });
+  std::vector<std::pair<double, std::function<void(std::int64_t)>>> events;
+  std::map<std::uint32_t, float> sim_times;
+  double host = 0.0, sim = kSimStart;
+  for (std::uint32_t k = 0; k < 900; ++k) {
+    const bool stutter = k == 600 || k == 602;
+    host += stutter ? 0.09 : 1.0 / kFps;
+    const auto period = static_cast<float>(stutter ? 0.05 : 1.0 / kFps);
+    sim += static_cast<double>(period);
+    sim_times[k] = static_cast<float>(sim);
+    core::SimStatus status;
+    status.sim_time = sim_times[k];
+    events.emplace_back(host + 1e-4,
+                        [&pairing, status, period](std::int64_t now) { pairing.addFrame(status, period, now); });
+    const auto state = boost::make_shared<FlightState>();
+    state->sim_time = sim_times[k];
+    state->header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(host)));
+    events.emplace_back(host + 5e-4, [&pairing, state](std::int64_t now) { pairing.addState(state, now); });
+    FrameState picture;
+    picture.image_count = k;
+    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(host + kDelay)));
+    events.emplace_back(host + kDelay + 1e-3,
+                        [&pairing, picture](std::int64_t now) { pairing.addPicture(picture, now); });
+  }
+  std::stable_sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [time, event] : events) event(kStart + ns(time));
+  ASSERT_GE(answers.size(), 890U);
+  for (const auto& [k, answer] : answers) {
+    if (k < 60) continue;
+    EXPECT_EQ(answer.state.sim_time, sim_times[k]) << "frame " << k;
+  }
+}
+
+}  // namespace
+}  // namespace xplane_bridge
