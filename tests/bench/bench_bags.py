@@ -11,9 +11,9 @@ import numpy as np
 from registry import Context, Measure, benchmark
 from rosbags.highlevel import AnyReader
 
+from support.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import HarnessError
-from xplane_bridge.harness.synthetic_flight import FlightBag, stamp_ns
 
 _TOPIC = "/xplane/flight_state"
 #: One hour at 100 Hz is 360 000 messages; the peers read a tenth of it, which is long enough for a rate.

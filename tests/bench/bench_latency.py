@@ -15,7 +15,7 @@ from xplane_bridge.analysis.latency import LatencyError, require_usable
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.pictures import grey_pictures, image_topic
 from xplane_bridge.cli.estimate_latency import command_responses, display_delay
-from xplane_bridge.emulator.renderer import StripError, read_strip
+from xplane_bridge.emulator.view.renderer import StripError, read_strip
 from xplane_bridge.harness import HarnessError
 from xplane_bridge.resources import program
 

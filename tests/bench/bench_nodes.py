@@ -13,9 +13,9 @@ from bench_offline import cpp_program
 from measuring import measuring, report_of
 from registry import Context, Measure, benchmark
 
+from support.emulator_fixture import EmulatorFixture, XPlaneClient
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
-from xplane_bridge.harness.emulator_bench import EmulatorBench, XPlaneClient
 from xplane_bridge.harness.ros import free_port, roslaunch
 
 
@@ -36,7 +36,7 @@ def _socket_drops(pid: int) -> int:
 
 def _write_values(file: Path) -> None:
     """All datarefs of the emulator in flight, a line each."""
-    with EmulatorBench() as bench:
+    with EmulatorFixture() as bench:
         bench.step(5)
         store = bench.sim.store
         with file.open("w", encoding="ascii") as out:

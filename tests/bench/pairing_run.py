@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from xplane_bridge.emulator.renderer import StripError, read_strip
+from xplane_bridge.emulator.view.renderer import StripError, read_strip
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import config_file, node_program

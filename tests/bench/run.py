@@ -38,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _load() -> None:
+    sys.path.append(str(Path(__file__).parents[1]))  # for tests/support
     for path in sorted(Path(__file__).parent.glob("bench_*.py")):
         importlib.import_module(path.stem)
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from xplane_bridge import protocol
-from xplane_bridge.emulator.renderer import read_strip
+from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import HarnessError, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 

@@ -19,7 +19,7 @@ import pytest
 
 from xplane_bridge import protocol
 from xplane_bridge.bags import Bags
-from xplane_bridge.emulator.renderer import StripError, read_strip
+from xplane_bridge.emulator.view.renderer import StripError, read_strip
 from xplane_bridge.harness import ManagedProcess, flight_check, wait_until
 from xplane_bridge.harness.ros import ros_environment
 from xplane_bridge.resources import program

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from support.tx_fixtures import AUTO, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
 from xplane_bridge import protocol
 from xplane_bridge.harness import wait_until
-from xplane_bridge.harness.tx_bench import AUTO, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
 
 OK, ACCEPTED, REFUSED = range(3)
 STICK = "sim/joystick/yoke_roll_ratio"

@@ -11,10 +11,7 @@ import time
 
 import pytest
 
-from xplane_bridge import protocol
-from xplane_bridge.emulator.simulator import aircraft_path
-from xplane_bridge.harness import wait_until
-from xplane_bridge.harness.tx_bench import (
+from support.tx_fixtures import (
     PITCH,
     ROLL,
     YAW,
@@ -25,6 +22,9 @@ from xplane_bridge.harness.tx_bench import (
     tx_params,
     write_mixing,
 )
+from xplane_bridge import protocol
+from xplane_bridge.emulator.simulator import aircraft_path
+from xplane_bridge.harness import wait_until
 
 OK, ACCEPTED, REFUSED, NOT_SUPPORTED, NO_LINK, TIMEOUT = range(6)
 AT_SIM_TIME, AT_ALTITUDE_ABOVE, AT_SPEED_BELOW = 1, 2, 5

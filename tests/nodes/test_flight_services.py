@@ -11,10 +11,10 @@ import time
 
 import pytest
 
+from support.tx_fixtures import ROLL, CommandSource, WatchedDatarefs, call, journal_entries, tx_params
 from xplane_bridge import protocol
 from xplane_bridge.emulator.simulator import aircraft_path
 from xplane_bridge.harness import wait_until
-from xplane_bridge.harness.tx_bench import ROLL, CommandSource, WatchedDatarefs, call, journal_entries, tx_params
 
 ACCEPTED, REFUSED, NOT_SUPPORTED, NO_LINK = 1, 2, 3, 4
 RESET, CRASH, AIRCRAFT, PAUSE, SITUATION, SETTING = 1, 2, 3, 4, 10, 11

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from xplane_bridge.emulator.renderer import read_strip
+from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 

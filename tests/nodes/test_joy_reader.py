@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from pathlib import Path
 
 import pytest
 import yaml
@@ -12,11 +13,12 @@ from xplane_bridge.harness import ManagedProcess
 from xplane_bridge.resources import config_file, program
 
 #: The reader in a process whose SDL does what comes line by line in a file: plug, axis I V, button I P, pull.
-READER = """
+READER = f"""
 import sys, threading, time
 from pathlib import Path
+sys.path.append({str(Path(__file__).resolve().parents[1])!r})
 from xplane_bridge.cli.joy_reader import main
-from xplane_bridge.harness.sdl_device import SdlDevice
+from support.sdl_device import SdlDevice
 
 def play(file):
     device, done = None, 0

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from support.tx_fixtures import RepeatedJoy
 from xplane_bridge.harness import wait_until
-from xplane_bridge.harness.tx_bench import RepeatedJoy
 
 JOYSTICKS = Path(__file__).resolve().parents[2] / "config" / "joysticks"
 ROLL, PITCH, YAW, THROTTLE = 1, 2, 4, 8

@@ -8,18 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from support.position_loop import Motion, PositionLoop
+from support.tx_fixtures import AUTO, PITCH, ROLL, THROTTLE, YAW, RepeatedJoy, WatchedDatarefs, tx_params
 from xplane_bridge.harness import wait_until
-from xplane_bridge.harness.position_loop import Motion, PositionLoop
-from xplane_bridge.harness.tx_bench import (
-    AUTO,
-    PITCH,
-    ROLL,
-    THROTTLE,
-    YAW,
-    RepeatedJoy,
-    WatchedDatarefs,
-    tx_params,
-)
 
 JOYSTICK = Path(__file__).resolve().parents[2] / "config" / "joysticks" / "logitech_extreme_3d_pro.yaml"
 

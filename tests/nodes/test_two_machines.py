@@ -16,9 +16,9 @@ from typing import Any, Callable, Iterator, Sequence
 import numpy as np
 import pytest
 
+from support.network_namespaces import Machine, TwoMachines, why_no_machines
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.harness.machines import Machine, TwoMachines, why_no_machines
 from xplane_bridge.resources import program
 
 FPS = 30
@@ -32,17 +32,18 @@ PERFECT = 90
 WAIT_S = 40.0
 #: What both machines are told: the namespace's parameters are shared.
 _SHARED = f"display_delay:={PIPELINE_DELAY_S}"
+_RECORDER = Path(__file__).resolve().parents[1] / "support" / "topic_recorder.py"
 _NOT_PERMITTED = why_no_machines()
 
 pytestmark = pytest.mark.skipif(bool(_NOT_PERMITTED), reason=_NOT_PERMITTED)
 
 
-class Witness:
-    """What tests/nodes/witness.py writes down on a machine."""
+class TopicRecorder:
+    """What tests/support/topic_recorder.py writes down on a machine."""
 
     def __init__(self, flight: Flight, machine: Machine) -> None:
-        self.file = machine.folder / "witness.jsonl"
-        flight.run(machine, "witness", sys.executable, Path(__file__).with_name("witness.py"), self.file)
+        self.file = machine.folder / "topics.jsonl"
+        flight.run(machine, "topic_recorder", sys.executable, _RECORDER, self.file)
 
     def all(self, topic: str) -> list[dict[str, Any]]:
         """All messages so far of a topic below /xplane, or of one with a leading slash."""
@@ -131,28 +132,28 @@ def lateness(row: dict[str, str]) -> float:
     return (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9 - PIPELINE_DELAY_S
 
 
-def perfect(witness: Witness) -> list[dict[str, Any]]:
+def perfect(recorder: TopicRecorder) -> list[dict[str, Any]]:
     """Pictures whose pairing is beyond doubt."""
-    return [state for state in witness.all("camera/frame_state") if not state["quality"]]
+    return [state for state in recorder.all("camera/frame_state") if not state["quality"]]
 
 
 def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     flight.start_bridge()
-    witness = Witness(flight, flight.bridge)
-    witness.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
-    begin = len(witness.all("flight_state"))
-    link = witness.all("link_state")[-1]
+    recorder = TopicRecorder(flight, flight.bridge)
+    recorder.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
+    begin = len(recorder.all("flight_state"))
+    link = recorder.all("link_state")[-1]
     assert (link["state"], link["host"]) == ("CONNECTED", flight.simulator.address), "found by its beacon"
 
     # The stick of the other machine moves the simulator, and both say so.
-    witness.wait_for("control/applied", lambda a: a["read_back"] and a["roll"] == 1.0, "the stick read back")
-    witness.wait_for("flight_state", lambda s: s["control_roll"] == 1.0, "the stick in the state")
-    wait_until(lambda: len(witness.all("flight_state")) > begin + STATES, WAIT_S, "states")
-    wait_until(lambda: len(perfect(witness)) >= PERFECT, WAIT_S, "perfectly paired pictures")
+    recorder.wait_for("control/applied", lambda a: a["read_back"] and a["roll"] == 1.0, "the stick read back")
+    recorder.wait_for("flight_state", lambda s: s["control_roll"] == 1.0, "the stick in the state")
+    wait_until(lambda: len(recorder.all("flight_state")) > begin + STATES, WAIT_S, "states")
+    wait_until(lambda: len(perfect(recorder)) >= PERFECT, WAIT_S, "perfectly paired pictures")
     flight.stop()  # what is still in buffers is written
 
     # States: every frame that was flown, one after the other.
-    times = np.array([state["sim_time"] for state in witness.all("flight_state")[begin:]], np.float32)
+    times = np.array([state["sim_time"] for state in recorder.all("flight_state")[begin:]], np.float32)
     flown = np.array([row["sim_time"] for row in rows(flight.truth)], np.float32)
     assert np.all(np.diff(times) > 0)
     assert set(times) == {t for t in flown if times[0] <= t <= times[-1]}, "a state was lost on the way"
@@ -160,8 +161,8 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     # Images: each that was published arrived, with its state; and nearly all that were drawn were published (a computer
     # too busy to look at the window in time misses some).
     first, last = times[0], times[-1] - 0.5  # those whose state and place in the log have come, too
-    images = {i["stamp"]: i for i in witness.all("camera/image_raw") if i["frame"] and first <= i["sim_time"] <= last}
-    states = {s["stamp"]: s for s in witness.all("camera/frame_state")}
+    images = {i["stamp"]: i for i in recorder.all("camera/image_raw") if i["frame"] and first <= i["sim_time"] <= last}
+    states = {s["stamp"]: s for s in recorder.all("camera/frame_state")}
     assert set(images) <= set(states)
     paired = [states[stamp] for stamp in sorted(images)]
     counts = np.array([state["image_count"] for state in paired])
@@ -182,7 +183,7 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
 
 def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(flight: Flight) -> None:
     flight.start_bridge()
-    here, there = Witness(flight, flight.simulator), Witness(flight, flight.bridge)
+    here, there = TopicRecorder(flight, flight.simulator), TopicRecorder(flight, flight.bridge)
     here.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
     there.wait_for("flight_state", lambda _: True, "a state")
 
@@ -199,7 +200,7 @@ def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(fl
     here.wait_for_status("capture_node: pairing", lambda level, text: level == 1 and "no state" in text, "a warning")
 
     flight.start_bridge()
-    there = Witness(flight, flight.bridge)
+    there = TopicRecorder(flight, flight.bridge)
     pictures = len(here.all("camera/frame_state"))
     here.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a picture with", after=pictures)
     there.wait_for("flight_state", lambda _: True, "a state")

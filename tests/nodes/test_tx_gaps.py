@@ -7,15 +7,8 @@ import threading
 
 import pytest
 
+from support.tx_fixtures import ROLL, CommandSource, WatchedDatarefs, journal_entries, tx_params, write_mixing
 from xplane_bridge.harness import wait_until
-from xplane_bridge.harness.tx_bench import (
-    ROLL,
-    CommandSource,
-    WatchedDatarefs,
-    journal_entries,
-    tx_params,
-    write_mixing,
-)
 
 SURFACES = "sim/operation/override/override_control_surfaces"
 OVERRIDE = "sim/operation/override/override_joystick"

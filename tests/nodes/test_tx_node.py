@@ -12,9 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from xplane_bridge import protocol
-from xplane_bridge.harness import ManagedProcess, wait_until
-from xplane_bridge.harness.tx_bench import (
+from support.tx_fixtures import (
     AUTO,
     FLAPS,
     MANUAL,
@@ -28,6 +26,8 @@ from xplane_bridge.harness.tx_bench import (
     journal_entries,
     tx_params,
 )
+from xplane_bridge import protocol
+from xplane_bridge.harness import ManagedProcess, wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from xplane_bridge.harness.synthetic_flight import Definitions
+from support.synthetic_flight import Definitions
 from xplane_bridge.topics import NAMESPACE, TOPICS
 
 ROOT = Path(__file__).parents[2]

@@ -10,13 +10,13 @@ import sys
 from typing import TYPE_CHECKING, Optional, Sequence
 
 from xplane_bridge.emulator.emulator import Emulator
-from xplane_bridge.emulator.flight_model import FlightModelError
+from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.emulator.options import Options, parse
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.scenario import ScenarioError
 
 if TYPE_CHECKING:
-    from xplane_bridge.emulator.cockpit_view import CockpitView
+    from xplane_bridge.emulator.view.cockpit_view import CockpitView
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
@@ -63,7 +63,7 @@ def _open_view(options: Options, emulator: Emulator) -> Optional[CockpitView]:
     """Opens the cockpit view's window, if one is wanted."""
     if not options.window:
         return None
-    from xplane_bridge.emulator.cockpit_view import CockpitView  # late: without a window, OpenCV is not needed
+    from xplane_bridge.emulator.view.cockpit_view import CockpitView  # late: without a window, OpenCV is not needed
 
     view = CockpitView(options)
     emulator.view = view

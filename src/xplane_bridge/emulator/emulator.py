@@ -18,18 +18,19 @@ from typing import List, Optional, Protocol, TextIO
 
 import numpy as np
 
-from .. import protocol
-from ..scenario import ScenarioError, ScenarioPilot, load_scenario
-from .faults import FaultyChannel
-from .flight_model import FlightModel, create_model
-from .kinematic import KinematicModel
-from .options import KINEMATIC, Options
-from .plane_connect import PlaneConnect
-from .priority import take_realtime_priority
-from .server import Beacon, Server
-from .simulator import INTERNAL_VERSIONS, Simulator
-from .subscriptions import Address, Subscriptions
-from .truth import TruthFile
+from xplane_bridge import protocol
+from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
+from xplane_bridge.emulator.flight.flight_model import FlightModel
+from xplane_bridge.emulator.options import KINEMATIC, Options
+from xplane_bridge.emulator.priority import take_realtime_priority
+from xplane_bridge.emulator.simulator import INTERNAL_VERSIONS, Simulator
+from xplane_bridge.emulator.truth import TruthFile
+from xplane_bridge.emulator.wire.faults import FaultyChannel
+from xplane_bridge.emulator.wire.server import Beacon, Server
+from xplane_bridge.emulator.wire.subscriptions import Address, Subscriptions
+from xplane_bridge.emulator.wire.xplane_connect import XPlaneConnect
+from xplane_bridge.scenario import ScenarioError, ScenarioPilot, load_scenario
 
 _LOG = logging.getLogger(__name__)
 
@@ -72,7 +73,7 @@ class Emulator:
         self.sim = self._new_simulator()
         self._server: Optional[Server] = self._new_server(options.port)
         self.port = self._server.port
-        self._plane_connect = self._new_plane_connect()
+        self._xplane_connect = self._new_xplane_connect()
         self._beacon = self._new_beacon()
         self._truth = TruthFile(options.truth, self.sim.model) if options.truth is not None else None
         self._frames = 0
@@ -83,9 +84,9 @@ class Emulator:
     def _make_model(self, name: str) -> FlightModel:
         return KinematicModel(self.options.seed) if name == KINEMATIC else create_model(name, self.options.seed)
 
-    def _new_plane_connect(self) -> Optional[PlaneConnect]:
-        port = self.options.plane_connect_port
-        return None if port is None else PlaneConnect(self.options.bind, port, lambda: self.sim.position())
+    def _new_xplane_connect(self) -> Optional[XPlaneConnect]:
+        port = self.options.xplane_connect_port
+        return None if port is None else XPlaneConnect(self.options.bind, port, lambda: self.sim.position())
 
     def _new_simulator(self) -> Simulator:
         o = self.options
@@ -201,8 +202,8 @@ class Emulator:
                 now, self.period, sim.rows, sim.store.values, sim.selected_rows, sim.data_rate, self._rpos_packet
             )
         server.flush_delayed(now)
-        if self._plane_connect is not None:
-            self._plane_connect.answer()
+        if self._xplane_connect is not None:
+            self._xplane_connect.answer()
         if self._truth is not None and sim.flying:
             self._truth.write(sim.frame, host_time)
         if self.view is not None:
@@ -300,7 +301,7 @@ class Emulator:
         """What clients see when X-Plane is quit: the port is closed, the beacon gone."""
         self.server.close()
         self._server = None
-        self._close_plane_connect()
+        self._close_xplane_connect()
         if self._beacon is not None:
             self._beacon.close()
             self._beacon = None
@@ -309,7 +310,7 @@ class Emulator:
         """Starts anew on the same port: no subscriptions, no targets, no overrides, a new flight."""
         self.sim = self._new_simulator()
         self._server = self._new_server(self.port)
-        self._plane_connect = self._new_plane_connect()
+        self._xplane_connect = self._new_xplane_connect()
         self._beacon = self._new_beacon()
 
     def step_frames(self, count: int) -> None:
@@ -364,7 +365,7 @@ class Emulator:
             "aircraft": o.aircraft,
             "fps": o.fps,
             "beacon": o.beacon,
-            "xpc_port": None if self._plane_connect is None else self._plane_connect.port,
+            "xpc_port": None if self._xplane_connect is None else self._xplane_connect.port,
             "stepped": o.stepped is not None,
             "pipeline_delay": o.pipeline_delay,
         }
@@ -383,10 +384,10 @@ class Emulator:
             }
         return report
 
-    def _close_plane_connect(self) -> None:
-        if self._plane_connect is not None:
-            self._plane_connect.close()
-            self._plane_connect = None
+    def _close_xplane_connect(self) -> None:
+        if self._xplane_connect is not None:
+            self._xplane_connect.close()
+            self._xplane_connect = None
 
     def close(self) -> None:
         """Closes sockets and files; may be called again."""
@@ -395,7 +396,7 @@ class Emulator:
         if self._beacon is not None:
             self._beacon.close()
             self._beacon = None
-        self._close_plane_connect()
+        self._close_xplane_connect()
         if self._truth is not None:
             self._truth.close()
             self._truth = None

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import List, Optional, Sequence, Tuple
 
-from .. import protocol
-from .earth import wrap_degrees, wrap_longitude
-from .faults import FaultPlan, FaultSyntaxError, parse_faults
-from .flight_model import InitialState, model_names
-from .server import RREF_REQUESTS_PER_FRAME
+from xplane_bridge import protocol
+from xplane_bridge.emulator.aircraft import model_names
+from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_longitude
+from xplane_bridge.emulator.flight.flight_model import InitialState
+from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, parse_faults
+from xplane_bridge.emulator.wire.server import RREF_REQUESTS_PER_FRAME
 
 KINEMATIC = "kinematic"
 
@@ -41,7 +42,7 @@ class Options:
     truth: Optional[Path] = None
     duration: Optional[float] = None
     stepped: Optional[str] = None  #: None: real time; "lines": frames on request; "fast": as fast as it goes
-    plane_connect_port: Optional[int] = None
+    xplane_connect_port: Optional[int] = None
     beacon: bool = True
     beacon_group: str = protocol.BEACON_GROUP
     beacon_port: int = protocol.BEACON_PORT
@@ -268,7 +269,7 @@ def _options(given: argparse.Namespace) -> Options:
         truth=given.truth,
         duration=given.duration,
         stepped=given.stepped,
-        plane_connect_port=given.xpc_port,
+        xplane_connect_port=given.xpc_port,
         beacon=given.beacon,
         beacon_group=group,
         beacon_port=int(beacon_port),

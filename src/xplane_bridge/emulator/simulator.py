@@ -9,16 +9,16 @@ from typing import Callable, Dict, List, Optional, Set, Tuple
 
 import numpy as np
 
-from .. import protocol
-from . import commands, data_rows, tables
-from .aircraft_systems import INHG_PA, Electrics, Instruments, Weather
-from .control_inputs import ControlInputs, Pilot
-from .datarefs import DatarefStore
-from .failure_effects import FailureEffects
-from .flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
-from .frame import Clocks, Frame
-from .placement import Placements
-from .tables.controls import surface_dataref
+from xplane_bridge import protocol
+from xplane_bridge.emulator.datarefs import commands, data_rows, tables
+from xplane_bridge.emulator.datarefs.aircraft_systems import INHG_PA, Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, Pilot
+from xplane_bridge.emulator.datarefs.failure_effects import FailureEffects
+from xplane_bridge.emulator.datarefs.placement import Placements
+from xplane_bridge.emulator.datarefs.store import DatarefStore
+from xplane_bridge.emulator.datarefs.tables.controls import surface_dataref
+from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
+from xplane_bridge.emulator.flight.frame import Clocks, Frame
 
 _LOG = logging.getLogger(__name__)
 

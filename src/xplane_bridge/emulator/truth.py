@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 from typing import Callable, List, Sequence, Tuple
 
-from .flight_model import FlightModel
-from .frame import Frame
+from xplane_bridge.emulator.flight.flight_model import FlightModel
+from xplane_bridge.emulator.flight.frame import Frame
 
 #: Frames between two flushes of the file.
 _FLUSH_EVERY = 10

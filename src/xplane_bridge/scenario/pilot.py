@@ -9,8 +9,8 @@ from .player import Action, FlightSample, Player
 from .schema import Scenario, ScenarioError
 
 if TYPE_CHECKING:
-    from ..emulator.control_inputs import PilotCommands
-    from ..emulator.frame import Frame
+    from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands
+    from xplane_bridge.emulator.flight.frame import Frame
 
 _FAILURES = "sim/operation/failures/"
 _TRIMS = {"roll_trim": "aileron_trim", "pitch_trim": "elevator_trim", "yaw_trim": "rudder_trim"}
@@ -42,7 +42,7 @@ class ScenarioPilot:
 
     def __call__(self, flight_time: float, frame: Frame) -> PilotCommands:
         """What the scenario wants at this flight time [s]."""
-        from ..emulator.control_inputs import PilotCommands  # the emulator imports this module
+        from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands  # the emulator imports this module
 
         commands = self.player.step(flight_time, sample_of(frame))
         handles = commands.handles

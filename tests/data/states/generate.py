@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from xplane_bridge.emulator.data_rows import DataRows
-from xplane_bridge.emulator.flight_model import InitialState
-from xplane_bridge.emulator.kinematic import KinematicModel
+from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
+from xplane_bridge.emulator.datarefs.data_rows import DataRows
+from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.simulator import Simulator
 
 FOLDER = Path(__file__).resolve().parent

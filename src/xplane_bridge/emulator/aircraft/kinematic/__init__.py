@@ -1,0 +1,1 @@
+"""A flight model without dynamics, for tests and for machines without JSBSim."""

@@ -1,0 +1,103 @@
+"""X-Plane commands (CMND) that the emulator knows; unknown ones do nothing, as in X-Plane."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Callable, Dict, Tuple
+
+if TYPE_CHECKING:
+    from xplane_bridge.emulator.simulator import Simulator
+
+_COCKPIT = "sim/cockpit2/controls/"
+_VIEW = "sim/graphics/view/"
+_FLAP_STEP = 0.25
+_TRIM_STEP = 0.01
+_THROTTLE_STEP = 0.05
+
+#: View commands: (view_type, whether external). The numbers are in no list of Laminar's; X-Plane plugins use these.
+VIEWS: Dict[str, Tuple[int, bool]] = {
+    "default_view": (1000, False),
+    "forward_with_2d_panel": (1000, False),
+    "forward_with_hud": (1023, False),
+    "forward_with_nothing": (1024, False),
+    "3d_cockpit_cmnd_look": (1026, False),
+    "tower": (1014, True),
+    "runway": (1015, True),
+    "chase": (1017, True),
+    "circle": (1018, True),
+    "still_spot": (1020, True),
+    "linear_spot": (1021, True),
+    "free_camera": (1028, True),
+    "ridealong": (1031, True),
+}
+
+
+def commands(sim: Simulator) -> Dict[str, Callable[[], None]]:
+    """What each command does."""
+    store = sim.store
+
+    def setter(name: str, value: float) -> Callable[[], None]:
+        return lambda: store.set(name, value)
+
+    def stepper(name: str, step: float, low: float, high: float) -> Callable[[], None]:
+        return lambda: store.set(name, min(max(store.get(name) + step, low), high))
+
+    def toggle(name: str) -> Callable[[], None]:
+        return lambda: store.set(name, 0.0 if store.get(name) else 1.0)
+
+    table: Dict[str, Callable[[], None]] = {
+        "sim/operation/pause_on": lambda: sim.pause(True),
+        "sim/operation/pause_off": lambda: sim.pause(False),
+        "sim/operation/pause_toggle": lambda: sim.pause(not sim.clocks.paused),
+        "sim/operation/fix_all_systems": sim.repair_all,
+        "sim/operation/reset_flight": lambda: sim.start_flight(sim.initial),
+        "sim/operation/load_last_situation": lambda: sim.load_situation(sim.last_situation),
+        "sim/operation/freeze_toggle": toggle("sim/operation/override/override_planepath"),
+        "sim/flight_controls/landing_gear_down": setter(_COCKPIT + "gear_handle_down", 1.0),
+        "sim/flight_controls/landing_gear_up": setter(_COCKPIT + "gear_handle_down", 0.0),
+        "sim/flight_controls/landing_gear_toggle": toggle(_COCKPIT + "gear_handle_down"),
+        "sim/flight_controls/flaps_up": stepper(_COCKPIT + "flap_ratio", -_FLAP_STEP, 0.0, 1.0),
+        "sim/flight_controls/flaps_down": stepper(_COCKPIT + "flap_ratio", _FLAP_STEP, 0.0, 1.0),
+        "sim/flight_controls/speed_brakes_up_all": setter(_COCKPIT + "speedbrake_ratio", 1.0),
+        "sim/flight_controls/speed_brakes_down_all": setter(_COCKPIT + "speedbrake_ratio", 0.0),
+        "sim/flight_controls/speed_brakes_toggle": toggle(_COCKPIT + "speedbrake_ratio"),
+        "sim/flight_controls/brakes_toggle_max": toggle(_COCKPIT + "parking_brake_ratio"),
+        "sim/flight_controls/brakes_toggle_regular": toggle(_COCKPIT + "parking_brake_ratio"),
+        "sim/flight_controls/pitch_trim_up": stepper(_COCKPIT + "elevator_trim", _TRIM_STEP, -1.0, 1.0),
+        "sim/flight_controls/pitch_trim_down": stepper(_COCKPIT + "elevator_trim", -_TRIM_STEP, -1.0, 1.0),
+        "sim/flight_controls/pitch_trim_takeoff": setter(_COCKPIT + "elevator_trim", 0.0),
+        "sim/flight_controls/aileron_trim_center": setter(_COCKPIT + "aileron_trim", 0.0),
+        "sim/flight_controls/rudder_trim_center": setter(_COCKPIT + "rudder_trim", 0.0),
+        "sim/engines/throttle_up": lambda: sim.move_throttles(_THROTTLE_STEP),
+        "sim/engines/throttle_down": lambda: sim.move_throttles(-_THROTTLE_STEP),
+        "sim/engines/throttle_full": lambda: sim.move_throttles(1.0),
+        "sim/engines/engage_starters": lambda: sim.run_engines(True),
+        "sim/operation/auto_start": lambda: sim.run_engines(True),
+        "sim/operation/quick_start": lambda: sim.run_engines(True),
+        "sim/magnetos/magnetos_off": lambda: sim.run_engines(False),
+    }
+    for name, dataref in (
+        ("lights/nav_lights", "navigation_lights_on"),
+        ("lights/beacon_lights", "beacon_on"),
+        ("lights/strobe_lights", "strobe_lights_on"),
+        ("lights/landing_lights", "landing_lights_on"),
+        ("lights/taxi_lights", "taxi_light_on"),
+        ("systems/avionics", "avionics_power_on"),
+    ):
+        switch = "sim/cockpit2/switches/" + dataref
+        table[f"sim/{name}_on"] = setter(switch, 1.0)
+        table[f"sim/{name}_off"] = setter(switch, 0.0)
+        table[f"sim/{name}_toggle"] = toggle(switch)
+    for engine in range(sim.model.info.engine_count):
+        table[f"sim/starters/engage_starter_{engine + 1}"] = lambda i=engine: sim.run_engine(i, True)
+        table[f"sim/magnetos/magnetos_off_{engine + 1}"] = lambda i=engine: sim.run_engine(i, False)
+    for name, (view, external) in VIEWS.items():
+        table[f"sim/view/{name}"] = lambda view=view, external=external: _look(sim, view, external)
+    return table
+
+
+def _look(sim: Simulator, view: int, external: bool) -> None:
+    """A new view, straight ahead."""
+    sim.store.set(_VIEW + "view_type", view)
+    sim.store.set(_VIEW + "view_is_external", float(external))
+    sim.store.set(_VIEW + "pilots_head_psi", 0.0)
+    sim.store.set(_VIEW + "pilots_head_the", 0.0)

@@ -1,0 +1,273 @@
+"""Who moves the controls: clients (overrides, DREF, DATA rows), the scripted pilot, or nobody."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Callable, Dict, Optional, Sequence, Tuple
+
+import numpy as np
+
+from xplane_bridge.emulator.datarefs.store import DatarefStore
+from xplane_bridge.emulator.datarefs.tables.engines import RPM_TO_RAD_S, THROTTLE_RELEASED
+from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel
+from xplane_bridge.emulator.flight.frame import Frame
+from xplane_bridge.protocol import UNUSED_SLOT
+
+if TYPE_CHECKING:
+    from xplane_bridge.emulator.simulator import Simulator
+
+_OVERRIDE = "sim/operation/override/override_"
+_COCKPIT = "sim/cockpit2/controls/"
+_ACTUATORS = "sim/cockpit2/engine/actuators/"
+_ENGINE = "sim/flightmodel/engine/"
+
+#: Stick axes: X-Plane's name, `Controls` attribute, slot in rows 8 and 11.
+_AXES = (("pitch", "pitch", 0), ("roll", "roll", 1), ("heading", "yaw", 2))
+#: Slots of DATA rows that move handles: (row, slot) -> (dataref, lowest, highest value).
+_HANDLES = {
+    (13, 0): (_COCKPIT + "elevator_trim", -1.0, 1.0),
+    (13, 1): (_COCKPIT + "aileron_trim", -1.0, 1.0),
+    (13, 2): (_COCKPIT + "rudder_trim", -1.0, 1.0),
+    (13, 3): (_COCKPIT + "flap_ratio", 0.0, 1.0),
+    (13, 6): (_COCKPIT + "speedbrake_ratio", -0.5, 1.0),
+    (14, 0): (_COCKPIT + "gear_handle_down", 0.0, 1.0),
+    (14, 1): (_COCKPIT + "parking_brake_ratio", 0.0, 1.0),
+    (14, 2): (_COCKPIT + "left_brake_ratio", 0.0, 1.0),
+    (14, 3): (_COCKPIT + "right_brake_ratio", 0.0, 1.0),
+}
+_THROTTLE_ROW = 25
+#: Levers and handles that a saved situation brings back and a new flight sets.
+_LEVERS = (
+    _ACTUATORS + "throttle_ratio",
+    _ACTUATORS + "prop_ratio",
+    _ACTUATORS + "mixture_ratio",
+    _COCKPIT + "elevator_trim",
+    _COCKPIT + "aileron_trim",
+    _COCKPIT + "rudder_trim",
+    _COCKPIT + "flap_ratio",
+    _COCKPIT + "speedbrake_ratio",
+    _COCKPIT + "gear_handle_down",
+    _COCKPIT + "parking_brake_ratio",
+    _COCKPIT + "left_brake_ratio",
+    _COCKPIT + "right_brake_ratio",
+    _COCKPIT + "thrust_vector_ratio",
+    "sim/joystick/yoke_pitch_ratio",
+    "sim/joystick/yoke_roll_ratio",
+    "sim/joystick/yoke_heading_ratio",
+)
+
+
+@dataclass(frozen=True)
+class PilotCommands:
+    """What a scripted pilot wants; None leaves a control where it is."""
+
+    roll: float = 0.0  #: -1..1, right +
+    pitch: float = 0.0  #: -1..1, nose up +
+    yaw: float = 0.0  #: -1..1, nose right +
+    throttle: Optional[float] = None  #: all levers, 0..1
+    flaps: Optional[float] = None
+    gear_down: Optional[bool] = None
+    speed_brake: Optional[float] = None
+    thrust_vector: Optional[float] = None
+    brakes: Optional[float] = None
+    datarefs: Tuple[Tuple[str, float], ...] = ()  #: to write once
+
+
+Pilot = Callable[[float, Frame], PilotCommands]
+
+
+class ControlInputs:
+    """Turns what was written into `Controls`, once a frame.
+
+    The order of power on the stick: a DATA row that holds it, `override_joystick` (what was written to the yoke
+    datarefs stays), the pilot, and last the centred stick. Levers stay where they were put last.
+    """
+
+    def __init__(self, store: DatarefStore, pilot: Optional[Pilot]) -> None:
+        self._store = store
+        self._pilot = pilot
+        self._held: Dict[Tuple[int, int], float] = {}
+        self._surface_commands: Dict[int, float] = {}
+        self._throttle_commands: Dict[int, float] = {}
+        self._surface_slots: Dict[str, int] = {}
+
+    # --- definition ---------------------------------------------------------------------------------------------------
+
+    def watch_surface(self, name: str) -> None:
+        """Remembers writes to a dataref that shows surfaces (they count while the surfaces are overridden)."""
+        slots = self._store.dataref(name).slots
+        commands = self._surface_commands
+        self._store.on_write(name, lambda index, value: commands.__setitem__(int(slots[index]), value))
+
+    def connect(self, sim: Simulator) -> None:
+        """Connects the datarefs that act on others."""
+        store = self._store
+        for name in ("throttle_ratio", "throttle_jet_rev_ratio", "mixture_ratio", "prop_ratio"):
+            store.on_write(f"{_ACTUATORS}{name}_all", lambda _i, value, name=name: store.set(_ACTUATORS + name, value))
+
+        def set_speed(index: int, value: float) -> None:
+            highest = sim.model.info.maximum_rpm * RPM_TO_RAD_S
+            slot = store.dataref(_ACTUATORS + "prop_ratio").slots[index]
+            store.values[slot] = min(max(value / highest, 0.0), 1.0) if highest > 0.0 else 0.0
+
+        store.on_write(_ENGINE + "ENGN_prop", set_speed)
+        store.on_write(_ACTUATORS + "prop_rotation_speed_rad_sec", set_speed)
+        store.on_write(_ENGINE + "ENGN_thro_use", self._throttle_commands.__setitem__)
+
+    # --- flights ------------------------------------------------------------------------------------------------------
+
+    def start(self, controls: Controls, model: FlightModel) -> None:
+        """A flight begins: levers as `controls` has them."""
+        engines = model.info.engine_count
+        levers = (
+            ("throttle_ratio", controls.throttle),
+            ("prop_ratio", controls.propeller),
+            ("mixture_ratio", controls.mixture),
+        )
+        for name, values in levers:
+            slots = self._store.dataref(_ACTUATORS + name).slots[:engines]
+            self._store.values[slots] = values[:engines]
+        for name, value in (
+            (_COCKPIT + "elevator_trim", controls.pitch_trim),
+            (_COCKPIT + "aileron_trim", controls.roll_trim),
+            (_COCKPIT + "rudder_trim", controls.yaw_trim),
+            (_COCKPIT + "flap_ratio", controls.flap_request),
+            (_COCKPIT + "speedbrake_ratio", controls.speed_brake),
+            (_COCKPIT + "gear_handle_down", float(controls.gear_down)),
+            (_COCKPIT + "parking_brake_ratio", controls.parking_brake),
+            (_COCKPIT + "thrust_vector_ratio", controls.thrust_vector),
+        ):
+            self._store.set(name, value)
+
+    def save(self) -> Dict[str, np.ndarray]:
+        """Levers and handles, for a situation."""
+        return {name: self._store.array(name) for name in _LEVERS}
+
+    def restore(self, levers: Dict[str, np.ndarray]) -> None:
+        """Puts back what `save` gave."""
+        for name, values in levers.items():
+            self._store.set(name, values)
+
+    # --- DATA rows ----------------------------------------------------------------------------------------------------
+
+    def take_row(self, row: int, slots: Sequence[float]) -> None:
+        """A row that a client sent: values hold until -999 comes; rows and slots that control nothing are ignored."""
+        for slot, value in enumerate(slots):
+            key = (row, slot)
+            if not (row == _THROTTLE_ROW or key in _HANDLES or (row in (8, 11) and slot < 3)):
+                continue
+            if value == UNUSED_SLOT:
+                self._held.pop(key, None)
+            elif np.isfinite(value):
+                self._held[key] = float(value)
+
+    def release_data(self) -> None:
+        """Gives back all that DATA rows held, as loading an aircraft does."""
+        self._held.clear()
+
+    # --- one frame ----------------------------------------------------------------------------------------------------
+
+    def read(self, controls: Controls, model: FlightModel, frame: Frame) -> None:
+        """Sets `controls` for this frame."""
+        store = self._store
+        self._apply_held()
+        joystick = self._overrides("joystick") or self._overrides("flightcontrol")
+        commands: Optional[PilotCommands] = None
+        if self._pilot is not None:
+            commands = self._pilot(frame.clocks.flight, frame)
+            for path, value in commands.datarefs:
+                store.write(path, value)
+            if not joystick:
+                self._move_handles(commands, model)
+        for axis, attribute, slot in _AXES:
+            name = f"sim/joystick/yoke_{axis}_ratio"
+            held = self._held.get((8, slot), self._held.get((11, slot)))
+            if held is not None:
+                store.set(name, held)
+            elif not joystick and not self._overrides("joystick_" + axis):
+                store.set(name, 0.0 if commands is None else getattr(commands, attribute))
+            setattr(controls, attribute, _clip(store.get(name), -1.0, 1.0))
+        self._read_handles(controls)
+        self._read_engines(controls, model)
+        self._read_surfaces(controls)
+
+    def _overrides(self, name: str) -> bool:
+        return self._store.get(_OVERRIDE + name) != 0.0
+
+    def _apply_held(self) -> None:
+        if not self._held:
+            return
+        throttle = self._store.dataref(_ACTUATORS + "throttle_ratio").slots
+        for (row, slot), value in self._held.items():
+            if row == _THROTTLE_ROW:
+                self._store.values[throttle[slot]] = _clip(value, -1.0, 1.0)
+            elif (row, slot) in _HANDLES:
+                name, low, high = _HANDLES[(row, slot)]
+                self._store.set(name, _clip(value, low, high))
+
+    def _move_handles(self, commands: PilotCommands, model: FlightModel) -> None:
+        store = self._store
+        if commands.throttle is not None and not self._overrides("throttles"):
+            slots = store.dataref(_ACTUATORS + "throttle_ratio").slots[: model.info.engine_count]
+            store.values[slots] = commands.throttle
+        for name, value in (
+            ("flap_ratio", commands.flaps),
+            ("gear_handle_down", commands.gear_down),
+            ("speedbrake_ratio", commands.speed_brake),
+            ("thrust_vector_ratio", commands.thrust_vector),
+            ("parking_brake_ratio", commands.brakes),
+        ):
+            if value is not None:
+                store.set(_COCKPIT + name, float(value))
+
+    def _read_handles(self, controls: Controls) -> None:
+        store = self._store
+        controls.pitch_trim = _clip(store.get(_COCKPIT + "elevator_trim"), -1.0, 1.0)
+        controls.roll_trim = _clip(store.get(_COCKPIT + "aileron_trim"), -1.0, 1.0)
+        controls.yaw_trim = _clip(store.get(_COCKPIT + "rudder_trim"), -1.0, 1.0)
+        controls.flap_request = _clip(store.get(_COCKPIT + "flap_ratio"), 0.0, 1.0)
+        controls.speed_brake = _clip(store.get(_COCKPIT + "speedbrake_ratio"), -0.5, 1.0)
+        controls.gear_down = store.get(_COCKPIT + "gear_handle_down") != 0.0
+        controls.parking_brake = _clip(store.get(_COCKPIT + "parking_brake_ratio"), 0.0, 1.0)
+        for side, slot in (("left", 2), ("right", 3)):
+            name = f"{_COCKPIT}{side}_brake_ratio"
+            if not self._overrides("toe_brakes") and (14, slot) not in self._held:
+                store.set(name, 0.0)  # pedals that nobody presses
+            setattr(controls, f"brake_{side}", _clip(store.get(name), 0.0, 1.0))
+        controls.thrust_vector = max(store.get(_COCKPIT + "thrust_vector_ratio"), 0.0)
+        controls.artificial_stability = store.get(
+            "sim/cockpit2/switches/artificial_stability_on"
+        ) != 0.0 and not self._overrides("artstab")
+
+    def _read_engines(self, controls: Controls, model: FlightModel) -> None:
+        store, info = self._store, model.info
+        levers = store.array(_ACTUATORS + "throttle_ratio")
+        overridden = store.array(_ENGINE + "ENGN_thro_override")
+        propeller, mixture = store.array(_ACTUATORS + "prop_ratio"), store.array(_ACTUATORS + "mixture_ratio")
+        use = store.array(_ENGINE + "ENGN_thro_use")
+        controls.override_throttles = self._overrides("throttles")
+        for i in range(info.engine_count):
+            lever = levers[i] if overridden[i] == THROTTLE_RELEASED else overridden[i]
+            controls.throttle[i] = _clip(float(lever), info.min_throttle, info.max_throttle)
+            controls.propeller[i] = _clip(float(propeller[i]), 0.0, 1.0)
+            controls.mixture[i] = _clip(float(mixture[i]), 0.0, 1.0)
+            controls.throttle_use[i] = _clip(self._throttle_commands.get(i, float(use[i])), -1.0, 1.0)
+        if not controls.override_throttles:
+            self._throttle_commands.clear()
+
+    def _read_surfaces(self, controls: Controls) -> None:
+        controls.override_surfaces = self._overrides("control_surfaces")
+        if not controls.override_surfaces:
+            self._surface_commands.clear()
+            controls.surface_deg = {}
+            return
+        commands = self._surface_commands
+        controls.surface_deg = {name: commands[slot] for name, slot in self._surface_slots.items() if slot in commands}
+
+    def bind_surfaces(self, slots: Dict[str, int]) -> None:
+        """Which slot shows which surface of the loaded aircraft."""
+        self._surface_slots = slots
+
+
+def _clip(value: float, low: float, high: float) -> float:
+    return min(max(value, low), high)

@@ -1,0 +1,153 @@
+"""What failed equipment (`rel_*` = 6) does to the controls that reach the flight model.
+
+Electrical and instrument failures act in `aircraft_systems`. Triggers other than "failed now" (2 to 5: at a time,
+speed, height or key press) are kept and read back but never fire.
+"""
+
+from __future__ import annotations
+
+from typing import Callable, Dict, Set
+
+import numpy as np
+
+from xplane_bridge.emulator.datarefs.store import DatarefStore
+from xplane_bridge.emulator.datarefs.tables.failures import PREFIX, names
+from xplane_bridge.emulator.flight.flight_model import (
+    Controls,
+    EngineFault,
+    FlightModel,
+    Side,
+    SurfaceFault,
+    SurfaceFaultKind,
+    SurfaceKind,
+)
+
+FAILED_NOW = 6.0
+_TRIM_RUNAWAY_PER_S = 0.05
+
+_EVENTS = {
+    "lock": SurfaceFaultKind.STUCK,
+    "mxdn": SurfaceFaultKind.HARD_OVER_DOWN,
+    "mxup": SurfaceFaultKind.HARD_OVER_UP,
+    "cntr": SurfaceFaultKind.CENTRED,
+    "gone": SurfaceFaultKind.GONE,
+}
+_LEAVES = {"ailn": "ail", "elev": "elv", "rudd": "rud", "rspo": "spo", "flap": "fla", "sbrk": "sbrk", "yawb": "yawb"}
+_SIDES = {"lft": Side.LEFT, "rgt": Side.RIGHT, "ctr": Side.CENTRE}
+
+
+class FailureEffects:
+    """Reads the failure datarefs and applies what they mean."""
+
+    def __init__(self, store: DatarefStore, version: int, surfaces_break: bool = True) -> None:
+        self._surfaces_break = surfaces_break
+        self._leaves = names(version)
+        self._store = store
+        self._slots = np.array([store.dataref(PREFIX + leaf).slots[0] for leaf in self._leaves])
+        self._frozen: Dict[str, float] = {}
+
+    def active(self) -> Set[str]:
+        """Leaves (`rel_...`) of everything that is failed now."""
+        return {self._leaves[i] for i in np.flatnonzero(self._store.values[self._slots] == FAILED_NOW)}
+
+    def repair_all(self) -> None:
+        """Repairs everything (RESE)."""
+        self._store.values[self._slots] = 0.0
+
+    def apply(self, controls: Controls, failed: Set[str], model: FlightModel, dt: float) -> None:
+        """Changes the frame's controls as the failures do."""
+        acting = failed if self._surfaces_break else {leaf for leaf in failed if not leaf.startswith("rel_fcon_")}
+        controls.surface_faults = self._surface_faults(acting, model)
+        engines = model.info.engine_count
+        controls.engine_faults = [self._engine_fault(i, failed) for i in range(len(controls.engine_faults))]
+        controls.stability_fault = "rel_stbaug" in failed
+        if not failed:
+            self._frozen.clear()
+            return
+        self._limit_stick(controls, failed)
+        lock = "rel_conlock" in failed
+        self._freeze(controls, "roll", lock or bool(failed & {"rel_ail_L_jam", "rel_ail_R_jam"}))
+        self._freeze(controls, "pitch", lock or bool(failed & {"rel_elv_L_jam", "rel_elv_R_jam"}))
+        self._freeze(controls, "yaw", lock or bool(failed & {"rel_rud_L_jam", "rel_rud_R_jam"}))
+        for attribute, leaf in (("roll_trim", "ail"), ("pitch_trim", "elv"), ("yaw_trim", "rud")):
+            if f"rel_{leaf}_trim_run" in failed:
+                value = self._frozen.setdefault(attribute, getattr(controls, attribute)) + _TRIM_RUNAWAY_PER_S * dt
+                self._frozen[attribute] = min(value, 1.0)
+                setattr(controls, attribute, self._frozen[attribute])
+            else:
+                self._freeze(controls, attribute, f"rel_trim_{leaf}" in failed)
+        self._freeze(controls, "flap_request", "rel_flap_act" in failed)
+        self._freeze(controls, "gear_down", "rel_gear_act" in failed)
+        if "rel_lbrakes" in failed:
+            controls.brake_left = 0.0
+        if "rel_rbrakes" in failed:
+            controls.brake_right = 0.0
+        for i in range(engines):
+            if "rel_throt_lo" in failed:
+                controls.throttle[i] = 0.0
+            elif "rel_throt_hi" in failed:
+                controls.throttle[i] = 1.0
+            elif "rel_fc_thr" in failed:
+                controls.throttle[i] = self._frozen.setdefault(f"throttle{i}", controls.throttle[i])
+            else:
+                self._frozen.pop(f"throttle{i}", None)
+
+    def _freeze(self, controls: Controls, attribute: str, failed: bool) -> None:
+        if failed:
+            setattr(controls, attribute, self._frozen.setdefault(attribute, getattr(controls, attribute)))
+        else:
+            self._frozen.pop(attribute, None)
+
+    @staticmethod
+    def _limit_stick(controls: Controls, failed: Set[str]) -> None:
+        """`rel_fc_ail_L` and the like: no authority to this side. The names without `fc_` are X-Plane 12's."""
+
+        def lost(*leaves: str) -> bool:
+            return any(f"rel_{leaf}{suffix}" in failed for leaf in leaves for suffix in ("", "1", "2"))
+
+        if lost("fc_ail_L", "ail_L"):
+            controls.roll = max(controls.roll, 0.0)
+        if lost("fc_ail_R", "ail_R"):
+            controls.roll = min(controls.roll, 0.0)
+        if lost("fc_elv_U", "elv_U"):
+            controls.pitch = min(controls.pitch, 0.0)
+        if lost("fc_elv_D", "elv_D"):
+            controls.pitch = max(controls.pitch, 0.0)
+        if lost("fc_rud_L", "rud_L"):
+            controls.yaw = max(controls.yaw, 0.0)
+        if lost("fc_rud_R", "rud_R"):
+            controls.yaw = min(controls.yaw, 0.0)
+
+    @staticmethod
+    def _engine_fault(engine: int, failed: Set[str]) -> EngineFault:
+        if f"rel_seize_{engine}" in failed:
+            return EngineFault.SEIZED
+        stops = ("engfai", "engfla", "engsep", "fuelfl")
+        return EngineFault.STOPPED if any(f"rel_{stem}{engine}" in failed for stem in stops) else EngineFault.NONE
+
+    @staticmethod
+    def _surface_faults(failed: Set[str], model: FlightModel) -> Dict[str, SurfaceFault]:
+        faults: Dict[str, SurfaceFault] = {}
+
+        def set_all(kind: SurfaceFaultKind, matching: Callable[..., bool]) -> None:
+            for spec in model.surfaces:
+                if matching(spec):
+                    faults[spec.name] = SurfaceFault(kind)
+
+        for side, letter in ((Side.LEFT, "L"), (Side.RIGHT, "R")):
+            if f"rel_fc_{letter}_flp" in failed:
+                set_all(SurfaceFaultKind.STUCK, lambda s, side=side: s.kind is SurfaceKind.FLAP and s.side is side)
+            if f"rel_{letter}_flp_off" in failed:
+                set_all(SurfaceFaultKind.GONE, lambda s, side=side: s.kind is SurfaceKind.FLAP and s.side is side)
+        for leaf in failed:
+            parts = leaf.split("_")
+            if parts[:2] != ["rel", "fcon"]:
+                continue
+            _, _, kind, number, side, event = parts
+            suffix = _LEAVES[kind] + number.replace("x", "")
+            set_all(_EVENTS[event], lambda s, x=suffix, y=_SIDES[side]: _matches(s.name, x) and s.side is y)
+        return faults
+
+
+def _matches(name: str, leaf: str) -> bool:
+    return name.endswith("_" + leaf)

@@ -1,0 +1,260 @@
+"""Stick, trims, handles, control surfaces and the overrides."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Callable, Dict, List, Optional
+
+from xplane_bridge.emulator.datarefs.tables.base import FLOAT, INT, X12, Table
+from xplane_bridge.emulator.flight.flight_model import SurfaceKind, SurfaceSpec
+
+if TYPE_CHECKING:
+    from xplane_bridge.emulator.flight.frame import Frame
+    from xplane_bridge.emulator.simulator import Simulator
+
+_CONTROLS = "sim/flightmodel/controls/"
+_COCKPIT = "sim/cockpit2/controls/"
+_CONTROLS2 = "sim/flightmodel2/controls/"
+
+#: Wing parts in the order of X-Plane's arrays; tailplanes and fins follow them.
+WINGS = tuple(f"wing{number}{side}" for number in (1, 2, 3, 4) for side in "lr")
+PARTS = (*WINGS, "hstab1", "hstab2", "vstab1", "vstab2")
+#: Elements of `sim/flightmodel2/wing/*_deg`: one a part, in the order of PARTS.
+_WING_ARRAY = 32
+#: Elements of the old arrays `sim/flightmodel/controls/*_def`: eight propellers come before the parts.
+_PART_ARRAY, _FIRST_PART = 56, 8
+
+_WING_LEAVES = ("ail1", "ail2", "spo1", "spo2", "fla1", "fla2", "yawb")
+#: Arrays by part: leaf of the single dataref -> array under sim/flightmodel2/wing/.
+_ARRAYS = {
+    "ail1": "aileron1_deg",
+    "ail2": "aileron2_deg",
+    "spo1": "spoiler1_deg",
+    "spo2": "spoiler2_deg",
+    "fla1": "flap1_deg",
+    "fla2": "flap2_deg",
+    "sbrk1": "speedbrake1_deg",
+    "sbrk2": "speedbrake2_deg",
+    "yawb": "yawbrake_deg",
+    "elv1": "elevator1_deg",
+    "elv2": "elevator2_deg",
+    "rud1": "rudder1_deg",
+    "rud2": "rudder2_deg",
+}
+_OLD_ARRAYS = {"ail1": "ail1_def", "ail2": "ail2_def", "elv1": "elv1_def", "rud1": "rudd_def", "fla1": "fla1_def"}
+#: Datarefs of one surface a side of X-Plane 9's naming: (leaf of the set, side) by name.
+_OLD_NAMES = {
+    "lail1def": ("ail1", "l"),
+    "rail1def": ("ail1", "r"),
+    "lail2def": ("ail2", "l"),
+    "rail2def": ("ail2", "r"),
+    "lsplrdef": ("spo1", "l"),
+    "rsplrdef": ("spo1", "r"),
+    "ldruddef": ("yawb", "l"),
+    "rdruddef": ("yawb", "r"),
+}
+
+OVERRIDES = (
+    "joystick",
+    "joystick_pitch",
+    "joystick_roll",
+    "joystick_heading",
+    "artstab",
+    "flightcontrol",
+    "throttles",
+    "control_surfaces",
+    "gearbrake",
+    "toe_brakes",
+    "wheel_steer",
+    "prop_pitch",
+    "prop_mode",
+    "mixture",
+    "forces",
+    "wing_forces",
+    "engine_forces",
+    "gear_forces",
+    "engines",
+    "torque_motors",
+    "fuel_flow",
+    "itt_egt",
+    "cht_oilt",
+    "ias",
+    "autopilot",
+    "flightdir",
+    "timestep",
+    "camera",
+    "TCAS",
+    "groundplane",
+    "navneedles",
+    "oxygen",
+    "boats",
+    "clouds",
+    "planepath_simple",
+)
+
+
+def surface_dataref(spec: SurfaceSpec) -> str:
+    """Path (with index, for arrays) of the dataref that shows a surface of the flight model."""
+    part, _, leaf = spec.name.partition("_")
+    if spec.kind is SurfaceKind.SPEED_BRAKE:
+        return f"sim/flightmodel2/wing/{_ARRAYS.get(leaf, 'speedbrake1_deg')}[{PARTS.index(part)}]"
+    return f"{_CONTROLS}{spec.name}def"
+
+
+def define(table: Table, sim: Simulator) -> None:
+    """Defines this subject's datarefs."""
+    _surfaces(table, sim)
+    _stick(table, sim)
+    _handles(table)
+    _limits(table, sim)
+    for name in OVERRIDES:
+        table.setting(f"sim/operation/override/override_{name}", 0, INT)
+    for name in ("override_planepath", "override_plane_ai_autopilot"):
+        table.setting(f"sim/operation/override/{name}", 0, INT, size=20)
+
+
+def _surfaces(t: Table, sim: Simulator) -> None:
+    single: Dict[str, List[str]] = {leaf: [] for leaf in _ARRAYS}
+    for leaf in _WING_LEAVES:
+        single[leaf] = [f"{_CONTROLS}{wing}_{leaf}def" for wing in WINGS]
+    for number in (1, 2):
+        single[f"elv{number}"] = [f"{_CONTROLS}hstab{half}_elv{number}def" for half in (1, 2)]
+        single[f"rud{number}"] = [f"{_CONTROLS}vstab{fin}_rud{number}def" for fin in (1, 2)]
+    for names in single.values():
+        for name in names:
+            t.setting(name)
+    t.setting("_emulator/no_surface", 0.0)
+    for leaf, name in _ARRAYS.items():
+        array = f"sim/flightmodel2/wing/{name}"
+        if single[leaf]:
+            start = {"elv": 8, "rud": 10}.get(leaf[:3], 0)
+            t.store.add_view(array, FLOAT, _padded(single[leaf], start, _WING_ARRAY), writable=True)
+        else:
+            t.setting(array, size=_WING_ARRAY)
+        single[leaf] = single[leaf] or [f"{array}[{part}]" for part in range(len(WINGS))]
+        sim.watch_surface(array)
+        if leaf in _OLD_ARRAYS:
+            start = _FIRST_PART + {"elv": 8, "rud": 10}.get(leaf[:3], 0)
+            t.store.add_view(
+                _CONTROLS + _OLD_ARRAYS[leaf], FLOAT, _padded(single[leaf], start, _PART_ARRAY), writable=True
+            )
+            sim.watch_surface(_CONTROLS + _OLD_ARRAYS[leaf])
+    for leaf in ("ail1", "ail2", "spo1", "spo2", "fla1", "fla2", "yawb", "elv1", "elv2", "rud1", "rud2"):
+        for name in single[leaf]:
+            sim.watch_surface(name)
+    for name, (leaf, side) in _OLD_NAMES.items():
+        carrier = _carrier(sim, leaf, side)
+        t.alias(_CONTROLS + name, f"{_CONTROLS}{carrier}_{leaf}def")
+        sim.watch_surface(_CONTROLS + name)
+
+
+def _padded(names: List[str], start: int, size: int) -> List[str]:
+    nothing = "_emulator/no_surface"
+    return [nothing] * start + names + [nothing] * (size - start - len(names))
+
+
+def _carrier(sim: Simulator, leaf: str, side: str) -> str:
+    """The first wing of the loaded aircraft with such a surface on this side; wing 2 where there is none."""
+    for spec in sim.model.surfaces:
+        part, _, its_leaf = spec.name.partition("_")
+        if its_leaf == leaf and part.startswith("wing") and part.endswith(side):
+            return part
+    return "wing2" + side
+
+
+def _stick(t: Table, sim: Simulator) -> None:
+    for axis, trim, total, stick in (
+        ("pitch", "elevator", lambda f: f.m.pitch_ratio, lambda: sim.controls.pitch),
+        ("roll", "aileron", lambda f: f.m.roll_ratio, lambda: sim.controls.roll),
+        ("heading", "rudder", lambda f: f.m.yaw_ratio, lambda: sim.controls.yaw),
+    ):
+        t.setting(f"sim/joystick/yoke_{axis}_ratio")
+        t.alias(f"{_COCKPIT}yoke_{axis}_ratio", f"sim/joystick/yoke_{axis}_ratio")
+        t.value(
+            f"sim/joystick/artstab_{axis}_ratio", lambda f, total=total, stick=stick: total(f) - stick(), writable=True
+        )
+        t.setting(f"sim/joystick/servo_{axis}_ratio")
+        t.value(f"{_COCKPIT}total_{axis}_ratio", _total(sim, total))
+        t.value(f"{_CONTROLS2}{axis}_ratio", total, writable=True)
+        t.setting(f"{_COCKPIT}{trim}_trim")
+        t.alias(f"{_CONTROLS2}{trim}_trim", f"{_COCKPIT}{trim}_trim")
+        t.alias(f"{_CONTROLS}{trim[:3] if trim != 'elevator' else 'elv'}_trim", f"{_COCKPIT}{trim}_trim")
+    t.setting("sim/cockpit2/switches/artificial_stability_on", 1, INT)
+    t.setting("sim/cockpit2/switches/yaw_damper_on", 0, INT)
+    t.setting("sim/joystick/joystick_axis_values", size=500, writable=False)
+
+
+def _total(sim: Simulator, total: Callable[[Frame], float]) -> Callable[[Frame], float]:
+    """The stick that the surfaces get; with `--overridden-totals frozen` it stands while a client has taken them."""
+    held = [0.0]
+
+    def shown(frame: Frame) -> float:
+        if sim.totals_move or not sim.controls.override_surfaces:
+            held[0] = total(frame)
+        return held[0]
+
+    return shown
+
+
+def _handles(t: Table) -> None:
+    t.setting(_COCKPIT + "flap_ratio")
+    t.alias(_COCKPIT + "flap_handle_request_ratio", _COCKPIT + "flap_ratio", versions=X12)
+    t.alias(_CONTROLS + "flaprqst", _COCKPIT + "flap_ratio")
+    t.value(_COCKPIT + "flap_handle_deploy_ratio", lambda f: f.m.flap_ratio, versions=X12)
+    t.value(_COCKPIT + "flap_system_deploy_ratio", lambda f: f.m.flap_ratio, versions=X12)
+    t.value(_CONTROLS + "flaprat", lambda f: f.m.flap_ratio)
+    t.value(_CONTROLS + "flap2rat", lambda f: f.m.flap_ratio)
+    t.value(_CONTROLS + "slatrat", lambda f: f.m.slat_ratio)
+    for name in ("flap1_deploy_ratio", "flap2_deploy_ratio", "flap_handle_deploy_ratio"):
+        t.value(_CONTROLS2 + name, lambda f: f.m.flap_ratio)
+    for name in ("slat1_deploy_ratio", "slat2_deploy_ratio"):
+        t.value(_CONTROLS2 + name, lambda f: f.m.slat_ratio)
+    t.setting(_COCKPIT + "speedbrake_ratio")
+    t.alias(_CONTROLS + "sbrkrqst", _COCKPIT + "speedbrake_ratio")
+    t.value(_CONTROLS + "sbrkrat", lambda f: f.m.speed_brake_ratio)
+    t.value(_CONTROLS2 + "speedbrake_ratio", lambda f: f.m.speed_brake_ratio)
+    t.setting(_COCKPIT + "gear_handle_down", 0, INT)
+    t.alias("sim/cockpit/switches/gear_handle_status", _COCKPIT + "gear_handle_down")
+    t.setting(_COCKPIT + "parking_brake_ratio")
+    t.alias(_CONTROLS + "parkbrake", _COCKPIT + "parking_brake_ratio")
+    t.setting(_COCKPIT + "left_brake_ratio")
+    t.setting(_COCKPIT + "right_brake_ratio")
+    t.alias(_CONTROLS + "l_brake_add", _COCKPIT + "left_brake_ratio")
+    t.alias(_CONTROLS + "r_brake_add", _COCKPIT + "right_brake_ratio")
+    t.setting(_COCKPIT + "thrust_vector_ratio")
+    t.alias(_CONTROLS + "vectrqst", _COCKPIT + "thrust_vector_ratio")
+    t.value(_CONTROLS + "vectrat", lambda f: f.m.thrust_vector_ratio)
+    t.value(_CONTROLS2 + "thrust_vector_ratio", lambda f: f.m.thrust_vector_ratio)
+    for name in ("wingsweep", "dihedral", "incidence", "wing_retraction"):
+        t.setting(f"{_COCKPIT}{name}_ratio")
+
+
+def _limits(t: Table, sim: Simulator) -> None:
+    limits = "sim/aircraft/controls/acf_"
+
+    def travel(leaf: str, low: bool) -> float:
+        spec = _spec(sim, leaf)
+        if spec is None:
+            return 0.0
+        return -spec.minimum_deg if low else spec.maximum_deg
+
+    for leaf, name in (("ail1", "ail1"), ("ail2", "ail2"), ("elv1", "elev"), ("elv2", "elev2")):
+        t.value(f"{limits}{name}_up", lambda _, leaf=leaf: travel(leaf, True))
+        t.value(f"{limits}{name}_dn", lambda _, leaf=leaf: travel(leaf, False))
+    t.value(limits + "rudd_lr", lambda _: travel("rud1", True))
+    t.value(limits + "rudd_rr", lambda _: travel("rud1", False))
+    t.value(limits + "flap_deg", lambda _: travel("fla1", False))
+    trims = {"elev": ("elevator", "elv1"), "ail": ("aileron", "ail1"), "rudd": ("rudder", "rud1")}
+    for name, (kind, leaf) in trims.items():
+        t.value(f"{limits}max_trim_{name}", lambda _, kind=kind, leaf=leaf: _trim_part(sim, kind, leaf))
+        t.value(f"{limits}min_trim_{name}", lambda _, kind=kind, leaf=leaf: _trim_part(sim, kind, leaf))
+
+
+def _spec(sim: Simulator, leaf: str) -> Optional[SurfaceSpec]:
+    return next((spec for spec in sim.model.surfaces if spec.name.endswith("_" + leaf)), None)
+
+
+def _trim_part(sim: Simulator, kind: str, leaf: str) -> float:
+    """Part of the surface's travel that full trim moves it."""
+    spec = _spec(sim, leaf)
+    trim = dict(sim.model.info.trim_deg).get(kind, 0.0)
+    return abs(trim) / spec.maximum_deg if spec is not None and spec.maximum_deg else 0.0

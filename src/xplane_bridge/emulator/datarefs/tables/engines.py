@@ -1,0 +1,130 @@
+"""Engines, propellers, fuel flow and their levers."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Callable, List
+
+from xplane_bridge.emulator.datarefs.tables.base import INT, X12, Table
+from xplane_bridge.emulator.flight.flight_model import EngineState
+from xplane_bridge.emulator.flight.frame import PA_TO_INHG, PA_TO_PSI, Frame
+
+if TYPE_CHECKING:
+    from xplane_bridge.emulator.simulator import Simulator
+
+_ENGINE = "sim/flightmodel/engine/"
+_INDICATORS = "sim/cockpit2/engine/indicators/"
+_ACTUATORS = "sim/cockpit2/engine/actuators/"
+RPM_TO_RAD_S = math.pi / 30.0
+#: Value of ENGN_thro_override that gives the engine back to its lever.
+THROTTLE_RELEASED = -2.0
+_FUEL_PRESSURE_PSI = 24.0
+
+
+def each(source: Callable[[EngineState], float]) -> Callable[[Frame], List[float]]:
+    """Makes an array source from a source for one engine."""
+    return lambda f: [source(engine) for engine in f.m.engines]
+
+
+def define(t: Table, sim: Simulator) -> None:
+    """Defines this subject's datarefs."""
+    size = t.engines
+    t.value("sim/aircraft/engine/acf_num_engines", lambda f: f.info.engine_count, INT)
+    t.value("sim/aircraft/engine/acf_RSC_redline_eng", lambda f: f.info.maximum_rpm * RPM_TO_RAD_S)
+    t.value("sim/aircraft/engine/acf_RSC_redline_prp", lambda f: f.info.maximum_rpm * RPM_TO_RAD_S)
+    t.value("sim/aircraft/engine/acf_pmax", lambda f: f.info.maximum_power_w)
+    t.value("sim/aircraft/engine/acf_throtmax_FWD", lambda f: f.info.max_throttle)
+    t.value("sim/aircraft/engine/acf_throtmax_REV", lambda f: -f.info.min_throttle)
+    # levers
+    t.setting(_ACTUATORS + "throttle_ratio", size=size)
+    t.alias(_ENGINE + "ENGN_thro", _ACTUATORS + "throttle_ratio")
+    # reverse is the negative part of the lever by every name; X-Plane has a mode of its own for it
+    t.alias(_ACTUATORS + "throttle_jet_rev_ratio", _ACTUATORS + "throttle_ratio")
+    for name in ("throttle_ratio_all", "throttle_jet_rev_ratio_all"):
+        t.setting(_ACTUATORS + name)
+    t.setting(_ACTUATORS + "mixture_ratio", size=size)
+    t.alias(_ENGINE + "ENGN_mixt", _ACTUATORS + "mixture_ratio")
+    t.setting(_ACTUATORS + "mixture_ratio_all")
+    t.setting(_ACTUATORS + "prop_ratio", size=size)
+    t.setting(_ACTUATORS + "prop_ratio_all")
+    t.array(
+        _ENGINE + "ENGN_prop",
+        size,
+        lambda f: [
+            lever * f.info.maximum_rpm * RPM_TO_RAD_S for lever in sim.controls.propeller[: f.info.engine_count]
+        ],
+        writable=True,
+    )
+    t.alias(_ACTUATORS + "prop_rotation_speed_rad_sec", _ENGINE + "ENGN_prop")
+    t.array(_ENGINE + "ENGN_thro_use", size, each(lambda e: e.throttle), writable=True)
+    t.setting(_ENGINE + "ENGN_thro_override", THROTTLE_RELEASED, size=size)
+    t.setting(_ENGINE + "ENGN_propmode", 1, INT, size=size)
+    t.setting(_ENGINE + "ENGN_heat", size=size)
+    t.setting(_ENGINE + "ENGN_cowl", size=size)
+    for name, initial in (("fuel_pump_on", 1), ("igniter_on", 1), ("ignition_on", 3), ("ignition_key", 3)):
+        t.setting(_ACTUATORS + name, initial, INT, size=size)
+    t.setting(_ACTUATORS + "starter_hit", 0, INT, size=size)
+    t.setting(_ACTUATORS + "idle_speed", 0, INT, size=size)
+    t.setting(_ACTUATORS + "fadec_on", 0, INT, size=size)
+    for name in ("carb_heat_ratio", "cowl_flap_ratio"):
+        t.setting(_ACTUATORS + name, size=size)
+    # what the engines do
+    t.array(_ENGINE + "ENGN_running", size, each(lambda e: e.running), INT)
+    for name, source in (
+        ("ENGN_tacrad", lambda e: e.rpm * RPM_TO_RAD_S),
+        ("POINT_tacrad", lambda e: e.prop_rpm * RPM_TO_RAD_S),
+        ("POINT_thrust", lambda e: e.thrust_n),
+        ("POINT_pitch_deg", lambda e: e.blade_pitch_deg),
+        ("POINT_driv_TRQ", lambda e: e.torque_nm),
+        ("ENGN_TRQ", lambda e: e.torque_nm),
+        ("ENGN_power", lambda e: e.power_w),
+        ("ENGN_FF_", lambda e: e.fuel_flow_kg_s),
+        ("ENGN_MPR", lambda e: e.manifold_pressure_pa * PA_TO_INHG),
+        ("ENGN_EGT_c", lambda e: _celsius(e.exhaust_gas_temperature_k)),
+        ("ENGN_ITT_c", lambda e: _celsius(e.exhaust_gas_temperature_k)),
+        ("ENGN_CHT_c", lambda e: _celsius(e.cylinder_head_temperature_k)),
+        ("ENGN_oil_temp_c", lambda e: _celsius(e.oil_temperature_k)),
+        ("ENGN_oil_press_psi", lambda e: e.oil_pressure_pa * PA_TO_PSI),
+        ("ENGN_N1_", lambda e: e.rpm * 100.0 / max(sim.model.info.maximum_rpm, 1.0)),
+        ("ENGN_N2_", lambda e: e.rpm * 100.0 / max(sim.model.info.maximum_rpm, 1.0)),
+        ("ENGN_EPR", lambda _: 1.0),
+        ("ENGN_EGT", lambda e: _celsius(e.exhaust_gas_temperature_k) / 900.0),
+        ("ENGN_ITT", lambda e: _celsius(e.exhaust_gas_temperature_k) / 900.0),
+        ("ENGN_CHT", lambda e: _celsius(e.cylinder_head_temperature_k) / 260.0),
+        ("ENGN_oil_temp", lambda e: _celsius(e.oil_temperature_k) / 120.0),
+        ("ENGN_oil_press", lambda e: e.oil_pressure_pa / 6e5),
+    ):
+        t.array(_ENGINE + name, size, each(source), writable=name.startswith("POINT"))
+    for name, target in (
+        ("N1_percent", "ENGN_N1_"),
+        ("N2_percent", "ENGN_N2_"),
+        ("MPR_in_hg", "ENGN_MPR"),
+        ("EPR_ratio", "ENGN_EPR"),
+        ("torque_n_mtr", "ENGN_TRQ"),
+        ("fuel_flow_kg_sec", "ENGN_FF_"),
+        ("ITT_deg_C", "ENGN_ITT_c"),
+        ("EGT_deg_C", "ENGN_EGT_c"),
+        ("CHT_deg_C", "ENGN_CHT_c"),
+        ("oil_pressure_psi", "ENGN_oil_press_psi"),
+        ("oil_temperature_deg_C", "ENGN_oil_temp_c"),
+        ("power_watts", "ENGN_power"),
+        ("thrust_n", "POINT_thrust"),
+    ):
+        t.alias(_INDICATORS + name, _ENGINE + target)
+    t.array(_INDICATORS + "engine_speed_rpm", size, each(lambda e: e.rpm))
+    t.array(_INDICATORS + "prop_speed_rpm", size, each(lambda e: e.prop_rpm))
+    t.array(_INDICATORS + "fuel_pressure_psi", size, each(lambda e: _FUEL_PRESSURE_PSI if e.running else 0.0))
+    t.setting(_INDICATORS + "carburetor_temperature_C", 15.0, size=size, writable=False)
+    engines2 = "sim/flightmodel2/engines/"
+    t.array(engines2 + "nacelle_vertical_angle_deg", size, each(lambda e: e.nacelle_deg))
+    t.array(engines2 + "engine_is_burning_fuel", size, each(lambda e: e.running), INT)
+    t.array(engines2 + "engine_rotation_speed_rad_sec", size, each(lambda e: e.rpm * RPM_TO_RAD_S))
+    t.array(engines2 + "prop_rotation_speed_rad_sec", size, each(lambda e: e.prop_rpm * RPM_TO_RAD_S))
+    t.array(engines2 + "prop_pitch_deg", size, each(lambda e: e.blade_pitch_deg), writable=True)
+    t.array(engines2 + "throttle_used_ratio", size, each(lambda e: e.throttle))
+    t.array(engines2 + "thrust_n", size, each(lambda e: e.thrust_n), versions=X12)
+
+
+def _celsius(kelvin: float) -> float:
+    """Degrees Celsius; 0 stays 0 (an engine without such a temperature)."""
+    return kelvin - 273.15 if kelvin > 0.0 else 0.0

@@ -1,0 +1,134 @@
+"""The renderer as a child process of the emulator."""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from xplane_bridge.emulator.view.renderer.scene import RECORD_BYTES, Scene
+from xplane_bridge.errors import XplaneBridgeError
+
+
+class RendererError(XplaneBridgeError):
+    """The window cannot be opened, or an option is out of range."""
+
+
+#: X-Plane's own window title.
+WINDOW_TITLE = "X-System"
+#: Longest settable pipeline delay [s].
+MAX_PIPELINE_DELAY_S = 0.2
+
+
+@dataclass(frozen=True)
+class RendererOptions:
+    """What is drawn where.
+
+    Attributes:
+        anchor: Latitude and longitude [deg] of the aerodrome.
+        runway_heading_deg: True heading of its runway.
+        width, height: Of the window [px].
+        pipeline_delay: From the frame (`Scene.time_ns`) to its display [s], 0..0.2; 0: as soon as it is drawn.
+        hud, strip: Whether the head-up display and the machine-readable strip are drawn.
+        swap_log: CSV file for frame, simulator time, frame time and swap time of each picture shown.
+        realtime: Whether the thread that swaps asks for real-time priority.
+        display: X display; None: `DISPLAY`.
+    """
+
+    anchor: tuple[float, float]
+    runway_heading_deg: float = 0.0
+    width: int = 640
+    height: int = 480
+    pipeline_delay: float = 0.0
+    hud: bool = False
+    strip: bool = True
+    swap_log: Path | None = None
+    realtime: bool = False
+    display: str | None = None
+
+    def __post_init__(self) -> None:
+        if not (320 <= self.width <= 4096 and 240 <= self.height <= 4096):
+            msg = f"window size {self.width}x{self.height}: expected 320x240 to 4096x4096"
+            raise RendererError(msg)
+        if not 0.0 <= self.pipeline_delay <= MAX_PIPELINE_DELAY_S:
+            msg = f"pipeline delay {self.pipeline_delay} s: expected 0 to {MAX_PIPELINE_DELAY_S}"
+            raise RendererError(msg)
+
+    def arguments(self) -> list[str]:
+        """The command line of `python -m xplane_bridge.emulator.view.renderer`."""
+        words = ["--anchor", *map(str, self.anchor), "--runway-heading", self.runway_heading_deg]
+        words += ["--size", f"{self.width}x{self.height}", "--pipeline-delay", self.pipeline_delay]
+        words += ["--hud"] if self.hud else []
+        words += [] if self.strip else ["--no-strip"]
+        words += ["--swap-log", self.swap_log] if self.swap_log else []
+        words += ["--realtime"] if self.realtime else []
+        return [str(word) for word in words]
+
+
+class RendererProcess:
+    """Starts the window and feeds it scenes.
+
+    Raises:
+        RendererError: The window could not be opened; the text says why.
+    """
+
+    def __init__(self, options: RendererOptions) -> None:
+        environment = dict(os.environ)
+        if options.display is not None:
+            environment["DISPLAY"] = options.display
+        source = str(Path(__file__).resolve().parents[4])
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, [source, environment.get("PYTHONPATH", "")]))
+        self._child = subprocess.Popen(
+            [sys.executable, "-m", __package__, *options.arguments()],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            bufsize=0,
+            env=environment,
+        )
+        assert self._child.stdin is not None
+        assert self._child.stdout is not None
+        if self._child.stdout.readline().strip() != b"READY":
+            self._child.wait()
+            assert self._child.stderr is not None
+            lines = self._child.stderr.read().decode(errors="replace").strip().splitlines()
+            msg = f"the window could not be opened: {lines[-1] if lines else 'the renderer ended without a word'}"
+            raise RendererError(msg)
+        self._scenes, self._answers = self._child.stdin.fileno(), self._child.stdout.fileno()
+        self._in_work = 0
+
+    @property
+    def alive(self) -> bool:
+        """Whether the window is still there."""
+        return self._child.poll() is None
+
+    def show(self, scene: Scene) -> None:
+        """Hands a frame over; not before the last one is drawn."""
+        record = scene.pack()
+        assert len(record) == RECORD_BYTES
+        try:
+            os.write(self._scenes, record)  # all or nothing: shorter than PIPE_BUF
+            self._in_work += 1
+        except BrokenPipeError:
+            self._in_work = 0  # the window was closed; X-Plane's packets go on
+
+    def drawn(self, timeout_s: float) -> bool:
+        """Whether all frames handed over are drawn (or the window gone); waits for it so long."""
+        if self._in_work and select.select((self._answers,), (), (), timeout_s)[0]:
+            answers = os.read(self._answers, 4096)
+            self._in_work = self._in_work - len(answers) if answers else 0
+        return self._in_work == 0
+
+    def close(self) -> None:
+        """Closes the window."""
+        for stream in (self._child.stdin, self._child.stdout, self._child.stderr):
+            if stream is not None:
+                stream.close()
+        try:
+            self._child.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            self._child.kill()
+            self._child.wait()

@@ -1,0 +1,135 @@
+"""RREF and RPOS subscriptions of all clients: who gets what in which frame.
+
+Each sender (address, port) has its own set. Values that are due in the same frame for the same client share datagrams
+of up to 183 pairs, or fewer with `split`.
+"""
+
+from __future__ import annotations
+
+from typing import Dict, Iterator, List, Tuple
+
+import numpy as np
+
+from xplane_bridge.protocol import FIFTH_BYTE, RREF_MAX_PAIRS
+
+Address = Tuple[str, int]
+
+#: [?] A request for an index in use replaces it, whatever its path (what client authors found); False keeps the first.
+SAME_INDEX_REPLACES = True
+#: A due time may lie this part of a frame ahead and still belong to this frame.
+_EARLY = 0.01
+_PAIR = np.dtype([("index", "<i4"), ("value", "<f4")])
+
+
+class Pacer:
+    """Says in which frames a stream of a given rate is due. A rate at or above the frame rate is due in every frame."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self.period = 1.0 / rate_hz
+        self._next = float("-inf")
+
+    def due(self, now: float, frame_period: float) -> bool:
+        """Whether to send in the frame at `now` [s]; to be asked once a frame."""
+        if now < self._next - _EARLY * frame_period:
+            return False
+        if self._next == float("-inf"):
+            self._next = now
+        self._next = max(self._next + self.period, now - frame_period + self.period)
+        return True
+
+
+class _Group:
+    """Subscriptions of one client with one rate."""
+
+    def __init__(self, rate_hz: int) -> None:
+        self.pacer = Pacer(rate_hz)
+        self.slots: Dict[int, int] = {}  # client's index -> slot of the store
+
+
+class RrefClient:
+    """One sender's subscriptions."""
+
+    def __init__(self) -> None:
+        self._groups: Dict[int, _Group] = {}
+        self._rates: Dict[int, int] = {}  # client's index -> rate
+        self._gathers: Dict[Tuple[int, ...], Tuple[np.ndarray, np.ndarray]] = {}
+
+    def __len__(self) -> int:
+        return len(self._rates)
+
+    def subscribe(self, index: int, rate_hz: int, slot: int) -> None:
+        """Adds or replaces the subscription with this index."""
+        if index in self._rates and not SAME_INDEX_REPLACES:
+            return
+        self.unsubscribe(index)
+        self._groups.setdefault(rate_hz, _Group(rate_hz)).slots[index] = slot
+        self._rates[index] = rate_hz
+        self._gathers.clear()
+
+    def unsubscribe(self, index: int) -> None:
+        """Ends the subscription with this index."""
+        rate = self._rates.pop(index, None)
+        if rate is None:
+            return
+        group = self._groups[rate]
+        del group.slots[index]
+        if not group.slots:
+            del self._groups[rate]
+        self._gathers.clear()
+
+    def datagrams(self, now: float, frame_period: float, values: np.ndarray, split: int) -> Iterator[bytes]:
+        """What is due in this frame."""
+        due = tuple(rate for rate, group in self._groups.items() if group.pacer.due(now, frame_period))
+        if not due:
+            return
+        gather = self._gathers.get(due)
+        if gather is None:
+            gather = self._gather(due)
+            self._gathers[due] = gather
+        slots, pairs = gather
+        with np.errstate(over="ignore"):
+            pairs["value"] = values[slots]
+        header = b"RREF" + bytes([FIFTH_BYTE[b"RREF"]])
+        for start in range(0, len(pairs), split):
+            yield header + pairs[start : start + split].tobytes()
+
+    def _gather(self, rates: Tuple[int, ...]) -> Tuple[np.ndarray, np.ndarray]:
+        items: List[Tuple[int, int]] = []
+        for rate in rates:
+            items += self._groups[rate].slots.items()
+        pairs = np.zeros(len(items), dtype=_PAIR)
+        pairs["index"] = [index for index, _ in items]
+        return np.array([slot for _, slot in items]), pairs
+
+
+class Subscriptions:
+    """All clients of RREF and RPOS."""
+
+    def __init__(self, split: int = RREF_MAX_PAIRS) -> None:
+        self.split = split
+        self.rref: Dict[Address, RrefClient] = {}
+        self.rpos: Dict[Address, Pacer] = {}
+
+    def request_rref(self, client: Address, index: int, rate_hz: int, slot: int) -> None:
+        """A client subscribes to a slot."""
+        self.rref.setdefault(client, RrefClient()).subscribe(index, rate_hz, slot)
+
+    def stop_rref(self, client: Address, index: int) -> None:
+        """A client ends a subscription."""
+        subscriptions = self.rref.get(client)
+        if subscriptions is not None:
+            subscriptions.unsubscribe(index)
+            if not len(subscriptions):
+                del self.rref[client]
+
+    def request_rpos(self, client: Address, rate_hz: int) -> None:
+        """A client asks for the position stream; rate 0 ends it."""
+        if rate_hz > 0:
+            self.rpos[client] = Pacer(rate_hz)
+        else:
+            self.rpos.pop(client, None)
+
+    def clear(self) -> None:
+        """What a restart of X-Plane does."""
+        self.rref.clear()
+        self.rpos.clear()

@@ -1,0 +1,97 @@
+"""estimate_latency on bags whose pictures were drawn with a known delay."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import cv2
+import pytest
+
+from support.synthetic_flight import FlightBag, stamp_ns
+from xplane_bridge.cli.estimate_latency import main
+from xplane_bridge.emulator.view.renderer import Scene
+from xplane_bridge.emulator.view.renderer.painter import Painter
+
+DURATION_S = 25.0
+
+
+def roll_and_rate(t: float, scale: float) -> tuple[float, float]:
+    """Roll angle [rad] and rate [rad/s] of a multisine."""
+    parts = ((0.3, 10.0, 0.1), (0.7, 2.4, 1.3), (1.1, 0.6, 2.9))
+    roll = sum(math.radians(a) * math.sin(2 * math.pi * f * t + p) for f, a, p in parts)
+    rate = sum(math.radians(a) * 2 * math.pi * f * math.cos(2 * math.pi * f * t + p) for f, a, p in parts)
+    return scale * roll, scale * rate
+
+
+def write_bag(path: Path, delay: float, scale: float = 1.0, pictures: bool = True, refresh: bool = False) -> None:
+    painter = Painter(320, 240, (47.02, 8.0))
+    with FlightBag(path) as bag:
+        for k in range(round(DURATION_S * 60)):
+            t = k / 60
+            state = bag.state(t, k)
+            state["angular_velocity"] = {"x": roll_and_rate(t, scale)[1], "y": 0.0, "z": 0.0}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
+            if k % 3 == 0 or refresh:
+                new = k // 3 * 3 / 60  # when this value was sent for the first time
+                command = {"header": bag.header(stamp_ns(t), ""), "roll": math.sin(2.1 * new)}
+                bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", stamp_ns(t), command)
+            if k % 3 == 0:  # the aileron follows the stick by 45 ms
+                surface = {"header": bag.header(stamp_ns(t), ""), "delta_aileron": 15.0 * math.sin(2.1 * (t - 0.045))}
+                bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", stamp_ns(t), surface)
+            if pictures and k % 2 == 0 and t > 0.5:
+                shown = t - delay
+                scene = Scene(
+                    frame=k,
+                    latitude_deg=47.0 + 60.0 * shown / 111000.0,
+                    longitude_deg=8.0,
+                    altitude_m=600.0,
+                    pitch_deg=-5.0,
+                    roll_deg=math.degrees(roll_and_rate(shown, scale)[0]),
+                )
+                _, jpeg = cv2.imencode(".jpg", painter.paint(scene))
+                header = bag.header(stamp_ns(t), "camera_forward_optical")
+                image = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.ravel()}
+                bag.add("/xplane/camera/image_raw/compressed", "sensor_msgs/CompressedImage", stamp_ns(t), image)
+                bag.add(
+                    "/xplane/camera/frame_state", "xplane_bridge/FrameState", stamp_ns(t), {"header": header, "view": 1}
+                )
+
+
+def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag, plot, numbers = tmp_path / "flight.bag", tmp_path / "delay.png", tmp_path / "delay.json"
+    write_bag(bag, delay=0.085)
+    assert main([str(bag), "--plot", str(plot), "--json", str(numbers)]) == 0
+    text = capsys.readouterr().out
+    assert "display delay" in text
+    assert "roll command" in text
+    results = json.loads(numbers.read_text())
+    assert results["display_delay"]["delay"] == pytest.approx(0.085, abs=0.005)
+    assert results["display_delay"]["low"] < results["display_delay"]["delay"] < results["display_delay"]["high"]
+    assert results["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
+    assert results["roll command"]["gain"] == pytest.approx(15.0, abs=0.1)
+    assert plot.stat().st_size > 5000
+
+
+def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Path) -> None:
+    bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
+    write_bag(bag, delay=0.05, refresh=True)
+    assert main([str(bag), "--json", str(numbers)]) == 0
+    assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
+
+
+def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = tmp_path / "calm.bag"
+    write_bag(bag, delay=0.05, scale=0.01)
+    assert main([str(bag)]) == 1
+    error = capsys.readouterr().err.strip()
+    assert "\n" not in error
+    assert "too small" in error or "do not move together" in error
+
+
+def test_bag_without_pictures_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = tmp_path / "blind.bag"
+    write_bag(bag, delay=0.0, pictures=False)
+    assert main([str(bag)]) == 1
+    assert "no camera images" in capsys.readouterr().err

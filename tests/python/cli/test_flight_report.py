@@ -1,0 +1,249 @@
+"""The report of an analytic flight: what it says, and that a real browser shows it without an error."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from support.synthetic_flight import FlightBag, stamp_ns, write_states
+from xplane_bridge.cli import flight_report
+from xplane_bridge.plotting.spec import Panel, Series
+
+RATE = 50.0
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """20 s with every topic the report knows, a gap of 2 s after 10 s, and a stuck aileron from 12 s on."""
+    path = tmp_path_factory.mktemp("full") / "flight.bag"
+    with FlightBag(path) as bag:
+        for k in range(1000):
+            t = k / RATE + (2.0 if k >= 500 else 0.0)
+            ns = stamp_ns(t)
+            state = bag.state(t, k)
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, state)
+            header = bag.header(ns, "base_link_frd", k)
+            if k % 5 == 0:
+                roll = math.sin(t)
+                controls = {"header": header, "valid": 1023, "stick_roll": roll, "total_roll": 0.9 * roll}
+                bag.add("/xplane/mission/controls", "xplane_bridge/ControlStates", ns, controls)
+                aileron = [0, 0, 10 * roll, -10 * roll, 0, 0, 0, 0]
+                surfaces = {"header": header, "valid": 2047, "aileron1": aileron, "elevator": [1, 1, 0, 0]}
+                bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", ns, surfaces)
+                engines = {"header": header, "count": 2, "throttle_actual": [0.7, 0.6] + [0] * 6}
+                engines["engine_speed"] = [2400, 2300] + [0] * 6
+                bag.add("/xplane/mission/engines", "xplane_bridge/EngineStates", ns, engines)
+                applied = {"header": header, "fields": 9, "roll": roll, "throttles": [0.7] * 8, "engine_count": 2}
+                bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", ns, applied)
+            if k % 25 == 0:
+                image_header = bag.header(ns, "camera_forward_optical", k)
+                pixels = np.full((48, 64, 3), (k // 4) % 256, np.uint8)
+                image = {"header": image_header, "format": "jpeg", "data": cv2.imencode(".jpg", pixels)[1].reshape(-1)}
+                bag.add("/xplane/camera/image_raw/compressed", "sensor_msgs/CompressedImage", ns, image)
+                frame = {"header": image_header, "state": state, "sim_time_error": 0.001}
+                bag.add("/xplane/camera/frame_state", "xplane_bridge/FrameState", ns, frame)
+        for t, mode in ((0.0, 1), (5.0, 2)):
+            ns = stamp_ns(t)
+            bag.add(
+                "/xplane/control/mode", "xplane_bridge/ControlMode", ns, {"header": bag.header(ns, ""), "mode": mode}
+            )
+        ns = stamp_ns(14.0)
+        failure = {"header": bag.header(ns, ""), "names": ["aileron1_wing2_left"], "kinds": ["stuck"], "values": [5.0]}
+        failure.update(set_by=["bridge"], active=[True], confirmed=[True], since_sim_time=[14.0])
+        bag.add("/xplane/failures/state", "xplane_bridge/FailureState", ns, failure)
+        event = {
+            "number": 1,
+            "stamp": {"sec": ns // 10**9, "nanosec": 0},
+            "text": "<aileron> stuck",
+            "requested_by": "me",
+        }
+        bag.add("/xplane/events", "xplane_bridge/EventList", ns, {"events": [event]})
+        for t, state in ((0.0, 1), (10.0, 3), (12.0, 1)):
+            ns = stamp_ns(t)
+            bag.add("/xplane/link_state", "xplane_bridge/LinkState", ns, {"header": bag.header(ns, ""), "state": state})
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(full: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    assert flight_report.main([str(full), "-o", str(folder / "report.html"), "--png", str(folder / "png")]) == 0
+    return folder / "report.html"
+
+
+def section(page: Path, key: str) -> str:
+    text = page.read_text()
+    return text[text.index(f'<section id="{key}">') :].split("</section>")[0]
+
+
+def test_the_summary_tells_the_flight(page: Path) -> None:
+    text = section(page, "summary")
+    assert "<b>21.98 s</b><span>duration</span>" in text
+    # 60 m/s over two stretches of 499 periods of 20 ms
+    assert "<b>1198 m</b><span>distance over ground</span>" in text
+    assert "&lt;aileron&gt; stuck" in text, "text from a bag must be escaped"
+    assert re.search(r">stale</td>", text)
+
+
+def test_every_section_is_there_and_filled(page: Path) -> None:
+    keys = re.findall(r'<section id="(\w+)">', page.read_text())
+    assert keys == [
+        "summary", "attitude", "airspeed", "altitude", "airflow", "rates", "loads", "controls", "surfaces", "engines",
+        "track", "path", "images", "quality",
+    ]  # fmt: skip
+    for key in keys:
+        assert "Not shown" not in section(page, key), key
+
+
+def test_the_quality_section_finds_the_gap_and_judges_physics(page: Path) -> None:
+    text = section(page, "quality")
+    row = re.search(r"<td>/xplane/flight_state</td>(.*?)</tr>", text).group(1)
+    cells = [re.sub("<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", row)]
+    assert cells[0] == "1000"
+    assert cells[3] == "1"
+    assert cells[4] == "2.02"
+    assert "1 epoch, 2 stretches without a gap" in text
+    rates = re.search(r"<tr><td>attitude against p, q, r</td>.*?</tr>", text).group(0)
+    assert "holds" in rates
+    # The analytic flight carries no centripetal load: the check must say so.
+    force = re.search(r"<tr><td>specific force against dv/dt</td>.*?</tr>", text).group(0)
+    assert "violated" in force
+    assert "40 images, 100.0 % with a state, 100.0 % without" in text
+
+
+def test_commanded_achieved_and_failures_are_drawn(page: Path) -> None:
+    controls = section(page, "controls")
+    assert '"name":"commanded"' in controls
+    assert '"name":"at the surfaces"' in controls
+    surfaces = section(page, "surfaces")
+    assert '"name":"wing 2 left"' in surfaces
+    assert '"name":"wing 1 left"' not in surfaces, "a wing without an aileron is not a line"
+    assert "aileron1_wing2_left stuck" in surfaces
+    assert '"text":"auto"' in surfaces
+
+
+def test_the_strip_shows_twelve_pictures_with_their_state(page: Path) -> None:
+    text = section(page, "images")
+    assert text.count("<img") == 12
+    assert text.count("time error 1.0 ms") == 12
+
+
+def test_png_files_are_pictures(page: Path) -> None:
+    names = {p.stem for p in (page.parent / "png").glob("*.png")}
+    assert len(names) == 11
+    for name in names:
+        image = cv2.imread(str(page.parent / "png" / f"{name}.png"))
+        assert image.shape[1] > 1000
+        assert image.std() > 5, f"{name}.png is empty"
+
+
+def browser() -> str:
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        found = shutil.which(name)
+        if found:
+            return found
+    pytest.fail("no Chromium to open the report with: apt-get install chromium (scripts/setup does)")
+
+
+#: Runs in the page: zooms one figure and writes down what the others show.
+PROBE = """
+<script>
+window.addEventListener('load', () => {
+  const all = [...document.querySelectorAll('[data-time] .plotly-graph-div')];
+  Plotly.relayout(all[0], {'xaxis.range': [3, 7]}).then(() => setTimeout(() => {
+    document.body.dataset.ranges = JSON.stringify(all.map(f => f.layout.xaxis.range));
+  }, 0));
+});
+</script>
+"""
+
+
+def test_a_real_browser_opens_it_offline_and_links_the_time_axes(page: Path, tmp_path: Path) -> None:
+    text = page.read_text()
+    loads = re.findall(r'<(?:script|link|img|iframe)[^>]*(?:src|href)="(?!data:)[^"]*"', text)
+    assert not loads, "the page must need no network"
+    probed = tmp_path / "probed.html"
+    probed.write_text(text.replace("</body>", PROBE + "</body>"))
+    command = [
+        browser(), "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
+        "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}",
+        "--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom", f"file://{probed}",
+    ]  # fmt: skip
+    run = subprocess.run(command, capture_output=True, text=True, timeout=180)
+    errors = [line for line in run.stderr.splitlines() if "CONSOLE" in line and ("Uncaught" in line or "Error" in line)]
+    assert not errors
+    assert 'data-linked="9"' in run.stdout
+    ranges = re.search(r'data-ranges="(.*?)"', run.stdout).group(1)
+    assert ranges == "[" + ",".join(["[3,7]"] * 9) + "]"
+    assert run.stdout.count('class="main-svg"') >= 20
+
+
+def test_missing_topics_are_said_and_the_rest_stands(tmp_path: Path) -> None:
+    write_states(tmp_path / "bare.bag", 2.0, 50.0)
+    assert flight_report.main([str(tmp_path / "bare.bag"), "-o", str(tmp_path / "r.html")]) == 0
+    page = tmp_path / "r.html"
+    for key, topic in (
+        ("controls", "mission/controls"),
+        ("surfaces", "mission/surfaces"),
+        ("engines", "mission/engines"),
+    ):
+        assert f"Not shown: the bag has no {topic}" in section(page, key)
+    assert "no compressed camera images" in section(page, "images")
+    assert "figure-attitude" in section(page, "attitude")
+
+
+def test_a_bag_without_state_still_gets_a_page(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "link.bag") as bag:
+        bag.add("/xplane/link_state", "xplane_bridge/LinkState", stamp_ns(0), {"state": 0})
+    assert flight_report.main([str(tmp_path / "link.bag"), "-o", str(tmp_path / "r.html")]) == 0
+    assert "the bag has no flight_state" in section(tmp_path / "r.html", "summary")
+
+
+def test_long_flights_stay_small_and_keep_their_peaks(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "long.bag") as bag:
+        for k in range(60_000):
+            state = bag.state(k / 100, k)
+            if k == 31_415:
+                state["load_factor_normal"] = 7.25
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 100), state)
+    page = tmp_path / "r.html"
+    assert flight_report.main([str(tmp_path / "long.bag"), "-o", str(page)]) == 0
+    assert page.stat().st_size < 15e6
+    assert "<b>7.25 g</b><span>highest load factor</span>" in section(page, "summary")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["none.bag"], "No such file"),
+        (["empty.bag"], "nothing was recorded"),
+        (["good.bag", "-o", "dir"], "Is a directory"),
+    ],
+)
+def test_errors_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, arguments: list, text: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dir").mkdir()
+    write_states(tmp_path / "good.bag", 0.1, 50.0)
+    with FlightBag(tmp_path / "empty.bag"):
+        pass
+    assert flight_report.main(arguments) == 1
+    err = capsys.readouterr().err
+    assert text in err
+    assert err.count("\n") == 1
+
+
+def test_a_value_that_only_rounds_does_not_fill_its_axes_with_noise() -> None:
+    time = np.arange(4, dtype=np.int64)
+    still = Panel("wind [m/s]", [Series("wind speed", time, np.array([2.0, 2.0 + 1e-12, np.nan, 2.0]))])
+    assert still.flat_range() == pytest.approx((1.5, 2.5))
+    assert Panel("roll [deg]", [Series("roll", time, np.array([0.0, 0.1, 0.2, 0.1]))]).flat_range() is None
+    assert Panel("empty", [Series("none", time, np.full(4, np.nan))]).flat_range() is None
