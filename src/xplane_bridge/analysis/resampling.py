@@ -1,36 +1,12 @@
 """One time base for signals of different rates: linear, across a wrap, along the shortest rotation, or held.
 
-Nothing is ever interpolated across a gap or an epoch: `segments` cuts a recording there, and every function here works
-inside the segments it is given.
+Nothing is ever interpolated across a gap or an epoch: `bags.segments` cuts a recording there, and every function here
+works inside the segments it is given.
 """
 
 from __future__ import annotations
 
 import numpy as np
-
-#: [s] Two samples further apart than this are a gap.
-DEFAULT_MAX_GAP = 0.5
-
-
-def segments(time: np.ndarray, epoch: np.ndarray | None = None, max_gap: float = DEFAULT_MAX_GAP) -> list[slice]:
-    """Cut a recording where it must not be bridged.
-
-    Args:
-        time: int64 [ns], shape (n,), non-decreasing inside an epoch.
-        epoch: Counter of shape (n,) that changes at resets and jumps; none when omitted.
-        max_gap: [s] longest distance of two samples of one segment.
-
-    Returns:
-        Slices of the samples, in order, that together cover all of them.
-    """
-    if not len(time):
-        return []
-    step = np.diff(time)
-    cut = (step > max_gap * 1e9) | (step < 0)
-    if epoch is not None:
-        cut |= np.diff(epoch.astype(np.int64)) != 0
-    edges = [0, *(np.flatnonzero(cut) + 1).tolist(), len(time)]
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:])]
 
 
 def time_base(time: np.ndarray, parts: list[slice], rate: float) -> np.ndarray:
@@ -38,7 +14,7 @@ def time_base(time: np.ndarray, parts: list[slice], rate: float) -> np.ndarray:
 
     Args:
         time: int64 [ns], shape (n,).
-        parts: From `segments`.
+        parts: From `bags.segments`.
         rate: [1/s]
 
     Returns:
@@ -87,7 +63,7 @@ def interpolated(
         base: int64 [ns], shape (m,).
         time: int64 [ns], shape (n,).
         values: Floating point, shape (n,) or (n, k).
-        parts: From `segments`.
+        parts: From `bags.segments`.
         wrap: Period of an angle (360), or 0: the short way round is taken.
         low: Lower end of the wrapped range.
 
@@ -116,7 +92,7 @@ def rotated(base: np.ndarray, time: np.ndarray, quaternions: np.ndarray, parts: 
         base: int64 [ns], shape (m,).
         time: int64 [ns], shape (n,).
         quaternions: x, y, z, w, shape (n, 4); normalised here.
-        parts: From `segments`.
+        parts: From `bags.segments`.
 
     Returns:
         Unit quaternions x, y, z, w, shape (m, 4); NaN outside every segment.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Mapping, NamedTuple, Sequence
+from typing import Mapping, NamedTuple, Sequence
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from xplane_bridge.scenario.criteria import Criterion
+from xplane_bridge.analysis.criteria import CAMERA, Criterion
 
 #: Variables that wrap at 360 degrees.
 _WRAPPING = ("roll", "heading")
@@ -52,7 +51,7 @@ def _score(
     labels: Mapping[str, float],
     camera: Mapping[str, float],
 ) -> Score:
-    if criterion.measure in ("paired", "perfect"):
+    if criterion.measure in CAMERA:
         if criterion.measure not in camera:
             return _unmeasured(criterion, "no images were recorded")
         return _judged(criterion, float(camera[criterion.measure]))

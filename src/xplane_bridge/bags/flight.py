@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xplane_bridge.analysis.resampling import segments
 from xplane_bridge.bags import BagError, Bags, Table, TopicInfo
+from xplane_bridge.bags.segments import segments
 
 if TYPE_CHECKING:
     from xplane_bridge.bags.units import Unit

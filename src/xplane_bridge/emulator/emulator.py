@@ -24,13 +24,14 @@ from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.priority import take_realtime_priority
+from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.emulator.simulator import INTERNAL_VERSIONS, Simulator
 from xplane_bridge.emulator.truth import TruthFile
 from xplane_bridge.emulator.wire.faults import FaultyChannel
 from xplane_bridge.emulator.wire.server import Beacon, Server
 from xplane_bridge.emulator.wire.subscriptions import Address, Subscriptions
 from xplane_bridge.emulator.wire.xplane_connect import XPlaneConnect
-from xplane_bridge.scenario import ScenarioError, ScenarioPilot, load_scenario
+from xplane_bridge.scenario import ScenarioError, load_scenario
 
 _LOG = logging.getLogger(__name__)
 

@@ -15,10 +15,10 @@ from typing import Any, Iterator, NamedTuple
 
 import numpy as np
 
-from xplane_bridge.analysis.columns import named
 from xplane_bridge.analysis.quality import BAD_QUALITY
 from xplane_bridge.bags import BagError, Bags
 from xplane_bridge.bags.pictures import COMPRESSED, RAW, image_topic
+from xplane_bridge.export.columns import named
 from xplane_bridge.export.flight import FRAME_STATE, labels, topic_of
 
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Sequence
 import numpy as np
 import pandas as pd
 
-from xplane_bridge.analysis.columns import named, on_base
-from xplane_bridge.analysis.resampling import DEFAULT_MAX_GAP, held, segments, time_base
+from xplane_bridge.analysis.resampling import held, time_base
+from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
+from xplane_bridge.export.columns import named, on_base
 from xplane_bridge.export.flight import STATE, labels, topic_of
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xplane_bridge.analysis.resampling import DEFAULT_MAX_GAP, interpolated, rotated, segments, time_base
+from xplane_bridge.analysis.resampling import interpolated, rotated, time_base
+from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.flight import ODOMETRY, topic_of
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from .holds import HoldGains, Targets
 from .loader import load_scenario, parse_scenario
-from .pilot import ScenarioPilot
 from .player import Action, Commands, FlightSample, Player
 from .schema import Event, Scenario, ScenarioError
 
@@ -15,7 +14,6 @@ __all__ = [
     "Player",
     "Scenario",
     "ScenarioError",
-    "ScenarioPilot",
     "Targets",
     "load_scenario",
     "parse_scenario",

@@ -9,7 +9,8 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import yaml
 
-from .criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
+from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
+
 from .holds import HoldGains
 from .schema import (
     EXCITATION_KINDS,

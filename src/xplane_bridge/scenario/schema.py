@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Dict, Mapping, Optional, Tuple
 
+from xplane_bridge.analysis.criteria import SCORED, Criterion
+
 from ..errors import XplaneBridgeError
-from .criteria import SCORED, Criterion
 
 #: Stick axes and their ranges; throttle is a lever.
 STICK_AXES: Dict[str, Tuple[float, float]] = {

@@ -9,11 +9,11 @@ import pytest
 import yaml
 
 from support.emulator_fixture import EmulatorFixture
+from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import (
     FlightSample,
     Player,
     ScenarioError,
-    ScenarioPilot,
     excitations,
     load_scenario,
     parse_scenario,

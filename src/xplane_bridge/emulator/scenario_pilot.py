@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, List, Tuple
+from typing import List, Tuple
 
-from .player import Action, FlightSample, Player
-from .schema import Scenario, ScenarioError
-
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands
-    from xplane_bridge.emulator.flight.frame import Frame
+from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands
+from xplane_bridge.emulator.flight.frame import Frame
+from xplane_bridge.scenario import Action, FlightSample, Player, Scenario, ScenarioError
 
 _FAILURES = "sim/operation/failures/"
 _TRIMS = {"roll_trim": "aileron_trim", "pitch_trim": "elevator_trim", "yaw_trim": "rudder_trim"}
@@ -42,8 +39,6 @@ class ScenarioPilot:
 
     def __call__(self, flight_time: float, frame: Frame) -> PilotCommands:
         """What the scenario wants at this flight time [s]."""
-        from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands  # the emulator imports this module
-
         commands = self.player.step(flight_time, sample_of(frame))
         handles = commands.handles
         writes = [(f"sim/cockpit2/controls/{_TRIMS[name]}", value) for name, value in handles.items() if name in _TRIMS]

@@ -1,0 +1,29 @@
+"""Where a recording must not be bridged."""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: [s] Two samples further apart than this are a gap.
+DEFAULT_MAX_GAP = 0.5
+
+
+def segments(time: np.ndarray, epoch: np.ndarray | None = None, max_gap: float = DEFAULT_MAX_GAP) -> list[slice]:
+    """Cut a recording where it must not be bridged.
+
+    Args:
+        time: int64 [ns], shape (n,), non-decreasing inside an epoch.
+        epoch: Counter of shape (n,) that changes at resets and jumps; none when omitted.
+        max_gap: [s] longest distance of two samples of one segment.
+
+    Returns:
+        Slices of the samples, in order, that together cover all of them.
+    """
+    if not len(time):
+        return []
+    step = np.diff(time)
+    cut = (step > max_gap * 1e9) | (step < 0)
+    if epoch is not None:
+        cut |= np.diff(epoch.astype(np.int64)) != 0
+    edges = [0, *(np.flatnonzero(cut) + 1).tolist(), len(time)]
+    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:])]

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xplane_bridge.analysis.criteria import Criterion
+from xplane_bridge.analysis.scoring import score
+
+T = np.arange(0, 20.001, 0.01)
+
+
+def criterion(**values: object) -> Criterion:
+    return Criterion(**{"name": "c", "variable": "roll", **values})
+
+
+def one(c: Criterion, roll: np.ndarray, **labels: float) -> object:
+    return score([c], T, {"roll": roll, "heading": roll}, labels, {})[0]
+
+
+def test_rms_and_peak_in_a_window() -> None:
+    roll = 10 + 5 * np.sin(2 * np.pi * T)  # rms about 10 is 5 / sqrt(2), over whole periods
+    got = one(criterion(measure="rms", target=10.0, start=2.0, end=12.0, below=3.6), roll)
+    assert got.value == pytest.approx(5 / np.sqrt(2), rel=1e-3)
+    assert got.passed
+    assert not one(criterion(measure="rms", target=10.0, start=2.0, end=12.0, below=3.5), roll).passed
+    assert one(criterion(measure="peak", target=9.0), roll).value == pytest.approx(6.0, abs=1e-3)
+
+
+def test_overshoot_is_seen_from_the_start() -> None:
+    step = np.where(T < 5, 0.0, 10.0)
+    ringing = step + np.where(T >= 5, 3 * np.exp(-(T - 5)) * np.sin(4 * (T - 5)), 0.0)
+    up = one(criterion(measure="overshoot", target=10.0), ringing)
+    assert up.value == pytest.approx(np.max(ringing) - 10.0)
+    down = one(criterion(measure="overshoot", target=-10.0), -ringing)
+    assert down.value == pytest.approx(up.value)
+
+
+def test_settling_counts_to_the_last_time_outside() -> None:
+    roll = np.where(T < 5, 0.0, 30 * np.exp(-0.5 * (T - 5)))
+    # 30 exp(-t / 2) = 3 at t = 2 ln 10
+    got = one(criterion(measure="settling", target=0.0, band=3.0, start="fault", below=5.0), roll, fault=5.0)
+    assert got.value == pytest.approx(2 * np.log(10), abs=0.02)
+    assert got.passed
+    never = one(criterion(measure="settling", target=0.0, band=3.0, start="fault", end=8.0, below=5.0), roll, fault=5.0)
+    assert (never.value, never.passed) == (np.inf, False)
+    assert one(criterion(measure="settling", target=0.0, band=40.0, below=1.0), roll).value == 0.0
+
+
+def test_heading_compares_the_short_way() -> None:
+    heading = np.where(T < 10, 350.0, 10.0)
+    got = one(criterion(variable="heading", measure="peak", target=0.0), heading)
+    assert got.value == pytest.approx(10.0)
+
+
+def test_final_and_extremes() -> None:
+    assert one(criterion(measure="final"), T).value == pytest.approx(19.5)
+    assert one(criterion(measure="minimum", start=3.0), T).value == pytest.approx(3.0)
+    assert one(criterion(measure="maximum", end=4.0), T).value == pytest.approx(4.0)
+
+
+def test_what_cannot_be_measured_has_not_passed() -> None:
+    label = one(criterion(measure="rms", start="fault", below=1.0), 0 * T)
+    assert not label.passed
+    assert "the event 'fault' never happened" in label.text
+    window = one(criterion(measure="rms", start=30.0, end=40.0, below=1.0), 0 * T)
+    assert "no samples between 30 s and 40 s" in window.text
+    camera = one(Criterion("p", "paired", above=0.9), 0 * T)
+    assert "no images" in camera.text
+    assert not camera.passed
+    good = score([Criterion("p", "paired", above=0.9)], T, {}, {}, {"paired": 0.99})[0]
+    assert good.passed
