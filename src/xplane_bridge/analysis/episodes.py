@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Sequence
+from typing import TYPE_CHECKING, NamedTuple, Sequence
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from xplane_bridge.bags import Table
+
+_MODES = {1: "manual", 2: "auto"}
 
 
 class Episode(NamedTuple):
@@ -34,6 +39,17 @@ def from_values(time: np.ndarray, labels: Sequence[str], end: int) -> list[Episo
         else:
             out.append(Episode(start, stop, label))
     return out
+
+
+def who_flew(modes: Table, end: int) -> list[Episode]:
+    """Give the stretches flown by ``manual``, ``auto`` or, while their source was silent, ``failsafe``.
+
+    Args:
+        modes: Of control/mode.
+        end: [ns] where the recording ends.
+    """
+    rows = zip(modes["mode"], modes["failsafe"])
+    return from_values(modes.stamp, ["failsafe" if safe else _MODES.get(int(mode), "") for mode, safe in rows], end)
 
 
 def from_sets(time: np.ndarray, sets: Sequence[Sequence[str]], end: int) -> list[Episode]:

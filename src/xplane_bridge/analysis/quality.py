@@ -82,34 +82,45 @@ class Pairing(NamedTuple):
     error_p50: float  #: [s] |simulator time of the state - of the picture|
     error_p95: float  #: [s]
     error_max: float  #: [s]
-    dropped: int  #: pictures seen but not published
-    frozen: int  #: images flagged frozen
+    dropped: int  #: pictures seen but not published, from the first image on
+    frozen: int  #: images flagged frozen, likewise
+    unpaired: int  #: images without a state, likewise
 
 
-def pairing(
-    quality: np.ndarray, sim_time_error: np.ndarray, dropped: np.ndarray, frozen: np.ndarray, missing_bit: int
-) -> Pairing:
+def pairing(frames: Mapping[str, np.ndarray], constants: Mapping[str, int]) -> Pairing:
     """Describe the pairing of a camera's images.
 
     Args:
-        quality: FrameState.quality, shape (n,).
-        sim_time_error: [s], NaN without a state, shape (n,).
-        dropped: Counter, shape (n,).
-        frozen: Counter, shape (n,).
-        missing_bit: FrameState.QUALITY_STATE_MISSING.
+        frames: Columns of FrameState, in time order; each of shape (n,).
+        constants: Of FrameState.
     """
     nan = float("nan")
+    quality = frames["quality"].astype(np.int64)
     if not len(quality):
-        return Pairing(0, nan, nan, nan, nan, nan, 0, 0)
-    error = np.abs(sim_time_error[np.isfinite(sim_time_error)])
+        return Pairing(0, nan, nan, nan, nan, nan, 0, 0, 0)
+    missing = (quality & int(constants["QUALITY_STATE_MISSING"])) != 0
+    frozen = (quality & int(constants["QUALITY_FROZEN"])) != 0
+    error = np.abs(frames["sim_time_error"][np.isfinite(frames["sim_time_error"])])
     p50, p95, worst = np.percentile(error, [50, 95, 100]) if len(error) else (nan, nan, nan)
     return Pairing(
         len(quality),
         float(np.mean(quality == 0)),
-        float(np.mean((quality.astype(np.int64) & missing_bit) == 0)),
+        float(np.mean(~missing)),
         float(p50),
         float(p95),
         float(worst),
-        int(dropped[-1]),
-        int(frozen[-1]),
+        _counted(frames["dropped"], 0),
+        _counted(frames["frozen"], int(frozen[0])),
+        _counted(frames["unpaired"], int(missing[0])),
     )
+
+
+def _counted(counter: np.ndarray, first: int) -> int:
+    """Tell how far a node's counter went during the recording.
+
+    Args:
+        counter: Since the node's start, which begins anew at 0 when the node does; shape (n,).
+        first: What the first message itself counts; what came before it is not of this recording.
+    """
+    steps = np.diff(counter.astype(np.int64))
+    return first + int(np.where(steps < 0, counter[1:], steps).sum())

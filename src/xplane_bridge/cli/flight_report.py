@@ -46,7 +46,7 @@ def write_report(bag_paths: Sequence[str | Path], output: Path, png: Path | None
 
     Raises:
         BagError: The bags cannot be read.
-        ReportError: The file cannot be written.
+        ReportError: The file cannot be written; or it is, and shows no flight, because no flight state was recorded.
     """
     from xplane_bridge.bags.flight import read_flight
     from xplane_bridge.plotting import report, static
@@ -64,4 +64,11 @@ def write_report(bag_paths: Sequence[str | Path], output: Path, png: Path | None
     except OSError as err:
         msg = f"{err.filename or output}: {err.strerror}"
         raise ReportError(msg) from None
+    if "state" not in flight.tables:
+        names = ", ".join(str(path) for path in bag_paths)
+        msg = (
+            f"{names}: no flight state in it, so {output} shows no flight; "
+            "record flight_state (launch/record.launch does) while link_state says connected"
+        )
+        raise ReportError(msg)
     return output

@@ -2,7 +2,7 @@
 
 Folder of one flight::
 
-    labels.csv        one row an image: file, split, stamp, quality, the paired state, mode, failures, excitation
+    labels.csv        one row an image: file, split, stamp, quality, the paired state, then the labels of `labels`
     images/000000.jpg numbered in time order; JPEG bytes as recorded, raw images as PNG (lossless)
 """
 

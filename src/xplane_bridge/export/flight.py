@@ -30,18 +30,20 @@ def topic_of(bags: Bags, msgtype: str) -> str:
 
 
 def labels(bags: Bags, base: np.ndarray) -> dict[str, np.ndarray]:
-    """Give mode, failures and excitation at each instant of `base` [ns]; None before the first label, or without topic.
+    """Give what holds at each instant of `base` [ns]; None before the first label, or without topic.
 
     Returns:
-        ``mode`` (1 manual, 2 automatic), ``failures`` (``name:kind:value;...`` of the active ones, empty for none) and
-        ``excitation`` (``kind:target`` of the running one, empty for none), shape (m,).
+        ``mode`` (1 manual, 2 automatic), ``failsafe`` (whether the failsafe flew, because the source of that mode was
+        silent), ``failures`` (``name:kind:value;...`` of the active ones, empty for none) and ``excitation``
+        (``kind:target`` of the running one, empty for none), shape (m,).
     """
     none = np.full(len(base), None, dtype=object)
-    out = {"mode": none, "failures": none, "excitation": none}
+    out = {"mode": none, "failsafe": none, "failures": none, "excitation": none}
     mode = bags.topic_of_type(MODE)
     if mode and bags.topics[mode].count:
         table = bags.read(mode)
         out["mode"] = _held(base, table, table["mode"])
+        out["failsafe"] = _held(base, table, table["failsafe"])
     failures = bags.topic_of_type(FAILURES)
     if failures and bags.topics[failures].count:
         table = bags.read(failures)

@@ -28,7 +28,7 @@ def flight_table(bags: Bags, rate: float | None = None, topics: Sequence[str] = 
 
     Returns:
         ``stamp_ns`` (int64), ``time_s`` since the first row, every field of FlightState with its unit in the name, the
-        labels ``mode``, ``failures``, ``excitation``, then the further topics.
+        labels ``mode``, ``failsafe``, ``failures``, ``excitation``, then the further topics.
 
     Raises:
         BagError: No flight state in the bag, or no such further topic.

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, Callable, Sequence
 
 import numpy as np
 
-from xplane_bridge.analysis.episodes import Episode, from_sets, from_values
+from xplane_bridge.analysis.episodes import Episode, from_sets, from_values, who_flew
 from xplane_bridge.plotting.spec import Panel, PathFigure, Series, TimeFigure
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Table
     from xplane_bridge.bags.flight import Flight
 
-_MODES = {1: "manual", 2: "auto"}
 #: ControlCommand's bits, as in AppliedCommand.fields; THROTTLE, ENGINE_THROTTLES and MOTORS all fill `throttles`.
 _COMMAND_BITS = {"roll": 1, "pitch": 2, "yaw": 4, "throttles": 8 | 16 | 32}
 
@@ -40,12 +39,10 @@ def all_figures() -> list[tuple[str, str, Callable[[Flight], TimeFigure | PathFi
 
 
 def episodes(flight: Flight) -> list[tuple[str, Episode]]:
-    """Give the stretches to shade: automatic flight, failures, excitations."""
+    """Give the stretches to shade: who flew, failures, excitations."""
     out: list[tuple[str, Episode]] = []
     if "mode" in flight.tables:
-        table = flight.tables["mode"]
-        names = [_MODES.get(int(mode), "") for mode in table["mode"]]
-        out += [(e.label, e) for e in from_values(table.stamp, names, flight.end)]
+        out += [(e.label, e) for e in who_flew(flight.tables["mode"], flight.end)]
     if "failures" in flight.tables:
         table = flight.tables["failures"]
         rows = zip(table["names"], table["kinds"], table["active"])

@@ -11,7 +11,7 @@ import numpy as np
 
 from xplane_bridge import __version__
 from xplane_bridge.analysis.consistency import check_flight, check_odometry
-from xplane_bridge.analysis.episodes import from_values
+from xplane_bridge.analysis.episodes import from_values, who_flew
 from xplane_bridge.analysis.quality import BAD_QUALITY, bit_shares, pairing, timing
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.plotting import interactive
@@ -156,7 +156,20 @@ def _summary(flight: Flight) -> str:
     rate = timing(state.stamp)
     cards.append(f'<div class="card"><b>{_number(rate.rate)} /s</b><span>flight states</span></div>')
     text = f'<div class="cards">{"".join(cards)}</div>'
-    return text + _links(flight) + _events(flight)
+    return text + _who_flew(flight) + _links(flight) + _events(flight)
+
+
+def _who_flew(flight: Flight) -> str:
+    if "mode" not in flight.tables:
+        return ""
+    table = flight.tables["mode"]
+    rows = []
+    for stretch in who_flew(table, max(flight.end, int(table.stamp[-1]))):
+        first = int(np.searchsorted(table.stamp, stretch.start, side="right")) - 1
+        who = f'<span class="bad">{stretch.label}</span>' if stretch.label == "failsafe" else stretch.label
+        why, asked_by = (html.escape(str(table[name][first])) for name in ("reason", "requested_by"))
+        rows.append((_seconds(stretch.start, flight), f"{(stretch.end - stretch.start) / 1e9:.1f}", who, why, asked_by))
+    return "<h3>Who flew</h3>" + _rows(("at [s]", "for [s]", "who", "why", "asked by"), rows, (0, 1))
 
 
 def _links(flight: Flight) -> str:
@@ -327,7 +340,7 @@ def _images_quality(flight: Flight) -> str:
     if "frames" not in flight.tables:
         return ""
     t, constants = flight.tables["frames"], flight.constants["frames"]
-    p = pairing(t["quality"], t["sim_time_error"], t["dropped"], t["frozen"], int(constants["QUALITY_STATE_MISSING"]))
+    p = pairing(t.columns, constants)
     shares = bit_shares(t["quality"], constants, "QUALITY_")
     rows = [
         (html.escape(name.lower().replace("_", " ")), f"{share * 100:.1f} %") for name, share in shares.items() if share
@@ -336,6 +349,7 @@ def _images_quality(flight: Flight) -> str:
         f"<h3>Images</h3><p>{p.images} images, {p.with_state * 100:.1f} % with a state, {p.perfect * 100:.1f} % "
         f"without any remark; time error {_number(p.error_p50 * 1e3, 3)} ms (median), "
         f"{_number(p.error_p95 * 1e3, 3)} ms (95 %), {_number(p.error_max * 1e3, 3)} ms (worst); "
-        f"{p.dropped} pictures not published, {p.frozen} frozen.</p>"
+        f"{p.dropped} pictures not published, {p.frozen} frozen, {p.unpaired} without a state, "
+        "counted from the first image recorded.</p>"
     )
     return text + (_rows(("remark", "images"), rows, (1,)) if rows else "")

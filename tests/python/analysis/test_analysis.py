@@ -126,16 +126,33 @@ def test_bit_shares_take_single_bits_only() -> None:
     assert bit_shares(np.array([1, 3, 0, 2], dtype=np.uint32), constants, "VALID_") == {"A": 0.5, "B": 0.5}
 
 
+BITS = {"QUALITY_STATE_MISSING": 1, "QUALITY_DISPLAY_UNKNOWN": 8, "QUALITY_FROZEN": 32}
+
+
+def frames(quality: list, **columns: list) -> dict:
+    """Columns of frame_state; counters that are not given stay 0, as do time errors."""
+    zeros = {name: [0] * len(quality) for name in ("sim_time_error", "dropped", "frozen", "unpaired")}
+    return {name: np.array(values) for name, values in {**zeros, "quality": quality, **columns}.items()}
+
+
 def test_pairing_numbers() -> None:
-    got = pairing(
-        np.array([0, 0, 1, 8]),
-        np.array([0.0, -0.002, np.nan, 0.004]),
-        np.array([0, 1, 1, 2]),
-        np.array([0, 0, 0, 1]),
-        1,
-    )
-    assert (got.images, got.perfect, got.with_state, got.dropped, got.frozen) == (4, 0.5, 0.75, 2, 1)
+    got = pairing(frames([0, 0, 1, 8], sim_time_error=[0.0, -0.002, np.nan, 0.004]), BITS)
+    assert (got.images, got.perfect, got.with_state) == (4, 0.5, 0.75)
     assert (got.error_p50, got.error_max) == pytest.approx((0.002, 0.004))
+
+
+def test_pictures_lost_before_the_recording_are_not_counted() -> None:
+    # The node had run for long: 70 dropped, 5 frozen, 9 unpaired before the recording. Its first image is frozen and
+    # has no state, which the counters have in them already.
+    quality = [33, 32, 0, 1]
+    got = pairing(frames(quality, dropped=[70, 70, 73, 73], frozen=[6, 7, 7, 7], unpaired=[10, 10, 10, 11]), BITS)
+    assert (got.dropped, got.frozen, got.unpaired) == (3, 2, 2)
+
+
+def test_counters_go_on_over_a_restart_of_the_node() -> None:
+    # 2 more before the restart, then 4 from zero, of which the last image brought 3.
+    got = pairing(frames([0] * 4, dropped=[70, 72, 1, 4], frozen=[5, 5, 0, 0], unpaired=[3, 3, 0, 0]), BITS)
+    assert (got.dropped, got.frozen, got.unpaired) == (6, 0, 0)
 
 
 def test_distance_is_the_integral_inside_segments() -> None:

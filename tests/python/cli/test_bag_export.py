@@ -58,9 +58,10 @@ def write_flight(path: Path, seconds: float = 4.0, offset: float = 0.0, raw_imag
                     values = {"format": "bgr8; jpeg compressed bgr8", "data": data.reshape(-1)}
                     topic = "/xplane/camera/image_raw/compressed"
                     bag.add(topic, "sensor_msgs/CompressedImage", ns, {"header": header, **values})
-        for t, mode in ((0.5, 1), (1.5, 2)):
+        for t, mode, failsafe in ((0.5, 1, False), (1.5, 2, False), (3.5, 2, True)):
             ns = stamp_ns(t + offset)
             values = {"header": bag.header(ns, ""), "mode": mode, "requested_by": "test", "reason": "r" * mode}
+            values["failsafe"] = failsafe
             bag.add("/xplane/control/mode", "xplane_bridge/ControlMode", ns, values)
         ns = stamp_ns(1.0 + offset)
         failure = {
@@ -105,6 +106,10 @@ def test_tables_read_back_with_pandas_row_for_row(tmp_path: Path, form: str) -> 
     modes = frame["mode"].astype(float)
     assert np.isnan(modes[24])
     assert (modes[25], modes[74], modes[75], modes[199]) == (1, 1, 2, 2)
+    # 3.5 s lie 0.5 s behind the gap: 100 rows before it, 25 after it.
+    safe = frame["failsafe"].astype(float)
+    assert np.isnan(safe[24])
+    assert (safe[25], safe[99], safe[124], safe[125], safe[199]) == (0, 0, 0, 1, 1)
     assert frame["failures"][199] == "aileron1_left:stuck:5;engine_1:failed"
 
 
@@ -157,6 +162,7 @@ def test_data_sets_hold_good_frames_with_their_own_state(tmp_path: Path, raw_ima
     np.testing.assert_allclose(labels["state_roll_deg"], [state_at(t)["roll_deg"] for t in times], atol=1e-12)
     assert labels["split"].tolist() == ["train" if t < 4.8 * 0.8 else "validation" for t in times]
     assert labels["mode"].tolist()[-1] == 2
+    assert labels["failsafe"].dropna().tolist() == [1 if t >= 3.5 else 0 for t in times if t >= 0.5]
     assert len(list((out / "flight" / "images").iterdir())) == 18
     for k, file in zip(kept, labels["file"]):
         image = cv2.imread(str(out / "flight" / file))

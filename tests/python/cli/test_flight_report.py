@@ -14,14 +14,14 @@ import pytest
 
 from support.synthetic_flight import FlightBag, stamp_ns, write_states
 from xplane_bridge.cli import flight_report
-from xplane_bridge.plotting.spec import Panel, Series
+from xplane_bridge.plotting.spec import SHADES, Panel, Series
 
 RATE = 50.0
 
 
 @pytest.fixture(scope="module")
 def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """20 s with every topic the report knows, a gap of 2 s after 10 s, and a stuck aileron from 12 s on."""
+    """20 s with every topic the report knows, a gap of 2 s after 10 s, an aileron stuck from 14 s on, a failsafe."""
     path = tmp_path_factory.mktemp("full") / "flight.bag"
     with FlightBag(path) as bag:
         for k in range(1000):
@@ -49,11 +49,15 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 bag.add("/xplane/camera/image_raw/compressed", "sensor_msgs/CompressedImage", ns, image)
                 frame = {"header": image_header, "state": state, "sim_time_error": 0.001}
                 bag.add("/xplane/camera/frame_state", "xplane_bridge/FrameState", ns, frame)
-        for t, mode in ((0.0, 1), (5.0, 2)):
+        for t, mode, failsafe, who, why in (
+            (0.0, 1, False, "", "start"),
+            (5.0, 2, False, "/pilot", "request"),
+            (16.0, 2, True, "", "timeout of control/auto"),
+            (18.0, 2, False, "", "control/auto is back"),
+        ):
             ns = stamp_ns(t)
-            bag.add(
-                "/xplane/control/mode", "xplane_bridge/ControlMode", ns, {"header": bag.header(ns, ""), "mode": mode}
-            )
+            values = {"mode": mode, "failsafe": failsafe, "requested_by": who, "reason": why}
+            bag.add("/xplane/control/mode", "xplane_bridge/ControlMode", ns, {"header": bag.header(ns, ""), **values})
         ns = stamp_ns(14.0)
         failure = {"header": bag.header(ns, ""), "names": ["aileron1_wing2_left"], "kinds": ["stuck"], "values": [5.0]}
         failure.update(set_by=["bridge"], active=[True], confirmed=[True], since_sim_time=[14.0])
@@ -90,6 +94,22 @@ def test_the_summary_tells_the_flight(page: Path) -> None:
     assert "<b>1198 m</b><span>distance over ground</span>" in text
     assert "&lt;aileron&gt; stuck" in text, "text from a bag must be escaped"
     assert re.search(r">stale</td>", text)
+
+
+def test_a_failsafe_is_told_apart_from_the_automatic_flight_it_interrupts(page: Path) -> None:
+    table = section(page, "summary").split("<h3>Who flew</h3>")[1].split("</table>")[0]
+    rows = [re.findall(r"<td.*?>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
+    assert rows == [
+        ["0.0", "5.0", "manual", "start", ""],
+        ["5.0", "11.0", "auto", "request", "/pilot"],
+        ["16.0", "2.0", '<span class="bad">failsafe</span>', "timeout of control/auto", ""],
+        ["18.0", "4.0", "auto", "control/auto is back", ""],
+    ]
+    attitude = section(page, "attitude")
+    shapes = re.findall(r'"fillcolor":"(#\w+)".*?"x0":([-\d.]+),"x1":([-\d.]+)', attitude)
+    shaded = {(colour, float(x0), float(x1)) for colour, x0, x1 in shapes}
+    assert {(SHADES["auto"], 5.0, 16.0), (SHADES["failsafe"], 16.0, 18.0), (SHADES["auto"], 18.0, 21.98)} <= shaded
+    assert '"text":"failsafe"' in attitude
 
 
 def test_every_section_is_there_and_filled(page: Path) -> None:
@@ -199,11 +219,17 @@ def test_missing_topics_are_said_and_the_rest_stands(tmp_path: Path) -> None:
     assert "figure-attitude" in section(page, "attitude")
 
 
-def test_a_bag_without_state_still_gets_a_page(tmp_path: Path) -> None:
+def test_a_bag_without_state_gets_a_page_and_an_error(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     with FlightBag(tmp_path / "link.bag") as bag:
         bag.add("/xplane/link_state", "xplane_bridge/LinkState", stamp_ns(0), {"state": 0})
-    assert flight_report.main([str(tmp_path / "link.bag"), "-o", str(tmp_path / "r.html")]) == 0
-    assert "the bag has no flight_state" in section(tmp_path / "r.html", "summary")
+    page = tmp_path / "r.html"
+    assert flight_report.main([str(tmp_path / "link.bag"), "-o", str(page)]) == 1
+    assert "the bag has no flight_state" in section(page, "summary")
+    err = capsys.readouterr().err
+    assert f"{tmp_path / 'link.bag'}: no flight state in it" in err
+    assert str(page) in err
+    assert "record flight_state" in err
+    assert err.count("\n") == 1
 
 
 def test_long_flights_stay_small_and_keep_their_peaks(tmp_path: Path) -> None:
