@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Dict, Tuple
+from typing import Callable, Dict, Tuple
 
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.simulator import Simulator
+from xplane_bridge.emulator.datarefs.sources import Actions
 
 _COCKPIT = "sim/cockpit2/controls/"
 _VIEW = "sim/graphics/view/"
@@ -31,7 +30,7 @@ VIEWS: Dict[str, Tuple[int, bool]] = {
 }
 
 
-def commands(sim: Simulator) -> Dict[str, Callable[[], None]]:
+def commands(sim: Actions) -> Dict[str, Callable[[], None]]:
     """What each command does."""
     store = sim.store
 
@@ -95,7 +94,7 @@ def commands(sim: Simulator) -> Dict[str, Callable[[], None]]:
     return table
 
 
-def _look(sim: Simulator, view: int, external: bool) -> None:
+def _look(sim: Actions, view: int, external: bool) -> None:
     """A new view, straight ahead."""
     sim.store.set(_VIEW + "view_type", view)
     sim.store.set(_VIEW + "view_is_external", float(external))

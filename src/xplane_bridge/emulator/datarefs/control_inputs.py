@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Callable, Dict, Optional, Sequence, Tuple
+from typing import Callable, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
+from xplane_bridge.emulator.datarefs.sources import LoadedAircraft
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.engines import RPM_TO_RAD_S, THROTTLE_RELEASED
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel
 from xplane_bridge.emulator.flight.frame import Frame
 from xplane_bridge.protocol import UNUSED_SLOT
-
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.simulator import Simulator
 
 _OVERRIDE = "sim/operation/override/override_"
 _COCKPIT = "sim/cockpit2/controls/"
@@ -99,7 +97,7 @@ class ControlInputs:
         commands = self._surface_commands
         self._store.on_write(name, lambda index, value: commands.__setitem__(int(slots[index]), value))
 
-    def connect(self, sim: Simulator) -> None:
+    def connect(self, sim: LoadedAircraft) -> None:
         """Connects the datarefs that act on others."""
         store = self._store
         for name in ("throttle_ratio", "throttle_jet_rev_ratio", "mixture_ratio", "prop_ratio"):

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables import controls, engines, failures, flight, systems
 from xplane_bridge.emulator.datarefs.tables.base import Table
-
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.simulator import Simulator
 
 __all__ = ["Table", "build"]
 
 
-def build(sim: Simulator) -> Table:
+def build(sim: Sources) -> Table:
     """Defines every dataref of the simulator's version in its store and returns what publishes them."""
     table = Table(sim.store, sim.version)
     for part in (flight, controls, engines, systems, failures):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional
 
+from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import FLOAT, INT, X12, Table
 from xplane_bridge.emulator.flight.flight_model import SurfaceKind, SurfaceSpec
-
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.flight.frame import Frame
-    from xplane_bridge.emulator.simulator import Simulator
+from xplane_bridge.emulator.flight.frame import Frame
 
 _CONTROLS = "sim/flightmodel/controls/"
 _COCKPIT = "sim/cockpit2/controls/"
@@ -100,7 +98,7 @@ def surface_dataref(spec: SurfaceSpec) -> str:
     return f"{_CONTROLS}{spec.name}def"
 
 
-def define(table: Table, sim: Simulator) -> None:
+def define(table: Table, sim: Sources) -> None:
     """Defines this subject's datarefs."""
     _surfaces(table, sim)
     _stick(table, sim)
@@ -112,7 +110,7 @@ def define(table: Table, sim: Simulator) -> None:
         table.setting(f"sim/operation/override/{name}", 0, INT, size=20)
 
 
-def _surfaces(t: Table, sim: Simulator) -> None:
+def _surfaces(t: Table, sim: Sources) -> None:
     single: Dict[str, List[str]] = {leaf: [] for leaf in _ARRAYS}
     for leaf in _WING_LEAVES:
         single[leaf] = [f"{_CONTROLS}{wing}_{leaf}def" for wing in WINGS]
@@ -152,7 +150,7 @@ def _padded(names: List[str], start: int, size: int) -> List[str]:
     return [nothing] * start + names + [nothing] * (size - start - len(names))
 
 
-def _carrier(sim: Simulator, leaf: str, side: str) -> str:
+def _carrier(sim: Sources, leaf: str, side: str) -> str:
     """The first wing of the loaded aircraft with such a surface on this side; wing 2 where there is none."""
     for spec in sim.model.surfaces:
         part, _, its_leaf = spec.name.partition("_")
@@ -161,7 +159,7 @@ def _carrier(sim: Simulator, leaf: str, side: str) -> str:
     return "wing2" + side
 
 
-def _stick(t: Table, sim: Simulator) -> None:
+def _stick(t: Table, sim: Sources) -> None:
     for axis, trim, total, stick in (
         ("pitch", "elevator", lambda f: f.m.pitch_ratio, lambda: sim.controls.pitch),
         ("roll", "aileron", lambda f: f.m.roll_ratio, lambda: sim.controls.roll),
@@ -183,7 +181,7 @@ def _stick(t: Table, sim: Simulator) -> None:
     t.setting("sim/joystick/joystick_axis_values", size=500, writable=False)
 
 
-def _total(sim: Simulator, total: Callable[[Frame], float]) -> Callable[[Frame], float]:
+def _total(sim: Sources, total: Callable[[Frame], float]) -> Callable[[Frame], float]:
     """The stick that the surfaces get; with `--overridden-totals frozen` it stands while a client has taken them."""
     held = [0.0]
 
@@ -228,7 +226,7 @@ def _handles(t: Table) -> None:
         t.setting(f"{_COCKPIT}{name}_ratio")
 
 
-def _limits(t: Table, sim: Simulator) -> None:
+def _limits(t: Table, sim: Sources) -> None:
     limits = "sim/aircraft/controls/acf_"
 
     def travel(leaf: str, low: bool) -> float:
@@ -249,11 +247,11 @@ def _limits(t: Table, sim: Simulator) -> None:
         t.value(f"{limits}min_trim_{name}", lambda _, kind=kind, leaf=leaf: _trim_part(sim, kind, leaf))
 
 
-def _spec(sim: Simulator, leaf: str) -> Optional[SurfaceSpec]:
+def _spec(sim: Sources, leaf: str) -> Optional[SurfaceSpec]:
     return next((spec for spec in sim.model.surfaces if spec.name.endswith("_" + leaf)), None)
 
 
-def _trim_part(sim: Simulator, kind: str, leaf: str) -> float:
+def _trim_part(sim: Sources, kind: str, leaf: str) -> float:
     """Part of the surface's travel that full trim moves it."""
     spec = _spec(sim, leaf)
     trim = dict(sim.model.info.trim_deg).get(kind, 0.0)

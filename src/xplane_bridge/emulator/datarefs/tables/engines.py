@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Callable, List
+from typing import Callable, List
 
+from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import INT, X12, Table
 from xplane_bridge.emulator.flight.flight_model import EngineState
 from xplane_bridge.emulator.flight.frame import PA_TO_INHG, PA_TO_PSI, Frame
-
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.simulator import Simulator
 
 _ENGINE = "sim/flightmodel/engine/"
 _INDICATORS = "sim/cockpit2/engine/indicators/"
@@ -26,7 +24,7 @@ def each(source: Callable[[EngineState], float]) -> Callable[[Frame], List[float
     return lambda f: [source(engine) for engine in f.m.engines]
 
 
-def define(t: Table, sim: Simulator) -> None:
+def define(t: Table, sim: Sources) -> None:
     """Defines this subject's datarefs."""
     size = t.engines
     t.value("sim/aircraft/engine/acf_num_engines", lambda f: f.info.engine_count, INT)

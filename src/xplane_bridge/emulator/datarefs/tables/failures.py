@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, List
+from typing import List
 
+from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import INT, Table
-
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.simulator import Simulator
 
 PREFIX = "sim/operation/failures/"
 
@@ -76,7 +74,7 @@ def names(version: int) -> List[str]:
     return leaves
 
 
-def define(t: Table, sim: Simulator) -> None:
+def define(t: Table, sim: Sources) -> None:
     """Defines this subject's datarefs."""
     for leaf in names(t.version):
         t.setting(PREFIX + leaf, 0, INT)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import DOUBLE, INT, X11, X12, Table
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.frame import (
@@ -18,14 +18,11 @@ from xplane_bridge.emulator.flight.frame import (
     Frame,
 )
 
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.simulator import Simulator
-
 _POSITION = "sim/flightmodel/position/"
 _FORCES = "sim/flightmodel/forces/"
 
 
-def define(table: Table, sim: Simulator) -> None:
+def define(table: Table, sim: Sources) -> None:
     """Defines this subject's datarefs."""
     _position(table)
     _attitude_and_rates(table)
@@ -86,7 +83,7 @@ def _attitude_and_rates(t: Table) -> None:
         t.value(_POSITION + axis + "_dot", lambda f, source=acceleration: math.degrees(source(f)))
 
 
-def _air_data(t: Table, sim: Simulator) -> None:
+def _air_data(t: Table, sim: Sources) -> None:
     t.value(_POSITION + "alpha", lambda f: math.degrees(f.m.alpha_rad))
     t.value(_POSITION + "beta", lambda f: BETA_SIGN * math.degrees(f.m.beta_rad))
     t.value(_POSITION + "true_airspeed", lambda f: f.m.true_airspeed_mps)
@@ -174,7 +171,7 @@ def _contact(t: Table) -> None:
     t.array("_emulator/gear_force_n", 10, lambda f: [wheel.vertical_force_n for wheel in f.m.gear])
 
 
-def _weather(t: Table, sim: Simulator) -> None:
+def _weather(t: Table, sim: Sources) -> None:
     # wind_speed_kt is in m/s in spite of its name
     t.value("_emulator/wind_speed_mps", lambda f: f.wind_speed)
     t.value("_emulator/wind_from_deg", lambda f: f.wind_from)
@@ -249,7 +246,7 @@ def _maximum_mass(f: Frame) -> float:
     return round(1.5 * f.m.empty_mass_kg, -1)
 
 
-def _time(t: Table, sim: Simulator) -> None:
+def _time(t: Table, sim: Sources) -> None:
     clock = sim.clocks
     t.value("sim/time/total_running_time_sec", lambda _: clock.running, always=True)
     t.value("sim/time/total_flight_time_sec", lambda _: clock.flight, writable=True)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, List
+from typing import List
 
+from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import BYTE, INT, X11, X12, Table
 from xplane_bridge.emulator.flight.frame import Frame
-
-if TYPE_CHECKING:
-    from xplane_bridge.emulator.simulator import Simulator
 
 _ELECTRICAL = "sim/cockpit2/electrical/"
 _SWITCHES = "sim/cockpit2/switches/"
@@ -17,7 +15,7 @@ _ANNUNCIATORS = "sim/cockpit2/annunciators/"
 _VIEW = "sim/graphics/view/"
 
 
-def define(t: Table, sim: Simulator) -> None:
+def define(t: Table, sim: Sources) -> None:
     """Defines this subject's datarefs."""
     _version_and_network(t, sim)
     _identity(t)
@@ -29,7 +27,7 @@ def define(t: Table, sim: Simulator) -> None:
     _radios(t)
 
 
-def _version_and_network(t: Table, sim: Simulator) -> None:
+def _version_and_network(t: Table, sim: Sources) -> None:
     t.setting("sim/version/xplane_internal_version", sim.internal_version, INT, writable=False)
     t.setting("sim/version/sim_build_string", 0, BYTE, size=256, writable=False)
     t.setting("sim/version/xplm_version", 303 if sim.version == 11 else 410, INT, writable=False)
@@ -59,7 +57,7 @@ def _identity(t: Table) -> None:
     t.setting(view + "acf_peX", 0.0)
 
 
-def _electrical(t: Table, sim: Simulator) -> None:
+def _electrical(t: Table, sim: Sources) -> None:
     e = _ELECTRICAL
     t.setting(e + "battery_on", 0, INT, size=8)
     t.setting(e + "generator_on", 0, INT, size=8)
@@ -88,7 +86,7 @@ def _electrical(t: Table, sim: Simulator) -> None:
     t.setting("sim/cockpit2/ice/ice_pitot_heat_on_copilot", 0, INT)
 
 
-def _hydraulics(t: Table, sim: Simulator) -> None:
+def _hydraulics(t: Table, sim: Sources) -> None:
     for number in (1, 2):
         t.value(
             f"sim/cockpit2/hydraulics/indicators/hydraulic_pressure_{number}",
@@ -138,7 +136,7 @@ def _autopilot(t: Table) -> None:
         t.setting(_AUTOPILOT + name)
 
 
-def _annunciators(t: Table, sim: Simulator) -> None:
+def _annunciators(t: Table, sim: Sources) -> None:
     a = _ANNUNCIATORS
     t.value(a + "master_caution", lambda f: _master_caution(f, sim), INT)
     t.value(a + "master_warning", lambda f: f.m.crashed or any(sim.failed(f"rel_engfir{i}") for i in range(8)), INT)
@@ -166,7 +164,7 @@ def _annunciators(t: Table, sim: Simulator) -> None:
     t.setting(a + "igniter_on", 0, INT, size=size, writable=False)
 
 
-def _failed(sim: Simulator, stem: str) -> List[bool]:
+def _failed(sim: Sources, stem: str) -> List[bool]:
     return [sim.failed(f"{stem}{i}") for i in range(sim.model.info.engine_count)]
 
 
@@ -176,12 +174,12 @@ def _gear_warning(f: Frame) -> bool:
     return up and f.height < 150.0 and f.m.calibrated_airspeed_mps < 1.5 * max(f.info.stall_mps, 1.0)
 
 
-def _master_caution(f: Frame, sim: Simulator) -> bool:
+def _master_caution(f: Frame, sim: Sources) -> bool:
     engines = any(not engine.running for engine in f.m.engines)
     return engines or sim.electrics.bus_volts[0] < 25.0
 
 
-def _view(t: Table, sim: Simulator) -> None:
+def _view(t: Table, sim: Sources) -> None:
     t.setting(_VIEW + "view_type", 1000, INT, writable=False)
     t.setting(_VIEW + "view_is_external", 0, INT, writable=False)
     t.setting(_VIEW + "field_of_view_deg", 60.0)

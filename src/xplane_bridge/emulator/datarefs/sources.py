@@ -1,0 +1,74 @@
+"""What datarefs and commands may know of the simulator and ask of it: it offers more than they need."""
+
+from __future__ import annotations
+
+from typing import Protocol, Tuple
+
+from xplane_bridge.emulator.datarefs.aircraft_systems import Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.store import DatarefStore
+from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, InitialState
+from xplane_bridge.emulator.flight.frame import Clocks
+
+
+class LoadedAircraft(Protocol):
+    """Which aircraft is loaded."""
+
+    model: FlightModel  #: another object after another aircraft was loaded
+
+
+class Sources(LoadedAircraft, Protocol):
+    """Where the tables take values from that are not in the frame. Objects may be replaced: ask anew each frame."""
+
+    version: int  #: 11 or 12
+    internal_version: int  #: as `sim/version/xplane_internal_version` has it
+    initial_data_rate: int  #: DATA datagrams a second
+    window_size: Tuple[int, int]  #: width and height [px]
+    totals_move: bool  #: whether `total_*_ratio` follow the stick under `override_control_surfaces`
+    store: DatarefStore
+    clocks: Clocks  #: the same object for ever
+    controls: Controls
+    electrics: Electrics
+    instruments: Instruments
+    weather: Weather
+
+    def failed(self, leaf: str) -> bool:
+        """Whether a failure dataref (`rel_...`) stands at "failed now"."""
+
+    def failures_changed(self) -> None:
+        """To be called when a failure dataref was written."""
+
+    def hydraulic_pressure_psi(self, system: int) -> float:
+        """Pressure of system 1 or 2."""
+
+    def watch_surface(self, name: str) -> None:
+        """Makes writes to a dataref that shows surfaces count while the surfaces are overridden."""
+
+
+class Actions(LoadedAircraft, Protocol):
+    """What commands do to the simulator."""
+
+    store: DatarefStore
+    clocks: Clocks
+    initial: InitialState  #: where flights start
+    last_situation: str  #: path of the situation that was saved last
+
+    def pause(self, paused: bool) -> None:
+        """Stops or continues simulated time."""
+
+    def repair_all(self) -> None:
+        """Repairs everything."""
+
+    def start_flight(self, initial: InitialState) -> None:
+        """Begins a flight."""
+
+    def load_situation(self, path: str) -> bool:
+        """Returns whether there is a situation of that name."""
+
+    def move_throttles(self, step: float) -> None:
+        """Moves all levers by `step`, within 0..1."""
+
+    def run_engine(self, engine: int, running: bool) -> None:
+        """Starts or stops one engine."""
+
+    def run_engines(self, running: bool) -> None:
+        """Starts or stops all engines."""
