@@ -4,14 +4,12 @@ import importlib
 import re
 import subprocess
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 
 import pytest
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 
 import xplane_bridge
-
-ROOT = Path(__file__).resolve().parents[2]
+from support.room_table import MOST_FILES, ROOT, not_needed, require_floors, room_table
 
 
 def sources(*folders, suffixes=(".hpp", ".cpp")):
@@ -51,17 +49,6 @@ ROS_HEADER = re.compile(
 GRAPHICS_HEADER = re.compile(r"^(opencv|opencv2|X11|xcb|turbojpeg)([/.]|$)")
 OUR_HEADER = re.compile(r"^xplane_bridge/([a-z/]+)/\w+\.hpp$")
 TREES = ("include/xplane_bridge", "lib", "tests/cpp")
-MOST_FILES = 20
-
-
-def room_table(heading):
-    """The table below a heading of docs/architecture.md: room to the rooms it may use."""
-    text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
-    section = text.split(f"\n## {heading}\n", 1)[1].split("\n## ", 1)[0]
-    rows = [line.strip("|").split("|") for line in section.splitlines() if line.startswith("| `")]
-    table = {re.findall(r"`([^`]+)`", row[0])[0]: set(re.findall(r"`([^`]+)`", row[2])) for row in rows}
-    assert table
-    return table
 
 
 def room_of(path):
@@ -95,11 +82,7 @@ def test_every_include_is_allowed_by_the_room_table():
 def test_the_room_table_names_the_rooms_there_are_and_they_form_floors():
     table = room_table("C++ rooms")
     assert set(table) == {room_of(path) for path in sources("include/xplane_bridge", "lib")}
-    placed = set()
-    while len(placed) < len(table):
-        floor = {room for room, below in table.items() if room not in placed and below <= placed}
-        assert floor, f"these rooms include each other: {sorted(set(table) - placed)}"
-        placed |= floor
+    require_floors(table)
 
 
 def test_the_room_table_allows_nothing_that_no_file_needs():
@@ -107,7 +90,7 @@ def test_the_room_table_allows_nothing_that_no_file_needs():
     used = {room: set() for room in table}
     for path in sources("include/xplane_bridge", "lib"):
         used[room_of(path)] |= {m.group(1) for m in map(OUR_HEADER.search, includes(path)) if m}
-    assert {room: below - used[room] for room, below in table.items() if below - used[room]} == {}
+    assert not_needed(table, used) == {}
 
 
 def test_rooms_are_small_and_tests_stand_in_the_room_of_what_they_test():

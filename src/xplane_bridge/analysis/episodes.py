@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Sequence
+from typing import NamedTuple, Sequence
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from xplane_bridge.bags import Table
 
 _MODES = {1: "manual", 2: "auto"}
 
@@ -41,15 +38,17 @@ def from_values(time: np.ndarray, labels: Sequence[str], end: int) -> list[Episo
     return out
 
 
-def who_flew(modes: Table, end: int) -> list[Episode]:
+def who_flew(time: np.ndarray, modes: Sequence[int], failsafes: Sequence[bool], end: int) -> list[Episode]:
     """Give the stretches flown by ``manual``, ``auto`` or, while their source was silent, ``failsafe``.
 
     Args:
-        modes: Of control/mode.
+        time: int64 [ns] of each message of control/mode, non-decreasing.
+        modes: Of each: 1 manual, 2 auto.
+        failsafes: Of each: whether the failsafe flies.
         end: [ns] where the recording ends.
     """
-    rows = zip(modes["mode"], modes["failsafe"])
-    return from_values(modes.stamp, ["failsafe" if safe else _MODES.get(int(mode), "") for mode, safe in rows], end)
+    labels = ["failsafe" if safe else _MODES.get(int(mode), "") for mode, safe in zip(modes, failsafes)]
+    return from_values(time, labels, end)
 
 
 def from_sets(time: np.ndarray, sets: Sequence[Sequence[str]], end: int) -> list[Episode]:

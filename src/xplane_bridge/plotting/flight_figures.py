@@ -42,7 +42,9 @@ def episodes(flight: Flight) -> list[tuple[str, Episode]]:
     """Give the stretches to shade: who flew, failures, excitations."""
     out: list[tuple[str, Episode]] = []
     if "mode" in flight.tables:
-        out += [(e.label, e) for e in who_flew(flight.tables["mode"], flight.end)]
+        table = flight.tables["mode"]
+        flown = who_flew(table.stamp, table["mode"], table["failsafe"], flight.end)
+        out += [(stretch.label, stretch) for stretch in flown]
     if "failures" in flight.tables:
         table = flight.tables["failures"]
         rows = zip(table["names"], table["kinds"], table["active"])

@@ -164,7 +164,8 @@ def _who_flew(flight: Flight) -> str:
         return ""
     table = flight.tables["mode"]
     rows = []
-    for stretch in who_flew(table, max(flight.end, int(table.stamp[-1]))):
+    end = max(flight.end, int(table.stamp[-1]))
+    for stretch in who_flew(table.stamp, table["mode"], table["failsafe"], end):
         first = int(np.searchsorted(table.stamp, stretch.start, side="right")) - 1
         who = f'<span class="bad">{stretch.label}</span>' if stretch.label == "failsafe" else stretch.label
         why, asked_by = (html.escape(str(table[name][first])) for name in ("reason", "requested_by"))
