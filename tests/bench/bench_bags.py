@@ -27,6 +27,7 @@ def bags(context: Context) -> List[Measure]:
     if importlib.util.find_spec("rosbag") is None:
         msg = "the rosbag API is not there to compare with: apt-get install python3-rosbag (scripts/setup does)"
         raise HarnessError(msg)
+    context.folder.mkdir(parents=True, exist_ok=True)
     hour, short = context.folder / "hour.bag", context.folder / "short.bag"
     _write(hour, round(_HOUR_S * 100))
     _write(short, round(_HOUR_S * 100) // _PEER_SHARE)
