@@ -76,11 +76,10 @@ void FailureKeeper::onLink(const core::LinkStatus& status) {
   std::lock_guard<std::mutex> lock(mutex_);
   link_status_ = status;
   changed_.notify_all();
-  if (!status.version) return;
-  const core::SimulatorGeneration generation = core::generationOf(*status.version);
-  if (menu_group_ >= 0 && generation == generation_) return;
-  generation_ = generation;
-  menu_datarefs_ = core::simulatorFailures(generation);
+  if (!status.version.known()) return;
+  if (menu_group_ >= 0 && status.version == version_) return;
+  version_ = status.version;
+  menu_datarefs_ = core::simulatorFailures(version_);
   if (menu_group_ >= 0) link_->removeGroup(menu_group_);
   menu_group_ = link_->addGroup({"failures", menu_datarefs_, kMenuRate, 0});
 }
@@ -376,7 +375,7 @@ void FailureKeeper::publishLocked() {
 }
 
 std::optional<ServiceResult> FailureKeeper::add(const core::FailureRequest& request, const std::string& who) {
-  const auto planned = core::planFailure(request, generation_);
+  const auto planned = core::planFailure(request, version_);
   if (planned.error == core::FailureError::kInvalid) return result(ServiceResult::REFUSED, planned.text);
   if (planned.error != core::FailureError::kNone) return result(ServiceResult::NOT_SUPPORTED, planned.text);
   const std::string& name = planned.plan.name;
@@ -422,11 +421,11 @@ void FailureKeeper::set(const SetFailure::Request& request, const std::string& w
                             static_cast<double>(request.trigger_value)};
   if (request.has_value) wish.value = static_cast<double>(request.value);
   std::unique_lock<std::mutex> lock(mutex_);
-  if (!isUp(link_status_) || !link_status_.version) {
+  if (!isUp(link_status_) || !link_status_.version.known()) {
     response->result = result(ServiceResult::NO_LINK, "X-Plane is not connected");
     return;
   }
-  const auto planned = core::planFailure(wish, generation_);
+  const auto planned = core::planFailure(wish, version_);
   if (planned.error == core::FailureError::kNone) {
     lock.unlock();
     bool answered = true;

@@ -136,10 +136,6 @@ double FlightJobs::left(Time deadline) {
 
 bool FlightJobs::over(Time deadline) const { return stopping_ || left(deadline) <= 0.0; }
 
-core::SimulatorGeneration FlightJobs::generation() const {
-  return core::generationOf(link_->status().version.value_or(0));
-}
-
 void FlightJobs::write(const std::vector<core::DatarefWrite>& writes) {
   for (const core::DatarefWrite& each : writes) link_->sendDref(each.dataref, each.value);
 }
@@ -167,7 +163,7 @@ void FlightJobs::pause(bool paused) {
 // --- placing ---
 
 std::optional<core::ShownFlight> FlightJobs::shownFlight() {
-  return core::shownFlightFrom(link_->readDatarefs(core::shownFlightDatarefs(generation()), kPoll));
+  return core::shownFlightFrom(link_->readDatarefs(core::shownFlightDatarefs(link_->status().version), kPoll));
 }
 
 FlightJobs::Outcome FlightJobs::place(const core::FlightStart& start) {
@@ -183,7 +179,7 @@ FlightJobs::Outcome FlightJobs::place(const core::FlightStart& start) {
 
 std::string FlightJobs::placed(const core::FlightStart& start) {
   // X-Plane 12 moves an aircraft that flies; one that has crashed needs a new flight.
-  const bool moves = generation() == core::SimulatorGeneration::k12;
+  const bool moves = link_->status().version.is12();
   bool anew = !moves || hooks_.watch().crashed;
   std::optional<core::ShownFlight> shown;
   // Scenery may have to be loaded.
@@ -211,7 +207,7 @@ std::string FlightJobs::placed(const core::FlightStart& start) {
   };
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
     write(core::motionWrites(start, *shown));
-    const auto values = link_->readDatarefsUntil(core::shownFlightDatarefs(generation()), kPoll, fits);
+    const auto values = link_->readDatarefsUntil(core::shownFlightDatarefs(link_->status().version), kPoll, fits);
     if (const auto now = core::shownFlightFrom(values)) shown = now;
     if (fits(values)) return "";
   }
@@ -221,11 +217,11 @@ std::string FlightJobs::placed(const core::FlightStart& start) {
 // --- settings ---
 
 FlightJobs::Outcome FlightJobs::blow(const core::UniformWind& wind) {
-  const auto names = core::shownWindDatarefs(generation());
+  const auto names = core::shownWindDatarefs(link_->status().version);
   const auto fits = [wind](const std::vector<core::DatarefValue>& values) { return core::shows(wind, values); };
   std::vector<core::DatarefValue> values;
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
-    write(core::windWrites(wind, generation()));
+    write(core::windWrites(wind, link_->status().version));
     for (const Time again = in(1.0); !over(again);) {
       values = link_->readDatarefsUntil(names, kPoll, fits);
       if (fits(values)) return {Event::SETTING, "the wind blows as asked for", true};
@@ -239,7 +235,7 @@ FlightJobs::Outcome FlightJobs::blow(const core::UniformWind& wind) {
 }
 
 FlightJobs::Outcome FlightJobs::load(const core::Loading& loading) {
-  const auto writes = core::loadingWrites(loading, generation());
+  const auto writes = core::loadingWrites(loading, link_->status().version);
   std::vector<std::string> names;
   names.reserve(writes.size());
   for (const core::DatarefWrite& each : writes) names.push_back(each.dataref);

@@ -62,7 +62,7 @@ const char* SurfaceControl::toString(State state) {
 }
 
 void SurfaceControl::subscribe() {
-  core::RrefGroup group{"surfaces", core::surfaceWatchDatarefs(generation_), core::kEveryFrameRateHz, 1};
+  core::RrefGroup group{"surfaces", core::surfaceWatchDatarefs(version_), core::kEveryFrameRateHz, 1};
   frames_ = std::make_unique<core::RrefFrameAssembler>(group.datarefs.size());
   if (group_ < 0) {
     group_ = link_->addGroup(std::move(group));
@@ -75,9 +75,10 @@ void SurfaceControl::onLink(const core::LinkStatus& status) {
   std::lock_guard<std::mutex> lock(mutex_);
   flowing_ = status.state == core::LinkState::kConnected;
   if (!flowing_) watch_.interrupt();
-  if (!status.version || core::generationOf(*status.version) == generation_) return;
-  generation_ = core::generationOf(*status.version);
-  subscribe();
+  if (!status.version.known() || status.version == version_) return;
+  const bool same = core::surfaceWatchDatarefs(status.version) == core::surfaceWatchDatarefs(version_);
+  version_ = status.version;
+  if (!same) subscribe();
 }
 
 bool SurfaceControl::onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info) {

@@ -42,7 +42,7 @@ std::vector<std::uint8_t> fullPacket() {
 
 template <typename State>
 struct Group {
-  GroupDecoder<State> decoder{Transport::kData, XPlaneVersion::k11};
+  GroupDecoder<State> decoder{Transport::kData, kXPlane11};
   std::vector<float> unknown = std::vector<float>(decoder.requests().size(), kNaNf);
   State state;
 
@@ -78,7 +78,7 @@ double decodePacket() {
 
 double assembleFlightState() {
   FlightStateAssembler::Options options;
-  options.version = XPlaneVersion::k11;
+  options.version = kXPlane11;
   FlightStateAssembler assembler(options);
   std::vector<std::uint8_t> datagram = {'R', 'R', 'E', 'F', ','};
   std::size_t time_at = 0;

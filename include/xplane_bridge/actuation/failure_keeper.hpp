@@ -95,7 +95,7 @@ class FailureKeeper {
   std::condition_variable changed_;
   bool stopped_ = false;
   core::LinkStatus link_status_;
-  core::SimulatorGeneration generation_ = core::SimulatorGeneration::k11;
+  core::SimulatorVersion version_;
   core::FailureBook book_;
   core::FlightConditions now_;
   double tick_time_ = 0.0;     // [s] steady

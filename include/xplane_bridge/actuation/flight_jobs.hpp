@@ -105,7 +105,6 @@ class FlightJobs {
   bool over(Time deadline) const;
   void write(const std::vector<core::DatarefWrite>& writes);
   void pause(bool paused);
-  core::SimulatorGeneration generation() const;
   /// Why X-Plane may not have shown it, for the end of a sentence; empty: no reason is known.
   std::string excuse() const;
 

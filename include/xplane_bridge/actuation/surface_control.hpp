@@ -143,7 +143,7 @@ class SurfaceControl {
   Report report_;
 
   mutable std::mutex mutex_;
-  core::SimulatorGeneration generation_ = core::SimulatorGeneration::k11;
+  core::SimulatorVersion version_;
   core::GroupId group_ = -1;
   std::unique_ptr<core::RrefFrameAssembler> frames_;
   core::SurfaceSample sample_;

@@ -45,7 +45,7 @@ Eigen::Quaterniond headOrientation(const Head& head) {
 
 std::vector<DatarefRequest> requestsOf() {
   std::vector<DatarefRequest> wanted;
-  for (DatarefRequest& request : datarefRequests(FieldGroup::kSim, Transport::kRref, XPlaneVersion::k11)) {
+  for (DatarefRequest& request : datarefRequests(FieldGroup::kSim, Transport::kRref, SimulatorVersion{})) {
     if (std::find(kFields.begin(), kFields.end(), request.field->field) != kFields.end()) {
       wanted.push_back(std::move(request));
     }

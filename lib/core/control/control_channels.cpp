@@ -101,12 +101,8 @@ std::string elementName(const char* dataref, Channel channel) {
 
 const char* const kSurfaceOverride = "sim/operation/override/override_control_surfaces";
 
-SimulatorGeneration generationOf(int internal_version) {
-  return internal_version >= 120000 ? SimulatorGeneration::k12 : SimulatorGeneration::k11;
-}
-
 const ChannelWire& channelWire(Channel channel, const EncoderOptions& options) {
-  if (channel == Channel::kFlaps && options.generation == SimulatorGeneration::k12) return kFlaps12;
+  if (channel == Channel::kFlaps && options.version.is12()) return kFlaps12;
   if (isLever(channel) && options.reverse_thrust) return kReverseLever;
   return std::find_if(std::begin(kRows), std::end(kRows),
                       [channel](const Row& row) { return channel >= row.first && channel <= row.last; })

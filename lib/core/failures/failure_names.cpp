@@ -47,14 +47,14 @@ std::vector<std::string> words(const char* text) {
   return out;
 }
 
-std::vector<std::string> makeNames(SimulatorGeneration generation) {
+std::vector<std::string> makeNames(SimulatorVersion version) {
   std::vector<std::string> out;
   const auto add = [&out](const std::string& leaf) { out.push_back(failureDataref("rel_" + leaf)); };
   for (const std::string& leaf : words(kOfBoth)) add(leaf);
   for (const std::string& stem : words(kOfEngines)) {
     for (int engine = 0; engine < kEngines; ++engine) add(stem + std::to_string(engine));
   }
-  if (generation == SimulatorGeneration::k11) {
+  if (!version.is12()) {
     for (const std::string& leaf : words(kOf11)) add(leaf);
     return out;
   }
@@ -74,10 +74,10 @@ bool touchesSurfaces(const std::string& dataref) {
                      [&name](const char* beginning) { return name.rfind(beginning, 0) == 0; });
 }
 
-const std::vector<std::string>& simulatorFailures(SimulatorGeneration generation) {
-  static const std::vector<std::string> names11 = makeNames(SimulatorGeneration::k11);
-  static const std::vector<std::string> names12 = makeNames(SimulatorGeneration::k12);
-  return generation == SimulatorGeneration::k12 ? names12 : names11;
+const std::vector<std::string>& simulatorFailures(SimulatorVersion version) {
+  static const std::vector<std::string> names11 = makeNames(kXPlane11);
+  static const std::vector<std::string> names12 = makeNames(kXPlane12);
+  return version.is12() ? names12 : names11;
 }
 
 }  // namespace xplane_bridge::core

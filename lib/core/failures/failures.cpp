@@ -79,7 +79,7 @@ std::string ownSurfaceFailure(const SurfaceInfo& surface, const std::string& kin
   return "rel_fcon_" + std::string(stem) + "_" + set + "_" + side + suffix;
 }
 
-FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface, SimulatorGeneration generation) {
+FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface, SimulatorVersion version) {
   FailurePlanResult out;
   out.plan = {request.name, request.kind, request.value, {}, std::nullopt};
   const auto fault = surfaceFaultFrom(request.kind);
@@ -93,7 +93,7 @@ FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface
     if (const auto wrong = validate(failure)) return refuse(FailureError::kInvalid, request.name + " " + *wrong);
     out.plan.surface = failure;
   }
-  if (generation == SimulatorGeneration::k12) {
+  if (version.is12()) {
     const std::string own = ownSurfaceFailure(surfaceTable()[surface], request.kind, request.value.has_value());
     if (!own.empty()) out.plan.datarefs.push_back(failureDataref(own));
   }
@@ -151,9 +151,9 @@ std::string failureName(const std::string& name) {
   return name.compare(0, kFolder.size(), kFolder) == 0 ? name.substr(kFolder.size()) : name;
 }
 
-FailurePlanResult planFailure(const FailureRequest& request, SimulatorGeneration generation) {
+FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion version) {
   if (const auto wrong = checkTrigger(request)) return refuse(FailureError::kInvalid, *wrong);
-  if (const auto surface = surfaceNumber(request.name)) return planSurface(request, *surface, generation);
+  if (const auto surface = surfaceNumber(request.name)) return planSurface(request, *surface, version);
 
   FailurePlanResult out;
   out.plan = {request.name, request.kind, std::nullopt, {}, std::nullopt};

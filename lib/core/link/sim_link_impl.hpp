@@ -178,7 +178,7 @@ class SimLink::Impl {
   std::int64_t next_rpos_request_ns_ = 0;
   std::int64_t next_xpc_request_ns_ = 0;
 
-  std::optional<std::int32_t> version_;
+  SimulatorVersion version_;
   std::optional<bool> paused_;
   std::optional<float> sim_time_s_;
   LinkCounters live_counters_;  // of this thread; published in housekeeping

@@ -130,7 +130,7 @@ void SimLink::Impl::takeStatus(const RrefPair& pair) {
   switch (pair.index) {
     case kVersionIndex:
       if (pair.value > 0.0F) {  // zero before a flight is loaded
-        version_ = static_cast<std::int32_t>(std::lround(pair.value));
+        version_.number = static_cast<std::int32_t>(std::lround(pair.value));
       }
       break;
     case kPausedIndex:

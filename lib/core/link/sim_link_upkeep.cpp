@@ -89,7 +89,7 @@ void SimLink::Impl::setPeer(const Endpoint& peer, const std::string& why) {
   if (const std::optional<BeaconSighting> sighting = beacons_.at(peer, now_ns_)) {
     peer_name_ = sighting->computer_name;
   }
-  version_.reset();
+  version_ = {};
   paused_.reset();
   sim_time_s_.reset();
   monitor_.newPeer();

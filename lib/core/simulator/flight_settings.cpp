@@ -53,8 +53,8 @@ std::optional<std::string> check(const UniformWind& wind) {
   return outside("turbulence", wind.turbulence, 0.0, 1.0, "-");
 }
 
-std::vector<DatarefWrite> windWrites(const UniformWind& wind, SimulatorGeneration generation) {
-  const bool is12 = generation == SimulatorGeneration::k12;
+std::vector<DatarefWrite> windWrites(const UniformWind& wind, SimulatorVersion version) {
+  const bool is12 = version.is12();
   const std::string at = is12 ? "sim/weather/region/" : "sim/weather/";
   const double speed = is12 ? wind.speed * kRegionSpeedPerMps : wind.speed / kMetersPerSecondPerKnot;
   std::vector<DatarefWrite> out;
@@ -75,8 +75,8 @@ std::vector<DatarefWrite> windWrites(const UniformWind& wind, SimulatorGeneratio
   return out;
 }
 
-std::vector<std::string> shownWindDatarefs(SimulatorGeneration generation) {
-  if (generation == SimulatorGeneration::k12) {
+std::vector<std::string> shownWindDatarefs(SimulatorVersion version) {
+  if (version.is12()) {
     return {"sim/weather/aircraft/wind_now_speed_msc", "sim/weather/aircraft/wind_now_direction_degt"};
   }
   // In metres a second, in spite of its name.
@@ -110,14 +110,14 @@ std::optional<std::string> check(const Loading& loading) {
   return outside("cg_offset", *loading.cg_offset, -kMaxCgOffset, kMaxCgOffset, "m, aft +");
 }
 
-std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorGeneration generation) {
+std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version) {
   std::vector<DatarefWrite> out;
   for (std::size_t i = 0; i < loading.fuel_tank.size(); ++i) {
     out.push_back({element(kFuel, i), static_cast<float>(loading.fuel_tank[i])});
   }
   if (loading.payload_mass) out.push_back({kPayload, static_cast<float>(*loading.payload_mass)});
   if (loading.cg_offset) {
-    const char* const name = generation == SimulatorGeneration::k12 ? kCg12 : kCg11;
+    const char* const name = version.is12() ? kCg12 : kCg11;
     out.push_back({name, static_cast<float>(*loading.cg_offset)});
   }
   return out;

@@ -99,8 +99,8 @@ VehiclePose poseOf(const FlightStart& start) {
   return out;
 }
 
-const std::vector<std::string>& shownFlightDatarefs(SimulatorGeneration generation) {
-  static const auto list = [](SimulatorGeneration g) {
+const std::vector<std::string>& shownFlightDatarefs(SimulatorVersion version) {
+  static const auto list = [](SimulatorVersion g) {
     const std::string at = "sim/flightmodel/position/";
     std::vector<std::string> out{at + "lat_ref", at + "lon_ref", "sim/physics/earth_radius_m"};
     for (const char* axis : {"x", "y", "z"}) out.push_back(at + "local_" + axis);
@@ -109,9 +109,9 @@ const std::vector<std::string>& shownFlightDatarefs(SimulatorGeneration generati
     for (const std::string& name : shownWindDatarefs(g)) out.push_back(name);
     return out;
   };
-  static const std::vector<std::string> names11 = list(SimulatorGeneration::k11);
-  static const std::vector<std::string> names12 = list(SimulatorGeneration::k12);
-  return generation == SimulatorGeneration::k12 ? names12 : names11;
+  static const std::vector<std::string> names11 = list(kXPlane11);
+  static const std::vector<std::string> names12 = list(kXPlane12);
+  return version.is12() ? names12 : names11;
 }
 
 std::optional<ShownFlight> shownFlightFrom(const std::vector<DatarefValue>& values) {

@@ -4,12 +4,6 @@
 
 namespace xplane_bridge::core {
 
-XPlaneVersion xplaneVersion(std::int32_t internal_version) {
-  constexpr std::int32_t kFirstOf12 = 120000;
-  if (internal_version <= 0) return XPlaneVersion::kUnknown;
-  return internal_version >= kFirstOf12 ? XPlaneVersion::k12 : XPlaneVersion::k11;
-}
-
 const char* toString(FieldGroup group) {
   switch (group) {
     case FieldGroup::kFlight:
@@ -104,14 +98,15 @@ std::vector<std::string> expandDatarefPath(std::string_view pattern, int count) 
   return expanded;
 }
 
-std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, XPlaneVersion version, int engines) {
+std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, SimulatorVersion version,
+                                            int engines) {
   std::vector<DatarefRequest> requests;
   for (const FieldSpec& field : fieldTable()) {
     if (field.group != group || field.store == nullptr) continue;
     if (transport == Transport::kData && field.row.row11 >= 0) continue;
     const DatarefSource& source = field.dataref;
-    if (source.path12 != nullptr && version == XPlaneVersion::kUnknown) continue;
-    const char* path = source.path12 != nullptr && version == XPlaneVersion::k12 ? source.path12 : source.path11;
+    if (source.path12 != nullptr && !version.known()) continue;
+    const char* path = source.path12 != nullptr && version.is12() ? source.path12 : source.path11;
     if (path == nullptr) continue;
     const std::vector<std::string> paths = expandDatarefPath(path, field.count);
     const int wanted = field.per_engine ? std::min(engines, field.count) : field.count;
@@ -122,12 +117,12 @@ std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transpor
   return requests;
 }
 
-std::vector<std::int32_t> dataRows(const std::vector<FieldGroup>& groups, XPlaneVersion version) {
+std::vector<std::int32_t> dataRows(const std::vector<FieldGroup>& groups, SimulatorVersion version) {
   std::vector<std::int32_t> rows;
   for (const FieldSpec& field : fieldTable()) {
     if (field.store == nullptr || std::find(groups.begin(), groups.end(), field.group) == groups.end()) continue;
-    if (version != XPlaneVersion::k12 && field.row.row11 >= 0) rows.push_back(field.row.row11);
-    if (version != XPlaneVersion::k11 && field.row.row12 >= 0) rows.push_back(field.row.row12);
+    if (!version.is12() && field.row.row11 >= 0) rows.push_back(field.row.row11);
+    if (!version.is11() && field.row.row12 >= 0) rows.push_back(field.row.row12);
   }
   std::sort(rows.begin(), rows.end());
   rows.erase(std::unique(rows.begin(), rows.end()), rows.end());

@@ -69,7 +69,7 @@ bool FlightStateAssembler::wantsRpos() const {
   return options_.position == PositionMode::kAuto || options_.position == PositionMode::kRpos;
 }
 
-void FlightStateAssembler::setVersion(XPlaneVersion version) {
+void FlightStateAssembler::setVersion(SimulatorVersion version) {
   if (version == options_.version) return;
   options_.version = version;
   decoder_ = StateDecoder(FieldGroup::kFlight, options_.transport, version);

@@ -27,12 +27,12 @@ struct ResolvedRow {
   Conversion conversion;
 };
 
-ResolvedRow resolve(const RowSource& source, XPlaneVersion version) {
+ResolvedRow resolve(const RowSource& source, SimulatorVersion version) {
   const bool differs = source.row12 != source.row11 || source.slot12 != source.slot11 ||
                        source.conversion12.factor != source.conversion11.factor ||
                        source.conversion12.offset != source.conversion11.offset;
-  if (differs && version == XPlaneVersion::kUnknown) return {};
-  if (version == XPlaneVersion::k12) return {source.row12, source.slot12, source.conversion12};
+  if (differs && !version.known()) return {};
+  if (version.is12()) return {source.row12, source.slot12, source.conversion12};
   return {source.row11, source.slot11, source.conversion11};
 }
 
@@ -51,7 +51,7 @@ void RowStore::update(const DataView& data, std::int64_t receive_ns) {
 
 void RowStore::clear() { times_.fill(kNever); }
 
-StateDecoder::StateDecoder(FieldGroup group, Transport transport, XPlaneVersion version, int engines)
+StateDecoder::StateDecoder(FieldGroup group, Transport transport, SimulatorVersion version, int engines)
     : group_(group), requests_(datarefRequests(group, transport, version, engines)) {
   std::size_t next_request = 0;
   for (const FieldSpec& field : fieldTable()) {
@@ -72,7 +72,7 @@ StateDecoder::StateDecoder(FieldGroup group, Transport transport, XPlaneVersion 
       plan.count = field.row.count;
       plan.conversion = row.conversion;
     } else {
-      const bool newer = field.dataref.path12 != nullptr && version == XPlaneVersion::k12;
+      const bool newer = field.dataref.path12 != nullptr && version.is12();
       plan.conversion = newer ? field.dataref.conversion12 : field.dataref.conversion;
       // Requests are in the table's order, so those of this field are next.
       plan.first = next_request;

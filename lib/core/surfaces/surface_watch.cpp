@@ -20,8 +20,8 @@ std::array<double, 3> totals(const MixingInputs& in) { return {in.roll, in.pitch
 
 }  // namespace
 
-std::vector<std::string> surfaceWatchDatarefs(SimulatorGeneration generation) {
-  const EncoderOptions options{generation, false};
+std::vector<std::string> surfaceWatchDatarefs(SimulatorVersion version) {
+  const EncoderOptions options{version, false};
   std::vector<std::string> out = {"sim/time/total_running_time_sec", "sim/operation/misc/frame_rate_period",
                                   kSurfaceOverride, "sim/flightmodel/position/alpha", "sim/flightmodel/position/beta"};
   for (const Channel channel :

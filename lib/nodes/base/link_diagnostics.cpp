@@ -46,7 +46,7 @@ void fillLinkDiagnostics(const core::LinkStatus& link, const core::LinkCounters&
 
   status->add("X-Plane", link.peer.valid() ? link.peer.toString() : "not found");
   status->add("X-Plane's computer", link.computer_name);
-  status->add("X-Plane version", link.version ? std::to_string(*link.version) : "unknown");
+  status->add("X-Plane version", link.version.known() ? std::to_string(link.version.number) : "unknown");
   status->add("Link epoch (-)", link.epoch);
   status->add("Silence (s)", link.silence_s);
   status->add("Beacons heard (-)", link.beacons.size());

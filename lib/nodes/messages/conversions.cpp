@@ -355,7 +355,7 @@ void toMessage(const core::LinkStatus& link, const std::string& transport, LinkS
   message->host = link.peer.address != 0 ? link.peer.addressString() : "";
   message->port = link.peer.port;
   message->transport = transport;
-  message->xplane_version = link.version.value_or(0);
+  message->xplane_version = link.version.number;
   message->host_name = link.computer_name;
   message->silence = link.silence_s;
 }

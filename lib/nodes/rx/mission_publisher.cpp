@@ -28,7 +28,7 @@ class TypedMissionPublisher : public MissionPublisher {
     publisher_ = handle->advertise<Message>(std::string("mission/") + core::toString(group()), kQueueSize);
   }
 
-  void configure(core::XPlaneVersion version) override {
+  void configure(core::SimulatorVersion version) override {
     version_ = version;
     rebuild();
   }
@@ -102,7 +102,7 @@ class TypedMissionPublisher : public MissionPublisher {
   }
 
   core::Transport transport_;
-  core::XPlaneVersion version_ = core::XPlaneVersion::kUnknown;
+  core::SimulatorVersion version_;
   int rate_;
   int engines_ = kFirstGuessOfEngines;
   int engines_seen_ = 0;

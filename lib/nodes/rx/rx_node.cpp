@@ -275,9 +275,8 @@ void RxNode::supervise() {
 }
 
 void RxNode::adoptVersion(const core::LinkStatus& status) {
-  core::XPlaneVersion version = core::XPlaneVersion::kUnknown;
-  if (status.version) {
-    version = core::xplaneVersion(*status.version);
+  const core::SimulatorVersion version = status.version;
+  if (version.known()) {
     waiting_for_version_since_.reset();
   } else {
     const bool answers = status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;

@@ -30,8 +30,7 @@ void TxNode::loadParameters(const ParamLoader& own) {
   options_ = loadTxOptions(own, common().aircraft);
   arbiter_ = std::make_unique<core::ControlArbiter>(options_.arbiter, now());
   arbiter_->setFlowing(false, now());
-  encoder_ = std::make_unique<core::ControlEncoder>(
-      core::EncoderOptions{core::SimulatorGeneration::k11, options_.aircraft.reverse_thrust});
+  encoder_ = std::make_unique<core::ControlEncoder>(core::EncoderOptions{{}, options_.aircraft.reverse_thrust});
 }
 
 void TxNode::advertise() {
@@ -321,13 +320,10 @@ void TxNode::onLinkState(const core::LinkStatus& status) {
     failures_->onLink(status);
     if (status.state == core::LinkState::kLost) excitation_->abort("the link is lost");
     arbiter_->setFlowing(status.state == core::LinkState::kConnected, time);
-    if (status.version) {
-      const auto generation = core::generationOf(*status.version);
-      if (generation != encoder_->options().generation) {
-        encoder_ =
-            std::make_unique<core::ControlEncoder>(core::EncoderOptions{generation, options_.aircraft.reverse_thrust});
-        read_back_channels_.reset();
-      }
+    if (status.version.known() && status.version != encoder_->options().version) {
+      encoder_ = std::make_unique<core::ControlEncoder>(
+          core::EncoderOptions{status.version, options_.aircraft.reverse_thrust});
+      read_back_channels_.reset();
     }
     const auto journal = link().journal();
     if (status.peer.valid() && journal) guardian_.setPeer(status.peer, journal->path());

@@ -87,7 +87,7 @@ void TxNode::ground(const std::string& why) {
 std::optional<ServiceResult> TxNode::refusalOfJob(const std::optional<std::string>& wrong) const {
   ServiceResult out;
   std::lock_guard<std::mutex> lock(mutex_);
-  const std::int32_t version = link_status_.version.value_or(0);
+  const std::int32_t version = link_status_.version.number;
   if (wrong) {
     out.code = ServiceResult::REFUSED;
     out.message = *wrong;

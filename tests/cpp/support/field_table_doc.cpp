@@ -12,7 +12,7 @@ namespace {
 void printRequests() {
   using namespace xplane_bridge::core;
   for (std::size_t group = 0; group < kFieldGroupCount; ++group) {
-    for (const auto& [version, number] : {std::pair{XPlaneVersion::k11, 11}, std::pair{XPlaneVersion::k12, 12}}) {
+    for (const auto& [version, number] : {std::pair{kXPlane11, 11}, std::pair{kXPlane12, 12}}) {
       for (const DatarefRequest& request : datarefRequests(static_cast<FieldGroup>(group), Transport::kRref, version)) {
         std::cout << number << ' ' << request.path << '\n';
       }

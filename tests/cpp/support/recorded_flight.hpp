@@ -63,7 +63,7 @@ class RecordedFlight {
   }
 
   std::size_t size() const { return json_["frames"].size(); }
-  XPlaneVersion version() const { return xplaneVersion(json_["version"].get<std::int32_t>()); }
+  SimulatorVersion version() const { return {json_["version"].get<std::int32_t>()}; }
   double truth(std::size_t frame, const std::string& name) const { return json_["frames"][frame]["truth"][name]; }
   bool answers(const std::string& path) const { return !json_["frames"][0]["rref"][index_.at(path)].is_null(); }
   float value(std::size_t frame, const std::string& path) const {

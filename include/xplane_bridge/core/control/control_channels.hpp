@@ -4,15 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/base/simulator_version.hpp"
 #include "xplane_bridge/core/control/control_command.hpp"
 
 namespace xplane_bridge::core {
-
-/// X-Plane generations that differ in datarefs. 10 is treated as 11.
-enum class SimulatorGeneration : std::uint8_t { k11, k12 };
-
-/// From the internal version number of `sim/version/xplane_internal_version` or the beacon, e.g. 115501 or 122015.
-SimulatorGeneration generationOf(int internal_version);
 
 /// How often a channel has to be written.
 enum class Refresh : std::uint8_t {
@@ -37,7 +32,7 @@ struct ChannelWire {
 
 /// What decides between alternative datarefs.
 struct EncoderOptions {
-  SimulatorGeneration generation = SimulatorGeneration::k11;
+  SimulatorVersion version;
   /// Levers go through the dataref whose negative half is reverse thrust. Without it levers below 0 have no meaning and
   /// the arbiter's limits must keep them at 0 and above.
   bool reverse_thrust = false;
@@ -61,7 +56,7 @@ extern const char* const kSurfaceOverride;
 /// overridden"). Anything else is not the bridge's to release: nullopt.
 std::optional<DatarefWrite> releaseOf(const std::string& dataref);
 
-/// Turns channel values into writes. Holds the dataref names of one generation, so nothing is put together per command.
+/// Turns channel values into writes. Holds the dataref names of one version, so nothing is put together per command.
 class ControlEncoder {
  public:
   explicit ControlEncoder(const EncoderOptions& options);

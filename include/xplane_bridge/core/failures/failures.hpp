@@ -1,4 +1,4 @@
-/// Failures: what can break, how each X-Plane generation is told, when it comes true, and the labels of it.
+/// Failures: what can break, how each X-Plane version is told, when it comes true, and the labels of it.
 ///
 /// X-Plane's own failures are datarefs sim/operation/failures/rel_* (6 failed now, 0 works). Surface failures that
 /// X-Plane cannot express are flown by SurfaceDriver.
@@ -54,8 +54,8 @@ struct FailurePlanResult {
   FailurePlan plan;
 };
 
-/// How `generation` of X-Plane is made to show the failure; nothing is looked up in the running simulator.
-FailurePlanResult planFailure(const FailureRequest& request, SimulatorGeneration generation);
+/// How that version of X-Plane is made to show the failure; nothing is looked up in the running simulator.
+FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion version);
 
 /// What triggers look at; NaN: unknown, the trigger waits.
 struct FlightConditions {

@@ -10,6 +10,7 @@
 
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/log.hpp"
+#include "xplane_bridge/core/base/simulator_version.hpp"
 #include "xplane_bridge/core/link/data_output.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/link/link_monitor.hpp"
@@ -58,12 +59,12 @@ struct ReceiveInfo {
 
 struct LinkStatus {
   LinkState state = LinkState::kSearching;
-  std::string reason;                   ///< one sentence
-  std::uint32_t epoch = 0;              ///< raised each time the link came up anew; 0 before the first time
-  std::int64_t since_steady_ns = 0;     ///< [ns] when `state` began
-  Endpoint peer;                        ///< X-Plane; not valid() while unknown
-  std::string computer_name;            ///< from the beacon; empty without
-  std::optional<std::int32_t> version;  ///< sim/version/xplane_internal_version, e.g. 115501
+  std::string reason;                ///< one sentence
+  std::uint32_t epoch = 0;           ///< raised each time the link came up anew; 0 before the first time
+  std::int64_t since_steady_ns = 0;  ///< [ns] when `state` began
+  Endpoint peer;                     ///< X-Plane; not valid() while unknown
+  std::string computer_name;         ///< from the beacon; empty without
+  SimulatorVersion version;          ///< unknown until X-Plane has answered
   std::optional<bool> paused;
   std::optional<float> sim_time_s;      ///< sim/time/total_running_time_sec as received
   double silence_s = 0.0;               ///< [s] since the last valid datagram; NaN before the first

@@ -28,9 +28,9 @@ inline constexpr double kRegionSpeedPerMps = 1.0;
 
 std::optional<std::string> check(const UniformWind& wind);
 /// Every layer of X-Plane's weather gets the same wind without shear; real weather and its changing end.
-std::vector<DatarefWrite> windWrites(const UniformWind& wind, SimulatorGeneration generation);
+std::vector<DatarefWrite> windWrites(const UniformWind& wind, SimulatorVersion version);
 /// Speed [m/s] and direction [deg, from, true] of the air at the aircraft.
-std::vector<std::string> shownWindDatarefs(SimulatorGeneration generation);
+std::vector<std::string> shownWindDatarefs(SimulatorVersion version);
 /// The values of shownWindDatarefs() are this wind, gusts of its turbulence allowed.
 bool shows(const UniformWind& wind, const std::vector<DatarefValue>& values);
 
@@ -45,7 +45,7 @@ struct Loading {
 
 std::optional<std::string> check(const Loading& loading);
 /// Datarefs that show the same value once X-Plane took it. The balance comes last: X-Plane moves it with the masses.
-std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorGeneration generation);
+std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version);
 /// One of loadingWrites() is shown; engines burn fuel meanwhile.
 bool shows(const DatarefWrite& loading, double shown);
 

@@ -13,16 +13,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "xplane_bridge/core/base/simulator_version.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 
 namespace xplane_bridge::core {
-
-/// What of X-Plane's version decides about sources.
-enum class XPlaneVersion : std::uint8_t { kUnknown, k11, k12 };
-
-/// @param internal_version `sim/version/xplane_internal_version` or the beacon's, e.g. 115501; 0 unknown
-/// @return k11 also for 9 and 10, whose rows it shares except as docs/fields.md says
-XPlaneVersion xplaneVersion(std::int32_t internal_version);
 
 enum class Transport : std::uint8_t { kRref, kData };
 
@@ -111,13 +105,13 @@ struct DatarefRequest {
 
 /// What to ask for, in index order: position in the list is the index to give X-Plane.
 /// @param transport with kData only what no row carries
-/// @param version with kUnknown, fields whose source differs between versions are left out
+/// @param version while unknown, fields whose source differs between versions are left out
 /// @param engines elements asked for of fields by engine; X-Plane answers all 8, few aircraft have them
-std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, XPlaneVersion version,
+std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, SimulatorVersion version,
                                             int engines = 8);
 
 /// DATA rows that carry fields of these groups, ascending, each once. All rows of every version when it is unknown.
-std::vector<std::int32_t> dataRows(const std::vector<FieldGroup>& groups, XPlaneVersion version);
+std::vector<std::int32_t> dataRows(const std::vector<FieldGroup>& groups, SimulatorVersion version);
 
 /// Expands `{a,b}` and `[*]`. @param count elements of the field
 std::vector<std::string> expandDatarefPath(std::string_view pattern, int count);

@@ -34,7 +34,7 @@ class FlightStateAssembler {
  public:
   struct Options {
     Transport transport = Transport::kRref;
-    XPlaneVersion version = XPlaneVersion::kUnknown;
+    SimulatorVersion version;
     PositionMode position = PositionMode::kAuto;
     AttitudeReference row_attitude_reference = kDefaultRowAttitudeReference;
     double max_supplement_age = 1.0;  ///< kData: values from RREF older than this are unknown [s]
@@ -63,8 +63,8 @@ class FlightStateAssembler {
   bool wantsRpos() const;
 
   /// The version became known or changed: requests() and rows() change with it.
-  void setVersion(XPlaneVersion version);
-  XPlaneVersion version() const { return options_.version; }
+  void setVersion(SimulatorVersion version);
+  SimulatorVersion version() const { return options_.version; }
 
   /// @return the state of a completed frame, valid until the next call; null when none was completed or it is to be
   /// dropped
@@ -137,7 +137,7 @@ class MissionAssembler {
  public:
   struct Options {
     Transport transport = Transport::kRref;
-    XPlaneVersion version = XPlaneVersion::kUnknown;
+    SimulatorVersion version;
     int rate = defaultRate(GroupOf<State>::kGroup);  ///< [1/s]
     int engines = kMaxEngines;                       ///< of which values are asked for
     double max_age = 1.5;                            ///< older values are unknown [s], at least two periods

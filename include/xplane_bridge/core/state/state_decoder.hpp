@@ -77,7 +77,7 @@ struct GroupOf<SimStatus> {
 /// Wire values of one group into its struct, in SI units, by a plan made once from the field table.
 class StateDecoder {
  public:
-  StateDecoder(FieldGroup group, Transport transport, XPlaneVersion version, int engines = kMaxEngines);
+  StateDecoder(FieldGroup group, Transport transport, SimulatorVersion version, int engines = kMaxEngines);
 
   FieldGroup group() const { return group_; }
   /// Datarefs to be asked for; the position is the index. With Transport::kData only what no row carries.
@@ -124,7 +124,7 @@ class StateDecoder {
 template <typename State>
 class GroupDecoder : public StateDecoder {
  public:
-  GroupDecoder(Transport transport, XPlaneVersion version, int engines = kMaxEngines)
+  GroupDecoder(Transport transport, SimulatorVersion version, int engines = kMaxEngines)
       : StateDecoder(GroupOf<State>::kGroup, transport, version, engines) {}
 };
 

@@ -26,7 +26,7 @@ struct SurfaceSample {
 };
 
 /// What to subscribe, every frame; the position is the index.
-std::vector<std::string> surfaceWatchDatarefs(SimulatorGeneration generation);
+std::vector<std::string> surfaceWatchDatarefs(SimulatorVersion version);
 
 /// A sample from values in that order; false when there are not as many.
 bool surfaceSampleFrom(const std::vector<float>& values, SurfaceSample* sample);

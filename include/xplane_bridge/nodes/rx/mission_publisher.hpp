@@ -33,7 +33,7 @@ class MissionPublisher {
   virtual void advertise(ros::NodeHandle* handle) = 0;
 
   /// X-Plane's version is known, or another: requests() and rows() change.
-  virtual void configure(core::XPlaneVersion version) = 0;
+  virtual void configure(core::SimulatorVersion version) = 0;
   /// Datarefs to ask for, the position is the index; may be empty with DATA rows.
   virtual std::vector<std::string> requests() const = 0;
   virtual const std::vector<std::int32_t>& rows() const = 0;

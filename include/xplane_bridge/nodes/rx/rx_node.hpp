@@ -102,7 +102,7 @@ class RxNode : public BaseNode {
   core::LinkStatus last_status_;
 
   // Timer only.
-  std::optional<core::XPlaneVersion> adopted_version_;
+  std::optional<core::SimulatorVersion> adopted_version_;
   std::optional<std::chrono::steady_clock::time_point> waiting_for_version_since_;
   std::chrono::steady_clock::time_point last_search_word_{};
   std::int32_t rpos_rate_ = 0;

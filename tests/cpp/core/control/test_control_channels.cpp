@@ -7,20 +7,13 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr EncoderOptions kXp11{SimulatorGeneration::k11, false};
-constexpr EncoderOptions kXp12{SimulatorGeneration::k12, false};
+constexpr EncoderOptions kXp11{kXPlane11, false};
+constexpr EncoderOptions kXp12{kXPlane12, false};
 
 ChannelSet setOf(std::initializer_list<Channel> channels) {
   ChannelSet set;
   for (const Channel c : channels) set.set(index(c));
   return set;
-}
-
-TEST(ControlChannels, GenerationFollowsTheInternalVersion) {
-  EXPECT_EQ(generationOf(105100), SimulatorGeneration::k11);
-  EXPECT_EQ(generationOf(115501), SimulatorGeneration::k11);
-  EXPECT_EQ(generationOf(120000), SimulatorGeneration::k12);
-  EXPECT_EQ(generationOf(122015), SimulatorGeneration::k12);
 }
 
 TEST(ControlChannels, WritesTheDatarefsOfTheReference) {
@@ -49,7 +42,7 @@ TEST(ControlChannels, WritesTheDatarefsOfTheReference) {
     EXPECT_EQ(writeDataref(channel, kXp12),
               channel == Channel::kFlaps ? "sim/cockpit2/controls/flap_handle_request_ratio" : dataref);
   }
-  EXPECT_EQ(writeDataref(leverChannel(1), {SimulatorGeneration::k11, true}),
+  EXPECT_EQ(writeDataref(leverChannel(1), {kXPlane11, true}),
             "sim/cockpit2/engine/actuators/throttle_jet_rev_ratio[1]");
 }
 

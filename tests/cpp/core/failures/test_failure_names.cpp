@@ -8,25 +8,25 @@
 namespace xplane_bridge::core {
 namespace {
 
-bool has(SimulatorGeneration generation, const std::string& leaf) {
-  const auto& names = simulatorFailures(generation);
+bool has(SimulatorVersion version, const std::string& leaf) {
+  const auto& names = simulatorFailures(version);
   return std::find(names.begin(), names.end(), "sim/operation/failures/" + leaf) != names.end();
 }
 
-TEST(FailureNames, ListEachGenerationsOnce) {
-  for (const auto generation : {SimulatorGeneration::k11, SimulatorGeneration::k12}) {
-    const auto& names = simulatorFailures(generation);
+TEST(FailureNames, ListEachVersionsOnce) {
+  for (const auto version : {kXPlane11, kXPlane12}) {
+    const auto& names = simulatorFailures(version);
     EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
-    EXPECT_TRUE(has(generation, "rel_engfai7"));
-    EXPECT_FALSE(has(generation, "rel_engfai8"));
-    EXPECT_TRUE(has(generation, "rel_esys6"));
-    EXPECT_TRUE(has(generation, "rel_pitot2"));
+    EXPECT_TRUE(has(version, "rel_engfai7"));
+    EXPECT_FALSE(has(version, "rel_engfai8"));
+    EXPECT_TRUE(has(version, "rel_esys6"));
+    EXPECT_TRUE(has(version, "rel_pitot2"));
   }
-  EXPECT_TRUE(has(SimulatorGeneration::k11, "rel_fc_ail_L"));
-  EXPECT_FALSE(has(SimulatorGeneration::k11, "rel_fcon_ailn_1_lft_lock"));
-  EXPECT_FALSE(has(SimulatorGeneration::k12, "rel_fc_ail_L"));
-  EXPECT_TRUE(has(SimulatorGeneration::k12, "rel_fcon_rudd_2_ctr_gone"));
-  EXPECT_TRUE(has(SimulatorGeneration::k12, "rel_fcon_yawb_x_rgt_mxdn"));
+  EXPECT_TRUE(has(kXPlane11, "rel_fc_ail_L"));
+  EXPECT_FALSE(has(kXPlane11, "rel_fcon_ailn_1_lft_lock"));
+  EXPECT_FALSE(has(kXPlane12, "rel_fc_ail_L"));
+  EXPECT_TRUE(has(kXPlane12, "rel_fcon_rudd_2_ctr_gone"));
+  EXPECT_TRUE(has(kXPlane12, "rel_fcon_yawb_x_rgt_mxdn"));
 }
 
 TEST(FailureNames, TellWhatKeepsSurfacesFromFollowing) {

@@ -7,16 +7,16 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr auto k11 = SimulatorGeneration::k11;
-constexpr auto k12 = SimulatorGeneration::k12;
+constexpr auto k11 = kXPlane11;
+constexpr auto k12 = kXPlane12;
 
 FailureRequest request(const std::string& name, const std::string& kind = "failed",
                        std::optional<double> value = std::nullopt, int trigger = 0, double trigger_value = 0.0) {
   return {name, kind, value, trigger, trigger_value};
 }
 
-std::vector<std::string> datarefs(const std::string& name, SimulatorGeneration generation = k11) {
-  return planFailure(request(name), generation).plan.datarefs;
+std::vector<std::string> datarefs(const std::string& name, SimulatorVersion version = k11) {
+  return planFailure(request(name), version).plan.datarefs;
 }
 
 std::string fcon(const std::string& name, const std::string& kind, std::optional<double> value = std::nullopt) {

@@ -42,7 +42,7 @@ TEST_F(SimLinkTest, ConnectsAndDeliversAGroup) {
   EXPECT_EQ(status.state, LinkState::kConnected);
   EXPECT_EQ(status.epoch, 1U);
   EXPECT_EQ(status.peer, (Endpoint{kLoopbackAddress, sim.port()}));
-  EXPECT_EQ(status.version, 115501);
+  EXPECT_EQ(status.version.number, 115501);
   EXPECT_EQ(status.paused, false);
   EXPECT_GT(status.sim_time_s.value_or(0.0F), 100.0F);
   EXPECT_TRUE(status.problems.empty());
@@ -75,10 +75,10 @@ TEST_F(SimLinkTest, ZerosBeforeAFlightIsLoadedAreNoVersion) {
   sim.datarefs["sim/time/total_running_time_sec"] = 0.0F;
   makeLink(optionsFor(sim));
   ASSERT_GE(runUntilState(LinkState::kConnected, 1.0, {&sim}), 0.0);
-  EXPECT_FALSE(link_->status().version.has_value());
+  EXPECT_FALSE(link_->status().version.known());
   sim.datarefs["sim/version/xplane_internal_version"] = 122015.0F;
   run(0.2, {&sim});
-  EXPECT_EQ(link_->status().version, 122015);
+  EXPECT_EQ(link_->status().version.number, 122015);
 }
 
 TEST_F(SimLinkTest, UnresolvableHostIsSaid) {

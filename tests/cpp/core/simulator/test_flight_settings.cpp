@@ -16,7 +16,7 @@ std::map<std::string, float> asMap(const std::vector<DatarefWrite>& writes) {
 }
 
 TEST(UniformWind, GoesToEveryLayerOfXPlane11InKnots) {
-  const auto writes = asMap(windWrites({10.0, 270.0, 0.3}, SimulatorGeneration::k11));
+  const auto writes = asMap(windWrites({10.0, 270.0, 0.3}, kXPlane11));
   ASSERT_EQ(writes.size(), 13u);
   EXPECT_EQ(writes.at("sim/weather/use_real_weather_bool"), 0.0F);
   for (const char* layer : {"[0]", "[1]", "[2]"}) {
@@ -28,7 +28,7 @@ TEST(UniformWind, GoesToEveryLayerOfXPlane11InKnots) {
 }
 
 TEST(UniformWind, GoesToEveryLayerOfXPlane12) {
-  const auto writes = asMap(windWrites({10.0, 90.0, 1.0}, SimulatorGeneration::k12));
+  const auto writes = asMap(windWrites({10.0, 90.0, 1.0}, kXPlane12));
   ASSERT_EQ(writes.size(), 3u + 4u * 13u);
   EXPECT_EQ(writes.at("sim/weather/region/update_immediately"), 1.0F);
   EXPECT_EQ(writes.at("sim/weather/region/change_mode"), 3.0F);
@@ -61,17 +61,17 @@ TEST(LoadingTest, WritesOnlyWhatIsGiven) {
   EXPECT_TRUE(check(loading)) << "nothing";
   loading.fuel_tank = {50.0, 60.0};
   EXPECT_FALSE(check(loading));
-  auto writes = loadingWrites(loading, SimulatorGeneration::k11);
+  auto writes = loadingWrites(loading, kXPlane11);
   ASSERT_EQ(writes.size(), 2u);
   EXPECT_EQ(writes[1].dataref, "sim/flightmodel/weight/m_fuel[1]");
   EXPECT_EQ(writes[1].value, 60.0F);
   loading.payload_mass = 100.0;
   loading.cg_offset = 0.1;
-  writes = loadingWrites(loading, SimulatorGeneration::k11);
+  writes = loadingWrites(loading, kXPlane11);
   ASSERT_EQ(writes.size(), 4u);
   EXPECT_EQ(writes[2].dataref, "sim/flightmodel/weight/m_fixed");
   EXPECT_EQ(writes[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default");
-  EXPECT_EQ(loadingWrites(loading, SimulatorGeneration::k12)[3].dataref, "sim/flightmodel2/misc/cg_offset_z");
+  EXPECT_EQ(loadingWrites(loading, kXPlane12)[3].dataref, "sim/flightmodel2/misc/cg_offset_z");
 }
 
 TEST(LoadingTest, ImpossibleOnesAreNamed) {

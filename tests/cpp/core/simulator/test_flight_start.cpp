@@ -148,8 +148,8 @@ TEST(FlightStart, WithoutAllValuesNothingIsShown) {
   values[8].reset();
   EXPECT_FALSE(shownFlightFrom(values));
   EXPECT_FALSE(shownFlightFrom({}));
-  EXPECT_EQ(shownFlightDatarefs(SimulatorGeneration::k11).size(), 15u);
-  EXPECT_EQ(shownFlightDatarefs(SimulatorGeneration::k12)[13], "sim/weather/aircraft/wind_now_speed_msc");
+  EXPECT_EQ(shownFlightDatarefs(kXPlane11).size(), 15u);
+  EXPECT_EQ(shownFlightDatarefs(kXPlane12)[13], "sim/weather/aircraft/wind_now_speed_msc");
 }
 
 }  // namespace

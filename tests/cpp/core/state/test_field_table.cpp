@@ -33,14 +33,14 @@ const FieldSpec& find(FieldGroup group, const std::string& name) {
   return fieldTable().front();
 }
 
-std::set<std::string> paths(FieldGroup group, Transport transport, XPlaneVersion version) {
+std::set<std::string> paths(FieldGroup group, Transport transport, SimulatorVersion version) {
   std::set<std::string> result;
   for (const DatarefRequest& request : datarefRequests(group, transport, version)) result.insert(request.path);
   return result;
 }
 
 TEST(FieldTable, FlightGroupFitsOneDatagram) {
-  for (const XPlaneVersion version : {XPlaneVersion::k11, XPlaneVersion::k12}) {
+  for (const SimulatorVersion version : {kXPlane11, kXPlane12}) {
     const std::size_t count = datarefRequests(FieldGroup::kFlight, Transport::kRref, version).size();
     EXPECT_LE(count, 80U);
     EXPECT_GT(count, 50U);
@@ -48,7 +48,7 @@ TEST(FieldTable, FlightGroupFitsOneDatagram) {
 }
 
 TEST(FieldTable, FlightGroupCarriesItsTime) {
-  const auto flight = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::k11);
+  const auto flight = paths(FieldGroup::kFlight, Transport::kRref, kXPlane11);
   for (const char* path : {"sim/time/total_running_time_sec", "sim/operation/misc/frame_rate_period", "sim/time/paused",
                            "sim/time/is_in_replay"}) {
     EXPECT_EQ(flight.count(path), 1U) << path;
@@ -59,7 +59,7 @@ TEST(FieldTable, FlightGroupCarriesItsTime) {
 // overlook.
 TEST(FieldTable, NoGroupAsksTwice) {
   for (const FieldGroup group : kAllGroups) {
-    for (const XPlaneVersion version : {XPlaneVersion::k11, XPlaneVersion::k12}) {
+    for (const SimulatorVersion version : {kXPlane11, kXPlane12}) {
       const auto requests = datarefRequests(group, Transport::kRref, version);
       EXPECT_EQ(requests.size(), paths(group, Transport::kRref, version).size()) << toString(group);
     }
@@ -113,8 +113,8 @@ TEST(FieldTable, SignsOfLoadsFollowTheSource) {
 }
 
 TEST(FieldTable, VersionsHaveTheirOwnNames) {
-  const auto v11 = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::k11);
-  const auto v12 = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::k12);
+  const auto v11 = paths(FieldGroup::kFlight, Transport::kRref, kXPlane11);
+  const auto v12 = paths(FieldGroup::kFlight, Transport::kRref, kXPlane12);
   EXPECT_EQ(v11.count("sim/weather/wind_now_x_msc"), 1U);
   EXPECT_EQ(v12.count("sim/weather/aircraft/wind_now_x_msc"), 1U);
   EXPECT_EQ(v12.count("sim/weather/wind_now_x_msc"), 0U);
@@ -123,19 +123,19 @@ TEST(FieldTable, VersionsHaveTheirOwnNames) {
 }
 
 TEST(FieldTable, UnknownVersionAsksOnlyWhatBothHave) {
-  const auto unknown = paths(FieldGroup::kFlight, Transport::kRref, XPlaneVersion::kUnknown);
+  const auto unknown = paths(FieldGroup::kFlight, Transport::kRref, SimulatorVersion{});
   EXPECT_EQ(unknown.count("sim/weather/wind_now_x_msc"), 0U);
   EXPECT_EQ(unknown.count("sim/weather/aircraft/wind_now_x_msc"), 0U);
   EXPECT_EQ(unknown.count("sim/flightmodel/position/true_phi"), 1U);
 }
 
 TEST(FieldTable, RowsOfTheFlightGroup) {
-  const std::vector<std::int32_t> rows = dataRows({FieldGroup::kFlight}, XPlaneVersion::k11);
+  const std::vector<std::int32_t> rows = dataRows({FieldGroup::kFlight}, kXPlane11);
   EXPECT_EQ(rows, (std::vector<std::int32_t>{0, 1, 3, 4, 5, 6, 8, 16, 17, 18, 19, 20, 21, 25, 64}));
 }
 
 TEST(FieldTable, DataTransportAsksOnlyWhatNoRowCarries) {
-  const auto supplement = paths(FieldGroup::kFlight, Transport::kData, XPlaneVersion::k11);
+  const auto supplement = paths(FieldGroup::kFlight, Transport::kData, kXPlane11);
   EXPECT_EQ(supplement.count("sim/time/paused"), 1U);
   EXPECT_EQ(supplement.count("sim/flightmodel/failures/onground_any"), 1U);
   EXPECT_EQ(supplement.count("sim/flightmodel/position/true_phi"), 0U);
@@ -143,24 +143,15 @@ TEST(FieldTable, DataTransportAsksOnlyWhatNoRowCarries) {
 }
 
 TEST(FieldTable, EnginesLimitTheRequests) {
-  const auto two = datarefRequests(FieldGroup::kEngines, Transport::kRref, XPlaneVersion::k11, 2);
+  const auto two = datarefRequests(FieldGroup::kEngines, Transport::kRref, kXPlane11, 2);
   EXPECT_EQ(two.size(), 2U + 23U * 2U);
-  EXPECT_EQ(datarefRequests(FieldGroup::kEngines, Transport::kRref, XPlaneVersion::k11).size(), 2U + 23U * 8U);
+  EXPECT_EQ(datarefRequests(FieldGroup::kEngines, Transport::kRref, kXPlane11).size(), 2U + 23U * 8U);
 }
 
 TEST(DatarefPath, Expands) {
   EXPECT_EQ(expandDatarefPath("a/b", 3), std::vector<std::string>{"a/b"});
   EXPECT_EQ(expandDatarefPath("a[*]", 3), (std::vector<std::string>{"a[0]", "a[1]", "a[2]"}));
   EXPECT_EQ(expandDatarefPath("w{1,2}{l,r}_d", 4), (std::vector<std::string>{"w1l_d", "w1r_d", "w2l_d", "w2r_d"}));
-}
-
-TEST(XPlaneVersionNumber, IsTakenApart) {
-  EXPECT_EQ(xplaneVersion(0), XPlaneVersion::kUnknown);
-  EXPECT_EQ(xplaneVersion(-1), XPlaneVersion::kUnknown);
-  EXPECT_EQ(xplaneVersion(115501), XPlaneVersion::k11);
-  EXPECT_EQ(xplaneVersion(105100), XPlaneVersion::k11);
-  EXPECT_EQ(xplaneVersion(120000), XPlaneVersion::k12);
-  EXPECT_EQ(xplaneVersion(122015), XPlaneVersion::k12);
 }
 
 // tests/data/datarefs.txt: name, type in 11.10, type in 12.08 of Laminar's published lists; "-" not in that list, "?"
@@ -212,10 +203,10 @@ class DatarefList : public testing::Test {
 
 TEST_F(DatarefList, HasEveryNameOfTheTable) {
   for (const FieldGroup group : kAllGroups) {
-    for (const XPlaneVersion version : {XPlaneVersion::k11, XPlaneVersion::k12}) {
+    for (const SimulatorVersion version : {kXPlane11, kXPlane12}) {
       for (const DatarefRequest& request : datarefRequests(group, Transport::kRref, version)) {
         const bool noted = std::string(request.field->remark).find("list") != std::string::npos;
-        check(request.path, version == XPlaneVersion::k12, noted);
+        check(request.path, version.is12(), noted);
       }
     }
   }

@@ -192,7 +192,7 @@ class Hand {
   }
   static FlightStateAssembler::Options withVersion() {
     FlightStateAssembler::Options options;
-    options.version = XPlaneVersion::k11;
+    options.version = kXPlane11;
     return options;
   }
   float& operator[](const std::string& path) {
@@ -444,7 +444,7 @@ TEST(DataTransport, RowsMayBeReorderedAddedAndRemoved) {
   const RecordedFlight flight(11);
   FlightStateAssembler::Options options;
   options.transport = Transport::kData;
-  options.version = XPlaneVersion::k11;
+  options.version = kXPlane11;
   FlightStateAssembler assembler(options);
   const FlightState* s = assembler.onData(flight.data(0, {21, 17, 20, 1, 0, 16}).data(), kStart);
   ASSERT_NE(s, nullptr);
@@ -478,7 +478,7 @@ TEST(DataTransport, Row16WaitsForTheVersion) {
   ASSERT_NE(s, nullptr);
   EXPECT_FALSE(s->has(V::kValidRates));
   EXPECT_TRUE(s->has(V::kValidAttitude));
-  assembler.setVersion(XPlaneVersion::k12);
+  assembler.setVersion(kXPlane12);
   s = assembler.onData(flight.data(1).data(), kStart + kFrame);
   ASSERT_NE(s, nullptr);
   EXPECT_TRUE(s->has(V::kValidRates));
@@ -557,7 +557,7 @@ TYPED_TEST(MissionGroup, KnowsNothingWithoutData) {
   for (const Transport transport : {Transport::kRref, Transport::kData}) {
     typename MissionAssembler<TypeParam>::Options options;
     options.transport = transport;
-    options.version = XPlaneVersion::k11;
+    options.version = kXPlane11;
     const MissionAssembler<TypeParam> assembler(options);
     const RowStore rows;
     const TypeParam state = assembler.assemble(transport == Transport::kData ? &rows : nullptr, kStart, noClock());
@@ -569,7 +569,7 @@ TYPED_TEST(MissionGroup, KnowsNothingWithoutData) {
 TYPED_TEST(MissionGroup, ForgetsOldValues) {
   const RecordedFlight flight(11);
   typename MissionAssembler<TypeParam>::Options options;
-  options.version = XPlaneVersion::k11;
+  options.version = kXPlane11;
   MissionAssembler<TypeParam> assembler(options);
   const Datagram d = flight.rref(0, assembler.requests());
   for (int i = 0; i < 5; ++i) assembler.add(d.rref(), kStart + i * 1'000'000'000LL);
@@ -624,7 +624,7 @@ TEST(MissionGroups, TransportsAgree) {
 TEST(MissionGroups, AirspeedDialIsKnotsOrMach) {
   for (const auto& [dial, expected] : {std::pair<float, double>{120.0F, 61.7333}, {0.78F, 0.78}}) {
     MissionAssembler<AutopilotState>::Options options;
-    options.version = XPlaneVersion::k11;
+    options.version = kXPlane11;
     MissionAssembler<AutopilotState> assembler(options);
     Datagram d = Datagram::labelled("RREF,");
     for (std::size_t i = 0; i < assembler.requests().size(); ++i) {
@@ -648,7 +648,7 @@ TEST(MissionGroups, StampComesFromTheSimulatorsTime) {
   }
   ASSERT_TRUE(clock.fitted());
   MissionAssembler<FuelState>::Options options;
-  options.version = XPlaneVersion::k11;
+  options.version = kXPlane11;
   MissionAssembler<FuelState> assembler(options);
   Datagram d = Datagram::labelled("RREF,");
   for (std::size_t i = 0; i < assembler.requests().size(); ++i) {

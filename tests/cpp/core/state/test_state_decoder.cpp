@@ -11,7 +11,7 @@ namespace xplane_bridge::core {
 namespace {
 
 template <typename State>
-State decodeRows(const Datagram& datagram, std::uint32_t* valid = nullptr, XPlaneVersion version = XPlaneVersion::k11) {
+State decodeRows(const Datagram& datagram, std::uint32_t* valid = nullptr, SimulatorVersion version = kXPlane11) {
   const GroupDecoder<State> decoder(Transport::kData, version);
   RowStore rows;
   rows.update(datagram.data(), 100);
@@ -72,11 +72,11 @@ TEST(StateDecoder, Row16ByVersion) {
   EXPECT_DOUBLE_EQ(v11.roll_rate, 20.0);
   EXPECT_DOUBLE_EQ(v11.pitch_rate, 10.0);
   EXPECT_DOUBLE_EQ(v11.yaw_rate, 30.0);
-  const FlightInputs v12 = decodeRows<FlightInputs>(d, nullptr, XPlaneVersion::k12);
+  const FlightInputs v12 = decodeRows<FlightInputs>(d, nullptr, kXPlane12);
   EXPECT_NEAR(v12.roll_rate, 0.1745329252, 1e-9);
   EXPECT_NEAR(v12.pitch_rate, 0.3490658504, 1e-9);
   EXPECT_NEAR(v12.yaw_rate, 0.5235987756, 1e-9);
-  EXPECT_TRUE(std::isnan(decodeRows<FlightInputs>(d, nullptr, XPlaneVersion::kUnknown).roll_rate));
+  EXPECT_TRUE(std::isnan(decodeRows<FlightInputs>(d, nullptr, SimulatorVersion{}).roll_rate));
 }
 
 // -999 is a value that can occur; only in slots that a row leaves blank, and only bit by bit, it means "unused".
@@ -110,7 +110,7 @@ TEST(StateDecoder, NonFiniteValuesAreUnknown) {
 }
 
 TEST(StateDecoder, StaleRowsAreUnknown) {
-  const GroupDecoder<ControlStates> decoder(Transport::kData, XPlaneVersion::k11);
+  const GroupDecoder<ControlStates> decoder(Transport::kData, kXPlane11);
   RowStore rows;
   rows.update(Datagram::labelled("DATA*").row(8, {0.1F, 0.2F, 0.3F}).data(), 100);
   rows.update(Datagram::labelled("DATA*").row(13, {0, 0, 0, 0.5F, 0.5F, 0, 0, 0}).data(), 200);
@@ -159,7 +159,7 @@ TEST(StateDecoder, UnitsBecomeSi) {
 }
 
 TEST(StateDecoder, EngineCountBoundsTheArrays) {
-  const GroupDecoder<EngineStates> decoder(Transport::kRref, XPlaneVersion::k11);
+  const GroupDecoder<EngineStates> decoder(Transport::kRref, kXPlane11);
   std::vector<float> values(decoder.requests().size(), 1.0F);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (decoder.requests()[i].path == "sim/aircraft/engine/acf_num_engines") values[i] = 2.0F;
@@ -172,7 +172,7 @@ TEST(StateDecoder, EngineCountBoundsTheArrays) {
 }
 
 TEST(StateDecoder, WithoutEngineCountNothingOfTheEnginesIsKnown) {
-  const GroupDecoder<EngineStates> decoder(Transport::kRref, XPlaneVersion::k11);
+  const GroupDecoder<EngineStates> decoder(Transport::kRref, kXPlane11);
   std::vector<float> values(decoder.requests().size(), 1.0F);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (decoder.requests()[i].path == "sim/aircraft/engine/acf_num_engines") values[i] = kNaNf;

@@ -16,7 +16,7 @@ std::size_t indexOf(const std::vector<std::string>& names, const std::string& na
 }
 
 TEST(SurfaceWatch, SamplesAreWhatIsSubscribed) {
-  const auto names = surfaceWatchDatarefs(SimulatorGeneration::k11);
+  const auto names = surfaceWatchDatarefs(kXPlane11);
   std::vector<float> values(names.size(), 0.0f);
   const auto set = [&](const std::string& name, float value) { values[indexOf(names, name)] = value; };
   set("sim/time/total_running_time_sec", 12.5f);
@@ -37,8 +37,7 @@ TEST(SurfaceWatch, SamplesAreWhatIsSubscribed) {
   EXPECT_EQ(sample.deflections_deg[surfaceNumber("aileron1_wing2_left").value()], 7.0);
   values.pop_back();
   EXPECT_FALSE(surfaceSampleFrom(values, &sample));
-  EXPECT_NO_FATAL_FAILURE(
-      indexOf(surfaceWatchDatarefs(SimulatorGeneration::k12), "sim/cockpit2/controls/flap_handle_request_ratio"));
+  EXPECT_NO_FATAL_FAILURE(indexOf(surfaceWatchDatarefs(kXPlane12), "sim/cockpit2/controls/flap_handle_request_ratio"));
 }
 
 SurfaceSample frame(double stick, double total, double flap_handle = 0.0, double flap = 0.0) {
