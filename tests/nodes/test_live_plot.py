@@ -64,6 +64,32 @@ def test_curves_are_drawn_and_saved(master: RosMaster, waves: str, tmp_path: Pat
     assert counts[3] == 0, counts
 
 
+def without_display(master: RosMaster) -> dict[str, str]:
+    return {key: value for key, value in master.env.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+
+
+def test_without_a_display_it_names_what_works_without_one(master: RosMaster, waves: str, tmp_path: Path) -> None:
+    command = [program("live_plot"), f"{waves}/vector/x", "--png", "x.png"]
+    plot = ManagedProcess("live_plot", command, tmp_path, env=without_display(master))
+    with plot:
+        assert plot.wait(60.0) == 1
+    said = plot.output()
+    assert "no window can be opened here: there is no display (DISPLAY)" in said
+    assert "--after S --png x.png" in said
+    assert said.count("\n") == 1
+
+
+def test_without_a_display_it_still_draws_into_a_file(master: RosMaster, waves: str, tmp_path: Path) -> None:
+    png = tmp_path / "x.png"
+    command = [program("live_plot"), f"{waves}/vector/x", "--window", "5", "--png", png, "--after", "6"]
+    plot = ManagedProcess("live_plot", command, tmp_path, env=without_display(master))
+    with plot:
+        assert plot.wait(90.0) == 0, plot.output()
+    image = matplotlib.image.imread(png)[:, :, :3]
+    curve = np.abs(image - matplotlib.colors.to_rgb(COLOURS[0])).max(axis=2) < 0.1
+    assert np.unique(np.nonzero(curve)[1]).size > 400
+
+
 def test_an_unknown_topic_is_one_line(master: RosMaster, tmp_path: Path) -> None:
     with VirtualDisplay(tmp_path) as screen:
         command = [program("live_plot"), "/no/such/field", "--wait", "0.5"]

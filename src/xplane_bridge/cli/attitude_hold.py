@@ -9,18 +9,27 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import Any, Dict, Optional, Sequence
+from typing import Any, Dict, List, Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded, rospy_module
-from xplane_bridge.cli.scenario_player import ros_arguments
+from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
+from xplane_bridge.cli.loaded_aircraft import AircraftError, LoadedAircraft
+from xplane_bridge.cli.waiting import wait_for_service, wait_for_state
+from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.topics import NAMESPACE
 
+#: Whose gains these are: stem of a file in config/aircraft.
+AIRCRAFT = "fixed_wing"
+_REMEDY = "copy this program and put gains for yours into it, or fly it as it is with --any-aircraft"
 _LONGEST_STEP_S = 0.1  # over a longer gap integrators do not go on
 
 
 def clip(value: float, low: float, high: float) -> float:
     """The value, or the nearer bound."""
     return min(max(value, low), high)
+
+
+class EngageError(XplaneBridgeError):
+    """tx_node refused mode AUTO."""
 
 
 class AttitudeHold:
@@ -96,6 +105,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--altitude", type=float, metavar="M", help="MSL (default: the one at engagement)")
     p.add_argument("--speed", type=float, metavar="M/S", help="calibrated airspeed (default: as at engagement)")
     p.add_argument("--engage", action="store_true", help="ask for mode AUTO")
+    p.add_argument("--any-aircraft", action="store_true", help=f"fly others than {AIRCRAFT} too, with the same gains")
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     return p
 
@@ -107,9 +117,18 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     rospy = rospy_module()
     rospy.init_node("attitude_hold")
     from xplane_bridge.msg import ControlCommand, ControlMode, FlightState
-    from xplane_bridge.srv import SetMode
 
-    topic = args.namespace.rstrip("/") + "/"
+    namespace = args.namespace.rstrip("/")
+    topic = namespace + "/"
+    refused: List[str] = []
+
+    def refuse(text: str) -> None:
+        refused.append(text)
+        rospy.signal_shutdown(text)
+
+    LoadedAircraft(namespace, "attitude_hold", [] if args.any_aircraft else [AIRCRAFT], _REMEDY, refuse).check()
+    wait_for_state(namespace, "attitude_hold")
+
     hold = AttitudeHold({name: getattr(args, name) for name in ("roll", "heading", "pitch", "altitude", "speed")})
     publisher = rospy.Publisher(topic + "control/auto", ControlCommand, queue_size=1, tcp_nodelay=True)
     fields = ControlCommand.ROLL | ControlCommand.PITCH | ControlCommand.YAW | ControlCommand.THROTTLE
@@ -123,7 +142,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         mode = message
 
     def on_state(state: Any) -> None:
-        if state.paused or state.valid & needed != needed:
+        if state.paused or state.valid & needed != needed or refused:
             return
         if mode.mode != ControlMode.AUTO:
             hold.restart()
@@ -137,7 +156,19 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     rospy.Subscriber(topic + "control/mode", ControlMode, on_mode, queue_size=1)
     rospy.Subscriber(topic + "flight_state", FlightState, on_state, queue_size=1, tcp_nodelay=True)
     if args.engage:
-        rospy.wait_for_service(topic + "tx_node/set_mode")
-        rospy.ServiceProxy(topic + "tx_node/set_mode", SetMode)(mode=SetMode._request_class.AUTO)
+        _engage(topic + "tx_node/set_mode")
     rospy.spin()
+    if refused:
+        raise AircraftError(refused[0])
     return 0
+
+
+def _engage(service: str) -> None:
+    import rospy
+
+    from xplane_bridge.srv import SetMode
+
+    wait_for_service(service, "attitude_hold")
+    answer = rospy.ServiceProxy(service, SetMode)(mode=SetMode._request_class.AUTO)
+    if not answer.success:
+        raise EngageError(f"mode AUTO was refused: {answer.result.message}")

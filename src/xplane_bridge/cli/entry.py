@@ -51,3 +51,9 @@ def rospy_module() -> Any:
     except ModuleNotFoundError:
         msg = "rospy is not there: source ROS's setup.bash (on Debian: apt-get install python3-rospy)"
         raise NoRosError(msg) from None
+
+
+def ros_arguments(argv: Sequence[str] | None) -> list[str]:
+    """Give the arguments without those that roslaunch adds (`__name:=...`)."""
+    given = list(sys.argv[1:] if argv is None else argv)
+    return [word for word in given if ":=" not in word]

@@ -17,8 +17,7 @@ import time
 from pathlib import Path
 from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
-from xplane_bridge.cli.entry import guarded, rospy_module
-from xplane_bridge.cli.scenario_player import ros_arguments
+from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
 from xplane_bridge.harness.processes import ManagedProcess
 from xplane_bridge.harness.ros import ros_environment
 from xplane_bridge.joystick.config_table import JoyConfigError, Live, load_joy_config, screen, skeleton

@@ -6,8 +6,7 @@ import argparse
 import time
 from typing import Any, List, Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded, rospy_module
-from xplane_bridge.cli.scenario_player import ros_arguments
+from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
 from xplane_bridge.joystick.sdl_reader import JoyReader, JoyState, device_names, start_sdl
 from xplane_bridge.topics import NAMESPACE
 

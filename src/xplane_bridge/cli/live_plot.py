@@ -9,7 +9,7 @@ from typing import Any, Callable, NamedTuple, Sequence
 
 from xplane_bridge.cli.entry import guarded, rospy_module
 from xplane_bridge.errors import XplaneBridgeError
-from xplane_bridge.plotting.live import LiveWindow, RollingSeries
+from xplane_bridge.plotting.live import LiveWindow, RollingSeries, can_show
 
 _TOPIC_POLL_S = 0.2
 _PART = re.compile(r"^(\w+)(?:\[(\d+)\])?$")
@@ -37,7 +37,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--window", type=float, default=60.0, metavar="S", help="width of the time axis (%(default)g s)")
     p.add_argument("--wait", type=float, default=30.0, metavar="S", help="for the topics to appear (%(default)g s)")
     p.add_argument("--png", default="live_plot.png", metavar="FILE", help="what the s key writes (%(default)s)")
-    p.add_argument("--after", type=float, metavar="S", help="write the PNG by itself after so long, and end")
+    p.add_argument(
+        "--after", type=float, metavar="S", help="write the PNG by itself after so long, and end; needs no display"
+    )
     return p
 
 
@@ -101,6 +103,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = p.parse_args(rospy.myargv(argv)[1:] if argv is None else list(argv))
     if not args.window > 0:
         p.error(f"--window {args.window:g}: must be positive")
+    if args.after is None and not can_show():
+        msg = (
+            "no window can be opened here: there is no display (DISPLAY), or matplotlib has no toolkit for it "
+            f"(python3-tk); without one, --after S --png {args.png} draws for S seconds and writes the picture"
+        )
+        raise LivePlotError(msg)
     rospy.init_node("live_plot", anonymous=True, disable_signals=True)
     names = [[rospy.resolve_name(name) for name in split(argument)] for argument in args.fields]
     found = _wait_for([name for group in names for name in group], args.wait)

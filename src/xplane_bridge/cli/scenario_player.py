@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
-from typing import List, Optional, Sequence
+from typing import Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded, rospy_module
+from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
+from xplane_bridge.cli.loaded_aircraft import LoadedAircraft
+from xplane_bridge.cli.waiting import wait_for_state
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
 from xplane_bridge.scenario.ros_player import RosPlayer
@@ -28,12 +29,6 @@ def scenario_of(name: str) -> Scenario:
         known = ", ".join(sorted(file.stem for file in config_file("scenarios", "README.md").parent.glob("*.yaml")))
         raise ScenarioError(f"there is no scenario {name}; expected a file, or one of: {known}")
     return load_scenario(path)
-
-
-def ros_arguments(argv: Optional[Sequence[str]]) -> List[str]:
-    """Arguments without those that roslaunch adds (`__name:=...`)."""
-    given = list(sys.argv[1:] if argv is None else argv)
-    return [word for word in given if ":=" not in word]
 
 
 def add_stick_options(p: argparse.ArgumentParser) -> None:
@@ -59,7 +54,12 @@ def play(
             file = config_file("joysticks", f"{args.joy_config}.yaml")
         stick = load_stick(file, args.stick_mode)
     rospy_module().init_node(node, argv=None if argv is None else list(argv))
-    RosPlayer(scenario, args.namespace, stick, log, say=lambda text: print(text, flush=True)).run()
+    namespace = args.namespace.rstrip("/")
+    player = RosPlayer(scenario, namespace, stick, log, say=lambda text: print(text, flush=True))
+    remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"
+    LoadedAircraft(namespace, node, scenario.aircraft, remedy, player.fail).check()
+    wait_for_state(namespace, node)
+    player.run()
     return 0
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded
-from xplane_bridge.cli.scenario_player import add_stick_options, play, ros_arguments
+from xplane_bridge.cli.entry import guarded, ros_arguments
+from xplane_bridge.cli.scenario_player import add_stick_options, play
 from xplane_bridge.topics import NAMESPACE
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import threading
+import time
 from typing import Sequence
 
 import matplotlib
@@ -12,6 +13,16 @@ import numpy as np
 from xplane_bridge.plotting.spec import COLOURS
 
 _REFRESH_MS = 50
+_WINDOWLESS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")  #: matplotlib's backends
+
+
+def can_show() -> bool:
+    """Tell whether a window can be opened: matplotlib falls back to drawing into memory where it cannot."""
+    from matplotlib import pyplot
+
+    pyplot.figure()  # only now the backend is chosen
+    pyplot.close()
+    return str(matplotlib.get_backend()).lower() not in _WINDOWLESS
 
 
 class RollingSeries:
@@ -28,13 +39,13 @@ class RollingSeries:
         self._samples: collections.deque[tuple[float, float]] = collections.deque()
         self._lock = threading.Lock()
 
-    def add(self, time: float, value: float) -> None:
+    def add(self, stamp: float, value: float) -> None:
         """Add a sample; one from before the newest [s] begins anew (the source was restarted)."""
         with self._lock:
-            if self._samples and time < self._samples[-1][0]:
+            if self._samples and stamp < self._samples[-1][0]:
                 self._samples.clear()
-            self._samples.append((time, value))
-            while self._samples[0][0] < time - self._window:
+            self._samples.append((stamp, value))
+            while self._samples[0][0] < stamp - self._window:
                 self._samples.popleft()
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray]:
@@ -80,7 +91,11 @@ class LiveWindow:
         self.figure.canvas.mpl_connect("key_press_event", self._key)
 
     def run(self, seconds: float | None = None) -> None:
-        """Show the window until it is closed; or for so long [s], and write the PNG then."""
+        """Show the window until it is closed; or for so long [s], and write the PNG then, also without any window."""
+        if seconds is not None and not can_show():
+            time.sleep(seconds)
+            self._save_and_close()
+            return
         timer = self.figure.canvas.new_timer(interval=_REFRESH_MS)
         timer.add_callback(self.refresh)
         timer.start()

@@ -181,10 +181,11 @@ class RosPlayer:
         try:
             self._play_on(state)
         except Exception as error:  # rospy would log it, and the stick stay where it is
-            self._fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error!r}")
+            self.fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error!r}")
             raise
 
-    def _fail(self, error: str) -> None:
+    def fail(self, error: str) -> None:
+        """Ends it with an error."""
         self._error = error
         self._finished.set()
 
@@ -236,10 +237,10 @@ class RosPlayer:
             try:
                 self._act(action)
             except ScenarioError as error:
-                self._fail(f"{self._player.scenario.name}, at {action.time:.1f} s: {error}")
+                self.fail(f"{self._player.scenario.name}, at {action.time:.1f} s: {error}")
                 return
             except BaseException as error:  # a thread of its own must not die unheard
-                self._fail(f"{action.kind}: {error!r}")
+                self.fail(f"{action.kind}: {error!r}")
                 raise
 
     def _act(self, action: Action) -> None:

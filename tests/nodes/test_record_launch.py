@@ -1,0 +1,29 @@
+"""record.launch: a recording that gets no flight says so while it can still be put right."""
+
+from __future__ import annotations
+
+from xplane_bridge.harness.ros import roslaunch
+
+
+def test_it_warns_while_no_states_come_and_takes_it_back(world):
+    import rospy
+    from xplane_bridge.msg import FlightState
+
+    namespace = world.namespace.strip("/")
+    launch = roslaunch(world.master, world.folder, "record.launch", ns=namespace, bag=world.folder / "empty.bag")
+    with launch:
+        launch.wait_for_line(rf"no flight is recorded: nobody publishes {world.namespace}/flight_state", 60)
+        publisher = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1, latch=True)
+        publisher.publish(FlightState())
+        launch.wait_for_line("flight states are recorded now", 60)
+        launch.wait_for_line(rf"nothing on {world.namespace}/flight_state .*, though /tests\w+ would publish it", 60)
+        publisher.unregister()
+
+
+def test_a_recording_that_does_not_want_states_has_no_watch(world):
+    namespace = world.namespace.strip("/")
+    bag = world.folder / "modes.bag"
+    launch = roslaunch(world.master, world.folder, "record.launch", ns=namespace, bag=bag, topics="control/mode")
+    with launch:
+        launch.wait_for_line(r"process\[.*record-\d+\]: started", 60)
+    assert "record_watch" not in launch.output()
