@@ -3,3 +3,11 @@
 
 class XplaneBridgeError(Exception):
     """Something a user can put right; the text is one line: what was given, what was expected, what to do."""
+
+
+def yaml_problem(error: Exception) -> str:
+    """One line about a `yaml.YAMLError`: where, and what."""
+    mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+    if mark is None or problem is None:
+        return f"does not parse as YAML: {' '.join(str(error).split())}"
+    return f"does not parse as YAML: line {mark.line + 1}, column {mark.column + 1}: {problem}"

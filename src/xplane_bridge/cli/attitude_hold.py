@@ -11,7 +11,7 @@ import argparse
 import math
 from typing import Any, Dict, List, Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
+from xplane_bridge.cli.entry import guarded, number, ros_arguments, start_node
 from xplane_bridge.cli.loaded_aircraft import AircraftError, LoadedAircraft
 from xplane_bridge.cli.waiting import wait_for_service, wait_for_state
 from xplane_bridge.errors import XplaneBridgeError
@@ -99,11 +99,16 @@ def parser() -> argparse.ArgumentParser:
         prog="attitude_hold",
         description="A controller to start from: holds attitude, altitude and airspeed of the twin on control/auto.",
     )
-    p.add_argument("--roll", type=float, metavar="DEG", help="right + (default: wings level)")
-    p.add_argument("--heading", type=float, metavar="DEG", help="true; instead of roll")
-    p.add_argument("--pitch", type=float, metavar="DEG", help="nose up +; instead of altitude")
-    p.add_argument("--altitude", type=float, metavar="M", help="MSL (default: the one at engagement)")
-    p.add_argument("--speed", type=float, metavar="M/S", help="calibrated airspeed (default: as at engagement)")
+    p.add_argument("--roll", type=number("degrees"), metavar="DEG", help="right + (default: wings level)")
+    p.add_argument("--heading", type=number("degrees"), metavar="DEG", help="true; instead of roll")
+    p.add_argument("--pitch", type=number("degrees"), metavar="DEG", help="nose up +; instead of altitude")
+    p.add_argument("--altitude", type=number("metres"), metavar="M", help="MSL (default: the one at engagement)")
+    p.add_argument(
+        "--speed",
+        type=number("metres per second"),
+        metavar="M/S",
+        help="calibrated airspeed (default: as at engagement)",
+    )
     p.add_argument("--engage", action="store_true", help="ask for mode AUTO")
     p.add_argument("--any-aircraft", action="store_true", help=f"fly others than {AIRCRAFT} too, with the same gains")
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
@@ -114,8 +119,7 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
     args = parser().parse_args(ros_arguments(argv))
-    rospy = rospy_module()
-    rospy.init_node("attitude_hold")
+    rospy = start_node("attitude_hold")
     from xplane_bridge.msg import ControlCommand, ControlMode, FlightState
 
     namespace = args.namespace.rstrip("/")

@@ -11,7 +11,7 @@ from typing import Sequence
 
 from tqdm import tqdm
 
-from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.export import campaign
 from xplane_bridge.export.dataset import Options
 
@@ -29,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--verify", action="store_true", help="compare DIR with its manifest instead of exporting")
     table = p.add_argument_group("tables and trajectories")
     table.add_argument(
-        "--rate", type=_positive, metavar="HZ", help="one uniform time base; default: samples as recorded"
+        "--rate", type=positive, metavar="HZ", help="one uniform time base; default: samples as recorded"
     )
     table.add_argument(
         "--topics",
@@ -40,7 +40,13 @@ def parser() -> argparse.ArgumentParser:
     )
     data = p.add_argument_group("image data sets")
     data.add_argument("--split-by", choices=("time", "flight"), default="time", help="default: %(default)s")
-    data.add_argument("--train-share", type=_share, default=0.8, metavar="0..1", help="default: %(default)s")
+    data.add_argument(
+        "--train-share",
+        type=number("a share from 0 to 1", 0.0, 1.0),
+        default=0.8,
+        metavar="0..1",
+        help="default: %(default)s",
+    )
     data.add_argument("--seed", type=int, default=0, help="of the draw with --split-by flight (default: %(default)s)")
     data.add_argument("--keep-bad-frames", action="store_true", help="keep frames whose quality bits say they are bad")
     run = p.add_argument_group("how to run")
@@ -49,22 +55,6 @@ def parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--scheduler", metavar="ADDRESS", help="run on this Dask cluster instead, e.g. tcp://host:8786")
     return p
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0 < value < float("inf"):
-        msg = f"{text} is not a positive number"
-        raise argparse.ArgumentTypeError(msg)
-    return value
-
-
-def _share(text: str) -> float:
-    value = float(text)
-    if not 0 <= value <= 1:
-        msg = f"{text} is not between 0 and 1"
-        raise argparse.ArgumentTypeError(msg)
-    return value
 
 
 @guarded

@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Optional, Sequence
 
 from tqdm import tqdm
 
-from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.entry import guarded, number
 from xplane_bridge.cli.flight_report import write_report
 from xplane_bridge.cli.scenario_player import scenario_of
 from xplane_bridge.harness import control_check, flight_check
@@ -21,6 +21,7 @@ from xplane_bridge.harness.scenario_flight import scenario_plan
 from xplane_bridge.resources import program
 
 _FPS = 60
+_SHORTEST_S = 5.0
 _SCENARIO, _JOYSTICK = "demo_flight", "logitech_extreme_3d_pro"
 #: Labels of the scenario after which there is something to judge.
 _LABELS = {"back_by": "manual by the stick", "stuck": "left aileron stuck", "repaired": "repaired"}
@@ -39,7 +40,11 @@ def parser() -> argparse.ArgumentParser:
         ),
     )
     p.add_argument(
-        "--duration", type=_duration, default=60.0, metavar="S", help="length of the recording [s] (%(default)g)"
+        "--duration",
+        type=number(f"seconds, {_SHORTEST_S:g} or more", low=_SHORTEST_S),
+        default=60.0,
+        metavar="S",
+        help="length of the recording [s] (%(default)g)",
     )
     p.add_argument("--output", type=Path, default=Path("out"), metavar="DIR", help="where to write (%(default)s)")
     p.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help="aircraft to fly (%(default)s)")
@@ -50,14 +55,6 @@ def parser() -> argparse.ArgumentParser:
         "launch_args", nargs="*", metavar="KEY:=VALUE", help="passed on to demo.launch, e.g. transport:=data"
     )
     return p
-
-
-def _duration(text: str) -> float:
-    value = float(text)
-    if not 5.0 <= value < float("inf"):
-        msg = f"{text} s: a flight takes at least 5 s"
-        raise argparse.ArgumentTypeError(msg)
-    return value
 
 
 def _plan(args: argparse.Namespace) -> FlightPlan:
@@ -142,6 +139,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
     args = parser().parse_args(argv)
     plan = _plan(args)
+    plan.make_folders()
     progress = _Progress(plan.duration)
     overrides = _Overrides()
 

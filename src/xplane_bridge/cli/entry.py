@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import functools
 import importlib
+import math
 import os
 import sys
 from typing import Any, Callable, Sequence
@@ -36,6 +38,31 @@ def guarded(main: Main) -> Main:
     return wrapped
 
 
+def number(expected: str, low: float = -math.inf, high: float = math.inf) -> Callable[[str], float]:
+    """Make the type of an option that takes a finite number.
+
+    Args:
+        expected: What the error calls it, e.g. "a share from 0 to 1".
+        low: Smallest number.
+        high: Largest number.
+    """
+
+    def convert(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and low <= value <= high):
+            raise argparse.ArgumentTypeError(f"{text}: expected {expected}")
+        return value
+
+    return convert
+
+
+#: The type of an option that takes a time or a rate.
+positive = number("a number above 0", low=sys.float_info.min)
+
+
 class NoRosError(XplaneBridgeError):
     """A program that is a ROS node was started where there is no ROS."""
 
@@ -57,3 +84,22 @@ def ros_arguments(argv: Sequence[str] | None) -> list[str]:
     """Give the arguments without those that roslaunch adds (`__name:=...`)."""
     given = list(sys.argv[1:] if argv is None else argv)
     return [word for word in given if ":=" not in word]
+
+
+def start_node(name: str, **options: Any) -> Any:
+    """Make this process a ROS node; gives rospy.
+
+    Args:
+        name: Of the node.
+        **options: For rospy.init_node.
+
+    Raises:
+        NoRosError: rospy is not there, or ROS ended while the master was waited for.
+    """
+    rospy = rospy_module()
+    try:
+        rospy.init_node(name, **options)
+    except rospy.exceptions.ROSInitException as err:
+        msg = f"no ROS master at {os.environ.get('ROS_MASTER_URI', '(ROS_MASTER_URI is not set)')}: {err}"
+        raise NoRosError(msg) from None
+    return rospy

@@ -18,7 +18,7 @@ from xplane_bridge.analysis.latency import (
     value_motion,
 )
 from xplane_bridge.bags import Bags
-from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.entry import guarded, number
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Table
@@ -46,23 +46,30 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--view", choices=sorted(_VIEWS), help="where camera/frame_state does not say it")
     p.add_argument(
         "--ignore-bottom",
-        type=float,
+        type=number("a share from 0 to 0.9", 0.0, 0.9),
         default=0.05,
         metavar="0..1",
         help="share of the picture at its lower edge that does not show the scene (default: %(default)s)",
     )
-    p.add_argument("--plot", type=Path, metavar="FILE", help="figure of cost and fit, e.g. delay.png")
+    p.add_argument("--plot", type=_picture, metavar="FILE", help="figure of cost and fit, e.g. delay.png")
     p.add_argument("--json", type=Path, metavar="FILE", help="the numbers as JSON")
     return p
+
+
+def _picture(text: str) -> Path:
+    from matplotlib.figure import Figure
+
+    kinds = Figure().canvas.get_supported_filetypes()
+    if Path(text).suffix[1:].lower() not in kinds:
+        msg = f"{text}: expected a file name that ends in one of {', '.join(sorted(kinds))}"
+        raise argparse.ArgumentTypeError(msg)
+    return Path(text)
 
 
 @guarded
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program."""
-    p = parser()
-    args = p.parse_args(argv)
-    if not 0.0 <= args.ignore_bottom < 0.9:
-        p.error(f"--ignore-bottom {args.ignore_bottom}: expected 0 to 0.9")
+    args = parser().parse_args(argv)
     with Bags(args.bags) as bags:
         display = display_delay(bags, _VIEWS[args.view] if args.view else None, args.ignore_bottom)
         responses = command_responses(bags)
@@ -75,14 +82,18 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"{name:<19} not determined: {err}")
         else:
             print(f"{name:<19} {_text(result)}")
-    if args.plot:
-        from xplane_bridge.plotting.latency import save
+    try:
+        if args.plot:
+            from xplane_bridge.plotting.latency import save
 
-        save({"display delay": display, **responses}, args.plot)
-        print(args.plot)
-    if args.json:
-        results = {"display_delay": display, **responses}
-        args.json.write_text(json.dumps({name: _numbers(value) for name, value in results.items()}, indent=2) + "\n")
+            save({"display delay": display, **responses}, args.plot)
+            print(args.plot)
+        if args.json:
+            numbers = {name: _numbers(value) for name, value in {"display_delay": display, **responses}.items()}
+            args.json.write_text(json.dumps(numbers, indent=2) + "\n")
+    except OSError as err:
+        msg = f"{err.filename}: {err.strerror}"
+        raise LatencyError(msg) from None
     return 0
 
 

@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
-from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
+from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.harness.processes import ManagedProcess
 from xplane_bridge.harness.ros import ros_environment
 from xplane_bridge.joystick.config_table import JoyConfigError, Live, load_joy_config, screen, skeleton
@@ -67,8 +67,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         load_joy_config(file, args.stick_mode)
     elif args.skeleton.exists():
         raise JoyConfigError(f"{args.skeleton} exists; give another name, or remove it")
-    rospy = rospy_module()
-    rospy.init_node("joy_config_check", anonymous=True, disable_signals=True)
+    rospy = start_node("joy_config_check", anonymous=True, disable_signals=True)
     device = _Device(rospy, args.namespace)
     if args.skeleton is not None:
         return _write_skeleton(device, args.skeleton, args.timeout)

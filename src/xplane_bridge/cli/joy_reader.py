@@ -6,7 +6,7 @@ import argparse
 import time
 from typing import Any, List, Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
+from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.joystick.sdl_reader import JoyReader, JoyState, device_names, start_sdl
 from xplane_bridge.topics import NAMESPACE
 
@@ -52,11 +52,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         names = device_names(start_sdl())
         print("\n".join(f"{index}  {name}" for index, name in enumerate(names)) or "no joystick is plugged in")
         return 0
-    rospy = rospy_module()
     pygame = start_sdl()
     reader = JoyReader(pygame, args.device, args.deadzone, args.autorepeat_rate, args.coalesce_interval)
-    rospy.init_node("joy_reader")
-    _Node(rospy, pygame, reader, args.namespace).run()
+    _Node(start_node("joy_reader"), pygame, reader, args.namespace).run()
     return 0
 
 

@@ -7,7 +7,7 @@ import re
 import time
 from typing import Any, Callable, NamedTuple, Sequence
 
-from xplane_bridge.cli.entry import guarded, rospy_module
+from xplane_bridge.cli.entry import guarded, positive, ros_arguments, start_node
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.plotting.live import LiveWindow, RollingSeries, can_show
 
@@ -34,11 +34,11 @@ def parser() -> argparse.ArgumentParser:
         epilog="example: live_plot /xplane/flight_state/roll_deg,pitch_deg /xplane/mission/engines/engine_speed[0]",
     )
     p.add_argument("fields", nargs="+", metavar="TOPIC/FIELD[,FIELD...]", help="as for rqt_plot")
-    p.add_argument("--window", type=float, default=60.0, metavar="S", help="width of the time axis (%(default)g s)")
-    p.add_argument("--wait", type=float, default=30.0, metavar="S", help="for the topics to appear (%(default)g s)")
+    p.add_argument("--window", type=positive, default=60.0, metavar="S", help="width of the time axis (%(default)g s)")
+    p.add_argument("--wait", type=positive, default=30.0, metavar="S", help="for the topics to appear (%(default)g s)")
     p.add_argument("--png", default="live_plot.png", metavar="FILE", help="what the s key writes (%(default)s)")
     p.add_argument(
-        "--after", type=float, metavar="S", help="write the PNG by itself after so long, and end; needs no display"
+        "--after", type=positive, metavar="S", help="write the PNG by itself after so long, and end; needs no display"
     )
     return p
 
@@ -98,18 +98,14 @@ def getter(path: str, message_type: Any) -> Callable[[Any], float]:
 @guarded
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program."""
-    rospy = rospy_module()
-    p = parser()
-    args = p.parse_args(rospy.myargv(argv)[1:] if argv is None else list(argv))
-    if not args.window > 0:
-        p.error(f"--window {args.window:g}: must be positive")
+    args = parser().parse_args(ros_arguments(argv))
     if args.after is None and not can_show():
         msg = (
             "no window can be opened here: there is no display (DISPLAY), or matplotlib has no toolkit for it "
             f"(python3-tk); without one, --after S --png {args.png} draws for S seconds and writes the picture"
         )
         raise LivePlotError(msg)
-    rospy.init_node("live_plot", anonymous=True, disable_signals=True)
+    rospy = start_node("live_plot", anonymous=True, disable_signals=True)
     names = [[rospy.resolve_name(name) for name in split(argument)] for argument in args.fields]
     found = _wait_for([name for group in names for name in group], args.wait)
     groups = [(_label(group), [RollingSeries(_short(name, group), args.window) for name in group]) for group in names]

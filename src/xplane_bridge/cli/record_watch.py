@@ -6,7 +6,7 @@ import argparse
 import time
 from typing import Any, Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
+from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.cli.waiting import Listener, Patience, link_text
 from xplane_bridge.topics import NAMESPACE
 
@@ -46,8 +46,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     )
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     args = p.parse_args(ros_arguments(argv))
-    rospy = rospy_module()
-    rospy.init_node("record_watch", anonymous=True)
+    rospy = start_node("record_watch", anonymous=True)
     from xplane_bridge.msg import FlightState, LinkState
 
     namespace = args.namespace.rstrip("/")

@@ -12,7 +12,7 @@ from typing import Optional, Sequence
 from xplane_bridge.analysis.scoring import Score
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import read_flight
-from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.entry import guarded, positive
 from xplane_bridge.cli.scenario_player import scenario_of
 from xplane_bridge.harness.display import screen
 from xplane_bridge.harness.flight import FlightPlan, fly
@@ -42,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--controller", metavar="COMMAND", help="program that flies in mode auto, started beside the bridge")
     p.add_argument("--camera", action="store_true", help="draw and record the cockpit view")
     p.add_argument("--headless", action="store_true", help="draw it, but not on this screen")
-    p.add_argument("--duration", type=float, metavar="S", help="end after so long; needed where a scenario repeats")
+    p.add_argument("--duration", type=positive, metavar="S", help="end after so long; needed where a scenario repeats")
     p.add_argument(
         "--emulator",
         default="",
@@ -91,6 +91,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     if path.exists():
         args.scenario = str(path.resolve())
     plan = plan_of(scenario, args)
+    plan.make_folders()
     with interrupted_by_signals("run_scenario"), screen(plan.logs, args.headless or not args.camera):
         fly(plan, say=lambda text: print(f"run_scenario: {text}", file=sys.stderr))
     played = json.loads((plan.output / "played.json").read_text(encoding="utf-8"))

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Optional, Sequence
 
-from xplane_bridge.cli.entry import guarded, ros_arguments, rospy_module
+from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.cli.loaded_aircraft import LoadedAircraft
 from xplane_bridge.cli.waiting import wait_for_state
 from xplane_bridge.resources import config_file
@@ -53,7 +53,7 @@ def play(
         if file.suffix != ".yaml":
             file = config_file("joysticks", f"{args.joy_config}.yaml")
         stick = load_stick(file, args.stick_mode)
-    rospy_module().init_node(node, argv=None if argv is None else list(argv))
+    start_node(node, argv=None if argv is None else list(argv))
     namespace = args.namespace.rstrip("/")
     player = RosPlayer(scenario, namespace, stick, log, say=lambda text: print(text, flush=True))
     remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"

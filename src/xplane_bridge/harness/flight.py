@@ -54,6 +54,20 @@ class FlightPlan:
         """Folder of the logs of all programs."""
         return self.output / "logs"
 
+    def make_folders(self) -> None:
+        """Makes what is to be written to.
+
+        Raises:
+            HarnessError: It cannot be made.
+        """
+        try:
+            self.logs.mkdir(parents=True, exist_ok=True)
+        except OSError as err:
+            msg = (
+                f"{self.output} cannot be written to: {err.strerror}; --output takes a folder, or the name of a new one"
+            )
+            raise HarnessError(msg) from None
+
 
 @dataclass
 class RunningFlight:
@@ -92,7 +106,7 @@ def fly(
     Raises:
         HarnessError: A program failed, or flight states stopped coming.
     """
-    plan.logs.mkdir(parents=True, exist_ok=True)
+    plan.make_folders()
     for old in (plan.bag, plan.truth):
         if old.exists():
             old.unlink()

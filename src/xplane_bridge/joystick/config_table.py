@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import yaml
 
-from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.errors import XplaneBridgeError, yaml_problem
 
 _BAR = 8  #: characters of an axis' bar on either side of its middle
 _MODES = {"manual": "asks for MANUAL", "auto": "asks for AUTO", "toggle": "asks for the other mode"}
@@ -60,7 +60,7 @@ def load_joy_config(file: Path, stick_mode: Optional[int] = None) -> JoyConfig:
     except OSError as error:
         raise JoyConfigError(f"{file}: {error.strerror}; expected a file like those in config/joysticks") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise JoyConfigError(f"{file}: not YAML: {' '.join(str(error).split())}") from None
+        raise JoyConfigError(f"{file}: {yaml_problem(error)}") from None
     if not isinstance(content, dict):
         raise JoyConfigError(
             f"{file}: expected keys like device, direct, integrated, buttons, mode; see config/joysticks"

@@ -10,6 +10,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 import yaml
 
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
+from xplane_bridge.errors import yaml_problem
 
 from .holds import HoldGains
 from .schema import (
@@ -50,7 +51,7 @@ def load_scenario(path: Path) -> Scenario:
     try:
         document = yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise ScenarioError(f"{path}: is not valid YAML: {error}") from None
+        raise ScenarioError(f"{path}: {yaml_problem(error)}") from None
     try:
         return parse_scenario(document)
     except ScenarioError as error:

@@ -11,6 +11,8 @@ from typing import Any, Dict, List, Optional, Tuple
 import numpy as np
 import yaml
 
+from xplane_bridge.errors import yaml_problem
+
 from .player import Commands
 from .schema import ScenarioError
 
@@ -112,7 +114,7 @@ def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:
     except OSError as error:
         raise ScenarioError(f"{file}: {error.strerror}; expected a file of config/joysticks") from None
     except yaml.YAMLError as error:
-        raise ScenarioError(f"{file}: not YAML: {error}") from None
+        raise ScenarioError(f"{file}: {yaml_problem(error)}") from None
     if not isinstance(device, dict):
         raise ScenarioError(f"{file}: expected a mapping with device, direct, ...")
     return VirtualStick(device, stick_mode)

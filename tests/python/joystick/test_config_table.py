@@ -122,7 +122,11 @@ def test_every_key_of_the_shipped_files_is_shown(name):
 
 @pytest.mark.parametrize(
     ("content", "part"),
-    [(None, "No such file"), ("roll: {axis: 0", "not YAML"), ("- 1\n", "expected keys like device")],
+    [
+        (None, "No such file"),
+        ("roll: {axis: 0", "pad.yaml: does not parse as YAML: line 1, column 15: "),
+        ("- 1\n", "expected keys like device"),
+    ],
 )
 def test_a_file_that_is_none_is_said(tmp_path, content, part):
     file = tmp_path / "pad.yaml"

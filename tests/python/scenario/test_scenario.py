@@ -101,7 +101,7 @@ def test_files_that_are_no_scenarios(tmp_path):
         load_scenario(tmp_path / "no.yaml")
     bad = tmp_path / "bad.yaml"
     bad.write_text("name: [")
-    with pytest.raises(ScenarioError, match=r"bad\.yaml: is not valid YAML"):
+    with pytest.raises(ScenarioError, match=r"bad\.yaml: does not parse as YAML: line 1, column 8: "):
         load_scenario(bad)
     bad.write_text("name: x\nevents: 3\n")
     with pytest.raises(ScenarioError, match=r"bad\.yaml: events: 3"):
