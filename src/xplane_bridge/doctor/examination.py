@@ -18,6 +18,15 @@ from .settings import Settings
 
 #: Each of the two rounds of observations gets so long [s]; the second needs to know where X-Plane is.
 _ROUND_S = 6.0
+#: Observations whose names say too little to users.
+_SAID = {
+    "answers": "X-Plane",
+    "data": "Data Output",
+    "display": "the X display",
+    "holders": "which programs hold ports",
+    "ros": "the ROS master",
+    "target": "the address of X-Plane's computer",
+}
 
 
 def examine(settings: Settings) -> Evidence:
@@ -64,8 +73,9 @@ def judge(evidence: Evidence) -> List[Finding]:
         for finding in check(evidence)
     ]
     for what, why in evidence.unfinished.items():
-        text = f"{what} could not be looked at: {why}"
-        findings.append(problem("unfinished", text, "try again; is a name server silent?", what=what, why=why))
+        text = f"{_SAID.get(what, what)} could not be looked at: {why}"
+        remedy = "try again; a name server that does not answer may be the reason"
+        findings.append(problem("unfinished", text, remedy, what=what, why=why))
     return findings
 
 

@@ -108,7 +108,7 @@ def test_what_was_not_seen_is_told_and_not_judged():
     findings = examination.judge(Evidence(unfinished={"ros": "it took too long"}))
     assert {finding.id for finding in seen} - {finding.id for finding in findings} == {"no-ros"}
     assert [(f.severity, f.text) for f in findings if f.id == "unfinished"] == [
-        (Severity.PROBLEM, "ros could not be looked at: it took too long")
+        (Severity.PROBLEM, "the ROS master could not be looked at: it took too long")
     ]
 
 

@@ -13,7 +13,7 @@ Check = Callable[[Evidence], List[Finding]]
 
 #: All checks, in the order of the report, from the cable to what is plugged in; each with the observations it needs.
 CHECKS: Tuple[Tuple[Check, FrozenSet[str]], ...] = (
-    (link.beacons, frozenset({"beacons", "target"})),
+    (link.beacons, frozenset({"beacons"})),
     (link.several, frozenset({"beacons", "target"})),
     (link.answer, frozenset({"answers", "beacons", "target"})),
     (link.answering_address, frozenset({"answers", "target"})),

@@ -93,7 +93,7 @@ def answer(evidence: Evidence) -> List[Finding]:
         text = f"no X-Plane announces itself on the network, and {nothing}"
         return [problem("no-simulator", text, f"start X-Plane; {hints.elsewhere(evidence)}", **facts)]
     if answers.refused:
-        text = f"{nothing}: the computer is there, but nothing listens on the port"
+        text = f"{nothing}: the computer is there, but nothing listens on the port (or its firewall rejects it)"
         remedy = "start X-Plane there, or give the port that Settings > Network shows (port:=, --port)"
         return [problem("nothing-listens", text, remedy, **facts)]
     if answers.unreachable:
