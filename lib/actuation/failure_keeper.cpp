@@ -63,8 +63,8 @@ std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double 
 
 }  // namespace
 
-FailureKeeper::FailureKeeper(core::SimLink* link, OverrideKeeper* overrides, SurfaceControl* surfaces, double timeout,
-                             ros::Publisher publisher, Report report)
+FailureKeeper::FailureKeeper(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControl* surfaces,
+                             double timeout, ros::Publisher publisher, Report report)
     : link_(link),
       overrides_(overrides),
       surfaces_(surfaces),
@@ -73,27 +73,26 @@ FailureKeeper::FailureKeeper(core::SimLink* link, OverrideKeeper* overrides, Sur
       report_(std::move(report)) {}
 
 void FailureKeeper::onLink(const core::LinkStatus& status) {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   link_status_ = status;
   changed_.notify_all();
   if (!status.version.known()) return;
-  if (menu_group_ >= 0 && status.version == version_) return;
+  if (menu_subscription_ && status.version == version_) return;
   version_ = status.version;
   menu_datarefs_ = core::simulatorFailures(version_);
-  if (menu_group_ >= 0) link_->removeGroup(menu_group_);
-  menu_group_ = link_->addGroup({"failures", menu_datarefs_, kMenuRate, 0});
+  watch(&menu_subscription_, {"failures", menu_datarefs_, kMenuRate, 0});
 }
 
-bool FailureKeeper::onRref(core::GroupId group, const core::RrefView& view) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (group == menu_group_) {
-    observe(menu_datarefs_, view);
-  } else if (group == own_group_) {
-    observe(own_datarefs_, view);
-  } else {
-    return false;
+void FailureKeeper::watch(core::Subscription* subscription, core::RrefGroup group) {
+  if (group.datarefs.empty()) {
+    subscription->reset();
+    return;
   }
-  return true;
+  // The handler has its list, so that it names each value rightly.
+  auto observed = [this, datarefs = group.datarefs](const core::RrefView& view, const core::ReceiveInfo&) {
+    observe(datarefs, view);
+  };
+  *subscription = link_->subscribe(std::move(group), std::move(observed), mutex_);
 }
 
 void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core::RrefView& view) {
@@ -119,7 +118,7 @@ void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core
 }
 
 void FailureKeeper::onFrame(const core::FlightWatch& watch) {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const double before = now_.sim_time;
   now_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
   if (stopped_) return;
@@ -177,9 +176,7 @@ void FailureKeeper::watchOwn() {
   }
   if (datarefs == own_datarefs_) return;
   own_datarefs_ = datarefs;
-  // A group of its own each time: answers to the old list must not be taken for the new one's.
-  if (own_group_ >= 0) link_->removeGroup(own_group_);
-  own_group_ = own_datarefs_.empty() ? -1 : link_->addGroup({"failures set", own_datarefs_, kOwnRate, 1});
+  watch(&own_subscription_, {"failures set", own_datarefs_, kOwnRate, 1});
 }
 
 void FailureKeeper::undo(const core::FailurePlan& plan) {
@@ -197,7 +194,7 @@ void FailureKeeper::repair(const std::vector<std::string>& datarefs) {
     }
     undone_[dataref] = tick_time_;
     // One of the simulator's menu is not held.
-    link_->sendDref(dataref, static_cast<float>(core::kWorking));
+    link_->write(dataref, static_cast<float>(core::kWorking));
   }
 }
 
@@ -266,7 +263,7 @@ bool FailureKeeper::settled(Pending* pending) {
       if (tick_time_ - pending->sent < kSendAgain) return false;
       pending->sent = tick_time_;  // a datagram may have been lost
       for (const std::string& dataref : pending->plan.datarefs) {
-        link_->sendDref(dataref, static_cast<float>(core::kFailedNow));
+        link_->write(dataref, static_cast<float>(core::kFailedNow));
       }
     } else {
       if (pending->plan.surface) {
@@ -319,7 +316,7 @@ void FailureKeeper::watchRepairs() {
 
 void FailureKeeper::tick(double time) {
   const auto dropped = surfaces_->takeDropped();
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   tick_time_ = time;
   if (dropped) end(true, *dropped);
   if (link_status_.state == core::LinkState::kConnected) {
@@ -337,19 +334,19 @@ void FailureKeeper::tick(double time) {
 }
 
 void FailureKeeper::stop() {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   stopped_ = true;
   changed_.notify_all();
 }
 
 void FailureKeeper::repaired() {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   book_.clear({}, false);
   pending_.clear();
 }
 
 void FailureKeeper::publish() {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   publishLocked();
 }
 
@@ -399,7 +396,7 @@ std::optional<ServiceResult> FailureKeeper::add(const core::FailureRequest& requ
   return std::nullopt;
 }
 
-ServiceResult FailureKeeper::await(std::unique_lock<std::mutex>* lock, const std::string& name) {
+ServiceResult FailureKeeper::await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name) {
   const auto longest = std::chrono::duration<double>(2.0 * timeout_ + kBehaviourWait + kWaitSlack);
   const auto paused = [this] { return link_status_.state == core::LinkState::kPaused; };
   // A short silence (STALE) is waited through: X-Plane loads scenery.
@@ -420,7 +417,7 @@ void FailureKeeper::set(const SetFailure::Request& request, const std::string& w
   core::FailureRequest wish{request.name, request.kind, std::nullopt, request.trigger,
                             static_cast<double>(request.trigger_value)};
   if (request.has_value) wish.value = static_cast<double>(request.value);
-  std::unique_lock<std::mutex> lock(mutex_);
+  std::unique_lock<core::HandlerMutex> lock(*mutex_);
   if (!isUp(link_status_) || !link_status_.version.known()) {
     response->result = result(ServiceResult::NO_LINK, "X-Plane is not connected");
     return;
@@ -430,7 +427,7 @@ void FailureKeeper::set(const SetFailure::Request& request, const std::string& w
     lock.unlock();
     bool answered = true;
     if (!planned.plan.datarefs.empty()) {
-      const auto values = link_->readDatarefs(planned.plan.datarefs, timeout_);
+      const auto values = link_->read(planned.plan.datarefs, timeout_);
       answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
     }
     const std::string refusal = planned.plan.surface ? surfaces_->refusal(planned.plan.surface->surface) : "";
@@ -460,7 +457,7 @@ void FailureKeeper::set(const SetFailure::Request& request, const std::string& w
 
 void FailureKeeper::clear(const ClearFailures::Request& request, const std::string& who,
                           ClearFailures::Response* response) {
-  std::unique_lock<std::mutex> lock(mutex_);
+  std::unique_lock<core::HandlerMutex> lock(*mutex_);
   std::vector<std::string> names;
   for (const std::string& name : request.names) {
     names.push_back(core::failureName(name));
@@ -522,7 +519,7 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
 
 void FailureKeeper::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   std::string broken, unconfirmed;
   for (const core::FailureLabel& label : book_.labels()) {
     broken += (broken.empty() ? "" : ", ") + label.name;

@@ -20,7 +20,7 @@ constexpr double kIdentityWait = 3.0;  // [s] until X-Plane must have told its a
 constexpr const char* kLoading = "another aircraft is being loaded";
 
 template <std::size_t Size, class Encode>
-bool sendMessage(core::SimLink* link, Encode encode) {
+bool sendMessage(core::SimulatorPort* link, Encode encode) {
   std::array<std::uint8_t, Size> buffer;
   const core::EncodeResult encoded = encode(core::ByteSpan(buffer));
   return encoded.ok() && link->send({buffer.data(), encoded.value()}) == core::SendStatus::kSent;
@@ -42,7 +42,7 @@ std::string loadingDifference(const std::vector<core::DatarefWrite>& writes,
 
 }  // namespace
 
-FlightJobs::FlightJobs(core::SimLink* link, const FlightJobOptions& options, FlightJobHooks hooks)
+FlightJobs::FlightJobs(core::SimulatorPort* link, const FlightJobOptions& options, FlightJobHooks hooks)
     : link_(link), options_(options), hooks_(std::move(hooks)), thread_([this] { loop(); }) {}
 
 FlightJobs::~FlightJobs() { stop(); }
@@ -137,7 +137,7 @@ double FlightJobs::left(Time deadline) {
 bool FlightJobs::over(Time deadline) const { return stopping_ || left(deadline) <= 0.0; }
 
 void FlightJobs::write(const std::vector<core::DatarefWrite>& writes) {
-  for (const core::DatarefWrite& each : writes) link_->sendDref(each.dataref, each.value);
+  for (const core::DatarefWrite& each : writes) link_->write(each.dataref, each.value);
 }
 
 std::string FlightJobs::excuse() const {
@@ -152,7 +152,7 @@ void FlightJobs::pause(bool paused) {
   const Time deadline = in(kPauseWait);
   hooks_.pausing(mover());
   do {
-    link_->sendCommand(core::pauseCommand(paused));
+    link_->command(core::pauseCommand(paused));
     for (const Time again = in(kWriteAgain); !over(again) && link_->status().paused != paused;) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -163,7 +163,7 @@ void FlightJobs::pause(bool paused) {
 // --- placing ---
 
 std::optional<core::ShownFlight> FlightJobs::shownFlight() {
-  return core::shownFlightFrom(link_->readDatarefs(core::shownFlightDatarefs(link_->status().version), kPoll));
+  return core::shownFlightFrom(link_->read(core::shownFlightDatarefs(link_->status().version), kPoll));
 }
 
 FlightJobs::Outcome FlightJobs::place(const core::FlightStart& start) {
@@ -207,7 +207,7 @@ std::string FlightJobs::placed(const core::FlightStart& start) {
   };
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
     write(core::motionWrites(start, *shown));
-    const auto values = link_->readDatarefsUntil(core::shownFlightDatarefs(link_->status().version), kPoll, fits);
+    const auto values = link_->readUntil(core::shownFlightDatarefs(link_->status().version), kPoll, fits);
     if (const auto now = core::shownFlightFrom(values)) shown = now;
     if (fits(values)) return "";
   }
@@ -223,7 +223,7 @@ FlightJobs::Outcome FlightJobs::blow(const core::UniformWind& wind) {
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
     write(core::windWrites(wind, link_->status().version));
     for (const Time again = in(1.0); !over(again);) {
-      values = link_->readDatarefsUntil(names, kPoll, fits);
+      values = link_->readUntil(names, kPoll, fits);
       if (fits(values)) return {Event::SETTING, "the wind blows as asked for", true};
     }
   }
@@ -245,7 +245,7 @@ FlightJobs::Outcome FlightJobs::load(const core::Loading& loading) {
   std::vector<core::DatarefValue> values;
   for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
     write(writes);
-    values = link_->readDatarefsUntil(names, kWriteAgain, fits);
+    values = link_->readUntil(names, kWriteAgain, fits);
     if (fits(values)) return {Event::SETTING, "the aircraft is loaded as asked for", true};
   }
   return {Event::SETTING, "set_loading: " + loadingDifference(writes, values) + excuse(), false};
@@ -265,7 +265,7 @@ FlightJobs::Outcome FlightJobs::change(const std::string& path, std::int32_t liv
 
 std::string FlightJobs::changed(const std::string& path, std::int32_t livery) {
   const auto names = core::aircraftPathDatarefs(path.size() + 1);
-  const auto isShown = [&] { return core::isSamePath(core::textFrom(link_->readDatarefs(names, kPoll)), path); };
+  const auto isShown = [&] { return core::isSamePath(core::textFrom(link_->read(names, kPoll)), path); };
   const bool same = isShown();
   const unsigned resets = hooks_.resets();
   bool gap = false;

@@ -32,7 +32,7 @@ constexpr float kSame = 1e-3F;
 
 const char* const kOverridePurpose = "override";
 
-OverrideKeeper::OverrideKeeper(core::SimLink* link, Report report) : link_(link), report_(std::move(report)) {}
+OverrideKeeper::OverrideKeeper(core::SimulatorPort* link, Report report) : link_(link), report_(std::move(report)) {}
 
 bool OverrideKeeper::set(const std::string& dataref, float value) {
   const auto journal = link_->journal();
@@ -40,7 +40,7 @@ bool OverrideKeeper::set(const std::string& dataref, float value) {
   // On disk first: a crash right after the datagram must find it there.
   journal->record(entryId(dataref), kOverridePurpose, {undoOf(dataref)});
   releasing_.erase(dataref);
-  link_->sendDref(dataref, value);
+  link_->write(dataref, value);
   return true;
 }
 
@@ -56,20 +56,19 @@ void OverrideKeeper::watch() {
   }
   watched_ = list;
   if (list.empty()) {
-    if (group_ >= 0) link_->removeGroup(std::exchange(group_, -1));
+    subscription_.reset();
     return;
   }
   core::RrefGroup group{"overrides", list, kWatchRate, 1};
-  if (group_ < 0) {
-    group_ = link_->addGroup(std::move(group));
+  if (subscription_) {
+    subscription_.replace(std::move(group));
   } else {
-    link_->replaceGroup(group_, std::move(group));
+    subscription_ = link_->subscribe(
+        std::move(group), [this](const core::RrefView& view, const core::ReceiveInfo&) { onShown(view); }, mutex_);
   }
 }
 
-bool OverrideKeeper::onRref(core::GroupId group, const core::RrefView& view) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (group != group_) return false;
+void OverrideKeeper::onShown(const core::RrefView& view) {
   for (std::size_t i = 0; i < view.size(); ++i) {
     const core::RrefPair pair = view[i];
     if (pair.index < 0 || static_cast<std::size_t>(pair.index) >= watched_.size()) continue;
@@ -83,14 +82,13 @@ bool OverrideKeeper::onRref(core::GroupId group, const core::RrefView& view) {
       ++shown.released;
     }
   }
-  return true;
 }
 
 std::vector<std::string> OverrideKeeper::releasedByOthers() {
   std::vector<std::string> stopped;
   std::set<std::string> all;
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     for (const auto& [dataref, shown] : shown_) {
       if (shown.released >= kReleasedAnswers) all.insert(dataref);
     }
@@ -108,7 +106,7 @@ std::vector<std::string> OverrideKeeper::releasedByOthers() {
 }
 
 void OverrideKeeper::forgetShown() {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   for (const std::string& dataref : watched_) shown_[dataref] = {false, 0, false};
 }
 
@@ -121,7 +119,7 @@ void OverrideKeeper::release(const std::string& dataref) {
 void OverrideKeeper::require(const std::vector<std::string>& wanted) {
   std::set<std::string> taken, given;
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     for (const std::string& dataref : wanted) {
       if (required_.count(dataref) != 0) continue;
       if (held_.count(dataref) == 0 && !set(dataref, 1.0F)) continue;
@@ -140,7 +138,7 @@ void OverrideKeeper::require(const std::vector<std::string>& wanted) {
     }
   }
   if (!taken.empty() || !given.empty()) {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     watch();
   }
   if (!taken.empty()) report_("set " + joined(taken), true);
@@ -148,7 +146,7 @@ void OverrideKeeper::require(const std::vector<std::string>& wanted) {
 }
 
 bool OverrideKeeper::hold(const std::string& dataref, float value, bool refreshed) {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   if (required_.count(dataref) == 0 && !set(dataref, value)) return false;
   held_[dataref] = {value, refreshed};
   watch();
@@ -156,14 +154,14 @@ bool OverrideKeeper::hold(const std::string& dataref, float value, bool refreshe
 }
 
 void OverrideKeeper::unhold(const std::string& dataref) {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   if (held_.erase(dataref) == 0) return;
   release(dataref);
   watch();
 }
 
 void OverrideKeeper::refresh() {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   for (const std::string& dataref : required_) send(dataref, 1.0F);
   for (const auto& [dataref, held] : held_) {
     if (held.refreshed) send(dataref, held.value);
@@ -174,7 +172,7 @@ void OverrideKeeper::send(const std::string& dataref, float value) {
   const auto found = shown_.find(dataref);
   if (found != shown_.end() && found->second.released > 0) return;  // by whom is not known yet
   if (found == shown_.end() || found->second.in_journal) {
-    link_->sendDref(dataref, value);
+    link_->write(dataref, value);
     return;
   }
   // It may be that the panic tool has taken the entry out.
@@ -186,7 +184,7 @@ void OverrideKeeper::send(const std::string& dataref, float value) {
 }
 
 bool OverrideKeeper::releasesPending() const {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   return !releasing_.empty();
 }
 
@@ -206,7 +204,7 @@ bool OverrideKeeper::confirm(const std::vector<core::UndoOperation>& operations,
 void OverrideKeeper::confirmReleases(double timeout_s) {
   std::set<std::string> pending;
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     pending = releasing_;
   }
   std::vector<std::string> ids;
@@ -217,7 +215,7 @@ void OverrideKeeper::confirmReleases(double timeout_s) {
   }
   if (operations.empty() || !link_->undo(operations, timeout_s)) return;
   const auto journal = link_->journal();
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   for (const std::string& dataref : pending) {
     // It may have been set again meanwhile.
     if (releasing_.erase(dataref) != 0 && journal) journal->remove({entryId(dataref)});
@@ -227,7 +225,7 @@ void OverrideKeeper::confirmReleases(double timeout_s) {
 bool OverrideKeeper::releaseAll(double timeout_s) {
   std::set<std::string> all;
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     all = required_;
     for (const auto& [dataref, held] : held_) all.insert(dataref);
     all.insert(releasing_.begin(), releasing_.end());
@@ -245,7 +243,7 @@ bool OverrideKeeper::releaseAll(double timeout_s) {
   }
   const auto remove = [&ids](core::Journal& journal) { journal.remove(ids); };
   if (!confirm(operations, timeout_s, joined(all), remove)) return false;
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   releasing_.clear();
   return true;
 }
@@ -266,7 +264,7 @@ bool OverrideKeeper::releaseLeftovers(double timeout_s) {
 }
 
 std::vector<std::string> OverrideKeeper::active() const {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   std::set<std::string> all = required_;
   for (const auto& [dataref, held] : held_) {
     if (held.refreshed) all.insert(dataref);

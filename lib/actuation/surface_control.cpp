@@ -33,17 +33,17 @@ std::string degrees(double value) {
 
 }  // namespace
 
-SurfaceControl::SurfaceControl(core::SimLink* link, OverrideKeeper* overrides, SurfaceControlOptions options,
-                               Report report)
+SurfaceControl::SurfaceControl(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControlOptions options,
+                               Report report, std::function<void()> on_frame)
     : link_(link),
       overrides_(overrides),
       options_(std::move(options)),
       report_(std::move(report)),
+      on_frame_(std::move(on_frame)),
       watch_(options_.mixing),
       inputs_(options_.flap_rate, options_.speedbrake_rate),
       stick_{std::nan(""), std::nan(""), std::nan("")},
       not_following_(core::surfaceTable().size(), 0.0) {
-  std::lock_guard<std::mutex> lock(mutex_);
   subscribe();
 }
 
@@ -64,30 +64,35 @@ const char* SurfaceControl::toString(State state) {
 void SurfaceControl::subscribe() {
   core::RrefGroup group{"surfaces", core::surfaceWatchDatarefs(version_), core::kEveryFrameRateHz, 1};
   frames_ = std::make_unique<core::RrefFrameAssembler>(group.datarefs.size());
-  if (group_ < 0) {
-    group_ = link_->addGroup(std::move(group));
-  } else {
-    link_->replaceGroup(group_, std::move(group));
+  if (subscription_) {
+    subscription_.replace(std::move(group));
+    return;
   }
+  subscription_ = link_->subscribe(
+      std::move(group), [this](const core::RrefView& view, const core::ReceiveInfo& info) { onDatagram(view, info); });
 }
 
 void SurfaceControl::onLink(const core::LinkStatus& status) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  flowing_ = status.state == core::LinkState::kConnected;
-  if (!flowing_) watch_.interrupt();
-  if (!status.version.known() || status.version == version_) return;
-  const bool same = core::surfaceWatchDatarefs(status.version) == core::surfaceWatchDatarefs(version_);
-  version_ = status.version;
-  if (!same) subscribe();
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    flowing_ = status.state == core::LinkState::kConnected;
+    if (!flowing_) watch_.interrupt();
+    if (!status.version.known() || status.version == version_) return;
+    const bool same = core::surfaceWatchDatarefs(status.version) == core::surfaceWatchDatarefs(version_);
+    version_ = status.version;
+    if (same) return;
+  }
+  subscribe();
 }
 
-bool SurfaceControl::onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (group != group_) return false;
-  if (frames_->add(view, info.stamp_ns) && core::surfaceSampleFrom(frames_->values(), &sample_) && !stopped_) {
-    onSample();
+void SurfaceControl::onDatagram(const core::RrefView& view, const core::ReceiveInfo& info) {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (frames_->add(view, info.stamp_ns) && core::surfaceSampleFrom(frames_->values(), &sample_) && !stopped_) {
+      onSample();
+    }
   }
-  return true;
+  on_frame_();
 }
 
 void SurfaceControl::onSample() {
@@ -113,7 +118,7 @@ void SurfaceControl::onSample() {
       break;
     case State::kTaking:
       drive(dt);
-      link_->sendDref(core::kSurfaceOverride, 1.0F);  // it is held; a datagram may have been lost
+      link_->write(core::kSurfaceOverride, 1.0F);  // it is held; a datagram may have been lost
       if (overridden) {
         enter(State::kDriving);
         report_("the surfaces are driven by their identified mixing", true);
@@ -199,7 +204,7 @@ void SurfaceControl::drive(double dt) {
   const auto& out = driver_->step(inputs, {sample_.alpha_deg, sample_.beta_deg}, dt);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const core::SurfaceDeflection& surface = out[i];
-    link_->sendDref(core::surfaceTable()[surface.surface].dataref, static_cast<float>(surface.deflection_deg));
+    link_->write(core::surfaceTable()[surface.surface].dataref, static_cast<float>(surface.deflection_deg));
     double& waiting = not_following_[surface.surface];
     waiting = followsLocked(surface.surface) ? 0.0 : waiting + dt;
     const bool same_list = i < sent_.size() && sent_[i].surface == surface.surface;

@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -18,7 +19,7 @@
 #include "xplane_bridge/actuation/override_keeper.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 #include "xplane_bridge/core/failures/failures.hpp"
-#include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
 
 namespace xplane_bridge {
@@ -33,13 +34,11 @@ class FailureKeeper {
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
 
   /// `timeout` [s]: until X-Plane must show what was asked for.
-  FailureKeeper(core::SimLink* link, OverrideKeeper* overrides, SurfaceControl* surfaces, double timeout,
+  FailureKeeper(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControl* surfaces, double timeout,
                 ros::Publisher publisher, Report report);
 
   // What drives it.
   void onLink(const core::LinkStatus& status);
-  /// Whether the group is one of this one's. From the link's thread.
-  bool onRref(core::GroupId group, const core::RrefView& view);
   /// Every frame: triggers.
   void onFrame(const core::FlightWatch& watch);
   /// At least ten times a second; `time` [s] steady.
@@ -80,19 +79,20 @@ class FailureKeeper {
   void applySurfaces();
   void observe(const std::vector<std::string>& datarefs, const core::RrefView& view);
   void watchOwn();
+  void watch(core::Subscription* subscription, core::RrefGroup group);
   void publishLocked();
   std::optional<ServiceResult> add(const core::FailureRequest& request, const std::string& who);
-  ServiceResult await(std::unique_lock<std::mutex>* lock, const std::string& name);
+  ServiceResult await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name);
 
-  core::SimLink* link_;
+  core::SimulatorPort* link_;
   OverrideKeeper* overrides_;
   SurfaceControl* surfaces_;
   double timeout_;
   ros::Publisher publisher_;
   Report report_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
+  const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
+  std::condition_variable_any changed_;
   bool stopped_ = false;
   core::LinkStatus link_status_;
   core::SimulatorVersion version_;
@@ -108,10 +108,11 @@ class FailureKeeper {
   std::map<std::string, double> undone_;          // [s] steady, by dataref: when it was repaired here
   std::map<std::string, double> repaired_since_;  // [s] steady, by name: ours that X-Plane does not show any more
 
-  core::GroupId menu_group_ = -1;
   std::vector<std::string> menu_datarefs_;
-  core::GroupId own_group_ = -1;
   std::vector<std::string> own_datarefs_;
+  // Last: they end first.
+  core::Subscription menu_subscription_;
+  core::Subscription own_subscription_;
 };
 
 }  // namespace xplane_bridge

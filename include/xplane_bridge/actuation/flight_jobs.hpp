@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "xplane_bridge/ServiceResult.h"
-#include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
@@ -49,7 +49,7 @@ class FlightJobs {
  public:
   static constexpr std::size_t kMostWaiting = 8;
 
-  FlightJobs(core::SimLink* link, const FlightJobOptions& options, FlightJobHooks hooks);
+  FlightJobs(core::SimulatorPort* link, const FlightJobOptions& options, FlightJobHooks hooks);
   /// stop()
   ~FlightJobs();
   FlightJobs(const FlightJobs&) = delete;
@@ -108,7 +108,7 @@ class FlightJobs {
   /// Why X-Plane may not have shown it, for the end of a sentence; empty: no reason is known.
   std::string excuse() const;
 
-  core::SimLink* link_;
+  core::SimulatorPort* link_;
   FlightJobOptions options_;
   FlightJobHooks hooks_;
   mutable std::mutex mutex_;

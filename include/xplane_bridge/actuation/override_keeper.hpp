@@ -2,12 +2,12 @@
 
 #include <functional>
 #include <map>
-#include <mutex>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
 
 namespace xplane_bridge {
 
@@ -19,7 +19,7 @@ class OverrideKeeper {
   /// `report(text, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, bool success)>;
 
-  OverrideKeeper(core::SimLink* link, Report report);
+  OverrideKeeper(core::SimulatorPort* link, Report report);
 
   /// Sets what of `wanted` is not set yet, and gives back what was set by an earlier call and is not in `wanted` any
   /// more (its journal entry stays until confirmReleases() has read it back). Writes to the disk when something is new;
@@ -34,8 +34,6 @@ class OverrideKeeper {
   /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted. Not those that
   /// X-Plane shows released.
   void refresh();
-  /// Whether the group is this one's. From the link's thread.
-  bool onRref(core::GroupId group, const core::RrefView& view);
   /// What somebody else has released (the panic tool, another client) since the last call, after X-Plane had shown it
   /// set. Its journal entry goes, and it is not set again by itself. Of what require() has set; what hold() has set is
   /// reported and let go as well, but for the surface override, which its holder watches.
@@ -71,22 +69,23 @@ class OverrideKeeper {
   bool set(const std::string& dataref, float value);
   void send(const std::string& dataref, float value);
   void watch();
+  void onShown(const core::RrefView& view);
   void release(const std::string& dataref);
   /// `remove`: takes what was undone out of the journal.
   bool confirm(const std::vector<core::UndoOperation>& operations, double timeout_s, const std::string& what,
                const std::function<void(core::Journal&)>& remove);
 
-  core::SimLink* link_;
+  core::SimulatorPort* link_;
   Report report_;
-  mutable std::mutex mutex_;
+  const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
   std::set<std::string> required_;
   std::map<std::string, Held> held_;
   std::set<std::string> releasing_;
-  core::GroupId group_ = -1;
-  std::vector<std::string> watched_;  // datarefs of the group
+  std::vector<std::string> watched_;  // datarefs of the subscription
   std::map<std::string, Shown> shown_;
-  bool ended_ = false;      // by releaseAll()
-  std::string unreleased_;  // what confirm() has told last of; of the one thread that waits
+  bool ended_ = false;               // by releaseAll()
+  std::string unreleased_;           // what confirm() has told last of; of the one thread that waits
+  core::Subscription subscription_;  // last: it ends first
 };
 
 /// Journal purpose of tx_node's entries.

@@ -13,7 +13,7 @@
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
 #include "xplane_bridge/actuation/override_keeper.hpp"
-#include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/surfaces/mixing_watch.hpp"
 #include "xplane_bridge/core/surfaces/surface_driver.hpp"
 #include "xplane_bridge/core/surfaces/surface_watch.hpp"
@@ -40,14 +40,14 @@ class SurfaceControl {
   /// `report(text, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, bool success)>;
 
-  SurfaceControl(core::SimLink* link, OverrideKeeper* overrides, SurfaceControlOptions options, Report report);
+  /// `on_frame`: called from the link's thread after every frame, so that takeEcho() can be asked.
+  SurfaceControl(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControlOptions options, Report report,
+                 std::function<void()> on_frame);
 
   // What drives it.
 
-  /// The link's state or version changed.
+  /// The link's state or version changed. From the link's thread.
   void onLink(const core::LinkStatus& status);
-  /// Whether the group is this one's. From the link's thread.
-  bool onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info);
   /// Another aircraft is loaded: whatever was driven ends, its mixing file is read.
   void onAircraft(const std::string& aircraft);
   /// Whatever is driven ends, failures and commands too.
@@ -116,6 +116,10 @@ class SurfaceControl {
   enum class State : std::uint8_t { kIdle, kTaking, kDriving, kReleasing };
   static const char* toString(State state);
 
+  // Of the link's thread, without mutex_.
+  void subscribe();
+  void onDatagram(const core::RrefView& view, const core::ReceiveInfo& info);
+
   // All with mutex_ held.
   void onSample();
   bool wanted() const;
@@ -135,17 +139,16 @@ class SurfaceControl {
   std::string refusalOf(std::size_t surface) const;
   bool followsLocked(std::size_t surface) const;
   bool isBroken(std::size_t surface) const;
-  void subscribe();
 
-  core::SimLink* link_;
+  core::SimulatorPort* link_;
   OverrideKeeper* overrides_;
   SurfaceControlOptions options_;
   Report report_;
+  std::function<void()> on_frame_;
 
   mutable std::mutex mutex_;
   core::SimulatorVersion version_;
-  core::GroupId group_ = -1;
-  std::unique_ptr<core::RrefFrameAssembler> frames_;
+  std::unique_ptr<core::RrefFrameAssembler> frames_;  // of the link's thread
   core::SurfaceSample sample_;
   double last_time_ = std::nan("");    // [s] simulator time of the previous frame
   double solved_time_ = std::nan("");  // [s] the same, of the last solution
@@ -194,6 +197,8 @@ class SurfaceControl {
   };
   std::deque<Sent> unseen_;  // movements not shown yet, oldest first
   double lag_frames_ = std::nan("");
+
+  core::Subscription subscription_;  // last: it ends first
 };
 
 }  // namespace xplane_bridge

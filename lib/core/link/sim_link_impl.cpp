@@ -220,25 +220,18 @@ void SimLink::Impl::post(std::function<void()> command) {
 void SimLink::Impl::wake() {
   const std::uint64_t one = 1;
   // Fails only when the counter is full, and then the thread is awake anyway.
-  [[maybe_unused]] const ssize_t written = write(wake_fd_, &one, sizeof(one));
+  [[maybe_unused]] const ssize_t written = ::write(wake_fd_, &one, sizeof(one));
 }
 
-GroupId SimLink::Impl::addGroup(RrefGroup group) {
-  const GroupId id = next_group_id_++;
-  replaceGroup(id, std::move(group));
-  return id;
-}
-
-void SimLink::Impl::replaceGroup(GroupId id, RrefGroup group) {
-  auto added = std::make_shared<Group>(Group{id, RrefSubscription(std::move(group)), openSocket()});
+void SimLink::Impl::changeGroup(const std::shared_ptr<RrefDelivery>& delivery, std::uint32_t list,
+                                std::optional<RrefGroup> group) {
+  if (!group) {
+    post([this, delivery] { removeGroup(delivery.get()); });
+    return;
+  }
+  auto added = std::make_shared<Group>(Group{delivery, list, RrefSubscription(std::move(*group)), openSocket()});
   post([this, added] {
-    const auto old =
-        std::find_if(groups_.begin(), groups_.end(), [&](const Group& each) { return each.id == added->id; });
-    if (old != groups_.end()) {
-      stopGroup(*old);
-      unwatch(old->socket->fd());
-      groups_.erase(old);
-    }
+    removeGroup(added->delivery.get());
     watch(added->socket->fd());
     if (monitor_.alive()) {
       added->subscription.restart(now_ns_);
@@ -251,15 +244,14 @@ void SimLink::Impl::replaceGroup(GroupId id, RrefGroup group) {
   });
 }
 
-void SimLink::Impl::removeGroup(GroupId id) {
-  post([this, id] {
-    const auto old = std::find_if(groups_.begin(), groups_.end(), [id](const Group& each) { return each.id == id; });
-    if (old != groups_.end()) {
-      stopGroup(*old);
-      unwatch(old->socket->fd());
-      groups_.erase(old);
-    }
-  });
+void SimLink::Impl::removeGroup(const RrefDelivery* delivery) {
+  const auto old = std::find_if(groups_.begin(), groups_.end(),
+                                [delivery](const Group& each) { return each.delivery.get() == delivery; });
+  if (old != groups_.end()) {
+    stopGroup(*old);
+    unwatch(old->socket->fd());
+    groups_.erase(old);
+  }
 }
 
 void SimLink::Impl::setRposRate(std::int32_t rate_hz) {

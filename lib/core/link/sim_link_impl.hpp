@@ -42,15 +42,15 @@ class SimLink::Impl {
   void start();
   bool stop(double timeout_s);
   void step(int timeout_ms);
-  GroupId addGroup(RrefGroup group);
-  void replaceGroup(GroupId id, RrefGroup group);
-  void removeGroup(GroupId id);
+  /// Subscribes `group` in the place of what `delivery` had before; nullopt: ends that.
+  void changeGroup(const std::shared_ptr<RrefDelivery>& delivery, std::uint32_t list, std::optional<RrefGroup> group);
   void setRposRate(std::int32_t rate_hz);
   void setDataRows(std::vector<std::int32_t> rows);
   LinkStatus status() const;
   LinkCounters counters() const;
   std::vector<std::string> unansweredDatarefs() const;
   std::shared_ptr<Journal> journal() const;
+  const Clock& clock() const { return clock_; }
   std::uint16_t dataPort() const { return data_socket_ ? data_socket_->localPort() : std::uint16_t{0}; }
   std::uint16_t beaconPort() const { return beacon_socket_ ? beacon_socket_->localPort() : std::uint16_t{0}; }
   SendStatus send(ByteView message);
@@ -62,7 +62,8 @@ class SimLink::Impl {
   using SocketPtr = std::shared_ptr<UdpSocket>;
 
   struct Group {
-    GroupId id = 0;
+    std::shared_ptr<RrefDelivery> delivery;
+    std::uint32_t list = 0;  // of the delivery
     RrefSubscription subscription;
     SocketPtr socket;
   };
@@ -109,6 +110,7 @@ class SimLink::Impl {
   void askXpc(std::int64_t now_ns);
   void flushRequests(std::int64_t now_ns);
   void sendRequest(UdpSocket* socket, const std::string& path, std::int32_t rate_hz, std::int32_t index);
+  void removeGroup(const RrefDelivery* delivery);
   void stopGroup(const Group& group);
   void stopSubscriptions();
   void updateStop(std::int64_t now_ns);
@@ -129,7 +131,6 @@ class SimLink::Impl {
   // Shared with any thread.
   std::atomic<std::uint64_t> packed_peer_{0};
   std::atomic<std::int64_t> last_heard_ns_{-1};
-  std::atomic<GroupId> next_group_id_{0};
   std::atomic<std::thread::id> link_thread_id_{};
   std::atomic<bool> running_{false};
   std::atomic<bool> quit_{false};

@@ -159,9 +159,7 @@ void SimLink::Impl::receiveGroup(Group* group) {
     }
     ++live_counters_.rref_datagrams;
     heardPeer();
-    if (callbacks_.on_rref) {
-      callbacks_.on_rref(group->id, *rref, infoOf(received));
-    }
+    group->delivery->deliver(group->list, *rref, infoOf(received));
     // The books are kept once the state is on its way.
     for (std::size_t i = 0; i < rref->size(); ++i) {
       live_counters_.non_finite_values += std::isfinite((*rref)[i].value) ? 0U : 1U;

@@ -100,9 +100,6 @@ void CaptureNode::subscribe() {
 
 core::SimLinkCallbacks CaptureNode::linkCallbacks() {
   core::SimLinkCallbacks callbacks;
-  callbacks.on_rref = [this](core::GroupId group, const core::RrefView& datagram, const core::ReceiveInfo& info) {
-    if (group == view_group_) onView(datagram, info);
-  };
   callbacks.on_state = [this](const core::LinkStatus& status) { onLinkState(status); };
   return callbacks;
 }
@@ -110,7 +107,9 @@ core::SimLinkCallbacks CaptureNode::linkCallbacks() {
 void CaptureNode::start() {
   // A picture is converted in a fraction of its period; OpenCV's workers would spend more on waiting for each other.
   cv::setNumThreads(1);
-  view_group_ = link().addGroup(view_stream_.group());
+  view_subscription_ = link().subscribe(
+      view_stream_.group(),
+      [this](const core::RrefView& datagram, const core::ReceiveInfo& info) { onView(datagram, info); });
   publisher_ =
       std::make_unique<LatestWorker<Grabbed>>(kPicturesWaiting, [this](Grabbed& grabbed) { publishPicture(&grabbed); });
   encoder_ = std::make_unique<LatestWorker<sensor_msgs::ImageConstPtr>>(
@@ -156,7 +155,7 @@ void CaptureNode::onLinkState(const core::LinkStatus& status) {
 
 void CaptureNode::changeFieldOfView() {
   const std::string path = view_stream_.fieldOfViewDataref();
-  link().readDatarefs({path}, kFieldOfViewTimeout, [this, path](const std::vector<core::DatarefValue>& values) {
+  link().read({path}, kFieldOfViewTimeout, [this, path](const std::vector<core::DatarefValue>& values) {
     if (!values.front().has_value()) {
       ROS_ERROR("X-Plane did not say its field of view within %.1f s; it is left as it is", kFieldOfViewTimeout);
       return;
@@ -177,7 +176,7 @@ void CaptureNode::changeFieldOfView() {
         }
       }
       journal->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {core::UndoDref{path, before}});
-      link().sendDref(path, static_cast<float>(options_.field_of_view_deg));
+      link().write(path, static_cast<float>(options_.field_of_view_deg));
     } catch (const core::JournalError& error) {
       ROS_ERROR("X-Plane's field of view is left as it is, because it could not be restored later: %s", error.what());
     }

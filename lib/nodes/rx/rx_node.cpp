@@ -68,37 +68,49 @@ void RxNode::loadParameters(const ParamLoader& own) {
   flight_publisher_ = std::make_unique<FlightPublisher>(options_, common().frames);
   missions_ = makeMissionPublishers(options_.rates, common().transport, common().frames);
   datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs);
-  addSubscriptions();
+  addStreams();
 }
 
-void RxNode::addSubscriptions() {
-  const auto add = [this](Subscription subscription) { subscriptions_.push_back(std::move(subscription)); };
-  add({"flight", options_.rates[static_cast<std::size_t>(core::FieldGroup::kFlight)], kFlightPriority,
+void RxNode::addStreams() {
+  const auto add = [this](DatarefStream stream) { streams_.push_back(std::move(stream)); };
+  add({"flight",
+       options_.rates[static_cast<std::size_t>(core::FieldGroup::kFlight)],
+       kFlightPriority,
        [this] { return pathsOf(flight_->requests()); },
        [this](const core::RrefView& datagram, std::int64_t receive_ns) {
          publishState(flight_->onRref(datagram, receive_ns), receive_ns);
        },
-       std::nullopt, false});
+       false,
+       {}});
   for (std::size_t i = 0; i < missions_.size(); ++i) {
     MissionPublisher* const mission = missions_[i].get();
-    const std::size_t own_index = subscriptions_.size();
-    add({core::toString(mission->group()), mission->rate(), kMissionPriority, [mission] { return mission->requests(); },
+    const std::size_t own_index = streams_.size();
+    add({core::toString(mission->group()),
+         mission->rate(),
+         kMissionPriority,
+         [mission] { return mission->requests(); },
          [this, mission, own_index](const core::RrefView& datagram, std::int64_t receive_ns) {
            if (mission->onRref(datagram, receive_ns, flight_->clock())) {
-             subscriptions_[own_index].current = false;
+             streams_[own_index].current = false;
            }
          },
-         std::nullopt, false});
+         false,
+         {}});
   }
   for (std::size_t batch = 0; batch < datarefs_->batches(); ++batch) {
-    add({"datarefs at " + std::to_string(datarefs_->rate(batch)) + " Hz", datarefs_->rate(batch), kDatarefPriority,
+    add({"datarefs at " + std::to_string(datarefs_->rate(batch)) + " Hz",
+         datarefs_->rate(batch),
+         kDatarefPriority,
          [this, batch] { return datarefs_->requests(batch); },
          [this, batch](const core::RrefView& datagram, std::int64_t receive_ns) {
            datarefs_->onRref(batch, datagram, receive_ns, nearSimTime(receive_ns), flight_->clock().epoch());
          },
-         std::nullopt, false});
+         false,
+         {}});
   }
-  add({"aircraft", core::AircraftIdentityReader::kRateHz, kIdentityPriority,
+  add({"aircraft",
+       core::AircraftIdentityReader::kRateHz,
+       kIdentityPriority,
        [] { return core::AircraftIdentityReader::datarefs(); },
        [this](const core::RrefView& datagram, std::int64_t receive_ns) {
          const bool another = aircraft_.known();
@@ -109,7 +121,8 @@ void RxNode::addSubscriptions() {
            publishLinkState(last_status_);
          }
        },
-       std::nullopt, false});
+       false,
+       {}});
 }
 
 void RxNode::advertise() {
@@ -148,9 +161,6 @@ void RxNode::configureLink(core::SimLinkOptions* options) {
 
 core::SimLinkCallbacks RxNode::linkCallbacks() {
   core::SimLinkCallbacks callbacks;
-  callbacks.on_rref = [this](core::GroupId id, const core::RrefView& datagram, const core::ReceiveInfo& info) {
-    onRref(id, datagram, info);
-  };
   callbacks.on_data = [this](const core::DataView& datagram, const core::ReceiveInfo& info) { onData(datagram, info); };
   callbacks.on_rpos = [this](const core::Rpos& position, const core::ReceiveInfo& info) { onRpos(position, info); };
   callbacks.on_xpc = [this](const core::XpcPosition& position, const core::ReceiveInfo& info) {
@@ -178,14 +188,11 @@ std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
   return receive_clock_.toHostTime(info.stamp_ns, wall_ns, clock_.steady_ns());
 }
 
-void RxNode::onRref(core::GroupId id, const core::RrefView& datagram, const core::ReceiveInfo& info) {
+void RxNode::onRref(std::size_t stream, const core::RrefView& datagram, const core::ReceiveInfo& info) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::int64_t receive_ns = begin(info);
-  for (const Subscription& subscription : subscriptions_) {
-    if (subscription.id == id && subscription.current) {
-      subscription.receive(datagram, receive_ns);
-      return;
-    }
+  if (streams_[stream].current) {
+    streams_[stream].receive(datagram, receive_ns);
   }
 }
 
@@ -302,8 +309,8 @@ void RxNode::adoptVersion(const core::LinkStatus& status) {
     for (const auto& mission : missions_) {
       mission->configure(version);
     }
-    for (Subscription& subscription : subscriptions_) {
-      subscription.current = false;
+    for (DatarefStream& stream : streams_) {
+      stream.current = false;
     }
   }
   if (common().transport == core::Transport::kData) {
@@ -312,30 +319,27 @@ void RxNode::adoptVersion(const core::LinkStatus& status) {
 }
 
 void RxNode::renewSubscriptions() {
-  for (Subscription& subscription : subscriptions_) {
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    DatarefStream& stream = streams_[i];
     core::RrefGroup group;
-    std::optional<core::GroupId> id;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (subscription.current) {
+      if (stream.current) {
         continue;
       }
-      group = {subscription.name, subscription.requests(), subscription.rate, subscription.priority};
-      id = subscription.id;
+      group = {stream.name, stream.requests(), stream.rate, stream.priority};
     }
     if (group.datarefs.empty()) {
-      if (id) {
-        link().removeGroup(*id);
-        id.reset();
-      }
-    } else if (id) {
-      link().replaceGroup(*id, group);
+      stream.subscription.reset();
+    } else if (stream.subscription) {
+      stream.subscription.replace(std::move(group));
     } else {
-      id = link().addGroup(group);
+      stream.subscription = link().subscribe(
+          std::move(group),
+          [this, i](const core::RrefView& datagram, const core::ReceiveInfo& info) { onRref(i, datagram, info); });
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    subscription.id = id;
-    subscription.current = true;
+    stream.current = true;
   }
 }
 
@@ -411,7 +415,7 @@ void RxNode::getDataref(const GetDataref::Request& request, GetDataref::Response
     return;
   }
   const double timeout = request.timeout > 0.0 ? request.timeout : kDefaultReadTimeout_s;
-  for (const core::DatarefValue& value : link().readDatarefs(paths, timeout)) {
+  for (const core::DatarefValue& value : link().read(paths, timeout)) {
     response.values.push_back(value.value_or(std::numeric_limits<float>::quiet_NaN()));
   }
   const auto missing =

@@ -61,9 +61,6 @@ void TxNode::subscribe() {
 core::SimLinkCallbacks TxNode::linkCallbacks() {
   core::SimLinkCallbacks callbacks;
   callbacks.on_state = [this](const core::LinkStatus& status) { onLinkState(status); };
-  callbacks.on_rref = [this](core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info) {
-    onRref(group, view, info);
-  };
   return callbacks;
 }
 
@@ -72,21 +69,31 @@ void TxNode::start() {
   overrides_ = std::make_unique<OverrideKeeper>(&link(), [this](const std::string& text, bool success) {
     logEvent(Event::OVERRIDE, "overrides: " + text, "", success);
   });
+  makeSurfaceControl();
   {
-    std::lock_guard<std::mutex> lock(mutex_);
-    watch_group_ = link().addGroup({"flight watch", core::flightWatchDatarefs(), core::kEveryFrameRateHz, 2});
-    identity_group_ = link().addGroup(
-        {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1});
-    makeSurfaceControl();
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
+    subscribeToXPlane();
     publishMode();
   }
   makeFlightJobs();
   worker_ = std::thread([this] { work(); });
 }
 
+void TxNode::subscribeToXPlane() {
+  watch_subscription_ = link().subscribe(
+      {"flight watch", core::flightWatchDatarefs(), core::kEveryFrameRateHz, 2},
+      [this](const core::RrefView& view, const core::ReceiveInfo&) { onWatch(view); }, mutex_);
+  identity_subscription_ = link().subscribe(
+      {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1},
+      [this](const core::RrefView& view, const core::ReceiveInfo& info) {
+        if (identity_.add(view, info.stamp_ns)) onIdentity();
+      },
+      mutex_);
+}
+
 void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
   const double time = now();
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const core::FlightMode before = arbiter_->status().mode;
   if (const auto refusal = arbiter_->onCommand(from, toCore(message), time)) {
     ROS_WARN_THROTTLE(1.0, "control/%s is refused: %s", from == core::FlightMode::kManual ? "manual" : "auto",
@@ -105,7 +112,7 @@ void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
 
 void TxNode::onModeRequest(const ModeRequest& message) {
   const double time = now();
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const core::FlightMode before = arbiter_->status().mode;
   const auto outcome =
       arbiter_->onModeRequest({message.sequence, message.mode, message.requester, message.header.stamp.toSec()}, time);
@@ -127,7 +134,7 @@ void TxNode::onModeChange() {
 
 void TxNode::onTimer() {
   const double time = now();
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   if (!overrides_) return;
   const std::string refusal = refusalToFly();
   surfaces_->tick(time, refusal);
@@ -219,9 +226,11 @@ void TxNode::sendControls(double time) {
     arbiter_->step(time);  // `controls` without it
   }
   publishMode();
-  if (!overrides_) return;
-  tellStick(nullptr);  // until it is sent
-  if (controls.active.none()) return;
+  if (overrides_) setCommandedStick(fly(controls, time) ? &controls : nullptr);
+}
+
+bool TxNode::fly(const core::ArbitratedControls& controls, double time) {
+  if (controls.active.none()) return false;
   const std::string refusal = refusalToFly();
   if (refusal != refusal_said_) {
     refusal_said_ = refusal;
@@ -230,21 +239,21 @@ void TxNode::sendControls(double time) {
   try {
     if (!refusal.empty()) {
       if (linkIsUp()) overrides_->require({});
-      return;
+      return false;
     }
     overrides_->require(core::requiredOverrides(controls.active, encoder_->options()));
   } catch (const core::JournalError& error) {
     ROS_ERROR_THROTTLE(5.0, "commands are not sent, because overrides could not be given back after a crash: %s",
                        error.what());
-    return;
+    return false;
   }
   writes_.clear();
   encoder_->encode(controls.values, channelsToSend(controls, time), writes_);
-  for (const core::DatarefWrite& write : writes_) link().sendDref(write.dataref, write.value);
+  for (const core::DatarefWrite& write : writes_) link().write(write.dataref, write.value);
   last_send_ = time;
-  tellStick(&controls);
   publishApplied(controls, time);
   watchReadBack(controls.active);
+  return true;
 }
 
 void TxNode::publishMode() {
@@ -293,18 +302,20 @@ void TxNode::watchReadBack(const core::ChannelSet& channels) {
     read_back_order_.push_back(static_cast<core::Channel>(i));
     group.datarefs.push_back(core::readBackDataref(static_cast<core::Channel>(i), encoder_->options()));
   }
-  if (read_back_group_ < 0) {
-    read_back_group_ = link().addGroup(group);
+  if (read_back_subscription_) {
+    read_back_subscription_.replace(std::move(group));
   } else {
-    link().replaceGroup(read_back_group_, group);
+    read_back_subscription_ = link().subscribe(
+        std::move(group), [this](const core::RrefView& view, const core::ReceiveInfo&) { onReadBack(view); }, mutex_);
   }
 }
 
 void TxNode::onLinkState(const core::LinkStatus& status) {
+  surfaces_->onLink(status);
   std::string text;
   std::optional<std::string> pause_by;
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     const double time = now();
     if (status.paused && link_status_.paused && status.paused != link_status_.paused) {
       pause_by = std::exchange(pause_by_, "");
@@ -316,7 +327,6 @@ void TxNode::onLinkState(const core::LinkStatus& status) {
       if (status.epoch > 1) came_back_ = true;
     }
     link_status_ = status;
-    surfaces_->onLink(status);
     failures_->onLink(status);
     if (status.state == core::LinkState::kLost) excitation_->abort("the link is lost");
     arbiter_->setFlowing(status.state == core::LinkState::kConnected, time);
@@ -333,36 +343,23 @@ void TxNode::onLinkState(const core::LinkStatus& status) {
   if (pause_by) logEvent(Event::PAUSE, *status.paused ? "paused" : "resumed", *pause_by);
 }
 
-void TxNode::onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (group == watch_group_) {
-    const bool crashed = watch_.crashed;
-    const double before = watch_.sim_time;
-    core::updateFlightWatch(view, &watch_);
-    // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
-    if (watch_.sim_time < before - kRestartStep) {
-      came_back_ = true;
-      reset_detector_.restart();
-    }
-    if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
-    sim_time_ = watch_.sim_time;
-    failures_->onFrame(watch_);
-    // The signal goes out with every frame, however rarely commands come.
-    if (excitation_->onFrame(watch_)) sendControls(now());
-    if (watch_.crashed && !crashed) {
-      excitation_->abort("the aircraft has crashed");
-      logEvent(Event::CRASH, "the aircraft has crashed");
-    }
-  } else if (group == identity_group_) {
-    if (identity_.add(view, info.stamp_ns)) onIdentity();
-  } else if (group == read_back_group_) {
-    onReadBack(view);
-  } else if (overrides_->onRref(group, view)) {
-    return;
-  } else if (surfaces_->onRref(group, view, info)) {
-    publishSurfacesApplied();
-  } else {
-    failures_->onRref(group, view);
+void TxNode::onWatch(const core::RrefView& view) {
+  const bool crashed = watch_.crashed;
+  const double before = watch_.sim_time;
+  core::updateFlightWatch(view, &watch_);
+  // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
+  if (watch_.sim_time < before - kRestartStep) {
+    came_back_ = true;
+    reset_detector_.restart();
+  }
+  if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
+  sim_time_ = watch_.sim_time;
+  failures_->onFrame(watch_);
+  // The signal goes out with every frame, however rarely commands come.
+  if (excitation_->onFrame(watch_)) sendControls(now());
+  if (watch_.crashed && !crashed) {
+    excitation_->abort("the aircraft has crashed");
+    logEvent(Event::CRASH, "the aircraft has crashed");
   }
 }
 
@@ -378,11 +375,11 @@ void TxNode::onIdentity() {
 }
 
 void TxNode::askIdentity() {
-  link().readDatarefs(core::AircraftIdentityReader::datarefs(), kIdentityWait,
-                      [this](const std::vector<core::DatarefValue>& values) {
-                        std::lock_guard<std::mutex> lock(mutex_);
-                        if (identity_.add(values)) onIdentity();
-                      });
+  link().read(core::AircraftIdentityReader::datarefs(), kIdentityWait,
+              [this](const std::vector<core::DatarefValue>& values) {
+                std::lock_guard<core::HandlerMutex> lock(*mutex_);
+                if (identity_.add(values)) onIdentity();
+              });
 }
 
 void TxNode::onReset(const std::string& how) {
@@ -427,7 +424,7 @@ void TxNode::onReadBack(const core::RrefView& view) {
 }
 
 void TxNode::work() {
-  std::unique_lock<std::mutex> lock(mutex_);
+  std::unique_lock<core::HandlerMutex> lock(*mutex_);
   while (!worker_ends_) {
     work_wanted_.wait_for(lock, std::chrono::duration<double>(kWorkPeriod));
     if (worker_ends_ || !linkIsUp()) continue;
@@ -445,7 +442,7 @@ void TxNode::work() {
 
 void TxNode::stopInputs() {
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     worker_ends_ = true;
     if (excitation_) excitation_->abort("tx_node ends");
   }
@@ -466,7 +463,7 @@ void TxNode::undo(Deadline deadline) {
 }
 
 void TxNode::publishFinalState() {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   publishMode();
   if (failures_) failures_->publish();
   if (excitation_) excitation_->publish();

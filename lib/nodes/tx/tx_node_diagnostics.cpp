@@ -11,7 +11,7 @@ constexpr double kDoesNotFollow = 1.0;  // [s] without read-back until it is sai
 
 void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const core::ModeStatus& mode = arbiter_->status();
   const double time = now();
   const bool flying = ever_sent_.any();

@@ -41,37 +41,37 @@ core::Loading toCore(const SetLoading::Request& q) {
 void TxNode::makeFlightJobs() {
   FlightJobHooks hooks;
   hooks.watch = [this] {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return watch_;
   };
   hooks.resets = [this] {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return resets_;
   };
   hooks.identities = [this] {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return identity_.told();
   };
   hooks.aircraft = [this] {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return described(identity_.identity());
   };
   hooks.ground = [this](const std::string& why) { ground(why); };
   hooks.pausing = [this](const std::string& who) {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     pause_by_ = who;
   };
   hooks.report = [this](std::uint32_t number, std::uint8_t kind, const std::string& text, const std::string& who,
                         bool success) { logEvent(kind, text, who, success, number); };
   auto jobs = std::make_unique<FlightJobs>(&link(), FlightJobOptions{options_.setting_timeout, options_.load_timeout},
                                            std::move(hooks));
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   jobs_ = std::move(jobs);
 }
 
 void TxNode::ground(const std::string& why) {
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     grounded_ = why;
     if (why.empty()) return;
     excitation_->abort(why);
@@ -86,7 +86,7 @@ void TxNode::ground(const std::string& why) {
 
 std::optional<ServiceResult> TxNode::refusalOfJob(const std::optional<std::string>& wrong) const {
   ServiceResult out;
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const std::int32_t version = link_status_.version.number;
   if (wrong) {
     out.code = ServiceResult::REFUSED;

@@ -56,7 +56,7 @@ void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* re
   message.mode = request.mode;
   message.requester = name() + "/set_mode";
   onModeRequest(message);
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const core::ModeStatus& status = arbiter_->status();
   response->mode = static_cast<std::uint8_t>(status.mode);
   response->success = response->mode == request.mode;
@@ -66,12 +66,12 @@ void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* re
 
 ServiceResult TxNode::writeAndConfirm(const std::vector<core::DatarefWrite>& writes) {
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     if (!linkIsUp()) return noLink();
   }
   const auto deadline = Clock::now() + std::chrono::duration<double>(options_.service_timeout);
   for (const core::DatarefWrite& write : writes) {
-    const core::SendStatus sent = link().sendDref(write.dataref, write.value);
+    const core::SendStatus sent = link().write(write.dataref, write.value);
     if (sent != core::SendStatus::kSent) {
       return result(ServiceResult::REFUSED, write.dataref + " is not sent: " + core::toString(sent));
     }
@@ -105,7 +105,7 @@ void TxNode::serveSetDataref(const SetDataref::Request& request, SetDataref::Res
   std::vector<core::DatarefWrite> writes;
   for (std::size_t i = 0; i < names.size(); ++i) writes.push_back({names[i], request.values[i]});
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     if (!linkIsUp()) {
       response->result = noLink();
       return;
@@ -123,7 +123,7 @@ void TxNode::serveSetDataref(const SetDataref::Request& request, SetDataref::Res
   }
   response->result = writeAndConfirm(writes);
   response->success = isOk(response->result);
-  for (const auto& value : link().readDatarefs(names, options_.service_timeout)) {
+  for (const auto& value : link().read(names, options_.service_timeout)) {
     response->values.push_back(value.value_or(std::nanf("")));
   }
   logEvent(Event::SETTING, "set_dataref " + request.name + ": " + response->result.message, "", response->success);
@@ -131,13 +131,13 @@ void TxNode::serveSetDataref(const SetDataref::Request& request, SetDataref::Res
 
 void TxNode::serveRunCommand(const RunCommand::Request& request, RunCommand::Response* response) {
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     if (!linkIsUp()) {
       response->result = noLink();
       return;
     }
   }
-  const core::SendStatus sent = link().sendCommand(request.name);
+  const core::SendStatus sent = link().command(request.name);
   response->success = sent == core::SendStatus::kSent;
   response->result = response->success ? result(ServiceResult::ACCEPTED, "sent; X-Plane never answers to a command")
                                        : result(ServiceResult::REFUSED, request.name + ": " + core::toString(sent));
@@ -145,7 +145,7 @@ void TxNode::serveRunCommand(const RunCommand::Request& request, RunCommand::Res
 
 void TxNode::servePause(bool pause, std_srvs::SetBool::Response* response) {
   const auto paused = [this] {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return linkIsUp() ? link_status_.paused : std::nullopt;
   };
   if (!paused()) {
@@ -154,10 +154,10 @@ void TxNode::servePause(bool pause, std_srvs::SetBool::Response* response) {
   }
   const std::string who = name() + "/pause";
   if (paused() != pause) {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     pause_by_ = who;
   }
-  link().sendCommand(core::pauseCommand(pause));
+  link().command(core::pauseCommand(pause));
   const auto deadline = Clock::now() + std::chrono::duration<double>(options_.service_timeout);
   while (paused() != pause && Clock::now() < deadline && !stopping()) {
     std::this_thread::sleep_for(std::chrono::duration<double>(kPollPeriod));
@@ -166,7 +166,7 @@ void TxNode::servePause(bool pause, std_srvs::SetBool::Response* response) {
   response->message = response->success ? (pause ? "paused" : "running") : "X-Plane did not follow in time";
   if (response->success) return;  // told when it happened
   {
-    std::lock_guard<std::mutex> lock(mutex_);
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
     pause_by_.clear();
   }
   logEvent(Event::PAUSE, pause ? "pause asked for: " + response->message : "resume asked for: " + response->message,

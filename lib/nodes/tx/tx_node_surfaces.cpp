@@ -2,6 +2,7 @@
 // ExcitationKeeper.
 
 #include <cmath>
+#include <utility>
 
 #include "xplane_bridge/Event.h"
 #include "xplane_bridge/nodes/base/user_folder.hpp"
@@ -18,38 +19,43 @@ void TxNode::makeSurfaceControl() {
   options.flap_rate = options_.aircraft.flap_rate;
   options.speedbrake_rate = options_.aircraft.speedbrake_rate;
   options.command_timeout = options_.arbiter.command_timeout;
-  surfaces_ = std::make_unique<SurfaceControl>(
+  auto surfaces = std::make_unique<SurfaceControl>(
       &link(), overrides_.get(), options,
-      [this](const std::string& text, bool success) { logEvent(Event::OVERRIDE, text, "", success); });
-  failures_ = std::make_unique<FailureKeeper>(&link(), overrides_.get(), surfaces_.get(), options_.service_timeout,
-                                              failure_publisher_,
-                                              [this](const std::string& text, const std::string& who, bool success) {
-                                                logEvent(Event::FAILURE, text, who, success);
-                                              });
-  excitation_ = std::make_unique<ExcitationKeeper>(
-      surfaces_.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg, excitation_publisher_,
+      [this](const std::string& text, bool success) { logEvent(Event::OVERRIDE, text, "", success); },
+      [this] { publishSurfacesApplied(); });
+  auto failures = std::make_unique<FailureKeeper>(
+      &link(), overrides_.get(), surfaces.get(), options_.service_timeout, failure_publisher_,
+      [this](const std::string& text, const std::string& who, bool success) {
+        logEvent(Event::FAILURE, text, who, success);
+      });
+  auto excitation = std::make_unique<ExcitationKeeper>(
+      surfaces.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg, excitation_publisher_,
       [this](const std::string& text, const std::string& who, bool success) {
         logEvent(Event::EXCITATION, text, who, success);
       });
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  surfaces_ = std::move(surfaces);
+  failures_ = std::move(failures);
+  excitation_ = std::move(excitation);
 }
 
 void TxNode::serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response) {
   const ExcitationKeeper::Plan plan = excitation_->plan(request);
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const bool flown = ever_sent_.any() && !arbiter_->status().failsafe;
   excitation_->inject(request, plan, name() + "/inject_excitation", watch_, refusalToFly(),
                       flown ? read_back_channels_ : core::ChannelSet{}, response);
 }
 
 void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
-  std::lock_guard<std::mutex> lock(mutex_);
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   if (!surfaces_) return;
   if (const auto refusal = surfaces_->command(message.names, message.deflections_deg, message.sequence)) {
     ROS_WARN_THROTTLE(1.0, "control/surfaces is refused: %s", refusal->c_str());
   }
 }
 
-void TxNode::tellStick(const core::ArbitratedControls* sent) {
+void TxNode::setCommandedStick(const core::ArbitratedControls* sent) {
   std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
   if (sent) {
     const core::Channel axes[] = {core::Channel::kRoll, core::Channel::kPitch, core::Channel::kYaw};
@@ -61,6 +67,7 @@ void TxNode::tellStick(const core::ArbitratedControls* sent) {
 }
 
 void TxNode::publishSurfacesApplied() {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
   while (const auto echo = surfaces_->takeEcho()) {
     AppliedCommand message;
     message.header.stamp = ros::Time(ros::WallTime::now().toSec());

@@ -51,13 +51,6 @@ class SimLinkRig : public testing::Test {
 
   void makeLink(const SimLinkOptions& options) {
     SimLinkCallbacks callbacks;
-    callbacks.on_rref = [this](GroupId group, const RrefView& values, const ReceiveInfo& info) {
-      ++datagrams_[group];
-      last_info_ = info;
-      for (std::size_t i = 0; i < values.size(); ++i) {
-        values_[{group, values[i].index}] = values[i].value;
-      }
-    };
     callbacks.on_data = [this](const DataView& data, const ReceiveInfo&) {
       ++data_datagrams_;
       for (std::size_t i = 0; i < data.size(); ++i) {
@@ -80,6 +73,20 @@ class SimLinkRig : public testing::Test {
     link_ = std::make_unique<SimLink>(
         options, std::move(callbacks), clock(), [this](LogLevel, const std::string& line) { log_.push_back(line); },
         journalsIn(folder_, "/test"));
+  }
+
+  /// Subscribes a group whose datagrams are counted, and values kept, under the number returned.
+  int subscribe(RrefGroup group) {
+    const auto id = static_cast<int>(subscriptions_.size());
+    subscriptions_.push_back(
+        link_->subscribe(std::move(group), [this, id](const RrefView& values, const ReceiveInfo& info) {
+          ++datagrams_[id];
+          last_info_ = info;
+          for (std::size_t i = 0; i < values.size(); ++i) {
+            values_[{id, values[i].index}] = values[i].value;
+          }
+        }));
+    return id;
   }
 
   /// Lets time pass in steps of 5 ms; each fake renders a frame every 15 ms and announces itself once a second.
@@ -133,8 +140,9 @@ class SimLinkRig : public testing::Test {
   int steps_ = 0;
   std::size_t most_requests_ = 0;
 
-  std::map<GroupId, int> datagrams_;
-  std::map<std::pair<GroupId, std::int32_t>, float> values_;
+  std::vector<Subscription> subscriptions_;
+  std::map<int, int> datagrams_;
+  std::map<std::pair<int, std::int32_t>, float> values_;
   ReceiveInfo last_info_;
   int data_datagrams_ = 0;
   std::map<std::int32_t, float> rows_;

@@ -4,20 +4,15 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/log.hpp"
-#include "xplane_bridge/core/base/simulator_version.hpp"
 #include "xplane_bridge/core/link/data_output.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
-#include "xplane_bridge/core/link/link_monitor.hpp"
-#include "xplane_bridge/core/wire/beacon_tracker.hpp"
-#include "xplane_bridge/core/wire/dataref_reader.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
-#include "xplane_bridge/core/wire/rref_subscription.hpp"
 #include "xplane_bridge/core/wire/udp_socket.hpp"
 
 namespace xplane_bridge::core {
@@ -45,33 +40,6 @@ struct SimLinkOptions {
   DataOutputOptions data_output;
 };
 
-using GroupId = std::int32_t;
-
-/// What is known of a datagram besides its bytes.
-struct ReceiveInfo {
-  std::int64_t stamp_ns = 0;     ///< [ns] CLOCK_REALTIME when the kernel received it; else when it was read
-  bool kernel_stamp = false;     ///< stamp_ns is the kernel's
-  std::int64_t steady_ns = 0;    ///< [ns] the injected steady clock when it was read
-  std::uint32_t link_epoch = 0;  ///< LinkStatus::epoch at that moment
-  Endpoint from;
-  std::array<std::uint8_t, kHeaderSize> label{};  ///< the datagram's first bytes; DATA only
-};
-
-struct LinkStatus {
-  LinkState state = LinkState::kSearching;
-  std::string reason;                ///< one sentence
-  std::uint32_t epoch = 0;           ///< raised each time the link came up anew; 0 before the first time
-  std::int64_t since_steady_ns = 0;  ///< [ns] when `state` began
-  Endpoint peer;                     ///< X-Plane; not valid() while unknown
-  std::string computer_name;         ///< from the beacon; empty without
-  SimulatorVersion version;          ///< unknown until X-Plane has answered
-  std::optional<bool> paused;
-  std::optional<float> sim_time_s;      ///< sim/time/total_running_time_sec as received
-  double silence_s = 0.0;               ///< [s] since the last valid datagram; NaN before the first
-  std::vector<BeaconSighting> beacons;  ///< all that are heard at the moment
-  std::vector<std::string> problems;    ///< what a user should know and do something about, one sentence each
-};
-
 struct LinkCounters {
   UdpCounters udp;              ///< sum over all sockets
   std::uint64_t strangers = 0;  ///< datagrams from another computer than X-Plane's: dropped
@@ -90,36 +58,29 @@ struct LinkCounters {
   int receive_buffer = 0;               ///< [bytes] smallest receive buffer the kernel granted
 };
 
-/// Called from the link's thread; must return quickly. Views are valid during the call only.
+/// What concerns the whole link, not one subscription. Called from the link's thread; must return quickly. Views are
+/// valid during the call only.
 struct SimLinkCallbacks {
-  std::function<void(GroupId, const RrefView&, const ReceiveInfo&)> on_rref;
   std::function<void(const DataView&, const ReceiveInfo&)> on_data;
   std::function<void(const Rpos&, const ReceiveInfo&)> on_rpos;
   std::function<void(const XpcPosition&, const ReceiveInfo&)> on_xpc;
   std::function<void(const LinkStatus&)> on_state;  ///< state, epoch, peer, version or problems changed
 };
 
-enum class SendStatus : std::uint8_t {
-  kSent = 0,
-  kNoPeer,       ///< X-Plane has not been found
-  kNotEncoded,   ///< empty, over-long or NUL-bearing path, non-finite value, bad row
-  kSocketError,  ///< the kernel refused it
-};
-const char* toString(SendStatus status);
-
 /// The link to one X-Plane: finds it, keeps subscriptions alive whatever happens to it, says in which state it is,
 /// reads and writes datarefs.
 ///
-/// One thread (start()) or the caller (step()) does all receiving and calls all callbacks. Every other public function
-/// may be called from any thread; those that wait say so and must not be called from a callback.
-class SimLink {
+/// One thread (start()) or the caller (step()) does all receiving and calls all handlers and callbacks. Every other
+/// public function may be called from any thread; those that wait say so and must not be called from a callback.
+/// Subscriptions may outlive the link; then they do nothing.
+class SimLink : public SimulatorPort {
  public:
   /// `journals` may be empty when neither Data Output is configured nor leftovers are to be restored.
   /// Throws std::invalid_argument (an option out of range) and SocketError (a port is taken).
   SimLink(SimLinkOptions options, SimLinkCallbacks callbacks, Clock clock, LogFunction log,
           JournalFactory journals = {});
   /// stop(), if it has not been called.
-  ~SimLink();
+  ~SimLink() override;
   SimLink(const SimLink&) = delete;
   SimLink& operator=(const SimLink&) = delete;
 
@@ -131,55 +92,33 @@ class SimLink {
   /// Instead of start(): waits up to `timeout_ms` for datagrams, handles them and everything that is due.
   void step(int timeout_ms);
 
-  /// Subscribes a group, from now on and after every loss. Throws std::invalid_argument for an empty or over-long path,
-  /// a rate outside 1..kEveryFrameRateHz, or an empty group; SocketError when no socket can be had.
-  GroupId addGroup(RrefGroup group);
-  /// Replaces a group's datarefs and rate; datagrams of the old list are no longer delivered.
-  void replaceGroup(GroupId id, RrefGroup group);
-  void removeGroup(GroupId id);
+  Subscription subscribe(RrefGroup group, RrefHandler handler, std::shared_ptr<HandlerMutex> mutex) override;
+  using SimulatorPort::subscribe;
   /// RPOS stream at `rate_hz`; 0 stops it.
   void setRposRate(std::int32_t rate_hz);
   /// Rows wanted from Data Output (transport DATA).
   void setDataRows(std::vector<std::int32_t> rows);
 
-  LinkStatus status() const;
+  LinkStatus status() const override;
   LinkCounters counters() const;
   /// Datarefs that were asked for repeatedly and never answered while others were: unknown to this X-Plane.
   std::vector<std::string> unansweredDatarefs() const;
-  /// The journal of the X-Plane found; null before, or without a factory.
-  std::shared_ptr<Journal> journal() const;
+  std::shared_ptr<Journal> journal() const override;
+  const Clock& clock() const override;
   /// Port on which DATA is received; 0 without DATA transport.
   std::uint16_t dataPort() const;
   /// Port on which beacons are received; 0 when not listening.
   std::uint16_t beaconPort() const;
 
-  /// All senders send at once, on the socket that reads datarefs too, so that X-Plane sees writes and reads in order.
-  SendStatus sendDref(std::string_view path, float value);
-  SendStatus sendCommand(std::string_view path);
-  SendStatus sendData(const DataRow* rows, std::size_t count);
-  SendStatus sendUndo(const UndoOperation& operation);
-  /// Any message made with encode...().
-  SendStatus send(ByteView message);
-
-  /// Reads datarefs once: subscribes, takes the first value that arrives afterwards, unsubscribes. Calls `done` from
-  /// the link's thread, with one value per path, at the latest after `timeout_s`.
-  void readDatarefs(std::vector<std::string> paths, double timeout_s,
-                    std::function<void(const std::vector<DatarefValue>&)> done);
-  /// The same, waiting. Not from a callback.
-  std::vector<DatarefValue> readDatarefs(std::vector<std::string> paths, double timeout_s);
-  /// The same, waiting until `fits` likes the values; X-Plane sends them every frame. Not from a callback.
-  std::vector<DatarefValue> readDatarefsUntil(std::vector<std::string> paths, double timeout_s,
-                                              const DatarefReader::Accept& fits);
-  /// Waits until a dataref reads `expected` within `tolerance`; returns the last value seen (empty: none) and whether
-  /// it fits. Not from a callback.
-  std::pair<bool, DatarefValue> waitForDataref(const std::string& path, float expected, float tolerance,
-                                               double timeout_s);
-  /// Carries out the operations and reads datarefs among them back. Waits. Returns whether all read back as written.
-  bool undo(const std::vector<UndoOperation>& operations, double timeout_s);
+  SendStatus send(ByteView message) override;
+  void read(std::vector<std::string> paths, double timeout_s, DatarefReader::Done done) override;
+  using SimulatorPort::read;
+  std::vector<DatarefValue> readUntil(std::vector<std::string> paths, double timeout_s,
+                                      DatarefReader::Accept accept) override;
 
  private:
   class Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<Impl> impl_;
 };
 
 }  // namespace xplane_bridge::core

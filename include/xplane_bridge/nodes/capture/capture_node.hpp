@@ -104,7 +104,6 @@ class CaptureNode : public BaseNode {
   // Link's thread.
   core::ViewStream view_stream_;
   core::ReceiveClock receive_clock_;
-  std::atomic<core::GroupId> view_group_{-1};
   std::uint32_t link_epoch_ = 0;
 
   mutable std::mutex camera_mutex_;
@@ -140,6 +139,8 @@ class CaptureNode : public BaseNode {
   std::uint32_t frozen_count_ = 0;
 
   core::AssociationCounters reported_;  // diagnostics only: as of the last report
+
+  core::Subscription view_subscription_;  // last: it ends first
 };
 
 }  // namespace xplane_bridge

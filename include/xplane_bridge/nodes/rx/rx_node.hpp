@@ -40,18 +40,18 @@ class RxNode : public BaseNode {
 
  private:
   /// One group of datarefs kept subscribed.
-  struct Subscription {
+  struct DatarefStream {
     std::string name;
     int rate = 0;
     int priority = 0;
     std::function<std::vector<std::string>()> requests;
     std::function<void(const core::RrefView&, std::int64_t receive_ns)> receive;
-    std::optional<core::GroupId> id;
-    bool current = false;  ///< X-Plane was asked for requests(); else answers belong to an older list
+    bool current = false;             ///< X-Plane was asked for requests(); else answers belong to an older list
+    core::Subscription subscription;  ///< of the timer; empty while nothing is requested
   };
 
   // Link's thread.
-  void onRref(core::GroupId id, const core::RrefView& datagram, const core::ReceiveInfo& info);
+  void onRref(std::size_t stream, const core::RrefView& datagram, const core::ReceiveInfo& info);
   void onData(const core::DataView& datagram, const core::ReceiveInfo& info);
   void onRpos(const core::Rpos& position, const core::ReceiveInfo& info);
   void onXpc(const core::XpcPosition& position, const core::ReceiveInfo& info);
@@ -68,7 +68,7 @@ class RxNode : public BaseNode {
   void supervisePositionCheck();
   std::vector<std::int32_t> wantedRows() const;
 
-  void addSubscriptions();
+  void addStreams();
   void publishLinkState(const core::LinkStatus& status);
   float nearSimTime(std::int64_t receive_ns) const;
 
@@ -95,7 +95,6 @@ class RxNode : public BaseNode {
   core::RowStore rows_;
   core::ReceiveClock receive_clock_;
   core::ConsistencyMonitor consistency_;
-  std::vector<Subscription> subscriptions_;
   std::uint32_t link_epoch_ = 0;
   std::optional<core::FlightState> last_state_;
   std::int64_t last_state_received_ns_ = 0;
@@ -114,6 +113,8 @@ class RxNode : public BaseNode {
   ros::Publisher link_state_publisher_;
   ros::Publisher rows_publisher_;
   DataRows rows_message_;
+
+  std::vector<DatarefStream> streams_;  // last: their subscriptions end first
 };
 
 }  // namespace xplane_bridge

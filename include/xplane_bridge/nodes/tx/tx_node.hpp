@@ -82,6 +82,7 @@ class TxNode : public BaseNode {
   void onSurfaceCommand(const SurfaceCommand& message);
   void onTimer();
   void sendControls(double time);
+  bool fly(const core::ArbitratedControls& controls, double time);
   std::string refusalToFly() const;
   core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
   void publishMode();
@@ -91,7 +92,8 @@ class TxNode : public BaseNode {
 
   // Link.
   void onLinkState(const core::LinkStatus& status);
-  void onRref(core::GroupId group, const core::RrefView& view, const core::ReceiveInfo& info);
+  void subscribeToXPlane();
+  void onWatch(const core::RrefView& view);
   void onReadBack(const core::RrefView& view);
   void onIdentity();
   void askIdentity();
@@ -101,7 +103,7 @@ class TxNode : public BaseNode {
 
   // Single surfaces and failures (tx_node_surfaces.cpp).
   void makeSurfaceControl();
-  void tellStick(const core::ArbitratedControls* sent);
+  void setCommandedStick(const core::ArbitratedControls* sent);
   void publishSurfacesApplied();
   void advertiseFailureServices();
   void serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response);
@@ -142,7 +144,7 @@ class TxNode : public BaseNode {
   std::unique_ptr<ExcitationKeeper> excitation_;  // guarded by mutex_
   std::unique_ptr<FlightJobs> jobs_;
 
-  mutable std::mutex mutex_;
+  const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
   std::unique_ptr<core::ControlArbiter> arbiter_;
   std::unique_ptr<core::ControlEncoder> encoder_;
   core::LinkStatus link_status_;
@@ -171,19 +173,20 @@ class TxNode : public BaseNode {
   double last_seen_ = -1e9;  // [s] steady: X-Plane last showed what was sent
   std::string refusal_said_;
 
-  core::GroupId watch_group_ = -1;
-  core::GroupId identity_group_ = -1;
-  core::GroupId read_back_group_ = -1;
-
   ros::Publisher applied_publisher_;
   ros::Publisher mode_publisher_;
   ros::Publisher failure_publisher_;
   ros::Publisher excitation_publisher_;
 
   std::thread worker_;
-  std::condition_variable work_wanted_;
+  std::condition_variable_any work_wanted_;
   bool worker_ends_ = false;
   std::uint32_t leftovers_of_epoch_ = 0;  // link epoch whose leftovers were released
+
+  // Last: they end first.
+  core::Subscription watch_subscription_;
+  core::Subscription identity_subscription_;
+  core::Subscription read_back_subscription_;
 };
 
 }  // namespace xplane_bridge

@@ -31,7 +31,7 @@ TEST_F(SimLinkTest, ConnectsAndDeliversAGroup) {
   sim.datarefs["a/b"] = 1.5F;
   sim.datarefs["c/d[2]"] = -2.5F;
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"a/b", "c/d[2]"}));
+  const int id = subscribe(group({"a/b", "c/d[2]"}));
   EXPECT_EQ(link_->status().state, LinkState::kSearching);
   EXPECT_TRUE(std::isnan(link_->status().silence_s));
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
@@ -56,7 +56,7 @@ TEST_F(SimLinkTest, ComesUpWhenXPlaneStartsLater) {
   const std::uint16_t port = sim->port();
   makeLink(optionsFor(*sim));
   sim.reset();
-  const GroupId id = link_->addGroup(group({"a/b"}));
+  const int id = subscribe(group({"a/b"}));
   run(5.0, {});
   EXPECT_EQ(link_->status().state, LinkState::kSearching);
   EXPECT_TRUE(hasProblem("nothing listens on the port")) << "loopback refuses, and that is worth saying";
@@ -89,7 +89,7 @@ TEST_F(SimLinkTest, UnresolvableHostIsSaid) {
   run(0.1, {});
   EXPECT_EQ(link_->status().state, LinkState::kSearching);
   EXPECT_TRUE(hasProblem("'no-such-host.invalid'"));
-  EXPECT_EQ(link_->sendDref("a/b", 1.0F), SendStatus::kNoPeer);
+  EXPECT_EQ(link_->write("a/b", 1.0F), SendStatus::kNoPeer);
 }
 
 TEST_F(SimLinkTest, BadOptionsAreRefused) {
@@ -117,7 +117,7 @@ TEST_F(SimLinkTest, GapIsStaleAndNothingIsForgotten) {
   FakeXPlane sim;
   sim.datarefs["a/b"] = 1.0F;
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"a/b"}));
+  const int id = subscribe(group({"a/b"}));
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
   const double noticed = runUntilState(LinkState::kStale, 2.0, {});
   EXPECT_GT(noticed, 0.3);
@@ -138,7 +138,7 @@ TEST_F(SimLinkTest, RestartedXPlaneIsAskedAgain) {
   FakeXPlane sim;
   sim.datarefs["a/b"] = 1.0F;
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"a/b"}));
+  const int id = subscribe(group({"a/b"}));
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
   ASSERT_GE(runUntilState(LinkState::kStale, 2.0, {}), 0.0);
   sim.restart();
@@ -157,7 +157,7 @@ TEST_F(SimLinkTest, RestartWithoutSilenceIsNoticedBySimulatorTime) {
   sim.datarefs["a/b"] = 1.0F;
   sim.datarefs["c/d"] = 1.0F;
   makeLink(optionsFor(sim));
-  const GroupId first = link_->addGroup(group({"a/b"}));
+  const int first = subscribe(group({"a/b"}));
   ASSERT_GE(runUntil([&] { return datagrams_[first] > 0; }, 1.0, {&sim}), 0.0);
   run(0.5, {&sim});
   // The link's own subscription survives (asked for by somebody quick), the group's does not.
@@ -278,7 +278,7 @@ TEST_F(SimLinkTest, FollowsARestartOnAnotherPort) {
   auto sim = std::make_unique<FakeXPlane>();
   beacons_ = true;
   makeLink(optionsForBeacon());
-  const GroupId id = link_->addGroup(group({"a/b"}));
+  const int id = subscribe(group({"a/b"}));
   sim->datarefs["a/b"] = 1.0F;
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 5.0, {sim.get()}), 0.0);
   FakeXPlane other;  // before the old port is free again
@@ -324,7 +324,7 @@ TEST_F(SimLinkTest, NeverAnsweringDatarefIsNamed) {
   FakeXPlane sim;
   sim.datarefs["a/b"] = 1.0F;
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"a/b", "no/such/dataref"}));
+  const int id = subscribe(group({"a/b", "no/such/dataref"}));
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
   EXPECT_TRUE(link_->unansweredDatarefs().empty()) << "too early to say";
   run(6.0, {&sim});
@@ -340,7 +340,7 @@ TEST_F(SimLinkTest, LostRequestIsRepeated) {
   sim.datarefs["a/b"] = 1.0F;
   sim.datarefs["c/d"] = 1.0F;
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"a/b", "c/d"}));
+  const int id = subscribe(group({"a/b", "c/d"}));
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
   for (auto& [client, indices] : sim.subscriptions) {
     if (indices.size() == 2) {
@@ -361,10 +361,10 @@ TEST_F(SimLinkTest, RequestsArePaced) {
     sim.datarefs[many.back()] = static_cast<float>(i);
   }
   makeLink(optionsFor(sim));
-  const GroupId big = link_->addGroup(group(many));
+  const int big = subscribe(group(many));
   RrefGroup flight = group({"x/y[5]"});
   flight.priority = 10;
-  const GroupId urgent = link_->addGroup(flight);
+  const int urgent = subscribe(flight);
   int big_when_urgent_came = -1;
   const double took = runUntil(
       [&] {
@@ -386,9 +386,9 @@ TEST_F(SimLinkTest, ReplacedGroupDeliversOnlyTheNewList) {
   sim.datarefs["a/b"] = 1.0F;
   sim.datarefs["c/d"] = 2.0F;
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"a/b", "a/b"}));
+  const int id = subscribe(group({"a/b", "a/b"}));
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
-  link_->replaceGroup(id, group({"c/d"}));
+  subscriptions_[0].replace(group({"c/d"}));
   link_->step(0);
   values_.clear();
   ASSERT_GE(runUntil([&] { return values_.count({id, 0}) != 0; }, 1.0, {&sim}), 0.0);
@@ -406,13 +406,37 @@ TEST_F(SimLinkTest, RemovedGroupIsStopped) {
   FakeXPlane sim;
   sim.datarefs["a/b"] = 1.0F;
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"a/b"}));
+  const int id = subscribe(group({"a/b"}));
   ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
-  link_->removeGroup(id);
+  subscriptions_[0].reset();
   run(0.3, {&sim});
   for (const auto& [client, indices] : sim.subscriptions) {
     EXPECT_TRUE(indices.empty() || indices.size() == 3U);
   }
+}
+
+TEST_F(SimLinkTest, HandlerMayEndItsSubscription) {
+  FakeXPlane sim;
+  sim.datarefs["a/b"] = 1.0F;
+  makeLink(optionsFor(sim));
+  int calls = 0;
+  Subscription once = link_->subscribe(group({"a/b"}), [&](const RrefView&, const ReceiveInfo&) {
+    ++calls;
+    once.reset();
+  });
+  ASSERT_GE(runUntil([&] { return calls > 0; }, 1.0, {&sim}), 0.0);
+  run(0.3, {&sim});
+  EXPECT_EQ(calls, 1);
+}
+
+TEST_F(SimLinkTest, SubscriptionsMayOutliveTheLink) {
+  FakeXPlane sim;
+  makeLink(optionsFor(sim));
+  const int id = subscribe(group({"a/b"}));
+  run(0.1, {&sim});
+  link_.reset();
+  subscriptions_[static_cast<std::size_t>(id)].replace(group({"c/d"}));
+  subscriptions_.clear();
 }
 
 TEST_F(SimLinkTest, SplitDatagramsAreAllDelivered) {
@@ -422,7 +446,7 @@ TEST_F(SimLinkTest, SplitDatagramsAreAllDelivered) {
     sim.datarefs[path] = 1.0F;
   }
   makeLink(optionsFor(sim));
-  const GroupId id = link_->addGroup(group({"p/0", "p/1", "p/2", "p/3", "p/4"}));
+  const int id = subscribe(group({"p/0", "p/1", "p/2", "p/3", "p/4"}));
   ASSERT_GE(runUntil([&] { return values_.count({id, 4}) != 0; }, 1.0, {&sim}), 0.0);
   EXPECT_EQ(values_.size(), 5U);
 }
@@ -430,12 +454,12 @@ TEST_F(SimLinkTest, SplitDatagramsAreAllDelivered) {
 TEST_F(SimLinkTest, BadGroupsAreRefused) {
   FakeXPlane sim;
   makeLink(optionsFor(sim));
-  EXPECT_THROW(link_->addGroup(group({})), std::invalid_argument);
-  EXPECT_THROW(link_->addGroup(group({""})), std::invalid_argument);
-  EXPECT_THROW(link_->addGroup(group({std::string(400, 'x')})), std::invalid_argument);
+  EXPECT_THROW(subscribe(group({})), std::invalid_argument);
+  EXPECT_THROW(subscribe(group({""})), std::invalid_argument);
+  EXPECT_THROW(subscribe(group({std::string(400, 'x')})), std::invalid_argument);
   RrefGroup slow = group({"a/b"});
   slow.rate_hz = 0;
-  EXPECT_THROW(link_->addGroup(slow), std::invalid_argument);
+  EXPECT_THROW(subscribe(slow), std::invalid_argument);
 }
 
 TEST_F(SimLinkTest, StopEndsAllSubscriptions) {
@@ -444,7 +468,7 @@ TEST_F(SimLinkTest, StopEndsAllSubscriptions) {
   SimLinkOptions options = optionsFor(sim);
   options.rpos_rate_hz = 20;
   makeLink(options);
-  link_->addGroup(group({"a/b"}));
+  subscribe(group({"a/b"}));
   ASSERT_GE(runUntil([&] { return rpos_datagrams_ > 0 && !datagrams_.empty(); }, 1.0, {&sim}), 0.0);
   EXPECT_TRUE(link_->stop(1.0));
   sim.pump();
@@ -555,13 +579,12 @@ TEST_F(SimLinkTest, SendersReachXPlane) {
   makeLink(optionsFor(sim));
   ASSERT_GE(runUntilState(LinkState::kConnected, 1.0, {&sim}), 0.0);
   sim.takeRequests();
-  EXPECT_EQ(link_->sendDref("w/x", 0.25F), SendStatus::kSent);
-  EXPECT_EQ(link_->sendCommand("sim/operation/pause_toggle"), SendStatus::kSent);
-  const DataRow row{25, {0.5F}};
-  EXPECT_EQ(link_->sendData(&row, 1), SendStatus::kSent);
+  EXPECT_EQ(link_->write("w/x", 0.25F), SendStatus::kSent);
+  EXPECT_EQ(link_->command("sim/operation/pause_toggle"), SendStatus::kSent);
+  EXPECT_EQ(link_->sendUndo(UndoData{{25, {0.5F}}}), SendStatus::kSent);
   EXPECT_EQ(link_->sendUndo(UndoUsel{{3}}), SendStatus::kSent);
-  EXPECT_EQ(link_->sendDref("", 0.25F), SendStatus::kNotEncoded);
-  EXPECT_EQ(link_->sendDref("w/x", NAN), SendStatus::kNotEncoded);
+  EXPECT_EQ(link_->write("", 0.25F), SendStatus::kNotEncoded);
+  EXPECT_EQ(link_->write("w/x", NAN), SendStatus::kNotEncoded);
   sim.labels.clear();
   sim.takeRequests();
   EXPECT_EQ(sim.labels, (std::vector<std::string>{"DREF", "CMND", "DATA", "USEL"}));
@@ -575,7 +598,7 @@ TEST_F(SimLinkTest, ReadsOnceAndUnsubscribes) {
   makeLink(optionsFor(sim));
   ASSERT_GE(runUntilState(LinkState::kConnected, 1.0, {&sim}), 0.0);
   std::optional<std::vector<DatarefValue>> values;
-  link_->readDatarefs({"r/1", "no/such"}, 0.5, [&](const std::vector<DatarefValue>& read) { values = read; });
+  link_->read({"r/1", "no/such"}, 0.5, [&](const std::vector<DatarefValue>& read) { values = read; });
   const double took = runUntil([&] { return values.has_value(); }, 2.0, {&sim});
   EXPECT_NEAR(took, 0.5, 0.02) << "one does not answer: the deadline ends it";
   ASSERT_EQ(values->size(), 2U);
@@ -587,16 +610,16 @@ TEST_F(SimLinkTest, ReadsOnceAndUnsubscribes) {
   }
   values.reset();
   sim.datarefs["r/1"] = 12.0F;
-  link_->readDatarefs({"r/1"}, 0.5, [&](const std::vector<DatarefValue>& read) { values = read; });
+  link_->read({"r/1"}, 0.5, [&](const std::vector<DatarefValue>& read) { values = read; });
   EXPECT_LE(runUntil([&] { return values.has_value(); }, 2.0, {&sim}), 0.1);
   EXPECT_EQ((*values)[0], 12.0F) << "the present value, not one of the read before";
-  EXPECT_THROW(link_->readDatarefs({""}, 0.5, [](const std::vector<DatarefValue>&) {}), std::invalid_argument);
+  EXPECT_THROW(link_->read({""}, 0.5, [](const std::vector<DatarefValue>&) {}), std::invalid_argument);
 }
 
 TEST_F(SimLinkTest, WaitingNeedsTheThread) {
   FakeXPlane sim;
   makeLink(optionsFor(sim));
-  EXPECT_THROW(link_->readDatarefs({"a/b"}, 0.1), std::logic_error);
+  EXPECT_THROW(link_->read({"a/b"}, 0.1), std::logic_error);
 }
 
 /// The link in its own thread under the real clock, and a fake X-Plane in another.
@@ -619,17 +642,17 @@ class ThreadedSimLink : public testing::Test {
 TEST_F(ThreadedSimLink, WritesAreReadBack) {
   link_->start();
   EXPECT_THROW(link_->start(), std::logic_error);
-  const std::vector<DatarefValue> version = link_->readDatarefs({"sim/version/xplane_internal_version"}, 5.0);
+  const std::vector<DatarefValue> version = link_->read({"sim/version/xplane_internal_version"}, 5.0);
   ASSERT_EQ(version.size(), 1U);
   EXPECT_EQ(version[0], 115501.0F);
-  ASSERT_EQ(link_->sendDref("w/x", 0.75F), SendStatus::kSent);
+  ASSERT_EQ(link_->write("w/x", 0.75F), SendStatus::kSent);
   const auto [fits, value] = link_->waitForDataref("w/x", 0.75F, 1e-6F, 5.0);
   EXPECT_TRUE(fits);
   EXPECT_EQ(value, 0.75F);
   EXPECT_FALSE(link_->waitForDataref("w/x", 0.0F, 1e-6F, 0.2).first);
   EXPECT_TRUE(link_->undo({UndoDref{"w/x", 0.0F}, UndoUsel{{4}}}, 5.0));
-  EXPECT_EQ(link_->readDatarefs({"w/x"}, 5.0)[0], 0.0F);
-  EXPECT_FALSE(link_->readDatarefs({"no/such"}, 0.1)[0].has_value());
+  EXPECT_EQ(link_->read({"w/x"}, 5.0)[0], 0.0F);
+  EXPECT_FALSE(link_->read({"no/such"}, 0.1)[0].has_value());
   EXPECT_TRUE(link_->stop(2.0));
   EXPECT_TRUE(link_->stop(2.0)) << "again is harmless";
 }
@@ -638,7 +661,7 @@ TEST_F(ThreadedSimLink, StopsAlsoWhenNobodyAnswers) {
   link_->start();
   sim_.stopThread();
   link_->stop(0.5);
-  EXPECT_THROW(link_->readDatarefs({"a/b"}, 0.1), std::logic_error);
+  EXPECT_THROW(link_->read({"a/b"}, 0.1), std::logic_error);
 }
 
 }  // namespace
