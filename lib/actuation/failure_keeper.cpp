@@ -63,7 +63,7 @@ std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double 
 
 }  // namespace
 
-FailureKeeper::FailureKeeper(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControl* surfaces,
+FailureKeeper::FailureKeeper(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces,
                              double timeout, ros::Publisher publisher, Report report)
     : link_(link),
       overrides_(overrides),
@@ -149,7 +149,7 @@ void FailureKeeper::carryOut(const core::FailurePlan& plan) {
   }
   try {
     for (const std::string& dataref : plan.datarefs) {
-      overrides_->hold(dataref, static_cast<float>(core::kFailedNow), false);
+      overrides_->acquire(dataref, static_cast<float>(core::kFailedNow), false);
       undone_.erase(dataref);
     }
   } catch (const core::JournalError& error) {
@@ -188,7 +188,7 @@ void FailureKeeper::undo(const core::FailurePlan& plan) {
 void FailureKeeper::repair(const std::vector<std::string>& datarefs) {
   for (const std::string& dataref : datarefs) {
     try {
-      overrides_->unhold(dataref);
+      overrides_->release(dataref);
     } catch (const core::JournalError& error) {
       report_(error.what(), "", false);
     }

@@ -13,11 +13,11 @@
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
 
-#include "xplane_bridge/actuation/override_keeper.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
 
 extern char** environ;
@@ -25,8 +25,9 @@ extern char** environ;
 namespace xplane_bridge {
 namespace {
 
-constexpr double kConnectTime = 2.0;  // [s] X-Plane answers within a frame or two, or it is gone too
-constexpr double kUndoTime = 2.0;     // [s]
+constexpr double kFindTime = 2.0;     // [s] until X-Plane's address is known: a name may have to be resolved
+constexpr double kUndoTime = 2.0;     // [s] X-Plane answers within a frame or two, or it is gone too
+constexpr double kAttemptTime = 0.5;  // [s] until a release that is not shown is sent again
 
 [[noreturn]] void fail(const std::string& what, int error) {
   throw std::runtime_error("the guardian process " + what + ": " + std::strerror(error));
@@ -38,29 +39,6 @@ std::string siblingProgram(const char* name) {
   if (length <= 0) fail("cannot be found", errno);
   const std::string self(path.data(), static_cast<std::size_t>(length));
   return self.substr(0, self.rfind('/') + 1) + name;
-}
-
-struct Orders {
-  std::string address, journal;
-  int port = 0;
-  bool dismissed = false;
-};
-
-// Returns when the parent has closed the pipe: by word, or by dying.
-Orders readOrders() {
-  Orders orders;
-  std::string line;
-  while (std::getline(std::cin, line)) {
-    std::istringstream words(line);
-    std::string verb;
-    words >> verb;
-    if (verb == "bye") orders.dismissed = true;
-    if (verb == "peer") {
-      words >> orders.address >> orders.port;
-      std::getline(words >> std::ws, orders.journal);
-    }
-  }
-  return orders;
 }
 
 }  // namespace
@@ -119,6 +97,41 @@ void Guardian::dismiss() {
   child_ = -1;
 }
 
+GuardianOrders readGuardianOrders(std::istream& lines) {
+  GuardianOrders orders;
+  std::string line;
+  while (std::getline(lines, line)) {
+    std::istringstream words(line);
+    std::string verb, address, journal;
+    int port = 0;
+    words >> verb;
+    if (verb == "bye") orders.dismissed = true;
+    if (verb != "peer") continue;
+    words >> address >> port;
+    std::getline(words >> std::ws, journal);
+    if (port < 1 || port > std::numeric_limits<std::uint16_t>::max() || journal.empty()) continue;
+    orders.address = address;
+    orders.port = static_cast<std::uint16_t>(port);
+    orders.journal = journal;
+  }
+  return orders;
+}
+
+std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int64_t parent) {
+  const auto runs = [parent](const core::JournalOwner& owner) { return owner.pid != parent && core::isAlive(owner); };
+  return std::make_shared<core::Journal>(path, core::thisProcess("override_guardian"), runs);
+}
+
+bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report& report) {
+  if (!link->waitUntil([link] { return link->journal() != nullptr; }, kFindTime)) return false;
+  OverrideManager overrides(link, report);
+  const std::int64_t deadline_ns = link->clock().steady_ns() + static_cast<std::int64_t>(kUndoTime * 1e9);
+  do {
+    if (overrides.releaseLeftovers(kAttemptTime)) return true;
+  } while (link->clock().steady_ns() < deadline_ns);
+  return false;
+}
+
 int runGuardian(int argc, char** argv) {
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGPIPE}) std::signal(number, SIG_IGN);
   if (argc != 2) {
@@ -128,29 +141,23 @@ int runGuardian(int argc, char** argv) {
   // The parent's sockets are not ours: held open here, its peers would not see it die.
   const auto last = static_cast<int>(std::min<long>(sysconf(_SC_OPEN_MAX), 4096));
   for (int descriptor = STDERR_FILENO + 1; descriptor < last; ++descriptor) close(descriptor);
-  const std::int64_t parent = std::strtoll(argv[1], nullptr, 10);
-  const Orders orders = readOrders();
+  const GuardianOrders orders = readGuardianOrders(std::cin);
   if (orders.dismissed || orders.journal.empty()) return 0;
 
   try {
-    // The parent may still be there as a process that nobody has waited for, but it does not run.
-    const auto runs = [parent](const core::JournalOwner& owner) { return owner.pid != parent && core::isAlive(owner); };
-    auto journal = std::make_shared<core::Journal>(orders.journal, core::thisProcess("override_guardian"), runs);
+    const auto journal = guardedJournal(orders.journal, std::strtoll(argv[1], nullptr, 10));
     if (journal->orphans(kOverridePurpose).empty()) return 0;
     core::SimLinkOptions options;
     options.host = orders.address;
-    options.port = static_cast<std::uint16_t>(orders.port);
+    options.port = orders.port;
     options.listen_for_beacon = false;
     core::SimLink link(
         options, {}, core::hostClock(), [](core::LogLevel, const std::string&) {},
         [journal](const core::Endpoint&) { return journal; });
     link.start();
-    OverrideKeeper keeper(&link, [](const std::string& text, bool success) {
+    const bool done = releaseLeftBehind(&link, [](const std::string& text, bool success) {
       std::fprintf(stderr, "override_guardian: %s%s\n", success ? "" : "NOT DONE: ", text.c_str());
     });
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(kConnectTime);
-    bool done = false;
-    while (!done && std::chrono::steady_clock::now() < deadline) done = keeper.releaseLeftovers(kUndoTime);
     link.stop();
     return done ? 0 : 1;
   } catch (const std::exception& error) {

@@ -33,7 +33,7 @@ std::string degrees(double value) {
 
 }  // namespace
 
-SurfaceControl::SurfaceControl(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControlOptions options,
+SurfaceControl::SurfaceControl(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControlOptions options,
                                Report report, std::function<void()> on_frame)
     : link_(link),
       overrides_(overrides),
@@ -182,7 +182,7 @@ void SurfaceControl::take() {
   enter(State::kTaking);
   drive(0.0);  // the snapshot goes ahead of the override
   try {
-    if (overrides_->hold(core::kSurfaceOverride)) {
+    if (overrides_->acquire(core::kSurfaceOverride)) {
       drive(0.0);
       return;
     }
@@ -271,7 +271,7 @@ void SurfaceControl::checkLeft() {
 
 void SurfaceControl::giveBack() {
   try {
-    overrides_->unhold(core::kSurfaceOverride);
+    overrides_->release(core::kSurfaceOverride);
   } catch (const core::JournalError& error) {
     report_(error.what(), false);
   }

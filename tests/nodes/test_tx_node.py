@@ -221,7 +221,7 @@ def test_release_overrides_stops_a_node_that_flies_until_a_mode_is_asked_for(tx,
     # Shown as set for a while, as it is when somebody panics.
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick")
     release_overrides(world)
-    world.events.wait_for(lambda e: "override_joystick was released by somebody else" in e.events[-1].text)
+    world.events.wait_for(lambda e: "override_joystick was released by another client" in e.events[-1].text)
     told = world.events.wait_for(lambda e: "nothing is sent any more" in e.events[-1].text)
     assert "ask for a mode" in told.events[-1].text
     count = len(world.applied.messages)

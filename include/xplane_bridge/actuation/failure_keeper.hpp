@@ -16,7 +16,7 @@
 #include "xplane_bridge/FailureState.h"
 #include "xplane_bridge/ServiceResult.h"
 #include "xplane_bridge/SetFailure.h"
-#include "xplane_bridge/actuation/override_keeper.hpp"
+#include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 #include "xplane_bridge/core/failures/failures.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
@@ -26,7 +26,7 @@ namespace xplane_bridge {
 
 /// What is broken, by the bridge or in the simulator's menu: sets, watches, repairs, labels it (failures/state).
 ///
-/// X-Plane's own failures (rel_*) go through the OverrideKeeper, so that they are repaired on exit and after a crash;
+/// X-Plane's own failures (rel_*) go through the OverrideManager, so that they are repaired on exit and after a crash;
 /// single surfaces that X-Plane cannot break go to SurfaceControl. Thread-safe; only the services wait.
 class FailureKeeper {
  public:
@@ -34,7 +34,7 @@ class FailureKeeper {
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
 
   /// `timeout` [s]: until X-Plane must show what was asked for.
-  FailureKeeper(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControl* surfaces, double timeout,
+  FailureKeeper(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces, double timeout,
                 ros::Publisher publisher, Report report);
 
   // What drives it.
@@ -43,9 +43,9 @@ class FailureKeeper {
   void onFrame(const core::FlightWatch& watch);
   /// At least ten times a second; `time` [s] steady.
   void tick(double time);
-  /// Nothing is broken any more from here on; what is set is the OverrideKeeper's to repair.
+  /// Nothing is broken any more from here on; what is set is the OverrideManager's to repair.
   void stop();
-  /// All that the bridge had broken has been repaired by the OverrideKeeper.
+  /// All that the bridge had broken has been repaired by the OverrideManager.
   void repaired();
   void publish();
 
@@ -85,7 +85,7 @@ class FailureKeeper {
   ServiceResult await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name);
 
   core::SimulatorPort* link_;
-  OverrideKeeper* overrides_;
+  OverrideManager* overrides_;
   SurfaceControl* surfaces_;
   double timeout_;
   ros::Publisher publisher_;

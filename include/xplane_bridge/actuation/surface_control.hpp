@@ -12,7 +12,7 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
-#include "xplane_bridge/actuation/override_keeper.hpp"
+#include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/surfaces/mixing_watch.hpp"
 #include "xplane_bridge/core/surfaces/surface_driver.hpp"
@@ -41,7 +41,7 @@ class SurfaceControl {
   using Report = std::function<void(const std::string& text, bool success)>;
 
   /// `on_frame`: called from the link's thread after every frame, so that takeEcho() can be asked.
-  SurfaceControl(core::SimulatorPort* link, OverrideKeeper* overrides, SurfaceControlOptions options, Report report,
+  SurfaceControl(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControlOptions options, Report report,
                  std::function<void()> on_frame);
 
   // What drives it.
@@ -141,7 +141,7 @@ class SurfaceControl {
   bool isBroken(std::size_t surface) const;
 
   core::SimulatorPort* link_;
-  OverrideKeeper* overrides_;
+  OverrideManager* overrides_;
   SurfaceControlOptions options_;
   Report report_;
   std::function<void()> on_frame_;

@@ -51,4 +51,8 @@ std::vector<DatarefValue> SimLink::readUntil(std::vector<std::string> paths, dou
   return impl_->readAndWait(std::move(paths), timeout_s, accept);
 }
 
+bool SimLink::waitUntil(const std::function<bool()>& condition, double timeout_s) {
+  return impl_->waitUntil(condition, timeout_s);
+}
+
 }  // namespace xplane_bridge::core

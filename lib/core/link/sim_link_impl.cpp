@@ -328,9 +328,7 @@ void SimLink::Impl::read(std::vector<std::string> paths, double timeout_s, Datar
 
 std::vector<DatarefValue> SimLink::Impl::readAndWait(std::vector<std::string> paths, double timeout_s,
                                                      const DatarefReader::Accept& accept) {
-  if (onLinkThread() || !running_) {
-    throw std::logic_error("reading datarefs and waiting needs the link's thread to run, and another one to wait");
-  }
+  requireWaiting();
   const std::size_t count = paths.size();
   auto promise = std::make_shared<std::promise<std::vector<DatarefValue>>>();
   std::future<std::vector<DatarefValue>> future = promise->get_future();
@@ -342,6 +340,44 @@ std::vector<DatarefValue> SimLink::Impl::readAndWait(std::vector<std::string> pa
     return std::vector<DatarefValue>(count);
   }
   return future.get();
+}
+
+void SimLink::Impl::requireWaiting() const {
+  if (onLinkThread() || !running_) {
+    throw std::logic_error("waiting for X-Plane needs the link's thread to run, and another one to wait");
+  }
+}
+
+bool SimLink::Impl::waitUntil(const std::function<bool()>& condition, double timeout_s) {
+  requireWaiting();
+  const std::int64_t deadline_ns = clock_.steady_ns() + nanoseconds(timeout_s);
+  ++waiting_;
+  bool met = false;
+  std::unique_lock<std::mutex> lock(waiting_mutex_);
+  for (;;) {
+    const std::uint64_t seen = steps_;
+    lock.unlock();
+    met = condition();
+    if (met || clock_.steady_ns() >= deadline_ns) {
+      break;
+    }
+    lock.lock();
+    // The link steps more often than that, unless it has been stopped.
+    stepped_.wait_for(lock, std::chrono::milliseconds(2 * kThreadStepMs), [&] { return steps_ != seen; });
+  }
+  --waiting_;
+  return met;
+}
+
+void SimLink::Impl::wakeWaiting() {
+  if (waiting_ == 0) {
+    return;
+  }
+  {
+    const std::lock_guard<std::mutex> lock(waiting_mutex_);
+    ++steps_;
+  }
+  stepped_.notify_all();
 }
 
 void SimLink::Impl::step(int timeout_ms) {
@@ -372,6 +408,7 @@ void SimLink::Impl::step(int timeout_ms) {
   if (stop_phase_ != StopPhase::kRunning) {
     updateStop(now_ns_);
   }
+  wakeWaiting();
 }
 
 }  // namespace xplane_bridge::core

@@ -3,6 +3,7 @@
 #include <sys/epoll.h>
 
 #include <atomic>
+#include <condition_variable>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -57,6 +58,7 @@ class SimLink::Impl {
   void read(std::vector<std::string> paths, double timeout_s, DatarefReader::Accept accept, DatarefReader::Done done);
   std::vector<DatarefValue> readAndWait(std::vector<std::string> paths, double timeout_s,
                                         const DatarefReader::Accept& accept);
+  bool waitUntil(const std::function<bool()>& condition, double timeout_s);
 
  private:
   using SocketPtr = std::shared_ptr<UdpSocket>;
@@ -120,6 +122,8 @@ class SimLink::Impl {
   std::string reasonOf(LinkState state) const;
   void publish(std::int64_t now_ns);
 
+  void requireWaiting() const;
+  void wakeWaiting();
   bool onLinkThread() const { return std::this_thread::get_id() == link_thread_id_.load(); }
 
   const SimLinkOptions options_;
@@ -140,6 +144,12 @@ class SimLink::Impl {
   LinkCounters counters_;
   std::vector<std::string> unanswered_;
   std::shared_ptr<Journal> journal_;
+
+  // Of waitUntil().
+  std::atomic<int> waiting_{0};
+  std::mutex waiting_mutex_;
+  std::condition_variable stepped_;
+  std::uint64_t steps_ = 0;
 
   int wake_fd_ = -1;
   std::thread thread_;

@@ -61,19 +61,25 @@ std::pair<bool, DatarefValue> SimulatorPort::waitForDataref(const std::string& p
 }
 
 bool SimulatorPort::undo(const std::vector<UndoOperation>& operations, double timeout_s) {
-  constexpr float kTolerance = 1e-3F;
-  std::vector<std::string> paths;
-  std::vector<float> expected;
   bool sent = true;
   for (const UndoOperation& operation : operations) {
     sent = sendUndo(operation) == SendStatus::kSent && sent;
+  }
+  return sent && waitUntilUndone(operations, timeout_s);
+}
+
+bool SimulatorPort::waitUntilUndone(const std::vector<UndoOperation>& operations, double timeout_s) {
+  constexpr float kTolerance = 1e-3F;
+  std::vector<std::string> paths;
+  std::vector<float> expected;
+  for (const UndoOperation& operation : operations) {
     if (const auto* dref = std::get_if<UndoDref>(&operation)) {
       paths.push_back(dref->path);
       expected.push_back(dref->value);
     }
   }
-  if (paths.empty() || !sent) {
-    return sent;
+  if (paths.empty()) {
+    return true;
   }
   const auto shown = [expected](const std::vector<DatarefValue>& values) {
     for (std::size_t i = 0; i < values.size(); ++i) {

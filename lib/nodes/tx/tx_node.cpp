@@ -66,7 +66,7 @@ core::SimLinkCallbacks TxNode::linkCallbacks() {
 
 void TxNode::start() {
   guardian_.start();
-  overrides_ = std::make_unique<OverrideKeeper>(&link(), [this](const std::string& text, bool success) {
+  overrides_ = std::make_unique<OverrideManager>(&link(), [this](const std::string& text, bool success) {
     logEvent(Event::OVERRIDE, "overrides: " + text, "", success);
   });
   makeSurfaceControl();
@@ -181,7 +181,7 @@ void TxNode::startAfresh(double time) {
   arbiter_ = std::make_unique<core::ControlArbiter>(options, time);
   arbiter_->setFlowing(link_status_.state == core::LinkState::kConnected, time);
   published_revision_.reset();
-  overrides_->require({});
+  overrides_->setRequired({});
 }
 
 std::string TxNode::refusalToFly() const {
@@ -238,10 +238,10 @@ bool TxNode::fly(const core::ArbitratedControls& controls, double time) {
   }
   try {
     if (!refusal.empty()) {
-      if (linkIsUp()) overrides_->require({});
+      if (linkIsUp()) overrides_->setRequired({});
       return false;
     }
-    overrides_->require(core::requiredOverrides(controls.active, encoder_->options()));
+    overrides_->setRequired(core::requiredOverrides(controls.active, encoder_->options()));
   } catch (const core::JournalError& error) {
     ROS_ERROR_THROTTLE(5.0, "commands are not sent, because overrides could not be given back after a crash: %s",
                        error.what());

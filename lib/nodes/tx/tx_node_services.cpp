@@ -116,9 +116,9 @@ void TxNode::serveSetDataref(const SetDataref::Request& request, SetDataref::Res
     const auto release = core::releaseOf(write.dataref);
     if (!release) continue;
     if (write.value != release->value) {
-      overrides_->hold(write.dataref, write.value);
+      overrides_->acquire(write.dataref, write.value);
     } else {
-      overrides_->unhold(write.dataref);
+      overrides_->release(write.dataref);
     }
   }
   response->result = writeAndConfirm(writes);

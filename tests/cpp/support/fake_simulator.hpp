@@ -233,9 +233,7 @@ class FakeSimulator : public SimulatorPort {
 
   std::vector<DatarefValue> readUntil(std::vector<std::string> paths, double timeout_s,
                                       DatarefReader::Accept accept) override {
-    if (delivering_) {
-      throw std::logic_error("a handler of the link must not wait");
-    }
+    mustNotBeHandling();
     const std::int64_t deadline_ns = now_ns_ + static_cast<std::int64_t>(timeout_s * 1e9);
     std::vector<DatarefValue> values(paths.size());
     do {
@@ -246,6 +244,18 @@ class FakeSimulator : public SimulatorPort {
       }
     } while (now_ns_ < deadline_ns);
     return values;
+  }
+
+  bool waitUntil(const std::function<bool()>& condition, double timeout_s) override {
+    mustNotBeHandling();
+    const std::int64_t deadline_ns = now_ns_ + static_cast<std::int64_t>(timeout_s * 1e9);
+    while (!condition()) {
+      if (now_ns_ >= deadline_ns) {
+        return false;
+      }
+      frame();
+    }
+    return true;
   }
 
   LinkStatus status() const override { return status_; }
@@ -269,6 +279,12 @@ class FakeSimulator : public SimulatorPort {
     std::int64_t deadline_ns = 0;
     DatarefReader::Done done;
   };
+
+  void mustNotBeHandling() const {
+    if (delivering_) {
+      throw std::logic_error("a handler of the link must not wait");
+    }
+  }
 
   bool answers() const { return status_.state == LinkState::kConnected || status_.state == LinkState::kPaused; }
 

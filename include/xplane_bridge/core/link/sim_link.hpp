@@ -115,6 +115,7 @@ class SimLink : public SimulatorPort {
   using SimulatorPort::read;
   std::vector<DatarefValue> readUntil(std::vector<std::string> paths, double timeout_s,
                                       DatarefReader::Accept accept) override;
+  bool waitUntil(const std::function<bool()>& condition, double timeout_s) override;
 
  private:
   class Impl;

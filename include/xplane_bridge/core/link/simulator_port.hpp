@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -77,8 +78,13 @@ class SimulatorPort {
   /// Waits until a dataref reads `expected` within `tolerance`; returns whether it does, and the last value seen.
   std::pair<bool, DatarefValue> waitForDataref(const std::string& path, float expected, float tolerance,
                                                double timeout_s);
+  /// Waits until `condition()` returns true, asked on the calling thread after everything the link has handled; returns
+  /// whether it did.
+  virtual bool waitUntil(const std::function<bool()>& condition, double timeout_s) = 0;
   /// Carries out the operations and reads datarefs among them back. Waits. Returns whether all read back as written.
   bool undo(const std::vector<UndoOperation>& operations, double timeout_s);
+  /// The second half of undo(), for operations that have been sent.
+  bool waitUntilUndone(const std::vector<UndoOperation>& operations, double timeout_s);
 
   virtual LinkStatus status() const = 0;
   /// The journal of the X-Plane found; null before, or without one.

@@ -32,7 +32,7 @@
 #include "xplane_bridge/actuation/failure_keeper.hpp"
 #include "xplane_bridge/actuation/flight_jobs.hpp"
 #include "xplane_bridge/actuation/guardian.hpp"
-#include "xplane_bridge/actuation/override_keeper.hpp"
+#include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 #include "xplane_bridge/core/control/control_arbiter.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
@@ -138,7 +138,7 @@ class TxNode : public BaseNode {
   EventLog events_;
   std::atomic<double> sim_time_{std::nan("")};  // [s] raw simulator time, for events of any thread
   Guardian guardian_;
-  std::unique_ptr<OverrideKeeper> overrides_;
+  std::unique_ptr<OverrideManager> overrides_;
   std::unique_ptr<SurfaceControl> surfaces_;
   std::unique_ptr<FailureKeeper> failures_;
   std::unique_ptr<ExcitationKeeper> excitation_;  // guarded by mutex_

@@ -657,6 +657,17 @@ TEST_F(ThreadedSimLink, WritesAreReadBack) {
   EXPECT_TRUE(link_->stop(2.0)) << "again is harmless";
 }
 
+TEST_F(ThreadedSimLink, WaitsForACondition) {
+  EXPECT_THROW(link_->waitUntil([] { return true; }, 0.1), std::logic_error) << "nothing would ever come";
+  std::atomic<int> datagrams{0};
+  const Subscription counting = link_->subscribe({"test", {"sim/time/paused"}, kEveryFrameRateHz, 0},
+                                                 [&](const RrefView&, const ReceiveInfo&) { ++datagrams; });
+  link_->start();
+  EXPECT_TRUE(link_->waitUntil([&] { return datagrams >= 3; }, 5.0));
+  EXPECT_FALSE(link_->waitUntil([] { return false; }, 0.05));
+  link_->stop(2.0);
+}
+
 TEST_F(ThreadedSimLink, StopsAlsoWhenNobodyAnswers) {
   link_->start();
   sim_.stopThread();

@@ -146,11 +146,25 @@ TEST_F(SimulatorPortTest, WaitingReadsLetFramesPass) {
   EXPECT_EQ(sim_.waitForDataref("no/such", 9.0F, 0.1F, 0.1), std::make_pair(false, DatarefValue()));
 }
 
+TEST_F(SimulatorPortTest, WaitsForAConditionFrameByFrame) {
+  sim_.set("a/b", 1.0F);
+  const Subscription counting = watch({"a/b"}, kEveryFrameRateHz);
+  const auto five = [this] { return datagrams_ == 5; };
+  EXPECT_TRUE(sim_.waitUntil(five, 1.0));
+  const double begin = sim_.time();
+  EXPECT_TRUE(sim_.waitUntil(five, 1.0));
+  EXPECT_EQ(sim_.time(), begin) << "it was true already";
+  EXPECT_FALSE(sim_.waitUntil([] { return false; }, 0.5));
+  EXPECT_NEAR(sim_.time() - begin, 0.5, 1e-9);
+}
+
 TEST_F(SimulatorPortTest, UndoIsReadBack) {
   sim_.setAll({"a/b", "c/d"}, 1.0F);
   EXPECT_TRUE(sim_.undo({UndoDref{"a/b", 0.0F}, UndoUsel{{4}}}, 1.0));
   EXPECT_EQ(sim_.value("a/b"), 0.0F);
   EXPECT_TRUE(sim_.undo({}, 1.0));
+  EXPECT_TRUE(sim_.waitUntilUndone({UndoDref{"a/b", 0.0F}, UndoUsel{{4}}}, 1.0));
+  EXPECT_FALSE(sim_.waitUntilUndone({UndoDref{"c/d", 0.0F}}, 1.0)) << "it was not sent";
   sim_.setReadOnly("c/d");
   EXPECT_FALSE(sim_.undo({UndoDref{"a/b", 0.0F}, UndoDref{"c/d", 0.0F}}, 1.0));
   EXPECT_FALSE(sim_.undo({UndoDref{"no/such", 0.0F}}, 1.0));

@@ -13,36 +13,37 @@ namespace xplane_bridge {
 
 /// The overrides this node has set in X-Plane, and nothing else's: each is in the journal before it is set, and taken
 /// out after it is released and read back. Thread-safe. Functions that wait for X-Plane say so; those that write to the
-/// journal throw core::JournalError.
-class OverrideKeeper {
+/// journal throw core::JournalError, but for releasedByOthers() and refresh(), which report it.
+class OverrideManager {
  public:
   /// `report(text, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, bool success)>;
 
-  OverrideKeeper(core::SimulatorPort* link, Report report);
+  OverrideManager(core::SimulatorPort* link, Report report);
 
   /// Sets what of `wanted` is not set yet, and gives back what was set by an earlier call and is not in `wanted` any
-  /// more (its journal entry stays until confirmReleases() has read it back). Writes to the disk when something is new;
-  /// without a journal (X-Plane has not been found), and after releaseAll(), nothing is set.
-  void require(const std::vector<std::string>& wanted);
-  /// Sets one, until unhold() or the end of the node, whatever require() says. Not only overrides: whatever is 0 (or
-  /// core::releaseOf()) where nobody sets it. Without `refreshed`, refresh() leaves it alone, so that it can be taken
-  /// back in the simulator. Returns whether it was set: as in require().
-  bool hold(const std::string& dataref, float value = 1.0F, bool refreshed = true);
-  /// Gives one back that hold() has set; another one stays as it is.
-  void unhold(const std::string& dataref);
+  /// more (its journal entry stays until confirmReleases() has read it back), this also where the journal fails. Writes
+  /// to the disk when something is new; without a journal (X-Plane has not been found), and after releaseAll(), nothing
+  /// is set.
+  void setRequired(const std::vector<std::string>& wanted);
+  /// Sets one, until release() or the end of the node, whatever setRequired() says. Not only overrides: whatever is 0
+  /// (or core::releaseOf()) where no client sets it. Without `refreshed`, refresh() leaves it alone, so that it can be
+  /// taken back in the simulator. Returns whether it was set: as in setRequired().
+  bool acquire(const std::string& dataref, float value = 1.0F, bool refreshed = true);
+  /// Gives one back that acquire() has set; another one stays as it is.
+  void release(const std::string& dataref);
   /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted. Not those that
   /// X-Plane shows released.
   void refresh();
-  /// What somebody else has released (the panic tool, another client) since the last call, after X-Plane had shown it
-  /// set. Its journal entry goes, and it is not set again by itself. Of what require() has set; what hold() has set is
-  /// reported and let go as well, but for the surface override, which its holder watches.
+  /// What another client has released (the panic tool, a user's script) since the last call, after X-Plane had shown it
+  /// set. Its journal entry goes, and it is not set again by itself. Returns those of setRequired(); what acquire() has
+  /// set is reported and let go as well, but for the surface override, which its holder watches.
   std::vector<std::string> releasedByOthers();
-  /// X-Plane may have released everything by itself (restarted, another aircraft): that is not somebody else.
+  /// X-Plane may have released everything by itself (restarted, another aircraft): that is not another client.
   void forgetShown();
   /// True while a release has not been read back.
   bool releasesPending() const;
-  /// Reads pending releases back, sending them again where needed. Waits up to `timeout_s`.
+  /// Reads pending releases back, sending them again. Waits up to `timeout_s`.
   void confirmReleases(double timeout_s);
   /// Releases everything; nothing is set after that. Waits up to `timeout_s`. Returns whether X-Plane has shown all of
   /// it; what it has not stays in the journal.
@@ -54,7 +55,7 @@ class OverrideKeeper {
   std::vector<std::string> active() const;
 
  private:
-  struct Held {
+  struct Acquired {
     float value = 1.0F;
     bool refreshed = true;
   };
@@ -66,12 +67,14 @@ class OverrideKeeper {
     bool in_journal = true;  // its entry is known to be there
   };
 
+  // All with mutex_ held.
   bool set(const std::string& dataref, float value);
-  void send(const std::string& dataref, float value);
-  void watch();
+  void resend(const std::string& dataref, float value);
+  void giveBack(const std::string& dataref);
+  void updateWatch();
   void onShown(const core::RrefView& view);
-  void release(const std::string& dataref);
-  /// `remove`: takes what was undone out of the journal.
+
+  /// Waits until X-Plane shows `operations`, reports `what`; `remove` takes what was undone out of the journal.
   bool confirm(const std::vector<core::UndoOperation>& operations, double timeout_s, const std::string& what,
                const std::function<void(core::Journal&)>& remove);
 
@@ -79,12 +82,12 @@ class OverrideKeeper {
   Report report_;
   const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
   std::set<std::string> required_;
-  std::map<std::string, Held> held_;
+  std::map<std::string, Acquired> acquired_;
   std::set<std::string> releasing_;
   std::vector<std::string> watched_;  // datarefs of the subscription
   std::map<std::string, Shown> shown_;
   bool ended_ = false;               // by releaseAll()
-  std::string unreleased_;           // what confirm() has told last of; of the one thread that waits
+  std::string unreleased_;           // what confirm() has reported last; of the one thread that waits
   core::Subscription subscription_;  // last: it ends first
 };
 

@@ -1,0 +1,297 @@
+#include "xplane_bridge/actuation/override_manager.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "xplane_bridge/core/control/control_channels.hpp"
+#include "xplane_bridge/core/link/journal.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using Lock = std::lock_guard<core::HandlerMutex>;
+
+constexpr std::int32_t kWatchRate = 10;  // [Hz]
+// Answers in a row that show a release: half a second, in which a restarted X-Plane is known to be one.
+constexpr int kReleasedAnswers = 5;
+constexpr float kSame = 1e-3F;
+
+std::string entryId(const std::string& dataref) { return "override:" + dataref; }
+
+std::vector<std::string> entryIds(const std::set<std::string>& datarefs) {
+  std::vector<std::string> out;
+  for (const std::string& dataref : datarefs) out.push_back(entryId(dataref));
+  return out;
+}
+
+core::UndoOperation undoOf(const std::string& dataref) {
+  const auto release = core::releaseOf(dataref);
+  return core::UndoDref{dataref, release ? release->value : 0.0F};
+}
+
+std::vector<core::UndoOperation> undoOf(const std::set<std::string>& datarefs) {
+  std::vector<core::UndoOperation> out;
+  for (const std::string& dataref : datarefs) out.push_back(undoOf(dataref));
+  return out;
+}
+
+std::string joined(const std::set<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name.substr(name.rfind('/') + 1);
+  return out;
+}
+
+}  // namespace
+
+const char* const kOverridePurpose = "override";
+
+OverrideManager::OverrideManager(core::SimulatorPort* link, Report report) : link_(link), report_(std::move(report)) {}
+
+bool OverrideManager::set(const std::string& dataref, float value) {
+  const auto journal = link_->journal();
+  if (!journal || ended_) return false;
+  // On disk first: a crash right after the datagram must find it there.
+  journal->record(entryId(dataref), kOverridePurpose, {undoOf(dataref)});
+  releasing_.erase(dataref);
+  link_->write(dataref, value);
+  return true;
+}
+
+void OverrideManager::giveBack(const std::string& dataref) {
+  if (required_.count(dataref) != 0 || acquired_.count(dataref) != 0) return;
+  releasing_.insert(dataref);
+  link_->sendUndo(undoOf(dataref));
+}
+
+// --- what X-Plane shows ---
+
+void OverrideManager::updateWatch() {
+  std::set<std::string> wanted = required_;
+  for (const auto& [dataref, acquired] : acquired_) {
+    if (acquired.refreshed && dataref != core::kSurfaceOverride) wanted.insert(dataref);
+  }
+  const std::vector<std::string> list(wanted.begin(), wanted.end());
+  if (list == watched_) return;
+  for (const std::string& dataref : watched_) {
+    if (wanted.count(dataref) == 0) shown_.erase(dataref);
+  }
+  watched_ = list;
+  if (list.empty()) {
+    subscription_.reset();
+    return;
+  }
+  core::RrefGroup group{"overrides", list, kWatchRate, 1};
+  if (subscription_) {
+    subscription_.replace(std::move(group));
+  } else {
+    subscription_ = link_->subscribe(
+        std::move(group), [this](const core::RrefView& view, const core::ReceiveInfo&) { onShown(view); }, mutex_);
+  }
+}
+
+void OverrideManager::onShown(const core::RrefView& view) {
+  for (std::size_t i = 0; i < view.size(); ++i) {
+    const core::RrefPair pair = view[i];
+    if (pair.index < 0 || static_cast<std::size_t>(pair.index) >= watched_.size()) continue;
+    const std::string& dataref = watched_[static_cast<std::size_t>(pair.index)];
+    const auto acquired = acquired_.find(dataref);
+    Shown& shown = shown_[dataref];
+    if (std::abs(pair.value - (acquired == acquired_.end() ? 1.0F : acquired->second.value)) <= kSame) {
+      shown.set = true;
+      shown.released = 0;
+    } else if (shown.set) {
+      ++shown.released;
+    }
+  }
+}
+
+std::vector<std::string> OverrideManager::releasedByOthers() {
+  std::vector<std::string> stopped;
+  std::set<std::string> all;
+  std::string problem;
+  {
+    const Lock lock(*mutex_);
+    for (const auto& [dataref, shown] : shown_) {
+      if (shown.released >= kReleasedAnswers) all.insert(dataref);
+    }
+    if (all.empty()) return stopped;
+    for (const std::string& dataref : all) {
+      if (required_.erase(dataref) != 0) stopped.push_back(dataref);
+      acquired_.erase(dataref);
+    }
+    try {
+      if (const auto journal = link_->journal()) journal->remove(entryIds(all));
+    } catch (const core::JournalError& error) {
+      problem = error.what();
+      releasing_.insert(all.begin(), all.end());  // confirmReleases() tries again to take the entries out
+    }
+    updateWatch();
+  }
+  if (!problem.empty()) report_(problem, false);
+  report_(joined(all) + " was released by another client", true);
+  return stopped;
+}
+
+void OverrideManager::forgetShown() {
+  const Lock lock(*mutex_);
+  for (const std::string& dataref : watched_) shown_[dataref] = {false, 0, false};
+}
+
+// --- setting ---
+
+void OverrideManager::setRequired(const std::vector<std::string>& wanted) {
+  std::set<std::string> taken, given;
+  std::exception_ptr failed;
+  {
+    const Lock lock(*mutex_);
+    try {
+      for (const std::string& dataref : wanted) {
+        if (required_.count(dataref) != 0) continue;
+        if (acquired_.count(dataref) == 0 && !set(dataref, 1.0F)) continue;
+        required_.insert(dataref);
+        taken.insert(dataref);
+      }
+    } catch (const core::JournalError&) {
+      failed = std::current_exception();
+    }
+    for (auto it = required_.begin(); it != required_.end();) {
+      if (std::find(wanted.begin(), wanted.end(), *it) != wanted.end()) {
+        ++it;
+        continue;
+      }
+      const std::string dataref = *it;
+      it = required_.erase(it);
+      giveBack(dataref);
+      given.insert(dataref);
+    }
+    if (!taken.empty() || !given.empty()) updateWatch();
+  }
+  if (!taken.empty()) report_("set " + joined(taken), true);
+  if (!given.empty()) report_("gave back " + joined(given), true);
+  if (failed) std::rethrow_exception(failed);
+}
+
+bool OverrideManager::acquire(const std::string& dataref, float value, bool refreshed) {
+  const Lock lock(*mutex_);
+  if (required_.count(dataref) == 0 && !set(dataref, value)) return false;
+  acquired_[dataref] = {value, refreshed};
+  updateWatch();
+  return true;
+}
+
+void OverrideManager::release(const std::string& dataref) {
+  const Lock lock(*mutex_);
+  if (acquired_.erase(dataref) == 0) return;
+  giveBack(dataref);
+  updateWatch();
+}
+
+void OverrideManager::refresh() {
+  const Lock lock(*mutex_);
+  for (const std::string& dataref : required_) resend(dataref, 1.0F);
+  for (const auto& [dataref, acquired] : acquired_) {
+    if (acquired.refreshed) resend(dataref, acquired.value);
+  }
+}
+
+void OverrideManager::resend(const std::string& dataref, float value) {
+  const auto found = shown_.find(dataref);
+  if (found != shown_.end() && found->second.released > 0) return;  // by whom is not known yet
+  if (found == shown_.end() || found->second.in_journal) {
+    link_->write(dataref, value);
+    return;
+  }
+  // The panic tool may have taken the entry out.
+  try {
+    found->second.in_journal = set(dataref, value);
+  } catch (const core::JournalError& error) {
+    report_(error.what(), false);
+  }
+}
+
+// --- confirming releases ---
+
+bool OverrideManager::releasesPending() const {
+  const Lock lock(*mutex_);
+  return !releasing_.empty();
+}
+
+void OverrideManager::confirmReleases(double timeout_s) {
+  std::set<std::string> pending;
+  {
+    const Lock lock(*mutex_);
+    pending = releasing_;
+    // Sent with the lock held, so that none goes out after one of them has been set again.
+    for (const std::string& dataref : pending) link_->sendUndo(undoOf(dataref));
+  }
+  if (pending.empty() || !link_->waitUntilUndone(undoOf(pending), timeout_s)) return;
+  const auto journal = link_->journal();
+  const Lock lock(*mutex_);
+  for (const std::string& dataref : pending) {
+    // It may have been set again meanwhile.
+    if (releasing_.count(dataref) == 0) continue;
+    if (journal) journal->remove({entryId(dataref)});
+    releasing_.erase(dataref);
+  }
+}
+
+bool OverrideManager::confirm(const std::vector<core::UndoOperation>& operations, double timeout_s,
+                              const std::string& what, const std::function<void(core::Journal&)>& remove) {
+  if (operations.empty()) return true;
+  const bool shown = link_->undo(operations, timeout_s);
+  const auto journal = link_->journal();
+  if (shown && journal) remove(*journal);
+  // It is tried again and again, but reported once.
+  if (shown || std::exchange(unreleased_, what) != what) {
+    report_(shown ? "released " + what : what + " could not be seen released; it stays in the journal", shown);
+  }
+  return shown;
+}
+
+bool OverrideManager::releaseAll(double timeout_s) {
+  std::set<std::string> all;
+  {
+    const Lock lock(*mutex_);
+    all = required_;
+    for (const auto& [dataref, acquired] : acquired_) all.insert(dataref);
+    all.insert(releasing_.begin(), releasing_.end());
+    required_.clear();
+    acquired_.clear();
+    updateWatch();
+    releasing_ = all;
+    ended_ = true;
+  }
+  const auto remove = [&all](core::Journal& journal) { journal.remove(entryIds(all)); };
+  if (!confirm(undoOf(all), timeout_s, joined(all), remove)) return false;
+  const Lock lock(*mutex_);
+  releasing_.clear();
+  return true;
+}
+
+bool OverrideManager::releaseLeftovers(double timeout_s) {
+  const auto journal = link_->journal();
+  if (!journal) return false;
+  const std::vector<core::JournalEntry> left = journal->orphans(kOverridePurpose);
+  std::vector<core::UndoOperation> operations;
+  std::set<std::string> names;
+  for (const core::JournalEntry& entry : left) {
+    names.insert(entry.id);
+    operations.insert(operations.end(), entry.undo.begin(), entry.undo.end());
+  }
+  // This run may have set one of them anew meanwhile: that entry is not theirs.
+  return confirm(operations, timeout_s, joined(names) + " left by a run that crashed",
+                 [&left](core::Journal& journal_now) { journal_now.removeUndone(left); });
+}
+
+std::vector<std::string> OverrideManager::active() const {
+  const Lock lock(*mutex_);
+  std::set<std::string> all = required_;
+  for (const auto& [dataref, acquired] : acquired_) {
+    if (acquired.refreshed) all.insert(dataref);
+  }
+  return {all.begin(), all.end()};
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,141 @@
+#include "xplane_bridge/actuation/guardian.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "fake_simulator.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr const char* kJoystick = "sim/operation/override/override_joystick";
+
+GuardianOrders read(const std::string& text) {
+  std::istringstream lines(text);
+  return readGuardianOrders(lines);
+}
+
+TEST(GuardianOrdersTest, LastPeerCounts) {
+  const GuardianOrders orders = read("peer 10.0.0.1 49000 /a/b.json\npeer 10.0.0.2 49010 /data/a user/c d.json\n");
+  EXPECT_EQ(orders.address, "10.0.0.2");
+  EXPECT_EQ(orders.port, 49010);
+  EXPECT_EQ(orders.journal, "/data/a user/c d.json");
+  EXPECT_FALSE(orders.dismissed);
+}
+
+TEST(GuardianOrdersTest, ByeDismisses) {
+  EXPECT_TRUE(read("bye\n").dismissed);
+  const GuardianOrders orders = read("peer 10.0.0.1 49000 /a/b.json\nbye\n");
+  EXPECT_TRUE(orders.dismissed);
+  EXPECT_EQ(orders.journal, "/a/b.json");
+}
+
+TEST(GuardianOrdersTest, DeadParentSaysNothing) {
+  const GuardianOrders orders = read("");
+  EXPECT_FALSE(orders.dismissed);
+  EXPECT_TRUE(orders.journal.empty());
+}
+
+TEST(GuardianOrdersTest, WhatIsNoOrderLeavesTheLastOne) {
+  for (const char* wrong : {"peer", "peer 10.0.0.9", "peer 10.0.0.9 49", "peer 10.0.0.9 0 /x", "peer 10.0.0.9 65536 /x",
+                            "peer 10.0.0.9 port /x", "by", "\n", "peers 10.0.0.9 49000 /x"}) {
+    const GuardianOrders orders = read(std::string("peer 10.0.0.1 49000 /a/b.json\n") + wrong);
+    EXPECT_EQ(orders.address, "10.0.0.1") << wrong;
+    EXPECT_EQ(orders.port, 49000) << wrong;
+    EXPECT_EQ(orders.journal, "/a/b.json") << wrong;
+    EXPECT_FALSE(orders.dismissed) << wrong;
+  }
+}
+
+/// Another process that has set an override.
+class GuardedProcess : public testing::Test {
+ protected:
+  GuardedProcess() : path_(sim_.folder() + "/guarded.json") {
+    int written[2];
+    EXPECT_EQ(pipe(written), 0);
+    child_ = fork();
+    if (child_ == 0) {
+      core::Journal(path_, core::thisProcess("/tx_node"))
+          .record("one", kOverridePurpose, {core::UndoDref{kJoystick, 0.0F}});
+      close(written[1]);
+      for (;;) pause();
+    }
+    close(written[1]);
+    char end = 0;
+    EXPECT_EQ(::read(written[0], &end, 1), 0);  // the child has closed its end: the entry is there
+    close(written[0]);
+  }
+  ~GuardedProcess() override {
+    kill(child_, SIGKILL);
+    waitpid(child_, nullptr, 0);
+  }
+
+  core::FakeSimulator sim_;  // for its folder
+  std::string path_;
+  pid_t child_ = -1;
+};
+
+TEST_F(GuardedProcess, EntriesOfALivingProcessAreLeftAloneUnlessItIsTheParent) {
+  EXPECT_TRUE(guardedJournal(path_, child_ + 1)->orphans(kOverridePurpose).empty());
+  EXPECT_EQ(guardedJournal(path_, child_)->orphans(kOverridePurpose).size(), 1U);
+}
+
+TEST_F(GuardedProcess, ParentThatHasNotBeenWaitedForCountsAsGone) {
+  kill(child_, SIGKILL);
+  siginfo_t ended{};
+  ASSERT_EQ(waitid(P_PID, static_cast<id_t>(child_), &ended, WEXITED | WNOWAIT), 0);  // and stays as a zombie
+  EXPECT_TRUE(guardedJournal(path_, child_ + 1)->orphans(kOverridePurpose).empty()) << "a zombie is still a process";
+  EXPECT_EQ(guardedJournal(path_, child_)->orphans(kOverridePurpose).size(), 1U);
+}
+
+class ReleaseLeftBehind : public testing::Test {
+ protected:
+  ReleaseLeftBehind() {
+    sim_.set(kJoystick, 1.0F);
+    sim_.journalOfAnother().record("one", kOverridePurpose, {core::UndoDref{kJoystick, 0.0F}});
+  }
+  bool release() {
+    return releaseLeftBehind(&sim_, [this](const std::string&, bool success) { successes_.push_back(success); });
+  }
+
+  core::FakeSimulator sim_;
+  std::vector<bool> successes_;
+};
+
+TEST_F(ReleaseLeftBehind, GivesBackAndClearsTheJournal) {
+  EXPECT_TRUE(release());
+  EXPECT_EQ(sim_.value(kJoystick), 0.0F);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+  EXPECT_EQ(successes_, std::vector<bool>{true});
+}
+
+TEST_F(ReleaseLeftBehind, LostDatagramIsSentAgain) {
+  sim_.loseMessages(2);
+  EXPECT_TRUE(release());
+  EXPECT_EQ(sim_.value(kJoystick), 0.0F);
+  EXPECT_EQ(sim_.messages().size(), 3U);
+}
+
+TEST_F(ReleaseLeftBehind, GivesUpAfterTwoSecondsOfSilence) {
+  sim_.setState(core::LinkState::kLost);
+  const double begin = sim_.time();
+  EXPECT_FALSE(release());
+  EXPECT_NEAR(sim_.time() - begin, 2.0, 0.1);
+  EXPECT_EQ(sim_.journal()->entries().size(), 1U) << "for the next start";
+  EXPECT_EQ(successes_, std::vector<bool>{false});
+}
+
+TEST_F(ReleaseLeftBehind, GivesUpWhereXPlaneIsNotFound) {
+  sim_.forgetPeer();
+  EXPECT_FALSE(release());
+  EXPECT_TRUE(sim_.messages().empty());
+}
+
+}  // namespace
+}  // namespace xplane_bridge
