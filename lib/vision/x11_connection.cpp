@@ -1,10 +1,15 @@
 #include "x11_connection.hpp"
 
+#include <limits.h>
+#include <unistd.h>
 #include <xcb/composite.h>
 #include <xcb/damage.h>
 #include <xcb/shm.h>
 
+#include <algorithm>
+#include <array>
 #include <cstring>
+#include <fstream>
 #include <regex>
 #include <stdexcept>
 #include <tuple>
@@ -63,6 +68,7 @@ X11Connection::X11Connection(const std::string& display) : display_name_(display
     has_shm_ = version != nullptr;
   }
   net_wm_name_ = atom("_NET_WM_NAME");
+  net_wm_pid_ = atom("_NET_WM_PID");
 }
 
 X11Connection::~X11Connection() { xcb_disconnect(connection_); }
@@ -134,35 +140,62 @@ std::vector<xcb_window_t> X11Connection::allWindows() const {
   return windows;
 }
 
-std::optional<xcb_window_t> X11Connection::findWindow(const X11SourceOptions& options, int& looked_at) const {
+bool X11Connection::fits(xcb_window_t window, const X11SourceOptions& options, const std::string& title) const {
+  if (!options.class_name.empty()) {
+    const std::string both = textProperty(window, XCB_ATOM_WM_CLASS);  // two strings, each ended by a zero
+    const std::string instance = both.c_str();
+    const std::string name = instance.size() < both.size() ? both.c_str() + instance.size() + 1 : "";
+    return instance == options.class_name || name == options.class_name;
+  }
+  if (title.empty()) return false;
+  if (options.title.empty()) {
+    const std::vector<std::string>& titles = xplaneWindowTitles();
+    return std::find(titles.begin(), titles.end(), title) != titles.end();
+  }
+  if (options.title_is_regex) return std::regex_search(title, std::regex(options.title));
+  return title.find(options.title) != std::string::npos;
+}
+
+bool X11Connection::isXPlanes(xcb_window_t window) const {
+  if (net_wm_pid_ == XCB_ATOM_NONE) return false;
+  std::array<char, HOST_NAME_MAX + 1> host{};
+  if (gethostname(host.data(), host.size() - 1) != 0) return false;
+  // A process number says nothing about a program of another computer.
+  if (textProperty(window, XCB_ATOM_WM_CLIENT_MACHINE) != host.data()) return false;
+  const XcbPointer<xcb_get_property_reply_t> reply(xcb_get_property_reply(
+      connection_, xcb_get_property(connection_, 0, window, net_wm_pid_, XCB_ATOM_CARDINAL, 0, 1), nullptr));
+  if (reply == nullptr || reply->format != 32 || xcb_get_property_value_length(reply.get()) != sizeof(std::uint32_t)) {
+    return false;
+  }
+  std::uint32_t process = 0;
+  std::memcpy(&process, xcb_get_property_value(reply.get()), sizeof process);
+  std::string name;
+  std::getline(std::ifstream("/proc/" + std::to_string(process) + "/comm"), name);
+  return name.rfind("X-Plane", 0) == 0;
+}
+
+std::uint32_t X11Connection::area(xcb_window_t window) const {
+  const XcbPointer<xcb_get_geometry_reply_t> geometry(
+      xcb_get_geometry_reply(connection_, xcb_get_geometry(connection_, window), nullptr));
+  return geometry == nullptr ? 0 : std::uint32_t{geometry->width} * geometry->height;
+}
+
+std::optional<xcb_window_t> X11Connection::findWindow(const X11SourceOptions& options,
+                                                      std::vector<std::string>& titles) const {
+  titles.clear();
   if (options.window_id != 0) {
-    looked_at = 1;
     return viewable(options.window_id) ? std::optional<xcb_window_t>(options.window_id) : std::nullopt;
   }
-  const std::vector<xcb_window_t> windows = allWindows();
-  looked_at = static_cast<int>(windows.size());
-  const std::regex pattern(options.title_is_regex ? options.title : std::string());
   std::optional<xcb_window_t> best;
-  std::pair<bool, std::uint32_t> best_rank{false, 0};  // exact title, area
-  for (const xcb_window_t window : windows) {
-    bool exact = false;
-    if (!options.class_name.empty()) {
-      const std::string both = textProperty(window, XCB_ATOM_WM_CLASS);  // two strings, each ended by a zero
-      const std::string instance = both.c_str();
-      const std::string name = instance.size() < both.size() ? both.c_str() + instance.size() + 1 : "";
-      if (instance != options.class_name && name != options.class_name) continue;
-    } else {
-      const std::string text = title(window);
-      const bool fits =
-          options.title_is_regex ? std::regex_search(text, pattern) : text.find(options.title) != std::string::npos;
-      if (text.empty() || !fits) continue;
-      exact = text == options.title;
-    }
-    if (!viewable(window)) continue;
-    const XcbPointer<xcb_get_geometry_reply_t> geometry(
-        xcb_get_geometry_reply(connection_, xcb_get_geometry(connection_, window), nullptr));
-    if (geometry == nullptr) continue;
-    const std::pair<bool, std::uint32_t> rank{exact, std::uint32_t{geometry->width} * geometry->height};
+  std::tuple<bool, bool, std::uint32_t> best_rank{false, false, 0};  // X-Plane's, exact title, area [px]
+  for (const xcb_window_t window : allWindows()) {
+    const std::string text = title(window);
+    const bool wanted = fits(window, options, text);
+    if ((!wanted && text.empty()) || !viewable(window)) continue;
+    if (!text.empty()) titles.push_back(text);
+    const std::uint32_t size = area(window);
+    if (!wanted || size == 0) continue;
+    const std::tuple<bool, bool, std::uint32_t> rank{isXPlanes(window), text == options.title, size};
     if (best.has_value() && rank <= best_rank) continue;
     best = window;
     best_rank = rank;

@@ -47,9 +47,10 @@ class X11Connection {
   /// Pixel format of a window's visual; empty when the server does not list it.
   [[nodiscard]] std::optional<PixelFormat> pixelFormat(xcb_visualid_t visual, int depth) const;
 
-  /// Viewable window that fits, best first: an exact title before a partial one, then the largest.
-  /// @param[out] looked_at number of windows examined
-  [[nodiscard]] std::optional<xcb_window_t> findWindow(const X11SourceOptions& options, int& looked_at) const;
+  /// Viewable window that fits best, see X11SourceOptions.
+  /// @param[out] titles of all viewable windows that have one
+  [[nodiscard]] std::optional<xcb_window_t> findWindow(const X11SourceOptions& options,
+                                                       std::vector<std::string>& titles) const;
 
   /// Title of a window, as UTF-8 where the window gives it so.
   [[nodiscard]] std::string title(xcb_window_t window) const;
@@ -59,6 +60,10 @@ class X11Connection {
   [[nodiscard]] std::string textProperty(xcb_window_t window, xcb_atom_t property) const;
   [[nodiscard]] xcb_atom_t atom(const char* name) const;
   [[nodiscard]] bool viewable(xcb_window_t window) const;
+  [[nodiscard]] bool fits(xcb_window_t window, const X11SourceOptions& options, const std::string& title) const;
+  /// Its process runs on this computer and is called X-Plane or X-Plane-x86_64.
+  [[nodiscard]] bool isXPlanes(xcb_window_t window) const;
+  [[nodiscard]] std::uint32_t area(xcb_window_t window) const;
 
   xcb_connection_t* connection_;
   xcb_screen_t* screen_ = nullptr;
@@ -68,6 +73,7 @@ class X11Connection {
   bool has_shm_ = false;
   std::uint8_t damage_event_ = 0;
   xcb_atom_t net_wm_name_ = XCB_ATOM_NONE;
+  xcb_atom_t net_wm_pid_ = XCB_ATOM_NONE;
 };
 
 }  // namespace xplane_bridge::vision

@@ -24,6 +24,8 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr int kSilentChangesToGiveUpDamage = 3;
 // Pause between two of those looks; long enough to cost nothing.
 constexpr std::chrono::milliseconds kDamageWatch{250};
+// Of windows named where the one looked for is missing.
+constexpr std::size_t kMostTitles = 8;
 
 std::chrono::nanoseconds seconds(double value) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(value * 1e9));
@@ -35,6 +37,24 @@ std::string hex(std::uint32_t value) {
   return text.str();
 }
 
+// Each in quotation marks.
+std::string quoted(const std::vector<std::string>& texts, const std::string& separator) {
+  std::string out;
+  for (const std::string& text : texts) out += (out.empty() ? "\"" : separator + "\"") + text + "\"";
+  return out;
+}
+
+// What there is instead of the window looked for, for the end of a sentence.
+std::string thereAre(std::vector<std::string> titles) {
+  if (titles.empty()) return "; no visible window has a title";
+  std::sort(titles.begin(), titles.end());
+  titles.erase(std::unique(titles.begin(), titles.end()), titles.end());
+  const std::size_t left_out = titles.size() > kMostTitles ? titles.size() - kMostTitles : 0;
+  titles.resize(titles.size() - left_out);
+  return "; visible windows are titled " + quoted(titles, ", ") +
+         (left_out == 0 ? "" : " and " + std::to_string(left_out) + " more");
+}
+
 std::string selection(const X11SourceOptions& options) {
   if (options.window_id != 0) return "window " + hex(options.window_id);
   if (!options.class_name.empty()) return "window of class \"" + options.class_name + "\"";
@@ -42,6 +62,7 @@ std::string selection(const X11SourceOptions& options) {
     return std::string("window whose title ") + (options.title_is_regex ? "matches" : "contains") + " \"" +
            options.title + "\"";
   }
+  if (options.region.empty()) return "window titled exactly " + quoted(xplaneWindowTitles(), " or ");
   return "screen region " + std::to_string(options.region.width) + "x" + std::to_string(options.region.height) + "+" +
          std::to_string(options.region.x) + "+" + std::to_string(options.region.y);
 }
@@ -49,9 +70,12 @@ std::string selection(const X11SourceOptions& options) {
 void validate(const X11SourceOptions& options) {
   const int given = static_cast<int>(!options.title.empty()) + static_cast<int>(!options.class_name.empty()) +
                     static_cast<int>(options.window_id != 0) + static_cast<int>(!options.region.empty());
-  if (given != 1) {
+  if (given > 1) {
     throw std::invalid_argument(std::to_string(given) +
-                                " of window title, class, id and screen region are given: expected exactly one");
+                                " of window title, class, id and screen region are given: expected at most one");
+  }
+  if (options.title_is_regex && options.title.empty()) {
+    throw std::invalid_argument("the window title is to be a regular expression, but none is given");
   }
   if (options.region.x < 0 || options.region.y < 0) {
     throw std::invalid_argument(selection(options) + ": expected its corner on the screen (x, y >= 0)");
@@ -73,6 +97,11 @@ void validate(const X11SourceOptions& options) {
 }
 
 }  // namespace
+
+const std::vector<std::string>& xplaneWindowTitles() {
+  static const std::vector<std::string> titles{"X-System", "X-Plane"};
+  return titles;
+}
 
 ChangeDetection changeDetectionFromName(const std::string& name) {
   if (name == "auto") return ChangeDetection::kAuto;
@@ -239,12 +268,12 @@ class X11WindowSource::Impl {
         return false;
       }
     }
-    int looked_at = 0;
+    std::vector<std::string> titles;
     std::optional<xcb_window_t> window = connection_->root();
-    if (options_.region.empty()) window = connection_->findWindow(options_, looked_at);
+    if (options_.region.empty()) window = connection_->findWindow(options_, titles);
     if (!window.has_value()) {
-      problem_ = "no visible " + wanted_ + " on display " + connection_->displayName() + " (" +
-                 std::to_string(looked_at) + " windows looked at)";
+      problem_ = "no visible " + wanted_ + " on display " + connection_->displayName() +
+                 (options_.window_id == 0 ? thereAre(std::move(titles)) : "");
       return false;
     }
     return open(*window);

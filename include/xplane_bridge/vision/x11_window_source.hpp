@@ -5,6 +5,7 @@
 #include <opencv2/core/types.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "xplane_bridge/vision/frame_source.hpp"
 
@@ -21,10 +22,15 @@ enum class ChangeDetection {
 /// @throws std::invalid_argument unless `name` is auto, damage, checksum or none.
 [[nodiscard]] ChangeDetection changeDetectionFromName(const std::string& name);
 
-/// Which part of which screen. Exactly one of title, class_name, window_id and region is given.
+/// What X-Plane calls its window: "X-System" up to early 12 on every system, "X-Plane" since (smiley22/XPPlugins #14).
+const std::vector<std::string>& xplaneWindowTitles();
+
+/// Which part of which screen. At most one of title, class_name, window_id and region is given; none: X-Plane's own
+/// window, which has exactly one of xplaneWindowTitles(). Of several windows that fit, the one whose process is X-Plane
+/// is preferred, then one with exactly the title, then the largest.
 struct X11SourceOptions {
   std::string display;          ///< X display, e.g. ":0"; empty = $DISPLAY
-  std::string title;            ///< part of the window's title; X-Plane's window is called "X-System"
+  std::string title;            ///< part of the window's title
   bool title_is_regex = false;  ///< `title` is an ECMAScript regular expression, searched for
   std::string class_name;       ///< WM_CLASS, either of its two strings, exact
   std::uint32_t window_id = 0;  ///< as xwininfo prints it

@@ -41,8 +41,7 @@ vision::X11SourceOptions loadWindow(const ParamLoader& window) {
   x11.class_name = window.text("class", "");
   x11.window_id = windowId(window);
   x11.region = region(window);
-  const bool otherwise = !x11.class_name.empty() || x11.window_id != 0 || !x11.region.empty();
-  x11.title = window.text("title", otherwise ? "" : "X-System");
+  x11.title = window.text("title", "");
   x11.title_is_regex = window.boolean("title_is_regex", false);
   x11.change_detection = vision::changeDetectionFromName(
       window.choice("change_detection", {"auto", "damage", "checksum", "none"}, "auto"));

@@ -137,6 +137,19 @@ class TestWindow {
   }
   [[nodiscard]] std::uint32_t id() const { return window_; }
 
+  /// Says which process it belongs to, as toolkits do (_NET_WM_PID).
+  void ownedBy(std::uint32_t process, const std::string& host) {
+    const char name[] = "_NET_WM_PID";
+    xcb_intern_atom_reply_t* reply =
+        xcb_intern_atom_reply(connection_, xcb_intern_atom(connection_, 0, sizeof name - 1, name), nullptr);
+    if (reply == nullptr) throw std::runtime_error("no atom _NET_WM_PID");
+    xcb_change_property(connection_, XCB_PROP_MODE_REPLACE, window_, reply->atom, XCB_ATOM_CARDINAL, 32, 1, &process);
+    std::free(reply);
+    xcb_change_property(connection_, XCB_PROP_MODE_REPLACE, window_, XCB_ATOM_WM_CLIENT_MACHINE, XCB_ATOM_STRING, 8,
+                        static_cast<std::uint32_t>(host.size()), host.data());
+    sync();
+  }
+
   /// Returns after the server has done everything asked so far.
   void sync() { std::free(xcb_get_input_focus_reply(connection_, xcb_get_input_focus(connection_), nullptr)); }
 

@@ -1,6 +1,8 @@
 #include "xplane_bridge/vision/x11_window_source.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <memory>
@@ -89,7 +91,10 @@ const cv::Vec3b kBlue(255, 0, 0);
 
 TEST(X11SourceOptions, RefusesContradictions) {
   X11SourceOptions options;
+  EXPECT_NO_THROW(X11WindowSource(options, steadyNow));  // X-Plane's own window
+  options.title_is_regex = true;
   EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
+  options.title_is_regex = false;
   options.title = "a";
   options.class_name = "b";
   EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
@@ -250,6 +255,39 @@ TEST_F(X11WindowSourceTest, PrefersTheExactTitleThenTheLargest) {
   X11WindowSource source(titled(server_), steadyNow);
   ASSERT_TRUE(nextPicture(source, picture_));
   EXPECT_EQ(source.window(), large.id());
+}
+
+TEST_F(X11WindowSourceTest, FindsXPlanesOwnWindowByExactlyItsTitle) {
+  TestWindow browser(server_.display(), "X-Plane 12 manual - browser", 600, 500);
+  X11WindowSource source(titled(server_, ""), steadyNow);
+  EXPECT_TRUE(becomesLost(source));
+  EXPECT_NE(source.problem().find("\"X-System\" or \"X-Plane\""), std::string::npos) << source.problem();
+  EXPECT_NE(source.problem().find("\"X-Plane 12 manual - browser\""), std::string::npos) << source.problem();
+  for (const char* title : {"X-System", "X-Plane"}) {
+    TestWindow window(server_.display(), title, 320, 240);
+    X11WindowSource finds(titled(server_, ""), steadyNow);
+    ASSERT_TRUE(nextPicture(finds, picture_)) << finds.describe();
+    EXPECT_EQ(finds.window(), window.id());
+  }
+}
+
+TEST_F(X11WindowSourceTest, PrefersTheWindowWhoseProcessIsXPlane) {
+  TestWindow folder(server_.display(), "X-Plane", 600, 500);  // a file manager, say
+  TestWindow elsewhere(server_.display(), "X-Plane", 500, 400);
+  TestWindow window(server_.display(), "X-Plane", 320, 240);
+  char host[256] = {};
+  ASSERT_EQ(gethostname(host, sizeof host - 1), 0);
+  char before[16] = {};
+  ASSERT_EQ(prctl(PR_GET_NAME, before), 0);
+  ASSERT_EQ(prctl(PR_SET_NAME, "X-Plane-x86_64"), 0);  // of the process too, as this is its main thread
+  folder.ownedBy(1, host);
+  elsewhere.ownedBy(static_cast<std::uint32_t>(getpid()), "another-computer");
+  window.ownedBy(static_cast<std::uint32_t>(getpid()), host);
+  X11WindowSource source(titled(server_, ""), steadyNow);
+  const bool found = nextPicture(source, picture_);
+  prctl(PR_SET_NAME, before);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(source.window(), window.id());
 }
 
 TEST_F(X11WindowSourceTest, WorksThroughTheSocketWithoutSharedMemory) {
