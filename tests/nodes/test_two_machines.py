@@ -7,16 +7,16 @@ out by making them; where it does not, the tests say so and are skipped.
 from __future__ import annotations
 
 import csv
-import json
 import sys
 import time
 from pathlib import Path
-from typing import Any, Callable, Iterator, Sequence
+from typing import Any, Iterator, Sequence
 
 import numpy as np
 import pytest
 
 from support.network_namespaces import Machine, TwoMachines, why_no_machines
+from support.recorded_topics import RecordedTopics
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import program
@@ -32,41 +32,9 @@ PERFECT = 90
 WAIT_S = 40.0
 #: What both machines are told: the namespace's parameters are shared.
 _SHARED = f"display_delay:={PIPELINE_DELAY_S}"
-_RECORDER = Path(__file__).resolve().parents[1] / "support" / "topic_recorder.py"
 _NOT_PERMITTED = why_no_machines()
 
 pytestmark = pytest.mark.skipif(bool(_NOT_PERMITTED), reason=_NOT_PERMITTED)
-
-
-class TopicRecorder:
-    """What tests/support/topic_recorder.py writes down on a machine."""
-
-    def __init__(self, flight: Flight, machine: Machine) -> None:
-        self.file = machine.folder / "topics.jsonl"
-        flight.run(machine, "topic_recorder", sys.executable, _RECORDER, self.file)
-
-    def all(self, topic: str) -> list[dict[str, Any]]:
-        """All messages so far of a topic below /xplane, or of one with a leading slash."""
-        if not self.file.exists():
-            return []
-        name = topic if topic.startswith("/") else f"/xplane/{topic}"
-        complete = self.file.read_text(encoding="utf-8").rpartition("\n")[0].splitlines()
-        messages = [json.loads(line) for line in complete]
-        return [message for message in messages if message["topic"] == name]
-
-    def wait_for(
-        self, topic: str, condition: Callable[[dict[str, Any]], bool], what: str, after: int = 0
-    ) -> dict[str, Any]:
-        """Waits for a message that fulfils `condition`, the first `after` ones left out."""
-        return wait_until(lambda: next(filter(condition, self.all(topic)[after:]), None), WAIT_S, f"{what} on {topic}")
-
-    def wait_for_status(self, node: str, condition: Callable[[int, str], bool], what: str) -> None:
-        """Waits for a diagnostic status of a node from now on."""
-
-        def fits(message: dict[str, Any]) -> bool:
-            return any(node in name and condition(level, text) for name, level, text in message["status"])
-
-        self.wait_for("/diagnostics", fits, what, after=len(self.all("/diagnostics")))
 
 
 class Flight:
@@ -102,6 +70,12 @@ class Flight:
         right = "{axes: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], buttons: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}"
         self.run(self.bridge, "stick", "rostopic", "pub", "-r", "50", "/xplane/joy", "sensor_msgs/Joy", right)
 
+    def recorder(self, machine: Machine) -> RecordedTopics:
+        """What arrives on a machine, from now on."""
+        recorded = RecordedTopics(machine.folder / "topics.jsonl", WAIT_S)
+        self.run(machine, "topic_recorder", *recorded.command)
+        return recorded
+
     def launch(self, machine: Machine, file: str, *args: str, prefix: Sequence[str] = ()) -> None:
         """Starts a launch file on a machine."""
         self.run(machine, file, *prefix, "roslaunch", "--wait", "xplane_bridge", file, *args)
@@ -132,14 +106,14 @@ def lateness(row: dict[str, str]) -> float:
     return (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9 - PIPELINE_DELAY_S
 
 
-def perfect(recorder: TopicRecorder) -> list[dict[str, Any]]:
+def perfect(recorder: RecordedTopics) -> list[dict[str, Any]]:
     """Pictures whose pairing is beyond doubt."""
     return [state for state in recorder.all("camera/frame_state") if not state["quality"]]
 
 
 def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     flight.start_bridge()
-    recorder = TopicRecorder(flight, flight.bridge)
+    recorder = flight.recorder(flight.bridge)
     recorder.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
     begin = len(recorder.all("flight_state"))
     link = recorder.all("link_state")[-1]
@@ -183,7 +157,7 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
 
 def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(flight: Flight) -> None:
     flight.start_bridge()
-    here, there = TopicRecorder(flight, flight.simulator), TopicRecorder(flight, flight.bridge)
+    here, there = flight.recorder(flight.simulator), flight.recorder(flight.bridge)
     here.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
     there.wait_for("flight_state", lambda _: True, "a state")
 
@@ -200,7 +174,7 @@ def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(fl
     here.wait_for_status("capture_node: pairing", lambda level, text: level == 1 and "no state" in text, "a warning")
 
     flight.start_bridge()
-    there = TopicRecorder(flight, flight.bridge)
+    there = flight.recorder(flight.bridge)
     pictures = len(here.all("camera/frame_state"))
     here.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a picture with", after=pictures)
     there.wait_for("flight_state", lambda _: True, "a state")

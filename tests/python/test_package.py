@@ -196,6 +196,11 @@ def test_every_launch_argument_is_documented():
     assert not wrong
 
 
+def test_both_example_controllers_fly_the_same_test():
+    files = [ROOT / "docs/examples" / name / "test/flies.yaml" for name in ("controller_py", "controller_cpp")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
 # ------------------------------------------------------------------------------------------------- version, changelog
 
 

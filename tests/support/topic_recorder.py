@@ -15,7 +15,7 @@ import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image
-from xplane_bridge.msg import AppliedCommand, FlightState, FrameState, LinkState
+from xplane_bridge.msg import AppliedCommand, ControlMode, FlightState, FrameState, LinkState
 
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
 
@@ -36,7 +36,12 @@ def _frame_state(message: FrameState) -> Dict[str, Any]:
 
 
 def _flight_state(state: FlightState) -> Dict[str, Any]:
-    return {"sim_time": state.sim_time, "control_roll": state.control_roll}
+    attitude = {"roll": state.roll_deg, "pitch": state.pitch_deg, "heading": state.heading_true_deg}
+    return {"sim_time": state.sim_time, "control_roll": state.control_roll, **attitude}
+
+
+def _mode(mode: ControlMode) -> Dict[str, Any]:
+    return {"mode": mode.mode, "failsafe": mode.failsafe, "reason": mode.reason}
 
 
 def _link_state(link: LinkState) -> Dict[str, Any]:
@@ -56,6 +61,7 @@ _TOPICS = {
     "/xplane/camera/frame_state": (FrameState, _frame_state),
     "/xplane/flight_state": (FlightState, _flight_state),
     "/xplane/link_state": (LinkState, _link_state),
+    "/xplane/control/mode": (ControlMode, _mode),
     "/xplane/control/applied": (AppliedCommand, _applied),
     "/diagnostics": (DiagnosticArray, _diagnostics),
 }
