@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/failures/failure_names.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 
@@ -39,6 +40,10 @@ std::string described(const core::FailurePlan& plan) {
   char text[32];
   std::snprintf(text, sizeof text, " at %g", *plan.value);
   return out + text;
+}
+
+std::string namesOf(const std::vector<core::FailureLabel>& labels) {
+  return core::join(labels, ", ", [](const core::FailureLabel& label) { return label.name; });
 }
 
 // Where X-Plane's own failure brings a surface; nullopt where that cannot be told from the law.
@@ -462,8 +467,7 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
   for (const std::string& name : request.names) {
     names.push_back(core::failureName(name));
     if (book_.knows(names.back())) continue;
-    std::string broken;
-    for (const core::FailureLabel& label : book_.labels()) broken += (broken.empty() ? "" : ", ") + label.name;
+    const std::string broken = namesOf(book_.labels());
     response->result = result(ServiceResult::REFUSED, "\"" + name + "\" is not broken: expected " +
                                                           (broken.empty() ? "nothing, all is well" : broken));
     return;
@@ -520,19 +524,19 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
 void FailureKeeper::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
   using Level = diagnostic_msgs::DiagnosticStatus;
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  std::string broken, unconfirmed;
-  for (const core::FailureLabel& label : book_.labels()) {
-    broken += (broken.empty() ? "" : ", ") + label.name;
-    if (label.active && !label.confirmed) unconfirmed += (unconfirmed.empty() ? "" : ", ") + label.name;
+  const std::vector<core::FailureLabel> labels = book_.labels();
+  std::vector<core::FailureLabel> unconfirmed;
+  for (const core::FailureLabel& label : labels) {
+    if (label.active && !label.confirmed) unconfirmed.push_back(label);
     status->add(label.name, label.kind + (label.by_bridge ? ", by the bridge" : ", by the simulator") +
                                 (!label.active     ? ", armed"
                                  : label.confirmed ? ", seen"
                                                    : ", not seen"));
   }
   if (!unconfirmed.empty()) {
-    status->summary(Level::WARN, "X-Plane does not show the failure of " + unconfirmed);
+    status->summary(Level::WARN, "X-Plane does not show the failure of " + namesOf(unconfirmed));
   } else {
-    status->summary(Level::OK, broken.empty() ? "nothing is broken" : "broken: " + broken);
+    status->summary(Level::OK, labels.empty() ? "nothing is broken" : "broken: " + namesOf(labels));
   }
 }
 

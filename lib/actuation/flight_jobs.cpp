@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "xplane_bridge/Event.h"
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
 
 namespace xplane_bridge {
@@ -29,15 +30,15 @@ bool sendMessage(core::SimulatorPort* link, Encode encode) {
 /// Empty: all is shown.
 std::string loadingDifference(const std::vector<core::DatarefWrite>& writes,
                               const std::vector<core::DatarefValue>& values) {
-  std::string out;
+  std::vector<std::string> out;
   for (std::size_t i = 0; i < writes.size(); ++i) {
     const bool answered = i < values.size() && values[i];
     if (answered && core::shows(writes[i], static_cast<double>(*values[i]))) continue;
-    out += (out.empty() ? "" : ", ") + writes[i].dataref +
-           (answered ? " is " + std::to_string(*values[i]) + ", not " + std::to_string(writes[i].value)
-                     : " does not answer");
+    out.push_back(writes[i].dataref +
+                  (answered ? " is " + std::to_string(*values[i]) + ", not " + std::to_string(writes[i].value)
+                            : " does not answer"));
   }
-  return out;
+  return core::join(out);
 }
 
 }  // namespace

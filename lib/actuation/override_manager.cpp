@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 
@@ -37,11 +38,7 @@ std::vector<core::UndoOperation> undoOf(const std::set<std::string>& datarefs) {
   return out;
 }
 
-std::string joined(const std::set<std::string>& names) {
-  std::string out;
-  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name.substr(name.rfind('/') + 1);
-  return out;
-}
+std::string joined(const std::set<std::string>& names) { return core::join(names, ", ", core::afterLastSlash); }
 
 }  // namespace
 

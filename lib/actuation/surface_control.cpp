@@ -6,6 +6,7 @@
 
 #include "xplane_bridge/actuation/mixing_files.hpp"
 #include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 
 namespace xplane_bridge {
@@ -29,6 +30,11 @@ std::string degrees(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f", value);
   return text;
+}
+
+std::string surfacesOf(const core::MixingModel& model) {
+  return core::join(model.laws, ", ",
+                    [](const core::SurfaceLaw& law) { return core::surfaceTable()[law.surface].name; });
 }
 
 }  // namespace
@@ -257,16 +263,16 @@ void SurfaceControl::endCommands() {
 void SurfaceControl::checkLeft() {
   if (left_.empty() || sample_.sim_time < left_time_ + kFollowsAgain) return;
   const core::MixingVector terms = core::mixingTerms(sample_.inputs);
-  std::string standing;
+  std::vector<std::string> standing;
   for (const core::SurfaceDeflection& left : left_) {
     const core::SurfaceLaw* law = watch_.model() ? watch_.model()->lawOf(left.surface) : nullptr;
     const double shown = sample_.deflections_deg[left.surface];
     const bool stands = std::abs(shown - left.deflection_deg) <= kFollowsDeg;
     if (!law || !stands || std::abs(law->deflection(terms) - shown) <= kOffLawDeg) continue;
-    standing += (standing.empty() ? "" : ", ") + core::surfaceTable()[left.surface].name;
+    standing.push_back(core::surfaceTable()[left.surface].name);
   }
   left_.clear();
-  if (!standing.empty()) report_("X-Plane does not drive again: " + standing, false);
+  if (!standing.empty()) report_("X-Plane does not drive again: " + core::join(standing), false);
 }
 
 void SurfaceControl::giveBack() {
@@ -466,14 +472,10 @@ std::string SurfaceControl::refusalOf(std::size_t surface) const {
   const std::string refusal = refusalLocked();
   const core::MixingModel* model = watch_.model();
   if (!refusal.empty() || !model || model->lawOf(surface)) return refusal;
-  std::string moved;
-  for (const core::SurfaceLaw& law : model->laws) {
-    moved += (moved.empty() ? "" : ", ") + core::surfaceTable()[law.surface].name;
-  }
   return core::surfaceTable()[surface].name +
          " has not been seen to move: either this aircraft has none, or its handle has to be moved once; those that "
          "moved: " +
-         moved;
+         surfacesOf(*model);
 }
 
 bool SurfaceControl::driving() const {
@@ -543,15 +545,15 @@ std::optional<std::string> SurfaceControl::takeDropped() {
 void SurfaceControl::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
   using Level = diagnostic_msgs::DiagnosticStatus;
   std::lock_guard<std::mutex> lock(mutex_);
-  std::string lost;
+  std::vector<std::string> lost;
   for (std::size_t i = 0; i < not_following_.size() && state_ == State::kDriving; ++i) {
-    if (not_following_[i] > kDoesNotFollow) lost += (lost.empty() ? "" : ", ") + core::surfaceTable()[i].name;
+    if (not_following_[i] > kDoesNotFollow) lost.push_back(core::surfaceTable()[i].name);
   }
   const std::string refusal = refusalLocked();
   if (!file_problem_.empty()) {
     status->summary(Level::WARN, file_problem_);
   } else if (!lost.empty()) {
-    status->summary(Level::WARN, "X-Plane does not show what is sent to " + lost);
+    status->summary(Level::WARN, "X-Plane does not show what is sent to " + core::join(lost));
   } else if (state_ != State::kIdle) {
     status->summary(Level::OK, toString(state_));
   } else if (wanted()) {
@@ -564,15 +566,8 @@ void SurfaceControl::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper
   status->add("Aircraft", watch_.aircraft());
   status->add("Mixing known", model != nullptr);
   if (model) {
-    std::string names;
-    for (const core::SurfaceLaw& law : model->laws) {
-      names += (names.empty() ? "" : ", ") + core::surfaceTable()[law.surface].name;
-    }
-    status->add("Surfaces of the mixing", names);
-    std::string unknown;
-    for (const std::string& term : model->unknownMovement(sample_.inputs)) {
-      unknown += (unknown.empty() ? "" : ", ") + term;
-    }
+    status->add("Surfaces of the mixing", surfacesOf(*model));
+    const std::string unknown = core::join(model->unknownMovement(sample_.inputs));
     status->add("Moved, with an effect that the mixing does not know", unknown.empty() ? "none" : unknown);
   }
   status->add("Identification of this flight", watch_.quality().text());

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/text.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -22,11 +23,7 @@ constexpr float kRateTolerance = 0.5F;  // the dataref is an int
 std::string rowDataref(std::int32_t row) { return std::string(kRowsDataref) + "[" + std::to_string(row) + "]"; }
 
 std::string listOf(const std::vector<std::int32_t>& rows) {
-  std::string text;
-  for (const std::int32_t row : rows) {
-    text += (text.empty() ? "" : ", ") + std::to_string(row);
-  }
-  return text;
+  return join(rows, ", ", [](std::int32_t row) { return std::to_string(row); });
 }
 
 template <typename T>

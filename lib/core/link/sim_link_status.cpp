@@ -3,17 +3,15 @@
 #include <algorithm>
 #include <utility>
 
+#include "xplane_bridge/core/base/text.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
 constexpr double kPatienceS = 3.0;  // before a fruitless search is called a problem
 
 std::string namesOf(const std::vector<BeaconSighting>& sightings) {
-  std::string text;
-  for (const BeaconSighting& sighting : sightings) {
-    text += (text.empty() ? "" : ", ") + toString(sighting);
-  }
-  return text;
+  return join(sightings, ", ", [](const BeaconSighting& sighting) { return toString(sighting); });
 }
 
 }  // namespace

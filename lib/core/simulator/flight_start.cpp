@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 
@@ -157,8 +158,8 @@ std::vector<DatarefWrite> motionWrites(const FlightStart& start, const ShownFlig
 }
 
 std::string differenceOf(const FlightStart& start, const ShownFlight& shown) {
-  std::string out;
-  const auto say = [&out](const std::string& text) { out += (out.empty() ? "" : ", ") + text; };
+  std::vector<std::string> out;
+  const auto say = [&out](const std::string& text) { out.push_back(text); };
   const Eigen::Vector3d velocity = velocityOf(start, shown.wind_ned);
   const double reach = kPlace + kFlownOn * velocity.norm();
   const double away = groundDistance({start.latitude_deg, start.longitude_deg, 0.0}, shown.place);
@@ -174,7 +175,7 @@ std::string differenceOf(const FlightStart& start, const ShownFlight& shown) {
   }
   const double off = (velocity - shown.velocity_ned).norm();
   if (!(off <= kVelocity + kFlownOn * kStandardGravity)) say("its velocity is " + number(off) + " m/s off");
-  return out;
+  return join(out);
 }
 
 }  // namespace xplane_bridge::core

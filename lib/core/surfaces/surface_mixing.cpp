@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "xplane_bridge/core/base/text.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -100,12 +102,7 @@ std::vector<std::string> MixingModel::unknownMovement(const MixingInputs& inputs
   return out;
 }
 
-std::string MixingQuality::text() const {
-  if (good) return "good";
-  std::string out;
-  for (const std::string& need : needs) out += (out.empty() ? "" : "; ") + need;
-  return out;
-}
+std::string MixingQuality::text() const { return good ? "good" : join(needs, "; "); }
 
 MixingIdentifier::MixingIdentifier(MixingRequirements requirements)
     : requirements_(requirements), surfaces_(surfaceTable().size()) {}

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
 
 namespace xplane_bridge {
@@ -36,10 +37,7 @@ void fillLinkDiagnostics(const core::LinkStatus& link, const core::LinkCounters&
                           static_cast<unsigned long long>(now.udp.dropped - last.udp.dropped));
   }
   if (!unanswered.empty()) {
-    std::string names;
-    for (const std::string& name : unanswered) {
-      names += (names.empty() ? "" : ", ") + name;
-    }
+    const std::string names = core::join(unanswered);
     status->mergeSummary(DiagnosticStatus::WARN, "X-Plane never answers: " + names);
     status->add("Unanswered datarefs", names);
   }

@@ -6,6 +6,8 @@
 
 #include <ros/param.h>
 
+#include "xplane_bridge/core/base/text.hpp"
+
 namespace xplane_bridge {
 namespace {
 
@@ -72,14 +74,6 @@ std::string describe(const char* kind, Range<T> range) {
   return out.str();
 }
 
-std::string join(const std::vector<std::string>& words, const char* separator) {
-  std::string joined;
-  for (const std::string& word : words) {
-    joined += (joined.empty() ? "" : separator) + word;
-  }
-  return joined;
-}
-
 [[noreturn]] void throwBad(const std::string& full_key, const XmlRpcValue& given, const std::string& wanted) {
   std::string hint;
   if (given.getType() == XmlRpcValue::TypeString && wanted.find("text") == std::string::npos &&
@@ -127,7 +121,7 @@ std::string textFrom(const std::string& full_key, const XmlRpcValue& value) {
 std::string choiceFrom(const std::string& full_key, const XmlRpcValue& value, const std::vector<std::string>& allowed) {
   if (value.getType() != XmlRpcValue::TypeString ||
       std::find(allowed.begin(), allowed.end(), as<std::string>(value)) == allowed.end()) {
-    throwBad(full_key, value, "one of: " + join(allowed, ", "));
+    throwBad(full_key, value, "one of: " + core::join(allowed));
   }
   return as<std::string>(value);
 }
@@ -316,7 +310,7 @@ void ParamLoader::collectUnknown(bool only_misspelt, std::vector<std::string>* p
           problems->push_back(fullKey(member.first) + " (did you mean " + nearest + "?)");
         }
       } else if (!only_misspelt) {
-        problems->push_back(fullKey(member.first) + " (known here: " + join(known, ", ") + ")");
+        problems->push_back(fullKey(member.first) + " (known here: " + core::join(known) + ")");
       }
     }
   }
@@ -333,7 +327,7 @@ void ParamLoader::throwUnknown(bool only_misspelt) const {
   std::vector<std::string> problems;
   collectUnknown(only_misspelt, &problems);
   if (!problems.empty()) {
-    throw ParamError("unknown parameter" + std::string(problems.size() > 1 ? "s " : " ") + join(problems, "; ") +
+    throw ParamError("unknown parameter" + std::string(problems.size() > 1 ? "s " : " ") + core::join(problems, "; ") +
                      "; correct the name in the YAML or launch file, or remove a left-over with: rosparam delete KEY");
   }
 }

@@ -2,19 +2,10 @@
 
 #include "xplane_bridge/ControlCommand.h"
 #include "xplane_bridge/ModeRequest.h"
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
 
 namespace xplane_bridge {
-namespace {
-
-std::string listed(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
-}  // namespace
-
 // Counting from the seconds of the clock, a restarted mapper is not mistaken for an old message.
 JoystickMapperNode::JoystickMapperNode()
     : request_sequence_(static_cast<std::uint32_t>(clock_.system_ns() / core::kNanosecondsPerSecond)) {}
@@ -90,8 +81,8 @@ void JoystickMapperNode::publish(double time) {
 }
 
 void JoystickMapperNode::reportProblems() {
-  std::string text;
-  for (const core::JoyProblem& problem : mapper_->problems()) text += (text.empty() ? "" : "; ") + problem.text;
+  const std::string text =
+      core::join(mapper_->problems(), "; ", [](const core::JoyProblem& problem) { return problem.text; });
   if (text == reported_problems_) return;
   reported_problems_ = text;
   if (!text.empty()) ROS_ERROR("%s", text.c_str());
@@ -101,7 +92,7 @@ void JoystickMapperNode::reportSelection() {
   auto selection = mapper_->selected();
   if (selection == reported_selection_) return;
   reported_selection_ = std::move(selection);
-  ROS_INFO("selected: %s", listed(reported_selection_).c_str());
+  ROS_INFO("selected: %s", core::join(reported_selection_).c_str());
 }
 
 void JoystickMapperNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {
@@ -120,7 +111,7 @@ void JoystickMapperNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWra
   status->add("Messages dropped (-)", mapper_->dropped());
   if (last_joy_ > 0.0) status->add("Silence (s)", time - last_joy_);
   status->add("Commands published (-)", command_sequence_);
-  status->add("Selected (-)", listed(mapper_->selected()));
+  status->add("Selected (-)", core::join(mapper_->selected()));
 }
 
 }  // namespace xplane_bridge

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/nodes/rx/rx_node.hpp"
 
 namespace xplane_bridge {
@@ -39,13 +40,13 @@ constexpr GroupName kFlightGroups[] = {
 };
 
 std::string missingGroups(std::uint32_t valid) {
-  std::string names;
+  std::vector<std::string> names;
   for (const GroupName& group : kFlightGroups) {
     if ((valid & group.bit) == 0) {
-      names += (names.empty() ? "" : ", ") + std::string(group.name);
+      names.emplace_back(group.name);
     }
   }
-  return names;
+  return core::join(names);
 }
 
 const char* nameOf(core::PositionSource source) {
@@ -200,7 +201,7 @@ void RxNode::diagnosePhysics(diagnostic_updater::DiagnosticStatusWrapper* status
 
 void RxNode::diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::string silent;
+  std::vector<std::string> silent_groups;
   for (std::size_t i = 0; i < missions_.size(); ++i) {
     const MissionPublisher& mission = *missions_[i];
     const MissionPublisher::Report& report = mission.report();
@@ -208,13 +209,14 @@ void RxNode::diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status
     const double age = report.stamp_ns == 0 ? std::numeric_limits<double>::infinity()
                                             : secondsBetween(report.stamp_ns, clock_.system_ns());
     if (age > kLatePeriods / mission.rate() + kLateMargin_s) {
-      silent += (silent.empty() ? "" : ", ") + name;
+      silent_groups.push_back(name);
     }
     status->addf(name + " (1/s)", "%.1f", mission_rates_[i].update(report.published));
     status->addf(name + ", age (s)", "%.2f", age);
     status->addf(name + ", groups not known (bits)", "0x%x", report.missing);
   }
   const bool should_flow = last_status_.state == core::LinkState::kConnected;
+  const std::string silent = core::join(silent_groups);
   status->summary(DiagnosticStatus::OK, silent.empty() ? "all groups arrive" : "not arriving: " + silent);
   if (should_flow && !silent.empty()) {
     status->summary(DiagnosticStatus::WARN, "not arriving: " + silent);

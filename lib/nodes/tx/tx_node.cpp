@@ -6,6 +6,7 @@
 
 #include "xplane_bridge/ControlMode.h"
 #include "xplane_bridge/Event.h"
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
 
@@ -193,10 +194,8 @@ std::string TxNode::refusalToFly() const {
   if (options_.aircraft.identity.empty()) return "";
   if (!identity_.known()) return "X-Plane has not told which aircraft is loaded";
   if (options_.aircraft.fits(identity_.identity())) return "";
-  std::string expected;
-  for (const std::string& icao : options_.aircraft.identity) expected += (expected.empty() ? "" : ", ") + icao;
   return "the aircraft loaded is " + described(identity_.identity()) + ", but config/aircraft/" + common().aircraft +
-         ".yaml is for " + expected;
+         ".yaml is for " + core::join(options_.aircraft.identity);
 }
 
 core::ChannelSet TxNode::channelsToSend(const core::ArbitratedControls& controls, double time) {

@@ -1,5 +1,6 @@
 // What tx_node says of itself on /diagnostics.
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/nodes/tx/tx_node.hpp"
 
 namespace xplane_bridge {
@@ -16,7 +17,7 @@ void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status
   const double time = now();
   const bool flying = ever_sent_.any();
   const std::string refusal = refusalToFly();
-  std::string unseen;
+  std::vector<std::string> unseen;
   if (flying && !unseen_.empty() && link_status_.state == core::LinkState::kConnected &&
       time - last_seen_ > kDoesNotFollow) {
     const Sent& last = unseen_.back();
@@ -24,7 +25,7 @@ void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status
       const auto channel = static_cast<core::Channel>(i);
       if (!last.channels.test(i) || (shown_known_.test(i) && encoder_->shows(channel, last.values[i], shown_[i])))
         continue;
-      unseen += (unseen.empty() ? "" : ", ") + core::channelName(channel);
+      unseen.push_back(core::channelName(channel));
     }
   }
   if (!refusal.empty()) {
@@ -32,7 +33,7 @@ void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status
   } else if (mode.failsafe) {
     status->summary(Level::WARN, std::string(core::toString(mode.mode)) + ", failsafe: " + mode.reason);
   } else if (!unseen.empty()) {
-    status->summary(Level::WARN, "X-Plane does not show what is sent: " + unseen);
+    status->summary(Level::WARN, "X-Plane does not show what is sent: " + core::join(unseen));
   } else {
     status->summary(Level::OK, core::toString(mode.mode));
   }
@@ -49,12 +50,7 @@ void TxNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status
     }
     if (!statistics.last_refusal.empty()) status->add(name + " last refusal", statistics.last_refusal);
   }
-  std::string active;
-  if (overrides_) {
-    for (const std::string& name : overrides_->active()) {
-      active += (active.empty() ? "" : ", ") + name.substr(name.rfind('/') + 1);
-    }
-  }
+  const std::string active = overrides_ ? core::join(overrides_->active(), ", ", core::afterLastSlash) : "";
   status->add("Overrides set", active.empty() ? "none" : active);
   status->add("Aircraft loaded", identity_.identity().icao);
 }
