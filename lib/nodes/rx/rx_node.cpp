@@ -9,6 +9,7 @@
 
 #include "xplane_bridge/LinkState.h"
 #include "xplane_bridge/core/wire/dataref_path.hpp"
+#include "xplane_bridge/nodes/base/service_result.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 
 namespace xplane_bridge {
@@ -43,13 +44,6 @@ std::vector<std::string> pathsOf(const std::vector<core::DatarefRequest>& reques
 }
 
 const char* nameOf(core::Transport transport) { return transport == core::Transport::kData ? "data" : "rref"; }
-
-ServiceResult result(std::uint8_t code, const std::string& message) {
-  ServiceResult made;
-  made.code = code;
-  made.message = message;
-  return made;
-}
 
 }  // namespace
 

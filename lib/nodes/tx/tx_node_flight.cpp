@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "xplane_bridge/Event.h"
+#include "xplane_bridge/nodes/base/service_result.hpp"
 #include "xplane_bridge/nodes/tx/tx_node.hpp"
 
 namespace xplane_bridge {
@@ -85,25 +86,19 @@ void TxNode::ground(const std::string& why) {
 }
 
 std::optional<ServiceResult> TxNode::refusalOfJob(const std::optional<std::string>& wrong) const {
-  ServiceResult out;
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const std::int32_t version = link_status_.version.number;
-  if (wrong) {
-    out.code = ServiceResult::REFUSED;
-    out.message = *wrong;
-  } else if (!linkIsUp() || version == 0 || !jobs_) {
-    out.code = ServiceResult::NO_LINK;
-    out.message = "X-Plane is not connected";
-  } else if (version < kOldest) {
-    out.code = ServiceResult::NOT_SUPPORTED;
-    out.message = "this is X-Plane " + std::to_string(version) + ": its messages for this are not known before 11.00";
-  } else if (jobs_->full()) {
-    out.code = ServiceResult::REFUSED;
-    out.message = std::to_string(FlightJobs::kMostWaiting) + " requests wait already: wait for their events";
-  } else {
-    return std::nullopt;
+  if (wrong) return result(ServiceResult::REFUSED, *wrong);
+  if (!linkIsUp() || version == 0 || !jobs_) return result(ServiceResult::NO_LINK, "X-Plane is not connected");
+  if (version < kOldest) {
+    return result(ServiceResult::NOT_SUPPORTED,
+                  "this is X-Plane " + std::to_string(version) + ": its messages for this are not known before 11.00");
   }
-  return out;
+  if (jobs_->full()) {
+    return result(ServiceResult::REFUSED,
+                  std::to_string(FlightJobs::kMostWaiting) + " requests wait already: wait for their events");
+  }
+  return std::nullopt;
 }
 
 template <class Response>
@@ -115,8 +110,8 @@ void TxNode::serveJob(const std::string& service, const std::optional<std::strin
   }
   response->success = true;
   response->event_number = events_.reserve();
-  response->result.code = ServiceResult::ACCEPTED;
-  response->result.message = "event " + std::to_string(response->event_number) + " will tell the outcome";
+  response->result =
+      result(ServiceResult::ACCEPTED, "event " + std::to_string(response->event_number) + " will tell the outcome");
   begin(response->event_number, name() + "/" + service);
 }
 

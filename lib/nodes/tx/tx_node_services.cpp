@@ -7,6 +7,7 @@
 
 #include "xplane_bridge/Event.h"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
+#include "xplane_bridge/nodes/base/service_result.hpp"
 #include "xplane_bridge/nodes/tx/tx_node.hpp"
 
 namespace xplane_bridge {
@@ -15,13 +16,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double kPollPeriod = 0.02;  // [s] of conditions no dataref subscription tells of
-
-ServiceResult result(std::uint8_t code, const std::string& message) {
-  ServiceResult out;
-  out.code = code;
-  out.message = message;
-  return out;
-}
 
 bool isOk(const ServiceResult& r) { return r.code == ServiceResult::OK; }
 
