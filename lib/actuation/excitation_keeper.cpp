@@ -38,15 +38,15 @@ core::ChannelSet channelsOf(const std::string& target) {
 
 }  // namespace
 
-ExcitationKeeper::ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg,
-                                   ros::Publisher publisher, Report report)
+ExcitationKeeper::ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, Publish publish,
+                                   Report report)
     : surfaces_(surfaces),
       max_roll_deg_(max_roll_deg),
       max_pitch_deg_(max_pitch_deg),
-      publisher_(std::move(publisher)),
+      publish_(std::move(publish)),
       report_(std::move(report)) {
   state_.sim_time = state_.start_sim_time = state_.end_sim_time = kUnknown;
-  publish();
+  publish_(&state_);
 }
 
 ExcitationKeeper::Plan ExcitationKeeper::plan(const InjectExcitation::Request& request) const {
@@ -180,10 +180,6 @@ void ExcitationKeeper::end() {
   report_("excitation " + std::to_string(state_.id) + " on " + state_.target + ": " + state_.result, who_, done);
 }
 
-void ExcitationKeeper::publish() {
-  const ros::WallTime now = ros::WallTime::now();
-  state_.header.stamp = ros::Time(now.sec, now.nsec);
-  publisher_.publish(state_);
-}
+void ExcitationKeeper::publish() { publish_(&state_); }
 
 }  // namespace xplane_bridge

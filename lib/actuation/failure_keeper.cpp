@@ -1,7 +1,6 @@
 #include "xplane_bridge/actuation/failure_keeper.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "xplane_bridge/core/base/clock.hpp"
@@ -69,18 +68,18 @@ std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double 
 }  // namespace
 
 FailureKeeper::FailureKeeper(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces,
-                             double timeout, ros::Publisher publisher, Report report)
+                             double timeout, Publish publish, Report report)
     : link_(link),
       overrides_(overrides),
       surfaces_(surfaces),
       timeout_(timeout),
-      publisher_(std::move(publisher)),
+      publish_(std::move(publish)),
       report_(std::move(report)) {}
 
 void FailureKeeper::onLink(const core::LinkStatus& status) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   link_status_ = status;
-  changed_.notify_all();
+  changed_.notifyAll();
   if (!status.version.known()) return;
   if (menu_subscription_ && status.version == version_) return;
   version_ = status.version;
@@ -210,7 +209,7 @@ void FailureKeeper::giveUp(const std::string& name, const std::string& why) {
   dirty_ = true;
   watchOwn();
   applySurfaces();
-  changed_.notify_all();
+  changed_.notifyAll();
 }
 
 void FailureKeeper::end(bool driven_only, const std::string& why) {
@@ -223,7 +222,7 @@ void FailureKeeper::end(bool driven_only, const std::string& why) {
   }
   watchOwn();
   applySurfaces();  // which may have been told of them again meanwhile
-  changed_.notify_all();
+  changed_.notifyAll();
 }
 
 void FailureKeeper::useDriver(const Pending& pending) {
@@ -298,7 +297,7 @@ void FailureKeeper::watchPending() {
     if (it == pending_.end() || !settled(&it->second)) continue;
     pending_.erase(name);
     dirty_ = true;
-    changed_.notify_all();
+    changed_.notifyAll();
   }
 }
 
@@ -335,13 +334,13 @@ void FailureKeeper::tick(double time) {
     }
   }
   if (dirty_ || published_driving_ != surfaces_->driving() || time - publish_time_ >= kPublishPeriod) publishLocked();
-  changed_.notify_all();  // services wait for what SurfaceControl does as well
+  changed_.notifyAll();  // services wait for what SurfaceControl does as well
 }
 
 void FailureKeeper::stop() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   stopped_ = true;
-  changed_.notify_all();
+  changed_.notifyAll();
 }
 
 void FailureKeeper::repaired() {
@@ -357,7 +356,6 @@ void FailureKeeper::publish() {
 
 void FailureKeeper::publishLocked() {
   FailureState message;
-  message.header.stamp = ros::Time(ros::WallTime::now().toSec());
   message.sim_time = static_cast<float>(now_.sim_time);
   for (const core::FailureLabel& label : book_.labels()) {
     message.names.push_back(label.name);
@@ -371,7 +369,7 @@ void FailureKeeper::publishLocked() {
   published_driving_ = surfaces_->driving();
   message.surrogate_mixing = published_driving_;
   message.surrogate_lag_frames = static_cast<float>(surfaces_->lagFrames());
-  publisher_.publish(message);
+  publish_(&message);
   publish_time_ = tick_time_;
   dirty_ = false;
 }
@@ -402,14 +400,14 @@ std::optional<ServiceResult> FailureKeeper::add(const core::FailureRequest& requ
 }
 
 ServiceResult FailureKeeper::await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name) {
-  const auto longest = std::chrono::duration<double>(2.0 * timeout_ + kBehaviourWait + kWaitSlack);
+  const core::Deadline longest(link_->clock(), 2.0 * timeout_ + kBehaviourWait + kWaitSlack);
   const auto paused = [this] { return link_status_.state == core::LinkState::kPaused; };
   // A short silence (STALE) is waited through: X-Plane loads scenery.
   const auto gone = [this] {
     return link_status_.state == core::LinkState::kLost || link_status_.state == core::LinkState::kSearching;
   };
   const auto over = [&] { return stopped_ || pending_.count(name) == 0 || paused() || gone(); };
-  if (!changed_.wait_for(*lock, longest, over))
+  if (!changed_.waitUntil(lock, longest, over))
     return result(ServiceResult::TIMEOUT, "X-Plane did not show it in time");
   if (stopped_ || gone()) return result(ServiceResult::NO_LINK, "X-Plane is not connected any more");
   if (pending_.count(name) != 0) return result(ServiceResult::ACCEPTED, "X-Plane is paused: it acts when it goes on");
@@ -496,10 +494,8 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
     response->result = result(ServiceResult::NO_LINK, "X-Plane is not connected; it is repaired when it comes back");
     return;
   }
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_);
-  const auto left = [&deadline] {
-    return std::max(std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count(), 0.01);
-  };
+  const core::Deadline deadline(link_->clock(), timeout_);
+  const auto left = [&deadline] { return std::max(deadline.left(), 0.01); };
   for (const std::string& dataref : datarefs) {
     if (link_->waitForDataref(dataref, static_cast<float>(core::kWorking), 0.0F, left()).first) continue;
     response->result = result(ServiceResult::TIMEOUT, "X-Plane still shows " + dataref);
@@ -507,8 +503,7 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
   }
   if (driven && given_back) {
     lock.lock();
-    const bool back = changed_.wait_for(lock, std::chrono::duration<double>(left()),
-                                        [this] { return stopped_ || !surfaces_->givingBack(); });
+    const bool back = changed_.waitUntil(&lock, deadline, [this] { return stopped_ || !surfaces_->givingBack(); });
     lock.unlock();
     // It also ends by being given up.
     if (!back || (!surfaces_->driving() &&

@@ -126,16 +126,9 @@ void FlightJobs::loadSituation(const std::string& path, std::uint32_t number, co
 
 // --- means ---
 
-FlightJobs::Time FlightJobs::in(double seconds) {
-  return std::chrono::steady_clock::now() +
-         std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(seconds));
+void FlightJobs::wait(double seconds, const std::function<bool()>& condition) {
+  link_->waitUntil([&] { return stopping_ || condition(); }, seconds);
 }
-
-double FlightJobs::left(Time deadline) {
-  return std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count();
-}
-
-bool FlightJobs::over(Time deadline) const { return stopping_ || left(deadline) <= 0.0; }
 
 void FlightJobs::write(const std::vector<core::DatarefWrite>& writes) {
   for (const core::DatarefWrite& each : writes) link_->write(each.dataref, each.value);
@@ -150,13 +143,11 @@ std::string FlightJobs::excuse() const {
 }
 
 void FlightJobs::pause(bool paused) {
-  const Time deadline = in(kPauseWait);
+  const core::Deadline deadline = in(kPauseWait);
   hooks_.pausing(mover());
   do {
     link_->command(core::pauseCommand(paused));
-    for (const Time again = in(kWriteAgain); !over(again) && link_->status().paused != paused;) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
+    wait(kWriteAgain, [&] { return link_->status().paused == paused; });
   } while (!over(deadline) && link_->status().paused != paused);
   if (link_->status().paused != paused) hooks_.pausing("");
 }
@@ -184,7 +175,7 @@ std::string FlightJobs::placed(const core::FlightStart& start) {
   bool anew = !moves || hooks_.watch().crashed;
   std::optional<core::ShownFlight> shown;
   // Scenery may have to be loaded.
-  for (const Time deadline = in(options_.load_timeout); !over(deadline);) {
+  for (const core::Deadline deadline = in(options_.load_timeout); !over(deadline);) {
     if (anew) {
       sendMessage<core::kPrelSize>(link_,
                                    [&](core::ByteSpan out) { return core::encodePrel(out, core::placementOf(start)); });
@@ -195,7 +186,7 @@ std::string FlightJobs::placed(const core::FlightStart& start) {
       sendMessage<core::kVehicleSize>(link_,
                                       [&](core::ByteSpan out) { return core::encodeVehs(out, core::poseOf(start)); });
     }
-    for (const Time again = in(kPlaceAgain); !over(again) && !(shown && core::isNear(start, *shown));)
+    for (const core::Deadline again = in(kPlaceAgain); !over(again) && !(shown && core::isNear(start, *shown));)
       shown = shownFlight();
     if (shown && core::isNear(start, *shown)) break;
   }
@@ -206,7 +197,7 @@ std::string FlightJobs::placed(const core::FlightStart& start) {
     const auto now = core::shownFlightFrom(values);
     return now && core::differenceOf(start, *now).empty();
   };
-  for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
+  for (const core::Deadline deadline = in(options_.setting_timeout); !over(deadline);) {
     write(core::motionWrites(start, *shown));
     const auto values = link_->readUntil(core::shownFlightDatarefs(link_->status().version), kPoll, fits);
     if (const auto now = core::shownFlightFrom(values)) shown = now;
@@ -221,9 +212,9 @@ FlightJobs::Outcome FlightJobs::blow(const core::UniformWind& wind) {
   const auto names = core::shownWindDatarefs(link_->status().version);
   const auto fits = [wind](const std::vector<core::DatarefValue>& values) { return core::shows(wind, values); };
   std::vector<core::DatarefValue> values;
-  for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
+  for (const core::Deadline deadline = in(options_.setting_timeout); !over(deadline);) {
     write(core::windWrites(wind, link_->status().version));
-    for (const Time again = in(1.0); !over(again);) {
+    for (const core::Deadline again = in(1.0); !over(again);) {
       values = link_->readUntil(names, kPoll, fits);
       if (fits(values)) return {Event::SETTING, "the wind blows as asked for", true};
     }
@@ -244,7 +235,7 @@ FlightJobs::Outcome FlightJobs::load(const core::Loading& loading) {
     return loadingDifference(writes, values).empty();
   };
   std::vector<core::DatarefValue> values;
-  for (const Time deadline = in(options_.setting_timeout); !over(deadline);) {
+  for (const core::Deadline deadline = in(options_.setting_timeout); !over(deadline);) {
     write(writes);
     values = link_->readUntil(names, kWriteAgain, fits);
     if (fits(values)) return {Event::SETTING, "the aircraft is loaded as asked for", true};
@@ -278,16 +269,13 @@ std::string FlightJobs::changed(const std::string& path, std::int32_t livery) {
                                     [&](core::ByteSpan out) { return core::encodeAcfn(out, 0, path, livery); })) {
     return "it could not be sent";
   }
-  const Time deadline = in(options_.load_timeout);
+  const core::Deadline deadline = in(options_.load_timeout);
   while (!isLoaded()) {
     if (over(deadline)) return "X-Plane does not show it; is the path that of a file below its folder?";
   }
   const unsigned identities = hooks_.identities();
-  for (const Time told = in(kIdentityWait); hooks_.identities() == identities;) {
-    if (over(told)) return "X-Plane has loaded it, but does not tell which aircraft it is";
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return "";
+  wait(kIdentityWait, [&] { return hooks_.identities() != identities; });
+  return hooks_.identities() != identities ? "" : "X-Plane has loaded it, but does not tell which aircraft it is";
 }
 
 FlightJobs::Outcome FlightJobs::save(const std::string& path) {
@@ -301,12 +289,10 @@ FlightJobs::Outcome FlightJobs::save(const std::string& path) {
 
 FlightJobs::Outcome FlightJobs::restore(const std::string& path) {
   const unsigned resets = hooks_.resets();
-  bool sent = sendMessage<core::kSimoSize>(
+  const bool sent = sendMessage<core::kSimoSize>(
       link_, [&](core::ByteSpan out) { return core::encodeSimo(out, core::SituationAction::kLoadSituation, path); });
-  for (const Time deadline = in(options_.load_timeout); sent && !over(deadline);) {
-    if (hooks_.resets() != resets) return {Event::SITUATION, "the situation " + path + " is loaded", true};
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  if (sent) wait(options_.load_timeout, [&] { return hooks_.resets() != resets; });
+  if (sent && hooks_.resets() != resets) return {Event::SITUATION, "the situation " + path + " is loaded", true};
   return {
       Event::SITUATION,
       "load_state " + path + ": the flight goes on as it was; is there such a file below X-Plane's folder?" + excuse(),

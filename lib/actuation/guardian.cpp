@@ -125,10 +125,10 @@ std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int6
 bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report& report) {
   if (!link->waitUntil([link] { return link->journal() != nullptr; }, kFindTime)) return false;
   OverrideManager overrides(link, report);
-  const std::int64_t deadline_ns = link->clock().steady_ns() + static_cast<std::int64_t>(kUndoTime * 1e9);
+  const core::Deadline deadline(link->clock(), kUndoTime);
   do {
     if (overrides.releaseLeftovers(kAttemptTime)) return true;
-  } while (link->clock().steady_ns() < deadline_ns);
+  } while (!deadline.over());
   return false;
 }
 

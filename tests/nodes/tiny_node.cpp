@@ -62,7 +62,7 @@ class TinyNode : public BaseNode {
 
   void stopInputs() override { trace("stop_inputs"); }
 
-  void undo(Deadline) override {
+  void undo(const Deadline&) override {
     trace(ros::ok() ? "undo" : "undo_after_ros");
     if (mode_ == "hang_in_undo") {
       std::this_thread::sleep_for(std::chrono::hours(1));

@@ -130,6 +130,68 @@ def test_the_rules_know_what_they_forbid(room, header):
     assert not any(forbidden("core/wire", name, table) for name in allowed)
 
 
+# ----------------------------------------------------------------------------------------------------- one clock
+
+HOST_TIME = re.compile(
+    r"hostClock\(|\b(?:steady|system|high_resolution)_clock\b|\b(?:clock_gettime|gettimeofday|nanosleep|usleep)\b"
+    r"|\btime\((?:nullptr|NULL|0)\)|\b(?:Wall|Steady)?Time::now\b|\b(?:Wall|Steady)Timer\b"
+    r"|\bcreate(?:Wall|Steady)?Timer\b|\b(?:Wall)?Rate [a-z]\w*\(|\bsleep_(?:for|until)\b"
+    r"|(?:\.|->)(?:wait_for|wait_until|sleep)\("
+)
+
+# Source: why, and what it uses. Everything else asks the clock it is given (BaseNode::clock()), so that a node can go
+# by the simulator's.
+MAY_USE_HOST_TIME = {
+    "include/xplane_bridge/core/base/clock.hpp": ("what the host's clock is", {"hostClock("}),
+    "lib/core/base/clock.cpp": (
+        "reads the host's clock, and waits by it for clocks that run by themselves",
+        {"hostClock(", "clock_gettime", ".wait_for("},
+    ),
+    "include/xplane_bridge/nodes/base/base_node.hpp": ("makes the node's clock", {"hostClock("}),
+    "lib/nodes/base/base_node.cpp": (
+        "waits for the master before there is a node; watches over the stop, which must not hang with the node's clock",
+        {".wait_for(", "sleep_for"},
+    ),
+    "lib/actuation/guardian.cpp": ("a process of its own: releases whatever clock the node had", {"hostClock("}),
+    "lib/vision/video_source.cpp": ("devices and files play in the host's time", {"steady_clock", "sleep_until"}),
+    "lib/vision/x11_window_source.cpp": ("windows are drawn in the host's time", {"steady_clock"}),
+}
+
+
+def test_only_the_listed_sources_use_the_hosts_time():
+    found = {
+        path.relative_to(ROOT).as_posix(): set(HOST_TIME.findall(without_comments(path.read_text(encoding="utf-8"))))
+        for path in sources("include/xplane_bridge", "lib")
+    }
+    assert {path: uses for path, uses in found.items() if uses} == {
+        path: uses for path, (_, uses) in MAY_USE_HOST_TIME.items()
+    }
+
+
+def test_the_pattern_finds_what_it_is_to_find():
+    for use in (
+        "core::Clock clock = core::hostClock();",
+        "const auto now = std::chrono::steady_clock::now();",
+        "message.header.stamp = ros::Time::now();",
+        "ros::Time(ros::WallTime::now().toSec())",
+        "timers_.push_back(handle_.createSteadyTimer(period, callback));",
+        "std::this_thread::sleep_for(std::chrono::milliseconds(10));",
+        "changed_.wait_for(lock, longest, over);",
+        "future.wait_until(deadline);",
+        "ros::Rate rate(50.0);",
+        "ros::WallDuration(0.1).sleep();",
+        "clock_gettime(CLOCK_MONOTONIC, &now);",
+    ):
+        assert HOST_TIME.search(use), use
+    for other in (
+        "changed_.waitUntil(&lock, deadline, done);",
+        "clock().steady_ns()",
+        "stampNow()",
+        "double rate(int)",
+    ):
+        assert not HOST_TIME.search(other), other
+
+
 ROS_IMPORT = re.compile(
     r"(import|from)\s+(rospy|roslib|rosbag|rosgraph|roslaunch|tf2?|\w+_msgs|xplane_bridge\.(msg|srv))\b"
 )

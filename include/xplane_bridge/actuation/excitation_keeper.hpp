@@ -5,8 +5,6 @@
 #include <optional>
 #include <string>
 
-#include <ros/publisher.h>
-
 #include "xplane_bridge/ExcitationState.h"
 #include "xplane_bridge/InjectExcitation.h"
 #include "xplane_bridge/actuation/surface_control.hpp"
@@ -24,8 +22,10 @@ class ExcitationKeeper {
   /// `report(text, who, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
 
-  ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, ros::Publisher publisher,
-                   Report report);
+  /// Stamps excitation/state and publishes it.
+  using Publish = std::function<void(ExcitationState* message)>;
+
+  ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, Publish publish, Report report);
 
   /// What a request asks for, as far as it tells by itself.
   struct Plan {
@@ -61,7 +61,7 @@ class ExcitationKeeper {
   SurfaceControl* surfaces_;
   double max_roll_deg_;
   double max_pitch_deg_;
-  ros::Publisher publisher_;
+  Publish publish_;
   Report report_;
 
   core::ExcitationRunner runner_;

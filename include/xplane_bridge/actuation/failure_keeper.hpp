@@ -1,6 +1,5 @@
 #pragma once
 
-#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
@@ -10,7 +9,6 @@
 #include <vector>
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
-#include <ros/publisher.h>
 
 #include "xplane_bridge/ClearFailures.h"
 #include "xplane_bridge/FailureState.h"
@@ -33,9 +31,12 @@ class FailureKeeper {
   /// `report(text, who, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
 
+  /// Stamps failures/state and publishes it.
+  using Publish = std::function<void(FailureState* message)>;
+
   /// `timeout` [s]: until X-Plane must show what was asked for.
   FailureKeeper(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces, double timeout,
-                ros::Publisher publisher, Report report);
+                Publish publish, Report report);
 
   // What drives it.
   void onLink(const core::LinkStatus& status);
@@ -88,11 +89,11 @@ class FailureKeeper {
   OverrideManager* overrides_;
   SurfaceControl* surfaces_;
   double timeout_;
-  ros::Publisher publisher_;
+  Publish publish_;
   Report report_;
 
   const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
-  std::condition_variable_any changed_;
+  core::ClockCondition changed_;
   bool stopped_ = false;
   core::LinkStatus link_status_;
   core::SimulatorVersion version_;

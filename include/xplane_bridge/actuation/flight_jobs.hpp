@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -71,7 +70,6 @@ class FlightJobs {
   void stop();
 
  private:
-  using Time = std::chrono::steady_clock::time_point;
   struct Outcome {
     std::uint8_t kind = 0;
     std::string text;
@@ -99,10 +97,11 @@ class FlightJobs {
   Outcome save(const std::string& path);
   Outcome restore(const std::string& path);
 
-  static Time in(double seconds);
-  static double left(Time deadline);
+  core::Deadline in(double seconds) const { return {link_->clock(), seconds}; }
   /// A stop was asked for, or the deadline is over.
-  bool over(Time deadline) const;
+  bool over(const core::Deadline& deadline) const { return stopping_ || deadline.over(); }
+  /// Waits until `condition()` is true, a stop is asked for or so many seconds have passed.
+  void wait(double seconds, const std::function<bool()>& condition);
   void write(const std::vector<core::DatarefWrite>& writes);
   void pause(bool paused);
   /// Why X-Plane may not have shown it, for the end of a sentence; empty: no reason is known.

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/base/units.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -93,7 +95,7 @@ void ImageAssociator::addState(const StateKey& state) {
     }
   }
   states_.push_back({state, state_segment_});
-  const auto history_ns = static_cast<std::int64_t>(options_.history * 1e9);
+  const std::int64_t history_ns = toNanoseconds(options_.history);
   while (states_.size() > 2 &&
          (static_cast<double>(state.sim_time_raw) - static_cast<double>(states_.front().key.sim_time_raw) >
               options_.history ||
@@ -269,7 +271,7 @@ void ImageAssociator::pairByStamp(const ImageMoment& moment, bool final, Associa
     answer.pending = true;
     return;
   }
-  if (nearest == nullptr || static_cast<double>(best) * 1e-9 > options_.max_state_offset) return;
+  if (nearest == nullptr || toSeconds(best) > options_.max_state_offset) return;
   answer.method = PairingMethod::kStamp;
   answer.id = answer.id_after = nearest->key.id;
 }

@@ -9,11 +9,11 @@
 #include <unsupported/Eigen/FFT>
 
 #include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/units.hpp"
 
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kMaxDuration = 600.0;     // [s] longer ones are a mistake in the unit
 constexpr int kMaxComponents = 2000;       // bounds the work of one sample
 constexpr double kMaxHarmonic = 60000.0;   // 100 Hz for the longest duration; bounds the work of finding the peak

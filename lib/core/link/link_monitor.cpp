@@ -2,15 +2,13 @@
 
 #include <limits>
 
+#include "xplane_bridge/core/base/units.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
 /// X-Plane's clock may seem to step back by a frame or two when datagrams overtake each other.
 constexpr float kRestartStepS = 1.0F;
-
-double seconds(std::int64_t duration_ns) {
-  return static_cast<double>(duration_ns) / static_cast<double>(kNanosecondsPerSecond);
-}
 
 }  // namespace
 
@@ -71,11 +69,11 @@ LinkState LinkMonitor::update(std::int64_t now_ns) {
 }
 
 double LinkMonitor::silence(std::int64_t now_ns) const {
-  return last_heard_ns_.has_value() ? seconds(now_ns - *last_heard_ns_) : std::numeric_limits<double>::quiet_NaN();
+  return last_heard_ns_.has_value() ? toSeconds(now_ns - *last_heard_ns_) : std::numeric_limits<double>::quiet_NaN();
 }
 
 bool LinkMonitor::beaconGone(std::int64_t now_ns) const {
-  return last_beacon_ns_.has_value() && seconds(now_ns - *last_beacon_ns_) > options_.beacon_timeout_s;
+  return last_beacon_ns_.has_value() && toSeconds(now_ns - *last_beacon_ns_) > options_.beacon_timeout_s;
 }
 
 }  // namespace xplane_bridge::core

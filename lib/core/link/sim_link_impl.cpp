@@ -6,10 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <cstring>
-#include <future>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -106,7 +104,7 @@ SimLink::Impl::Impl(SimLinkOptions options, SimLinkCallbacks callbacks, Clock cl
                    {[this](ByteView message) { send(message); },
                     [this](std::vector<std::string> paths, double timeout_s, DatarefReader::Accept accept,
                            DatarefReader::Done done) {
-                      reader_.start(std::move(paths), now_ns_, now_ns_ + nanoseconds(timeout_s), std::move(done),
+                      reader_.start(std::move(paths), now_ns_, now_ns_ + toNanoseconds(timeout_s), std::move(done),
                                     std::move(accept));
                     },
                     log_}),
@@ -185,7 +183,7 @@ bool SimLink::Impl::stop(double timeout_s) {
       return;
     }
     stop_phase_ = StopPhase::kReleasing;
-    stop_deadline_ns_ = now_ns_ + nanoseconds(timeout_s);
+    stop_deadline_ns_ = now_ns_ + toNanoseconds(timeout_s);
     released_ = false;
     reader_.cancelAll();
     // Who does not answer cannot confirm: say it once and leave the rest to the journal.
@@ -198,6 +196,7 @@ bool SimLink::Impl::stop(double timeout_s) {
   if (thread_.joinable()) {
     thread_.join();
     running_ = false;
+    wakeWaiting();
   } else {
     // Driven by the caller: the injected clock may stand still, so the number of steps is bounded, too.
     const int max_steps = static_cast<int>(timeout_s * 1000.0) + 100;
@@ -285,8 +284,7 @@ LinkStatus SimLink::Impl::status() const {
     status = status_;
   }
   const std::int64_t last = last_heard_ns_;
-  status.silence_s =
-      last < 0 ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(clock_.steady_ns() - last) / 1e9;
+  status.silence_s = last < 0 ? std::numeric_limits<double>::quiet_NaN() : toSeconds(clock_.steady_ns() - last);
   return status;
 }
 
@@ -322,7 +320,7 @@ void SimLink::Impl::read(std::vector<std::string> paths, double timeout_s, Datar
   }
   requireRange("timeout", timeout_s, 0.0, 3600.0);
   post([this, paths = std::move(paths), timeout_s, accept = std::move(accept), done = std::move(done)] {
-    reader_.start(paths, now_ns_, now_ns_ + nanoseconds(timeout_s), done, accept);
+    reader_.start(paths, now_ns_, now_ns_ + toNanoseconds(timeout_s), done, accept);
   });
 }
 
@@ -330,16 +328,22 @@ std::vector<DatarefValue> SimLink::Impl::readAndWait(std::vector<std::string> pa
                                                      const DatarefReader::Accept& accept) {
   requireWaiting();
   const std::size_t count = paths.size();
-  auto promise = std::make_shared<std::promise<std::vector<DatarefValue>>>();
-  std::future<std::vector<DatarefValue>> future = promise->get_future();
-  read(std::move(paths), timeout_s, accept,
-       [promise](const std::vector<DatarefValue>& values) { promise->set_value(values); });
+  struct Answer {
+    std::mutex mutex;
+    ClockCondition changed;
+    std::optional<std::vector<DatarefValue>> values;
+  };
+  const auto answer = std::make_shared<Answer>();
+  read(std::move(paths), timeout_s, accept, [answer](const std::vector<DatarefValue>& values) {
+    const std::lock_guard<std::mutex> lock(answer->mutex);
+    answer->values = values;
+    answer->changed.notifyAll();
+  });
   // The link ends the read in time; this deadline is for a link that is stopped before it sees the read.
-  const auto patience = std::chrono::duration<double>(timeout_s + 1.0);
-  if (future.wait_for(patience) != std::future_status::ready) {
-    return std::vector<DatarefValue>(count);
-  }
-  return future.get();
+  const Deadline patience(clock_, timeout_s + 1.0);
+  std::unique_lock<std::mutex> lock(answer->mutex);
+  answer->changed.waitUntil(&lock, patience, [&answer] { return answer->values.has_value(); });
+  return answer->values.value_or(std::vector<DatarefValue>(count));
 }
 
 void SimLink::Impl::requireWaiting() const {
@@ -350,7 +354,7 @@ void SimLink::Impl::requireWaiting() const {
 
 bool SimLink::Impl::waitUntil(const std::function<bool()>& condition, double timeout_s) {
   requireWaiting();
-  const std::int64_t deadline_ns = clock_.steady_ns() + nanoseconds(timeout_s);
+  const Deadline deadline(clock_, timeout_s);
   ++waiting_;
   bool met = false;
   std::unique_lock<std::mutex> lock(waiting_mutex_);
@@ -358,12 +362,11 @@ bool SimLink::Impl::waitUntil(const std::function<bool()>& condition, double tim
     const std::uint64_t seen = steps_;
     lock.unlock();
     met = condition();
-    if (met || clock_.steady_ns() >= deadline_ns) {
+    if (met || deadline.over() || !running_) {
       break;
     }
     lock.lock();
-    // The link steps more often than that, unless it has been stopped.
-    stepped_.wait_for(lock, std::chrono::milliseconds(2 * kThreadStepMs), [&] { return steps_ != seen; });
+    stepped_.waitUntil(&lock, deadline, [&] { return steps_ != seen || !running_; });
   }
   --waiting_;
   return met;
@@ -377,7 +380,7 @@ void SimLink::Impl::wakeWaiting() {
     const std::lock_guard<std::mutex> lock(waiting_mutex_);
     ++steps_;
   }
-  stepped_.notify_all();
+  stepped_.notifyAll();
 }
 
 void SimLink::Impl::step(int timeout_ms) {

@@ -3,7 +3,6 @@
 #include <sys/epoll.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -13,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
 
 namespace xplane_bridge::core {
@@ -24,10 +24,6 @@ constexpr std::int32_t kVersionIndex = 0;
 constexpr std::int32_t kPausedIndex = 1;
 constexpr std::int32_t kSimTimeIndex = 2;
 constexpr std::int32_t kFirstReadIndex = 1000;  ///< of one-shot reads, on the same socket
-
-inline std::int64_t nanoseconds(double seconds) {
-  return static_cast<std::int64_t>(seconds * static_cast<double>(kNanosecondsPerSecond));
-}
 
 /// The loop of SimLink. Its parts: sim_link_impl.cpp (life cycle, calls of any thread), sim_link_receive.cpp (what
 /// arrives), sim_link_upkeep.cpp (what is due), sim_link_status.cpp (what is said). Functions under "any thread" lock;
@@ -148,7 +144,7 @@ class SimLink::Impl {
   // Of waitUntil().
   std::atomic<int> waiting_{0};
   std::mutex waiting_mutex_;
-  std::condition_variable stepped_;
+  ClockCondition stepped_;
   std::uint64_t steps_ = 0;
 
   int wake_fd_ = -1;

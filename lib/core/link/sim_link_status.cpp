@@ -25,7 +25,7 @@ std::vector<std::string> SimLink::Impl::findProblems(std::int64_t now_ns) const 
     problems.push_back(beacon_failure_);
   }
   const std::vector<BeaconSighting> sightings = beacons_.sightings(now_ns);
-  const double searched_s = static_cast<double>(now_ns - started_ns_) / 1e9;
+  const double searched_s = toSeconds(now_ns - started_ns_);
   if (!monitor_.alive() && options_.host.empty()) {
     if (sightings.size() > 1 && !beacons_.at(peer_, now_ns).has_value()) {
       problems.push_back("several X-Planes announce themselves: " + namesOf(sightings) +

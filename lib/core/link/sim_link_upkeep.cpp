@@ -27,7 +27,7 @@ void SimLink::Impl::housekeeping(std::int64_t now_ns) {
   }
   refreshLink(now_ns);
   if (peer_.valid() && !monitor_.alive() && now_ns >= next_probe_ns_) {
-    next_probe_ns_ = now_ns + jitter_.around(nanoseconds(options_.probe_period_s));
+    next_probe_ns_ = now_ns + jitter_.around(toNanoseconds(options_.probe_period_s));
     status_subscription_.restart(now_ns);
   }
   data_output_.update(monitor_.state() == LinkState::kConnected, now_ns);
@@ -56,7 +56,7 @@ void SimLink::Impl::findPeer(std::int64_t now_ns) {
   }
   // The X-Plane we knew is silent. Only one that has begun to announce itself since may be it: never jump to another
   // computer's that has been there all along.
-  if (now_ns - beacons_.lastHeard(peer_) < nanoseconds(options_.beacon_settle_s)) {
+  if (now_ns - beacons_.lastHeard(peer_) < toNanoseconds(options_.beacon_settle_s)) {
     return;
   }
   const std::optional<BeaconSighting> restarted = beacons_.onlyNewSince(last_heard_ns_, now_ns);
@@ -171,7 +171,7 @@ void SimLink::Impl::askXpc(std::int64_t now_ns) {
   if (const EncodeResult size = encodeGetp(buffer, kOwnAircraft)) {
     xpc_socket_->sendTo({buffer.data(), *size}, {peer_.address, options_.xpc_port});
   }
-  next_xpc_request_ns_ = now_ns + nanoseconds(1.0 / options_.xpc_rate_hz);
+  next_xpc_request_ns_ = now_ns + toNanoseconds(1.0 / options_.xpc_rate_hz);
 }
 
 void SimLink::Impl::flushRequests(std::int64_t now_ns) {

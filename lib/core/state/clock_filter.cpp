@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "xplane_bridge/core/base/units.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kSecondsPerNs = 1e-9;
-constexpr double kNsPerSecond = 1e9;
 /// Stamps of one epoch are at least this far apart.
 constexpr std::int64_t kMinStampStepNs = 1000;
 /// This many consecutive older samples are no late datagrams any more.
@@ -79,7 +79,7 @@ const char* toString(ClockEvent event) {
 }
 
 ClockEstimate ClockFilter::update(const ClockSample& sample) {
-  const double host_step = static_cast<double>(sample.receive_ns - last_.receive_ns) * kSecondsPerNs;
+  const double host_step = toSeconds(sample.receive_ns - last_.receive_ns);
   const double sim_step = static_cast<double>(sample.sim_time) - static_cast<double>(last_.sim_time);
   ClockEvent event = ClockEvent::kNone;
 
@@ -143,7 +143,7 @@ void ClockFilter::reset() {
 
 std::optional<double> ClockFilter::simTime(std::int64_t host_ns) const {
   if (!fitted_ || paused_) return std::nullopt;
-  const double host = static_cast<double>(host_ns - host_reference_ns_) * kSecondsPerNs;
+  const double host = toSeconds(host_ns - host_reference_ns_);
   double sim = (host - offset_) / slope_;
   for (std::size_t i = 0; i < slips_kept_; ++i) {
     const Slip& slip = newestSlip(i);
@@ -158,7 +158,7 @@ std::optional<std::int64_t> ClockFilter::hostTime(double sim_time) const {
   const double sim = sim_time - sim_reference_;
   double host = offset_ + slope_ * sim;
   for (std::size_t i = 0; i < slips_kept_ && sim <= newestSlip(i).before; ++i) host -= newestSlip(i).length;
-  return host_reference_ns_ + static_cast<std::int64_t>(std::llround(host * kNsPerSecond));
+  return host_reference_ns_ + toNanoseconds(host);
 }
 
 double ClockFilter::timeRatio() const {
@@ -299,7 +299,7 @@ void ClockFilter::dropBucketsBefore(double host) {
 }
 
 ClockFilter::Point ClockFilter::relative(const ClockSample& sample) const {
-  return {sim_time_ - sim_reference_, static_cast<double>(sample.receive_ns - host_reference_ns_) * kSecondsPerNs};
+  return {sim_time_ - sim_reference_, toSeconds(sample.receive_ns - host_reference_ns_)};
 }
 
 void ClockFilter::addToFit(const Point& point) {

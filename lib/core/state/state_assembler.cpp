@@ -8,13 +8,10 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kSecondsPerNs = 1e-9;
 /// Position by scenery coordinates and by float32 latitude, longitude may differ by the latter's steps and no more [m].
 constexpr double kFloat32Tolerance = 3.0;
 /// How long values that no row carries wait for each other [s].
 constexpr double kSupplementJoinWindow = 0.1;
-
-std::int64_t toNs(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
 
 RrefFrameAssembler::Options frameOptions(double join_window) {
   RrefFrameAssembler::Options options;
@@ -87,8 +84,8 @@ const FlightState* FlightStateAssembler::onData(const DataView& datagram, std::i
   if (options_.transport != Transport::kData) return nullptr;
   row_store_.update(datagram, receive_ns);
   inputs_ = FlightInputs{};
-  const bool fresh =
-      frames_->counters().samples > 0 && receive_ns - frames_->receiveTime() <= toNs(options_.max_supplement_age);
+  const bool fresh = frames_->counters().samples > 0 &&
+                     receive_ns - frames_->receiveTime() <= toNanoseconds(options_.max_supplement_age);
   decoder_.decode(fresh ? frames_->values() : unknown(frames_->size()), &row_store_, receive_ns, &inputs_);
   return assemble(receive_ns, options_.row_attitude_reference);
 }
@@ -202,7 +199,7 @@ PositionFix FlightStateAssembler::choosePosition(std::int64_t receive_ns) {
 }
 
 PositionFix FlightStateAssembler::fromAid(const Aid& aid, PositionSource source, std::int64_t receive_ns) const {
-  const double age = static_cast<double>(receive_ns - aid.receive_ns) * kSecondsPerNs;
+  const double age = toSeconds(receive_ns - aid.receive_ns);
   if (!aid.known || std::abs(age) > options_.max_aid_age) return {};
   // The aid has no simulator time: it is moved by its age along the velocity. Origin axes do, over so short a way.
   const Eigen::Vector3d velocity = enuFromOpengl(inputs_.local_velocity);
@@ -246,7 +243,8 @@ MissionAssembler<State>::MissionAssembler(const Options& options)
 template <typename State>
 State MissionAssembler<State>::assemble(const RowStore* rows, std::int64_t now_ns, const ClockFilter& clock) const {
   constexpr double kPeriods = 2.0;
-  const std::int64_t oldest_ns = now_ns - toNs(std::max(options_.max_age, kPeriods / std::max(options_.rate, 1)));
+  const std::int64_t oldest_ns =
+      now_ns - toNanoseconds(std::max(options_.max_age, kPeriods / std::max(options_.rate, 1)));
   const bool fresh = frames_.counters().samples > 0 && frames_.receiveTime() >= oldest_ns;
   State state;
   state.valid = decoder_.decode(fresh ? frames_.values() : unknown_, rows, oldest_ns, &state);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "xplane_bridge/core/base/units.hpp"
+
 namespace xplane_bridge::core {
 
 std::string toString(const BeaconSighting& sighting) {
@@ -11,9 +13,7 @@ std::string toString(const BeaconSighting& sighting) {
 }
 
 BeaconTracker::BeaconTracker(double timeout_s, double settle_s, std::function<bool(std::uint32_t)> is_own)
-    : timeout_ns_(static_cast<std::int64_t>(timeout_s * 1e9)),
-      settle_ns_(static_cast<std::int64_t>(settle_s * 1e9)),
-      is_own_(std::move(is_own)) {}
+    : timeout_ns_(toNanoseconds(timeout_s)), settle_ns_(toNanoseconds(settle_s)), is_own_(std::move(is_own)) {}
 
 bool BeaconTracker::isSame(const Endpoint& a, const Endpoint& b) const {
   return a.port == b.port &&

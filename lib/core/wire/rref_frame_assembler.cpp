@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "xplane_bridge/core/base/units.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -24,7 +26,7 @@ RrefFrameAssembler::RrefFrameAssembler(std::size_t size, std::int32_t first_inde
       missed_(size, 0) {}
 
 bool RrefFrameAssembler::add(const RrefView& datagram, std::int64_t receive_ns) {
-  const auto window_ns = static_cast<std::int64_t>(options_.join_window * 1e9);
+  const std::int64_t window_ns = toNanoseconds(options_.join_window);
   if (open_ && receive_ns - frame_start_ns_ > window_ns) closeFrame(false);
   bool completed = false;
   for (std::size_t i = 0; i < datagram.size(); ++i) {

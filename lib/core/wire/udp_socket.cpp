@@ -5,9 +5,7 @@
 #include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
-#include <poll.h>
 #include <sys/socket.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,7 +14,7 @@
 #include <memory>
 #include <utility>
 
-#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/units.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -321,29 +319,6 @@ ReceiveStatus UdpSocket::receive(ByteSpan buffer, Received* received) {
     return ReceiveStatus::kReceived;
   }
   return ReceiveStatus::kNothing;
-}
-
-ReceiveStatus UdpSocket::receive(ByteSpan buffer, Received* received, int timeout_ms) {
-  const auto now_ms = [] {
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return static_cast<std::int64_t>(now.tv_sec) * 1000 + now.tv_nsec / kNanosecondsPerMillisecond;
-  };
-  const std::int64_t deadline = now_ms() + timeout_ms;
-  for (;;) {
-    const ReceiveStatus status = receive(buffer, received);
-    const std::int64_t left = deadline - now_ms();
-    if (status != ReceiveStatus::kNothing || left < 0) {
-      return status;
-    }
-    pollfd waiting{fd_, POLLIN, 0};
-    if (poll(&waiting, 1, static_cast<int>(left)) < 0 && errno != EINTR) {
-      return ReceiveStatus::kFailed;
-    }
-    if (left == 0) {
-      return receive(buffer, received);
-    }
-  }
 }
 
 UdpCounters UdpSocket::counters() const {

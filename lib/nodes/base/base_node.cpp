@@ -12,9 +12,7 @@
 namespace xplane_bridge {
 namespace {
 
-using std::chrono::steady_clock;
-
-constexpr std::chrono::seconds kDiagnosticsPeriod{1};
+constexpr std::int64_t kDiagnosticsPeriodNs = core::kNanosecondsPerSecond;
 constexpr std::chrono::milliseconds kServiceGrace{300};
 constexpr std::chrono::milliseconds kFlushTime{100};
 constexpr std::chrono::milliseconds kMasterPollPeriod{200};
@@ -71,6 +69,8 @@ void BaseNode::requireState(State wanted, const char* call) const {
 void BaseNode::initialize() {
   requireState(State::kCreated, "initialize");
   common_ = loadCommonOptions(ParamLoader::fromServer(handle_.getNamespace()));
+  clock_ = host_clock_;
+  timers_ = std::make_unique<ClockTimers>(clock_, ros::getGlobalCallbackQueue());
   const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());
   loadParameters(own);
   own.refuseUnknown();
@@ -119,6 +119,7 @@ ExitCode BaseNode::run() {
   if (!stopping()) {
     spinner_->start();
     service_spinner_->start();
+    timers_->start();
   }
   diagnostics_thread_ = std::thread([this] { diagnosticsLoop(); });
   waitForStopRequest();
@@ -137,12 +138,12 @@ void BaseNode::requestStop(const std::string& reason, ExitCode code) {
     exit_code_ = code;
     stop_requested_ = true;
   }
-  stop_changed_.notify_all();
+  stop_changed_.notifyAll();
 }
 
 void BaseNode::waitForStopRequest() {
   std::unique_lock<std::mutex> lock(stop_mutex_);
-  stop_changed_.wait(lock, [this] { return stop_requested_.load(); });
+  stop_changed_.wait(&lock, [this] { return stop_requested_.load(); });
   const std::string reason = stop_reason_;
   const bool failed = exit_code_ != ExitCode::kOk;
   lock.unlock();
@@ -165,9 +166,9 @@ void BaseNode::stop() {
   };
   if (started_) {
     step("end inputs", [this] { endInputs(); });
-    const Deadline deadline = steady_clock::now() + kUndoTime;
-    step("undo in X-Plane", [this, deadline] { undo(deadline); });
-    step("stop the link", [this, deadline] { stopLink(deadline); });
+    const Deadline deadline(host_clock_, std::chrono::duration<double>(kUndoTime).count());
+    step("undo in X-Plane", [&] { undo(deadline); });
+    step("stop the link", [&] { stopLink(deadline); });
     step("publish the final state", [this] {
       publishFinalState();
       flushPublishers();
@@ -187,9 +188,7 @@ void BaseNode::endInputs() {
   for (ros::Subscriber& subscriber : subscribers_) {
     subscriber.shutdown();
   }
-  for (ros::SteadyTimer& timer : timers_) {
-    timer.stop();
-  }
+  timers_->stop();
   spinner_->stop();
   service_queue_.disable();
   stopInputs();
@@ -228,10 +227,7 @@ bool BaseNode::guardedService(const std::string& service, const std::function<vo
   return served;
 }
 
-void BaseNode::addTimer(double period, std::function<void()> callback) {
-  timers_.push_back(handle_.createSteadyTimer(
-      ros::WallDuration(period), [callback = std::move(callback)](const ros::SteadyTimerEvent&) { callback(); }));
-}
+void BaseNode::addTimer(double period, std::function<void()> callback) { timers_->add(period, std::move(callback)); }
 
 void BaseNode::addDiagnostics(const std::string& status_name,
                               std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)> fill) {
@@ -245,7 +241,7 @@ void BaseNode::setHardwareId(const std::string& id) {
 }
 
 void BaseNode::diagnosticsLoop() {
-  auto next = steady_clock::now();
+  std::int64_t next_ns = host_clock_.steady_ns();
   std::unique_lock<std::mutex> lock(stop_mutex_);
   while (!stop_requested_) {
     lock.unlock();
@@ -254,8 +250,8 @@ void BaseNode::diagnosticsLoop() {
       diagnostics_->force_update();
     }
     lock.lock();
-    next += kDiagnosticsPeriod;
-    stop_changed_.wait_until(lock, next, [this] { return stop_requested_.load(); });
+    next_ns += kDiagnosticsPeriodNs;
+    stop_changed_.waitUntil(&lock, Deadline::at(host_clock_, next_ns), [this] { return stop_requested_.load(); });
   }
 }
 

@@ -39,7 +39,7 @@ void BaseNode::makeLink() {
   core::SimLinkOptions options = linkOptions(common_);
   options.jitter_seed = static_cast<std::uint32_t>(getpid());
   configureLink(&options);
-  link_ = std::make_unique<core::SimLink>(options, linkCallbacks(), core::hostClock(), logToRos,
+  link_ = std::make_unique<core::SimLink>(options, linkCallbacks(), clock_, logToRos,
                                           core::journalsIn(userFolder(), name()));
   addDiagnostics("link to X-Plane", [this, last = core::LinkCounters()](auto& status) mutable {
     const core::LinkCounters now = link_->counters();
@@ -54,12 +54,11 @@ void BaseNode::startLink() {
   }
 }
 
-void BaseNode::stopLink(Deadline deadline) {
+void BaseNode::stopLink(const Deadline& deadline) {
   if (!link_) {
     return;
   }
-  const std::chrono::duration<double> left = deadline - std::chrono::steady_clock::now();
-  if (!link_->stop(std::max(left.count(), kShortestLinkStop_s))) {
+  if (!link_->stop(std::max(deadline.left(), kShortestLinkStop_s))) {
     const std::shared_ptr<core::Journal> journal = link_->journal();
     ROS_WARN("not everything could be undone in X-Plane; the rest is in %s and is undone at the next start",
              journal ? journal->path().c_str() : "no journal");

@@ -1,5 +1,7 @@
 #include "xplane_bridge/nodes/base/event_log.hpp"
 
+#include "xplane_bridge/nodes/base/ros_time.hpp"
+
 namespace xplane_bridge {
 
 std::uint32_t EventLog::add(std::uint8_t kind, const std::string& text, double sim_time,
@@ -7,7 +9,7 @@ std::uint32_t EventLog::add(std::uint8_t kind, const std::string& text, double s
   std::lock_guard<std::mutex> lock(mutex_);
   Event event;
   event.number = number != 0 ? number : ++number_;
-  event.stamp = ros::Time(ros::WallTime::now().toSec());
+  event.stamp = toRosTime(clock_.system_ns());
   event.sim_time = static_cast<float>(sim_time);
   event.kind = kind;
   event.text = text;

@@ -14,6 +14,7 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 
 namespace xplane_bridge {
@@ -34,8 +35,6 @@ constexpr double kMovedMetres = 0.2;
 constexpr double kFieldOfViewTimeout = 2.0;  // [s]
 constexpr const char* kFieldOfViewPurpose = "field_of_view";
 
-ros::Time rosTime(std::int64_t stamp_ns) { return toRosTime(std::max<std::int64_t>(stamp_ns, 0)); }
-
 bool moved(const FlightState& from, const FlightState& to) {
   const auto turned = [](double a, double b) { return std::abs(std::remainder(b - a, 360.0)) > kMovedDeg; };
   if (turned(from.roll_deg, to.roll_deg) || turned(from.pitch_deg, to.pitch_deg) ||
@@ -48,14 +47,14 @@ bool moved(const FlightState& from, const FlightState& to) {
 
 }  // namespace
 
-CaptureNode::CaptureNode() : clock_(core::hostClock()), frozen_check_(0) {}
+CaptureNode::CaptureNode() : frozen_check_(0) {}
 CaptureNode::~CaptureNode() = default;
 
 void CaptureNode::loadParameters(const ParamLoader& own) {
   options_ = loadCaptureOptions(own);
   scaler_ = std::make_unique<vision::PictureScaler>(options_.width, options_.height, options_.fit);
   limiter_ = core::RateLimiter(options_.max_rate);
-  frozen_check_ = vision::FrozenCheck(static_cast<std::int64_t>(options_.frozen_after * 1e9));
+  frozen_check_ = vision::FrozenCheck(core::toNanoseconds(options_.frozen_after));
 }
 
 void CaptureNode::advertise() {
@@ -75,7 +74,7 @@ void CaptureNode::broadcastFrames() {
   std::vector<geometry_msgs::TransformStamped> frames;
   for (const core::CameraView view : {core::CameraView::kForward, core::CameraView::kRear, core::CameraView::kDown}) {
     geometry_msgs::TransformStamped frame;
-    frame.header.stamp = rosTime(clock_.system_ns());
+    frame.header.stamp = stampNow();
     frame.header.frame_id = common().frames.base_link;
     frame.child_frame_id = options_.frame_ids[static_cast<std::size_t>(view)];
     frame.transform.translation.x = options_.camera_offset[0];
@@ -95,7 +94,7 @@ void CaptureNode::broadcastFrames() {
 void CaptureNode::subscribe() {
   subscribeTopic<FlightState>("flight_state", kStateQueue,
                               [this](const FlightState::ConstPtr& state) { onState(state); });
-  addTimer(kOverduePeriod, [this] { pairing_->flush(clock_.system_ns()); });
+  addTimer(kOverduePeriod, [this] { pairing_->flush(clock().system_ns()); });
 }
 
 core::SimLinkCallbacks CaptureNode::linkCallbacks() {
@@ -130,7 +129,7 @@ void CaptureNode::joinThreads() {
 
 void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo& info) {
   // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
-  const std::int64_t receive_ns = receive_clock_.toHostTime(info.stamp_ns, clock_.system_ns(), clock_.steady_ns());
+  const std::int64_t receive_ns = receive_clock_.toHostTime(info.stamp_ns, clock().system_ns(), clock().steady_ns());
   if (!view_stream_.add(datagram, receive_ns)) return;
   {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
@@ -183,13 +182,12 @@ void CaptureNode::changeFieldOfView() {
   });
 }
 
-void CaptureNode::undo(Deadline deadline) {
+void CaptureNode::undo(const Deadline& deadline) {
   if (!options_.set_field_of_view || !link().journal()) return;
-  const double left = std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count();
   try {
     for (const core::JournalEntry& entry : link().journal()->own()) {
       if (entry.purpose != kFieldOfViewPurpose) continue;
-      if (link().undo(entry.undo, std::max(left, 0.1))) link().journal()->remove({entry.id});
+      if (link().undo(entry.undo, std::max(deadline.left(), 0.1))) link().journal()->remove({entry.id});
     }
   } catch (const core::JournalError& error) {
     ROS_ERROR("X-Plane's field of view may not be restored: %s", error.what());
@@ -217,7 +215,7 @@ CaptureNode::CameraFacts CaptureNode::cameraFacts() const {
 
 void CaptureNode::captureLoop() {
   prctl(PR_SET_NAME, "capture");
-  const std::unique_ptr<vision::FrameSource> source = makeSource(options_, clock_.system_ns);
+  const std::unique_ptr<vision::FrameSource> source = makeSource(options_, clock().system_ns);
   std::string problem_said;
   while (!stop_) {
     vision::Change change;
@@ -240,7 +238,7 @@ void CaptureNode::captureLoop() {
         source_description_ = source->describe();
       }
     }
-    repeatFrozen(clock_.system_ns());
+    repeatFrozen(clock().system_ns());
   }
 }
 
@@ -272,7 +270,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     frozen_ = false;
     ++grabbed_;
     if (grabbed.display_known) {
-      const double age = static_cast<double>(grabbed.grab_ns - grabbed.display_ns) * 1e-9;
+      const double age = core::toSeconds(grabbed.grab_ns - grabbed.display_ns);
       grab_age_sum_ += age;
       grab_age_max_ = std::max(grab_age_max_, age);
       ++grab_ages_;
@@ -307,7 +305,7 @@ bool CaptureNode::anybodyListens() const {
 void CaptureNode::publishPicture(Grabbed* grabbed) {
   const CameraFacts camera = cameraFacts();
   FrameState state;
-  state.header.stamp = rosTime(grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns);
+  state.header.stamp = toRosTime(grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns);
   state.header.seq = image_count_;
   const core::CameraView frame = camera.view == core::CameraView::kUnknown ? options_.assumed_view : camera.view;
   state.header.frame_id = options_.frame_ids[static_cast<std::size_t>(frame)];
@@ -320,8 +318,8 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
     state.quality |= FrameState::QUALITY_FROZEN;
     ++frozen_count_;
   }
-  state.display_time = rosTime(grabbed->display_ns);
-  state.grab_time = rosTime(grabbed->grab_ns);
+  state.display_time = toRosTime(grabbed->display_ns);
+  state.grab_time = toRosTime(grabbed->grab_ns);
   state.dropped = grabbed->dropped;
   state.frozen = frozen_count_;
   state.image_count = ++image_count_;
@@ -347,7 +345,7 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
     if (jpeg) encoder_->giveDroppingOldest(image);
   }
   info_publisher_.publish(info);
-  pairing_->addPicture(state, clock_.system_ns());
+  pairing_->addPicture(state, clock().system_ns());
   if (!grabbed->frozen) giveBuffer(std::move(grabbed->pixels));
 }
 
@@ -405,7 +403,7 @@ void CaptureNode::giveBuffer(cv::Mat buffer) {
 }
 
 void CaptureNode::onState(const FlightState::ConstPtr& state) {
-  const std::int64_t now_ns = clock_.system_ns();
+  const std::int64_t now_ns = clock().system_ns();
   pairing_->addState(state, now_ns);
   const std::lock_guard<std::mutex> lock(capture_mutex_);
   if (!moved_from_ || moved(*moved_from_, *state)) {

@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/nodes/capture/flight_state_interpolation.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 
@@ -23,9 +23,6 @@ static_assert(sameBit(FrameState::QUALITY_PAUSED, core::kPaused), "FrameState an
 static_assert(sameBit(FrameState::QUALITY_EPOCH_EDGE, core::kEpochEdge), "FrameState and core differ");
 static_assert(sameBit(FrameState::QUALITY_BORDERLINE, core::kBorderline), "FrameState and core differ");
 
-std::int64_t nanoseconds(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
-double seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
-
 /// A state that nothing is known of: valid = 0 and NaN, never zero for unknown.
 FlightState unknownState() {
   FlightState message;
@@ -36,7 +33,7 @@ FlightState unknownState() {
 }  // namespace
 
 ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish)
-    : display_delay_(display_delay), max_wait_ns_(nanoseconds(max_wait)), publish_(std::move(publish)) {}
+    : display_delay_(display_delay), max_wait_ns_(core::toNanoseconds(max_wait)), publish_(std::move(publish)) {}
 
 void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -111,7 +108,8 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns) {
   if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
   waiting.answer.clock_uncertainty = clock_.fitted() ? clock_.uncertainty() : kNaN;
   waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : std::numeric_limits<float>::quiet_NaN();
-  waiting.moment.host_time_ns = static_cast<std::int64_t>(picture.header.stamp.toNSec()) - nanoseconds(display_delay_);
+  waiting.moment.host_time_ns =
+      static_cast<std::int64_t>(picture.header.stamp.toNSec()) - core::toNanoseconds(display_delay_);
   waiting.deadline_ns = now_ns + max_wait_ns_;
   map(&waiting.moment);
   waiting.slips = clock_.slips();
@@ -156,7 +154,7 @@ void ImagePairing::complete(const core::Association& association, std::int64_t n
     answer.state = association.method == core::PairingMethod::kInterpolated
                        ? interpolate(*state->second.message, *after->second.message, association.fraction)
                        : *state->second.message;
-    answer.state_age = seconds(now_ns - after->second.arrival_ns);
+    answer.state_age = core::toSeconds(now_ns - after->second.arrival_ns);
     if (association.frame_known) answer.sim_time_error = association.state_offset;
   }
   answer.unpaired = unpaired_;

@@ -6,15 +6,11 @@
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
 
 namespace xplane_bridge {
-// Counting from the seconds of the clock, a restarted mapper is not mistaken for an old message.
-JoystickMapperNode::JoystickMapperNode()
-    : request_sequence_(static_cast<std::uint32_t>(clock_.system_ns() / core::kNanosecondsPerSecond)) {}
-
-double JoystickMapperNode::now() const { return static_cast<double>(clock_.steady_ns()) * 1e-9; }
-
 void JoystickMapperNode::loadParameters(const ParamLoader& own) {
   period_ = 1.0 / own.number("rate", {1.0, 1000.0}, 50.0);
   mapper_ = std::make_unique<core::JoystickMapper>(loadJoystickOptions(own));
+  // Counting from the seconds of the clock, a restarted mapper is not mistaken for an old message.
+  request_sequence_ = static_cast<std::uint32_t>(clock().system_ns() / core::kNanosecondsPerSecond);
 }
 
 void JoystickMapperNode::advertise() {
@@ -36,7 +32,7 @@ void JoystickMapperNode::subscribe() {
 
 void JoystickMapperNode::onJoy(const sensor_msgs::Joy& joy) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const double time = now();
+  const double time = clock().steadySeconds();
   ++joy_count_;
   if (mapper_->onJoy(joy.axes, joy.buttons, time)) {
     last_joy_ = time;
@@ -47,7 +43,7 @@ void JoystickMapperNode::onJoy(const sensor_msgs::Joy& joy) {
 
 void JoystickMapperNode::onTimer() {
   std::lock_guard<std::mutex> lock(mutex_);
-  const double time = now();
+  const double time = clock().steadySeconds();
   const bool alive = mapper_->alive(time);
   if (was_alive_ && !alive) {
     ROS_WARN("%s is silent: control/manual stops. Is it plugged in, and does the joy driver repeat (autorepeat_rate)?",
@@ -61,7 +57,7 @@ void JoystickMapperNode::onTimer() {
 
 void JoystickMapperNode::publish(double time) {
   core::JoystickCommand command = mapper_->update(time);
-  const ros::Time stamp(ros::WallTime::now().toSec());
+  const ros::Time stamp = stampNow();
   for (const core::FlightMode mode : mapper_->takeModeRequests()) {
     ModeRequest request;
     request.header.stamp = stamp;
@@ -98,7 +94,7 @@ void JoystickMapperNode::reportSelection() {
 void JoystickMapperNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
   std::lock_guard<std::mutex> lock(mutex_);
-  const double time = now();
+  const double time = clock().steadySeconds();
   if (!mapper_->problems().empty()) {
     status->summary(Level::ERROR, reported_problems_);
   } else if (mapper_->alive(time)) {

@@ -90,12 +90,6 @@ geometry_msgs::TransformStamped axesTransform(const std::string& parent, const s
 
 }  // namespace
 
-ros::Time toRosTime(std::int64_t stamp_ns) {
-  ros::Time stamp;
-  stamp.fromNSec(static_cast<std::uint64_t>(std::max<std::int64_t>(stamp_ns, 0)));
-  return stamp;
-}
-
 void toMessage(const core::FlightState& state, const std::string& frame, FlightState* message) {
   message->header.stamp = toRosTime(state.stamp_ns);
   message->header.frame_id = frame;

@@ -6,6 +6,7 @@
 
 #include <std_msgs/Float64.h>
 
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 
 namespace xplane_bridge {
@@ -77,7 +78,7 @@ void DatarefPublisher::onRref(std::size_t batch_index, const core::RrefView& dat
 
 void DatarefPublisher::publish(std::int64_t receive_ns, float sim_time, std::uint32_t epoch) {
   for (const Batch& batch : batches_) {
-    const double age = static_cast<double>(receive_ns - batch.received_ns) * 1e-9;
+    const double age = core::toSeconds(receive_ns - batch.received_ns);
     if (age > std::max(kFreshPeriods / batch.rate, kShortestAge_s)) {
       for (const std::size_t position : batch.positions) {
         message_.values[position] = std::numeric_limits<float>::quiet_NaN();

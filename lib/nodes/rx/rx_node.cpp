@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "xplane_bridge/LinkState.h"
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/core/wire/dataref_path.hpp"
 #include "xplane_bridge/nodes/base/service_result.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
@@ -15,12 +16,10 @@
 namespace xplane_bridge {
 namespace {
 
-using std::chrono::steady_clock;
-
 constexpr double kSupervisePeriod_s = 0.1;
 // An X-Plane that answers but does not say its version within this is treated as of unknown version.
-constexpr std::chrono::seconds kVersionPatience{2};
-constexpr std::chrono::seconds kSearchWordPeriod{1};
+constexpr double kVersionPatience_s = 2.0;
+constexpr double kSearchWordPeriod_s = 1.0;
 constexpr std::int32_t kRposCheckRateHz = 20;
 // Further away, a flight state says nothing about the time of another datagram.
 constexpr double kNearState_s = 0.1;
@@ -178,8 +177,8 @@ std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
     consistency_.reset();
     last_state_.reset();
   }
-  const std::int64_t wall_ns = clock_.system_ns();
-  return receive_clock_.toHostTime(info.stamp_ns, wall_ns, clock_.steady_ns());
+  const std::int64_t wall_ns = clock().system_ns();
+  return receive_clock_.toHostTime(info.stamp_ns, wall_ns, clock().steady_ns());
 }
 
 void RxNode::onRref(std::size_t stream, const core::RrefView& datagram, const core::ReceiveInfo& info) {
@@ -247,14 +246,14 @@ void RxNode::publishRows(const core::DataView& datagram, const core::ReceiveInfo
 }
 
 float RxNode::nearSimTime(std::int64_t receive_ns) const {
-  const double age = static_cast<double>(receive_ns - last_state_received_ns_) * 1e-9;
+  const double age = core::toSeconds(receive_ns - last_state_received_ns_);
   return last_state_ && std::abs(age) < kNearState_s ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
 }
 
 void RxNode::publishLinkState(const core::LinkStatus& status) {
   LinkState message;
   toMessage(status, nameOf(common().transport), &message);
-  message.header.stamp = toRosTime(clock_.system_ns());
+  message.header.stamp = stampNow();
   message.aircraft_icao = aircraft_.identity().icao;
   message.aircraft_description = aircraft_.identity().description;
   link_state_publisher_.publish(message);
@@ -267,9 +266,8 @@ void RxNode::supervise() {
     renewSubscriptions();
     supervisePositionCheck();
   }
-  const auto now = steady_clock::now();
-  if (status.state == core::LinkState::kSearching && now - last_search_word_ >= kSearchWordPeriod) {
-    last_search_word_ = now;
+  if (status.state == core::LinkState::kSearching && (!search_word_pause_ || search_word_pause_->over())) {
+    search_word_pause_.emplace(clock(), kSearchWordPeriod_s);
     const std::lock_guard<std::mutex> lock(mutex_);
     publishLinkState(status);
   }
@@ -278,18 +276,17 @@ void RxNode::supervise() {
 void RxNode::adoptVersion(const core::LinkStatus& status) {
   const core::SimulatorVersion version = status.version;
   if (version.known()) {
-    waiting_for_version_since_.reset();
+    version_patience_.reset();
   } else {
     const bool answers = status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
-    const auto now = steady_clock::now();
     if (!answers) {
-      waiting_for_version_since_.reset();
+      version_patience_.reset();
       return;
     }
-    if (!waiting_for_version_since_) {
-      waiting_for_version_since_ = now;
+    if (!version_patience_) {
+      version_patience_.emplace(clock(), kVersionPatience_s);
     }
-    if (now - *waiting_for_version_since_ < kVersionPatience) {
+    if (!version_patience_->over()) {
       return;
     }
   }
@@ -383,7 +380,7 @@ void RxNode::setOrigin(const SetOrigin::Request& request, SetOrigin::Response& r
   }
   flight_->setMapOrigin(origin);
   response.position_epoch = flight_->positionEpoch();
-  flight_publisher_->publishOrigin(*flight_->map(), response.position_epoch, clock_.system_ns());
+  flight_publisher_->publishOrigin(*flight_->map(), response.position_epoch, clock().system_ns());
   response.result = result(ServiceResult::OK, "the next states refer to the new origin");
   response.success = true;
 }

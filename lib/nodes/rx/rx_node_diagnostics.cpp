@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/nodes/rx/rx_node.hpp"
 
 namespace xplane_bridge {
@@ -71,10 +72,6 @@ const char* nameOf(core::PositionSource source) {
 constexpr double kLatePeriods = 2.5;
 constexpr double kLateMargin_s = 0.5;
 
-double secondsBetween(std::int64_t earlier_ns, std::int64_t later_ns) {
-  return static_cast<double>(later_ns - earlier_ns) * 1e-9;
-}
-
 }  // namespace
 
 void RxNode::addAllDiagnostics() {
@@ -91,7 +88,7 @@ void RxNode::addAllDiagnostics() {
 void RxNode::diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto& counters = flight_->counters();
-  const double rate = state_rate_.update(counters.states);
+  const double rate = state_rate_.update(counters.states, clock().steady_ns());
   const bool flowing = rate > 0.0;
   const bool should_flow = last_status_.state == core::LinkState::kConnected;
   if (flight_->noFlight()) {
@@ -112,7 +109,7 @@ void RxNode::diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status)
   status->add("States published (-)", flight_publisher_->published());
   status->add("Groups not known", last_state_ ? missingGroups(last_state_->valid) : "all");
   if (last_state_) {
-    status->addf("Age of the last state (s)", "%.3f", secondsBetween(last_state_received_ns_, clock_.system_ns()));
+    status->addf("Age of the last state (s)", "%.3f", core::toSeconds(clock().system_ns() - last_state_received_ns_));
     status->addf("Frame period (s)", "%.4f", static_cast<double>(last_state_->frame_period));
   }
   status->add("Epoch (-)", flight_->clock().epoch());
@@ -207,11 +204,11 @@ void RxNode::diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status
     const MissionPublisher::Report& report = mission.report();
     const std::string name = core::toString(mission.group());
     const double age = report.stamp_ns == 0 ? std::numeric_limits<double>::infinity()
-                                            : secondsBetween(report.stamp_ns, clock_.system_ns());
+                                            : core::toSeconds(clock().system_ns() - report.stamp_ns);
     if (age > kLatePeriods / mission.rate() + kLateMargin_s) {
       silent_groups.push_back(name);
     }
-    status->addf(name + " (1/s)", "%.1f", mission_rates_[i].update(report.published));
+    status->addf(name + " (1/s)", "%.1f", mission_rates_[i].update(report.published, clock().steady_ns()));
     status->addf(name + ", age (s)", "%.2f", age);
     status->addf(name + ", groups not known (bits)", "0x%x", report.missing);
   }

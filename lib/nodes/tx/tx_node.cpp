@@ -21,11 +21,9 @@ constexpr double kReleaseWait = 1.0;      // [s] of one attempt
 constexpr double kRestartStep = 0.25;  // [s] backwards in total running time, more than datagrams overtake each other
 constexpr double kIdentityWait = 2.0;  // [s] of asking for it once
 
-ros::Time stampNow() { return ros::Time(ros::WallTime::now().toSec()); }
-
 }  // namespace
 
-double TxNode::now() const { return static_cast<double>(clock_.steady_ns()) * 1e-9; }
+double TxNode::now() const { return clock().steadySeconds(); }
 
 void TxNode::loadParameters(const ParamLoader& own) {
   options_ = loadTxOptions(own, common().aircraft);
@@ -35,7 +33,7 @@ void TxNode::loadParameters(const ParamLoader& own) {
 }
 
 void TxNode::advertise() {
-  events_.setPublisher(advertiseTopic<EventList>("events", 1, true));
+  events_.start(advertiseTopic<EventList>("events", 1, true), clock());
   mode_publisher_ = advertiseTopic<ControlMode>("control/mode", 10, true);
   applied_publisher_ = advertiseTopic<AppliedCommand>("control/applied", 100);
   failure_publisher_ = advertiseTopic<FailureState>("failures/state", 10, true);
@@ -336,7 +334,8 @@ void TxNode::onLinkState(const core::LinkStatus& status) {
     }
     const auto journal = link().journal();
     if (status.peer.valid() && journal) guardian_.setPeer(status.peer, journal->path());
-    work_wanted_.notify_all();
+    work_now_ = true;
+    work_wanted_.notifyAll();
   }
   if (!text.empty()) logEvent(Event::LINK, text);
   if (pause_by) logEvent(Event::PAUSE, *status.paused ? "paused" : "resumed", *pause_by);
@@ -425,7 +424,8 @@ void TxNode::onReadBack(const core::RrefView& view) {
 void TxNode::work() {
   std::unique_lock<core::HandlerMutex> lock(*mutex_);
   while (!worker_ends_) {
-    work_wanted_.wait_for(lock, std::chrono::duration<double>(kWorkPeriod));
+    work_wanted_.waitUntil(&lock, Deadline(clock(), kWorkPeriod), [this] { return worker_ends_ || work_now_; });
+    work_now_ = false;
     if (worker_ends_ || !linkIsUp()) continue;
     const std::uint32_t epoch = link_status_.epoch;
     lock.unlock();
@@ -446,17 +446,16 @@ void TxNode::stopInputs() {
     if (excitation_) excitation_->abort("tx_node ends");
   }
   if (jobs_) jobs_->stop();
-  work_wanted_.notify_all();
+  work_wanted_.notifyAll();
   if (worker_.joinable()) worker_.join();
   if (surfaces_) surfaces_->stop();
   if (failures_) failures_->stop();
 }
 
-void TxNode::undo(Deadline deadline) {
+void TxNode::undo(const Deadline& deadline) {
   if (!overrides_) return;
-  const double left = std::chrono::duration<double>(deadline - std::chrono::steady_clock::now()).count();
   // Left undone, the guardian tries once more, and the journal keeps it for the next start.
-  if (!overrides_->releaseAll(std::max(0.1, left))) return;
+  if (!overrides_->releaseAll(std::max(0.1, deadline.left()))) return;
   guardian_.dismiss();
   failures_->repaired();
 }

@@ -79,10 +79,7 @@ void TxNode::ground(const std::string& why) {
     surfaces_->release(why);
     sendControls(now());
   }
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(kGroundedWait);
-  while ((surfaces_->driving() || overrides_->releasesPending()) && std::chrono::steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  link().waitUntil([this] { return !(surfaces_->driving() || overrides_->releasesPending()); }, kGroundedWait);
 }
 
 std::optional<ServiceResult> TxNode::refusalOfJob(const std::optional<std::string>& wrong) const {

@@ -13,10 +13,6 @@
 namespace xplane_bridge {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-constexpr double kPollPeriod = 0.02;  // [s] of conditions no dataref subscription tells of
-
 bool isOk(const ServiceResult& r) { return r.code == ServiceResult::OK; }
 
 ServiceResult noLink() { return result(ServiceResult::NO_LINK, "X-Plane is not connected"); }
@@ -46,7 +42,7 @@ void TxNode::advertiseServices() {
 
 void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* response) {
   ModeRequest message;
-  message.header.stamp = ros::Time(ros::WallTime::now().toSec());
+  message.header.stamp = stampNow();
   message.mode = request.mode;
   message.requester = name() + "/set_mode";
   onModeRequest(message);
@@ -63,7 +59,7 @@ ServiceResult TxNode::writeAndConfirm(const std::vector<core::DatarefWrite>& wri
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     if (!linkIsUp()) return noLink();
   }
-  const auto deadline = Clock::now() + std::chrono::duration<double>(options_.service_timeout);
+  const Deadline deadline(clock(), options_.service_timeout);
   for (const core::DatarefWrite& write : writes) {
     const core::SendStatus sent = link().write(write.dataref, write.value);
     if (sent != core::SendStatus::kSent) {
@@ -71,9 +67,8 @@ ServiceResult TxNode::writeAndConfirm(const std::vector<core::DatarefWrite>& wri
     }
   }
   for (const core::DatarefWrite& write : writes) {
-    const double left = std::chrono::duration<double>(deadline - Clock::now()).count();
     const auto [fits, shown] =
-        link().waitForDataref(write.dataref, write.value, toleranceOf(write.value), std::max(left, 0.01));
+        link().waitForDataref(write.dataref, write.value, toleranceOf(write.value), std::max(deadline.left(), 0.01));
     if (fits) continue;
     return result(ServiceResult::TIMEOUT,
                   write.dataref + (shown ? " shows " + std::to_string(*shown) + ", not " + std::to_string(write.value)
@@ -152,10 +147,7 @@ void TxNode::servePause(bool pause, std_srvs::SetBool::Response* response) {
     pause_by_ = who;
   }
   link().command(core::pauseCommand(pause));
-  const auto deadline = Clock::now() + std::chrono::duration<double>(options_.service_timeout);
-  while (paused() != pause && Clock::now() < deadline && !stopping()) {
-    std::this_thread::sleep_for(std::chrono::duration<double>(kPollPeriod));
-  }
+  link().waitUntil([&] { return paused() == pause || stopping(); }, options_.service_timeout);
   response->success = paused() == pause;
   response->message = response->success ? (pause ? "paused" : "running") : "X-Plane did not follow in time";
   if (response->success) return;  // told when it happened

@@ -24,12 +24,14 @@ void TxNode::makeSurfaceControl() {
       [this](const std::string& text, bool success) { logEvent(Event::OVERRIDE, text, "", success); },
       [this] { publishSurfacesApplied(); });
   auto failures = std::make_unique<FailureKeeper>(
-      &link(), overrides_.get(), surfaces.get(), options_.service_timeout, failure_publisher_,
+      &link(), overrides_.get(), surfaces.get(), options_.service_timeout,
+      [this](FailureState* message) { publishStamped(failure_publisher_, message); },
       [this](const std::string& text, const std::string& who, bool success) {
         logEvent(Event::FAILURE, text, who, success);
       });
   auto excitation = std::make_unique<ExcitationKeeper>(
-      surfaces.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg, excitation_publisher_,
+      surfaces.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg,
+      [this](ExcitationState* message) { publishStamped(excitation_publisher_, message); },
       [this](const std::string& text, const std::string& who, bool success) {
         logEvent(Event::EXCITATION, text, who, success);
       });
@@ -70,7 +72,7 @@ void TxNode::publishSurfacesApplied() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   while (const auto echo = surfaces_->takeEcho()) {
     AppliedCommand message;
-    message.header.stamp = ros::Time(ros::WallTime::now().toSec());
+    message.header.stamp = stampNow();
     message.mode = static_cast<std::uint8_t>(arbiter_->status().mode);
     message.source = AppliedCommand::SOURCE_NONE;
     message.sequence = echo->sequence;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+
 /// @file
 /// Every unit factor of the bridge, named by both ends: `kMetersPerFoot` turns feet into metres. Exact where the unit
 /// is defined exactly (foot, nautical mile, pound, standard gravity: international definitions of 1959 and CGPM 1901).
@@ -7,6 +10,20 @@
 namespace xplane_bridge::core {
 
 inline constexpr double kPi = 3.14159265358979323846;
+
+// Time.
+inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
+inline constexpr std::int64_t kNanosecondsPerMillisecond = 1'000'000;
+
+inline double toSeconds(std::int64_t nanoseconds) {
+  return static_cast<double>(nanoseconds) / static_cast<double>(kNanosecondsPerSecond);
+}
+
+/// The nearest nanosecond.
+/// @param seconds within +-9.2e9, beyond which 64 bits do not hold it
+inline std::int64_t toNanoseconds(double seconds) {
+  return std::llround(seconds * static_cast<double>(kNanosecondsPerSecond));
+}
 
 // Angles.
 inline constexpr double kRadiansPerDegree = kPi / 180.0;

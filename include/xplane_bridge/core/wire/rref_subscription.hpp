@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
 
 namespace xplane_bridge::core {
@@ -37,7 +38,7 @@ class Jitter {
 class RequestPacer {
  public:
   RequestPacer(std::size_t batch_size, double spacing_s)
-      : batch_size_(batch_size), spacing_ns_(static_cast<std::int64_t>(spacing_s * 1e9)) {}
+      : batch_size_(batch_size), spacing_ns_(toNanoseconds(spacing_s)) {}
 
   /// Requests that may be sent now.
   std::size_t allowance(std::int64_t now_ns, Jitter* jitter);

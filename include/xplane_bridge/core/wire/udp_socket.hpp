@@ -108,8 +108,6 @@ class UdpSocket {
 
   /// Reads one datagram that is already there.
   ReceiveStatus receive(ByteSpan buffer, Received* received);
-  /// Waits up to `timeout_ms` for one.
-  ReceiveStatus receive(ByteSpan buffer, Received* received, int timeout_ms);
 
   /// Copy of the counters; from the receiving thread, or when none receives.
   UdpCounters counters() const;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -15,9 +16,12 @@
 #include <ros/ros.h>
 #include <boost/make_shared.hpp>
 
+#include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/nodes/base/clock_timers.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
+#include "xplane_bridge/nodes/base/ros_time.hpp"
 
 namespace xplane_bridge {
 
@@ -47,6 +51,10 @@ enum class ExitCode {
 /// Threads: subscriptions and timers are served one at a time by one thread; services by another one, so that a
 /// service waiting for X-Plane never delays a control callback; diagnostics by a third at a steady 1 Hz; the link by a
 /// fourth, which knows no ROS and calls linkCallbacks(). Hooks run on the thread that calls initialize() or run().
+///
+/// Time: stamps, ages, deadlines, timers and the link go by clock(), the one clock of the node. Only what must come
+/// about while that clock stands goes by the host's: diagnostics and the stop sequence.
+///
 /// SIGINT, SIGTERM and SIGHUP are blocked in all threads (see StopSignals): a child process must unblock them.
 class BaseNode {
  public:
@@ -74,7 +82,7 @@ class BaseNode {
   bool stopping() const { return stop_requested_; }
 
  protected:
-  using Deadline = std::chrono::steady_clock::time_point;
+  using Deadline = core::Deadline;
 
   // Hooks, in the order they are called.
 
@@ -93,14 +101,18 @@ class BaseNode {
   virtual void start() {}
   /// Subscriptions, timers and services have ended; end the node's own inputs.
   virtual void stopInputs() {}
-  /// Take back what was changed in X-Plane and read it back, until `deadline` at most.
-  virtual void undo(Deadline deadline) { static_cast<void>(deadline); }
+  /// Take back what was changed in X-Plane and read it back, until `deadline` (of the host's clock) at most.
+  virtual void undo(const Deadline& deadline) { static_cast<void>(deadline); }
   /// Publish the last word on latched topics.
   virtual void publishFinalState() {}
   /// Join the node's own threads; ROS is down.
   virtual void joinThreads() {}
 
   const CommonOptions& common() const { return common_; }
+  /// The clock everything in the node goes by. From loadParameters() on.
+  const core::Clock& clock() const { return clock_; }
+  /// The clock's time as a stamp.
+  ros::Time stampNow() const { return toRosTime(clock_.system_ns()); }
   /// Valid from start() to the end of undo(), only with usesLink(). What a node changes in X-Plane it records in
   /// link().journal() first.
   core::SimLink& link() { return *link_; }
@@ -135,7 +147,8 @@ class BaseNode {
     services_.push_back(handle_.advertiseService(options));
   }
 
-  /// Calls `callback` every `period` [s] of the steady clock, on the thread of the subscriptions.
+  /// Calls `callback` every `period` [s] of clock(), on the thread of the subscriptions. From advertise() and
+  /// subscribe() only.
   void addTimer(double period, std::function<void()> callback);
 
   /// Adds a status to /diagnostics, filled at 1 Hz on the diagnostics thread: `fill` must lock what it reads.
@@ -149,7 +162,7 @@ class BaseNode {
 
   void makeLink();
   void startLink();
-  void stopLink(Deadline deadline);
+  void stopLink(const Deadline& deadline);
   void requireState(State wanted, const char* call) const;
   bool guardedService(const std::string& service, const std::function<void()>& serve);
   void takeOverShutdownRequest();
@@ -164,13 +177,15 @@ class BaseNode {
   ros::NodeHandle handle_;
   ros::NodeHandle private_handle_;
   CommonOptions common_;
+  const core::Clock host_clock_ = core::hostClock();
+  core::Clock clock_;
 
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
-  std::vector<ros::SteadyTimer> timers_;
   ros::CallbackQueue service_queue_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
+  std::unique_ptr<ClockTimers> timers_;
 
   std::unique_ptr<core::SimLink> link_;
 
@@ -183,7 +198,7 @@ class BaseNode {
   std::thread diagnostics_thread_;
 
   mutable std::mutex stop_mutex_;
-  std::condition_variable stop_changed_;
+  core::ClockCondition stop_changed_;
   std::atomic<bool> stop_requested_{false};
   std::string stop_reason_;
   ExitCode exit_code_ = ExitCode::kOk;

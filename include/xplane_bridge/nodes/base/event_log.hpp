@@ -7,15 +7,21 @@
 #include <ros/publisher.h>
 
 #include "xplane_bridge/EventList.h"
+#include "xplane_bridge/core/base/clock.hpp"
 
 namespace xplane_bridge {
 
-/// The last hundred events on a latched topic, numbered without gaps. Thread-safe.
+/// The last hundred events on a latched topic, numbered without gaps. Thread-safe once started.
 class EventLog {
  public:
   static constexpr std::size_t kKept = 100;
 
-  void setPublisher(const ros::Publisher& publisher) { publisher_ = publisher; }
+  /// @param publisher of the topic
+  /// @param clock of the stamps
+  void start(const ros::Publisher& publisher, const core::Clock& clock) {
+    publisher_ = publisher;
+    clock_ = clock;
+  }
 
   /// Adds and publishes. `kind` is one of Event's. Returns the event's number: the next one, or `number`, which
   /// reserve() has given.
@@ -27,6 +33,7 @@ class EventLog {
  private:
   std::mutex mutex_;
   ros::Publisher publisher_;
+  core::Clock clock_;
   EventList list_;
   std::uint32_t number_ = 0;
 };

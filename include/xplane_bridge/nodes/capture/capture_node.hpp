@@ -45,7 +45,7 @@ class CaptureNode : public BaseNode {
   core::SimLinkCallbacks linkCallbacks() override;
   void start() override;
   void stopInputs() override;
-  void undo(Deadline deadline) override;
+  void undo(const Deadline& deadline) override;
   void joinThreads() override;
 
  private:
@@ -86,7 +86,6 @@ class CaptureNode : public BaseNode {
   void giveBuffer(cv::Mat buffer);
 
   CaptureOptions options_;
-  core::Clock clock_;
   std::unique_ptr<vision::PictureScaler> scaler_;
   std::unique_ptr<ImagePairing> pairing_;
   std::unique_ptr<tf2_ros::StaticTransformBroadcaster> static_frames_;

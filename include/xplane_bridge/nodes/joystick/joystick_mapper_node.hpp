@@ -8,7 +8,6 @@
 #include <sensor_msgs/Joy.h>
 
 #include "xplane_bridge/ControlMode.h"
-#include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/control/axis_map.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 
@@ -18,11 +17,8 @@ namespace xplane_bridge {
 core::JoystickOptions loadJoystickOptions(const ParamLoader& own);
 
 /// `joy` into `control/manual` and `control/mode_request`, by one of config/joysticks/. Publishes on every joy message
-/// and, on a steady timer of its own, in between; nothing while the device is silent for longer than `joy_timeout`.
+/// and, on a timer of its own, in between; nothing while the device is silent for longer than `joy_timeout`.
 class JoystickMapperNode : public BaseNode {
- public:
-  JoystickMapperNode();
-
  protected:
   bool usesLink() const override { return false; }
   void loadParameters(const ParamLoader& own) override;
@@ -30,7 +26,6 @@ class JoystickMapperNode : public BaseNode {
   void subscribe() override;
 
  private:
-  double now() const;
   void onJoy(const sensor_msgs::Joy& joy);
   void onTimer();
   void publish(double now);
@@ -38,16 +33,15 @@ class JoystickMapperNode : public BaseNode {
   void reportSelection();
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status);
 
-  core::Clock clock_ = core::hostClock();
   double period_ = 0.02;  // [s]
   std::mutex mutex_;      // the mapper, against the diagnostics thread
   std::unique_ptr<core::JoystickMapper> mapper_;
   ros::Publisher command_publisher_;
   ros::Publisher request_publisher_;
   std::uint32_t command_sequence_ = 0;
-  std::uint32_t request_sequence_;
+  std::uint32_t request_sequence_ = 0;
   std::uint64_t joy_count_ = 0;
-  double last_publication_ = 0.0;  // [s] of the steady clock
+  double last_publication_ = 0.0;  // [s] steady
   double last_joy_ = 0.0;
   bool was_alive_ = false;
   std::string reported_problems_;

@@ -29,11 +29,9 @@
 #include "xplane_bridge/core/state/frames.hpp"
 #include "xplane_bridge/core/state/mission_state.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
+#include "xplane_bridge/nodes/base/ros_time.hpp"
 
 namespace xplane_bridge {
-
-/// @param stamp_ns [ns] since the Unix epoch, 0 or later
-ros::Time toRosTime(std::int64_t stamp_ns);
 
 /// @param frame frame_id: the body, FRD
 void toMessage(const core::FlightState& state, const std::string& frame, FlightState* message);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -84,7 +83,6 @@ class RxNode : public BaseNode {
   void diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status);
 
   RxOptions options_;
-  core::Clock clock_ = core::hostClock();
 
   std::mutex mutex_;
   std::unique_ptr<core::FlightStateAssembler> flight_;
@@ -102,8 +100,8 @@ class RxNode : public BaseNode {
 
   // Timer only.
   std::optional<core::SimulatorVersion> adopted_version_;
-  std::optional<std::chrono::steady_clock::time_point> waiting_for_version_since_;
-  std::chrono::steady_clock::time_point last_search_word_{};
+  std::optional<core::Deadline> version_patience_;   ///< running while X-Plane answers without saying its version
+  std::optional<core::Deadline> search_word_pause_;  ///< running since SEARCHING was published last
   std::int32_t rpos_rate_ = 0;
 
   // Diagnostics thread only.

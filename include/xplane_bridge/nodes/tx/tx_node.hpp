@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -59,7 +58,7 @@ class TxNode : public BaseNode {
   core::SimLinkCallbacks linkCallbacks() override;
   void start() override;
   void stopInputs() override;
-  void undo(Deadline deadline) override;
+  void undo(const Deadline& deadline) override;
   void publishFinalState() override;
   void joinThreads() override;
 
@@ -73,7 +72,7 @@ class TxNode : public BaseNode {
     double time = 0.0;               // [s] steady
   };
 
-  double now() const;
+  double now() const;  // [s] steady
 
   // Control path.
   void onCommand(core::FlightMode from, const ControlCommand& message);
@@ -105,6 +104,11 @@ class TxNode : public BaseNode {
   void makeSurfaceControl();
   void setCommandedStick(const core::ArbitratedControls* sent);
   void publishSurfacesApplied();
+  template <class Message>
+  void publishStamped(const ros::Publisher& publisher, Message* message) {
+    message->header.stamp = stampNow();
+    publisher.publish(*message);
+  }
   void advertiseFailureServices();
   void serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response);
 
@@ -134,7 +138,6 @@ class TxNode : public BaseNode {
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status);
 
   TxOptions options_;
-  core::Clock clock_ = core::hostClock();
   EventLog events_;
   std::atomic<double> sim_time_{std::nan("")};  // [s] raw simulator time, for events of any thread
   Guardian guardian_;
@@ -179,7 +182,8 @@ class TxNode : public BaseNode {
   ros::Publisher excitation_publisher_;
 
   std::thread worker_;
-  std::condition_variable_any work_wanted_;
+  core::ClockCondition work_wanted_;
+  bool work_now_ = false;  // without waiting for the end of the period
   bool worker_ends_ = false;
   std::uint32_t leftovers_of_epoch_ = 0;  // link epoch whose leftovers were released
 

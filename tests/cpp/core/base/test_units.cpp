@@ -36,5 +36,14 @@ TEST(Units, TurnFahrenheit) {
   EXPECT_NEAR(kCelsiusAtZeroFahrenheit + 212.0 * kKelvinPerFahrenheit, 100.0, 1e-9);
 }
 
+TEST(Seconds, AreNanosecondsToTheNearest) {
+  EXPECT_EQ(toNanoseconds(1.5), 1'500'000'000);
+  EXPECT_EQ(toNanoseconds(2.01), 2'010'000'000);  // 2.01 * 1e9 is 2009999999.9999998 in doubles
+  EXPECT_EQ(toNanoseconds(-2.01), -2'010'000'000);
+  EXPECT_EQ(toNanoseconds(1.0 / 3.0), 333'333'333);
+  EXPECT_DOUBLE_EQ(toSeconds(1'500'000'000), 1.5);
+  EXPECT_DOUBLE_EQ(toSeconds(-1), -1e-9);
+}
+
 }  // namespace
 }  // namespace xplane_bridge::core

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <net/if.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -31,6 +32,16 @@ UdpSocketOptions onLoopback(std::uint16_t port = 0) {
 Endpoint endpointOf(const UdpSocket& socket) { return {kLoopbackAddress, socket.localPort()}; }
 
 const std::array<std::uint8_t, 3> kPayload = {1, 2, 3};
+
+/// Reads one datagram; waits for it while the socket is silent for no longer than `timeout_ms`.
+ReceiveStatus receiveWithin(int timeout_ms, UdpSocket* socket, ByteSpan buffer, Received* received) {
+  pollfd waiting{socket->fd(), POLLIN, 0};
+  while (poll(&waiting, 1, timeout_ms) > 0) {
+    const ReceiveStatus status = socket->receive(buffer, received);
+    if (status != ReceiveStatus::kNothing) return status;
+  }
+  return socket->receive(buffer, received);
+}
 
 TEST(Endpoint, IsWrittenAsPeopleDo) {
   EXPECT_EQ((Endpoint{0xC0A8010AU, 49000}).toString(), "192.168.1.10:49000");
@@ -72,7 +83,7 @@ TEST(UdpSocket, DeliversWithKernelTimeAndSender) {
   ASSERT_TRUE(sender.sendTo(kPayload, endpointOf(receiver)));
   std::array<std::uint8_t, 64> buffer{};
   Received received;
-  ASSERT_EQ(receiver.receive(buffer, &received, kPatienceMs), ReceiveStatus::kReceived);
+  ASSERT_EQ(receiveWithin(kPatienceMs, &receiver, buffer, &received), ReceiveStatus::kReceived);
   const std::int64_t after = clock.system_ns();
   EXPECT_EQ(received.size, 3U);
   EXPECT_TRUE(std::equal(kPayload.begin(), kPayload.end(), buffer.begin()));
@@ -85,15 +96,11 @@ TEST(UdpSocket, DeliversWithKernelTimeAndSender) {
   EXPECT_EQ(sender.counters().sent_bytes, 3U);
 }
 
-TEST(UdpSocket, NothingThereReturnsAtTheDeadline) {
+TEST(UdpSocket, NothingThereReturnsAtOnce) {
   UdpSocket socket(onLoopback());
   std::array<std::uint8_t, 8> buffer{};
   Received received;
   EXPECT_EQ(socket.receive(buffer, &received), ReceiveStatus::kNothing);
-  const Clock clock = hostClock();
-  const std::int64_t before = clock.steady_ns();
-  EXPECT_EQ(socket.receive(buffer, &received, 30), ReceiveStatus::kNothing);
-  EXPECT_GE(clock.steady_ns() - before, 29 * kNanosecondsPerMillisecond);
 }
 
 TEST(UdpSocket, TakenPortIsSaidWithTheRemedy) {
@@ -127,12 +134,12 @@ TEST(UdpSocket, RefusalIsCountedAndHarmless) {
   ASSERT_TRUE(socket.sendTo(kPayload, nobody));
   std::array<std::uint8_t, 8> buffer{};
   Received received;
-  // The refusal wakes the waiting call or is found by it; either way there is nothing to read and no busy loop later.
-  EXPECT_EQ(socket.receive(buffer, &received, 20), ReceiveStatus::kNothing);
+  // The refusal ends the wait or is found by the read; either way there is nothing to read and no busy loop later.
+  EXPECT_EQ(receiveWithin(20, &socket, buffer, &received), ReceiveStatus::kNothing);
   EXPECT_EQ(socket.counters().refused, 1U);
   EXPECT_TRUE(socket.sendTo(kPayload, nobody)) << "a later send must not fail because of an earlier refusal";
   EXPECT_TRUE(socket.sendTo(kPayload, endpointOf(socket))) << "nor to somebody else";
-  EXPECT_EQ(socket.receive(buffer, &received, kPatienceMs), ReceiveStatus::kReceived);
+  EXPECT_EQ(receiveWithin(kPatienceMs, &socket, buffer, &received), ReceiveStatus::kReceived);
   EXPECT_EQ(socket.counters().send_failures, 0U);
 }
 
@@ -156,7 +163,7 @@ TEST(UdpSocket, DropsOfTheKernelAreCounted) {
   ASSERT_LT(read, kSent);
   // The kernel reports the count with the next datagram.
   ASSERT_TRUE(sender.sendTo(payload, endpointOf(receiver)));
-  ASSERT_EQ(receiver.receive(buffer, &received, kPatienceMs), ReceiveStatus::kReceived);
+  ASSERT_EQ(receiveWithin(kPatienceMs, &receiver, buffer, &received), ReceiveStatus::kReceived);
   EXPECT_EQ(receiver.counters().dropped, kSent - read);
 }
 
@@ -166,7 +173,7 @@ TEST(UdpSocket, TruncationIsCounted) {
   ASSERT_TRUE(socket.sendTo(payload, endpointOf(socket)));
   std::array<std::uint8_t, 10> buffer{};
   Received received;
-  ASSERT_EQ(socket.receive(buffer, &received, kPatienceMs), ReceiveStatus::kReceived);
+  ASSERT_EQ(receiveWithin(kPatienceMs, &socket, buffer, &received), ReceiveStatus::kReceived);
   EXPECT_EQ(received.size, 10U);
   EXPECT_EQ(socket.counters().truncated, 1U);
 }
@@ -178,7 +185,7 @@ TEST(UdpSocket, LargestDatagramArrivesWhole) {
   ASSERT_TRUE(socket.sendTo(payload, endpointOf(socket)));
   std::vector<std::uint8_t> buffer(65536);
   Received received;
-  ASSERT_EQ(socket.receive(buffer, &received, kPatienceMs), ReceiveStatus::kReceived);
+  ASSERT_EQ(receiveWithin(kPatienceMs, &socket, buffer, &received), ReceiveStatus::kReceived);
   EXPECT_EQ(received.size, payload.size());
   EXPECT_EQ(buffer[65506], 77);
   EXPECT_EQ(socket.counters().truncated, 0U);
@@ -200,7 +207,7 @@ TEST(UdpSocket, MovesWithItsPort) {
   ASSERT_TRUE(second.sendTo(kPayload, {kLoopbackAddress, port}));
   std::array<std::uint8_t, 8> buffer{};
   Received received;
-  EXPECT_EQ(second.receive(buffer, &received, kPatienceMs), ReceiveStatus::kReceived);
+  EXPECT_EQ(receiveWithin(kPatienceMs, &second, buffer, &received), ReceiveStatus::kReceived);
 }
 
 TEST(UdpSocket, HearsMulticastOnLoopback) {
@@ -223,7 +230,7 @@ TEST(UdpSocket, HearsMulticastOnLoopback) {
   ASSERT_EQ(sendto(sender, kPayload.data(), kPayload.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof(to)), 3);
   std::array<std::uint8_t, 8> buffer{};
   Received received;
-  EXPECT_EQ(listener.receive(buffer, &received, kPatienceMs), ReceiveStatus::kReceived);
+  EXPECT_EQ(receiveWithin(kPatienceMs, &listener, buffer, &received), ReceiveStatus::kReceived);
   close(sender);
 }
 

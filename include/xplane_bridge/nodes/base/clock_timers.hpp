@@ -1,0 +1,54 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include <ros/callback_queue_interface.h>
+
+#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/timer_schedule.hpp"
+
+namespace xplane_bridge {
+
+/// Periodic timers on a clock, served by a callback queue like messages. A thread of its own waits for the clock and
+/// hands over what is due; of one timer at most one call waits in the queue, and times missed meanwhile are left out.
+class ClockTimers {
+ public:
+  ClockTimers(core::Clock clock, ros::CallbackQueueInterface* queue);
+  /// stop()
+  ~ClockTimers();
+  ClockTimers(const ClockTimers&) = delete;
+  ClockTimers& operator=(const ClockTimers&) = delete;
+
+  /// A timer that is due every `period` [s] from now on. Only before start(). @throws std::logic_error after it
+  void add(double period, std::function<void()> callback);
+  /// Begins with what is due already.
+  void start();
+  /// No callback begins any more; waits for one that runs.
+  void stop();
+
+ private:
+  struct Timer {
+    std::function<void()> callback;
+    std::atomic<bool> waiting{false};  ///< in the queue, or called just now
+  };
+  class Call;
+
+  void run();
+  std::uint64_t id() const { return reinterpret_cast<std::uintptr_t>(this); }
+
+  core::Clock clock_;
+  ros::CallbackQueueInterface* queue_;
+  core::TimerSchedule schedule_;
+  std::vector<std::shared_ptr<Timer>> timers_;
+  std::mutex mutex_;
+  core::ClockCondition stopped_changed_;
+  bool stopped_ = false;
+  std::thread thread_;
+};
+
+}  // namespace xplane_bridge
