@@ -84,6 +84,12 @@ def test_configuration_and_launch_files_are_installed(install_space):
     assert [str(p) for p in wanted if not (share / p.relative_to(ROOT)).is_file()] == []
 
 
+def test_launch_files_of_the_install_space_look_at_their_arguments(install_space, tmp_path):
+    command = "roslaunch xplane_bridge tx.launch aircraft:=zeppelin || true"
+    said = in_shell(install_space / "setup.bash", command, home=str(tmp_path))
+    assert "(aircraft:=zeppelin); there is fixed_wing, multirotor, tiltrotor" in said
+
+
 def test_nodes_of_the_install_space_find_their_libraries(install_space):
     nodes = [path.stem for path in (ROOT / "src").glob("*.cpp")]
     assert nodes
