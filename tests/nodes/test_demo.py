@@ -91,7 +91,8 @@ def test_tables_of_the_demo_read_back_with_pandas(recording: Path, tmp_path: Pat
 def test_trajectories_of_the_demo_are_what_evo_reads(recording: Path, tmp_path: Path) -> None:
     file_interface = pytest.importorskip("evo.tools.file_interface", reason="evo needs Python 3.10")
     tum = file_interface.read_tum_trajectory_file(str(export(recording, "tum", tmp_path / "tum") / "flight.tum"))
-    euroc = file_interface.read_euroc_csv_trajectory(str(export(recording, "euroc", tmp_path / "euroc") / "flight.csv"))
+    file = export(recording, "euroc", tmp_path / "euroc") / "flight.euroc.csv"
+    euroc = file_interface.read_euroc_csv_trajectory(str(file))
     with Bags(recording) as bags:
         odom = bags.read("/xplane/odom", [f"pose.pose.position.{axis}" for axis in "xyz"])
     positions = np.stack([odom[f"pose.pose.position.{axis}"] for axis in "xyz"], axis=1)
