@@ -25,3 +25,22 @@ function(xplane_bridge_configure_target target)
     endif()
   endif()
 endfunction()
+
+# xplane_bridge_message_code(<target> core|nodes <folder>...): what cmake/message_code writes from the messages, made
+# before <target>. Files that stay the same keep their time, hence the stamp.
+get_filename_component(XPLANE_BRIDGE_MESSAGE_CODE "${CMAKE_CURRENT_LIST_DIR}/message_code" ABSOLUTE)
+function(xplane_bridge_message_code target part)
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  get_filename_component(root "${XPLANE_BRIDGE_MESSAGE_CODE}/../.." ABSOLUTE)
+  file(GLOB inputs CONFIGURE_DEPENDS
+    ${XPLANE_BRIDGE_MESSAGE_CODE}/*.py ${root}/msg/*.msg ${root}/srv/*.srv)
+  set(stamp "${CMAKE_CURRENT_BINARY_DIR}/message_code_${part}.stamp")
+  add_custom_command(OUTPUT ${stamp}
+    COMMAND ${Python3_EXECUTABLE} -B ${XPLANE_BRIDGE_MESSAGE_CODE} ${part} ${ARGN}
+    COMMAND ${CMAKE_COMMAND} -E touch ${stamp}
+    DEPENDS ${inputs} ${root}/lib/core/state/sources.txt
+    COMMENT "Writing what follows from the messages: ${part}"
+    VERBATIM)
+  add_custom_target(${target}_message_code DEPENDS ${stamp})
+  add_dependencies(${target} ${target}_message_code)
+endfunction()

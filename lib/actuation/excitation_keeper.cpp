@@ -11,14 +11,6 @@ namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
-std::optional<core::ExcitationShape> shapeFrom(const std::string& kind) {
-  for (const auto shape : {core::ExcitationShape::kDoublet, core::ExcitationShape::k3211,
-                           core::ExcitationShape::kMultisine, core::ExcitationShape::kChirp}) {
-    if (kind == core::toString(shape)) return shape;
-  }
-  return std::nullopt;
-}
-
 bool hasBand(core::ExcitationShape shape) {
   return shape == core::ExcitationShape::kMultisine || shape == core::ExcitationShape::kChirp;
 }
@@ -52,9 +44,9 @@ ExcitationKeeper::ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg
 ExcitationKeeper::Plan ExcitationKeeper::plan(const InjectExcitation::Request& request) const {
   Plan out;
   if (request.kind == "stop") return out;
-  const auto shape = shapeFrom(request.kind);
+  const auto shape = core::excitationShapeFrom(request.kind);
   if (!shape) {
-    out.wrong = "kind is \"" + request.kind + "\"; expected doublet, 3-2-1-1, multisine, chirp or stop";
+    out.wrong = "kind is \"" + request.kind + "\"; expected stop, " + core::kExcitationShapeWords;
     return out;
   }
   out.channels = channelsOf(request.target);

@@ -60,6 +60,7 @@ std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double 
     case core::SurfaceFault::kFloating:
     case core::SurfaceFault::kReduced:
     case core::SurfaceFault::kSlow:
+    case core::SurfaceFault::kGone:
       return std::nullopt;
   }
   return std::nullopt;

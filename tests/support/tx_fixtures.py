@@ -11,13 +11,15 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from xplane_bridge.constants import ControlField, FlightMode
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.harness.xplane_client import XPlaneClient
 from xplane_bridge.resources import config_file
 
-MANUAL, AUTO = 1, 2
+MANUAL, AUTO = FlightMode.MANUAL, FlightMode.AUTO
 #: Bits of ControlCommand.fields.
-ROLL, PITCH, YAW, THROTTLE, FLAPS, GEAR = 1, 2, 4, 8, 512, 2048
+ROLL, PITCH, YAW, THROTTLE = ControlField.ROLL, ControlField.PITCH, ControlField.YAW, ControlField.THROTTLE
+FLAPS, GEAR = ControlField.FLAPS, ControlField.GEAR
 
 
 class WatchedDatarefs:

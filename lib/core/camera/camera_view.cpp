@@ -55,20 +55,6 @@ std::vector<DatarefRequest> requestsOf() {
 
 }  // namespace
 
-const char* toString(CameraView view) {
-  switch (view) {
-    case CameraView::kForward:
-      return "forward";
-    case CameraView::kRear:
-      return "rear";
-    case CameraView::kDown:
-      return "down";
-    case CameraView::kUnknown:
-      break;
-  }
-  return "unknown";
-}
-
 CameraView classifyView(double heading_deg, double pitch_deg, double tolerance_deg) {
   if (!std::isfinite(heading_deg) || !std::isfinite(pitch_deg)) return CameraView::kUnknown;
   const Eigen::Quaterniond head = headOrientation({heading_deg, pitch_deg});

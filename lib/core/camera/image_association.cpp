@@ -337,15 +337,15 @@ void ImageAssociator::settle(const Association& answer) {
 
 std::uint32_t pairingQuality(const ImageMoment& moment, const Association& answer) {
   std::uint32_t quality = 0;
-  if (answer.method == PairingMethod::kNone) quality |= kStateMissing;
-  if (answer.method == PairingMethod::kInterpolated) quality |= kInterpolated;
-  if (answer.method == PairingMethod::kNearestFrame) quality |= kOffFrame;
+  if (answer.method == PairingMethod::kNone) quality |= kQualityStateMissing;
+  if (answer.method == PairingMethod::kInterpolated) quality |= kQualityInterpolated;
+  if (answer.method == PairingMethod::kNearestFrame) quality |= kQualityOffFrame;
   // By stamps alone the very frame cannot be told.
-  if (answer.method == PairingMethod::kStamp) quality |= kOffFrame | kClockUnsure;
-  if (answer.frame_known && moment.uncertainty > 0.5 * answer.frame_period) quality |= kClockUnsure;
-  if (moment.paused || answer.method == PairingMethod::kPaused) quality |= kPaused;
-  if (answer.at_edge) quality |= kEpochEdge;
-  if (answer.ambiguous) quality |= kBorderline;
+  if (answer.method == PairingMethod::kStamp) quality |= kQualityOffFrame | kQualityClockUnsure;
+  if (answer.frame_known && moment.uncertainty > 0.5 * answer.frame_period) quality |= kQualityClockUnsure;
+  if (moment.paused || answer.method == PairingMethod::kPaused) quality |= kQualityPaused;
+  if (answer.at_edge) quality |= kQualityEpochEdge;
+  if (answer.ambiguous) quality |= kQualityBorderline;
   return quality;
 }
 

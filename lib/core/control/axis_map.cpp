@@ -11,40 +11,13 @@ namespace {
 // Drivers divide by 32767 or 32768, so full travel may come out a little above 1.
 constexpr double kAxisTolerance = 1e-3;
 
-struct TargetRow {
-  JoyTarget target;
-  const char* name;
-  std::uint32_t field;
-  double ControlCommand::*value;
-  Channel range;
-};
-constexpr TargetRow kTargets[] = {
-    {JoyTarget::kRoll, "roll", kFieldRoll, &ControlCommand::roll, Channel::kRoll},
-    {JoyTarget::kPitch, "pitch", kFieldPitch, &ControlCommand::pitch, Channel::kPitch},
-    {JoyTarget::kYaw, "yaw", kFieldYaw, &ControlCommand::yaw, Channel::kYaw},
-    {JoyTarget::kThrottle, "throttle", kFieldThrottle, &ControlCommand::throttle, Channel::kLever0},
-    {JoyTarget::kTrimRoll, "trim_roll", kFieldTrimRoll, &ControlCommand::trim_roll, Channel::kTrimRoll},
-    {JoyTarget::kTrimPitch, "trim_pitch", kFieldTrimPitch, &ControlCommand::trim_pitch, Channel::kTrimPitch},
-    {JoyTarget::kTrimYaw, "trim_yaw", kFieldTrimYaw, &ControlCommand::trim_yaw, Channel::kTrimYaw},
-    {JoyTarget::kFlaps, "flaps", kFieldFlaps, &ControlCommand::flaps, Channel::kFlaps},
-    {JoyTarget::kSpeedbrake, "speedbrake", kFieldSpeedbrake, &ControlCommand::speedbrake, Channel::kSpeedbrake},
-    {JoyTarget::kGear, "gear", kFieldGear, &ControlCommand::gear, Channel::kGear},
-    {JoyTarget::kParkingBrake, "parking_brake", kFieldParkingBrake, &ControlCommand::parking_brake,
-     Channel::kParkingBrake},
-    {JoyTarget::kBrakes, "brakes", kFieldToeBrakes, nullptr, Channel::kLeftBrake},
-    {JoyTarget::kLeftBrake, "left_brake", kFieldToeBrakes, &ControlCommand::left_brake, Channel::kLeftBrake},
-    {JoyTarget::kRightBrake, "right_brake", kFieldToeBrakes, &ControlCommand::right_brake, Channel::kRightBrake},
-    {JoyTarget::kThrustVector, "thrust_vector", kFieldThrustVector, &ControlCommand::thrust_vector,
-     Channel::kThrustVector},
-};
-
-const TargetRow& rowOf(JoyTarget target) {
-  return *std::find_if(std::begin(kTargets), std::end(kTargets),
-                       [&](const TargetRow& r) { return r.target == target; });
+const JoyTargetRow& rowOf(JoyTarget target) {
+  return *std::find_if(std::begin(kJoyTargets), std::end(kJoyTargets),
+                       [&](const JoyTargetRow& r) { return r.target == target; });
 }
 
 void command(JoyTarget target, double value, ControlCommand& out) {
-  const TargetRow& row = rowOf(target);
+  const JoyTargetRow& row = rowOf(target);
   const ChannelRange range = commandRange(row.range);
   const double saturated = std::clamp(value, range.low, range.high);
   out.fields |= row.field;
@@ -99,7 +72,7 @@ bool sameSource(const IntegratedInput& a, const IntegratedInput& b, StickMode mo
 }  // namespace
 
 std::optional<JoyTarget> joyTargetFrom(const std::string& name) {
-  for (const auto& row : kTargets) {
+  for (const auto& row : kJoyTargets) {
     if (name == row.name) return row.target;
   }
   return std::nullopt;

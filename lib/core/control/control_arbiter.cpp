@@ -6,6 +6,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "xplane_bridge/core/control/control_channels.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -21,8 +23,6 @@ std::string wrong(const std::string& key, double given, const std::string& expec
 
 }  // namespace
 
-const char* toString(FlightMode mode) { return mode == FlightMode::kManual ? "MANUAL" : "AUTO"; }
-
 std::uint64_t SourceStatistics::refusedTotal() const {
   return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
 }
@@ -32,10 +32,8 @@ ArbiterOptions::ArbiterOptions() {
     const ChannelRange range = commandRange(static_cast<Channel>(i));
     channels[i].low = range.low;
     channels[i].high = range.high;
-  }
-  for (const Channel c : {Channel::kTrimRoll, Channel::kTrimPitch, Channel::kTrimYaw, Channel::kFlaps,
-                          Channel::kSpeedbrake, Channel::kGear, Channel::kParkingBrake, Channel::kThrustVector}) {
-    channels[index(c)].failsafe = Failsafe::kHold;
+    const bool handle = channelWire(static_cast<Channel>(i), {}).refresh == Refresh::kOnChange;
+    if (handle) channels[i].failsafe = Failsafe::kHold;
   }
 }
 

@@ -80,6 +80,20 @@ constexpr Row kRows[] = {
       Refresh::kOnChange, kHandle}},
 };
 
+constexpr bool hasWire(Channel channel) {
+  for (const Row& row : kRows) {
+    if (channel >= row.first && channel <= row.last) return true;
+  }
+  return false;
+}
+constexpr bool everyChannelHasWire() {
+  for (std::size_t i = 0; i < kChannelCount; ++i) {
+    if (!hasWire(static_cast<Channel>(i))) return false;
+  }
+  return true;
+}
+static_assert(everyChannelHasWire(), "a channel of ControlCommand.msg has no line here");
+
 // X-Plane 12 marks flap_ratio as replaced.
 constexpr ChannelWire kFlaps12 = {"sim/cockpit2/controls/flap_handle_request_ratio",
                                   "sim/cockpit2/controls/flap_handle_request_ratio", nullptr, Refresh::kOnChange,

@@ -6,33 +6,8 @@
 namespace xplane_bridge::core {
 namespace {
 
-struct ScalarChannel {
-  Channel channel;
-  std::uint32_t field;
-  const char* name;
-  double ControlCommand::*value;
-  ChannelRange range;
-};
-
-constexpr ScalarChannel kScalars[] = {
-    {Channel::kRoll, kFieldRoll, "roll", &ControlCommand::roll, {-1.0, 1.0}},
-    {Channel::kPitch, kFieldPitch, "pitch", &ControlCommand::pitch, {-1.0, 1.0}},
-    {Channel::kYaw, kFieldYaw, "yaw", &ControlCommand::yaw, {-1.0, 1.0}},
-    {Channel::kTrimRoll, kFieldTrimRoll, "trim_roll", &ControlCommand::trim_roll, {-1.0, 1.0}},
-    {Channel::kTrimPitch, kFieldTrimPitch, "trim_pitch", &ControlCommand::trim_pitch, {-1.0, 1.0}},
-    {Channel::kTrimYaw, kFieldTrimYaw, "trim_yaw", &ControlCommand::trim_yaw, {-1.0, 1.0}},
-    {Channel::kFlaps, kFieldFlaps, "flaps", &ControlCommand::flaps, {0.0, 1.0}},
-    {Channel::kSpeedbrake, kFieldSpeedbrake, "speedbrake", &ControlCommand::speedbrake, {-0.5, 1.0}},
-    {Channel::kGear, kFieldGear, "gear", &ControlCommand::gear, {0.0, 1.0}},
-    {Channel::kParkingBrake, kFieldParkingBrake, "parking_brake", &ControlCommand::parking_brake, {0.0, 1.0}},
-    {Channel::kLeftBrake, kFieldToeBrakes, "left_brake", &ControlCommand::left_brake, {0.0, 1.0}},
-    {Channel::kRightBrake, kFieldToeBrakes, "right_brake", &ControlCommand::right_brake, {0.0, 1.0}},
-    {Channel::kThrustVector, kFieldThrustVector, "thrust_vector", &ControlCommand::thrust_vector, {0.0, 1.0}},
-};
-constexpr ChannelRange kThrottleRange = {-1.0, 1.0};
-
 const ScalarChannel* scalarOf(Channel channel) {
-  for (const auto& row : kScalars) {
+  for (const auto& row : kScalarChannels) {
     if (row.channel == channel) return &row;
   }
   return nullptr;
@@ -124,7 +99,7 @@ std::optional<CommandRefusal> checkCommand(const ControlCommand& command) {
                   command.fields & ~kAllFields);
     return CommandRefusal{Refusal::kUnknownBits, text};
   }
-  for (const auto& row : kScalars) {
+  for (const auto& row : kScalarChannels) {
     if ((command.fields & row.field) == 0u) continue;
     if (auto wrong = checkValue(command.*row.value, row.range, row.name)) return wrong;
   }
@@ -137,7 +112,7 @@ ExpandedCommand expand(const ControlCommand& command, int engines) {
     out.values[index(channel)] = value;
     out.commanded.set(index(channel));
   };
-  for (const auto& row : kScalars) {
+  for (const auto& row : kScalarChannels) {
     if ((command.fields & row.field) != 0u) set(row.channel, command.*row.value);
   }
   if ((command.fields & kFieldThrottle) != 0u) {

@@ -61,20 +61,6 @@ double peakOf(int first, const std::vector<double>& phases) {
 
 }  // namespace
 
-const char* toString(ExcitationShape shape) {
-  switch (shape) {
-    case ExcitationShape::kDoublet:
-      return "doublet";
-    case ExcitationShape::k3211:
-      return "3-2-1-1";
-    case ExcitationShape::kMultisine:
-      return "multisine";
-    case ExcitationShape::kChirp:
-      return "chirp";
-  }
-  return "unknown";
-}
-
 const char* toString(ExcitationPhase phase) {
   switch (phase) {
     case ExcitationPhase::kIdle:

@@ -41,14 +41,30 @@ const SystemRow kSystems[] = {
 
 FailurePlanResult refuse(FailureError error, const std::string& text) { return {error, text, {}}; }
 
+// How X-Plane 12 names what a surface does; nullptr where it cannot express it.
+const char* ownSuffix(SurfaceFault fault, bool has_value) {
+  switch (fault) {
+    case SurfaceFault::kStuck:
+      return has_value ? nullptr : "_lock";
+    case SurfaceFault::kHardOverUp:
+      return "_mxup";
+    case SurfaceFault::kHardOverDown:
+      return "_mxdn";
+    case SurfaceFault::kCentred:
+      return "_cntr";
+    case SurfaceFault::kGone:
+      return "_gone";
+    case SurfaceFault::kFloating:
+    case SurfaceFault::kReduced:
+    case SurfaceFault::kSlow:
+      break;
+  }
+  return nullptr;
+}
+
 // X-Plane 12's own failure of a surface; empty where it cannot express the wish.
-std::string ownSurfaceFailure(const SurfaceInfo& surface, const std::string& kind, bool has_value) {
-  const char* suffix = kind == "stuck" && !has_value ? "_lock"
-                       : kind == "hard_over_up"      ? "_mxup"
-                       : kind == "hard_over_down"    ? "_mxdn"
-                       : kind == "centred"           ? "_cntr"
-                       : kind == "gone"              ? "_gone"
-                                                     : nullptr;
+std::string ownSurfaceFailure(const SurfaceInfo& surface, SurfaceFault fault, bool has_value) {
+  const char* suffix = ownSuffix(fault, has_value);
   if (!suffix) return "";
   const char* stem = nullptr;
   switch (surface.kind) {
@@ -83,18 +99,16 @@ FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface
   FailurePlanResult out;
   out.plan = {request.name, request.kind, request.value, {}, std::nullopt};
   const auto fault = surfaceFaultFrom(request.kind);
-  if (!fault && request.kind != "gone") {
-    return refuse(FailureError::kInvalid,
-                  "kind is \"" + request.kind +
-                      "\": expected stuck, hard_over_up, hard_over_down, centred, floating, reduced, slow or gone");
+  if (!fault) {
+    return refuse(FailureError::kInvalid, "kind is \"" + request.kind + "\": expected " + kSurfaceFaultWords);
   }
-  if (fault) {
+  if (*fault != SurfaceFault::kGone) {
     const SurfaceFailure failure{surface, *fault, request.value};
     if (const auto wrong = validate(failure)) return refuse(FailureError::kInvalid, request.name + " " + *wrong);
     out.plan.surface = failure;
   }
   if (version.is12()) {
-    const std::string own = ownSurfaceFailure(surfaceTable()[surface], request.kind, request.value.has_value());
+    const std::string own = ownSurfaceFailure(surfaceTable()[surface], *fault, request.value.has_value());
     if (!own.empty()) out.plan.datarefs.push_back(failureDataref(own));
   }
   if (out.plan.datarefs.empty() && !out.plan.surface) {

@@ -12,22 +12,6 @@ constexpr float kRestartStepS = 1.0F;
 
 }  // namespace
 
-const char* toString(LinkState state) {
-  switch (state) {
-    case LinkState::kSearching:
-      return "SEARCHING";
-    case LinkState::kConnected:
-      return "CONNECTED";
-    case LinkState::kPaused:
-      return "PAUSED";
-    case LinkState::kStale:
-      return "STALE";
-    case LinkState::kLost:
-      return "LOST";
-  }
-  return "INVALID";
-}
-
 void LinkMonitor::heard(std::int64_t now_ns) {
   update(now_ns);  // a silence that ends with this datagram may have been long enough for LOST
   if (!last_heard_ns_.has_value() || state_ == LinkState::kLost) {

@@ -13,7 +13,7 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr std::size_t kTanks = kMaxTanks;
+constexpr std::size_t kTanks = std::tuple_size_v<decltype(FuelState::fuel_tank)>;
 constexpr double kMaxWind = 100.0;       // [m/s]
 constexpr double kWindTolerance = 0.5;   // [m/s]
 constexpr double kGust = 15.0;           // [m/s] that full turbulence may add for a moment
@@ -98,7 +98,7 @@ std::optional<std::string> check(const Loading& loading) {
   }
   if (loading.fuel_tank.size() > kTanks) {
     return "fuel_tank has " + std::to_string(loading.fuel_tank.size()) + " values: expected at most " +
-           std::to_string(kMaxTanks) + ", one a tank";
+           std::to_string(kTanks) + ", one a tank";
   }
   for (std::size_t i = 0; i < loading.fuel_tank.size(); ++i) {
     if (auto wrong = outside(element("fuel_tank", i), loading.fuel_tank[i], 0.0, kMaxMass, "kg")) return wrong;

@@ -1,76 +1,15 @@
 #include "xplane_bridge/core/state/field_table.hpp"
 
 #include <algorithm>
+#include <iterator>
+
+#include "xplane_bridge/core/state/field_lines.hpp"
 
 namespace xplane_bridge::core {
 
-const char* toString(FieldGroup group) {
-  switch (group) {
-    case FieldGroup::kFlight:
-      return "flight";
-    case FieldGroup::kEngines:
-      return "engines";
-    case FieldGroup::kSurfaces:
-      return "surfaces";
-    case FieldGroup::kControls:
-      return "controls";
-    case FieldGroup::kElectrical:
-      return "electrical";
-    case FieldGroup::kAutopilot:
-      return "autopilot";
-    case FieldGroup::kWarnings:
-      return "warnings";
-    case FieldGroup::kFuel:
-      return "fuel";
-    case FieldGroup::kSim:
-      return "sim";
-  }
-  return "unknown";
-}
-
-const char* messageName(FieldGroup group) {
-  switch (group) {
-    case FieldGroup::kFlight:
-      return "FlightState";
-    case FieldGroup::kEngines:
-      return "EngineStates";
-    case FieldGroup::kSurfaces:
-      return "SurfaceStates";
-    case FieldGroup::kControls:
-      return "ControlStates";
-    case FieldGroup::kElectrical:
-      return "ElectricalState";
-    case FieldGroup::kAutopilot:
-      return "AutopilotState";
-    case FieldGroup::kWarnings:
-      return "WarningState";
-    case FieldGroup::kFuel:
-      return "FuelState";
-    case FieldGroup::kSim:
-      return "SimStatus";
-  }
-  return "unknown";
-}
-
-int defaultRate(FieldGroup group) {
-  switch (group) {
-    case FieldGroup::kFlight:
-      return kEveryFrame;
-    case FieldGroup::kSurfaces:
-    case FieldGroup::kControls:
-      return 20;
-    case FieldGroup::kEngines:
-      return 10;
-    case FieldGroup::kAutopilot:
-    case FieldGroup::kWarnings:
-    case FieldGroup::kSim:
-      return 5;
-    case FieldGroup::kElectrical:
-      return 2;
-    case FieldGroup::kFuel:
-      return 1;
-  }
-  return 1;
+const std::vector<FieldSpec>& fieldTable() {
+  static const std::vector<FieldSpec> table(std::begin(kFieldLines), std::end(kFieldLines));
+  return table;
 }
 
 std::vector<std::string> expandDatarefPath(std::string_view pattern, int count) {

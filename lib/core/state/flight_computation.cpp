@@ -39,12 +39,13 @@ Eigen::Matrix3d levelFromScenery(const TangentFrame& scenery, const GeoPoint& pl
   return R_ned_opengl;
 }
 
+// Time and flags of the frame, known or not what else the group has: the time is the key that pairs messages.
 void fillSim(const FlightInputs& in, FlightState& s) {
-  s.sim_time = static_cast<float>(in.sim_time);
-  s.frame_period = static_cast<float>(in.frame_period);
-  s.paused = in.paused > 0.5;
-  s.replay = in.replay > 0.5;
-  if (allFinite(in.sim_time, in.frame_period, in.paused, in.replay)) s.valid |= FlightState::kValidSim;
+  takeField(in.sim_time, s.sim_time);
+  takeField(in.frame_period, s.frame_period);
+  takeField(in.paused, s.paused);
+  takeField(in.replay, s.replay);
+  takeReceived(in, FlightState::kValidSim, s);
 }
 
 void fillPosition(const PositionFix& position, const TangentFrame& map, FlightState& s) {
@@ -60,15 +61,16 @@ void fillPosition(const PositionFix& position, const TangentFrame& map, FlightSt
   s.valid |= FlightState::kValidPosition;
 }
 
-void fillAltitudes(const FlightInputs& in, FlightState& s) {
-  s.altitude_agl = static_cast<float>(in.altitude_agl);
-  if (allFinite(in.altitude_agl)) s.valid |= FlightState::kValidAgl;
-  const double pressure_altitude =
-      allFinite(in.altitude_pressure) ? in.altitude_pressure : pressureAltitude(in.static_pressure);
-  if (!allFinite(in.altitude_indicated, pressure_altitude)) return;
-  s.altitude_indicated = static_cast<float>(in.altitude_indicated);
-  s.altitude_pressure = static_cast<float>(pressure_altitude);
-  s.valid |= FlightState::kValidBaro;
+/// The inputs with what X-Plane gave none of worked out from others, and angles in their messages' range.
+FlightInputs completed(const FlightInputs& in) {
+  FlightInputs out = in;
+  if (!isKnown(in.altitude_pressure)) out.altitude_pressure = pressureAltitude(in.static_pressure);
+  if (!isKnown(in.equivalent_airspeed)) out.equivalent_airspeed = equivalentAirspeed(in.true_airspeed, in.air_density);
+  if (!isKnown(in.calibrated_airspeed)) {
+    out.calibrated_airspeed = calibratedAirspeed(impactPressure(in.dynamic_pressure, in.mach));
+  }
+  out.heading_magnetic_deg = wrap360(in.heading_magnetic_deg);
+  return out;
 }
 
 /// @return FRD -> NED; NaN when unknown.
@@ -89,23 +91,12 @@ Eigen::Matrix3d fillAttitude(const FlightInputs& in, const std::optional<Tangent
   return rotationNedFrd(level);
 }
 
-void fillMagnetic(const FlightInputs& in, FlightState& s) {
-  if (!allFinite(in.heading_magnetic_deg, in.declination_deg)) return;
-  s.heading_magnetic_deg = wrap360(in.heading_magnetic_deg);
-  s.declination_deg = static_cast<float>(in.declination_deg);
-  s.valid |= FlightState::kValidMagnetic;
-}
-
 void fillRates(const FlightInputs& in, FlightState& s) {
   if (allFinite(in.roll_rate, in.pitch_rate, in.yaw_rate) && s.has(FlightState::kValidAttitude)) {
     s.angular_velocity = {in.roll_rate, in.pitch_rate, in.yaw_rate};
     s.euler_rates =
         eulerRates({s.roll_deg * kRadiansPerDegree, s.pitch_deg * kRadiansPerDegree, 0.0}, s.angular_velocity);
     s.valid |= FlightState::kValidRates;
-  }
-  if (allFinite(in.angular_acceleration)) {
-    s.angular_acceleration = in.angular_acceleration;
-    s.valid |= FlightState::kValidAngularAccel;
   }
 }
 
@@ -146,63 +137,6 @@ void fillAirVelocity(const Rotations& k, FlightState& s) {
   s.valid |= FlightState::kValidAirVelocity;
 }
 
-void fillAirData(const FlightInputs& in, FlightState& s) {
-  if (allFinite(in.air_density)) {
-    s.air_density = static_cast<float>(in.air_density);
-    s.valid |= FlightState::kValidAtmosphere;
-  }
-  const double equivalent =
-      allFinite(in.equivalent_airspeed) ? in.equivalent_airspeed : equivalentAirspeed(in.true_airspeed, in.air_density);
-  const double calibrated = allFinite(in.calibrated_airspeed)
-                                ? in.calibrated_airspeed
-                                : calibratedAirspeed(impactPressure(in.dynamic_pressure, in.mach));
-  if (!allFinite(in.indicated_airspeed, calibrated, equivalent, in.true_airspeed, in.mach, in.dynamic_pressure)) return;
-  s.indicated_airspeed = static_cast<float>(in.indicated_airspeed);
-  s.calibrated_airspeed = static_cast<float>(calibrated);
-  s.equivalent_airspeed = static_cast<float>(equivalent);
-  s.true_airspeed = static_cast<float>(in.true_airspeed);
-  s.mach = static_cast<float>(in.mach);
-  s.dynamic_pressure = static_cast<float>(in.dynamic_pressure);
-  s.valid |= FlightState::kValidAirspeeds;
-}
-
-void fillLoads(const FlightInputs& in, FlightState& s) {
-  if (allFinite(in.load_factor_normal, in.load_factor_axial, in.load_factor_side)) {
-    s.load_factor_normal = static_cast<float>(in.load_factor_normal);
-    s.load_factor_axial = static_cast<float>(in.load_factor_axial);
-    s.load_factor_side = static_cast<float>(in.load_factor_side);
-    s.specific_force = specificForce(in.load_factor_axial, in.load_factor_side, in.load_factor_normal);
-    s.valid |= FlightState::kValidLoad;
-  }
-  if (allFinite(in.aero_moment)) {
-    s.aero_moment = in.aero_moment;
-    s.valid |= FlightState::kValidMoments;
-  }
-}
-
-void fillRawAirflow(const FlightInputs& in, FlightState& s) {
-  if (!allFinite(in.xplane_alpha_deg, in.xplane_beta_deg, in.xplane_hpath_deg, in.xplane_vpath_deg)) return;
-  s.xplane_alpha_deg = static_cast<float>(in.xplane_alpha_deg);
-  s.xplane_beta_deg = static_cast<float>(in.xplane_beta_deg);
-  s.xplane_hpath_deg = static_cast<float>(in.xplane_hpath_deg);
-  s.xplane_vpath_deg = static_cast<float>(in.xplane_vpath_deg);
-  s.valid |= FlightState::kValidRawAirflow;
-}
-
-void fillControls(const FlightInputs& in, FlightState& s) {
-  if (allFinite(in.control_roll, in.control_pitch, in.control_yaw, in.control_throttle)) {
-    s.control_roll = static_cast<float>(in.control_roll);
-    s.control_pitch = static_cast<float>(in.control_pitch);
-    s.control_yaw = static_cast<float>(in.control_yaw);
-    s.control_throttle = static_cast<float>(in.control_throttle);
-    s.valid |= FlightState::kValidControls;
-  }
-  if (allFinite(in.on_ground)) {
-    s.on_ground = in.on_ground > 0.5;
-    s.valid |= FlightState::kValidContact;
-  }
-}
-
 }  // namespace
 
 double usableEarthRadius(const FlightInputs& inputs) {
@@ -237,20 +171,18 @@ FlightState computeFlightState(const FlightInputs& in, const PositionFix& positi
   fillSim(in, s);
   if (isNoFlight(in)) return s;
   fillPosition(position, map, s);
-  fillAltitudes(in, s);
   Rotations k;
   const std::optional<TangentFrame> scenery = sceneryFrame(in);
   if (scenery && s.has(FlightState::kValidPosition)) k.R_ned_opengl = levelFromScenery(*scenery, position.place);
   k.R_ned_frd = fillAttitude(in, scenery, attitude_reference, s);
-  fillMagnetic(in, s);
   fillRates(in, s);
   fillVelocity(in, k, s);
   fillWind(in, k, s);
   fillAirVelocity(k, s);
-  fillAirData(in, s);
-  fillLoads(in, s);
-  fillRawAirflow(in, s);
-  fillControls(in, s);
+  takeReceived(completed(in), kReceivedGroups & ~FlightState::kValidSim, s);
+  if (s.has(FlightState::kValidLoad)) {
+    s.specific_force = specificForce(in.load_factor_axial, in.load_factor_side, in.load_factor_normal);
+  }
   return s;
 }
 

@@ -68,7 +68,7 @@ StateDecoder::StateDecoder(FieldGroup group, Transport transport, SimulatorVersi
     if (row.row >= 0) {
       plan.row = row.row;
       plan.first = static_cast<std::size_t>(row.slot);
-      plan.special = field.row.bitfield || field.row.may_be_blank || field.row.stride != 1;
+      plan.special = field.row.bitfield || field.row.may_be_blank;
       plan.count = field.row.count;
       plan.conversion = row.conversion;
     } else {
@@ -97,7 +97,7 @@ int StateDecoder::convert(const Plan& plan, const float* wire, int count, double
     return known;
   }
   const RowSource& row = plan.field->row;
-  for (int element = 0; element < count; ++element, wire += row.bitfield ? 0 : row.stride) {
+  for (int element = 0; element < count; ++element, wire += row.bitfield ? 0 : 1) {
     values[element] = kNaN;
     if (!std::isfinite(*wire) || (row.may_be_blank && isMarkedUnused(*wire))) continue;
     values[element] = row.bitfield ? bit(*wire, element) : static_cast<double>(*wire) * factor + offset;
@@ -141,7 +141,7 @@ void computeEquivalentDeflections(SurfaceStates& s) {
     int wings = 0;
     const bool second = (s.valid & SurfaceStates::kValidAileron2) != 0;
     for (std::size_t left = 0; left < s.aileron1.size(); left += 2) {
-      for (const SurfaceStates::PerWing* surface : {&s.aileron1, &s.aileron2}) {
+      for (const auto* surface : {&s.aileron1, &s.aileron2}) {
         if (surface == &s.aileron2 && !second) continue;
         const float l = (*surface)[left], r = (*surface)[left + 1];
         if (!std::isfinite(l) || !std::isfinite(r) || (l == 0.0F && r == 0.0F)) continue;

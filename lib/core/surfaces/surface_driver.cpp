@@ -8,34 +8,9 @@
 namespace xplane_bridge::core {
 namespace {
 
-struct FaultName {
-  SurfaceFault fault;
-  const char* name;
-};
-constexpr FaultName kFaultNames[] = {
-    {SurfaceFault::kStuck, "stuck"},       {SurfaceFault::kHardOverUp, "hard_over_up"},
-    {SurfaceFault::kCentred, "centred"},   {SurfaceFault::kHardOverDown, "hard_over_down"},
-    {SurfaceFault::kFloating, "floating"}, {SurfaceFault::kReduced, "reduced"},
-    {SurfaceFault::kSlow, "slow"},
-};
-
 double towards(double from, double to, double step) { return from + std::clamp(to - from, -step, step); }
 
 }  // namespace
-
-std::optional<SurfaceFault> surfaceFaultFrom(const std::string& kind) {
-  for (const auto& row : kFaultNames) {
-    if (kind == row.name) return row.fault;
-  }
-  return std::nullopt;
-}
-
-const char* toString(SurfaceFault fault) {
-  for (const auto& row : kFaultNames) {
-    if (fault == row.fault) return row.name;
-  }
-  return "unknown";
-}
 
 std::optional<std::string> validate(const SurfaceFailure& f) {
   const auto wrong = [&f](const char* expected) {
@@ -58,6 +33,8 @@ std::optional<std::string> validate(const SurfaceFailure& f) {
     case SurfaceFault::kCentred:
     case SurfaceFault::kFloating:
       break;
+    case SurfaceFault::kGone:
+      return "gone: no deflection expresses a lost surface";
   }
   return std::nullopt;
 }
@@ -139,6 +116,7 @@ double SurfaceDriver::target(const Driven& d, const MixingVector& terms) const {
       return neutral + *d.failure->value * (bounded - neutral);
     case SurfaceFault::kFloating:
     case SurfaceFault::kSlow:
+    case SurfaceFault::kGone:  // refused by validate()
       return bounded;
   }
   return bounded;

@@ -5,23 +5,14 @@
 #include <utility>
 
 #include "xplane_bridge/core/base/units.hpp"
-#include "xplane_bridge/nodes/capture/flight_state_interpolation.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
+#include "xplane_bridge/nodes/messages/flight_state_interpolation.hpp"
 
 namespace xplane_bridge {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kOffsetSmoothing = 0.05;
-
-constexpr bool sameBit(std::uint32_t message, std::uint32_t ours) { return message == ours; }
-static_assert(sameBit(FrameState::QUALITY_STATE_MISSING, core::kStateMissing), "FrameState and core differ");
-static_assert(sameBit(FrameState::QUALITY_INTERPOLATED, core::kInterpolated), "FrameState and core differ");
-static_assert(sameBit(FrameState::QUALITY_OFF_FRAME, core::kOffFrame), "FrameState and core differ");
-static_assert(sameBit(FrameState::QUALITY_CLOCK_UNSURE, core::kClockUnsure), "FrameState and core differ");
-static_assert(sameBit(FrameState::QUALITY_PAUSED, core::kPaused), "FrameState and core differ");
-static_assert(sameBit(FrameState::QUALITY_EPOCH_EDGE, core::kEpochEdge), "FrameState and core differ");
-static_assert(sameBit(FrameState::QUALITY_BORDERLINE, core::kBorderline), "FrameState and core differ");
 
 /// A state that nothing is known of: valid = 0 and NaN, never zero for unknown.
 FlightState unknownState() {

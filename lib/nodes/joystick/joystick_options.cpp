@@ -11,10 +11,11 @@ core::JoyTarget targetOf(const ParamLoader& in, const std::string& name) {
   const std::string text = in.text("target", name);
   const auto target = core::joyTargetFrom(text);
   if (!target) {
+    std::string known;
+    for (const core::JoyTargetRow& row : core::kJoyTargets)
+      known += (known.empty() ? "" : ", ") + std::string(row.name);
     throw ParamError("parameter " + in.fullKey("target") + ": \"" + text +
-                     "\" (by default the section's name) is no target; allowed: roll, pitch, yaw, throttle, trim_roll, "
-                     "trim_pitch, trim_yaw, flaps, speedbrake, gear, parking_brake, brakes, left_brake, right_brake, "
-                     "thrust_vector");
+                     "\" (by default the section's name) is no target; allowed: " + known);
   }
   return *target;
 }

@@ -1,6 +1,7 @@
 #include "xplane_bridge/nodes/rx/mission_publisher.hpp"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include "xplane_bridge/core/base/rate_limiter.hpp"
@@ -21,7 +22,7 @@ class TypedMissionPublisher : public MissionPublisher {
     rebuild();
   }
 
-  core::FieldGroup group() const override { return core::GroupOf<State>::kGroup; }
+  core::FieldGroup group() const override { return State::kGroup; }
   int rate() const override { return rate_; }
 
   void advertise(ros::NodeHandle* handle) override {
@@ -113,28 +114,27 @@ class TypedMissionPublisher : public MissionPublisher {
   Message message_;
 };
 
+/// Calls f with a null pointer to each of a tuple's types.
+template <class F, class... Types>
+void forEachType(F f, std::tuple<Types...>*) {
+  (f(static_cast<Types*>(nullptr)), ...);
+}
+
 }  // namespace
 
 std::vector<std::unique_ptr<MissionPublisher>> makeMissionPublishers(
     const std::array<int, core::kFieldGroupCount>& rates, core::Transport transport, const FrameNames& frames) {
   std::vector<std::unique_ptr<MissionPublisher>> publishers;
-  const auto add = [&](auto* state, auto* message) {
-    using State = std::remove_pointer_t<decltype(state)>;
-    using Message = std::remove_pointer_t<decltype(message)>;
-    const int rate = rates[static_cast<std::size_t>(core::GroupOf<State>::kGroup)];
+  const auto add = [&](auto* pair) {
+    using State = typename std::remove_pointer_t<decltype(pair)>::first_type;
+    using Message = typename std::remove_pointer_t<decltype(pair)>::second_type;
+    const int rate = rates[static_cast<std::size_t>(State::kGroup)];
     if (rate > 0) {
       publishers.push_back(
           std::make_unique<TypedMissionPublisher<State, Message>>(rate, transport, frames.base_link_frd));
     }
   };
-  add(static_cast<core::EngineStates*>(nullptr), static_cast<EngineStates*>(nullptr));
-  add(static_cast<core::SurfaceStates*>(nullptr), static_cast<SurfaceStates*>(nullptr));
-  add(static_cast<core::ControlStates*>(nullptr), static_cast<ControlStates*>(nullptr));
-  add(static_cast<core::ElectricalState*>(nullptr), static_cast<ElectricalState*>(nullptr));
-  add(static_cast<core::AutopilotState*>(nullptr), static_cast<AutopilotState*>(nullptr));
-  add(static_cast<core::WarningState*>(nullptr), static_cast<WarningState*>(nullptr));
-  add(static_cast<core::FuelState*>(nullptr), static_cast<FuelState*>(nullptr));
-  add(static_cast<core::SimStatus*>(nullptr), static_cast<SimStatus*>(nullptr));
+  forEachType(add, static_cast<MissionMessages*>(nullptr));
   return publishers;
 }
 

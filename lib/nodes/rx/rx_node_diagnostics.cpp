@@ -40,6 +40,13 @@ constexpr GroupName kFlightGroups[] = {
     {core::FlightState::kValidContact, "ground contact"},
 };
 
+constexpr std::uint32_t allGroups() {
+  std::uint32_t bits = 0;
+  for (const GroupName& group : kFlightGroups) bits |= group.bit;
+  return bits;
+}
+static_assert(allGroups() == core::FlightState::kValidAll, "every group of FlightState has a name here");
+
 std::string missingGroups(std::uint32_t valid) {
   std::vector<std::string> names;
   for (const GroupName& group : kFlightGroups) {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "xplane_bridge/core/control/control_channels.hpp"
+
 namespace xplane_bridge {
 namespace {
-
-using core::Channel;
 
 core::Failsafe failsafeOf(const ParamLoader& in, const std::string& key, core::Failsafe fallback, bool required) {
   const std::vector<std::string> allowed = {"neutral", "hold", "manual"};
@@ -15,41 +15,21 @@ core::Failsafe failsafeOf(const ParamLoader& in, const std::string& key, core::F
   return text == "manual" ? core::Failsafe::kManual : core::Failsafe::kNeutral;
 }
 
-struct ChannelSection {
-  const char* name;
-  Channel first, last;
-  bool primary;  // follows the aircraft's `failsafe`; the others hold unless they say otherwise
-};
-const ChannelSection kSections[] = {
-    {"roll", Channel::kRoll, Channel::kRoll, true},
-    {"pitch", Channel::kPitch, Channel::kPitch, true},
-    {"yaw", Channel::kYaw, Channel::kYaw, true},
-    {"throttle", core::leverChannel(0), core::leverChannel(core::kMaxEngines - 1), true},
-    {"motors", core::motorChannel(0), core::motorChannel(core::kMaxEngines - 1), true},
-    {"trim_roll", Channel::kTrimRoll, Channel::kTrimRoll, false},
-    {"trim_pitch", Channel::kTrimPitch, Channel::kTrimPitch, false},
-    {"trim_yaw", Channel::kTrimYaw, Channel::kTrimYaw, false},
-    {"flaps", Channel::kFlaps, Channel::kFlaps, false},
-    {"speedbrake", Channel::kSpeedbrake, Channel::kSpeedbrake, false},
-    {"gear", Channel::kGear, Channel::kGear, false},
-    {"parking_brake", Channel::kParkingBrake, Channel::kParkingBrake, false},
-    {"toe_brakes", Channel::kLeftBrake, Channel::kRightBrake, true},
-    {"thrust_vector", Channel::kThrustVector, Channel::kThrustVector, false},
-};
-
 void loadChannels(const ParamLoader& aircraft, bool reverse_thrust, core::ArbiterOptions* out) {
   const core::Failsafe failsafe = failsafeOf(aircraft, "failsafe", core::Failsafe::kNeutral, true);
   const ParamLoader channels = aircraft.section("channels");
-  for (const ChannelSection& section : kSections) {
+  for (const core::ChannelSection& section : core::kChannelSections) {
     const ParamLoader in = channels.section(section.name);
     core::ChannelRange range = core::commandRange(section.first);
     // Below 0 a lever means reverse thrust, which most aircraft do not have.
     if (core::isLever(section.first) && !reverse_thrust) range.low = 0.0;
+    // Sticks, levers, motors and toe brakes follow the aircraft's `failsafe`; handles hold unless they say otherwise.
+    const bool primary = core::channelWire(section.first, {}).refresh == core::Refresh::kContinuous;
     core::ChannelOptions options;
     options.low = in.number("low", {range.low, range.high}, range.low);
     options.high = in.number("high", {options.low, range.high}, range.high);
     if (in.has("slew")) options.slew = in.number("slew", {1e-3, 1e3});
-    options.failsafe = failsafeOf(in, "failsafe", section.primary ? failsafe : core::Failsafe::kHold, false);
+    options.failsafe = failsafeOf(in, "failsafe", primary ? failsafe : core::Failsafe::kHold, false);
     options.neutral = in.number("neutral", {options.low, options.high}, std::clamp(0.0, options.low, options.high));
     for (std::size_t i = core::index(section.first); i <= core::index(section.last); ++i) out->channels[i] = options;
   }

@@ -6,7 +6,9 @@ from typing import NamedTuple, Sequence
 
 import numpy as np
 
-_MODES = {1: "manual", 2: "auto"}
+from xplane_bridge.constants import FlightMode, words
+
+_MODES = words(FlightMode)
 
 
 class Episode(NamedTuple):
@@ -43,7 +45,7 @@ def who_flew(time: np.ndarray, modes: Sequence[int], failsafes: Sequence[bool], 
 
     Args:
         time: int64 [ns] of each message of control/mode, non-decreasing.
-        modes: Of each: 1 manual, 2 auto.
+        modes: Of each: `constants.FlightMode`.
         failsafes: Of each: whether the failsafe flies.
         end: [ns] where the recording ends.
     """

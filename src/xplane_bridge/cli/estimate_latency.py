@@ -19,15 +19,16 @@ from xplane_bridge.analysis.latency import (
 )
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.entry import guarded, number
+from xplane_bridge.constants import CameraView, ImageQuality, words
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Table
 
 #: Line of sight in body axes (forward, right, down), by FrameState.view.
 _AXES = {1: (1.0, 0.0, 0.0), 2: (-1.0, 0.0, 0.0), 3: (0.0, 0.0, 1.0)}
-_VIEWS = {"forward": 1, "rear": 2, "down": 3}
-#: FrameState bits of pictures that say nothing about the delay: display unknown, frozen, black, external view.
-_USELESS = 8 | 32 | 64 | 2048
+_VIEWS = {name: number for number, name in words(CameraView).items() if number != CameraView.UNKNOWN}
+#: Pictures that say nothing about the delay.
+_USELESS = ImageQuality.DISPLAY_UNKNOWN | ImageQuality.FROZEN | ImageQuality.BLACK | ImageQuality.EXTERNAL_VIEW
 #: A command that stays the same for longer rests; until then it may be on its way from one value to the next [s].
 _MOVING_S = 0.06
 #: Command and the surface that follows it.
@@ -191,7 +192,7 @@ def _frame_states(bags: Bags) -> tuple[set[int] | None, int]:
         return None, 0
     views, counts = np.unique(table["view"], return_counts=True)
     view = int(views[np.argmax(counts)])
-    use = ((table["quality"] & _USELESS) == 0) & (table["view"] == view)
+    use = ((table["quality"] & _USELESS.value) == 0) & (table["view"] == view)
     return {int(stamp) for stamp in table.stamp[use]}, view
 
 

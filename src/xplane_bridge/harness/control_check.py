@@ -8,12 +8,12 @@ from typing import Dict, List, NamedTuple, Tuple
 import numpy as np
 
 from xplane_bridge.bags import Bags, Table
+from xplane_bridge.constants import CommandSource, FlightMode
 from xplane_bridge.harness.flight_check import CheckError, Verdict
 from xplane_bridge.topics import NAMESPACE
 
-MANUAL, AUTO = 1, 2
-#: Who commands, in AppliedCommand; the same numbers as the modes.
-_SOURCE_OF = {MANUAL: 1, AUTO: 2}
+#: Who commands, in AppliedCommand.
+_SOURCE_OF = {FlightMode.MANUAL: CommandSource.MANUAL, FlightMode.AUTO: CommandSource.AUTO}
 #: Sources change within so long of a change of mode [s].
 _SETTLED_S = 0.3
 #: A controller that flies for less has not flown [s].
@@ -58,7 +58,7 @@ def check_stick(joy: Table, manual: Table, applied: Table, states: Table) -> Ver
     if not len(joy) or not len(manual) or not len(applied):
         text = f"{len(joy)} messages of the joystick, {len(manual)} commands from it, {len(applied)} sent"
         return Verdict("stick", False, text)
-    sent = applied["source"] == _SOURCE_OF[MANUAL]
+    sent = applied["source"] == CommandSource.MANUAL
     sequences = np.unique(applied["sequence"][sent])
     shown = np.unique(applied["sequence"][sent & applied["read_back"].astype(bool)])
     # Frames while the stick flew: those to which the newest command sent was the stick's.
@@ -80,9 +80,8 @@ def check_modes(modes: Table, applied: Table, joystick: str) -> Verdict:
     """
     end = float(applied.time[-1]) / 1e9
     flown = spells(modes, end)
-    automatic = [
-        k for k, spell in enumerate(flown) if spell.mode == AUTO and spell.end - spell.start > _SHORTEST_AUTO_S
-    ]
+    long = [spell.end - spell.start > _SHORTEST_AUTO_S for spell in flown]
+    automatic = [k for k, spell in enumerate(flown) if spell.mode == FlightMode.AUTO and long[k]]
     automatic = [k for k in automatic if flown[k].asked_by == joystick]
     if not automatic:
         return Verdict("modes", False, f"no automatic flight of {_SHORTEST_AUTO_S:g} s that {joystick} asked for")
@@ -92,10 +91,10 @@ def check_modes(modes: Table, applied: Table, joystick: str) -> Verdict:
     time = applied.time / 1e9
     right = total = 0
     for spell in flown:
-        within = (time > spell.start + _SETTLED_S) & (time < spell.end) & (applied["source"] != 0)
+        within = (time > spell.start + _SETTLED_S) & (time < spell.end) & (applied["source"] != CommandSource.NONE)
         if spell is flown[-1]:
-            within &= applied["source"] != 3  # the end: the stick falls silent
-        right += int(np.count_nonzero(applied["source"][within] == _SOURCE_OF[spell.mode]))
+            within &= applied["source"] != CommandSource.FAILSAFE  # the end: the stick falls silent
+        right += int(np.count_nonzero(applied["source"][within] == _SOURCE_OF[FlightMode(spell.mode)]))
         total += int(np.count_nonzero(within))
     share = right / max(total, 1)
     auto_s = sum(flown[k].end - flown[k].start for k in automatic)

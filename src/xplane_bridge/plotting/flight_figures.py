@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Callable, Sequence
 import numpy as np
 
 from xplane_bridge.analysis.episodes import Episode, from_sets, from_values, who_flew
+from xplane_bridge.constants import ControlField
 from xplane_bridge.plotting.spec import Panel, PathFigure, Series, TimeFigure
 
 if TYPE_CHECKING:
@@ -14,7 +15,12 @@ if TYPE_CHECKING:
     from xplane_bridge.bags.flight import Flight
 
 #: ControlCommand's bits, as in AppliedCommand.fields; THROTTLE, ENGINE_THROTTLES and MOTORS all fill `throttles`.
-_COMMAND_BITS = {"roll": 1, "pitch": 2, "yaw": 4, "throttles": 8 | 16 | 32}
+_COMMAND_BITS = {
+    "roll": ControlField.ROLL,
+    "pitch": ControlField.PITCH,
+    "yaw": ControlField.YAW,
+    "throttles": ControlField.THROTTLE | ControlField.ENGINE_THROTTLES | ControlField.MOTORS,
+}
 
 
 class MissingError(Exception):
@@ -181,7 +187,7 @@ def _commanded(flight: Flight, column: str, index: int | None = None) -> list[Se
         return []
     t = flight.tables["applied"]
     values = (t[column] if index is None else t[column][:, index]).astype(np.float64)
-    sent = (t["fields"].astype(np.int64) & _COMMAND_BITS[column]) != 0
+    sent = (t["fields"].astype(np.int64) & _COMMAND_BITS[column].value) != 0
     if not sent.any():
         return []
     return [Series("commanded", t.stamp, np.where(sent, values, np.nan), dashed=True, stepped=True)]

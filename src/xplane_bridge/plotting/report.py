@@ -14,6 +14,7 @@ from xplane_bridge.analysis.consistency import check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values, who_flew
 from xplane_bridge.analysis.quality import BAD_QUALITY, bit_shares, pairing, timing
 from xplane_bridge.analysis.summary import summary
+from xplane_bridge.constants import LinkState, words
 from xplane_bridge.plotting import interactive
 from xplane_bridge.plotting.flight_figures import MissingError, all_figures
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 #: Images on the strip, evenly spread over the flight.
 STRIP_IMAGES = 12
 _THUMBNAIL_WIDTH = 320
-_LINK_STATES = ("searching", "connected", "paused", "stale", "lost")
+_LINK_STATES = words(LinkState)
 
 _STYLE = """
 :root { --ink: #1d2733; --soft: #5c6b7a; --line: #dde3e9; --back: #f6f8fa; }
@@ -177,7 +178,7 @@ def _links(flight: Flight) -> str:
     if "link" not in flight.tables:
         return ""
     table = flight.tables["link"]
-    names = [_LINK_STATES[k] if k < len(_LINK_STATES) else str(k) for k in table["state"]]
+    names = [_LINK_STATES.get(int(k), str(k)) for k in table["state"]]
     rows = [
         (_seconds(e.start, flight), f"{(e.end - e.start) / 1e9:.1f}", html.escape(e.label))
         for e in from_values(table.stamp, names, max(flight.end, int(table.stamp[-1])))

@@ -12,10 +12,9 @@ import yaml
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
 from xplane_bridge.errors import yaml_problem
 
+from ..constants import EXCITATION_KINDS, FAILURE_KINDS
 from .holds import HoldGains
 from .schema import (
-    EXCITATION_KINDS,
-    FAILURE_KINDS,
     HANDLES,
     HOLDS,
     MODES,

@@ -13,8 +13,9 @@ import time
 from pathlib import Path
 from typing import Any, Callable, Dict, Optional
 
+from ..constants import COMMAND_FIELDS, FlightMode, words
 from .player import Action, Commands, FlightSample, Player
-from .schema import Scenario, ScenarioError
+from .schema import HANDLE_FIELDS, Scenario, ScenarioError
 from .virtual_stick import VirtualStick
 
 #: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
@@ -23,18 +24,7 @@ _BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_no
 _SERVICE_WAIT_S = 15.0
 _MODE_WAIT_S = 5.0
 _TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
-_MODE_NAMES = {1: "manual", 2: "auto"}
-#: Player handles to fields of ControlCommand.
-_HANDLES = {
-    "flaps": ("FLAPS", ("flaps",)),
-    "gear": ("GEAR", ("gear",)),
-    "speed_brake": ("SPEEDBRAKE", ("speedbrake",)),
-    "thrust_vector": ("THRUST_VECTOR", ("thrust_vector",)),
-    "brakes": ("TOE_BRAKES", ("left_brake", "right_brake")),
-    "roll_trim": ("TRIM_ROLL", ("trim_roll",)),
-    "pitch_trim": ("TRIM_PITCH", ("trim_pitch",)),
-    "yaw_trim": ("TRIM_YAW", ("trim_yaw",)),
-}
+_MODE_NAMES = words(FlightMode)
 
 
 def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
@@ -67,9 +57,8 @@ def fill_command(commands: Commands, message: Any) -> None:
         message.fields |= message.THROTTLE
         message.throttle = commands.throttle
     for handle, value in commands.handles.items():
-        bit, names = _HANDLES[handle]
-        message.fields |= getattr(message, bit)
-        for name in names:
+        for name in HANDLE_FIELDS[handle]:
+            message.fields |= COMMAND_FIELDS[name].bit.value
             setattr(message, name, value)
 
 

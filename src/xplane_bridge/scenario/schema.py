@@ -7,26 +7,29 @@ from typing import Any, Dict, Mapping, Optional, Tuple
 
 from xplane_bridge.analysis.criteria import SCORED, Criterion
 
+from ..constants import COMMAND_FIELDS, FlightMode, words
 from ..errors import XplaneBridgeError
 
+
+def _range(field: str) -> Tuple[float, float]:
+    return COMMAND_FIELDS[field].low, COMMAND_FIELDS[field].high
+
+
 #: Stick axes and their ranges; throttle is a lever.
-STICK_AXES: Dict[str, Tuple[float, float]] = {
-    "roll": (-1.0, 1.0),
-    "pitch": (-1.0, 1.0),
-    "yaw": (-1.0, 1.0),
-    "throttle": (-1.0, 1.0),
+STICK_AXES: Dict[str, Tuple[float, float]] = {name: _range(name) for name in ("roll", "pitch", "yaw", "throttle")}
+#: Handles, and the fields of ControlCommand that each moves.
+HANDLE_FIELDS: Dict[str, Tuple[str, ...]] = {
+    "flaps": ("flaps",),
+    "gear": ("gear",),
+    "speed_brake": ("speedbrake",),
+    "thrust_vector": ("thrust_vector",),
+    "brakes": ("left_brake", "right_brake"),
+    "roll_trim": ("trim_roll",),
+    "pitch_trim": ("trim_pitch",),
+    "yaw_trim": ("trim_yaw",),
 }
 #: Handles and their ranges; gear: 1 down.
-HANDLES: Dict[str, Tuple[float, float]] = {
-    "flaps": (0.0, 1.0),
-    "gear": (0.0, 1.0),
-    "speed_brake": (-0.5, 1.0),
-    "thrust_vector": (0.0, 1.0),
-    "brakes": (0.0, 1.0),
-    "roll_trim": (-1.0, 1.0),
-    "pitch_trim": (-1.0, 1.0),
-    "yaw_trim": (-1.0, 1.0),
-}
+HANDLES: Dict[str, Tuple[float, float]] = {handle: _range(fields[0]) for handle, fields in HANDLE_FIELDS.items()}
 #: Targets that the player flies to, with their ranges (units in config/scenarios/README.md).
 HOLDS: Dict[str, Tuple[float, float]] = {
     "roll": (-80.0, 80.0),
@@ -39,19 +42,8 @@ HOLDS: Dict[str, Tuple[float, float]] = {
 }
 #: What conditions can look at.
 VARIABLES = ("time", *SCORED, "on_ground", "stall_warning", "mode")
-FAILURE_KINDS = (
-    "stuck",
-    "hard_over_up",
-    "hard_over_down",
-    "centred",
-    "floating",
-    "reduced",
-    "slow",
-    "gone",
-    "failed",
-)
-EXCITATION_KINDS = ("doublet", "3-2-1-1", "multisine", "chirp")
-MODES = {"manual": 1, "auto": 2}
+#: Modes by name, and their numbers.
+MODES: Dict[str, int] = {name: number for number, name in words(FlightMode).items()}
 
 
 class ScenarioError(XplaneBridgeError, ValueError):

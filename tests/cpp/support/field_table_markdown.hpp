@@ -26,7 +26,7 @@ inline std::string markdownConversion(const Conversion& conversion) {
 inline std::string markdownSlots(int row, int slot, const RowSource& source) {
   std::string text = std::to_string(row) + "." + std::to_string(slot);
   if (source.bitfield) return text + " (bits)";
-  if (source.count > 1) text += "-" + std::to_string(slot + (source.count - 1) * source.stride);
+  if (source.count > 1) text += "-" + std::to_string(slot + source.count - 1);
   return text;
 }
 
@@ -53,8 +53,7 @@ inline std::string markdownRow(const RowSource& source) {
 inline std::string fieldTableMarkdown() {
   std::ostringstream page;
   page << "# Where every field comes from\n\n"
-          "Generated from the field table (`lib/core/state/field_table_lines.cpp`) by `field_table_doc`; do not "
-          "edit.\n\n"
+          "Generated from the messages and `lib/core/state/sources.txt` by `field_table_doc`; do not edit.\n\n"
           "* **Field**: as in the message, or an input that fields are computed from. `[n]`: elements.\n"
           "* **Dataref**: transport `rref`. `{a,b}` stands for several datarefs, `[*]` for every element; `12:` is\n"
           "  another name in X-Plane 12. Datarefs of fields without a row are asked for with transport `data` too.\n"
@@ -72,12 +71,10 @@ inline std::string fieldTableMarkdown() {
            << "| Field | Unit | Dataref | Row | Remarks |\n|---|---|---|---|---|\n";
     }
     previous = &field;
-    std::string remarks = field.derivation;
-    if (*field.remark != '\0') remarks += (remarks.empty() ? "" : ". ") + std::string(field.remark);
     page << "| " << field.field;
     if (field.count > 1 && field.store != nullptr) page << "[" << field.count << "]";
     page << " | " << field.unit << " | " << markdownDataref(field.dataref) << " | " << markdownRow(field.row) << " | "
-         << remarks << " |\n";
+         << field.remark << " |\n";
   }
   return page.str();
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/base/message_constants.hpp"
 #include "xplane_bridge/core/state/field_table.hpp"
 #include "xplane_bridge/core/state/mission_state.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
@@ -12,11 +13,6 @@
 #include "xplane_bridge/core/wire/rref_subscription.hpp"
 
 namespace xplane_bridge::core {
-
-/// Where the pilot's camera looks; equal in value to FrameState.VIEW_*.
-enum class CameraView : std::uint8_t { kUnknown = 0, kForward = 1, kRear = 2, kDown = 3 };
-/// "unknown", "forward", "rear", "down"
-const char* toString(CameraView view);
 
 /// Which of the three views a head attitude is.
 /// @param heading_deg of the head in the aircraft, right + (SimStatus.view_heading_deg), any branch

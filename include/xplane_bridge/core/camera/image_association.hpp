@@ -5,6 +5,8 @@
 #include <deque>
 #include <optional>
 
+#include "xplane_bridge/core/base/message_constants.hpp"
+
 namespace xplane_bridge::core {
 
 /// Which simulator frame does a picture show, and which received flight state belongs to that frame?
@@ -73,25 +75,6 @@ struct Association {
   bool at_edge = false;       ///< the frame lies at a pause, reset, epoch or gap
   double frame_period = 0.0;  ///< [s] simulator time of one frame, 0 = unknown
   bool ambiguous = false;     ///< the moment lies nearer to the border between two frames than its uncertainty
-};
-
-/// Bits of FrameState.quality, equal in value to the message's QUALITY_* (0 is perfect).
-enum ImageQuality : std::uint32_t {
-  kStateMissing = 1,
-  kInterpolated = 2,
-  kOffFrame = 4,
-  kDisplayUnknown = 8,
-  kClockUnsure = 16,
-  kFrozen = 32,
-  kBlack = 64,
-  kPaused = 128,
-  kReplay = 256,
-  kViewUnknown = 512,
-  kFovAssumed = 1024,
-  kExternalView = 2048,
-  kEpochEdge = 4096,
-  kDelayAssumed = 8192,
-  kBorderline = 16384,
 };
 
 /// Running totals since construction.
@@ -180,8 +163,8 @@ class ImageAssociator {
   AssociationCounters counters_;
 };
 
-/// The quality bits that follow from the pairing alone (kStateMissing, kInterpolated, kOffFrame, kClockUnsure, kPaused,
-/// kEpochEdge, kBorderline); the capture's own bits are added by the caller.
+/// The quality bits that follow from the pairing alone (STATE_MISSING, INTERPOLATED, OFF_FRAME, CLOCK_UNSURE, PAUSED,
+/// EPOCH_EDGE, BORDERLINE); the capture's own bits are added by the caller.
 [[nodiscard]] std::uint32_t pairingQuality(const ImageMoment& moment, const Association& answer);
 
 /// Interpolates an angle the short way round.

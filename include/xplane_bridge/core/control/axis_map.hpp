@@ -27,25 +27,6 @@ struct AxisIndex {
   int of(StickMode mode) const { return mode == StickMode::kMode1 ? mode_1 : mode_2; }
 };
 
-/// What an input can command: ControlCommand's fields, with both toe brakes together as well.
-enum class JoyTarget : std::uint8_t {
-  kRoll,
-  kPitch,
-  kYaw,
-  kThrottle,
-  kTrimRoll,
-  kTrimPitch,
-  kTrimYaw,
-  kFlaps,
-  kSpeedbrake,
-  kGear,
-  kParkingBrake,
-  kBrakes,
-  kLeftBrake,
-  kRightBrake,
-  kThrustVector,
-};
-
 /// By the name in YAML ("roll", "trim_pitch", "brakes", ...); nullopt for another.
 std::optional<JoyTarget> joyTargetFrom(const std::string& name);
 const char* toString(JoyTarget target);

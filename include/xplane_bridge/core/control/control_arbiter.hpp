@@ -14,13 +14,6 @@
 
 namespace xplane_bridge::core {
 
-/// The paper's manualAutoState.
-enum class FlightMode : std::uint8_t { kManual = 1, kAuto = 2 };
-const char* toString(FlightMode mode);
-
-/// Where the values sent come from (AppliedCommand.msg).
-enum class CommandSource : std::uint8_t { kNone = 0, kManual = 1, kAuto = 2, kFailsafe = 3 };
-
 /// What a channel does when the source that flies it is silent for longer than the time-out.
 enum class Failsafe : std::uint8_t {
   kNeutral,  ///< goes to the channel's neutral value (the paper's zeros)

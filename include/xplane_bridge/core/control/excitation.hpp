@@ -10,16 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/base/message_constants.hpp"
+
 namespace xplane_bridge::core {
 
-enum class ExcitationShape : std::uint8_t {
-  kDoublet,    ///< +A for the first half of `duration`, then -A
-  k3211,       ///< +A for 3/7 of `duration`, -A for 2/7, +A for 1/7, -A for 1/7
-  kMultisine,  ///< equal-power harmonics of 1/`duration` within the band, Schroeder phases (low crest factor)
-  kChirp,      ///< logarithmic sweep from `frequency_min` to `frequency_max`
-};
-
-const char* toString(ExcitationShape shape);
+// The shapes (ExcitationShape), A the amplitude. Doublet: +A for the first half of `duration`, then -A. 3-2-1-1: +A for
+// 3/7 of `duration`, -A for 2/7, +A for 1/7, -A for 1/7. Multisine: equal-power harmonics of 1/`duration` within the
+// band, Schroeder phases (low crest factor). Chirp: logarithmic sweep from `frequency_min` to `frequency_max`.
 
 /// What to play. Defaults are a usable roll multisine.
 struct ExcitationSpec {

@@ -19,15 +19,6 @@ namespace xplane_bridge::core {
 constexpr int kFailedNow = 6;
 constexpr int kWorking = 0;
 
-enum class FailureTrigger : std::uint8_t {
-  kNow = 0,
-  kAtSimTime = 1,        ///< [s] after the request, in simulator time
-  kAtAltitudeAbove = 2,  ///< [m] AGL
-  kAtAltitudeBelow = 3,
-  kAtSpeedAbove = 4,  ///< [m/s] indicated airspeed
-  kAtSpeedBelow = 5,
-};
-
 /// As SetFailure.srv.
 struct FailureRequest {
   std::string name;  ///< surface, engine_<n>, bus_<n>, ..., or a rel_* dataref

@@ -4,18 +4,9 @@
 #include <optional>
 
 #include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/message_constants.hpp"
 
 namespace xplane_bridge::core {
-
-enum class LinkState : std::uint8_t {
-  kSearching = 0,  ///< no answer yet, or no X-Plane found
-  kConnected = 1,  ///< answers arrive
-  kPaused = 2,     ///< answers arrive, simulator time stands
-  kStale = 3,      ///< silence longer than `stale_after_s`: scenery load or menu; everything is kept
-  kLost = 4,       ///< silence, and the beacon is gone too or it lasts longer than `lost_after_s`
-};
-/// "SEARCHING" ... "LOST"
-const char* toString(LinkState state);
 
 struct LinkMonitorOptions {
   double stale_after_s = 0.4;

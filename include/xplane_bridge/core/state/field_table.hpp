@@ -2,46 +2,23 @@
 
 /// @file
 /// The one table that knows where every field of every state message comes from: dataref or DATA row and slot, for
-/// X-Plane 11 and 12, with units, factors and signs. Nothing else in the code names a dataref of a state field or a row
-/// number. docs/fields.md is generated from it (tests/cpp/support/field_table_doc.cpp).
+/// X-Plane 11 and 12, with units, factors and signs. Its lines are those of lib/core/state/sources.txt; nothing else
+/// names a dataref of a state field or a row number. docs/fields.md is made from it
+/// (tests/cpp/support/field_table_doc.cpp).
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <vector>
 
 #include "xplane_bridge/core/base/simulator_version.hpp"
-#include "xplane_bridge/core/base/units.hpp"
+#include "xplane_bridge/core/state/field_groups.hpp"
+#include "xplane_bridge/core/state/field_store.hpp"
 
 namespace xplane_bridge::core {
 
 enum class Transport : std::uint8_t { kRref, kData };
-
-/// One group is one message, one set of requests, one rate.
-enum class FieldGroup : std::uint8_t {
-  kFlight,
-  kEngines,
-  kSurfaces,
-  kControls,
-  kElectrical,
-  kAutopilot,
-  kWarnings,
-  kFuel,
-  kSim,
-};
-inline constexpr std::size_t kFieldGroupCount = 9;
-/// `flight`, `engines`, ...: parameter and topic names.
-const char* toString(FieldGroup group);
-/// Name of the group's message type.
-const char* messageName(FieldGroup group);
-
-/// Requests per second that mean "every frame": X-Plane caps at its frame rate.
-inline constexpr int kEveryFrame = 999;
-/// Rate asked for unless a parameter says otherwise [1/s].
-int defaultRate(FieldGroup group);
 
 /// wire value * factor + offset = SI value.
 struct Conversion {
@@ -58,7 +35,7 @@ struct DatarefSource {
   Conversion conversion12{};  ///< of path12
 };
 
-/// Slots of a DATA row: element i is in slot + i * stride.
+/// Slots of a DATA row: elements follow each other.
 struct RowSource {
   int row11 = -1;  ///< -1: no row carries it
   int slot11 = 0;
@@ -66,14 +43,11 @@ struct RowSource {
   int slot12 = 0;
   Conversion conversion11{};
   Conversion conversion12{};
-  int count = 0;  ///< elements carried
-  int stride = 1;
+  int count = 0;              ///< elements carried
   bool bitfield = false;      ///< one slot for all elements: element i is bit i of the number in it
   bool may_be_blank = false;  ///< -999 in this slot means unused (it is a value in all others)
 };
 
-/// Writes a field's first `count` elements, SI values; NaN is unknown. `target` is the group's struct.
-using FieldStore = void (*)(void* target, const double* values, int count);
 /// No field has more elements.
 inline constexpr int kMaxFieldElements = 16;
 
@@ -84,11 +58,10 @@ struct FieldSpec {
   int count = 1;               ///< elements
   const char* unit = "";       ///< of the stored value
   std::uint32_t valid = 0;     ///< bit of the message's `valid` it counts for; 0: none by itself
-  FieldStore store = nullptr;  ///< null: computed (derivation says how)
+  FieldStore store = nullptr;  ///< null: computed (remark says how)
   DatarefSource dataref{};
   RowSource row{};
-  const char* derivation = "";   ///< how it is computed, or what an input is for; "" for plain fields
-  const char* remark = "";       ///< on the sources; [?] marks what only a live simulator can settle
+  const char* remark = "";       ///< [?] marks what only a live simulator can settle
   bool per_engine = false;       ///< elements at or beyond the engine count are not known
   bool is_engine_count = false;  ///< is that count; comes before the fields it bounds
 };

@@ -2,72 +2,11 @@
 
 #include <cstdint>
 
+#include "xplane_bridge/core/state/flight_inputs.hpp"
 #include "xplane_bridge/core/state/flight_state.hpp"
 #include "xplane_bridge/core/state/frames.hpp"
 
 namespace xplane_bridge::core {
-
-/// What the flight group's table lines deliver for one frame, in SI units (degrees where a name ends in _deg),
-/// whichever transport it came by. NaN: not carried. Axes: OpenGL = X-Plane's scenery axes at its origin.
-struct FlightInputs {
-  double sim_time = kNaN;  ///< raw float32
-  double frame_period = kNaN;
-  double paused = kNaN;  ///< 0 or 1
-  double replay = kNaN;  ///< 0 or 1
-
-  Eigen::Vector3d local_position = nanVector();  ///< OpenGL
-  double origin_latitude = kNaN;                 ///< of the scenery origin [deg]
-  double origin_longitude = kNaN;
-  double earth_radius = kNaN;
-  double latitude = kNaN;  ///< float32, coarse [deg]
-  double longitude = kNaN;
-  double elevation = kNaN;  ///< MSL
-  double altitude_agl = kNaN;
-  double altitude_indicated = kNaN;
-  double altitude_pressure = kNaN;
-  double static_pressure = kNaN;  ///< outside the aircraft [Pa]
-
-  double roll_deg = kNaN;
-  double pitch_deg = kNaN;
-  double heading_true_deg = kNaN;
-  double heading_magnetic_deg = kNaN;
-  double declination_deg = kNaN;  ///< east +
-
-  double roll_rate = kNaN;  ///< p
-  double pitch_rate = kNaN;
-  double yaw_rate = kNaN;
-  Eigen::Vector3d angular_acceleration = nanVector();  ///< FRD
-  Eigen::Vector3d local_velocity = nanVector();        ///< OpenGL
-
-  double indicated_airspeed = kNaN;
-  double calibrated_airspeed = kNaN;  ///< only where X-Plane gives it
-  double equivalent_airspeed = kNaN;  ///< only where X-Plane gives it
-  double true_airspeed = kNaN;
-  double mach = kNaN;
-  double dynamic_pressure = kNaN;
-  double air_density = kNaN;
-
-  double load_factor_normal = kNaN;
-  double load_factor_axial = kNaN;
-  double load_factor_side = kNaN;
-
-  double xplane_alpha_deg = kNaN;
-  double xplane_beta_deg = kNaN;
-  double xplane_hpath_deg = kNaN;
-  double xplane_vpath_deg = kNaN;
-
-  Eigen::Vector3d wind_local = nanVector();  ///< velocity of the air, OpenGL
-  double wind_from_deg = kNaN;               ///< the same by direction and speed, where that is what comes
-  double wind_speed = kNaN;
-
-  Eigen::Vector3d aero_moment = nanVector();  ///< FRD
-
-  double control_roll = kNaN;
-  double control_pitch = kNaN;
-  double control_yaw = kNaN;
-  double control_throttle = kNaN;
-  double on_ground = kNaN;  ///< 0 or 1
-};
 
 /// A position with the source it came from.
 struct PositionFix {

@@ -138,9 +138,9 @@ class MissionAssembler {
   struct Options {
     Transport transport = Transport::kRref;
     SimulatorVersion version;
-    int rate = defaultRate(GroupOf<State>::kGroup);  ///< [1/s]
-    int engines = kMaxEngines;                       ///< of which values are asked for
-    double max_age = 1.5;                            ///< older values are unknown [s], at least two periods
+    int rate = defaultRate(State::kGroup);  ///< [1/s]
+    int engines = kMaxEngines;              ///< of which values are asked for
+    double max_age = 1.5;                   ///< older values are unknown [s], at least two periods
   };
 
   explicit MissionAssembler(const Options& options);

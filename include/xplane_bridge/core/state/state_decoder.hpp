@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "xplane_bridge/core/base/limits.hpp"
 #include "xplane_bridge/core/state/field_table.hpp"
 #include "xplane_bridge/core/state/flight_computation.hpp"
 #include "xplane_bridge/core/state/mission_state.hpp"
@@ -34,46 +35,6 @@ class RowStore {
   std::array<std::int64_t, kRows> times_{};
 };
 
-/// Which group a struct belongs to.
-template <typename State>
-struct GroupOf;
-template <>
-struct GroupOf<FlightInputs> {
-  static constexpr FieldGroup kGroup = FieldGroup::kFlight;
-};
-template <>
-struct GroupOf<EngineStates> {
-  static constexpr FieldGroup kGroup = FieldGroup::kEngines;
-};
-template <>
-struct GroupOf<SurfaceStates> {
-  static constexpr FieldGroup kGroup = FieldGroup::kSurfaces;
-};
-template <>
-struct GroupOf<ControlStates> {
-  static constexpr FieldGroup kGroup = FieldGroup::kControls;
-};
-template <>
-struct GroupOf<ElectricalState> {
-  static constexpr FieldGroup kGroup = FieldGroup::kElectrical;
-};
-template <>
-struct GroupOf<AutopilotState> {
-  static constexpr FieldGroup kGroup = FieldGroup::kAutopilot;
-};
-template <>
-struct GroupOf<WarningState> {
-  static constexpr FieldGroup kGroup = FieldGroup::kWarnings;
-};
-template <>
-struct GroupOf<FuelState> {
-  static constexpr FieldGroup kGroup = FieldGroup::kFuel;
-};
-template <>
-struct GroupOf<SimStatus> {
-  static constexpr FieldGroup kGroup = FieldGroup::kSim;
-};
-
 /// Wire values of one group into its struct, in SI units, by a plan made once from the field table.
 class StateDecoder {
  public:
@@ -100,7 +61,7 @@ class StateDecoder {
     const FieldSpec* field = nullptr;
     std::int32_t row = -1;  ///< -1: from datarefs
     std::size_t first = 0;  ///< slot, or index
-    bool special = false;   ///< bit field, blanks or a stride: not plain numbers side by side
+    bool special = false;   ///< bit field or blanks: not plain numbers side by side
     int count = 0;          ///< 0: nothing carries it
     Conversion conversion;
     // Of the field, side by side with the rest: a decoder walks its plans for every frame.
@@ -125,7 +86,7 @@ template <typename State>
 class GroupDecoder : public StateDecoder {
  public:
   GroupDecoder(Transport transport, SimulatorVersion version, int engines = kMaxEngines)
-      : StateDecoder(GroupOf<State>::kGroup, transport, version, engines) {}
+      : StateDecoder(State::kGroup, transport, version, engines) {}
 };
 
 /// SurfaceStates' equivalent deflections from the surfaces by side.

@@ -9,20 +9,9 @@
 
 namespace xplane_bridge::core {
 
-/// What a broken surface does. "Up" is towards the low end of its travel (trailing edge up, rudder trailing edge left).
-enum class SurfaceFault : std::uint8_t {
-  kStuck,         ///< at the given angle, or where it is
-  kHardOverUp,    ///< runs to the low end of its travel
-  kHardOverDown,  ///< runs to the high end
-  kCentred,       ///< goes to where it is with controls centred
-  kFloating,      ///< trails with the airflow: a surrogate, see DriverOptions::floating_gain
-  kReduced,       ///< moves by `value` of what it should
-  kSlow,          ///< moves at `value` deg/s at most
-};
-
-/// By the name in SetFailure.srv; nullopt for another ("gone" cannot be expressed by a deflection).
-std::optional<SurfaceFault> surfaceFaultFrom(const std::string& kind);
-const char* toString(SurfaceFault fault);
+// Of the faults (SurfaceFault; values of SetFailure): "up" is towards the low end of a surface's travel (trailing edge
+// up, rudder trailing edge left). Centred is where it is with controls centred; floating trails with the airflow, a
+// surrogate (DriverOptions::floating_gain); gone cannot be expressed by a deflection.
 
 struct SurfaceFailure {
   std::size_t surface = 0;  ///< number in surfaceTable()

@@ -2,7 +2,8 @@
 
 /// @file
 /// Core structs into ROS messages. Free functions; they fill a message the caller keeps, so that publishing at a
-/// kilohertz allocates nothing here. Axes come from core/frames.hpp (REP 103, 105, 145, 147).
+/// kilohertz allocates nothing here. Those of the bridge's own states are in state_messages.hpp, made by
+/// cmake/message_code. Axes come from core/frames.hpp (REP 103, 105, 145, 147).
 
 #include <cstdint>
 #include <string>
@@ -14,37 +15,15 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/NavSatFix.h>
 
-#include "xplane_bridge/AutopilotState.h"
-#include "xplane_bridge/ControlStates.h"
-#include "xplane_bridge/ElectricalState.h"
-#include "xplane_bridge/EngineStates.h"
-#include "xplane_bridge/FlightState.h"
-#include "xplane_bridge/FuelState.h"
 #include "xplane_bridge/LinkState.h"
-#include "xplane_bridge/SimStatus.h"
-#include "xplane_bridge/SurfaceStates.h"
-#include "xplane_bridge/WarningState.h"
 #include "xplane_bridge/core/link/sim_link.hpp"
 #include "xplane_bridge/core/state/flight_state.hpp"
 #include "xplane_bridge/core/state/frames.hpp"
-#include "xplane_bridge/core/state/mission_state.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
+#include "xplane_bridge/nodes/messages/state_messages.hpp"
 
 namespace xplane_bridge {
-
-/// @param frame frame_id: the body, FRD
-void toMessage(const core::FlightState& state, const std::string& frame, FlightState* message);
-
-/// @param frame frame_id: the body, FRD
-void toMessage(const core::EngineStates& state, const std::string& frame, EngineStates* message);
-void toMessage(const core::SurfaceStates& state, const std::string& frame, SurfaceStates* message);
-void toMessage(const core::ControlStates& state, const std::string& frame, ControlStates* message);
-void toMessage(const core::ElectricalState& state, const std::string& frame, ElectricalState* message);
-void toMessage(const core::AutopilotState& state, const std::string& frame, AutopilotState* message);
-void toMessage(const core::WarningState& state, const std::string& frame, WarningState* message);
-void toMessage(const core::FuelState& state, const std::string& frame, FuelState* message);
-void toMessage(const core::SimStatus& state, const std::string& frame, SimStatus* message);
 
 /// All of a link's status except header.stamp and the aircraft.
 void toMessage(const core::LinkStatus& link, const std::string& transport, LinkState* message);

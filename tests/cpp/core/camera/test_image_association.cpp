@@ -90,7 +90,7 @@ TEST(ImageAssociator, FallsBackToTheNearestStateAtTheDeadlineAndSaysSo) {
   EXPECT_EQ(answer.method, PairingMethod::kNearestFrame);
   EXPECT_EQ(answer.id, 9U);
   EXPECT_NEAR(answer.state_offset, -1.0 / 60.0, 1e-6);
-  EXPECT_EQ(core::pairingQuality(momentAt(10.0 / 60.0), answer), static_cast<std::uint32_t>(core::kOffFrame));
+  EXPECT_EQ(core::pairingQuality(momentAt(10.0 / 60.0), answer), static_cast<std::uint32_t>(core::kQualityOffFrame));
 }
 
 TEST(ImageAssociator, InfersAFrameWhoseDatagramWasLost) {
@@ -142,7 +142,7 @@ TEST(ImageAssociator, InterpolatesOnlyBelowTheFrameRateAndFlagsIt) {
   EXPECT_EQ(answer.id, 60U);
   EXPECT_EQ(answer.id_after, 63U);
   EXPECT_NEAR(answer.fraction, 1.0 / 3.0, 1e-3);
-  EXPECT_EQ(core::pairingQuality(momentAt(0.0), answer), static_cast<std::uint32_t>(core::kInterpolated));
+  EXPECT_EQ(core::pairingQuality(momentAt(0.0), answer), static_cast<std::uint32_t>(core::kQualityInterpolated));
   const auto exact = associator.associate(momentAt(100.0 + 63.0 / 60.0), false);
   EXPECT_EQ(exact.method, PairingMethod::kFrame);
   EXPECT_EQ(exact.id, 63U);
@@ -164,7 +164,7 @@ TEST(ImageAssociator, NeverInterpolatesAcrossAnEpochPauseOrGap) {
   for (const auto& answer : {between(true, false, 0.0), between(false, true, 0.0)}) {
     EXPECT_EQ(answer.method, PairingMethod::kNone);
     EXPECT_TRUE(answer.at_edge);
-    EXPECT_EQ(core::pairingQuality(momentAt(0.0), answer), core::kStateMissing | core::kEpochEdge);
+    EXPECT_EQ(core::pairingQuality(momentAt(0.0), answer), core::kQualityStateMissing | core::kQualityEpochEdge);
   }
   const auto gap = between(false, false, 2.0);
   EXPECT_NE(gap.method, PairingMethod::kInterpolated);
@@ -199,7 +199,7 @@ TEST(ImageAssociator, PausedPictureTakesTheStateThatStands) {
   const auto answer = associator.associate(moment, false);
   EXPECT_EQ(answer.method, PairingMethod::kPaused);
   EXPECT_EQ(answer.id, 60U);
-  EXPECT_EQ(core::pairingQuality(moment, answer), static_cast<std::uint32_t>(core::kPaused));
+  EXPECT_EQ(core::pairingQuality(moment, answer), static_cast<std::uint32_t>(core::kQualityPaused));
 }
 
 TEST(ImageAssociator, PairsByStampWithoutASimulatorClockAndFlagsIt) {
@@ -210,7 +210,7 @@ TEST(ImageAssociator, PairsByStampWithoutASimulatorClockAndFlagsIt) {
   const auto answer = associator.associate(moment, false);
   EXPECT_EQ(answer.method, PairingMethod::kStamp);
   EXPECT_EQ(answer.id, 30U);
-  EXPECT_EQ(core::pairingQuality(moment, answer), core::kOffFrame | core::kClockUnsure);
+  EXPECT_EQ(core::pairingQuality(moment, answer), core::kQualityOffFrame | core::kQualityClockUnsure);
   moment.host_time_ns = 5000000000;
   EXPECT_TRUE(associator.associate(moment, false).pending);
   EXPECT_EQ(associator.associate(moment, true).method, PairingMethod::kNone);

@@ -72,7 +72,7 @@ TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
     const bool sourced = field.dataref.path11 != nullptr || field.dataref.path12 != nullptr || field.row.row11 >= 0;
     EXPECT_EQ(sourced, field.store != nullptr);
     if (!sourced) {
-      EXPECT_STRNE(field.derivation, "");
+      EXPECT_STRNE(field.remark, "");
     }
     EXPECT_GE(field.count, 1);
     EXPECT_LE(field.count, kMaxFieldElements);
@@ -84,7 +84,7 @@ TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
       EXPECT_LT(field.row.row11, 139);
       EXPECT_GE(field.row.count, 1);
       EXPECT_LE(field.row.count, field.count);
-      const int last = field.row.bitfield ? 0 : (field.row.count - 1) * field.row.stride;
+      const int last = field.row.bitfield ? 0 : field.row.count - 1;
       EXPECT_LE(field.row.slot11 + last, 7);
       EXPECT_LE(field.row.slot12 + last, 7);
     }

@@ -210,7 +210,8 @@ TEST(SurfaceDriver, FailureValuesAreChecked) {
   EXPECT_TRUE(validate(SurfaceFailure{kLeft, SurfaceFault::kReduced, 1.1}));
   EXPECT_TRUE(validate(SurfaceFailure{kLeft, SurfaceFault::kSlow, 0.0}));
   EXPECT_EQ(surfaceFaultFrom("hard_over_down"), SurfaceFault::kHardOverDown);
-  EXPECT_FALSE(surfaceFaultFrom("gone"));
+  EXPECT_FALSE(surfaceFaultFrom("failed"));
+  EXPECT_TRUE(validate(SurfaceFailure{kLeft, SurfaceFault::kGone, std::nullopt}));
   EXPECT_STREQ(toString(SurfaceFault::kReduced), "reduced");
 }
 

@@ -1,0 +1,90 @@
+"""Where things are written: the table of CONTRIBUTING.md, topics, and words that documents explain."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from support.room_table import ROOT
+from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
+from xplane_bridge.topics import TOPICS
+
+#: Written apart, made, or lists of X-Plane's own names.
+NOT_COUNTED = (":!src/xplane_bridge/emulator", ":!src/xplane_bridge/constants.py", ":!src/xplane_bridge/xplane_names")
+
+
+def changes():
+    """The rows of the table: the words of the example, and the files."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("\n## Where a change goes\n")[1]
+    rows = [line.strip("|").split("|") for line in text.split("\n## ")[0].splitlines() if line.startswith("| ")]
+    return [
+        pytest.param(re.findall(r"`([^`]+)`", words), set(re.findall(r"`([^`]+)`", files)), id=change.strip())
+        for change, words, files in rows[1:]
+    ]
+
+
+@pytest.mark.parametrize(("words", "files"), changes())
+def test_the_files_of_a_change_are_those_that_have_its_example(words, files):
+    patterns = [part for word in words for part in ("-e", word)]
+    command = ["git", "-c", f"safe.directory={ROOT}", "-C", str(ROOT), "grep", "-lwF", *patterns, "--"]
+    where = ("msg", "srv", "lib", "include", "launch", "src", "cmake", *NOT_COUNTED)
+    found = subprocess.run([*command, *where], stdout=subprocess.PIPE, text=True, check=True).stdout.split()
+    assert set(found) == files
+
+
+def test_documents_explain_every_kind():
+    surfaces, scenarios = (ROOT / "docs/surfaces.md", ROOT / "config/scenarios/README.md")
+    for document, kinds in ((surfaces, FAILURE_KINDS), (scenarios, (*FAILURE_KINDS, *EXCITATION_KINDS))):
+        words = document.read_text(encoding="utf-8")
+        assert [kind for kind in kinds if not re.search(rf"\b{re.escape(kind)}\b", words)] == [], document
+
+
+# ---------------------------------------------------------------------------------------------------------- topics
+
+
+def cpp_topics(verb):
+    """Topics that the nodes have, and their types: those of BaseNode's functions and of a handle's."""
+    found = {}
+    for path in sorted((ROOT / "lib/nodes").rglob("*.cpp")):
+        text = path.read_text(encoding="utf-8")
+        for msgtype, topic in re.findall(rf'\b{verb}(?:Topic)?<([\w:]+)>\(\s*"([^"]+)"\s*,', text):
+            package, _, name = msgtype.rpartition("::")
+            found[topic] = f"{package or 'xplane_bridge'}/{name}"
+    assert found
+    return found
+
+
+def groups():
+    """`mission/<group>` of each group of lib/core/state/sources.txt, and its type."""
+    text = (ROOT / "lib/core/state/sources.txt").read_text(encoding="utf-8")
+    sections = re.findall(r"^\[(\w+): (\w+), ", text, re.MULTILINE)
+    return {f"mission/{group}": f"xplane_bridge/{message}" for message, group in sections if group != "flight"}
+
+
+#: Of the bridge's namespace, advertised by others than its nodes: joy, controllers, the scenario's player.
+FROM_OUTSIDE = {"joy", "control/auto", "control/surfaces", "scenario/label"}
+
+
+def test_the_nodes_advertise_the_topics_of_the_list_with_their_types():
+    advertised = {**cpp_topics("advertise"), **groups()}
+    assert advertised == {topic: msgtype for topic, msgtype in TOPICS.items() if topic not in FROM_OUTSIDE}
+
+
+def test_the_nodes_subscribe_to_topics_of_the_list():
+    subscribed = cpp_topics("subscribe")
+    assert {topic: TOPICS.get(topic) for topic in subscribed} == subscribed
+    assert set(subscribed) >= FROM_OUTSIDE - {"scenario/label"}
+
+
+def test_all_topics_but_raw_pictures_are_recorded():
+    launch = ElementTree.parse(ROOT / "launch/record.launch").getroot()
+    recorded = next(arg.get("default") for arg in launch.findall("arg") if arg.get("name") == "topics").split()
+    assert recorded == [
+        *(topic for topic in TOPICS if topic != "camera/image_raw"),
+        "/tf",
+        "/tf_static",
+        "/diagnostics",
+    ]
