@@ -224,7 +224,7 @@ void SurfaceControl::drive(double dt) {
     command_sent_ = true;
     commands_unseen_.push_back({command_sequence_, sample_.sim_time, commands_});
     if (commands_unseen_.size() > kUnseenKept) commands_unseen_.pop_front();
-    echoes_.push_back({command_sequence_, false, std::nan(""), std::nan("")});
+    addEcho({command_sequence_, false, std::nan(""), std::nan("")});
   }
 }
 
@@ -249,10 +249,17 @@ void SurfaceControl::watchCommand() {
       return std::abs(sample_.deflections_deg[command.surface] - command.deflection_deg) <= kFollowsDeg;
     });
     if (!shown || !(sample_.sim_time > it->sim_time)) continue;
-    echoes_.push_back({it->sequence, true, sample_.sim_time, (sample_.sim_time - it->sim_time) / sample_.frame_period});
+    addEcho({it->sequence, true, sample_.sim_time, (sample_.sim_time - it->sim_time) / sample_.frame_period});
     commands_unseen_.erase(commands_unseen_.begin(), it.base());
     return;
   }
+}
+
+void SurfaceControl::addEcho(const Echo& echo) {
+  echoes_.push_back(echo);
+  if (echoes_.size() <= kUnseenKept) return;
+  echoes_.pop_front();
+  ++echoes_dropped_;
 }
 
 void SurfaceControl::endCommands() {
@@ -576,6 +583,7 @@ void SurfaceControl::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper
   status->add("Lag of driven surfaces (frames)", lag_frames_);
   status->add("control/surfaces accepted (-)", commands_accepted_);
   status->add("control/surfaces refused (-)", commands_refused_);
+  status->add("control/surfaces answers dropped (-)", echoes_dropped_);
   if (!last_refusal_.empty()) status->add("control/surfaces last refusal", last_refusal_);
 }
 

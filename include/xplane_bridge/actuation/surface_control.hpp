@@ -133,6 +133,7 @@ class SurfaceControl {
   void enter(State state);
   void measureLag();
   void watchCommand();
+  void addEcho(const Echo& echo);
   void loadModel();
   void saveModel();
   std::string refusalLocked() const;
@@ -184,7 +185,8 @@ class SurfaceControl {
     std::vector<core::SurfaceDeflection> surfaces;
   };
   std::deque<SentCommand> commands_unseen_;  // oldest first
-  std::deque<Echo> echoes_;
+  std::deque<Echo> echoes_;                  // until takeEcho(), oldest first
+  std::uint64_t echoes_dropped_ = 0;
   std::uint64_t commands_accepted_ = 0, commands_refused_ = 0;
   std::string last_refusal_;
   std::optional<core::SurfaceDeflection> offset_;

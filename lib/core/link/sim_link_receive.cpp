@@ -1,76 +1,35 @@
-#include "sim_link_impl.hpp"
-
-#include <sys/epoll.h>
-#include <unistd.h>
+#include "xplane_bridge/core/link/sim_link.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <string>
+
+#include "xplane_bridge/core/wire/udp_socket.hpp"
 
 namespace xplane_bridge::core {
 namespace {
 
-constexpr int kMaxDatagramsAtOnce = 64;  // of one socket, before the others have their turn
+constexpr int kMaxDatagramsAtOnce = 64;  // of one source, before the others have their turn
 constexpr std::int64_t kRposSilenceNs = 500 * kNanosecondsPerMillisecond;
 
 }  // namespace
 
-void SimLink::Impl::watch(int fd) {
-  epoll_event event{};
-  event.events = EPOLLIN;
-  event.data.fd = fd;
-  if (epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, fd, &event) != 0) {
-    log_(LogLevel::kError, std::string("a socket cannot be waited for: ") + std::strerror(errno));
-  }
-}
-
-// A removed group's socket may live on for requests that are still to be sent; nobody reads it any more.
-void SimLink::Impl::unwatch(int fd) { epoll_ctl(epoll_fd_, EPOLL_CTL_DEL, fd, nullptr); }
-
-void SimLink::Impl::waitForInput(int timeout_ms) {
-  constexpr std::size_t kMostAtOnce = 64;
-  ready_.resize(kMostAtOnce);
-  const int count = epoll_wait(epoll_fd_, ready_.data(), static_cast<int>(ready_.size()), timeout_ms);
-  ready_.resize(static_cast<std::size_t>(std::max(0, count)));  // interrupted: nothing
-  if (hasInput(wake_fd_)) {
-    std::uint64_t woken = 0;
-    [[maybe_unused]] const ssize_t size = ::read(wake_fd_, &woken, sizeof(woken));
-  }
-}
-
-void SimLink::Impl::runCommands() {
-  std::vector<std::function<void()>> commands;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    commands.swap(commands_);
-  }
-  for (const std::function<void()>& command : commands) {
-    command();
-  }
-}
-
-bool SimLink::Impl::hasInput(int fd) const {
-  return std::any_of(ready_.begin(), ready_.end(), [fd](const epoll_event& event) { return event.data.fd == fd; });
-}
-
 template <typename Handler>
-void SimLink::Impl::drain(UdpSocket* socket, const Handler& handle) {
-  // Asking every socket in vain would cost a flight state more time than all its computing.
-  if (socket == nullptr || !hasInput(socket->fd())) {
+void SimLink::drain(DatagramSource* source, const Handler& handle) {
+  // Asking every source in vain would cost a flight state more time than all its computing.
+  if (source == nullptr || !hub_->hasInput(*source)) {
     return;
   }
   Received received;
   for (int i = 0; i < kMaxDatagramsAtOnce; ++i) {
-    if (socket->receive(buffer_, &received) != ReceiveStatus::kReceived) {
+    if (source->receive(buffer_, &received) != ReceiveStatus::kReceived) {
       return;
     }
     handle(ByteView(buffer_.data(), received.size), received);
   }
 }
 
-bool SimLink::Impl::isFromPeer(const Received& received) {
+bool SimLink::isFromPeer(const Received& received) {
   // By address only: X-Plane may answer from another port than the one it listens on.
   if (peer_.valid() && isSameHost(received.from.address, peer_.address)) {
     return true;
@@ -79,12 +38,12 @@ bool SimLink::Impl::isFromPeer(const Received& received) {
   return false;
 }
 
-void SimLink::Impl::heardPeer() {
+void SimLink::heardPeer() {
   monitor_.heard(now_ns_);
   last_heard_ns_ = now_ns_;
 }
 
-ReceiveInfo SimLink::Impl::infoOf(const Received& received) {
+ReceiveInfo SimLink::infoOf(const Received& received) {
   ReceiveInfo info;
   info.kernel_stamp = received.kernel_stamp_ns != 0;
   info.stamp_ns = info.kernel_stamp ? received.kernel_stamp_ns : clock_.system_ns();
@@ -94,12 +53,10 @@ ReceiveInfo SimLink::Impl::infoOf(const Received& received) {
   return info;
 }
 
-void SimLink::Impl::countDecodeError(DecodeError error) {
-  ++live_counters_.decode_errors[static_cast<std::size_t>(error)];
-}
+void SimLink::countDecodeError(DecodeError error) { ++live_counters_.decode_errors[static_cast<std::size_t>(error)]; }
 
-void SimLink::Impl::receiveControl() {
-  drain(control_socket_.get(), [this](ByteView bytes, const Received& received) {
+void SimLink::receiveControl() {
+  drain(control_source_.get(), [this](ByteView bytes, const Received& received) {
     if (!isFromPeer(received)) {
       return;
     }
@@ -122,7 +79,7 @@ void SimLink::Impl::receiveControl() {
   });
 }
 
-void SimLink::Impl::takeStatus(const RrefPair& pair) {
+void SimLink::takeStatus(const RrefPair& pair) {
   if (!std::isfinite(pair.value)) {
     ++live_counters_.non_finite_values;
     return;
@@ -147,8 +104,8 @@ void SimLink::Impl::takeStatus(const RrefPair& pair) {
   }
 }
 
-void SimLink::Impl::receiveGroup(Group* group) {
-  drain(group->socket.get(), [this, group](ByteView bytes, const Received& received) {
+void SimLink::receiveGroup(Group* group) {
+  drain(group->source.get(), [this, group](ByteView bytes, const Received& received) {
     if (!isFromPeer(received)) {
       return;
     }
@@ -160,7 +117,7 @@ void SimLink::Impl::receiveGroup(Group* group) {
     ++live_counters_.rref_datagrams;
     heardPeer();
     group->delivery->deliver(group->list, *rref, infoOf(received));
-    // The books are kept once the state is on its way.
+    // Statistics after delivery, to keep latency low.
     for (std::size_t i = 0; i < rref->size(); ++i) {
       live_counters_.non_finite_values += std::isfinite((*rref)[i].value) ? 0U : 1U;
     }
@@ -168,8 +125,8 @@ void SimLink::Impl::receiveGroup(Group* group) {
   });
 }
 
-void SimLink::Impl::receiveData() {
-  drain(data_socket_.get(), [this](ByteView bytes, const Received& received) {
+void SimLink::receiveData() {
+  drain(data_source_.get(), [this](ByteView bytes, const Received& received) {
     if (!isFromPeer(received)) {
       return;
     }
@@ -192,8 +149,8 @@ void SimLink::Impl::receiveData() {
   });
 }
 
-void SimLink::Impl::receiveRpos() {
-  drain(rpos_socket_.get(), [this](ByteView bytes, const Received& received) {
+void SimLink::receiveRpos() {
+  drain(rpos_source_.get(), [this](ByteView bytes, const Received& received) {
     if (!isFromPeer(received)) {
       return;
     }
@@ -211,8 +168,8 @@ void SimLink::Impl::receiveRpos() {
   });
 }
 
-void SimLink::Impl::receiveXpc() {
-  drain(xpc_socket_.get(), [this](ByteView bytes, const Received& received) {
+void SimLink::receiveXpc() {
+  drain(xpc_source_.get(), [this](ByteView bytes, const Received& received) {
     if (!isFromPeer(received)) {
       return;
     }
@@ -229,8 +186,8 @@ void SimLink::Impl::receiveXpc() {
   });
 }
 
-void SimLink::Impl::receiveBeacons() {
-  drain(beacon_socket_.get(), [this](ByteView bytes, const Received& received) {
+void SimLink::receiveBeacons() {
+  drain(beacon_source_.get(), [this](ByteView bytes, const Received& received) {
     const DecodeResult<Beacon> beacon = decodeBeacon(bytes);
     if (!beacon.ok()) {
       countDecodeError(beacon.error());

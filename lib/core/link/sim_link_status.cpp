@@ -1,9 +1,10 @@
-#include "sim_link_impl.hpp"
+#include "xplane_bridge/core/link/sim_link.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/core/wire/udp_socket.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -16,7 +17,7 @@ std::string namesOf(const std::vector<BeaconSighting>& sightings) {
 
 }  // namespace
 
-std::vector<std::string> SimLink::Impl::findProblems(std::int64_t now_ns) const {
+std::vector<std::string> SimLink::findProblems(std::int64_t now_ns) const {
   std::vector<std::string> problems;
   if (!resolve_failure_.empty()) {
     problems.push_back(resolve_failure_);
@@ -48,7 +49,7 @@ std::vector<std::string> SimLink::Impl::findProblems(std::int64_t now_ns) const 
   }
   if (peer_.valid() && monitor_.state() == LinkState::kSearching && searched_s > kPatienceS) {
     problems.push_back("no answer from " + peer_.toString() +
-                       (control_socket_->counters().refused > 0
+                       (control_source_->counters().refused > 0
                             ? ": that computer is there, but nothing listens on the port: start X-Plane, or set port"
                             : ": start X-Plane; check the address, firewalls and, in X-Plane 12, Settings > Network > "
                               "Accept incoming connections"));
@@ -59,7 +60,7 @@ std::vector<std::string> SimLink::Impl::findProblems(std::int64_t now_ns) const 
   return problems;
 }
 
-std::string SimLink::Impl::reasonOf(LinkState state) const {
+std::string SimLink::reasonOf(LinkState state) const {
   switch (state) {
     case LinkState::kSearching:
       return peer_.valid() ? "waiting for the first answer of " + peer_.toString() : "waiting for X-Plane's beacon";
@@ -80,22 +81,22 @@ std::string SimLink::Impl::reasonOf(LinkState state) const {
   return {};
 }
 
-void SimLink::Impl::publish(std::int64_t now_ns) {
+void SimLink::publish(std::int64_t now_ns) {
   LinkCounters counters = live_counters_;
   counters.udp = retired_udp_;
-  counters.receive_buffer = control_socket_->receiveBuffer();
+  counters.receive_buffer = control_source_->receiveBuffer();
   std::vector<std::string> unanswered = status_subscription_.unanswered();
-  const auto count = [&counters](const SocketPtr& socket) {
-    if (socket != nullptr) {
-      counters.udp += socket->counters();
-      counters.receive_buffer = std::min(counters.receive_buffer, socket->receiveBuffer());
+  const auto count = [&counters](const SourcePtr& source) {
+    if (source != nullptr) {
+      counters.udp += source->counters();
+      counters.receive_buffer = std::min(counters.receive_buffer, source->receiveBuffer());
     }
   };
-  for (const SocketPtr& socket : {control_socket_, beacon_socket_, data_socket_, rpos_socket_, xpc_socket_}) {
-    count(socket);
+  for (const SourcePtr& source : {control_source_, beacon_source_, data_source_, rpos_source_, xpc_source_}) {
+    count(source);
   }
   for (const Group& group : groups_) {
-    count(group.socket);
+    count(group.source);
     counters.repeated_requests += group.subscription.repeats();
     for (std::string& path : group.subscription.unanswered()) {
       unanswered.push_back(std::move(path));

@@ -67,6 +67,7 @@ void fillLinkDiagnostics(const core::LinkStatus& link, const core::LinkCounters&
   status->add("Values nobody asked for (-)", now.unknown_indices);
   status->add("Subscription requests (-)", now.requests);
   status->add("Subscriptions repeated (-)", now.resubscriptions);
+  status->add("Calls refused, link behind (-)", now.refused_calls);
   status->add("Send failures (-)", now.udp.send_failures);
   status->add("Port unreachable (-)", now.udp.refused);
 }

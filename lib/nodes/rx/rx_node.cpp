@@ -19,7 +19,7 @@ namespace {
 constexpr double kSupervisePeriod_s = 0.1;
 // An X-Plane that answers but does not say its version within this is treated as of unknown version.
 constexpr double kVersionPatience_s = 2.0;
-constexpr double kSearchWordPeriod_s = 1.0;
+constexpr double kSearchingPublishPeriod_s = 1.0;
 constexpr std::int32_t kRposCheckRateHz = 20;
 // Further away, a flight state says nothing about the time of another datagram.
 constexpr double kNearState_s = 0.1;
@@ -267,7 +267,7 @@ void RxNode::supervise() {
     supervisePositionCheck();
   }
   if (status.state == core::LinkState::kSearching && (!search_word_pause_ || search_word_pause_->over())) {
-    search_word_pause_.emplace(clock(), kSearchWordPeriod_s);
+    search_word_pause_.emplace(clock(), kSearchingPublishPeriod_s);
     const std::lock_guard<std::mutex> lock(mutex_);
     publishLinkState(status);
   }

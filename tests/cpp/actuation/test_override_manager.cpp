@@ -186,6 +186,7 @@ TEST_F(OverrideManagerTest, RefreshRepeatsWhatIsSetButForFailures) {
   manager_.acquire(core::kSurfaceOverride);
   manager_.acquire(kFailure, 6.0F, false);
   EXPECT_EQ(manager_.active(), (Names{core::kSurfaceOverride, kJoystick}));
+  EXPECT_EQ(sim_.subscribed(), std::multiset<std::string>{kJoystick}) << "the other two are watched by their holders";
   sim_.clearMessages();
   manager_.refresh();
   EXPECT_EQ(sim_.writes(), (Writes{{kJoystick, 1.0F}, {core::kSurfaceOverride, 1.0F}}));
@@ -231,7 +232,7 @@ TEST_F(OverrideManagerTest, ReleaseByAnotherClientIsFoundAfterFiveAnswers) {
   sim_.set(kJoystick, 0.0F);
   sim_.run(0.4);
   EXPECT_TRUE(manager_.releasedByOthers().empty()) << "four answers";
-  sim_.run(0.12);
+  sim_.run(0.1);
   EXPECT_EQ(manager_.releasedByOthers(), Names{kJoystick});
   EXPECT_EQ(manager_.active(), Names{kThrottles});
   EXPECT_EQ(inJournal(), Names{kThrottles});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -87,6 +88,7 @@ class FakeSimulator : public SimulatorPort {
   /// One frame. While X-Plane does not answer (SEARCHING, STALE, LOST), time passes and nothing is delivered.
   void frame(double dt = kFrame) {
     now_ns_ += static_cast<std::int64_t>(std::llround(dt * 1e9));
+    clock_.waiters->wakeAll();
     if (answers()) {
       if (status_.state == LinkState::kConnected) {
         datarefs_[kSimTime] += static_cast<float>(dt);
@@ -367,8 +369,9 @@ class FakeSimulator : public SimulatorPort {
   const JournalOwner self_ = thisProcess("/fake");
   std::shared_ptr<Journal> journal_;
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
-  std::int64_t now_ns_ = 5'000'000'000'000;
-  const Clock clock_{[this] { return now_ns_; }, [this] { return now_ns_ + 1'000'000'000'000'000; }};
+  std::atomic<std::int64_t> now_ns_{5'000'000'000'000};
+  const Clock clock_{[this] { return now_ns_.load(); }, [this] { return now_ns_ + 1'000'000'000'000'000; },
+                     std::make_shared<ClockWaiters>()};
   LinkStatus status_;
   std::map<std::string, float> datarefs_;
   std::set<std::string> read_only_;

@@ -1,44 +1,32 @@
 #pragma once
 
 #include <array>
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/log.hpp"
 #include "xplane_bridge/core/link/data_output.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
+#include "xplane_bridge/core/link/link_monitor.hpp"
+#include "xplane_bridge/core/link/sim_link_options.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
+#include "xplane_bridge/core/wire/beacon_tracker.hpp"
+#include "xplane_bridge/core/wire/datagram_source.hpp"
+#include "xplane_bridge/core/wire/dataref_reader.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
-#include "xplane_bridge/core/wire/udp_socket.hpp"
+#include "xplane_bridge/core/wire/rref_subscription.hpp"
 
 namespace xplane_bridge::core {
-
-/// Where X-Plane is and how long to wait for it. Checked by SimLink's constructor.
-struct SimLinkOptions {
-  std::string host;                   ///< name or IPv4 address; empty: found by beacon
-  std::uint16_t port = kDefaultPort;  ///< X-Plane's listening port; with an empty host the beacon says it
-  bool listen_for_beacon = true;
-  std::string beacon_group = kBeaconGroup;
-  std::uint16_t beacon_port = kBeaconPort;
-  double stale_after_s = 0.4;        ///< [s] silence until STALE
-  double lost_after_s = 10.0;        ///< [s] silence until LOST whatever the beacon says
-  double beacon_timeout_s = 2.5;     ///< [s] without a beacon until it counts as gone
-  double beacon_settle_s = 1.2;      ///< [s] waited for a second beacon before the first is chosen
-  double probe_period_s = 0.2;       ///< [s] between questions while X-Plane is silent
-  std::int32_t status_rate_hz = 20;  ///< of the link's own subscription (version, paused, simulator time)
-  std::size_t batch_size = 100;      ///< subscription requests sent at once; X-Plane loses some above about 140
-  double batch_spacing_s = 0.1;      ///< [s] between batches
-  double request_timeout_s = 2.0;    ///< [s] deadline of the link's own read-backs
-  std::uint32_t jitter_seed = 1;     ///< retries are spread by up to 20 %
-  std::int32_t rpos_rate_hz = 0;     ///< RPOS stream; 0: none
-  std::uint16_t xpc_port = 0;        ///< where the X-Plane Connect plugin is asked for the position; 0: not at all
-  double xpc_rate_hz = 60.0;         ///< of these questions (each has one answer), up to 1000
-  DataOutputOptions data_output;
-};
 
 struct LinkCounters {
   UdpCounters udp;              ///< sum over all sockets
@@ -55,6 +43,7 @@ struct LinkCounters {
   std::uint64_t requests = 0;           ///< subscription requests sent
   std::uint64_t resubscriptions = 0;    ///< groups asked for anew because the link came up or X-Plane was silent
   std::uint64_t repeated_requests = 0;  ///< datarefs asked for again because they did not answer
+  std::uint64_t refused_calls = 0;      ///< calls of other threads dropped because the link did not take them up
   int receive_buffer = 0;               ///< [bytes] smallest receive buffer the kernel granted
 };
 
@@ -72,13 +61,15 @@ struct SimLinkCallbacks {
 ///
 /// One thread (start()) or the caller (step()) does all receiving and calls all handlers and callbacks. Every other
 /// public function may be called from any thread; those that wait say so and must not be called from a callback.
-/// Subscriptions may outlive the link; then they do nothing.
+/// Subscriptions may outlive the link; then they do nothing. Members that are not said to be shared belong to the
+/// thread that receives.
 class SimLink : public SimulatorPort {
  public:
   /// `journals` may be empty when neither Data Output is configured nor leftovers are to be restored.
   /// Throws std::invalid_argument (an option out of range) and SocketError (a port is taken).
+  /// `hub`: where datagrams come from and go to; null: the computer's UDP sockets.
   SimLink(SimLinkOptions options, SimLinkCallbacks callbacks, Clock clock, LogFunction log,
-          JournalFactory journals = {});
+          JournalFactory journals = {}, std::unique_ptr<DatagramHub> hub = nullptr);
   /// stop(), if it has not been called.
   ~SimLink() override;
   SimLink(const SimLink&) = delete;
@@ -104,11 +95,11 @@ class SimLink : public SimulatorPort {
   /// Datarefs that were asked for repeatedly and never answered while others were: unknown to this X-Plane.
   std::vector<std::string> unansweredDatarefs() const;
   std::shared_ptr<Journal> journal() const override;
-  const Clock& clock() const override;
+  const Clock& clock() const override { return clock_; }
   /// Port on which DATA is received; 0 without DATA transport.
-  std::uint16_t dataPort() const;
+  std::uint16_t dataPort() const { return data_source_ ? data_source_->localPort() : std::uint16_t{0}; }
   /// Port on which beacons are received; 0 when not listening.
-  std::uint16_t beaconPort() const;
+  std::uint16_t beaconPort() const { return beacon_source_ ? beacon_source_->localPort() : std::uint16_t{0}; }
 
   SendStatus send(ByteView message) override;
   void read(std::vector<std::string> paths, double timeout_s, DatarefReader::Done done) override;
@@ -118,8 +109,155 @@ class SimLink : public SimulatorPort {
   bool waitUntil(const std::function<bool()>& condition, double timeout_s) override;
 
  private:
-  class Impl;
-  std::shared_ptr<Impl> impl_;
+  using SourcePtr = std::shared_ptr<DatagramSource>;
+
+  struct Group {
+    std::shared_ptr<RrefDelivery> delivery;
+    std::uint32_t list = 0;  // of the delivery
+    RrefSubscription subscription;
+    SourcePtr source;
+  };
+  /// An RREF request waiting for its turn. Holds the source of a group that may be gone by then.
+  struct Request {
+    SourcePtr source;
+    std::string path;
+    std::int32_t rate_hz = 0;
+    std::int32_t index = 0;
+  };
+
+  /// For handles: null once the link is gone.
+  struct Self {
+    std::mutex mutex;
+    SimLink* link = nullptr;
+  };
+
+  static constexpr std::int32_t kVersionIndex = 0;  // of the status subscription: sim_link.cpp
+  static constexpr std::int32_t kPausedIndex = 1;
+  static constexpr std::int32_t kSimTimeIndex = 2;
+  static constexpr std::int32_t kFirstReadIndex = 1000;  // of one-shot reads, on the same source
+
+  // Calls of any thread, carried out on the link's (sim_link.cpp).
+  void post(std::function<void()> call);
+  void runCalls();
+  void changeGroup(const std::shared_ptr<RrefDelivery>& delivery, std::uint32_t list, std::optional<RrefGroup> group);
+  void startRead(std::vector<std::string> paths, double timeout_s, DatarefReader::Accept accept,
+                 DatarefReader::Done done);
+  void requireWaiting() const;
+  void wakeWaiting();
+  bool onLinkThread() const { return std::this_thread::get_id() == link_thread_id_.load(); }
+  SourcePtr open(const std::string& name, std::uint16_t port = 0);
+  void listenForBeacon();
+
+  // What arrives (sim_link_receive.cpp).
+  template <typename Handler>
+  void drain(DatagramSource* source, const Handler& handle);
+  bool isFromPeer(const Received& received);
+  void heardPeer();
+  ReceiveInfo infoOf(const Received& received);
+  void countDecodeError(DecodeError error);
+  void receiveControl();
+  void receiveGroup(Group* group);
+  void receiveData();
+  void receiveRpos();
+  void receiveXpc();
+  void receiveBeacons();
+  void takeStatus(const RrefPair& pair);
+
+  // What is due (sim_link_maintenance.cpp).
+  void maintain(std::int64_t now_ns);
+  void findPeer(std::int64_t now_ns);
+  void resolve(std::int64_t now_ns);
+  void setPeer(const Endpoint& peer, const std::string& why);
+  void refreshLink(std::int64_t now_ns);
+  void restartSubscriptions(std::int64_t now_ns);
+  void updateDataOutput(std::int64_t now_ns);
+  void updateRpos(std::int64_t now_ns);
+  void askXpc(std::int64_t now_ns);
+  void flushRequests(std::int64_t now_ns);
+  void sendRequest(DatagramSource* source, const std::string& path, std::int32_t rate_hz, std::int32_t index);
+  void removeGroup(const RrefDelivery* delivery);
+  void stopGroup(const Group& group);
+  void stopSubscriptions();
+  void updateStop(std::int64_t now_ns);
+
+  // What is said (sim_link_status.cpp).
+  std::vector<std::string> findProblems(std::int64_t now_ns) const;
+  std::string reasonOf(LinkState state) const;
+  void publish(std::int64_t now_ns);
+
+  const SimLinkOptions options_;
+  const SimLinkCallbacks callbacks_;
+  const Clock clock_;
+  const LogFunction log_;
+  const JournalFactory journals_;
+  const std::unique_ptr<DatagramHub> hub_;
+  const std::shared_ptr<Self> self_ = std::make_shared<Self>();
+
+  // Shared with any thread.
+  std::atomic<std::uint64_t> packed_peer_{0};
+  std::atomic<std::int64_t> last_heard_ns_{-1};
+  std::atomic<std::thread::id> link_thread_id_{};
+  std::atomic<bool> running_{false};
+  std::atomic<bool> quit_{false};
+  mutable std::mutex mutex_;  // guards the following
+  std::vector<std::function<void()>> calls_;
+  std::uint64_t refused_calls_ = 0;
+  LinkStatus status_;
+  LinkCounters counters_;
+  std::vector<std::string> unanswered_;
+  std::shared_ptr<Journal> journal_;
+
+  // Of waitUntil().
+  std::mutex waiting_mutex_;  // guards the following
+  int waiting_ = 0;
+  ClockCondition stepped_;
+  std::uint64_t steps_ = 0;
+
+  std::thread thread_;
+  std::vector<std::uint8_t> buffer_;
+  SourcePtr control_source_;
+  SourcePtr beacon_source_;
+  SourcePtr data_source_;
+  SourcePtr rpos_source_;
+  SourcePtr xpc_source_;
+  std::string beacon_failure_;
+
+  Endpoint peer_;
+  std::string peer_name_;
+  std::string resolve_failure_;
+  std::int64_t next_resolve_ns_ = 0;
+  std::int64_t started_ns_ = 0;
+  std::int64_t next_join_ns_ = 0;
+  std::int64_t next_maintenance_ns_ = 0;
+  std::int64_t next_probe_ns_ = 0;
+  std::int64_t now_ns_ = 0;
+
+  LinkMonitor monitor_;
+  BeaconTracker beacons_;
+  Jitter jitter_;
+  RequestPacer pacer_;
+  RrefSubscription status_subscription_;
+  DatarefReader reader_;
+  DataOutput data_output_;
+  std::vector<Group> groups_;  // by falling priority
+  std::deque<Request> requests_;
+  bool was_alive_ = false;
+  std::uint32_t seen_epoch_ = 0;
+
+  std::int32_t rpos_rate_hz_ = 0;
+  std::int64_t next_rpos_request_ns_ = 0;
+  std::int64_t next_xpc_request_ns_ = 0;
+
+  SimulatorVersion version_;
+  std::optional<bool> paused_;
+  std::optional<float> sim_time_s_;
+  LinkCounters live_counters_;  // of this thread; published by maintain()
+  UdpCounters retired_udp_;     // of sources that are gone
+
+  enum class StopPhase : std::uint8_t { kRunning, kReleasing, kUnsubscribing, kDone };
+  StopPhase stop_phase_ = StopPhase::kRunning;
+  std::int64_t stop_deadline_ns_ = 0;
+  bool released_ = true;
 };
 
 }  // namespace xplane_bridge::core

@@ -1,8 +1,11 @@
-#include "sim_link_impl.hpp"
+#include "xplane_bridge/core/link/sim_link.hpp"
 
 #include <algorithm>
 #include <array>
 #include <utility>
+
+#include "xplane_bridge/core/base/units.hpp"
+#include "xplane_bridge/core/wire/udp_socket.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -13,11 +16,11 @@ constexpr std::int64_t kRposRetryNs = kNanosecondsPerSecond;
 
 }  // namespace
 
-void SimLink::Impl::housekeeping(std::int64_t now_ns) {
-  if (beacon_socket_ != nullptr && now_ns >= next_join_ns_) {
+void SimLink::maintain(std::int64_t now_ns) {
+  if (beacon_source_ != nullptr && now_ns >= next_join_ns_) {
     next_join_ns_ = now_ns + kJoinNs;
     try {
-      beacon_socket_->joinOnAllInterfaces(resolveHost(options_.beacon_group));
+      beacon_source_->joinOnAllInterfaces(resolveHost(options_.beacon_group));
     } catch (const SocketError& error) {
       beacon_failure_ = std::string("X-Plane's beacon cannot be heard: ") + error.what();
     }
@@ -35,7 +38,7 @@ void SimLink::Impl::housekeeping(std::int64_t now_ns) {
   publish(now_ns);
 }
 
-void SimLink::Impl::findPeer(std::int64_t now_ns) {
+void SimLink::findPeer(std::int64_t now_ns) {
   if (!options_.host.empty()) {
     if (!monitor_.alive() && now_ns >= next_resolve_ns_) {
       resolve(now_ns);
@@ -65,7 +68,7 @@ void SimLink::Impl::findPeer(std::int64_t now_ns) {
   }
 }
 
-void SimLink::Impl::resolve(std::int64_t now_ns) {
+void SimLink::resolve(std::int64_t now_ns) {
   next_resolve_ns_ = now_ns + kResolveNs;
   try {
     const Endpoint found{resolveHost(options_.host), options_.port};
@@ -81,7 +84,7 @@ void SimLink::Impl::resolve(std::int64_t now_ns) {
   }
 }
 
-void SimLink::Impl::setPeer(const Endpoint& peer, const std::string& why) {
+void SimLink::setPeer(const Endpoint& peer, const std::string& why) {
   log_(LogLevel::kInfo, "talking to X-Plane at " + peer.toString() + ", " + why);
   peer_ = peer;
   packed_peer_ = (std::uint64_t{peer.address} << 16) | peer.port;
@@ -102,7 +105,7 @@ void SimLink::Impl::setPeer(const Endpoint& peer, const std::string& why) {
   journal_ = std::move(journal);
 }
 
-void SimLink::Impl::refreshLink(std::int64_t now_ns) {
+void SimLink::refreshLink(std::int64_t now_ns) {
   monitor_.update(now_ns);
   const bool alive = monitor_.alive();
   const bool came_up = alive && monitor_.epoch() != seen_epoch_;
@@ -127,7 +130,7 @@ void SimLink::Impl::refreshLink(std::int64_t now_ns) {
   }
 }
 
-void SimLink::Impl::restartSubscriptions(std::int64_t now_ns) {
+void SimLink::restartSubscriptions(std::int64_t now_ns) {
   for (Group& group : groups_) {
     group.subscription.restart(now_ns);
     ++live_counters_.resubscriptions;
@@ -136,7 +139,7 @@ void SimLink::Impl::restartSubscriptions(std::int64_t now_ns) {
   next_rpos_request_ns_ = now_ns;
 }
 
-void SimLink::Impl::updateDataOutput(std::int64_t now_ns) {
+void SimLink::updateDataOutput(std::int64_t now_ns) {
   Endpoint target{0, dataPort()};
   try {
     target.address =
@@ -148,86 +151,96 @@ void SimLink::Impl::updateDataOutput(std::int64_t now_ns) {
   data_output_.linkUp(journal(), target, now_ns);
 }
 
-void SimLink::Impl::updateRpos(std::int64_t now_ns) {
-  if (rpos_socket_ == nullptr || rpos_rate_hz_ == 0 || !monitor_.alive() || now_ns < next_rpos_request_ns_ ||
+void SimLink::updateRpos(std::int64_t now_ns) {
+  if (rpos_source_ == nullptr || rpos_rate_hz_ == 0 || !monitor_.alive() || now_ns < next_rpos_request_ns_ ||
       stop_phase_ != StopPhase::kRunning) {
     return;
   }
   std::array<std::uint8_t, kRposRequestSize> buffer;
   if (const EncodeResult size = encodeRpos(buffer, rpos_rate_hz_)) {
-    rpos_socket_->sendTo({buffer.data(), *size}, peer_);
+    rpos_source_->sendTo({buffer.data(), *size}, peer_);
     ++live_counters_.requests;
   }
   next_rpos_request_ns_ = now_ns + jitter_.around(kRposRetryNs);
 }
 
-void SimLink::Impl::askXpc(std::int64_t now_ns) {
-  if (xpc_socket_ == nullptr || !peer_.valid() || !monitor_.alive() || now_ns < next_xpc_request_ns_ ||
+void SimLink::askXpc(std::int64_t now_ns) {
+  if (xpc_source_ == nullptr || !peer_.valid() || !monitor_.alive() || now_ns < next_xpc_request_ns_ ||
       stop_phase_ != StopPhase::kRunning) {
     return;
   }
   constexpr std::uint8_t kOwnAircraft = 0;
   std::array<std::uint8_t, kGetpSize> buffer;
   if (const EncodeResult size = encodeGetp(buffer, kOwnAircraft)) {
-    xpc_socket_->sendTo({buffer.data(), *size}, {peer_.address, options_.xpc_port});
+    xpc_source_->sendTo({buffer.data(), *size}, {peer_.address, options_.xpc_port});
   }
   next_xpc_request_ns_ = now_ns + toNanoseconds(1.0 / options_.xpc_rate_hz);
 }
 
-void SimLink::Impl::flushRequests(std::int64_t now_ns) {
+void SimLink::flushRequests(std::int64_t now_ns) {
   if (!peer_.valid()) {
     return;
   }
   std::size_t allowance = pacer_.allowance(now_ns, &jitter_);
   const std::size_t before = allowance;
-  const auto flush = [&](RrefSubscription* subscription, UdpSocket* socket) {
+  const auto flush = [&](RrefSubscription* subscription, DatagramSource* source) {
     while (allowance > 0) {
       const std::optional<std::size_t> index = subscription->nextRequest(now_ns, &jitter_);
       if (!index.has_value()) {
         return;
       }
-      sendRequest(socket, subscription->group().datarefs[*index], subscription->group().rate_hz,
+      sendRequest(source, subscription->group().datarefs[*index], subscription->group().rate_hz,
                   static_cast<std::int32_t>(*index));
       --allowance;
     }
   };
   const bool subscribing = stop_phase_ == StopPhase::kRunning || stop_phase_ == StopPhase::kReleasing;
   if (subscribing) {
-    flush(&status_subscription_, control_socket_.get());
+    flush(&status_subscription_, control_source_.get());
   }
   for (; allowance > 0 && !requests_.empty(); --allowance) {
     const Request& request = requests_.front();
-    sendRequest(request.socket.get(), request.path, request.rate_hz, request.index);
+    sendRequest(request.source.get(), request.path, request.rate_hz, request.index);
     requests_.pop_front();
   }
   if (subscribing) {
     for (Group& group : groups_) {
-      flush(&group.subscription, group.socket.get());
+      flush(&group.subscription, group.source.get());
     }
   }
   pacer_.spend(before - allowance);
 }
 
-void SimLink::Impl::sendRequest(UdpSocket* socket, const std::string& path, std::int32_t rate_hz, std::int32_t index) {
+void SimLink::sendRequest(DatagramSource* source, const std::string& path, std::int32_t rate_hz, std::int32_t index) {
   std::array<std::uint8_t, kRrefRequestSize> buffer;
   if (const EncodeResult size = encodeRref(buffer, path, rate_hz, index)) {
-    socket->sendTo({buffer.data(), *size}, peer_);
+    source->sendTo({buffer.data(), *size}, peer_);
     ++live_counters_.requests;
   }
 }
 
-void SimLink::Impl::stopGroup(const Group& group) {
-  retired_udp_ += group.socket->counters();
+void SimLink::removeGroup(const RrefDelivery* delivery) {
+  const auto old = std::find_if(groups_.begin(), groups_.end(),
+                                [delivery](const Group& each) { return each.delivery.get() == delivery; });
+  if (old != groups_.end()) {
+    stopGroup(*old);
+    hub_->ignore(*old->source);  // it may live on for requests that are still to be sent
+    groups_.erase(old);
+  }
+}
+
+void SimLink::stopGroup(const Group& group) {
+  retired_udp_ += group.source->counters();
   if (!monitor_.alive()) {
     return;  // X-Plane has forgotten us, or will find nobody on that port
   }
   const RrefGroup& stopped = group.subscription.group();
   for (std::size_t i = 0; i < stopped.datarefs.size(); ++i) {
-    requests_.push_back({group.socket, stopped.datarefs[i], 0, static_cast<std::int32_t>(i)});
+    requests_.push_back({group.source, stopped.datarefs[i], 0, static_cast<std::int32_t>(i)});
   }
 }
 
-void SimLink::Impl::stopSubscriptions() {
+void SimLink::stopSubscriptions() {
   if (!monitor_.alive()) {
     return;
   }
@@ -236,17 +249,17 @@ void SimLink::Impl::stopSubscriptions() {
   }
   groups_.clear();
   for (std::int32_t i = 0; i <= kSimTimeIndex; ++i) {
-    requests_.push_back({control_socket_, kStatusDatarefs[i], 0, i});
+    requests_.push_back({control_source_, status_subscription_.group().datarefs[static_cast<std::size_t>(i)], 0, i});
   }
-  if (rpos_socket_ != nullptr && rpos_rate_hz_ > 0) {
+  if (rpos_source_ != nullptr && rpos_rate_hz_ > 0) {
     std::array<std::uint8_t, kRposRequestSize> buffer;
     if (const EncodeResult size = encodeRpos(buffer, 0)) {
-      rpos_socket_->sendTo({buffer.data(), *size}, peer_);
+      rpos_source_->sendTo({buffer.data(), *size}, peer_);
     }
   }
 }
 
-void SimLink::Impl::updateStop(std::int64_t now_ns) {
+void SimLink::updateStop(std::int64_t now_ns) {
   const bool late = now_ns >= stop_deadline_ns_;
   if (stop_phase_ == StopPhase::kReleasing && late) {
     reader_.cancelAll();

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <sys/epoll.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/wire/datagram_source.hpp"
+
+namespace xplane_bridge::core {
+
+/// The computer's UDP sockets, waited for with epoll.
+class UdpHub : public DatagramHub {
+ public:
+  /// Throws SocketError.
+  UdpHub();
+  ~UdpHub() override;
+  UdpHub(const UdpHub&) = delete;
+  UdpHub& operator=(const UdpHub&) = delete;
+
+  std::shared_ptr<DatagramSource> open(const std::string& name, const UdpSocketOptions& options) override;
+  void wake() override;
+  void ignore(const DatagramSource& source) override;
+  void wait(int timeout_ms) override;
+  bool hasInput(const DatagramSource& source) const override;
+
+ private:
+  void watch(int fd, const void* tag);
+  bool isReady(const void* tag) const;
+
+  int epoll_fd_ = -1;
+  int wake_fd_ = -1;
+  std::vector<epoll_event> ready_;  // as the last wait() found them
+};
+
+}  // namespace xplane_bridge::core

@@ -1,0 +1,85 @@
+#include "xplane_bridge/core/wire/udp_hub.hpp"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+
+#include "xplane_bridge/core/wire/udp_socket.hpp"
+
+namespace xplane_bridge::core {
+namespace {
+
+[[noreturn]] void fail(const char* what, int error_number) {
+  throw SocketError(std::string(what) + ": " + std::strerror(error_number), error_number);
+}
+
+// open() makes no other sources.
+int fdOf(const DatagramSource& source) { return static_cast<const UdpSocket&>(source).fd(); }
+
+}  // namespace
+
+UdpHub::UdpHub() {
+  epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
+  if (epoll_fd_ < 0) {
+    fail("cannot make an epoll", errno);
+  }
+  wake_fd_ = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+  if (wake_fd_ < 0) {
+    const int error_number = errno;
+    close(epoll_fd_);
+    fail("cannot make an eventfd", error_number);
+  }
+  watch(wake_fd_, this);
+}
+
+UdpHub::~UdpHub() {
+  close(wake_fd_);
+  close(epoll_fd_);
+}
+
+std::shared_ptr<DatagramSource> UdpHub::open(const std::string& name, const UdpSocketOptions& options) {
+  static_cast<void>(name);  // X-Plane does not see it
+  auto socket = std::make_shared<UdpSocket>(options);
+  watch(socket->fd(), static_cast<const DatagramSource*>(socket.get()));
+  return socket;
+}
+
+void UdpHub::watch(int fd, const void* tag) {
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.ptr = const_cast<void*>(tag);  // compared only
+  if (epoll_ctl(epoll_fd_, EPOLL_CTL_ADD, fd, &event) != 0) {
+    fail("a socket cannot be waited for", errno);
+  }
+}
+
+void UdpHub::ignore(const DatagramSource& source) { epoll_ctl(epoll_fd_, EPOLL_CTL_DEL, fdOf(source), nullptr); }
+
+void UdpHub::wake() {
+  const std::uint64_t one = 1;
+  // Fails only when the counter is full, and then the thread is awake anyway.
+  [[maybe_unused]] const ssize_t written = ::write(wake_fd_, &one, sizeof(one));
+}
+
+void UdpHub::wait(int timeout_ms) {
+  constexpr std::size_t kMostAtOnce = 64;
+  ready_.resize(kMostAtOnce);
+  const int count = epoll_wait(epoll_fd_, ready_.data(), static_cast<int>(ready_.size()), timeout_ms);
+  ready_.resize(static_cast<std::size_t>(std::max(0, count)));  // interrupted: nothing
+  if (isReady(this)) {
+    std::uint64_t woken = 0;
+    [[maybe_unused]] const ssize_t size = ::read(wake_fd_, &woken, sizeof(woken));
+  }
+}
+
+bool UdpHub::hasInput(const DatagramSource& source) const { return isReady(&source); }
+
+bool UdpHub::isReady(const void* tag) const {
+  return std::any_of(ready_.begin(), ready_.end(), [tag](const epoll_event& event) { return event.data.ptr == tag; });
+}
+
+}  // namespace xplane_bridge::core
