@@ -321,11 +321,12 @@ def test_refused_command_changes_nothing_and_is_named(tx, world, values, named):
     world.manual.fly(fields=ROLL, roll=0.3)
     world.wire.wait(STICK, 0.3)
     other = CommandSource(world, "control/manual")
-    other.once(**values)
+    other.fly(**values)  # again and again: with queues of one, each may be overtaken by one of the good ones
     status = world.wait_for_diagnostics(
         "control", lambda s: named in world.values_of(s).get("control/manual last refusal", "")
     )
-    assert world.values_of(status)["control/manual refused (-)"] == "1"
+    other.stop()
+    assert int(world.values_of(status)["control/manual refused (-)"]) > 0
     assert all(a.roll <= 0.3 + 1e-6 for a in world.applied.messages)
     world.wire.wait(STICK, 0.3)
 
