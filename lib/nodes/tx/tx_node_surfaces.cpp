@@ -1,5 +1,5 @@
 // tx_node's side of single surfaces, failures and excitations: topics and services to SurfaceControl, FailureKeeper and
-// ExcitationKeeper.
+// ExcitationManager.
 
 #include <cmath>
 #include <utility>
@@ -29,7 +29,7 @@ void TxNode::makeSurfaceControl() {
       [this](const std::string& text, const std::string& who, bool success) {
         logEvent(Event::FAILURE, text, who, success);
       });
-  auto excitation = std::make_unique<ExcitationKeeper>(
+  auto excitation = std::make_unique<ExcitationManager>(
       surfaces.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg,
       [this](ExcitationState* message) { publishStamped(excitation_publisher_, message); },
       [this](const std::string& text, const std::string& who, bool success) {
@@ -42,7 +42,7 @@ void TxNode::makeSurfaceControl() {
 }
 
 void TxNode::serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response) {
-  const ExcitationKeeper::Plan plan = excitation_->plan(request);
+  const ExcitationManager::Plan plan = excitation_->plan(request);
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const bool flown = ever_sent_.any() && !arbiter_->status().failsafe;
   excitation_->inject(request, plan, name() + "/inject_excitation", watch_, refusalToFly(),

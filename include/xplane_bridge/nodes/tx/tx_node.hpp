@@ -27,7 +27,7 @@
 #include "xplane_bridge/SetWind.h"
 #include "xplane_bridge/Situation.h"
 #include "xplane_bridge/SurfaceCommand.h"
-#include "xplane_bridge/actuation/excitation_keeper.hpp"
+#include "xplane_bridge/actuation/excitation_manager.hpp"
 #include "xplane_bridge/actuation/failure_keeper.hpp"
 #include "xplane_bridge/actuation/flight_jobs.hpp"
 #include "xplane_bridge/actuation/guardian.hpp"
@@ -144,7 +144,7 @@ class TxNode : public BaseNode {
   std::unique_ptr<OverrideManager> overrides_;
   std::unique_ptr<SurfaceControl> surfaces_;
   std::unique_ptr<FailureKeeper> failures_;
-  std::unique_ptr<ExcitationKeeper> excitation_;  // guarded by mutex_
+  std::unique_ptr<ExcitationManager> excitation_;  // guarded by mutex_
   std::unique_ptr<FlightJobs> jobs_;
 
   const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();

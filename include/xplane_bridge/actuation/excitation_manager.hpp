@@ -17,7 +17,7 @@ namespace xplane_bridge {
 /// The one test signal that runs, on an axis (added to what is commanded) or on a surface (which is driven for as
 /// long), and its label (excitation/state). X-Plane's frames drive it. Not thread-safe: TxNode's mutex guards it, but
 /// for plan().
-class ExcitationKeeper {
+class ExcitationManager {
  public:
   /// `report(text, who, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
@@ -25,7 +25,8 @@ class ExcitationKeeper {
   /// Stamps excitation/state and publishes it.
   using Publish = std::function<void(ExcitationState* message)>;
 
-  ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, Publish publish, Report report);
+  ExcitationManager(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, Publish publish,
+                    Report report);
 
   /// What a request asks for, as far as it tells by itself.
   struct Plan {

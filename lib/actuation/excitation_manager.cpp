@@ -1,4 +1,4 @@
-#include "xplane_bridge/actuation/excitation_keeper.hpp"
+#include "xplane_bridge/actuation/excitation_manager.hpp"
 
 #include <cmath>
 #include <limits>
@@ -30,8 +30,8 @@ core::ChannelSet channelsOf(const std::string& target) {
 
 }  // namespace
 
-ExcitationKeeper::ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, Publish publish,
-                                   Report report)
+ExcitationManager::ExcitationManager(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg,
+                                     Publish publish, Report report)
     : surfaces_(surfaces),
       max_roll_deg_(max_roll_deg),
       max_pitch_deg_(max_pitch_deg),
@@ -41,7 +41,7 @@ ExcitationKeeper::ExcitationKeeper(SurfaceControl* surfaces, double max_roll_deg
   publish_(&state_);
 }
 
-ExcitationKeeper::Plan ExcitationKeeper::plan(const InjectExcitation::Request& request) const {
+ExcitationManager::Plan ExcitationManager::plan(const InjectExcitation::Request& request) const {
   Plan out;
   if (request.kind == "stop") return out;
   const auto shape = core::excitationShapeFrom(request.kind);
@@ -77,9 +77,9 @@ ExcitationKeeper::Plan ExcitationKeeper::plan(const InjectExcitation::Request& r
   return out;
 }
 
-void ExcitationKeeper::inject(const InjectExcitation::Request& request, const Plan& plan, const std::string& who,
-                              const core::FlightWatch& watch, const std::string& refusal,
-                              const core::ChannelSet& commanded, InjectExcitation::Response* response) {
+void ExcitationManager::inject(const InjectExcitation::Request& request, const Plan& plan, const std::string& who,
+                               const core::FlightWatch& watch, const std::string& refusal,
+                               const core::ChannelSet& commanded, InjectExcitation::Response* response) {
   const auto answer = [&](std::uint8_t code, const std::string& text) {
     response->result.code = code;
     response->result.message = text;
@@ -136,7 +136,7 @@ void ExcitationKeeper::inject(const InjectExcitation::Request& request, const Pl
   answer(ServiceResult::ACCEPTED, "it runs; excitation/state tells its end");
 }
 
-bool ExcitationKeeper::onFrame(const core::FlightWatch& watch) {
+bool ExcitationManager::onFrame(const core::FlightWatch& watch) {
   if (!running()) return false;
   const double value = runner_.step(watch.sim_time, watch.roll_deg, watch.pitch_deg);
   last_sim_time_ = watch.sim_time;
@@ -151,18 +151,18 @@ bool ExcitationKeeper::onFrame(const core::FlightWatch& watch) {
   return channels_.any();
 }
 
-void ExcitationKeeper::abort(const std::string& reason) {
+void ExcitationManager::abort(const std::string& reason) {
   if (!running()) return;
   runner_.abort(reason);
   end();
 }
 
-core::ChannelExcitation ExcitationKeeper::excitation() const {
+core::ChannelExcitation ExcitationManager::excitation() const {
   if (!running()) return {};
   return {channels_, runner_.value()};
 }
 
-void ExcitationKeeper::end() {
+void ExcitationManager::end() {
   if (surface_) surfaces_->clearOffset();
   const bool done = runner_.phase() == core::ExcitationPhase::kDone;
   state_.active = false;
@@ -172,6 +172,6 @@ void ExcitationKeeper::end() {
   report_("excitation " + std::to_string(state_.id) + " on " + state_.target + ": " + state_.result, who_, done);
 }
 
-void ExcitationKeeper::publish() { publish_(&state_); }
+void ExcitationManager::publish() { publish_(&state_); }
 
 }  // namespace xplane_bridge
