@@ -204,14 +204,14 @@ FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion ve
   return out;
 }
 
-std::optional<std::string> FailureBook::sameAs(const FailurePlan& plan) const {
+std::optional<std::string> FailureRegistry::sameAs(const FailurePlan& plan) const {
   for (const auto& [name, entry] : entries_) {
     if (entry.by_bridge && name != plan.name && shareDataref(entry.plan, plan)) return name;
   }
   return std::nullopt;
 }
 
-void FailureBook::add(const FailureRequest& request, const FailurePlan& plan, const FlightConditions& now) {
+void FailureRegistry::add(const FailureRequest& request, const FailurePlan& plan, const FlightConditions& now) {
   for (auto it = entries_.begin(); it != entries_.end();) {
     it = !it->second.by_bridge && shareDataref(it->second.plan, plan) ? entries_.erase(it) : std::next(it);
   }
@@ -224,7 +224,7 @@ void FailureBook::add(const FailureRequest& request, const FailurePlan& plan, co
   entries_[plan.name] = entry;
 }
 
-std::vector<FailurePlan> FailureBook::due(const FlightConditions& now) {
+std::vector<FailurePlan> FailureRegistry::due(const FlightConditions& now) {
   std::vector<FailurePlan> out;
   for (auto& [name, entry] : entries_) {
     if (entry.active || !hasCome(entry.trigger, entry.trigger_value, now)) continue;
@@ -235,17 +235,17 @@ std::vector<FailurePlan> FailureBook::due(const FlightConditions& now) {
   return out;
 }
 
-void FailureBook::confirm(const std::string& name, bool shown) {
+void FailureRegistry::confirm(const std::string& name, bool shown) {
   const auto it = entries_.find(name);
   if (it != entries_.end()) it->second.confirmed = shown;
 }
 
-void FailureBook::setValue(const std::string& name, double value) {
+void FailureRegistry::setValue(const std::string& name, double value) {
   const auto it = entries_.find(name);
   if (it != entries_.end()) it->second.plan.value = value;
 }
 
-bool FailureBook::observe(const std::string& dataref, double value, double sim_time) {
+bool FailureRegistry::observe(const std::string& dataref, double value, double sim_time) {
   const bool failed = value == kFailedNow;
   for (auto it = entries_.begin(); it != entries_.end(); ++it) {
     Entry& entry = it->second;
@@ -277,7 +277,7 @@ bool FailureBook::observe(const std::string& dataref, double value, double sim_t
   return true;
 }
 
-FailureBook::Cleared FailureBook::clear(const std::vector<std::string>& names, bool include_simulator) {
+FailureRegistry::Cleared FailureRegistry::clear(const std::vector<std::string>& names, bool include_simulator) {
   Cleared out;
   for (auto it = entries_.begin(); it != entries_.end();) {
     const bool named = std::find(names.begin(), names.end(), it->first) != names.end();
@@ -294,7 +294,7 @@ FailureBook::Cleared FailureBook::clear(const std::vector<std::string>& names, b
   return out;
 }
 
-std::vector<FailureLabel> FailureBook::labels() const {
+std::vector<FailureLabel> FailureRegistry::labels() const {
   std::vector<FailureLabel> out;
   for (const auto& [name, entry] : entries_) {
     FailureLabel label;
@@ -310,7 +310,7 @@ std::vector<FailureLabel> FailureBook::labels() const {
   return out;
 }
 
-std::vector<SurfaceFailure> FailureBook::drivenSurfaces() const {
+std::vector<SurfaceFailure> FailureRegistry::drivenSurfaces() const {
   std::vector<SurfaceFailure> out;
   for (const auto& [name, entry] : entries_) {
     if (entry.active && entry.driven && entry.plan.surface) out.push_back(*entry.plan.surface);
@@ -318,18 +318,18 @@ std::vector<SurfaceFailure> FailureBook::drivenSurfaces() const {
   return out;
 }
 
-bool FailureBook::isDriven(const std::string& name) const {
+bool FailureRegistry::isDriven(const std::string& name) const {
   const auto it = entries_.find(name);
   return it != entries_.end() && it->second.driven;
 }
 
-std::vector<std::string> FailureBook::datarefsOf(const std::string& name) const {
+std::vector<std::string> FailureRegistry::datarefsOf(const std::string& name) const {
   const auto it = entries_.find(name);
   if (it == entries_.end() || !it->second.active || it->second.driven) return {};
   return it->second.plan.datarefs;
 }
 
-void FailureBook::useDriver(const std::string& name, double sim_time, std::optional<double> stuck_deg) {
+void FailureRegistry::useDriver(const std::string& name, double sim_time, std::optional<double> stuck_deg) {
   const auto it = entries_.find(name);
   if (it == entries_.end() || !it->second.plan.surface) return;
   it->second.driven = true;

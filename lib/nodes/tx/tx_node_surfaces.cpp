@@ -1,5 +1,5 @@
-// tx_node's side of single surfaces, failures and excitations: topics and services to SurfaceControl, FailureKeeper and
-// ExcitationManager.
+// tx_node's side of single surfaces, failures and excitations: topics and services to SurfaceControl, FailureManager
+// and ExcitationManager.
 
 #include <cmath>
 #include <utility>
@@ -23,7 +23,7 @@ void TxNode::makeSurfaceControl() {
       &link(), overrides_.get(), options,
       [this](const std::string& text, bool success) { logEvent(Event::OVERRIDE, text, "", success); },
       [this] { publishSurfacesApplied(); });
-  auto failures = std::make_unique<FailureKeeper>(
+  auto failures = std::make_unique<FailureManager>(
       &link(), overrides_.get(), surfaces.get(), options_.service_timeout,
       [this](FailureState* message) { publishStamped(failure_publisher_, message); },
       [this](const std::string& text, const std::string& who, bool success) {

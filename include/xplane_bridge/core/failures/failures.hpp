@@ -66,7 +66,7 @@ struct FailureLabel {
 };
 
 /// All failures that are armed or active, by name. The caller carries plans out and reports what X-Plane shows.
-class FailureBook {
+class FailureRegistry {
  public:
   /// The other failure of the bridge's that one of the plan's datarefs belongs to already; nullopt: none. One that was
   /// set in the simulator's menu gives way.

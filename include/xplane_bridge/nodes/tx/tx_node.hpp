@@ -28,7 +28,7 @@
 #include "xplane_bridge/Situation.h"
 #include "xplane_bridge/SurfaceCommand.h"
 #include "xplane_bridge/actuation/excitation_manager.hpp"
-#include "xplane_bridge/actuation/failure_keeper.hpp"
+#include "xplane_bridge/actuation/failure_manager.hpp"
 #include "xplane_bridge/actuation/flight_jobs.hpp"
 #include "xplane_bridge/actuation/guardian.hpp"
 #include "xplane_bridge/actuation/override_manager.hpp"
@@ -143,7 +143,7 @@ class TxNode : public BaseNode {
   Guardian guardian_;
   std::unique_ptr<OverrideManager> overrides_;
   std::unique_ptr<SurfaceControl> surfaces_;
-  std::unique_ptr<FailureKeeper> failures_;
+  std::unique_ptr<FailureManager> failures_;
   std::unique_ptr<ExcitationManager> excitation_;  // guarded by mutex_
   std::unique_ptr<FlightJobs> jobs_;
 

@@ -87,7 +87,7 @@ TEST(Failures, XPlane12sOwnFailuresWhereTheyExpressTheWish) {
   EXPECT_FALSE(planFailure(request("rudder1_fin1", "gone"), k12).plan.surface);
 }
 
-TEST(FailureBook, TriggersWaitForTheirCondition) {
+TEST(FailureRegistry, TriggersWaitForTheirCondition) {
   const struct {
     int trigger;
     double value;
@@ -100,142 +100,142 @@ TEST(FailureBook, TriggersWaitForTheirCondition) {
       {5, 30.0, at(100, NAN, 31), at(100, NAN, NAN), at(100, NAN, 30)},
   };
   for (const auto& c : cases) {
-    FailureBook book;
+    FailureRegistry registry;
     const auto r = request("engine_1", "failed", {}, c.trigger, c.value);
-    book.add(r, planFailure(r, k11).plan, at(100.0));
-    EXPECT_TRUE(book.due(c.before).empty()) << c.trigger;
-    EXPECT_TRUE(book.due(c.unknown).empty()) << c.trigger;
-    EXPECT_FALSE(book.labels()[0].active);
-    EXPECT_TRUE(std::isnan(book.labels()[0].since_sim_time));
-    ASSERT_EQ(book.due(c.after).size(), 1u) << c.trigger;
-    EXPECT_TRUE(book.due(c.after).empty()) << "once";
-    EXPECT_TRUE(book.labels()[0].active);
-    EXPECT_DOUBLE_EQ(book.labels()[0].since_sim_time, c.after.sim_time);
+    registry.add(r, planFailure(r, k11).plan, at(100.0));
+    EXPECT_TRUE(registry.due(c.before).empty()) << c.trigger;
+    EXPECT_TRUE(registry.due(c.unknown).empty()) << c.trigger;
+    EXPECT_FALSE(registry.labels()[0].active);
+    EXPECT_TRUE(std::isnan(registry.labels()[0].since_sim_time));
+    ASSERT_EQ(registry.due(c.after).size(), 1u) << c.trigger;
+    EXPECT_TRUE(registry.due(c.after).empty()) << "once";
+    EXPECT_TRUE(registry.labels()[0].active);
+    EXPECT_DOUBLE_EQ(registry.labels()[0].since_sim_time, c.after.sim_time);
   }
 }
 
-TEST(FailureBook, ConfirmsByReadBackAndSeesTheSimulatorsOwn) {
-  FailureBook book;
+TEST(FailureRegistry, ConfirmsByReadBackAndSeesTheSimulatorsOwn) {
+  FailureRegistry registry;
   const auto r = request("engine_1");
-  book.add(r, planFailure(r, k11).plan, at(10.0));
-  EXPECT_FALSE(book.observe("sim/operation/failures/rel_engfai0", 6, 10.0)) << "not active yet";
-  book.due(at(10.0));
-  EXPECT_TRUE(book.observe("sim/operation/failures/rel_engfai0", 6, 10.1));
-  EXPECT_TRUE(book.labels()[0].confirmed);
-  EXPECT_FALSE(book.observe("sim/operation/failures/rel_engfai0", 6, 10.2)) << "nothing new";
+  registry.add(r, planFailure(r, k11).plan, at(10.0));
+  EXPECT_FALSE(registry.observe("sim/operation/failures/rel_engfai0", 6, 10.0)) << "not active yet";
+  registry.due(at(10.0));
+  EXPECT_TRUE(registry.observe("sim/operation/failures/rel_engfai0", 6, 10.1));
+  EXPECT_TRUE(registry.labels()[0].confirmed);
+  EXPECT_FALSE(registry.observe("sim/operation/failures/rel_engfai0", 6, 10.2)) << "nothing new";
 
-  EXPECT_FALSE(book.observe("sim/operation/failures/rel_pitot", 0, 11.0));
-  EXPECT_TRUE(book.observe("sim/operation/failures/rel_pitot", 6, 12.0));
-  ASSERT_EQ(book.labels().size(), 2u);
-  const FailureLabel pitot = book.labels()[1];
+  EXPECT_FALSE(registry.observe("sim/operation/failures/rel_pitot", 0, 11.0));
+  EXPECT_TRUE(registry.observe("sim/operation/failures/rel_pitot", 6, 12.0));
+  ASSERT_EQ(registry.labels().size(), 2u);
+  const FailureLabel pitot = registry.labels()[1];
   EXPECT_EQ(pitot.name, "rel_pitot");
   EXPECT_FALSE(pitot.by_bridge);
   EXPECT_TRUE(pitot.active && pitot.confirmed);
   EXPECT_DOUBLE_EQ(pitot.since_sim_time, 12.0);
-  EXPECT_TRUE(book.observe("sim/operation/failures/rel_pitot", 0, 13.0));
-  EXPECT_EQ(book.labels().size(), 1u);
+  EXPECT_TRUE(registry.observe("sim/operation/failures/rel_pitot", 0, 13.0));
+  EXPECT_EQ(registry.labels().size(), 1u);
 }
 
-TEST(FailureBook, IsConfirmedWhenAllItsDatarefsShowIt) {
+TEST(FailureRegistry, IsConfirmedWhenAllItsDatarefsShowIt) {
   const std::string horizon = "sim/operation/failures/rel_ss_ahz", gyro = "sim/operation/failures/rel_ss_dgy";
-  FailureBook book;
+  FailureRegistry registry;
   const auto r = request("gyro_1");
-  book.add(r, planFailure(r, k11).plan, at(1.0));
-  book.due(at(1.0));
-  EXPECT_FALSE(book.observe(horizon, 6, 1.1));
-  EXPECT_FALSE(book.observe(gyro, 0, 1.1));
-  EXPECT_FALSE(book.labels()[0].confirmed) << "one of two";
-  EXPECT_TRUE(book.observe(gyro, 6, 1.2));
-  EXPECT_TRUE(book.labels()[0].confirmed);
-  EXPECT_TRUE(book.observe(horizon, 0, 1.3));
-  EXPECT_FALSE(book.labels()[0].confirmed);
+  registry.add(r, planFailure(r, k11).plan, at(1.0));
+  registry.due(at(1.0));
+  EXPECT_FALSE(registry.observe(horizon, 6, 1.1));
+  EXPECT_FALSE(registry.observe(gyro, 0, 1.1));
+  EXPECT_FALSE(registry.labels()[0].confirmed) << "one of two";
+  EXPECT_TRUE(registry.observe(gyro, 6, 1.2));
+  EXPECT_TRUE(registry.labels()[0].confirmed);
+  EXPECT_TRUE(registry.observe(horizon, 0, 1.3));
+  EXPECT_FALSE(registry.labels()[0].confirmed);
 }
 
-TEST(FailureBook, OneDatarefHasOneName) {
-  FailureBook book;
-  book.observe("sim/operation/failures/rel_static", 6, 1.0);  // in the menu
+TEST(FailureRegistry, OneDatarefHasOneName) {
+  FailureRegistry registry;
+  registry.observe("sim/operation/failures/rel_static", 6, 1.0);  // in the menu
   const auto ours = planFailure(request("static_1"), k11).plan;
-  EXPECT_EQ(book.sameAs(ours), std::nullopt) << "what the simulator has failed may be failed";
-  book.add(request("static_1"), ours, at(2.0));
-  ASSERT_EQ(book.labels().size(), 1u) << "and is the bridge's from then on";
-  book.due(at(2.0));
-  EXPECT_TRUE(book.observe("sim/operation/failures/rel_static", 6, 2.1));
-  EXPECT_TRUE(book.labels()[0].confirmed);
-  EXPECT_EQ(book.sameAs(ours), std::nullopt) << "itself is replaced";
-  EXPECT_EQ(book.sameAs(planFailure(request("rel_static"), k11).plan), "static_1");
-  EXPECT_EQ(book.sameAs(planFailure(request("rel_pitot"), k11).plan), std::nullopt);
+  EXPECT_EQ(registry.sameAs(ours), std::nullopt) << "what the simulator has failed may be failed";
+  registry.add(request("static_1"), ours, at(2.0));
+  ASSERT_EQ(registry.labels().size(), 1u) << "and is the bridge's from then on";
+  registry.due(at(2.0));
+  EXPECT_TRUE(registry.observe("sim/operation/failures/rel_static", 6, 2.1));
+  EXPECT_TRUE(registry.labels()[0].confirmed);
+  EXPECT_EQ(registry.sameAs(ours), std::nullopt) << "itself is replaced";
+  EXPECT_EQ(registry.sameAs(planFailure(request("rel_static"), k11).plan), "static_1");
+  EXPECT_EQ(registry.sameAs(planFailure(request("rel_pitot"), k11).plan), std::nullopt);
 }
 
-TEST(FailureBook, ClearsOnlyWhatItIsAskedTo) {
-  FailureBook book;
+TEST(FailureRegistry, ClearsOnlyWhatItIsAskedTo) {
+  FailureRegistry registry;
   for (const char* name : {"engine_1", "engine_2"}) {
     const auto r = request(name);
-    book.add(r, planFailure(r, k11).plan, at(1.0));
+    registry.add(r, planFailure(r, k11).plan, at(1.0));
   }
-  book.due(at(1.0));
+  registry.due(at(1.0));
   const auto armed = request("bus_1", "failed", {}, 1, 100.0);
-  book.add(armed, planFailure(armed, k11).plan, at(1.0));
-  book.observe("sim/operation/failures/rel_pitot", 6, 2.0);
+  registry.add(armed, planFailure(armed, k11).plan, at(1.0));
+  registry.observe("sim/operation/failures/rel_pitot", 6, 2.0);
 
-  auto out = book.clear({"engine_2", "rel_pitot", "no_such"}, false);
+  auto out = registry.clear({"engine_2", "rel_pitot", "no_such"}, false);
   EXPECT_EQ(out.names, std::vector<std::string>{"engine_2"});
   ASSERT_EQ(out.undo.size(), 1u);
   EXPECT_EQ(out.undo[0].datarefs[0], "sim/operation/failures/rel_engfai1");
-  out = book.clear({}, false);
+  out = registry.clear({}, false);
   EXPECT_EQ(out.names, (std::vector<std::string>{"bus_1", "engine_1"}));
   EXPECT_EQ(out.undo.size(), 1u) << "an armed one has nothing to undo";
-  out = book.clear({}, true);
+  out = registry.clear({}, true);
   EXPECT_EQ(out.names, std::vector<std::string>{"rel_pitot"});
-  EXPECT_TRUE(book.labels().empty());
+  EXPECT_TRUE(registry.labels().empty());
 }
 
-TEST(FailureBook, DriverFliesWhatXPlaneCannotOrDoesNot) {
-  FailureBook book;
+TEST(FailureRegistry, DriverFliesWhatXPlaneCannotOrDoesNot) {
+  FailureRegistry registry;
   const auto angle = request("aileron1_wing2_left", "stuck", 5.0);
   const auto lock = request("rudder1_fin1", "stuck");
-  book.add(angle, planFailure(angle, k12).plan, at(1.0));
-  book.add(lock, planFailure(lock, k12).plan, at(1.0));
-  EXPECT_TRUE(book.drivenSurfaces().empty()) << "armed";
-  book.due(at(1.0));
-  ASSERT_EQ(book.drivenSurfaces().size(), 1u);
-  EXPECT_EQ(book.drivenSurfaces()[0].value, 5.0);
-  book.confirm("rudder1_fin1", true);
-  book.useDriver("rudder1_fin1", 3.0);
-  EXPECT_EQ(book.drivenSurfaces().size(), 2u);
+  registry.add(angle, planFailure(angle, k12).plan, at(1.0));
+  registry.add(lock, planFailure(lock, k12).plan, at(1.0));
+  EXPECT_TRUE(registry.drivenSurfaces().empty()) << "armed";
+  registry.due(at(1.0));
+  ASSERT_EQ(registry.drivenSurfaces().size(), 1u);
+  EXPECT_EQ(registry.drivenSurfaces()[0].value, 5.0);
+  registry.confirm("rudder1_fin1", true);
+  registry.useDriver("rudder1_fin1", 3.0);
+  EXPECT_EQ(registry.drivenSurfaces().size(), 2u);
   // X-Plane has shown its own failure, but not this one yet, which begins now.
-  EXPECT_FALSE(book.labels()[1].confirmed);
-  EXPECT_DOUBLE_EQ(book.labels()[1].since_sim_time, 3.0);
+  EXPECT_FALSE(registry.labels()[1].confirmed);
+  EXPECT_DOUBLE_EQ(registry.labels()[1].since_sim_time, 3.0);
 }
 
-TEST(FailureBook, SecondRequestOfANameReplacesTheFirst) {
-  FailureBook book;
+TEST(FailureRegistry, SecondRequestOfANameReplacesTheFirst) {
+  FailureRegistry registry;
   auto r = request("aileron1_wing2_left", "stuck", 5.0);
-  book.add(r, planFailure(r, k11).plan, at(1.0));
-  book.due(at(1.0));
+  registry.add(r, planFailure(r, k11).plan, at(1.0));
+  registry.due(at(1.0));
   r.value = 10.0;
-  book.add(r, planFailure(r, k11).plan, at(2.0));
-  ASSERT_EQ(book.due(at(2.0)).size(), 1u);
-  ASSERT_EQ(book.drivenSurfaces().size(), 1u);
-  EXPECT_EQ(book.drivenSurfaces()[0].value, 10.0);
+  registry.add(r, planFailure(r, k11).plan, at(2.0));
+  ASSERT_EQ(registry.due(at(2.0)).size(), 1u);
+  ASSERT_EQ(registry.drivenSurfaces().size(), 1u);
+  EXPECT_EQ(registry.drivenSurfaces()[0].value, 10.0);
 }
 
-TEST(FailureBook, TellsWhatIsDrivenAndWhatShowsAFailure) {
-  FailureBook book;
+TEST(FailureRegistry, TellsWhatIsDrivenAndWhatShowsAFailure) {
+  FailureRegistry registry;
   const auto stuck = request("aileron1_wing2_left", "stuck");
-  book.add(stuck, planFailure(stuck, k12).plan, at(1.0));
-  EXPECT_TRUE(book.datarefsOf("aileron1_wing2_left").empty()) << "armed";
-  book.due(at(1.0));
-  EXPECT_FALSE(book.isDriven("aileron1_wing2_left"));
-  EXPECT_EQ(book.datarefsOf("aileron1_wing2_left").front(), "sim/operation/failures/rel_fcon_ailn_1_lft_lock");
-  book.setValue("aileron1_wing2_left", 4.5);
-  EXPECT_EQ(book.labels().front().value, 4.5);
-  book.useDriver("aileron1_wing2_left", 2.0);
-  EXPECT_TRUE(book.isDriven("aileron1_wing2_left"));
-  EXPECT_TRUE(book.datarefsOf("aileron1_wing2_left").empty());
-  EXPECT_FALSE(book.drivenSurfaces().front().value) << "the label's value is no wish";
-  book.useDriver("aileron1_wing2_left", 2.0, 4.5);
-  EXPECT_EQ(book.drivenSurfaces().front().value, 4.5);
-  EXPECT_FALSE(book.isDriven("engine_1"));
+  registry.add(stuck, planFailure(stuck, k12).plan, at(1.0));
+  EXPECT_TRUE(registry.datarefsOf("aileron1_wing2_left").empty()) << "armed";
+  registry.due(at(1.0));
+  EXPECT_FALSE(registry.isDriven("aileron1_wing2_left"));
+  EXPECT_EQ(registry.datarefsOf("aileron1_wing2_left").front(), "sim/operation/failures/rel_fcon_ailn_1_lft_lock");
+  registry.setValue("aileron1_wing2_left", 4.5);
+  EXPECT_EQ(registry.labels().front().value, 4.5);
+  registry.useDriver("aileron1_wing2_left", 2.0);
+  EXPECT_TRUE(registry.isDriven("aileron1_wing2_left"));
+  EXPECT_TRUE(registry.datarefsOf("aileron1_wing2_left").empty());
+  EXPECT_FALSE(registry.drivenSurfaces().front().value) << "the label's value is no wish";
+  registry.useDriver("aileron1_wing2_left", 2.0, 4.5);
+  EXPECT_EQ(registry.drivenSurfaces().front().value, 4.5);
+  EXPECT_FALSE(registry.isDriven("engine_1"));
   EXPECT_EQ(failureName("sim/operation/failures/rel_otto"), "rel_otto");
   EXPECT_EQ(failureName("engine_1"), "engine_1");
 }

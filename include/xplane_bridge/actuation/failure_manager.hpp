@@ -26,7 +26,7 @@ namespace xplane_bridge {
 ///
 /// X-Plane's own failures (rel_*) go through the OverrideManager, so that they are repaired on exit and after a crash;
 /// single surfaces that X-Plane cannot break go to SurfaceControl. Thread-safe; only the services wait.
-class FailureKeeper {
+class FailureManager {
  public:
   /// `report(text, who, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
@@ -35,8 +35,8 @@ class FailureKeeper {
   using Publish = std::function<void(FailureState* message)>;
 
   /// `timeout` [s]: until X-Plane must show what was asked for.
-  FailureKeeper(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces, double timeout,
-                Publish publish, Report report);
+  FailureManager(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces, double timeout,
+                 Publish publish, Report report);
 
   // What drives it.
   void onLink(const core::LinkStatus& status);
@@ -97,7 +97,7 @@ class FailureKeeper {
   bool stopped_ = false;
   core::LinkStatus link_status_;
   core::SimulatorVersion version_;
-  core::FailureBook book_;
+  core::FailureRegistry registry_;
   core::FlightConditions now_;
   double tick_time_ = 0.0;     // [s] steady
   double publish_time_ = 0.0;  // [s] steady

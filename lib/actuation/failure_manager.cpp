@@ -1,4 +1,4 @@
-#include "xplane_bridge/actuation/failure_keeper.hpp"
+#include "xplane_bridge/actuation/failure_manager.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -68,8 +68,8 @@ std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double 
 
 }  // namespace
 
-FailureKeeper::FailureKeeper(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces,
-                             double timeout, Publish publish, Report report)
+FailureManager::FailureManager(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces,
+                               double timeout, Publish publish, Report report)
     : link_(link),
       overrides_(overrides),
       surfaces_(surfaces),
@@ -77,7 +77,7 @@ FailureKeeper::FailureKeeper(core::SimulatorPort* link, OverrideManager* overrid
       publish_(std::move(publish)),
       report_(std::move(report)) {}
 
-void FailureKeeper::onLink(const core::LinkStatus& status) {
+void FailureManager::onLink(const core::LinkStatus& status) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   link_status_ = status;
   changed_.notifyAll();
@@ -88,7 +88,7 @@ void FailureKeeper::onLink(const core::LinkStatus& status) {
   watch(&menu_subscription_, {"failures", menu_datarefs_, kMenuRate, 0});
 }
 
-void FailureKeeper::watch(core::Subscription* subscription, core::RrefGroup group) {
+void FailureManager::watch(core::Subscription* subscription, core::RrefGroup group) {
   if (group.datarefs.empty()) {
     subscription->reset();
     return;
@@ -100,7 +100,7 @@ void FailureKeeper::watch(core::Subscription* subscription, core::RrefGroup grou
   *subscription = link_->subscribe(std::move(group), std::move(observed), mutex_);
 }
 
-void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core::RrefView& view) {
+void FailureManager::observe(const std::vector<std::string>& datarefs, const core::RrefView& view) {
   bool any = false;
   for (std::size_t i = 0; i < view.size(); ++i) {
     const core::RrefPair pair = view[i];
@@ -110,10 +110,10 @@ void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core
     const auto undone = undone_.find(dataref);
     if (undone != undone_.end() && tick_time_ - undone->second < kRepairWait) continue;
     const std::string name = core::failureName(dataref);
-    const bool known = book_.knows(name);
-    if (!book_.observe(dataref, static_cast<double>(pair.value), now_.sim_time)) continue;
+    const bool known = registry_.knows(name);
+    if (!registry_.observe(dataref, static_cast<double>(pair.value), now_.sim_time)) continue;
     any = true;
-    if (known != book_.knows(name)) {
+    if (known != registry_.knows(name)) {
       report_(known ? name + " was repaired in the simulator" : name + " was failed in the simulator", "", true);
     }
   }
@@ -122,26 +122,26 @@ void FailureKeeper::observe(const std::vector<std::string>& datarefs, const core
   applySurfaces();
 }
 
-void FailureKeeper::onFrame(const core::FlightWatch& watch) {
+void FailureManager::onFrame(const core::FlightWatch& watch) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const double before = now_.sim_time;
   now_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
   if (stopped_) return;
   if (now_.sim_time < before - core::kOvertaking) end(false, "X-Plane was restarted");
-  for (const core::FailurePlan& plan : book_.due(now_)) carryOut(plan);
+  for (const core::FailurePlan& plan : registry_.due(now_)) carryOut(plan);
 }
 
-void FailureKeeper::applySurfaces() {
-  surfaces_->setFailures(book_.drivenSurfaces());
+void FailureManager::applySurfaces() {
+  surfaces_->setFailures(registry_.drivenSurfaces());
   bool disturbed = false;
-  for (const core::FailureLabel& label : book_.labels()) {
+  for (const core::FailureLabel& label : registry_.labels()) {
     disturbed = disturbed || (label.active && core::touchesSurfaces(label.name));
   }
   for (const auto& dataref : own_datarefs_) disturbed = disturbed || core::touchesSurfaces(dataref);
   surfaces_->setDisturbed(disturbed);
 }
 
-void FailureKeeper::carryOut(const core::FailurePlan& plan) {
+void FailureManager::carryOut(const core::FailurePlan& plan) {
   dirty_ = true;
   Pending pending;
   pending.plan = plan;
@@ -149,7 +149,7 @@ void FailureKeeper::carryOut(const core::FailurePlan& plan) {
   pending.since = pending.sent = tick_time_;
   if (plan.surface) {
     const double shown = surfaces_->shown(plan.surface->surface);
-    if (plan.surface->fault == core::SurfaceFault::kStuck && !plan.value) book_.setValue(plan.name, shown);
+    if (plan.surface->fault == core::SurfaceFault::kStuck && !plan.value) registry_.setValue(plan.name, shown);
     pending.expected_deg = expectedAngle(*plan.surface, shown, surfaces_->lawOf(plan.surface->surface));
   }
   try {
@@ -167,16 +167,16 @@ void FailureKeeper::carryOut(const core::FailurePlan& plan) {
   applySurfaces();
 }
 
-void FailureKeeper::watchOwn() {
+void FailureManager::watchOwn() {
   std::vector<std::string> datarefs;
   for (const auto& [name, pending] : pending_) {
-    if (!book_.isDriven(name)) {
+    if (!registry_.isDriven(name)) {
       datarefs.insert(datarefs.end(), pending.plan.datarefs.begin(), pending.plan.datarefs.end());
     }
   }
-  for (const core::FailureLabel& label : book_.labels()) {
+  for (const core::FailureLabel& label : registry_.labels()) {
     if (!label.by_bridge || !label.active || pending_.count(label.name) != 0) continue;
-    const auto own = book_.datarefsOf(label.name);
+    const auto own = registry_.datarefsOf(label.name);
     datarefs.insert(datarefs.end(), own.begin(), own.end());
   }
   if (datarefs == own_datarefs_) return;
@@ -184,13 +184,13 @@ void FailureKeeper::watchOwn() {
   watch(&own_subscription_, {"failures set", own_datarefs_, kOwnRate, 1});
 }
 
-void FailureKeeper::undo(const core::FailurePlan& plan) {
+void FailureManager::undo(const core::FailurePlan& plan) {
   pending_.erase(plan.name);
   repaired_since_.erase(plan.name);
   repair(plan.datarefs);
 }
 
-void FailureKeeper::repair(const std::vector<std::string>& datarefs) {
+void FailureManager::repair(const std::vector<std::string>& datarefs) {
   for (const std::string& dataref : datarefs) {
     try {
       overrides_->release(dataref);
@@ -203,8 +203,8 @@ void FailureKeeper::repair(const std::vector<std::string>& datarefs) {
   }
 }
 
-void FailureKeeper::giveUp(const std::string& name, const std::string& why) {
-  for (const core::FailurePlan& plan : book_.clear({name}, false).undo) undo(plan);
+void FailureManager::giveUp(const std::string& name, const std::string& why) {
+  for (const core::FailurePlan& plan : registry_.clear({name}, false).undo) undo(plan);
   not_shown_[name] = why;
   report_("failure of " + name + " is given up: " + why, asked_by_[name], false);
   dirty_ = true;
@@ -213,10 +213,10 @@ void FailureKeeper::giveUp(const std::string& name, const std::string& why) {
   changed_.notifyAll();
 }
 
-void FailureKeeper::end(bool driven_only, const std::string& why) {
-  for (const core::FailureLabel& label : book_.labels()) {
-    if (!label.by_bridge || (driven_only && !book_.isDriven(label.name))) continue;
-    for (const core::FailurePlan& plan : book_.clear({label.name}, false).undo) undo(plan);
+void FailureManager::end(bool driven_only, const std::string& why) {
+  for (const core::FailureLabel& label : registry_.labels()) {
+    if (!label.by_bridge || (driven_only && !registry_.isDriven(label.name))) continue;
+    for (const core::FailurePlan& plan : registry_.clear({label.name}, false).undo) undo(plan);
     not_shown_[label.name] = why;
     report_("failure of " + label.name + " has ended: " + why, "", true);
     dirty_ = true;
@@ -226,9 +226,9 @@ void FailureKeeper::end(bool driven_only, const std::string& why) {
   changed_.notifyAll();
 }
 
-void FailureKeeper::useDriver(const Pending& pending) {
+void FailureManager::useDriver(const Pending& pending) {
   repair(pending.plan.datarefs);
-  book_.useDriver(pending.plan.name, now_.sim_time, pending.expected_deg);
+  registry_.useDriver(pending.plan.name, now_.sim_time, pending.expected_deg);
   report_(pending.plan.name + ": X-Plane's own failure does not act as it says, so that tx_node drives the surfaces",
           pending.who, true);
   dirty_ = true;
@@ -236,20 +236,20 @@ void FailureKeeper::useDriver(const Pending& pending) {
   applySurfaces();
 }
 
-bool FailureKeeper::settled(Pending* pending) {
+bool FailureManager::settled(Pending* pending) {
   const std::string& name = pending->plan.name;
   const auto settle = [this, pending, &name] {
     const auto& surface = pending->plan.surface;
     // Where it got stuck is known only now.
     if (surface && surface->fault == core::SurfaceFault::kStuck && !surface->value) {
-      book_.setValue(name, surfaces_->shown(surface->surface));
+      registry_.setValue(name, surfaces_->shown(surface->surface));
     }
     return true;
   };
   const double age = tick_time_ - pending->since;
-  if (book_.isDriven(name)) {
+  if (registry_.isDriven(name)) {
     if (surfaces_->follows(pending->plan.surface->surface)) {
-      book_.confirm(name, true);
+      registry_.confirm(name, true);
       return settle();
     }
     if (age < timeout_) return false;
@@ -258,7 +258,7 @@ bool FailureKeeper::settled(Pending* pending) {
     return true;
   }
   if (pending->confirmed < 0.0) {
-    const auto labels = book_.labels();
+    const auto labels = registry_.labels();
     const bool shown = std::any_of(labels.begin(), labels.end(), [&name](const core::FailureLabel& label) {
       return label.name == name && label.confirmed;
     });
@@ -290,7 +290,7 @@ bool FailureKeeper::settled(Pending* pending) {
   return false;
 }
 
-void FailureKeeper::watchPending() {
+void FailureManager::watchPending() {
   std::vector<std::string> names;
   for (const auto& [name, pending] : pending_) names.push_back(name);
   for (const std::string& name : names) {
@@ -302,8 +302,8 @@ void FailureKeeper::watchPending() {
   }
 }
 
-void FailureKeeper::watchRepairs() {
-  for (const core::FailureLabel& label : book_.labels()) {
+void FailureManager::watchRepairs() {
+  for (const core::FailureLabel& label : registry_.labels()) {
     const bool ours = label.by_bridge && label.active && pending_.count(label.name) == 0;
     if (!ours || label.confirmed) {
       repaired_since_.erase(label.name);
@@ -311,7 +311,7 @@ void FailureKeeper::watchRepairs() {
     }
     const auto since = repaired_since_.emplace(label.name, tick_time_).first->second;
     if (tick_time_ - since < kRepairedAfter) continue;
-    for (const core::FailurePlan& plan : book_.clear({label.name}, false).undo) undo(plan);
+    for (const core::FailurePlan& plan : registry_.clear({label.name}, false).undo) undo(plan);
     report_(label.name + " was repaired in the simulator", "", true);
     dirty_ = true;
     watchOwn();
@@ -319,7 +319,7 @@ void FailureKeeper::watchRepairs() {
   }
 }
 
-void FailureKeeper::tick(double time) {
+void FailureManager::tick(double time) {
   const auto dropped = surfaces_->takeDropped();
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   tick_time_ = time;
@@ -338,27 +338,27 @@ void FailureKeeper::tick(double time) {
   changed_.notifyAll();  // services wait for what SurfaceControl does as well
 }
 
-void FailureKeeper::stop() {
+void FailureManager::stop() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   stopped_ = true;
   changed_.notifyAll();
 }
 
-void FailureKeeper::repaired() {
+void FailureManager::repaired() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  book_.clear({}, false);
+  registry_.clear({}, false);
   pending_.clear();
 }
 
-void FailureKeeper::publish() {
+void FailureManager::publish() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   publishLocked();
 }
 
-void FailureKeeper::publishLocked() {
+void FailureManager::publishLocked() {
   FailureState message;
   message.sim_time = static_cast<float>(now_.sim_time);
-  for (const core::FailureLabel& label : book_.labels()) {
+  for (const core::FailureLabel& label : registry_.labels()) {
     message.names.push_back(label.name);
     message.kinds.push_back(label.kind);
     message.values.push_back(static_cast<float>(label.value));
@@ -375,32 +375,32 @@ void FailureKeeper::publishLocked() {
   dirty_ = false;
 }
 
-std::optional<ServiceResult> FailureKeeper::add(const core::FailureRequest& request, const std::string& who) {
+std::optional<ServiceResult> FailureManager::add(const core::FailureRequest& request, const std::string& who) {
   const auto planned = core::planFailure(request, version_);
   if (planned.error == core::FailureError::kInvalid) return result(ServiceResult::REFUSED, planned.text);
   if (planned.error != core::FailureError::kNone) return result(ServiceResult::NOT_SUPPORTED, planned.text);
   const std::string& name = planned.plan.name;
-  if (const auto same = book_.sameAs(planned.plan)) {
+  if (const auto same = registry_.sameAs(planned.plan)) {
     return result(ServiceResult::REFUSED, name + " is broken already as " + *same + ": clear that first");
   }
   if (request.trigger == static_cast<int>(core::FailureTrigger::kAtSimTime) && !std::isfinite(now_.sim_time)) {
     return result(ServiceResult::NO_LINK, "X-Plane has not told its time yet");
   }
   // A failure of the same name is replaced; a surface that stays driven goes from where it is.
-  for (const core::FailurePlan& plan : book_.clear({name}, true).undo) undo(plan);
+  for (const core::FailurePlan& plan : registry_.clear({name}, true).undo) undo(plan);
   not_shown_.erase(name);
   asked_by_[name] = who;
-  book_.add(request, planned.plan, now_);
+  registry_.add(request, planned.plan, now_);
   dirty_ = true;
   if (request.trigger != 0) report_("failure armed: " + described(planned.plan), who, true);
   if (!stopped_) {
-    for (const core::FailurePlan& plan : book_.due(now_)) carryOut(plan);
+    for (const core::FailurePlan& plan : registry_.due(now_)) carryOut(plan);
   }
   applySurfaces();
   return std::nullopt;
 }
 
-ServiceResult FailureKeeper::await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name) {
+ServiceResult FailureManager::await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name) {
   const core::Deadline longest(link_->clock(), 2.0 * timeout_ + kBehaviourWait + kWaitSlack);
   const auto paused = [this] { return link_status_.state == core::LinkState::kPaused; };
   // A short silence (STALE) is waited through: X-Plane loads scenery.
@@ -417,7 +417,7 @@ ServiceResult FailureKeeper::await(std::unique_lock<core::HandlerMutex>* lock, c
   return result(ServiceResult::OK, "X-Plane shows it");
 }
 
-void FailureKeeper::set(const SetFailure::Request& request, const std::string& who, SetFailure::Response* response) {
+void FailureManager::set(const SetFailure::Request& request, const std::string& who, SetFailure::Response* response) {
   core::FailureRequest wish{request.name, request.kind, std::nullopt, request.trigger,
                             static_cast<double>(request.trigger_value)};
   if (request.has_value) wish.value = static_cast<double>(request.value);
@@ -459,22 +459,22 @@ void FailureKeeper::set(const SetFailure::Request& request, const std::string& w
   response->success = response->result.code == ServiceResult::OK || response->result.code == ServiceResult::ACCEPTED;
 }
 
-void FailureKeeper::clear(const ClearFailures::Request& request, const std::string& who,
-                          ClearFailures::Response* response) {
+void FailureManager::clear(const ClearFailures::Request& request, const std::string& who,
+                           ClearFailures::Response* response) {
   std::unique_lock<core::HandlerMutex> lock(*mutex_);
   std::vector<std::string> names;
   for (const std::string& name : request.names) {
     names.push_back(core::failureName(name));
-    if (book_.knows(names.back())) continue;
-    const std::string broken = namesOf(book_.labels());
+    if (registry_.knows(names.back())) continue;
+    const std::string broken = namesOf(registry_.labels());
     response->result = result(ServiceResult::REFUSED, "\"" + name + "\" is not broken: expected " +
                                                           (broken.empty() ? "nothing, all is well" : broken));
     return;
   }
   const bool driven = surfaces_->driving();
-  const auto cleared = book_.clear(names, request.include_simulator);
+  const auto cleared = registry_.clear(names, request.include_simulator);
   for (const std::string& name : names) {
-    if (!book_.knows(name)) continue;
+    if (!registry_.knows(name)) continue;
     response->result = result(ServiceResult::REFUSED, name + " was failed in the simulator: set include_simulator");
   }
   std::vector<std::string> datarefs;
@@ -487,7 +487,7 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
   dirty_ = true;
   watchOwn();
   applySurfaces();
-  const bool given_back = book_.drivenSurfaces().empty();
+  const bool given_back = registry_.drivenSurfaces().empty();
   const bool up = isUp(link_status_);
   lock.unlock();
   if (response->result.code == ServiceResult::REFUSED) return;
@@ -517,10 +517,10 @@ void FailureKeeper::clear(const ClearFailures::Request& request, const std::stri
   response->result = result(ServiceResult::OK, cleared.names.empty() ? "nothing was broken" : "repaired");
 }
 
-void FailureKeeper::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
+void FailureManager::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
   using Level = diagnostic_msgs::DiagnosticStatus;
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  const std::vector<core::FailureLabel> labels = book_.labels();
+  const std::vector<core::FailureLabel> labels = registry_.labels();
   std::vector<core::FailureLabel> unconfirmed;
   for (const core::FailureLabel& label : labels) {
     if (label.active && !label.confirmed) unconfirmed.push_back(label);
