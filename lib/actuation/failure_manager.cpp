@@ -253,7 +253,7 @@ bool FailureManager::settled(Pending* pending) {
       return settle();
     }
     if (age < timeout_) return false;
-    const std::string refusal = surfaces_->refusal();
+    const std::string refusal = surfaces_->blockReason();
     giveUp(name, refusal.empty() ? "X-Plane does not show what is sent to the surface" : refusal);
     return true;
   }
@@ -320,10 +320,10 @@ void FailureManager::watchRepairs() {
 }
 
 void FailureManager::tick(double time) {
-  const auto dropped = surfaces_->takeDropped();
+  const auto abandoned = surfaces_->takeAbandoned();
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   tick_time_ = time;
-  if (dropped) end(true, *dropped);
+  if (abandoned) end(true, *abandoned);
   if (link_status_.state == core::LinkState::kConnected) {
     watchPending();
     watchRepairs();
@@ -434,7 +434,7 @@ void FailureManager::set(const SetFailure::Request& request, const std::string& 
       const auto values = link_->read(planned.plan.datarefs, timeout_);
       answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
     }
-    const std::string refusal = planned.plan.surface ? surfaces_->refusal(planned.plan.surface->surface) : "";
+    const std::string refusal = planned.plan.surface ? surfaces_->blockReasonFor(planned.plan.surface->surface) : "";
     lock.lock();
     if (!answered && !planned.plan.surface) {
       response->result =

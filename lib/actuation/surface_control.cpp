@@ -24,7 +24,7 @@ constexpr double kMovementDeg = 0.05;     // [deg] of a step by which the lag is
 constexpr double kFollowsAgain = 0.5;     // [s] after the release until X-Plane must move the surfaces
 constexpr double kOffLawDeg = 2.0;        // [deg] off the law that tells a surface left standing
 constexpr double kLagSmoothing = 0.1;
-constexpr std::size_t kUnseenKept = 64;
+constexpr std::size_t kMaxAwaitingReadBack = 64;
 
 std::string degrees(double value) {
   char text[32];
@@ -103,7 +103,7 @@ void SurfaceControl::onDatagram(const core::RrefView& view, const core::ReceiveI
 
 void SurfaceControl::onSample() {
   const double time = sample_.sim_time;
-  if (time < last_time_ - core::kOvertaking) drop("X-Plane was restarted");
+  if (time < last_time_ - core::kOvertaking) abandon("X-Plane was restarted");
   const double step = time > last_time_ ? std::min(sample_.frame_period, kLongestFrame) : 0.0;
   const double dt = std::isfinite(step) ? std::max(step, 0.0) : 0.0;
   last_time_ = time;
@@ -120,7 +120,7 @@ void SurfaceControl::onSample() {
           if (watch_.solve()) saveModel();
         }
       }
-      if (wanted() && tick_time_ >= not_before_ && refusalLocked().empty()) take();
+      if (wanted() && tick_time_ >= not_before_ && blockReasonLocked().empty()) take();
       break;
     case State::kTaking:
       drive(dt);
@@ -131,7 +131,7 @@ void SurfaceControl::onSample() {
       } else if (tick_time_ - state_since_ > kTakeOverWait) {
         giveBack();
         endCommands();
-        loseOffset("X-Plane does not show the surface override");
+        cancelOffset("X-Plane does not show the surface override");
         not_before_ = tick_time_ + kRetry;
         report_("X-Plane does not show the surface override: the surfaces are given back", false);
       }
@@ -141,15 +141,15 @@ void SurfaceControl::onSample() {
         giveBack();
       } else if (!overridden) {
         // The panic tool, or another client: it is not taken again.
-        drop("somebody else has released the surface override");
-      } else if (may_not_.empty()) {
+        abandon("somebody else has released the surface override");
+      } else if (blocked_reason_.empty()) {
         drive(dt);
         measureLag();
         watchCommand();
       }
       break;
     case State::kReleasing:
-      if (wanted() && refusalLocked().empty()) {
+      if (wanted() && blockReasonLocked().empty()) {
         take();
       } else if (!overridden) {
         left_ = sent_;
@@ -176,7 +176,7 @@ void SurfaceControl::take() {
     } catch (const std::invalid_argument& error) {
       driver_.reset();
       not_before_ = tick_time_ + kRetry;
-      loseOffset("the surfaces could not be taken over");
+      cancelOffset("the surfaces could not be taken over");
       report_(std::string("the surfaces are not taken over: ") + error.what(), false);
       return;
     }
@@ -184,7 +184,7 @@ void SurfaceControl::take() {
     lag_frames_ = std::nan("");
   }
   std::fill(not_following_.begin(), not_following_.end(), 0.0);
-  unseen_.clear();
+  awaiting_read_back_.clear();
   enter(State::kTaking);
   drive(0.0);  // the snapshot goes ahead of the override
   try {
@@ -197,7 +197,7 @@ void SurfaceControl::take() {
                 error.what(),
             false);
   }
-  loseOffset("the surfaces could not be taken over");
+  cancelOffset("the surfaces could not be taken over");
   enter(State::kIdle);
   not_before_ = tick_time_ + kRetry;
 }
@@ -215,56 +215,56 @@ void SurfaceControl::drive(double dt) {
     waiting = followsLocked(surface.surface) ? 0.0 : waiting + dt;
     const bool same_list = i < sent_.size() && sent_[i].surface == surface.surface;
     if (same_list && std::abs(sent_[i].deflection_deg - surface.deflection_deg) > kMovementDeg) {
-      unseen_.push_back({sample_.sim_time, surface.surface, surface.deflection_deg});
-      if (unseen_.size() > kUnseenKept) unseen_.pop_front();
+      awaiting_read_back_.push_back({sample_.sim_time, surface.surface, surface.deflection_deg});
+      if (awaiting_read_back_.size() > kMaxAwaitingReadBack) awaiting_read_back_.pop_front();
     }
   }
   sent_ = out;
   if (!command_sent_) {
     command_sent_ = true;
-    commands_unseen_.push_back({command_sequence_, sample_.sim_time, commands_});
-    if (commands_unseen_.size() > kUnseenKept) commands_unseen_.pop_front();
+    commands_awaiting_read_back_.push_back({command_sequence_, sample_.sim_time, commands_});
+    if (commands_awaiting_read_back_.size() > kMaxAwaitingReadBack) commands_awaiting_read_back_.pop_front();
     addEcho({command_sequence_, false, std::nan(""), std::nan("")});
   }
 }
 
 void SurfaceControl::measureLag() {
   // The newest movement that the frame shows; a surface shows each angle of a movement for one frame only.
-  for (auto it = unseen_.rbegin(); it != unseen_.rend(); ++it) {
+  for (auto it = awaiting_read_back_.rbegin(); it != awaiting_read_back_.rend(); ++it) {
     if (it->sim_time >= sample_.sim_time) continue;
     if (std::abs(sample_.deflections_deg[it->surface] - it->deflection_deg) > kMovementDeg / 10.0) continue;
     const double frames = (sample_.sim_time - it->sim_time) / sample_.frame_period;
     if (std::isfinite(frames)) {
       lag_frames_ = std::isfinite(lag_frames_) ? lag_frames_ + kLagSmoothing * (frames - lag_frames_) : frames;
     }
-    unseen_.erase(unseen_.begin(), it.base());
+    awaiting_read_back_.erase(awaiting_read_back_.begin(), it.base());
     return;
   }
 }
 
 void SurfaceControl::watchCommand() {
   // The newest that fits: older ones were overtaken.
-  for (auto it = commands_unseen_.rbegin(); it != commands_unseen_.rend(); ++it) {
+  for (auto it = commands_awaiting_read_back_.rbegin(); it != commands_awaiting_read_back_.rend(); ++it) {
     const bool shown = std::all_of(it->surfaces.begin(), it->surfaces.end(), [this](const auto& command) {
       return std::abs(sample_.deflections_deg[command.surface] - command.deflection_deg) <= kFollowsDeg;
     });
     if (!shown || !(sample_.sim_time > it->sim_time)) continue;
     addEcho({it->sequence, true, sample_.sim_time, (sample_.sim_time - it->sim_time) / sample_.frame_period});
-    commands_unseen_.erase(commands_unseen_.begin(), it.base());
+    commands_awaiting_read_back_.erase(commands_awaiting_read_back_.begin(), it.base());
     return;
   }
 }
 
 void SurfaceControl::addEcho(const Echo& echo) {
   echoes_.push_back(echo);
-  if (echoes_.size() <= kUnseenKept) return;
+  if (echoes_.size() <= kMaxAwaitingReadBack) return;
   echoes_.pop_front();
   ++echoes_dropped_;
 }
 
 void SurfaceControl::endCommands() {
   commands_.clear();
-  commands_unseen_.clear();
+  commands_awaiting_read_back_.clear();
 }
 
 void SurfaceControl::checkLeft() {
@@ -291,20 +291,20 @@ void SurfaceControl::giveBack() {
   enter(State::kReleasing);
 }
 
-void SurfaceControl::drop(const std::string& why) {
+void SurfaceControl::abandon(const std::string& why) {
   const bool was = state_ == State::kTaking || state_ == State::kDriving;
   failures_.clear();
   endCommands();
-  loseOffset(why);
-  dropped_ = why;
+  cancelOffset(why);
+  abandoned_ = why;
   watch_.recheck();
   if (was) giveBack();
-  driver_.reset();  // it is not gone on with, nor taken up again while it is being given back
+  driver_.reset();  // do not resume this driver while the override is being released
   if (!was) return;
   report_("the surfaces are given back: " + why, true);
 }
 
-void SurfaceControl::loseOffset(const std::string& why) {
+void SurfaceControl::cancelOffset(const std::string& why) {
   if (!offset_) return;
   offset_.reset();
   offset_lost_ = why;
@@ -316,7 +316,7 @@ void SurfaceControl::enter(State state) {
   if (state != State::kIdle) return;
   driver_.reset();
   sent_.clear();
-  unseen_.clear();
+  awaiting_read_back_.clear();
   lag_frames_ = std::nan("");
   watch_.interrupt();
 }
@@ -324,14 +324,14 @@ void SurfaceControl::enter(State state) {
 void SurfaceControl::onAircraft(const std::string& aircraft) {
   std::lock_guard<std::mutex> lock(mutex_);
   if (aircraft == watch_.aircraft()) return;
-  drop("another aircraft was loaded");
+  abandon("another aircraft was loaded");
   watch_.reset(aircraft);
   loadModel();
 }
 
 void SurfaceControl::release(const std::string& why) {
   std::lock_guard<std::mutex> lock(mutex_);
-  drop(why);
+  abandon(why);
 }
 
 void SurfaceControl::loadModel() {
@@ -356,11 +356,11 @@ void SurfaceControl::saveModel() {
   }
 }
 
-void SurfaceControl::tick(double time, const std::string& refusal) {
+void SurfaceControl::tick(double time, const std::string& blocked_reason) {
   std::lock_guard<std::mutex> lock(mutex_);
   const double dt = tick_time_ > 0.0 ? time - tick_time_ : 0.0;
   tick_time_ = time;
-  may_not_ = refusal;
+  blocked_reason_ = blocked_reason;
   if (flowing_) command_age_ += dt;
   if (!commands_.empty() && command_age_ > options_.command_timeout) endCommands();
 }
@@ -396,9 +396,9 @@ std::optional<std::string> SurfaceControl::command(const std::vector<std::string
   }
   for (const core::SurfaceDeflection& surface : checked.surfaces) {
     if (wrong) break;
-    const std::string refusal = refusalOf(surface.surface);
-    if (!refusal.empty()) {
-      wrong = refusal;
+    const std::string blocked = blockReasonForLocked(surface.surface);
+    if (!blocked.empty()) {
+      wrong = blocked;
       break;
     }
     const core::SurfaceLaw* law = watch_.model()->lawOf(surface.surface);
@@ -423,8 +423,8 @@ std::optional<std::string> SurfaceControl::command(const std::vector<std::string
 
 std::string SurfaceControl::beginOffset(std::size_t surface, double amplitude_deg) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const std::string refusal = refusalOf(surface);
-  if (!refusal.empty()) return refusal;
+  const std::string blocked = blockReasonForLocked(surface);
+  if (!blocked.empty()) return blocked;
   if (isBroken(surface)) return core::surfaceTable()[surface].name + " is broken";
   const core::SurfaceLaw* law = watch_.model()->lawOf(surface);
   const double half = 0.5 * (law->high_deg - law->low_deg);
@@ -452,8 +452,8 @@ void SurfaceControl::clearOffset() {
   offset_.reset();
 }
 
-std::string SurfaceControl::refusalLocked() const {
-  if (!may_not_.empty()) return may_not_;
+std::string SurfaceControl::blockReasonLocked() const {
+  if (!blocked_reason_.empty()) return blocked_reason_;
   if (state_ == State::kTaking || state_ == State::kDriving) return "";
   if (state_ == State::kReleasing && driver_) return "";
   if (tick_time_ < not_before_) return "X-Plane did not let the surfaces be taken over a moment ago";
@@ -465,20 +465,20 @@ std::string SurfaceControl::refusalLocked() const {
   return watch_.refusal();
 }
 
-std::string SurfaceControl::refusal() const {
+std::string SurfaceControl::blockReason() const {
   std::lock_guard<std::mutex> lock(mutex_);
-  return refusalLocked();
+  return blockReasonLocked();
 }
 
-std::string SurfaceControl::refusal(std::size_t surface) const {
+std::string SurfaceControl::blockReasonFor(std::size_t surface) const {
   std::lock_guard<std::mutex> lock(mutex_);
-  return refusalOf(surface);
+  return blockReasonForLocked(surface);
 }
 
-std::string SurfaceControl::refusalOf(std::size_t surface) const {
-  const std::string refusal = refusalLocked();
+std::string SurfaceControl::blockReasonForLocked(std::size_t surface) const {
+  const std::string blocked = blockReasonLocked();
   const core::MixingModel* model = watch_.model();
-  if (!refusal.empty() || !model || model->lawOf(surface)) return refusal;
+  if (!blocked.empty() || !model || model->lawOf(surface)) return blocked;
   return core::surfaceTable()[surface].name +
          " has not been seen to move: either this aircraft has none, or its handle has to be moved once; those that "
          "moved: " +
@@ -523,7 +523,7 @@ std::optional<core::SurfaceLaw> SurfaceControl::lawOf(std::size_t surface) const
   return *law;
 }
 
-std::vector<core::SurfaceDeflection> SurfaceControl::sentOneByOne() const {
+std::vector<core::SurfaceDeflection> SurfaceControl::individuallyDriven() const {
   std::lock_guard<std::mutex> lock(mutex_);
   std::vector<core::SurfaceDeflection> out;
   for (const core::SurfaceDeflection& sent : sent_) {
@@ -544,9 +544,9 @@ std::optional<SurfaceControl::Echo> SurfaceControl::takeEcho() {
   return echo;
 }
 
-std::optional<std::string> SurfaceControl::takeDropped() {
+std::optional<std::string> SurfaceControl::takeAbandoned() {
   std::lock_guard<std::mutex> lock(mutex_);
-  return std::exchange(dropped_, std::nullopt);
+  return std::exchange(abandoned_, std::nullopt);
 }
 
 void SurfaceControl::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
@@ -556,7 +556,7 @@ void SurfaceControl::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper
   for (std::size_t i = 0; i < not_following_.size() && state_ == State::kDriving; ++i) {
     if (not_following_[i] > kDoesNotFollow) lost.push_back(core::surfaceTable()[i].name);
   }
-  const std::string refusal = refusalLocked();
+  const std::string blocked = blockReasonLocked();
   if (!file_problem_.empty()) {
     status->summary(Level::WARN, file_problem_);
   } else if (!lost.empty()) {
@@ -564,9 +564,9 @@ void SurfaceControl::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper
   } else if (state_ != State::kIdle) {
     status->summary(Level::OK, toString(state_));
   } else if (wanted()) {
-    status->summary(Level::WARN, "the surfaces are not driven: " + refusal);
+    status->summary(Level::WARN, "the surfaces are not driven: " + blocked);
   } else {
-    status->summary(Level::OK, refusal.empty() ? "ready to drive single surfaces" : refusal);
+    status->summary(Level::OK, blocked.empty() ? "ready to drive single surfaces" : blocked);
   }
   const core::MixingModel* model = watch_.model();
   status->add("State", toString(state_));

@@ -52,8 +52,9 @@ class SurfaceControl {
   void onAircraft(const std::string& aircraft);
   /// Whatever is driven ends, failures and commands too.
   void release(const std::string& why);
-  /// At least ten times a second; `time` [s] steady. `refusal`: why nothing may be sent to X-Plane now; empty: it may.
-  void tick(double time, const std::string& refusal);
+  /// At least ten times a second; `time` [s] steady. `blocked_reason`: why nothing may be sent to X-Plane now; empty:
+  /// it may.
+  void tick(double time, const std::string& blocked_reason);
   /// Ends all driving; overrides are the keeper's to give back.
   void stop();
 
@@ -80,9 +81,9 @@ class SurfaceControl {
   // What is.
 
   /// Why surfaces cannot be driven now, in words that say what to do; empty: they can, or are.
-  std::string refusal() const;
+  std::string blockReason() const;
   /// The same for one surface, which the mixing has to know.
-  std::string refusal(std::size_t surface) const;
+  std::string blockReasonFor(std::size_t surface) const;
   /// The surface override is set, or being taken or given back.
   bool driving() const;
   /// Nothing needs the surfaces any more, but X-Plane has not shown yet that it drives them.
@@ -97,7 +98,7 @@ class SurfaceControl {
   std::optional<core::SurfaceLaw> lawOf(std::size_t surface) const;
 
   /// Surfaces commanded one by one or broken, as sent last.
-  std::vector<core::SurfaceDeflection> sentOneByOne() const;
+  std::vector<core::SurfaceDeflection> individuallyDriven() const;
   /// A command that was sent, or shown by X-Plane, since the last call.
   struct Echo {
     std::uint32_t sequence = 0;
@@ -106,9 +107,9 @@ class SurfaceControl {
     double frames = std::nan("");    ///< since it was sent
   };
   std::optional<Echo> takeEcho();
-  /// Why all failures and commands were dropped (another aircraft, X-Plane restarted, the override released by somebody
-  /// else), once after it happened.
-  std::optional<std::string> takeDropped();
+  /// Why all failures and commands were abandoned (another aircraft, X-Plane restarted, the override released by
+  /// another client), once after it happened.
+  std::optional<std::string> takeAbandoned();
 
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const;
 
@@ -127,8 +128,8 @@ class SurfaceControl {
   void drive(double dt);
   void giveBack();
   void checkLeft();
-  void drop(const std::string& why);
-  void loseOffset(const std::string& why);
+  void abandon(const std::string& why);
+  void cancelOffset(const std::string& why);
   void endCommands();
   void enter(State state);
   void measureLag();
@@ -136,8 +137,8 @@ class SurfaceControl {
   void addEcho(const Echo& echo);
   void loadModel();
   void saveModel();
-  std::string refusalLocked() const;
-  std::string refusalOf(std::size_t surface) const;
+  std::string blockReasonLocked() const;
+  std::string blockReasonForLocked(std::size_t surface) const;
   bool followsLocked(std::size_t surface) const;
   bool isBroken(std::size_t surface) const;
 
@@ -156,7 +157,7 @@ class SurfaceControl {
   bool flowing_ = false;
   bool disturbed_ = false;
   bool stopped_ = false;
-  std::string may_not_ = "X-Plane is not connected";
+  std::string blocked_reason_ = "X-Plane is not connected";
   double tick_time_ = 0.0;  // [s] steady
 
   core::MixingWatch watch_;
@@ -174,7 +175,7 @@ class SurfaceControl {
   std::vector<double> not_following_;          // [s] simulator time for which each surface has not shown what was sent
 
   std::vector<core::SurfaceFailure> failures_;
-  std::optional<std::string> dropped_;
+  std::optional<std::string> abandoned_;
   std::vector<core::SurfaceDeflection> commands_;
   std::uint32_t command_sequence_ = 0;
   double command_age_ = 0.0;  // [s] while X-Plane runs
@@ -184,8 +185,8 @@ class SurfaceControl {
     double sim_time = std::nan("");  // [s] of the frame in which it was sent
     std::vector<core::SurfaceDeflection> surfaces;
   };
-  std::deque<SentCommand> commands_unseen_;  // oldest first
-  std::deque<Echo> echoes_;                  // until takeEcho(), oldest first
+  std::deque<SentCommand> commands_awaiting_read_back_;  // oldest first
+  std::deque<Echo> echoes_;                              // until takeEcho(), oldest first
   std::uint64_t echoes_dropped_ = 0;
   std::uint64_t commands_accepted_ = 0, commands_refused_ = 0;
   std::string last_refusal_;
@@ -197,7 +198,7 @@ class SurfaceControl {
     std::size_t surface;
     double deflection_deg;
   };
-  std::deque<Sent> unseen_;  // movements not shown yet, oldest first
+  std::deque<Sent> awaiting_read_back_;  // movements not shown yet, oldest first
   double lag_frames_ = std::nan("");
 
   core::Subscription subscription_;  // last: it ends first

@@ -276,7 +276,7 @@ void TxNode::publishApplied(const core::ArbitratedControls& controls, double tim
   Sent sent;
   toMessage(controls, &sent.message);
   sent.message.header.stamp = stampNow();
-  fillSurfaces(surfaces_->sentOneByOne(), &sent.message);
+  fillSurfaces(surfaces_->individuallyDriven(), &sent.message);
   sent.message.read_back_sim_time = std::nanf("");
   sent.message.read_back_frames = std::nanf("");
   sent.values = controls.values;

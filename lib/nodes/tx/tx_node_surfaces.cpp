@@ -76,7 +76,7 @@ void TxNode::publishSurfacesApplied() {
     message.mode = static_cast<std::uint8_t>(arbiter_->status().mode);
     message.source = AppliedCommand::SOURCE_NONE;
     message.sequence = echo->sequence;
-    fillSurfaces(surfaces_->sentOneByOne(), &message);
+    fillSurfaces(surfaces_->individuallyDriven(), &message);
     message.read_back = echo->read_back;
     message.read_back_sim_time = static_cast<float>(echo->sim_time);
     message.read_back_frames = static_cast<float>(echo->frames);
