@@ -1,15 +1,12 @@
 #include "xplane_bridge/actuation/excitation_manager.hpp"
 
 #include <cmath>
-#include <limits>
+#include <utility>
 
-#include "xplane_bridge/ServiceResult.h"
 #include "xplane_bridge/core/surfaces/surfaces.hpp"
 
 namespace xplane_bridge {
 namespace {
-
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 bool hasBand(core::ExcitationShape shape) {
   return shape == core::ExcitationShape::kMultisine || shape == core::ExcitationShape::kChirp;
@@ -37,11 +34,10 @@ ExcitationManager::ExcitationManager(SurfaceControl* surfaces, double max_roll_d
       max_pitch_deg_(max_pitch_deg),
       publish_(std::move(publish)),
       report_(std::move(report)) {
-  state_.sim_time = state_.start_sim_time = state_.end_sim_time = kUnknown;
-  publish_(&state_);
+  this->publish();
 }
 
-ExcitationManager::Plan ExcitationManager::plan(const InjectExcitation::Request& request) const {
+ExcitationManager::Plan ExcitationManager::plan(const ExcitationRequest& request) const {
   Plan out;
   if (request.kind == "stop") return out;
   const auto shape = core::excitationShapeFrom(request.kind);
@@ -58,15 +54,15 @@ ExcitationManager::Plan ExcitationManager::plan(const InjectExcitation::Request&
   }
   core::ExcitationSpec spec;
   spec.shape = *shape;
-  spec.amplitude = static_cast<double>(request.amplitude);
-  spec.duration = static_cast<double>(request.duration);
+  spec.amplitude = request.amplitude;
+  spec.duration = request.duration;
   if (hasBand(*shape)) {
-    spec.frequency_min = static_cast<double>(request.frequency_min);
-    spec.frequency_max = static_cast<double>(request.frequency_max);
+    spec.frequency_min = request.frequency_min;
+    spec.frequency_max = request.frequency_max;
   }
   spec.seed = request.seed;
-  spec.roll_limit_deg = request.max_roll_deg == 0.0F ? max_roll_deg_ : static_cast<double>(request.max_roll_deg);
-  spec.pitch_limit_deg = request.max_pitch_deg == 0.0F ? max_pitch_deg_ : static_cast<double>(request.max_pitch_deg);
+  spec.roll_limit_deg = request.max_roll_deg == 0.0 ? max_roll_deg_ : request.max_roll_deg;
+  spec.pitch_limit_deg = request.max_pitch_deg == 0.0 ? max_pitch_deg_ : request.max_pitch_deg;
   if (const auto problem = core::validate(spec)) {
     out.wrong = *problem;
   } else if (out.channels.any() && spec.amplitude > 1.0) {
@@ -77,63 +73,60 @@ ExcitationManager::Plan ExcitationManager::plan(const InjectExcitation::Request&
   return out;
 }
 
-void ExcitationManager::inject(const InjectExcitation::Request& request, const Plan& plan, const std::string& who,
-                               const core::FlightWatch& watch, const std::string& refusal,
-                               const core::ChannelSet& commanded, InjectExcitation::Response* response) {
-  const auto answer = [&](std::uint8_t code, const std::string& text) {
-    response->result.code = code;
-    response->result.message = text;
-    response->id = state_.id;
-    response->success = code == ServiceResult::ACCEPTED;
-  };
-  if (!plan.wrong.empty()) return answer(ServiceResult::REFUSED, plan.wrong);
+RequestResult ExcitationManager::inject(const ExcitationRequest& request, const Plan& plan, const std::string& who,
+                                        const core::FlightWatch& watch, const std::string& blocked_reason,
+                                        const core::ChannelSet& commanded) {
+  if (!plan.wrong.empty()) return {ResultCode::kRefused, plan.wrong};
   if (!plan.signal) {
-    if (!running()) return answer(ServiceResult::REFUSED, "no excitation runs");
+    if (!running()) return {ResultCode::kRefused, "no excitation runs"};
     abort("stopped by " + who);
-    return answer(ServiceResult::ACCEPTED, "excitation " + std::to_string(state_.id) + " is stopped");
+    return {ResultCode::kAccepted, "excitation " + std::to_string(label_.id) + " is stopped"};
   }
   const core::ExcitationSpec& spec = plan.signal->spec();
-  if (!refusal.empty()) return answer(ServiceResult::NO_LINK, refusal);
+  if (!blocked_reason.empty()) return {ResultCode::kNoLink, blocked_reason};
   if (running()) {
-    return answer(ServiceResult::REFUSED, "excitation " + std::to_string(state_.id) + " runs on " + state_.target +
-                                              "; one at a time: wait for it, or stop it");
+    return {ResultCode::kRefused, "excitation " + std::to_string(label_.id) + " runs on " + label_.target +
+                                      "; one at a time: wait for it, or stop it"};
   }
   if (plan.channels.any() && (plan.channels & commanded).none()) {
-    return answer(ServiceResult::REFUSED, "nobody commands " + request.target +
-                                              ": an excitation is added to a command (control/manual or auto)");
+    return {ResultCode::kRefused,
+            "nobody commands " + request.target + ": an excitation is added to a command (control/manual or auto)"};
   }
   if (!std::isfinite(watch.sim_time) || !std::isfinite(watch.roll_deg) || !std::isfinite(watch.pitch_deg)) {
-    return answer(ServiceResult::NO_LINK, "X-Plane has not told the attitude yet");
+    return {ResultCode::kNoLink, "X-Plane has not shown the attitude yet"};
   }
   if (!(std::abs(watch.roll_deg) < spec.roll_limit_deg && std::abs(watch.pitch_deg) < spec.pitch_limit_deg)) {
-    return answer(ServiceResult::REFUSED, "the attitude is beyond the limits of the excitation already");
+    return {ResultCode::kRefused, "the attitude is beyond the limits of the excitation already"};
   }
   if (plan.surface) {
     const std::string why = surfaces_->beginOffset(*plan.surface, spec.amplitude);
-    if (!why.empty()) return answer(ServiceResult::REFUSED, why);
+    if (!why.empty()) return {ResultCode::kRefused, why};
   }
   runner_.start(*plan.signal, watch.sim_time);
   channels_ = plan.channels;
   surface_ = plan.surface;
   who_ = who;
-  state_.active = true;
-  ++state_.id;
-  state_.kind = request.kind;
-  state_.target = request.target;
-  state_.amplitude = request.amplitude;
-  state_.duration = request.duration;
+  begin(request, spec, watch.sim_time);
+  return {ResultCode::kAccepted, "it runs; excitation/state tells its end"};
+}
+
+void ExcitationManager::begin(const ExcitationRequest& request, const core::ExcitationSpec& spec, double sim_time) {
   const bool has_band = hasBand(spec.shape);
-  state_.frequency_min = has_band ? request.frequency_min : 0.0F;
-  state_.frequency_max = has_band ? request.frequency_max : 0.0F;
-  state_.seed = request.seed;
-  state_.start_sim_time = state_.sim_time = static_cast<float>(watch.sim_time);
-  state_.end_sim_time = kUnknown;
-  state_.result = "running";
-  last_sim_time_ = watch.sim_time;
+  label_.active = true;
+  ++label_.id;
+  label_.kind = request.kind;
+  label_.target = request.target;
+  label_.amplitude = request.amplitude;
+  label_.duration = request.duration;
+  label_.frequency_min = has_band ? request.frequency_min : 0.0;
+  label_.frequency_max = has_band ? request.frequency_max : 0.0;
+  label_.seed = request.seed;
+  label_.start_sim_time = label_.sim_time = last_sim_time_ = sim_time;
+  label_.end_sim_time = std::nan("");
+  label_.result = "running";
   publish();
-  report_("excitation " + std::to_string(state_.id) + ": " + request.kind + " on " + request.target + " begins", who,
+  report_("excitation " + std::to_string(label_.id) + ": " + request.kind + " on " + request.target + " begins", who_,
           true);
-  answer(ServiceResult::ACCEPTED, "it runs; excitation/state tells its end");
 }
 
 bool ExcitationManager::onFrame(const core::FlightWatch& watch) {
@@ -165,13 +158,11 @@ core::ChannelExcitation ExcitationManager::excitation() const {
 void ExcitationManager::end() {
   if (surface_) surfaces_->clearOffset();
   const bool done = runner_.phase() == core::ExcitationPhase::kDone;
-  state_.active = false;
-  state_.sim_time = state_.end_sim_time = static_cast<float>(last_sim_time_);
-  state_.result = done ? "done" : "aborted: " + runner_.reason();
+  label_.active = false;
+  label_.sim_time = label_.end_sim_time = last_sim_time_;
+  label_.result = done ? "done" : "aborted: " + runner_.reason();
   publish();
-  report_("excitation " + std::to_string(state_.id) + " on " + state_.target + ": " + state_.result, who_, done);
+  report_("excitation " + std::to_string(label_.id) + " on " + label_.target + ": " + label_.result, who_, done);
 }
-
-void ExcitationManager::publish() { publish_(&state_); }
 
 }  // namespace xplane_bridge

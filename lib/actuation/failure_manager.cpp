@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <utility>
 
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/text.hpp"
@@ -22,13 +24,6 @@ constexpr double kSendAgain = 0.3;      // [s] until what X-Plane does not show 
 constexpr double kWaitSlack = 1.0;      // [s] a service waits beyond what ends by itself
 constexpr double kReadWait = 0.5;       // [s] for one dataref, however late it is
 
-ServiceResult result(std::uint8_t code, const std::string& message) {
-  ServiceResult out;
-  out.code = code;
-  out.message = message;
-  return out;
-}
-
 bool isUp(const core::LinkStatus& status) {
   return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
 }
@@ -39,10 +34,6 @@ std::string described(const core::FailurePlan& plan) {
   char text[32];
   std::snprintf(text, sizeof text, " at %g", *plan.value);
   return out + text;
-}
-
-std::string namesOf(const std::vector<core::FailureLabel>& labels) {
-  return core::join(labels, ", ", [](const core::FailureLabel& label) { return label.name; });
 }
 
 // Where X-Plane's own failure brings a surface; nullopt where that cannot be told from the law.
@@ -77,10 +68,11 @@ FailureManager::FailureManager(core::SimulatorPort* link, OverrideManager* overr
       publish_(std::move(publish)),
       report_(std::move(report)) {}
 
+double FailureManager::now() const { return link_->clock().steadySeconds(); }
+
 void FailureManager::onLink(const core::LinkStatus& status) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   link_status_ = status;
-  changed_.notifyAll();
   if (!status.version.known()) return;
   if (menu_subscription_ && status.version == version_) return;
   version_ = status.version;
@@ -108,10 +100,10 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
     const std::string& dataref = datarefs[static_cast<std::size_t>(pair.index)];
     // What was on its way when it was repaired here says nothing.
     const auto undone = undone_.find(dataref);
-    if (undone != undone_.end() && tick_time_ - undone->second < kRepairWait) continue;
+    if (undone != undone_.end() && now() - undone->second < kRepairWait) continue;
     const std::string name = core::failureName(dataref);
     const bool known = registry_.knows(name);
-    if (!registry_.observe(dataref, static_cast<double>(pair.value), now_.sim_time)) continue;
+    if (!registry_.observe(dataref, static_cast<double>(pair.value), flight_.sim_time)) continue;
     any = true;
     if (known != registry_.knows(name)) {
       report_(known ? name + " was repaired in the simulator" : name + " was failed in the simulator", "", true);
@@ -124,11 +116,11 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
 
 void FailureManager::onFrame(const core::FlightWatch& watch) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  const double before = now_.sim_time;
-  now_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
+  const double before = flight_.sim_time;
+  flight_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
   if (stopped_) return;
-  if (now_.sim_time < before - core::kOvertaking) end(false, "X-Plane was restarted");
-  for (const core::FailurePlan& plan : registry_.due(now_)) carryOut(plan);
+  if (flight_.sim_time < before - core::kOvertaking) end(false, "X-Plane was restarted");
+  for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
 }
 
 void FailureManager::applySurfaces() {
@@ -146,7 +138,7 @@ void FailureManager::carryOut(const core::FailurePlan& plan) {
   Pending pending;
   pending.plan = plan;
   pending.who = asked_by_[plan.name];
-  pending.since = pending.sent = tick_time_;
+  pending.since = pending.sent = now();
   if (plan.surface) {
     const double shown = surfaces_->shown(plan.surface->surface);
     if (plan.surface->fault == core::SurfaceFault::kStuck && !plan.value) registry_.setValue(plan.name, shown);
@@ -197,7 +189,7 @@ void FailureManager::repair(const std::vector<std::string>& datarefs) {
     } catch (const core::JournalError& error) {
       report_(error.what(), "", false);
     }
-    undone_[dataref] = tick_time_;
+    undone_[dataref] = now();
     // One of the simulator's menu is not held.
     link_->write(dataref, static_cast<float>(core::kWorking));
   }
@@ -210,7 +202,6 @@ void FailureManager::giveUp(const std::string& name, const std::string& why) {
   dirty_ = true;
   watchOwn();
   applySurfaces();
-  changed_.notifyAll();
 }
 
 void FailureManager::end(bool driven_only, const std::string& why) {
@@ -223,12 +214,11 @@ void FailureManager::end(bool driven_only, const std::string& why) {
   }
   watchOwn();
   applySurfaces();  // which may have been told of them again meanwhile
-  changed_.notifyAll();
 }
 
 void FailureManager::useDriver(const Pending& pending) {
   repair(pending.plan.datarefs);
-  registry_.useDriver(pending.plan.name, now_.sim_time, pending.expected_deg);
+  registry_.useDriver(pending.plan.name, flight_.sim_time, pending.expected_deg);
   report_(pending.plan.name + ": X-Plane's own failure does not act as it says, so that tx_node drives the surfaces",
           pending.who, true);
   dirty_ = true;
@@ -246,7 +236,7 @@ bool FailureManager::settled(Pending* pending) {
     }
     return true;
   };
-  const double age = tick_time_ - pending->since;
+  const double age = now() - pending->since;
   if (registry_.isDriven(name)) {
     if (surfaces_->follows(pending->plan.surface->surface)) {
       registry_.confirm(name, true);
@@ -263,16 +253,16 @@ bool FailureManager::settled(Pending* pending) {
       return label.name == name && label.confirmed;
     });
     if (shown) {
-      pending->confirmed = tick_time_;
+      pending->confirmed = now();
     } else if (age <= timeout_) {
-      if (tick_time_ - pending->sent < kSendAgain) return false;
-      pending->sent = tick_time_;  // a datagram may have been lost
+      if (now() - pending->sent < kSendAgain) return false;
+      pending->sent = now();  // a datagram may have been lost
       for (const std::string& dataref : pending->plan.datarefs) {
         link_->write(dataref, static_cast<float>(core::kFailedNow));
       }
     } else {
       if (pending->plan.surface) {
-        pending->since = tick_time_;
+        pending->since = now();
         useDriver(*pending);
         return false;
       }
@@ -283,9 +273,9 @@ bool FailureManager::settled(Pending* pending) {
   }
   if (!pending->plan.surface || !pending->expected_deg) return settle();
   const double off = surfaces_->shown(pending->plan.surface->surface) - *pending->expected_deg;
-  if (tick_time_ - pending->confirmed < kBehaviourWait) return false;
+  if (now() - pending->confirmed < kBehaviourWait) return false;
   if (std::abs(off) <= kBehaviourDeg) return settle();
-  pending->since = tick_time_;
+  pending->since = now();
   useDriver(*pending);
   return false;
 }
@@ -298,7 +288,6 @@ void FailureManager::watchPending() {
     if (it == pending_.end() || !settled(&it->second)) continue;
     pending_.erase(name);
     dirty_ = true;
-    changed_.notifyAll();
   }
 }
 
@@ -309,8 +298,8 @@ void FailureManager::watchRepairs() {
       repaired_since_.erase(label.name);
       continue;
     }
-    const auto since = repaired_since_.emplace(label.name, tick_time_).first->second;
-    if (tick_time_ - since < kRepairedAfter) continue;
+    const auto since = repaired_since_.emplace(label.name, now()).first->second;
+    if (now() - since < kRepairedAfter) continue;
     for (const core::FailurePlan& plan : registry_.clear({label.name}, false).undo) undo(plan);
     report_(label.name + " was repaired in the simulator", "", true);
     dirty_ = true;
@@ -319,10 +308,10 @@ void FailureManager::watchRepairs() {
   }
 }
 
-void FailureManager::tick(double time) {
+void FailureManager::tick() {
   const auto abandoned = surfaces_->takeAbandoned();
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  tick_time_ = time;
+  const double time = now();
   if (abandoned) end(true, *abandoned);
   if (link_status_.state == core::LinkState::kConnected) {
     watchPending();
@@ -330,18 +319,16 @@ void FailureManager::tick(double time) {
   } else {
     // Time stands still for what X-Plane has to show.
     for (auto& [name, pending] : pending_) {
-      pending.since = tick_time_;
-      if (pending.confirmed >= 0.0) pending.confirmed = tick_time_;
+      pending.since = time;
+      if (pending.confirmed >= 0.0) pending.confirmed = time;
     }
   }
   if (dirty_ || published_driving_ != surfaces_->driving() || time - publish_time_ >= kPublishPeriod) publishLocked();
-  changed_.notifyAll();  // services wait for what SurfaceControl does as well
 }
 
 void FailureManager::stop() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   stopped_ = true;
-  changed_.notifyAll();
 }
 
 void FailureManager::repaired() {
@@ -355,185 +342,167 @@ void FailureManager::publish() {
   publishLocked();
 }
 
-void FailureManager::publishLocked() {
-  FailureState message;
-  message.sim_time = static_cast<float>(now_.sim_time);
-  for (const core::FailureLabel& label : registry_.labels()) {
-    message.names.push_back(label.name);
-    message.kinds.push_back(label.kind);
-    message.values.push_back(static_cast<float>(label.value));
-    message.set_by.emplace_back(label.by_bridge ? "bridge" : "simulator");
-    message.active.push_back(label.active);
-    message.confirmed.push_back(label.confirmed);
-    message.since_sim_time.push_back(static_cast<float>(label.since_sim_time));
-  }
-  published_driving_ = surfaces_->driving();
-  message.surrogate_mixing = published_driving_;
-  message.surrogate_lag_frames = static_cast<float>(surfaces_->lagFrames());
-  publish_(&message);
-  publish_time_ = tick_time_;
-  dirty_ = false;
+FailureSnapshot FailureManager::snapshot() const {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  return snapshotLocked();
 }
 
-std::optional<ServiceResult> FailureManager::add(const core::FailureRequest& request, const std::string& who) {
+FailureSnapshot FailureManager::snapshotLocked() const {
+  return {flight_.sim_time, registry_.labels(), surfaces_->driving(), surfaces_->lagFrames()};
+}
+
+void FailureManager::publishLocked() {
+  const FailureSnapshot snapshot = snapshotLocked();
+  published_driving_ = snapshot.surrogate_mixing;
+  publish_time_ = now();
+  dirty_ = false;
+  publish_(snapshot);
+}
+
+std::optional<RequestResult> FailureManager::add(const core::FailureRequest& request, const std::string& who) {
   const auto planned = core::planFailure(request, version_);
-  if (planned.error == core::FailureError::kInvalid) return result(ServiceResult::REFUSED, planned.text);
-  if (planned.error != core::FailureError::kNone) return result(ServiceResult::NOT_SUPPORTED, planned.text);
+  if (planned.error == core::FailureError::kInvalid) return RequestResult{ResultCode::kRefused, planned.text};
+  if (planned.error != core::FailureError::kNone) return RequestResult{ResultCode::kNotSupported, planned.text};
   const std::string& name = planned.plan.name;
   if (const auto same = registry_.sameAs(planned.plan)) {
-    return result(ServiceResult::REFUSED, name + " is broken already as " + *same + ": clear that first");
+    return RequestResult{ResultCode::kRefused, name + " is broken already as " + *same + ": clear that first"};
   }
-  if (request.trigger == static_cast<int>(core::FailureTrigger::kAtSimTime) && !std::isfinite(now_.sim_time)) {
-    return result(ServiceResult::NO_LINK, "X-Plane has not told its time yet");
+  if (request.trigger == static_cast<int>(core::FailureTrigger::kAtSimTime) && !std::isfinite(flight_.sim_time)) {
+    return RequestResult{ResultCode::kNoLink, "X-Plane has not shown its time yet"};
   }
   // A failure of the same name is replaced; a surface that stays driven goes from where it is.
   for (const core::FailurePlan& plan : registry_.clear({name}, true).undo) undo(plan);
   not_shown_.erase(name);
   asked_by_[name] = who;
-  registry_.add(request, planned.plan, now_);
+  registry_.add(request, planned.plan, flight_);
   dirty_ = true;
   if (request.trigger != 0) report_("failure armed: " + described(planned.plan), who, true);
   if (!stopped_) {
-    for (const core::FailurePlan& plan : registry_.due(now_)) carryOut(plan);
+    for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
   }
   applySurfaces();
   return std::nullopt;
 }
 
-ServiceResult FailureManager::await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name) {
-  const core::Deadline longest(link_->clock(), 2.0 * timeout_ + kBehaviourWait + kWaitSlack);
-  const auto paused = [this] { return link_status_.state == core::LinkState::kPaused; };
+bool FailureManager::gone() const {
   // A short silence (STALE) is waited through: X-Plane loads scenery.
-  const auto gone = [this] {
-    return link_status_.state == core::LinkState::kLost || link_status_.state == core::LinkState::kSearching;
+  return link_status_.state == core::LinkState::kLost || link_status_.state == core::LinkState::kSearching;
+}
+
+RequestResult FailureManager::await(const std::string& name) {
+  const double longest = 2.0 * timeout_ + kBehaviourWait + kWaitSlack;
+  const auto ended = [this, &name] {
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
+    return stopped_ || pending_.count(name) == 0 || link_status_.state == core::LinkState::kPaused || gone();
   };
-  const auto over = [&] { return stopped_ || pending_.count(name) == 0 || paused() || gone(); };
-  if (!changed_.waitUntil(lock, longest, over))
-    return result(ServiceResult::TIMEOUT, "X-Plane did not show it in time");
-  if (stopped_ || gone()) return result(ServiceResult::NO_LINK, "X-Plane is not connected any more");
-  if (pending_.count(name) != 0) return result(ServiceResult::ACCEPTED, "X-Plane is paused: it acts when it goes on");
+  if (!link_->waitUntil(ended, longest)) return {ResultCode::kTimeout, "X-Plane did not show it in time"};
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  if (stopped_ || gone()) return {ResultCode::kNoLink, "X-Plane is not connected any more"};
+  if (pending_.count(name) != 0) return {ResultCode::kAccepted, "X-Plane is paused: it acts when it goes on"};
   const auto why = not_shown_.find(name);
-  if (why != not_shown_.end()) return result(ServiceResult::TIMEOUT, why->second);
-  return result(ServiceResult::OK, "X-Plane shows it");
+  if (why != not_shown_.end()) return {ResultCode::kTimeout, why->second};
+  return {ResultCode::kOk, "X-Plane shows it"};
 }
 
-void FailureManager::set(const SetFailure::Request& request, const std::string& who, SetFailure::Response* response) {
-  core::FailureRequest wish{request.name, request.kind, std::nullopt, request.trigger,
-                            static_cast<double>(request.trigger_value)};
-  if (request.has_value) wish.value = static_cast<double>(request.value);
-  std::unique_lock<core::HandlerMutex> lock(*mutex_);
-  if (!isUp(link_status_) || !link_status_.version.known()) {
-    response->result = result(ServiceResult::NO_LINK, "X-Plane is not connected");
-    return;
+std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan& plan) {
+  bool answered = !plan.datarefs.empty();
+  if (answered) {
+    const auto values = link_->read(plan.datarefs, timeout_);
+    answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
   }
-  const auto planned = core::planFailure(wish, version_);
+  if (answered) return std::nullopt;
+  if (!plan.surface) {
+    return RequestResult{ResultCode::kNotSupported,
+                         "this X-Plane does not answer to " + plan.datarefs.front() + ": is the name right?"};
+  }
+  const std::string blocked = surfaces_->blockReasonFor(plan.surface->surface);
+  if (blocked.empty()) return std::nullopt;
+  return RequestResult{ResultCode::kRefused, plan.name + " cannot be broken now: " + blocked};
+}
+
+RequestResult FailureManager::set(const core::FailureRequest& request, const std::string& who) {
+  core::SimulatorVersion version;
+  {
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
+    if (!isUp(link_status_) || !link_status_.version.known()) {
+      return {ResultCode::kNoLink, "X-Plane is not connected"};
+    }
+    version = version_;
+  }
+  const auto planned = core::planFailure(request, version);
   if (planned.error == core::FailureError::kNone) {
-    lock.unlock();
-    bool answered = true;
-    if (!planned.plan.datarefs.empty()) {
-      const auto values = link_->read(planned.plan.datarefs, timeout_);
-      answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
-    }
-    const std::string refusal = planned.plan.surface ? surfaces_->blockReasonFor(planned.plan.surface->surface) : "";
-    lock.lock();
-    if (!answered && !planned.plan.surface) {
-      response->result =
-          result(ServiceResult::NOT_SUPPORTED,
-                 "this X-Plane does not answer to " + planned.plan.datarefs.front() + ": is the name right?");
-      return;
-    }
-    if ((planned.plan.datarefs.empty() || !answered) && !refusal.empty()) {
-      response->result = result(ServiceResult::REFUSED, request.name + " cannot be broken now: " + refusal);
-      return;
-    }
+    if (const auto refused = unanswered(planned.plan)) return *refused;
   }
-  if (const auto refused = add(wish, who)) {
-    response->result = *refused;
-    return;
+  {
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
+    if (const auto refused = add(request, who)) return *refused;
   }
-  if (request.trigger != 0) {
-    response->result = result(ServiceResult::ACCEPTED, "armed; events and failures/state tell when it comes true");
-  } else {
-    response->result = await(&lock, planned.plan.name);
-  }
-  response->success = response->result.code == ServiceResult::OK || response->result.code == ServiceResult::ACCEPTED;
+  if (request.trigger != 0) return {ResultCode::kAccepted, "armed; events and failures/state tell when it comes true"};
+  return await(planned.plan.name);
 }
 
-void FailureManager::clear(const ClearFailures::Request& request, const std::string& who,
-                           ClearFailures::Response* response) {
+FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>& names, bool include_simulator,
+                                                  const std::string& who) {
+  ClearResult out;
   std::unique_lock<core::HandlerMutex> lock(*mutex_);
-  std::vector<std::string> names;
-  for (const std::string& name : request.names) {
-    names.push_back(core::failureName(name));
-    if (registry_.knows(names.back())) continue;
-    const std::string broken = namesOf(registry_.labels());
-    response->result = result(ServiceResult::REFUSED, "\"" + name + "\" is not broken: expected " +
-                                                          (broken.empty() ? "nothing, all is well" : broken));
-    return;
+  std::vector<std::string> labels;
+  for (const std::string& name : names) {
+    labels.push_back(core::failureName(name));
+    if (registry_.knows(labels.back())) continue;
+    const std::string broken =
+        core::join(registry_.labels(), ", ", [](const core::FailureLabel& label) { return label.name; });
+    out.result = {ResultCode::kRefused,
+                  "\"" + name + "\" is not broken: expected " + (broken.empty() ? "nothing, all is well" : broken)};
+    return out;
   }
   const bool driven = surfaces_->driving();
-  const auto cleared = registry_.clear(names, request.include_simulator);
-  for (const std::string& name : names) {
-    if (!registry_.knows(name)) continue;
-    response->result = result(ServiceResult::REFUSED, name + " was failed in the simulator: set include_simulator");
-  }
+  const auto cleared = registry_.clear(labels, include_simulator);
   std::vector<std::string> datarefs;
   for (const core::FailurePlan& plan : cleared.undo) {
     undo(plan);
     datarefs.insert(datarefs.end(), plan.datarefs.begin(), plan.datarefs.end());
   }
   for (const std::string& name : cleared.names) report_("cleared: " + name, who, true);
-  response->cleared = cleared.names;
+  out.cleared = cleared.names;
   dirty_ = true;
   watchOwn();
   applySurfaces();
-  const bool given_back = registry_.drivenSurfaces().empty();
+  const bool given_back = driven && registry_.drivenSurfaces().empty();
   const bool up = isUp(link_status_);
-  lock.unlock();
-  if (response->result.code == ServiceResult::REFUSED) return;
-  if (!up) {
-    response->result = result(ServiceResult::NO_LINK, "X-Plane is not connected; it is repaired when it comes back");
-    return;
+  for (const std::string& name : labels) {
+    if (!registry_.knows(name)) continue;
+    out.result = {ResultCode::kRefused, name + " was failed in the simulator: set include_simulator"};
+    return out;
   }
+  lock.unlock();
+  if (!up) {
+    out.result = {ResultCode::kNoLink, "X-Plane is not connected; it is repaired when it comes back"};
+    return out;
+  }
+  out.result = awaitRepair(datarefs, given_back);
+  if (out.result.success()) out.result.text = cleared.names.empty() ? "nothing was broken" : "repaired";
+  return out;
+}
+
+RequestResult FailureManager::awaitRepair(const std::vector<std::string>& datarefs, bool given_back) {
   const core::Deadline deadline(link_->clock(), timeout_);
   const auto left = [&deadline] { return std::max(deadline.left(), 0.01); };
   for (const std::string& dataref : datarefs) {
     if (link_->waitForDataref(dataref, static_cast<float>(core::kWorking), 0.0F, left()).first) continue;
-    response->result = result(ServiceResult::TIMEOUT, "X-Plane still shows " + dataref);
-    return;
+    return {ResultCode::kTimeout, "X-Plane still shows " + dataref};
   }
-  if (driven && given_back) {
-    lock.lock();
-    const bool back = changed_.waitUntil(&lock, deadline, [this] { return stopped_ || !surfaces_->givingBack(); });
-    lock.unlock();
-    // It also ends by being given up.
-    if (!back || (!surfaces_->driving() &&
-                  !link_->waitForDataref(core::kSurfaceOverride, 0.0F, 0.0F, std::max(left(), kReadWait)).first)) {
-      response->result = result(ServiceResult::TIMEOUT, std::string("X-Plane still shows ") + core::kSurfaceOverride);
-      return;
-    }
+  if (!given_back) return {};
+  const auto back = [this] {
+    std::lock_guard<core::HandlerMutex> lock(*mutex_);
+    return stopped_ || !surfaces_->givingBack();
+  };
+  const bool ended = link_->waitUntil(back, left());
+  // It also ends by being given up.
+  if (!ended || (!surfaces_->driving() &&
+                 !link_->waitForDataref(core::kSurfaceOverride, 0.0F, 0.0F, std::max(left(), kReadWait)).first)) {
+    return {ResultCode::kTimeout, std::string("X-Plane still shows ") + core::kSurfaceOverride};
   }
-  response->success = true;
-  response->result = result(ServiceResult::OK, cleared.names.empty() ? "nothing was broken" : "repaired");
-}
-
-void FailureManager::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
-  using Level = diagnostic_msgs::DiagnosticStatus;
-  std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  const std::vector<core::FailureLabel> labels = registry_.labels();
-  std::vector<core::FailureLabel> unconfirmed;
-  for (const core::FailureLabel& label : labels) {
-    if (label.active && !label.confirmed) unconfirmed.push_back(label);
-    status->add(label.name, label.kind + (label.by_bridge ? ", by the bridge" : ", by the simulator") +
-                                (!label.active     ? ", armed"
-                                 : label.confirmed ? ", seen"
-                                                   : ", not seen"));
-  }
-  if (!unconfirmed.empty()) {
-    status->summary(Level::WARN, "X-Plane does not show the failure of " + namesOf(unconfirmed));
-  } else {
-    status->summary(Level::OK, labels.empty() ? "nothing is broken" : "broken: " + namesOf(labels));
-  }
+  return {};
 }
 
 }  // namespace xplane_bridge

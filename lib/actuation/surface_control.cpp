@@ -32,12 +32,29 @@ std::string degrees(double value) {
   return text;
 }
 
-std::string surfacesOf(const core::MixingModel& model) {
-  return core::join(model.laws, ", ",
-                    [](const core::SurfaceLaw& law) { return core::surfaceTable()[law.surface].name; });
+std::string nameOf(std::size_t surface) { return core::surfaceTable()[surface].name; }
+
+std::vector<std::string> surfacesOf(const core::MixingModel& model) {
+  std::vector<std::string> out;
+  for (const core::SurfaceLaw& law : model.laws) out.push_back(nameOf(law.surface));
+  return out;
 }
 
 }  // namespace
+
+const char* toString(SurfaceControlState state) {
+  switch (state) {
+    case SurfaceControlState::kIdle:
+      return "X-Plane drives the surfaces";
+    case SurfaceControlState::kTaking:
+      return "taking over the surfaces";
+    case SurfaceControlState::kDriving:
+      return "driving the surfaces";
+    case SurfaceControlState::kReleasing:
+      return "giving the surfaces back";
+  }
+  return "invalid";
+}
 
 SurfaceControl::SurfaceControl(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControlOptions options,
                                Report report, std::function<void()> on_frame)
@@ -53,19 +70,7 @@ SurfaceControl::SurfaceControl(core::SimulatorPort* link, OverrideManager* overr
   subscribe();
 }
 
-const char* SurfaceControl::toString(State state) {
-  switch (state) {
-    case State::kIdle:
-      return "X-Plane drives the surfaces";
-    case State::kTaking:
-      return "taking over the surfaces";
-    case State::kDriving:
-      return "driving the surfaces";
-    case State::kReleasing:
-      return "giving the surfaces back";
-  }
-  return "";
-}
+double SurfaceControl::now() const { return link_->clock().steadySeconds(); }
 
 void SurfaceControl::subscribe() {
   core::RrefGroup group{"surfaces", core::surfaceWatchDatarefs(version_), core::kEveryFrameRateHz, 1};
@@ -120,7 +125,7 @@ void SurfaceControl::onSample() {
           if (watch_.solve()) saveModel();
         }
       }
-      if (wanted() && tick_time_ >= not_before_ && blockReasonLocked().empty()) take();
+      if (wanted() && now() >= not_before_ && blockReasonLocked().empty()) take();
       break;
     case State::kTaking:
       drive(dt);
@@ -128,11 +133,11 @@ void SurfaceControl::onSample() {
       if (overridden) {
         enter(State::kDriving);
         report_("the surfaces are driven by their identified mixing", true);
-      } else if (tick_time_ - state_since_ > kTakeOverWait) {
+      } else if (now() - state_since_ > kTakeOverWait) {
         giveBack();
         endCommands();
         cancelOffset("X-Plane does not show the surface override");
-        not_before_ = tick_time_ + kRetry;
+        not_before_ = now() + kRetry;
         report_("X-Plane does not show the surface override: the surfaces are given back", false);
       }
       break;
@@ -156,7 +161,7 @@ void SurfaceControl::onSample() {
         left_time_ = time;
         enter(State::kIdle);
         report_("X-Plane drives the surfaces again", true);
-      } else if (tick_time_ - state_since_ > kReleaseWait) {
+      } else if (now() - state_since_ > kReleaseWait) {
         enter(State::kIdle);
         report_("X-Plane still shows the surface override", false);
       }
@@ -175,7 +180,7 @@ void SurfaceControl::take() {
       driver_->engage(sample_.deflections_deg, watch_.bias());
     } catch (const std::invalid_argument& error) {
       driver_.reset();
-      not_before_ = tick_time_ + kRetry;
+      not_before_ = now() + kRetry;
       cancelOffset("the surfaces could not be taken over");
       report_(std::string("the surfaces are not taken over: ") + error.what(), false);
       return;
@@ -199,7 +204,7 @@ void SurfaceControl::take() {
   }
   cancelOffset("the surfaces could not be taken over");
   enter(State::kIdle);
-  not_before_ = tick_time_ + kRetry;
+  not_before_ = now() + kRetry;
 }
 
 void SurfaceControl::drive(double dt) {
@@ -276,7 +281,7 @@ void SurfaceControl::checkLeft() {
     const double shown = sample_.deflections_deg[left.surface];
     const bool stands = std::abs(shown - left.deflection_deg) <= kFollowsDeg;
     if (!law || !stands || std::abs(law->deflection(terms) - shown) <= kOffLawDeg) continue;
-    standing.push_back(core::surfaceTable()[left.surface].name);
+    standing.push_back(nameOf(left.surface));
   }
   left_.clear();
   if (!standing.empty()) report_("X-Plane does not drive again: " + core::join(standing), false);
@@ -312,7 +317,7 @@ void SurfaceControl::cancelOffset(const std::string& why) {
 
 void SurfaceControl::enter(State state) {
   state_ = state;
-  state_since_ = tick_time_;
+  state_since_ = now();
   if (state != State::kIdle) return;
   driver_.reset();
   sent_.clear();
@@ -356,10 +361,11 @@ void SurfaceControl::saveModel() {
   }
 }
 
-void SurfaceControl::tick(double time, const std::string& blocked_reason) {
+void SurfaceControl::tick(const std::string& blocked_reason) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const double dt = tick_time_ > 0.0 ? time - tick_time_ : 0.0;
-  tick_time_ = time;
+  const double time = now();
+  const double dt = time - last_tick_.value_or(time);
+  last_tick_ = time;
   blocked_reason_ = blocked_reason;
   if (flowing_) command_age_ += dt;
   if (!commands_.empty() && command_age_ > options_.command_timeout) endCommands();
@@ -404,8 +410,8 @@ std::optional<std::string> SurfaceControl::command(const std::vector<std::string
     const core::SurfaceLaw* law = watch_.model()->lawOf(surface.surface);
     const double low = law->low_deg - kTravelMarginDeg, high = law->high_deg + kTravelMarginDeg;
     if (surface.deflection_deg >= low && surface.deflection_deg <= high) continue;
-    wrong = core::surfaceTable()[surface.surface].name + " is " + degrees(surface.deflection_deg) +
-            " deg: expected its travel, " + degrees(low) + ".." + degrees(high);
+    wrong = nameOf(surface.surface) + " is " + degrees(surface.deflection_deg) + " deg: expected its travel, " +
+            degrees(low) + ".." + degrees(high);
   }
   if (wrong) {
     ++commands_refused_;
@@ -425,7 +431,7 @@ std::string SurfaceControl::beginOffset(std::size_t surface, double amplitude_de
   std::lock_guard<std::mutex> lock(mutex_);
   const std::string blocked = blockReasonForLocked(surface);
   if (!blocked.empty()) return blocked;
-  if (isBroken(surface)) return core::surfaceTable()[surface].name + " is broken";
+  if (isBroken(surface)) return nameOf(surface) + " is broken";
   const core::SurfaceLaw* law = watch_.model()->lawOf(surface);
   const double half = 0.5 * (law->high_deg - law->low_deg);
   if (amplitude_deg > half) {
@@ -438,7 +444,7 @@ std::string SurfaceControl::beginOffset(std::size_t surface, double amplitude_de
 std::string SurfaceControl::setOffset(double offset_deg) {
   std::lock_guard<std::mutex> lock(mutex_);
   if (!offset_) return offset_lost_;
-  if (isBroken(offset_->surface)) return core::surfaceTable()[offset_->surface].name + " is broken";
+  if (isBroken(offset_->surface)) return nameOf(offset_->surface) + " is broken";
   offset_->deflection_deg = offset_deg;
   return "";
 }
@@ -456,7 +462,7 @@ std::string SurfaceControl::blockReasonLocked() const {
   if (!blocked_reason_.empty()) return blocked_reason_;
   if (state_ == State::kTaking || state_ == State::kDriving) return "";
   if (state_ == State::kReleasing && driver_) return "";
-  if (tick_time_ < not_before_) return "X-Plane did not let the surfaces be taken over a moment ago";
+  if (now() < not_before_) return "X-Plane did not let the surfaces be taken over a moment ago";
   if (sample_.override_shown != 0.0) {
     return std::isfinite(sample_.override_shown)
                ? std::string("another program has set override_control_surfaces and must give it back")
@@ -479,10 +485,10 @@ std::string SurfaceControl::blockReasonForLocked(std::size_t surface) const {
   const std::string blocked = blockReasonLocked();
   const core::MixingModel* model = watch_.model();
   if (!blocked.empty() || !model || model->lawOf(surface)) return blocked;
-  return core::surfaceTable()[surface].name +
+  return nameOf(surface) +
          " has not been seen to move: either this aircraft has none, or its handle has to be moved once; those that "
          "moved: " +
-         surfacesOf(*model);
+         core::join(surfacesOf(*model));
 }
 
 bool SurfaceControl::driving() const {
@@ -549,42 +555,31 @@ std::optional<std::string> SurfaceControl::takeAbandoned() {
   return std::exchange(abandoned_, std::nullopt);
 }
 
-void SurfaceControl::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const {
-  using Level = diagnostic_msgs::DiagnosticStatus;
+SurfaceControlStatus SurfaceControl::status() const {
   std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<std::string> lost;
+  SurfaceControlStatus out;
+  out.state = state_;
+  out.wanted = wanted();
+  out.blocked_reason = blockReasonLocked();
+  out.file_problem = file_problem_;
   for (std::size_t i = 0; i < not_following_.size() && state_ == State::kDriving; ++i) {
-    if (not_following_[i] > kDoesNotFollow) lost.push_back(core::surfaceTable()[i].name);
+    if (not_following_[i] > kDoesNotFollow) out.not_following.push_back(nameOf(i));
   }
-  const std::string blocked = blockReasonLocked();
-  if (!file_problem_.empty()) {
-    status->summary(Level::WARN, file_problem_);
-  } else if (!lost.empty()) {
-    status->summary(Level::WARN, "X-Plane does not show what is sent to " + core::join(lost));
-  } else if (state_ != State::kIdle) {
-    status->summary(Level::OK, toString(state_));
-  } else if (wanted()) {
-    status->summary(Level::WARN, "the surfaces are not driven: " + blocked);
-  } else {
-    status->summary(Level::OK, blocked.empty() ? "ready to drive single surfaces" : blocked);
+  out.aircraft = watch_.aircraft();
+  if (const core::MixingModel* model = watch_.model()) {
+    out.mixing_known = true;
+    out.mixed_surfaces = surfacesOf(*model);
+    out.unknown_moved = model->unknownMovement(sample_.inputs);
   }
-  const core::MixingModel* model = watch_.model();
-  status->add("State", toString(state_));
-  status->add("Aircraft", watch_.aircraft());
-  status->add("Mixing known", model != nullptr);
-  if (model) {
-    status->add("Surfaces of the mixing", surfacesOf(*model));
-    const std::string unknown = core::join(model->unknownMovement(sample_.inputs));
-    status->add("Moved, with an effect that the mixing does not know", unknown.empty() ? "none" : unknown);
-  }
-  status->add("Identification of this flight", watch_.quality().text());
-  status->add("Samples of this flight (-)", watch_.samples());
-  status->add("Worst residual (deg)", watch_.quality().worst_residual_deg);
-  status->add("Lag of driven surfaces (frames)", lag_frames_);
-  status->add("control/surfaces accepted (-)", commands_accepted_);
-  status->add("control/surfaces refused (-)", commands_refused_);
-  status->add("control/surfaces answers dropped (-)", echoes_dropped_);
-  if (!last_refusal_.empty()) status->add("control/surfaces last refusal", last_refusal_);
+  out.identification = watch_.quality().text();
+  out.samples = watch_.samples();
+  out.worst_residual_deg = watch_.quality().worst_residual_deg;
+  out.lag_frames = lag_frames_;
+  out.commands_accepted = commands_accepted_;
+  out.commands_refused = commands_refused_;
+  out.answers_dropped = echoes_dropped_;
+  out.last_refusal = last_refusal_;
+  return out;
 }
 
 }  // namespace xplane_bridge

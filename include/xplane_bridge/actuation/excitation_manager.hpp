@@ -1,12 +1,12 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 
-#include "xplane_bridge/ExcitationState.h"
-#include "xplane_bridge/InjectExcitation.h"
+#include "xplane_bridge/actuation/request_result.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 #include "xplane_bridge/core/control/control_arbiter.hpp"
 #include "xplane_bridge/core/control/excitation.hpp"
@@ -14,17 +14,44 @@
 
 namespace xplane_bridge {
 
+/// As InjectExcitation.srv.
+struct ExcitationRequest {
+  std::string kind;    ///< of ExcitationShape, or "stop"
+  std::string target;  ///< roll, pitch, yaw, throttle or a surface
+  double amplitude = 0.0;
+  double duration = 0.0;       ///< [s]
+  double frequency_min = 0.0;  ///< [Hz]
+  double frequency_max = 0.0;  ///< [Hz]
+  std::uint32_t seed = 0;
+  double max_roll_deg = 0.0;   ///< 0: the aircraft's
+  double max_pitch_deg = 0.0;  ///< 0: the aircraft's
+};
+
+/// As ExcitationState.msg.
+struct ExcitationLabel {
+  double sim_time = std::nan("");  ///< [s] of the last sample
+  bool active = false;
+  std::uint32_t id = 0;
+  std::string kind, target;
+  double amplitude = 0.0;
+  double duration = 0.0;       ///< [s]
+  double frequency_min = 0.0;  ///< [Hz]
+  double frequency_max = 0.0;  ///< [Hz]
+  std::uint32_t seed = 0;
+  double start_sim_time = std::nan("");  ///< [s]
+  double end_sim_time = std::nan("");    ///< [s]
+  std::string result;                    ///< running, done, aborted: <why>
+};
+
 /// The one test signal that runs, on an axis (added to what is commanded) or on a surface (which is driven for as
-/// long), and its label (excitation/state). X-Plane's frames drive it. Not thread-safe: TxNode's mutex guards it, but
-/// for plan().
+/// long), and its label. X-Plane's frames drive it. Not thread-safe: its owner's mutex guards it, but for plan().
 class ExcitationManager {
  public:
   /// `report(text, who, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
+  using Publish = std::function<void(const ExcitationLabel& label)>;
 
-  /// Stamps excitation/state and publishes it.
-  using Publish = std::function<void(ExcitationState* message)>;
-
+  /// `publish` is called at once and on every change.
   ExcitationManager(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, Publish publish,
                     Report report);
 
@@ -35,15 +62,15 @@ class ExcitationManager {
     std::optional<std::size_t> surface;
     std::optional<core::ExcitationSignal> signal;  ///< none to stop the one that runs
   };
-  /// Takes up to half a second. May be called without TxNode's mutex.
-  Plan plan(const InjectExcitation::Request& request) const;
-  /// tx_node/inject_excitation.
+  /// Takes up to half a second. May be called without the owner's mutex.
+  Plan plan(const ExcitationRequest& request) const;
+  /// Begins or stops one; label() has its number.
   /// @param plan of the request
-  /// @param refusal why nothing may be sent to X-Plane now; empty: it may
-  /// @param commanded the channels somebody commands now
-  void inject(const InjectExcitation::Request& request, const Plan& plan, const std::string& who,
-              const core::FlightWatch& watch, const std::string& refusal, const core::ChannelSet& commanded,
-              InjectExcitation::Response* response);
+  /// @param blocked_reason why nothing may be sent to X-Plane now; empty: it may
+  /// @param commanded the channels that are commanded now
+  RequestResult inject(const ExcitationRequest& request, const Plan& plan, const std::string& who,
+                       const core::FlightWatch& watch, const std::string& blocked_reason,
+                       const core::ChannelSet& commanded);
 
   /// Every frame. Returns whether an axis is excited, so that the controls have to be sent anew.
   bool onFrame(const core::FlightWatch& watch);
@@ -54,9 +81,13 @@ class ExcitationManager {
   bool running() const { return runner_.phase() == core::ExcitationPhase::kRunning; }
   /// The channels it is added to; none for a surface, or while none runs.
   core::ChannelSet channels() const { return running() ? channels_ : core::ChannelSet{}; }
-  void publish();
+  /// The one that runs, or ran last; without id before the first.
+  const ExcitationLabel& label() const { return label_; }
+  /// Publishes the label once more.
+  void publish() { publish_(label_); }
 
  private:
+  void begin(const ExcitationRequest& request, const core::ExcitationSpec& spec, double sim_time);
   void end();
 
   SurfaceControl* surfaces_;
@@ -70,7 +101,7 @@ class ExcitationManager {
   std::optional<std::size_t> surface_;
   std::string who_;
   double last_sim_time_ = std::nan("");
-  ExcitationState state_;
+  ExcitationLabel label_;
 };
 
 }  // namespace xplane_bridge

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -8,13 +9,8 @@
 #include <string>
 #include <vector>
 
-#include <diagnostic_updater/DiagnosticStatusWrapper.h>
-
-#include "xplane_bridge/ClearFailures.h"
-#include "xplane_bridge/FailureState.h"
-#include "xplane_bridge/ServiceResult.h"
-#include "xplane_bridge/SetFailure.h"
 #include "xplane_bridge/actuation/override_manager.hpp"
+#include "xplane_bridge/actuation/request_result.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 #include "xplane_bridge/core/failures/failures.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
@@ -22,19 +18,28 @@
 
 namespace xplane_bridge {
 
-/// What is broken, by the bridge or in the simulator's menu: sets, watches, repairs, labels it (failures/state).
+/// As FailureState.msg.
+struct FailureSnapshot {
+  double sim_time = std::nan("");  ///< [s] of the newest frame
+  std::vector<core::FailureLabel> labels;
+  bool surrogate_mixing = false;  ///< the surfaces are driven to express a failure
+  double surrogate_lag_frames = std::nan("");
+};
+
+/// What is broken, by the bridge or in the simulator's menu: sets, watches, repairs and labels it.
 ///
 /// X-Plane's own failures (rel_*) go through the OverrideManager, so that they are repaired on exit and after a crash;
-/// single surfaces that X-Plane cannot break go to SurfaceControl. Thread-safe; only the services wait.
+/// single surfaces that X-Plane cannot break go to SurfaceControl. Goes by the link's clock. Thread-safe; only set()
+/// and clear() wait.
 class FailureManager {
  public:
   /// `report(text, who, success)`: what happened, for events and the log.
   using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
 
-  /// Stamps failures/state and publishes it.
-  using Publish = std::function<void(FailureState* message)>;
+  using Publish = std::function<void(const FailureSnapshot& snapshot)>;
 
-  /// `timeout` [s]: until X-Plane must show what was asked for.
+  /// `timeout` [s]: until X-Plane must show what was asked for. `publish` is called from tick(): on every change and
+  /// once a second.
   FailureManager(core::SimulatorPort* link, OverrideManager* overrides, SurfaceControl* surfaces, double timeout,
                  Publish publish, Report report);
 
@@ -42,30 +47,41 @@ class FailureManager {
   void onLink(const core::LinkStatus& status);
   /// Every frame: triggers.
   void onFrame(const core::FlightWatch& watch);
-  /// At least ten times a second; `time` [s] steady.
-  void tick(double time);
+  /// At least ten times a second.
+  void tick();
   /// Nothing is broken any more from here on; what is set is the OverrideManager's to repair.
   void stop();
   /// All that the bridge had broken has been repaired by the OverrideManager.
   void repaired();
+  /// Publishes the snapshot once more.
   void publish();
 
-  // Services: wait up to the time-out.
-  void set(const SetFailure::Request& request, const std::string& who, SetFailure::Response* response);
-  void clear(const ClearFailures::Request& request, const std::string& who, ClearFailures::Response* response);
+  // Requests: wait up to the time-out. `who` asked for it.
 
-  void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const;
+  /// Breaks something: at once, which is waited for, or when its trigger comes.
+  RequestResult set(const core::FailureRequest& request, const std::string& who);
+  struct ClearResult {
+    RequestResult result;
+    std::vector<std::string> cleared;  ///< names that were broken or armed and are not any more
+  };
+  /// Repairs `names`; all of the bridge's where there are none. With `include_simulator` also what was set in X-Plane's
+  /// menu.
+  ClearResult clear(const std::vector<std::string>& names, bool include_simulator, const std::string& who);
+
+  FailureSnapshot snapshot() const;
 
  private:
   /// A failure that came true, until X-Plane has shown it.
   struct Pending {
     core::FailurePlan plan;
     std::string who;
-    double since = 0.0;                  // [s] steady
+    double since = 0.0;                  // [s] steady; when X-Plane was first asked for it
     double sent = 0.0;                   // [s] steady, last
     double confirmed = -1.0;             // [s] steady: the dataref shows it; < 0: not yet
     std::optional<double> expected_deg;  // where X-Plane's own failure must bring the surface
   };
+
+  double now() const;
 
   // All with mutex_ held.
   void carryOut(const core::FailurePlan& plan);
@@ -81,9 +97,15 @@ class FailureManager {
   void observe(const std::vector<std::string>& datarefs, const core::RrefView& view);
   void watchOwn();
   void watch(core::Subscription* subscription, core::RrefGroup group);
+  FailureSnapshot snapshotLocked() const;
   void publishLocked();
-  std::optional<ServiceResult> add(const core::FailureRequest& request, const std::string& who);
-  ServiceResult await(std::unique_lock<core::HandlerMutex>* lock, const std::string& name);
+  std::optional<RequestResult> add(const core::FailureRequest& request, const std::string& who);
+  bool gone() const;
+
+  // All without it.
+  std::optional<RequestResult> unanswered(const core::FailurePlan& plan);
+  RequestResult await(const std::string& name);
+  RequestResult awaitRepair(const std::vector<std::string>& datarefs, bool given_back);
 
   core::SimulatorPort* link_;
   OverrideManager* overrides_;
@@ -93,19 +115,17 @@ class FailureManager {
   Report report_;
 
   const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
-  core::ClockCondition changed_;
   bool stopped_ = false;
   core::LinkStatus link_status_;
   core::SimulatorVersion version_;
   core::FailureRegistry registry_;
-  core::FlightConditions now_;
-  double tick_time_ = 0.0;     // [s] steady
-  double publish_time_ = 0.0;  // [s] steady
-  bool dirty_ = true;          // labels changed since they were published
+  core::FlightConditions flight_;
+  double publish_time_ = -1e9;  // [s] steady
+  bool dirty_ = true;           // labels changed since they were published
   bool published_driving_ = false;
   std::map<std::string, Pending> pending_;
   std::map<std::string, std::string> asked_by_;   // by name: who asked for it
-  std::map<std::string, std::string> not_shown_;  // by name: those X-Plane did not show, and why; for await()
+  std::map<std::string, std::string> not_shown_;  // by name: those that ended, and why; for await()
   std::map<std::string, double> undone_;          // [s] steady, by dataref: when it was repaired here
   std::map<std::string, double> repaired_since_;  // [s] steady, by name: ours that X-Plane does not show any more
 

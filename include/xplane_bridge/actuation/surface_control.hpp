@@ -10,8 +10,6 @@
 #include <string>
 #include <vector>
 
-#include <diagnostic_updater/DiagnosticStatusWrapper.h>
-
 #include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/surfaces/mixing_watch.hpp"
@@ -30,11 +28,39 @@ struct SurfaceControlOptions {
   double command_timeout = 0.5;  ///< [s] after which a SurfaceCommand that is not repeated ends
 };
 
+enum class SurfaceControlState : std::uint8_t {
+  kIdle,       ///< X-Plane drives the surfaces
+  kTaking,     ///< they are sent, but X-Plane does not show the override yet
+  kDriving,    ///< they are sent, and X-Plane shows the override
+  kReleasing,  ///< given back, but X-Plane still shows the override
+};
+const char* toString(SurfaceControlState state);
+
+/// What diagnostics tell of driven surfaces.
+struct SurfaceControlStatus {
+  SurfaceControlState state = SurfaceControlState::kIdle;
+  bool wanted = false;                     ///< something needs the surfaces driven
+  std::string blocked_reason;              ///< why they cannot be driven now; empty: they can, or are
+  std::string file_problem;                ///< with the mixing file; empty: none
+  std::vector<std::string> not_following;  ///< surfaces that do not show what is sent to them
+  std::string aircraft;                    ///< whose mixing this is
+  bool mixing_known = false;
+  std::vector<std::string> mixed_surfaces;  ///< those of the mixing
+  std::vector<std::string> unknown_moved;   ///< terms that have moved and that the mixing does not know
+  std::string identification;               ///< how good that of this flight is, or what it needs
+  std::size_t samples = 0;                  ///< of this flight
+  double worst_residual_deg = 0.0;
+  double lag_frames = std::nan("");  ///< [frames] by which driven surfaces trail X-Plane's own
+  std::uint64_t commands_accepted = 0, commands_refused = 0;
+  std::uint64_t answers_dropped = 0;  ///< to commands, because nothing took them
+  std::string last_refusal;
+};
+
 /// Every control surface, driven one by one while somebody needs that (a broken surface, a command to single surfaces,
 /// an excitation of one), and left to X-Plane otherwise. Learns the mixing that takes (docs/surfaces.md).
 ///
-/// X-Plane's frames drive it: what is sent goes out on arrival of each. Thread-safe; nothing waits but for the
-/// journal's disk.
+/// X-Plane's frames drive it: what is sent goes out on arrival of each. It goes by the link's clock. Thread-safe;
+/// nothing waits but for the journal's disk.
 class SurfaceControl {
  public:
   /// `report(text, success)`: what happened, for events and the log.
@@ -52,9 +78,8 @@ class SurfaceControl {
   void onAircraft(const std::string& aircraft);
   /// Whatever is driven ends, failures and commands too.
   void release(const std::string& why);
-  /// At least ten times a second; `time` [s] steady. `blocked_reason`: why nothing may be sent to X-Plane now; empty:
-  /// it may.
-  void tick(double time, const std::string& blocked_reason);
+  /// At least ten times a second. `blocked_reason`: why nothing may be sent to X-Plane now; empty: it may.
+  void tick(const std::string& blocked_reason);
   /// Ends all driving; overrides are the keeper's to give back.
   void stop();
 
@@ -111,11 +136,12 @@ class SurfaceControl {
   /// another client), once after it happened.
   std::optional<std::string> takeAbandoned();
 
-  void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status) const;
+  SurfaceControlStatus status() const;
 
  private:
-  enum class State : std::uint8_t { kIdle, kTaking, kDriving, kReleasing };
-  static const char* toString(State state);
+  using State = SurfaceControlState;
+
+  double now() const;
 
   // Of the link's thread, without mutex_.
   void subscribe();
@@ -158,7 +184,7 @@ class SurfaceControl {
   bool disturbed_ = false;
   bool stopped_ = false;
   std::string blocked_reason_ = "X-Plane is not connected";
-  double tick_time_ = 0.0;  // [s] steady
+  std::optional<double> last_tick_;  // [s] steady
 
   core::MixingWatch watch_;
   std::string file_problem_;

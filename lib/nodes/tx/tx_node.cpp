@@ -136,9 +136,9 @@ void TxNode::onTimer() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   if (!overrides_) return;
   const std::string refusal = refusalToFly();
-  surfaces_->tick(time, refusal);
+  surfaces_->tick(refusal);
   if (!refusal.empty()) excitation_->abort("nothing is sent: " + refusal);
-  failures_->tick(time);
+  failures_->tick();
   if (came_back_) startAfresh(time);
   watchReleases(time);
   if (linkIsUp() && time - last_refresh_ > kOverrideRefresh) {

@@ -6,7 +6,9 @@
 
 #include "xplane_bridge/Event.h"
 #include "xplane_bridge/nodes/base/user_folder.hpp"
+#include "xplane_bridge/nodes/messages/actuation_conversions.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
+#include "xplane_bridge/nodes/tx/actuation_diagnostics.hpp"
 #include "xplane_bridge/nodes/tx/tx_node.hpp"
 
 namespace xplane_bridge {
@@ -25,13 +27,21 @@ void TxNode::makeSurfaceControl() {
       [this] { publishSurfacesApplied(); });
   auto failures = std::make_unique<FailureManager>(
       &link(), overrides_.get(), surfaces.get(), options_.service_timeout,
-      [this](FailureState* message) { publishStamped(failure_publisher_, message); },
+      [this](const FailureSnapshot& snapshot) {
+        FailureState message;
+        toMessage(snapshot, &message);
+        publishStamped(failure_publisher_, &message);
+      },
       [this](const std::string& text, const std::string& who, bool success) {
         logEvent(Event::FAILURE, text, who, success);
       });
   auto excitation = std::make_unique<ExcitationManager>(
       surfaces.get(), options_.aircraft.max_roll_deg, options_.aircraft.max_pitch_deg,
-      [this](ExcitationState* message) { publishStamped(excitation_publisher_, message); },
+      [this](const ExcitationLabel& label) {
+        ExcitationState message;
+        toMessage(label, &message);
+        publishStamped(excitation_publisher_, &message);
+      },
       [this](const std::string& text, const std::string& who, bool success) {
         logEvent(Event::EXCITATION, text, who, success);
       });
@@ -42,11 +52,15 @@ void TxNode::makeSurfaceControl() {
 }
 
 void TxNode::serveInjectExcitation(const InjectExcitation::Request& request, InjectExcitation::Response* response) {
-  const ExcitationManager::Plan plan = excitation_->plan(request);
+  const ExcitationRequest wish = toCore(request);
+  const ExcitationManager::Plan plan = excitation_->plan(wish);
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const bool flown = ever_sent_.any() && !arbiter_->status().failsafe;
-  excitation_->inject(request, plan, name() + "/inject_excitation", watch_, refusalToFly(),
-                      flown ? read_back_channels_ : core::ChannelSet{}, response);
+  const RequestResult result = excitation_->inject(wish, plan, name() + "/inject_excitation", watch_, refusalToFly(),
+                                                   flown ? read_back_channels_ : core::ChannelSet{});
+  response->result = toMessage(result);
+  response->success = result.success();
+  response->id = excitation_->label().id;
 }
 
 void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
@@ -87,11 +101,16 @@ void TxNode::publishSurfacesApplied() {
 void TxNode::advertiseFailureServices() {
   advertiseService<SetFailure::Request, SetFailure::Response>(
       name() + "/set_failure", [this](const SetFailure::Request& request, SetFailure::Response& response) {
-        failures_->set(request, name() + "/set_failure", &response);
+        const RequestResult result = failures_->set(toCore(request), name() + "/set_failure");
+        response.result = toMessage(result);
+        response.success = result.success();
       });
   advertiseService<ClearFailures::Request, ClearFailures::Response>(
       name() + "/clear_failures", [this](const ClearFailures::Request& request, ClearFailures::Response& response) {
-        failures_->clear(request, name() + "/clear_failures", &response);
+        const auto done = failures_->clear(request.names, request.include_simulator, name() + "/clear_failures");
+        response.result = toMessage(done.result);
+        response.success = done.result.success();
+        response.cleared = done.cleared;
       });
   advertiseService<InjectExcitation::Request, InjectExcitation::Response>(
       name() + "/inject_excitation",
@@ -99,10 +118,10 @@ void TxNode::advertiseFailureServices() {
         serveInjectExcitation(request, &response);
       });
   addDiagnostics("surfaces", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
-    if (surfaces_) surfaces_->fillDiagnostics(&status);
+    if (surfaces_) xplane_bridge::fillDiagnostics(surfaces_->status(), &status);
   });
   addDiagnostics("failures", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
-    if (failures_) failures_->fillDiagnostics(&status);
+    if (failures_) xplane_bridge::fillDiagnostics(failures_->snapshot(), &status);
   });
 }
 

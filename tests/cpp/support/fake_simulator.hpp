@@ -85,6 +85,10 @@ class FakeSimulator : public SimulatorPort {
   /// Called for each message before X-Plane takes it: what is in the journal by then?
   std::function<void(const Message&)> on_message;
 
+  /// Called for each frame, once its time has come and before its values are sent: what X-Plane moves by itself, and
+  /// what else happens while a call under test waits.
+  std::function<void()> on_frame;
+
   /// One frame. While X-Plane does not answer (SEARCHING, STALE, LOST), time passes and nothing is delivered.
   void frame(double dt = kFrame) {
     now_ns_ += static_cast<std::int64_t>(std::llround(dt * 1e9));
@@ -95,6 +99,11 @@ class FakeSimulator : public SimulatorPort {
       }
       datarefs_[kFramePeriod] = static_cast<float>(dt);
       status_.sim_time_s = datarefs_[kSimTime];
+    }
+    if (on_frame) {
+      on_frame();
+    }
+    if (answers()) {
       deliver();
     }
     serveReads();

@@ -14,13 +14,18 @@
 #include <std_srvs/SetBool.h>
 
 #include "xplane_bridge/AppliedCommand.h"
+#include "xplane_bridge/ClearFailures.h"
 #include "xplane_bridge/ControlCommand.h"
+#include "xplane_bridge/ExcitationState.h"
+#include "xplane_bridge/FailureState.h"
+#include "xplane_bridge/InjectExcitation.h"
 #include "xplane_bridge/LoadAircraft.h"
 #include "xplane_bridge/ModeRequest.h"
 #include "xplane_bridge/ResetFlight.h"
 #include "xplane_bridge/RunCommand.h"
 #include "xplane_bridge/ServiceResult.h"
 #include "xplane_bridge/SetDataref.h"
+#include "xplane_bridge/SetFailure.h"
 #include "xplane_bridge/SetLoading.h"
 #include "xplane_bridge/SetMode.h"
 #include "xplane_bridge/SetView.h"

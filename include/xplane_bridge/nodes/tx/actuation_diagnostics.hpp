@@ -1,0 +1,16 @@
+#pragma once
+
+/// @file
+/// What driven surfaces and failures say of themselves on /diagnostics.
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+
+#include "xplane_bridge/actuation/failure_manager.hpp"
+#include "xplane_bridge/actuation/surface_control.hpp"
+
+namespace xplane_bridge {
+
+void fillDiagnostics(const SurfaceControlStatus& surfaces, diagnostic_updater::DiagnosticStatusWrapper* status);
+void fillDiagnostics(const FailureSnapshot& failures, diagnostic_updater::DiagnosticStatusWrapper* status);
+
+}  // namespace xplane_bridge

@@ -1,0 +1,80 @@
+#include "xplane_bridge/nodes/messages/actuation_conversions.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+static_assert(static_cast<int>(ResultCode::kOk) == ServiceResult::OK);
+static_assert(static_cast<int>(ResultCode::kAccepted) == ServiceResult::ACCEPTED);
+static_assert(static_cast<int>(ResultCode::kRefused) == ServiceResult::REFUSED);
+static_assert(static_cast<int>(ResultCode::kNotSupported) == ServiceResult::NOT_SUPPORTED);
+static_assert(static_cast<int>(ResultCode::kNoLink) == ServiceResult::NO_LINK);
+static_assert(static_cast<int>(ResultCode::kTimeout) == ServiceResult::TIMEOUT);
+
+}  // namespace
+
+core::FailureRequest toCore(const SetFailure::Request& request) {
+  core::FailureRequest out;
+  out.name = request.name;
+  out.kind = request.kind;
+  if (request.has_value) out.value = static_cast<double>(request.value);
+  out.trigger = request.trigger;
+  out.trigger_value = static_cast<double>(request.trigger_value);
+  return out;
+}
+
+ExcitationRequest toCore(const InjectExcitation::Request& request) {
+  ExcitationRequest out;
+  out.kind = request.kind;
+  out.target = request.target;
+  out.amplitude = static_cast<double>(request.amplitude);
+  out.duration = static_cast<double>(request.duration);
+  out.frequency_min = static_cast<double>(request.frequency_min);
+  out.frequency_max = static_cast<double>(request.frequency_max);
+  out.seed = request.seed;
+  out.max_roll_deg = static_cast<double>(request.max_roll_deg);
+  out.max_pitch_deg = static_cast<double>(request.max_pitch_deg);
+  return out;
+}
+
+ServiceResult toMessage(const RequestResult& result) {
+  ServiceResult out;
+  out.code = static_cast<std::uint8_t>(result.code);
+  out.message = result.text;
+  return out;
+}
+
+void toMessage(const FailureSnapshot& snapshot, FailureState* message) {
+  const std_msgs::Header header = message->header;
+  *message = FailureState();
+  message->header = header;
+  message->sim_time = static_cast<float>(snapshot.sim_time);
+  for (const core::FailureLabel& label : snapshot.labels) {
+    message->names.push_back(label.name);
+    message->kinds.push_back(label.kind);
+    message->values.push_back(static_cast<float>(label.value));
+    message->set_by.emplace_back(label.by_bridge ? "bridge" : "simulator");
+    message->active.push_back(label.active);
+    message->confirmed.push_back(label.confirmed);
+    message->since_sim_time.push_back(static_cast<float>(label.since_sim_time));
+  }
+  message->surrogate_mixing = snapshot.surrogate_mixing;
+  message->surrogate_lag_frames = static_cast<float>(snapshot.surrogate_lag_frames);
+}
+
+void toMessage(const ExcitationLabel& label, ExcitationState* message) {
+  message->sim_time = static_cast<float>(label.sim_time);
+  message->active = label.active;
+  message->id = label.id;
+  message->kind = label.kind;
+  message->target = label.target;
+  message->amplitude = static_cast<float>(label.amplitude);
+  message->duration = static_cast<float>(label.duration);
+  message->frequency_min = static_cast<float>(label.frequency_min);
+  message->frequency_max = static_cast<float>(label.frequency_max);
+  message->seed = label.seed;
+  message->start_sim_time = static_cast<float>(label.start_sim_time);
+  message->end_sim_time = static_cast<float>(label.end_sim_time);
+  message->result = label.result;
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,63 @@
+#include "xplane_bridge/nodes/tx/actuation_diagnostics.hpp"
+
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/core/base/text.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using Level = diagnostic_msgs::DiagnosticStatus;
+
+}  // namespace
+
+void fillDiagnostics(const SurfaceControlStatus& surfaces, diagnostic_updater::DiagnosticStatusWrapper* status) {
+  const std::string& blocked = surfaces.blocked_reason;
+  if (!surfaces.file_problem.empty()) {
+    status->summary(Level::WARN, surfaces.file_problem);
+  } else if (!surfaces.not_following.empty()) {
+    status->summary(Level::WARN, "X-Plane does not show what is sent to " + core::join(surfaces.not_following));
+  } else if (surfaces.state != SurfaceControlState::kIdle) {
+    status->summary(Level::OK, toString(surfaces.state));
+  } else if (surfaces.wanted) {
+    status->summary(Level::WARN, "the surfaces are not driven: " + blocked);
+  } else {
+    status->summary(Level::OK, blocked.empty() ? "ready to drive single surfaces" : blocked);
+  }
+  status->add("State", toString(surfaces.state));
+  status->add("Aircraft", surfaces.aircraft);
+  status->add("Mixing known", surfaces.mixing_known);
+  if (surfaces.mixing_known) {
+    status->add("Surfaces of the mixing", core::join(surfaces.mixed_surfaces));
+    status->add("Moved, with an effect that the mixing does not know",
+                surfaces.unknown_moved.empty() ? "none" : core::join(surfaces.unknown_moved));
+  }
+  status->add("Identification of this flight", surfaces.identification);
+  status->add("Samples of this flight (-)", surfaces.samples);
+  status->add("Worst residual (deg)", surfaces.worst_residual_deg);
+  status->add("Lag of driven surfaces (frames)", surfaces.lag_frames);
+  status->add("control/surfaces accepted (-)", surfaces.commands_accepted);
+  status->add("control/surfaces refused (-)", surfaces.commands_refused);
+  status->add("control/surfaces answers dropped (-)", surfaces.answers_dropped);
+  if (!surfaces.last_refusal.empty()) status->add("control/surfaces last refusal", surfaces.last_refusal);
+}
+
+void fillDiagnostics(const FailureSnapshot& failures, diagnostic_updater::DiagnosticStatusWrapper* status) {
+  std::vector<std::string> broken, unconfirmed;
+  for (const core::FailureLabel& label : failures.labels) {
+    broken.push_back(label.name);
+    if (label.active && !label.confirmed) unconfirmed.push_back(label.name);
+    status->add(label.name, label.kind + (label.by_bridge ? ", by the bridge" : ", by the simulator") +
+                                (!label.active     ? ", armed"
+                                 : label.confirmed ? ", seen"
+                                                   : ", not seen"));
+  }
+  if (!unconfirmed.empty()) {
+    status->summary(Level::WARN, "X-Plane does not show the failure of " + core::join(unconfirmed));
+  } else {
+    status->summary(Level::OK, broken.empty() ? "nothing is broken" : "broken: " + core::join(broken));
+  }
+}
+
+}  // namespace xplane_bridge
