@@ -227,7 +227,7 @@ void FailureManager::useDriver(const Pending& pending) {
 }
 
 bool FailureManager::settled(Pending* pending) {
-  const std::string& name = pending->plan.name;
+  const std::string name = pending->plan.name;  // a copy: giveUp() erases `pending`
   const auto settle = [this, pending, &name] {
     const auto& surface = pending->plan.surface;
     // Where it got stuck is known only now.

@@ -135,6 +135,7 @@ void SurfaceControl::onSample() {
         report_("the surfaces are driven by their identified mixing", true);
       } else if (now() - state_since_ > kTakeOverWait) {
         giveBack();
+        driver_.reset();  // not resumed before not_before_
         endCommands();
         cancelOffset("X-Plane does not show the surface override");
         not_before_ = now() + kRetry;
@@ -438,6 +439,7 @@ std::string SurfaceControl::beginOffset(std::size_t surface, double amplitude_de
     return "amplitude is " + degrees(amplitude_deg) + " deg: expected at most half of its travel, " + degrees(half);
   }
   offset_ = core::SurfaceDeflection{surface, 0.0};
+  offset_lost_.clear();
   return "";
 }
 

@@ -82,7 +82,7 @@ void MixingWatch::add(const SurfaceSample& sample) {
 }
 
 bool MixingWatch::replaces(const MixingModel& found) const {
-  if (!model_ || !contradiction().empty()) return true;
+  if (!model_ || !contradiction().empty() || !notShown().empty()) return true;
   for (std::size_t j = 0; j < kMixingTerms; ++j) {
     if (model_->known[j] && !found.known[j]) return false;
   }
@@ -105,11 +105,20 @@ std::string MixingWatch::contradiction() const {
   if (!model_ || off_count_ < kChecked || unknownMoved()) return "";
   for (const SurfaceLaw& law : model_->laws) {
     const double off = off_[law.surface];
-    if (std::abs(off) <= kContradiction * requirements_.residual_deg) continue;
+    if (!std::isfinite(off) || std::abs(off) <= kContradiction * requirements_.residual_deg) continue;
     char text[200];
     std::snprintf(text, sizeof text, "%s stands %.1f deg off what its mixing says",
                   surfaceTable()[law.surface].name.c_str(), off);
     return text;
+  }
+  return "";
+}
+
+std::string MixingWatch::notShown() const {
+  for (const SurfaceLaw& law : model_->laws) {
+    if (!std::isfinite(off_[law.surface])) {
+      return "X-Plane does not show " + surfaceTable()[law.surface].name + ", which the mixing has";
+    }
   }
   return "";
 }
@@ -121,12 +130,7 @@ std::string MixingWatch::refusal() const {
   }
   const std::string wrong = contradiction();
   if (!wrong.empty()) return wrong + "; identify anew, move the stick: " + quality_.text();
-  for (const SurfaceLaw& law : model_->laws) {
-    if (!std::isfinite(off_[law.surface])) {
-      return "X-Plane does not show " + surfaceTable()[law.surface].name + ", which the mixing has";
-    }
-  }
-  return "";
+  return notShown();
 }
 
 std::vector<double> MixingWatch::bias() const {

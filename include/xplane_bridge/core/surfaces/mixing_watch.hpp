@@ -47,6 +47,7 @@ class MixingWatch {
 
  private:
   std::string contradiction() const;
+  std::string notShown() const;
   bool unknownMoved() const;
   bool replaces(const MixingModel& found) const;
 

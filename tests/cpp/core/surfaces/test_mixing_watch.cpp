@@ -75,6 +75,19 @@ TEST(MixingWatch, LearnsAtTenSamplesASecondAndThenAllowsDriving) {
   EXPECT_EQ(watch.samples(), 0u);
 }
 
+TEST(MixingWatch, SurfaceThatXPlaneDoesNotShowIsNamed) {
+  MixingWatch watch;
+  const double time = fly(&watch, 0.0, 30.0);
+  ASSERT_TRUE(watch.solve()) << watch.quality().text();
+  SurfaceSample sample;
+  for (double at = time; at < time + 2.0; at += kFrame) {
+    sample = sampleOf(at, {});
+    sample.deflections_deg[kRudder] = std::nan("");
+    watch.add(sample);
+  }
+  EXPECT_EQ(watch.refusal(), "X-Plane does not show rudder1_fin1, which the mixing has");
+}
+
 TEST(MixingWatch, StickFasterThanSurfacesSaysNothing) {
   MixingWatch watch;
   double time = hold(&watch, 0.0, 1.0);
