@@ -56,6 +56,8 @@ ENUMERATIONS = (
     Enumeration("ControlMode", "", "FlightMode", "Who flies.", "upper"),
     Enumeration("AppliedCommand", "SOURCE_", "CommandSource", "Where the values sent come from.", ""),
     Enumeration("SetFailure", "", "FailureTrigger", "When a failure comes true.", ""),
+    Enumeration("ServiceResult", "", "ResultCode", "How a service call ended.", ""),
+    Enumeration("Event", "", "EventKind", "What an event is about.", ""),
     Enumeration("FrameState", "VIEW_", "CameraView", "Where the pilot's camera looks.", "lower"),
 )
 BITS = (

@@ -76,38 +76,38 @@ ExcitationManager::Plan ExcitationManager::plan(const ExcitationRequest& request
 RequestResult ExcitationManager::inject(const ExcitationRequest& request, const Plan& plan, const std::string& who,
                                         const core::FlightWatch& watch, const std::string& blocked_reason,
                                         const core::ChannelSet& commanded) {
-  if (!plan.wrong.empty()) return {ResultCode::kRefused, plan.wrong};
+  if (!plan.wrong.empty()) return {core::ResultCode::kRefused, plan.wrong};
   if (!plan.signal) {
-    if (!running()) return {ResultCode::kRefused, "no excitation runs"};
+    if (!running()) return {core::ResultCode::kRefused, "no excitation runs"};
     abort("stopped by " + who);
-    return {ResultCode::kAccepted, "excitation " + std::to_string(label_.id) + " is stopped"};
+    return {core::ResultCode::kAccepted, "excitation " + std::to_string(label_.id) + " is stopped"};
   }
   const core::ExcitationSpec& spec = plan.signal->spec();
-  if (!blocked_reason.empty()) return {ResultCode::kNoLink, blocked_reason};
+  if (!blocked_reason.empty()) return {core::ResultCode::kNoLink, blocked_reason};
   if (running()) {
-    return {ResultCode::kRefused, "excitation " + std::to_string(label_.id) + " runs on " + label_.target +
-                                      "; one at a time: wait for it, or stop it"};
+    return {core::ResultCode::kRefused, "excitation " + std::to_string(label_.id) + " runs on " + label_.target +
+                                            "; one at a time: wait for it, or stop it"};
   }
   if (plan.channels.any() && (plan.channels & commanded).none()) {
-    return {ResultCode::kRefused,
+    return {core::ResultCode::kRefused,
             "nobody commands " + request.target + ": an excitation is added to a command (control/manual or auto)"};
   }
   if (!std::isfinite(watch.sim_time) || !std::isfinite(watch.roll_deg) || !std::isfinite(watch.pitch_deg)) {
-    return {ResultCode::kNoLink, "X-Plane has not shown the attitude yet"};
+    return {core::ResultCode::kNoLink, "X-Plane has not shown the attitude yet"};
   }
   if (!(std::abs(watch.roll_deg) < spec.roll_limit_deg && std::abs(watch.pitch_deg) < spec.pitch_limit_deg)) {
-    return {ResultCode::kRefused, "the attitude is beyond the limits of the excitation already"};
+    return {core::ResultCode::kRefused, "the attitude is beyond the limits of the excitation already"};
   }
   if (plan.surface) {
     const std::string why = surfaces_->beginOffset(*plan.surface, spec.amplitude);
-    if (!why.empty()) return {ResultCode::kRefused, why};
+    if (!why.empty()) return {core::ResultCode::kRefused, why};
   }
   runner_.start(*plan.signal, watch.sim_time);
   channels_ = plan.channels;
   surface_ = plan.surface;
   who_ = who;
   begin(request, spec, watch.sim_time);
-  return {ResultCode::kAccepted, "it runs; excitation/state tells its end"};
+  return {core::ResultCode::kAccepted, "it runs; excitation/state tells its end"};
 }
 
 void ExcitationManager::begin(const ExcitationRequest& request, const core::ExcitationSpec& spec, double sim_time) {

@@ -361,14 +361,14 @@ void FailureManager::publishLocked() {
 
 std::optional<RequestResult> FailureManager::add(const core::FailureRequest& request, const std::string& who) {
   const auto planned = core::planFailure(request, version_);
-  if (planned.error == core::FailureError::kInvalid) return RequestResult{ResultCode::kRefused, planned.text};
-  if (planned.error != core::FailureError::kNone) return RequestResult{ResultCode::kNotSupported, planned.text};
+  if (planned.error == core::FailureError::kInvalid) return RequestResult{core::ResultCode::kRefused, planned.text};
+  if (planned.error != core::FailureError::kNone) return RequestResult{core::ResultCode::kNotSupported, planned.text};
   const std::string& name = planned.plan.name;
   if (const auto same = registry_.sameAs(planned.plan)) {
-    return RequestResult{ResultCode::kRefused, name + " is broken already as " + *same + ": clear that first"};
+    return RequestResult{core::ResultCode::kRefused, name + " is broken already as " + *same + ": clear that first"};
   }
   if (request.trigger == static_cast<int>(core::FailureTrigger::kAtSimTime) && !std::isfinite(flight_.sim_time)) {
-    return RequestResult{ResultCode::kNoLink, "X-Plane has not shown its time yet"};
+    return RequestResult{core::ResultCode::kNoLink, "X-Plane has not shown its time yet"};
   }
   // A failure of the same name is replaced; a surface that stays driven goes from where it is.
   for (const core::FailurePlan& plan : registry_.clear({name}, true).undo) undo(plan);
@@ -395,13 +395,13 @@ RequestResult FailureManager::await(const std::string& name) {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return stopped_ || pending_.count(name) == 0 || link_status_.state == core::LinkState::kPaused || gone();
   };
-  if (!link_->waitUntil(ended, longest)) return {ResultCode::kTimeout, "X-Plane did not show it in time"};
+  if (!link_->waitUntil(ended, longest)) return {core::ResultCode::kTimeout, "X-Plane did not show it in time"};
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  if (stopped_ || gone()) return {ResultCode::kNoLink, "X-Plane is not connected any more"};
-  if (pending_.count(name) != 0) return {ResultCode::kAccepted, "X-Plane is paused: it acts when it goes on"};
+  if (stopped_ || gone()) return {core::ResultCode::kNoLink, "X-Plane is not connected any more"};
+  if (pending_.count(name) != 0) return {core::ResultCode::kAccepted, "X-Plane is paused: it acts when it goes on"};
   const auto why = not_shown_.find(name);
-  if (why != not_shown_.end()) return {ResultCode::kTimeout, why->second};
-  return {ResultCode::kOk, "X-Plane shows it"};
+  if (why != not_shown_.end()) return {core::ResultCode::kTimeout, why->second};
+  return {core::ResultCode::kOk, "X-Plane shows it"};
 }
 
 std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan& plan) {
@@ -412,12 +412,12 @@ std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan&
   }
   if (answered) return std::nullopt;
   if (!plan.surface) {
-    return RequestResult{ResultCode::kNotSupported,
+    return RequestResult{core::ResultCode::kNotSupported,
                          "this X-Plane does not answer to " + plan.datarefs.front() + ": is the name right?"};
   }
   const std::string blocked = surfaces_->blockReasonFor(plan.surface->surface);
   if (blocked.empty()) return std::nullopt;
-  return RequestResult{ResultCode::kRefused, plan.name + " cannot be broken now: " + blocked};
+  return RequestResult{core::ResultCode::kRefused, plan.name + " cannot be broken now: " + blocked};
 }
 
 RequestResult FailureManager::set(const core::FailureRequest& request, const std::string& who) {
@@ -425,7 +425,7 @@ RequestResult FailureManager::set(const core::FailureRequest& request, const std
   {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     if (!isUp(link_status_) || !link_status_.version.known()) {
-      return {ResultCode::kNoLink, "X-Plane is not connected"};
+      return {core::ResultCode::kNoLink, "X-Plane is not connected"};
     }
     version = version_;
   }
@@ -437,7 +437,8 @@ RequestResult FailureManager::set(const core::FailureRequest& request, const std
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     if (const auto refused = add(request, who)) return *refused;
   }
-  if (request.trigger != 0) return {ResultCode::kAccepted, "armed; events and failures/state tell when it comes true"};
+  if (request.trigger != 0)
+    return {core::ResultCode::kAccepted, "armed; events and failures/state tell when it comes true"};
   return await(planned.plan.name);
 }
 
@@ -451,7 +452,7 @@ FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>
     if (registry_.knows(labels.back())) continue;
     const std::string broken =
         core::join(registry_.labels(), ", ", [](const core::FailureLabel& label) { return label.name; });
-    out.result = {ResultCode::kRefused,
+    out.result = {core::ResultCode::kRefused,
                   "\"" + name + "\" is not broken: expected " + (broken.empty() ? "nothing, all is well" : broken)};
     return out;
   }
@@ -471,12 +472,12 @@ FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>
   const bool up = isUp(link_status_);
   for (const std::string& name : labels) {
     if (!registry_.knows(name)) continue;
-    out.result = {ResultCode::kRefused, name + " was failed in the simulator: set include_simulator"};
+    out.result = {core::ResultCode::kRefused, name + " was failed in the simulator: set include_simulator"};
     return out;
   }
   lock.unlock();
   if (!up) {
-    out.result = {ResultCode::kNoLink, "X-Plane is not connected; it is repaired when it comes back"};
+    out.result = {core::ResultCode::kNoLink, "X-Plane is not connected; it is repaired when it comes back"};
     return out;
   }
   out.result = awaitRepair(datarefs, given_back);
@@ -489,7 +490,7 @@ RequestResult FailureManager::awaitRepair(const std::vector<std::string>& datare
   const auto left = [&deadline] { return std::max(deadline.left(), 0.01); };
   for (const std::string& dataref : datarefs) {
     if (link_->waitForDataref(dataref, static_cast<float>(core::kWorking), 0.0F, left()).first) continue;
-    return {ResultCode::kTimeout, "X-Plane still shows " + dataref};
+    return {core::ResultCode::kTimeout, "X-Plane still shows " + dataref};
   }
   if (!given_back) return {};
   const auto back = [this] {
@@ -500,7 +501,7 @@ RequestResult FailureManager::awaitRepair(const std::vector<std::string>& datare
   // It also ends by being given up.
   if (!ended || (!surfaces_->driving() &&
                  !link_->waitForDataref(core::kSurfaceOverride, 0.0F, 0.0F, std::max(left(), kReadWait)).first)) {
-    return {ResultCode::kTimeout, std::string("X-Plane still shows ") + core::kSurfaceOverride};
+    return {core::ResultCode::kTimeout, std::string("X-Plane still shows ") + core::kSurfaceOverride};
   }
   return {};
 }

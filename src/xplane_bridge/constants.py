@@ -57,6 +57,33 @@ class FailureTrigger(enum.IntEnum):
     AT_SPEED_BELOW = 5  #: [m/s]
 
 
+class ResultCode(enum.IntEnum):
+    """How a service call ended. Numbers of ServiceResult."""
+
+    OK = 0  #: done, and seen in X-Plane by read-back where a dataref shows it
+    ACCEPTED = 1  #: sent; the outcome follows on `events`
+    REFUSED = 2  #: the request is wrong or not safe now; message says what was expected
+    NOT_SUPPORTED = 3  #: this X-Plane version or aircraft cannot; message says why
+    NO_LINK = 4  #: X-Plane is not connected
+    TIMEOUT = 5  #: sent, but X-Plane did not show it within the deadline
+
+
+class EventKind(enum.IntEnum):
+    """What an event is about. Numbers of Event."""
+
+    RESET = 1  #: the flight was reset or placed anew
+    CRASH = 2
+    AIRCRAFT = 3  #: another aircraft was loaded
+    PAUSE = 4  #: paused or resumed
+    LINK = 5  #: link state changed
+    MODE = 6  #: manual or automatic
+    FAILURE = 7  #: failure set, come true, cleared
+    EXCITATION = 8
+    OVERRIDE = 9  #: override taken, released, found left over
+    SITUATION = 10  #: situation saved or loaded
+    SETTING = 11  #: wind, loading, view or a dataref was set
+
+
 class CameraView(enum.IntEnum):
     """Where the pilot's camera looks. Numbers of FrameState."""
 

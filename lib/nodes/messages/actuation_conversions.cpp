@@ -1,17 +1,6 @@
 #include "xplane_bridge/nodes/messages/actuation_conversions.hpp"
 
 namespace xplane_bridge {
-namespace {
-
-static_assert(static_cast<int>(ResultCode::kOk) == ServiceResult::OK);
-static_assert(static_cast<int>(ResultCode::kAccepted) == ServiceResult::ACCEPTED);
-static_assert(static_cast<int>(ResultCode::kRefused) == ServiceResult::REFUSED);
-static_assert(static_cast<int>(ResultCode::kNotSupported) == ServiceResult::NOT_SUPPORTED);
-static_assert(static_cast<int>(ResultCode::kNoLink) == ServiceResult::NO_LINK);
-static_assert(static_cast<int>(ResultCode::kTimeout) == ServiceResult::TIMEOUT);
-
-}  // namespace
-
 core::FailureRequest toCore(const SetFailure::Request& request) {
   core::FailureRequest out;
   out.name = request.name;

@@ -14,6 +14,7 @@ namespace {
 
 using core::Channel;
 using core::FakeAirframe;
+using core::ResultCode;
 
 const std::string kLeft = FakeAirframe::dataref(FakeAirframe::kLeft);
 const std::size_t kLeftNumber = core::surfaceNumber(FakeAirframe::kLeft).value();

@@ -21,6 +21,7 @@ using core::FailureTrigger;
 using core::FakeAirframe;
 using core::kSurfaceOverride;
 using core::LinkState;
+using core::ResultCode;
 using Names = std::vector<std::string>;
 
 const std::string kLeft = FakeAirframe::dataref(FakeAirframe::kLeft);
