@@ -64,7 +64,7 @@ def _words(kind: Words) -> str:
         f"{known}  return std::nullopt;\n}}\n"
         "/// All of them, for error texts.\n"
         f"inline constexpr const char* k{kind.name}Words =\n"
-        f'    "{", ".join(words[:-1])} or {words[-1]}";\n'
+        f'    "{", ".join(words)}";\n'
     )
 
 

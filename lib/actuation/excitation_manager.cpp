@@ -42,7 +42,7 @@ ExcitationManager::Plan ExcitationManager::plan(const ExcitationRequest& request
   if (request.kind == "stop") return out;
   const auto shape = core::excitationShapeFrom(request.kind);
   if (!shape) {
-    out.wrong = "kind is \"" + request.kind + "\"; expected stop, " + core::kExcitationShapeWords;
+    out.wrong = "kind is \"" + request.kind + "\"; expected " + core::kExcitationShapeWords + " or stop";
     return out;
   }
   out.channels = channelsOf(request.target);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import xml.etree.ElementTree as ElementTree
@@ -88,3 +89,16 @@ def test_all_topics_but_raw_pictures_are_recorded():
         "/tf_static",
         "/diagnostics",
     ]
+
+
+# ------------------------------------------------------------------------------------------------------- overrides
+
+
+def test_the_panic_tool_knows_every_override_that_the_bridge_sets():
+    """scripts/release_overrides runs without the package: its list is its own."""
+    tool = (ROOT / "scripts/release_overrides").read_text(encoding="utf-8")
+    known = {path for path, _ in ast.literal_eval(re.search(r"^KNOWN = (\[.*?^\])", tool, re.MULTILINE | re.DOTALL)[1])}
+    named = set()
+    for path in (ROOT / "lib").rglob("*.cpp"):
+        named |= set(re.findall(r'"(sim/operation/override/override_\w*[a-z])"', path.read_text(encoding="utf-8")))
+    assert known == named
