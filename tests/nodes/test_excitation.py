@@ -181,7 +181,7 @@ def test_one_surface_is_excited_while_the_others_fly(flown):
 @pytest.mark.parametrize(
     ("request_", "part"),
     [
-        ({"kind": "square"}, "expected stop, doublet, 3-2-1-1, multisine or chirp"),
+        ({"kind": "square"}, "expected doublet, 3-2-1-1, multisine, chirp or stop"),
         ({"target": "flaps"}, "expected roll, pitch, yaw, throttle or a surface"),
         ({"amplitude": 0.0}, "amplitude"),
         ({"amplitude": float("nan")}, "amplitude"),
