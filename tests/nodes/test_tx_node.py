@@ -227,7 +227,7 @@ def test_release_overrides_stops_a_node_that_flies_until_a_mode_is_asked_for(tx,
     count = len(world.applied.messages)
     for _ in range(2):  # longer than overrides take to be sent again, with commands coming all the time
         status = world.wait_for_diagnostics("control", lambda s: s.level == 1)
-        assert "somebody else has released" in status.message
+        assert "another client has released" in status.message
     assert world.wire.value(OVERRIDE) == 0.0
     assert not journal_entries(world)
     assert len(world.applied.messages) == count

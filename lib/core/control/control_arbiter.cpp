@@ -192,6 +192,29 @@ void ControlArbiter::setMode(FlightMode mode, const std::string& who, const std:
   }
 }
 
+void ControlArbiter::forgetCommands(const std::string& reason, double now) {
+  advance(now);
+  for (Source& source : sources_) {
+    source.expires.fill(kNever);
+    source.alive_until = kNever;
+    source.throttle_field = 0;
+  }
+  stick_reference_.fill(kUnset);
+  origin_.fill(Origin::kNone);
+  blending_.reset();
+  status_.reason = reason;
+  status_.requested_by.clear();
+  status_.request_sequence = 0;
+  ++status_.revision;
+  updateStatus(false);
+}
+
+ChannelSet ControlArbiter::commanded() const {
+  ChannelSet out;
+  for (std::size_t i = 0; i < kChannelCount; ++i) out.set(i, fresh(status_.mode, i));
+  return out;
+}
+
 void ControlArbiter::dropOtherThrottleKind() {
   const std::uint32_t kind = sourceOf(status_.mode).throttle_field;
   if (kind == 0u) return;
@@ -254,7 +277,7 @@ const ArbitratedControls& ControlArbiter::step(double now, const ChannelExcitati
     moveTowards(i, *target, dt);
     const auto channel = static_cast<Channel>(i);
     out_.values[i] = output_[i];
-    if (excitation.channels.test(i)) {
+    if (excitation.channels.test(i) && fresh(status_.mode, i)) {
       const ChannelOptions& options = options_.channels[i];
       const double excited = output_[i] + excitation.value;
       out_.values[i] = std::clamp(excited, options.low, options.high);

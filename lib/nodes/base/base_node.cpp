@@ -229,6 +229,10 @@ bool BaseNode::guardedService(const std::string& service, const std::function<vo
 
 void BaseNode::addTimer(double period, std::function<void()> callback) { timers_->add(period, std::move(callback)); }
 
+BaseNode::Alarm BaseNode::addAlarm(std::function<void()> callback) { return timers_->addAlarm(std::move(callback)); }
+
+void BaseNode::setAlarm(Alarm alarm, std::int64_t due_ns) { timers_->setAlarm(alarm, due_ns); }
+
 void BaseNode::addDiagnostics(const std::string& status_name,
                               std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)> fill) {
   std::lock_guard<std::mutex> lock(diagnostics_mutex_);

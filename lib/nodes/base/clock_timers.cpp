@@ -12,6 +12,8 @@ class ClockTimers::Call : public ros::CallbackInterface {
  public:
   explicit Call(std::shared_ptr<Timer> timer) : timer_(std::move(timer)) {}
   CallResult call() override {
+    // An alarm that is set anew while it is being called must go off again.
+    if (timer_->is_alarm) timer_->waiting = false;
     timer_->callback();
     timer_->waiting = false;
     return Success;
@@ -26,13 +28,32 @@ ClockTimers::ClockTimers(core::Clock clock, ros::CallbackQueueInterface* queue)
 
 ClockTimers::~ClockTimers() { stop(); }
 
-void ClockTimers::add(double period, std::function<void()> callback) {
+void ClockTimers::addTimer(std::function<void()> callback, bool is_alarm) {
   if (thread_.joinable()) {
     throw std::logic_error("a timer is added after the timers were started");
   }
-  schedule_.add(clock_.steady_ns(), core::toNanoseconds(period));
   timers_.push_back(std::make_shared<Timer>());
   timers_.back()->callback = std::move(callback);
+  timers_.back()->is_alarm = is_alarm;
+}
+
+void ClockTimers::add(double period, std::function<void()> callback) {
+  addTimer(std::move(callback), false);
+  schedule_.add(clock_.steady_ns(), core::toNanoseconds(period));
+}
+
+core::TimerSchedule::Timer ClockTimers::addAlarm(std::function<void()> callback) {
+  addTimer(std::move(callback), true);
+  return schedule_.addAlarm();
+}
+
+void ClockTimers::setAlarm(core::TimerSchedule::Timer alarm, std::int64_t due_ns) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    schedule_.setAlarm(alarm, due_ns);
+    alarm_set_ = true;
+  }
+  changed_.notifyAll();
 }
 
 void ClockTimers::start() {
@@ -46,7 +67,7 @@ void ClockTimers::stop() {
     const std::lock_guard<std::mutex> lock(mutex_);
     stopped_ = true;
   }
-  stopped_changed_.notifyAll();
+  changed_.notifyAll();
   if (thread_.joinable()) {
     thread_.join();
     queue_->removeByID(id());
@@ -55,9 +76,15 @@ void ClockTimers::stop() {
 
 void ClockTimers::run() {
   std::unique_lock<std::mutex> lock(mutex_);
-  for (;;) {
-    const auto next = core::Deadline::at(clock_, *schedule_.next());
-    if (stopped_changed_.waitUntil(&lock, next, [this] { return stopped_; })) {
+  const auto changed = [this] { return stopped_ || alarm_set_; };
+  while (!stopped_) {
+    alarm_set_ = false;
+    if (const auto next = schedule_.next()) {
+      changed_.waitUntil(&lock, core::Deadline::at(clock_, *next), changed);
+    } else {
+      changed_.wait(&lock, changed);
+    }
+    if (stopped_) {
       return;
     }
     for (const core::TimerSchedule::Timer due : schedule_.takeDue(clock_.steady_ns())) {

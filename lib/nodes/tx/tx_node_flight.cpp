@@ -71,14 +71,8 @@ void TxNode::makeFlightJobs() {
 }
 
 void TxNode::ground(const std::string& why) {
-  {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    grounded_ = why;
-    if (why.empty()) return;
-    excitation_->abort(why);
-    surfaces_->release(why);
-    sendControls(now());
-  }
+  if (why.empty()) return path_->resume();
+  path_->suspend(why);
   link().waitUntil([this] { return !(surfaces_->driving() || overrides_->releasesPending()); }, kGroundedWait);
 }
 

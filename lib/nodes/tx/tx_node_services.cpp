@@ -46,8 +46,7 @@ void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* re
   message.mode = request.mode;
   message.requester = name() + "/set_mode";
   onModeRequest(message);
-  std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  const core::ModeStatus& status = arbiter_->status();
+  const core::ModeStatus status = path_->mode();
   response->mode = static_cast<std::uint8_t>(status.mode);
   response->success = response->mode == request.mode;
   response->result = response->success ? result(ServiceResult::OK, core::toString(status.mode))

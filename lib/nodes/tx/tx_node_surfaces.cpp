@@ -20,7 +20,7 @@ void TxNode::makeSurfaceControl() {
   options.driver = options_.aircraft.surfaces;
   options.flap_rate = options_.aircraft.flap_rate;
   options.speedbrake_rate = options_.aircraft.speedbrake_rate;
-  options.command_timeout = options_.arbiter.command_timeout;
+  options.command_timeout = options_.control.arbiter.command_timeout;
   auto surfaces = std::make_unique<SurfaceControl>(
       &link(), overrides_.get(), options,
       [this](const std::string& text, bool success) { logEvent(Event::OVERRIDE, text, "", success); },
@@ -55,9 +55,8 @@ void TxNode::serveInjectExcitation(const InjectExcitation::Request& request, Inj
   const ExcitationRequest wish = toCore(request);
   const ExcitationManager::Plan plan = excitation_->plan(wish);
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  const bool flown = ever_sent_.any() && !arbiter_->status().failsafe;
-  const RequestResult result = excitation_->inject(wish, plan, name() + "/inject_excitation", watch_, refusalToFly(),
-                                                   flown ? read_back_channels_ : core::ChannelSet{});
+  const RequestResult result =
+      excitation_->inject(wish, plan, name() + "/inject_excitation", watch_, path_->refusal(), path_->commanded());
   response->result = toMessage(result);
   response->success = result.success();
   response->id = excitation_->label().id;
@@ -71,23 +70,12 @@ void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
   }
 }
 
-void TxNode::setCommandedStick(const core::ArbitratedControls* sent) {
-  std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
-  if (sent) {
-    const core::Channel axes[] = {core::Channel::kRoll, core::Channel::kPitch, core::Channel::kYaw};
-    for (std::size_t i = 0; i < stick.size(); ++i) {
-      if (sent->active.test(core::index(axes[i]))) stick[i] = sent->values[core::index(axes[i])];
-    }
-  }
-  surfaces_->setStick(stick);
-}
-
 void TxNode::publishSurfacesApplied() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   while (const auto echo = surfaces_->takeEcho()) {
     AppliedCommand message;
     message.header.stamp = stampNow();
-    message.mode = static_cast<std::uint8_t>(arbiter_->status().mode);
+    message.mode = static_cast<std::uint8_t>(path_->mode().mode);
     message.source = AppliedCommand::SOURCE_NONE;
     message.sequence = echo->sequence;
     fillSurfaces(surfaces_->individuallyDriven(), &message);

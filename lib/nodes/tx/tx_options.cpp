@@ -35,12 +35,12 @@ void loadChannels(const ParamLoader& aircraft, bool reverse_thrust, core::Arbite
   }
 }
 
-AircraftOptions loadAircraft(const ParamLoader& in, core::ArbiterOptions* arbiter) {
+AircraftOptions loadAircraft(const ParamLoader& in, ControlPathOptions* control) {
   AircraftOptions out;
-  out.identity = in.texts("identity");
-  out.reverse_thrust = in.boolean("reverse_thrust", false);
-  arbiter->engines = in.integer("engines", {1, core::kMaxEngines});
-  loadChannels(in, out.reverse_thrust, arbiter);
+  control->aircraft = in.texts("identity");
+  control->reverse_thrust = in.boolean("reverse_thrust", false);
+  control->arbiter.engines = in.integer("engines", {1, core::kMaxEngines});
+  loadChannels(in, control->reverse_thrust, &control->arbiter);
   const ParamLoader excitation = in.section("excitation");
   out.max_roll_deg = excitation.number("max_roll_deg", {1.0, 180.0}, out.max_roll_deg);
   out.max_pitch_deg = excitation.number("max_pitch_deg", {1.0, 90.0}, out.max_pitch_deg);
@@ -55,18 +55,14 @@ AircraftOptions loadAircraft(const ParamLoader& in, core::ArbiterOptions* arbite
 
 }  // namespace
 
-bool AircraftOptions::fits(const core::AircraftIdentity& loaded) const {
-  return identity.empty() || std::find(identity.begin(), identity.end(), loaded.icao) != identity.end();
-}
-
 TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
   TxOptions out;
-  out.rate = own.number("rate", {1.0, 500.0}, out.rate);
-  out.max_rate = own.number("max_rate", {1.0, 2000.0}, out.max_rate);
+  out.control.rate = own.number("rate", {1.0, 500.0}, out.control.rate);
+  out.control.max_rate = own.number("max_rate", {1.0, 2000.0}, out.control.max_rate);
   out.service_timeout = own.number("service_timeout", {0.1, 10.0}, out.service_timeout);
   out.setting_timeout = own.number("setting_timeout", {0.5, 300.0}, out.setting_timeout);
   out.load_timeout = own.number("load_timeout", {0.5, 3600.0}, out.load_timeout);
-  core::ArbiterOptions& arbiter = out.arbiter;
+  core::ArbiterOptions& arbiter = out.control.arbiter;
   arbiter.command_timeout = own.number("command_timeout", {0.02, 60.0}, arbiter.command_timeout);
   arbiter.resume_grace = own.number("resume_grace", {0.0, 60.0}, arbiter.resume_grace);
   arbiter.transition_rate = own.number("transition_rate", {0.01, 1000.0}, arbiter.transition_rate);
@@ -90,7 +86,8 @@ TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
     file.refuse("name",
                 "\"" + aircraft + "\", the shared parameter `aircraft`: load that aircraft's file, or name this one");
   }
-  out.aircraft = loadAircraft(file, &arbiter);
+  out.aircraft = loadAircraft(file, &out.control);
+  out.control.aircraft_file = "config/aircraft/" + aircraft + ".yaml";
   if (const auto wrong = core::validate(arbiter)) throw ParamError("parameter " + own.fullKey(*wrong));
   return out;
 }

@@ -7,7 +7,8 @@
 
 namespace xplane_bridge::core {
 
-/// When periodic timers are due. Times are passed in: it knows neither clocks nor threads.
+/// When timers are due: periodic ones, and alarms that go off once. Times are passed in: it knows neither clocks nor
+/// threads.
 class TimerSchedule {
  public:
   /// Numbers of the timers, in the order of add().
@@ -16,7 +17,13 @@ class TimerSchedule {
   /// A timer that is due every `period_ns` [ns], > 0, for the first time one period after `now_ns`.
   Timer add(std::int64_t now_ns, std::int64_t period_ns);
 
-  /// [ns] when the next timer is due; nullopt without timers.
+  /// A timer that is due once for each setAlarm().
+  Timer addAlarm();
+  /// An alarm is due at `due_ns`, instead of the time it was set to before. @throws std::invalid_argument for a timer
+  /// that is no alarm
+  void setAlarm(Timer alarm, std::int64_t due_ns);
+
+  /// [ns] when the next timer is due; nullopt when none will be.
   std::optional<std::int64_t> next() const;
 
   /// The timers due at `now_ns`, by the times they were due at, those of the same time in the order of add(). A timer
@@ -27,7 +34,7 @@ class TimerSchedule {
  private:
   struct Entry {
     std::int64_t due_ns;
-    std::int64_t period_ns;
+    std::int64_t period_ns;  // 0: an alarm
   };
   std::vector<Entry> timers_;
 };

@@ -85,7 +85,7 @@ struct SourceStatistics {
 
 /// A test signal added to what was arbitrated.
 struct ChannelExcitation {
-  ChannelSet channels;  ///< only those in use are excited
+  ChannelSet channels;  ///< only those that the active source commands are excited
   double value = 0.0;
 };
 
@@ -118,10 +118,16 @@ class ControlArbiter {
   /// Changes the mode from inside, e.g. by a service; `reason` and `who` are shown on control/mode.
   void setMode(FlightMode mode, const std::string& who, const std::string& reason, double now);
 
+  /// Nothing is sent any more before the next command, as before the first one. The mode stays; `reason` is shown on
+  /// control/mode.
+  void forgetCommands(const std::string& reason, double now);
+
   /// Advances to `now` and says what to send. Call at the sending rate and right after each accepted command.
   const ArbitratedControls& step(double now, const ChannelExcitation& excitation = {});
 
   const ModeStatus& status() const { return status_; }
+  /// Channels for which the source that flies has a command younger than its time-out, as of the last call.
+  ChannelSet commanded() const;
   const SourceStatistics& statistics(FlightMode source) const { return sourceOf(source).statistics; }
   const ArbiterOptions& options() const { return options_; }
 

@@ -151,6 +151,12 @@ class BaseNode {
   /// subscribe() only.
   void addTimer(double period, std::function<void()> callback);
 
+  /// A timer that is due once each time it is set, on the same thread. From advertise() and subscribe() only.
+  using Alarm = core::TimerSchedule::Timer;
+  Alarm addAlarm(std::function<void()> callback);
+  /// Lets an alarm go off at `due_ns` [ns] of clock()'s steady time, instead of what it was set to before.
+  void setAlarm(Alarm alarm, std::int64_t due_ns);
+
   /// Adds a status to /diagnostics, filled at 1 Hz on the diagnostics thread: `fill` must lock what it reads.
   void addDiagnostics(const std::string& status_name,
                       std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)> fill);

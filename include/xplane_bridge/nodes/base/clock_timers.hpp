@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -14,8 +15,9 @@
 
 namespace xplane_bridge {
 
-/// Periodic timers on a clock, served by a callback queue like messages. A thread of its own waits for the clock and
-/// hands over what is due; of one timer at most one call waits in the queue, and times missed meanwhile are left out.
+/// Periodic timers and alarms on a clock, served by a callback queue like messages. A thread of its own waits for the
+/// clock and hands over what is due; of one timer at most one call waits in the queue, and times missed meanwhile are
+/// left out.
 class ClockTimers {
  public:
   ClockTimers(core::Clock clock, ros::CallbackQueueInterface* queue);
@@ -26,6 +28,10 @@ class ClockTimers {
 
   /// A timer that is due every `period` [s] from now on. Only before start(). @throws std::logic_error after it
   void add(double period, std::function<void()> callback);
+  /// A timer that is due when it is set. Only before start(). @throws std::logic_error after it
+  core::TimerSchedule::Timer addAlarm(std::function<void()> callback);
+  /// That one is due at `due_ns` [ns, steady] once, instead of the time it was set to before. From any thread.
+  void setAlarm(core::TimerSchedule::Timer alarm, std::int64_t due_ns);
   /// Begins with what is due already.
   void start();
   /// No callback begins any more; waits for one that runs.
@@ -34,10 +40,12 @@ class ClockTimers {
  private:
   struct Timer {
     std::function<void()> callback;
-    std::atomic<bool> waiting{false};  ///< in the queue, or called just now
+    bool is_alarm = false;
+    std::atomic<bool> waiting{false};  ///< in the queue; of a periodic one, or called just now
   };
   class Call;
 
+  void addTimer(std::function<void()> callback, bool is_alarm);
   void run();
   std::uint64_t id() const { return reinterpret_cast<std::uintptr_t>(this); }
 
@@ -46,8 +54,9 @@ class ClockTimers {
   core::TimerSchedule schedule_;
   std::vector<std::shared_ptr<Timer>> timers_;
   std::mutex mutex_;
-  core::ClockCondition stopped_changed_;
+  core::ClockCondition changed_;
   bool stopped_ = false;
+  bool alarm_set_ = false;  // since the thread has looked at the schedule
   std::thread thread_;
 };
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -32,14 +31,13 @@
 #include "xplane_bridge/SetWind.h"
 #include "xplane_bridge/Situation.h"
 #include "xplane_bridge/SurfaceCommand.h"
+#include "xplane_bridge/actuation/control_path.hpp"
 #include "xplane_bridge/actuation/excitation_manager.hpp"
 #include "xplane_bridge/actuation/failure_manager.hpp"
 #include "xplane_bridge/actuation/flight_jobs.hpp"
 #include "xplane_bridge/actuation/guardian.hpp"
 #include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
-#include "xplane_bridge/core/control/control_arbiter.hpp"
-#include "xplane_bridge/core/control/control_channels.hpp"
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
 #include "xplane_bridge/core/state/reset_detector.hpp"
@@ -49,12 +47,12 @@
 
 namespace xplane_bridge {
 
-/// Commands into X-Plane: arbitrates control/manual and control/auto, sends what is flown, holds the overrides that
-/// needs and gives them back, whatever happens. Topics, services and parameters: README.md, config/tx.yaml.
+/// Commands into X-Plane, whatever is broken or excited there, and services that change the flight: topics, services
+/// and diagnostics of the classes of actuation/. Topics, services and parameters: README.md, config/tx.yaml.
 ///
-/// Threads: commands and the refresh timer come on the subscription thread, X-Plane's answers on the link's, services
-/// on their own, waiting for releases on the worker's. mutex_ guards everything they share; nothing waits while holding
-/// it except for the journal's disk.
+/// Threads: commands and timers come on the subscription thread, X-Plane's answers on the link's, services on their
+/// own, waiting for releases on the worker's. mutex_ guards everything they share; nothing waits while holding it
+/// except for the journal's disk.
 class TxNode : public BaseNode {
  protected:
   void loadParameters(const ParamLoader& own) override;
@@ -68,46 +66,26 @@ class TxNode : public BaseNode {
   void joinThreads() override;
 
  private:
-  /// What was sent at one moment, until X-Plane shows it.
-  struct Sent {
-    AppliedCommand message;
-    core::ChannelValues values{};
-    core::ChannelSet channels;
-    double sim_time = std::nan("");  // [s] known at sending
-    double time = 0.0;               // [s] steady
-  };
-
-  double now() const;  // [s] steady
-
   // Control path.
+  void makeControlPath();
   void onCommand(core::FlightMode from, const ControlCommand& message);
-  void onModeRequest(const ModeRequest& message);
-  void onModeChange();
+  core::RequestOutcome onModeRequest(const ModeRequest& message);
   void onSurfaceCommand(const SurfaceCommand& message);
   void onTimer();
-  void sendControls(double time);
-  bool fly(const core::ArbitratedControls& controls, double time);
-  std::string refusalToFly() const;
-  core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
-  void publishMode();
-  void publishApplied(const core::ArbitratedControls& controls, double time);
-  void watchReadBack(const core::ChannelSet& channels);
-  void startAfresh(double time);
+  void publishMode(const core::ModeStatus& status, double sim_time);
+  void publishApplied(const AppliedControls& applied);
 
   // Link.
   void onLinkState(const core::LinkStatus& status);
   void subscribeToXPlane();
   void onWatch(const core::RrefView& view);
-  void onReadBack(const core::RrefView& view);
   void onIdentity();
   void askIdentity();
   void onReset(const std::string& how);
-  void watchReleases(double time);
   void work();
 
   // Single surfaces and failures (tx_node_surfaces.cpp).
   void makeSurfaceControl();
-  void setCommandedStick(const core::ArbitratedControls* sent);
   void publishSurfacesApplied();
   template <class Message>
   void publishStamped(const ros::Publisher& publisher, Message* message) {
@@ -153,33 +131,14 @@ class TxNode : public BaseNode {
   std::unique_ptr<FlightJobs> jobs_;
 
   const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
-  std::unique_ptr<core::ControlArbiter> arbiter_;
-  std::unique_ptr<core::ControlEncoder> encoder_;
+  std::unique_ptr<ControlPath> path_;
   core::LinkStatus link_status_;
   core::AircraftIdentityReader identity_;
   core::FlightWatch watch_;
   core::ResetDetector reset_detector_;
-  unsigned resets_ = 0;         // of the flight, since the start
-  std::string grounded_;        // why nothing is flown for a while; empty: it is
-  std::string released_;        // what somebody else has released, and what to do; empty: nothing
-  std::string pause_by_;        // who has asked for a pause or its end that has not come yet
-  bool came_back_ = false;      // the link came up anew: commands from before count only if somebody still flies
-  double last_command_ = -1e9;  // [s] steady, of any source
-  double last_send_ = -1e9;     // [s] steady
-  double last_refresh_ = -1e9;  // [s] steady, of the overrides
-  bool send_pending_ = false;
-  std::optional<std::uint32_t> published_revision_;
-  core::ChannelValues last_values_{};                     // of kOnChange channels
-  std::array<double, core::kChannelCount> changed_at_{};  // [s] steady; of kOnChange channels
-  core::ChannelSet ever_sent_;
-  std::vector<core::DatarefWrite> writes_;
-  std::deque<Sent> unseen_;  // oldest first
-  core::ChannelSet read_back_channels_;
-  std::vector<core::Channel> read_back_order_;
-  core::ChannelValues shown_{};
-  core::ChannelSet shown_known_;
-  double last_seen_ = -1e9;  // [s] steady: X-Plane last showed what was sent
-  std::string refusal_said_;
+  unsigned resets_ = 0;   // of the flight, since the start
+  std::string pause_by_;  // who has asked for a pause or its end that has not come yet
+  Alarm deadline_ = 0;    // of a command that waits
 
   ros::Publisher applied_publisher_;
   ros::Publisher mode_publisher_;
@@ -195,7 +154,6 @@ class TxNode : public BaseNode {
   // Last: they end first.
   core::Subscription watch_subscription_;
   core::Subscription identity_subscription_;
-  core::Subscription read_back_subscription_;
 };
 
 }  // namespace xplane_bridge

@@ -41,6 +41,29 @@ TEST(TimerSchedule, DoesNotMakeUpForMissedTimes) {
   EXPECT_EQ(schedule.takeDue(100), Timers{0});
 }
 
+TEST(TimerSchedule, AnAlarmIsDueOnceEachTimeItIsSet) {
+  TimerSchedule schedule;
+  const auto alarm = schedule.addAlarm();
+  EXPECT_EQ(schedule.next(), std::nullopt);
+  EXPECT_EQ(schedule.takeDue(1000), Timers{});
+  schedule.setAlarm(alarm, 1020);
+  schedule.setAlarm(alarm, 1010);  // instead
+  EXPECT_EQ(schedule.next(), 1010);
+  EXPECT_EQ(schedule.takeDue(1009), Timers{});
+  EXPECT_EQ(schedule.takeDue(1030), Timers{alarm});
+  EXPECT_EQ(schedule.next(), std::nullopt);
+  EXPECT_EQ(schedule.takeDue(2000), Timers{});
+  schedule.setAlarm(alarm, 500);  // over already
+  EXPECT_EQ(schedule.takeDue(2000), Timers{alarm});
+}
+
+TEST(TimerSchedule, SetsAlarmsOnly) {
+  TimerSchedule schedule;
+  const auto timer = schedule.add(0, 20);
+  EXPECT_THROW(schedule.setAlarm(timer, 10), std::invalid_argument);
+  EXPECT_THROW(schedule.setAlarm(7, 10), std::invalid_argument);
+}
+
 TEST(TimerSchedule, RefusesAPeriodThatIsNone) {
   TimerSchedule schedule;
   EXPECT_THROW(schedule.add(0, 0), std::invalid_argument);

@@ -110,6 +110,33 @@ TEST_F(ClockTimersTest, RefuseATimerAfterTheStart) {
   EXPECT_THROW(add("late", 0.02), std::logic_error);
 }
 
+TEST_F(ClockTimersTest, AnAlarmGoesOffWhenItIsSetTo) {
+  const auto alarm = timers_.addAlarm([this] { called_.emplace_back("alarm"); });
+  add("every 20 ms", 0.02);
+  timers_.start();
+  timers_.setAlarm(alarm, hand_.clock().steady_ns() + 5 * kMs);
+  hand_.move(5 * kMs);
+  serve(1);
+  hand_.move(20 * kMs);
+  serve(2);
+  EXPECT_EQ(called_, (Names{"alarm", "every 20 ms"}));
+}
+
+TEST_F(ClockTimersTest, AnAlarmSetByItsOwnCallbackGoesOffAgain) {
+  core::TimerSchedule::Timer alarm = 0;
+  alarm = timers_.addAlarm([&] {
+    called_.emplace_back("alarm");
+    if (called_.size() == 1) {
+      timers_.setAlarm(alarm, 0);  // at once
+      while (queue_.isEmpty()) std::this_thread::yield();
+    }
+  });
+  timers_.start();
+  timers_.setAlarm(alarm, 0);
+  serve(2);
+  EXPECT_EQ(called_.size(), 2U);
+}
+
 TEST(ClockTimersOfTheHost, FireByThemselves) {
   ros::CallbackQueue queue;
   ClockTimers timers(core::hostClock(), &queue);
