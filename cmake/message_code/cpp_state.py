@@ -111,11 +111,12 @@ def _conversion(place: Place, wires: Dict[str, str]) -> str:
     return f'{{"{place.wire}", {wires[place.wire]}, 0.0}}' if place.wire else "{}"
 
 
-def _dataref(source: Source, wires: Dict[str, str]) -> str:
-    own = source.datarefs.get("11", Place((), ""))
-    newer = source.datarefs.get("12")
-    paths = [f'"{place.at[0]}"' if place and place.at else "nullptr" for place in (own, newer)]
-    return f"{{{paths[0]}, {paths[1]}, {_conversion(own, wires)}, {_conversion(newer or own, wires)}}}"
+def _datarefs(source: Source, wires: Dict[str, str]) -> str:
+    found = []
+    for place, first, end in source.datarefs:
+        versions = f"{first}, {end}" if end else str(first) if first else ""
+        found.append(f'{{"{place.at[0]}", {_conversion(place, wires)}, {{{versions}}}}}')
+    return f"{{{{{', '.join(found)}}}}}"
 
 
 def _row(source: Source, wires: Dict[str, str]) -> str:
@@ -138,7 +139,7 @@ def _field_lines(sources: Sources) -> str:
             remark = ("input: " if s.kind == "input" else "") + s.remark.replace("\\", "\\\\").replace('"', '\\"')
             head = f'FieldGroup::k{camel(section.group)}, "{", ".join(s.names)}", {s.count}, "{s.unit}", {bit}'
             flags = f"{str(s.kind == 'engine').lower()}, {str(s.kind == 'engines').lower()}"
-            wire = f"{_dataref(s, sources.wires)}, {_row(s, sources.wires)}"
+            wire = f"{_datarefs(s, sources.wires)}, {_row(s, sources.wires)}"
             rows.append(f'{{{head}, {store},\n     {wire}, "{remark}", {flags}}},')
     text = "/// The lines of the field table, in the messages' order.\n"
     return f"{text}inline constexpr FieldSpec kFieldLines[] = {{\n{lines(rows, 4)}}};\n"

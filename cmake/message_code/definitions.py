@@ -8,6 +8,9 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = "lib/core/state/sources.txt"
 
+#: As FieldSpec::datarefs has room for.
+MOST_DATAREFS = 2
+
 #: Every mission message starts with these; core::MissionHeader holds them.
 HEADER = ("header", "sim_time", "epoch", "valid")
 
@@ -16,6 +19,7 @@ _LINE = re.compile(
 )
 _FIELD = re.compile(r"^(?P<name>\w+)(\[(?P<count>\d+)\])?(\s+\[(?P<unit>[^\]]+)\])?$")
 _DATAREF = re.compile(r"^(?P<path>[^\s()]+)( \((?P<wire>[^)]+)\))?$")
+_FROM = re.compile(r"^(?P<version>\d+(\.\d\d)?): (?P<rest>.+)$")
 _ROW = re.compile(
     r"^(?P<row>\d+)\.(?P<slot>[0-7])(-(?P<last>[0-7]))?(?P<bits> bits)?(?P<blank> blank)?( \((?P<wire>[^)]+)\))?$"
 )
@@ -90,6 +94,14 @@ class Place(NamedTuple):
     wire: str
 
 
+class Dataref(NamedTuple):
+    """A dataref of a field, and the versions of X-Plane that have it."""
+
+    place: Place
+    first: int  #: version as X-Plane numbers itself: 120800 is 12.08; 0: all before `end`
+    end: Optional[int]  #: the first that has another, or none; None: the newest has it
+
+
 class Source(NamedTuple):
     """A line of the sources."""
 
@@ -99,8 +111,8 @@ class Source(NamedTuple):
     bit: str  #: without VALID_; empty: none
     count: int
     unit: str
-    datarefs: Dict[str, Place]  #: by X-Plane's version, "11" and "12"
-    rows: Dict[str, Place]  #: at: row, slot
+    datarefs: List[Dataref]
+    rows: Dict[str, Place]  #: by X-Plane's version, "11" and "12"; at: row, slot
     slots: int  #: elements that the row carries
     bitfield: bool
     blank: bool
@@ -176,7 +188,7 @@ def _source(line: str, where: str, message: Definition, wires: Dict[str, str]) -
     if len(cells) != 5:
         raise MessageError(f"{where}: expected `field | validity | dataref | row | remarks`: {line}")
     names, kind, bit, count, unit = _what(cells[0], cells[1], where, message)
-    datarefs = {version: Place((m["path"],), m["wire"] or "") for version, m in _places(cells[2], _DATAREF, where)}
+    datarefs = _datarefs(cells[2], where)
     rows, slots, bitfield, blank = {}, 0, False, False
     for version, m in _places(cells[3], _ROW, where):
         rows[version] = Place((int(m["row"]), int(m["slot"])), m["wire"] or "")
@@ -184,7 +196,7 @@ def _source(line: str, where: str, message: Definition, wires: Dict[str, str]) -
             bitfield, blank = bool(m["bits"]), bool(m["blank"])
             last = int(m["last"]) if m["last"] else 7
             slots = count if bitfield else min(count, last + 1 - int(m["slot"]))
-    for place in (*datarefs.values(), *rows.values()):
+    for place in (*(dataref.place for dataref in datarefs), *rows.values()):
         if place.wire and place.wire not in wires:
             raise MessageError(f"{where}: unit {place.wire}: expected one of {', '.join(wires)} ([wire units] above)")
     if (kind == "computed") == bool(datarefs or rows):
@@ -211,13 +223,39 @@ def _what(cell: str, validity: str, where: str, message: Definition) -> Tuple[Tu
     return (name,), kind, bit, count or elements, field.unit
 
 
+def _datarefs(cell: str, where: str) -> List[Dataref]:
+    """Those of the cell, each until the next one's version."""
+    found: List[Tuple[int, Optional[Place]]] = []
+    for part in filter(None, (part.strip() for part in cell.split("; "))):
+        version = _FROM.match(part)
+        first, text = (_number(version["version"]), version["rest"]) if version else (0, part)
+        match = None if text == "-" else _DATAREF.match(text)
+        if (match is None and text != "-") or (found and first <= found[-1][0]):
+            raise MessageError(
+                f"{where}: expected datarefs in the order of their versions, each with its wire unit in brackets or "
+                f"`-` for none: {part}"
+            )
+        found.append((first, Place((match["path"],), match["wire"] or "") if match else None))
+    ends = [first for first, _ in found[1:]] + [None]
+    datarefs = [Dataref(place, first, end) for (first, place), end in zip(found, ends) if place]
+    if len(datarefs) > MOST_DATAREFS:
+        raise MessageError(f"{where}: expected at most {MOST_DATAREFS} datarefs of different versions")
+    return datarefs
+
+
+def _number(version: str) -> int:
+    """12.08 as X-Plane numbers it: 120800."""
+    major, _, minor = version.partition(".")
+    return int(major) * 10000 + int(minor or 0) * 100
+
+
 def _places(cell: str, form: "re.Pattern[str]", where: str) -> List[Tuple[str, "re.Match[str]"]]:
     found = []
     for part in filter(None, (part.strip() for part in cell.split("; "))):
         version, text = ("12", part[4:]) if part.startswith("12: ") else ("11", part)
         match = form.match(text)
         if not match:
-            raise MessageError(f"{where}: neither dataref nor row.slot, with its wire unit in brackets: {part}")
+            raise MessageError(f"{where}: no row.slot, with its wire unit in brackets: {part}")
         found.append((version, match))
     return found
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "xplane_bridge/Event.h"
+#include "xplane_bridge/actuation/pausing.hpp"
 #include "xplane_bridge/core/base/text.hpp"
-#include "xplane_bridge/core/simulator/simulator_settings.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -143,13 +143,9 @@ std::string FlightJobs::excuse() const {
 }
 
 void FlightJobs::pause(bool paused) {
-  const core::Deadline deadline = in(kPauseWait);
   hooks_.pausing(mover());
-  do {
-    link_->command(core::pauseCommand(paused));
-    wait(kWriteAgain, [&] { return link_->status().paused == paused; });
-  } while (!over(deadline) && link_->status().paused != paused);
-  if (link_->status().paused != paused) hooks_.pausing("");
+  const PauseOutcome outcome = setPaused(link_, paused, kPauseWait, [this] { return stopping_.load(); });
+  if (outcome != PauseOutcome::kFollowed) hooks_.pausing("");
 }
 
 // --- placing ---
@@ -161,9 +157,10 @@ std::optional<core::ShownFlight> FlightJobs::shownFlight() {
 FlightJobs::Outcome FlightJobs::place(const core::FlightStart& start) {
   // Paused, so that the aircraft does not fly between place and motion.
   const bool was_paused = link_->status().paused.value_or(false);
-  if (!was_paused) pause(true);
+  pause(true);
   const std::string difference = placed(start);
-  if (!was_paused) pause(false);
+  // Starting a flight may have paused or resumed it.
+  pause(was_paused);
   if (!difference.empty())
     return {Event::RESET, "reset_flight: X-Plane did not place the aircraft: " + difference, false};
   return {Event::RESET, "the flight goes on at the place, attitude and speed asked for", true};
@@ -256,14 +253,16 @@ FlightJobs::Outcome FlightJobs::change(const std::string& path, std::int32_t liv
 }
 
 std::string FlightJobs::changed(const std::string& path, std::int32_t livery) {
-  const auto names = core::aircraftPathDatarefs(path.size() + 1);
+  const auto names = core::aircraftPathDatarefs(path.size() + 1, link_->status().version);
   const auto isShown = [&] { return core::isSamePath(core::textFrom(link_->read(names, kPoll)), path); };
-  const bool same = isShown();
+  // Where no file is shown, that the flight began anew has to do.
+  const bool tells = !names.empty();
+  const bool same = !tells || isShown();
   const unsigned resets = hooks_.resets();
   bool gap = false;
   const auto isLoaded = [&] {
     gap = gap || link_->status().state == core::LinkState::kStale || link_->status().state == core::LinkState::kLost;
-    return isShown() && (!same || gap || hooks_.resets() != resets);
+    return (!tells || isShown()) && (!same || gap || hooks_.resets() != resets);
   };
   if (!sendMessage<core::kAcfnSize>(link_,
                                     [&](core::ByteSpan out) { return core::encodeAcfn(out, 0, path, livery); })) {
@@ -272,6 +271,7 @@ std::string FlightJobs::changed(const std::string& path, std::int32_t livery) {
   const core::Deadline deadline = in(options_.load_timeout);
   while (!isLoaded()) {
     if (over(deadline)) return "X-Plane does not show it; is the path that of a file below its folder?";
+    if (!tells) wait(kPoll, isLoaded);
   }
   const unsigned identities = hooks_.identities();
   wait(kIdentityWait, [&] { return hooks_.identities() != identities; });

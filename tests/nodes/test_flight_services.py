@@ -30,14 +30,14 @@ WIND = {
 HERE = {"latitude": 47.2, "longitude": 8.3, "altitude_msl": 1500.0, "heading_true_deg": 250.0, "true_airspeed": 75.0}
 
 
-def fly(world, version=11, **params):
+def fly(world, version="11", **params):
     """Starts emulator (its own pilot flies level) and tx_node."""
     from xplane_bridge.msg import EventList
 
     pilot = world.folder / "pilot.yaml"
     pilot.write_text("name: level\nevents: [{at: 0, hold: {roll: 0, altitude: 1000, speed: 72}}]\n", encoding="utf-8")
     options = ("--no-beacon", "--start", "air", "--pilot", pilot, "--version", version)
-    world.version = version
+    world.version = int(version.split(".")[0])
     world.xplane = world.emulator(*options)
     world.other = world.wire(world.xplane.port)
     world.seen = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK)
@@ -55,7 +55,7 @@ def close(world):
     world.close()
 
 
-@pytest.fixture(scope="module", params=[11, 12])
+@pytest.fixture(scope="module", params=["11.40", "12"])
 def flight(request, new_world, tmp_path_factory):
     """One flight of each X-Plane, that many tests share."""
     world = fly(new_world(tmp_path_factory.mktemp("services")), request.param, setting_timeout=2.0, load_timeout=5.0)
@@ -233,7 +233,7 @@ def test_aircraft_is_loaded_and_flown_only_if_it_is_the_one_configured(flight):
     flight.manual.stop()
 
 
-@pytest.mark.parametrize("flight", [11], indirect=True)  # it waits for two time-outs
+@pytest.mark.parametrize("flight", ["11.40"], indirect=True)  # it waits for two time-outs
 def test_files_that_are_not_there_are_told(flight):
     flight.manual.fly(fields=ROLL, roll=0.125)
     flight.seen.wait(STICK, 0.125)
@@ -325,9 +325,9 @@ def wait_for_event(world, kind, text=""):
 
 def test_pause_of_somebody_else_is_told(menu):
     menu.events.skip_to_now()
-    menu.other.send(protocol.CommandRequest("sim/operation/pause_on"))
+    menu.other.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     wait_for_event(menu, PAUSE, "paused")
-    menu.other.send(protocol.CommandRequest("sim/operation/pause_off"))
+    menu.other.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     wait_for_event(menu, PAUSE, "resumed")
 
 

@@ -522,9 +522,9 @@ def test_pause_and_resume(world, rx):
     rx()
     world.states.wait_for_count(20)
     wire = world.wire(emulator.port)
-    wire.send(protocol.CommandRequest("sim/operation/pause_on"))
+    wire.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     wait_for_link(world, "PAUSED")
-    wire.send(protocol.CommandRequest("sim/operation/pause_off"))
+    wire.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     wait_for_link(world, "CONNECTED")
     states = world.states.wait_for_count(20)
     assert not states[-1].paused

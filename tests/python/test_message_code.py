@@ -60,7 +60,11 @@ N2 = "float32[8] n2 "
         (SOURCES, "| CG  ", "| CGG ", "FuelState has no bit VALID_CGG"),
         (SOURCES, "| CG  ", "| -   ", "FuelState: no field counts for VALID_CG"),
         (SOURCES, "62.0 (lb)", "62.0 (lbs)", r"sources.txt:\d+: unit lbs: expected one of .*lb"),
-        (SOURCES, "62.0 (lb)", "62,0 (lb)", r"sources.txt:\d+: neither dataref nor row.slot.*: 62,0"),
+        (SOURCES, "62.0 (lb)", "62,0 (lb)", r"sources.txt:\d+: no row.slot.*: 62,0"),
+        (SOURCES, "; 12: -", "; 12", r"sources.txt:\d+: expected datarefs in the order of their versions.*: 12$"),
+        (SOURCES, "; 12: -", "; 12.8: -", r"sources.txt:\d+: expected datarefs in the order.*: 12.8: -"),
+        (SOURCES, "; 12: -", "; 12: sim/b; 12.08: sim/c", r"sources.txt:\d+: expected at most 2 datarefs"),
+        (SOURCES, "; 12: -", "; 12.08: sim/b; 12: sim/c", r"sources.txt:\d+: expected .* order .*: 12: sim/c"),
         (SOURCES, "| 62.0 (lb) |", "|", r"sources.txt:\d+: expected `field \| validity"),
         (SOURCES, "| computed LOAD |", "| computed LOAD | sim/a/b", "a computed field has no dataref and no row"),
         ("srv/SetMode.srv", "uint8 AUTO = 2", "uint8 AUTO = 3", "SetMode has the constants .*AUTO', 3"),
@@ -105,6 +109,14 @@ def test_a_plain_field_is_two_lines(copy):
     subprocess.run(["c++", *flags, str(table)], check=True)
 
 
+def test_a_dataref_holds_until_the_version_of_the_next(copy):
+    change(copy / SOURCES, "sim/time/paused |", "sim/a (s); 11.55: -; 12.08: sim/b |")
+    change(copy / SOURCES, "[wire units]\n", "[wire units]\ns = 1.0\n")
+    assert run(copy, "core", copy / "include").returncode == 0
+    made = (copy / "include/xplane_bridge/core/state/field_lines.hpp").read_text()
+    assert '{{{"sim/a", {"s", 1.0, 0.0}, {0, 115500}}, {"sim/b", {}, {120800}}}}' in made
+
+
 # --- the sources in the messages' comments ---
 
 
@@ -131,7 +143,7 @@ def received_fields():
             and not line.startswith("#")
             and cells[1].split()[0] not in ("input", "computed")
         ):
-            dataref = "" if cells[2].startswith("12: ") else re.split(r"[ ;]", cells[2])[0]
+            dataref = "" if re.match(r"[\d.]+: ", cells[2]) else re.split(r"[ ;]", cells[2])[0]
             yield message, re.match(r"\w+", cells[0])[0], dataref, re.split(r"[ ;]", cells[3])[0]
 
 

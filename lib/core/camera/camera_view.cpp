@@ -95,7 +95,7 @@ bool ViewStream::add(const RrefView& datagram, std::int64_t receive_ns) {
     const float value = assembler_.values()[i];
     if (std::isnan(value)) continue;
     const FieldSpec& field = *requests_[i].field;
-    const Conversion& unit = field.dataref.conversion;
+    const Conversion& unit = field.datarefs.front().conversion;  // all of them have one name in every version
     const double si = static_cast<double>(value) * unit.factor + unit.offset;
     field.store(&status_, &si, 1);  // all of them are single numbers
   }

@@ -9,7 +9,6 @@ namespace {
 constexpr const char* kJoystick = "sim/operation/override/override_joystick";
 constexpr const char* kThrottles = "sim/operation/override/override_throttles";
 constexpr const char* kToeBrakes = "sim/operation/override/override_toe_brakes";
-constexpr const char* kThrottleOverride = "sim/flightmodel/engine/ENGN_thro_override";
 constexpr const char* kOverridePrefix = "sim/operation/override/override_";
 
 // X-Plane keeps these as float32, so what was sent comes back but for one rounding.
@@ -113,6 +112,7 @@ std::string elementName(const char* dataref, Channel channel) {
 
 }  // namespace
 
+const char* const kThrottleOverride = "sim/flightmodel/engine/ENGN_thro_override";
 const char* const kSurfaceOverride = "sim/operation/override/override_control_surfaces";
 
 const ChannelWire& channelWire(Channel channel, const EncoderOptions& options) {

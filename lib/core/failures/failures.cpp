@@ -7,6 +7,8 @@
 #include <iterator>
 #include <utility>
 
+#include "xplane_bridge/core/failures/failure_names.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -107,10 +109,9 @@ FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface
     if (const auto wrong = validate(failure)) return refuse(FailureError::kInvalid, request.name + " " + *wrong);
     out.plan.surface = failure;
   }
-  if (version.is12()) {
-    const std::string own = ownSurfaceFailure(surfaceTable()[surface], *fault, request.value.has_value());
-    if (!own.empty()) out.plan.datarefs.push_back(failureDataref(own));
-  }
+  const std::string own = ownSurfaceFailure(surfaceTable()[surface], *fault, request.value.has_value());
+  // No version has all of them: a flap or a speed brake cannot be centred.
+  if (!own.empty() && hasFailure(version, failureDataref(own))) out.plan.datarefs.push_back(failureDataref(own));
   if (out.plan.datarefs.empty() && !out.plan.surface) {
     return refuse(FailureError::kNotSupported,
                   "a lost surface (gone) cannot be expressed by X-Plane 11: use floating, or reduced with value 0");

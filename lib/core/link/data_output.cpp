@@ -11,16 +11,12 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr const char* kRateDataref = "sim/network/dataout/network_data_rate";
-constexpr const char* kRowsDataref = "sim/network/dataout/data_to_internet";
 constexpr const char* kEntryId = "data_output";
 constexpr const char* kPurpose = "data_output";
 
 constexpr std::int64_t kQuietNs = kNanosecondsPerSecond;  // without DATA, or without one row, until something is done
 constexpr int kMaxTries = 3;
 constexpr float kRateTolerance = 0.5F;  // the dataref is an int
-
-std::string rowDataref(std::int32_t row) { return std::string(kRowsDataref) + "[" + std::to_string(row) + "]"; }
 
 std::string listOf(const std::vector<std::int32_t>& rows) {
   return join(rows, ", ", [](std::int32_t row) { return std::to_string(row); });
@@ -37,6 +33,10 @@ const T* findOperation(const JournalEntry& entry) {
 }
 
 }  // namespace
+
+std::string dataRowDataref(std::int32_t row) {
+  return "sim/network/dataout/data_to_internet[" + std::to_string(row) + "]";
+}
 
 DataOutput::DataOutput(DataOutputOptions options, double read_timeout_s, Services services)
     : options_(std::move(options)), read_timeout_s_(read_timeout_s), services_(std::move(services)) {}
@@ -84,9 +84,9 @@ std::optional<JournalEntry> DataOutput::previousEntry() const {
 void DataOutput::readPrevious() {
   phase_ = Phase::kReading;
   asked_rows_ = options_.rows;
-  std::vector<std::string> paths = {kRateDataref};
+  std::vector<std::string> paths = {kDataRateDataref};
   for (const std::int32_t row : asked_rows_) {
-    paths.push_back(rowDataref(row));
+    paths.push_back(dataRowDataref(row));
   }
   services_.read(std::move(paths), read_timeout_s_, {},
                  [this, generation = generation_](const std::vector<DatarefValue>& values) {
@@ -99,7 +99,7 @@ void DataOutput::readPrevious() {
 void DataOutput::configure(const std::vector<DatarefValue>& values) {
   if (!values[0].has_value()) {
     // Nothing is changed that could not be put back.
-    fail(std::string("Data Output is not configured: X-Plane does not answer ") + kRateDataref +
+    fail(std::string("Data Output is not configured: X-Plane does not answer ") + kDataRateDataref +
          ", so the rate could not be restored; set Data Output in X-Plane by hand and configure_xplane: false, or use "
          "transport: rref");
     return;
@@ -138,7 +138,7 @@ void DataOutput::configure(const std::vector<DatarefValue>& values) {
       std::sort(rows_before_off.begin(), rows_before_off.end());
       undo.emplace_back(UndoUsel{rows_before_off});
     }
-    undo.emplace_back(UndoDref{kRateDataref, rate_before});
+    undo.emplace_back(UndoDref{kDataRateDataref, rate_before});
     undo.emplace_back(UndoIse4{kIse4DataOutput, target_.addressString(), target_.port});
     journal_->record(kEntryId, kPurpose, undo);
   } catch (const JournalError& error) {
@@ -158,7 +158,7 @@ void DataOutput::sendSettings(const std::vector<std::int32_t>& rows) {
   if (const EncodeResult size = encodeDsel(buffer, rows.data(), rows.size())) {
     services_.send({buffer.data(), *size});
   }
-  if (const EncodeResult size = encodeDref(buffer, kRateDataref, static_cast<float>(options_.rate_hz))) {
+  if (const EncodeResult size = encodeDref(buffer, kDataRateDataref, static_cast<float>(options_.rate_hz))) {
     services_.send({buffer.data(), *size});
   }
   if (const EncodeResult size = encodeIse4(buffer, kIse4DataOutput, target_.addressString(), target_.port, true)) {
@@ -306,7 +306,7 @@ void DataOutput::undoEntry(const JournalEntry& entry, double timeout_s, const st
       expected.push_back(dref->value);
     } else if (const auto* usel = std::get_if<UndoUsel>(&operation)) {
       for (const std::int32_t row : usel->rows) {
-        paths.push_back(rowDataref(row));
+        paths.push_back(dataRowDataref(row));
         expected.push_back(0.0F);
       }
     }

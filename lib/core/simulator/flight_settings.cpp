@@ -22,13 +22,13 @@ constexpr double kMaxCgOffset = 20.0;    // [m]
 constexpr double kMassTolerance = 0.01;  // [kg]
 constexpr double kMassShare = 0.005;     // of it
 constexpr double kCgTolerance = 0.005;   // [m]
-constexpr std::size_t kLayers11 = 3, kLayers12 = 13;
+constexpr std::size_t kLayers = 3, kRegionLayers = 13;
 constexpr int kStaticWeather = 3;
 
 constexpr const char* kFuel = "sim/flightmodel/weight/m_fuel";
 constexpr const char* kPayload = "sim/flightmodel/weight/m_fixed";
-constexpr const char* kCg11 = "sim/flightmodel/misc/cgz_ref_to_default";
-constexpr const char* kCg12 = "sim/flightmodel2/misc/cg_offset_z";
+constexpr const char* kCgOld = "sim/flightmodel/misc/cgz_ref_to_default";
+constexpr const char* kCg = "sim/flightmodel2/misc/cg_offset_z";
 
 std::string number(double value) {
   char text[32];
@@ -43,7 +43,10 @@ std::optional<std::string> outside(const std::string& name, double value, double
 
 std::string element(const std::string& name, std::size_t i) { return name + "[" + std::to_string(i) + "]"; }
 
-bool isCg(const std::string& dataref) { return dataref == kCg11 || dataref == kCg12; }
+/// Whether the weather is set by region, under names of its own.
+bool hasRegions(SimulatorVersion version) { return version.number >= kFirstOf1208; }
+
+bool isCg(const std::string& dataref) { return dataref == kCgOld || dataref == kCg; }
 
 }  // namespace
 
@@ -54,29 +57,29 @@ std::optional<std::string> check(const UniformWind& wind) {
 }
 
 std::vector<DatarefWrite> windWrites(const UniformWind& wind, SimulatorVersion version) {
-  const bool is12 = version.is12();
-  const std::string at = is12 ? "sim/weather/region/" : "sim/weather/";
-  const double speed = is12 ? wind.speed * kRegionSpeedPerMps : wind.speed / kMetersPerSecondPerKnot;
+  const bool regions = hasRegions(version);
+  const std::string at = regions ? "sim/weather/region/" : "sim/weather/";
+  const double speed = regions ? wind.speed * kRegionSpeedPerMps : wind.speed / kMetersPerSecondPerKnot;
   std::vector<DatarefWrite> out;
-  if (is12) {
+  if (regions) {
     out.push_back({at + "update_immediately", 1.0F});
     out.push_back({at + "change_mode", static_cast<float>(kStaticWeather)});
     out.push_back({at + "variability_pct", 0.0F});
-  } else {
+  } else if (!version.is12()) {  // there it cannot be written
     out.push_back({at + "use_real_weather_bool", 0.0F});
   }
-  // The brackets are part of version 11's names, and elements of version 12's arrays.
-  for (std::size_t layer = 0; layer < (is12 ? kLayers12 : kLayers11); ++layer) {
+  // The brackets are part of the old names, and elements of the regions' arrays.
+  for (std::size_t layer = 0; layer < (regions ? kRegionLayers : kLayers); ++layer) {
     out.push_back({element(at + "wind_direction_degt", layer), static_cast<float>(wind.from_deg)});
-    out.push_back({element(at + (is12 ? "shear_speed_msc" : "shear_speed_kt"), layer), 0.0F});
+    out.push_back({element(at + (regions ? "shear_speed_msc" : "shear_speed_kt"), layer), 0.0F});
     out.push_back({element(at + "turbulence", layer), static_cast<float>(wind.turbulence * kXPlaneFullTurbulence)});
-    out.push_back({element(at + (is12 ? "wind_speed_msc" : "wind_speed_kt"), layer), static_cast<float>(speed)});
+    out.push_back({element(at + (regions ? "wind_speed_msc" : "wind_speed_kt"), layer), static_cast<float>(speed)});
   }
   return out;
 }
 
 std::vector<std::string> shownWindDatarefs(SimulatorVersion version) {
-  if (version.is12()) {
+  if (hasRegions(version)) {
     return {"sim/weather/aircraft/wind_now_speed_msc", "sim/weather/aircraft/wind_now_direction_degt"};
   }
   // In metres a second, in spite of its name.
@@ -117,7 +120,7 @@ std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion
   }
   if (loading.payload_mass) out.push_back({kPayload, static_cast<float>(*loading.payload_mass)});
   if (loading.cg_offset) {
-    const char* const name = version.is12() ? kCg12 : kCg11;
+    const char* const name = version.number >= kFirstOf1208 ? kCg : kCgOld;
     out.push_back({name, static_cast<float>(*loading.cg_offset)});
   }
   return out;
@@ -145,8 +148,9 @@ std::optional<std::string> checkXPlanePath(const std::string& path, const std::s
   return ends ? std::nullopt : refuse("does not end in " + ending);
 }
 
-std::vector<std::string> aircraftPathDatarefs(std::size_t characters) {
+std::vector<std::string> aircraftPathDatarefs(std::size_t characters, SimulatorVersion version) {
   std::vector<std::string> out;
+  if (!version.is12()) return out;
   for (std::size_t i = 0; i < characters; ++i) out.push_back(element("sim/aircraft/view/acf_relative_path", i));
   return out;
 }

@@ -100,19 +100,14 @@ VehiclePose poseOf(const FlightStart& start) {
   return out;
 }
 
-const std::vector<std::string>& shownFlightDatarefs(SimulatorVersion version) {
-  static const auto list = [](SimulatorVersion g) {
-    const std::string at = "sim/flightmodel/position/";
-    std::vector<std::string> out{at + "lat_ref", at + "lon_ref", "sim/physics/earth_radius_m"};
-    for (const char* axis : {"x", "y", "z"}) out.push_back(at + "local_" + axis);
-    for (const char* element : {"0", "1", "2", "3"}) out.push_back(at + "q[" + element + "]");
-    for (const char* axis : {"x", "y", "z"}) out.push_back(at + "local_v" + axis);
-    for (const std::string& name : shownWindDatarefs(g)) out.push_back(name);
-    return out;
-  };
-  static const std::vector<std::string> names11 = list(kXPlane11);
-  static const std::vector<std::string> names12 = list(kXPlane12);
-  return version.is12() ? names12 : names11;
+std::vector<std::string> shownFlightDatarefs(SimulatorVersion version) {
+  const std::string at = "sim/flightmodel/position/";
+  std::vector<std::string> out{at + "lat_ref", at + "lon_ref", "sim/physics/earth_radius_m"};
+  for (const char* axis : {"x", "y", "z"}) out.push_back(at + "local_" + axis);
+  for (const char* element : {"0", "1", "2", "3"}) out.push_back(at + "q[" + element + "]");
+  for (const char* axis : {"x", "y", "z"}) out.push_back(at + "local_v" + axis);
+  for (const std::string& name : shownWindDatarefs(version)) out.push_back(name);
+  return out;
 }
 
 std::optional<ShownFlight> shownFlightFrom(const std::vector<DatarefValue>& values) {

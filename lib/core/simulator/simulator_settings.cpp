@@ -6,7 +6,10 @@
 
 namespace xplane_bridge::core {
 
-const char* pauseCommand(bool pause) { return pause ? "sim/operation/pause_on" : "sim/operation/pause_off"; }
+const char* pauseCommand(bool pause, SimulatorVersion version) {
+  if (version.number < kFirstOf1210) return "sim/operation/pause_toggle";
+  return pause ? "sim/operation/pause_on" : "sim/operation/pause_off";
+}
 
 std::vector<DatarefWrite> viewWrites(CameraView view) {
   const float heading = view == CameraView::kRear ? 180.0F : 0.0F;

@@ -37,17 +37,23 @@ std::vector<std::string> expandDatarefPath(std::string_view pattern, int count) 
   return expanded;
 }
 
+const DatarefSource* datarefOf(const FieldSpec& field, SimulatorVersion version) {
+  const auto fits = [version](const DatarefSource& source) {
+    return source.path != nullptr && source.versions.has(version);
+  };
+  const auto found = std::find_if(field.datarefs.begin(), field.datarefs.end(), fits);
+  return found == field.datarefs.end() ? nullptr : &*found;
+}
+
 std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, SimulatorVersion version,
                                             int engines) {
   std::vector<DatarefRequest> requests;
   for (const FieldSpec& field : fieldTable()) {
     if (field.group != group || field.store == nullptr) continue;
     if (transport == Transport::kData && field.row.row11 >= 0) continue;
-    const DatarefSource& source = field.dataref;
-    if (source.path12 != nullptr && !version.known()) continue;
-    const char* path = source.path12 != nullptr && version.is12() ? source.path12 : source.path11;
-    if (path == nullptr) continue;
-    const std::vector<std::string> paths = expandDatarefPath(path, field.count);
+    const DatarefSource* const source = datarefOf(field, version);
+    if (source == nullptr) continue;
+    const std::vector<std::string> paths = expandDatarefPath(source->path, field.count);
     const int wanted = field.per_engine ? std::min(engines, field.count) : field.count;
     for (int i = 0; i < std::min(wanted, static_cast<int>(paths.size())); ++i) {
       requests.push_back({paths[static_cast<std::size_t>(i)], &field, i});

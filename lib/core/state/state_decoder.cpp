@@ -72,8 +72,10 @@ StateDecoder::StateDecoder(FieldGroup group, Transport transport, SimulatorVersi
       plan.count = field.row.count;
       plan.conversion = row.conversion;
     } else {
-      const bool newer = field.dataref.path12 != nullptr && version.is12();
-      plan.conversion = newer ? field.dataref.conversion12 : field.dataref.conversion;
+      const DatarefSource* const source = datarefOf(field, version);
+      if (source != nullptr) plan.conversion = source->conversion;
+      // What this version does not have makes nothing else of the message invalid.
+      if (source == nullptr && version.known()) plan.valid = 0;
       // Requests are in the table's order, so those of this field are next.
       plan.first = next_request;
       while (next_request < requests_.size() && requests_[next_request].field == &field) ++next_request;

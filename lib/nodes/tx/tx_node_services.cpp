@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "xplane_bridge/Event.h"
+#include "xplane_bridge/actuation/pausing.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
 #include "xplane_bridge/nodes/base/service_result.hpp"
 #include "xplane_bridge/nodes/tx/tx_node.hpp"
@@ -145,10 +146,12 @@ void TxNode::servePause(bool pause, std_srvs::SetBool::Response* response) {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     pause_by_ = who;
   }
-  link().command(core::pauseCommand(pause));
-  link().waitUntil([&] { return paused() == pause || stopping(); }, options_.service_timeout);
-  response->success = paused() == pause;
-  response->message = response->success ? (pause ? "paused" : "running") : "X-Plane did not follow in time";
+  const PauseOutcome outcome =
+      setPaused(&link(), pause, options_.service_timeout, [this] { return static_cast<bool>(stopping()); });
+  response->success = outcome == PauseOutcome::kWasSo || outcome == PauseOutcome::kFollowed;
+  response->message = response->success                   ? (pause ? "paused" : "running")
+                      : outcome == PauseOutcome::kUnknown ? "X-Plane does not tell whether it is paused"
+                                                          : "X-Plane did not follow in time";
   if (response->success) return;  // told when it happened
   {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);

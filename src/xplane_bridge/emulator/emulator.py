@@ -21,6 +21,7 @@ import numpy as np
 from xplane_bridge import protocol
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
+from xplane_bridge.emulator.datarefs.control_inputs import InputOptions
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.priority import take_realtime_priority
@@ -78,6 +79,7 @@ class Emulator:
         self._beacon = self._new_beacon()
         self._truth = TruthFile(options.truth, self.sim.model) if options.truth is not None else None
         self._frames = 0
+        self._loading_until = -math.inf
         self._sent_at: List[float] = []
 
     # --- construction -------------------------------------------------------------------------------------------------
@@ -92,6 +94,7 @@ class Emulator:
     def _new_simulator(self) -> Simulator:
         o = self.options
         pilot = self._new_pilot()
+        inputs = InputOptions(o.joystick == "attached", o.auto_coordination)
         sim = Simulator(
             self._make_model,
             o.aircraft,
@@ -100,10 +103,12 @@ class Emulator:
             sim_time_start=o.sim_time_start,
             data_rate=o.rate,
             level_angles=o.angle_axes == "level",
+            bracket_names=o.bracket_names,
             surface_failures=o.surface_failures == "act",
             totals_move=o.overridden_totals == "move",
             load_time=o.load_time,
             pilot=pilot,
+            inputs=inputs,
             window_size=o.window_size,
         )
         sim.set_weather(*o.wind, o.turbulence, o.seed)
@@ -139,14 +144,15 @@ class Emulator:
             protocol.VehiclePose: lambda request, _: sim.on_vehicle(request),
         }
         o = self.options
-        return Server(o.bind, port, handlers, Subscriptions(o.rref_split), self._channel, o.request_limit)
+        subscriptions = Subscriptions(o.rref_split)
+        return Server(o.bind, port, handlers, subscriptions, self._channel, o.request_limit, o.answer_from)
 
     def _new_beacon(self) -> Optional[Beacon]:
         o = self.options
         if not o.beacon:
             return None
         message = protocol.Beacon(INTERNAL_VERSIONS[o.version], self.port, socket.gethostname())
-        return Beacon(o.bind, message, o.beacon_group, o.beacon_port)
+        return Beacon(o.bind, message, o.beacon_group, o.beacon_port, o.second_beacon)
 
     # --- requests that concern the wire -------------------------------------------------------------------------------
 
@@ -196,7 +202,12 @@ class Emulator:
             host_time: Host time for the truth file [s].
         """
         server, sim = self.server, self.sim
-        server.receive()
+        self._frames += 1
+        if now < self._loading_until:  # requests wait in the socket
+            return
+        if self._reads_a_load(server):
+            self._loading_until = now + self.options.loading_time
+            return
         sim.step(period)
         if self.options.send_while_paused or not sim.clocks.paused:
             server.send_frame(
@@ -210,7 +221,13 @@ class Emulator:
         if self.view is not None:
             self.view.show(sim)
             self._wait_for_picture(self.view)
-        self._frames += 1
+
+    def _reads_a_load(self, server: Server) -> bool:
+        """Takes what clients sent, up to a request that has files loaded; returns whether there was one."""
+        sim, loads = self.sim, self.sim.loads
+        takes_time = self.options.loading_time > 0.0
+        server.receive(enough=lambda: takes_time and sim.loads != loads)
+        return takes_time and sim.loads != loads
 
     def _wait_for_picture(self, view: View) -> None:
         """Waits as X-Plane's loop does until the frame is drawn; sends delayed datagrams on the way."""

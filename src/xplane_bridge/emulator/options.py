@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import List, Optional, Sequence, Tuple
 
-from xplane_bridge import protocol
+from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_longitude
 from xplane_bridge.emulator.flight.flight_model import InitialState
@@ -29,7 +29,7 @@ class Options:
     """How to run an emulator. The defaults are those of the command line."""
 
     aircraft: str = "fixed_wing"
-    version: int = 11
+    version: str = "11"  #: one of `xplane_names.VERSIONS`, whose newest 11 and 12 become
     initial: InitialState = field(default_factory=lambda: InitialState(engines_running=True))
     bind: str = "0.0.0.0"
     port: int = protocol.DEFAULT_PORT
@@ -49,6 +49,7 @@ class Options:
     rref_split: int = protocol.RREF_MAX_PAIRS
     request_limit: int = RREF_REQUESTS_PER_FRAME
     unknown_datarefs: str = "omit"
+    bracket_names: bool = True  #: whether names with brackets are taken as a whole
     angle_axes: str = "level"
     surface_failures: str = "act"
     overridden_totals: str = "move"
@@ -61,9 +62,17 @@ class Options:
     hud: bool = False
     strip: bool = True
     swap_log: Optional[Path] = None
+    joystick: str = "attached"
+    auto_coordination: bool = False
+    loading_time: float = 0.0  #: of a flight, an aircraft, a situation that a client asks for [s]
+    answer_from: Optional[str] = None  #: address of this machine that answers come from
+    second_beacon: Optional[str] = None  #: second address of this machine that beacons come from
     fault: FaultPlan = field(default_factory=FaultPlan)
     realtime: bool = True  #: whether to ask for real-time priority
     verbose: bool = False
+
+    def __post_init__(self) -> None:
+        self.version = xplane_names.NEWEST.get(self.version, self.version)
 
 
 #: roslaunch adds arguments like `__name:=emulator` and `__log:=...`; remappings look the same.
@@ -94,7 +103,13 @@ def _parser() -> argparse.ArgumentParser:
     flight = p.add_argument_group("flight")
     flight.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help=f"{', '.join(model_names())}")
     flight.add_argument("--model", choices=("jsbsim", KINEMATIC), default="jsbsim", help="kinematic: needs no JSBSim")
-    flight.add_argument("--version", type=int, choices=(11, 12), default=11, help="X-Plane version (default 11)")
+    flight.add_argument(
+        "--version",
+        choices=(*xplane_names.NEWEST, *xplane_names.VERSIONS),
+        default="11",
+        help="X-Plane version: names and commands are those of its list (default 11, that is "
+        f"{xplane_names.NEWEST['11']}; 12 is {xplane_names.NEWEST['12']})",
+    )
     flight.add_argument("--start", choices=("ground", "air"), default="air", help="(default air)")
     flight.add_argument("--lat", type=float, default=37.4602, metavar="DEG", help="latitude (default 37.4602)")
     flight.add_argument("--lon", type=float, default=126.4407, metavar="DEG", help="longitude (default 126.4407)")
@@ -104,6 +119,18 @@ def _parser() -> argparse.ArgumentParser:
     flight.add_argument("--terrain", type=float, default=0.0, metavar="M", help="height of the ground MSL (default 0)")
     flight.add_argument("--engines-off", action="store_true", help="start with the engines stopped")
     flight.add_argument("--pilot", type=Path, metavar="FILE", help="scenario that flies until a client does")
+    flight.add_argument(
+        "--joystick",
+        choices=("attached", "none"),
+        default="attached",
+        help="attached: centres the stick that nobody has taken; none: the yoke datarefs take writes without an "
+        "override (default attached)",
+    )
+    flight.add_argument(
+        "--auto-coordination",
+        action="store_true",
+        help="the rudder follows the sideslip while no override, pilot or client has it",
+    )
     flight.add_argument("--wind", default="0/0", metavar="FROM/SPEED", help="degrees true / m/s, e.g. 270/8")
     flight.add_argument(
         "--turbulence", type=float, default=0.0, metavar="M/S", help="standard deviation of the vertical gust"
@@ -117,6 +144,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     loop.add_argument(
         "--load-time", type=float, default=0.0, metavar="S", help="zeros for so long, then the flight is loaded"
+    )
+    loop.add_argument(
+        "--loading-time",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="a flight, aircraft or situation that a client asks for takes so long to load; until then nothing is "
+        "read or sent, and requests wait (default 0)",
     )
     loop.add_argument("--duration", type=float, metavar="S", help="end after so long")
     loop.add_argument(
@@ -161,6 +196,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     wire.add_argument("--no-beacon", dest="beacon", action="store_false", help="do not announce on multicast")
     wire.add_argument(
+        "--second-beacon",
+        type=_address,
+        metavar="IP",
+        help="announce from this address of the machine as well, as a computer with two networks does",
+    )
+    wire.add_argument(
+        "--answer-from", type=_address, metavar="IP", help="RREF and RPOS come from this address of the machine"
+    )
+    wire.add_argument(
         "--beacon-target",
         default=f"{protocol.BEACON_GROUP}:{protocol.BEACON_PORT}",
         metavar="IP:PORT",
@@ -177,6 +221,12 @@ def _parser() -> argparse.ArgumentParser:
         help=f"RREF requests taken a frame, more are lost (default {RREF_REQUESTS_PER_FRAME})",
     )
     wire.add_argument("--unknown-datarefs", choices=("omit", "zero"), default="omit", help="(default omit)")
+    wire.add_argument(
+        "--bracket-names",
+        choices=("whole", "cut"),
+        default="whole",
+        help="sim/weather/wind_speed_kt[0] is a name of its own, or an element of wind_speed_kt (default whole)",
+    )
     wire.add_argument(
         "--angle-axes", choices=("level", "origin"), default="level", help="of row 17 and RPOS (default level)"
     )
@@ -204,8 +254,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _options(given: argparse.Namespace) -> Options:
-    finite = ("lat", "lon", "alt", "heading", "terrain", "turbulence", "fps", "sim_time_start", "load_time")
-    for name in finite:
+    finite = ("lat", "lon", "alt", "heading", "terrain", "turbulence", "fps")
+    for name in (*finite, "sim_time_start", "load_time", "loading_time"):
         _require(
             math.isfinite(getattr(given, name)), f"--{name.replace('_', '-')}", getattr(given, name), "a finite number"
         )
@@ -218,6 +268,7 @@ def _options(given: argparse.Namespace) -> Options:
     _require(0 <= given.rate <= 99, "--rate", given.rate, "0..99")
     _require(0.0 <= given.turbulence <= 20.0, "--turbulence", given.turbulence, "0..20")
     _require(given.load_time >= 0.0, "--load-time", given.load_time, "0 or more")
+    _require(given.loading_time >= 0.0, "--loading-time", given.loading_time, "0 or more")
     _require(given.duration is None or given.duration > 0.0, "--duration", given.duration, "more than 0")
     _require(given.speed is None or 0.0 <= given.speed <= 300.0, "--speed", given.speed, "0..300")
     _require(given.stepped != "fast" or given.duration is not None, "--stepped", "fast", "--duration with it")
@@ -257,6 +308,7 @@ def _options(given: argparse.Namespace) -> Options:
     return Options(
         aircraft=aircraft,
         version=given.version,
+        bracket_names=given.bracket_names == "whole",
         initial=initial,
         bind=given.bind,
         port=given.port,
@@ -288,10 +340,22 @@ def _options(given: argparse.Namespace) -> Options:
         hud=given.hud,
         strip=given.strip,
         swap_log=given.swap_log,
+        joystick=given.joystick,
+        auto_coordination=given.auto_coordination,
+        loading_time=given.loading_time,
+        answer_from=given.answer_from,
+        second_beacon=given.second_beacon,
         fault=fault,
         realtime=given.priority == "realtime",
         verbose=given.verbose,
     )
+
+
+def _address(text: str) -> str:
+    try:
+        return str(ipaddress.IPv4Address(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: expected an IPv4 address of this machine") from None
 
 
 def _wind(text: str) -> Tuple[float, float]:

@@ -9,10 +9,10 @@ from typing import Callable, Dict, List, Optional, Set, Tuple
 
 import numpy as np
 
-from xplane_bridge import protocol
+from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.datarefs import commands, data_rows, tables
 from xplane_bridge.emulator.datarefs.aircraft_systems import INHG_PA, Electrics, Instruments, Weather
-from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, Pilot
+from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, InputOptions, Pilot
 from xplane_bridge.emulator.datarefs.failure_effects import FailureEffects
 from xplane_bridge.emulator.datarefs.placement import Placements
 from xplane_bridge.emulator.datarefs.store import DatarefStore
@@ -22,8 +22,8 @@ from xplane_bridge.emulator.flight.frame import Clocks, Frame
 
 _LOG = logging.getLogger(__name__)
 
-#: Version as datarefs and beacon give it.
-INTERNAL_VERSIONS = {11: 115501, 12: 122015}
+#: Version as datarefs and beacon give it, by the list of names that it has.
+INTERNAL_VERSIONS = {"11.40": 114012, "11.55": 115501, "12.00": 120012, "12.08": 120815, "12.10": 122015}
 #: Below this frame rate X-Plane slows simulated time instead of taking larger steps [1/s].
 MIN_FRAME_RATE = 19.9
 #: Vertical gust per unit of X-Plane's turbulence, which goes from 0 to 10 [m/s].
@@ -38,8 +38,8 @@ _MAX_WIND_MPS = 100.0
 _MAX_TURBULENCE_MPS = 10.0
 _MAX_LOAD_KG = 5000.0
 
-#: Where the centre of gravity is set, by version.
-CG_OFFSET = {11: "sim/flightmodel/misc/cgz_ref_to_default", 12: "sim/flightmodel2/misc/cg_offset_z"}
+#: Where the centre of gravity is set: by the first of these that the version has.
+CG_OFFSETS = ("sim/flightmodel2/misc/cg_offset_z", "sim/flightmodel/misc/cgz_ref_to_default")
 _SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot"
 _SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
 _SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
@@ -55,15 +55,17 @@ class Simulator:
     Args:
         make_model: Builds the flight model of an aircraft by name; raises FlightModelError for an unknown one.
         aircraft: Which aircraft to load first.
-        version: 11 or 12.
+        version: One of `xplane_names.VERSIONS`: X-Plane's list of names for it holds.
         initial: Where flights start.
         sim_time_start: Running time at the start [s].
         data_rate: `network_data_rate` at the start [1/s].
         level_angles: Whether row 17 and RPOS give angles relative to the local level ([?]: else to the origin's axes).
+        bracket_names: Whether names with brackets are taken as a whole (see `DatarefStore`).
         surface_failures: Whether `rel_fcon_*` act ([?]: not on every aircraft).
         totals_move: Whether `total_*_ratio` follow the stick under `override_control_surfaces` ([?]).
         load_time: Time before the first flight is loaded; until then its values are zeros [s].
         pilot: Flies until a client does.
+        inputs: What moves the stick where neither a client nor the pilot does.
         window_size: Width and height of the window that the view is drawn in [px].
     """
 
@@ -71,18 +73,21 @@ class Simulator:
         self,
         make_model: ModelFactory,
         aircraft: str,
-        version: int = 11,
+        version: str = xplane_names.NEWEST["11"],
         initial: Optional[InitialState] = None,
         sim_time_start: float = 0.0,
         data_rate: int = 20,
         level_angles: bool = True,
+        bracket_names: bool = True,
         surface_failures: bool = True,
         totals_move: bool = True,
         load_time: float = 0.0,
         pilot: Optional[Pilot] = None,
+        inputs: Optional[InputOptions] = None,
         window_size: Tuple[int, int] = (1024, 768),
     ) -> None:
         self.version = version
+        self.is_12 = version.startswith("12")
         self.totals_move = totals_move
         self.internal_version = INTERNAL_VERSIONS[version]
         self.initial = InitialState() if initial is None else initial
@@ -91,14 +96,14 @@ class Simulator:
         self._make_model = make_model
         self.aircraft = aircraft
         self.model = make_model(aircraft)
-        self.store = DatarefStore()
+        self.store = DatarefStore(version, bracket_names)
         self.clocks = Clocks(running=sim_time_start)
         self.frame = Frame(self.model.info, self.clocks)
         self.controls = Controls()
         self.electrics, self.instruments, self.weather = Electrics(), Instruments(), Weather()
         self.flying = False
+        self.loads = 0  #: how often a flight or a situation was loaded
         self.frozen = False  #: by VEHX: the flight model stands still until an aircraft or a flight is loaded
-        self.last_situation = ""
         self._last_start = self.initial
         self._load_time = load_time
         self._situations: Dict[str, Tuple[str, bytes, Dict[str, np.ndarray]]] = {}
@@ -106,14 +111,14 @@ class Simulator:
         self._failures_dirty = True
         self._surface_slots = np.zeros(0, dtype=int)
         self._surface_names: List[str] = []
-        self.inputs = ControlInputs(self.store, pilot)
+        self.inputs = ControlInputs(self.store, pilot, inputs or InputOptions())
         self.table = tables.build(self)
-        self.rows = data_rows.DataRows(self.store, version, level_angles)
+        self.rows = data_rows.DataRows(self.store, self.is_12, level_angles)
         self._level_angles = level_angles
         #: What unknown datarefs are sent from where they are sent as 0.
         self.unknown_slot = int(self.store.add("_emulator/unknown").slots[0])
         self._placements = Placements(self.store)
-        self._failures = FailureEffects(self.store, version, surface_failures)
+        self._failures = FailureEffects(self.store, surface_failures)
         self.inputs.connect(self)
         self._connect_settings()
         self._bind_aircraft()
@@ -223,6 +228,7 @@ class Simulator:
         """Begins a flight: levers and trims as the flight needs them, the origin where the aircraft is."""
         self._last_start = initial
         self.controls = self.model.reset(initial)
+        self.loads += 1
         self.inputs.start(self.controls, self.model)
         self.frozen, self.flying = False, True
         self.clocks.flight = 0.0
@@ -259,7 +265,6 @@ class Simulator:
     def save_situation(self, path: str) -> None:
         """Keeps the whole flight under a name."""
         self._situations[path] = (self.aircraft, self.model.save(), self.inputs.save())
-        self.last_situation = path
 
     def load_situation(self, path: str) -> bool:
         """Returns whether there is a situation of that name."""
@@ -269,6 +274,7 @@ class Simulator:
         if aircraft != self.aircraft:
             self.load_aircraft(aircraft)
         self.model.restore(situation)
+        self.loads += 1
         self.inputs.restore(levers)
         self.frozen = False
         self.clocks.flight = 0.0
@@ -377,7 +383,7 @@ class Simulator:
 
     def on_vehicle(self, request: protocol.VehiclePose) -> Optional[str]:
         """VEHX holds the aircraft at the pose without a flight model; VEHS (X-Plane 12) puts it there once."""
-        if request.label == "VEHS" and self.version < 12:
+        if request.label == "VEHS" and not self.is_12:
             return "version"
         if request.aircraft != 0:
             return "aircraft"
@@ -388,7 +394,7 @@ class Simulator:
 
     def on_rows(self, request: protocol.RowSelection) -> Optional[str]:
         """DSEL, USEL (network), DCOC, UCOC (cockpit display): the numbers are the rows' indices."""
-        name = "data_to_internet" if request.label in ("DSEL", "USEL") else "data_to_cockpit"
+        name = "data_to_internet" if request.label in ("DSEL", "USEL") else "data_to_screen"
         slots = self.store.dataref("sim/network/dataout/" + name).slots
         for row in request.rows:
             if 0 <= row < protocol.ROW_COUNT:
@@ -439,10 +445,10 @@ class Simulator:
         store.on_write("sim/time/zulu_time_sec", lambda _i, value: setattr(self.clocks, "zulu", value % 86400.0))
         store.on_write("sim/flightmodel/weight/m_fixed", self._set_payload)
         store.on_write("sim/flightmodel/weight/m_fuel", self._set_fuel)
-        store.on_write(CG_OFFSET[self.version], self._set_balance)
+        store.on_write(next(name for name in CG_OFFSETS if store.dataref(name).visible), self._set_balance)
         for name in (_SEA_LEVEL, _SEA_LEVEL_TEMPERATURE):
             store.on_write(name, lambda _i, _v: self._set_atmosphere())
-        if self.version < 12:
+        if not store.dataref("sim/weather/region/wind_speed_msc").visible:
             layer = "sim/weather/{}[0]"
             names = (layer.format("wind_direction_degt"), layer.format("wind_speed_kt"), layer.format("turbulence"))
             factor = 1852.0 / 3600.0  # the layers' speed is in knots, unlike the present wind's

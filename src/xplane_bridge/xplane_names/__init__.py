@@ -68,9 +68,9 @@ def version_of(internal_version: int) -> str:
 
 
 def first_version(version: str) -> int:
-    """The first internal version that a list holds for: 12.08 is 120800."""
+    """The first internal version that a list holds for: 12.08 is 120800, 12 is 120000."""
     major, _, minor = version.partition(".")
-    return int(major) * 10000 + int(minor) * 100
+    return int(major) * 10000 + int(minor or 0) * 100
 
 
 @functools.lru_cache(maxsize=None)

@@ -19,7 +19,7 @@ using Reports = std::vector<std::pair<std::string, bool>>;
 
 constexpr const char* kJoystick = "sim/operation/override/override_joystick";
 constexpr const char* kThrottles = "sim/operation/override/override_throttles";
-constexpr const char* kFailure = "sim/operation/failures/rel_elv_jam";
+constexpr const char* kFailure = "sim/operation/failures/rel_elv_L_jam";
 constexpr const char* kThrottle12 = "sim/flightmodel/engine/ENGN_thro_override[0]";
 
 /// Expectations are worked out by hand from the contract in override_manager.hpp: overrides are 1 while set and 0 when
@@ -265,7 +265,7 @@ TEST_F(OverrideManagerTest, WhatWasAcquiredIsLetGoButStopsNothing) {
   letSixAnswersPass();
   EXPECT_TRUE(manager_.releasedByOthers().empty());
   EXPECT_EQ(manager_.active(), Names{core::kSurfaceOverride}) << "its holder watches that one";
-  EXPECT_EQ(reports_, (Reports{{"rel_elv_jam was released by another client", true}}));
+  EXPECT_EQ(reports_, (Reports{{"rel_elv_L_jam was released by another client", true}}));
 }
 
 TEST_F(OverrideManagerTest, ReleaseByOthersStopsAlsoWhereTheJournalFails) {
@@ -379,7 +379,7 @@ TEST_F(OverrideManagerTest, ReleaseAllGivesBackEverythingForGood) {
   EXPECT_TRUE(manager_.active().empty());
   EXPECT_FALSE(manager_.releasesPending());
   EXPECT_TRUE(sim_.subscribed().empty());
-  EXPECT_EQ(reports_, (Reports{{"released rel_elv_jam, override_joystick, override_throttles", true}}));
+  EXPECT_EQ(reports_, (Reports{{"released rel_elv_L_jam, override_joystick, override_throttles", true}}));
   sim_.clearMessages();
   manager_.setRequired({kJoystick});
   EXPECT_FALSE(manager_.acquire(kThrottles));

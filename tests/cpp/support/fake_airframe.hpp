@@ -24,7 +24,7 @@ class FakeAirframe {
 
   explicit FakeAirframe(FakeSimulator* sim) : sim_(sim) {
     for (const std::string& dataref : surfaceWatchDatarefs(sim->status().version)) {
-      if (dataref.rfind("sim/time", 0) != 0) sim->set(dataref, dataref == kFrameRate ? sim->value(dataref) : 0.0F);
+      if (dataref.rfind("sim/time/", 0) != 0) sim->set(dataref, dataref == kFrameRate ? sim->value(dataref) : 0.0F);
     }
   }
 

@@ -30,12 +30,24 @@ inline std::string markdownSlots(int row, int slot, const RowSource& source) {
   return text;
 }
 
-inline std::string markdownDataref(const DatarefSource& source) {
+/// 120800 -> 12.08, 120000 -> 12.
+inline std::string markdownVersion(std::int32_t first) {
+  const std::int32_t minor = first / 100 % 100;
+  return std::to_string(first / 10000) + (minor == 0 ? "" : (minor < 10 ? ".0" : ".") + std::to_string(minor));
+}
+
+inline std::string markdownVersions(const VersionRange& versions) {
+  if (versions.isAll()) return "";
+  if (versions.first == 0) return "before " + markdownVersion(versions.end) + ": ";
+  return "from " + markdownVersion(versions.first) + ": ";
+}
+
+inline std::string markdownDatarefs(const FieldSpec& field) {
   std::string text;
-  if (source.path11 != nullptr) text += "`" + std::string(source.path11) + "`" + markdownConversion(source.conversion);
-  if (source.path12 != nullptr) {
-    text += std::string(text.empty() ? "" : "<br>") + "12: `" + source.path12 + "`" +
-            markdownConversion(source.conversion12);
+  for (const DatarefSource& source : field.datarefs) {
+    if (source.path == nullptr) continue;
+    text += (text.empty() ? "" : "<br>") + markdownVersions(source.versions) + "`" + source.path + "`" +
+            markdownConversion(source.conversion);
   }
   return text;
 }
@@ -55,13 +67,15 @@ inline std::string fieldTableMarkdown() {
   page << "# Where every field comes from\n\n"
           "Generated from the messages and `lib/core/state/sources.txt` by `field_table_doc`; do not edit.\n\n"
           "* **Field**: as in the message, or an input that fields are computed from. `[n]`: elements.\n"
-          "* **Dataref**: transport `rref`. `{a,b}` stands for several datarefs, `[*]` for every element; `12:` is\n"
-          "  another name in X-Plane 12. Datarefs of fields without a row are asked for with transport `data` too.\n"
+          "* **Dataref**: transport `rref`. `{a,b}` stands for several datarefs, `[*]` for every element; `from "
+          "12.08:`\n"
+          "  and `before 12:` say which versions of X-Plane have it. Datarefs of fields without a row are asked for "
+          "with\n"
+          "  transport `data` too.\n"
           "* **Row**: transport `data`, `row.slot`. In brackets: unit on the wire and factor into the field's unit.\n"
           "* **[?]** marks what only a live simulator can settle.\n\n"
-          "Datarefs are checked against Laminar's published lists (X-Plane/XPlane2Blender,\n"
-          "`io_xplane2blender/resources/DataRefs.txt`, versions 11.10 and 12.08); rows are those of X-Plane 11's Data\n"
-          "Output screen.\n";
+          "Datarefs are checked against Laminar's lists of 11.40, 11.55, 12.00, 12.08 and 12.10\n"
+          "(`src/xplane_bridge/xplane_names`); rows are those of X-Plane 11's Data Output screen.\n";
   const FieldSpec* previous = nullptr;
   for (const FieldSpec& field : fieldTable()) {
     if (previous == nullptr || previous->group != field.group) {
@@ -73,7 +87,7 @@ inline std::string fieldTableMarkdown() {
     previous = &field;
     page << "| " << field.field;
     if (field.count > 1 && field.store != nullptr) page << "[" << field.count << "]";
-    page << " | " << field.unit << " | " << markdownDataref(field.dataref) << " | " << markdownRow(field.row) << " | "
+    page << " | " << field.unit << " | " << markdownDatarefs(field) << " | " << markdownRow(field.row) << " | "
          << field.remark << " |\n";
   }
   return page.str();

@@ -86,13 +86,21 @@ def test_defaults():
     options = parse([])
     assert (options.port, options.version, options.fps, options.rate, options.aircraft) == (
         49000,
-        11,
+        "11.55",
         60.0,
         20,
         "fixed_wing",
     )
     assert options.beacon
     assert not options.initial.on_ground
+
+
+@pytest.mark.parametrize(
+    ("given", "version"),
+    [("11", "11.55"), ("12", "12.10"), ("11.40", "11.40"), ("11.55", "11.55"), ("12.00", "12.00"), ("12.08", "12.08")],
+)
+def test_a_major_version_is_the_newest_of_its_lists(given, version):
+    assert parse(["--version", given]).version == version
 
 
 def test_options_reach_where_they_belong():
@@ -105,7 +113,7 @@ def test_options_reach_where_they_belong():
     assert options.initial.on_ground
     assert options.initial.longitude_deg == pytest.approx(-46.96)
     assert options.initial.heading_deg == 270.0
-    assert (options.version, options.fps, options.rate, options.seed) == (12, 30.0, 50, 7)
+    assert (options.version, options.fps, options.rate, options.seed) == ("12.10", 30.0, 50, 7)
     assert options.wind == (270.0, 8.0)
     assert options.pipeline_delay == pytest.approx(0.05)
     assert options.fault.delay_s == pytest.approx(0.02)
@@ -126,7 +134,7 @@ def test_options_reach_where_they_belong():
         ("--pilot nowhere.yaml", "--pilot nowhere.yaml: expected an existing file"),
         ("--stepped fast", "--stepped fast: expected --duration with it"),
         ("--rref-split 184", "--rref-split 184: expected 1..183"),
-        ("--version 10", "invalid choice: 10"),
+        ("--version 10", "invalid choice: '10'"),
     ],
 )
 def test_wrong_options_are_said(arguments, message, capsys):

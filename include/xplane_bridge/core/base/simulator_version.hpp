@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 namespace xplane_bridge::core {
 
@@ -24,8 +25,25 @@ constexpr bool operator==(SimulatorVersion a, SimulatorVersion b) {
 }
 constexpr bool operator!=(SimulatorVersion a, SimulatorVersion b) { return !(a == b); }
 
-/// The versions whose published lists the names in this package are checked against.
+/// Where X-Plane's names change within a major version: the first number that the list of 12.08, of 12.10 holds for.
+inline constexpr std::int32_t kFirstOf1208 = 120800;
+inline constexpr std::int32_t kFirstOf1210 = 121000;
+
+/// The versions that have something: from `first` on, before `end`.
+struct VersionRange {
+  std::int32_t first = 0;
+  std::int32_t end = std::numeric_limits<std::int32_t>::max();
+
+  constexpr bool isAll() const { return *this == VersionRange{}; }
+  /// An unknown version has what all have.
+  constexpr bool has(SimulatorVersion version) const {
+    return version.known() ? first <= version.number && version.number < end : isAll();
+  }
+  constexpr bool operator==(const VersionRange& other) const { return first == other.first && end == other.end; }
+};
+
+/// The oldest versions of 11 and 12 with all that the package uses.
 inline constexpr SimulatorVersion kXPlane11{114000};
-inline constexpr SimulatorVersion kXPlane12{120800};
+inline constexpr SimulatorVersion kXPlane12{kFirstOf1208};
 
 }  // namespace xplane_bridge::core

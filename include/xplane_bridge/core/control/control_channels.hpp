@@ -52,6 +52,9 @@ std::vector<std::string> requiredOverrides(const ChannelSet& channels, const Enc
 /// Overrides whose effect is on all surfaces (protocol.md 8.2).
 extern const char* const kSurfaceOverride;
 
+/// A throttle for all engines in place of their levers'; -2 gives it back.
+extern const char* const kThrottleOverride;
+
 /// The write that gives back what the bridge took: overrides to 0, ENGN_thro_override to -2 (X-Plane 11's own "not
 /// overridden"). Anything else is not the bridge's to release: nullopt.
 std::optional<DatarefWrite> releaseOf(const std::string& dataref);

@@ -8,10 +8,21 @@
 
 namespace xplane_bridge::core {
 
-/// Full datarefs sim/operation/failures/rel_* of a version, as Laminar's published lists have them (11.40, 12.08;
-/// X-Plane2Blender, io_xplane2blender/resources/DataRefs.txt). [?] A later X-Plane may have more: any rel_* can be set
-/// by its name, but those that are not listed are not noticed when they are set in the simulator's menu.
-const std::vector<std::string>& simulatorFailures(SimulatorVersion version);
+/// Failures that come and go with the same versions of X-Plane.
+struct FailureNames {
+  VersionRange versions;
+  const char* leaves;  ///< without "rel_", separated by spaces
+};
+/// All sim/operation/failures/rel_* of the lists that Laminar ships with X-Plane.
+const std::vector<FailureNames>& failureNameTable();
+
+/// Full datarefs sim/operation/failures/rel_* of a version; while it is unknown those of all. [?] A later X-Plane may
+/// have more: any rel_* can be set by its name, but those that are not listed are not noticed when they are set in the
+/// simulator's menu.
+std::vector<std::string> simulatorFailures(SimulatorVersion version);
+
+/// Whether a version has a failure (full dataref).
+bool hasFailure(SimulatorVersion version, const std::string& dataref);
 
 /// Whether a failure dataref keeps surfaces from following stick, trims and flaps.
 bool touchesSurfaces(const std::string& dataref);

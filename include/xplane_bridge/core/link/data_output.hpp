@@ -16,6 +16,11 @@
 
 namespace xplane_bridge::core {
 
+/// DATA datagrams a second.
+inline constexpr const char* kDataRateDataref = "sim/network/dataout/network_data_rate";
+/// Not 0: X-Plane sends this row.
+std::string dataRowDataref(std::int32_t row);
+
 /// DATA transport: what the bridge wants from X-Plane's Data Output.
 struct DataOutputOptions {
   bool enabled = false;

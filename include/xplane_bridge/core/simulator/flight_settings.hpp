@@ -54,8 +54,8 @@ bool shows(const DatarefWrite& loading, double shown);
 /// A path below X-Plane's folder for ACFN and SIMO: what is wrong with it; nullopt: nothing.
 /// @param ending e.g. ".acf"
 std::optional<std::string> checkXPlanePath(const std::string& path, const std::string& ending);
-/// The first `characters` of `acf_relative_path`, one dataref each.
-std::vector<std::string> aircraftPathDatarefs(std::size_t characters);
+/// The first `characters` of the loaded aircraft's path, one dataref each; empty: that version does not tell it.
+std::vector<std::string> aircraftPathDatarefs(std::size_t characters, SimulatorVersion version);
 /// The text of such datarefs, up to the first NUL or missing one.
 std::string textFrom(const std::vector<DatarefValue>& characters);
 /// The same file: X-Plane writes separators as its platform does, which may not tell capitals either.

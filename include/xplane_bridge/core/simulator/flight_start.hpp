@@ -44,7 +44,7 @@ struct ShownFlight {
 };
 
 /// What to read for it.
-const std::vector<std::string>& shownFlightDatarefs(SimulatorVersion version);
+std::vector<std::string> shownFlightDatarefs(SimulatorVersion version);
 /// From the values of shownFlightDatarefs(), in that order; nullopt while one is missing.
 std::optional<ShownFlight> shownFlightFrom(const std::vector<DatarefValue>& values);
 

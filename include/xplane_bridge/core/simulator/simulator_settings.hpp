@@ -9,8 +9,10 @@
 
 namespace xplane_bridge::core {
 
-/// Command that pauses or resumes.
-const char* pauseCommand(bool pause);
+/// 0: the flight runs.
+inline constexpr const char* kPausedDataref = "sim/time/paused";
+/// Command that pauses or resumes. Before 12.10 there is only a toggle: send it once, and only if it is to change.
+const char* pauseCommand(bool pause, SimulatorVersion version);
 
 /// Turns the pilot's head. X-Plane has no command for a vertical view (protocol.md 8.5); [?] that the 2-D cockpit views
 /// follow the head angles on a live simulator.

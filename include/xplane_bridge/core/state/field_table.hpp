@@ -29,10 +29,9 @@ struct Conversion {
 
 /// A dataref, or several: `{a,b}` is expanded as by a shell, leftmost slowest; `[*]` is every element of the field.
 struct DatarefSource {
-  const char* path11 = nullptr;  ///< null: no dataref
-  const char* path12 = nullptr;  ///< null: as path11
+  const char* path = nullptr;  ///< null: no dataref
   Conversion conversion{};
-  Conversion conversion12{};  ///< of path12
+  VersionRange versions{};  ///< that have it, and are to be asked for it
 };
 
 /// Slots of a DATA row: elements follow each other.
@@ -54,12 +53,12 @@ inline constexpr int kMaxFieldElements = 16;
 /// One line of the table.
 struct FieldSpec {
   FieldGroup group = FieldGroup::kFlight;
-  const char* field = "";      ///< name in the message, or of the input that fields are computed from
-  int count = 1;               ///< elements
-  const char* unit = "";       ///< of the stored value
-  std::uint32_t valid = 0;     ///< bit of the message's `valid` it counts for; 0: none by itself
-  FieldStore store = nullptr;  ///< null: computed (remark says how)
-  DatarefSource dataref{};
+  const char* field = "";                   ///< name in the message, or of the input that fields are computed from
+  int count = 1;                            ///< elements
+  const char* unit = "";                    ///< of the stored value
+  std::uint32_t valid = 0;                  ///< bit of the message's `valid` it counts for; 0: none by itself
+  FieldStore store = nullptr;               ///< null: computed (remark says how)
+  std::array<DatarefSource, 2> datarefs{};  ///< of different versions, at most one of which fits
   RowSource row{};
   const char* remark = "";       ///< [?] marks what only a live simulator can settle
   bool per_engine = false;       ///< elements at or beyond the engine count are not known
@@ -68,6 +67,9 @@ struct FieldSpec {
 
 /// All lines, in the messages' order.
 const std::vector<FieldSpec>& fieldTable();
+
+/// Where this version has the field; null: in no dataref.
+const DatarefSource* datarefOf(const FieldSpec& field, SimulatorVersion version);
 
 /// One dataref element to be asked for.
 struct DatarefRequest {

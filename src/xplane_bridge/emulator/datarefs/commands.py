@@ -1,9 +1,13 @@
-"""X-Plane commands (CMND) that the emulator knows; unknown ones do nothing, as in X-Plane."""
+"""X-Plane commands (CMND) that the emulator knows; unknown ones do nothing, as in X-Plane.
+
+Those that the list of the running version does not have are unknown to it as well.
+"""
 
 from __future__ import annotations
 
 from typing import Callable, Dict, Tuple
 
+from xplane_bridge import xplane_names
 from xplane_bridge.emulator.datarefs.sources import Actions
 
 _COCKPIT = "sim/cockpit2/controls/"
@@ -31,7 +35,13 @@ VIEWS: Dict[str, Tuple[int, bool]] = {
 
 
 def commands(sim: Actions) -> Dict[str, Callable[[], None]]:
-    """What each command does."""
+    """What each command of the running version does."""
+    listed = xplane_names.commands(sim.version)
+    return {name: action for name, action in all_commands(sim).items() if name in listed}
+
+
+def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
+    """What the commands of all versions do."""
     store = sim.store
 
     def setter(name: str, value: float) -> Callable[[], None]:
@@ -49,7 +59,6 @@ def commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/operation/pause_toggle": lambda: sim.pause(not sim.clocks.paused),
         "sim/operation/fix_all_systems": sim.repair_all,
         "sim/operation/reset_flight": lambda: sim.start_flight(sim.initial),
-        "sim/operation/load_last_situation": lambda: sim.load_situation(sim.last_situation),
         "sim/operation/freeze_toggle": toggle("sim/operation/override/override_planepath"),
         "sim/flight_controls/landing_gear_down": setter(_COCKPIT + "gear_handle_down", 1.0),
         "sim/flight_controls/landing_gear_up": setter(_COCKPIT + "gear_handle_down", 0.0),

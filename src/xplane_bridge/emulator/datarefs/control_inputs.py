@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Callable, Dict, Optional, Sequence, Tuple
 
@@ -34,6 +35,8 @@ _HANDLES = {
     (14, 3): (_COCKPIT + "right_brake_ratio", 0.0, 1.0),
 }
 _THROTTLE_ROW = 25
+#: Rudder that auto-coordination gives for sideslip (wind from the right positive: the nose goes right).
+_COORDINATION_PER_DEG = 0.1
 #: Levers and handles that a saved situation brings back and a new flight sets.
 _LEVERS = (
     _ACTUATORS + "throttle_ratio",
@@ -71,6 +74,14 @@ class PilotCommands:
     datarefs: Tuple[Tuple[str, float], ...] = ()  #: to write once
 
 
+@dataclass(frozen=True)
+class InputOptions:
+    """What moves the stick where neither a client nor the pilot does."""
+
+    joystick: bool = True  #: attached and centred; without one, what clients write stays, under no override too
+    auto_coordination: bool = False  #: the rudder follows the sideslip, as X-Plane does for who has no pedals
+
+
 Pilot = Callable[[float, Frame], PilotCommands]
 
 
@@ -78,10 +89,12 @@ class ControlInputs:
     """Turns what was written into `Controls`, once a frame.
 
     The order of power on the stick: a DATA row that holds it, `override_joystick` (what was written to the yoke
-    datarefs stays), the pilot, and last the centred stick. Levers stay where they were put last.
+    datarefs stays, pedals and auto-coordination included), the pilot, auto-coordination, and last the centred stick.
+    Levers stay where they were put last.
     """
 
-    def __init__(self, store: DatarefStore, pilot: Optional[Pilot]) -> None:
+    def __init__(self, store: DatarefStore, pilot: Optional[Pilot], options: InputOptions) -> None:
+        self._options = options
         self._store = store
         self._pilot = pilot
         self._held: Dict[Tuple[int, int], float] = {}
@@ -183,11 +196,21 @@ class ControlInputs:
             if held is not None:
                 store.set(name, held)
             elif not joystick and not self._overrides("joystick_" + axis):
-                store.set(name, 0.0 if commands is None else getattr(commands, attribute))
+                if commands is not None:
+                    store.set(name, getattr(commands, attribute))
+                else:
+                    self._move_unowned(name, axis, frame)
             setattr(controls, attribute, _clip(store.get(name), -1.0, 1.0))
         self._read_handles(controls)
         self._read_engines(controls, model)
         self._read_surfaces(controls)
+
+    def _move_unowned(self, name: str, axis: str, frame: Frame) -> None:
+        """An axis that no client has taken and no pilot moves."""
+        if axis == "heading" and self._options.auto_coordination:
+            self._store.set(name, _clip(_COORDINATION_PER_DEG * math.degrees(frame.m.beta_rad), -1.0, 1.0))
+        elif self._options.joystick:
+            self._store.set(name, 0.0)
 
     def _overrides(self, name: str) -> bool:
         return self._store.get(_OVERRIDE + name) != 0.0
@@ -240,12 +263,12 @@ class ControlInputs:
     def _read_engines(self, controls: Controls, model: FlightModel) -> None:
         store, info = self._store, model.info
         levers = store.array(_ACTUATORS + "throttle_ratio")
-        overridden = store.array(_ENGINE + "ENGN_thro_override")
+        overridden = store.get(_ENGINE + "ENGN_thro_override")  # one number for all engines
         propeller, mixture = store.array(_ACTUATORS + "prop_ratio"), store.array(_ACTUATORS + "mixture_ratio")
         use = store.array(_ENGINE + "ENGN_thro_use")
         controls.override_throttles = self._overrides("throttles")
         for i in range(info.engine_count):
-            lever = levers[i] if overridden[i] == THROTTLE_RELEASED else overridden[i]
+            lever = levers[i] if overridden == THROTTLE_RELEASED else overridden
             controls.throttle[i] = _clip(float(lever), info.min_throttle, info.max_throttle)
             controls.propeller[i] = _clip(float(propeller[i]), 0.0, 1.0)
             controls.mixture[i] = _clip(float(mixture[i]), 0.0, 1.0)

@@ -45,19 +45,19 @@ def _wings(leaf: str) -> List[Source]:
     return [f"sim/flightmodel/controls/{wing}_{leaf}def" for wing in WINGS]
 
 
-def layout(version: int, level_angles: bool) -> Dict[int, Sequence[Source]]:
+def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
     """Slots by row index; rows that are left out are eight zeros (systems the emulator does not have).
 
     Args:
-        version: 11 or 12.
+        is_12: X-Plane 12, not 11.
         level_angles: Whether row 17's angles are those relative to the local level (else to the origin's axes).
     """
     true = "true_" if level_angles else ""
     deg = 180.0 / math.pi
     rates: Sequence[Source] = (
-        (_P + "Qrad", _P + "Prad", _P + "Rrad")
-        if version < 12
-        else ((_P + "Prad", deg), (_P + "Qrad", deg), (_P + "Rrad", deg))
+        ((_P + "Prad", deg), (_P + "Qrad", deg), (_P + "Rrad", deg))
+        if is_12
+        else (_P + "Qrad", _P + "Prad", _P + "Rrad")
     )
     true_airspeed, ground_speed, keas = _P + "true_airspeed", _P + "groundspeed", "_emulator/keas"
     kcas = _P + "indicated_airspeed"
@@ -298,7 +298,7 @@ def layout(version: int, level_angles: bool) -> Dict[int, Sequence[Source]]:
             _A + "ice",
             _A + "pitot_heat",
             _A + "cabin_altitude_12500",
-            _A + "autofeather_arm",
+            0.0,
             0.0,
         ),
         115: (
@@ -382,13 +382,13 @@ def layout(version: int, level_angles: bool) -> Dict[int, Sequence[Source]]:
 class DataRows:
     """Builds DATA datagrams from the store's present values."""
 
-    def __init__(self, store: DatarefStore, version: int, level_angles: bool) -> None:
+    def __init__(self, store: DatarefStore, is_12: bool, level_angles: bool) -> None:
         shape = (ROW_COUNT, SLOTS_PER_ROW)
         self._store = store
         self._sources = np.zeros(shape, dtype=int)
         self._factors = np.zeros(shape)
         self._constants = np.zeros(shape)
-        for row, slots in layout(version, level_angles).items():
+        for row, slots in layout(is_12, level_angles).items():
             for slot in range(SLOTS_PER_ROW):
                 self._define(row, slot, slots[slot] if slot < len(slots) else None)
         self._selected: Optional[np.ndarray] = None

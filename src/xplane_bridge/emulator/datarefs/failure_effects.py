@@ -11,7 +11,7 @@ from typing import Callable, Dict, Set
 import numpy as np
 
 from xplane_bridge.emulator.datarefs.store import DatarefStore
-from xplane_bridge.emulator.datarefs.tables.failures import PREFIX, names
+from xplane_bridge.emulator.datarefs.tables.failures import PREFIX
 from xplane_bridge.emulator.flight.flight_model import (
     Controls,
     EngineFault,
@@ -39,11 +39,12 @@ _SIDES = {"lft": Side.LEFT, "rgt": Side.RIGHT, "ctr": Side.CENTRE}
 class FailureEffects:
     """Reads the failure datarefs and applies what they mean."""
 
-    def __init__(self, store: DatarefStore, version: int, surfaces_break: bool = True) -> None:
+    def __init__(self, store: DatarefStore, surfaces_break: bool = True) -> None:
         self._surfaces_break = surfaces_break
-        self._leaves = names(version)
+        names = store.listed(PREFIX + "rel_")
+        self._leaves = [name[len(PREFIX) :] for name in names]
         self._store = store
-        self._slots = np.array([store.dataref(PREFIX + leaf).slots[0] for leaf in self._leaves])
+        self._slots = np.array([store.dataref(name).slots[0] for name in names])
         self._frozen: Dict[str, float] = {}
 
     def active(self) -> Set[str]:

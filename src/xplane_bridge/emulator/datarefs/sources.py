@@ -19,7 +19,6 @@ class LoadedAircraft(Protocol):
 class Sources(LoadedAircraft, Protocol):
     """Where the tables take values from that are not in the frame. Objects may be replaced: ask anew each frame."""
 
-    version: int  #: 11 or 12
     internal_version: int  #: as `sim/version/xplane_internal_version` has it
     initial_data_rate: int  #: DATA datagrams a second
     window_size: Tuple[int, int]  #: width and height [px]
@@ -47,10 +46,10 @@ class Sources(LoadedAircraft, Protocol):
 class Actions(LoadedAircraft, Protocol):
     """What commands do to the simulator."""
 
+    version: str  #: one of `xplane_names.VERSIONS`
     store: DatarefStore
     clocks: Clocks
     initial: InitialState  #: where flights start
-    last_situation: str  #: path of the situation that was saved last
 
     def pause(self, paused: bool) -> None:
         """Stops or continues simulated time."""
@@ -60,9 +59,6 @@ class Actions(LoadedAircraft, Protocol):
 
     def start_flight(self, initial: InitialState) -> None:
         """Begins a flight."""
-
-    def load_situation(self, path: str) -> bool:
-        """Returns whether there is a situation of that name."""
 
     def move_throttles(self, step: float) -> None:
         """Moves all levers by `step`, within 0..1."""

@@ -1,5 +1,9 @@
 """The emulator's datarefs: one vector of values, with names, types and write access as in X-Plane.
 
+Type, array size and access of a dataref are those of X-Plane's list of the running version (`xplane_names`). A name
+that only other versions have can be defined all the same, so that the tables need not distinguish: the emulator can
+work with it, but clients do not see it. A name that no list has is refused.
+
 Every element of every dataref is a slot of `DatarefStore.values`; a subscription is an array of slot numbers, so that a
 frame's answer to a client is one numpy gather. Reading through RREF is always float32, which the sender does; here
 values are doubles, except that integer datarefs hold whole numbers and float datarefs lose nothing before they are
@@ -12,9 +16,11 @@ import enum
 import math
 import re
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Optional, Sequence, Union
+from typing import Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
+
+from xplane_bridge import xplane_names
 
 #: Names that start with this are the emulator's own values (sources of DATA rows); clients cannot see them.
 HIDDEN_PREFIX = "_emulator/"
@@ -41,6 +47,7 @@ class Dataref:
         slots: Its elements in `DatarefStore.values`; aliases share them.
         is_array: Whether clients may append `[i]`.
         writable: Whether a DREF of a client changes it.
+        visible: Whether clients know it.
     """
 
     name: str
@@ -48,6 +55,7 @@ class Dataref:
     slots: np.ndarray
     is_array: bool
     writable: bool
+    visible: bool
 
 
 #: Called after a client wrote an element: (element index, value).
@@ -56,45 +64,60 @@ Numbers = Union[float, Sequence[float], np.ndarray]
 
 
 class DatarefStore:
-    """All datarefs of one running simulator version."""
+    """All datarefs of one running simulator version.
 
-    def __init__(self) -> None:
+    Args:
+        version: Whose list holds, one of `xplane_names.VERSIONS`.
+        brackets: Whether names with brackets (`sim/weather/wind_speed_kt[0]`) are taken as a whole ([?]: else the
+            index is cut off first).
+    """
+
+    def __init__(self, version: str, brackets: bool = True) -> None:
         self.values = np.zeros(1024)
         self._used = 0
+        self._version = version
+        self._brackets = brackets
         self._by_name: Dict[str, Dataref] = {}
         self._hooks: Dict[str, List[WriteHook]] = {}
 
     # --- definition ---------------------------------------------------------------------------------------------------
 
-    def add(
-        self, name: str, kind: Kind = Kind.FLOAT, size: int = 0, writable: bool = False, initial: Numbers = 0.0
-    ) -> Dataref:
-        """Defines a dataref; `size` 0 is a scalar, more is an array.
+    def add(self, name: str, initial: Numbers = 0.0, read_only: bool = False, size: int = 0) -> Dataref:
+        """Defines a dataref.
+
+        Args:
+            name: A name of X-Plane's lists, or one of the emulator's own (HIDDEN_PREFIX).
+            initial: Its value, or one for each element.
+            read_only: Clients cannot write it, whatever the list says.
+            size: Of an array of the emulator's own; the lists tell that of all others.
 
         Raises:
-            ValueError: The name is taken.
+            ValueError: The name is taken, or is in no list.
         """
-        if name in self._by_name:
-            raise ValueError(f"dataref {name} is defined twice")
-        count = max(size, 1)
+        count = size or self.elements(name)
         while self._used + count > len(self.values):
             self.values = np.concatenate((self.values, np.zeros(len(self.values))))
         slots = np.arange(self._used, self._used + count)
         self._used += count
-        dataref = Dataref(name, kind, slots, size > 0, writable)
-        self._by_name[name] = dataref
         self.values[slots] = initial
-        return dataref
+        return self._define(name, slots, read_only)
 
-    def add_alias(self, name: str, target: str, writable: Optional[bool] = None) -> Dataref:
-        """A second name for the same values."""
-        source = self._by_name[target]
-        return self._add_view(name, source.kind, source.slots, source.is_array, writable, source.writable)
+    def add_alias(self, name: str, target: str) -> Dataref:
+        """A second name for the same values, or for the first of them where this name has fewer elements."""
+        slots = self._by_name[target].slots
+        return self._define(name, slots[: self.elements(name)])
 
-    def add_view(self, name: str, kind: Kind, elements: Sequence[str], writable: bool) -> Dataref:
+    def add_view(self, name: str, elements: Sequence[str]) -> Dataref:
         """An array whose elements are other datarefs' elements."""
-        slots = np.array([self._require_slot(element) for element in elements])
-        return self._add_view(name, kind, slots, True, writable, writable)
+        return self._define(name, np.array([self._require_slot(element) for element in elements]))
+
+    def elements(self, name: str) -> int:
+        """How many elements X-Plane gives a name; 1 for a scalar and for the emulator's own."""
+        return 1 if name.startswith(HIDDEN_PREFIX) else self._fact(name)[0].size
+
+    def listed(self, prefix: str) -> List[str]:
+        """All names of this version's list that begin with `prefix`, whether they are defined or not."""
+        return [name for name in xplane_names.datarefs(self._version) if name.startswith(prefix)]
 
     def on_write(self, name: str, hook: WriteHook) -> None:
         """Calls `hook` after each write of a client to this name (not to its aliases)."""
@@ -107,7 +130,7 @@ class DatarefStore:
 
     def names(self) -> List[str]:
         """All names that clients can see."""
-        return [name for name in self._by_name if not name.startswith(HIDDEN_PREFIX)]
+        return [name for name, dataref in self._by_name.items() if dataref.visible]
 
     def dataref(self, name: str) -> Dataref:
         """The dataref of this name (no index); KeyError if there is none."""
@@ -136,12 +159,10 @@ class DatarefStore:
     def slot(self, path: str) -> Optional[int]:
         """The slot behind a client's path (`name` or `name[i]`); None if X-Plane would not know it.
 
-        An array without an index means its first element.
+        An array without an index means its first element; the first element of a scalar is the scalar.
         """
-        if path.startswith(HIDDEN_PREFIX):
-            return None
         found = self._resolve(path)
-        return None if found is None else int(found[0].slots[found[1]])
+        return None if found is None or not found[0].visible else int(found[0].slots[found[1]])
 
     def write(self, path: str, value: float) -> bool:
         """A client's DREF. Non-finite values are dropped (X-Plane's behaviour on them is unknown).
@@ -149,11 +170,12 @@ class DatarefStore:
         Returns:
             Whether anything was written.
         """
-        found = None if path.startswith(HIDDEN_PREFIX) else self._resolve(path)
+        found = self._resolve(path)
         if found is None or not math.isfinite(value):
             return False
         dataref, index = found
-        if not dataref.writable or dataref.kind is Kind.BYTE:  # byte[] writes were ignored in 11.55
+        # writes to byte[] were ignored in 11.55
+        if not dataref.visible or not dataref.writable or dataref.kind is Kind.BYTE:
             return False
         stored = float(int(value)) if dataref.kind is Kind.INT else value
         self.values[dataref.slots[index]] = stored
@@ -163,27 +185,37 @@ class DatarefStore:
 
     # --- internals ----------------------------------------------------------------------------------------------------
 
-    def _add_view(
-        self, name: str, kind: Kind, slots: np.ndarray, is_array: bool, writable: Optional[bool], default: bool
-    ) -> Dataref:
+    def _define(self, name: str, slots: np.ndarray, read_only: bool = False) -> Dataref:
         if name in self._by_name:
             raise ValueError(f"dataref {name} is defined twice")
-        dataref = Dataref(name, kind, slots, is_array, default if writable is None else writable)
+        if name.startswith(HIDDEN_PREFIX):
+            dataref = Dataref(name, Kind.FLOAT, slots, len(slots) > 1, writable=False, visible=False)
+        else:
+            fact, visible = self._fact(name)
+            if fact.size != len(slots):
+                raise ValueError(f"dataref {name} has {len(slots)} elements, in X-Plane {fact.size}")
+            writable = bool(fact.writable) and not read_only
+            dataref = Dataref(name, Kind(fact.kind), slots, fact.is_array, writable, visible)
         self._by_name[name] = dataref
         return dataref
 
-    def _resolve(self, path: str) -> Optional[tuple]:
-        dataref = self._by_name.get(path)  # a few X-Plane names carry brackets themselves: try the whole path first
-        if dataref is not None:
-            return dataref, 0
+    def _fact(self, name: str) -> Tuple[xplane_names.Dataref, bool]:
+        """What X-Plane's list says of a name, and whether that is the list of this version or another's."""
+        for version in (self._version, *reversed(xplane_names.VERSIONS)):
+            fact = xplane_names.datarefs(version).get(name)
+            if fact is not None:
+                return fact, version == self._version
+        raise ValueError(f"dataref {name} is in no list of X-Plane's: is it spelt right?")
+
+    def _resolve(self, path: str) -> Optional[Tuple[Dataref, int]]:
+        """The dataref that a path means, and the element."""
+        dataref = self._by_name.get(path)
         match = _INDEXED.fullmatch(path)
-        if match is None:
-            return None
+        if match is None or (dataref is not None and self._brackets):
+            return None if dataref is None else (dataref, 0)
         dataref = self._by_name.get(match.group(1))
         index = int(match.group(2))
-        if dataref is None or not dataref.is_array or index >= len(dataref.slots):
-            return None
-        return dataref, index
+        return None if dataref is None or index >= len(dataref.slots) else (dataref, index)
 
     def _require_slot(self, path: str) -> int:
         found = self._resolve(path)

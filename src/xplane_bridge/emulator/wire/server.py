@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import logging
 import socket
+import struct
 from collections import Counter
 from typing import Callable, Dict, Optional, Tuple
 
@@ -23,6 +24,8 @@ from xplane_bridge.emulator.wire.subscriptions import Address, Pacer, Subscripti
 _LOG = logging.getLogger(__name__)
 
 _RECEIVE_BUFFER = 4 << 20
+#: Of Linux; Python's socket module does not name it.
+_IP_PKTINFO = 8
 #: RREF requests X-Plane takes in one frame; more are lost (Laminar: up to about 148, clients send batches of 100).
 RREF_REQUESTS_PER_FRAME = 148
 BEACON_PERIOD_S = 1.0
@@ -52,12 +55,14 @@ class Server:
         subscriptions: Subscriptions,
         channel: FaultyChannel[Route],
         request_limit: int = RREF_REQUESTS_PER_FRAME,
+        answer_from: Optional[str] = None,
     ) -> None:
         self.subscriptions = subscriptions
         self.ignored: Counter = Counter()
         self._handlers = handlers
         self._channel = channel
         self._request_limit = request_limit
+        self._answer_from = answer_from
         self._socket = _bound_socket(bind, port)
         self.port = self._socket.getsockname()[1]
         self._data_socket = _data_socket(bind, port)
@@ -76,14 +81,18 @@ class Server:
 
     # --- in -----------------------------------------------------------------------------------------------------------
 
-    def receive(self, discard: bool = False) -> int:
-        """Takes all datagrams that have come; `discard` drops them unread, as a loading or frozen X-Plane does.
+    def receive(self, discard: bool = False, enough: Callable[[], bool] = lambda: False) -> int:
+        """Takes all datagrams that have come.
+
+        Args:
+            discard: Drops them unread.
+            enough: Asked after each datagram; what comes after it says yes stays in the socket.
 
         Returns:
             How many came.
         """
         count = rref = 0
-        while True:
+        while not enough():
             try:
                 datagram, sender = self._socket.recvfrom(protocol.MAX_DATAGRAM)
             except (BlockingIOError, InterruptedError):
@@ -101,6 +110,7 @@ class Server:
                     self.ignored["flood"] += 1
                     continue
             self.handle(datagram, sender)
+        return count
 
     def handle(self, datagram: bytes, sender: Address) -> None:
         """Handles one datagram as if it had come from `sender`."""
@@ -173,7 +183,10 @@ class Server:
 
     def _send_now(self, packet: bytes, target: Address, source: socket.socket) -> None:
         try:
-            source.sendto(packet, target)
+            if self._answer_from is None or source is not self._socket:
+                source.sendto(packet, target)
+            else:
+                send_from(source, packet, target, self._answer_from)
         except OSError as error:  # nobody there, no route, buffer full: X-Plane goes on, so do we
             _LOG.debug("could not send %d bytes to %s:%d: %s", len(packet), target[0], target[1], error)
             self.ignored["send"] += 1
@@ -182,7 +195,10 @@ class Server:
 class Beacon:
     """Announces the emulator on X-Plane's multicast group once a second."""
 
-    def __init__(self, bind: str, message: protocol.Beacon, group: str, port: int) -> None:
+    def __init__(
+        self, bind: str, message: protocol.Beacon, group: str, port: int, second_address: Optional[str] = None
+    ) -> None:
+        self._second_address = second_address
         self._packet = message.encode()
         self._target = (group, port)
         self._next = float("-inf")
@@ -200,6 +216,8 @@ class Beacon:
             try:
                 self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(interface))
                 self._socket.sendto(self._packet, self._target)
+                if self._second_address is not None:
+                    send_from(self._socket, self._packet, self._target, self._second_address)
                 return
             except OSError as error:
                 _LOG.debug("no beacon on %s: %s", interface, error)
@@ -207,6 +225,12 @@ class Beacon:
     def close(self) -> None:
         """Closes it."""
         self._socket.close()
+
+
+def send_from(sock: socket.socket, packet: bytes, target: Address, address: str) -> None:
+    """Sends a datagram from another address of this machine than the socket's, but from its port."""
+    interface = struct.pack("=i4s4x", 0, socket.inet_aton(address))
+    sock.sendmsg([packet], [(socket.IPPROTO_IP, _IP_PKTINFO, interface)], 0, target)
 
 
 def _bound_socket(bind: str, port: int) -> socket.socket:

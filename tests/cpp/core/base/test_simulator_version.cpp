@@ -33,5 +33,20 @@ TEST(SimulatorVersion, KeepsTheExactNumber) {
   EXPECT_EQ(SimulatorVersion{115501}, SimulatorVersion{115501});
 }
 
+TEST(VersionRange, HasItsFirstVersionAndNotItsEnd) {
+  constexpr VersionRange range{120000, 120800};
+  EXPECT_FALSE(range.has(SimulatorVersion{119999}));
+  EXPECT_TRUE(range.has(SimulatorVersion{120000}));
+  EXPECT_TRUE(range.has(SimulatorVersion{120799}));
+  EXPECT_FALSE(range.has(SimulatorVersion{120800}));
+}
+
+TEST(VersionRange, AnUnknownVersionHasOnlyWhatAllHave) {
+  EXPECT_TRUE(VersionRange{}.isAll());
+  EXPECT_TRUE(VersionRange{}.has(SimulatorVersion{}));
+  EXPECT_FALSE((VersionRange{0, 120000}.has(SimulatorVersion{})));
+  EXPECT_FALSE((VersionRange{120000}.has(SimulatorVersion{})));
+}
+
 }  // namespace
 }  // namespace xplane_bridge::core

@@ -61,9 +61,9 @@ TEST(ControlChannels, ReleasesOnlyWhatABridgeCanHaveTaken) {
   const auto override_release = releaseOf("sim/operation/override/override_joystick");
   ASSERT_TRUE(override_release);
   EXPECT_EQ(override_release->value, 0.0f);
-  const auto throttle_release = releaseOf("sim/flightmodel/engine/ENGN_thro_override[1]");
+  const auto throttle_release = releaseOf("sim/flightmodel/engine/ENGN_thro_override[0]");
   ASSERT_TRUE(throttle_release);
-  EXPECT_EQ(throttle_release->dataref, "sim/flightmodel/engine/ENGN_thro_override[1]");
+  EXPECT_EQ(throttle_release->dataref, "sim/flightmodel/engine/ENGN_thro_override[0]");
   EXPECT_EQ(throttle_release->value, -2.0f);
   EXPECT_FALSE(releaseOf("sim/time/sim_speed"));
   EXPECT_FALSE(releaseOf("xsim/operation/override/override_joystick"));

@@ -82,6 +82,9 @@ TEST(Failures, XPlane12sOwnFailuresWhereTheyExpressTheWish) {
   EXPECT_EQ(fcon("spoiler2_wing1_right", "hard_over_down"), folder + "rel_fcon_rspo_2_rgt_mxdn");
   EXPECT_EQ(fcon("yaw_brake_wing3_left", "gone"), folder + "rel_fcon_yawb_x_lft_gone");
   EXPECT_EQ(fcon("flap1_wing1_left", "slow", 1.0), "");
+  EXPECT_EQ(fcon("flap1_wing1_left", "hard_over_down"), folder + "rel_fcon_flap_1_lft_mxdn");
+  EXPECT_EQ(fcon("flap1_wing1_left", "centred"), "") << "in no list";
+  EXPECT_EQ(fcon("speedbrake2_wing1_right", "centred"), "") << "in no list";
   // Flown after all where read-back shows that X-Plane does not obey.
   EXPECT_TRUE(planFailure(request("rudder1_fin1", "centred"), k12).plan.surface);
   EXPECT_FALSE(planFailure(request("rudder1_fin1", "gone"), k12).plan.surface);

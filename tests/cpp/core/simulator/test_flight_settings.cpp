@@ -38,6 +38,15 @@ TEST(UniformWind, GoesToEveryLayerOfXPlane12) {
   EXPECT_EQ(writes.at("sim/weather/region/turbulence[5]"), 10.0F);
 }
 
+TEST(UniformWind, GoesToTheOldNamesWhereThereAreNoRegionsYet) {
+  const UniformWind wind{10.0, 90.0, 1.0};
+  auto of11 = asMap(windWrites(wind, kXPlane11));
+  EXPECT_EQ(of11.erase("sim/weather/use_real_weather_bool"), 1U) << "version 12.00 can only read it";
+  EXPECT_EQ(asMap(windWrites(wind, SimulatorVersion{120000})), of11);
+  EXPECT_EQ(asMap(windWrites(wind, SimulatorVersion{120800})), asMap(windWrites(wind, SimulatorVersion{122015})));
+  EXPECT_EQ(shownWindDatarefs(SimulatorVersion{120000}), shownWindDatarefs(kXPlane11));
+}
+
 TEST(UniformWind, IsShownByTheAirAtTheAircraft) {
   const UniformWind north{10.0, 350.0, 0.0};
   EXPECT_TRUE(shows(north, {10.2F, 351.0F}));
@@ -71,6 +80,7 @@ TEST(LoadingTest, WritesOnlyWhatIsGiven) {
   ASSERT_EQ(writes.size(), 4u);
   EXPECT_EQ(writes[2].dataref, "sim/flightmodel/weight/m_fixed");
   EXPECT_EQ(writes[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default");
+  EXPECT_EQ(loadingWrites(loading, SimulatorVersion{120000})[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default");
   EXPECT_EQ(loadingWrites(loading, kXPlane12)[3].dataref, "sim/flightmodel2/misc/cg_offset_z");
 }
 
@@ -110,8 +120,9 @@ TEST(XPlanePath, IsAFileBelowXPlanesFolder) {
 }
 
 TEST(XPlanePath, IsReadCharacterByCharacter) {
-  EXPECT_EQ(aircraftPathDatarefs(20).size(), 20u);
-  EXPECT_EQ(aircraftPathDatarefs(20)[7], "sim/aircraft/view/acf_relative_path[7]");
+  EXPECT_EQ(aircraftPathDatarefs(20, SimulatorVersion{120000}).size(), 20u);
+  EXPECT_EQ(aircraftPathDatarefs(20, kXPlane12)[7], "sim/aircraft/view/acf_relative_path[7]");
+  EXPECT_TRUE(aircraftPathDatarefs(20, kXPlane11).empty()) << "version 11 has no such dataref";
   EXPECT_EQ(textFrom({65.0F, 47.0F, 98.0F, 0.0F, 99.0F}), "A/b");
   EXPECT_EQ(textFrom({65.0F, std::nullopt}), "A");
   EXPECT_TRUE(isSamePath("Aircraft\\a\\B.acf", "Aircraft/a/b.acf"));

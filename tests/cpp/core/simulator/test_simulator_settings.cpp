@@ -6,8 +6,13 @@ namespace xplane_bridge::core {
 namespace {
 
 TEST(SimulatorSettings, PausesByCommand) {
-  EXPECT_STREQ(pauseCommand(true), "sim/operation/pause_on");
-  EXPECT_STREQ(pauseCommand(false), "sim/operation/pause_off");
+  EXPECT_STREQ(pauseCommand(true, SimulatorVersion{121000}), "sim/operation/pause_on");
+  EXPECT_STREQ(pauseCommand(false, SimulatorVersion{122015}), "sim/operation/pause_off");
+  // Older versions have only this one.
+  for (const std::int32_t number : {0, 114000, 115501, 120000, 120999}) {
+    EXPECT_STREQ(pauseCommand(true, SimulatorVersion{number}), "sim/operation/pause_toggle") << number;
+    EXPECT_STREQ(pauseCommand(false, SimulatorVersion{number}), "sim/operation/pause_toggle") << number;
+  }
 }
 
 TEST(SimulatorSettings, ViewsTurnTheHead) {

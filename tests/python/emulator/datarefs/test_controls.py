@@ -64,6 +64,31 @@ def test_stick_override_by_axis(bench):
     assert emulator.read(YOKE_ROLL, YOKE_PITCH) == [0.5, 0.0]
 
 
+def test_without_a_joystick_the_stick_takes_writes_under_no_override(bench):
+    centred, free = bench(), bench(joystick="none")
+    for emulator in (centred, free):
+        emulator.write({YOKE_ROLL: 0.5, "sim/cockpit2/controls/yoke_pitch_ratio": 0.25})
+        emulator.step(30)
+    assert centred.read(YOKE_ROLL, YOKE_PITCH) == [0.0, 0.0]
+    assert free.read(YOKE_ROLL, YOKE_PITCH) == [0.5, 0.25]
+    assert math.degrees(free.sim.model.state.roll_rad) > 5.0
+
+
+@pytest.mark.parametrize(
+    ("override", "stays"),
+    [("", False), ("joystick", True), ("joystick_heading", True), ("joystick_roll", False)],
+)
+def test_overrides_stop_pedals_and_auto_coordination(bench, override, stays):
+    emulator = bench(auto_coordination=True)
+    emulator.sim.model.state.beta_rad = math.radians(3.0)
+    emulator.write({OVERRIDE + "planepath": 1.0})  # the sideslip stands
+    if override:
+        emulator.write({OVERRIDE + override: 1.0})
+    emulator.step(2)
+    # nose to the wind: to the right when it comes from there
+    assert emulator.read("sim/joystick/yoke_heading_ratio") == [pytest.approx(0.0 if stays else 0.3)]
+
+
 def test_overrides_and_the_last_stick_outlive_the_client(bench):
     emulator = bench()
     emulator.write({OVERRIDE + "joystick": 1.0, YOKE_ROLL: 0.3})  # this client's socket is closed again
@@ -205,13 +230,13 @@ def test_engines_obey_thro_use_only_under_the_override(bench):
     assert emulator.read(THRO_USE) == [pytest.approx(lever)]
 
 
-def test_throttle_override_of_one_engine_is_released_by_minus_two(bench):
+def test_throttle_override_of_all_engines_is_released_by_minus_two(bench):
     emulator = bench()
     name = "sim/flightmodel/engine/ENGN_thro_override"
-    emulator.write({name + "[1]": 0.1})
+    emulator.write({name: 0.1})
     emulator.step(2)
-    assert emulator.read(THRO_USE + "[1]") == [pytest.approx(0.1)]
-    emulator.write({name + "[1]": -2.0})
+    assert emulator.read(THRO_USE + "[0]", THRO_USE + "[1]") == [pytest.approx(0.1)] * 2
+    emulator.write({name: -2.0})
     emulator.step(2)
     assert emulator.read(THRO_USE + "[1]") == [pytest.approx(emulator.sim.controls.throttle[1])]
 
@@ -249,12 +274,12 @@ def test_rese_repairs_everything(bench):
 
 def test_surface_lock_exists_only_in_x_plane_12_and_keeps_the_present_position(bench):
     name = FAILURES + "rel_fcon_ailn_1_lft_lock"
-    eleven = bench(version=11)
+    eleven = bench(version="11")
     client = eleven.client()
     client.subscribe([name])
     eleven.step()
     assert client.values() == {}
-    twelve = bench(version=12)
+    twelve = bench(version="12")
     twelve.write({OVERRIDE + "joystick": 1.0, YOKE_ROLL: 0.5})
     twelve.step(30)
     twelve.write({name: 6.0, YOKE_ROLL: -0.5})
@@ -263,7 +288,7 @@ def test_surface_lock_exists_only_in_x_plane_12_and_keeps_the_present_position(b
 
 
 def test_roll_authority_to_the_left_is_lost(bench):
-    emulator = bench(version=11)
+    emulator = bench(version="11")
     emulator.write({OVERRIDE + "joystick": 1.0, YOKE_ROLL: -0.5, FAILURES + "rel_fc_ail_L": 6.0})
     emulator.step(30)
     assert emulator.read(LEFT_AILERON) == [0.0]
@@ -338,7 +363,12 @@ def test_prel_into_the_ground_is_not_flown(bench):
 
 
 @pytest.mark.parametrize(
-    ("version", "name"), [(11, "sim/flightmodel/misc/cgz_ref_to_default"), (12, "sim/flightmodel2/misc/cg_offset_z")]
+    ("version", "name"),
+    [
+        ("11", "sim/flightmodel/misc/cgz_ref_to_default"),
+        ("12.00", "sim/flightmodel/misc/cgz_ref_to_default"),
+        ("12.08", "sim/flightmodel2/misc/cg_offset_z"),
+    ],
 )
 def test_balance_is_moved_by_the_payload_and_pitches_the_aircraft(bench, version, name):
     emulator = bench(aircraft="fixed_wing", version=version)
@@ -358,7 +388,7 @@ def test_loading_is_shown_while_the_flight_stands(bench):
     emulator = bench(aircraft="fixed_wing")
     weight = "sim/flightmodel/weight/"
     (before,) = emulator.read(weight + "m_total")
-    emulator.client().send(protocol.CommandRequest("sim/operation/pause_on"))
+    emulator.client().send(protocol.CommandRequest("sim/operation/pause_toggle"))
     emulator.write({weight + "m_fuel[0]": 60.0, weight + "m_fixed": 300.0})
     shown = emulator.read(weight + "m_fuel[0]", weight + "m_fixed", weight + "m_total")
     assert shown == pytest.approx([60.0, 300.0, before - 40.0 + 90.0], abs=0.1)
@@ -398,7 +428,7 @@ def test_vehx_stops_the_flight_model_until_an_aircraft_is_loaded(bench):
     assert emulator.sim.model.state.latitude_deg != 37.5
 
 
-@pytest.mark.parametrize(("version", "moves"), [(11, False), (12, True)])
+@pytest.mark.parametrize(("version", "moves"), [("11", False), ("12", True)])
 def test_vehs_is_of_x_plane_12_and_leaves_the_flight_model_on(bench, version, moves):
     emulator = bench(version=version)
     emulator.client().send(protocol.VehiclePose("VEHS", 0, 47.0, 8.0, 2000.0, 10.0, 0.0, 0.0))
@@ -443,7 +473,7 @@ def test_reset_of_x_plane_11_pause_place_attitude_velocity_go(bench):
     emulator = bench(aircraft="fixed_wing")
     client = emulator.client()
     emulator.step(120)
-    client.send(protocol.CommandRequest("sim/operation/pause_on"))
+    client.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     client.send(protocol.Placement(6, latitude_deg=37.5, longitude_deg=127.0, elevation_m=1200.0, speed_mps=65.0))
     emulator.step()
     half = math.radians(20.0) / 2
@@ -455,7 +485,7 @@ def test_reset_of_x_plane_11_pause_place_attitude_velocity_go(bench):
         values = emulator.read(*(POSITION + name for name in names))
         assert values[:5] == pytest.approx([20.0, 0.0, 2.0, -65.0, 0.05], abs=0.01)
         assert values[5] == pytest.approx(37.5, abs=1e-5)
-    client.send(protocol.CommandRequest("sim/operation/pause_off"))
+    client.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     emulator.step(60)
     assert emulator.sim.model.state.latitude_deg == pytest.approx(37.5 + math.degrees(65.0 / 6379345.0), abs=1e-4)
 
@@ -527,14 +557,21 @@ def test_fuel_and_payload_reach_the_model(bench):
     ("version", "direction", "speed", "value", "read"),
     [
         (
-            11,
+            "11",
             "sim/weather/wind_direction_degt[0]",
             "sim/weather/wind_speed_kt[0]",
             19.4384,
             "sim/weather/wind_now_x_msc",
         ),
         (
-            12,
+            "12.00",
+            "sim/weather/wind_direction_degt[0]",
+            "sim/weather/wind_speed_kt[0]",
+            19.4384,
+            "sim/weather/wind_now_x_msc",
+        ),
+        (
+            "12",
             "sim/weather/region/wind_direction_degt",
             "sim/weather/region/wind_speed_msc",
             10.0,
@@ -554,7 +591,7 @@ def test_wind_set_by_a_client_blows(bench, version, direction, speed, value, rea
 
 @pytest.mark.parametrize(("mode", "angle"), [("act", -20.0), ("ignored", 0.0)])
 def test_failures_of_single_surfaces_act_or_are_ignored(bench, mode, angle):
-    emulator = bench(version=12, surface_failures=mode)
+    emulator = bench(version="12", surface_failures=mode)
     emulator.write({FAILURES + "rel_fcon_ailn_1_lft_mxup": 6.0})
     emulator.step(120)
     left, right, failure = emulator.read(LEFT_AILERON, RIGHT_AILERON, FAILURES + "rel_fcon_ailn_1_lft_mxup")

@@ -269,14 +269,14 @@ def test_rows_20_and_21_belong_together(bench):
     assert rows[20][3] == pytest.approx((emulator.sim.model.state.agl_m - 1.2 + 0.076) / 0.3048, rel=1e-5)
 
 
-@pytest.mark.parametrize("version", [11, 12])
+@pytest.mark.parametrize("version", ["11", "12"])
 def test_row_16_changes_order_and_unit_with_the_version(bench, version):
     emulator = bench(version=version)
     emulator.write({"sim/operation/override/override_joystick": 1.0, "sim/joystick/yoke_roll_ratio": 0.5})
     emulator.write({"sim/joystick/yoke_pitch_ratio": 0.3})
     rows = data(emulator, [16], frames=40)
     state = emulator.sim.model.state
-    if version == 11:
+    if version == "11":
         expected = (state.q_rad_s, state.p_rad_s, state.r_rad_s)
     else:
         expected = tuple(math.degrees(rate) for rate in (state.p_rad_s, state.q_rad_s, state.r_rad_s))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import socket
 import struct
 
 import pytest
@@ -13,7 +14,7 @@ from xplane_bridge import protocol
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.options import Options
-from xplane_bridge.emulator.wire.server import PortInUseError
+from xplane_bridge.emulator.wire.server import Beacon, PortInUseError
 
 POSITION = "sim/flightmodel/position/"
 LATITUDE, LONGITUDE, THETA = POSITION + "latitude", POSITION + "longitude", POSITION + "theta"
@@ -292,7 +293,7 @@ def test_dref_to_an_int_dataref_is_cut_to_whole_numbers(bench):
 def test_cmnd_works_terminated_or_not_and_unknown_ones_are_silent(bench):
     emulator = bench()
     client = emulator.client()
-    client.send(b"CMND\0sim/operation/pause_on")
+    client.send(b"CMND\0sim/operation/pause_toggle")
     assert emulator.read(PAUSED) == [1.0]
     client.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     assert emulator.read(PAUSED) == [0.0]
@@ -322,7 +323,7 @@ def test_values_keep_coming_while_paused_and_time_stands(bench):
     client = emulator.client()
     client.subscribe([TIME, PAUSED, LONGITUDE])
     emulator.step(10)
-    client.send(protocol.CommandRequest("sim/operation/pause_on"))
+    client.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     client.received()
     emulator.step(10)
     rows = [dict(protocol.decode_rref_response(packet)) for packet in client.received()]
@@ -335,7 +336,7 @@ def test_output_can_stop_while_paused(bench):
     emulator = bench(send_while_paused=False)
     client = emulator.client()
     client.subscribe([TIME])
-    client.send(protocol.CommandRequest("sim/operation/pause_on"))
+    client.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     emulator.step(5)
     assert client.received() == []
 
@@ -419,7 +420,7 @@ def test_other_letters_and_wrong_sizes_are_ignored_silently(bench):
 
 
 def test_random_bytes_never_stop_it(bench):
-    emulator = bench(version=12)
+    emulator = bench(version="12")
     client = emulator.client()
     chance = random.Random(4)
     labels = [
@@ -470,3 +471,79 @@ def test_extreme_numbers_in_valid_messages_never_stop_it(bench):
     client.subscribe([TIME])
     emulator.step()
     assert client.received()
+
+
+# --- a computer with two addresses ---
+
+
+def test_answers_can_come_from_a_second_address_of_the_machine(bench):
+    emulator = bench(answer_from="127.0.0.2")
+    client = emulator.client()
+    client.subscribe([TIME])
+    emulator.step()
+    packet, sender = client.socket.recvfrom(protocol.MAX_DATAGRAM)
+    assert packet[:4] == b"RREF"
+    assert sender == ("127.0.0.2", emulator.emulator.port)
+
+
+def test_a_machine_can_announce_itself_from_two_addresses():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.settimeout(10.0)
+        message = protocol.Beacon(115501, 49000, "one computer")
+        beacon = Beacon("127.0.0.1", message, *listener.getsockname(), second_address="127.0.0.2")
+        beacon.poll(0.0)
+        heard = [listener.recvfrom(protocol.MAX_DATAGRAM) for _ in range(2)]
+        beacon.close()
+    assert [sender[0] for _, sender in heard] == ["127.0.0.1", "127.0.0.2"]
+    assert [packet for packet, _ in heard] == [message.encode()] * 2
+
+
+# --- loading ---
+
+
+def test_nothing_is_read_or_sent_while_a_flight_loads_and_requests_wait(bench):
+    emulator = bench(fps=20.0, loading_time=1.0)
+    client = emulator.client()
+    client.subscribe([TIME, LATITUDE])
+    emulator.step(2)
+    assert len(client.received()) == 2
+    client.send(protocol.Placement(6, latitude_deg=10.0, longitude_deg=20.0, elevation_m=1000.0, speed_mps=50.0))
+    client.send(protocol.Placement(6, latitude_deg=30.0, longitude_deg=20.0, elevation_m=1000.0, speed_mps=50.0))
+    client.send(protocol.DrefWrite("sim/cockpit2/controls/flap_ratio", 0.5))
+    emulator.step(20)  # the frame that reads it, and one second
+    assert client.received() == []
+    # the second one waited, and has the flight loaded anew
+    emulator.step(1)
+    assert client.received() == []
+    assert emulator.sim.store.get("sim/cockpit2/controls/flap_ratio") == 0.0
+    emulator.step(20)
+    values = client.values()
+    assert values[1] == pytest.approx(30.0)
+    assert emulator.sim.store.get("sim/cockpit2/controls/flap_ratio") == 0.5
+    assert emulator.read("sim/time/total_flight_time_sec")[0] < 0.5
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [protocol.AircraftLoad(0, "kinematic.acf"), protocol.CommandRequest("sim/operation/reset_flight")],
+)
+def test_an_aircraft_and_a_reset_take_time_to_load_too(bench, request_):
+    emulator = bench(fps=20.0, loading_time=0.5, version="12")
+    client = emulator.client()
+    client.subscribe([TIME])
+    client.send(request_)
+    emulator.step(10)
+    assert client.received() == []
+    emulator.step(5)
+    assert client.received() != []
+
+
+def test_a_request_that_loads_nothing_takes_no_time(bench):
+    emulator = bench(loading_time=10.0)
+    client = emulator.client()
+    client.subscribe([TIME])
+    client.send(protocol.AircraftLoad(0, "no_such_aircraft.acf"))
+    client.send(protocol.Situation(protocol.Situation.LOAD, "no_such_situation.sit"))
+    emulator.step(1)
+    assert len(client.received()) == 1

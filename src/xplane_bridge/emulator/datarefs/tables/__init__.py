@@ -10,8 +10,8 @@ __all__ = ["Table", "build"]
 
 
 def build(sim: Sources) -> Table:
-    """Defines every dataref of the simulator's version in its store and returns what publishes them."""
-    table = Table(sim.store, sim.version)
+    """Defines all datarefs in the simulator's store and returns what publishes them."""
+    table = Table(sim.store)
     for part in (flight, controls, engines, systems, failures):
         part.define(table, sim)
     return table

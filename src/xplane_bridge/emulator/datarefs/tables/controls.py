@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Callable, Dict, List, Optional
 
 from xplane_bridge.emulator.datarefs.sources import Sources
-from xplane_bridge.emulator.datarefs.tables.base import FLOAT, INT, X12, Table
+from xplane_bridge.emulator.datarefs.store import DatarefStore
+from xplane_bridge.emulator.datarefs.tables.base import Table
 from xplane_bridge.emulator.flight.flight_model import SurfaceKind, SurfaceSpec
 from xplane_bridge.emulator.flight.frame import Frame
 
@@ -16,10 +17,9 @@ _CONTROLS2 = "sim/flightmodel2/controls/"
 #: Wing parts in the order of X-Plane's arrays; tailplanes and fins follow them.
 WINGS = tuple(f"wing{number}{side}" for number in (1, 2, 3, 4) for side in "lr")
 PARTS = (*WINGS, "hstab1", "hstab2", "vstab1", "vstab2")
-#: Elements of `sim/flightmodel2/wing/*_deg`: one a part, in the order of PARTS.
-_WING_ARRAY = 32
-#: Elements of the old arrays `sim/flightmodel/controls/*_def`: eight propellers come before the parts.
-_PART_ARRAY, _FIRST_PART = 56, 8
+#: Place of the first of PARTS in the old arrays `sim/flightmodel/controls/*_def`: eight propellers come before. The
+#: arrays `sim/flightmodel2/wing/*_deg` begin with it.
+_FIRST_PART = 8
 
 _WING_LEAVES = ("ail1", "ail2", "spo1", "spo2", "fla1", "fla2", "yawb")
 #: Arrays by part: leaf of the single dataref -> array under sim/flightmodel2/wing/.
@@ -83,10 +83,10 @@ OVERRIDES = (
     "TCAS",
     "groundplane",
     "navneedles",
-    "oxygen",
+    "planepath",
+    "plane_ai_autopilot",
     "boats",
     "clouds",
-    "planepath_simple",
 )
 
 
@@ -105,9 +105,7 @@ def define(table: Table, sim: Sources) -> None:
     _handles(table)
     _limits(table, sim)
     for name in OVERRIDES:
-        table.setting(f"sim/operation/override/override_{name}", 0, INT)
-    for name in ("override_planepath", "override_plane_ai_autopilot"):
-        table.setting(f"sim/operation/override/{name}", 0, INT, size=20)
+        table.setting(f"sim/operation/override/override_{name}")
 
 
 def _surfaces(t: Table, sim: Sources) -> None:
@@ -120,22 +118,21 @@ def _surfaces(t: Table, sim: Sources) -> None:
     for names in single.values():
         for name in names:
             t.setting(name)
-    t.setting("_emulator/no_surface", 0.0)
+    t.setting("_emulator/no_surface")
     for leaf, name in _ARRAYS.items():
         array = f"sim/flightmodel2/wing/{name}"
         if single[leaf]:
             start = {"elv": 8, "rud": 10}.get(leaf[:3], 0)
-            t.store.add_view(array, FLOAT, _padded(single[leaf], start, _WING_ARRAY), writable=True)
+            t.store.add_view(array, _padded(t.store, array, single[leaf], start))
         else:
-            t.setting(array, size=_WING_ARRAY)
+            t.setting(array)
         single[leaf] = single[leaf] or [f"{array}[{part}]" for part in range(len(WINGS))]
         sim.watch_surface(array)
         if leaf in _OLD_ARRAYS:
             start = _FIRST_PART + {"elv": 8, "rud": 10}.get(leaf[:3], 0)
-            t.store.add_view(
-                _CONTROLS + _OLD_ARRAYS[leaf], FLOAT, _padded(single[leaf], start, _PART_ARRAY), writable=True
-            )
-            sim.watch_surface(_CONTROLS + _OLD_ARRAYS[leaf])
+            old = _CONTROLS + _OLD_ARRAYS[leaf]
+            t.store.add_view(old, _padded(t.store, old, single[leaf], start))
+            sim.watch_surface(old)
     for leaf in ("ail1", "ail2", "spo1", "spo2", "fla1", "fla2", "yawb", "elv1", "elv2", "rud1", "rud2"):
         for name in single[leaf]:
             sim.watch_surface(name)
@@ -145,9 +142,10 @@ def _surfaces(t: Table, sim: Sources) -> None:
         sim.watch_surface(_CONTROLS + name)
 
 
-def _padded(names: List[str], start: int, size: int) -> List[str]:
+def _padded(store: DatarefStore, array: str, names: List[str], start: int) -> List[str]:
+    """The elements of an array of X-Plane's that shows these datarefs from its element `start` on."""
     nothing = "_emulator/no_surface"
-    return [nothing] * start + names + [nothing] * (size - start - len(names))
+    return [nothing] * start + names + [nothing] * (store.elements(array) - start - len(names))
 
 
 def _carrier(sim: Sources, leaf: str, side: str) -> str:
@@ -167,18 +165,16 @@ def _stick(t: Table, sim: Sources) -> None:
     ):
         t.setting(f"sim/joystick/yoke_{axis}_ratio")
         t.alias(f"{_COCKPIT}yoke_{axis}_ratio", f"sim/joystick/yoke_{axis}_ratio")
-        t.value(
-            f"sim/joystick/artstab_{axis}_ratio", lambda f, total=total, stick=stick: total(f) - stick(), writable=True
-        )
+        t.value(f"sim/joystick/artstab_{axis}_ratio", lambda f, total=total, stick=stick: total(f) - stick())
         t.setting(f"sim/joystick/servo_{axis}_ratio")
         t.value(f"{_COCKPIT}total_{axis}_ratio", _total(sim, total))
-        t.value(f"{_CONTROLS2}{axis}_ratio", total, writable=True)
+        t.value(f"{_CONTROLS2}{axis}_ratio", total)
         t.setting(f"{_COCKPIT}{trim}_trim")
         t.alias(f"{_CONTROLS2}{trim}_trim", f"{_COCKPIT}{trim}_trim")
         t.alias(f"{_CONTROLS}{trim[:3] if trim != 'elevator' else 'elv'}_trim", f"{_COCKPIT}{trim}_trim")
-    t.setting("sim/cockpit2/switches/artificial_stability_on", 1, INT)
-    t.setting("sim/cockpit2/switches/yaw_damper_on", 0, INT)
-    t.setting("sim/joystick/joystick_axis_values", size=500, writable=False)
+    t.setting("sim/cockpit2/switches/artificial_stability_on", 1)
+    t.setting("sim/cockpit2/switches/yaw_damper_on")
+    t.setting("sim/joystick/joystick_axis_values")
 
 
 def _total(sim: Sources, total: Callable[[Frame], float]) -> Callable[[Frame], float]:
@@ -195,10 +191,10 @@ def _total(sim: Sources, total: Callable[[Frame], float]) -> Callable[[Frame], f
 
 def _handles(t: Table) -> None:
     t.setting(_COCKPIT + "flap_ratio")
-    t.alias(_COCKPIT + "flap_handle_request_ratio", _COCKPIT + "flap_ratio", versions=X12)
+    t.alias(_COCKPIT + "flap_handle_request_ratio", _COCKPIT + "flap_ratio")
     t.alias(_CONTROLS + "flaprqst", _COCKPIT + "flap_ratio")
-    t.value(_COCKPIT + "flap_handle_deploy_ratio", lambda f: f.m.flap_ratio, versions=X12)
-    t.value(_COCKPIT + "flap_system_deploy_ratio", lambda f: f.m.flap_ratio, versions=X12)
+    t.value(_COCKPIT + "flap_handle_deploy_ratio", lambda f: f.m.flap_ratio)
+    t.value(_COCKPIT + "flap_system_deploy_ratio", lambda f: f.m.flap_ratio)
     t.value(_CONTROLS + "flaprat", lambda f: f.m.flap_ratio)
     t.value(_CONTROLS + "flap2rat", lambda f: f.m.flap_ratio)
     t.value(_CONTROLS + "slatrat", lambda f: f.m.slat_ratio)
@@ -210,7 +206,7 @@ def _handles(t: Table) -> None:
     t.alias(_CONTROLS + "sbrkrqst", _COCKPIT + "speedbrake_ratio")
     t.value(_CONTROLS + "sbrkrat", lambda f: f.m.speed_brake_ratio)
     t.value(_CONTROLS2 + "speedbrake_ratio", lambda f: f.m.speed_brake_ratio)
-    t.setting(_COCKPIT + "gear_handle_down", 0, INT)
+    t.setting(_COCKPIT + "gear_handle_down")
     t.alias("sim/cockpit/switches/gear_handle_status", _COCKPIT + "gear_handle_down")
     t.setting(_COCKPIT + "parking_brake_ratio")
     t.alias(_CONTROLS + "parkbrake", _COCKPIT + "parking_brake_ratio")
@@ -220,7 +216,6 @@ def _handles(t: Table) -> None:
     t.alias(_CONTROLS + "r_brake_add", _COCKPIT + "right_brake_ratio")
     t.setting(_COCKPIT + "thrust_vector_ratio")
     t.alias(_CONTROLS + "vectrqst", _COCKPIT + "thrust_vector_ratio")
-    t.value(_CONTROLS + "vectrat", lambda f: f.m.thrust_vector_ratio)
     t.value(_CONTROLS2 + "thrust_vector_ratio", lambda f: f.m.thrust_vector_ratio)
     for name in ("wingsweep", "dihedral", "incidence", "wing_retraction"):
         t.setting(f"{_COCKPIT}{name}_ratio")
@@ -235,13 +230,12 @@ def _limits(t: Table, sim: Sources) -> None:
             return 0.0
         return -spec.minimum_deg if low else spec.maximum_deg
 
-    for leaf, name in (("ail1", "ail1"), ("ail2", "ail2"), ("elv1", "elev"), ("elv2", "elev2")):
+    for leaf, name in (("ail1", "ail1"), ("ail2", "ail2"), ("elv1", "elev")):
         t.value(f"{limits}{name}_up", lambda _, leaf=leaf: travel(leaf, True))
         t.value(f"{limits}{name}_dn", lambda _, leaf=leaf: travel(leaf, False))
     t.value(limits + "rudd_lr", lambda _: travel("rud1", True))
     t.value(limits + "rudd_rr", lambda _: travel("rud1", False))
-    t.value(limits + "flap_deg", lambda _: travel("fla1", False))
-    trims = {"elev": ("elevator", "elv1"), "ail": ("aileron", "ail1"), "rudd": ("rudder", "rud1")}
+    trims = {"elev": ("elevator", "elv1"), "rudd": ("rudder", "rud1")}
     for name, (kind, leaf) in trims.items():
         t.value(f"{limits}max_trim_{name}", lambda _, kind=kind, leaf=leaf: _trim_part(sim, kind, leaf))
         t.value(f"{limits}min_trim_{name}", lambda _, kind=kind, leaf=leaf: _trim_part(sim, kind, leaf))

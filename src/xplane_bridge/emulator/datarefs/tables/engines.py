@@ -6,7 +6,7 @@ import math
 from typing import Callable, List
 
 from xplane_bridge.emulator.datarefs.sources import Sources
-from xplane_bridge.emulator.datarefs.tables.base import INT, X12, Table
+from xplane_bridge.emulator.datarefs.tables.base import Table
 from xplane_bridge.emulator.flight.flight_model import EngineState
 from xplane_bridge.emulator.flight.frame import PA_TO_INHG, PA_TO_PSI, Frame
 
@@ -14,7 +14,7 @@ _ENGINE = "sim/flightmodel/engine/"
 _INDICATORS = "sim/cockpit2/engine/indicators/"
 _ACTUATORS = "sim/cockpit2/engine/actuators/"
 RPM_TO_RAD_S = math.pi / 30.0
-#: Value of ENGN_thro_override that gives the engine back to its lever.
+#: Value of ENGN_thro_override that gives the engines back to their levers.
 THROTTLE_RELEASED = -2.0
 _FUEL_PRESSURE_PSI = 24.0
 
@@ -26,48 +26,45 @@ def each(source: Callable[[EngineState], float]) -> Callable[[Frame], List[float
 
 def define(t: Table, sim: Sources) -> None:
     """Defines this subject's datarefs."""
-    size = t.engines
-    t.value("sim/aircraft/engine/acf_num_engines", lambda f: f.info.engine_count, INT)
+    t.value("sim/aircraft/engine/acf_num_engines", lambda f: f.info.engine_count)
     t.value("sim/aircraft/engine/acf_RSC_redline_eng", lambda f: f.info.maximum_rpm * RPM_TO_RAD_S)
-    t.value("sim/aircraft/engine/acf_RSC_redline_prp", lambda f: f.info.maximum_rpm * RPM_TO_RAD_S)
+    t.value("sim/aircraft/controls/acf_RSC_redline_prp", lambda f: f.info.maximum_rpm * RPM_TO_RAD_S)
     t.value("sim/aircraft/engine/acf_pmax", lambda f: f.info.maximum_power_w)
     t.value("sim/aircraft/engine/acf_throtmax_FWD", lambda f: f.info.max_throttle)
     t.value("sim/aircraft/engine/acf_throtmax_REV", lambda f: -f.info.min_throttle)
     # levers
-    t.setting(_ACTUATORS + "throttle_ratio", size=size)
+    t.setting(_ACTUATORS + "throttle_ratio")
     t.alias(_ENGINE + "ENGN_thro", _ACTUATORS + "throttle_ratio")
     # reverse is the negative part of the lever by every name; X-Plane has a mode of its own for it
     t.alias(_ACTUATORS + "throttle_jet_rev_ratio", _ACTUATORS + "throttle_ratio")
     for name in ("throttle_ratio_all", "throttle_jet_rev_ratio_all"):
         t.setting(_ACTUATORS + name)
-    t.setting(_ACTUATORS + "mixture_ratio", size=size)
+    t.setting(_ACTUATORS + "mixture_ratio")
     t.alias(_ENGINE + "ENGN_mixt", _ACTUATORS + "mixture_ratio")
     t.setting(_ACTUATORS + "mixture_ratio_all")
-    t.setting(_ACTUATORS + "prop_ratio", size=size)
+    t.setting(_ACTUATORS + "prop_ratio")
     t.setting(_ACTUATORS + "prop_ratio_all")
     t.array(
         _ENGINE + "ENGN_prop",
-        size,
         lambda f: [
             lever * f.info.maximum_rpm * RPM_TO_RAD_S for lever in sim.controls.propeller[: f.info.engine_count]
         ],
-        writable=True,
     )
     t.alias(_ACTUATORS + "prop_rotation_speed_rad_sec", _ENGINE + "ENGN_prop")
-    t.array(_ENGINE + "ENGN_thro_use", size, each(lambda e: e.throttle), writable=True)
-    t.setting(_ENGINE + "ENGN_thro_override", THROTTLE_RELEASED, size=size)
-    t.setting(_ENGINE + "ENGN_propmode", 1, INT, size=size)
-    t.setting(_ENGINE + "ENGN_heat", size=size)
-    t.setting(_ENGINE + "ENGN_cowl", size=size)
+    t.array(_ENGINE + "ENGN_thro_use", each(lambda e: e.throttle))
+    t.setting(_ENGINE + "ENGN_thro_override", THROTTLE_RELEASED)
+    t.setting(_ENGINE + "ENGN_propmode", 1)
+    t.setting(_ENGINE + "ENGN_heat")
+    t.setting(_ENGINE + "ENGN_cowl")
     for name, initial in (("fuel_pump_on", 1), ("igniter_on", 1), ("ignition_on", 3), ("ignition_key", 3)):
-        t.setting(_ACTUATORS + name, initial, INT, size=size)
-    t.setting(_ACTUATORS + "starter_hit", 0, INT, size=size)
-    t.setting(_ACTUATORS + "idle_speed", 0, INT, size=size)
-    t.setting(_ACTUATORS + "fadec_on", 0, INT, size=size)
+        t.setting(_ACTUATORS + name, initial)
+    t.setting(_ACTUATORS + "starter_hit")
+    t.setting(_ACTUATORS + "idle_speed")
+    t.setting(_ACTUATORS + "fadec_on")
     for name in ("carb_heat_ratio", "cowl_flap_ratio"):
-        t.setting(_ACTUATORS + name, size=size)
+        t.setting(_ACTUATORS + name)
     # what the engines do
-    t.array(_ENGINE + "ENGN_running", size, each(lambda e: e.running), INT)
+    t.array(_ENGINE + "ENGN_running", each(lambda e: e.running))
     for name, source in (
         ("ENGN_tacrad", lambda e: e.rpm * RPM_TO_RAD_S),
         ("POINT_tacrad", lambda e: e.prop_rpm * RPM_TO_RAD_S),
@@ -92,7 +89,7 @@ def define(t: Table, sim: Sources) -> None:
         ("ENGN_oil_temp", lambda e: _celsius(e.oil_temperature_k) / 120.0),
         ("ENGN_oil_press", lambda e: e.oil_pressure_pa / 6e5),
     ):
-        t.array(_ENGINE + name, size, each(source), writable=name.startswith("POINT"))
+        t.array(_ENGINE + name, each(source))
     for name, target in (
         ("N1_percent", "ENGN_N1_"),
         ("N2_percent", "ENGN_N2_"),
@@ -109,18 +106,17 @@ def define(t: Table, sim: Sources) -> None:
         ("thrust_n", "POINT_thrust"),
     ):
         t.alias(_INDICATORS + name, _ENGINE + target)
-    t.array(_INDICATORS + "engine_speed_rpm", size, each(lambda e: e.rpm))
-    t.array(_INDICATORS + "prop_speed_rpm", size, each(lambda e: e.prop_rpm))
-    t.array(_INDICATORS + "fuel_pressure_psi", size, each(lambda e: _FUEL_PRESSURE_PSI if e.running else 0.0))
-    t.setting(_INDICATORS + "carburetor_temperature_C", 15.0, size=size, writable=False)
+    t.array(_INDICATORS + "engine_speed_rpm", each(lambda e: e.rpm))
+    t.array(_INDICATORS + "prop_speed_rpm", each(lambda e: e.prop_rpm))
+    t.array(_INDICATORS + "fuel_pressure_psi", each(lambda e: _FUEL_PRESSURE_PSI if e.running else 0.0))
+    t.setting(_INDICATORS + "carburetor_temperature_C", 15.0)
     engines2 = "sim/flightmodel2/engines/"
-    t.array(engines2 + "nacelle_vertical_angle_deg", size, each(lambda e: e.nacelle_deg))
-    t.array(engines2 + "engine_is_burning_fuel", size, each(lambda e: e.running), INT)
-    t.array(engines2 + "engine_rotation_speed_rad_sec", size, each(lambda e: e.rpm * RPM_TO_RAD_S))
-    t.array(engines2 + "prop_rotation_speed_rad_sec", size, each(lambda e: e.prop_rpm * RPM_TO_RAD_S))
-    t.array(engines2 + "prop_pitch_deg", size, each(lambda e: e.blade_pitch_deg), writable=True)
-    t.array(engines2 + "throttle_used_ratio", size, each(lambda e: e.throttle))
-    t.array(engines2 + "thrust_n", size, each(lambda e: e.thrust_n), versions=X12)
+    t.array(engines2 + "nacelle_vertical_angle_deg", each(lambda e: e.nacelle_deg))
+    t.array(engines2 + "engine_is_burning_fuel", each(lambda e: e.running))
+    t.array(engines2 + "engine_rotation_speed_rad_sec", each(lambda e: e.rpm * RPM_TO_RAD_S))
+    t.array(engines2 + "prop_rotation_speed_rad_sec", each(lambda e: e.prop_rpm * RPM_TO_RAD_S))
+    t.array(engines2 + "prop_pitch_deg", each(lambda e: e.blade_pitch_deg))
+    t.array(engines2 + "throttle_used_ratio", each(lambda e: e.throttle))
 
 
 def _celsius(kelvin: float) -> float:

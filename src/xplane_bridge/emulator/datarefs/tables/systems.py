@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import List
 
 from xplane_bridge.emulator.datarefs.sources import Sources
-from xplane_bridge.emulator.datarefs.tables.base import BYTE, INT, X11, X12, Table
+from xplane_bridge.emulator.datarefs.tables.base import Table
 from xplane_bridge.emulator.flight.frame import Frame
 
 _ELECTRICAL = "sim/cockpit2/electrical/"
@@ -28,28 +28,27 @@ def define(t: Table, sim: Sources) -> None:
 
 
 def _version_and_network(t: Table, sim: Sources) -> None:
-    t.setting("sim/version/xplane_internal_version", sim.internal_version, INT, writable=False)
-    t.setting("sim/version/sim_build_string", 0, BYTE, size=256, writable=False)
-    t.setting("sim/version/xplm_version", 303 if sim.version == 11 else 410, INT, writable=False)
+    t.setting("sim/version/xplane_internal_version", sim.internal_version)
+    t.setting("sim/version/sim_build_string")
     dataout = "sim/network/dataout/"
-    for name in ("data_to_internet", "data_to_disk", "data_to_graphical", "data_to_cockpit"):
-        t.setting(dataout + name, 0, INT, size=200)
-    t.setting(dataout + "network_data_rate", sim.initial_data_rate, INT)
-    t.setting(dataout + "is_external_visual", 0, INT, writable=False)
-    t.setting(dataout + "multiplayer_ip", 0, INT, size=20, writable=False)
-    t.setting("sim/operation/misc/debug_network", 0, INT)
+    for name in ("data_to_internet", "data_to_disk", "data_to_graph", "data_to_screen"):
+        t.setting(dataout + name)
+    t.setting(dataout + "network_data_rate", sim.initial_data_rate)
+    t.setting(dataout + "is_external_visual")
+    t.setting(dataout + "multiplayer_ip")
+    t.setting("sim/operation/misc/debug_network")
 
 
 def _identity(t: Table) -> None:
     view = "sim/aircraft/view/"
-    t.setting(view + "acf_ICAO", 0, BYTE, size=40)
-    t.setting(view + "acf_descrip", 0, BYTE, size=260)
-    t.setting(view + "acf_author", 0, BYTE, size=500)
-    t.setting(view + "acf_tailnum", 0, BYTE, size=40)
-    t.setting(view + "acf_ui_name", 0, BYTE, size=250, writable=False)
-    t.setting(view + "acf_relative_path", 0, BYTE, size=1024, writable=False)
-    t.setting(view + "acf_livery_path", 0, BYTE, size=1024, writable=False)
-    t.setting(view + "acf_livery_index", 0, INT, writable=False)
+    t.setting(view + "acf_ICAO")
+    t.setting(view + "acf_descrip")
+    t.setting(view + "acf_author")
+    t.setting(view + "acf_tailnum")
+    t.setting(view + "acf_ui_name")
+    t.setting(view + "acf_relative_path")
+    t.setting(view + "acf_livery_path")
+    t.setting(view + "acf_livery_index")
     t.value(view + "acf_Vne", lambda f: f.info.never_exceed_mps * 3600.0 / 1852.0)
     t.value(view + "acf_Vs", lambda f: f.info.stall_mps * 3600.0 / 1852.0)
     t.value(view + "acf_peZ", lambda f: -f.info.eye_forward_m)
@@ -59,20 +58,20 @@ def _identity(t: Table) -> None:
 
 def _electrical(t: Table, sim: Sources) -> None:
     e = _ELECTRICAL
-    t.setting(e + "battery_on", 0, INT, size=8)
-    t.setting(e + "generator_on", 0, INT, size=8)
-    t.setting(e + "inverter_on", 0, INT, size=2)
-    t.setting(e + "cross_tie", 0, INT)
-    t.array(e + "bus_volts", 6, lambda _: sim.electrics.bus_volts, writable=True)
-    t.array(e + "bus_load_amps", 6, lambda _: sim.electrics.bus_amps, writable=True)
-    t.array(e + "battery_voltage_actual_volts", 8, lambda _: sim.electrics.battery_volts, writable=True)
-    t.array(e + "battery_voltage_indicated_volts", 8, lambda _: sim.electrics.battery_volts, writable=True)
-    t.array(e + "battery_amps", 8, lambda _: sim.electrics.battery_amps, writable=True)
-    t.array(e + "generator_amps", 8, lambda _: sim.electrics.generator_amps)
-    for name, kind in (("APU_generator_on", INT), ("APU_starter_switch", INT), ("APU_running", INT)):
-        t.setting(e + name, 0, kind, writable=name != "APU_running")
+    t.setting(e + "battery_on")
+    t.setting(e + "generator_on")
+    t.setting(e + "inverter_on")
+    t.setting(e + "cross_tie")
+    t.array(e + "bus_volts", lambda _: sim.electrics.bus_volts)
+    t.array(e + "bus_load_amps", lambda _: sim.electrics.bus_amps)
+    t.array(e + "battery_voltage_actual_volts", lambda _: sim.electrics.battery_volts)
+    t.array(e + "battery_voltage_indicated_volts", lambda _: sim.electrics.battery_volts)
+    t.array(e + "battery_amps", lambda _: sim.electrics.battery_amps)
+    t.array(e + "generator_amps", lambda _: sim.electrics.generator_amps)
+    for name in ("APU_generator_on", "APU_starter_switch", "APU_running"):
+        t.setting(e + name)
     t.setting(e + "APU_generator_amps")
-    t.setting(e + "APU_N1_percent", writable=False)
+    t.setting(e + "APU_N1_percent")
     for name in (
         "avionics_power_on",
         "navigation_lights_on",
@@ -81,9 +80,9 @@ def _electrical(t: Table, sim: Sources) -> None:
         "landing_lights_on",
         "taxi_light_on",
     ):
-        t.setting(_SWITCHES + name, 0, INT)
-    t.setting("sim/cockpit2/ice/ice_pitot_heat_on_pilot", 0, INT)
-    t.setting("sim/cockpit2/ice/ice_pitot_heat_on_copilot", 0, INT)
+        t.setting(_SWITCHES + name)
+    t.setting("sim/cockpit2/ice/ice_pitot_heat_on_pilot")
+    t.setting("sim/cockpit2/ice/ice_pitot_heat_on_copilot")
 
 
 def _hydraulics(t: Table, sim: Sources) -> None:
@@ -92,9 +91,9 @@ def _hydraulics(t: Table, sim: Sources) -> None:
             f"sim/cockpit2/hydraulics/indicators/hydraulic_pressure_{number}",
             lambda _, n=number: sim.hydraulic_pressure_psi(n),
         )
-        t.setting(f"sim/cockpit2/hydraulics/indicators/hydraulic_fluid_ratio_{number}", 1.0, writable=False)
-    t.setting("sim/cockpit2/hydraulics/actuators/electric_hydraulic_pump_on", 0, INT)
-    t.setting("sim/cockpit2/hydraulics/actuators/engine_pump", 1, INT, size=8)
+        t.setting(f"sim/cockpit2/hydraulics/indicators/hydraulic_fluid_ratio_{number}", 1.0)
+    t.setting("sim/cockpit2/hydraulics/actuators/electric_hydraulic_pump_on")
+    t.setting("sim/cockpit2/hydraulics/actuators/engine_pump", 1)
 
 
 def _autopilot(t: Table) -> None:
@@ -118,7 +117,7 @@ def _autopilot(t: Table) -> None:
         "glideslope_status",
         "backcourse_status",
     ):
-        t.setting(_AUTOPILOT + name, 0, INT, writable=not name.endswith("_status"))
+        t.setting(_AUTOPILOT + name)
     for name in (
         "airspeed_dial_kts_mach",
         "airspeed_dial_kts",
@@ -138,30 +137,29 @@ def _autopilot(t: Table) -> None:
 
 def _annunciators(t: Table, sim: Sources) -> None:
     a = _ANNUNCIATORS
-    t.value(a + "master_caution", lambda f: _master_caution(f, sim), INT)
-    t.value(a + "master_warning", lambda f: f.m.crashed or any(sim.failed(f"rel_engfir{i}") for i in range(8)), INT)
-    for name in ("master_accept", "autopilot_disconnect", "ice", "GPWS", "autofeather_arm", "hydraulic_pressure"):
-        t.setting(a + name, 0, INT, writable=False)
-    t.value(a + "low_vacuum", lambda f: not any(e.running for e in f.m.engines), INT)
-    t.value(a + "low_voltage", lambda _: sim.electrics.bus_volts[0] < 25.0, INT)
-    t.value(a + "fuel_quantity", lambda f: sum(f.m.fuel_kg) < 20.0 and len(f.m.fuel_kg) > 0, INT)
-    t.value(a + "yaw_damper", lambda _: sim.store.get(_SWITCHES + "yaw_damper_on"), INT)
-    t.value(a + "speedbrake", lambda f: f.m.speed_brake_ratio > 0.01, INT)
-    t.value(a + "pitot_heat", lambda _: not sim.store.get("sim/cockpit2/ice/ice_pitot_heat_on_pilot"), INT)
-    t.value(a + "cabin_altitude_12500", lambda f: f.m.altitude_m > 3810.0, INT)
-    t.value(a + "stall_warning", lambda f: f.m.stall_warning, INT)
+    t.value(a + "master_caution", lambda f: _master_caution(f, sim))
+    t.value(a + "master_warning", lambda f: f.m.crashed or any(sim.failed(f"rel_engfir{i}") for i in range(8)))
+    for name in ("master_accept", "autopilot_disconnect", "ice", "GPWS", "hydraulic_pressure"):
+        t.setting(a + name)
+    t.value(a + "low_vacuum", lambda f: not any(e.running for e in f.m.engines))
+    t.value(a + "low_voltage", lambda _: sim.electrics.bus_volts[0] < 25.0)
+    t.value(a + "fuel_quantity", lambda f: sum(f.m.fuel_kg) < 20.0 and len(f.m.fuel_kg) > 0)
+    t.value(a + "yaw_damper", lambda _: sim.store.get(_SWITCHES + "yaw_damper_on"))
+    t.value(a + "speedbrake", lambda f: f.m.speed_brake_ratio > 0.01)
+    t.value(a + "pitot_heat", lambda _: not sim.store.get("sim/cockpit2/ice/ice_pitot_heat_on_pilot"))
+    t.value(a + "cabin_altitude_12500", lambda f: f.m.altitude_m > 3810.0)
+    t.value(a + "stall_warning", lambda f: f.m.stall_warning)
     t.value(a + "stall_warning_ratio", lambda f: f.m.stall_warning)
-    t.value(a + "gear_unsafe", lambda f: any(0.01 < wheel.extended < 0.99 for wheel in f.m.gear), INT)
-    t.value(a + "gear_warning", lambda f: _gear_warning(f), INT)
-    size = t.engines
-    t.array(a + "fuel_pressure_low", size, lambda f: [not e.running for e in f.m.engines], INT)
-    t.array(a + "oil_pressure_low", size, lambda f: [e.oil_pressure_pa < 1e5 for e in f.m.engines], INT)
-    t.array(a + "oil_temperature_high", size, lambda f: [e.oil_temperature_k > 395.0 for e in f.m.engines], INT)
-    t.array(a + "inverter_off", 2, lambda _: 1.0 - sim.store.array(_ELECTRICAL + "inverter_on"), INT)
-    t.array(a + "generator_off", 8, lambda _: sim.electrics.generator_off, INT)
-    t.array(a + "chip_detected", size, lambda _: _failed(sim, "rel_chipde"), INT)
-    t.array(a + "engine_fires", size, lambda _: _failed(sim, "rel_engfir"), INT)
-    t.setting(a + "igniter_on", 0, INT, size=size, writable=False)
+    t.value(a + "gear_unsafe", lambda f: any(0.01 < wheel.extended < 0.99 for wheel in f.m.gear))
+    t.value(a + "gear_warning", lambda f: _gear_warning(f))
+    t.array(a + "fuel_pressure_low", lambda f: [not e.running for e in f.m.engines])
+    t.array(a + "oil_pressure_low", lambda f: [e.oil_pressure_pa < 1e5 for e in f.m.engines])
+    t.array(a + "oil_temperature_high", lambda f: [e.oil_temperature_k > 395.0 for e in f.m.engines])
+    t.array(a + "inverter_off", lambda _: 1.0 - sim.store.array(_ELECTRICAL + "inverter_on"))
+    t.array(a + "generator_off", lambda _: sim.electrics.generator_off)
+    t.array(a + "chip_detected", lambda _: _failed(sim, "rel_chipde"))
+    t.array(a + "engine_fires", lambda _: _failed(sim, "rel_engfir"))
+    t.setting(a + "igniter_on")
 
 
 def _failed(sim: Sources, stem: str) -> List[bool]:
@@ -180,14 +178,14 @@ def _master_caution(f: Frame, sim: Sources) -> bool:
 
 
 def _view(t: Table, sim: Sources) -> None:
-    t.setting(_VIEW + "view_type", 1000, INT, writable=False)
-    t.setting(_VIEW + "view_is_external", 0, INT, writable=False)
+    t.setting(_VIEW + "view_type", 1000)
+    t.setting(_VIEW + "view_is_external")
     t.setting(_VIEW + "field_of_view_deg", 60.0)
     t.setting(_VIEW + "vertical_field_of_view_deg", 46.8264)
     for name in ("field_of_view_vertical_deg", "field_of_view_horizontal_deg", "field_of_view_roll_deg"):
         t.setting(_VIEW + name)
-    t.setting(_VIEW + "window_width", sim.window_size[0], INT, writable=False)
-    t.setting(_VIEW + "window_height", sim.window_size[1], INT, writable=False)
+    t.setting(_VIEW + "window_width", sim.window_size[0], read_only=True)
+    t.setting(_VIEW + "window_height", sim.window_size[1], read_only=True)
     for name in ("pilots_head_x", "pilots_head_y", "pilots_head_z"):
         t.setting(_VIEW + name)
     for name in ("pilots_head_psi", "pilots_head_the", "pilots_head_phi"):
@@ -198,14 +196,14 @@ def _view(t: Table, sim: Sources) -> None:
     t.value(_VIEW + "view_pitch", lambda f: f.theta + sim.store.get(_VIEW + "pilots_head_the"))
     t.value(_VIEW + "view_roll", lambda f: f.phi)
     t.value(_VIEW + "view_heading", lambda f: (f.psi + sim.store.get(_VIEW + "pilots_head_psi")) % 360.0)
-    t.setting("sim/graphics/VR/enabled", 0, INT, versions=(*X11, *X12), writable=False)
+    t.setting("sim/graphics/VR/enabled")
 
 
 def _radios(t: Table) -> None:
     """Frequencies in 10 kHz; nothing transmits."""
     radios = "sim/cockpit/radios/"
     for name, frequency in (("com1", 12190), ("com2", 12280), ("nav1", 11030), ("nav2", 11130)):
-        t.setting(f"{radios}{name}_freq_hz", frequency, INT)
-        t.setting(f"{radios}{name}_stdby_freq_hz", frequency + 100, INT)
-    t.setting(radios + "transponder_code", 1200, INT)
-    t.setting(radios + "transponder_mode", 2, INT)
+        t.setting(f"{radios}{name}_freq_hz", frequency)
+        t.setting(f"{radios}{name}_stdby_freq_hz", frequency + 100)
+    t.setting(radios + "transponder_code", 1200)
+    t.setting(radios + "transponder_mode", 2)

@@ -1,0 +1,146 @@
+// Prints every dataref and command that the C++ sources use, by version: version, access, path, unit, one use a line,
+// separated by tabs. Access is `read`, `write` or `command`; the unit is empty where the code assumes none.
+// tests/python/xplane_names holds them to X-Plane's lists.
+
+#include <iostream>
+#include <string>
+
+#include "xplane_bridge/core/control/control_channels.hpp"
+#include "xplane_bridge/core/failures/failure_names.hpp"
+#include "xplane_bridge/core/failures/failures.hpp"
+#include "xplane_bridge/core/link/data_output.hpp"
+#include "xplane_bridge/core/simulator/flight_settings.hpp"
+#include "xplane_bridge/core/simulator/flight_start.hpp"
+#include "xplane_bridge/core/simulator/simulator_settings.hpp"
+#include "xplane_bridge/core/state/aircraft_identity.hpp"
+#include "xplane_bridge/core/state/field_table.hpp"
+#include "xplane_bridge/core/state/flight_watch.hpp"
+#include "xplane_bridge/core/surfaces/surface_watch.hpp"
+#include "xplane_bridge/core/surfaces/surfaces.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
+
+namespace {
+
+using namespace xplane_bridge::core;
+
+class Uses {
+ public:
+  explicit Uses(SimulatorVersion version) : version_(version) {}
+
+  void all() const {
+    state();
+    controls();
+    surfaces();
+    failures();
+    settings();
+    link();
+  }
+
+ private:
+  void print(const char* access, const std::string& path, const std::string& unit) const {
+    std::cout << version_.number << '\t' << access << '\t' << path << '\t' << unit << '\n';
+  }
+  void read(const std::string& path, const std::string& unit = "") const { print("read", path, unit); }
+  void write(const std::string& path, const std::string& unit = "") const { print("write", path, unit); }
+
+  template <typename Names>
+  void readAll(const Names& names) const {
+    for (const auto& name : names) read(name);
+  }
+  /// Written, and read back.
+  void set(const std::vector<DatarefWrite>& writes) const {
+    for (const DatarefWrite& each : writes) {
+      write(each.dataref);
+      read(each.dataref);
+    }
+  }
+
+  void state() const {
+    for (std::size_t group = 0; group < kFieldGroupCount; ++group) {
+      for (const DatarefRequest& request :
+           datarefRequests(static_cast<FieldGroup>(group), Transport::kRref, version_)) {
+        const std::string wire_unit = datarefOf(*request.field, version_)->conversion.wire_unit;
+        read(request.path, wire_unit.empty() || wire_unit == "negated" ? request.field->unit : wire_unit);
+      }
+    }
+    readAll(flightWatchDatarefs());
+    readAll(AircraftIdentityReader::datarefs());
+  }
+
+  void controls() const {
+    ChannelSet every;
+    every.set();
+    for (const bool reverse_thrust : {false, true}) {
+      const EncoderOptions options{version_, reverse_thrust};
+      for (std::size_t i = 0; i < kChannelCount; ++i) {
+        write(writeDataref(static_cast<Channel>(i), options));
+        read(readBackDataref(static_cast<Channel>(i), options));
+      }
+      for (const std::string& name : requiredOverrides(every, options)) set({{name, 1.0F}});
+    }
+    set({{kThrottleOverride, 0.0F}});
+  }
+
+  void surfaces() const {
+    set({{kSurfaceOverride, 1.0F}});
+    for (const SurfaceInfo& surface : surfaceTable()) {
+      write(surface.dataref, "deg");
+      read(surface.dataref, "deg");
+    }
+    readAll(surfaceWatchDatarefs(version_));
+  }
+
+  void failures() const {
+    for (const std::string& name : simulatorFailures(version_)) set({{name, 6.0F}});
+    std::vector<FailureRequest> requests;
+    for (const SurfaceInfo& surface : surfaceTable()) {
+      for (const char* kind : {"stuck", "hard_over_up", "hard_over_down", "centred", "gone"}) {
+        requests.push_back({surface.name, kind, std::nullopt});
+      }
+    }
+    for (const char* system : {"engine", "bus", "generator", "battery", "pitot", "static", "gyro"}) {
+      for (int number = 1; number < 10; ++number) {
+        requests.push_back({std::string(system) + "_" + std::to_string(number), "failed", std::nullopt});
+      }
+    }
+    for (const FailureRequest& request : requests) {
+      for (const std::string& name : planFailure(request, version_).plan.datarefs) set({{name, 6.0F}});
+    }
+  }
+
+  void settings() const {
+    set(windWrites({10.0, 270.0, 0.5}, version_));
+    readAll(shownWindDatarefs(version_));
+    Loading loading;
+    loading.fuel_tank.assign(9, 10.0);
+    loading.payload_mass = 100.0;
+    loading.cg_offset = 0.1;
+    set(loadingWrites(loading, version_));
+    const std::vector<std::string> flight = shownFlightDatarefs(version_);
+    readAll(flight);
+    if (const auto shown = shownFlightFrom(std::vector<DatarefValue>(flight.size(), 1.0F))) {
+      set(motionWrites(FlightStart{}, *shown));
+    }
+    readAll(aircraftPathDatarefs(kFilePathSize, version_));
+    for (const auto view : {CameraView::kForward, CameraView::kRear, CameraView::kDown}) set(viewWrites(view));
+    for (const bool pause : {false, true}) print("command", pauseCommand(pause, version_), "");
+    read(kPausedDataref);
+  }
+
+  void link() const {
+    set({{kDataRateDataref, 20.0F}});
+    std::vector<FieldGroup> groups;
+    for (std::size_t group = 0; group < kFieldGroupCount; ++group) groups.push_back(static_cast<FieldGroup>(group));
+    for (const std::int32_t row : dataRows(groups, version_)) set({{dataRowDataref(row), 1.0F}});
+  }
+
+  SimulatorVersion version_;
+};
+
+}  // namespace
+
+/// simulator_names VERSION...: internal versions, e.g. 115500
+int main(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) Uses(SimulatorVersion{std::stoi(argv[i])}).all();
+  return 0;
+}

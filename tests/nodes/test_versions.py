@@ -1,0 +1,129 @@
+"""rx_node and tx_node at the oldest and the newest X-Plane: what they do works, by names that it has."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from support.tx_fixtures import ROLL, CommandSource, WatchedDatarefs, call, tx_params
+from xplane_bridge import protocol
+from xplane_bridge.emulator.simulator import aircraft_path
+from xplane_bridge.harness import HarnessError, wait_until
+
+ACCEPTED, AIRCRAFT, OK = 1, 3, 0
+FAILURES = "sim/operation/failures/"
+PAUSED, STICK = "sim/time/paused", "sim/joystick/yoke_roll_ratio"
+THERE = {"latitude": 47.2, "longitude": 8.3, "altitude_msl": 1500.0, "heading_true_deg": 250.0, "true_airspeed": 75.0}
+
+
+@pytest.fixture(scope="module", params=["11.40", "12"])
+def flight(request, new_world, tmp_path_factory):
+    """One flight of each version; when its tests are over, nothing may have been asked for in vain."""
+    from xplane_bridge.msg import EventList, FailureState, FlightState
+
+    world = new_world(tmp_path_factory.mktemp("versions"))
+    pilot = world.folder / "pilot.yaml"
+    pilot.write_text("name: level\nevents: [{at: 0, hold: {roll: 0, altitude: 1000, speed: 72}}]\n", encoding="utf-8")
+    world.version = request.param
+    world.xplane = world.emulator("--no-beacon", "--start", "air", "--pilot", pilot, "--version", request.param)
+    world.other = world.wire(world.xplane.port)
+    world.seen = WatchedDatarefs(world.xplane.port, STICK)
+    world.events = world.watch("events", EventList)
+    world.failures = world.watch("failures/state", FailureState)
+    world.states = world.watch("flight_state", FlightState)
+    world.manual = CommandSource(world, "control/manual")
+    world.set_param("aircraft", "fixed_wing")
+    world.start("rx_node")
+    world.start("tx_node", tx_params(setting_timeout=5.0, load_timeout=10.0))
+    world.events.wait_for(lambda e: any(event.kind == AIRCRAFT for event in e.events))
+    world.states.wait_for()
+    yield world
+    world.manual.stop()
+    world.seen.close()
+    world.close()
+    ignored = json.loads(world.xplane.wait_for_line(r"^STOPPED (.*)", 1.0).group(1))["ignored"]
+    assert {reason: count for reason, count in ignored.items() if reason in ("dataref", "command", "value")} == {}
+
+
+def done(world, service, kind, **request):
+    """Calls a service that accepts, and waits for the event that tells that X-Plane did it."""
+    response = call(world, service, kind, **request)
+    assert response.result.code == ACCEPTED, response.result.message
+    number = response.event_number
+    told = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 30)
+    event = next(event for event in told.events if event.number == number)
+    assert event.success, event.text
+
+
+def pause(world, paused):
+    from std_srvs.srv import SetBool
+
+    answer = world.call("tx_node/pause", SetBool, paused)
+    assert answer.success, answer.message
+    assert world.other.read(PAUSED) == float(paused)
+
+
+def test_pause_pauses_however_often_it_is_asked_for(flight):
+    for paused in (True, True, False, False, True, False):
+        pause(flight, paused)
+
+
+def test_reset_places_the_flight_and_leaves_it_running_or_paused(flight):
+    for paused in (False, True):
+        pause(flight, paused)
+        done(flight, "reset_flight", "ResetFlight", **THERE)
+        assert flight.other.read("sim/flightmodel/position/latitude") == pytest.approx(47.2, abs=0.01)
+        assert flight.other.read(PAUSED) == float(paused)
+    pause(flight, False)
+
+
+def test_another_aircraft_is_loaded_and_flown(flight):
+    done(flight, "load_aircraft", "LoadAircraft", path=aircraft_path("multirotor"))
+    done(flight, "load_aircraft", "LoadAircraft", path=aircraft_path("fixed_wing"))
+    flight.manual.fly(fields=ROLL, roll=0.125)
+    flight.seen.wait(STICK, 0.125)
+    flight.manual.stop()
+
+
+@pytest.mark.parametrize("name", ["rel_invert0", "rel_lites_beac", "rel_mwing36", "rel_bird_strike_eng1"])
+def test_a_failure_of_the_simulators_menu_is_labelled_whatever_it_is(flight, name):
+    if flight.version == "11.40" and name in ("rel_mwing36", "rel_bird_strike_eng1"):
+        pytest.skip("version 11 does not have it")
+    flight.other.send(protocol.DrefWrite(FAILURES + name, 6.0))
+    state = flight.failures.wait_for_next(lambda f: name in f.names)
+    assert state.set_by[state.names.index(name)] == "simulator"
+    flight.other.send(protocol.DrefWrite(FAILURES + name, 0.0))
+    flight.failures.wait_for_next(lambda f: name not in f.names)
+
+
+def test_an_engine_is_failed_and_repaired(flight):
+    assert call(flight, "set_failure", "SetFailure", name="engine_1", kind="failed").result.code == OK
+    assert flight.other.read(FAILURES + "rel_engfai0") == 6.0
+    assert call(flight, "clear_failures", "ClearFailures").result.code == OK
+    assert flight.other.read(FAILURES + "rel_engfai0") == 0.0
+
+
+def test_diagnostics_are_without_a_warning(flight):
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    log = flight.watch("/diagnostics", DiagnosticArray)
+    prefix = flight.namespace.lstrip("/") + "/"
+
+    def newest():
+        found = {}
+        for array in log.messages:
+            found.update({s.name: s for s in array.status if s.name.lstrip("/").startswith(prefix)})
+        return found
+
+    def all_well():
+        statuses = newest()
+        links = [name for name in statuses if name.endswith("link to X-Plane")]
+        return len(links) == 2 and all(status.level == OK for status in statuses.values())
+
+    try:
+        wait_until(all_well, 40.0, "diagnostics without a warning")
+    except HarnessError:
+        pytest.fail("\n".join(f"{s.name}: {s.level} {s.message}" for s in newest().values()))
+    finally:
+        log.close()
