@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from xplane_bridge import xplane_names
 from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
 from xplane_bridge.emulator.datarefs.data_rows import DataRows
 from xplane_bridge.emulator.flight.flight_model import InitialState
@@ -45,8 +46,9 @@ def truth(model):
 
 
 def generate(version, paths):
-    sim = Simulator(lambda _: KinematicModel(7), "fixed_wing", version=version, initial=START, sim_time_start=5000.0)
-    rows = DataRows(sim.store, version, level_angles=True)
+    newest = xplane_names.NEWEST[str(version)]
+    sim = Simulator(lambda _: KinematicModel(7), "fixed_wing", version=newest, initial=START, sim_time_start=5000.0)
+    rows = DataRows(sim.store, sim.is_12, level_angles=True)
     sim.set_weather(WIND_FROM_DEG, WIND_MPS, 0.0, 1)
     sim.store.write("sim/operation/override/override_joystick", 1.0)
     for path, value in (("yoke_roll_ratio", 0.4), ("yoke_pitch_ratio", 0.25), ("yoke_heading_ratio", 0.2)):
