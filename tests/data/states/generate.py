@@ -40,8 +40,11 @@ def rpos(position):
     return struct.pack("<4sB3d10f", b"RPOS", 0x34, *dataclasses.astuple(position)).hex()
 
 
-def truth(model):
-    state = dataclasses.asdict(model.state)
+def truth(sim):
+    state = dataclasses.asdict(sim.model.state)
+    state["agl_m"] = (
+        sim.frame.height
+    )  # X-Plane's y_agl: of an aircraft on its wheels it is not the height of its centre
     return {key: value for key, value in state.items() if isinstance(value, (int, float)) and math.isfinite(value)}
 
 
@@ -63,7 +66,7 @@ def generate(version, paths):
                 "rref": values(sim.store, paths),
                 "data": rows.packet(np.arange(139)).hex(),
                 "rpos": rpos(sim.position()),
-                "truth": truth(sim.model),
+                "truth": truth(sim),
             }
         )
     return {"version": sim.internal_version, "paths": paths, "frames": frames}
