@@ -160,10 +160,10 @@ class NoRos:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
-site, program, module = sys.argv[1:]
+site, program, module, *arguments = sys.argv[1:]
 sys.meta_path.insert(0, NoRos)
 sys.path.insert(0, site)
-sys.argv = [program, "--help"]
+sys.argv = [program, *arguments]
 from xplane_bridge.resources import config_file
 
 assert config_file("scenarios", "demo.yaml").is_file()
@@ -172,19 +172,36 @@ sys.exit(main())
 """
 
 
-@pytest.mark.parametrize("name", launchers())
-def test_without_ros_programs_start_or_say_that_they_need_it(name, wheel_folder, tmp_path):
+def without_ros(name, arguments, wheel_folder, folder):
+    """Runs a program that pip has installed where there is no ROS."""
     script = (ROOT / "scripts" / name).read_text(encoding="utf-8")
     module = re.search(r'launch\("(\w+)"\)', script).group(1)
     # -I: neither this process's PYTHONPATH nor the folder it is started in.
-    command = [sys.executable, "-I", "-c", WITHOUT_ROS, wheel_folder, name, module]
-    done = subprocess.run(list(map(str, command)), cwd=tmp_path, capture_output=True, text=True, check=False)
-    if "import rospy" in (ROOT / "src/xplane_bridge/cli" / f"{module}.py").read_text(encoding="utf-8"):
-        assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
-        assert "rospy is not there: source ROS's setup.bash" in done.stderr
-    else:
-        assert done.returncode == 0, done.stderr
-        assert "usage:" in done.stdout
+    command = [sys.executable, "-I", "-c", WITHOUT_ROS, wheel_folder, name, module, *arguments]
+    return subprocess.run(list(map(str, command)), cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("name", launchers())
+def test_without_ros_programs_say_how_they_are_used(name, wheel_folder, tmp_path):
+    done = without_ros(name, ["--help"], wheel_folder, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "usage:" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("attitude_hold", []),
+        ("joy_reader", []),
+        ("live_plot", ["--after", "1", "/xplane/flight_state/roll_deg"]),
+        ("record_watch", []),
+        ("scenario_player", ["demo"]),
+    ],
+)
+def test_without_ros_nodes_say_that_they_need_it(name, arguments, wheel_folder, tmp_path):
+    done = without_ros(name, arguments, wheel_folder, tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+    assert "rospy is not there: source ROS's setup.bash" in done.stderr
 
 
 def test_environment_leaves_the_arguments_of_a_script_alone(tmp_path):
