@@ -252,7 +252,7 @@ def test_states_below_the_frame_rate_are_interpolated(world, display) -> None:
     [
         ({"max_rate": -1.0}, "max_rate"),
         ({"fit": "zoom"}, "crop"),
-        ({"window": {"title": "a", "class": "b"}}, "exactly one"),
+        ({"window": {"title": "a", "class": "b"}}, "at most one"),
         ({"window": {"region": [1, 2, 3]}}, "region"),
         ({"source": "video"}, "address"),
         ({"widht": 320}, "width"),
