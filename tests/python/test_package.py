@@ -133,7 +133,8 @@ def test_the_rules_know_what_they_forbid(room, header):
 # ----------------------------------------------------------------------------------------------------- one clock
 
 HOST_TIME = re.compile(
-    r"hostClock\(|\b(?:steady|system|high_resolution)_clock\b|\b(?:clock_gettime|gettimeofday|nanosleep|usleep)\b"
+    r"hostClock\(|\b(?:steady|system|high_resolution)_clock\b"
+    r"|\b(?:clock_gettime|gettimeofday|nanosleep|usleep|pthread_cond_timedwait)\b"
     r"|\btime\((?:nullptr|NULL|0)\)|\b(?:Wall|Steady)?Time::now\b|\b(?:Wall|Steady)Timer\b"
     r"|\bcreate(?:Wall|Steady)?Timer\b|\b(?:Wall)?Rate [a-z]\w*\(|\bsleep_(?:for|until)\b"
     r"|(?:\.|->)(?:wait_for|wait_until|sleep)\("
@@ -145,12 +146,15 @@ MAY_USE_HOST_TIME = {
     "include/xplane_bridge/core/base/clock.hpp": ("what the host's clock is", {"hostClock("}),
     "lib/core/base/clock.cpp": (
         "reads the host's clock, and waits by it for clocks that run by themselves",
-        {"hostClock(", "clock_gettime", ".wait_for("},
+        {"hostClock(", "clock_gettime", "pthread_cond_timedwait"},
     ),
-    "include/xplane_bridge/nodes/base/base_node.hpp": ("makes the node's clock", {"hostClock("}),
+    "include/xplane_bridge/nodes/base/base_node.hpp": (
+        "makes the node's clock; also for the stop, which must not hang with the node's clock",
+        {"hostClock("},
+    ),
     "lib/nodes/base/base_node.cpp": (
-        "waits for the master before there is a node; watches over the stop, which must not hang with the node's clock",
-        {".wait_for(", "sleep_for"},
+        "waits for the master before there is a node, and for roscpp to send the last words",
+        {"sleep_for"},
     ),
     "lib/actuation/guardian.cpp": ("a process of its own: releases whatever clock the node had", {"hostClock("}),
     "lib/vision/video_source.cpp": ("devices and files play in the host's time", {"steady_clock", "sleep_until"}),

@@ -3,7 +3,7 @@
 #include <time.h>
 
 #include <algorithm>
-#include <chrono>
+#include <system_error>
 
 namespace xplane_bridge::core {
 namespace {
@@ -32,9 +32,22 @@ void ClockWaiters::wakeAll() {
   }
 }
 
+ClockCondition::ClockCondition() {
+  pthread_condattr_t attributes;
+  pthread_condattr_init(&attributes);
+  pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+  const int error = pthread_cond_init(&changed_, &attributes);
+  pthread_condattr_destroy(&attributes);
+  if (error != 0) {
+    throw std::system_error(error, std::generic_category(), "cannot make a condition");
+  }
+}
+
+ClockCondition::~ClockCondition() { pthread_cond_destroy(&changed_); }
+
 void ClockCondition::notifyAll() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  changed_.notify_all();
+  pthread_cond_broadcast(&changed_);
 }
 
 void ClockCondition::beginWait(const Deadline* deadline) {
@@ -45,14 +58,17 @@ void ClockCondition::beginWait(const Deadline* deadline) {
 }
 
 void ClockCondition::sleep(std::unique_lock<std::mutex>* sleeping, const Deadline* deadline) {
-  constexpr double kLongest = 3600.0;  // [s] of one sleep: far below what a duration holds
-  if (deadline == nullptr) {
-    changed_.wait(*sleeping);
-  } else if (waitersOf(deadline) == nullptr) {
-    changed_.wait_for(*sleeping, std::chrono::duration<double>(std::min(deadline->left(), kLongest)));
-  } else if (!deadline->over()) {
-    changed_.wait(*sleeping);
+  constexpr double kLongest = 3600.0;  // [s] of one sleep: far below what a time holds
+  pthread_mutex_t* const mutex = sleeping->mutex()->native_handle();
+  if (deadline == nullptr || waitersOf(deadline) != nullptr) {
+    if (deadline == nullptr || !deadline->over()) {
+      pthread_cond_wait(&changed_, mutex);
+    }
+    return;
   }
+  const std::int64_t end_ns = readClock(CLOCK_MONOTONIC) + toNanoseconds(std::min(deadline->left(), kLongest));
+  const timespec end{end_ns / kNanosecondsPerSecond, end_ns % kNanosecondsPerSecond};
+  pthread_cond_timedwait(&changed_, mutex, &end);
 }
 
 void ClockCondition::endWait(const Deadline* deadline) {

@@ -13,21 +13,23 @@ namespace xplane_bridge {
 namespace {
 
 constexpr std::int64_t kDiagnosticsPeriodNs = core::kNanosecondsPerSecond;
-constexpr std::chrono::milliseconds kServiceGrace{300};
+constexpr double kServiceGrace = 0.3;  // [s]
 constexpr std::chrono::milliseconds kFlushTime{100};
 constexpr std::chrono::milliseconds kMasterPollPeriod{200};
 
 /// Ends the process when the stop sequence hangs; says in which step.
 class StopWatchdog {
  public:
-  StopWatchdog() : thread_([this] { watch(); }) {}
+  explicit StopWatchdog(const core::Clock& host_clock)
+      : deadline_(host_clock, std::chrono::duration<double>(BaseNode::kStopTime).count()),
+        thread_([this] { watch(); }) {}
 
   ~StopWatchdog() {
     {
       std::lock_guard<std::mutex> lock(mutex_);
       done_ = true;
     }
-    changed_.notify_all();
+    changed_.notifyAll();
     thread_.join();
   }
 
@@ -36,14 +38,15 @@ class StopWatchdog {
  private:
   void watch() {
     std::unique_lock<std::mutex> lock(mutex_);
-    if (!changed_.wait_for(lock, BaseNode::kStopTime, [this] { return done_; })) {
+    if (!changed_.waitUntil(&lock, deadline_, [this] { return done_; })) {
       std::fprintf(stderr, "the stop sequence hangs in: %s; ending the process\n", step_.load());
       std::_Exit(static_cast<int>(ExitCode::kStopTimeout));
     }
   }
 
+  const core::Deadline deadline_;
   std::mutex mutex_;
-  std::condition_variable changed_;
+  core::ClockCondition changed_;
   bool done_ = false;
   std::atomic<const char*> step_{"start"};
   std::thread thread_;
@@ -155,7 +158,7 @@ void BaseNode::waitForStopRequest() {
 }
 
 void BaseNode::stop() {
-  StopWatchdog watchdog;
+  StopWatchdog watchdog(host_clock_);
   const auto step = [&watchdog](const char* step_name, const std::function<void()>& action) {
     watchdog.enter(step_name);
     try {
@@ -193,7 +196,7 @@ void BaseNode::endInputs() {
   service_queue_.disable();
   stopInputs();
   std::unique_lock<std::mutex> lock(service_mutex_);
-  if (!service_idle_.wait_for(lock, kServiceGrace, [this] { return !service_busy_; })) {
+  if (!service_idle_.waitUntil(&lock, Deadline(host_clock_, kServiceGrace), [this] { return !service_busy_; })) {
     ROS_WARN("a service call is still waiting for X-Plane; stopping without it");
   }
 }
@@ -223,7 +226,7 @@ bool BaseNode::guardedService(const std::string& service, const std::function<vo
     std::lock_guard<std::mutex> lock(service_mutex_);
     service_busy_ = false;
   }
-  service_idle_.notify_all();
+  service_idle_.notifyAll();
   return served;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <condition_variable>
+#include <pthread.h>
+
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -71,6 +72,11 @@ class Deadline {
 /// as it is notified or the clock reaches the deadline, whichever way the clock goes.
 class ClockCondition {
  public:
+  ClockCondition();
+  ~ClockCondition();
+  ClockCondition(const ClockCondition&) = delete;
+  ClockCondition& operator=(const ClockCondition&) = delete;
+
   /// Lets all who wait look at what they wait for. The caller may hold their mutex.
   void notifyAll();
 
@@ -112,7 +118,8 @@ class ClockCondition {
   // Held when a waiting thread goes to sleep and when one is woken, so that no waking gets lost in between. Nothing
   // else is locked while it is held; this is why those who notify or move the clock may hold any lock.
   std::mutex mutex_;
-  std::condition_variable changed_;
+  // std::condition_variable of g++ 9 waits by the system's time, and so too long where that is set back meanwhile.
+  pthread_cond_t changed_{};
 };
 
 }  // namespace xplane_bridge::core

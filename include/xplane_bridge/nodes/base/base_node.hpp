@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -196,7 +195,7 @@ class BaseNode {
   std::unique_ptr<core::SimLink> link_;
 
   std::mutex service_mutex_;
-  std::condition_variable service_idle_;
+  core::ClockCondition service_idle_;
   bool service_busy_ = false;
 
   std::mutex diagnostics_mutex_;

@@ -111,6 +111,56 @@ TEST_F(AConditionOfAClock, MayBeMovedByWhoHoldsTheMutex) {
   EXPECT_FALSE(waiting.get().done);
 }
 
+TEST_F(AConditionOfAClock, IsNotWaitedForWhereTheClockIsMovedJustBefore) {
+  std::atomic<std::int64_t> now{0};
+  const auto waiters = std::make_shared<ClockWaiters>();
+  int looks = 0;
+  const Clock clock{[&] {
+                      const std::int64_t seen = now;
+                      if (++looks == 2) {  // the wait has seen that the deadline is not over, and does not sleep yet
+                        now = kMs;
+                        waiters->wakeAll();
+                      }
+                      return seen;
+                    },
+                    [] { return std::int64_t{0}; }, waiters};
+  const Deadline deadline = Deadline::at(clock, kMs);
+  std::unique_lock<std::mutex> lock(mutex_);
+  EXPECT_FALSE(condition_.waitUntil(&lock, deadline, [] { return false; }));
+}
+
+TEST_F(AConditionOfAClock, LosesNoNotificationWhileItGoesToSleep) {
+  // A lock that lets another thread notify as soon as it is unlocked, which is before the waiting one sleeps.
+  struct NotifiedInUnlock {
+    void lock() { mutex->lock(); }
+    void unlock() {
+      mutex->unlock();
+      if (notifying.joinable()) return;
+      notifying = std::thread([this] {
+        {
+          const std::lock_guard<std::mutex> locked(*mutex);
+          *done = true;
+        }
+        condition->notifyAll();
+        notified = true;
+      });
+      // Right code holds the other back until it sleeps itself, wrong code lets it be done with it by now.
+      for (int i = 0; i < 10'000 && !notified; ++i) std::this_thread::yield();
+    }
+    std::mutex* mutex;
+    bool* done;
+    ClockCondition* condition;
+    std::thread notifying{};
+    std::atomic<bool> notified{false};
+  };
+  NotifiedInUnlock lock{&mutex_, &done_, &condition_};
+  lock.lock();
+  condition_.wait(&lock, [this] { return done_; });
+  EXPECT_TRUE(done_);
+  lock.unlock();
+  lock.notifying.join();
+}
+
 TEST_F(AConditionOfAClock, LosesNoWakingOfManyMovesAndWaiters) {
   HandClock hand;
   constexpr int kWaits = 2000;
