@@ -62,7 +62,7 @@ def forbidden(room, header, table):
     ours = OUR_HEADER.search(header)
     if ours:
         return ours.group(1) != room and ours.group(1) not in table[room]
-    ros_allowed = room == "actuation" or room.startswith("nodes/")
+    ros_allowed = room.startswith("nodes/")
     if ROS_HEADER.search(header):
         return not ros_allowed
     return bool(GRAPHICS_HEADER.search(header)) and not (ros_allowed or room == "vision")

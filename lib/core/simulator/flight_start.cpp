@@ -152,24 +152,30 @@ std::vector<DatarefWrite> motionWrites(const FlightStart& start, const ShownFlig
           {at + "Rrad", 0.0F}};
 }
 
+std::string placeDifferenceOf(const FlightStart& start, const ShownFlight& shown) {
+  std::vector<std::string> out;
+  const double reach = kPlace + kFlownOn * velocityOf(start, shown.wind_ned).norm();
+  const double away = groundDistance({start.latitude_deg, start.longitude_deg, 0.0}, shown.place);
+  if (!(away <= reach)) out.push_back("it is " + number(away) + " m away");
+  if (!(std::abs(shown.place.height - start.altitude_msl) <= reach)) {
+    out.push_back("its altitude is " + number(shown.place.height) + " m, not " + number(start.altitude_msl));
+  }
+  return join(out);
+}
+
 std::string differenceOf(const FlightStart& start, const ShownFlight& shown) {
   std::vector<std::string> out;
-  const auto say = [&out](const std::string& text) { out.push_back(text); };
-  const Eigen::Vector3d velocity = velocityOf(start, shown.wind_ned);
-  const double reach = kPlace + kFlownOn * velocity.norm();
-  const double away = groundDistance({start.latitude_deg, start.longitude_deg, 0.0}, shown.place);
-  if (!(away <= reach)) say("it is " + number(away) + " m away");
-  if (!(std::abs(shown.place.height - start.altitude_msl) <= reach)) {
-    say("its altitude is " + number(shown.place.height) + " m, not " + number(start.altitude_msl));
-  }
+  if (const std::string place = placeDifferenceOf(start, shown); !place.empty()) out.push_back(place);
   // By the angle of the one rotation between both, because roll and heading mean little near +-90 deg of pitch.
   const Eigen::AngleAxisd turn(
       Eigen::Matrix3d(rotationNedFrd(attitudeOf(start)).transpose() * rotationNedFrd(shown.attitude)));
   if (!(turn.angle() * kDegreesPerRadian <= kAngleDeg)) {
-    say("its attitude is " + number(turn.angle() * kDegreesPerRadian) + " deg off");
+    out.push_back("its attitude is " + number(turn.angle() * kDegreesPerRadian) + " deg off");
   }
-  const double off = (velocity - shown.velocity_ned).norm();
-  if (!(off <= kVelocity + kFlownOn * kStandardGravity)) say("its velocity is " + number(off) + " m/s off");
+  const double off = (velocityOf(start, shown.wind_ned) - shown.velocity_ned).norm();
+  if (!(off <= kVelocity + kFlownOn * kStandardGravity)) {
+    out.push_back("its velocity is " + number(off) + " m/s off");
+  }
   return join(out);
 }
 

@@ -9,7 +9,7 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kGroundedWait = 1.0;     // [s] until everything must be given back
+constexpr double kSuspensionWait = 1.0;   // [s] until everything must be given back
 constexpr std::int32_t kOldest = 110000;  // X-Plane 11.00: earlier ones have other messages for placing and loading
 
 std::optional<double> given(float value) {
@@ -40,7 +40,7 @@ core::Loading toCore(const SetLoading::Request& q) {
 }  // namespace
 
 void TxNode::makeFlightJobs() {
-  FlightJobHooks hooks;
+  FlightChangeHooks hooks;
   hooks.watch = [this] {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return watch_;
@@ -57,23 +57,24 @@ void TxNode::makeFlightJobs() {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     return described(identity_.identity());
   };
-  hooks.ground = [this](const std::string& why) { ground(why); };
+  hooks.suspend_control = [this](const std::string& reason) { suspendControl(reason); };
   hooks.pausing = [this](const std::string& who) {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
     pause_by_ = who;
   };
-  hooks.report = [this](std::uint32_t number, std::uint8_t kind, const std::string& text, const std::string& who,
-                        bool success) { logEvent(kind, text, who, success, number); };
-  auto jobs = std::make_unique<FlightJobs>(&link(), FlightJobOptions{options_.setting_timeout, options_.load_timeout},
-                                           std::move(hooks));
+  auto jobs = std::make_unique<FlightJobs>(
+      &link(), FlightChangeOptions{options_.setting_timeout, options_.load_timeout}, std::move(hooks),
+      [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
+        logEvent(static_cast<std::uint8_t>(outcome.kind), outcome.text, who, outcome.success, number);
+      });
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   jobs_ = std::move(jobs);
 }
 
-void TxNode::ground(const std::string& why) {
-  if (why.empty()) return path_->resume();
-  path_->suspend(why);
-  link().waitUntil([this] { return !(surfaces_->driving() || overrides_->releasesPending()); }, kGroundedWait);
+void TxNode::suspendControl(const std::string& reason) {
+  if (reason.empty()) return path_->resume();
+  path_->suspend(reason);
+  link().waitUntil([this] { return !(surfaces_->driving() || overrides_->releasesPending()); }, kSuspensionWait);
 }
 
 std::optional<ServiceResult> TxNode::refusalOfJob(const std::optional<std::string>& wrong) const {

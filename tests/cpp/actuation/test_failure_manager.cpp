@@ -701,6 +701,51 @@ TEST_F(FailureManagerTest12, HardOverOfXPlanesMustReachTheEndOfTheTravel) {
   EXPECT_EQ(state(), SurfaceControlState::kIdle) << "within 2 deg";
 }
 
+struct OwnCase {
+  std::string kind;
+  std::string event;  // the end of X-Plane's own name
+  double shown;       // [deg] where X-Plane brings the left aileron, from 5
+};
+const std::vector<OwnCase> kOwnCases{{"stuck", "lock", 5.0},
+                                     {"hard_over_up", "mxup", -20.0},
+                                     {"hard_over_down", "mxdn", 20.0},
+                                     {"centred", "cntr", 0.0}};
+
+TEST_F(FailureManagerTest12, EachOwnFailureIsBelievedWhereTheSurfaceGoesAsItSays) {
+  for (const OwnCase& each : kOwnCases) {
+    SCOPED_TRACE(each.kind);
+    airframe_.letGo(FakeAirframe::kLeft);
+    airframe_.setStick(0.25);
+    sim_.run(1.2);
+    const std::string own = "sim/operation/failures/rel_fcon_ailn_1_lft_" + each.event;
+    sim_.on_message = [&](const core::FakeSimulator::Message& message) {
+      if (message.path == own && message.value == 6.0F) airframe_.hold(FakeAirframe::kLeft, each.shown);
+    };
+    after(0.2, [this] { airframe_.setStick(-0.25); });
+    require(broken(FakeAirframe::kLeft, each.kind));
+    EXPECT_EQ(sim_.value(own), 6.0F);
+    EXPECT_EQ(state(), SurfaceControlState::kIdle);
+    requireClear();
+    EXPECT_EQ(sim_.value(own), 0.0F);
+  }
+}
+
+TEST_F(FailureManagerTest12, EachOwnFailureGivesWayToTheDriverWhereTheSurfaceDoesNotGoThere) {
+  for (const OwnCase& each : kOwnCases) {
+    SCOPED_TRACE(each.kind);
+    airframe_.setStick(0.25);
+    sim_.run(1.2);
+    after(0.2, [this] { airframe_.setStick(-0.25); });
+    require(broken(FakeAirframe::kLeft, each.kind));
+    EXPECT_EQ(sim_.value("sim/operation/failures/rel_fcon_ailn_1_lft_" + each.event), 0.0F);
+    EXPECT_EQ(state(), SurfaceControlState::kDriving);
+    sim_.run(1.0);
+    EXPECT_NEAR(sim_.value(kLeft), each.shown, 1e-4);
+    EXPECT_NEAR(sim_.value(kRight), 5.0, 1e-4);
+    requireClear();
+  }
+}
+
 TEST_F(FailureManagerTest12, LostSurfaceIsXPlanesAlone) {
   require(broken(FakeAirframe::kLeft, "gone"));
   EXPECT_EQ(sim_.value("sim/operation/failures/rel_fcon_ailn_1_lft_gone"), 6.0F);

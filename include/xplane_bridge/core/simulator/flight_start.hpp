@@ -56,5 +56,7 @@ std::vector<DatarefWrite> motionWrites(const FlightStart& start, const ShownFlig
 /// In what X-Plane differs from it, in words; empty: in nothing. Tolerances are those of an aircraft that has flown on
 /// for 0.2 s.
 std::string differenceOf(const FlightStart& start, const ShownFlight& shown);
+/// The same of the place alone.
+std::string placeDifferenceOf(const FlightStart& start, const ShownFlight& shown);
 
 }  // namespace xplane_bridge::core

@@ -98,7 +98,7 @@ class TxNode : public BaseNode {
   // Flight services: accepted, then told on `events` (tx_node_flight.cpp).
   void makeFlightJobs();
   void advertiseFlightServices();
-  void ground(const std::string& why);
+  void suspendControl(const std::string& reason);
   /// Why a flight service is not accepted; `wrong`: what the request itself says. nullopt: it is.
   std::optional<ServiceResult> refusalOfJob(const std::optional<std::string>& wrong) const;
   /// Answers a flight service: refused, or accepted and begun with `begin(number of the event, who)`.

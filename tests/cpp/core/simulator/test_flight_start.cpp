@@ -140,6 +140,7 @@ TEST(FlightStart, WhatWasSentIsWhatIsShown) {
   other = given;
   other.latitude_deg = 47.71;
   EXPECT_NE(differenceOf(other, *shown).find("m away"), std::string::npos);
+  EXPECT_EQ(placeDifferenceOf(other, *shown), differenceOf(other, *shown));
   EXPECT_FALSE(isNear(other, *shown)) << "1113 m";
 }
 

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/actuation/pausing.hpp"
+#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/message_constants.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
+#include "xplane_bridge/core/simulator/flight_settings.hpp"
+#include "xplane_bridge/core/simulator/flight_start.hpp"
+#include "xplane_bridge/core/state/flight_watch.hpp"
+
+namespace xplane_bridge {
+
+/// What FlightChanges needs of its node. Each function is called from the thread that changes, without a lock held.
+struct FlightChangeHooks {
+  std::function<core::FlightWatch()> watch;  ///< the newest frame
+  std::function<unsigned()> resets;          ///< how often the flight was reset until now, see core::ResetDetector
+  std::function<unsigned()> identities;      ///< how often X-Plane has shown its aircraft until now
+  std::function<std::string()> aircraft;     ///< the aircraft it showed last, in words
+  /// Gives everything back and flies nothing until the next call with an empty text; the text says why. Waits until
+  /// X-Plane has shown it, or a second.
+  std::function<void(const std::string& reason)> suspend_control;
+  /// `who` is about to pause or resume the flight; empty: it did not come to that.
+  std::function<void(const std::string& who)> pausing;
+};
+
+struct FlightChangeOptions {
+  double setting_timeout = 10.0;  ///< [s] until X-Plane must show a setting, or attitude and velocity
+  double load_timeout = 120.0;    ///< [s] the same of a place, an aircraft or a situation: it may load files
+};
+
+/// How a change ended, for an event.
+struct FlightChangeOutcome {
+  core::EventKind kind = core::EventKind::kSetting;
+  std::string text;
+  bool success = false;
+};
+
+/// Places the flight, sets weather and loading, loads aircraft and situations. Each call waits until X-Plane shows it.
+/// Goes by the link's clock. One thread changes; any may stop it.
+class FlightChanges {
+ public:
+  FlightChanges(core::SimulatorPort* link, const FlightChangeOptions& options, FlightChangeHooks hooks);
+
+  /// Puts the aircraft there, with that attitude and velocity; `who` asked for it. X-Plane stands still meanwhile, and
+  /// is as it was afterwards: paused or running.
+  FlightChangeOutcome place(const core::FlightStart& start, const std::string& who);
+  FlightChangeOutcome applyWind(const core::UniformWind& wind);
+  FlightChangeOutcome applyLoading(const core::Loading& loading);
+  FlightChangeOutcome applyAircraft(const std::string& path, std::int32_t livery);
+  FlightChangeOutcome saveSituation(const std::string& path);
+  FlightChangeOutcome applySituation(const std::string& path);
+
+  /// The change that is under way ends where it is, X-Plane resumed if it was paused for it, and so does every later
+  /// one.
+  void stop() { stopping_ = true; }
+  bool stopping() const { return stopping_; }
+
+ private:
+  using Outcome = FlightChangeOutcome;
+
+  // Of place(). `shown` is what X-Plane shows last.
+  // `tells`: X-Plane will show that a flight begins anew.
+  bool movesAircraft() const;
+  std::string waitForPlacement(const core::FlightStart& start, bool tells, std::optional<core::ShownFlight>* shown);
+  bool moveThere(const core::FlightStart& start, const core::Deadline& deadline,
+                 std::optional<core::ShownFlight>* shown);
+  bool beginThere(const core::FlightStart& start, const core::Deadline& deadline, bool tells,
+                  std::optional<core::ShownFlight>* shown);
+  std::string waitForMotion(const core::FlightStart& start, std::optional<core::ShownFlight>* shown);
+  std::optional<core::ShownFlight> shownFlight();
+  PauseOutcome pause(bool paused, const std::string& who);
+
+  /// What went wrong; empty: it is loaded, and X-Plane has shown which it is.
+  std::string waitForAircraft(const std::string& path, std::int32_t livery);
+
+  core::Deadline deadlineAfter(double seconds) const { return {link_->clock(), seconds}; }
+  /// A stop was asked for, or the deadline is over.
+  bool expired(const core::Deadline& deadline) const { return stopping_ || deadline.over(); }
+  /// Waits until `condition()` is true, a stop is asked for or so many seconds have passed; returns whether it is.
+  bool waitFor(double seconds, const std::function<bool()>& condition);
+  /// Waits until the flight is old enough to show when it begins anew, unless it stands still; returns whether it is.
+  bool tellsBeginning();
+  void write(const std::vector<core::DatarefWrite>& writes);
+  bool isUp() const;
+  /// Why X-Plane may not have shown it, for the end of a sentence; empty: no reason is known.
+  std::string linkCondition() const;
+
+  core::SimulatorPort* link_;
+  const FlightChangeOptions options_;
+  const FlightChangeHooks hooks_;
+  std::atomic<bool> stopping_{false};
+};
+
+}  // namespace xplane_bridge

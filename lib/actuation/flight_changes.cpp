@@ -1,0 +1,290 @@
+#include "xplane_bridge/actuation/flight_changes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "xplane_bridge/core/base/text.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr double kPoll = 0.2;          // [s] longest wait without looking at anything else
+constexpr double kPlaceAgain = 3.0;    // [s] until a placement of which nothing is seen is sent once more
+constexpr int kMoves = 2;              // attempts at moving the aircraft before a new flight is begun
+constexpr int kBeginnings = 2;         // attempts at beginning a flight
+constexpr double kTellsAnew = 0.5;     // [s] of flight from which on its beginning anew can be seen
+constexpr double kTellsWait = 1.0;     // [s] for that
+constexpr double kWriteAgain = 0.3;    // [s] until datarefs that are not shown are written once more
+constexpr double kWindAgain = 1.0;     // [s] the same of the weather
+constexpr double kPauseWait = 1.0;     // [s] until a pause must be shown
+constexpr double kIdentityWait = 3.0;  // [s] until X-Plane must have shown its aircraft
+constexpr const char* kLoading = "another aircraft is being loaded";
+
+template <std::size_t Size, class Encode>
+bool sendMessage(core::SimulatorPort* link, Encode encode) {
+  std::array<std::uint8_t, Size> buffer;
+  const core::EncodeResult encoded = encode(core::ByteSpan(buffer));
+  return encoded.ok() && link->send({buffer.data(), encoded.value()}) == core::SendStatus::kSent;
+}
+
+bool sendSituation(core::SimulatorPort* link, core::SituationAction action, const std::string& path) {
+  return sendMessage<core::kSimoSize>(link, [&](core::ByteSpan out) { return core::encodeSimo(out, action, path); });
+}
+
+/// Empty: all is shown.
+std::string loadingDifference(const std::vector<core::DatarefWrite>& writes,
+                              const std::vector<core::DatarefValue>& values) {
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < writes.size(); ++i) {
+    const bool answered = i < values.size() && values[i];
+    if (answered && core::shows(writes[i], static_cast<double>(*values[i]))) continue;
+    out.push_back(writes[i].dataref +
+                  (answered ? " is " + std::to_string(*values[i]) + ", not " + std::to_string(writes[i].value)
+                            : " does not answer"));
+  }
+  return core::join(out);
+}
+
+bool isNear(const core::FlightStart& start, const std::optional<core::ShownFlight>& shown) {
+  return shown && core::isNear(start, *shown);
+}
+
+}  // namespace
+
+FlightChanges::FlightChanges(core::SimulatorPort* link, const FlightChangeOptions& options, FlightChangeHooks hooks)
+    : link_(link), options_(options), hooks_(std::move(hooks)) {}
+
+// --- means ---
+
+bool FlightChanges::waitFor(double seconds, const std::function<bool()>& condition) {
+  bool met = false;
+  link_->waitUntil([&] { return stopping_ || (met = condition()); }, seconds);
+  return met;
+}
+
+void FlightChanges::write(const std::vector<core::DatarefWrite>& writes) {
+  for (const core::DatarefWrite& each : writes) link_->write(each.dataref, each.value);
+}
+
+bool FlightChanges::tellsBeginning() {
+  const auto tells = [this] { return hooks_.watch().flight_time > kTellsAnew; };
+  if (!link_->status().paused.value_or(false)) waitFor(kTellsWait, tells);
+  return tells();
+}
+
+bool FlightChanges::isUp() const {
+  const core::LinkState state = link_->status().state;
+  return state == core::LinkState::kConnected || state == core::LinkState::kPaused;
+}
+
+std::string FlightChanges::linkCondition() const {
+  const core::LinkState state = link_->status().state;
+  if (state == core::LinkState::kPaused) return " (it is paused)";
+  if (state != core::LinkState::kConnected) return std::string(" (the link is ") + core::toString(state) + ")";
+  return "";
+}
+
+PauseOutcome FlightChanges::pause(bool paused, const std::string& who) {
+  hooks_.pausing(who);
+  const PauseOutcome outcome = setPaused(link_, paused, kPauseWait, [this] { return stopping_.load(); });
+  if (outcome != PauseOutcome::kFollowed) hooks_.pausing("");
+  return outcome;
+}
+
+// --- placing ---
+
+FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, const std::string& who) {
+  const bool tells = movesAircraft() || tellsBeginning();
+  // Paused, so that the aircraft does not fly between place and motion. A new flight may begin in the other state.
+  const PauseOutcome before = pause(true, who);
+  PauseOutcome again = PauseOutcome::kUnknown;
+  std::optional<core::ShownFlight> shown;
+  std::string problem = waitForPlacement(start, tells, &shown);
+  if (problem.empty()) {
+    again = pause(true, who);
+    problem = waitForMotion(start, &shown);
+  }
+  // A silent X-Plane has not shown at first whether it was paused.
+  const PauseOutcome first = before == PauseOutcome::kUnknown ? again : before;
+  if (first != PauseOutcome::kUnknown) pause(first == PauseOutcome::kWasSo, who);
+  if (!problem.empty())
+    return {core::EventKind::kReset, "reset_flight: X-Plane did not place the aircraft: " + problem, false};
+  return {core::EventKind::kReset, "the flight goes on at the place, attitude and speed asked for", true};
+}
+
+std::optional<core::ShownFlight> FlightChanges::shownFlight() {
+  return core::shownFlightFrom(link_->read(core::shownFlightDatarefs(link_->status().version), kPoll));
+}
+
+bool FlightChanges::movesAircraft() const { return link_->status().version.is12() && !hooks_.watch().crashed; }
+
+std::string FlightChanges::waitForPlacement(const core::FlightStart& start, bool tells,
+                                            std::optional<core::ShownFlight>* shown) {
+  const core::Deadline deadline = deadlineAfter(options_.load_timeout);  // scenery may have to be loaded
+  *shown = shownFlight();
+  // X-Plane 12 moves an aircraft that flies; one that has crashed needs a new flight.
+  if (movesAircraft() && moveThere(start, deadline, shown)) return "";
+  if (beginThere(start, deadline, tells, shown)) return "";
+  if (!*shown) return "it does not show where it is" + linkCondition();
+  if (!isNear(start, *shown)) return core::differenceOf(start, **shown) + linkCondition();
+  return "the flight has not begun anew" + linkCondition();
+}
+
+bool FlightChanges::moveThere(const core::FlightStart& start, const core::Deadline& deadline,
+                              std::optional<core::ShownFlight>* shown) {
+  // Where it was near already, only the very place tells that it was moved.
+  const bool was_near = isNear(start, *shown);
+  for (int attempt = 0; attempt < kMoves; ++attempt) {
+    // Twice: the elevation is wrong the first time.
+    for (int i = 0; i < 2; ++i) {
+      sendMessage<core::kVehicleSize>(link_,
+                                      [&](core::ByteSpan out) { return core::encodeVehs(out, core::poseOf(start)); });
+    }
+    for (const core::Deadline again = deadlineAfter(kPlaceAgain); !expired(again) && !expired(deadline);) {
+      *shown = shownFlight();
+      if (isNear(start, *shown) && (!was_near || core::placeDifferenceOf(start, **shown).empty())) return true;
+    }
+  }
+  return false;
+}
+
+bool FlightChanges::beginThere(const core::FlightStart& start, const core::Deadline& deadline, bool tells,
+                               std::optional<core::ShownFlight>* shown) {
+  // X-Plane reads nothing while it loads; what is sent meanwhile would begin the flight once more afterwards.
+  if (!waitFor(deadline.left(), [this] { return isUp(); })) return false;
+  const unsigned resets = hooks_.resets();
+  bool seen = false;  // that the flight began anew, or that X-Plane loads
+  core::Deadline again = deadlineAfter(0.0);
+  for (int sent = 0; !expired(deadline);) {
+    if (sent < kBeginnings && !seen && again.over() && isUp()) {
+      sendMessage<core::kPrelSize>(link_,
+                                   [&](core::ByteSpan out) { return core::encodePrel(out, core::placementOf(start)); });
+      again = deadlineAfter(kPlaceAgain);
+      ++sent;
+    }
+    *shown = shownFlight();
+    seen = seen || hooks_.resets() != resets || !isUp();
+    // A flight that has only just begun does not show whether it began anew: then the time it is given has to do.
+    const bool begun = seen || (!tells && again.over());
+    if (begun && isNear(start, *shown)) return true;
+  }
+  return false;
+}
+
+std::string FlightChanges::waitForMotion(const core::FlightStart& start, std::optional<core::ShownFlight>* shown) {
+  // The link may look at values after a wait was given up: what it calls owns what it uses.
+  const auto fits = [start](const std::vector<core::DatarefValue>& values) {
+    const auto now = core::shownFlightFrom(values);
+    return now && core::differenceOf(start, *now).empty();
+  };
+  for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !expired(deadline);) {
+    write(core::motionWrites(start, **shown));
+    const auto values = link_->readUntil(core::shownFlightDatarefs(link_->status().version), kPoll, fits);
+    if (const auto now = core::shownFlightFrom(values)) *shown = now;
+    if (fits(values)) return "";
+  }
+  return core::differenceOf(start, **shown) + linkCondition();
+}
+
+// --- settings ---
+
+FlightChanges::Outcome FlightChanges::applyWind(const core::UniformWind& wind) {
+  const auto names = core::shownWindDatarefs(link_->status().version);
+  const auto fits = [wind](const std::vector<core::DatarefValue>& values) { return core::shows(wind, values); };
+  std::vector<core::DatarefValue> values;
+  for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !expired(deadline);) {
+    write(core::windWrites(wind, link_->status().version));
+    for (const core::Deadline again = deadlineAfter(kWindAgain); !expired(again);) {
+      values = link_->readUntil(names, kPoll, fits);
+      if (fits(values)) return {core::EventKind::kSetting, "the wind blows as asked for", true};
+    }
+  }
+  std::string text = "set_wind: the air at the aircraft does not show it";
+  if (values.size() == 2 && values[0] && values[1]) {
+    text += ", but " + std::to_string(*values[0]) + " m/s from " + std::to_string(*values[1]) + " deg";
+  }
+  return {core::EventKind::kSetting, text + linkCondition(), false};
+}
+
+FlightChanges::Outcome FlightChanges::applyLoading(const core::Loading& loading) {
+  const auto writes = core::loadingWrites(loading, link_->status().version);
+  std::vector<std::string> names;
+  names.reserve(writes.size());
+  for (const core::DatarefWrite& each : writes) names.push_back(each.dataref);
+  const auto fits = [writes](const std::vector<core::DatarefValue>& values) {
+    return loadingDifference(writes, values).empty();
+  };
+  std::vector<core::DatarefValue> values;
+  for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !expired(deadline);) {
+    write(writes);
+    values = link_->readUntil(names, kWriteAgain, fits);
+    if (fits(values)) return {core::EventKind::kSetting, "the aircraft is loaded as asked for", true};
+  }
+  return {core::EventKind::kSetting, "set_loading: " + loadingDifference(writes, values) + linkCondition(), false};
+}
+
+// --- files ---
+
+FlightChanges::Outcome FlightChanges::applyAircraft(const std::string& path, std::int32_t livery) {
+  const auto resume = [this](void*) { hooks_.suspend_control(""); };
+  std::unique_ptr<void, decltype(resume)> suspended(this, resume);
+  hooks_.suspend_control(kLoading);
+  const std::string problem = waitForAircraft(path, livery);
+  suspended.reset();
+  if (!problem.empty())
+    return {core::EventKind::kAircraft, "load_aircraft " + path + ": " + problem + linkCondition(), false};
+  return {core::EventKind::kAircraft, "loaded " + path + ": " + hooks_.aircraft(), true};
+}
+
+std::string FlightChanges::waitForAircraft(const std::string& path, std::int32_t livery) {
+  const auto names = core::aircraftPathDatarefs(path.size() + 1, link_->status().version);
+  // Where no file is shown, that the flight began anew has to do, or that the aircraft is another one.
+  const bool shows_file = !names.empty();
+  const auto isShown = [&] { return !shows_file || core::isSamePath(core::textFrom(link_->read(names, kPoll)), path); };
+  const bool same = isShown();
+  if (same) tellsBeginning();
+  const unsigned resets = hooks_.resets();
+  const std::string aircraft = hooks_.aircraft();
+  bool begun = false;  // the flight anew, or loading
+  const auto hasBegun = [&] {
+    return begun = begun || !isUp() || hooks_.resets() != resets || hooks_.aircraft() != aircraft;
+  };
+  if (!sendMessage<core::kAcfnSize>(link_,
+                                    [&](core::ByteSpan out) { return core::encodeAcfn(out, 0, path, livery); })) {
+    return "it could not be sent";
+  }
+  const core::Deadline deadline = deadlineAfter(options_.load_timeout);
+  for (bool loaded = false; !loaded;) {
+    if (expired(deadline)) return "X-Plane does not show it; is the path that of a file below its folder?";
+    if (!shows_file) waitFor(kPoll, [&] { return hasBegun() && isUp(); });
+    loaded = isShown() && (hasBegun() || !same) && isUp();
+  }
+  const unsigned identities = hooks_.identities();
+  const bool shown = waitFor(kIdentityWait, [&] { return hooks_.identities() != identities; });
+  return shown ? "" : "X-Plane has loaded it, but does not tell which aircraft it is";
+}
+
+FlightChanges::Outcome FlightChanges::saveSituation(const std::string& path) {
+  const bool sent = sendSituation(link_, core::SituationAction::kSaveSituation, path);
+  return {core::EventKind::kSituation,
+          sent ? "asked X-Plane to save the situation as " + path + "; it does not show whether it did"
+               : "save_state " + path + ": it could not be sent",
+          sent};
+}
+
+FlightChanges::Outcome FlightChanges::applySituation(const std::string& path) {
+  tellsBeginning();
+  const unsigned resets = hooks_.resets();
+  const bool sent = sendSituation(link_, core::SituationAction::kLoadSituation, path);
+  const bool loaded = sent && waitFor(options_.load_timeout, [&] { return hooks_.resets() != resets; });
+  if (loaded) return {core::EventKind::kSituation, "the situation " + path + " is loaded", true};
+  return {core::EventKind::kSituation,
+          "load_state " + path + ": the flight goes on as it was; is there such a file below X-Plane's folder?" +
+              linkCondition(),
+          false};
+}
+
+}  // namespace xplane_bridge
