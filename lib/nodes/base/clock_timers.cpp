@@ -12,10 +12,10 @@ class ClockTimers::Call : public ros::CallbackInterface {
  public:
   explicit Call(std::shared_ptr<Timer> timer) : timer_(std::move(timer)) {}
   CallResult call() override {
-    // An alarm that is set anew while it is being called must go off again.
+    // An alarm that is set anew while it is being called must go off again, a slow periodic timer must not.
     if (timer_->is_alarm) timer_->waiting = false;
     timer_->callback();
-    timer_->waiting = false;
+    if (!timer_->is_alarm) timer_->waiting = false;
     return Success;
   }
 

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <ros/callback_queue.h>
 
+#include <atomic>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -14,6 +16,21 @@ namespace xplane_bridge {
 namespace {
 
 constexpr std::int64_t kMs = core::kNanosecondsPerMillisecond;
+
+/// Counts what it is given to serve.
+class CountingQueue : public ros::CallbackQueue {
+ public:
+  void addCallback(const ros::CallbackInterfacePtr& callback, std::uint64_t id) override {
+    ros::CallbackQueue::addCallback(callback, id);
+    ++added_;
+  }
+  void awaitAdded(int count) const {
+    while (added_ < count) std::this_thread::yield();
+  }
+
+ private:
+  std::atomic<int> added_{0};
+};
 
 /// Timers on a clock moved by hand; what they call writes its name down.
 class ClockTimersTest : public testing::Test {
@@ -27,7 +44,7 @@ class ClockTimersTest : public testing::Test {
   }
 
   core::HandClock hand_;
-  ros::CallbackQueue queue_;
+  CountingQueue queue_;
   ClockTimers timers_{hand_.clock(), &queue_};
   std::vector<std::string> called_;
 };
@@ -61,19 +78,19 @@ TEST_F(ClockTimersTest, FireOnTheThreadThatServesTheQueue) {
 }
 
 TEST_F(ClockTimersTest, WaitInTheQueueOnceHoweverLongItIsNotServed) {
-  add("often", 0.02);
-  add("once", 0.1);
+  add("every 20 ms", 0.02);
+  add("every 40 ms", 0.04);
   timers_.start();
-  for (int step = 0; step < 5; ++step) {
-    hand_.move(20 * kMs);
-    std::this_thread::yield();
-  }
+  hand_.move(20 * kMs);
+  queue_.awaitAdded(1);
+  hand_.move(20 * kMs);  // both are due, the first one waits already
+  queue_.awaitAdded(2);
   serve(2);
-  EXPECT_EQ(called_, (Names{"often", "once"}));
+  EXPECT_EQ(called_, (Names{"every 20 ms", "every 40 ms"}));
   EXPECT_TRUE(queue_.isEmpty());
   hand_.move(20 * kMs);
   serve(3);
-  EXPECT_EQ(called_.back(), "often");
+  EXPECT_EQ(called_.back(), "every 20 ms");
 }
 
 TEST_F(ClockTimersTest, BeginWithWhatIsDueAtTheStart) {
@@ -135,6 +152,26 @@ TEST_F(ClockTimersTest, AnAlarmSetByItsOwnCallbackGoesOffAgain) {
   timers_.setAlarm(alarm, 0);
   serve(2);
   EXPECT_EQ(called_.size(), 2U);
+}
+
+TEST_F(ClockTimersTest, AnAlarmWaitsInTheQueueOnceAlsoWhereItsOwnCallbackSetIt) {
+  core::TimerSchedule::Timer alarm = 0;
+  alarm = timers_.addAlarm([&] {
+    called_.emplace_back("alarm");
+    if (called_.size() == 1) {
+      timers_.setAlarm(alarm, 0);
+      queue_.awaitAdded(2);
+    }
+  });
+  const auto marker = timers_.addAlarm([this] { called_.emplace_back("marker"); });
+  timers_.start();
+  timers_.setAlarm(alarm, 0);
+  serve(1);
+  timers_.setAlarm(alarm, 0);  // it waits already
+  timers_.setAlarm(marker, 0);
+  queue_.awaitAdded(3);
+  serve(3);
+  EXPECT_EQ(called_, (Names{"alarm", "alarm", "marker"}));
 }
 
 TEST(ClockTimersOfTheHost, FireByThemselves) {
