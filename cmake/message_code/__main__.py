@@ -6,6 +6,7 @@ A field of a message is written in two places: in msg/ (type, unit, range, frame
     python3 cmake/message_code core INCLUDE             headers of xplane_bridge_core
     python3 cmake/message_code nodes INCLUDE SOURCES    headers and sources of xplane_bridge_nodes
     python3 cmake/message_code python                   src/xplane_bridge/constants.py, held up to date by a test
+    python3 cmake/message_code migration                migration/*.bmr and bags/later_fields.py, likewise
 
 Python 3.8 and its standard library: this runs before anything is installed.
 """
@@ -14,13 +15,13 @@ import sys
 from pathlib import Path
 from typing import Dict, List
 
+import cpp_base
 import cpp_control
 import cpp_state
+import migration
 from definitions import ROOT, MessageError, read_sources
 from kinds import check_repetitions
-
-import cpp
-from python import python_file
+from python_constants import python_file
 
 CORE, MESSAGES = "xplane_bridge/core", "xplane_bridge/nodes/messages"
 CONSTANTS = ROOT / "src" / "xplane_bridge" / "constants.py"
@@ -42,12 +43,14 @@ def main(arguments: List[str]) -> int:
         check_repetitions()
         if arguments[:1] == ["core"] and len(arguments) == 2:
             _write(Path(arguments[1]), cpp_state.state_headers(sources))
-            _write(Path(arguments[1]), {f"{CORE}/base/message_constants.hpp": cpp.constants()})
+            _write(Path(arguments[1]), {f"{CORE}/base/message_constants.hpp": cpp_base.constants()})
             _write(Path(arguments[1]), {f"{CORE}/control/control_fields.hpp": cpp_control.control_fields()})
         elif arguments[:1] == ["nodes"] and len(arguments) == 3:
             _write(Path(arguments[1]), {f"{MESSAGES}/state_messages.hpp": cpp_state.state_messages_header(sources)})
             _write(Path(arguments[1]), {f"{MESSAGES}/control_scalars.hpp": cpp_control.control_scalars()})
             _write(Path(arguments[2]), {"state_messages.cpp": cpp_state.state_messages_source(sources)})
+        elif arguments == ["migration"]:
+            migration.write()
         elif arguments == ["python"]:
             CONSTANTS.write_text(python_file(sources), encoding="utf-8")
         else:

@@ -2,10 +2,9 @@
 
 from typing import List, Tuple
 
+from cpp_base import NODES, camel, comment, header, lines
 from definitions import Constant, definition
 from kinds import BY_ENGINE, ONE_LEVER, Channel, channels
-
-from cpp import NODES, camel, comment, header, lines
 
 _CHANNELS = """
 constexpr Channel leverChannel(int engine) {

@@ -2,10 +2,9 @@
 
 from typing import Callable, Dict, List, Tuple
 
+from cpp_base import NODES, camel, comment, enumerators, header, lines
 from definitions import HEADER, SOURCES, Field, Place, Section, Source, Sources
 from kinds import ENUMERATIONS
-
-from cpp import NODES, camel, comment, enumerators, header, lines
 
 _TYPES = {
     "bool": ("bool", "false"),

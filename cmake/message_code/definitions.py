@@ -37,6 +37,7 @@ class Field(NamedTuple):
     size: Optional[int]  #: of an array; None: a scalar
     name: str
     comment: str
+    is_list: bool = False  #: an array of any length
 
     @property
     def unit(self) -> str:
@@ -138,22 +139,26 @@ class Sources(NamedTuple):
 
 def read_definition(path: Path) -> Definition:
     """Reads a .msg, or the request of a .srv."""
+    return read_lines(path.stem, path.read_text(encoding="utf-8").split("\n---\n")[0], path.name)
+
+
+def read_lines(name: str, text: str, where: str) -> Definition:
+    """Reads the text of a definition; `where` is what names it, for the error."""
     fields: Dict[str, Field] = {}
     constants: List[Constant] = []
-    text = path.read_text(encoding="utf-8").split("\n---\n")[0]
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):
             continue
         match = _LINE.match(line)
         if not match:
-            raise MessageError(f"{path.name}:{number}: neither a field nor a constant: {line}")
-        name, comment = match["name"], match["comment"] or ""
+            raise MessageError(f"{where}:{number}: neither a field nor a constant: {line}")
+        entry, comment = match["name"], match["comment"] or ""
         if match["value"]:
-            constants.append(Constant(name, int(match["value"]), comment))
+            constants.append(Constant(entry, int(match["value"]), comment))
         else:
             size = int(match["size"]) if match["size"] else None
-            fields[name] = Field(match["type"], size, name, comment)
-    return Definition(path.stem, fields, constants)
+            fields[entry] = Field(match["type"], size, entry, comment, match["size"] == "")
+    return Definition(name, fields, constants)
 
 
 def definition(name: str, root: Path = ROOT) -> Definition:

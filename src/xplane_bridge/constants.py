@@ -34,7 +34,7 @@ class FlightMode(enum.IntEnum):
     """Who flies. Numbers of ControlMode."""
 
     MANUAL = 1  #: control/manual flies
-    AUTO = 2  #: control/auto flies
+    AUTO = 2  #: control/auto flies, and control/surfaces
 
 
 class CommandSource(enum.IntEnum):
@@ -131,6 +131,7 @@ class ImageQuality(enum.IntFlag):
     EPOCH_EDGE = 4096  #: the frame lies at a reset, pause or gap
     DELAY_ASSUMED = 8192  #: the display delay is the default, not measured on this set-up
     BORDERLINE = 16384  #: the moment lies about half way between two frames: the pairing may be one frame off
+    POSE_UNSURE = 32768  #: how X-Plane's camera angles are to be read is open, or the camera moved in the cockpit
 
 
 class FlightStateValid(enum.IntFlag):
@@ -182,6 +183,14 @@ class EngineStatesValid(enum.IntFlag):
     FUEL_PRESSURE = 1048576
     RUNNING = 2097152
     PROPELLER_MODE = 4194304
+    MAGNETOS = 8388608
+    IGNITER_ON = 16777216
+    STARTER_RUNNING = 33554432
+    FUEL_PUMP_ON = 67108864
+    CARBURETTOR_HEAT = 134217728
+    COWL_FLAP = 268435456
+    INLET_HEAT_ON = 536870912
+    PROPELLER_HEAT_ON = 1073741824
 
 
 class SurfaceStatesValid(enum.IntFlag):
@@ -225,14 +234,18 @@ class ElectricalStateValid(enum.IntFlag):
     APU = 16  #: apu_*
     HYDRAULICS = 32  #: hydraulic_*
     SWITCHES = 64  #: avionics_on, *_light_on, pitot_heat_on, cross_tie
+    ICE = 128  #: pitot_heat_copilot_on .. deicing_fluid
+    CABIN = 256  #: cabin_*, bleed_air_mode
+    OXYGEN = 512  #: oxygen_*
 
 
 class AutopilotStateValid(enum.IntFlag):
     """Bits of AutopilotState.valid."""
 
     MODES = 1  #: flight_director_mode .. back_course_status
-    TARGETS = 2  #: target_*
+    TARGETS = 2  #: target_*; of target_airspeed and target_mach the dial's one
     DIRECTOR = 4  #: director_*
+    STATUS = 8  #: heading_status .. roll_status
 
 
 class WarningStateValid(enum.IntFlag):
@@ -247,9 +260,10 @@ class WarningStateValid(enum.IntFlag):
 class FuelStateValid(enum.IntFlag):
     """Bits of FuelState.valid."""
 
-    FUEL = 1  #: fuel_*
+    FUEL = 1  #: fuel_tank, fuel_total
     WEIGHTS = 2  #: *_mass
     CG = 4  #: cg_offset
+    SELECTORS = 8  #: fuel_selector .. tank_pump_on
 
 
 class SimStatusValid(enum.IntFlag):
@@ -259,6 +273,43 @@ class SimStatusValid(enum.IntFlag):
     TIME = 2  #: time_ratio .. local_time
     VIEW = 4  #: view_*, field_of_view_deg
     WINDOW = 8  #: window_*
+
+
+class NavigationStateValid(enum.IntFlag):
+    """Bits of NavigationState.valid."""
+
+    COM = 1  #: com_*
+    TRANSPONDER = 2  #: transponder_*
+    NAV = 4  #: nav_*, obs_deg, glideslope_*
+    DME = 8  #: dme_*
+    ADF = 16  #: adf_*
+    MARKERS = 32  #: *_marker_lit
+    GPS = 64  #: gps_*
+    HSI = 128  #: hsi_*
+
+
+class InstrumentStateValid(enum.IntFlag):
+    """Bits of InstrumentState.valid."""
+
+    AIR_DATA = 1  #: airspeed .. altimeter_setting
+    VACUUM = 2  #: *_vacuum_deg, suction
+    ELECTRIC = 4  #: *_electric_deg
+    AHARS = 8  #: *_ahars_deg
+    TURN = 16  #: turn_*, slip_deg, compass_heading_deg
+    RADIO_ALTITUDE = 32  #: radio_altitude
+    TEMPERATURE = 64  #: outside_temperature
+    CLOCK = 128  #: clock_*, elapsed_*
+
+
+class EnvironmentStateValid(enum.IntFlag):
+    """Bits of EnvironmentState.valid."""
+
+    AIR = 1  #: temperature .. sea_level_temperature
+    WIND = 2  #: wind_layer_*
+    CLOUDS = 4  #: cloud_*
+    WEATHER = 8  #: visibility, rain, precipitation
+    TIME = 16  #: zulu_time, local_time, date_days
+    TERRAIN = 32  #: height_above_ground, altitude_msl, terrain_height
 
 
 def words(numbers: Type[enum.IntEnum]) -> Dict[int, str]:
