@@ -8,8 +8,12 @@
 namespace xplane_bridge::core {
 
 std::string toString(const BeaconSighting& sighting) {
-  return (sighting.computer_name.empty() ? std::string("X-Plane") : sighting.computer_name) + " (" +
-         sighting.endpoint.toString() + ", version " + std::to_string(sighting.version) + ")";
+  std::string text = (sighting.computer_name.empty() ? std::string("X-Plane") : sighting.computer_name) + " (" +
+                     sighting.endpoint.toString() + ", version " + std::to_string(sighting.version);
+  for (const std::uint32_t address : sighting.other_addresses) {
+    text += ", also heard from " + Endpoint{address, 0}.addressString();
+  }
+  return text + ")";
 }
 
 BeaconTracker::BeaconTracker(double timeout_s, double settle_s, std::function<bool(std::uint32_t)> is_own)
@@ -20,18 +24,37 @@ bool BeaconTracker::isSame(const Endpoint& a, const Endpoint& b) const {
          (isSameHost(a.address, b.address) || (is_own_ && is_own_(a.address) && is_own_(b.address)));
 }
 
+bool BeaconTracker::isAt(const BeaconSighting& sighting, const Endpoint& endpoint) const {
+  if (isSame(sighting.endpoint, endpoint)) {
+    return true;
+  }
+  const std::vector<std::uint32_t>& others = sighting.other_addresses;
+  return sighting.endpoint.port == endpoint.port &&
+         std::find(others.begin(), others.end(), endpoint.address) != others.end();
+}
+
 bool BeaconTracker::heard(const Beacon& beacon, std::uint32_t from_address, std::int64_t now_ns) {
   if (beacon.host != Beacon::Host::kXPlane || beacon.role != Beacon::Role::kMaster) {
     return false;
   }
   const Endpoint endpoint{from_address, beacon.port};
-  auto known = std::find_if(known_.begin(), known_.end(),
-                            [&](const Known& each) { return isSame(each.sighting.endpoint, endpoint); });
+  auto known =
+      std::find_if(known_.begin(), known_.end(), [&](const Known& each) { return isAt(each.sighting, endpoint); });
   if (known == known_.end()) {
-    known = known_.insert(known_.end(), Known{{endpoint, 0, {}}, now_ns, now_ns});
+    known = std::find_if(known_.begin(), known_.end(), [&](const Known& each) {
+      return isFresh(each, now_ns) && !beacon.computer_name.empty() && each.sighting.endpoint.port == beacon.port &&
+             each.sighting.computer_name == beacon.computer_name && each.sighting.version == beacon.version;
+    });
+    if (known != known_.end()) {
+      known->sighting.other_addresses.push_back(from_address);
+    }
+  }
+  if (known == known_.end()) {
+    known = known_.insert(known_.end(), Known{{endpoint, {}, 0, {}}, now_ns, now_ns});
   } else if (!isFresh(*known, now_ns)) {
     // Come back after an absence: as new, also under the address it is heard from now.
     known->sighting.endpoint = endpoint;
+    known->sighting.other_addresses.clear();
     known->first_ns = now_ns;
   }
   known->sighting.version = beacon.version;
@@ -52,7 +75,7 @@ std::vector<BeaconSighting> BeaconTracker::sightings(std::int64_t now_ns) const 
 
 std::optional<BeaconSighting> BeaconTracker::at(const Endpoint& endpoint, std::int64_t now_ns) const {
   for (const Known& known : known_) {
-    if (isFresh(known, now_ns) && isSame(known.sighting.endpoint, endpoint)) {
+    if (isFresh(known, now_ns) && isAt(known.sighting, endpoint)) {
       return known.sighting;
     }
   }
@@ -61,7 +84,7 @@ std::optional<BeaconSighting> BeaconTracker::at(const Endpoint& endpoint, std::i
 
 std::int64_t BeaconTracker::lastHeard(const Endpoint& endpoint) const {
   for (const Known& known : known_) {
-    if (isSame(known.sighting.endpoint, endpoint)) {
+    if (isAt(known.sighting, endpoint)) {
       return known.last_ns;
     }
   }

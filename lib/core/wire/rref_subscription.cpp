@@ -33,6 +33,12 @@ std::size_t RequestPacer::allowance(std::int64_t now_ns, Jitter* jitter) {
   return batch_size_ - std::min(used_, batch_size_);
 }
 
+std::size_t RequestPacer::urgentAllowance(std::int64_t now_ns, Jitter* jitter) {
+  constexpr std::size_t kUrgentRequests = 100;
+  allowance(now_ns, jitter);
+  return kUrgentRequests - std::min(used_, kUrgentRequests);
+}
+
 RrefSubscription::RrefSubscription(RrefGroup group) : group_(std::move(group)), entries_(group_.datarefs.size()) {
   const std::string name = "dataref group '" + group_.name + "': ";
   if (group_.datarefs.empty()) {
@@ -110,6 +116,12 @@ std::vector<std::string> RrefSubscription::unanswered() const {
     }
   }
   return paths;
+}
+
+bool RrefSubscription::settled() const {
+  return !suspended_ && std::all_of(entries_.begin(), entries_.end(), [](const Entry& entry) {
+    return entry.answered || entry.attempts >= kUnansweredAttempts;
+  });
 }
 
 }  // namespace xplane_bridge::core

@@ -13,7 +13,8 @@ namespace xplane_bridge::core {
 
 /// An X-Plane that announces itself.
 struct BeaconSighting {
-  Endpoint endpoint;  ///< where it listens
+  Endpoint endpoint;                           ///< where it listens
+  std::vector<std::uint32_t> other_addresses;  ///< of the same computer, from which its beacon comes as well
   std::int32_t version = 0;
   std::string computer_name;
 };
@@ -27,8 +28,9 @@ class BeaconTracker {
   /// `is_own`: whether an address is one of this computer's, whose X-Plane is heard under several.
   BeaconTracker(double timeout_s, double settle_s, std::function<bool(std::uint32_t)> is_own);
 
-  /// Takes note of a beacon. Ignores what is not a master X-Plane (external visuals, instructor stations, Plane Maker);
-  /// returns whether it was noted.
+  /// Takes note of a beacon. One from another address but with the name, port and version of one that is heard at the
+  /// moment is the same X-Plane: its computer has several addresses. Ignores what is not a master X-Plane (external
+  /// visuals, instructor stations, Plane Maker); returns whether it was noted.
   bool heard(const Beacon& beacon, std::uint32_t from_address, std::int64_t now_ns);
 
   /// Those heard within the timeout.
@@ -54,6 +56,7 @@ class BeaconTracker {
   };
   bool isFresh(const Known& known, std::int64_t now_ns) const { return now_ns - known.last_ns <= timeout_ns_; }
   bool isSame(const Endpoint& a, const Endpoint& b) const;
+  bool isAt(const BeaconSighting& sighting, const Endpoint& endpoint) const;
 
   std::int64_t timeout_ns_;
   std::int64_t settle_ns_;

@@ -182,7 +182,7 @@ class RrefView {
   std::size_t count_ = 0;
 };
 
-/// RPOS: position with doubles. Angles and velocity are relative to the local level or to the origin's axes [?].
+/// RPOS: position with doubles. Angles and velocity are relative to the local level or to the origin's [? rpos-axes].
 struct Rpos {
   double longitude_deg = 0.0;
   double latitude_deg = 0.0;

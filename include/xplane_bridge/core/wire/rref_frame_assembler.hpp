@@ -10,10 +10,10 @@ namespace xplane_bridge::core {
 
 /// Joins the RREF datagrams of one simulator frame into one sample.
 ///
-/// X-Plane may put the values that are due in a frame into one datagram or several. A sample is complete when every
+/// X-Plane may put a frame's values into one datagram or several [? samples-whole]. A sample is complete when every
 /// index that answers at all has come; an index that comes again, or a piece that comes too late, begins the next
-/// frame. An index that stays away from several frames in a row is taken as never answering (unknown dataref): it is
-/// named by silent(), its value is NaN and it does not hold up samples. It counts again as soon as it answers.
+/// frame. An index that stays away for several frames is taken as unknown [? unknown-omitted]: silent() names it, its
+/// value is NaN and it does not hold up samples. It counts again as soon as it answers.
 ///
 /// Allocates in the constructor only. One thread calls.
 class RrefFrameAssembler {

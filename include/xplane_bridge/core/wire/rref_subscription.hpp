@@ -13,7 +13,7 @@
 namespace xplane_bridge::core {
 
 /// RREF rate that means "every frame": X-Plane never sends more than one value a frame, so any number above every
-/// frame rate does. [?] on a live X-Plane: that it accepts numbers above 99.
+/// frame rate does [? rate-above-99].
 constexpr std::int32_t kEveryFrameRateHz = 1000;
 
 /// Datarefs received together on a socket of their own. Values come back with the position in `datarefs` as index.
@@ -34,14 +34,21 @@ class Jitter {
   std::minstd_rand random_;
 };
 
-/// Lets through so many requests at once that X-Plane does not lose any (above about 140 in a frame it does).
+/// Groups of this priority or a higher one are asked for at once, and do not wait for their place in a batch.
+constexpr int kUrgentPriority = 10;
+
+/// Lets through so many requests at once that X-Plane loses none; above about 148 a frame it does [? requests-a-frame].
 class RequestPacer {
  public:
   RequestPacer(std::size_t batch_size, double spacing_s)
       : batch_size_(batch_size), spacing_ns_(toNanoseconds(spacing_s)) {}
 
+  /// Between batches, from the next one on.
+  void setSpacing(double spacing_s) { spacing_ns_ = toNanoseconds(spacing_s); }
   /// Requests that may be sent now.
   std::size_t allowance(std::int64_t now_ns, Jitter* jitter);
+  /// Urgent ones that may be sent now, for which there is room for as many again as X-Plane takes.
+  std::size_t urgentAllowance(std::int64_t now_ns, Jitter* jitter);
   void spend(std::size_t requests) { used_ += requests; }
 
  private:
@@ -62,6 +69,8 @@ class RrefSubscription {
 
   const RrefGroup& group() const { return group_; }
 
+  bool urgent() const { return group_.priority >= kUrgentPriority; }
+
   /// Everything has to be asked for again: X-Plane is new, or was away.
   void restart(std::int64_t now_ns);
   /// Nothing is asked for until restart(): X-Plane does not answer anybody.
@@ -75,6 +84,8 @@ class RrefSubscription {
 
   /// Datarefs that did not answer although asked several times since restart().
   std::vector<std::string> unanswered() const;
+  /// Each dataref has answered since restart(), or was asked for in vain.
+  bool settled() const;
   /// Requests beyond the first of each dataref since construction.
   std::uint64_t repeats() const { return repeats_; }
 

@@ -40,11 +40,13 @@ TEST(BeaconTracker, OneIsChosenAfterTheSettlingTime) {
 
 TEST(BeaconTracker, TwoAreListedNotChosen) {
   BeaconTracker tracker = makeTracker();
+  Beacon other = beacon();
+  other.computer_name = "sim-2";
   tracker.heard(beacon(), kLan, 0);
-  tracker.heard(beacon(), kOther, 0);
+  tracker.heard(other, kOther, 0);
   EXPECT_EQ(tracker.sightings(2 * kS).size(), 2U);
-  EXPECT_FALSE(tracker.onlyOne(2 * kS).has_value()) << "the same name on two computers is two X-Planes";
-  tracker.heard(beacon(), kOther, 2 * kS);
+  EXPECT_FALSE(tracker.onlyOne(2 * kS).has_value());
+  tracker.heard(other, kOther, 2 * kS);
   EXPECT_EQ(tracker.sightings(3 * kS).size(), 1U) << "the first has been silent for longer than the timeout";
   EXPECT_EQ(tracker.onlyOne(3 * kS)->endpoint.address, kOther);
 }
@@ -60,6 +62,31 @@ TEST(BeaconTracker, OwnComputerHeardUnderSeveralAddressesIsOne) {
   EXPECT_FALSE(tracker.at({kLan, 49000}, kS).has_value());
 }
 
+TEST(BeaconTracker, OneComputerHeardUnderTwoAddressesIsOne) {
+  BeaconTracker tracker = makeTracker();
+  tracker.heard(beacon(), kLan, 0);
+  tracker.heard(beacon(), kOther, kS / 10);
+  tracker.heard(beacon(), kLan, kS);
+  tracker.heard(beacon(), kOther, kS + kS / 10);
+  ASSERT_TRUE(tracker.onlyOne(2 * kS).has_value());
+  EXPECT_EQ(tracker.onlyOne(2 * kS)->endpoint, (Endpoint{kLan, 49000})) << "as it was heard first";
+  EXPECT_EQ(toString(tracker.sightings(2 * kS).at(0)),
+            "sim (192.168.1.5:49000, version 115501, also heard from 192.168.1.9)");
+  EXPECT_TRUE(tracker.at({kOther, 49000}, 2 * kS).has_value());
+  EXPECT_EQ(tracker.lastHeard({kOther, 49000}), kS + kS / 10);
+  // Another port, version or name is another X-Plane.
+  tracker.heard(beacon(49010), kOther, 2 * kS);
+  EXPECT_EQ(tracker.sightings(2 * kS).size(), 2U);
+  Beacon newer = beacon();
+  newer.version = 122015;
+  tracker.heard(newer, 0xC0A80110U, 2 * kS);
+  Beacon nameless = beacon();
+  nameless.computer_name = "";
+  tracker.heard(nameless, 0xC0A80111U, 2 * kS);
+  tracker.heard(nameless, 0xC0A80112U, 2 * kS);
+  EXPECT_EQ(tracker.sightings(2 * kS).size(), 5U);
+}
+
 TEST(BeaconTracker, OnlyMasterXPlanesCount) {
   BeaconTracker tracker = makeTracker();
   Beacon visual = beacon();
@@ -73,9 +100,11 @@ TEST(BeaconTracker, OnlyMasterXPlanesCount) {
 
 TEST(BeaconTracker, NewSinceMeansBegunSince) {
   BeaconTracker tracker = makeTracker();
+  Beacon other = beacon();
+  other.computer_name = "sim-2";
   tracker.heard(beacon(), kLan, 0);
-  tracker.heard(beacon(), kOther, kS);
-  tracker.heard(beacon(), kOther, 5 * kS);
+  tracker.heard(other, kOther, kS);
+  tracker.heard(other, kOther, 5 * kS);
   EXPECT_FALSE(tracker.onlyNewSince(6 * kS, 6 * kS).has_value());
   // kOther was away from 1 s to 5 s, longer than the timeout: it has begun anew.
   EXPECT_EQ(tracker.onlyNewSince(4 * kS, 6 * kS)->endpoint.address, kOther);

@@ -110,6 +110,24 @@ TEST(RrefSubscription, NamesWhatNeverAnswers) {
   EXPECT_TRUE(subscription.unanswered().empty()) << "a new X-Plane has its chance";
 }
 
+TEST(RrefSubscription, IsSettledOnceEachHasAnsweredOrWasAskedInVain) {
+  RrefSubscription subscription(group({"a", "unknown"}));
+  Jitter jitter(1);
+  EXPECT_FALSE(subscription.settled()) << "not started";
+  subscription.restart(0);
+  allRequests(&subscription, 0, &jitter);
+  subscription.answered(Answer({0}).view(), 10 * kMs);
+  EXPECT_FALSE(subscription.settled());
+  for (int seconds = 1; !subscription.settled() && seconds < 20; ++seconds) {
+    subscription.answered(Answer({0}).view(), seconds * 1000 * kMs);
+    allRequests(&subscription, seconds * 1000 * kMs, &jitter);
+  }
+  EXPECT_TRUE(subscription.settled());
+  EXPECT_EQ(subscription.unanswered(), std::vector<std::string>{"unknown"});
+  subscription.restart(30'000 * kMs);
+  EXPECT_FALSE(subscription.settled());
+}
+
 TEST(RrefSubscription, CountsIndicesItNeverAsked) {
   RrefSubscription subscription(group({"a"}));
   EXPECT_EQ(subscription.answered(Answer({0, 1, -1, 2'000'000'000}).view(), 0), 3U);
@@ -136,6 +154,21 @@ TEST(RequestPacer, LetsOneBatchThroughPerSpacing) {
   pacer.spend(30);
   EXPECT_EQ(pacer.allowance(79 * kMs, &jitter), 0U);
   EXPECT_EQ(pacer.allowance(121 * kMs, &jitter), 100U);
+}
+
+TEST(RequestPacer, UrgentRequestsGoBeyondTheBatchAndAreCountedInIt) {
+  RequestPacer pacer(38, 0.1);
+  Jitter jitter(1);
+  EXPECT_EQ(pacer.urgentAllowance(0, &jitter), 100U);
+  pacer.spend(70);
+  EXPECT_EQ(pacer.urgentAllowance(1 * kMs, &jitter), 30U);
+  EXPECT_EQ(pacer.allowance(1 * kMs, &jitter), 0U);
+  pacer.setSpacing(0.04);
+  EXPECT_EQ(pacer.allowance(79 * kMs, &jitter), 0U) << "the batch that has begun lasts as long as it would have";
+  EXPECT_EQ(pacer.allowance(121 * kMs, &jitter), 38U);
+  pacer.spend(38);
+  EXPECT_EQ(pacer.allowance(121 * kMs + 31 * kMs, &jitter), 0U);
+  EXPECT_EQ(pacer.allowance(121 * kMs + 49 * kMs, &jitter), 38U);
 }
 
 TEST(Jitter, StaysWithinTwentyPercentAndVaries) {

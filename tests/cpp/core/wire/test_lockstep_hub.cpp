@@ -1,0 +1,187 @@
+// LockstepHub over a list of datagrams: what is handed out when, whatever order the datagrams come in.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "scripted_hub.hpp"
+#include "xplane_bridge/core/wire/lockstep_hub.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
+
+namespace xplane_bridge::core {
+namespace {
+
+constexpr Endpoint kXPlane{0x7F000001U, 49000};
+constexpr std::int32_t kFence = 0x4C530000;
+
+class LockstepHubTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto inner = std::make_unique<ScriptedHub>(wire_);
+    LockstepHooks hooks;
+    hooks.begin = [this](const LockstepFrame& frame) { said_ += " begin" + std::to_string(frame.number); };
+    hooks.ready = [this](const LockstepFrame&) { return ready_; };
+    hooks.close = [this](const LockstepFrame& frame) {
+      if (frame.number > 0) said_ += " close" + std::to_string(frame.number);
+    };
+    hooks.end = [this](const LockstepFrame& frame) {
+      if (frame.number > 0) said_ += " end" + std::to_string(frame.number);
+    };
+    hub_ = std::make_unique<LockstepHub>(std::move(inner), clock_, wire_->clock(), hooks);
+    a_ = hub_->open("a", {});
+    b_ = hub_->open("b", {});
+    ask(a_.get());
+    ask(b_.get());
+  }
+
+  static void ask(DatagramSource* source) {
+    std::array<std::uint8_t, kRrefRequestSize> message;
+    const EncodeResult size = encodeRref(message, "sim/time/paused", 20, 0);
+    source->sendTo({message.data(), *size}, kXPlane, nullptr);
+  }
+
+  void arrive(const std::string& source, std::vector<std::pair<std::int32_t, float>> pairs) {
+    std::vector<std::uint8_t> bytes = {'R', 'R', 'E', 'F', ','};
+    for (const auto& [index, value] : pairs) {
+      std::uint8_t pair[8];
+      std::memcpy(pair, &index, 4);
+      std::memcpy(pair + 4, &value, 4);
+      bytes.insert(bytes.end(), pair, pair + 8);
+    }
+    wire_->arrivals.push_back({wire_->now_ns, source, bytes, kXPlane, 12345});
+  }
+  void value(const std::string& source, float value) { arrive(source, {{0, value}}); }
+  void fence(const std::string& source, float frame, float seconds = 0.0F, float microseconds = 0.0F) {
+    arrive(source, {{kFence, frame}, {kFence + 1, seconds}, {kFence + 2, microseconds}});
+  }
+
+  /// As SimLink's step: waits, then takes what there is, of a first.
+  void step() {
+    hub_->wait(1);
+    for (const auto& [name, source] : {std::pair{"a", a_.get()}, std::pair{"b", b_.get()}}) {
+      std::array<std::uint8_t, 100> buffer;
+      Received received;
+      while (hub_->hasInput(*source) &&
+             source->receive({buffer.data(), buffer.size()}, &received) == ReceiveStatus::kReceived) {
+        const auto rref = decodeRref({buffer.data(), received.size});
+        EXPECT_EQ(received.kernel_stamp_ns, 0);
+        said_ += std::string(" ") + name + std::to_string(static_cast<int>((*rref)[0].value));
+      }
+    }
+  }
+  std::string steps(int count) {
+    said_.clear();
+    for (int i = 0; i < count; ++i) step();
+    return said_;
+  }
+  void takeOff() {
+    fence("a", 0.0F);
+    fence("b", 0.0F);
+    steps(3);
+    value("a", 1.0F);
+    fence("a", 1.0F);
+    value("b", 1.0F);
+    fence("b", 1.0F);
+    steps(8);
+  }
+
+  std::shared_ptr<ScriptedHub::Wire> wire_ = std::make_shared<ScriptedHub::Wire>();
+  LockstepClock clock_{wire_->clock(), 0};
+  bool ready_ = true;
+  std::string said_;
+  std::unique_ptr<LockstepHub> hub_;
+  std::shared_ptr<DatagramSource> a_, b_;
+};
+
+TEST_F(LockstepHubTest, AsksForTheFenceOnEverySourceThatAsksForSomething) {
+  std::vector<std::string> asked;
+  for (const auto& sent : wire_->sent) {
+    const std::string text(sent.bytes.begin(), sent.bytes.end());
+    const auto at = text.find(kFenceDataref);
+    if (at != std::string::npos) asked.push_back(sent.source + text.substr(at + std::strlen(kFenceDataref), 3));
+  }
+  EXPECT_EQ(asked, (std::vector<std::string>{"a[0]", "a[1]", "a[2]", "b[0]", "b[1]", "b[2]"}));
+}
+
+TEST_F(LockstepHubTest, HandsOutFrame0AsItComesAndNoFences) {
+  value("a", 7.0F);
+  EXPECT_EQ(steps(2), " a7");
+  fence("a", 0.0F);
+  value("a", 8.0F);
+  EXPECT_EQ(steps(2), "") << "its fence has not come";
+  fence("a", 0.0F);
+  EXPECT_EQ(steps(2), " a8");
+}
+
+TEST_F(LockstepHubTest, HandsOutAFrameWhenAllSourcesShowItsFenceAndGoesThroughItsStages) {
+  takeOff();
+  EXPECT_EQ(said_, " begin1 a1 b1 close1 end1");
+  value("b", 2.0F);
+  fence("b", 2.0F);
+  value("a", 2.0F);
+  EXPECT_EQ(steps(3), "");
+  fence("a", 2.0F, 3.0F, 500000.0F);
+  EXPECT_EQ(steps(1), " begin2 a2 b2");
+  EXPECT_EQ(clock_.clock().system_ns(), 3'500'000'000);
+  EXPECT_EQ(steps(6), " close2 end2");
+}
+
+TEST_F(LockstepHubTest, WaitsForTheAnswersAfterTheFrameWasHandled) {
+  takeOff();
+  ready_ = false;
+  for (const char* source : {"a", "b"}) fence(source, 2.0F);
+  EXPECT_EQ(steps(5), " begin2");
+  ready_ = true;
+  EXPECT_EQ(steps(1), " close2");
+  EXPECT_EQ(steps(1), "") << "the link sends what close() has led to";
+  EXPECT_EQ(steps(1), " end2");
+}
+
+TEST_F(LockstepHubTest, LeavesOutFrame0WhereItComesTogetherWithTheFirstFrame) {
+  fence("a", 0.0F);
+  fence("b", 0.0F);
+  steps(3);
+  value("a", 99.0F);
+  fence("a", 0.0F);
+  value("a", 1.0F);
+  fence("a", 1.0F);
+  fence("b", 1.0F);
+  EXPECT_EQ(steps(2), " begin1 a1");  // the first step is frame 0's: the link sends
+}
+
+TEST_F(LockstepHubTest, ASourceThatIsNotWantedAnyMoreIsNotWaitedFor) {
+  takeOff();
+  hub_->ignore(*b_);
+  fence("a", 2.0F);
+  EXPECT_EQ(steps(1), " begin2");
+}
+
+TEST_F(LockstepHubTest, ASourceThatJoinsIsWaitedForInTheNextFrame) {
+  takeOff();
+  const auto c = hub_->open("c", {});
+  ask(c.get());
+  fence("a", 2.0F);
+  fence("b", 2.0F);
+  EXPECT_EQ(steps(3), "");
+  fence("c", 2.0F);
+  EXPECT_EQ(steps(1), " begin2");
+}
+
+TEST_F(LockstepHubTest, LetsTheSimulatorFlyOnOnceTheClockIsReleased) {
+  takeOff();
+  ready_ = false;
+  for (const char* source : {"a", "b"}) fence(source, 2.0F);
+  steps(3);
+  clock_.release();
+  EXPECT_EQ(steps(1), " end2");
+  value("a", 3.0F);
+  for (const char* source : {"a", "b"}) fence(source, 3.0F);
+  EXPECT_EQ(steps(2), " a3 end3");
+}
+
+}  // namespace
+}  // namespace xplane_bridge::core
