@@ -32,6 +32,14 @@ void TimerSchedule::setAlarm(Timer alarm, std::int64_t due_ns) {
   timers_[alarm].due_ns = due_ns;
 }
 
+void TimerSchedule::restart(std::int64_t now_ns) {
+  for (Entry& entry : timers_) {
+    if (entry.period_ns != 0) {
+      entry.due_ns = now_ns + entry.period_ns;
+    }
+  }
+}
+
 std::optional<std::int64_t> TimerSchedule::next() const {
   const auto first = std::min_element(timers_.begin(), timers_.end(),
                                       [](const Entry& a, const Entry& b) { return a.due_ns < b.due_ns; });

@@ -81,7 +81,13 @@ class Lock {
 
 json toJson(const UndoOperation& operation) {
   struct Writer {
-    json operator()(const UndoDref& dref) const { return {{"op", "dref"}, {"path", dref.path}, {"value", dref.value}}; }
+    json operator()(const UndoDref& dref) const {
+      json out = {{"op", "dref"}, {"path", dref.path}, {"value", dref.value}};
+      if (!dref.confirm) {
+        out["confirm"] = false;
+      }
+      return out;
+    }
     json operator()(const UndoData& data) const {
       return {{"op", "data"}, {"row", data.row.index}, {"values", data.row.values}};
     }
@@ -89,6 +95,7 @@ json toJson(const UndoOperation& operation) {
     json operator()(const UndoIse4& ise4) const {
       return {{"op", "ise4_off"}, {"target", ise4.target}, {"address", ise4.address}, {"port", ise4.port}};
     }
+    json operator()(const UndoPause&) const { return {{"op", "resume"}}; }
   };
   return std::visit(Writer{}, operation);
 }
@@ -96,7 +103,7 @@ json toJson(const UndoOperation& operation) {
 UndoOperation operationFrom(const json& document) {
   const std::string op = document.at("op");
   if (op == "dref") {
-    return UndoDref{document.at("path"), document.at("value")};
+    return UndoDref{document.at("path"), document.at("value"), document.value("confirm", true)};
   }
   if (op == "data") {
     return UndoData{DataRow{document.at("row"), document.at("values")}};
@@ -107,6 +114,9 @@ UndoOperation operationFrom(const json& document) {
   if (op == "ise4_off") {
     return UndoIse4{document.at("target"), document.at("address"), document.at("port")};
   }
+  if (op == "resume") {
+    return UndoPause{};
+  }
   throw JournalError("unknown operation '" + op + "'");
 }
 
@@ -115,15 +125,23 @@ json toJson(const JournalEntry& entry) {
   for (const UndoOperation& operation : entry.undo) {
     undo.push_back(toJson(operation));
   }
-  return {{"id", entry.id},
-          {"purpose", entry.purpose},
-          {"owner",
-           {{"node", entry.owner.node},
-            {"pid", entry.owner.pid},
-            {"start_ticks", entry.owner.start_ticks},
-            {"boot_id", entry.owner.boot_id},
-            {"computer", entry.owner.computer}}},
-          {"undo", undo}};
+  json document = {{"id", entry.id},
+                   {"purpose", entry.purpose},
+                   {"owner",
+                    {{"node", entry.owner.node},
+                     {"pid", entry.owner.pid},
+                     {"start_ticks", entry.owner.start_ticks},
+                     {"boot_id", entry.owner.boot_id},
+                     {"computer", entry.owner.computer}}},
+                   {"undo", undo}};
+  if (!entry.left.empty()) {
+    document["left"] = entry.left;
+  }
+  for (const JournalSubscription& subscription : entry.subscriptions) {
+    document["subscriptions"].push_back(
+        {{"port", subscription.port}, {"datarefs", subscription.datarefs}, {"rpos", subscription.rpos}});
+  }
+  return document;
 }
 
 JournalEntry entryFrom(const json& document) {
@@ -138,6 +156,11 @@ JournalEntry entryFrom(const json& document) {
   entry.owner.computer = owner.at("computer");
   for (const json& operation : document.at("undo")) {
     entry.undo.push_back(operationFrom(operation));
+  }
+  entry.left = document.value("left", "");
+  for (const json& subscription : document.value("subscriptions", json::array())) {
+    entry.subscriptions.push_back({subscription.at("port"), subscription.at("datarefs").get<std::vector<std::string>>(),
+                                   subscription.at("rpos")});
   }
   return entry;
 }
@@ -281,6 +304,13 @@ std::int64_t startTicks(std::int64_t pid) {
 
 }  // namespace
 
+std::string whyNotChanged(const JournalError& error) {
+  if (dynamic_cast<const JournalTakenError*>(&error) != nullptr) {
+    return std::string("another bridge is at this X-Plane: ") + error.what();
+  }
+  return std::string("it could not be given back after a crash, should there be one: ") + error.what();
+}
+
 EncodeResult encodeUndo(ByteSpan out, const UndoOperation& operation) {
   struct Encoder {
     ByteSpan out;
@@ -290,6 +320,7 @@ EncodeResult encodeUndo(ByteSpan out, const UndoOperation& operation) {
     EncodeResult operator()(const UndoIse4& ise4) const {
       return encodeIse4(out, ise4.target, ise4.address, ise4.port, false);
     }
+    EncodeResult operator()(const UndoPause&) const { return EncodeError::kOutOfRange; }
   };
   return std::visit(Encoder{out}, operation);
 }
@@ -312,6 +343,12 @@ bool isAlive(const JournalOwner& owner) {
 
 Journal::Journal(std::string path, JournalOwner self, AliveFunction alive)
     : path_(std::move(path)), self_(std::move(self)), alive_(std::move(alive)) {}
+
+std::shared_ptr<Journal> Journal::ofSubscriptions() const {
+  const fs::path path(path_);
+  const fs::path beside = path.parent_path() / (path.stem().string() + "_subscriptions" + path.extension().string());
+  return std::make_shared<Journal>(beside.string(), self_, alive_);
+}
 
 std::vector<JournalEntry> Journal::entries() const {
   const Lock lock(path_);
@@ -336,19 +373,32 @@ std::vector<JournalEntry> Journal::own() const {
   return found;
 }
 
-void Journal::record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo) {
+void Journal::record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo,
+                     std::vector<JournalSubscription> subscriptions) {
   const Lock lock(path_);
   std::vector<JournalEntry> entries = read(path_);
-  JournalEntry entry{id, purpose, self_, std::move(undo)};
+  JournalEntry entry{id, purpose, self_, std::move(undo), "", std::move(subscriptions)};
   const auto same =
       std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == id; });
   if (same == entries.end()) {
     entries.push_back(std::move(entry));
   } else if (same->owner != self_ && alive_(same->owner)) {
-    fail(path_, "'" + id + "' belongs to " + same->owner.node + " (process " + std::to_string(same->owner.pid) +
-                    " on " + same->owner.computer + "), which still runs: end it first");
+    throw JournalTakenError("'" + id + "' belongs to " + same->owner.node + " (process " +
+                            std::to_string(same->owner.pid) + " on " + same->owner.computer +
+                            "), which still runs: end it first");
   } else {
     *same = std::move(entry);
+  }
+  write(path_, entries);
+}
+
+void Journal::leave(const std::vector<std::string>& ids, const std::string& why) {
+  const Lock lock(path_);
+  std::vector<JournalEntry> entries = read(path_);
+  for (JournalEntry& entry : entries) {
+    if (entry.owner == self_ && std::find(ids.begin(), ids.end(), entry.id) != ids.end()) {
+      entry.left = why;
+    }
   }
   write(path_, entries);
 }

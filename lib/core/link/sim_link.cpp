@@ -23,12 +23,13 @@ Endpoint unpack(std::uint64_t packed) {
   return {static_cast<std::uint32_t>(packed >> 16), static_cast<std::uint16_t>(packed & 0xFFFFU)};
 }
 
-// In the order of kVersionIndex, kPausedIndex, kSimTimeIndex.
+// In the order of kVersionIndex, kPausedIndex, kSimTimeIndex, kFramePeriodIndex.
 RrefGroup statusGroup(std::int32_t rate_hz) {
   return {"link status",
-          {"sim/version/xplane_internal_version", "sim/time/paused", "sim/time/total_running_time_sec"},
+          {"sim/version/xplane_internal_version", "sim/time/paused", "sim/time/total_running_time_sec",
+           "sim/operation/misc/frame_rate_period"},
           rate_hz,
-          0};
+          kUrgentPriority};
 }
 
 }  // namespace
@@ -60,6 +61,7 @@ SimLink::SimLink(SimLinkOptions options, SimLinkCallbacks callbacks, Clock clock
                                     std::move(accept));
                     },
                     log_}),
+      leftovers_([this](std::uint16_t port) { return open("leftover", port); }, log_),
       rpos_rate_hz_(options_.rpos_rate_hz) {
   if (!clock_.steady_ns || !clock_.system_ns) {
     throw std::invalid_argument("SimLink needs both clocks");
@@ -100,6 +102,10 @@ void SimLink::listenForBeacon() {
     options.bind_port = options_.beacon_port;
     options.share_port = true;
     beacon_source_ = hub_->open("beacon", options);
+    if (options_.host.empty()) {
+      log_(LogLevel::kInfo, "looking for X-Plane by its beacon on " + options_.beacon_group + ":" +
+                                std::to_string(options_.beacon_port));
+    }
   } catch (const SocketError& error) {
     beacon_failure_ = std::string("X-Plane's beacon cannot be heard: ") + error.what();
     log_(options_.host.empty() ? LogLevel::kError : LogLevel::kWarn, beacon_failure_);
@@ -218,6 +224,7 @@ void SimLink::changeGroup(const std::shared_ptr<RrefDelivery>& delivery, std::ui
       return each.subscription.group().priority < priority;
     });
     groups_.insert(place, std::move(*added));
+    subscriptions_changed_ = true;
   });
 }
 
@@ -228,6 +235,7 @@ void SimLink::setRposRate(std::int32_t rate_hz) {
     if (rpos_source_ == nullptr) {
       rpos_source_ = source;
     }
+    subscriptions_changed_ = subscriptions_changed_ || (rate_hz > 0) != (rpos_rate_hz_ > 0);
     rpos_rate_hz_ = rate_hz;
     next_rpos_request_ns_ = now_ns_;
     if (rate_hz == 0) {
@@ -263,6 +271,18 @@ LinkCounters SimLink::counters() const {
 std::vector<std::string> SimLink::unansweredDatarefs() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return unanswered_;
+}
+
+bool SimLink::settled() const {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!calls_.empty()) {
+      return false;
+    }
+  }
+  const auto answered = [](const Group& group) { return group.subscription.settled(); };
+  return monitor_.state() == LinkState::kConnected && requests_.empty() && reader_.idle() &&
+         status_subscription_.settled() && std::all_of(groups_.begin(), groups_.end(), answered);
 }
 
 std::shared_ptr<Journal> SimLink::journal() const {
@@ -371,14 +391,18 @@ void SimLink::step(int timeout_ms) {
   receiveData();
   receiveRpos();
   receiveXpc();
+  receiveLeftovers();
   askXpc(now_ns_);
   receiveBeacons();
   refreshLink(now_ns_);
   if (!reader_.idle()) {
     reader_.update(now_ns_);
   }
-  if (now_ns_ >= next_maintenance_ns_) {
+  // In lock-step by frames, whatever the phase of the time before the flight.
+  const bool due = options_.lockstep ? now_ns_ != maintained_ns_ : now_ns_ >= next_maintenance_ns_;
+  if (due) {
     next_maintenance_ns_ = now_ns_ + kMaintenanceNs;
+    maintained_ns_ = now_ns_;
     maintain(now_ns_);
   }
   flushRequests(now_ns_);

@@ -14,6 +14,11 @@ constexpr std::int64_t kResolveNs = 5 * kNanosecondsPerSecond;
 constexpr std::int64_t kJoinNs = 5 * kNanosecondsPerSecond;
 constexpr std::int64_t kRposRetryNs = kNanosecondsPerSecond;
 
+/// Of this process: what an earlier one has left under the same name is kept until it is ended.
+std::string subscriptionsId(const Journal& journal) {
+  return std::string(kSubscriptionsPurpose) + ":" + journal.self().node + ":" + std::to_string(journal.self().pid);
+}
+
 }  // namespace
 
 void SimLink::maintain(std::int64_t now_ns) {
@@ -35,6 +40,9 @@ void SimLink::maintain(std::int64_t now_ns) {
   }
   data_output_.update(monitor_.state() == LinkState::kConnected, now_ns);
   updateRpos(now_ns);
+  if (monitor_.alive()) {
+    leftovers_.update(now_ns);
+  }
   publish(now_ns);
 }
 
@@ -85,14 +93,19 @@ void SimLink::resolve(std::int64_t now_ns) {
 }
 
 void SimLink::setPeer(const Endpoint& peer, const std::string& why) {
-  log_(LogLevel::kInfo, "talking to X-Plane at " + peer.toString() + ", " + why);
+  log_(LogLevel::kInfo, "looking for X-Plane at " + peer.toString() + ", " + why);
   peer_ = peer;
   packed_peer_ = (std::uint64_t{peer.address} << 16) | peer.port;
   peer_name_.clear();
   if (const std::optional<BeaconSighting> sighting = beacons_.at(peer, now_ns_)) {
     peer_name_ = sighting->computer_name;
   }
+  ports_.fill(0);
+  intruder_.reset();
+  other_address_.reset();
+  answered_ns_.reset();
   version_ = {};
+  judged_version_ = 0;
   paused_.reset();
   sim_time_s_.reset();
   monitor_.newPeer();
@@ -101,6 +114,7 @@ void SimLink::setPeer(const Endpoint& peer, const std::string& why) {
   }
   next_probe_ns_ = now_ns_;
   std::shared_ptr<Journal> journal = journals_ ? journals_(peer) : nullptr;
+  subscriptions_journal_ = journal && options_.journal_subscriptions ? journal->ofSubscriptions() : nullptr;
   const std::lock_guard<std::mutex> lock(mutex_);
   journal_ = std::move(journal);
 }
@@ -116,12 +130,17 @@ void SimLink::refreshLink(std::int64_t now_ns) {
       group.subscription.suspend();
     }
     next_probe_ns_ = now_ns;
+    ports_.fill(0);  // what comes back may be another run of X-Plane
   }
   const bool changed = alive != was_alive_ || came_up;
   was_alive_ = alive;
   if (came_up) {
     seen_epoch_ = monitor_.epoch();
+    came_up_ns_ = now_ns;
+    answered_ns_.reset();
     if (stop_phase_ == StopPhase::kRunning) {
+      leftovers_.linkUp(subscriptions_journal_, now_ns);
+      subscriptions_changed_ = true;
       updateDataOutput(now_ns);
     }
   }
@@ -156,11 +175,7 @@ void SimLink::updateRpos(std::int64_t now_ns) {
       stop_phase_ != StopPhase::kRunning) {
     return;
   }
-  std::array<std::uint8_t, kRposRequestSize> buffer;
-  if (const EncodeResult size = encodeRpos(buffer, rpos_rate_hz_)) {
-    rpos_source_->sendTo({buffer.data(), *size}, peer_);
-    ++live_counters_.requests;
-  }
+  sendRposRequest(rpos_source_.get(), rpos_rate_hz_);
   next_rpos_request_ns_ = now_ns + jitter_.around(kRposRetryNs);
 }
 
@@ -181,24 +196,31 @@ void SimLink::flushRequests(std::int64_t now_ns) {
   if (!peer_.valid()) {
     return;
   }
-  std::size_t allowance = pacer_.allowance(now_ns, &jitter_);
-  const std::size_t before = allowance;
   const auto flush = [&](RrefSubscription* subscription, DatagramSource* source) {
-    while (allowance > 0) {
+    const auto allowed = [&] {
+      return subscription->urgent() ? pacer_.urgentAllowance(now_ns, &jitter_) : pacer_.allowance(now_ns, &jitter_);
+    };
+    while (allowed() > 0) {
       const std::optional<std::size_t> index = subscription->nextRequest(now_ns, &jitter_);
       if (!index.has_value()) {
         return;
       }
       sendRequest(source, subscription->group().datarefs[*index], subscription->group().rate_hz,
                   static_cast<std::int32_t>(*index));
-      --allowance;
+      pacer_.spend(1);
     }
   };
   const bool subscribing = stop_phase_ == StopPhase::kRunning || stop_phase_ == StopPhase::kReleasing;
   if (subscribing) {
+    recordSubscriptions();
     flush(&status_subscription_, control_source_.get());
+    for (Group& group : groups_) {
+      if (group.subscription.urgent()) {
+        flush(&group.subscription, group.source.get());
+      }
+    }
   }
-  for (; allowance > 0 && !requests_.empty(); --allowance) {
+  for (; !requests_.empty() && pacer_.allowance(now_ns, &jitter_) > 0; pacer_.spend(1)) {
     const Request& request = requests_.front();
     sendRequest(request.source.get(), request.path, request.rate_hz, request.index);
     requests_.pop_front();
@@ -208,7 +230,17 @@ void SimLink::flushRequests(std::int64_t now_ns) {
       flush(&group.subscription, group.source.get());
     }
   }
-  pacer_.spend(before - allowance);
+  for (; monitor_.alive() && pacer_.allowance(now_ns, &jitter_) > 0; pacer_.spend(1)) {
+    const std::optional<LeftoverSubscriptions::Request> leftover = leftovers_.next(now_ns);
+    if (!leftover.has_value()) {
+      break;
+    }
+    if (leftover->dataref.empty()) {
+      sendRposRequest(leftover->source.get(), 0);
+    } else {
+      sendRequest(leftover->source.get(), leftover->dataref, 0, leftover->index);
+    }
+  }
 }
 
 void SimLink::sendRequest(DatagramSource* source, const std::string& path, std::int32_t rate_hz, std::int32_t index) {
@@ -219,6 +251,50 @@ void SimLink::sendRequest(DatagramSource* source, const std::string& path, std::
   }
 }
 
+void SimLink::sendRposRequest(DatagramSource* source, std::int32_t rate_hz) {
+  std::array<std::uint8_t, kRposRequestSize> buffer;
+  if (const EncodeResult size = encodeRpos(buffer, rate_hz)) {
+    source->sendTo({buffer.data(), *size}, peer_);
+    ++live_counters_.requests;
+  }
+}
+
+void SimLink::recordSubscriptions() {
+  if (!subscriptions_changed_ || subscriptions_journal_ == nullptr || !monitor_.alive()) {
+    return;  // before X-Plane has answered, it is asked for the link's own status only
+  }
+  subscriptions_changed_ = false;
+  std::vector<JournalSubscription> subscriptions;
+  const auto add = [&subscriptions](const DatagramSource& source, const std::vector<std::string>& datarefs, bool rpos) {
+    subscriptions.push_back({source.localPort(), datarefs, rpos});
+  };
+  add(*control_source_, status_subscription_.group().datarefs, false);
+  for (const Group& group : groups_) {
+    add(*group.source, group.subscription.group().datarefs, false);
+  }
+  if (rpos_source_ != nullptr && rpos_rate_hz_ > 0) {
+    add(*rpos_source_, {}, true);
+  }
+  try {
+    subscriptions_journal_->record(subscriptionsId(*subscriptions_journal_), kSubscriptionsPurpose, {},
+                                   std::move(subscriptions));
+  } catch (const JournalError& error) {
+    log_(LogLevel::kWarn,
+         std::string("subscriptions are not written down, and stay in X-Plane after a crash: ") + error.what());
+  }
+}
+
+void SimLink::forgetSubscriptions() {
+  if (subscriptions_journal_ == nullptr || monitor_.epoch() == 0 || monitor_.state() == LinkState::kStale) {
+    return;  // while it loads, X-Plane does not read that it is to stop
+  }
+  try {
+    subscriptions_journal_->remove({subscriptionsId(*subscriptions_journal_)});
+  } catch (const JournalError& error) {
+    log_(LogLevel::kError, error.what());
+  }
+}
+
 void SimLink::removeGroup(const RrefDelivery* delivery) {
   const auto old = std::find_if(groups_.begin(), groups_.end(),
                                 [delivery](const Group& each) { return each.delivery.get() == delivery; });
@@ -226,6 +302,7 @@ void SimLink::removeGroup(const RrefDelivery* delivery) {
     stopGroup(*old);
     hub_->ignore(*old->source);  // it may live on for requests that are still to be sent
     groups_.erase(old);
+    subscriptions_changed_ = true;
   }
 }
 
@@ -248,14 +325,12 @@ void SimLink::stopSubscriptions() {
     stopGroup(group);
   }
   groups_.clear();
-  for (std::int32_t i = 0; i <= kSimTimeIndex; ++i) {
-    requests_.push_back({control_source_, status_subscription_.group().datarefs[static_cast<std::size_t>(i)], 0, i});
+  const std::vector<std::string>& status = status_subscription_.group().datarefs;
+  for (std::size_t i = 0; i < status.size(); ++i) {
+    requests_.push_back({control_source_, status[i], 0, static_cast<std::int32_t>(i)});
   }
   if (rpos_source_ != nullptr && rpos_rate_hz_ > 0) {
-    std::array<std::uint8_t, kRposRequestSize> buffer;
-    if (const EncodeResult size = encodeRpos(buffer, 0)) {
-      rpos_source_->sendTo({buffer.data(), *size}, peer_);
-    }
+    sendRposRequest(rpos_source_.get(), 0);
   }
 }
 
@@ -267,6 +342,9 @@ void SimLink::updateStop(std::int64_t now_ns) {
   }
   if (stop_phase_ == StopPhase::kUnsubscribing && (requests_.empty() || late)) {
     stop_phase_ = StopPhase::kDone;
+    if (requests_.empty()) {
+      forgetSubscriptions();
+    }
   }
   if (stop_phase_ == StopPhase::kDone) {
     reader_.cancelAll();

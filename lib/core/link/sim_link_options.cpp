@@ -40,6 +40,7 @@ SimLinkOptions checked(SimLinkOptions options, bool has_journals) {
   requireRange("beacon_settle_s", options.beacon_settle_s, 0.0, kHour);
   requireRange("probe_period_s", options.probe_period_s, 0.01, kHour);
   requireRange("batch_size", static_cast<double>(options.batch_size), 1.0, 1e6);
+  requireRange("batch_frames", options.batch_frames, 0.0, 1e3);
   requireRange("batch_spacing_s", options.batch_spacing_s, 0.0, kHour);
   requireRange("request_timeout_s", options.request_timeout_s, 0.01, kHour);
   requireRange("rpos_rate_hz", options.rpos_rate_hz, 0, kEveryFrameRateHz);

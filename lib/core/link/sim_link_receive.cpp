@@ -29,16 +29,29 @@ void SimLink::drain(DatagramSource* source, const Handler& handle) {
   }
 }
 
-bool SimLink::isFromPeer(const Received& received) {
-  // By address only: X-Plane may answer from another port than the one it listens on.
-  if (peer_.valid() && isSameHost(received.from.address, peer_.address)) {
+bool SimLink::isFromPeer(ByteView bytes, const Received& received, Stream stream) {
+  const bool same_host = peer_.valid() && isSameHost(received.from.address, peer_.address);
+  // X-Plane may answer from another port than the one it listens on, but while it runs it keeps to that: what comes
+  // from another port is another program's.
+  const std::uint16_t port = ports_[static_cast<std::size_t>(stream)];
+  if (same_host && (port == 0 || port == received.from.port)) {
     return true;
   }
   ++live_counters_.strangers;
+  if (classify(bytes) != MessageKind::kUnknown) {
+    (same_host ? intruder_ : other_address_) = Sighting{received.from, now_ns_};
+  }
   return false;
 }
 
-void SimLink::heardPeer() {
+void SimLink::heardPeer(const Received& received, Stream stream) {
+  ports_[static_cast<std::size_t>(stream)] = received.from.port;
+  if (stream == Stream::kAnswers) {
+    answered_ns_ = now_ns_;
+  }
+  if (stream == Stream::kPlugin) {
+    return;  // it answers also while X-Plane's own sender is silent
+  }
   monitor_.heard(now_ns_);
   last_heard_ns_ = now_ns_;
 }
@@ -57,7 +70,7 @@ void SimLink::countDecodeError(DecodeError error) { ++live_counters_.decode_erro
 
 void SimLink::receiveControl() {
   drain(control_source_.get(), [this](ByteView bytes, const Received& received) {
-    if (!isFromPeer(received)) {
+    if (!isFromPeer(bytes, received, Stream::kAnswers)) {
       return;
     }
     const DecodeResult<RrefView> rref = decodeRref(bytes);
@@ -66,7 +79,7 @@ void SimLink::receiveControl() {
       return;
     }
     ++live_counters_.rref_datagrams;
-    heardPeer();
+    heardPeer(received, Stream::kAnswers);
     for (std::size_t i = 0; i < rref->size(); ++i) {
       const RrefPair pair = (*rref)[i];
       if (pair.index >= 0 && pair.index < kFirstReadIndex) {
@@ -98,6 +111,12 @@ void SimLink::takeStatus(const RrefPair& pair) {
       sim_time_s_ = pair.value;
       monitor_.setSimTime(pair.value);
       break;
+    case kFramePeriodIndex:
+      if (pair.value > 0.0F) {
+        constexpr double kLongestFrame = 0.1;  // [s] a hitch says nothing about the next frames
+        pacer_.setSpacing(options_.batch_frames * std::min(static_cast<double>(pair.value), kLongestFrame));
+      }
+      break;
     default:
       ++live_counters_.unknown_indices;
       break;
@@ -106,7 +125,7 @@ void SimLink::takeStatus(const RrefPair& pair) {
 
 void SimLink::receiveGroup(Group* group) {
   drain(group->source.get(), [this, group](ByteView bytes, const Received& received) {
-    if (!isFromPeer(received)) {
+    if (!isFromPeer(bytes, received, Stream::kAnswers)) {
       return;
     }
     const DecodeResult<RrefView> rref = decodeRref(bytes);
@@ -115,7 +134,7 @@ void SimLink::receiveGroup(Group* group) {
       return;
     }
     ++live_counters_.rref_datagrams;
-    heardPeer();
+    heardPeer(received, Stream::kAnswers);
     group->delivery->deliver(group->list, *rref, infoOf(received));
     // Statistics after delivery, to keep latency low.
     for (std::size_t i = 0; i < rref->size(); ++i) {
@@ -127,7 +146,7 @@ void SimLink::receiveGroup(Group* group) {
 
 void SimLink::receiveData() {
   drain(data_source_.get(), [this](ByteView bytes, const Received& received) {
-    if (!isFromPeer(received)) {
+    if (!isFromPeer(bytes, received, Stream::kData)) {
       return;
     }
     const DecodeResult<DataView> data = decodeData(bytes);
@@ -136,7 +155,7 @@ void SimLink::receiveData() {
       return;
     }
     ++live_counters_.data_datagrams;
-    heardPeer();
+    heardPeer(received, Stream::kData);
     const DataAnomalies anomalies = inspect(*data);
     live_counters_.unknown_rows += anomalies.unknown_rows;
     live_counters_.non_finite_values += anomalies.non_finite_values;
@@ -151,7 +170,7 @@ void SimLink::receiveData() {
 
 void SimLink::receiveRpos() {
   drain(rpos_source_.get(), [this](ByteView bytes, const Received& received) {
-    if (!isFromPeer(received)) {
+    if (!isFromPeer(bytes, received, Stream::kPosition)) {
       return;
     }
     const DecodeResult<Rpos> rpos = decodeRpos(bytes);
@@ -160,7 +179,7 @@ void SimLink::receiveRpos() {
       return;
     }
     ++live_counters_.rpos_datagrams;
-    heardPeer();
+    heardPeer(received, Stream::kPosition);
     next_rpos_request_ns_ = now_ns_ + jitter_.around(kRposSilenceNs);
     if (callbacks_.on_rpos && rpos_rate_hz_ > 0) {
       callbacks_.on_rpos(*rpos, infoOf(received));
@@ -170,7 +189,7 @@ void SimLink::receiveRpos() {
 
 void SimLink::receiveXpc() {
   drain(xpc_source_.get(), [this](ByteView bytes, const Received& received) {
-    if (!isFromPeer(received)) {
+    if (!isFromPeer(bytes, received, Stream::kPlugin)) {
       return;
     }
     const DecodeResult<XpcPosition> position = decodePosi(bytes);
@@ -178,12 +197,18 @@ void SimLink::receiveXpc() {
       countDecodeError(classify(bytes) == MessageKind::kUnknown ? DecodeError::kUnknownLabel : position.error());
       return;
     }
-    // Not heardPeer(): the plugin answers also while X-Plane's own sender is silent.
     ++live_counters_.xpc_datagrams;
+    heardPeer(received, Stream::kPlugin);
     if (callbacks_.on_xpc) {
       callbacks_.on_xpc(*position, infoOf(received));
     }
   });
+}
+
+void SimLink::receiveLeftovers() {
+  for (std::size_t i = 0; i < leftovers_.sources().size(); ++i) {
+    drain(leftovers_.sources()[i].get(), [this, i](ByteView, const Received&) { leftovers_.heard(i, now_ns_); });
+  }
 }
 
 void SimLink::receiveBeacons() {

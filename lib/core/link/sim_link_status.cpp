@@ -1,6 +1,7 @@
 #include "xplane_bridge/core/link/sim_link.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "xplane_bridge/core/base/text.hpp"
@@ -9,13 +10,58 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kPatienceS = 3.0;  // before a fruitless search is called a problem
+constexpr double kPatienceS = 5.0;        // before a fruitless search is called a problem
+constexpr double kRecentS = 5.0;          // what was noticed within this is told
+constexpr double kAnswerPatienceS = 2.0;  // without an answer, while DATA comes
 
 std::string namesOf(const std::vector<BeaconSighting>& sightings) {
   return join(sightings, ", ", [](const BeaconSighting& sighting) { return toString(sighting); });
 }
 
+bool contains(const std::vector<std::string>& texts, const std::string& text) {
+  return std::find(texts.begin(), texts.end(), text) != texts.end();
+}
+
 }  // namespace
+
+void SimLink::findSearchProblems(std::int64_t now_ns, std::vector<std::string>* problems) const {
+  const std::vector<BeaconSighting> sightings = beacons_.sightings(now_ns);
+  const double searched_s = toSeconds(now_ns - started_ns_);
+  if (options_.host.empty()) {
+    if (sightings.size() > 1 && !beacons_.at(peer_, now_ns).has_value()) {
+      problems->push_back("several X-Planes announce themselves: " + namesOf(sightings) +
+                          "; set the parameter host (and port) to the one that is meant");
+    } else if (!peer_.valid() && sightings.empty() && searched_s > kPatienceS) {
+      problems->push_back("no X-Plane announces itself on " + options_.beacon_group + ":" +
+                          std::to_string(options_.beacon_port) +
+                          ": start X-Plane, or set the parameter host if its beacon cannot get here (other network, "
+                          "firewall, container)");
+    }
+  } else if (peer_.valid()) {
+    for (const BeaconSighting& sighting : sightings) {
+      if (isSameHost(sighting.endpoint.address, peer_.address) && sighting.endpoint.port != peer_.port) {
+        problems->push_back("X-Plane at " + sighting.endpoint.addressString() + " listens on port " +
+                            std::to_string(sighting.endpoint.port) + ", but port " + std::to_string(peer_.port) +
+                            " is configured: set the parameter port");
+      }
+    }
+  }
+  if (other_address_.has_value() && toSeconds(now_ns - other_address_->time_ns) <= kRecentS) {
+    const std::string from = other_address_->from.addressString();
+    problems->push_back(
+        "answers come from " + from +
+        (peer_.valid()
+             ? ", but " + peer_.addressString() + (options_.host.empty() ? " announced itself" : " is configured")
+             : ", but no X-Plane has announced itself") +
+        ": X-Plane's computer has several addresses, or it is another one; set the parameter host to " + from);
+  } else if (peer_.valid() && monitor_.state() == LinkState::kSearching && searched_s > kPatienceS) {
+    problems->push_back("no answer from " + peer_.toString() +
+                        (control_source_->counters().refused > 0
+                             ? ": that computer is there, but nothing listens on the port: start X-Plane, or set port"
+                             : ": start X-Plane; check the address, firewalls and, in X-Plane 12, Settings > Network > "
+                               "Accept incoming connections"));
+  }
+}
 
 std::vector<std::string> SimLink::findProblems(std::int64_t now_ns) const {
   std::vector<std::string> problems;
@@ -25,34 +71,21 @@ std::vector<std::string> SimLink::findProblems(std::int64_t now_ns) const {
   if (!beacon_failure_.empty() && options_.host.empty()) {
     problems.push_back(beacon_failure_);
   }
-  const std::vector<BeaconSighting> sightings = beacons_.sightings(now_ns);
-  const double searched_s = toSeconds(now_ns - started_ns_);
-  if (!monitor_.alive() && options_.host.empty()) {
-    if (sightings.size() > 1 && !beacons_.at(peer_, now_ns).has_value()) {
-      problems.push_back("several X-Planes announce themselves: " + namesOf(sightings) +
-                         "; set the parameter host (and port) to the one that is meant");
-    } else if (!peer_.valid() && sightings.empty() && searched_s > kPatienceS) {
-      problems.push_back("no X-Plane announces itself on " + options_.beacon_group + ":" +
-                         std::to_string(options_.beacon_port) +
-                         ": start X-Plane, or set the parameter host if its beacon cannot get here (other network, "
-                         "firewall, container)");
+  if (!monitor_.alive()) {
+    findSearchProblems(now_ns, &problems);
+  } else if (isOneWay(now_ns)) {
+    problems.push_back("X-Plane sends Data Output, but nothing answers on " + peer_.toString() +
+                       ": only what its rows tell is known (a firewall there; in X-Plane 12, Settings > Network > " +
+                       "Accept incoming connections)");
+    if (!versionNow(now_ns).known()) {
+      problems.emplace_back(
+          "X-Plane's version is not known, so rows that differ by version (rates, for example) are left "
+          "out: set the parameter xplane_version");
     }
   }
-  if (!monitor_.alive() && !options_.host.empty() && peer_.valid()) {
-    for (const BeaconSighting& sighting : sightings) {
-      if (isSameHost(sighting.endpoint.address, peer_.address) && sighting.endpoint.port != peer_.port) {
-        problems.push_back("X-Plane at " + sighting.endpoint.addressString() + " listens on port " +
-                           std::to_string(sighting.endpoint.port) + ", but port " + std::to_string(peer_.port) +
-                           " is configured: set the parameter port");
-      }
-    }
-  }
-  if (peer_.valid() && monitor_.state() == LinkState::kSearching && searched_s > kPatienceS) {
-    problems.push_back("no answer from " + peer_.toString() +
-                       (control_source_->counters().refused > 0
-                            ? ": that computer is there, but nothing listens on the port: start X-Plane, or set port"
-                            : ": start X-Plane; check the address, firewalls and, in X-Plane 12, Settings > Network > "
-                              "Accept incoming connections"));
+  if (intruder_.has_value() && toSeconds(now_ns - intruder_->time_ns) <= kRecentS) {
+    problems.push_back("another program at " + intruder_->from.toString() +
+                       " sends X-Plane's messages as well: they are dropped");
   }
   if (!data_output_.problem().empty()) {
     problems.push_back(data_output_.problem());
@@ -60,12 +93,25 @@ std::vector<std::string> SimLink::findProblems(std::int64_t now_ns) const {
   return problems;
 }
 
+bool SimLink::isOneWay(std::int64_t now_ns) const {
+  const std::int64_t answered_ns = answered_ns_.value_or(came_up_ns_);
+  return monitor_.alive() && live_counters_.data_datagrams > 0 && toSeconds(now_ns - answered_ns) > kAnswerPatienceS;
+}
+
+SimulatorVersion SimLink::versionNow(std::int64_t now_ns) const {
+  if (version_.known() || !isOneWay(now_ns)) {
+    return version_;
+  }
+  const std::optional<BeaconSighting> beacon = beacons_.at(peer_, now_ns);
+  return {beacon.has_value() ? beacon->version : options_.unheard_version};
+}
+
 std::string SimLink::reasonOf(LinkState state) const {
   switch (state) {
     case LinkState::kSearching:
       return peer_.valid() ? "waiting for the first answer of " + peer_.toString() : "waiting for X-Plane's beacon";
     case LinkState::kConnected:
-      return "X-Plane answers";
+      return isOneWay(now_ns_) ? "X-Plane sends, but does not answer" : "X-Plane answers";
     case LinkState::kPaused:
       return "X-Plane answers, the simulation is paused";
     case LinkState::kStale:
@@ -102,33 +148,50 @@ void SimLink::publish(std::int64_t now_ns) {
       unanswered.push_back(std::move(path));
     }
   }
+  if (version_.known() && version_.number != judged_version_ && options_.otherwise) {
+    version_.otherwise = options_.otherwise(peer_, version_.number);
+    judged_version_ = version_.number;
+  }
   LinkStatus status;
   status.state = monitor_.state();
   status.epoch = monitor_.epoch();
   status.reason = reasonOf(status.state);
   status.peer = peer_;
   status.computer_name = peer_name_;
-  status.version = version_;
+  status.version = versionNow(now_ns);
+  status.one_way = isOneWay(now_ns);
   status.paused = paused_;
   status.sim_time_s = sim_time_s_;
   status.silence_s = monitor_.silence(now_ns);
   status.beacons = beacons_.sightings(now_ns);
   status.problems = findProblems(now_ns);
+  if (status.state == LinkState::kSearching && !status.problems.empty()) {
+    status.reason = join(status.problems, "; ");
+  }
   bool changed = false;
   bool state_changed = false;
+  std::vector<std::string> new_problems;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     state_changed = status.state != status_.state || status.epoch != status_.epoch;
     changed = state_changed || status.peer != status_.peer || status.version != status_.version ||
               status.problems != status_.problems || status.computer_name != status_.computer_name;
+    std::copy_if(status.problems.begin(), status.problems.end(), std::back_inserter(new_problems),
+                 [this](const std::string& problem) { return !contains(status_.problems, problem); });
     status.since_steady_ns = status.state != status_.state ? now_ns : status_.since_steady_ns;
     status_ = status;
     counters_ = counters;
-    unanswered_ = std::move(unanswered);
+    unanswered_ = status.one_way ? std::vector<std::string>() : std::move(unanswered);
   }
   if (state_changed) {
     const bool bad = status.state == LinkState::kLost || status.state == LinkState::kStale;
     log_(bad ? LogLevel::kWarn : LogLevel::kInfo, std::string("link ") + toString(status.state) + ": " + status.reason);
+  }
+  for (const std::string& problem : new_problems) {
+    // These three were logged when they came about.
+    if (problem != resolve_failure_ && problem != beacon_failure_ && problem != data_output_.problem()) {
+      log_(LogLevel::kWarn, problem);
+    }
   }
   if (changed && callbacks_.on_state) {
     callbacks_.on_state(status);

@@ -73,7 +73,7 @@ bool SimulatorPort::waitUntilUndone(const std::vector<UndoOperation>& operations
   std::vector<std::string> paths;
   std::vector<float> expected;
   for (const UndoOperation& operation : operations) {
-    if (const auto* dref = std::get_if<UndoDref>(&operation)) {
+    if (const auto* dref = std::get_if<UndoDref>(&operation); dref != nullptr && dref->confirm) {
       paths.push_back(dref->path);
       expected.push_back(dref->value);
     }

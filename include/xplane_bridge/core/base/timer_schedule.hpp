@@ -23,6 +23,9 @@ class TimerSchedule {
   /// that is no alarm
   void setAlarm(Timer alarm, std::int64_t due_ns);
 
+  /// Periodic timers begin anew: due one period after `now_ns`.
+  void restart(std::int64_t now_ns);
+
   /// [ns] when the next timer is due; nullopt when none will be.
   std::optional<std::int64_t> next() const;
 

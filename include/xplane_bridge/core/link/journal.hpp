@@ -21,11 +21,19 @@ class JournalError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+/// What is to be changed is in the journal already, by a process that still runs: a second bridge at one X-Plane.
+class JournalTakenError : public JournalError {
+ public:
+  using JournalError::JournalError;
+};
+/// Why X-Plane is left as it is when the journal refuses a change, as the end of a sentence.
+std::string whyNotChanged(const JournalError& error);
 
 /// Writes `value` to a dataref (DREF).
 struct UndoDref {
   std::string path;
   float value = 0.0F;
+  bool confirm = true;  ///< it is undone only once X-Plane shows the value; else it is written and not looked at
 };
 /// Writes one DATA row; -999 gives a slot back (DATA).
 struct UndoData {
@@ -41,9 +49,12 @@ struct UndoIse4 {
   std::string address;  ///< dotted decimal
   std::uint16_t port = 0;
 };
-using UndoOperation = std::variant<UndoDref, UndoData, UndoUsel, UndoIse4>;
+/// Lets X-Plane go on if it is paused. Has no datagram of its own: before 12.10 there is only a toggle, so what X-Plane
+/// shows decides whether anything is sent (xplane_bridge::resumeLeftovers()).
+struct UndoPause {};
+using UndoOperation = std::variant<UndoDref, UndoData, UndoUsel, UndoIse4, UndoPause>;
 
-/// The datagram that carries out an operation.
+/// The datagram that carries out an operation; kOutOfRange for one that has none.
 EncodeResult encodeUndo(ByteSpan out, const UndoOperation& operation);
 /// Room for any operation's datagram.
 constexpr std::size_t kMaxUndoSize = kMaxDselSize;
@@ -68,12 +79,21 @@ JournalOwner thisProcess(const std::string& node);
 /// file may lie on a shared disk) is taken to run: its changes are not ours to undo.
 bool isAlive(const JournalOwner& owner);
 
+/// What X-Plane sends to one UDP port of ours until it is told to stop: by datagrams from that port.
+struct JournalSubscription {
+  std::uint16_t port = 0;
+  std::vector<std::string> datarefs;  ///< RREF, the position is the index
+  bool rpos = false;                  ///< the position stream
+};
+
 /// One thing that was changed.
 struct JournalEntry {
   std::string id;       ///< unique in the file, e.g. "override:sim/operation/override/override_joystick"
-  std::string purpose;  ///< who looks after such entries: "data_output", "override", "field_of_view", ...
+  std::string purpose;  ///< who looks after such entries: "data_output", "override", "subscriptions", ...
   JournalOwner owner;
   std::vector<UndoOperation> undo;  ///< in the order in which they are to be carried out
+  std::string left = {};            ///< why its process ended without undoing it; empty: it crashed, or still runs
+  std::vector<JournalSubscription> subscriptions = {};
 };
 
 /// The journal of one X-Plane (host and port), shared by all nodes that use it.
@@ -92,6 +112,10 @@ class Journal {
   const std::string& path() const { return path_; }
   const JournalOwner& self() const { return self_; }
 
+  /// The journal of subscriptions beside this one, "<file>_subscriptions.json": a process that gives overrides back
+  /// never has to wait for a node that is writing down hundreds of datarefs, or was stopped in the middle of that.
+  std::shared_ptr<Journal> ofSubscriptions() const;
+
   /// Everything in the file; empty when there is none.
   std::vector<JournalEntry> entries() const;
   /// The entries of a purpose whose process is gone: to be undone, then removed.
@@ -100,9 +124,12 @@ class Journal {
   std::vector<JournalEntry> own() const;
 
   /// Adds an entry in the name of this process, or replaces the one with the same id. Returns once it is on disk: only
-  /// then may X-Plane be changed. Refuses to replace an entry of another process that still runs; the entry of one that
-  /// is gone is replaced, so look at orphans() first.
-  void record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo);
+  /// then may X-Plane be changed. Refuses to replace an entry of another process that still runs (JournalTakenError);
+  /// the entry of one that is gone is replaced, so look at orphans() first.
+  void record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo,
+              std::vector<JournalSubscription> subscriptions = {});
+  /// Writes into this process's entries of these ids why they are left behind.
+  void leave(const std::vector<std::string>& ids, const std::string& why);
   /// Removes entries by id; unknown ids are no error. The file goes with its last entry.
   void remove(const std::vector<std::string>& ids);
   /// Removes what was found by orphans() and has been undone, but not what record() has taken over since.

@@ -19,7 +19,7 @@ class LinkMonitor {
  public:
   explicit LinkMonitor(const LinkMonitorOptions& options) : options_(options) {}
 
-  /// A valid datagram of X-Plane.
+  /// A valid datagram of X-Plane; they come during a pause as well [? paused-output].
   void heard(std::int64_t now_ns);
   /// Its beacon.
   void beaconHeard(std::int64_t now_ns) { last_beacon_ns_ = now_ns; }

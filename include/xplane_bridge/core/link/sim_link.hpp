@@ -17,6 +17,7 @@
 #include "xplane_bridge/core/base/log.hpp"
 #include "xplane_bridge/core/link/data_output.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
+#include "xplane_bridge/core/link/leftover_subscriptions.hpp"
 #include "xplane_bridge/core/link/link_monitor.hpp"
 #include "xplane_bridge/core/link/sim_link_options.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
@@ -30,7 +31,7 @@ namespace xplane_bridge::core {
 
 struct LinkCounters {
   UdpCounters udp;              ///< sum over all sockets
-  std::uint64_t strangers = 0;  ///< datagrams from another computer than X-Plane's: dropped
+  std::uint64_t strangers = 0;  ///< datagrams from another computer than X-Plane's, or another program there: dropped
   std::array<std::uint64_t, kDecodeErrorCount> decode_errors{};  ///< by DecodeError
   std::uint64_t unknown_rows = 0;                                ///< DATA rows with an index outside 0..199: skipped
   std::uint64_t non_finite_values = 0;  ///< NaN or infinite values in DATA and RREF: passed on, to be judged
@@ -90,11 +91,15 @@ class SimLink : public SimulatorPort {
   /// Rows wanted from Data Output (transport DATA).
   void setDataRows(std::vector<std::int32_t> rows);
 
+  bool inLockstep() const override { return options_.lockstep; }
   LinkStatus status() const override;
   LinkCounters counters() const;
   /// Datarefs that were asked for repeatedly and never answered while others were: unknown to this X-Plane.
   std::vector<std::string> unansweredDatarefs() const;
   std::shared_ptr<Journal> journal() const override;
+  /// X-Plane has answered for all datarefs that are asked for, or has been asked in vain, and nothing is under way. Of
+  /// the link's thread.
+  bool settled() const;
   const Clock& clock() const override { return clock_; }
   /// Port on which DATA is received; 0 without DATA transport.
   std::uint16_t dataPort() const { return data_source_ ? data_source_->localPort() : std::uint16_t{0}; }
@@ -125,6 +130,14 @@ class SimLink : public SimulatorPort {
     std::int32_t index = 0;
   };
 
+  /// What X-Plane sends from one socket of its own, as far as is known.
+  enum class Stream : std::uint8_t { kAnswers, kData, kPosition, kPlugin };
+  static constexpr std::size_t kStreamCount = 4;
+  struct Sighting {
+    Endpoint from;
+    std::int64_t time_ns = 0;
+  };
+
   /// For handles: null once the link is gone.
   struct Self {
     std::mutex mutex;
@@ -134,6 +147,7 @@ class SimLink : public SimulatorPort {
   static constexpr std::int32_t kVersionIndex = 0;  // of the status subscription: sim_link.cpp
   static constexpr std::int32_t kPausedIndex = 1;
   static constexpr std::int32_t kSimTimeIndex = 2;
+  static constexpr std::int32_t kFramePeriodIndex = 3;
   static constexpr std::int32_t kFirstReadIndex = 1000;  // of one-shot reads, on the same source
 
   // Calls of any thread, carried out on the link's (sim_link.cpp).
@@ -151,8 +165,8 @@ class SimLink : public SimulatorPort {
   // What arrives (sim_link_receive.cpp).
   template <typename Handler>
   void drain(DatagramSource* source, const Handler& handle);
-  bool isFromPeer(const Received& received);
-  void heardPeer();
+  bool isFromPeer(ByteView bytes, const Received& received, Stream stream);
+  void heardPeer(const Received& received, Stream stream);
   ReceiveInfo infoOf(const Received& received);
   void countDecodeError(DecodeError error);
   void receiveControl();
@@ -160,6 +174,7 @@ class SimLink : public SimulatorPort {
   void receiveData();
   void receiveRpos();
   void receiveXpc();
+  void receiveLeftovers();
   void receiveBeacons();
   void takeStatus(const RrefPair& pair);
 
@@ -175,13 +190,19 @@ class SimLink : public SimulatorPort {
   void askXpc(std::int64_t now_ns);
   void flushRequests(std::int64_t now_ns);
   void sendRequest(DatagramSource* source, const std::string& path, std::int32_t rate_hz, std::int32_t index);
+  void sendRposRequest(DatagramSource* source, std::int32_t rate_hz);
   void removeGroup(const RrefDelivery* delivery);
   void stopGroup(const Group& group);
   void stopSubscriptions();
+  void recordSubscriptions();
+  void forgetSubscriptions();
   void updateStop(std::int64_t now_ns);
 
   // What is said (sim_link_status.cpp).
   std::vector<std::string> findProblems(std::int64_t now_ns) const;
+  void findSearchProblems(std::int64_t now_ns, std::vector<std::string>* problems) const;
+  bool isOneWay(std::int64_t now_ns) const;
+  SimulatorVersion versionNow(std::int64_t now_ns) const;
   std::string reasonOf(LinkState state) const;
   void publish(std::int64_t now_ns);
 
@@ -229,8 +250,16 @@ class SimLink : public SimulatorPort {
   std::int64_t started_ns_ = 0;
   std::int64_t next_join_ns_ = 0;
   std::int64_t next_maintenance_ns_ = 0;
+  std::int64_t maintained_ns_ = -1;
   std::int64_t next_probe_ns_ = 0;
   std::int64_t now_ns_ = 0;
+
+  /// Port of X-Plane's that a stream has come from since the link came up; 0: not yet.
+  std::array<std::uint16_t, kStreamCount> ports_{};
+  std::optional<Sighting> intruder_;         // another program of X-Plane's computer, see isFromPeer()
+  std::optional<Sighting> other_address_;    // X-Plane's messages from another computer, or another address of its
+  std::optional<std::int64_t> answered_ns_;  // RREF, the last one
+  std::int64_t came_up_ns_ = 0;
 
   LinkMonitor monitor_;
   BeaconTracker beacons_;
@@ -239,7 +268,10 @@ class SimLink : public SimulatorPort {
   RrefSubscription status_subscription_;
   DatarefReader reader_;
   DataOutput data_output_;
-  std::vector<Group> groups_;  // by falling priority
+  LeftoverSubscriptions leftovers_;
+  std::shared_ptr<Journal> subscriptions_journal_;  // null: they are not written down
+  bool subscriptions_changed_ = false;              // since recordSubscriptions()
+  std::vector<Group> groups_;                       // by falling priority
   std::deque<Request> requests_;
   bool was_alive_ = false;
   std::uint32_t seen_epoch_ = 0;
@@ -249,6 +281,7 @@ class SimLink : public SimulatorPort {
   std::int64_t next_xpc_request_ns_ = 0;
 
   SimulatorVersion version_;
+  std::int32_t judged_version_ = 0;  // for which options_.otherwise was asked
   std::optional<bool> paused_;
   std::optional<float> sim_time_s_;
   LinkCounters live_counters_;  // of this thread; published by maintain()

@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "xplane_bridge/core/link/data_output.hpp"
+#include "xplane_bridge/core/wire/datagram_source.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
 
 namespace xplane_bridge::core {
@@ -23,13 +25,24 @@ struct SimLinkOptions {
   double beacon_settle_s = 1.2;      ///< [s] waited for a second beacon before the first is chosen
   double probe_period_s = 0.2;       ///< [s] between questions while X-Plane is silent
   std::int32_t status_rate_hz = 20;  ///< of the link's own subscription (version, paused, simulator time)
-  std::size_t batch_size = 100;      ///< subscription requests sent at once; X-Plane loses some above about 140
-  double batch_spacing_s = 0.1;      ///< [s] between batches
-  double request_timeout_s = 2.0;    ///< [s] deadline of the link's own read-backs
-  std::uint32_t jitter_seed = 1;     ///< retries are spread by up to 20 %
-  std::int32_t rpos_rate_hz = 0;     ///< RPOS stream; 0: none
-  std::uint16_t xpc_port = 0;        ///< where the X-Plane Connect plugin is asked for the position; 0: not at all
-  double xpc_rate_hz = 60.0;         ///< of these questions (each has one answer), up to 1000
+  /// Subscription requests sent at once. X-Plane takes about 148 in a frame: the flight group of one node (70, and the
+  /// link's own status) and a batch of each of two others stay below.
+  std::size_t batch_size = 38;
+  double batch_frames = 2.0;          ///< X-Plane's frames between batches
+  double batch_spacing_s = 0.1;       ///< [s] between batches until X-Plane has said how long a frame is
+  bool journal_subscriptions = true;  ///< write subscriptions down, and end those an earlier run of the node has left
+  double request_timeout_s = 2.0;     ///< [s] deadline of the link's own read-backs
+  std::uint32_t jitter_seed = 1;      ///< retries are spread by up to 20 %
+  std::int32_t rpos_rate_hz = 0;      ///< RPOS stream; 0: none
+  std::uint16_t xpc_port = 0;         ///< where the X-Plane Connect plugin is asked for the position; 0: not at all
+  double xpc_rate_hz = 60.0;          ///< of these questions (each has one answer), up to 1000
+  /// xplane_internal_version of an X-Plane that sends Data Output but answers nothing, and whose beacon is not heard
+  /// either; 0: unknown.
+  std::int32_t unheard_version = 0;
+  /// In what this X-Plane is otherwise than others of its version, see SimulatorVersion; asked once its number is
+  /// known.
+  std::function<std::uint32_t(const Endpoint& peer, std::int32_t number)> otherwise;
+  bool lockstep = false;  ///< under a LockstepHub: its state is looked at in every frame
   DataOutputOptions data_output;
 };
 

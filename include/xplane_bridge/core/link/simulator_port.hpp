@@ -26,7 +26,8 @@ struct LinkStatus {
   std::int64_t since_steady_ns = 0;  ///< [ns] when `state` began
   Endpoint peer;                     ///< X-Plane; not valid() while unknown
   std::string computer_name;         ///< from the beacon; empty without
-  SimulatorVersion version;          ///< unknown until X-Plane has answered
+  SimulatorVersion version;          ///< unknown until X-Plane has answered; see also one_way
+  bool one_way = false;              ///< DATA comes, but nothing answers: `version` is the beacon's or the option's
   std::optional<bool> paused;
   std::optional<float> sim_time_s;      ///< sim/time/total_running_time_sec as received
   double silence_s = 0.0;               ///< [s] since the last valid datagram; NaN before the first
@@ -86,6 +87,9 @@ class SimulatorPort {
   /// The second half of undo(), for operations that have been sent.
   bool waitUntilUndone(const std::vector<UndoOperation>& operations, double timeout_s);
 
+  /// Whether the simulator stands until its frame is answered (lock-step): who waits for a frame must not be waited for
+  /// in it.
+  virtual bool inLockstep() const { return false; }
   virtual LinkStatus status() const = 0;
   /// The journal of the X-Plane found; null before, or without one.
   virtual std::shared_ptr<Journal> journal() const = 0;

@@ -64,6 +64,17 @@ TEST(TimerSchedule, SetsAlarmsOnly) {
   EXPECT_THROW(schedule.setAlarm(7, 10), std::invalid_argument);
 }
 
+TEST(TimerSchedule, BeginsAnewWhereItIsRestartedButLeavesAlarmsAsTheyAre) {
+  TimerSchedule schedule;
+  const auto timer = schedule.add(3, 20);
+  const auto alarm = schedule.addAlarm();
+  schedule.setAlarm(alarm, 105);
+  schedule.restart(100);
+  EXPECT_EQ(schedule.takeDue(119), Timers{alarm});
+  EXPECT_EQ(schedule.takeDue(120), Timers{timer});
+  EXPECT_EQ(schedule.next(), 140);
+}
+
 TEST(TimerSchedule, RefusesAPeriodThatIsNone) {
   TimerSchedule schedule;
   EXPECT_THROW(schedule.add(0, 0), std::invalid_argument);

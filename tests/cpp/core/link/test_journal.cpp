@@ -77,6 +77,21 @@ TEST_F(JournalTest, WritesTheDocumentedFormat) {
   EXPECT_EQ(entry.at("undo"), expected);
 }
 
+TEST_F(JournalTest, PauseAndWhatIsNotReadBackAreWrittenAndReadAsDocumented) {
+  journal().record("a", "pause", {UndoPause{}, UndoDref{"lever", 0.5F, false}, UndoDref{"override", 0.0F}});
+  const nlohmann::json expected = nlohmann::json::parse(R"([
+    {"op": "resume"},
+    {"op": "dref", "path": "lever", "value": 0.5, "confirm": false},
+    {"op": "dref", "path": "override", "value": 0.0}])");
+  EXPECT_EQ(readFile().at("entries").at(0).at("undo"), expected);
+  const std::vector<UndoOperation> undo = journal().entries().at(0).undo;
+  EXPECT_TRUE(std::holds_alternative<UndoPause>(undo.at(0)));
+  EXPECT_FALSE(std::get<UndoDref>(undo.at(1)).confirm);
+  EXPECT_TRUE(std::get<UndoDref>(undo.at(2)).confirm);
+  std::array<std::uint8_t, kMaxUndoSize> buffer{};
+  EXPECT_FALSE(encodeUndo(buffer, UndoPause{}).ok()) << "what X-Plane shows decides on the datagram";
+}
+
 TEST_F(JournalTest, ReadsWhatItWrote) {
   journal().record("a", "data_output", {UndoUsel{{1}}, UndoDref{"rate", 20.5F}});
   const std::vector<JournalEntry> entries = journal().entries();
@@ -125,10 +140,22 @@ TEST_F(JournalTest, EntryOfARunningProcessIsNotTaken) {
   try {
     other.record("a", "override", kReleaseJoystick);
     FAIL() << "the entry's owner (this test) runs";
-  } catch (const JournalError& error) {
+  } catch (const JournalTakenError& error) {
     EXPECT_NE(std::string(error.what()).find("/first"), std::string::npos) << error.what();
   }
   EXPECT_EQ(journal().entries()[0].owner.node, "/first");
+}
+
+TEST_F(JournalTest, WhyAnEntryIsLeftIsKeptUntilItIsTakenAnew) {
+  Journal(path_, deadOwner()).record("dead", "override", kReleaseJoystick);
+  for (const char* id : {"a", "b"}) journal().record(id, "override", kReleaseJoystick);
+  journal().leave({"a", "dead", "never there"}, "X-Plane went first");
+  std::vector<std::string> left;
+  for (const JournalEntry& entry : journal().entries()) left.push_back(entry.left);
+  EXPECT_EQ(left, (std::vector<std::string>{"", "X-Plane went first", ""})) << "of one's own only";
+  EXPECT_FALSE(readFile().at("entries").at(2).contains("left"));
+  journal().record("a", "override", kReleaseJoystick);
+  EXPECT_EQ(journal().entries()[1].left, "");
 }
 
 TEST_F(JournalTest, EntryOfADeadProcessIsTakenOver) {

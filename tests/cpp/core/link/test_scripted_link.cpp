@@ -33,24 +33,41 @@ std::vector<std::uint8_t> rref(const Pairs& pairs) {
   return bytes;
 }
 
+/// Row 3 with this speed in all slots.
+std::vector<std::uint8_t> data(float speed) {
+  std::vector<std::uint8_t> bytes = {'D', 'A', 'T', 'A', '*', 3, 0, 0, 0};
+  std::uint8_t value[4];
+  std::memcpy(value, &speed, 4);
+  for (int slot = 0; slot < 8; ++slot) {
+    bytes.insert(bytes.end(), value, value + 4);
+  }
+  return bytes;
+}
+
 /// What a handler got: steady time, stamp, whether it is the kernel's, epoch, index and value.
 using Delivery = std::tuple<std::int64_t, std::int64_t, bool, std::uint32_t, std::int32_t, float>;
 
 class ScriptedLink : public testing::Test {
  protected:
-  void makeLink() {
+  static SimLinkOptions defaults() {
     SimLinkOptions options;
     options.host = "10.1.2.3";
     options.port = 49000;
     options.listen_for_beacon = false;
+    return options;
+  }
+  void makeLink(const SimLinkOptions& options = defaults()) {
     SimLinkCallbacks callbacks;
+    callbacks.on_data = [this](const DataView& data, const ReceiveInfo&) { rows_.push_back(data[0].value(0)); };
     callbacks.on_state = [this](const LinkStatus& status) {
       if (states_.empty() || states_.back().second != status.state) {
         states_.emplace_back(wire_->now_ns, status.state);
       }
     };
-    link_ = std::make_unique<SimLink>(options, callbacks, wire_->clock(), LogFunction{}, JournalFactory{},
-                                      std::make_unique<ScriptedHub>(wire_));
+    link_ = std::make_unique<SimLink>(
+        options, callbacks, wire_->clock(),
+        [this](LogLevel level, const std::string& line) { log_.emplace_back(level, line); }, JournalFactory{},
+        std::make_unique<ScriptedHub>(wire_));
     flight_ = link_->subscribe({"flight", {"a/b", "c/d"}, kEveryFrameRateHz, 0},
                                [this](const RrefView& view, const ReceiveInfo& info) {
                                  for (std::size_t i = 0; i < view.size(); ++i) {
@@ -75,8 +92,10 @@ class ScriptedLink : public testing::Test {
   }
 
   std::shared_ptr<ScriptedHub::Wire> wire_ = std::make_shared<ScriptedHub::Wire>();
+  std::vector<std::pair<LogLevel, std::string>> log_;
   std::vector<std::pair<std::int64_t, LinkState>> states_;
   std::vector<Delivery> delivered_;
+  std::vector<float> rows_;  // first slots of the first rows of DATA
   std::unique_ptr<SimLink> link_;
   Subscription flight_;
 };
@@ -124,6 +143,26 @@ TEST_F(ScriptedLink, AllThatIsSentGoesThroughTheSources) {
   EXPECT_EQ(asked, 2);
 }
 
+TEST_F(ScriptedLink, ASearchInVainIsWarnedOfOnceAndGivesTheReason) {
+  using Line = std::pair<LogLevel, std::string>;
+  makeLink();
+  runUntil(4900 * kMs);
+  EXPECT_EQ(log_, (std::vector<Line>{{LogLevel::kInfo, "looking for X-Plane at 10.1.2.3:49000, host '10.1.2.3'"}}));
+  EXPECT_EQ(link_->status().reason, "waiting for the first answer of 10.1.2.3:49000");
+  EXPECT_TRUE(link_->status().problems.empty());
+  runUntil(20'000 * kMs);
+  ASSERT_EQ(link_->status().problems.size(), 1U);
+  const std::string problem = link_->status().problems[0];
+  EXPECT_EQ(problem.rfind("no answer from 10.1.2.3:49000: start X-Plane", 0), 0U) << problem;
+  EXPECT_EQ(link_->status().reason, problem);
+  ASSERT_EQ(log_.size(), 2U) << "once, not every time it is looked at";
+  EXPECT_EQ(log_[1], Line(LogLevel::kWarn, problem));
+  arriveStatus(20'100 * kMs, 50.0F);
+  runUntil(20'200 * kMs);
+  EXPECT_EQ(link_->status().reason, "X-Plane answers");
+  EXPECT_TRUE(link_->status().problems.empty());
+}
+
 TEST_F(ScriptedLink, StatesFollowTheScriptsSilences) {
   makeLink();
   arriveStatus(100 * kMs, 50.0F);
@@ -156,6 +195,96 @@ TEST_F(ScriptedLink, OtherPeoplesDatagramsAndGarbageAreCounted) {
   EXPECT_EQ(counters.udp.dropped, 6U) << "three of each source";
   wire_->refuses = true;
   EXPECT_EQ(link_->write("w/x", 1.0F), SendStatus::kSocketError);
+}
+
+TEST_F(ScriptedLink, NoOtherProgramOfXPlanesComputerInjectsAState) {
+  SimLinkOptions options = defaults();
+  options.data_output.enabled = true;
+  options.data_output.configure = false;
+  options.data_output.rows = {3};
+  makeLink(options);
+  const Endpoint sender{kXPlane.address, 49001}, program{kXPlane.address, 51234};
+  arriveStatus(100 * kMs, 50.0F);
+  arrive(110 * kMs, "flight", rref({{0, 1.0F}}));
+  arrive(110 * kMs, "data", data(1.0F), sender);  // X-Plane's own port for DATA
+  arrive(120 * kMs, "flight", rref({{0, 9.0F}}), program);
+  arrive(120 * kMs, "data", data(9.0F), program);
+  arrive(130 * kMs, "flight", {'h', 'e', 'l', 'l', 'o', '!'}, program);
+  arrive(140 * kMs, "flight", rref({{0, 2.0F}}));
+  arrive(140 * kMs, "data", data(2.0F), sender);
+  runUntil(200 * kMs);
+  ASSERT_EQ(delivered_.size(), 2U);
+  EXPECT_EQ(std::get<5>(delivered_[1]), 2.0F);
+  EXPECT_EQ(rows_, (std::vector<float>{1.0F, 2.0F}));
+  EXPECT_EQ(link_->counters().strangers, 3U);
+  EXPECT_EQ(link_->status().problems, (std::vector<std::string>{"another program at 10.1.2.3:51234 sends X-Plane's "
+                                                                "messages as well: they are dropped"}));
+  // After a silence X-Plane may be another run, with other ports.
+  const Endpoint other{kXPlane.address, 50001};
+  arrive(1000 * kMs, "control", rref({{0, 115501.0F}, {1, 0.0F}, {2, 2.0F}}), other);
+  arrive(1010 * kMs, "flight", rref({{0, 3.0F}}), other);
+  arrive(1020 * kMs, "flight", rref({{0, 9.0F}}), kXPlane);
+  runUntil(1100 * kMs);
+  ASSERT_EQ(delivered_.size(), 3U);
+  EXPECT_EQ(std::get<5>(delivered_[2]), 3.0F);
+}
+
+TEST_F(ScriptedLink, AnswersFromAnotherAddressAreNamed) {
+  makeLink();
+  for (int k = 1; k < 100; ++k) {
+    arrive(100 * k * kMs, "control", rref({{0, 115501.0F}}), {0x0A020203U, 49000});
+  }
+  runUntil(1000 * kMs);
+  const std::string problem =
+      "answers come from 10.2.2.3, but 10.1.2.3 is configured: X-Plane's computer has several addresses, or it is "
+      "another one; set the parameter host to 10.2.2.3";
+  EXPECT_EQ(link_->status().state, LinkState::kSearching);
+  EXPECT_EQ(link_->status().problems, std::vector<std::string>{problem});
+  EXPECT_EQ(link_->status().reason, problem);
+  runUntil(9000 * kMs);
+  EXPECT_EQ(link_->status().problems, std::vector<std::string>{problem}) << "not that nothing answers";
+  arriveStatus(10'000 * kMs, 50.0F);
+  runUntil(10'100 * kMs);
+  EXPECT_TRUE(link_->status().problems.empty());
+}
+
+TEST_F(ScriptedLink, DataWithoutAnswersIsOneWayAndItsVersionIsTheOption) {
+  for (const std::int32_t given : {0, 122015}) {
+    wire_ = std::make_shared<ScriptedHub::Wire>();
+    SimLinkOptions options = defaults();
+    options.unheard_version = given;
+    options.data_output.enabled = true;
+    options.data_output.configure = false;
+    options.data_output.rows = {3};
+    makeLink(options);
+    for (int k = 0; k < 100; ++k) {
+      arrive((1000 + 50 * k) * kMs, "data", data(1.0F));
+      if (k == 80) {
+        arriveStatus(5000 * kMs, 50.0F);
+      }
+    }
+    runUntil(2900 * kMs);
+    EXPECT_FALSE(link_->status().one_way) << "it may still answer";
+    EXPECT_FALSE(link_->status().version.known());
+    runUntil(4000 * kMs);
+    LinkStatus status = link_->status();
+    EXPECT_EQ(status.state, LinkState::kConnected);
+    EXPECT_TRUE(status.one_way);
+    EXPECT_EQ(status.version.number, given);
+    ASSERT_EQ(status.problems.size(), given == 0 ? 2U : 1U);
+    EXPECT_EQ(status.problems[0].rfind("X-Plane sends Data Output, but nothing answers on 10.1.2.3:49000", 0), 0U);
+    if (given == 0) {
+      EXPECT_NE(status.problems[1].find("set the parameter xplane_version"), std::string::npos);
+    }
+    EXPECT_TRUE(link_->unansweredDatarefs().empty()) << "that is said of X-Plane, not of each dataref";
+    runUntil(5500 * kMs);
+    status = link_->status();
+    EXPECT_FALSE(status.one_way);
+    EXPECT_EQ(status.version.number, 115501) << "what X-Plane says itself";
+    EXPECT_TRUE(status.problems.empty());
+    flight_.reset();
+    link_.reset();
+  }
 }
 
 TEST_F(ScriptedLink, SameScriptGivesTheSameDatagrams) {

@@ -57,7 +57,7 @@ TEST_F(SimLinkTest, ComesUpWhenXPlaneStartsLater) {
   makeLink(optionsFor(*sim));
   sim.reset();
   const int id = subscribe(group({"a/b"}));
-  run(5.0, {});
+  run(5.1, {});
   EXPECT_EQ(link_->status().state, LinkState::kSearching);
   EXPECT_TRUE(hasProblem("nothing listens on the port")) << "loopback refuses, and that is worth saying";
   FakeXPlane late(port);
@@ -220,7 +220,9 @@ TEST_F(SimLinkTest, FoundByBeacon) {
 
 TEST_F(SimLinkTest, NoBeaconIsSaid) {
   makeLink(optionsForBeacon());
-  run(4.0, {});
+  run(4.9, {});
+  EXPECT_TRUE(link_->status().problems.empty()) << "X-Plane may be starting";
+  run(0.2, {});
   EXPECT_TRUE(hasProblem("no X-Plane announces itself"));
 }
 
@@ -362,23 +364,66 @@ TEST_F(SimLinkTest, RequestsArePaced) {
   }
   makeLink(optionsFor(sim));
   const int big = subscribe(group(many));
-  RrefGroup flight = group({"x/y[5]"});
-  flight.priority = 10;
-  const int urgent = subscribe(flight);
-  int big_when_urgent_came = -1;
-  const double took = runUntil(
+  const double took = runUntil([&] { return values_.count({big, 349}) != 0; }, 3.0, {&sim});
+  EXPECT_GE(took, 0.2) << "10 batches, 2 frames of 15 ms apart";
+  EXPECT_LE(took, 0.5);
+  EXPECT_LE(most_requests_, 38U);
+  // Further apart where frames are longer.
+  sim.datarefs["sim/operation/misc/frame_rate_period"] = 0.05F;
+  run(0.3, {&sim});
+  RrefGroup second = group(many);
+  const int slow = subscribe(second);
+  const double took_longer = runUntil([&] { return values_.count({slow, 349}) != 0; }, 3.0, {&sim});
+  EXPECT_GE(took_longer, 0.75) << "10 batches, 2 frames of 50 ms apart, less 20 %";
+  EXPECT_LE(took_longer, 1.3);
+}
+
+TEST_F(SimLinkTest, FlightGroupComesFirstAndThreeNodesLoseNoRequest) {
+  FakeXPlane sim;
+  sim.datarefs["x/y"] = 1.0F;
+  const auto datarefs = [&sim](const std::string& name, int count) {
+    std::vector<std::string> paths;
+    for (int i = 0; i < count; ++i) {
+      paths.push_back(name + "[" + std::to_string(i) + "]");
+      sim.datarefs[paths.back()] = static_cast<float>(i);
+    }
+    return paths;
+  };
+  makeLink(optionsFor(sim));  // as rx_node
+  const int mission = subscribe({"mission", datarefs("mission/x", 300), 20, 0});
+  const int flight = subscribe({"flight", datarefs("flight/x", 66), kEveryFrameRateHz, kUrgentPriority});
+  // As tx_node and capture_node, of the same clock.
+  std::vector<std::unique_ptr<SimLink>> others;
+  std::vector<Subscription> theirs;
+  for (const int count : {540, 100}) {
+    others.push_back(std::make_unique<SimLink>(optionsFor(sim), SimLinkCallbacks{}, clock(), LogFunction{}));
+    theirs.push_back(others.back()->subscribe({"slow", datarefs("slow/x", count), 20, 1}, [](auto&&...) {}));
+  }
+  std::size_t missions_before_flight = 0;
+  const bool complete = runUntil(
+                            [&] {
+                              for (const auto& other : others) {
+                                other->step(0);
+                              }
+                              const auto got = [this](int id, int last) { return values_.count({id, last}) != 0; };
+                              if (!got(flight, 65)) {
+                                missions_before_flight = static_cast<std::size_t>(got(mission, 0));
+                              }
+                              return got(mission, 299);
+                            },
+                            3.0, {&sim}) >= 0.0;
+  EXPECT_TRUE(complete);
+  EXPECT_EQ(missions_before_flight, 0U) << "the flight group is asked for before all others";
+  runUntil(
       [&] {
-        if (datagrams_[urgent] > 0 && big_when_urgent_came < 0) {
-          big_when_urgent_came = datagrams_[big];
+        for (const auto& other : others) {
+          other->step(0);
         }
-        return values_.count({big, 349}) != 0;
+        return false;
       },
-      3.0, {&sim});
-  EXPECT_GE(took, 0.3) << "350 requests in batches of 100, 100 ms apart";
-  EXPECT_LE(took, 0.7);
-  EXPECT_LE(most_requests_, 100U);
-  EXPECT_LE(big_when_urgent_came, 1) << "priority goes into the first batch, although it was added last";
-  EXPECT_EQ((values_[{big, 349}]), 349.0F);
+      0.6, {&sim});
+  EXPECT_EQ(sim.lost_requests, 0U);
+  EXPECT_GT(most_requests_, 100U) << "the nodes ask in the same frames";
 }
 
 TEST_F(SimLinkTest, ReplacedGroupDeliversOnlyTheNewList) {
@@ -399,7 +444,7 @@ TEST_F(SimLinkTest, ReplacedGroupDeliversOnlyTheNewList) {
   for (const auto& [client, indices] : sim.subscriptions) {
     subscribed += indices.size();
   }
-  EXPECT_EQ(subscribed, 4U) << "the old list has been stopped: 3 of the link itself and 1";
+  EXPECT_EQ(subscribed, 5U) << "the old list has been stopped: 4 of the link itself and 1";
 }
 
 TEST_F(SimLinkTest, RemovedGroupIsStopped) {
@@ -411,7 +456,7 @@ TEST_F(SimLinkTest, RemovedGroupIsStopped) {
   subscriptions_[0].reset();
   run(0.3, {&sim});
   for (const auto& [client, indices] : sim.subscriptions) {
-    EXPECT_TRUE(indices.empty() || indices.size() == 3U);
+    EXPECT_TRUE(indices.empty() || indices.size() == 4U);
   }
 }
 
@@ -606,7 +651,7 @@ TEST_F(SimLinkTest, ReadsOnceAndUnsubscribes) {
   EXPECT_FALSE((*values)[1].has_value());
   run(0.1, {&sim});
   for (const auto& [client, indices] : sim.subscriptions) {
-    EXPECT_LE(indices.size(), 3U) << "only the link's own";
+    EXPECT_LE(indices.size(), 4U) << "only the link's own";
   }
   values.reset();
   sim.datarefs["r/1"] = 12.0F;
