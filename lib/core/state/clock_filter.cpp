@@ -113,18 +113,19 @@ ClockEstimate ClockFilter::update(const ClockSample& sample) {
     startEpoch(sample);
   } else {
     backward_samples_ = 0;
+    countMissed(sample);
     sim_time_before_ = sim_time_;
     advanceSimTime(sample);
     if (sample.paused != paused_) {
       event = sample.paused ? ClockEvent::kPaused : ClockEvent::kResumed;
       paused_ = sample.paused;
       restartFit(sample);
-    } else if (!paused_) {
+    } else if (!paused_ && !options_.exact) {
       event = judgeDelay(sample, host_step);
     }
   }
   last_ = sample;
-  if (!paused_) addToFit(relative(sample));
+  if (!paused_ && !options_.exact) addToFit(relative(sample));
 
   estimate.usable = true;
   estimate.event = event;
@@ -134,6 +135,14 @@ ClockEstimate ClockFilter::update(const ClockSample& sample) {
   estimate.time_ratio = timeRatio();
   estimate.uncertainty = uncertainty();
   return estimate;
+}
+
+void ClockFilter::countMissed(const ClockSample& sample) {
+  if (sample.paused || paused_ || replay_ || !(sample.frame_period > 0.0F)) return;
+  // What was not received lasted as long as the frame that was; a hitch is one long frame, and says so.
+  const double elapsed = static_cast<double>(sample.sim_time) - static_cast<double>(last_.sim_time);
+  const long frames = std::lround(elapsed / static_cast<double>(sample.frame_period));
+  if (frames > 1) missed_frames_ += static_cast<std::uint64_t>(frames - 1);
 }
 
 void ClockFilter::reset() {
@@ -172,6 +181,7 @@ double ClockFilter::timeRatio() const {
 }
 
 double ClockFilter::uncertainty() const {
+  if (options_.exact) return 0.0;
   if (fitted_) return fit_spread_ + sim_time_step_;
   return std::max(options_.unfitted_uncertainty, sim_time_step_);
 }
@@ -370,6 +380,7 @@ void ClockFilter::fit() {
 }
 
 std::int64_t ClockFilter::stampOf(const ClockSample& sample) {
+  if (options_.exact) return sample.receive_ns;
   std::int64_t stamp = sample.receive_ns;
   if (const auto host = hostTime(sim_time_)) stamp = std::min(stamp, *host);
   // A new epoch may step back with the host clock; within one, stamps increase whatever the fit does.

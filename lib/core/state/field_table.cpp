@@ -45,12 +45,34 @@ const DatarefSource* datarefOf(const FieldSpec& field, SimulatorVersion version)
   return found == field.datarefs.end() ? nullptr : &*found;
 }
 
+bool isRowKnown(const FieldSpec& field, SimulatorVersion version) {
+  constexpr int kZuluSlot = 5, kLocalSlot = 6;
+  const RowSource& row = field.row;
+  switch (row.row11) {
+    case 1:
+      return !version.is(Otherwise::kRow1Hours) || (row.slot11 != kZuluSlot && row.slot11 != kLocalSlot);
+    case 16:
+      return !version.is(Otherwise::kRow16);
+    case 20:
+      return !version.is(Otherwise::kRow20);
+    case 28:
+      return !version.is(Otherwise::kRow28Unit);
+    case 115:
+      return !version.is(Otherwise::kRow115Bits);
+    case 116:
+    case 117:
+      return !version.is(Otherwise::kRow116Modes);
+    default:
+      return row.row11 >= 0;
+  }
+}
+
 std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, SimulatorVersion version,
                                             int engines) {
   std::vector<DatarefRequest> requests;
   for (const FieldSpec& field : fieldTable()) {
     if (field.group != group || field.store == nullptr) continue;
-    if (transport == Transport::kData && field.row.row11 >= 0) continue;
+    if (transport == Transport::kData && isRowKnown(field, version)) continue;
     const DatarefSource* const source = datarefOf(field, version);
     if (source == nullptr) continue;
     const std::vector<std::string> paths = expandDatarefPath(source->path, field.count);
@@ -66,6 +88,7 @@ std::vector<std::int32_t> dataRows(const std::vector<FieldGroup>& groups, Simula
   std::vector<std::int32_t> rows;
   for (const FieldSpec& field : fieldTable()) {
     if (field.store == nullptr || std::find(groups.begin(), groups.end(), field.group) == groups.end()) continue;
+    if (!isRowKnown(field, version)) continue;
     if (!version.is12() && field.row.row11 >= 0) rows.push_back(field.row.row11);
     if (!version.is11() && field.row.row12 >= 0) rows.push_back(field.row.row12);
   }

@@ -24,9 +24,14 @@ constexpr Row kRows[] = {
     {"sim/flightmodel/position/longitude", &FlightWatch::longitude_deg, 1.0},
     {"sim/flightmodel/position/elevation", &FlightWatch::elevation, 1.0},
     {"sim/flightmodel/position/groundspeed", &FlightWatch::ground_speed, 1.0},
+    {"sim/flightmodel/position/Prad", &FlightWatch::roll_rate_deg_s, 1.0 / kRadiansPerDegree},
+    {"sim/flightmodel/position/Qrad", &FlightWatch::pitch_rate_deg_s, 1.0 / kRadiansPerDegree},
+    {"sim/flightmodel/position/Rrad", &FlightWatch::yaw_rate_deg_s, 1.0 / kRadiansPerDegree},
 };
 constexpr std::size_t kRowCount = sizeof kRows / sizeof kRows[0];
+// Behind them.
 constexpr const char* kCrashed = "sim/flightmodel2/misc/has_crashed";
+constexpr const char* kOnGround = "sim/flightmodel/failures/onground_any";
 
 }  // namespace
 
@@ -35,6 +40,7 @@ const std::vector<std::string>& flightWatchDatarefs() {
     std::vector<std::string> out;
     for (const Row& row : kRows) out.emplace_back(row.dataref);
     out.emplace_back(kCrashed);
+    out.emplace_back(kOnGround);
     return out;
   }();
   return names;
@@ -48,6 +54,7 @@ void updateFlightWatch(const RrefView& datagram, FlightWatch* watch) {
     const auto value = static_cast<double>(pair.value);
     if (index < kRowCount) watch->*kRows[index].value = value * kRows[index].factor;
     if (index == kRowCount) watch->crashed = value != 0.0;
+    if (index == kRowCount + 1) watch->on_ground = value != 0.0;
   }
 }
 

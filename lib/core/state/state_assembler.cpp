@@ -36,16 +36,24 @@ void finish(State&, const ClockFilter&) {}
 void finish(SurfaceStates& surfaces, const ClockFilter&) { computeEquivalentDeflections(surfaces); }
 
 void finish(AutopilotState& autopilot, const ClockFilter&) {
-  // The dial is in knots or in Mach; no aircraft flies at 10 kt on autopilot, none at Mach 10.
+  // One dial, in knots or in Mach; no aircraft flies at 10 kt on autopilot, none at Mach 10.
   constexpr float kLargestMach = 10.0F;
-  if (autopilot.target_airspeed >= kLargestMach) {
-    autopilot.target_airspeed = static_cast<float>(autopilot.target_airspeed * kMetersPerSecondPerKnot);
-  }
+  const float dial = autopilot.target_airspeed;
+  const bool mach = std::isfinite(autopilot.airspeed_is_mach) ? autopilot.airspeed_is_mach > 0.5F : dial < kLargestMach;
+  autopilot.target_mach = mach ? dial : kNaNf;
+  autopilot.target_airspeed = mach ? kNaNf : static_cast<float>(static_cast<double>(dial) * kMetersPerSecondPerKnot);
 }
+
+void finish(EngineStates& engines, const ClockFilter&) { computeCelsius(engines); }
 
 void finish(SimStatus& status, const ClockFilter& clock) {
   status.time_ratio = static_cast<float>(clock.timeRatio());
+  status.frames_missed = static_cast<std::uint32_t>(clock.missedFrames());
   if (!std::isfinite(status.frame_rate) && status.frame_period > 0.0F) status.frame_rate = 1.0F / status.frame_period;
+}
+
+void finish(EnvironmentState& world, const ClockFilter&) {
+  world.terrain_height = world.altitude_msl - world.height_above_ground;
 }
 
 }  // namespace
@@ -87,7 +95,8 @@ const FlightState* FlightStateAssembler::onData(const DataView& datagram, std::i
   const bool fresh = frames_->counters().samples > 0 &&
                      receive_ns - frames_->receiveTime() <= toNanoseconds(options_.max_supplement_age);
   decoder_.decode(fresh ? frames_->values() : unknown(frames_->size()), &row_store_, receive_ns, &inputs_);
-  return assemble(receive_ns, options_.row_attitude_reference);
+  const bool origin = options_.version.is(Otherwise::kRow17Axes);
+  return assemble(receive_ns, origin ? AttitudeReference::kSceneryOrigin : options_.row_attitude_reference);
 }
 
 void FlightStateAssembler::onRpos(const Rpos& position, std::int64_t receive_ns) {
@@ -116,6 +125,12 @@ void FlightStateAssembler::reset() {
   has_previous_ = false;
   position_check_ = PositionCheck();
   rpos_.known = xpc_.known = false;
+  frame_count_ = 0;
+}
+
+void FlightStateAssembler::restart() {
+  clock_ = ClockFilter(options_.clock);
+  has_previous_ = false;
   frame_count_ = 0;
 }
 
@@ -265,5 +280,8 @@ template class MissionAssembler<AutopilotState>;
 template class MissionAssembler<WarningState>;
 template class MissionAssembler<FuelState>;
 template class MissionAssembler<SimStatus>;
+template class MissionAssembler<NavigationState>;
+template class MissionAssembler<InstrumentState>;
+template class MissionAssembler<EnvironmentState>;
 
 }  // namespace xplane_bridge::core

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <limits>
 
 namespace xplane_bridge::core {
@@ -27,7 +28,9 @@ struct ResolvedRow {
   Conversion conversion;
 };
 
-ResolvedRow resolve(const RowSource& source, SimulatorVersion version) {
+ResolvedRow resolve(const FieldSpec& field, SimulatorVersion version) {
+  if (!isRowKnown(field, version)) return {};
+  const RowSource& source = field.row;
   const bool differs = source.row12 != source.row11 || source.slot12 != source.slot11 ||
                        source.conversion12.factor != source.conversion11.factor ||
                        source.conversion12.offset != source.conversion11.offset;
@@ -64,7 +67,7 @@ StateDecoder::StateDecoder(FieldGroup group, Transport transport, SimulatorVersi
     plan.valid = field.valid;
     plan.per_engine = field.per_engine;
     plan.is_engine_count = field.is_engine_count;
-    const ResolvedRow row = transport == Transport::kData ? resolve(field.row, version) : ResolvedRow{};
+    const ResolvedRow row = transport == Transport::kData ? resolve(field, version) : ResolvedRow{};
     if (row.row >= 0) {
       plan.row = row.row;
       plan.first = static_cast<std::size_t>(row.slot);
@@ -132,6 +135,26 @@ std::uint32_t StateDecoder::decode(const std::vector<float>& dataref_values, con
     if (!complete) known_bits &= ~plan.valid;
   }
   return known_bits;
+}
+
+void computeCelsius(EngineStates& s) {
+  struct Gauge {
+    std::array<float, kMaxEngines>* shown;
+    std::uint32_t valid;
+  };
+  const Gauge gauges[] = {{&s.itt, EngineStates::kValidItt},
+                          {&s.egt, EngineStates::kValidEgt},
+                          {&s.cht, EngineStates::kValidCht},
+                          {&s.oil_temperature, EngineStates::kValidOilTemperature}};
+  for (std::size_t i = 0; i < std::size(gauges); ++i) {
+    const float in_celsius = s.gauge_in_celsius[i];
+    if (!std::isfinite(in_celsius)) {
+      gauges[i].shown->fill(kNaNf);
+      s.valid &= ~gauges[i].valid;
+    } else if (in_celsius < 0.5F) {
+      for (float& shown : *gauges[i].shown) shown = (shown - 32.0F) / 1.8F;
+    }
+  }
 }
 
 void computeEquivalentDeflections(SurfaceStates& s) {

@@ -97,6 +97,7 @@ class ClockFilter {
     double backward_tolerance = 1.0;  ///< older samples within this are late datagrams, not a reset [s]
     double forward_jump = 2.0;        ///< simulator time ahead of `max_time_ratio` times host time by this: a reset [s]
     double max_time_ratio = 20.0;     ///< fastest time acceleration taken for real
+    bool exact = false;  ///< receive times are the frames' own: nothing is fitted, stamps are receive times
     double unfitted_uncertainty = 0.02;  ///< said while there is no fit: one frame at a low rate [s]
   };
 
@@ -126,6 +127,8 @@ class ClockFilter {
   /// Slips seen so far; simTime() of moments near the newest slip may have changed.
   std::uint32_t slips() const { return slip_count_; }
   std::uint32_t epoch() const { return epoch_; }
+  /// Frames that X-Plane made between two samples, by simulator time against the frame period.
+  std::uint64_t missedFrames() const { return missed_frames_; }
 
  private:
   /// Relative to the references, so that doubles keep nanoseconds.
@@ -153,6 +156,7 @@ class ClockFilter {
 
   bool isForwardJump(const ClockSample& sample, double host_step) const;
   void startEpoch(const ClockSample& sample);
+  void countMissed(const ClockSample& sample);
   void restartFit(const ClockSample& sample);
   void advanceSimTime(const ClockSample& sample);
   /// Gives up what of the fit no longer holds. @return kGap, kRateChanged or kNone.
@@ -176,6 +180,7 @@ class ClockFilter {
   bool paused_ = false;
   bool replay_ = false;
   std::uint32_t epoch_ = 0;
+  std::uint64_t missed_frames_ = 0;
   ClockSample last_;
   bool has_stamp_ = false;
   std::uint32_t stamp_epoch_ = 0;

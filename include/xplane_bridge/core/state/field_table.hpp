@@ -60,7 +60,7 @@ struct FieldSpec {
   FieldStore store = nullptr;               ///< null: computed (remark says how)
   std::array<DatarefSource, 2> datarefs{};  ///< of different versions, at most one of which fits
   RowSource row{};
-  const char* remark = "";       ///< [?] marks what only a live simulator can settle
+  const char* remark = "";       ///< [? id] marks what only a live simulator can settle
   bool per_engine = false;       ///< elements at or beyond the engine count are not known
   bool is_engine_count = false;  ///< is that count; comes before the fields it bounds
 };
@@ -71,6 +71,9 @@ const std::vector<FieldSpec>& fieldTable();
 /// Where this version has the field; null: in no dataref.
 const DatarefSource* datarefOf(const FieldSpec& field, SimulatorVersion version);
 
+/// Whether a row carries the field, and what that row holds is known of this X-Plane.
+bool isRowKnown(const FieldSpec& field, SimulatorVersion version);
+
 /// One dataref element to be asked for.
 struct DatarefRequest {
   std::string path;
@@ -79,7 +82,7 @@ struct DatarefRequest {
 };
 
 /// What to ask for, in index order: position in the list is the index to give X-Plane.
-/// @param transport with kData only what no row carries
+/// @param transport with kData only what no known row carries
 /// @param version while unknown, fields whose source differs between versions are left out
 /// @param engines elements asked for of fields by engine; X-Plane answers all 8, few aircraft have them
 std::vector<DatarefRequest> datarefRequests(FieldGroup group, Transport transport, SimulatorVersion version,

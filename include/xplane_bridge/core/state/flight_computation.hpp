@@ -15,7 +15,7 @@ struct PositionFix {
 };
 
 /// Axes against which X-Plane gives roll, pitch and heading. The datarefs asked for are the local level's; for row 17
-/// it is not known [?], and the default below is what the working programs assume.
+/// it is not known [? row17-axes], and the default below is what the working programs assume.
 enum class AttitudeReference : std::uint8_t { kLocalLevel, kSceneryOrigin };
 inline constexpr AttitudeReference kDefaultRowAttitudeReference = AttitudeReference::kLocalLevel;
 

@@ -18,12 +18,16 @@ struct FlightWatch {
   double roll_deg = std::nan("");            ///< right +
   double pitch_deg = std::nan("");           ///< nose up +
   double alpha_deg = std::nan("");           ///< nose up +
-  double beta_deg = std::nan("");            ///< as X-Plane has it [?]: only floating surfaces use it
+  double beta_deg = std::nan("");            ///< [? beta-sign] as X-Plane has it: for floating surfaces
   double flight_time = std::nan("");         ///< [s] since the flight began
   double latitude_deg = std::nan("");        ///< to a metre: X-Plane sends it as float32
   double longitude_deg = std::nan("");
-  double elevation = std::nan("");     ///< [m] MSL
-  double ground_speed = std::nan("");  ///< [m/s]
+  double elevation = std::nan("");         ///< [m] MSL
+  double ground_speed = std::nan("");      ///< [m/s]
+  double roll_rate_deg_s = std::nan("");   ///< about the body's axes: right +
+  double pitch_rate_deg_s = std::nan("");  ///< nose up +
+  double yaw_rate_deg_s = std::nan("");    ///< nose right +
+  bool on_ground = false;                  ///< a wheel is
   bool crashed = false;
 };
 

@@ -36,8 +36,8 @@ struct GeoPoint {
 inline constexpr double kEarthRadius = 6378145.0;
 
 /// Signs that turn X-Plane's load values into load factors (axial forward +, side right +, normal up +), in units of g.
-/// DATA row 4 and the datarefs `sim/flightmodel/forces/g_*` differ in the axial sign (protocol reference 1.9); [?] on a
-/// live simulator: at rest the axial load factor must be +sin(pitch).
+/// DATA row 4 and the datarefs `sim/flightmodel/forces/g_*` differ in the axial sign (protocol reference 1.9)
+/// [? axial-sign] [? side-sign]: at rest the axial load factor must be +sin(pitch).
 inline constexpr double kRowAxialSign = +1.0;
 inline constexpr double kRowSideSign = +1.0;
 inline constexpr double kRowNormalSign = +1.0;

@@ -86,6 +86,9 @@ class FlightStateAssembler {
   /// The subscription starts anew (link lost, X-Plane restarted): forgets what was learnt about silent datarefs too.
   void reset();
 
+  /// The next state is the first one: time and counting begin anew, what was learnt of datarefs and position stays.
+  void restart();
+
   const ClockFilter& clock() const { return clock_; }
   const PositionCheck& positionCheck() const { return position_check_; }
   const RrefFrameAssembler& frames() const { return *frames_; }
@@ -173,5 +176,8 @@ extern template class MissionAssembler<AutopilotState>;
 extern template class MissionAssembler<WarningState>;
 extern template class MissionAssembler<FuelState>;
 extern template class MissionAssembler<SimStatus>;
+extern template class MissionAssembler<NavigationState>;
+extern template class MissionAssembler<InstrumentState>;
+extern template class MissionAssembler<EnvironmentState>;
 
 }  // namespace xplane_bridge::core

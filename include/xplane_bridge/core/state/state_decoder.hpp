@@ -89,6 +89,8 @@ class GroupDecoder : public StateDecoder {
       : StateDecoder(State::kGroup, transport, version, engines) {}
 };
 
+/// EngineStates' temperatures as degrees Celsius: by its gauge_in_celsius, NaN where that is not known.
+void computeCelsius(EngineStates& engines);
 /// SurfaceStates' equivalent deflections from the surfaces by side.
 void computeEquivalentDeflections(SurfaceStates& surfaces);
 

@@ -76,9 +76,12 @@ TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
     EXPECT_GE(field.count, 1);
     EXPECT_LE(field.count, kMaxFieldElements);
     EXPECT_STRNE(field.unit, "");
+    std::size_t most = 0;  // a version may have fewer elements: X-Plane 11 has 3 layers of wind, X-Plane 12 has 13
     for (const DatarefSource& source : field.datarefs) {
-      if (source.path == nullptr || field.store == nullptr) continue;
-      EXPECT_EQ(expandDatarefPath(source.path, field.count).size(), static_cast<std::size_t>(field.count));
+      if (source.path != nullptr) most = std::max(most, expandDatarefPath(source.path, field.count).size());
+    }
+    if (most != 0 && field.store != nullptr) {
+      EXPECT_EQ(most, static_cast<std::size_t>(field.count));
     }
     if (field.row.row11 >= 0) {
       EXPECT_LT(field.row.row11, 139);
@@ -172,8 +175,8 @@ TEST(FieldTable, DataTransportAsksOnlyWhatNoRowCarries) {
 
 TEST(FieldTable, EnginesLimitTheRequests) {
   const auto two = datarefRequests(FieldGroup::kEngines, Transport::kRref, kXPlane11, 2);
-  EXPECT_EQ(two.size(), 2U + 23U * 2U);
-  EXPECT_EQ(datarefRequests(FieldGroup::kEngines, Transport::kRref, kXPlane11).size(), 2U + 23U * 8U);
+  EXPECT_EQ(two.size(), 6U + 31U * 2U);
+  EXPECT_EQ(datarefRequests(FieldGroup::kEngines, Transport::kRref, kXPlane11).size(), 6U + 31U * 8U);
 }
 
 TEST(DatarefPath, Expands) {

@@ -134,6 +134,21 @@ TEST_P(EveryTransport, StateMatchesTheTruth) {
   EXPECT_NEAR(s->frame_period, 1.0 / 60.0, 1e-6);
 }
 
+TEST_P(EveryTransport, FramesThatDidNotComeAreCounted) {
+  Feed whole(GetParam());
+  whole.all();
+  ASSERT_GE(whole.assembler->counters().states, 9U);
+  EXPECT_EQ(whole.assembler->clock().missedFrames(), 0U);
+
+  Feed feed(GetParam());
+  for (std::size_t i = 0; i < feed.flight.size(); ++i) {
+    if (i != 5 && i != 8 && i != 9) feed.frame(i);  // lost: one, and two in a row
+  }
+  EXPECT_EQ(feed.assembler->clock().missedFrames(), 3U);
+  feed.frame(2);  // time goes back: another epoch
+  EXPECT_EQ(feed.assembler->clock().missedFrames(), 3U);
+}
+
 TEST_P(EveryTransport, FirstPositionIsTheMapOrigin) {
   Feed feed(GetParam());
   EXPECT_FALSE(feed.assembler->map().has_value());
@@ -537,7 +552,7 @@ State assembleData(const RecordedFlight& flight, std::size_t frame = 0) {
 template <typename State>
 class MissionGroup : public testing::Test {};
 using Groups = testing::Types<EngineStates, SurfaceStates, ControlStates, ElectricalState, AutopilotState, WarningState,
-                              FuelState, SimStatus>;
+                              FuelState, SimStatus, NavigationState, InstrumentState, EnvironmentState>;
 TYPED_TEST_SUITE(MissionGroup, Groups);
 
 template <typename State>
@@ -621,18 +636,65 @@ TEST(MissionGroups, TransportsAgree) {
   EXPECT_GT(tr.frame_rate, 0.0F);
 }
 
+// 100 deg C are 212 deg F, -40 are the same in both.
+TEST(MissionGroups, TemperaturesAreCelsiusWhateverTheGaugesShow) {
+  for (const float in_celsius : {1.0F, 0.0F, kNaNf}) {
+    SCOPED_TRACE(in_celsius);
+    MissionAssembler<EngineStates>::Options options;
+    options.version = kXPlane11;
+    MissionAssembler<EngineStates> assembler(options);
+    Datagram d = Datagram::labelled("RREF,");
+    for (std::size_t i = 0; i < assembler.requests().size(); ++i) {
+      const std::string& path = assembler.requests()[i].path;
+      float value = 2.0F;
+      if (path == "sim/aircraft/engine/acf_CHT_is_C") value = in_celsius;
+      if (path == "sim/flightmodel/engine/ENGN_CHT_c[0]") value = 212.0F;
+      if (path == "sim/flightmodel/engine/ENGN_CHT_c[1]") value = -40.0F;
+      d.pair(static_cast<std::int32_t>(i), value);
+    }
+    ASSERT_TRUE(assembler.add(d.rref(), kStart));
+    const EngineStates s = assembler.assemble(nullptr, kStart, noClock());
+    EXPECT_EQ((s.valid & EngineStates::kValidCht) != 0, std::isfinite(in_celsius));
+    EXPECT_EQ(s.egt[0], 2.0F);  // its gauge is another
+    if (std::isnan(in_celsius)) {
+      EXPECT_TRUE(std::isnan(s.cht[0]));
+    } else {
+      EXPECT_FLOAT_EQ(s.cht[0], in_celsius > 0.5F ? 212.0F : 100.0F);
+      EXPECT_FLOAT_EQ(s.cht[1], -40.0F);
+    }
+  }
+}
+
 TEST(MissionGroups, AirspeedDialIsKnotsOrMach) {
-  for (const auto& [dial, expected] : {std::pair<float, double>{120.0F, 61.7333}, {0.78F, 0.78}}) {
+  struct Dial {
+    float dial, is_mach;
+    double airspeed, mach;
+  };
+  // The last two: airspeed_is_mach does not answer. 120 kt are 61.7333 m/s, 8 kt 4.1156 m/s.
+  for (const Dial& c :
+       {Dial{120.0F, 0.0F, 61.7333, kNaN}, Dial{0.78F, 1.0F, kNaN, 0.78}, Dial{8.0F, 0.0F, 4.1156, kNaN},
+        Dial{120.0F, kNaNf, 61.7333, kNaN}, Dial{0.78F, kNaNf, kNaN, 0.78}}) {
+    SCOPED_TRACE(c.dial);
     MissionAssembler<AutopilotState>::Options options;
     options.version = kXPlane11;
     MissionAssembler<AutopilotState> assembler(options);
     Datagram d = Datagram::labelled("RREF,");
     for (std::size_t i = 0; i < assembler.requests().size(); ++i) {
-      const bool airspeed = assembler.requests()[i].path == "sim/cockpit2/autopilot/airspeed_dial_kts_mach";
-      d.pair(static_cast<std::int32_t>(i), airspeed ? dial : 0.0F);
+      const std::string& path = assembler.requests()[i].path;
+      const bool dial = path == "sim/cockpit2/autopilot/airspeed_dial_kts_mach";
+      const bool is_mach = path == "sim/cockpit2/autopilot/airspeed_is_mach";
+      d.pair(static_cast<std::int32_t>(i), dial ? c.dial : is_mach ? c.is_mach : 0.0F);
     }
     ASSERT_TRUE(assembler.add(d.rref(), kStart));
-    EXPECT_NEAR(assembler.assemble(nullptr, kStart, noClock()).target_airspeed, expected, 1e-3);
+    const AutopilotState s = assembler.assemble(nullptr, kStart, noClock());
+    EXPECT_EQ(std::isnan(s.target_airspeed), std::isnan(c.airspeed));
+    EXPECT_EQ(std::isnan(s.target_mach), std::isnan(c.mach));
+    if (!std::isnan(c.airspeed)) {
+      EXPECT_NEAR(s.target_airspeed, c.airspeed, 1e-3);
+    }
+    if (!std::isnan(c.mach)) {
+      EXPECT_NEAR(s.target_mach, c.mach, 1e-6);
+    }
   }
 }
 

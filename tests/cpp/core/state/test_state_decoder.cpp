@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -214,6 +215,53 @@ TEST(EquivalentDeflections, AreZeroAtNeutralAndUnknownWithoutSurfaces) {
   EXPECT_EQ(s.delta_aileron, 0.0F);
   EXPECT_EQ(s.delta_elevator, 0.0F);
   EXPECT_EQ(s.delta_rudder, 0.0F);
+}
+
+// --- rows that are otherwise than assumed ---
+
+SimulatorVersion otherwise(Otherwise what) { return {kXPlane12.number, static_cast<std::uint32_t>(what)}; }
+
+bool asksFor(const StateDecoder& decoder, const std::string& path) {
+  const auto& requests = decoder.requests();
+  return std::any_of(requests.begin(), requests.end(), [&](const DatarefRequest& each) { return each.path == path; });
+}
+
+bool takesRow(const StateDecoder& decoder, std::int32_t row) {
+  return std::count(decoder.rows().begin(), decoder.rows().end(), row) != 0;
+}
+
+TEST(StateDecoder, TakesDatarefsInsteadOfRowsThatAreOtherwise) {
+  const StateDecoder usual(FieldGroup::kFlight, Transport::kData, kXPlane12);
+  EXPECT_TRUE(takesRow(usual, 16));
+  EXPECT_FALSE(asksFor(usual, "sim/flightmodel/position/Prad"));
+  const StateDecoder rates(FieldGroup::kFlight, Transport::kData, otherwise(Otherwise::kRow16));
+  EXPECT_FALSE(takesRow(rates, 16));
+  EXPECT_TRUE(takesRow(rates, 20));
+  EXPECT_TRUE(asksFor(rates, "sim/flightmodel/position/Prad"));
+  const StateDecoder place(FieldGroup::kFlight, Transport::kData, otherwise(Otherwise::kRow20));
+  EXPECT_FALSE(takesRow(place, 20));
+  EXPECT_TRUE(asksFor(place, "sim/flightmodel/position/lat_ref"));
+}
+
+TEST(StateDecoder, WithoutTheHoursOfRow1KeepsItsClock) {
+  const StateDecoder flight(FieldGroup::kFlight, Transport::kData, otherwise(Otherwise::kRow1Hours));
+  EXPECT_TRUE(takesRow(flight, 1));
+  EXPECT_FALSE(asksFor(flight, "sim/time/total_running_time_sec"));
+  const StateDecoder status(FieldGroup::kSim, Transport::kData, otherwise(Otherwise::kRow1Hours));
+  EXPECT_TRUE(asksFor(status, "sim/time/zulu_time_sec"));
+}
+
+TEST(StateDecoder, DecodesThoseDatarefs) {
+  const StateDecoder decoder(FieldGroup::kFlight, Transport::kData, otherwise(Otherwise::kRow16));
+  std::vector<float> values(decoder.requests().size(), kNaNf);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (decoder.requests()[i].path == "sim/flightmodel/position/Qrad") values[i] = 0.25F;
+  }
+  RowStore rows;
+  rows.update(Datagram::labelled("DATA*").row(16, {1, 2, 3}).data(), 100);
+  FlightInputs inputs;
+  decoder.decode(values, &rows, 100, &inputs);
+  EXPECT_DOUBLE_EQ(inputs.pitch_rate, 0.25);
 }
 
 }  // namespace
