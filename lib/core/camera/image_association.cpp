@@ -210,6 +210,16 @@ std::optional<ImageAssociator::FrameChoice> ImageAssociator::chooseFrame(const I
   return choose(*before, std::round(ahead / period) * period, true, false);
 }
 
+ImageAssociator::FrameChoice ImageAssociator::keyedFrame(float key) const {
+  FrameChoice choice{};
+  choice.raw = static_cast<double>(key);
+  choice.period = framePeriod();
+  choice.settled = true;
+  // After a day neighbouring frames may share a key.
+  choice.ambiguous = choice.period > 0.0 && resolution(choice.raw) > (0.5 - kBorder) * choice.period;
+  return choice;
+}
+
 void ImageAssociator::pairWithFrame(const FrameChoice& frame, bool final, Association& answer) const {
   const auto distance = [&frame](const State& state) {
     return static_cast<double>(state.key.sim_time_raw) - frame.raw;
@@ -276,22 +286,28 @@ void ImageAssociator::pairByStamp(const ImageMoment& moment, bool final, Associa
   answer.id = answer.id_after = nearest->key.id;
 }
 
+void ImageAssociator::pairPaused(bool final, Association& answer) const {
+  const bool state_paused = !states_.empty() && states_.back().key.paused;
+  answer.pending = !final && !state_paused;
+  if (!answer.pending && !states_.empty()) {
+    answer.method = PairingMethod::kPaused;
+    answer.id = answer.id_after = states_.back().key.id;
+  }
+}
+
 Association ImageAssociator::associate(const ImageMoment& moment, bool final) {
   Association answer;
-  if (moment.paused) {
-    const bool state_paused = !states_.empty() && states_.back().key.paused;
-    answer.pending = !final && !state_paused;
-    if (!answer.pending && !states_.empty()) {
-      answer.method = PairingMethod::kPaused;
-      answer.id = answer.id_after = states_.back().key.id;
-    }
+  std::optional<FrameChoice> frame;
+  if (moment.frame_key.has_value()) {
+    frame = keyedFrame(*moment.frame_key);
+  } else if (moment.paused) {
+    pairPaused(final, answer);
   } else if (!moment.sim_time.has_value()) {
     pairByStamp(moment, final, answer);
-  } else if (const auto frame = chooseFrame(moment); !frame.has_value()) {
+  } else if (frame = chooseFrame(moment); !frame.has_value() || (!frame->settled && !final)) {
     answer.pending = !final;
-  } else if (!frame->settled && !final) {
-    answer.pending = true;
-  } else {
+  }
+  if (frame.has_value() && !answer.pending) {
     answer.frame_known = true;
     answer.frame_sim_time = frame->raw;
     answer.frame_offset = frame->offset;

@@ -27,6 +27,8 @@ constexpr int kStaticWeather = 3;
 
 constexpr const char* kFuel = "sim/flightmodel/weight/m_fuel";
 constexpr const char* kPayload = "sim/flightmodel/weight/m_fixed";
+constexpr const char* kStations = "sim/flightmodel/weight/m_stations";
+constexpr std::size_t kStationCount = 9;
 constexpr const char* kCgOld = "sim/flightmodel/misc/cgz_ref_to_default";
 constexpr const char* kCg = "sim/flightmodel2/misc/cg_offset_z";
 
@@ -53,6 +55,9 @@ bool isCg(const std::string& dataref) { return dataref == kCgOld || dataref == k
 std::optional<std::string> check(const UniformWind& wind) {
   if (auto wrong = outside("speed", wind.speed, 0.0, kMaxWind, "m/s")) return wrong;
   if (auto wrong = outside("from_deg", wind.from_deg, 0.0, 360.0, "deg true")) return wrong;
+  if (wind.speed == 0.0 && wind.from_deg == 0.0 && wind.turbulence == 0.0) {
+    return "nothing is given: expected speed, from_deg or turbulence; for calm air from_deg 360 and speed 0";
+  }
   return outside("turbulence", wind.turbulence, 0.0, 1.0, "-");
 }
 
@@ -113,12 +118,43 @@ std::optional<std::string> check(const Loading& loading) {
   return outside("cg_offset", *loading.cg_offset, -kMaxCgOffset, kMaxCgOffset, "m, aft +");
 }
 
-std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version) {
+std::vector<std::string> stationDatarefs(SimulatorVersion version) {
+  std::vector<std::string> out;
+  if (!version.is12()) return out;
+  for (std::size_t i = 0; i < kStationCount; ++i) out.push_back(element(kStations, i));
+  return out;
+}
+
+namespace {
+
+/// The payload on its stations; empty: they are not known.
+std::vector<DatarefWrite> stationWrites(double payload, const std::vector<DatarefValue>& stations) {
+  double sum = 0.0;
+  for (const DatarefValue& station : stations) {
+    if (!station || !(*station >= 0.0F)) return {};
+    sum += static_cast<double>(*station);
+  }
+  std::vector<DatarefWrite> out;
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    const double share = sum > kMassTolerance ? static_cast<double>(*stations[i]) / sum : (i == 0 ? 1.0 : 0.0);
+    out.push_back({element(kStations, i), static_cast<float>(payload * share)});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version,
+                                        const std::vector<DatarefValue>& stations) {
   std::vector<DatarefWrite> out;
   for (std::size_t i = 0; i < loading.fuel_tank.size(); ++i) {
     out.push_back({element(kFuel, i), static_cast<float>(loading.fuel_tank[i])});
   }
-  if (loading.payload_mass) out.push_back({kPayload, static_cast<float>(*loading.payload_mass)});
+  if (loading.payload_mass) {
+    const std::vector<DatarefWrite> spread = stationWrites(*loading.payload_mass, stations);
+    out.insert(out.end(), spread.begin(), spread.end());
+    if (spread.empty()) out.push_back({kPayload, static_cast<float>(*loading.payload_mass)});
+  }
   if (loading.cg_offset) {
     const char* const name = version.number >= kFirstOf1208 ? kCg : kCgOld;
     out.push_back({name, static_cast<float>(*loading.cg_offset)});

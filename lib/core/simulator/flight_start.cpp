@@ -75,6 +75,10 @@ std::optional<std::string> check(const FlightStart& start) {
     return std::string(range.name) + " is " + number(value) + ": expected " + number(range.low) + ".." +
            number(range.high) + " [" + range.unit + "]";
   }
+  // A request that leaves them out has 0 in both, a place in the open sea.
+  if (start.latitude_deg == 0.0 && start.longitude_deg == 0.0) {
+    return "no place is given: expected latitude and longitude, of which one is not 0";
+  }
   return std::nullopt;
 }
 

@@ -11,12 +11,6 @@ const char* pauseCommand(bool pause, SimulatorVersion version) {
   return pause ? "sim/operation/pause_on" : "sim/operation/pause_off";
 }
 
-std::vector<DatarefWrite> viewWrites(CameraView view) {
-  const float heading = view == CameraView::kRear ? 180.0F : 0.0F;
-  const float pitch = view == CameraView::kDown ? -90.0F : 0.0F;
-  return {{"sim/graphics/view/pilots_head_psi", heading}, {"sim/graphics/view/pilots_head_the", pitch}};
-}
-
 std::vector<std::string> consecutiveElements(const std::string& name, std::size_t count) {
   std::vector<std::string> first = datarefElements(name);
   if (first.size() != 1) throw std::invalid_argument("\"" + name + "\" is a range: expected path or path[i]");

@@ -46,6 +46,8 @@ struct ImageMoment {
   std::uint32_t epoch = 0;        ///< the ClockFilter's epoch of that mapping
   std::int64_t host_time_ns = 0;  ///< [ns] (change - display delay) on the capture host's clock
   bool paused = false;            ///< the simulator was paused or in replay at that moment
+  /// [s] raw simulator time of the frame shown, where the picture's source knows it: then no clock decides
+  std::optional<float> frame_key;
 };
 
 /// How a state was found for a picture.
@@ -147,10 +149,12 @@ class ImageAssociator {
   };
 
   [[nodiscard]] std::optional<FrameChoice> chooseFrame(const ImageMoment& moment) const;
+  [[nodiscard]] FrameChoice keyedFrame(float key) const;
   [[nodiscard]] double framePeriod() const;
   [[nodiscard]] double statePeriod() const;
   [[nodiscard]] double runningOffset() const;
   void pairWithFrame(const FrameChoice& frame, bool final, Association& answer) const;
+  void pairPaused(bool final, Association& answer) const;
   void pairByStamp(const ImageMoment& moment, bool final, Association& answer) const;
   void settle(const Association& answer);
 

@@ -22,7 +22,7 @@ struct UniformWind {
 
 /// X-Plane's turbulence goes from 0 to 10; "the unit is just a scale".
 inline constexpr double kXPlaneFullTurbulence = 10.0;
-/// [?] `sim/weather/region/wind_speed_msc` is metres a second by its name and by Laminar's article on version 12's
+/// [? wind-names] `sim/weather/region/wind_speed_msc` is m/s by its name and by Laminar's article on version 12's
 /// weather, knots by the text of the list. This is what one metre a second is there.
 inline constexpr double kRegionSpeedPerMps = 1.0;
 
@@ -44,9 +44,18 @@ struct Loading {
 };
 
 std::optional<std::string> check(const Loading& loading);
-/// Datarefs that show the same value once X-Plane took it. The balance comes last: X-Plane moves it with the masses.
-std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version);
-/// One of loadingWrites() is shown; engines burn fuel meanwhile.
+/// Where X-Plane 12 shows how the payload is spread; none before.
+std::vector<std::string> stationDatarefs(SimulatorVersion version);
+/// What is sent. The balance comes last: X-Plane moves it with the masses.
+/// @param stations values of stationDatarefs(): the payload is spread as it is now, or put on the first one where none
+/// is loaded; without them, or where one is not known, it is written as a sum
+std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version,
+                                        const std::vector<DatarefValue>& stations = {});
+/// What X-Plane must show once it took it: the payload as a sum, which the stations make in X-Plane 12.
+inline std::vector<DatarefWrite> loadingShown(const Loading& loading, SimulatorVersion version) {
+  return loadingWrites(loading, version);
+}
+/// One of loadingShown() is shown [? stations]; engines burn fuel meanwhile.
 bool shows(const DatarefWrite& loading, double shown);
 
 // --- files ---

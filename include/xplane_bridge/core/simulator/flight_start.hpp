@@ -29,9 +29,9 @@ struct FlightStart {
 /// What is wrong with it: name, value, expected range; nullopt: nothing.
 std::optional<std::string> check(const FlightStart& start);
 
-/// PREL: a new flight at the place, X-Plane 11's way. It takes heading and speed; the rest is motionWrites()'.
+/// PREL: a new flight at the place, X-Plane 11's way. It takes heading and speed; the rest is motionWrites()' [? prel].
 Placement placementOf(const FlightStart& start);
-/// VEHS: X-Plane 12's way, which leaves the velocity as it is.
+/// VEHS: X-Plane 12's way, which leaves the velocity as it is [? vehs].
 VehiclePose poseOf(const FlightStart& start);
 
 /// The same flight as X-Plane shows it.
@@ -51,7 +51,7 @@ std::optional<ShownFlight> shownFlightFrom(const std::vector<DatarefValue>& valu
 /// X-Plane shows it there: within 1 km, when the place has been taken but the motion has not been set.
 bool isNear(const FlightStart& start, const ShownFlight& shown);
 /// Attitude (by q, which alone sets it), velocity over ground and rates (none), for the scenery origin and the wind
-/// that X-Plane shows at the place.
+/// that X-Plane shows at the place; during a pause [? paused-motion].
 std::vector<DatarefWrite> motionWrites(const FlightStart& start, const ShownFlight& shown);
 /// In what X-Plane differs from it, in words; empty: in nothing. Tolerances are those of an aircraft that has flown on
 /// for 0.2 s.

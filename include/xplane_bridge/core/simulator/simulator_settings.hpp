@@ -1,10 +1,9 @@
-/// Commands and datarefs behind tx_node's services: pause and view.
+/// Commands and datarefs behind tx_node's services: pause, and datarefs by name.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "xplane_bridge/core/camera/camera_view.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
 
 namespace xplane_bridge::core {
@@ -13,10 +12,6 @@ namespace xplane_bridge::core {
 inline constexpr const char* kPausedDataref = "sim/time/paused";
 /// Command that pauses or resumes. Before 12.10 there is only a toggle: send it once, and only if it is to change.
 const char* pauseCommand(bool pause, SimulatorVersion version);
-
-/// Turns the pilot's head. X-Plane has no command for a vertical view (protocol.md 8.5); [?] that the 2-D cockpit views
-/// follow the head angles on a live simulator.
-std::vector<DatarefWrite> viewWrites(CameraView view);
 
 /// The names of `count` (1 and up) values beginning at `name`: the name itself for one, the elements that follow for
 /// several. Throws std::invalid_argument as datarefElements() does; `name` is one dataref or element, no range.

@@ -364,3 +364,52 @@ TEST(Interpolation, FollowsAnAnalyticMotionBelowTheFrameRate) {
   }
   EXPECT_GT(interpolated, 70);
 }
+
+TEST(ImageAssociator, AKeyNamesTheFrameWhateverTheClocksSay) {
+  core::ImageAssociator associator;
+  feed(associator, 60, 60.0, 1000.0);
+  auto moment = momentAt(1000.9);  // by the clock it were frame 54
+  moment.frame_key = static_cast<float>(1000.0 + 30.0 / 60.0);
+  const auto answer = associator.associate(moment, false);
+  EXPECT_EQ(answer.method, PairingMethod::kFrame);
+  EXPECT_EQ(answer.id, 30U);
+  EXPECT_EQ(answer.state_offset, 0.0);
+  EXPECT_EQ(answer.frame_sim_time, 1000.5);
+  moment.sim_time.reset();  // and without any clock
+  EXPECT_EQ(associator.associate(moment, false).id, 30U);
+  moment.paused = true;  // or when X-Plane was paused since
+  EXPECT_EQ(associator.associate(moment, false).id, 30U);
+}
+
+TEST(ImageAssociator, AKeyWhoseStateWasLostIsSaidToBeOffFrame) {
+  core::ImageAssociator associator;
+  for (int k = 0; k < 60; ++k) {
+    associator.addFrame(frameAt(k / 60.0));
+    if (k != 30) associator.addState(stateAt(static_cast<std::uint64_t>(k), k / 60.0));
+  }
+  auto moment = momentAt(0.5);
+  moment.frame_key = 0.5F;
+  const auto answer = associator.associate(moment, false);
+  EXPECT_EQ(answer.method, PairingMethod::kNearestFrame);
+  EXPECT_EQ(core::pairingQuality(moment, answer), core::kQualityOffFrame);
+}
+
+TEST(ImageAssociator, AKeyWaitsForItsState) {
+  core::ImageAssociator associator;
+  feed(associator, 30, 60.0);
+  auto moment = momentAt(0.5);
+  moment.frame_key = 0.5F;
+  EXPECT_TRUE(associator.associate(moment, false).pending);
+  associator.addState(stateAt(30, 0.5));
+  const auto answer = associator.associate(moment, false);
+  EXPECT_FALSE(answer.pending);
+  EXPECT_EQ(answer.id, 30U);
+}
+
+TEST(ImageAssociator, AKeyThatFramesShareAfterADayIsAmbiguous) {
+  core::ImageAssociator associator;
+  feed(associator, 60, 60.0, 140000.0);  // float32 steps by 15.6 ms there, 0.94 of a frame
+  auto moment = momentAt(140000.5);
+  moment.frame_key = 140000.5F;
+  EXPECT_TRUE(associator.associate(moment, true).ambiguous);
+}

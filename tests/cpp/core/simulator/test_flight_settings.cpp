@@ -60,6 +60,8 @@ TEST(UniformWind, IsShownByTheAirAtTheAircraft) {
 
 TEST(UniformWind, ImpossibleOnesAreNamed) {
   EXPECT_FALSE(check(UniformWind{10.0, 360.0, 1.0}));
+  EXPECT_FALSE(check(UniformWind{0.0, 360.0, 0.0})) << "calm";
+  EXPECT_EQ(check(UniformWind{}).value_or("").substr(0, 16), "nothing is given");
   EXPECT_EQ(check(UniformWind{-1.0, 0.0, 0.0}).value_or(""), "speed is -1: expected 0..100 [m/s]");
   EXPECT_EQ(check(UniformWind{1.0, 400.0, 0.0}).value_or(""), "from_deg is 400: expected 0..360 [deg true]");
   EXPECT_EQ(check(UniformWind{1.0, 0.0, std::nan("")}).value_or(""), "turbulence is nan: expected 0..1 [-]");
@@ -82,6 +84,36 @@ TEST(LoadingTest, WritesOnlyWhatIsGiven) {
   EXPECT_EQ(writes[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default");
   EXPECT_EQ(loadingWrites(loading, SimulatorVersion{120000})[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default");
   EXPECT_EQ(loadingWrites(loading, kXPlane12)[3].dataref, "sim/flightmodel2/misc/cg_offset_z");
+}
+
+TEST(LoadingTest, SpreadsThePayloadOverStationsAsItIs) {
+  EXPECT_TRUE(stationDatarefs(kXPlane11).empty());
+  ASSERT_EQ(stationDatarefs(SimulatorVersion{120000}).size(), 9u);
+  EXPECT_EQ(stationDatarefs(kXPlane12)[8], "sim/flightmodel/weight/m_stations[8]");
+  Loading loading;
+  loading.payload_mass = 200.0;
+  loading.cg_offset = 0.1;
+  std::vector<DatarefValue> stations(9, 0.0F);
+  stations[1] = 30.0F;
+  stations[4] = 10.0F;
+  auto writes = loadingWrites(loading, kXPlane12, stations);
+  ASSERT_EQ(writes.size(), 10u);
+  EXPECT_EQ(writes[0].value, 0.0F);
+  EXPECT_EQ(writes[1].dataref, "sim/flightmodel/weight/m_stations[1]");
+  EXPECT_EQ(writes[1].value, 150.0F) << "three quarters";
+  EXPECT_EQ(writes[4].value, 50.0F);
+  EXPECT_EQ(writes[9].dataref, "sim/flightmodel2/misc/cg_offset_z") << "last";
+  writes = loadingWrites(loading, kXPlane12, std::vector<DatarefValue>(9, 0.0F));
+  EXPECT_EQ(writes[0].value, 200.0F) << "on the first one where none is loaded";
+  EXPECT_EQ(writes[1].value, 0.0F);
+  stations[8].reset();
+  writes = loadingWrites(loading, kXPlane12, stations);
+  ASSERT_EQ(writes.size(), 2u);
+  EXPECT_EQ(writes[0].dataref, "sim/flightmodel/weight/m_fixed") << "they are not known";
+  const auto shown = loadingShown(loading, kXPlane12);
+  ASSERT_EQ(shown.size(), 2u);
+  EXPECT_EQ(shown[0].dataref, "sim/flightmodel/weight/m_fixed");
+  EXPECT_EQ(shown[0].value, 200.0F);
 }
 
 TEST(LoadingTest, ImpossibleOnesAreNamed) {

@@ -40,6 +40,8 @@ double valueOf(const std::vector<DatarefWrite>& writes, const std::string& leaf)
 
 TEST(FlightStart, ImpossibleNumbersAreNamed) {
   EXPECT_FALSE(check(start()));
+  EXPECT_EQ(check(FlightStart{}).value_or(""),
+            "no place is given: expected latitude and longitude, of which one is not 0");
   FlightStart wrong = start();
   wrong.latitude_deg = 95.0;
   EXPECT_EQ(check(wrong).value_or(""), "latitude is 95: expected -89.9..89.9 [deg, north +]");

@@ -15,16 +15,6 @@ TEST(SimulatorSettings, PausesByCommand) {
   }
 }
 
-TEST(SimulatorSettings, ViewsTurnTheHead) {
-  const auto down = viewWrites(CameraView::kDown);
-  ASSERT_EQ(down.size(), 2u);
-  EXPECT_EQ(down[0].dataref, "sim/graphics/view/pilots_head_psi");
-  EXPECT_EQ(down[0].value, 0.0F);
-  EXPECT_EQ(down[1].value, -90.0F);
-  EXPECT_EQ(viewWrites(CameraView::kRear)[0].value, 180.0F);
-  EXPECT_EQ(viewWrites(CameraView::kForward)[0].value, 0.0F);
-}
-
 TEST(SimulatorSettings, SeveralValuesGoToTheElementsThatFollow) {
   using List = std::vector<std::string>;
   EXPECT_EQ(consecutiveElements("sim/a", 1), List{"sim/a"});
