@@ -21,10 +21,22 @@ std::string wrong(const std::string& key, double given, const std::string& expec
   return key + " is " + number + ": expected " + expected;
 }
 
+const char* topicOf(FlightMode mode) { return mode == FlightMode::kManual ? "control/manual" : "control/auto"; }
+
 }  // namespace
 
 std::uint64_t SourceStatistics::refusedTotal() const {
   return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
+}
+
+ChannelOptions channelDefaults(const ChannelSection& section, Failsafe failsafe, bool reverse_thrust) {
+  const ChannelRange range = commandRange(section.first);
+  ChannelOptions out;
+  out.low = isLever(section.first) && !reverse_thrust ? 0.0 : range.low;
+  out.high = range.high;
+  const bool handle = channelWire(section.first, {}).refresh == Refresh::kOnChange;
+  out.failsafe = handle ? Failsafe::kHold : failsafe;
+  return out;
 }
 
 ArbiterOptions::ArbiterOptions() {
@@ -78,6 +90,7 @@ void ControlArbiter::setFlowing(bool flowing, double now) {
   if (flowing && !flowing_) {
     // Sources that were alive when the flow stopped get time to be heard again.
     const double until = flow_time_ + options_.resume_grace;
+    if (surfacesFly()) surfaces_until_ = std::max(surfaces_until_, until);
     for (Source& source : sources_) {
       if (source.alive_until > flow_time_) source.alive_until = std::max(source.alive_until, until);
       for (double& expires : source.expires) {
@@ -102,6 +115,7 @@ std::optional<CommandRefusal> ControlArbiter::onCommand(FlightMode from, const C
   source.arrival = now_;
   source.sequence = command.sequence;
   source.alive_until = std::max(source.alive_until, until);
+  heard_ = heard_ || from == status_.mode;
 
   const std::uint32_t throttle = command.fields & kThrottleFields;
   if (throttle != 0u) {
@@ -141,6 +155,33 @@ void ControlArbiter::watchStick(const ChannelSet& commanded, const ChannelValues
   }
 }
 
+std::string ControlArbiter::refusalOfSurfaces(double now) {
+  advance(now);
+  if (status_.mode != options_.surfaces_source) {
+    return std::string("control/surfaces flies in ") + toString(options_.surfaces_source) + ", and the mode is " +
+           toString(status_.mode);
+  }
+  if (status_.failsafe && heard_) {
+    return std::string(topicOf(status_.mode)) + " is silent and the failsafe acts: it must be back, or " +
+           toString(status_.mode) + " asked for again";
+  }
+  return "";
+}
+
+void ControlArbiter::onSurfaces(double now) {
+  advance(now);
+  surfaces_until_ = flow_time_ + options_.command_timeout;
+  surfaces_heard_ = true;
+}
+
+std::string ControlArbiter::endingSurfaces() {
+  if (!surfacesFly()) return "";
+  surfaces_until_ = kNever;
+  return "; control/surfaces ends";
+}
+
+void ControlArbiter::beginMode() { heard_ = surfaces_heard_ = false; }
+
 RequestOutcome ControlArbiter::onModeRequest(const ModeRequest& request, double now) {
   advance(now);
   if (request.sequence != 0) {
@@ -167,6 +208,7 @@ RequestOutcome ControlArbiter::onModeRequest(const ModeRequest& request, double 
   if (mode == status_.mode) {
     status_.accepted = true;
     status_.reason = "request (already in this mode)";
+    beginMode();
     return RequestOutcome::kUnchanged;
   }
   setMode(mode, request.requester, "request", now);
@@ -181,7 +223,9 @@ void ControlArbiter::setMode(FlightMode mode, const std::string& who, const std:
   status_.reason = reason;
   status_.request_sequence = 0;
   ++status_.revision;
+  beginMode();
   if (mode == status_.mode) return;
+  status_.reason += endingSurfaces();
   status_.previous = status_.mode;
   status_.mode = mode;
   status_.since = now_;
@@ -202,6 +246,8 @@ void ControlArbiter::forgetCommands(const std::string& reason, double now) {
   stick_reference_.fill(kUnset);
   origin_.fill(Origin::kNone);
   blending_.reset();
+  endSurfaces();
+  beginMode();
   status_.reason = reason;
   status_.requested_by.clear();
   status_.request_sequence = 0;
@@ -258,6 +304,22 @@ void ControlArbiter::moveTowards(std::size_t i, const Target& target, double dt)
   if (output_[i] != target.value) out_.limited |= fieldOf(static_cast<Channel>(i));
 }
 
+/// Whether a channel takes a test signal: commanded, or without anybody's command if the signal brings its own rest. A
+/// failsafe that flies takes none.
+bool ControlArbiter::takesSignal(std::size_t i, bool has_target, const ChannelExcitation& excitation) const {
+  if (!excitation.channels.test(i)) return false;
+  return fresh(status_.mode, i) || (excitation.rest && (!has_target || alive(status_.mode)));
+}
+
+void ControlArbiter::excite(std::size_t i, double base, double value) {
+  const ChannelOptions& options = options_.channels[i];
+  const double excited = base + value;
+  out_.values[i] = std::clamp(excited, options.low, options.high);
+  const std::uint32_t field = fieldOf(static_cast<Channel>(i));
+  out_.excited |= field;
+  if (out_.values[i] != excited) out_.limited |= field;
+}
+
 const ArbitratedControls& ControlArbiter::step(double now, const ChannelExcitation& excitation) {
   advance(now);
   const double dt = flow_time_ - last_step_flow_;
@@ -269,21 +331,19 @@ const ArbitratedControls& ControlArbiter::step(double now, const ChannelExcitati
   out_.sequence = source.sequence;
   out_.source_age = source.statistics.accepted > 0 ? now_ - source.arrival : 0.0;
   dropOtherThrottleKind();
-  bool failsafe = false;
+  bool failsafe = false, commanded = false;
   for (std::size_t i = 0; i < kChannelCount; ++i) {
     const auto target = targetOf(i);
-    if (!target) continue;
-    failsafe = failsafe || !fresh(status_.mode, i);
-    moveTowards(i, *target, dt);
     const auto channel = static_cast<Channel>(i);
-    out_.values[i] = output_[i];
-    if (excitation.channels.test(i) && fresh(status_.mode, i)) {
-      const ChannelOptions& options = options_.channels[i];
-      const double excited = output_[i] + excitation.value;
-      out_.values[i] = std::clamp(excited, options.low, options.high);
-      out_.excited |= fieldOf(channel);
-      if (out_.values[i] != excited) out_.limited |= fieldOf(channel);
+    if (target) {
+      failsafe = failsafe || !fresh(status_.mode, i);
+      moveTowards(i, *target, dt);
+      out_.values[i] = output_[i];
+      commanded = true;
     }
+    const bool excited = takesSignal(i, target.has_value(), excitation);
+    if (excited) excite(i, target ? output_[i] : *excitation.rest, excitation.value);
+    if (!target && !excited) continue;
     out_.active.set(i);
     out_.fields |= fieldOf(channel);
   }
@@ -295,22 +355,31 @@ const ArbitratedControls& ControlArbiter::step(double now, const ChannelExcitati
   useOneLever(out_.fields);
   useOneLever(out_.limited);
   useOneLever(out_.excited);
-  if (out_.active.any()) {
+  const bool surfaces_alone = surfacesFly() && !heard_;
+  failsafe = failsafe && !alive(status_.mode) && !surfaces_alone;
+  if (commanded) {
     const CommandSource own = status_.mode == FlightMode::kManual ? CommandSource::kManual : CommandSource::kAuto;
-    out_.source = alive(status_.mode) ? own : CommandSource::kFailsafe;
+    out_.source = failsafe ? CommandSource::kFailsafe : own;
   }
-  updateStatus(failsafe && !alive(status_.mode));
+  updateStatus(failsafe);
   return out_;
 }
 
 void ControlArbiter::updateStatus(bool failsafe) {
   const bool manual_alive = alive(FlightMode::kManual), auto_alive = alive(FlightMode::kAuto);
   if (failsafe && !status_.failsafe) {
-    status_.reason = std::string("timeout of control/") + (status_.mode == FlightMode::kManual ? "manual" : "auto");
-    status_.requested_by.clear();
-    status_.request_sequence = 0;
-  } else if (!failsafe && status_.failsafe && alive(status_.mode)) {
-    status_.reason = std::string("control/") + (status_.mode == FlightMode::kManual ? "manual" : "auto") + " is back";
+    const bool of_surfaces = surfaces_heard_ && !heard_;
+    const std::string timeout = std::string("timeout of ") + (of_surfaces ? "control/surfaces" : topicOf(status_.mode));
+    const std::string ending = endingSurfaces();
+    if (status_.since == now_) {  // the mode began with it: both are the reason
+      status_.reason += "; " + timeout + ending;
+    } else {
+      status_.reason = timeout + ending;
+      status_.requested_by.clear();
+      status_.request_sequence = 0;
+    }
+  } else if (!failsafe && status_.failsafe && (alive(status_.mode) || surfacesFly())) {
+    status_.reason = std::string(alive(status_.mode) ? topicOf(status_.mode) : "control/surfaces") + " is back";
   }
   if (failsafe != status_.failsafe || manual_alive != status_.manual_alive || auto_alive != status_.auto_alive) {
     ++status_.revision;

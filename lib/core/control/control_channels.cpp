@@ -3,10 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "xplane_bridge/core/control/control_rows.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
-constexpr const char* kJoystick = "sim/operation/override/override_joystick";
+// override_joystick would take pedals and auto-coordination from who commands roll only.
+constexpr const char* kJoystickRoll = "sim/operation/override/override_joystick_roll";
+constexpr const char* kJoystickPitch = "sim/operation/override/override_joystick_pitch";
+constexpr const char* kJoystickHeading = "sim/operation/override/override_joystick_heading";
 constexpr const char* kThrottles = "sim/operation/override/override_throttles";
 constexpr const char* kToeBrakes = "sim/operation/override/override_toe_brakes";
 constexpr const char* kOverridePrefix = "sim/operation/override/override_";
@@ -25,13 +30,14 @@ struct Row {
 constexpr Row kRows[] = {
     {Channel::kRoll,
      Channel::kRoll,
-     {"sim/joystick/yoke_roll_ratio", "sim/joystick/yoke_roll_ratio", kJoystick, Refresh::kContinuous, kExact}},
+     {"sim/joystick/yoke_roll_ratio", "sim/joystick/yoke_roll_ratio", kJoystickRoll, Refresh::kContinuous, kExact}},
     {Channel::kPitch,
      Channel::kPitch,
-     {"sim/joystick/yoke_pitch_ratio", "sim/joystick/yoke_pitch_ratio", kJoystick, Refresh::kContinuous, kExact}},
+     {"sim/joystick/yoke_pitch_ratio", "sim/joystick/yoke_pitch_ratio", kJoystickPitch, Refresh::kContinuous, kExact}},
     {Channel::kYaw,
      Channel::kYaw,
-     {"sim/joystick/yoke_heading_ratio", "sim/joystick/yoke_heading_ratio", kJoystick, Refresh::kContinuous, kExact}},
+     {"sim/joystick/yoke_heading_ratio", "sim/joystick/yoke_heading_ratio", kJoystickHeading, Refresh::kContinuous,
+      kExact}},
     {Channel::kLever0,
      leverChannel(kMaxEngines - 1),
      {"sim/cockpit2/engine/actuators/throttle_ratio", "sim/cockpit2/engine/actuators/throttle_ratio", nullptr,
@@ -97,7 +103,7 @@ static_assert(everyChannelHasWire(), "a channel of ControlCommand.msg has no lin
 constexpr ChannelWire kFlaps12 = {"sim/cockpit2/controls/flap_handle_request_ratio",
                                   "sim/cockpit2/controls/flap_handle_request_ratio", nullptr, Refresh::kOnChange,
                                   kHandle};
-// [?] -1 full reverse .. 1 full throttle, from the description in X-Plane's list; not tried on a live simulator.
+// [? reverse-lever] -1 full reverse .. 1 full throttle, from the description in X-Plane's list.
 constexpr ChannelWire kReverseLever = {"sim/cockpit2/engine/actuators/throttle_jet_rev_ratio",
                                        "sim/cockpit2/engine/actuators/throttle_jet_rev_ratio", nullptr,
                                        Refresh::kContinuous, kExact};
@@ -138,6 +144,7 @@ std::vector<std::string> requiredOverrides(const ChannelSet& channels, const Enc
     const char* name = channelWire(static_cast<Channel>(i), options).override_name;
     if (name && std::find(out.begin(), out.end(), name) == out.end()) out.emplace_back(name);
   }
+  for (const DataRow& row : controlRows({}, channels, {}, options)) out.push_back(rowName(row.index));
   return out;
 }
 
@@ -155,13 +162,17 @@ float wireValue(Channel channel, double value) {
 }
 
 ControlEncoder::ControlEncoder(const EncoderOptions& options) : options_(options) {
-  for (std::size_t i = 0; i < kChannelCount; ++i) names_[i] = writeDataref(static_cast<Channel>(i), options_);
+  for (std::size_t i = 0; i < kChannelCount; ++i) {
+    names_[i] = writeDataref(static_cast<Channel>(i), options_);
+    in_rows_.set(i, !rowSlotsOf(static_cast<Channel>(i), options_).empty());
+  }
 }
 
 void ControlEncoder::encode(const ChannelValues& values, const ChannelSet& channels,
                             std::vector<DatarefWrite>& out) const {
   for (std::size_t i = 0; i < kChannelCount; ++i) {
-    if (channels.test(i)) out.push_back({names_[i], wireValue(static_cast<Channel>(i), values[i])});
+    if (channels.test(i) && !in_rows_.test(i))
+      out.push_back({names_[i], wireValue(static_cast<Channel>(i), values[i])});
   }
 }
 

@@ -109,12 +109,15 @@ FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface
     if (const auto wrong = validate(failure)) return refuse(FailureError::kInvalid, request.name + " " + *wrong);
     out.plan.surface = failure;
   }
-  const std::string own = ownSurfaceFailure(surfaceTable()[surface], *fault, request.value.has_value());
+  const std::string own = version.is(Otherwise::kFconActs)
+                              ? ""
+                              : ownSurfaceFailure(surfaceTable()[surface], *fault, request.value.has_value());
   // No version has all of them: a flap or a speed brake cannot be centred.
   if (!own.empty() && hasFailure(version, failureDataref(own))) out.plan.datarefs.push_back(failureDataref(own));
   if (out.plan.datarefs.empty() && !out.plan.surface) {
     return refuse(FailureError::kNotSupported,
-                  "a lost surface (gone) cannot be expressed by X-Plane 11: use floating, or reduced with value 0");
+                  "a lost surface (gone) cannot be expressed by X-Plane 11, nor where rel_fcon_* do not act: use "
+                  "floating, or reduced with value 0");
   }
   return out;
 }

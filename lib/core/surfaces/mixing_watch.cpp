@@ -14,6 +14,8 @@ constexpr double kGap = 0.5;              // [s] between frames from which on th
 constexpr double kSmoothing = 0.1;        // weight of a sample: one second
 constexpr int kChecked = 5;               // samples until the check says anything
 constexpr double kContradiction = 2.0;    // [-] times the allowed rms
+constexpr double kSignalExcursion = 0.2;  // [-] of stick by test signals of one axis at a time
+constexpr std::size_t kSignalSamples = 60;
 
 double fastest(const MixingInputs& a, const MixingInputs& b) {
   return std::max({std::abs(a.roll - b.roll), std::abs(a.pitch - b.pitch), std::abs(a.yaw - b.yaw),
@@ -81,23 +83,61 @@ void MixingWatch::add(const SurfaceSample& sample) {
   ++off_count_;
 }
 
-bool MixingWatch::replaces(const MixingModel& found) const {
-  if (!model_ || !contradiction().empty() || !notShown().empty()) return true;
+/// Or as much.
+bool MixingWatch::knowsMore(const MixingModel& found) const {
   for (std::size_t j = 0; j < kMixingTerms; ++j) {
     if (model_->known[j] && !found.known[j]) return false;
   }
+  return true;
+}
+
+bool MixingWatch::replaces(const MixingModel& found) const {
+  if (!model_ || !contradiction().empty() || !notShown().empty()) return true;
+  if (!knowsMore(found)) return false;
   return knownTerms(found) > knownTerms(*model_) || found.samples >= 2 * solved_samples_;
+}
+
+void MixingWatch::adoptFound(const MixingModel& found) {
+  model_ = found;
+  solved_samples_ = found.samples;
+  recheck();
 }
 
 bool MixingWatch::solve() {
   const auto solution = identifier_.solve(aircraft_);
   quality_ = solution.quality;
   if (!quality_.good || !replaces(solution.model)) return false;
-  model_ = solution.model;
-  solved_samples_ = solution.model.samples;
-  recheck();
+  adoptFound(solution.model);
   return true;
 }
+
+MixingRequirements MixingWatch::signalled(MixingRequirements requirements) {
+  requirements.excursion = std::min(requirements.excursion, kSignalExcursion);
+  requirements.samples = std::min(requirements.samples, kSignalSamples);
+  return requirements;
+}
+
+void MixingWatch::beginIdentification() {
+  const bool contradicts = model_ && !contradiction().empty();
+  const bool inconsistent = identifier_.solve(aircraft_).quality.worst_residual_deg > requirements_.residual_deg;
+  if (contradicts || inconsistent) identifier_.reset();
+  identifier_.setRequirements(signalled(requirements_));
+  interrupt();
+}
+
+MixingWatch::Found MixingWatch::concludeIdentification() {
+  const auto solution = identifier_.solve(aircraft_);
+  identifier_.setRequirements(requirements_);
+  quality_ = solution.quality;
+  Found out{solution.quality};
+  const bool holds = model_ && contradiction().empty() && notShown().empty();
+  if (!out.good() || (holds && !knowsMore(solution.model))) return out;
+  adoptFound(solution.model);
+  out.adopted = true;
+  return out;
+}
+
+void MixingWatch::cancelIdentification() { identifier_.setRequirements(requirements_); }
 
 bool MixingWatch::unknownMoved() const { return model_ && !model_->unknownMovement(used_inputs_).empty(); }
 
@@ -124,12 +164,14 @@ std::string MixingWatch::notShown() const {
 }
 
 std::string MixingWatch::refusal() const {
-  if (!model_) return "how the surfaces are moved is not identified yet; move the stick: " + quality_.text();
+  if (!model_)
+    return "how the surfaces are moved is not identified yet: call identify_surfaces, or move the stick: " +
+           quality_.text();
   if (off_count_ < kChecked) {
     return "the surfaces have not been seen to follow their mixing for half a second of steady stick yet";
   }
   const std::string wrong = contradiction();
-  if (!wrong.empty()) return wrong + "; identify anew, move the stick: " + quality_.text();
+  if (!wrong.empty()) return wrong + "; identify anew: call identify_surfaces, or move the stick: " + quality_.text();
   return notShown();
 }
 

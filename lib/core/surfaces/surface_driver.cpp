@@ -136,6 +136,7 @@ const std::vector<SurfaceDeflection>& SurfaceDriver::step(const MixingInputs& in
                                                           double dt) {
   const MixingVector terms = mixingTerms(inputs);
   out_.clear();
+  off_target_deg_ = 0.0;
   for (Driven& d : driven_) {
     const bool broken = d.failure.has_value();
     const double rate = broken && d.failure->fault == SurfaceFault::kSlow
@@ -143,7 +144,10 @@ const std::vector<SurfaceDeflection>& SurfaceDriver::step(const MixingInputs& in
                             : options_.rate_deg_s;
     const double wanted =
         broken && d.failure->fault == SurfaceFault::kFloating ? floating(d, flow, dt) : target(d, terms);
-    if (std::isfinite(wanted)) d.now_deg = towards(d.now_deg, wanted, rate * dt);
+    if (std::isfinite(wanted)) {
+      d.now_deg = towards(d.now_deg, wanted, rate * dt);
+      off_target_deg_ = std::max(off_target_deg_, std::abs(wanted - d.now_deg));
+    }
     double sent = d.now_deg;
     // A broken surface does not answer to a test signal, and none leaves its travel by one.
     if (!broken && d.offset_deg != 0.0) {

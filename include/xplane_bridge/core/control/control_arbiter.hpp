@@ -29,6 +29,10 @@ struct ChannelOptions {
   double neutral = 0.0;  ///< within [low, high]
 };
 
+/// Limits and failsafe that a section of the aircraft's YAML begins with. Sticks, levers, motors and toe brakes follow
+/// the aircraft's `failsafe`, handles hold; below 0 a lever means reverse thrust, which most aircraft do not have.
+ChannelOptions channelDefaults(const ChannelSection& section, Failsafe failsafe, bool reverse_thrust);
+
 struct ArbiterOptions {
   /// Sticks, levers, motors and toe brakes go to 0; handles and trims hold.
   ArbiterOptions();
@@ -40,6 +44,7 @@ struct ArbiterOptions {
   double transition_rate = 2.0;     ///< [1/s] fastest change of a channel that changes hands; > 0
   double takeover_threshold = 0.3;  ///< stick movement since AUTO was engaged that takes over; 0: never
   FlightMode initial_mode = FlightMode::kManual;
+  FlightMode surfaces_source = FlightMode::kAuto;  ///< the mode in which control/surfaces flies
 };
 
 /// First thing wrong, with the key, given value and expectation; nullopt when all is well.
@@ -71,7 +76,9 @@ struct ModeStatus {
   double since = 0.0;  ///< [s] steady time of the last change of mode
   bool manual_alive = false;
   bool auto_alive = false;
-  bool failsafe = false;       ///< the active source is silent and at least one channel follows its failsafe
+  /// The active source is silent and at least one channel follows its failsafe. In the mode of control/surfaces those
+  /// commands are a source too, until the mode's own topic is heard.
+  bool failsafe = false;
   std::uint32_t revision = 0;  ///< counts changes of any of the above: publish when it differs
 };
 
@@ -85,8 +92,10 @@ struct SourceStatistics {
 
 /// A test signal added to what was arbitrated.
 struct ChannelExcitation {
-  ChannelSet channels;  ///< only those that the active source commands are excited
+  ChannelSet channels;  ///< only those that the active source commands are excited, unless `rest` is set
   double value = 0.0;
+  /// Where the channels that nobody commands are meanwhile; they are X-Plane's again afterwards.
+  std::optional<double> rest;
 };
 
 /// What to send now.
@@ -112,6 +121,16 @@ class ControlArbiter {
 
   /// A command that arrived at `now`. A refused one changes nothing: the last good command goes on until its time-out.
   std::optional<CommandRefusal> onCommand(FlightMode from, const ControlCommand& command, double now);
+
+  /// Why control/surfaces may not command single surfaces now; empty: it may. They belong to one mode, and what ends
+  /// that mode or its source ends them.
+  std::string refusalOfSurfaces(double now);
+  /// A command of single surfaces that arrived at `now` and may fly. It has to be repeated like any other.
+  void onSurfaces(double now);
+  /// They were given up by those who command them.
+  void endSurfaces() { surfaces_until_ = kNever; }
+  /// Single surfaces are commanded, as of the last call.
+  bool surfacesFly() const { return surfaces_until_ > flow_time_; }
 
   RequestOutcome onModeRequest(const ModeRequest& request, double now);
 
@@ -158,7 +177,11 @@ class ControlArbiter {
   void dropOtherThrottleKind();
   std::optional<Target> targetOf(std::size_t channel) const;
   void moveTowards(std::size_t channel, const Target& target, double dt);
+  bool takesSignal(std::size_t channel, bool has_target, const ChannelExcitation& excitation) const;
+  void excite(std::size_t channel, double base, double value);
   void updateStatus(bool failsafe);
+  std::string endingSurfaces();
+  void beginMode();
 
   ArbiterOptions options_;
   std::array<Source, 2> sources_;
@@ -170,6 +193,9 @@ class ControlArbiter {
   std::array<Origin, kChannelCount> origin_{};
   std::bitset<kChannelCount> blending_;  // changes hands: transition_rate applies until it has caught up
   std::array<double, 3> stick_reference_;
+  double surfaces_until_ = kNever;  // on the flowing clock
+  bool heard_ = false;              // the topic of the mode, since the mode was asked for
+  bool surfaces_heard_ = false;     // control/surfaces, likewise
   struct Seen {
     std::uint32_t sequence;
     double stamp;

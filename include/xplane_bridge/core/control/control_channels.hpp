@@ -36,6 +36,8 @@ struct EncoderOptions {
   /// Levers go through the dataref whose negative half is reverse thrust. Without it levers below 0 have no meaning and
   /// the arbiter's limits must keep them at 0 and above.
   bool reverse_thrust = false;
+  /// What DATA rows can carry (control_rows.hpp) goes in them; all else, and overrides, as datarefs.
+  bool rows = false;
 };
 
 /// The wire of a channel.
@@ -46,7 +48,7 @@ std::string writeDataref(Channel channel, const EncoderOptions& options);
 /// Dataref of `channel` to read back, with [i] where it is an element.
 std::string readBackDataref(Channel channel, const EncoderOptions& options);
 
-/// Overrides the commanded channels need, each once, in a fixed order.
+/// Overrides the commanded channels need, each once, in a fixed order; behind them the DATA rows that hold them.
 std::vector<std::string> requiredOverrides(const ChannelSet& channels, const EncoderOptions& options);
 
 /// Overrides whose effect is on all surfaces (protocol.md 8.2).
@@ -66,7 +68,7 @@ class ControlEncoder {
 
   const EncoderOptions& options() const { return options_; }
 
-  /// Appends one write for each channel of `channels`, in channel order.
+  /// Appends one write for each channel of `channels`, in channel order; not of those that rows carry.
   void encode(const ChannelValues& values, const ChannelSet& channels, std::vector<DatarefWrite>& out) const;
 
   /// True if X-Plane's `shown` is the `sent` value of `channel`.
@@ -75,6 +77,7 @@ class ControlEncoder {
  private:
   EncoderOptions options_;
   std::array<std::string, kChannelCount> names_;
+  ChannelSet in_rows_;
 };
 
 /// Value as written for a channel: gear becomes 0 or 1 (down from 0.5), everything else is passed on.

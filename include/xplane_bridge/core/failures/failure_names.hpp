@@ -16,7 +16,7 @@ struct FailureNames {
 /// All sim/operation/failures/rel_* of the lists that Laminar ships with X-Plane.
 const std::vector<FailureNames>& failureNameTable();
 
-/// Full datarefs sim/operation/failures/rel_* of a version; while it is unknown those of all. [?] A later X-Plane may
+/// Full datarefs sim/operation/failures/rel_* of a version; while it is unknown those of all. A later X-Plane may
 /// have more: any rel_* can be set by its name, but those that are not listed are not noticed when they are set in the
 /// simulator's menu.
 std::vector<std::string> simulatorFailures(SimulatorVersion version);

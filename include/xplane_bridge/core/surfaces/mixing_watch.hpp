@@ -32,6 +32,21 @@ class MixingWatch {
   /// worth keeping.
   bool solve();
 
+  /// From here on test signals move each axis by itself, which tells more in less time than a pilot: less of it is
+  /// needed. solve() is not to be called until it is concluded. What was seen before and contradicts is forgotten.
+  void beginIdentification();
+  /// What came of it.
+  struct Found {
+    MixingQuality quality;
+    bool good() const { return quality.good; }
+    bool adopted = false;  ///< a new mixing, which is worth keeping; else the one known stays
+  };
+  Found concludeIdentification();
+  /// It ends without result.
+  void cancelIdentification();
+  /// [-] of stick that it takes to both sides of each axis.
+  double excursionNeeded() const { return signalled(requirements_).excursion; }
+
   const std::string& aircraft() const { return aircraft_; }
   /// Null while none is known.
   const MixingModel* model() const { return model_ ? &*model_ : nullptr; }
@@ -49,7 +64,10 @@ class MixingWatch {
   std::string contradiction() const;
   std::string notShown() const;
   bool unknownMoved() const;
+  bool knowsMore(const MixingModel& found) const;
   bool replaces(const MixingModel& found) const;
+  void adoptFound(const MixingModel& found);
+  static MixingRequirements signalled(MixingRequirements requirements);
 
   MixingRequirements requirements_;
   MixingIdentifier identifier_;

@@ -25,7 +25,7 @@ std::optional<std::string> validate(const SurfaceFailure& failure);
 struct DriverOptions {
   double rate_deg_s = 60.0;  ///< [deg/s] of every surface; > 0
   /// A floating surface trails by this share of the flow angle (alpha for wings and tailplane, beta for rudders), with
-  /// its trailing edge going with the flow. [?] a typical hinge-moment ratio, not taken from the aircraft.
+  /// its trailing edge going with the flow: a typical hinge-moment ratio, not taken from the aircraft.
   double floating_gain = 0.3;
   double floating_time = 0.2;  ///< [s] first-order lag of a floating surface
 };
@@ -62,6 +62,9 @@ class SurfaceDriver {
   /// Advances by `dt` [s] and gives what to send, every driven surface by rising number.
   const std::vector<SurfaceDeflection>& step(const MixingInputs& inputs, const FlowAngles& flow, double dt);
 
+  /// [deg] by which the surface that is farthest off was not where it is wanted, after the last step.
+  double offTarget() const { return off_target_deg_; }
+
   const MixingModel& model() const { return model_; }
 
  private:
@@ -85,6 +88,7 @@ class SurfaceDriver {
   DriverOptions options_;
   std::vector<Driven> driven_;
   std::vector<SurfaceDeflection> out_;
+  double off_target_deg_ = 0.0;
 };
 
 }  // namespace xplane_bridge::core

@@ -117,6 +117,8 @@ class MixingIdentifier {
   void reset();
 
   std::size_t samples() const { return samples_; }
+  /// What solve() asks for from here on.
+  void setRequirements(const MixingRequirements& requirements) { requirements_ = requirements; }
 
   struct Solution {
     MixingModel model;

@@ -35,7 +35,7 @@ bool surfaceSampleFrom(const std::vector<float>& values, SurfaceSample* sample);
 ///
 /// Own commands act at once, what only X-Plane knows (its stick, autopilot, stability augmentation, trims) one to two
 /// frames later. X-Plane no longer moves flaps and speed brakes under the override, so they are run to where their
-/// handles point. [?] Whether total_*_ratio still moves under the override on a live X-Plane: where it stands still
+/// handles point. [? totals-move] Whether total_*_ratio still moves under the override: where it stands still
 /// although the stick moves, the stick's own movement is added instead.
 class DrivenInputs {
  public:

@@ -48,7 +48,12 @@ TEST(ControlChannels, WritesTheDatarefsOfTheReference) {
 
 TEST(ControlChannels, NeedsTheOverridesOfTheReferenceEachOnce) {
   EXPECT_EQ(requiredOverrides(setOf({Channel::kRoll, Channel::kPitch, Channel::kYaw}), kXp11),
-            std::vector<std::string>{"sim/operation/override/override_joystick"});
+            (std::vector<std::string>{"sim/operation/override/override_joystick_roll",
+                                      "sim/operation/override/override_joystick_pitch",
+                                      "sim/operation/override/override_joystick_heading"}));
+  EXPECT_EQ(requiredOverrides(setOf({Channel::kYaw}), kXp12),
+            std::vector<std::string>{"sim/operation/override/override_joystick_heading"})
+      << "and nothing that stops another axis";
   EXPECT_EQ(requiredOverrides(setOf({leverChannel(0), Channel::kFlaps, Channel::kGear, Channel::kThrustVector}), kXp11),
             std::vector<std::string>{});
   EXPECT_EQ(

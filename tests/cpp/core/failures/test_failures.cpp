@@ -90,6 +90,15 @@ TEST(Failures, XPlane12sOwnFailuresWhereTheyExpressTheWish) {
   EXPECT_FALSE(planFailure(request("rudder1_fin1", "gone"), k12).plan.surface);
 }
 
+TEST(Failures, WhereXPlanesOwnDoNotActEverySurfaceFailureIsFlown) {
+  const SimulatorVersion ignored{k12.number, static_cast<std::uint32_t>(Otherwise::kFconActs)};
+  const auto out = planFailure(request("aileron1_wing2_left", "stuck"), ignored);
+  ASSERT_EQ(out.error, FailureError::kNone);
+  EXPECT_TRUE(out.plan.datarefs.empty());
+  ASSERT_TRUE(out.plan.surface);
+  EXPECT_EQ(planFailure(request("rudder1_fin1", "gone"), ignored).error, FailureError::kNotSupported);
+}
+
 TEST(FailureRegistry, TriggersWaitForTheirCondition) {
   const struct {
     int trigger;
