@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/core/control/control_rows.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 
 namespace xplane_bridge {
@@ -11,8 +13,8 @@ namespace {
 
 constexpr double kOverrideRefresh = 1.0;  // [s] a lost datagram must not leave the stick with X-Plane
 constexpr double kHandleRepeat = 0.3;     // [s] in which a changed handle is sent with every refresh
-constexpr double kDoesNotFollow = 1.0;    // [s] without read-back until it is said
-constexpr std::size_t kUnseenKept = 64;   // two frames of 200 commands and 20 frames a second, three times
+constexpr double kSameFlight = 1.0;       // [s] by which a flight may seem to have run on too far in a gap
+constexpr double kGap = 0.4;              // [s] without a frame in which X-Plane may have been restarted
 
 }  // namespace
 
@@ -40,7 +42,7 @@ ControlPath::ControlPath(core::SimulatorPort* link, OverrideManager* overrides, 
       hooks_(std::move(hooks)),
       mutex_(std::move(mutex)),
       arbiter_(options.arbiter, now()),
-      encoder_(core::EncoderOptions{{}, options.reverse_thrust}) {
+      encoder_(core::EncoderOptions{{}, options.reverse_thrust, options.rows}) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   arbiter_.setFlowing(false, now());
   settle();
@@ -48,10 +50,6 @@ ControlPath::ControlPath(core::SimulatorPort* link, OverrideManager* overrides, 
 }
 
 double ControlPath::now() const { return link_->clock().steadySeconds(); }
-
-bool ControlPath::isUp() const {
-  return link_status_.state == core::LinkState::kConnected || link_status_.state == core::LinkState::kPaused;
-}
 
 // --- the standing ---
 
@@ -68,16 +66,16 @@ void ControlPath::settle() {
   } else if (!suspension_.empty()) {
     standing_ = Standing::kSuspended;
     why_not_ = suspension_;
-  } else if (!released_.empty()) {
+  } else if (!halted_.empty()) {
     standing_ = Standing::kWaitingForMode;
-    why_not_ = "another client has released " + released_ + ": ask for a mode to fly on";
+    why_not_ = halted_ + ": ask for a mode to fly on";
   } else if (!fits && aircraft_ == core::AircraftIdentity{}) {
     standing_ = Standing::kWrongAircraft;
     why_not_ = "X-Plane has not told which aircraft is loaded";
   } else if (!fits) {
     standing_ = Standing::kWrongAircraft;
     why_not_ = "the aircraft loaded is " + described(aircraft_) + ", but " + options_.aircraft_file + " is for " +
-               core::join(options_.aircraft);
+               core::join(options_.aircraft) + "; scripts/aircraft_config writes a file for the one that is loaded";
   } else {
     standing_ = Standing::kFlying;
     why_not_.clear();
@@ -87,6 +85,15 @@ void ControlPath::settle() {
   } else {
     hooks_.end_excitation("nothing is sent: " + why_not_);
   }
+}
+
+/// Whether the arbiter's time goes on: while X-Plane runs, and through a hitch of it as long as the source that flies
+/// goes on. One that has become silent with X-Plane waits for its frames.
+bool ControlPath::flows(double time) {
+  if (link_status_.state == core::LinkState::kConnected) return true;
+  if (link_status_.state != core::LinkState::kStale || link_status_.paused.value_or(false)) return false;
+  const double silence = time - last_frame_;
+  return silence <= options_.stale_after && time - lastCommandOf(arbiter_.status().mode) < 0.5 * silence;
 }
 
 void ControlPath::suspend(const std::string& why) {
@@ -109,9 +116,9 @@ void ControlPath::onLink(const core::LinkStatus& status) {
   const std::uint32_t epoch = std::exchange(link_status_, status).epoch;
   // X-Plane has come back, or another one has come: which, its first frame shows.
   if (status.epoch != epoch && epoch != 0) flight_shown_ = false;
-  arbiter_.setFlowing(status.state == core::LinkState::kConnected, now());
+  arbiter_.setFlowing(flows(now()), now());
   if (status.version.known() && status.version != encoder_.options().version) {
-    encoder_ = core::ControlEncoder(core::EncoderOptions{status.version, options_.reverse_thrust});
+    encoder_ = core::ControlEncoder(core::EncoderOptions{status.version, options_.reverse_thrust, options_.rows});
     watched_.reset();
   }
   settle();
@@ -124,45 +131,104 @@ void ControlPath::onAircraft(const core::AircraftIdentity& aircraft) {
   settle();
 }
 
-void ControlPath::onNewFlight() {
+void ControlPath::onNewFlight(const std::string& how) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   overrides_->forgetShown();
+  endAuto(how, now());
+}
+
+/// A controller must not fly on in a flight that it does not know.
+void ControlPath::endAuto(const std::string& why, double time) {
+  const core::FlightMode before = arbiter_.status().mode;
+  if (options_.resume_auto || before != core::FlightMode::kAuto) return;
+  arbiter_.setMode(core::FlightMode::kManual, "tx_node", why + "; AUTO is off until it is asked for", time);
+  afterModeChange(before);
+  sayMode();
+}
+
+/// Whether it is the flight of before the gap: both of X-Plane's times have run on, and no further than the gap was
+/// long.
+bool ControlPath::continues(const core::FlightWatch& watch) const {
+  const double longest = now() - last_frame_ + kSameFlight;
+  const auto ran_on = [longest](double before, double after) {
+    return after >= before - core::kOvertaking && after <= before + longest;
+  };
+  const bool flight_time_known = std::isfinite(watch_.flight_time);
+  return ran_on(watch_.sim_time, watch.sim_time) &&
+         (!flight_time_known || ran_on(watch_.flight_time, watch.flight_time));
+}
+
+/// Whether X-Plane was restarted, also where the link has bridged the gap: its total running time has run back, or is
+/// no longer than the gap.
+bool ControlPath::isAnotherXPlane(const core::FlightWatch& watch) const {
+  if (!std::isfinite(watch_.sim_time)) return false;
+  const double gap = now() - last_frame_;
+  return watch.sim_time < watch_.sim_time - core::kOvertaking || (gap > kGap && watch.sim_time <= gap);
+}
+
+void ControlPath::beginFlight() {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  last_frame_ = now();
+  last_override_refresh_ = last_frame_;
 }
 
 void ControlPath::onFrame(const core::FlightWatch& watch) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  // Total running time only runs back in another X-Plane, also where the link has bridged the gap.
-  const bool ran_back = watch.sim_time < watch_.sim_time - core::kOvertaking;
+  const bool another = isAnotherXPlane(watch);
+  const bool same_flight = !another && continues(watch);
   watch_ = watch;
-  if (!flight_shown_ || ran_back) comeBack(now());
+  last_frame_ = now();
+  if (!flight_shown_ || another) comeBack(same_flight, last_frame_);
   // A test signal goes out with every frame, however rarely commands come, and so does its end.
-  if (excited_ || hooks_.excitation().channels.any()) send(now());
+  if (!options_.each_frame && (excited_ || hooks_.excitation().channels.any())) send(now());
 }
 
-void ControlPath::comeBack(double time) {
+void ControlPath::comeBack(bool same_flight, double time) {
   flight_shown_ = true;
   settle();
+  if (!same_flight) endAuto("X-Plane was restarted", time);
   overrides_->forgetShown();
   unseen_.clear();
   ever_sent_.reset();  // another X-Plane does not know where the handles are
-  if (time - last_command_ <= options_.arbiter.command_timeout) {
+  const core::ModeStatus& status = arbiter_.status();
+  if (time - lastCommandOf(status.mode) <= options_.arbiter.command_timeout) {
     overrides_->refresh();
     return;
   }
-  // Nobody flies any more, so X-Plane, which may be another one now, is not taken over.
-  arbiter_.forgetCommands("X-Plane came back and nobody commanded it", time);
+  // What flies now is silent, so X-Plane, which may be another one, is not taken over.
+  const std::string silent = core::toString(status.mode) + std::string(" is not commanded");
+  arbiter_.forgetCommands((status.since == time ? status.reason : "X-Plane came back") + "; " + silent, time);
+  watchSurfaces();
   sayMode();
   overrides_->setRequired({});
 }
 
 void ControlPath::watchReleases() {
   const std::vector<std::string> released = overrides_->releasedByOthers();
-  if (released.empty()) return;
-  released_ = released.front();
+  if (!released.empty()) onReleasedByAnother(released.front());
+}
+
+void ControlPath::onReleasedByAnother(const std::string& override_name) {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  halt("another client has released " + override_name, now());
+}
+
+void ControlPath::onGivenBack(const std::string& why) {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  const double time = now();
+  const core::FlightMode before = arbiter_.status().mode;
+  arbiter_.setMode(core::FlightMode::kManual, "tx_node", why + "; nothing is sent until a mode is asked for", time);
+  afterModeChange(before);
+  sayMode();
+  halt(why, time);
+}
+
+void ControlPath::halt(const std::string& why, double time) {
+  halted_ = why;
   settle();
   hooks_.release_surfaces(why_not_);
   hooks_.event(ControlPathHooks::Kind::kOverride, "nothing is sent any more: " + why_not_, "");
-  send(now());
+  send(time);
 }
 
 // --- commands ---
@@ -172,9 +238,10 @@ std::optional<core::CommandRefusal> ControlPath::command(core::FlightMode from, 
   const double time = now();
   const core::FlightMode before = arbiter_.status().mode;
   if (auto refusal = arbiter_.onCommand(from, command, time)) return refusal;
-  last_command_ = time;
+  lastCommandOf(from) = time;
   afterModeChange(before);
   if (from != arbiter_.status().mode) return std::nullopt;
+  if (options_.each_frame) return std::nullopt;
   if (link_->clock().steady_ns() < next_command_ns_) {
     command_waits_ = true;
     return std::nullopt;
@@ -190,7 +257,7 @@ core::RequestOutcome ControlPath::requestMode(const core::ModeRequest& request) 
   const core::RequestOutcome outcome = arbiter_.onModeRequest(request, time);
   if (outcome == core::RequestOutcome::kIgnored) return outcome;
   if (outcome != core::RequestOutcome::kRefused) {
-    released_.clear();
+    halted_.clear();
     settle();
   }
   afterModeChange(before);
@@ -202,9 +269,42 @@ core::RequestOutcome ControlPath::requestMode(const core::ModeRequest& request) 
   return outcome;
 }
 
+std::string ControlPath::refusalOfSurfaces() {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  return standing_ == Standing::kFlying ? arbiter_.refusalOfSurfaces(now()) : why_not_;
+}
+
+void ControlPath::onSurfaceCommand(bool gives_back) {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  surfaces_fly_ = !gives_back;
+  if (gives_back) {
+    arbiter_.endSurfaces();
+    return;
+  }
+  lastCommandOf(options_.arbiter.surfaces_source) = now();
+  arbiter_.onSurfaces(now());
+}
+
+void ControlPath::watchFailsafe() {
+  const core::ModeStatus& status = arbiter_.status();
+  if (std::exchange(failsafe_, status.failsafe) == status.failsafe) return;
+  const std::string mode = core::toString(status.mode);
+  const std::string text =
+      status.failsafe ? mode + ": failsafe: " + status.reason : mode + ": the failsafe ends: " + status.reason;
+  hooks_.event(ControlPathHooks::Kind::kFailsafe, text, status.requested_by);
+}
+
+/// What the arbiter has ended ends before anything else is sent.
+void ControlPath::watchSurfaces() {
+  if (!surfaces_fly_ || arbiter_.surfacesFly()) return;
+  surfaces_fly_ = false;
+  hooks_.end_surface_commands();
+}
+
 void ControlPath::afterModeChange(core::FlightMode before) {
   const core::ModeStatus& status = arbiter_.status();
   if (status.mode == before) return;
+  watchSurfaces();
   hooks_.end_excitation("the mode changed");
   hooks_.event(ControlPathHooks::Kind::kMode, std::string(core::toString(status.mode)) + ": " + status.reason,
                status.requested_by);
@@ -213,12 +313,15 @@ void ControlPath::afterModeChange(core::FlightMode before) {
 void ControlPath::tick() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const double time = now();
+  arbiter_.setFlowing(flows(time), time);
   watchReleases();
-  if (isUp() && time - last_override_refresh_ > kOverrideRefresh) {
+  if (isUp(link_status_) && time - last_override_refresh_ > kOverrideRefresh) {
     overrides_->refresh();
     last_override_refresh_ = time;
   }
-  if (command_waits_ && link_->clock().steady_ns() >= next_command_ns_) {
+  if (options_.each_frame) {
+    send(time);
+  } else if (command_waits_ && link_->clock().steady_ns() >= next_command_ns_) {
     sendCommand(time);
   } else if (time - last_send_ >= 0.5 / options_.rate) {
     send(time);
@@ -241,6 +344,8 @@ void ControlPath::send(double time) {
   command_waits_ = false;
   const core::ChannelExcitation excitation = hooks_.excitation();
   const core::ArbitratedControls& controls = arbiter_.step(time, excitation);
+  watchSurfaces();
+  watchFailsafe();
   excited_ = controls.excited != 0u;
   if (excitation.channels.any() && !excited_) hooks_.end_excitation("nobody commands the axis any more");
   sayMode();
@@ -255,27 +360,59 @@ void ControlPath::send(double time) {
 }
 
 bool ControlPath::fly(const core::ArbitratedControls& controls, double time) {
-  if (controls.active.none()) return false;
   try {
+    if (controls.active.none()) {
+      // An axis that only a test signal had taken is X-Plane's again.
+      if (std::exchange(taken_, false) && isUp(link_status_)) overrides_->setRequired({});
+      return false;
+    }
     if (standing_ != Standing::kFlying) {
       if (std::exchange(said_, why_not_) != why_not_) hooks_.warn("commands are not sent: " + why_not_);
-      if (isUp()) overrides_->setRequired({});
+      if (isUp(link_status_)) overrides_->setRequired({});
       return false;
     }
     overrides_->setRequired(core::requiredOverrides(controls.active, encoder_.options()));
     said_.clear();
+    taken_ = controls.source == core::CommandSource::kNone;
   } catch (const core::JournalError& error) {
-    const std::string why = std::string("overrides could not be given back after a crash: ") + error.what();
-    if (std::exchange(said_, why) != why) hooks_.warn("commands are not sent, because " + why);
+    const std::string why = core::whyNotChanged(error);
+    if (std::exchange(said_, why) != why) hooks_.warn("commands are not sent: " + why);
     return false;
   }
   writes_.clear();
-  encoder_.encode(controls.values, channelsToSend(controls, time), writes_);
+  const core::ChannelSet now = channelsToSend(controls, time);
+  encoder_.encode(controls.values, now, writes_);
   for (const core::DatarefWrite& write : writes_) link_->write(write.dataref, write.value);
+  sendRows(controls, now);
+  prepareLevers(controls);
   last_send_ = time;
   sayApplied(controls);
   watchReadBack(controls.active);
   return true;
+}
+
+void ControlPath::sendRows(const core::ArbitratedControls& controls, const core::ChannelSet& now) {
+  const std::vector<core::DataRow> rows = core::controlRows(controls.values, controls.active, now, encoder_.options());
+  if (rows.empty()) return;
+  std::array<std::uint8_t, core::kHeaderSize + 4 * core::kDataRowSize> buffer;
+  const core::EncodeResult size = core::encodeData(buffer, rows.data(), rows.size());
+  if (size) link_->send({buffer.data(), *size});
+}
+
+/// When their override ends, motors go by their levers at once: those are to be where the motors are by then.
+void ControlPath::prepareLevers(const core::ArbitratedControls& controls) {
+  std::vector<core::UndoOperation> levers;
+  for (int engine = 0; engine < core::kMaxEngines; ++engine) {
+    const std::size_t motor = core::index(core::motorChannel(engine));
+    if (!controls.active.test(motor)) continue;
+    const core::Channel lever = core::leverChannel(engine);
+    const double position = std::clamp(controls.values[motor], options_.reverse_thrust ? -1.0 : 0.0, 1.0);
+    levers.emplace_back(core::UndoDref{core::writeDataref(lever, encoder_.options()), core::wireValue(lever, position),
+                                       /*confirm=*/false});
+  }
+  if (levers.empty()) return;
+  const char* override_name = core::channelWire(core::motorChannel(0), encoder_.options()).override_name;
+  overrides_->prepareRelease(override_name, std::move(levers));
 }
 
 core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& controls, double time) {
@@ -302,73 +439,15 @@ void ControlPath::sayMode() {
   hooks_.mode(status, watch_.sim_time);
 }
 
-void ControlPath::sayApplied(const core::ArbitratedControls& controls) {
-  AppliedControls applied;
-  applied.controls = controls;
-  applied.sent_ns = link_->clock().system_ns();
-  applied.sim_time = watch_.sim_time;
-  hooks_.applied(applied);
-  if (unseen_.empty()) last_seen_ = now();  // until now there was nothing to show
-  unseen_.push_back(std::move(applied));
-  if (unseen_.size() > kUnseenKept) unseen_.pop_front();
-}
-
-// --- the way back ---
-
-void ControlPath::watchReadBack(const core::ChannelSet& channels) {
-  if (channels == watched_) return;
-  watched_ = channels;
-  watched_order_.clear();
-  shown_known_.reset();
-  core::RrefGroup group{"read-back", {core::flightWatchDatarefs().front()}, core::kEveryFrameRateHz, 1};
-  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
-    if (!channels.test(i)) continue;
-    watched_order_.push_back(static_cast<core::Channel>(i));
-    group.datarefs.push_back(core::readBackDataref(static_cast<core::Channel>(i), encoder_.options()));
-  }
-  if (read_back_) {
-    read_back_.replace(std::move(group));
-  } else {
-    read_back_ = link_->subscribe(
-        std::move(group), [this](const core::RrefView& view, const core::ReceiveInfo&) { onReadBack(view); }, mutex_);
-  }
-}
-
-void ControlPath::onReadBack(const core::RrefView& view) {
-  double sim_time = watch_.sim_time;
-  for (std::size_t i = 0; i < view.size(); ++i) {
-    const core::RrefPair pair = view[i];
-    if (pair.index == 0) sim_time = static_cast<double>(pair.value);
-    if (pair.index < 1 || static_cast<std::size_t>(pair.index) > watched_order_.size()) continue;
-    const std::size_t channel = core::index(watched_order_[static_cast<std::size_t>(pair.index) - 1]);
-    shown_[channel] = static_cast<double>(pair.value);
-    shown_known_.set(channel);
-  }
-  // The newest that fits: older ones were overtaken.
-  for (auto it = unseen_.rbegin(); it != unseen_.rend(); ++it) {
-    bool all = true;
-    for (std::size_t i = 0; i < core::kChannelCount && all; ++i) {
-      if (!it->controls.active.test(i)) continue;
-      all = shown_known_.test(i) && encoder_.shows(static_cast<core::Channel>(i), it->controls.values[i], shown_[i]);
-    }
-    // What stood there before the command reached X-Plane is not its doing.
-    const bool too_early = link_status_.state != core::LinkState::kPaused && sim_time <= it->sim_time;
-    if (!all || too_early) continue;
-    it->read_back = true;
-    it->read_back_sim_time = sim_time;
-    it->read_back_frames = (sim_time - it->sim_time) / watch_.frame_period;
-    hooks_.applied(*it);
-    last_seen_ = now();
-    unseen_.erase(unseen_.begin(), it.base());
-    return;
-  }
-}
-
 // --- what is ---
 
 bool ControlPath::fits(const core::AircraftIdentity& aircraft) const {
-  const std::vector<std::string>& codes = options_.aircraft;
-  return codes.empty() || std::find(codes.begin(), codes.end(), aircraft.icao) != codes.end();
+  const std::vector<std::string>& known = options_.aircraft;
+  if (known.empty()) return true;
+  const auto listed = [&known](const std::string& text) {
+    return !text.empty() && std::find(known.begin(), known.end(), text) != known.end();
+  };
+  return listed(aircraft.icao) || listed(aircraft.description);
 }
 
 Standing ControlPath::standing() const {
@@ -394,21 +473,6 @@ core::SourceStatistics ControlPath::statistics(core::FlightMode source) const {
 core::ChannelSet ControlPath::commanded() const {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   return standing_ == Standing::kFlying ? arbiter_.commanded() : core::ChannelSet{};
-}
-
-std::vector<std::string> ControlPath::notFollowed() const {
-  std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  std::vector<std::string> out;
-  if (unseen_.empty() || link_status_.state != core::LinkState::kConnected || now() - last_seen_ <= kDoesNotFollow) {
-    return out;
-  }
-  const core::ArbitratedControls& last = unseen_.back().controls;
-  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
-    const auto channel = static_cast<core::Channel>(i);
-    if (!last.active.test(i) || (shown_known_.test(i) && encoder_.shows(channel, last.values[i], shown_[i]))) continue;
-    out.push_back(core::channelName(channel));
-  }
-  return out;
 }
 
 }  // namespace xplane_bridge

@@ -88,7 +88,7 @@ RequestResult ExcitationManager::inject(const ExcitationRequest& request, const 
     return {core::ResultCode::kRefused, "excitation " + std::to_string(label_.id) + " runs on " + label_.target +
                                             "; one at a time: wait for it, or stop it"};
   }
-  if (plan.channels.any() && (plan.channels & commanded).none()) {
+  if (plan.channels.any() && (plan.channels & commanded).none() && !request.rest) {
     return {core::ResultCode::kRefused,
             "nobody commands " + request.target + ": an excitation is added to a command (control/manual or auto)"};
   }
@@ -104,6 +104,7 @@ RequestResult ExcitationManager::inject(const ExcitationRequest& request, const 
   }
   runner_.start(*plan.signal, watch.sim_time);
   channels_ = plan.channels;
+  rest_ = request.rest;
   surface_ = plan.surface;
   who_ = who;
   begin(request, spec, watch.sim_time);
@@ -152,7 +153,7 @@ void ExcitationManager::abort(const std::string& reason) {
 
 core::ChannelExcitation ExcitationManager::excitation() const {
   if (!running()) return {};
-  return {channels_, runner_.value()};
+  return {channels_, runner_.value(), rest_};
 }
 
 void ExcitationManager::end() {

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/failures/failure_names.hpp"
@@ -16,25 +17,10 @@ namespace {
 constexpr std::int32_t kMenuRate = 1;   // [Hz] of all failure datarefs: what is set in the simulator's menu
 constexpr std::int32_t kOwnRate = 20;   // [Hz] of those set here
 constexpr double kPublishPeriod = 1.0;  // [s]
-constexpr double kBehaviourWait = 1.0;  // [s] in which X-Plane's own failure must move the surface as it says
 constexpr double kBehaviourDeg = 2.0;   // [deg] off that counts as obeyed
 constexpr double kRepairedAfter = 0.5;  // [s] without it until a failure counts as repaired in the simulator
 constexpr double kRepairWait = 0.5;     // [s] in which values from before a repair may still come
 constexpr double kSendAgain = 0.3;      // [s] until what X-Plane does not show is sent once more
-constexpr double kWaitSlack = 1.0;      // [s] a service waits beyond what ends by itself
-constexpr double kReadWait = 0.5;       // [s] for one dataref, however late it is
-
-bool isUp(const core::LinkStatus& status) {
-  return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
-}
-
-std::string described(const core::FailurePlan& plan) {
-  std::string out = plan.name + " " + plan.kind;
-  if (!plan.value) return out;
-  char text[32];
-  std::snprintf(text, sizeof text, " at %g", *plan.value);
-  return out + text;
-}
 
 // Where X-Plane's own failure brings a surface; nullopt where that cannot be told from the law.
 std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double shown,
@@ -67,6 +53,14 @@ FailureManager::FailureManager(core::SimulatorPort* link, OverrideManager* overr
       timeout_(timeout),
       publish_(std::move(publish)),
       report_(std::move(report)) {}
+
+std::string FailureManager::described(const core::FailurePlan& plan) {
+  std::string out = plan.name + " " + plan.kind;
+  if (!plan.value) return out;
+  char text[32];
+  std::snprintf(text, sizeof text, " at %g", *plan.value);
+  return out + text;
+}
 
 double FailureManager::now() const { return link_->clock().steadySeconds(); }
 
@@ -150,7 +144,7 @@ void FailureManager::carryOut(const core::FailurePlan& plan) {
       undone_.erase(dataref);
     }
   } catch (const core::JournalError& error) {
-    giveUp(plan.name, std::string("it could not be repaired after a crash: ") + error.what());
+    giveUp(plan.name, core::whyNotChanged(error));
     return;
   }
   report_("failure: " + described(plan), pending.who, true);
@@ -357,153 +351,6 @@ void FailureManager::publishLocked() {
   publish_time_ = now();
   dirty_ = false;
   publish_(snapshot);
-}
-
-std::optional<RequestResult> FailureManager::add(const core::FailureRequest& request, const std::string& who) {
-  const auto planned = core::planFailure(request, version_);
-  if (planned.error == core::FailureError::kInvalid) return RequestResult{core::ResultCode::kRefused, planned.text};
-  if (planned.error != core::FailureError::kNone) return RequestResult{core::ResultCode::kNotSupported, planned.text};
-  const std::string& name = planned.plan.name;
-  if (const auto same = registry_.sameAs(planned.plan)) {
-    return RequestResult{core::ResultCode::kRefused, name + " is broken already as " + *same + ": clear that first"};
-  }
-  if (request.trigger == static_cast<int>(core::FailureTrigger::kAtSimTime) && !std::isfinite(flight_.sim_time)) {
-    return RequestResult{core::ResultCode::kNoLink, "X-Plane has not shown its time yet"};
-  }
-  // A failure of the same name is replaced; a surface that stays driven goes from where it is.
-  for (const core::FailurePlan& plan : registry_.clear({name}, true).undo) undo(plan);
-  not_shown_.erase(name);
-  asked_by_[name] = who;
-  registry_.add(request, planned.plan, flight_);
-  dirty_ = true;
-  if (request.trigger != 0) report_("failure armed: " + described(planned.plan), who, true);
-  if (!stopped_) {
-    for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
-  }
-  applySurfaces();
-  return std::nullopt;
-}
-
-bool FailureManager::gone() const {
-  // A short silence (STALE) is waited through: X-Plane loads scenery.
-  return link_status_.state == core::LinkState::kLost || link_status_.state == core::LinkState::kSearching;
-}
-
-RequestResult FailureManager::await(const std::string& name) {
-  const double longest = 2.0 * timeout_ + kBehaviourWait + kWaitSlack;
-  const auto ended = [this, &name] {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    return stopped_ || pending_.count(name) == 0 || link_status_.state == core::LinkState::kPaused || gone();
-  };
-  if (!link_->waitUntil(ended, longest)) return {core::ResultCode::kTimeout, "X-Plane did not show it in time"};
-  std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  if (stopped_ || gone()) return {core::ResultCode::kNoLink, "X-Plane is not connected any more"};
-  if (pending_.count(name) != 0) return {core::ResultCode::kAccepted, "X-Plane is paused: it acts when it goes on"};
-  const auto why = not_shown_.find(name);
-  if (why != not_shown_.end()) return {core::ResultCode::kTimeout, why->second};
-  return {core::ResultCode::kOk, "X-Plane shows it"};
-}
-
-std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan& plan) {
-  bool answered = !plan.datarefs.empty();
-  if (answered) {
-    const auto values = link_->read(plan.datarefs, timeout_);
-    answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
-  }
-  if (answered) return std::nullopt;
-  if (!plan.surface) {
-    return RequestResult{core::ResultCode::kNotSupported,
-                         "this X-Plane does not answer to " + plan.datarefs.front() + ": is the name right?"};
-  }
-  const std::string blocked = surfaces_->blockReasonFor(plan.surface->surface);
-  if (blocked.empty()) return std::nullopt;
-  return RequestResult{core::ResultCode::kRefused, plan.name + " cannot be broken now: " + blocked};
-}
-
-RequestResult FailureManager::set(const core::FailureRequest& request, const std::string& who) {
-  core::SimulatorVersion version;
-  {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    if (!isUp(link_status_) || !link_status_.version.known()) {
-      return {core::ResultCode::kNoLink, "X-Plane is not connected"};
-    }
-    version = version_;
-  }
-  const auto planned = core::planFailure(request, version);
-  if (planned.error == core::FailureError::kNone) {
-    if (const auto refused = unanswered(planned.plan)) return *refused;
-  }
-  {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    if (const auto refused = add(request, who)) return *refused;
-  }
-  if (request.trigger != 0)
-    return {core::ResultCode::kAccepted, "armed; events and failures/state tell when it comes true"};
-  return await(planned.plan.name);
-}
-
-FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>& names, bool include_simulator,
-                                                  const std::string& who) {
-  ClearResult out;
-  std::unique_lock<core::HandlerMutex> lock(*mutex_);
-  std::vector<std::string> labels;
-  for (const std::string& name : names) {
-    labels.push_back(core::failureName(name));
-    if (registry_.knows(labels.back())) continue;
-    const std::string broken =
-        core::join(registry_.labels(), ", ", [](const core::FailureLabel& label) { return label.name; });
-    out.result = {core::ResultCode::kRefused,
-                  "\"" + name + "\" is not broken: expected " + (broken.empty() ? "nothing, all is well" : broken)};
-    return out;
-  }
-  const bool driven = surfaces_->driving();
-  const auto cleared = registry_.clear(labels, include_simulator);
-  std::vector<std::string> datarefs;
-  for (const core::FailurePlan& plan : cleared.undo) {
-    undo(plan);
-    datarefs.insert(datarefs.end(), plan.datarefs.begin(), plan.datarefs.end());
-  }
-  for (const std::string& name : cleared.names) report_("cleared: " + name, who, true);
-  out.cleared = cleared.names;
-  dirty_ = true;
-  watchOwn();
-  applySurfaces();
-  const bool given_back = driven && registry_.drivenSurfaces().empty();
-  const bool up = isUp(link_status_);
-  for (const std::string& name : labels) {
-    if (!registry_.knows(name)) continue;
-    out.result = {core::ResultCode::kRefused, name + " was failed in the simulator: set include_simulator"};
-    return out;
-  }
-  lock.unlock();
-  if (!up) {
-    out.result = {core::ResultCode::kNoLink, "X-Plane is not connected; it is repaired when it comes back"};
-    return out;
-  }
-  out.result = awaitRepair(datarefs, given_back);
-  if (out.result.success()) out.result.text = cleared.names.empty() ? "nothing was broken" : "repaired";
-  return out;
-}
-
-RequestResult FailureManager::awaitRepair(const std::vector<std::string>& datarefs, bool given_back) {
-  const core::Deadline deadline(link_->clock(), timeout_);
-  const auto left = [&deadline] { return std::max(deadline.left(), 0.01); };
-  for (const std::string& dataref : datarefs) {
-    if (link_->waitForDataref(dataref, static_cast<float>(core::kWorking), 0.0F, left()).first) continue;
-    return {core::ResultCode::kTimeout, "X-Plane still shows " + dataref};
-  }
-  if (!given_back) return {};
-  const auto back = [this] {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    return stopped_ || !surfaces_->givingBack();
-  };
-  const bool ended = link_->waitUntil(back, left());
-  // It also ends by being given up.
-  if (!ended || (!surfaces_->driving() &&
-                 !link_->waitForDataref(core::kSurfaceOverride, 0.0F, 0.0F, std::max(left(), kReadWait)).first)) {
-    return {core::ResultCode::kTimeout, std::string("X-Plane still shows ") + core::kSurfaceOverride};
-  }
-  return {};
 }
 
 }  // namespace xplane_bridge

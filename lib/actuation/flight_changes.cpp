@@ -5,7 +5,10 @@
 #include <cmath>
 #include <memory>
 #include <utility>
+#include <variant>
 
+#include "xplane_bridge/actuation/link_condition.hpp"
+#include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/core/base/text.hpp"
 
 namespace xplane_bridge {
@@ -18,9 +21,11 @@ constexpr int kBeginnings = 2;         // attempts at beginning a flight
 constexpr double kTellsAnew = 0.5;     // [s] of flight from which on its beginning anew can be seen
 constexpr double kTellsWait = 1.0;     // [s] for that
 constexpr double kWriteAgain = 0.3;    // [s] until datarefs that are not shown are written once more
+constexpr double kStationsWait = 0.5;  // [s] until a payload that the stations do not take is written as a sum
 constexpr double kWindAgain = 1.0;     // [s] the same of the weather
 constexpr double kPauseWait = 1.0;     // [s] until a pause must be shown
 constexpr double kIdentityWait = 3.0;  // [s] until X-Plane must have shown its aircraft
+constexpr const char* kSettingsEntry = "override:settings of the flight";
 constexpr const char* kLoading = "another aircraft is being loaded";
 
 template <std::size_t Size, class Encode>
@@ -75,10 +80,7 @@ bool FlightChanges::tellsBeginning() {
   return tells();
 }
 
-bool FlightChanges::isUp() const {
-  const core::LinkState state = link_->status().state;
-  return state == core::LinkState::kConnected || state == core::LinkState::kPaused;
-}
+bool FlightChanges::isUp() const { return xplane_bridge::isUp(link_->status()); }
 
 std::string FlightChanges::linkCondition() const {
   const core::LinkState state = link_->status().state;
@@ -89,7 +91,11 @@ std::string FlightChanges::linkCondition() const {
 
 PauseOutcome FlightChanges::pause(bool paused, const std::string& who) {
   hooks_.pausing(who);
-  const PauseOutcome outcome = setPaused(link_, paused, kPauseWait, [this] { return stopping_.load(); });
+  const auto record = [this, paused] {
+    if (paused) recordPause(link_);  // after a crash X-Plane must go on
+  };
+  const PauseOutcome outcome = setPaused(
+      link_, paused, kPauseWait, [this] { return stopping_.load(); }, record);
   if (outcome != PauseOutcome::kFollowed) hooks_.pausing("");
   return outcome;
 }
@@ -109,7 +115,10 @@ FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, cons
   }
   // A silent X-Plane has not shown at first whether it was paused.
   const PauseOutcome first = before == PauseOutcome::kUnknown ? again : before;
-  if (first != PauseOutcome::kUnknown) pause(first == PauseOutcome::kWasSo, who);
+  if (first != PauseOutcome::kUnknown) {
+    const PauseOutcome last = pause(first == PauseOutcome::kWasSo, who);
+    if (last == PauseOutcome::kWasSo || last == PauseOutcome::kFollowed) forgetPause(link_);
+  }
   if (!problem.empty())
     return {core::EventKind::kReset, "reset_flight: X-Plane did not place the aircraft: " + problem, false};
   return {core::EventKind::kReset, "the flight goes on at the place, attitude and speed asked for", true};
@@ -119,7 +128,10 @@ std::optional<core::ShownFlight> FlightChanges::shownFlight() {
   return core::shownFlightFrom(link_->read(core::shownFlightDatarefs(link_->status().version), kPoll));
 }
 
-bool FlightChanges::movesAircraft() const { return link_->status().version.is12() && !hooks_.watch().crashed; }
+bool FlightChanges::movesAircraft() const {
+  const core::SimulatorVersion version = link_->status().version;
+  return version.is12() && !version.is(core::Otherwise::kVehs) && !hooks_.watch().crashed;
+}
 
 std::string FlightChanges::waitForPlacement(const core::FlightStart& start, bool tells,
                                             std::optional<core::ShownFlight>* shown) {
@@ -209,21 +221,113 @@ FlightChanges::Outcome FlightChanges::applyWind(const core::UniformWind& wind) {
   return {core::EventKind::kSetting, text + linkCondition(), false};
 }
 
-FlightChanges::Outcome FlightChanges::applyLoading(const core::Loading& loading) {
-  const auto writes = core::loadingWrites(loading, link_->status().version);
-  std::vector<std::string> names;
-  names.reserve(writes.size());
-  for (const core::DatarefWrite& each : writes) names.push_back(each.dataref);
-  const auto fits = [writes](const std::vector<core::DatarefValue>& values) {
-    return loadingDifference(writes, values).empty();
+std::string FlightChanges::remember(const std::vector<core::SettingWrite>& settings) {
+  std::vector<std::string> names, untold;
+  for (const core::SettingWrite& each : settings) names.push_back(each.write.dataref);
+  const auto told = [](const std::vector<core::DatarefValue>& values) {
+    return std::all_of(values.begin(), values.end(), [](const core::DatarefValue& value) { return value.has_value(); });
+  };
+  const std::vector<core::DatarefValue> values = link_->readUntil(names, options_.setting_timeout, told);
+  const std::lock_guard<std::mutex> lock(restores_mutex_);
+  std::vector<core::UndoOperation> all = restores_;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const bool known = std::any_of(all.begin(), all.end(), [&](const core::UndoOperation& operation) {
+      return std::get<core::UndoDref>(operation).path == names[i];
+    });
+    if (known) continue;  // what X-Plane had before the first of them counts
+    if (i < values.size() && values[i]) {
+      // Not looked at: time runs on, and X-Plane's own weather may change it at once.
+      all.push_back(core::UndoDref{names[i], *values[i], false});
+    } else if (settings[i].is_shown) {
+      untold.push_back(names[i]);
+    }
+  }
+  const auto journal = link_->journal();
+  if (!untold.empty() || !journal) return core::join(untold.empty() ? names : untold);
+  journal->record(kSettingsEntry, kOverridePurpose, all);
+  restores_ = std::move(all);
+  return "";
+}
+
+void FlightChanges::restoreSettings() {
+  const std::lock_guard<std::mutex> lock(restores_mutex_);
+  const auto journal = link_->journal();
+  if (restores_.empty() || !journal) return;
+  try {
+    if (isUp()) {
+      for (const core::UndoOperation& operation : restores_) link_->sendUndo(operation);
+      restores_.clear();
+      journal->remove({kSettingsEntry});
+    } else {
+      journal->leave({kSettingsEntry}, "X-Plane went first");
+    }
+  } catch (const core::JournalError&) {
+    // The next start does it once more, or for the first time.
+  }
+}
+
+FlightChanges::Outcome FlightChanges::applySettings(const std::vector<core::SettingWrite>& settings,
+                                                    const std::string& service, const std::string& done, bool restore) {
+  if (restore) {
+    const std::string untold = remember(settings);
+    if (!untold.empty()) {
+      return {core::EventKind::kSetting,
+              service + ": X-Plane does not tell " + untold + ", which could not be put back on exit" + linkCondition(),
+              false};
+    }
+  }
+  std::vector<core::DatarefWrite> writes;
+  for (const core::SettingWrite& each : settings) writes.push_back(each.write);
+  const auto names = core::shownDatarefs(settings);
+  const auto fits = [settings](const std::vector<core::DatarefValue>& values) {
+    return core::differenceOf(settings, values).empty();
   };
   std::vector<core::DatarefValue> values;
   for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !expired(deadline);) {
     write(writes);
     values = link_->readUntil(names, kWriteAgain, fits);
+    if (fits(values)) return {core::EventKind::kSetting, done, true};
+  }
+  const std::string difference = core::differenceOf(settings, values);
+  return {core::EventKind::kSetting, service + ": " + difference + linkCondition(), false};
+}
+
+FlightChanges::Outcome FlightChanges::applyTime(const core::TimeSetting& time) {
+  return applySettings(core::timeWrites(time), "set_time", "it is the time that was asked for", time.restore_on_exit);
+}
+
+FlightChanges::Outcome FlightChanges::applyWeather(const core::Weather& weather) {
+  const core::SimulatorVersion version = link_->status().version;
+  if (const auto refusal = core::refusalBy(version, weather)) {
+    return {core::EventKind::kSetting, "set_weather: " + *refusal, false};
+  }
+  return applySettings(core::weatherWrites(weather, version), "set_weather", "the weather is set as asked for",
+                       weather.restore_on_exit);
+}
+
+FlightChanges::Outcome FlightChanges::applyLoading(const core::Loading& loading) {
+  const core::SimulatorVersion version = link_->status().version;
+  const auto shown = core::loadingShown(loading, version);
+  std::vector<std::string> names;
+  names.reserve(shown.size());
+  for (const core::DatarefWrite& each : shown) names.push_back(each.dataref);
+  const auto fits = [shown](const std::vector<core::DatarefValue>& values) {
+    return loadingDifference(shown, values).empty();
+  };
+  const auto stations = core::stationDatarefs(version);
+  const bool spread = loading.payload_mass && !stations.empty();
+  std::vector<core::DatarefValue> values;
+  if (spread) values = link_->read(stations, kWriteAgain);
+  const auto writes = core::loadingWrites(loading, version, values);
+  const core::Deadline by_stations = deadlineAfter(kStationsWait);
+  for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !expired(deadline);) {
+    write(writes);
+    // An aircraft without stations takes the sum.
+    if (spread && by_stations.over()) write(shown);
+    values = link_->readUntil(names, kWriteAgain, fits);
     if (fits(values)) return {core::EventKind::kSetting, "the aircraft is loaded as asked for", true};
   }
-  return {core::EventKind::kSetting, "set_loading: " + loadingDifference(writes, values) + linkCondition(), false};
+  return {core::EventKind::kSetting, "set_loading: " + loadingDifference(shown, values) + linkCondition(), false};
 }
 
 // --- files ---

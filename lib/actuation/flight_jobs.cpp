@@ -3,11 +3,18 @@
 #include <exception>
 #include <utility>
 
+#include "xplane_bridge/actuation/link_condition.hpp"
+
 namespace xplane_bridge {
+namespace {
+
+constexpr std::int32_t kOldest = 110000;  // X-Plane 11.00: earlier ones have other messages for placing and loading
+
+}  // namespace
 
 FlightJobs::FlightJobs(core::SimulatorPort* link, const FlightChangeOptions& options, FlightChangeHooks hooks,
                        Report report)
-    : changes_(link, options, std::move(hooks)), report_(std::move(report)), thread_([this] { loop(); }) {}
+    : link_(link), changes_(link, options, std::move(hooks)), report_(std::move(report)), thread_([this] { loop(); }) {}
 
 FlightJobs::~FlightJobs() { stop(); }
 
@@ -24,6 +31,21 @@ void FlightJobs::stop() {
 bool FlightJobs::full() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return changes_.stopping() || jobs_.size() >= kMostWaiting;
+}
+
+std::optional<RequestResult> FlightJobs::refusal() const {
+  const core::LinkStatus status = link_->status();
+  const std::int32_t version = status.version.number;
+  if (!isUp(status) || version == 0) return noLink();
+  if (version < kOldest) {
+    return RequestResult{core::ResultCode::kNotSupported, "this is X-Plane " + std::to_string(version) +
+                                                              ": its messages for this are not known before 11.00"};
+  }
+  if (full()) {
+    return RequestResult{core::ResultCode::kRefused,
+                         std::to_string(kMostWaiting) + " requests wait already: wait for their events"};
+  }
+  return std::nullopt;
 }
 
 std::string FlightJobs::mover() const {
@@ -73,6 +95,14 @@ void FlightJobs::setWind(const core::UniformWind& wind, std::uint32_t number, co
 
 void FlightJobs::setLoading(const core::Loading& loading, std::uint32_t number, const std::string& who) {
   add(number, who, false, [this, loading] { return changes_.applyLoading(loading); });
+}
+
+void FlightJobs::setTime(const core::TimeSetting& time, std::uint32_t number, const std::string& who) {
+  add(number, who, false, [this, time] { return changes_.applyTime(time); });
+}
+
+void FlightJobs::setWeather(const core::Weather& weather, std::uint32_t number, const std::string& who) {
+  add(number, who, false, [this, weather] { return changes_.applyWeather(weather); });
 }
 
 void FlightJobs::loadAircraft(const std::string& path, std::int32_t livery, std::uint32_t number,

@@ -1,7 +1,9 @@
 #include "xplane_bridge/actuation/guardian.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <spawn.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,12 +14,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <iostream>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
+#include "xplane_bridge/actuation/pausing.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
 
 extern char** environ;
@@ -28,6 +31,8 @@ namespace {
 constexpr double kFindTime = 2.0;     // [s] until X-Plane's address is known: a name may have to be resolved
 constexpr double kUndoTime = 2.0;     // [s] X-Plane answers within a frame or two, or it is gone too
 constexpr double kAttemptTime = 0.5;  // [s] until a release that is not shown is sent again
+constexpr double kBeatPeriod = 0.05;  // [s] at most often
+constexpr int kLookMs = 50;           // [ms] without hearing the parent
 
 [[noreturn]] void fail(const std::string& what, int error) {
   throw std::runtime_error("the guardian process " + what + ": " + std::strerror(error));
@@ -43,13 +48,15 @@ std::string siblingProgram(const char* name) {
 
 }  // namespace
 
+// --- of the parent ---
+
 Guardian::~Guardian() {
-  if (pipe_ >= 0) close(pipe_);
+  if (socket_ >= 0) close(socket_);
 }
 
 void Guardian::start() {
   std::array<int, 2> ends{};
-  if (pipe2(ends.data(), O_CLOEXEC) != 0) fail("has no pipe", errno);
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) fail("has no socket", errno);
   const std::string program = siblingProgram("override_guardian");
   std::string owner = std::to_string(getpid());
   std::array<char*, 3> arguments = {const_cast<char*>(program.c_str()), owner.data(), nullptr};
@@ -72,49 +79,88 @@ void Guardian::start() {
     close(ends[1]);
     fail(program + " cannot be started", error);
   }
-  pipe_ = ends[1];
+  const std::lock_guard<std::mutex> lock(mutex_);
+  socket_ = ends[1];
   child_ = child;
 }
 
+/// With mutex_ held.
 void Guardian::tell(const std::string& line) {
-  if (pipe_ < 0) return;
-  // The child reads all the time, so a pipe that does not take a line at once has no reader any more.
-  if (write(pipe_, line.data(), line.size()) == static_cast<ssize_t>(line.size())) return;
-  close(pipe_);
-  pipe_ = -1;
+  if (socket_ < 0) return;
+  const ssize_t sent = send(socket_, line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  // Half a line would spoil the next one; a child that does not read for so long does not guard any more.
+  if (sent == static_cast<ssize_t>(line.size()) || (sent < 0 && errno == EINTR)) return;
+  close(socket_);
+  socket_ = -1;
+}
+
+bool Guardian::running() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return socket_ >= 0;
 }
 
 void Guardian::setPeer(const core::Endpoint& peer, const std::string& journal_path) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   tell("peer " + peer.addressString() + " " + std::to_string(peer.port) + " " + journal_path + "\n");
 }
 
+bool Guardian::beat(double hang_timeout) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double now = core::hostClock().steadySeconds();
+  if (socket_ < 0 || now - last_beat_ < kBeatPeriod) return false;
+  last_beat_ = now;
+  char released = 0;
+  bool told = false;
+  while (recv(socket_, &released, 1, MSG_DONTWAIT) == 1) told = true;
+  tell("beat " + std::to_string(hang_timeout) + "\n");
+  return told;
+}
+
+void Guardian::rest() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  tell("rest\n");
+}
+
 void Guardian::dismiss() {
+  const std::lock_guard<std::mutex> lock(mutex_);
   tell("bye\n");
-  if (pipe_ >= 0) close(pipe_);
-  pipe_ = -1;
+  if (socket_ >= 0) close(socket_);
+  socket_ = -1;
   int status = 0;
   if (child_ > 0) waitpid(child_, &status, 0);
   child_ = -1;
 }
 
-GuardianOrders readGuardianOrders(std::istream& lines) {
-  GuardianOrders orders;
-  std::string line;
-  while (std::getline(lines, line)) {
-    std::istringstream words(line);
-    std::string verb, address, journal;
-    int port = 0;
-    words >> verb;
-    if (verb == "bye") orders.dismissed = true;
-    if (verb != "peer") continue;
-    words >> address >> port;
-    std::getline(words >> std::ws, journal);
-    if (port < 1 || port > std::numeric_limits<std::uint16_t>::max() || journal.empty()) continue;
-    orders.address = address;
-    orders.port = static_cast<std::uint16_t>(port);
-    orders.journal = journal;
+// --- of the child ---
+
+void GuardianOrders::take(const std::string& line) {
+  std::istringstream words(line);
+  std::string verb;
+  words >> verb;
+  if (verb == "bye") dismissed = true;
+  if (verb == "rest") hang_timeout = 0.0;
+  if (verb == "beat") {
+    double timeout = 0.0;
+    if (!(words >> timeout) || timeout <= 0.0) return;
+    hang_timeout = timeout;
+    ++beats;
   }
-  return orders;
+  if (verb != "peer") return;
+  std::string new_address, new_journal;
+  int new_port = 0;
+  words >> new_address >> new_port;
+  std::getline(words >> std::ws, new_journal);
+  if (new_port < 1 || new_port > std::numeric_limits<std::uint16_t>::max() || new_journal.empty()) return;
+  address = new_address;
+  port = static_cast<std::uint16_t>(new_port);
+  journal = new_journal;
+}
+
+bool HangWatch::passed(double elapsed, double timeout) {
+  if (timeout <= 0.0 || hangs_) return false;
+  silence_ += std::min(elapsed, kLongestLook);
+  hangs_ = silence_ >= timeout;
+  return hangs_;
 }
 
 std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int64_t parent) {
@@ -127,10 +173,75 @@ bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report&
   OverrideManager overrides(link, report);
   const core::Deadline deadline(link->clock(), kUndoTime);
   do {
-    if (overrides.releaseLeftovers(kAttemptTime)) return true;
+    // The aircraft first.
+    if (overrides.releaseLeftovers(kAttemptTime) && resumeLeftovers(link, kAttemptTime)) return true;
   } while (!deadline.over());
   return false;
 }
+
+namespace {
+
+/// Gives back what the parent has in the journal. Returns whether nothing is left.
+bool undoFor(const GuardianOrders& orders, std::int64_t parent) {
+  if (orders.journal.empty()) return true;
+  try {
+    const auto journal = guardedJournal(orders.journal, parent);
+    if (journal->orphans(kOverridePurpose).empty() && journal->orphans(kPausePurpose).empty()) return true;
+    core::SimLinkOptions options;
+    options.host = orders.address;
+    options.port = orders.port;
+    options.listen_for_beacon = false;
+    options.journal_subscriptions = false;
+    core::SimLink link(
+        options, {}, core::hostClock(), [](core::LogLevel, const std::string&) {},
+        [journal](const core::Endpoint&) { return journal; });
+    link.start();
+    const bool done = releaseLeftBehind(&link, [](const std::string& text, bool success) {
+      std::fprintf(stderr, "override_guardian: %s%s\n", success ? "" : "NOT DONE: ", text.c_str());
+    });
+    link.stop();
+    return done;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "override_guardian: %s\n", error.what());
+    return false;
+  }
+}
+
+/// Until the parent is gone; acts while it hangs. Returns the last orders.
+GuardianOrders guard(std::int64_t parent) {
+  GuardianOrders orders;
+  HangWatch watch;
+  std::string heard;  // the beginning of a line
+  double looked = core::hostClock().steadySeconds();
+  for (;;) {
+    pollfd ear{STDIN_FILENO, POLLIN, 0};
+    const bool speaks = poll(&ear, 1, kLookMs) > 0;
+    const double now = core::hostClock().steadySeconds();
+    const double elapsed = now - std::exchange(looked, now);
+    if (speaks) {
+      std::array<char, 4096> text{};
+      const ssize_t length = read(STDIN_FILENO, text.data(), text.size());
+      if (length < 0 && errno == EINTR) continue;
+      if (length <= 0) return orders;
+      heard.append(text.data(), static_cast<std::size_t>(length));
+    }
+    const unsigned beats = orders.beats;
+    for (std::size_t end = heard.find('\n'); end != std::string::npos; end = heard.find('\n')) {
+      orders.take(heard.substr(0, end));
+      heard.erase(0, end + 1);
+    }
+    if (orders.beats != beats) watch.beat();
+    if (!watch.passed(elapsed, orders.hang_timeout)) continue;
+    std::fprintf(stderr, "override_guardian: process %lld has not run for %.1f s: giving back what it has set\n",
+                 static_cast<long long>(parent), orders.hang_timeout);
+    // First it must learn that it may not go on as before.
+    static_cast<void>(send(STDIN_FILENO, "!", 1, MSG_NOSIGNAL | MSG_DONTWAIT));
+    undoFor(orders, parent);
+    looked = core::hostClock().steadySeconds();
+  }
+}
+
+}  // namespace
 
 int runGuardian(int argc, char** argv) {
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGPIPE}) std::signal(number, SIG_IGN);
@@ -141,29 +252,9 @@ int runGuardian(int argc, char** argv) {
   // The parent's sockets are not ours: held open here, its peers would not see it die.
   const auto last = static_cast<int>(std::min<long>(sysconf(_SC_OPEN_MAX), 4096));
   for (int descriptor = STDERR_FILENO + 1; descriptor < last; ++descriptor) close(descriptor);
-  const GuardianOrders orders = readGuardianOrders(std::cin);
-  if (orders.dismissed || orders.journal.empty()) return 0;
-
-  try {
-    const auto journal = guardedJournal(orders.journal, std::strtoll(argv[1], nullptr, 10));
-    if (journal->orphans(kOverridePurpose).empty()) return 0;
-    core::SimLinkOptions options;
-    options.host = orders.address;
-    options.port = orders.port;
-    options.listen_for_beacon = false;
-    core::SimLink link(
-        options, {}, core::hostClock(), [](core::LogLevel, const std::string&) {},
-        [journal](const core::Endpoint&) { return journal; });
-    link.start();
-    const bool done = releaseLeftBehind(&link, [](const std::string& text, bool success) {
-      std::fprintf(stderr, "override_guardian: %s%s\n", success ? "" : "NOT DONE: ", text.c_str());
-    });
-    link.stop();
-    return done ? 0 : 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "override_guardian: %s\n", error.what());
-    return 1;
-  }
+  const std::int64_t parent = std::strtoll(argv[1], nullptr, 10);
+  const GuardianOrders orders = guard(parent);
+  return orders.dismissed || undoFor(orders, parent) ? 0 : 1;
 }
 
 }  // namespace xplane_bridge

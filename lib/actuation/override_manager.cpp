@@ -5,8 +5,10 @@
 #include <exception>
 #include <utility>
 
+#include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
+#include "xplane_bridge/core/control/control_rows.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 
 namespace xplane_bridge {
@@ -18,6 +20,14 @@ constexpr std::int32_t kWatchRate = 10;  // [Hz]
 // Answers in a row that show a release: half a second, in which a restarted X-Plane is known to be one.
 constexpr int kReleasedAnswers = 5;
 constexpr float kSame = 1e-3F;
+constexpr float kSamePreparation = 0.01F;
+constexpr double kRecordPeriod = 1.0;  // [s]
+
+core::DataRow rowOfUnused(std::int32_t row) {
+  core::DataRow out;
+  out.index = row;
+  return out;
+}
 
 std::string entryId(const std::string& dataref) { return "override:" + dataref; }
 
@@ -28,6 +38,7 @@ std::vector<std::string> entryIds(const std::set<std::string>& datarefs) {
 }
 
 core::UndoOperation undoOf(const std::string& dataref) {
+  if (const auto row = core::rowOfName(dataref)) return core::UndoData{rowOfUnused(*row)};
   const auto release = core::releaseOf(dataref);
   return core::UndoDref{dataref, release ? release->value : 0.0F};
 }
@@ -38,6 +49,16 @@ std::vector<core::UndoOperation> undoOf(const std::set<std::string>& datarefs) {
   return out;
 }
 
+/// Whether the journal must be brought up to date; small changes are not worth its disk.
+bool differ(const std::vector<core::UndoOperation>& a, const std::vector<core::UndoOperation>& b) {
+  const auto same = [](const core::UndoOperation& one, const core::UndoOperation& other) {
+    const auto& first = std::get<core::UndoDref>(one);
+    const auto& second = std::get<core::UndoDref>(other);
+    return first.path == second.path && std::abs(first.value - second.value) <= kSamePreparation;
+  };
+  return !std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
+}
+
 std::string joined(const std::set<std::string>& names) { return core::join(names, ", ", core::afterLastSlash); }
 
 }  // namespace
@@ -46,26 +67,89 @@ const char* const kOverridePurpose = "override";
 
 OverrideManager::OverrideManager(core::SimulatorPort* link, Report report) : link_(link), report_(std::move(report)) {}
 
+bool OverrideManager::isSet(const std::string& dataref) const {
+  return required_.count(dataref) != 0 || acquired_.count(dataref) != 0;
+}
+
+std::vector<core::UndoOperation> OverrideManager::releaseOf(const std::string& dataref) const {
+  const auto prepared = prepared_.find(dataref);
+  std::vector<core::UndoOperation> out;
+  if (prepared != prepared_.end()) out = prepared->second.writes;
+  out.push_back(undoOf(dataref));
+  return out;
+}
+
 bool OverrideManager::set(const std::string& dataref, float value) {
   const auto journal = link_->journal();
   if (!journal || ended_) return false;
   // On disk first: a crash right after the datagram must find it there.
   journal->record(entryId(dataref), kOverridePurpose, {undoOf(dataref)});
   releasing_.erase(dataref);
-  link_->write(dataref, value);
+  // A row goes out with the command that it is set for.
+  if (!core::rowOfName(dataref)) link_->write(dataref, value);
   return true;
 }
 
 void OverrideManager::giveBack(const std::string& dataref) {
-  if (required_.count(dataref) != 0 || acquired_.count(dataref) != 0) return;
+  if (isSet(dataref)) return;
   releasing_.insert(dataref);
-  link_->sendUndo(undoOf(dataref));
+  for (const core::UndoOperation& operation : releaseOf(dataref)) link_->sendUndo(operation);
+  prepared_.erase(dataref);  // from now on it may be commanded otherwise
+}
+
+// --- what is written before a release ---
+
+void OverrideManager::prepareRelease(const std::string& dataref, std::vector<core::UndoOperation> writes) {
+  const Lock lock(*mutex_);
+  if (isSet(dataref)) prepared_[dataref].writes = std::move(writes);
+}
+
+void OverrideManager::recordPreparations() {
+  const auto journal = link_->journal();
+  std::map<std::string, std::vector<core::UndoOperation>> changed;
+  {
+    const Lock lock(*mutex_);
+    const double now = link_->clock().steadySeconds();
+    if (!journal || now - recorded_at_ < kRecordPeriod) return;
+    for (const auto& [dataref, prepared] : prepared_) {
+      if (differ(prepared.writes, prepared.recorded)) changed[dataref] = prepared.writes;
+    }
+    if (!changed.empty()) recorded_at_ = now;
+  }
+  for (const auto& [dataref, writes] : changed) {
+    std::vector<core::UndoOperation> undo = writes;
+    undo.push_back(undoOf(dataref));
+    journal->record(entryId(dataref), kOverridePurpose, std::move(undo));
+    const Lock lock(*mutex_);
+    if (isSet(dataref)) {
+      prepared_[dataref].recorded = writes;
+    } else if (releasing_.count(dataref) == 0) {  // released by another client meanwhile
+      journal->remove({entryId(dataref)});
+    }
+  }
+}
+
+std::set<std::string> OverrideManager::takeAll() {
+  std::set<std::string> all = std::exchange(required_, {});
+  for (const auto& [dataref, acquired] : std::exchange(acquired_, {})) all.insert(dataref);
+  return all;
+}
+
+void OverrideManager::giveBackAll() {
+  const Lock lock(*mutex_);
+  const std::set<std::string> all = takeAll();
+  prepared_.clear();
+  for (const std::string& dataref : all) giveBack(dataref);
+  updateWatch();
 }
 
 // --- what X-Plane shows ---
 
 void OverrideManager::updateWatch() {
-  std::set<std::string> wanted = required_;
+  std::set<std::string> wanted;
+  for (const std::string& dataref : required_) {
+    if (!core::rowOfName(dataref)) wanted.insert(dataref);  // X-Plane does not show who holds a row
+  }
   for (const auto& [dataref, acquired] : acquired_) {
     if (acquired.refreshed && dataref != core::kSurfaceOverride) wanted.insert(dataref);
   }
@@ -117,6 +201,7 @@ std::vector<std::string> OverrideManager::releasedByOthers() {
     for (const std::string& dataref : all) {
       if (required_.erase(dataref) != 0) stopped.push_back(dataref);
       acquired_.erase(dataref);
+      prepared_.erase(dataref);
     }
     try {
       if (const auto journal = link_->journal()) journal->remove(entryIds(all));
@@ -187,7 +272,9 @@ void OverrideManager::release(const std::string& dataref) {
 
 void OverrideManager::refresh() {
   const Lock lock(*mutex_);
-  for (const std::string& dataref : required_) resend(dataref, 1.0F);
+  for (const std::string& dataref : required_) {
+    if (!core::rowOfName(dataref)) resend(dataref, 1.0F);
+  }
   for (const auto& [dataref, acquired] : acquired_) {
     if (acquired.refreshed) resend(dataref, acquired.value);
   }
@@ -240,28 +327,42 @@ bool OverrideManager::confirm(const std::vector<core::UndoOperation>& operations
   const bool shown = link_->undo(operations, timeout_s);
   const auto journal = link_->journal();
   if (shown && journal) remove(*journal);
-  // It is tried again and again, but reported once.
-  if (shown || std::exchange(unreleased_, what) != what) {
-    report_(shown ? "released " + what : what + " could not be seen released; it stays in the journal", shown);
+  if (shown) {
+    report_("released " + what, true);
+  } else if (std::exchange(unreleased_, what) != what) {  // it is tried again and again, but reported once
+    if (answers()) {
+      report_(what + " could not be seen released; it stays in the journal", false);
+    } else {
+      report_(
+          what + " could not be released, because X-Plane went first, or is silent. If it still runs, the next start " +
+              "releases it, or scripts/release_overrides",
+          ended_);  // closing X-Plane before the bridge is nothing wrong
+    }
   }
   return shown;
 }
 
 bool OverrideManager::releaseAll(double timeout_s) {
   std::set<std::string> all;
+  std::vector<core::UndoOperation> operations;
   {
     const Lock lock(*mutex_);
-    all = required_;
-    for (const auto& [dataref, acquired] : acquired_) all.insert(dataref);
+    all = takeAll();
     all.insert(releasing_.begin(), releasing_.end());
-    required_.clear();
-    acquired_.clear();
     updateWatch();
     releasing_ = all;
     ended_ = true;
+    for (const std::string& dataref : all) {
+      const std::vector<core::UndoOperation> release = releaseOf(dataref);
+      operations.insert(operations.end(), release.begin(), release.end());
+    }
   }
   const auto remove = [&all](core::Journal& journal) { journal.remove(entryIds(all)); };
-  if (!confirm(undoOf(all), timeout_s, joined(all), remove)) return false;
+  if (!confirm(operations, timeout_s, joined(all), remove)) {
+    const char* why = answers() ? "X-Plane did not show it released" : "X-Plane went first";
+    if (const auto journal = link_->journal()) journal->leave(entryIds(all), why);
+    return false;
+  }
   const Lock lock(*mutex_);
   releasing_.clear();
   return true;
@@ -272,15 +373,22 @@ bool OverrideManager::releaseLeftovers(double timeout_s) {
   if (!journal) return false;
   const std::vector<core::JournalEntry> left = journal->orphans(kOverridePurpose);
   std::vector<core::UndoOperation> operations;
-  std::set<std::string> names;
+  std::map<std::string, std::set<std::string>> names;  // by the cause for which they were left
   for (const core::JournalEntry& entry : left) {
-    names.insert(entry.id);
+    names[entry.left].insert(entry.id);
     operations.insert(operations.end(), entry.undo.begin(), entry.undo.end());
   }
+  std::vector<std::string> what;
+  for (const auto& [cause, ids] : names) {
+    what.push_back(joined(ids) + (cause.empty() ? " left by a run that crashed" : " left because " + cause));
+  }
+  const std::string all = core::join(what);
+  if (!answers() && names.count("") == 0) unreleased_ = all;  // the runs that left them have said so
   // This run may have set one of them anew meanwhile: that entry is not theirs.
-  return confirm(operations, timeout_s, joined(names) + " left by a run that crashed",
-                 [&left](core::Journal& journal_now) { journal_now.removeUndone(left); });
+  return confirm(operations, timeout_s, all, [&left](core::Journal& journal_now) { journal_now.removeUndone(left); });
 }
+
+bool OverrideManager::answers() const { return isUp(link_->status()); }
 
 std::vector<std::string> OverrideManager::active() const {
   const Lock lock(*mutex_);

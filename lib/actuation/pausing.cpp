@@ -1,19 +1,50 @@
 #include "xplane_bridge/actuation/pausing.hpp"
 
+#include <vector>
+
+#include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
 
 namespace xplane_bridge {
+namespace {
 
-PauseOutcome setPaused(core::SimulatorPort* link, bool pause, double timeout_s, const std::function<bool()>& given_up) {
+constexpr const char* kPauseEntry = "pause:flight change";
+
+}  // namespace
+
+PauseOutcome setPaused(core::SimulatorPort* link, bool pause, double timeout_s, const std::function<bool()>& given_up,
+                       const std::function<void()>& before) {
   // Read now: the link's own status may be a fifth of a second old, and a toggle on that would do the opposite.
   const auto shown = link->read({core::kPausedDataref}, timeout_s);
   if (shown.empty() || !shown.front()) return PauseOutcome::kUnknown;
   const bool was_so = (*shown.front() != 0.0F) == pause;
+  if (!was_so && before) before();
   if (!was_so) link->command(core::pauseCommand(pause, link->status().version));
   const auto is_so = [&] { return link->status().paused == pause; };
   link->waitUntil([&] { return given_up() || is_so(); }, timeout_s);
   if (!is_so()) return PauseOutcome::kNotFollowed;
   return was_so ? PauseOutcome::kWasSo : PauseOutcome::kFollowed;
+}
+
+const char* const kPausePurpose = "pause";
+
+void recordPause(core::SimulatorPort* link) {
+  if (const auto journal = link->journal()) journal->record(kPauseEntry, kPausePurpose, {core::UndoPause{}});
+}
+
+void forgetPause(core::SimulatorPort* link) {
+  if (const auto journal = link->journal()) journal->remove({kPauseEntry});
+}
+
+bool resumeLeftovers(core::SimulatorPort* link, double timeout_s) {
+  const auto journal = link->journal();
+  if (!journal) return false;
+  const std::vector<core::JournalEntry> left = journal->orphans(kPausePurpose);
+  if (left.empty()) return true;
+  const PauseOutcome outcome = setPaused(link, false, timeout_s, [] { return false; });
+  if (outcome != PauseOutcome::kWasSo && outcome != PauseOutcome::kFollowed) return false;
+  journal->removeUndone(left);
+  return true;
 }
 
 }  // namespace xplane_bridge

@@ -12,33 +12,18 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kSolvePeriod = 1.0;      // [s] of simulator time
-constexpr double kTakeOverWait = 1.0;     // [s] until the override must be shown
-constexpr double kReleaseWait = 2.0;      // [s] until it must be shown released
-constexpr double kRetry = 5.0;            // [s] after an attempt that failed
-constexpr double kFollowsDeg = 0.1;       // [deg] between sent and shown; X-Plane keeps float32
-constexpr double kDoesNotFollow = 1.0;    // [s] until it is said
-constexpr double kLongestFrame = 0.1;     // [s] X-Plane slows its time beyond 1/20 s
-constexpr double kTravelMarginDeg = 1.0;  // [deg] a command may go beyond the identified travel
-constexpr double kMovementDeg = 0.05;     // [deg] of a step by which the lag is measured
-constexpr double kFollowsAgain = 0.5;     // [s] after the release until X-Plane must move the surfaces
-constexpr double kOffLawDeg = 2.0;        // [deg] off the law that tells a surface left standing
+constexpr double kSolvePeriod = 1.0;   // [s] of simulator time
+constexpr double kTakeOverWait = 1.0;  // [s] until the override must be shown
+constexpr double kReleaseWait = 2.0;   // [s] until it must be shown released
+constexpr double kRetry = 5.0;         // [s] after an attempt that failed
+constexpr double kLongestFrame = 0.1;  // [s] X-Plane slows its time beyond 1/20 s
+constexpr double kMovementDeg = 0.05;  // [deg] of a step by which the lag is measured
+constexpr double kSettleWait = 2.0;    // [s] of frames in which surfaces must have gone back to the law
+constexpr double kSettledDeg = 0.5;    // [deg] off the law that is no jump
+constexpr double kFollowsAgain = 0.5;  // [s] after the release until X-Plane must move the surfaces
+constexpr double kOffLawDeg = 2.0;     // [deg] off the law that tells a surface left standing
 constexpr double kLagSmoothing = 0.1;
 constexpr std::size_t kMaxAwaitingReadBack = 64;
-
-std::string degrees(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f", value);
-  return text;
-}
-
-std::string nameOf(std::size_t surface) { return core::surfaceTable()[surface].name; }
-
-std::vector<std::string> surfacesOf(const core::MixingModel& model) {
-  std::vector<std::string> out;
-  for (const core::SurfaceLaw& law : model.laws) out.push_back(nameOf(law.surface));
-  return out;
-}
 
 }  // namespace
 
@@ -69,6 +54,8 @@ SurfaceControl::SurfaceControl(core::SimulatorPort* link, OverrideManager* overr
       not_following_(core::surfaceTable().size(), 0.0) {
   subscribe();
 }
+
+std::string SurfaceControl::nameOf(std::size_t surface) { return core::surfaceTable()[surface].name; }
 
 double SurfaceControl::now() const { return link_->clock().steadySeconds(); }
 
@@ -120,7 +107,7 @@ void SurfaceControl::onSample() {
       } else if (!disturbed_) {
         checkLeft();
         watch_.add(sample_);
-        if (!(time - solved_time_ < kSolvePeriod)) {
+        if (!identifying_ && !(time - solved_time_ < kSolvePeriod)) {
           solved_time_ = time;
           if (watch_.solve()) saveModel();
         }
@@ -136,19 +123,21 @@ void SurfaceControl::onSample() {
       } else if (now() - state_since_ > kTakeOverWait) {
         giveBack();
         driver_.reset();  // not resumed before not_before_
-        endCommands();
+        clearCommands();
         cancelOffset("X-Plane does not show the surface override");
         not_before_ = now() + kRetry;
         report_("X-Plane does not show the surface override: the surfaces are given back", false);
       }
       break;
     case State::kDriving:
-      if (!wanted()) {
-        giveBack();
-      } else if (!overridden) {
+      if (wanted() && !overridden) {
         // The panic tool, or another client: it is not taken again.
+        released_by_another_ = released_by_another_ || !commands_.empty();
         abandon("somebody else has released the surface override");
+      } else if (!wanted() && (settled() || !overridden)) {
+        giveBack();
       } else if (blocked_reason_.empty()) {
+        settling_ = wanted() ? 0.0 : settling_ + dt;
         drive(dt);
         measureLag();
         watchCommand();
@@ -170,11 +159,18 @@ void SurfaceControl::onSample() {
   }
 }
 
+/// Surfaces are where X-Plane will have them, or cannot be brought there.
+bool SurfaceControl::settled() const {
+  const bool there = settling_ > 0.0 && driver_->offTarget() <= kSettledDeg;
+  return there || settling_ > kSettleWait || !flowing_ || !blocked_reason_.empty();
+}
+
 bool SurfaceControl::wanted() const { return !failures_.empty() || !commands_.empty() || offset_; }
 
 void SurfaceControl::take() {
   const core::MixingModel* model = watch_.model();
   const bool again = state_ == State::kReleasing && driver_;
+  settling_ = 0.0;
   if (!again) {
     driver_ = std::make_unique<core::SurfaceDriver>(*model, options_.driver);
     try {
@@ -199,9 +195,7 @@ void SurfaceControl::take() {
       return;
     }
   } catch (const core::JournalError& error) {
-    report_(std::string("the surfaces are not taken over, because they could not be given back after a crash: ") +
-                error.what(),
-            false);
+    report_("the surfaces are not taken over: " + core::whyNotChanged(error), false);
   }
   cancelOffset("the surfaces could not be taken over");
   enter(State::kIdle);
@@ -213,7 +207,9 @@ void SurfaceControl::drive(double dt) {
   driver_->setCommands(commands_);
   driver_->setOffset(offset_ ? offset_->surface : 0, offset_ ? offset_->deflection_deg : 0.0);
   const core::MixingInputs inputs = inputs_.step(sample_, stick_, dt);
-  const auto& out = driver_->step(inputs, {sample_.alpha_deg, sample_.beta_deg}, dt);
+  // X-Plane's beta is + with wind from the left [? beta-sign].
+  const double from_right = version_.is(core::Otherwise::kBetaSign) ? sample_.beta_deg : -sample_.beta_deg;
+  const auto& out = driver_->step(inputs, {sample_.alpha_deg, from_right}, dt);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const core::SurfaceDeflection& surface = out[i];
     link_->write(core::surfaceTable()[surface.surface].dataref, static_cast<float>(surface.deflection_deg));
@@ -268,7 +264,7 @@ void SurfaceControl::addEcho(const Echo& echo) {
   ++echoes_dropped_;
 }
 
-void SurfaceControl::endCommands() {
+void SurfaceControl::clearCommands() {
   commands_.clear();
   commands_awaiting_read_back_.clear();
 }
@@ -300,8 +296,9 @@ void SurfaceControl::giveBack() {
 void SurfaceControl::abandon(const std::string& why) {
   const bool was = state_ == State::kTaking || state_ == State::kDriving;
   failures_.clear();
-  endCommands();
+  clearCommands();
   cancelOffset(why);
+  if (identifying_) identification_lost_ = why;
   abandoned_ = why;
   watch_.recheck();
   if (was) giveBack();
@@ -327,12 +324,13 @@ void SurfaceControl::enter(State state) {
   watch_.interrupt();
 }
 
-void SurfaceControl::onAircraft(const std::string& aircraft) {
+void SurfaceControl::onAircraft(const std::string& aircraft, const std::string& exactly) {
   std::lock_guard<std::mutex> lock(mutex_);
   if (aircraft == watch_.aircraft()) return;
   abandon("another aircraft was loaded");
   watch_.reset(aircraft);
-  loadModel();
+  keeps_ = true;
+  loadModel(exactly);
 }
 
 void SurfaceControl::release(const std::string& why) {
@@ -340,248 +338,49 @@ void SurfaceControl::release(const std::string& why) {
   abandon(why);
 }
 
-void SurfaceControl::loadModel() {
+void SurfaceControl::loadModel(const std::string& exactly) {
   file_problem_.clear();
   try {
-    if (const auto model = readMixingFile(options_.mixing_folder, watch_.aircraft())) watch_.adopt(*model);
+    std::optional<core::MixingModel> model;
+    if (!options_.mixing_folder.empty()) model = readMixingFile(options_.mixing_folder, watch_.aircraft());
+    if (!model && !options_.shipped_mixing.empty() && !exactly.empty()) {
+      model = readMixingFile(options_.shipped_mixing, exactly);
+      if (model) model->aircraft = watch_.aircraft();
+    }
+    if (model) watch_.adopt(*model);
   } catch (const std::runtime_error& error) {
     file_problem_ = error.what();
     report_(file_problem_, false);
   }
 }
 
-void SurfaceControl::saveModel() {
+/// Says where, or why not; then file_problem_ is set.
+std::string SurfaceControl::keepModel() {
   file_problem_.clear();
+  if (options_.mixing_folder.empty()) return "not kept in a file: no folder is given";
   try {
-    report_(
-        "the mixing of the surfaces is identified, kept in " + writeMixingFile(options_.mixing_folder, *watch_.model()),
-        true);
+    return "kept in " + writeMixingFile(options_.mixing_folder, *watch_.model());
   } catch (const std::runtime_error& error) {
     file_problem_ = error.what();
-    report_("the mixing of the surfaces is identified, but could not be kept: " + file_problem_, false);
+    return "but could not be kept: " + file_problem_;
   }
+}
+
+void SurfaceControl::saveModel() {
+  if (!keeps_) return;
+  const std::string kept = keepModel();
+  report_("the mixing of the surfaces is identified, " + kept, file_problem_.empty());
 }
 
 void SurfaceControl::tick(const std::string& blocked_reason) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const double time = now();
-  const double dt = time - last_tick_.value_or(time);
-  last_tick_ = time;
   blocked_reason_ = blocked_reason;
-  if (flowing_) command_age_ += dt;
-  if (!commands_.empty() && command_age_ > options_.command_timeout) endCommands();
 }
 
 void SurfaceControl::stop() {
   std::lock_guard<std::mutex> lock(mutex_);
   stopped_ = true;
   enter(State::kIdle);
-}
-
-void SurfaceControl::setStick(const std::array<double, 3>& stick) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  stick_ = stick;
-}
-
-void SurfaceControl::setFailures(const std::vector<core::SurfaceFailure>& failures) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  failures_ = failures;
-}
-
-void SurfaceControl::setDisturbed(bool disturbed) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  disturbed_ = disturbed;
-}
-
-std::optional<std::string> SurfaceControl::command(const std::vector<std::string>& names,
-                                                   const std::vector<float>& deflections_deg, std::uint32_t sequence) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  auto checked = core::checkSurfaceCommand(names, deflections_deg);
-  std::optional<std::string> wrong;
-  if (checked.refusal) {
-    wrong = checked.refusal->text;
-  }
-  for (const core::SurfaceDeflection& surface : checked.surfaces) {
-    if (wrong) break;
-    const std::string blocked = blockReasonForLocked(surface.surface);
-    if (!blocked.empty()) {
-      wrong = blocked;
-      break;
-    }
-    const core::SurfaceLaw* law = watch_.model()->lawOf(surface.surface);
-    const double low = law->low_deg - kTravelMarginDeg, high = law->high_deg + kTravelMarginDeg;
-    if (surface.deflection_deg >= low && surface.deflection_deg <= high) continue;
-    wrong = nameOf(surface.surface) + " is " + degrees(surface.deflection_deg) + " deg: expected its travel, " +
-            degrees(low) + ".." + degrees(high);
-  }
-  if (wrong) {
-    ++commands_refused_;
-    last_refusal_ = *wrong;
-    return wrong;
-  }
-  ++commands_accepted_;
-  commands_ = std::move(checked.surfaces);
-  command_sequence_ = sequence;
-  command_age_ = 0.0;
-  command_sent_ = commands_.empty();
-  if (commands_.empty()) endCommands();
-  return std::nullopt;
-}
-
-std::string SurfaceControl::beginOffset(std::size_t surface, double amplitude_deg) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  const std::string blocked = blockReasonForLocked(surface);
-  if (!blocked.empty()) return blocked;
-  if (isBroken(surface)) return nameOf(surface) + " is broken";
-  const core::SurfaceLaw* law = watch_.model()->lawOf(surface);
-  const double half = 0.5 * (law->high_deg - law->low_deg);
-  if (amplitude_deg > half) {
-    return "amplitude is " + degrees(amplitude_deg) + " deg: expected at most half of its travel, " + degrees(half);
-  }
-  offset_ = core::SurfaceDeflection{surface, 0.0};
-  offset_lost_.clear();
-  return "";
-}
-
-std::string SurfaceControl::setOffset(double offset_deg) {
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (!offset_) return offset_lost_;
-  if (isBroken(offset_->surface)) return nameOf(offset_->surface) + " is broken";
-  offset_->deflection_deg = offset_deg;
-  return "";
-}
-
-bool SurfaceControl::isBroken(std::size_t surface) const {
-  return std::any_of(failures_.begin(), failures_.end(), [surface](const auto& f) { return f.surface == surface; });
-}
-
-void SurfaceControl::clearOffset() {
-  std::lock_guard<std::mutex> lock(mutex_);
-  offset_.reset();
-}
-
-std::string SurfaceControl::blockReasonLocked() const {
-  if (!blocked_reason_.empty()) return blocked_reason_;
-  if (state_ == State::kTaking || state_ == State::kDriving) return "";
-  if (state_ == State::kReleasing && driver_) return "";
-  if (now() < not_before_) return "X-Plane did not let the surfaces be taken over a moment ago";
-  if (sample_.override_shown != 0.0) {
-    return std::isfinite(sample_.override_shown)
-               ? std::string("another program has set override_control_surfaces and must give it back")
-               : std::string("X-Plane does not show its surfaces");
-  }
-  return watch_.refusal();
-}
-
-std::string SurfaceControl::blockReason() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return blockReasonLocked();
-}
-
-std::string SurfaceControl::blockReasonFor(std::size_t surface) const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return blockReasonForLocked(surface);
-}
-
-std::string SurfaceControl::blockReasonForLocked(std::size_t surface) const {
-  const std::string blocked = blockReasonLocked();
-  const core::MixingModel* model = watch_.model();
-  if (!blocked.empty() || !model || model->lawOf(surface)) return blocked;
-  return nameOf(surface) +
-         " has not been seen to move: either this aircraft has none, or its handle has to be moved once; those that "
-         "moved: " +
-         core::join(surfacesOf(*model));
-}
-
-bool SurfaceControl::driving() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return state_ != State::kIdle;
-}
-
-bool SurfaceControl::givingBack() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return state_ != State::kIdle && !wanted();
-}
-
-double SurfaceControl::lagFrames() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return lag_frames_;
-}
-
-bool SurfaceControl::followsLocked(std::size_t surface) const {
-  const auto it =
-      std::find_if(sent_.begin(), sent_.end(), [surface](const auto& sent) { return sent.surface == surface; });
-  return it != sent_.end() && std::abs(sample_.deflections_deg[surface] - it->deflection_deg) <= kFollowsDeg;
-}
-
-bool SurfaceControl::follows(std::size_t surface) const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return state_ == State::kDriving && followsLocked(surface);
-}
-
-double SurfaceControl::shown(std::size_t surface) const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return surface < sample_.deflections_deg.size() ? sample_.deflections_deg[surface] : std::nan("");
-}
-
-std::optional<core::SurfaceLaw> SurfaceControl::lawOf(std::size_t surface) const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  const core::SurfaceLaw* law = watch_.model() ? watch_.model()->lawOf(surface) : nullptr;
-  if (!law) return std::nullopt;
-  return *law;
-}
-
-std::vector<core::SurfaceDeflection> SurfaceControl::individuallyDriven() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<core::SurfaceDeflection> out;
-  for (const core::SurfaceDeflection& sent : sent_) {
-    const auto is_it = [&sent](const auto& other) { return other.surface == sent.surface; };
-    if (std::any_of(failures_.begin(), failures_.end(), is_it) ||
-        std::any_of(commands_.begin(), commands_.end(), is_it) || (offset_ && is_it(*offset_))) {
-      out.push_back(sent);
-    }
-  }
-  return out;
-}
-
-std::optional<SurfaceControl::Echo> SurfaceControl::takeEcho() {
-  std::lock_guard<std::mutex> lock(mutex_);
-  if (echoes_.empty()) return std::nullopt;
-  const Echo echo = echoes_.front();
-  echoes_.pop_front();
-  return echo;
-}
-
-std::optional<std::string> SurfaceControl::takeAbandoned() {
-  std::lock_guard<std::mutex> lock(mutex_);
-  return std::exchange(abandoned_, std::nullopt);
-}
-
-SurfaceControlStatus SurfaceControl::status() const {
-  std::lock_guard<std::mutex> lock(mutex_);
-  SurfaceControlStatus out;
-  out.state = state_;
-  out.wanted = wanted();
-  out.blocked_reason = blockReasonLocked();
-  out.file_problem = file_problem_;
-  for (std::size_t i = 0; i < not_following_.size() && state_ == State::kDriving; ++i) {
-    if (not_following_[i] > kDoesNotFollow) out.not_following.push_back(nameOf(i));
-  }
-  out.aircraft = watch_.aircraft();
-  if (const core::MixingModel* model = watch_.model()) {
-    out.mixing_known = true;
-    out.mixed_surfaces = surfacesOf(*model);
-    out.unknown_moved = model->unknownMovement(sample_.inputs);
-  }
-  out.identification = watch_.quality().text();
-  out.samples = watch_.samples();
-  out.worst_residual_deg = watch_.quality().worst_residual_deg;
-  out.lag_frames = lag_frames_;
-  out.commands_accepted = commands_accepted_;
-  out.commands_refused = commands_refused_;
-  out.answers_dropped = echoes_dropped_;
-  out.last_refusal = last_refusal_;
-  return out;
 }
 
 }  // namespace xplane_bridge

@@ -33,9 +33,13 @@ struct ControlPathOptions {
   core::ArbiterOptions arbiter;
   double rate = 50.0;                 ///< [Hz] of refreshing
   double max_rate = 200.0;            ///< [Hz] of sending commands on arrival
+  double stale_after = 1.0;           ///< [s] of X-Plane's silence from which on the arbiter stands still
+  bool each_frame = false;            ///< lock-step: sent by tick() only, which is called once a frame
+  bool resume_auto = false;           ///< AUTO goes on in a new flight and in a new X-Plane
   bool reverse_thrust = false;        ///< of the levers
-  std::vector<std::string> aircraft;  ///< ICAO codes that may be flown; empty: any
-  std::string aircraft_file;          ///< where those codes stand, for messages
+  bool rows = false;                  ///< commands go as DATA rows, as far as those can carry them
+  std::vector<std::string> aircraft;  ///< ICAO codes, or descriptions, that may be flown; empty: any
+  std::string aircraft_file;          ///< where those stand, for messages
 };
 
 /// What was sent to X-Plane at one moment, and what X-Plane has shown of it.
@@ -62,8 +66,10 @@ struct ControlPathHooks {
   std::function<void(const std::string& why)> end_excitation;
   /// Surfaces that are driven one by one must be given back: they would stand still.
   std::function<void(const std::string& why)> release_surfaces;
-  /// The mode has changed, or overrides were released by another client: for events.
-  enum class Kind : std::uint8_t { kMode, kOverride };
+  /// The commands of control/surfaces must end; stick or mixing takes those surfaces on from where they are.
+  std::function<void()> end_surface_commands;
+  /// The mode has changed, a failsafe begins or ends, overrides were released by another client: for events.
+  enum class Kind : std::uint8_t { kMode, kFailsafe, kOverride };
   std::function<void(Kind kind, const std::string& text, const std::string& who)> event;
   /// For the log: why commands are not sent.
   std::function<void(const std::string& text)> warn;
@@ -86,6 +92,10 @@ class ControlPath {
   /// @return why it is refused; nullopt: taken
   std::optional<core::CommandRefusal> command(core::FlightMode from, const core::ControlCommand& command);
   core::RequestOutcome requestMode(const core::ModeRequest& request);
+  /// Why control/surfaces may not move surfaces now, in words that say what to do; empty: it may.
+  std::string refusalOfSurfaces();
+  /// A command of control/surfaces that was not refused: of single surfaces, or one that gives all back.
+  void onSurfaceCommand(bool gives_back);
   /// Nothing is flown until resume(), because of what `why` says; overrides are given back.
   void suspend(const std::string& why);
   void resume();
@@ -95,8 +105,14 @@ class ControlPath {
   void onLink(const core::LinkStatus& status);
   /// X-Plane has told which aircraft is loaded.
   void onAircraft(const core::AircraftIdentity& aircraft);
-  /// The flight began anew, or was placed elsewhere.
-  void onNewFlight();
+  /// The flight began anew, or was placed elsewhere: `how`, in words.
+  void onNewFlight(const std::string& how);
+  /// Another client has released the override under which this node flew: it waits for a mode.
+  void onReleasedByAnother(const std::string& override_name);
+  /// Everything was given back without this node's doing, because of what `why` says: it waits for a mode, in MANUAL.
+  void onGivenBack(const std::string& why);
+  /// The next frame is the first one of a simulator in lock-step, which stood until now: that was no gap.
+  void beginFlight();
   /// Every frame of X-Plane.
   void onFrame(const core::FlightWatch& watch);
   /// Refreshes, and notices what others do to overrides. To be called at `rate` or more often, and at deadline().
@@ -120,19 +136,28 @@ class ControlPath {
 
  private:
   double now() const;
-  bool isUp() const;
   void settle();
-  void comeBack(double time);
+  bool flows(double time);
+  void halt(const std::string& why, double time);
+  void comeBack(bool same_flight, double time);
+  bool isAnotherXPlane(const core::FlightWatch& watch) const;
+  bool continues(const core::FlightWatch& watch) const;
+  void endAuto(const std::string& why, double time);
+  void watchFailsafe();
+  double& lastCommandOf(core::FlightMode mode) { return last_command_of_[mode == core::FlightMode::kManual ? 0 : 1]; }
   void afterModeChange(core::FlightMode before);
   void sendCommand(double time);
   void send(double time);
   bool fly(const core::ArbitratedControls& controls, double time);
+  void sendRows(const core::ArbitratedControls& controls, const core::ChannelSet& now);
+  void prepareLevers(const core::ArbitratedControls& controls);
   core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
   void sayMode();
   void sayApplied(const core::ArbitratedControls& controls);
   void watchReadBack(const core::ChannelSet& channels);
   void onReadBack(const core::RrefView& view);
   void watchReleases();
+  void watchSurfaces();
 
   core::SimulatorPort* link_;
   OverrideManager* overrides_;
@@ -146,20 +171,24 @@ class ControlPath {
   core::LinkStatus link_status_;
   bool flight_shown_ = true;  // a frame has come since the link came up anew
   std::string suspension_;    // why; empty: not suspended
-  std::string released_;      // the override that another client has released; empty: none
+  std::string halted_;        // why a mode must be asked for; empty: it need not
   core::AircraftIdentity aircraft_;
 
   core::ControlArbiter arbiter_;
   core::ControlEncoder encoder_;
   std::optional<std::uint32_t> said_revision_;
   core::FlightWatch watch_;
-  double last_command_ = -1e9;           // [s] steady; of any source
-  std::int64_t next_command_ns_ = 0;     // [ns] steady; when the next one may be sent
-  bool command_waits_ = false;           // for that
-  double last_send_ = -1e9;              // [s] steady
-  double last_override_refresh_ = -1e9;  // [s] steady
-  bool excited_ = false;                 // what was sent last
-  std::string said_;                     // why commands are not sent, as warned of last
+  double last_frame_ = -1e9;                           // [s] steady
+  bool failsafe_ = false;                              // as told last
+  std::array<double, 2> last_command_of_{-1e9, -1e9};  // [s] steady; MANUAL, AUTO with its surfaces
+  std::int64_t next_command_ns_ = 0;                   // [ns] steady; when the next one may be sent
+  bool command_waits_ = false;                         // for that
+  double last_send_ = -1e9;                            // [s] steady
+  double last_override_refresh_ = -1e9;                // [s] steady
+  bool surfaces_fly_ = false;  // control/surfaces commands, as far as end_surface_commands has not been called
+  bool excited_ = false;       // what was sent last
+  bool taken_ = false;         // overrides, for a test signal of what nobody commands
+  std::string said_;           // why commands are not sent, as warned of last
 
   core::ChannelValues last_values_{};                     // of Refresh::kOnChange channels
   std::array<double, core::kChannelCount> changed_at_{};  // [s] steady; of the same

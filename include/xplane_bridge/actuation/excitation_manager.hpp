@@ -25,6 +25,8 @@ struct ExcitationRequest {
   std::uint32_t seed = 0;
   double max_roll_deg = 0.0;   ///< 0: the aircraft's
   double max_pitch_deg = 0.0;  ///< 0: the aircraft's
+  /// [-1..1] where an axis that nobody commands is, which is taken for as long; none: such an axis is refused.
+  std::optional<double> rest;
 };
 
 /// As ExcitationState.msg.
@@ -98,6 +100,7 @@ class ExcitationManager {
 
   core::ExcitationRunner runner_;
   core::ChannelSet channels_;
+  std::optional<double> rest_;
   std::optional<std::size_t> surface_;
   std::string who_;
   double last_sim_time_ = std::nan("");

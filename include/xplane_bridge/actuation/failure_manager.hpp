@@ -81,6 +81,9 @@ class FailureManager {
     std::optional<double> expected_deg;  // where X-Plane's own failure must bring the surface
   };
 
+  static constexpr double kBehaviourWait = 1.0;  // [s] in which X-Plane's own failure must move the surface as it says
+
+  static std::string described(const core::FailurePlan& plan);
   double now() const;
 
   // All with mutex_ held.

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,9 +11,11 @@
 #include "xplane_bridge/actuation/pausing.hpp"
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/message_constants.hpp"
+#include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
+#include "xplane_bridge/core/simulator/world_settings.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
 
 namespace xplane_bridge {
@@ -53,9 +56,15 @@ class FlightChanges {
   FlightChangeOutcome place(const core::FlightStart& start, const std::string& who);
   FlightChangeOutcome applyWind(const core::UniformWind& wind);
   FlightChangeOutcome applyLoading(const core::Loading& loading);
+  FlightChangeOutcome applyTime(const core::TimeSetting& time);
+  FlightChangeOutcome applyWeather(const core::Weather& weather);
   FlightChangeOutcome applyAircraft(const std::string& path, std::int32_t livery);
   FlightChangeOutcome saveSituation(const std::string& path);
   FlightChangeOutcome applySituation(const std::string& path);
+
+  /// Puts back what X-Plane had before settings that were to end with the node. What cannot be sent stays in the
+  /// journal, for the node's next start.
+  void restoreSettings();
 
   /// The change that is under way ends where it is, X-Plane resumed if it was paused for it, and so does every later
   /// one.
@@ -75,6 +84,11 @@ class FlightChanges {
                   std::optional<core::ShownFlight>* shown);
   std::string waitForMotion(const core::FlightStart& start, std::optional<core::ShownFlight>* shown);
   std::optional<core::ShownFlight> shownFlight();
+  /// Sends them until X-Plane shows them; `done` tells that it does.
+  Outcome applySettings(const std::vector<core::SettingWrite>& settings, const std::string& service,
+                        const std::string& done, bool restore);
+  /// Writes into the journal what X-Plane has now; returns what it does not tell, empty: nothing.
+  std::string remember(const std::vector<core::SettingWrite>& settings);
   PauseOutcome pause(bool paused, const std::string& who);
 
   /// What went wrong; empty: it is loaded, and X-Plane has shown which it is.
@@ -96,6 +110,8 @@ class FlightChanges {
   const FlightChangeOptions options_;
   const FlightChangeHooks hooks_;
   std::atomic<bool> stopping_{false};
+  std::mutex restores_mutex_;
+  std::vector<core::UndoOperation> restores_;  ///< of settings that end with the node
 };
 
 }  // namespace xplane_bridge

@@ -5,10 +5,12 @@
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "xplane_bridge/actuation/flight_changes.hpp"
+#include "xplane_bridge/actuation/request_result.hpp"
 
 namespace xplane_bridge {
 
@@ -30,6 +32,10 @@ class FlightJobs {
   /// Starts once what came before has ended. `number`: of the event that will tell the outcome; `who` asked for it.
   void reset(const core::FlightStart& start, std::uint32_t number, const std::string& who);
   void setWind(const core::UniformWind& wind, std::uint32_t number, const std::string& who);
+  /// See FlightChanges.
+  void restoreSettings() { changes_.restoreSettings(); }
+  void setTime(const core::TimeSetting& time, std::uint32_t number, const std::string& who);
+  void setWeather(const core::Weather& weather, std::uint32_t number, const std::string& who);
   void setLoading(const core::Loading& loading, std::uint32_t number, const std::string& who);
   void loadAircraft(const std::string& path, std::int32_t livery, std::uint32_t number, const std::string& who);
   void saveSituation(const std::string& path, std::uint32_t number, const std::string& who);
@@ -37,6 +43,8 @@ class FlightJobs {
 
   /// Too many wait already.
   bool full() const;
+  /// Why X-Plane could not be asked for anything now; nullopt: it could.
+  std::optional<RequestResult> refusal() const;
   /// Who asked for the job at it, if that places the aircraft or loads files; empty: none does.
   std::string mover() const;
   /// The one at it ends where it is, X-Plane resumed if it was paused for it; the others are dropped. Waits for that.
@@ -53,6 +61,7 @@ class FlightJobs {
   void add(std::uint32_t number, const std::string& who, bool moves, std::function<FlightChangeOutcome()> run);
   void loop();
 
+  core::SimulatorPort* link_;
   FlightChanges changes_;
   Report report_;
   mutable std::mutex mutex_;

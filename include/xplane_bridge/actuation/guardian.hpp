@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <iosfwd>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "xplane_bridge/actuation/override_manager.hpp"
@@ -13,10 +13,11 @@
 namespace xplane_bridge {
 
 /// A child process that undoes what this process has in the journal when it dies without dismissing it (kill -9, a
-/// crash).
+/// crash), and when it hangs (SIGSTOP, a deadlock).
 ///
-/// It holds the reading end of a pipe: when that ends without dismiss(), its parent is gone. It has a session of its
-/// own and ignores the terminal's signals, so that Ctrl-C reaches the parent only. It needs neither ROS nor the parent.
+/// It holds the other end of a socket: when that ends without dismiss(), its parent is gone; when no beat() comes for
+/// too long, its parent hangs. It has a session of its own and ignores the terminal's signals, so that Ctrl-C reaches
+/// the parent only. It needs neither ROS nor the parent. Thread-safe.
 class Guardian {
  public:
   Guardian() = default;
@@ -29,32 +30,61 @@ class Guardian {
   void start();
   /// Where X-Plane is, and what was changed there, from now on.
   void setPeer(const core::Endpoint& peer, const std::string& journal_path);
+  /// This process runs, and beat() will be called again within `hang_timeout` [s]; to be called by the thread that must
+  /// not hang, as often as it likes. Returns whether the guardian has given everything back since the last call,
+  /// because that was not so.
+  bool beat(double hang_timeout);
+  /// No beat() is to be expected any more.
+  void rest();
   /// Everything is undone: the child ends without doing anything.
   void dismiss();
-  bool running() const { return pipe_ >= 0; }
+  bool running() const;
 
  private:
   void tell(const std::string& line);
 
-  int pipe_ = -1;
+  mutable std::mutex mutex_;
+  int socket_ = -1;
   int child_ = -1;
+  double last_beat_ = -1e9;  // [s] steady
 };
 
-/// What the parent has told its guardian.
+/// What the parent has told its guardian, line by line.
 struct GuardianOrders {
   std::string address;
   std::uint16_t port = 0;
-  std::string journal;     ///< path; empty: nothing was ever changed
-  bool dismissed = false;  ///< the parent has undone everything itself
+  std::string journal;        ///< path; empty: nothing was ever changed
+  bool dismissed = false;     ///< the parent has undone everything itself
+  double hang_timeout = 0.0;  ///< [s] in which a beat must come; 0: none is to be expected
+  unsigned beats = 0;         ///< until now
+
+  /// Takes "peer ADDRESS PORT JOURNAL" (the last counts), "beat SECONDS", "rest" or "bye". Anything else is skipped:
+  /// the last line of a parent that died may be cut off.
+  void take(const std::string& line);
 };
-/// Reads "peer ADDRESS PORT JOURNAL" (the last counts) and "bye" until the parent closes the pipe, deliberately or by
-/// dying. Lines that are neither are skipped: the last may be cut off.
-GuardianOrders readGuardianOrders(std::istream& lines);
+
+/// Tells when a parent has not shown for too long that it runs. Counts only time in which this process got to run: on a
+/// computer that is too busy for both, the parent does not count as hung.
+class HangWatch {
+ public:
+  static constexpr double kLongestLook = 0.1;  ///< [s] that one call of passed() counts at most
+
+  /// The parent runs.
+  void beat() { silence_ = 0.0, hangs_ = false; }
+  /// `elapsed` [s] have passed since the last call. Returns true once, when no beat() has come for `timeout` [s]; with
+  /// 0, none is expected.
+  bool passed(double elapsed, double timeout);
+
+ private:
+  double silence_ = 0.0;  // [s]
+  bool hangs_ = false;
+};
+
 /// The journal in which the entries of `parent` count as left behind, although that may still be there as a process
 /// that has not been waited for.
 std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int64_t parent);
-/// Gives back over `link`, whose journal is a guardedJournal(), what was left behind. Waits for X-Plane to be found and
-/// to show it. Returns whether nothing is left.
+/// Gives back over `link`, whose journal is a guardedJournal(), what was left behind, and lets X-Plane go on if it was
+/// left paused. Waits for X-Plane to be found and to show it. Returns whether nothing is left.
 bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report& report);
 
 /// The whole of override_guardian's main(). Its argument is the process it guards, its standard input the orders.

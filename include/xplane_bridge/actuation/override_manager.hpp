@@ -25,11 +25,20 @@ class OverrideManager {
   /// more (its journal entry stays until confirmReleases() has read it back), this also where the journal fails. Writes
   /// to the disk when something is new; without a journal (X-Plane has not been found), and after releaseAll(), nothing
   /// is set.
+  /// A DATA row (core::rowName()) is only kept in the journal; released, it gets -999, which X-Plane does not confirm.
   void setRequired(const std::vector<std::string>& wanted);
   /// Sets one, until release() or the end of the node, whatever setRequired() says. Not only overrides: whatever is 0
   /// (or core::releaseOf()) where no client sets it. Without `refreshed`, refresh() leaves it alone, so that it can be
   /// taken back in the simulator. Returns whether it was set: as in setRequired().
   bool acquire(const std::string& dataref, float value = 1.0F, bool refreshed = true);
+  /// What is to be written right before `dataref`, which is set, is released: by this node, and, as far as
+  /// recordPreparations() has brought it into the journal, by its guardian, its next start and
+  /// scripts/release_overrides. It is not read back.
+  void prepareRelease(const std::string& dataref, std::vector<core::UndoOperation> writes);
+  /// Brings what has changed of that into the journal, once a second. Writes to the disk, without holding anything up.
+  void recordPreparations();
+  /// Another process has given everything back: nothing is set any more. Released once more, and confirmed.
+  void giveBackAll();
   /// Gives one back that acquire() has set; another one stays as it is.
   void release(const std::string& dataref);
   /// Sends all that are set once more: a datagram may have been lost, X-Plane may have been restarted. Not those that
@@ -48,7 +57,8 @@ class OverrideManager {
   /// Releases everything; nothing is set after that. Waits up to `timeout_s`. Returns whether X-Plane has shown all of
   /// it; what it has not stays in the journal.
   bool releaseAll(double timeout_s);
-  /// Releases what a crashed run has left. Waits up to `timeout_s`. Returns whether nothing is left.
+  /// Releases what earlier runs have left: by a crash, or because X-Plane had gone before them. Waits up to
+  /// `timeout_s`. Returns whether nothing is left.
   bool releaseLeftovers(double timeout_s);
 
   /// Set now, by name; those that refresh() repeats.
@@ -67,7 +77,16 @@ class OverrideManager {
     bool in_journal = true;  // its entry is known to be there
   };
 
+  struct Preparation {
+    std::vector<core::UndoOperation> writes;
+    std::vector<core::UndoOperation> recorded;  // as the journal has them
+  };
+
   // All with mutex_ held.
+  bool isSet(const std::string& dataref) const;
+  /// All that is set; nothing is required or acquired any more.
+  std::set<std::string> takeAll();
+  std::vector<core::UndoOperation> releaseOf(const std::string& dataref) const;
   bool set(const std::string& dataref, float value);
   void resend(const std::string& dataref, float value);
   void giveBack(const std::string& dataref);
@@ -78,12 +97,16 @@ class OverrideManager {
   bool confirm(const std::vector<core::UndoOperation>& operations, double timeout_s, const std::string& what,
                const std::function<void(core::Journal&)>& remove);
 
+  bool answers() const;
+
   core::SimulatorPort* link_;
   Report report_;
   const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
   std::set<std::string> required_;
   std::map<std::string, Acquired> acquired_;
   std::set<std::string> releasing_;
+  std::map<std::string, Preparation> prepared_;
+  double recorded_at_ = -1e9;         // [s] steady
   std::vector<std::string> watched_;  // datarefs of the subscription
   std::map<std::string, Shown> shown_;
   bool ended_ = false;               // by releaseAll()

@@ -18,6 +18,17 @@ enum class PauseOutcome : std::uint8_t {
 /// before 12.10 there is only a toggle, and a toggle sent twice is none. Waits.
 /// @param timeout_s for X-Plane's answer, and again until it shows what was asked for
 /// @param given_up asked while waiting
-PauseOutcome setPaused(core::SimulatorPort* link, bool pause, double timeout_s, const std::function<bool()>& given_up);
+/// @param before called right before anything is sent
+PauseOutcome setPaused(core::SimulatorPort* link, bool pause, double timeout_s, const std::function<bool()>& given_up,
+                       const std::function<void()>& before = {});
+
+/// Journal purpose of pauses that must not outlive who asked for them.
+extern const char* const kPausePurpose;
+/// To be called before such a pause, and once it is over. Throw core::JournalError.
+void recordPause(core::SimulatorPort* link);
+void forgetPause(core::SimulatorPort* link);
+/// Lets X-Plane go on that a crashed run has left paused. Waits up to `timeout_s` twice. Returns whether no such pause
+/// is left. Throws core::JournalError.
+bool resumeLeftovers(core::SimulatorPort* link, double timeout_s);
 
 }  // namespace xplane_bridge

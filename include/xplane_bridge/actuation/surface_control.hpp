@@ -21,11 +21,11 @@ namespace xplane_bridge {
 
 struct SurfaceControlOptions {
   core::MixingRequirements mixing;
-  std::string mixing_folder;  ///< of the mixing files (docs/mixing_file.md)
+  std::string mixing_folder;   ///< of the mixing files (docs/mixing_file.md); empty: none are kept
+  std::string shipped_mixing;  ///< of those to begin with; empty: none
   core::DriverOptions driver;
   double flap_rate = 0.15;       ///< [1/s] of full travel, while they are driven
   double speedbrake_rate = 1.0;  ///< [1/s] of full travel
-  double command_timeout = 0.5;  ///< [s] after which a SurfaceCommand that is not repeated ends
 };
 
 enum class SurfaceControlState : std::uint8_t {
@@ -74,14 +74,17 @@ class SurfaceControl {
 
   /// The link's state or version changed. From the link's thread.
   void onLink(const core::LinkStatus& status);
-  /// Another aircraft is loaded: whatever was driven ends, its mixing file is read.
-  void onAircraft(const std::string& aircraft);
+  /// Another aircraft is loaded: whatever was driven ends, its mixing file is read; where there is none, the shipped
+  /// one of `exactly`, a name that only this aircraft has.
+  void onAircraft(const std::string& aircraft, const std::string& exactly = "");
   /// Whatever is driven ends, failures and commands too.
   void release(const std::string& why);
   /// At least ten times a second. `blocked_reason`: why nothing may be sent to X-Plane now; empty: it may.
   void tick(const std::string& blocked_reason);
   /// Ends all driving; overrides are the keeper's to give back.
   void stop();
+  /// What was seen until now was no flight: it says nothing about the mixing.
+  void restart();
 
   // What is wanted.
 
@@ -91,9 +94,14 @@ class SurfaceControl {
   void setFailures(const std::vector<core::SurfaceFailure>& failures);
   /// X-Plane itself has something broken, so that its surfaces say nothing about the mixing.
   void setDisturbed(bool disturbed);
-  /// control/surfaces; an empty list gives all back. Returns why it is refused as a whole; nullopt: taken.
+  /// control/surfaces; an empty list gives all back. Whether it may fly, and for how long without being repeated, is
+  /// the ControlPath's to say. Returns why it is refused as a whole; nullopt: taken.
   std::optional<std::string> command(const std::vector<std::string>& names, const std::vector<float>& deflections_deg,
                                      std::uint32_t sequence);
+  /// Counts a command that may not fly, for diagnostics.
+  void refuseCommand(const std::string& why);
+  /// What was commanded ends: those surfaces go where stick or mixing wants them, at the rate of the driver.
+  void endCommands();
   /// Excitation of one surface by up to `amplitude_deg`: the surfaces are driven from now on. One at a time. Returns
   /// why not, in words; empty: they are.
   std::string beginOffset(std::size_t surface, double amplitude_deg);
@@ -102,6 +110,28 @@ class SurfaceControl {
   std::string setOffset(double offset_deg);
   /// The excitation is over.
   void clearOffset();
+
+  // Identification by test signals.
+
+  /// The surfaces are watched for it from now on. Returns why not, in words; empty: they are.
+  std::string beginIdentification();
+  /// Why it cannot go on, in words; empty: it can, or none runs.
+  std::string identificationProblem() const;
+  struct Identified {
+    bool good = false;
+    std::string text;  ///< what came of it, or what is missing
+  };
+  /// Ends it. A mixing that is good is the one to drive by from now on, and is kept in a file if `save`.
+  Identified concludeIdentification(bool save);
+  void cancelIdentification();
+  /// [-] of stick that it takes to both sides of each axis.
+  double excursionNeeded() const;
+  /// [-1..1] roll, pitch, yaw as X-Plane shows them; NaN: unknown.
+  struct Sticks {
+    std::array<double, 3> stick{};  ///< the stick alone
+    std::array<double, 3> total{};  ///< what the surfaces follow
+  };
+  Sticks sticks() const;
 
   // What is.
 
@@ -132,6 +162,8 @@ class SurfaceControl {
     double frames = std::nan("");    ///< since it was sent
   };
   std::optional<Echo> takeEcho();
+  /// Another client has released the surface override while control/surfaces commanded, since the last call.
+  bool takeReleasedByAnother();
   /// Why all failures and commands were abandoned (another aircraft, X-Plane restarted, the override released by
   /// another client), once after it happened.
   std::optional<std::string> takeAbandoned();
@@ -141,6 +173,9 @@ class SurfaceControl {
  private:
   using State = SurfaceControlState;
 
+  static constexpr double kFollowsDeg = 0.1;  // [deg] between sent and shown; X-Plane keeps float32
+
+  static std::string nameOf(std::size_t surface);
   double now() const;
 
   // Of the link's thread, without mutex_.
@@ -156,12 +191,15 @@ class SurfaceControl {
   void checkLeft();
   void abandon(const std::string& why);
   void cancelOffset(const std::string& why);
-  void endCommands();
+  void clearCommands();
+  void countRefused(const std::string& why);
+  bool settled() const;
   void enter(State state);
   void measureLag();
   void watchCommand();
   void addEcho(const Echo& echo);
-  void loadModel();
+  void loadModel(const std::string& exactly);
+  std::string keepModel();
   void saveModel();
   std::string blockReasonLocked() const;
   std::string blockReasonForLocked(std::size_t surface) const;
@@ -184,10 +222,12 @@ class SurfaceControl {
   bool disturbed_ = false;
   bool stopped_ = false;
   std::string blocked_reason_ = "X-Plane is not connected";
-  std::optional<double> last_tick_;  // [s] steady
 
   core::MixingWatch watch_;
   std::string file_problem_;
+  bool keeps_ = true;  // in a file, what normal flight tells of this aircraft
+  bool identifying_ = false;
+  std::string identification_lost_;  // why, where its end was not asked for
 
   State state_ = State::kIdle;
   double state_since_ = 0.0;  // [s] steady
@@ -204,8 +244,9 @@ class SurfaceControl {
   std::optional<std::string> abandoned_;
   std::vector<core::SurfaceDeflection> commands_;
   std::uint32_t command_sequence_ = 0;
-  double command_age_ = 0.0;  // [s] while X-Plane runs
   bool command_sent_ = true;
+  bool released_by_another_ = false;
+  double settling_ = 0.0;  // [s] of frames for which surfaces have been on their way back to the law
   struct SentCommand {
     std::uint32_t sequence = 0;
     double sim_time = std::nan("");  // [s] of the frame in which it was sent

@@ -20,6 +20,33 @@ class ControlPathTest : public testing::Test, protected FlownPath {
     }
     return false;
   }
+  static constexpr const char* kRunningTime = "sim/time/total_running_time_sec";
+  static constexpr const char* kFlightTime = "sim/time/total_flight_time_sec";
+
+  /// Asks for the mode and flies in it, a quarter to the right.
+  void fly(FlightMode mode, double seconds) {
+    sim.set(kFlightTime, 50.0F);
+    if (mode == FlightMode::kAuto) ask(mode);
+    flyOn(mode, seconds);
+    ASSERT_FLOAT_EQ(sim.value(kStickRoll), 0.25F);
+    ASSERT_EQ(modes.back().mode, mode);
+  }
+  void flyOn(FlightMode mode, double seconds) {
+    for (const double end = sim.time() + seconds - 1e-6; sim.time() < end;) {
+      path->command(mode, rollCommand(0.25));
+      frame();
+    }
+  }
+  /// X-Plane ends and comes back with a flight of its own.
+  void restartXPlane() {
+    setState(LinkState::kLost);
+    run(1.0);
+    sim.set(kRunningTime, 1.0F);
+    sim.set(kFlightTime, 1.0F);
+    sim.set(kStickOverride, 0.0F);
+    sim.set(kStickRoll, 0.0F);
+    setState(LinkState::kConnected);
+  }
   /// Another client, or the panic tool, takes the override back, and X-Plane shows it for the half second it takes to
   /// believe it.
   void releaseByAnother() {
@@ -272,6 +299,107 @@ TEST_F(ControlPathTest, ASilentStickGoesToItsFailsafe) {
   EXPECT_TRUE(path->commanded().none());
 }
 
+TEST_F(ControlPathTest, AFailsafeBeginsAndEndsWithAnEventThatNamesItsCause) {
+  start();
+  path->command(FlightMode::kAuto, rollCommand(0.4));
+  ask(FlightMode::kAuto);
+  run(0.3);
+  EXPECT_EQ(events, Texts{"AUTO: request (test)"});
+  run(0.4);
+  ASSERT_EQ(events.size(), 2u) << "once";
+  EXPECT_EQ(events[1], "AUTO: failsafe: timeout of control/auto");
+  path->command(FlightMode::kAuto, rollCommand(0.4));
+  run(0.1);
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[2], "AUTO: the failsafe ends: control/auto is back");
+}
+
+TEST_F(ControlPathTest, ANewFlightEndsAutoUntilItIsAskedForAgain) {
+  start();
+  fly(FlightMode::kAuto, 0.3);
+  path->onNewFlight("the flight began anew");
+  const std::string reason = "the flight began anew; AUTO is off until it is asked for";
+  EXPECT_EQ(events.back(), "MANUAL: " + reason + " (tx_node)");
+  EXPECT_EQ(modes.back().mode, FlightMode::kManual);
+  EXPECT_EQ(modes.back().reason, reason);
+  flyOn(FlightMode::kAuto, 0.3);
+  EXPECT_EQ(modes.back().mode, FlightMode::kManual) << "though its controller goes on";
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.0F) << "the failsafe of MANUAL";
+  ask(FlightMode::kAuto);
+  flyOn(FlightMode::kAuto, 0.1);
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.25F);
+}
+
+TEST_F(ControlPathTest, ANewFlightLeavesManualAsItIs) {
+  start();
+  fly(FlightMode::kManual, 0.3);
+  path->onNewFlight("the flight began anew");
+  EXPECT_TRUE(events.empty());
+  EXPECT_EQ(modes.back().reason, "start");
+}
+
+TEST_F(ControlPathTest, OnABenchAutoGoesOn) {
+  options.resume_auto = true;
+  start();
+  fly(FlightMode::kAuto, 0.3);
+  path->onNewFlight("the flight began anew");
+  restartXPlane();
+  flyOn(FlightMode::kAuto, 0.3);
+  EXPECT_EQ(modes.back().mode, FlightMode::kAuto);
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.25F);
+}
+
+TEST_F(ControlPathTest, AGapInTheSameFlightKeepsAuto) {
+  start();
+  fly(FlightMode::kAuto, 0.3);
+  setState(LinkState::kLost);
+  flyOn(FlightMode::kAuto, 20.0);
+  sim.set(kRunningTime, sim.value(kRunningTime) + 19.0F);
+  sim.set(kFlightTime, sim.value(kFlightTime) + 19.0F);
+  setState(LinkState::kConnected);
+  flyOn(FlightMode::kAuto, 0.3);
+  EXPECT_EQ(modes.back().mode, FlightMode::kAuto);
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.25F);
+}
+
+TEST_F(ControlPathTest, ARestartedXPlaneEndsAutoAndIsLeftAlone) {
+  start();
+  fly(FlightMode::kAuto, 0.3);
+  restartXPlane();
+  sim.clearMessages();
+  flyOn(FlightMode::kAuto, 1.0);
+  EXPECT_EQ(events.back(), "MANUAL: X-Plane was restarted; AUTO is off until it is asked for (tx_node)");
+  EXPECT_EQ(modes.back().mode, FlightMode::kManual);
+  EXPECT_EQ(modes.back().reason, "X-Plane was restarted; AUTO is off until it is asked for; MANUAL is not commanded");
+  EXPECT_TRUE(writesTo(kStickRoll).empty());
+}
+
+TEST_F(ControlPathTest, ARestartThatTookLongIsKnownByTheTimesOfTheFlight) {
+  for (const bool by_running_time : {true, false}) {
+    SCOPED_TRACE(by_running_time ? "total running time" : "total flight time");
+    start();
+    fly(FlightMode::kAuto, 1.0);
+    setState(LinkState::kLost);
+    flyOn(FlightMode::kAuto, 5.0);
+    // Further than the gap was long, or back to the flight's beginning.
+    sim.set(by_running_time ? kRunningTime : kFlightTime, by_running_time ? sim.value(kRunningTime) + 60.0F : 0.0F);
+    setState(LinkState::kConnected);
+    flyOn(FlightMode::kAuto, 0.3);
+    EXPECT_EQ(modes.back().mode, FlightMode::kManual);
+    ask(FlightMode::kManual);
+    sim.set(kFlightTime, 50.0F);
+  }
+}
+
+TEST_F(ControlPathTest, ARestartedXPlaneIsFlownOnByHand) {
+  start();
+  fly(FlightMode::kManual, 0.3);
+  restartXPlane();
+  flyOn(FlightMode::kManual, 0.3);
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.25F);
+  EXPECT_TRUE(events.empty());
+}
+
 TEST_F(ControlPathTest, WhilePausedNoTimeOutAdvances) {
   start();
   path->command(FlightMode::kManual, rollCommand(0.4));
@@ -281,6 +409,58 @@ TEST_F(ControlPathTest, WhilePausedNoTimeOutAdvances) {
   EXPECT_EQ(path->standing(), Standing::kFlying);
   EXPECT_FALSE(modes.back().failsafe);
   EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.4F);
+}
+
+// --- DATA rows ---
+
+class ControlPathRowsTest : public ControlPathTest {
+ protected:
+  ControlPathRowsTest() { options.rows = true; }
+  /// Slot of a row in each DATA message since the last clearMessages() that has the row.
+  Floats slotsOf(std::int32_t row, std::size_t slot) const {
+    Floats out;
+    for (const auto& message : sim.messages()) {
+      if (message.label != "DATA") continue;
+      for (std::size_t at = 0; at + 36 <= message.body.size(); at += 36) {
+        if (core::loadLittleEndian<std::int32_t>(message.body.data() + at) != row) continue;
+        out.push_back(core::loadLittleEndian<float>(message.body.data() + at + 4 + 4 * slot));
+      }
+    }
+    return out;
+  }
+};
+
+TEST_F(ControlPathRowsTest, CommandsGoAsRowsUnderTheSameOverrides) {
+  start();
+  path->command(FlightMode::kManual, rollCommand(0.4));
+  EXPECT_EQ(slotsOf(8, 1), Floats{0.4F});
+  EXPECT_EQ(slotsOf(11, 1), Floats{0.4F});
+  EXPECT_EQ(slotsOf(8, 0), Floats{-999.0F});
+  EXPECT_TRUE(writesTo(kStickRoll).empty());
+  EXPECT_EQ(sim.value(kStickOverride), 1.0F);
+  EXPECT_TRUE(inJournal("DATA row 8"));
+  EXPECT_TRUE(inJournal("DATA row 11"));
+}
+
+TEST_F(ControlPathRowsTest, RowsAreGivenBackWithTheOverrides) {
+  start();
+  path->command(FlightMode::kManual, rollCommand(0.4));
+  sim.clearMessages();
+  path->suspend("another aircraft is being loaded");
+  EXPECT_EQ(slotsOf(8, 1), Floats{-999.0F});
+  EXPECT_EQ(slotsOf(11, 1), Floats{-999.0F});
+  EXPECT_EQ(sim.value(kStickOverride), 0.0F);
+}
+
+TEST_F(ControlPathRowsTest, HandlesAreLeftToTheCockpitAfterAChange) {
+  core::ControlCommand command;
+  command.fields = core::kFieldFlaps;
+  command.flaps = 0.5;
+  start();
+  runWith(command, 0.5);
+  const Floats flaps = slotsOf(13, 3);
+  EXPECT_EQ(flaps.front(), 0.5F);
+  EXPECT_EQ(flaps.back(), -999.0F);
 }
 
 // --- test signals ---
@@ -299,6 +479,22 @@ TEST_F(ControlPathTest, AnExcitationGoesOutWithEveryFrameAndItsEndToo) {
   sim.frame(0.001);
   sim.frame(0.001);
   EXPECT_EQ(writesTo(kStickRoll), (Floats{0.4F, 0.4F, 0.1F})) << "without it, once";
+}
+
+TEST_F(ControlPathTest, AnAxisThatNobodyCommandsIsTakenForASignalAndGivenBack) {
+  start();
+  excitation.channels.set(core::index(core::Channel::kRoll));
+  excitation.value = 0.3;
+  excitation.rest = 0.1;
+  sim.frame(0.001);
+  EXPECT_EQ(sim.value(kStickOverride), 1.0F);
+  EXPECT_EQ(sim.value(kPitchOverride), 0.0F);
+  EXPECT_EQ(writesTo(kStickRoll), Floats{0.4F});
+  EXPECT_TRUE(excitation_ends.empty());
+  excitation = {};
+  sim.frame(0.001);
+  EXPECT_EQ(sim.value(kStickOverride), 0.0F);
+  EXPECT_EQ(writesTo(kStickRoll), Floats{0.4F});
 }
 
 TEST_F(ControlPathTest, AnExcitationEndsWithTheSourceAndIsNotSentOnTheFailsafe) {
@@ -392,7 +588,7 @@ TEST_F(ControlPathTest, AfterALossNobodyFliesXPlaneIsLeftAlone) {
   run(3.0);
   EXPECT_EQ(path->standing(), Standing::kFlying);
   EXPECT_EQ(sim.writes(), (std::vector<std::pair<std::string, float>>{{kStickOverride, 0.0F}})) << "given back";
-  EXPECT_EQ(modes.back().reason, "X-Plane came back and nobody commanded it");
+  EXPECT_EQ(modes.back().reason, "X-Plane came back; MANUAL is not commanded");
   EXPECT_FALSE(modes.back().failsafe);
 }
 
@@ -410,6 +606,157 @@ TEST_F(ControlPathTest, ARestartWithoutASilenceIsSeenByItsTime) {
   EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F) << "another X-Plane does not know where the handles are";
 }
 
+TEST_F(ControlPathTest, HitchOfXPlaneDoesNotStopTheStick) {
+  options.arbiter.channels[core::index(core::Channel::kRoll)].slew = 0.5;  // [1/s]
+  start();
+  runWith(rollCommand(0.0), 0.2);
+  setState(LinkState::kStale);
+  runWith(rollCommand(1.0), 0.8);
+  EXPECT_NEAR(writesTo(kStickRoll).back(), 0.4F, 0.06F);
+  runWith(rollCommand(1.0), 1.0);
+  EXPECT_NEAR(writesTo(kStickRoll).back(), 0.5F, 0.06F) << "from a second of silence on the arbiter stands still";
+  setState(LinkState::kConnected);
+  runWith(rollCommand(1.0), 0.4);
+  EXPECT_NEAR(writesTo(kStickRoll).back(), 0.7F, 0.06F);
+}
+
+TEST_F(ControlPathTest, SourceThatIsSilentWithXPlaneIsWaitedFor) {
+  start();
+  runWith(rollCommand(0.3), 0.2);
+  run(0.4);  // a controller that goes by X-Plane's frames; by 0.5 s it would be silent for too long
+  setState(LinkState::kStale);
+  run(0.9);
+  EXPECT_FALSE(modes.back().failsafe);
+  setState(LinkState::kConnected);
+  runWith(rollCommand(0.3), 0.2);
+  EXPECT_TRUE(std::none_of(modes.begin(), modes.end(), [](const auto& mode) { return mode.failsafe; }));
+}
+
+TEST_F(ControlPathTest, PausedXPlaneThatBecomesSilentStandsStill) {
+  options.arbiter.channels[core::index(core::Channel::kRoll)].slew = 0.5;
+  start();
+  runWith(rollCommand(0.0), 0.2);
+  sim.setState(LinkState::kPaused);
+  path->onLink(sim.status());
+  core::LinkStatus stale = sim.status();
+  stale.state = LinkState::kStale;
+  path->onLink(stale);
+  runWith(rollCommand(1.0), 0.3);
+  EXPECT_NEAR(writesTo(kStickRoll).back(), 0.0F, 0.02F);
+}
+
+constexpr const char* kMotorOverride = "sim/operation/override/override_throttles";
+
+core::ControlCommand motorsCommand(double first, double second) {
+  core::ControlCommand command;
+  command.fields = core::kFieldMotors;
+  command.engine_count = 2;
+  command.motors = {first, second};
+  return command;
+}
+
+/// Motors 0 and 1 with their levers.
+class MotorsTest : public ControlPathTest {
+ protected:
+  MotorsTest() {
+    options.arbiter.engines = 2;
+    sim.set(kMotorOverride, 0.0F);
+    for (const char* name :
+         {"sim/flightmodel/engine/ENGN_thro_use[0]", "sim/flightmodel/engine/ENGN_thro_use[1]",
+          "sim/cockpit2/engine/actuators/throttle_ratio[0]", "sim/cockpit2/engine/actuators/throttle_ratio[1]"}) {
+      sim.set(name, 0.0F);
+    }
+  }
+  float lever(int engine) {
+    return sim.value("sim/cockpit2/engine/actuators/throttle_ratio[" + std::to_string(engine) + "]");
+  }
+};
+
+TEST_F(MotorsTest, LeversAreWhereTheMotorsAreWhenTheirOverrideEnds) {
+  std::vector<float> at_release;
+  sim.on_message = [&](const core::FakeSimulator::Message& message) {
+    if (message.path == kMotorOverride && message.value == 0.0F) at_release = {lever(0), lever(1)};
+  };
+  start();
+  runWith(motorsCommand(0.6, 0.7), 0.5);
+  EXPECT_FLOAT_EQ(lever(0), 0.0F) << "theirs is the cockpit";
+  runWith(rollCommand(0.0), 0.02);
+  path->suspend("loading");
+  ASSERT_EQ(at_release.size(), 2U);
+  EXPECT_FLOAT_EQ(at_release[0], 0.6F);
+  EXPECT_FLOAT_EQ(at_release[1], 0.7F);
+}
+
+TEST_F(MotorsTest, LeverWithoutReverseIsNotBelowZero) {
+  start();
+  core::ControlCommand command = motorsCommand(-0.5, 0.7);
+  if (path->command(FlightMode::kManual, command)) GTEST_SKIP() << "motors take no negative values";
+  runWith(command, 0.5);
+  path->suspend("loading");
+  EXPECT_FLOAT_EQ(lever(0), 0.0F);
+}
+
+TEST_F(MotorsTest, JournalHasWhatIsToBeWrittenBeforeTheRelease) {
+  start();
+  runWith(motorsCommand(0.6, 0.7), 0.5);
+  overrides.recordPreparations();
+  ASSERT_EQ(sim.journal()->entries().size(), 1U);
+  const std::vector<core::UndoOperation> undo = sim.journal()->entries()[0].undo;
+  ASSERT_EQ(undo.size(), 3U);
+  const auto& first = std::get<core::UndoDref>(undo[0]);
+  EXPECT_EQ(first.path, "sim/cockpit2/engine/actuators/throttle_ratio[0]");
+  EXPECT_FLOAT_EQ(first.value, 0.6F);
+  EXPECT_FALSE(first.confirm) << "a throttle of X-Plane's own may move it again";
+  EXPECT_EQ(std::get<core::UndoDref>(undo[2]).path, kMotorOverride) << "last";
+}
+
+TEST_F(ControlPathTest, WhatWasGivenBackWithoutItsDoingStopsItUntilAModeIsAskedFor) {
+  start();
+  ask(FlightMode::kAuto);
+  runWith(rollCommand(0.3), 0.3);
+  path->onGivenBack("tx_node hung");
+  EXPECT_EQ(path->standing(), Standing::kWaitingForMode);
+  EXPECT_EQ(modes.back().mode, FlightMode::kManual);
+  EXPECT_EQ(modes.back().reason, "tx_node hung; nothing is sent until a mode is asked for");
+  EXPECT_EQ(path->refusal(), "tx_node hung: ask for a mode to fly on");
+  sim.clearMessages();
+  runWith(rollCommand(0.3), 3.0);
+  EXPECT_TRUE(writesTo(kStickRoll).empty());
+  ask(FlightMode::kManual);
+  runWith(rollCommand(0.3), 0.1);
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.3F);
+}
+
+TEST_F(ControlPathTest, AxesThatNobodyCommandsStayWithXPlane) {
+  start();
+  core::ControlCommand command = rollCommand(0.3);
+  command.fields = core::kFieldRoll | core::kFieldPitch;
+  command.pitch = -0.2;
+  runWith(command, 0.5);
+  EXPECT_FLOAT_EQ(sim.value(kStickOverride), 1.0F);
+  EXPECT_FLOAT_EQ(sim.value(kPitchOverride), 1.0F);
+  EXPECT_FLOAT_EQ(sim.value(kYawOverride), 0.0F) << "pedals, and X-Plane's auto-coordination";
+  EXPECT_TRUE(writesTo(kStickYaw).empty());
+  command.fields = core::kFieldRoll;
+  runWith(command, 1.0);
+  EXPECT_FLOAT_EQ(sim.value(kStickOverride), 1.0F);
+  EXPECT_FLOAT_EQ(sim.value(kPitchOverride), 1.0F) << "given to its failsafe, not dropped";
+}
+
+TEST_F(ControlPathTest, AnXPlaneThatHasRunNoLongerThanTheGapIsAnotherOne) {
+  sim.set("sim/time/total_running_time_sec", 1.0F);
+  start();
+  runWith(rollCommand(0.3), 1.0);  // it has run for 2 s, and shown its override
+  setState(LinkState::kStale);
+  runWith(rollCommand(0.3), 4.0);
+  sim.set(kStickOverride, 0.0F);
+  sim.set("sim/time/total_running_time_sec", 3.0F);  // started 1 s after the last frame: it seems to have run on
+  setState(LinkState::kConnected);
+  runWith(rollCommand(0.3), 2.0);
+  EXPECT_EQ(path->standing(), Standing::kFlying) << path->refusal();
+  EXPECT_FLOAT_EQ(sim.value(kStickOverride), 1.0F);
+}
+
 TEST_F(ControlPathTest, AnotherAircraftIsNotFlown) {
   start(LinkState::kConnected, "");
   EXPECT_EQ(path->standing(), Standing::kWrongAircraft);
@@ -417,7 +764,8 @@ TEST_F(ControlPathTest, AnotherAircraftIsNotFlown) {
   path->onAircraft({"QUAD", "Quadrotor"});
   EXPECT_EQ(path->standing(), Standing::kWrongAircraft);
   EXPECT_EQ(path->refusal(),
-            "the aircraft loaded is QUAD (Quadrotor), but config/aircraft/fixed_wing.yaml is for DA62");
+            "the aircraft loaded is QUAD (Quadrotor), but config/aircraft/fixed_wing.yaml is for DA62; "
+            "scripts/aircraft_config writes a file for the one that is loaded");
   path->command(FlightMode::kManual, rollCommand(0.3));
   EXPECT_TRUE(sim.writes().empty());
   EXPECT_FALSE(path->fits({"QUAD", ""}));
@@ -433,6 +781,15 @@ TEST_F(ControlPathTest, OverridesAreGivenBackWhenAnotherAircraftComes) {
   path->command(FlightMode::kManual, rollCommand(0.3));
   EXPECT_FLOAT_EQ(sim.value(kStickOverride), 0.0F);
   EXPECT_EQ(path->standing(), Standing::kWrongAircraft);
+}
+
+TEST_F(ControlPathTest, AnAircraftWithoutIcaoCodeIsKnownByItsDescription) {
+  options.aircraft = {"Aerolite 103"};
+  start(LinkState::kConnected, "");
+  EXPECT_FALSE(path->fits({"", ""}));
+  EXPECT_FALSE(path->fits({"", "Aerolite"}));
+  path->onAircraft({"", "Aerolite 103"});
+  EXPECT_EQ(path->standing(), Standing::kFlying);
 }
 
 TEST_F(ControlPathTest, WithoutAListAnyAircraftIsFlown) {
@@ -466,9 +823,9 @@ TEST_F(ControlPathTest, AnOverrideReleasedByAnotherStopsItUntilAModeIsAskedFor) 
   releaseByAnother();
   EXPECT_EQ(path->standing(), Standing::kWaitingForMode);
   const std::string why =
-      "another client has released sim/operation/override/override_joystick: ask for a mode to fly on";
+      "another client has released sim/operation/override/override_joystick_roll: ask for a mode to fly on";
   EXPECT_EQ(path->refusal(), why);
-  EXPECT_EQ(events, Texts{"nothing is sent any more: " + why});
+  EXPECT_EQ(events.back(), "nothing is sent any more: " + why);
   EXPECT_EQ(surface_releases, Texts{why});
   EXPECT_FALSE(inJournal(kStickOverride));
   sim.clearMessages();
@@ -499,7 +856,7 @@ TEST_F(ControlPathTest, ARepeatedRequestDoesNotEndTheWaiting) {
 TEST_F(ControlPathTest, WhatXPlaneReleasesWithANewFlightIsTakenAgain) {
   start();
   runWith(rollCommand(0.3), 0.3);
-  path->onNewFlight();
+  path->onNewFlight("the flight began anew");
   sim.set(kStickOverride, 0.0F);
   runWith(rollCommand(0.3), 2.0);
   EXPECT_EQ(path->standing(), Standing::kFlying);
@@ -540,6 +897,19 @@ TEST_F(ControlPathTest, SuspendedDuringALossItGivesBackAfterwards) {
   EXPECT_FLOAT_EQ(sim.value(kStickOverride), 0.0F);
 }
 
+TEST_F(ControlPathTest, ASecondBridgeIsNoCrash) {
+  start();
+  sim.journalOfAnother(true).record(std::string("override:") + kStickOverride, kOverridePurpose,
+                                    {core::UndoDref{kStickOverride, 0.0F}});
+  path->command(FlightMode::kManual, rollCommand(0.3));
+  frame();
+  EXPECT_TRUE(sim.writes().empty());
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].find("commands are not sent: another bridge is at this X-Plane: "), 0U);
+  EXPECT_NE(warnings[0].find("belongs to /fake"), std::string::npos);
+  EXPECT_EQ(warnings[0].find("crash"), std::string::npos);
+}
+
 TEST_F(ControlPathTest, WithoutTheJournalNothingIsTaken) {
   start();
   sim.breakJournal();
@@ -548,7 +918,8 @@ TEST_F(ControlPathTest, WithoutTheJournalNothingIsTaken) {
   frame();
   EXPECT_TRUE(sim.writes().empty());
   ASSERT_EQ(warnings.size(), 1u) << "warned of once";
-  EXPECT_NE(warnings[0].find("commands are not sent, because overrides could not be given back"), std::string::npos);
+  EXPECT_EQ(warnings[0].find("commands are not sent: it could not be given back after a crash, should there be one: "),
+            0U);
   sim.breakJournal(false);
   path->command(FlightMode::kManual, rollCommand(0.3));
   frame();

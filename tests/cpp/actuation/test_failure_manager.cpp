@@ -219,7 +219,7 @@ TEST_F(FailureManagerTest, WithoutTheJournalNothingIsBroken) {
   sim_.breakJournal();
   const RequestResult result = set(failed("engine_1"));
   EXPECT_EQ(result.code, ResultCode::kTimeout);
-  EXPECT_EQ(result.text.find("it could not be repaired after a crash: "), 0U) << result.text;
+  EXPECT_EQ(result.text.find("it could not be given back after a crash, should there be one: "), 0U) << result.text;
   EXPECT_EQ(sim_.value(kEngine), 0.0F);
   EXPECT_TRUE(labelNames().empty());
   const auto sent = written(kEngine);

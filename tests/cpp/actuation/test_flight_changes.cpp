@@ -100,6 +100,12 @@ class FlightChangesTest12 : public FlightChangesTest {
   FlightChangesTest12() : FlightChangesTest(core::kXPlane12) {}
 };
 
+class FlightChangesTestWithoutVehs : public FlightChangesTest {
+ protected:
+  FlightChangesTestWithoutVehs()
+      : FlightChangesTest({core::kXPlane12.number, static_cast<std::uint32_t>(core::Otherwise::kVehs)}) {}
+};
+
 // ------------------------------------------------------------------------------------------------ placing, version 11
 
 TEST_F(FlightChangesTest, PlacesByANewFlightWhileItIsPaused) {
@@ -114,6 +120,34 @@ TEST_F(FlightChangesTest, PausedFlightStaysPaused) {
   expectPlaced(place());
   EXPECT_EQ(flight_.messages, Names{"PREL"});
   EXPECT_TRUE(flight_.paused());
+}
+
+TEST_F(FlightChangesTest, ItsPauseIsInTheJournalWhileItLasts) {
+  std::size_t while_paused = 0, before_pause = 0;
+  const auto entries = [this] { return sim_.journal()->entries(); };
+  const auto on_frame = sim_.on_frame;
+  sim_.on_frame = [&] {
+    on_frame();
+    if (flight_.paused() && !entries().empty()) ++while_paused;
+    if (flight_.messages.empty()) before_pause += entries().size();
+  };
+  expectPlaced(place());
+  EXPECT_EQ(before_pause, 0U);
+  EXPECT_GT(while_paused, 0U);
+  EXPECT_TRUE(entries().empty());
+}
+
+TEST_F(FlightChangesTest, PauseOfTheUsersIsNotInTheJournal) {
+  flight_.setPaused(true);
+  sim_.run(0.1);
+  std::size_t seen = 0;
+  const auto on_frame = sim_.on_frame;
+  sim_.on_frame = [&] {
+    on_frame();
+    seen += sim_.journal()->entries().size();
+  };
+  expectPlaced(place());
+  EXPECT_EQ(seen, 0U);
 }
 
 TEST_F(FlightChangesTest, WhatThePauseIsForIsSaid) {
@@ -277,6 +311,12 @@ TEST_F(FlightChangesTest12, BeginsANewFlightWhereMovingFailsTwice) {
   EXPECT_NEAR(sim_.time() - begin, 6.1, 0.4);
 }
 
+TEST_F(FlightChangesTestWithoutVehs, BeginsANewFlightAtOnce) {
+  flight_.ignores_vehs = true;
+  expectPlaced(place());
+  EXPECT_EQ(flight_.messages, (Names{kToggle, "PREL", kToggle}));
+}
+
 TEST_F(FlightChangesTest12, BeginsANewFlightAfterACrash) {
   flight_.crashed = true;
   expectPlaced(place());
@@ -318,12 +358,110 @@ TEST_F(FlightChangesTest, LoadingIsShown) {
   EXPECT_EQ(sim_.value("sim/flightmodel/weight/m_fixed"), 100.0F);
 }
 
+TEST_F(FlightChangesTest12, PayloadGoesByTheStations) {
+  const auto stations = core::stationDatarefs(sim_.status().version);
+  sim_.setAll(stations, 0.0F);
+  sim_.set(stations[2], 40.0F);
+  sim_.set(stations[3], 10.0F);
+  sim_.set("sim/flightmodel/weight/m_fixed", 50.0F);
+  sim_.setReadOnly("sim/flightmodel/weight/m_fixed");  // it is their sum, whatever is written
+  const auto before = sim_.on_frame;
+  sim_.on_frame = [this, before, stations] {
+    if (before) before();
+    float sum = 0.0F;
+    for (const std::string& name : stations) sum += sim_.value(name);
+    sim_.set("sim/flightmodel/weight/m_fixed", sum);
+  };
+  expect(changes_.applyLoading({{}, 100.0, {}}), EventKind::kSetting, "the aircraft is loaded as asked for");
+  EXPECT_EQ(sim_.value(stations[2]), 80.0F);
+  EXPECT_EQ(sim_.value(stations[3]), 20.0F);
+}
+
+TEST_F(FlightChangesTest12, PayloadOfAnAircraftWithoutStationsGoesAsASum) {
+  sim_.set("sim/flightmodel/weight/m_fixed", 0.0F);
+  expect(changes_.applyLoading({{}, 100.0, {}}), EventKind::kSetting, "the aircraft is loaded as asked for");
+  // The same where there are stations that do nothing.
+  sim_.setAll(core::stationDatarefs(sim_.status().version), 0.0F);
+  expect(changes_.applyLoading({{}, 120.0, {}}), EventKind::kSetting, "the aircraft is loaded as asked for");
+  EXPECT_EQ(sim_.value("sim/flightmodel/weight/m_fixed"), 120.0F);
+}
+
 TEST_F(FlightChangesTest, LoadingThatIsNotTakenIsTold) {
   sim_.set("sim/flightmodel/weight/m_fuel[0]", 5.0F);
   sim_.setReadOnly("sim/flightmodel/weight/m_fuel[0]");
   expectFailure(changes_.applyLoading({{80.0}, 100.0, {}}), EventKind::kSetting,
                 "set_loading: sim/flightmodel/weight/m_fuel[0] is 5.000000, not 80.000000, "
                 "sim/flightmodel/weight/m_fixed does not answer");
+}
+
+// ------------------------------------------------------------------------------------------------ time and weather
+
+TEST_F(FlightChangesTest, TimeIsShown) {
+  sim_.setAll({"sim/time/use_system_time", "sim/time/zulu_time_sec"}, 1.0F);
+  sim_.loseMessages(2);
+  core::TimeSetting time;
+  time.zulu_time = 43200.0;
+  expect(changes_.applyTime(time), EventKind::kSetting, "it is the time that was asked for");
+  EXPECT_EQ(sim_.value("sim/time/use_system_time"), 0.0F);
+  EXPECT_EQ(sim_.value("sim/time/zulu_time_sec"), 43200.0F);
+}
+
+TEST_F(FlightChangesTest, SettingsThatEndWithTheNodeAreInTheJournalAndComeBack) {
+  const std::string name = "sim/weather/temperature_sealevel_c", real = "sim/weather/use_real_weather_bool";
+  sim_.set(name, 15.0F);
+  sim_.set(real, 1.0F);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  weather.sea_level_temperature = 35.0;  // what was there before the first of them counts
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  EXPECT_EQ(sim_.value(name), 35.0F);
+  ASSERT_EQ(sim_.journal()->entries().size(), 1U);
+  EXPECT_EQ(sim_.journal()->entries()[0].undo.size(), 2U);
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  EXPECT_EQ(sim_.value(name), 15.0F);
+  EXPECT_EQ(sim_.value(real), 1.0F);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+TEST_F(FlightChangesTest, SettingsStayWhereNobodyAskedToPutThemBack) {
+  const std::string name = "sim/weather/temperature_sealevel_c";
+  sim_.set(name, 15.0F);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  EXPECT_EQ(sim_.value(name), 30.0F);
+}
+
+TEST_F(FlightChangesTest, WhatCouldNotBePutBackIsNotChanged) {
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  expectFailure(changes_.applyWeather(weather), EventKind::kSetting,
+                "set_weather: X-Plane does not tell sim/weather/temperature_sealevel_c, which could not be put back "
+                "on exit");
+  EXPECT_TRUE(sim_.writes().empty());
+}
+
+TEST_F(FlightChangesTest, WeatherThatIsNotTakenIsTold) {
+  const std::string name = "sim/weather/temperature_sealevel_c";
+  sim_.set(name, 15.0F);
+  sim_.setReadOnly(name);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  expectFailure(changes_.applyWeather(weather), EventKind::kSetting, "set_weather: " + name + " is 15, not 30");
+}
+
+TEST_F(FlightChangesTest, WeatherThatXPlaneDoesNotHaveIsRefused) {
+  core::Weather weather;
+  weather.clouds.emplace(4);
+  expectFailure(changes_.applyWeather(weather), EventKind::kSetting,
+                "set_weather: X-Plane before 12.08 has 3 layers of clouds: 4 are given");
+  EXPECT_TRUE(sim_.writes().empty());
 }
 
 // ------------------------------------------------------------------------------------------------ aircraft

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fake_simulator.hpp"
+#include "xplane_bridge/actuation/pausing.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -17,8 +18,10 @@ namespace {
 constexpr const char* kJoystick = "sim/operation/override/override_joystick";
 
 GuardianOrders read(const std::string& text) {
+  GuardianOrders orders;
   std::istringstream lines(text);
-  return readGuardianOrders(lines);
+  for (std::string line; std::getline(lines, line);) orders.take(line);
+  return orders;
 }
 
 TEST(GuardianOrdersTest, LastPeerCounts) {
@@ -51,6 +54,44 @@ TEST(GuardianOrdersTest, WhatIsNoOrderLeavesTheLastOne) {
     EXPECT_EQ(orders.journal, "/a/b.json") << wrong;
     EXPECT_FALSE(orders.dismissed) << wrong;
   }
+}
+
+TEST(GuardianOrdersTest, BeatsAreExpectedFromTheFirstOnUntilARest) {
+  EXPECT_EQ(read("peer 10.0.0.1 49000 /a/b.json\n").hang_timeout, 0.0);
+  const GuardianOrders beating = read("beat 1.5\nbeat 1.5\nbeat\nbeat 0\nbeat x\n");
+  EXPECT_EQ(beating.hang_timeout, 1.5);
+  EXPECT_EQ(beating.beats, 2U);
+  EXPECT_EQ(read("beat 1.5\nrest\n").hang_timeout, 0.0);
+}
+
+TEST(HangWatchTest, HangsOnceAfterTheTimeout) {
+  HangWatch watch;
+  for (int i = 0; i < 19; ++i) EXPECT_FALSE(watch.passed(0.05, 1.0)) << i;
+  EXPECT_TRUE(watch.passed(0.06, 1.0));
+  EXPECT_FALSE(watch.passed(5.0, 1.0)) << "said once";
+  watch.beat();
+  for (int i = 0; i < 19; ++i) EXPECT_FALSE(watch.passed(0.05, 1.0)) << i;
+  EXPECT_TRUE(watch.passed(0.06, 1.0)) << "again";
+}
+
+TEST(HangWatchTest, EachBeatBeginsAnew) {
+  HangWatch watch;
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_FALSE(watch.passed(0.09, 1.0));
+    if (i % 10 == 9) watch.beat();
+  }
+}
+
+TEST(HangWatchTest, TimeInWhichTheGuardianDidNotRunIsNotTheParents) {
+  HangWatch watch;
+  for (int i = 0; i < 9; ++i) EXPECT_FALSE(watch.passed(3.0, 1.0)) << "a computer that is too busy for both";
+  watch.beat();
+  EXPECT_FALSE(watch.passed(60.0, 1.0)) << "it was suspended";
+}
+
+TEST(HangWatchTest, NothingHangsWhereNoBeatIsExpected) {
+  HangWatch watch;
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(watch.passed(0.1, 0.0));
 }
 
 /// Another process that has set an override.
@@ -113,6 +154,17 @@ TEST_F(ReleaseLeftBehind, GivesBackAndClearsTheJournal) {
   EXPECT_EQ(sim_.value(kJoystick), 0.0F);
   EXPECT_TRUE(sim_.journal()->entries().empty());
   EXPECT_EQ(successes_, std::vector<bool>{true});
+}
+
+TEST_F(ReleaseLeftBehind, LetsXPlaneGoOn) {
+  sim_.setState(core::LinkState::kPaused);
+  sim_.journalOfAnother().record("two", kPausePurpose, {core::UndoPause{}});
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.label == "CMND") sim_.setState(core::LinkState::kConnected);
+  };
+  EXPECT_TRUE(release());
+  EXPECT_EQ(sim_.commands(), std::vector<std::string>{"sim/operation/pause_toggle"});
+  EXPECT_TRUE(sim_.journal()->entries().empty());
 }
 
 TEST_F(ReleaseLeftBehind, LostDatagramIsSentAgain) {

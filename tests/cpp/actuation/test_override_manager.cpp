@@ -50,6 +50,53 @@ class OverrideManagerTest : public testing::Test {
                            [this](const std::string& text, bool success) { reports_.emplace_back(text, success); }};
 };
 
+TEST_F(OverrideManagerTest, WhatWasShownBeforeAReleaseSaysNothingOfTheNextTime) {
+  manager_.setRequired({kJoystick});
+  letSixAnswersPass();
+  manager_.setRequired({});
+  sim_.setReadOnly(kJoystick);
+  manager_.setRequired({kJoystick});
+  letSixAnswersPass();
+  EXPECT_TRUE(manager_.releasedByOthers().empty()) << "it has not been shown as set since";
+}
+
+// ------------------------------------------------------------------------------------------------ DATA rows
+
+TEST_F(OverrideManagerTest, RowIsInTheJournalAndGetsItsSlotsBack) {
+  const auto rowsSent = [this] {
+    std::vector<std::int32_t> out;
+    for (const auto& message : sim_.messages()) {
+      if (message.label != "DATA") continue;
+      out.push_back(core::loadLittleEndian<std::int32_t>(message.body.data()));
+      for (std::size_t i = 0; i < 8; ++i) {
+        EXPECT_EQ(core::loadLittleEndian<float>(message.body.data() + 4 + 4 * i), -999.0F);
+      }
+    }
+    return out;
+  };
+  const auto entries = [this] { return sim_.journal()->entries(); };
+  manager_.setRequired({"DATA row 8"});
+  EXPECT_TRUE(sim_.messages().empty()) << "it goes out with the command";
+  ASSERT_EQ(entries().size(), 1U);
+  EXPECT_EQ(entries()[0].id, "override:DATA row 8");
+  ASSERT_EQ(entries()[0].undo.size(), 1U);
+  EXPECT_EQ(std::get<core::UndoData>(entries()[0].undo[0]).row.index, 8);
+  EXPECT_TRUE(sim_.subscribed().empty()) << "X-Plane does not show who holds it";
+  manager_.refresh();
+  letSixAnswersPass();
+  EXPECT_TRUE(manager_.releasedByOthers().empty());
+  EXPECT_TRUE(sim_.messages().empty());
+  manager_.setRequired({});
+  EXPECT_EQ(rowsSent(), std::vector<std::int32_t>{8});
+  manager_.confirmReleases(1.0);
+  EXPECT_EQ(rowsSent(), (std::vector<std::int32_t>{8, 8})) << "a datagram may be lost";
+  EXPECT_TRUE(entries().empty());
+  manager_.setRequired({"DATA row 13"});
+  EXPECT_TRUE(manager_.releaseAll(1.0));
+  EXPECT_EQ(rowsSent(), (std::vector<std::int32_t>{8, 8, 13}));
+  EXPECT_TRUE(entries().empty());
+}
+
 // ------------------------------------------------------------------------------------------------ setRequired()
 
 TEST_F(OverrideManagerTest, RequiredOverridesAreSetOnce) {
@@ -167,6 +214,107 @@ TEST_F(OverrideManagerTest, AcquiredAnewItTakesTheNewValue) {
   sim_.set(kFailure, 0.0F);
   manager_.refresh();
   EXPECT_EQ(sim_.value(kFailure), 1.0F);
+}
+
+// ------------------------------------------------------------------------------- what is written before a release
+
+class PreparedRelease : public OverrideManagerTest {
+ protected:
+  static constexpr const char* kLever = "sim/cockpit2/engine/actuators/throttle_ratio[0]";
+  PreparedRelease() { sim_.set(kLever, 0.0F); }
+  void prepare(float value) { manager_.prepareRelease(kThrottles, {core::UndoDref{kLever, value, false}}); }
+  float recorded() {
+    const auto undo = sim_.journal()->entries().at(0).undo;
+    return undo.size() == 2 ? std::get<core::UndoDref>(undo[0]).value : -1.0F;
+  }
+};
+
+TEST_F(PreparedRelease, IsOverWithTheRelease) {
+  manager_.setRequired({kThrottles});
+  prepare(0.5F);
+  manager_.setRequired({});
+  manager_.setRequired({kThrottles});
+  sim_.clearMessages();
+  manager_.setRequired({});
+  EXPECT_EQ(sim_.writes(), (Writes{{kThrottles, 0.0F}})) << "the lever was commanded otherwise meanwhile";
+}
+
+TEST_F(PreparedRelease, ComesRightBeforeTheRelease) {
+  manager_.setRequired({kThrottles});
+  prepare(0.5F);
+  prepare(0.6F);
+  sim_.clearMessages();
+  manager_.setRequired({});
+  EXPECT_EQ(sim_.writes(), (Writes{{kLever, 0.6F}, {kThrottles, 0.0F}}));
+  sim_.set(kLever, 0.2F);
+  sim_.clearMessages();
+  manager_.confirmReleases(1.0);
+  EXPECT_EQ(sim_.writes(), (Writes{{kThrottles, 0.0F}})) << "the lever may be commanded by now";
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+TEST_F(PreparedRelease, IsNotReadBack) {
+  sim_.setReadOnly(kLever);
+  manager_.setRequired({kThrottles});
+  prepare(0.6F);
+  EXPECT_TRUE(manager_.releaseAll(1.0));
+  EXPECT_EQ(sim_.value(kThrottles), 0.0F);
+}
+
+TEST_F(PreparedRelease, ComesAlsoAtTheEnd) {
+  manager_.setRequired({kThrottles});
+  prepare(0.6F);
+  EXPECT_TRUE(manager_.releaseAll(1.0));
+  EXPECT_EQ(sim_.value(kLever), 0.6F);
+}
+
+TEST_F(PreparedRelease, IsForWhatIsSetOnly) {
+  prepare(0.6F);
+  manager_.setRequired({kThrottles});
+  manager_.setRequired({});
+  EXPECT_EQ(sim_.value(kLever), 0.0F);
+}
+
+TEST_F(PreparedRelease, GoesToTheJournalOnceASecondWhereItChanges) {
+  manager_.setRequired({kThrottles});
+  prepare(0.5F);
+  EXPECT_EQ(recorded(), -1.0F) << "not by the thread that controls";
+  manager_.recordPreparations();
+  EXPECT_EQ(recorded(), 0.5F);
+  prepare(0.7F);
+  sim_.run(0.5);
+  manager_.recordPreparations();
+  EXPECT_EQ(recorded(), 0.5F);
+  sim_.run(0.6);
+  manager_.recordPreparations();
+  EXPECT_EQ(recorded(), 0.7F);
+  prepare(0.705F);
+  sim_.run(1.1);
+  manager_.recordPreparations();
+  EXPECT_EQ(recorded(), 0.7F) << "a hundredth is not worth the disk";
+}
+
+TEST_F(PreparedRelease, OfACrashedRunIsWrittenWithItsRelease) {
+  sim_.set(kThrottles, 1.0F);
+  sim_.setReadOnly(kLever, false);
+  sim_.journalOfAnother().record(std::string("override:") + kThrottles, kOverridePurpose,
+                                 {core::UndoDref{kLever, 0.6F, false}, core::UndoDref{kThrottles, 0.0F}});
+  EXPECT_TRUE(manager_.releaseLeftovers(1.0));
+  EXPECT_EQ(sim_.writes(), (Writes{{kLever, 0.6F}, {kThrottles, 0.0F}}));
+}
+
+TEST_F(OverrideManagerTest, GivenBackByAnotherProcessNothingIsSetAnyMore) {
+  manager_.setRequired({kJoystick});
+  manager_.acquire(kFailure, 6.0F, false);
+  manager_.giveBackAll();
+  EXPECT_TRUE(manager_.active().empty());
+  EXPECT_EQ(sim_.value(kFailure), 0.0F);
+  manager_.refresh();
+  EXPECT_EQ(sim_.value(kJoystick), 0.0F);
+  manager_.confirmReleases(1.0);
+  EXPECT_TRUE(inJournal().empty());
+  manager_.setRequired({kJoystick});
+  EXPECT_EQ(sim_.value(kJoystick), 1.0F) << "it may be taken again";
 }
 
 // --------------------------------------------------------------------------------------------------- refresh()
@@ -389,14 +537,31 @@ TEST_F(OverrideManagerTest, ReleaseAllGivesBackEverythingForGood) {
 
 TEST_F(OverrideManagerTest, ReleaseAllSaysWhatCouldNotBeSeen) {
   manager_.setRequired({kJoystick});
-  sim_.setState(core::LinkState::kLost);
+  sim_.setReadOnly(kJoystick);
   reports_.clear();
   EXPECT_FALSE(manager_.releaseAll(0.5));
   EXPECT_EQ(inJournal(), Names{kJoystick}) << "for the guardian and the next start";
   EXPECT_FALSE(manager_.releaseAll(0.5));
-  ASSERT_EQ(reports_.size(), 1U) << "said once";
-  EXPECT_FALSE(reports_[0].second);
-  EXPECT_NE(reports_[0].first.find("override_joystick"), std::string::npos);
+  EXPECT_EQ(reports_, (Reports{{"override_joystick could not be seen released; it stays in the journal", false}}))
+      << "said once";
+  sim_.setReadOnly(kJoystick, false);
+  EXPECT_TRUE(manager_.releaseAll(0.5));
+  EXPECT_TRUE(inJournal().empty());
+}
+
+TEST_F(OverrideManagerTest, XPlaneThatWentFirstIsNoCrashOfOurs) {
+  manager_.setRequired({kJoystick});
+  sim_.setState(core::LinkState::kLost);
+  reports_.clear();
+  EXPECT_FALSE(manager_.releaseAll(0.5));
+  EXPECT_EQ(inJournal(), Names{kJoystick}) << "it may only have been silent";
+  EXPECT_EQ(sim_.journal()->entries()[0].left, "X-Plane went first") << "for the next start";
+  ASSERT_EQ(reports_.size(), 1U);
+  EXPECT_EQ(reports_[0].first.find("override_joystick could not be released, because X-Plane went first, or is silent"),
+            0U);
+  EXPECT_TRUE(reports_[0].second);
+  EXPECT_FALSE(manager_.releaseAll(0.5));
+  EXPECT_EQ(reports_.size(), 1U) << "said once";
   sim_.setState(core::LinkState::kConnected);
   EXPECT_TRUE(manager_.releaseAll(0.5));
   EXPECT_EQ(sim_.value(kJoystick), 0.0F);
@@ -418,6 +583,33 @@ TEST_F(OverrideManagerTest, LeftoversOfACrashedRunAreReleased) {
   EXPECT_TRUE(inJournal().empty());
   EXPECT_EQ(reports_.back(),
             (std::pair<std::string, bool>{"released override_joystick left by a run that crashed", true}));
+}
+
+TEST_F(OverrideManagerTest, LeftoversAreToldByTheirCause) {
+  crashedRunHas(kJoystick);
+  core::Journal gone = sim_.journalOfAnother();
+  gone.record("override:" + std::string(kThrottles), kOverridePurpose, {core::UndoDref{kThrottles, 0.0F}});
+  gone.leave({"override:" + std::string(kThrottles)}, "X-Plane went first");
+  sim_.setState(core::LinkState::kLost);
+  EXPECT_FALSE(manager_.releaseLeftovers(0.5));
+  sim_.setState(core::LinkState::kConnected);
+  EXPECT_TRUE(manager_.releaseLeftovers(0.5));
+  ASSERT_EQ(reports_.size(), 2U);
+  EXPECT_FALSE(reports_[0].second);
+  const std::string what =
+      "override_joystick left by a run that crashed, "
+      "override_throttles left because X-Plane went first";
+  EXPECT_EQ(reports_[0].first.find(what + " could not be released, because X-Plane went first, or is silent"), 0U);
+  EXPECT_EQ(reports_[1].first, "released " + what);
+}
+
+TEST_F(OverrideManagerTest, WhatItsRunHasToldIsNotToldAgain) {
+  core::Journal gone = sim_.journalOfAnother();
+  gone.record("override:x", kOverridePurpose, {core::UndoDref{kJoystick, 0.0F}});
+  gone.leave({"override:x"}, "X-Plane went first");
+  sim_.setState(core::LinkState::kLost);
+  EXPECT_FALSE(manager_.releaseLeftovers(0.5));
+  EXPECT_TRUE(reports_.empty());
 }
 
 TEST_F(OverrideManagerTest, NoLeftoversIsDoneAtOnce) {

@@ -89,5 +89,60 @@ TEST(Pausing, DoesNotWaitOnceItIsGivenUp) {
   EXPECT_EQ(sim.commands(), Names{kToggle});
 }
 
+TEST(Pausing, WhatComesBeforeIsCalledOnlyWhereSomethingIsSent) {
+  core::FakeSimulator sim(core::kXPlane11);
+  obey(&sim);
+  int calls = 0;
+  const auto count = [&] {
+    ++calls;
+    EXPECT_TRUE(sim.commands().empty());
+  };
+  setPaused(&sim, false, kTimeout, never, count);
+  EXPECT_EQ(calls, 0);
+  setPaused(&sim, true, kTimeout, never, count);
+  EXPECT_EQ(calls, 1);
+}
+
+TEST(ResumeLeftovers, LetsGoOnWhatACrashedRunHasPaused) {
+  core::FakeSimulator sim(core::kXPlane11);
+  obey(&sim);
+  sim.setState(core::LinkState::kPaused);
+  EXPECT_TRUE(resumeLeftovers(&sim, kTimeout)) << "nothing is left";
+  EXPECT_TRUE(sim.commands().empty()) << "a pause of the user's";
+  sim.journalOfAnother().record("pause:one", kPausePurpose, {core::UndoPause{}});
+  EXPECT_TRUE(resumeLeftovers(&sim, kTimeout));
+  EXPECT_EQ(sim.commands(), Names{kToggle});
+  EXPECT_TRUE(sim.journal()->entries().empty());
+}
+
+TEST(ResumeLeftovers, SendsNothingToAnXPlaneThatRuns) {
+  core::FakeSimulator sim(core::kXPlane11);
+  sim.journalOfAnother().record("pause:one", kPausePurpose, {core::UndoPause{}});
+  EXPECT_TRUE(resumeLeftovers(&sim, kTimeout));
+  EXPECT_TRUE(sim.commands().empty());
+  EXPECT_TRUE(sim.journal()->entries().empty());
+}
+
+TEST(ResumeLeftovers, IsKeptWhereXPlaneDoesNotFollow) {
+  core::FakeSimulator sim(core::kXPlane11);
+  sim.setState(core::LinkState::kPaused);
+  sim.journalOfAnother().record("pause:one", kPausePurpose, {core::UndoPause{}});
+  EXPECT_FALSE(resumeLeftovers(&sim, kTimeout));
+  EXPECT_EQ(sim.journal()->entries().size(), 1U);
+}
+
+TEST(ResumeLeftovers, PauseOfARunThatLivesIsItsOwn) {
+  core::FakeSimulator sim(core::kXPlane11);
+  obey(&sim);
+  sim.setState(core::LinkState::kPaused);
+  recordPause(&sim);
+  sim.journalOfAnother(true).record("pause:alive", kPausePurpose, {core::UndoPause{}});
+  EXPECT_TRUE(resumeLeftovers(&sim, kTimeout));
+  EXPECT_TRUE(sim.commands().empty());
+  EXPECT_EQ(sim.journal()->entries().size(), 2U);
+  forgetPause(&sim);
+  EXPECT_EQ(sim.journal()->entries().size(), 1U);
+}
+
 }  // namespace
 }  // namespace xplane_bridge

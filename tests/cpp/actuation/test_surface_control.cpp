@@ -54,6 +54,15 @@ class SurfaceControlTest12 : public SurfaceControlTest {
   SurfaceControlTest12() : SurfaceControlTest(core::kXPlane12) {}
 };
 
+core::SimulatorVersion otherwise(core::Otherwise what) {
+  return {core::kXPlane11.number, static_cast<std::uint32_t>(what)};
+}
+
+class SurfaceControlTestOfOtherBeta : public SurfaceControlTest {
+ protected:
+  SurfaceControlTestOfOtherBeta() : SurfaceControlTest(otherwise(core::Otherwise::kBetaSign)) {}
+};
+
 // ------------------------------------------------------------------------------------------------ the four states
 
 TEST_F(SurfaceControlTest, NothingIsSentWhileNothingNeedsTheSurfaces) {
@@ -126,10 +135,17 @@ TEST_F(SurfaceControlTest, OverrideIsRepeatedWhileXPlaneDoesNotShowIt) {
   EXPECT_EQ(state(), State::kDriving);
 }
 
-TEST_F(SurfaceControlTest, GivesBackWhatIsNotNeededAnyMore) {
+TEST_F(SurfaceControlTest, GivesBackWhatIsNotNeededAnyMoreOnceItIsBackOnTheLaw) {
   drive();
   surfaces_.setFailures({});
   EXPECT_TRUE(surfaces_.givingBack());
+  sim_.run(0.1);
+  const std::vector<float> way = written(kLeft);
+  const std::vector<double> expected{4.8, 3.6, 2.4, 1.2, 0.0};  // from 6 deg, no jump
+  ASSERT_EQ(way.size(), expected.size());
+  for (std::size_t i = 0; i < way.size(); ++i) EXPECT_NEAR(way[i], expected[i], 1e-5);
+  EXPECT_EQ(state(), State::kDriving);
+  sim_.clearMessages();
   sim_.frame();
   EXPECT_EQ(state(), State::kReleasing);
   EXPECT_EQ(sim_.writes(), (Writes{{kSurfaceOverride, 0.0F}}));
@@ -138,10 +154,29 @@ TEST_F(SurfaceControlTest, GivesBackWhatIsNotNeededAnyMore) {
   EXPECT_EQ(state(), State::kIdle);
   EXPECT_FALSE(surfaces_.givingBack());
   EXPECT_EQ(reports_, (Reports{{"X-Plane drives the surfaces again", true}}));
-  EXPECT_EQ(sim_.value(kLeft), 0.0F);
   EXPECT_TRUE(overrides_.releasesPending()) << "its journal entry stays until the release has been read back";
   sim_.run(1.0);
   EXPECT_EQ(reports_.size(), 1U) << "all of them follow the stick";
+}
+
+TEST_F(SurfaceControlTest, GivesBackWithinTwoSecondsWhateverTheStickDoes) {
+  drive();
+  surfaces_.setFailures({});
+  for (int i = 0; i < 99; ++i) {
+    surfaces_.setStick({i % 2 == 0 ? 1.0 : -1.0, 0.0, 0.0});  // no surface can follow that
+    sim_.frame();
+  }
+  EXPECT_EQ(state(), State::kDriving);
+  sim_.run(0.1);
+  EXPECT_EQ(state(), State::kIdle);
+}
+
+TEST_F(SurfaceControlTest, WhilePausedItGivesBackAtOnce) {
+  drive();
+  setLink(core::LinkState::kPaused);
+  surfaces_.setFailures({});
+  sim_.frame();
+  EXPECT_EQ(state(), State::kReleasing);
 }
 
 TEST_F(SurfaceControlTest, WhatIsNeededAgainWhileReleasingGoesOnFromThere) {
@@ -149,14 +184,14 @@ TEST_F(SurfaceControlTest, WhatIsNeededAgainWhileReleasingGoesOnFromThere) {
   airframe_.setStick(0.5);
   sim_.setReadOnly(kSurfaceOverride);
   surfaces_.setFailures({});
-  sim_.run(0.1);
+  sim_.run(0.3);
   ASSERT_EQ(state(), State::kReleasing);
   sim_.setReadOnly(kSurfaceOverride, false);
   sim_.clearMessages();
   surfaces_.setFailures({stuckAt(6.0)});
   sim_.frame();
   EXPECT_EQ(state(), State::kTaking);
-  EXPECT_EQ(written(kLeft).front(), 6.0F) << "not from the middle: the same driver goes on";
+  EXPECT_EQ(written(kLeft).front(), 10.0F) << "not from the middle: the same driver goes on";
   sim_.run(0.1);
   EXPECT_EQ(state(), State::kDriving);
 }
@@ -165,7 +200,9 @@ TEST_F(SurfaceControlTest, ReleaseThatIsNotShownEndsAfterTwoSeconds) {
   drive();
   sim_.setReadOnly(kSurfaceOverride);
   surfaces_.setFailures({});
-  sim_.run(1.98);
+  sim_.run(0.12);  // five frames back to the law, and the one that gives back
+  ASSERT_EQ(state(), State::kReleasing);
+  sim_.run(1.96);
   EXPECT_EQ(state(), State::kReleasing);
   sim_.run(0.1);
   EXPECT_EQ(state(), State::kIdle);
@@ -177,7 +214,10 @@ TEST_F(SurfaceControlTest, SurfaceThatXPlaneLeavesStandingIsReported) {
   drive();
   airframe_.setStanding(FakeAirframe::kLeft);
   surfaces_.setFailures({});
-  sim_.run(0.48);
+  sim_.run(0.14);
+  ASSERT_EQ(state(), State::kIdle);
+  airframe_.setStick(0.5);  // 10 deg
+  sim_.run(0.46);
   EXPECT_EQ(reports_.size(), 1U) << "it is given half a second";
   sim_.run(0.1);
   EXPECT_EQ(reports_.back(),
@@ -226,7 +266,7 @@ TEST_F(SurfaceControlTest, EachFaultBringsTheSurfaceWhereItSays) {
     EXPECT_NEAR(sim_.value(kLeft), each.at_last, 1e-4);
     EXPECT_NEAR(sim_.value(kRight), -10.0, 1e-4);
     surfaces_.setFailures({});
-    sim_.run(0.1);
+    sim_.run(0.6);  // 30 deg at most, back to the law
     ASSERT_EQ(state(), State::kIdle);
   }
 }
@@ -237,6 +277,22 @@ TEST_F(SurfaceControlTest, FloatingSurfaceTrailsWithTheFlow) {
   surfaces_.setFailures({{kLeftNumber, SurfaceFault::kFloating, {}}});
   sim_.run(5.0);
   EXPECT_NEAR(sim_.value(kLeft), -3.0, 1e-3);  // 0.3 of alpha, trailing edge up
+}
+
+TEST_F(SurfaceControlTest, FloatingRudderTrailsWithWindFromTheLeftWhereBetaIsPositive) {
+  drive();
+  sim_.set("sim/flightmodel/position/beta", 10.0F);
+  surfaces_.setFailures({{core::surfaceNumber(FakeAirframe::kRudder).value(), SurfaceFault::kFloating, {}}});
+  sim_.run(5.0);
+  EXPECT_NEAR(sim_.value(kRudder), 3.0, 1e-3);  // 0.3 of it, trailing edge right: away from the wind
+}
+
+TEST_F(SurfaceControlTestOfOtherBeta, FloatingRudderTrailsTheOtherWay) {
+  drive();
+  sim_.set("sim/flightmodel/position/beta", 10.0F);
+  surfaces_.setFailures({{core::surfaceNumber(FakeAirframe::kRudder).value(), SurfaceFault::kFloating, {}}});
+  sim_.run(5.0);
+  EXPECT_NEAR(sim_.value(kRudder), -3.0, 1e-3);
 }
 
 // ------------------------------------------------------------------------------------------- what X-Plane does not do
@@ -258,7 +314,7 @@ TEST_F(SurfaceControlTest, OverrideThatIsNotShownIsGivenBackAndTriedAgainAfterFi
   sim_.run(0.3);
   EXPECT_EQ(state(), State::kDriving) << "the failure still needs it";
   surfaces_.setFailures({});
-  sim_.run(0.1);
+  sim_.run(0.2);
   EXPECT_EQ(state(), State::kIdle) << "but nothing else does";
 }
 
@@ -285,7 +341,8 @@ TEST_F(SurfaceControlTest, WithoutTheJournalNothingIsTakenOver) {
   EXPECT_EQ(state(), State::kIdle);
   EXPECT_TRUE(written(kSurfaceOverride).empty());
   ASSERT_EQ(reports_.size(), 1U);
-  EXPECT_NE(reports_[0].first.find("because they could not be given back after a crash: "), std::string::npos);
+  EXPECT_NE(reports_[0].first.find("it could not be given back after a crash, should there be one: "),
+            std::string::npos);
   EXPECT_FALSE(reports_[0].second);
   EXPECT_EQ(surfaces_.setOffset(1.0), "the surfaces could not be taken over");
   sim_.breakJournal(false);
@@ -520,34 +577,48 @@ TEST_F(SurfaceControlTest, CommandThatIsOvertakenIsNotToldAsShown) {
   EXPECT_TRUE(echoes_[2].read_back);
 }
 
-TEST_F(SurfaceControlTest, CommandThatIsNotRepeatedEnds) {
-  ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 1));
-  sim_.run(0.4);
-  ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 2));
-  sim_.run(0.48);
-  EXPECT_EQ(state(), State::kDriving);
-  sim_.run(0.1);
-  EXPECT_EQ(state(), State::kIdle);
-}
-
-TEST_F(SurfaceControlTest, CommandDoesNotAgeWhileXPlaneStands) {
-  ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 1));
-  sim_.run(0.3);
-  setLink(core::LinkState::kPaused);
-  sim_.run(10.0);
-  EXPECT_EQ(state(), State::kDriving);
-  setLink(core::LinkState::kConnected);
-  sim_.run(0.3);
-  EXPECT_EQ(state(), State::kIdle);
-}
-
-TEST_F(SurfaceControlTest, EmptyCommandGivesBackAtOnce) {
-  ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 1));
-  sim_.run(0.1);
-  ASSERT_EQ(state(), State::kDriving);
-  EXPECT_FALSE(surfaces_.command({}, {}, 2));
+TEST_F(SurfaceControlTest, CommandsThatEndGoBackToTheStickWithoutAJump) {
+  airframe_.setStick(-0.25);  // the left aileron at -5 deg
   sim_.frame();
-  EXPECT_EQ(state(), State::kReleasing);
+  for (const bool by_an_empty_list : {true, false}) {
+    ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 1));
+    sim_.run(0.3);
+    ASSERT_FLOAT_EQ(sim_.value(kLeft), 6.0F);
+    sim_.clearMessages();
+    if (by_an_empty_list) {
+      EXPECT_FALSE(surfaces_.command({}, {}, 2));
+    } else {
+      surfaces_.endCommands();
+    }
+    sim_.frame();
+    EXPECT_EQ(written(kLeft), std::vector<float>{4.8F}) << "with the next frame";
+    sim_.run(0.16);
+    EXPECT_NEAR(sim_.value(kLeft), -4.8, 1e-5) << "eight frames later, and given back from there";
+    sim_.run(0.04);
+    EXPECT_EQ(state(), State::kIdle);
+    EXPECT_FLOAT_EQ(sim_.value(kLeft), -5.0F);
+  }
+}
+
+TEST_F(SurfaceControlTest, AnotherClientThatReleasesTheOverrideUnderACommandIsToldOnce) {
+  drive();
+  sim_.set(kSurfaceOverride, 0.0F);
+  sim_.frame();
+  EXPECT_FALSE(surfaces_.takeReleasedByAnother()) << "a failure has no mode";
+  sim_.run(1.2);  // its mixing is checked again
+  ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 1));
+  sim_.run(0.2);
+  ASSERT_EQ(state(), State::kDriving);
+  sim_.set(kSurfaceOverride, 0.0F);
+  sim_.frame();
+  EXPECT_TRUE(surfaces_.takeReleasedByAnother());
+  EXPECT_FALSE(surfaces_.takeReleasedByAnother());
+}
+
+TEST_F(SurfaceControlTest, CommandsThatMayNotFlyAreCounted) {
+  surfaces_.refuseCommand("the mode is MANUAL");
+  EXPECT_EQ(surfaces_.status().commands_refused, 1U);
+  EXPECT_EQ(surfaces_.status().last_refusal, "the mode is MANUAL");
 }
 
 TEST_F(SurfaceControlTest, FailureIsStrongerThanACommand) {
@@ -630,6 +701,28 @@ TEST_F(SurfaceControlTest, MixingThatCannotBeKeptIsStillFlownBy) {
   EXPECT_FALSE(reports_[0].second);
   EXPECT_NE(surfaces_.status().file_problem, "");
   EXPECT_EQ(surfaces_.blockReason(), "");
+}
+
+TEST_F(SurfaceControlTest, AShippedMixingCountsForExactlyItsAircraftAndWhereThereIsNoOwn) {
+  core::MixingModel model = *readMixingFile(folder(), "TEST");
+  model.aircraft = "TEST Own one";
+  writeMixingFile(shipped(), model);
+  surfaces_.onAircraft("OTHER", "OTHER Own one");
+  EXPECT_FALSE(surfaces_.status().mixing_known);
+  std::filesystem::remove(core::mixingPath(folder(), "TEST"));
+  surfaces_.onAircraft("TEST", "TEST Another");
+  EXPECT_FALSE(surfaces_.status().mixing_known);
+  surfaces_.onAircraft("OTHER");
+  surfaces_.onAircraft("TEST", "TEST Own one");
+  EXPECT_TRUE(surfaces_.status().mixing_known);
+  sim_.run(2.0);
+  EXPECT_EQ(surfaces_.blockReason(), "");
+  model.aircraft = "TEST";
+  model.laws.pop_back();
+  writeMixingFile(folder(), model);
+  surfaces_.onAircraft("OTHER");
+  surfaces_.onAircraft("TEST", "TEST Own one");
+  EXPECT_EQ(surfaces_.status().mixed_surfaces.size(), model.laws.size()) << "its own goes first";
 }
 
 TEST_F(SurfaceControlTest, FileThatCannotBeReadIsReported) {

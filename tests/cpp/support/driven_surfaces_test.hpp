@@ -37,9 +37,11 @@ class DrivenSurfacesTest : public testing::Test {
     surfaces_.tick(blocked_);
   }
   std::string folder() const { return sim_.folder() + "/mixing"; }
+  std::string shipped() const { return sim_.folder() + "/shipped"; }
   SurfaceControlOptions options() const {
     SurfaceControlOptions out;
     out.mixing_folder = folder();
+    out.shipped_mixing = shipped();
     return out;
   }
   SurfaceControlState state() const { return surfaces_.status().state; }

@@ -37,6 +37,7 @@ class FakeXPlane {
     datarefs["sim/version/xplane_internal_version"] = 115501.0F;
     datarefs["sim/time/paused"] = 0.0F;
     datarefs["sim/time/total_running_time_sec"] = 100.0F;
+    datarefs["sim/operation/misc/frame_rate_period"] = 0.015F;
     datarefs["sim/network/dataout/network_data_rate"] = 20.0F;
     for (int row = 0; row < 200; ++row) {
       datarefs[rowPath(row)] = 0.0F;
@@ -156,6 +157,8 @@ class FakeXPlane {
   Address data_target{0, 0};
   bool data_target_on = false;
   std::size_t requests_in_pump = 0;
+  std::size_t request_limit = 148;  // RREF requests taken in a frame, more are lost
+  std::size_t lost_requests = 0;
   std::size_t pairs_per_datagram = 180;
   bool ignores_target = false;  // ISE4 is lost
 
@@ -179,7 +182,10 @@ class FakeXPlane {
     labels.push_back(label);
     const auto* text = reinterpret_cast<const char*>(bytes);
     if (label == "RREF" && size == 413) {
-      ++requests_in_pump;
+      if (++requests_in_pump > request_limit) {
+        ++lost_requests;
+        return;
+      }
       const auto index = at<std::int32_t>(bytes + 9);
       if (at<std::int32_t>(bytes + 5) == 0) {
         subscriptions[from].erase(index);

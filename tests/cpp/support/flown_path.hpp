@@ -14,7 +14,9 @@ namespace xplane_bridge {
 constexpr const char* kStickRoll = "sim/joystick/yoke_roll_ratio";
 constexpr const char* kStickPitch = "sim/joystick/yoke_pitch_ratio";
 constexpr const char* kStickYaw = "sim/joystick/yoke_heading_ratio";
-constexpr const char* kStickOverride = "sim/operation/override/override_joystick";
+constexpr const char* kStickOverride = "sim/operation/override/override_joystick_roll";
+constexpr const char* kPitchOverride = "sim/operation/override/override_joystick_pitch";
+constexpr const char* kYawOverride = "sim/operation/override/override_joystick_heading";
 constexpr const char* kFlapHandle = "sim/cockpit2/controls/flap_ratio";
 
 inline core::ControlCommand rollCommand(double roll, std::uint32_t sequence = 1) {
@@ -39,6 +41,7 @@ struct FlownPath {
   std::vector<AppliedControls> applied;
   std::vector<std::string> events, warnings, excitation_ends, surface_releases, override_reports;
   std::array<double, 3> stick{};
+  int surface_ends = 0;
   core::ChannelExcitation excitation;  // the test's: what is to be added
 
   FlownPath() {
@@ -47,7 +50,8 @@ struct FlownPath {
     options.aircraft_file = "config/aircraft/fixed_wing.yaml";
     sim.setAll(core::flightWatchDatarefs(), 0.0F);
     sim.set("sim/time/total_running_time_sec", 100.0F);
-    for (const char* name : {kStickRoll, kStickPitch, kStickYaw, kStickOverride, kFlapHandle}) {
+    for (const char* name :
+         {kStickRoll, kStickPitch, kStickYaw, kStickOverride, kPitchOverride, kYawOverride, kFlapHandle}) {
       sim.set(name, 0.0F);
     }
   }
@@ -65,6 +69,7 @@ struct FlownPath {
       excitation_ends.push_back(why);
     };
     hooks.release_surfaces = [this](const std::string& why) { surface_releases.push_back(why); };
+    hooks.end_surface_commands = [this] { ++surface_ends; };
     hooks.event = [this](ControlPathHooks::Kind, const std::string& text, const std::string& who) {
       events.push_back(who.empty() ? text : text + " (" + who + ")");
     };

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <string>
 
+#include "xplane_bridge/core/camera/view_stream.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
 #include "xplane_bridge/core/failures/failure_names.hpp"
 #include "xplane_bridge/core/failures/failures.hpp"
@@ -12,6 +13,8 @@
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
+#include "xplane_bridge/core/simulator/view_ways.hpp"
+#include "xplane_bridge/core/simulator/world_settings.hpp"
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 #include "xplane_bridge/core/state/field_table.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
@@ -33,6 +36,7 @@ class Uses {
     surfaces();
     failures();
     settings();
+    camera();
     link();
   }
 
@@ -111,20 +115,47 @@ class Uses {
   void settings() const {
     set(windWrites({10.0, 270.0, 0.5}, version_));
     readAll(shownWindDatarefs(version_));
+    Weather weather;
+    weather.wind.emplace(1);
+    weather.clouds.emplace();
+    weather.visibility = weather.precipitation = weather.sea_level_temperature = weather.sea_level_pressure = 1.0;
+    TimeSetting time;
+    time.zulu_time = 1.0;
+    time.date_days = time.time_ratio = 1;
+    for (const auto& settings : {weatherWrites(weather, version_), timeWrites(time)}) {
+      for (const SettingWrite& each : settings) set({each.write});
+    }
     Loading loading;
     loading.fuel_tank.assign(9, 10.0);
     loading.payload_mass = 100.0;
     loading.cg_offset = 0.1;
     set(loadingWrites(loading, version_));
+    for (const std::string& station : stationDatarefs(version_)) set({{station, 1.0F}});
     const std::vector<std::string> flight = shownFlightDatarefs(version_);
     readAll(flight);
     if (const auto shown = shownFlightFrom(std::vector<DatarefValue>(flight.size(), 1.0F))) {
       set(motionWrites(FlightStart{}, *shown));
     }
     readAll(aircraftPathDatarefs(kFilePathSize, version_));
-    for (const auto view : {CameraView::kForward, CameraView::kRear, CameraView::kDown}) set(viewWrites(view));
     for (const bool pause : {false, true}) print("command", pauseCommand(pause, version_), "");
     read(kPausedDataref);
+  }
+
+  void camera() const {
+    readAll(ViewStream().group().datarefs);
+    if (version_.number >= kFirstWithFrustumShiftUp) read(kFrustumShiftUpDataref);
+    for (int direction = ViewWish::kForward; direction <= ViewWish::kTurned; ++direction) {
+      ViewWish wish;
+      wish.direction = direction;
+      for (const ViewWay& way : waysTo(wish)) {
+        print("command", way.command, "");
+        set(way.writes);
+      }
+    }
+    for (int view_type = 1000; view_type < 1040; ++view_type) {  // X-Plane's numbers of views
+      if (!commandOf(view_type).empty()) print("command", commandOf(view_type), "");
+    }
+    set({{kFieldOfViewDataref, 60.0F}});
   }
 
   void link() const {

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "xplane_bridge/actuation/request_result.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
+
+namespace xplane_bridge {
+
+/// X-Plane answers: what is sent now acts, and can be read back.
+inline bool isUp(const core::LinkStatus& status) {
+  return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
+}
+
+/// The answer to a request while it does not.
+inline RequestResult noLink() { return {core::ResultCode::kNoLink, "X-Plane is not connected"}; }
+
+}  // namespace xplane_bridge

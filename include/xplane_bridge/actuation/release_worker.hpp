@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "xplane_bridge/actuation/override_manager.hpp"
+#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
+
+namespace xplane_bridge {
+
+/// The thread that waits until X-Plane has shown what was given back, and gives back what a crashed run has left in
+/// each X-Plane the link finds, so that nothing else has to wait for that.
+class ReleaseWorker {
+ public:
+  /// `problem(text)`: the journal cannot be used; called again and again while that lasts.
+  ReleaseWorker(core::SimulatorPort* link, OverrideManager* overrides,
+                std::function<void(const std::string& text)> problem);
+  /// stop()
+  ~ReleaseWorker();
+  ReleaseWorker(const ReleaseWorker&) = delete;
+  ReleaseWorker& operator=(const ReleaseWorker&) = delete;
+
+  void start();
+  /// Looks at once, instead of at the end of its period: the link has changed.
+  void wake();
+  /// Waits for the release that is under way, up to a second.
+  void stop();
+
+  /// What it does each time. Waits.
+  void work();
+
+ private:
+  void loop();
+
+  core::SimulatorPort* link_;
+  OverrideManager* overrides_;
+  std::function<void(const std::string&)> problem_;
+  std::uint32_t leftovers_of_epoch_ = 0;  // link epoch whose leftovers were released
+  std::mutex mutex_;
+  core::ClockCondition wanted_;
+  bool now_ = false;  // without waiting for the end of the period
+  bool ends_ = false;
+  std::thread thread_;
+};
+
+}  // namespace xplane_bridge

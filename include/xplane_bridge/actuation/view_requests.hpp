@@ -1,0 +1,56 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "xplane_bridge/actuation/request_result.hpp"
+#include "xplane_bridge/core/camera/camera_pose.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
+#include "xplane_bridge/core/simulator/view_ways.hpp"
+
+namespace xplane_bridge {
+
+/// Turns X-Plane's camera, and gives it back. What is changed is in the journal first, so that the guardian, the next
+/// start and scripts/release_overrides can give it back as well. Thread-safe; all functions wait.
+class ViewRequests {
+ public:
+  /// `report(text, success)`: what was done, for events and the log.
+  using Report = std::function<void(const std::string& text, bool success)>;
+
+  ViewRequests(core::SimulatorPort* link, Report report);
+
+  /// Tries the ways of a wish until X-Plane's camera is measured where it is wanted. Where none leads there, what was
+  /// changed is given back.
+  RequestResult setView(const core::ViewWish& wish);
+  /// Brings back what the first setView() found. Returns whether X-Plane shows it, or nothing was changed.
+  bool giveBack(double timeout_s);
+
+ private:
+  /// Where X-Plane's camera is.
+  struct Shown {
+    int view_type = 0;
+    core::CameraPose pose;
+  };
+
+  RequestResult setViewLocked(const core::ViewWish& wish);
+  /// Writes down what is to be changed, as it is now. @return why it cannot be; empty: it was
+  std::string remember();
+  void takeOver(const std::vector<core::DatarefWrite>& writes);
+  /// @return what is measured in the end, and whether that is what was wanted
+  std::pair<bool, std::optional<Shown>> tryWay(const core::ViewWay& way, const Eigen::Quaterniond& wanted);
+  RequestResult setFieldOfView(double field_of_view_deg);
+  bool giveBackLocked(double timeout_s);
+
+  core::SimulatorPort* link_;
+  Report report_;
+  std::mutex mutex_;
+  std::map<std::string, float> before_;  // as the first setView() found it
+  int view_before_ = 0;
+  std::vector<std::string> answered_;  // of core::cameraDatarefs()
+};
+
+}  // namespace xplane_bridge

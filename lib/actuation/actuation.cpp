@@ -1,0 +1,350 @@
+#include "xplane_bridge/actuation/actuation.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "xplane_bridge/actuation/link_condition.hpp"
+#include "xplane_bridge/actuation/pausing.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using Lock = std::lock_guard<core::HandlerMutex>;
+using core::EventKind;
+
+constexpr double kIdentityWait = 2.0;    // [s] of asking for it once
+constexpr double kLeastUndo = 0.2;       // [s] for the view, however long the overrides took
+constexpr double kSuspensionWait = 1.0;  // [s] until everything must be given back
+
+}  // namespace
+
+Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options, ActuationHooks hooks)
+    : link_(link),
+      options_(options),
+      hooks_(std::move(hooks)),
+      overrides_(link, [this](const std::string& text,
+                              bool success) { say(EventKind::kOverride, "overrides: " + text, "", success); }),
+      surfaces_(
+          link, &overrides_, options.surfaces,
+          [this](const std::string& text, bool success) { say(EventKind::kOverride, text, "", success); },
+          [this] { onSurfaces(); }),
+      failures_(link, &overrides_, &surfaces_, options.service_timeout, hooks_.failures,
+                [this](const std::string& text, const std::string& who, bool success) {
+                  say(EventKind::kFailure, text, who, success);
+                }),
+      excitation_(&surfaces_, options.max_roll_deg, options.max_pitch_deg, hooks_.excitation,
+                  [this](const std::string& text, const std::string& who, bool success) {
+                    say(EventKind::kExcitation, text, who, success);
+                  }),
+      identification_(&surfaces_, &excitation_, options.max_roll_deg, options.max_pitch_deg,
+                      [this](std::uint32_t number, const std::string& text, const std::string& who, bool success) {
+                        hooks_.event({EventKind::kSetting, text, who, success, false, number, sim_time_});
+                      }),
+      path_(link, &overrides_, options.control, pathHooks(), mutex_),
+      settings_(link, &overrides_, options.service_timeout,
+                [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
+      views_(link, [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
+      jobs_(link, options.flight, changeHooks(),
+            [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
+              hooks_.event({outcome.kind, outcome.text, who, outcome.success, false, number, sim_time_});
+            }),
+      releases_(link, &overrides_, hooks_.journal_problem) {
+  const Lock lock(*mutex_);
+  subscribe();
+}
+
+// --- wiring ---
+
+void Actuation::say(EventKind kind, const std::string& text, const std::string& who, bool success) {
+  hooks_.event({kind, text, who, success, false, 0, sim_time_});
+}
+
+ControlPathHooks Actuation::pathHooks() {
+  ControlPathHooks hooks;
+  hooks.mode = hooks_.mode;
+  hooks.applied = [this](const AppliedControls& applied) { hooks_.applied(applied, surfaces_.individuallyDriven()); };
+  hooks.stick = [this](const std::array<double, 3>& stick) { surfaces_.setStick(stick); };
+  hooks.excitation = [this] { return excitation_.excitation(); };
+  hooks.end_excitation = [this](const std::string& why) { endSignals(why); };
+  hooks.release_surfaces = [this](const std::string& why) { surfaces_.release(why); };
+  hooks.end_surface_commands = [this] { surfaces_.endCommands(); };
+  hooks.event = [this](ControlPathHooks::Kind kind, const std::string& text, const std::string& who) {
+    const bool of_overrides = kind == ControlPathHooks::Kind::kOverride;
+    hooks_.event({of_overrides ? EventKind::kOverride : EventKind::kMode, text, who, true,
+                  kind == ControlPathHooks::Kind::kFailsafe, 0, sim_time_});
+  };
+  hooks.warn = hooks_.warn;
+  return hooks;
+}
+
+FlightChangeHooks Actuation::changeHooks() {
+  FlightChangeHooks hooks;
+  hooks.watch = [this] {
+    const Lock lock(*mutex_);
+    return watch_;
+  };
+  hooks.resets = [this] {
+    const Lock lock(*mutex_);
+    return resets_;
+  };
+  hooks.identities = [this] {
+    const Lock lock(*mutex_);
+    return identity_.told();
+  };
+  hooks.aircraft = [this] {
+    const Lock lock(*mutex_);
+    return described(identity_.identity());
+  };
+  hooks.suspend_control = [this](const std::string& reason) { suspend(reason); };
+  hooks.pausing = [this](const std::string& who) { setPausing(who); };
+  return hooks;
+}
+
+void Actuation::subscribe() {
+  watch_subscription_ = link_->subscribe(
+      {"flight watch", core::flightWatchDatarefs(), core::kEveryFrameRateHz, 2},
+      [this](const core::RrefView& view, const core::ReceiveInfo&) { onWatch(view); }, mutex_);
+  identity_subscription_ = link_->subscribe(
+      {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1},
+      [this](const core::RrefView& view, const core::ReceiveInfo& info) {
+        if (identity_.add(view, info.stamp_ns)) onIdentity();
+      },
+      mutex_);
+}
+
+// --- what X-Plane shows ---
+
+void Actuation::onLink(const core::LinkStatus& status) {
+  surfaces_.onLink(status);
+  std::string text;
+  std::optional<std::string> pause_by;
+  {
+    const Lock lock(*mutex_);
+    if (status.paused && link_status_.paused && status.paused != link_status_.paused) {
+      pause_by = std::exchange(pause_by_, "");
+    }
+    if (status.state != link_status_.state) text = std::string(core::toString(status.state)) + ": " + status.reason;
+    if (status.epoch != link_status_.epoch) {
+      identity_.reset();
+      reset_detector_.restart();
+    }
+    link_status_ = status;
+    failures_.onLink(status);
+    path_.onLink(status);
+  }
+  releases_.wake();
+  if (!text.empty()) say(EventKind::kLink, text);
+  if (pause_by) say(EventKind::kPause, *status.paused ? "paused" : "resumed", *pause_by);
+}
+
+void Actuation::onWatch(const core::RrefView& view) {
+  const bool crashed = watch_.crashed;
+  const double before = watch_.sim_time;
+  core::updateFlightWatch(view, &watch_);
+  // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
+  if (watch_.sim_time < before - core::kOvertaking) reset_detector_.restart();
+  if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
+  sim_time_ = watch_.sim_time;
+  if (watch_.sim_time > before) ++frames_flown_;
+  failures_.onFrame(watch_);
+  excitation_.onFrame(watch_);
+  if (identification_.running()) identification_.onFrame(watch_, conditions());
+  path_.onFrame(watch_);
+  if (watch_.crashed && !crashed) {
+    endSignals("the aircraft has crashed");
+    say(EventKind::kCrash, "the aircraft has crashed");
+  }
+}
+
+void Actuation::onSurfaces() {
+  const Lock lock(*mutex_);
+  if (surfaces_.takeReleasedByAnother()) path_.onReleasedByAnother(core::kSurfaceOverride);
+  while (const auto echo = surfaces_.takeEcho()) {
+    hooks_.surfaces_applied(*echo, path_.mode().mode, surfaces_.individuallyDriven());
+  }
+}
+
+void Actuation::onIdentity() {
+  const core::AircraftIdentity& loaded = identity_.identity();
+  path_.onAircraft(loaded);
+  const bool fits = path_.fits(loaded);
+  say(EventKind::kAircraft, "aircraft: " + described(loaded) + (fits ? "" : "; not the one of the configuration"),
+      jobs_.mover());
+  endSignals("another aircraft was loaded");
+  surfaces_.onAircraft(loaded.icao.empty() ? loaded.description : loaded.icao, loaded.icao + " " + loaded.description);
+}
+
+void Actuation::askIdentity() {
+  link_->read(core::AircraftIdentityReader::datarefs(), kIdentityWait,
+              [this](const std::vector<core::DatarefValue>& values) {
+                const Lock lock(*mutex_);
+                if (identity_.add(values)) onIdentity();
+              });
+}
+
+void Actuation::onReset(const std::string& how) {
+  ++resets_;
+  endSignals("the flight was reset");
+  path_.onNewFlight(how);
+  // Perhaps with another aircraft, which must not be flown until the subscription tells.
+  askIdentity();
+  // What was asked for is told with its outcome.
+  if (jobs_.mover().empty()) say(EventKind::kReset, how);
+}
+
+// --- what drives it ---
+
+void Actuation::tick() {
+  const Lock lock(*mutex_);
+  surfaces_.tick(path_.refusal());
+  failures_.tick();
+  path_.tick();
+}
+
+void Actuation::onHang() {
+  const Lock lock(*mutex_);
+  overrides_.giveBackAll();
+  failures_.repaired();
+  path_.onGivenBack("tx_node hung, and its guardian has given back what it had set");
+}
+
+void Actuation::beginFlight() {
+  surfaces_.restart();
+  path_.beginFlight();
+  publish();
+}
+
+void Actuation::stop() {
+  {
+    const Lock lock(*mutex_);
+    endSignals("tx_node ends");
+  }
+  jobs_.stop();
+  releases_.stop();
+  surfaces_.stop();
+  failures_.stop();
+}
+
+bool Actuation::undo(double timeout) {
+  jobs_.restoreSettings();
+  const core::Deadline deadline(link_->clock(), timeout);
+  const bool released = overrides_.releaseAll(timeout);  // the aircraft first
+  if (released) failures_.repaired();
+  return views_.giveBack(std::max(deadline.left(), kLeastUndo)) && released;
+}
+
+void Actuation::publish() {
+  const Lock lock(*mutex_);
+  hooks_.mode(path_.mode(), sim_time_);
+  failures_.publish();
+  excitation_.publish();
+}
+
+// --- requests ---
+
+std::string Actuation::commandSurfaces(const std::vector<std::string>& names, const std::vector<float>& deflections_deg,
+                                       std::uint32_t sequence) {
+  const Lock lock(*mutex_);
+  const bool gives_back = names.empty();
+  std::string refusal = gives_back ? "" : path_.refusalOfSurfaces();
+  if (refusal.empty()) {
+    refusal = surfaces_.command(names, deflections_deg, sequence).value_or("");
+  } else {
+    surfaces_.refuseCommand(refusal);
+  }
+  if (refusal.empty()) path_.onSurfaceCommand(gives_back);
+  return refusal;
+}
+
+Actuation::Injected Actuation::inject(const ExcitationRequest& request, const std::string& who) {
+  const ExcitationManager::Plan plan = excitation_.plan(request);
+  const Lock lock(*mutex_);
+  if (identification_.running() && plan.wrong.empty()) {
+    if (plan.signal) {
+      return {{core::ResultCode::kRefused,
+               "identify_surfaces runs: wait for event " + std::to_string(identification_.number()) + ", or stop it"},
+              excitation_.label().id};
+    }
+    endSignals("stopped by " + who);
+    return {{core::ResultCode::kAccepted, "identify_surfaces is stopped"}, excitation_.label().id};
+  }
+  RequestResult result = excitation_.inject(request, plan, who, watch_, path_.refusal(), path_.commanded());
+  return {std::move(result), excitation_.label().id};
+}
+
+/// Test signals, those of an identification included.
+void Actuation::endSignals(const std::string& why) {
+  identification_.abort(why);
+  excitation_.abort(why);
+}
+
+IdentificationConditions Actuation::conditions() const {
+  return {path_.refusal(), path_.mode().failsafe, !failures_.snapshot().labels.empty(), path_.commanded()};
+}
+
+Actuation::Identifying Actuation::identifySurfaces(const IdentificationRequest& request, const std::string& who,
+                                                   const std::function<std::uint32_t()>& reserve) {
+  const Lock lock(*mutex_);
+  if (link_status_.paused.value_or(false)) {
+    return {{core::ResultCode::kRefused, "X-Plane is paused: let it run first"}, 0};
+  }
+  RequestResult result = identification_.begin(request, who, watch_, conditions(), reserve);
+  const bool begun = result.code == core::ResultCode::kAccepted;
+  return {std::move(result), begun ? identification_.number() : 0};
+}
+
+RequestResult Actuation::setPaused(bool paused, const std::string& who) {
+  if (link_->inLockstep()) {
+    return {core::ResultCode::kNotSupported, "in lock-step the simulator stands between frames: call lockstep/hold"};
+  }
+  const auto shown = [this] {
+    const core::LinkStatus status = link_->status();
+    return isUp(status) ? status.paused : std::nullopt;
+  };
+  if (!shown()) return noLink();
+  if (shown() != paused) setPausing(who);
+  const PauseOutcome outcome = xplane_bridge::setPaused(link_, paused, options_.service_timeout, hooks_.stopping);
+  if (outcome == PauseOutcome::kWasSo || outcome == PauseOutcome::kFollowed) {
+    return {core::ResultCode::kOk, paused ? "paused" : "running"};  // told as an event when it happened
+  }
+  const std::string text = outcome == PauseOutcome::kUnknown ? "X-Plane does not tell whether it is paused"
+                                                             : "X-Plane did not follow in time";
+  setPausing("");
+  say(EventKind::kPause, (paused ? "pause asked for: " : "resume asked for: ") + text, who, false);
+  return {core::ResultCode::kTimeout, text};
+}
+
+void Actuation::setPausing(const std::string& who) {
+  const Lock lock(*mutex_);
+  pause_by_ = who;
+}
+
+/// For a job that loads something: nothing is flown until it is called without a reason.
+void Actuation::suspend(const std::string& reason) {
+  if (reason.empty()) return path_.resume();
+  path_.suspend(reason);
+  link_->waitUntil([this] { return !(surfaces_.driving() || overrides_.releasesPending()); }, kSuspensionWait);
+}
+
+// --- what is ---
+
+bool Actuation::knowsFlight() const {
+  const Lock lock(*mutex_);
+  return link_status_.version.known() && std::isfinite(watch_.sim_time) && identity_.told() > 0;
+}
+
+ControlSnapshot Actuation::control() const {
+  const Lock lock(*mutex_);
+  ControlSnapshot out;
+  out.mode = path_.mode();
+  out.standing = path_.standing();
+  out.refusal = path_.refusal();
+  out.not_followed = path_.notFollowed();
+  out.received = {path_.statistics(core::FlightMode::kManual), path_.statistics(core::FlightMode::kAuto)};
+  out.overrides = overrides_.active();
+  out.aircraft = identity_.identity().icao;
+  return out;
+}
+
+}  // namespace xplane_bridge

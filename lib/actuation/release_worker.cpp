@@ -1,0 +1,71 @@
+#include "xplane_bridge/actuation/release_worker.hpp"
+
+#include <utility>
+
+#include "xplane_bridge/actuation/link_condition.hpp"
+#include "xplane_bridge/actuation/pausing.hpp"
+#include "xplane_bridge/core/link/journal.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr double kPeriod = 0.2;       // [s]
+constexpr double kReleaseWait = 1.0;  // [s] of one attempt
+
+}  // namespace
+
+ReleaseWorker::ReleaseWorker(core::SimulatorPort* link, OverrideManager* overrides,
+                             std::function<void(const std::string&)> problem)
+    : link_(link), overrides_(overrides), problem_(std::move(problem)) {}
+
+ReleaseWorker::~ReleaseWorker() { stop(); }
+
+void ReleaseWorker::start() {
+  thread_ = std::thread([this] { loop(); });
+}
+
+void ReleaseWorker::wake() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    now_ = true;
+  }
+  wanted_.notifyAll();
+}
+
+void ReleaseWorker::stop() {
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    ends_ = true;
+  }
+  wanted_.notifyAll();
+  if (thread_.joinable()) thread_.join();
+}
+
+void ReleaseWorker::loop() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    wanted_.waitUntil(&lock, core::Deadline(link_->clock(), kPeriod), [this] { return ends_ || now_; });
+    now_ = false;
+    if (ends_) return;
+    lock.unlock();
+    work();
+    lock.lock();
+  }
+}
+
+void ReleaseWorker::work() {
+  const core::LinkStatus status = link_->status();
+  if (!isUp(status)) return;
+  try {
+    if (leftovers_of_epoch_ != status.epoch && overrides_->releaseLeftovers(kReleaseWait) &&
+        resumeLeftovers(link_, kReleaseWait)) {
+      leftovers_of_epoch_ = status.epoch;
+    }
+    overrides_->recordPreparations();
+    if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseWait);
+  } catch (const core::JournalError& error) {
+    problem_(error.what());
+  }
+}
+
+}  // namespace xplane_bridge

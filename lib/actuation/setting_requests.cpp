@@ -1,0 +1,100 @@
+#include "xplane_bridge/actuation/setting_requests.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "xplane_bridge/actuation/link_condition.hpp"
+#include "xplane_bridge/core/simulator/simulator_settings.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using core::ResultCode;
+
+// X-Plane keeps float32; integers come back exactly.
+float toleranceOf(float value) { return 1e-4F * std::max(1.0F, std::abs(value)); }
+
+}  // namespace
+
+SettingRequests::SettingRequests(core::SimulatorPort* link, OverrideManager* overrides, double timeout, Report report)
+    : link_(link), overrides_(overrides), timeout_(timeout), report_(std::move(report)) {}
+
+/// In lock-step X-Plane shows it in the next frame, for which the caller may be awaited.
+void SettingRequests::confirmLater(const std::vector<core::DatarefWrite>& writes, const std::string& what) {
+  std::vector<std::string> names;
+  for (const core::DatarefWrite& write : writes) names.push_back(write.dataref);
+  link_->read(names, timeout_, [this, writes, what](const std::vector<core::DatarefValue>& values) {
+    for (std::size_t i = 0; i < writes.size(); ++i) {
+      if (values[i] && std::abs(*values[i] - writes[i].value) <= toleranceOf(writes[i].value)) continue;
+      report_(what + ": X-Plane does not show it at " + writes[i].dataref, false);
+      return;
+    }
+    report_(what + ": X-Plane shows it", true);
+  });
+}
+
+RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWrite>& writes, const std::string& what) {
+  if (!isUp(link_->status())) return noLink();
+  const core::Deadline deadline(link_->clock(), timeout_);
+  for (const core::DatarefWrite& write : writes) {
+    const core::SendStatus sent = link_->write(write.dataref, write.value);
+    if (sent != core::SendStatus::kSent) {
+      return {ResultCode::kRefused, write.dataref + " is not sent: " + core::toString(sent)};
+    }
+  }
+  if (link_->inLockstep()) {
+    confirmLater(writes, what);
+    return {ResultCode::kAccepted, "sent; an event tells whether X-Plane shows it"};
+  }
+  for (const core::DatarefWrite& write : writes) {
+    const auto [fits, shown] =
+        link_->waitForDataref(write.dataref, write.value, toleranceOf(write.value), std::max(deadline.left(), 0.01));
+    if (fits) continue;
+    return {ResultCode::kTimeout,
+            write.dataref + (shown ? " shows " + std::to_string(*shown) + ", not " + std::to_string(write.value)
+                                   : std::string(" does not answer: is the name right?"))};
+  }
+  return {ResultCode::kOk, "X-Plane shows it"};
+}
+
+SettingRequests::Written SettingRequests::setDataref(const std::string& name, const std::vector<float>& values) {
+  const bool finite = std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+  if (values.empty() || !finite) {
+    return {{ResultCode::kRefused, "values: expected one or more finite numbers"}, {}};
+  }
+  std::vector<std::string> names;
+  try {
+    names = core::consecutiveElements(name, values.size());
+  } catch (const std::invalid_argument& error) {
+    return {{ResultCode::kRefused, error.what()}, {}};
+  }
+  if (!isUp(link_->status())) return {noLink(), {}};
+  std::vector<core::DatarefWrite> writes;
+  for (std::size_t i = 0; i < names.size(); ++i) writes.push_back({names[i], values[i]});
+  for (const core::DatarefWrite& write : writes) {
+    const auto release = core::releaseOf(write.dataref);
+    if (!release) continue;
+    if (write.value != release->value) {
+      overrides_->acquire(write.dataref, write.value);
+    } else {
+      overrides_->release(write.dataref);
+    }
+  }
+  Written out;
+  out.result = writeAndConfirm(writes, "set_dataref " + name);
+  if (link_->inLockstep()) return out;
+  for (const auto& value : link_->read(names, timeout_)) out.values.push_back(value.value_or(std::nanf("")));
+  report_("set_dataref " + name + ": " + out.result.text, out.result.code == ResultCode::kOk);
+  return out;
+}
+
+RequestResult SettingRequests::runCommand(const std::string& name) {
+  if (!isUp(link_->status())) return noLink();
+  const core::SendStatus sent = link_->command(name);
+  if (sent != core::SendStatus::kSent) return {ResultCode::kRefused, name + ": " + core::toString(sent)};
+  return {ResultCode::kAccepted, "sent; X-Plane never answers to a command"};
+}
+
+}  // namespace xplane_bridge

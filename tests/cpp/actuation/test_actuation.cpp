@@ -1,0 +1,220 @@
+#include "xplane_bridge/actuation/actuation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "fake_simulator.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using core::EventKind;
+
+constexpr const char* kRoll = "sim/joystick/yoke_roll_ratio";
+constexpr const char* kFlightTime = "sim/time/total_flight_time_sec";
+
+/// An Actuation on a FakeSimulator that shows a DA62, wired as in tx_node, without its threads.
+class ActuationTest : public testing::Test {
+ protected:
+  ActuationTest() {
+    sim_.setAll(core::flightWatchDatarefs(), 0.0F);
+    sim_.set("sim/time/total_running_time_sec", 100.0F);
+    sim_.set(kFlightTime, 10.0F);
+    sim_.set("sim/flightmodel/position/latitude", 37.46F);
+    sim_.setAll(core::requiredOverrides(rollOnly(), {}), 0.0F);
+    sim_.set(kRoll, 0.0F);
+    showAircraft("DA62");
+    sim_.on_frame = [this] { sim_.set(kFlightTime, sim_.value(kFlightTime) + 0.02F); };
+    ActuationHooks hooks;
+    hooks.mode = [this](const core::ModeStatus& status, double) { modes_.push_back(status); };
+    hooks.applied = [this](const AppliedControls& applied, const auto&) { applied_.push_back(applied); };
+    hooks.surfaces_applied = [](const SurfaceControl::Echo&, core::FlightMode, const auto&) {};
+    hooks.failures = [](const FailureSnapshot&) {};
+    hooks.excitation = [](const ExcitationLabel&) {};
+    hooks.event = [this](const ActuationEvent& event) { events_.push_back(event); };
+    hooks.warn = [](const std::string&) {};
+    hooks.journal_problem = [](const std::string&) {};
+    hooks.stopping = [] { return false; };
+    ActuationOptions options;
+    options.control.aircraft = {"DA62"};
+    actuation_ = std::make_unique<Actuation>(&sim_, options, std::move(hooks));
+    actuation_->onLink(sim_.status());
+    run(0.2);
+  }
+
+  static core::ChannelSet rollOnly() {
+    core::ChannelSet out;
+    out.set(core::index(core::Channel::kRoll));
+    return out;
+  }
+  /// As X-Plane shows texts: a number for each letter, 0 at the end.
+  void showAircraft(const std::string& icao) {
+    sim_.setAll(core::AircraftIdentityReader::datarefs(), 0.0F);
+    for (const auto& [name, text] : {std::pair<std::string, std::string>{"acf_ICAO", icao}, {"acf_descrip", "Twin"}}) {
+      for (std::size_t i = 0; i < text.size(); ++i) {
+        sim_.set("sim/aircraft/view/" + name + "[" + std::to_string(i) + "]", static_cast<float>(text[i]));
+      }
+    }
+  }
+  void setPaused(bool paused) {
+    sim_.setState(paused ? core::LinkState::kPaused : core::LinkState::kConnected);
+    actuation_->onLink(sim_.status());
+  }
+  void run(double seconds) {
+    for (double end = sim_.time() + seconds - 1e-6; sim_.time() < end;) {
+      sim_.frame();
+      actuation_->tick();
+    }
+  }
+  void fly(double seconds) {
+    core::ControlCommand command;
+    command.fields = core::kFieldRoll;
+    command.roll = 0.25;
+    for (double end = sim_.time() + seconds - 1e-6; sim_.time() < end;) {
+      actuation_->path().command(core::FlightMode::kManual, command);
+      run(0.02);
+    }
+  }
+  /// Events of a kind, oldest first.
+  std::vector<ActuationEvent> eventsOf(EventKind kind) const {
+    std::vector<ActuationEvent> out;
+    std::copy_if(events_.begin(), events_.end(), std::back_inserter(out),
+                 [kind](const ActuationEvent& event) { return event.kind == kind; });
+    return out;
+  }
+
+  core::FakeSimulator sim_;
+  std::vector<core::ModeStatus> modes_;
+  std::vector<AppliedControls> applied_;
+  std::vector<ActuationEvent> events_;
+  std::unique_ptr<Actuation> actuation_;
+};
+
+TEST_F(ActuationTest, AircraftThatXPlaneShowsIsFlownAndTold) {
+  ASSERT_EQ(eventsOf(EventKind::kAircraft).size(), 1U);
+  EXPECT_EQ(eventsOf(EventKind::kAircraft)[0].text, "aircraft: DA62 (Twin)");
+  EXPECT_EQ(actuation_->control().aircraft, "DA62");
+  fly(0.5);
+  EXPECT_FLOAT_EQ(sim_.value(kRoll), 0.25F);
+  EXPECT_TRUE(applied_.back().read_back || applied_[applied_.size() - 2].read_back);
+  EXPECT_EQ(actuation_->control().received[0].accepted, 25U);
+}
+
+TEST_F(ActuationTest, AnotherAircraftIsToldAndNotFlown) {
+  fly(0.2);
+  showAircraft("QUAD");
+  fly(2.0);
+  EXPECT_EQ(eventsOf(EventKind::kAircraft).back().text, "aircraft: QUAD (Twin); not the one of the configuration");
+  EXPECT_EQ(actuation_->control().standing, Standing::kWrongAircraft);
+  EXPECT_TRUE(actuation_->control().overrides.empty());
+}
+
+TEST_F(ActuationTest, NewFlightIsToldAndEndsAuto) {
+  actuation_->path().requestMode({1, 2, "test", 0.0});
+  ASSERT_EQ(actuation_->control().mode.mode, core::FlightMode::kAuto);
+  sim_.set(kFlightTime, 0.0F);
+  run(0.1);
+  ASSERT_EQ(eventsOf(EventKind::kReset).size(), 1U);
+  EXPECT_EQ(actuation_->control().mode.mode, core::FlightMode::kManual);
+  EXPECT_EQ(eventsOf(EventKind::kMode).back().who, "tx_node");
+  EXPECT_EQ(eventsOf(EventKind::kReset)[0].sim_time, eventsOf(EventKind::kMode).back().sim_time);
+}
+
+TEST_F(ActuationTest, CrashIsToldOnce) {
+  sim_.set("sim/flightmodel2/misc/has_crashed", 1.0F);
+  run(0.2);
+  EXPECT_EQ(eventsOf(EventKind::kCrash).size(), 1U);
+}
+
+TEST_F(ActuationTest, PauseIsToldWithWhoAskedForIt) {
+  setPaused(true);
+  setPaused(false);
+  ASSERT_EQ(eventsOf(EventKind::kPause).size(), 2U);
+  EXPECT_EQ(eventsOf(EventKind::kPause)[0].text, "paused");
+  EXPECT_EQ(eventsOf(EventKind::kPause)[1].text, "resumed");
+  EXPECT_EQ(eventsOf(EventKind::kPause)[0].who, "") << "by the user of X-Plane";
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.path == "sim/operation/pause_toggle") setPaused(true);
+  };
+  EXPECT_TRUE(actuation_->setPaused(true, "test").success());
+  EXPECT_EQ(eventsOf(EventKind::kPause).back().who, "test");
+  EXPECT_TRUE(actuation_->setPaused(true, "another").success());
+  setPaused(false);
+  EXPECT_EQ(eventsOf(EventKind::kPause).back().who, "") << "what was paused already leaves no name";
+}
+
+TEST_F(ActuationTest, DatarefIsWrittenAndShown) {
+  const auto written = actuation_->settings().setDataref(kRoll, {0.5F});
+  EXPECT_EQ(written.result.code, core::ResultCode::kOk);
+  EXPECT_EQ(written.values, std::vector<float>{0.5F});
+  EXPECT_EQ(eventsOf(EventKind::kSetting).back().text, std::string("set_dataref ") + kRoll + ": X-Plane shows it");
+  const auto unknown = actuation_->settings().setDataref("sim/no/such", {0.5F});
+  EXPECT_EQ(unknown.result.code, core::ResultCode::kTimeout);
+  EXPECT_TRUE(std::isnan(unknown.values[0]));
+  EXPECT_FALSE(eventsOf(EventKind::kSetting).back().success);
+  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {}).result.code, core::ResultCode::kRefused);
+}
+
+TEST_F(ActuationTest, DatarefThatIsShownOnlyNearlyIsNotSet) {
+  sim_.set(kRoll, 0.49F);
+  sim_.setReadOnly(kRoll);
+  const auto written = actuation_->settings().setDataref(kRoll, {0.5F});
+  EXPECT_EQ(written.result.code, core::ResultCode::kTimeout);
+  EXPECT_EQ(written.result.text, std::string(kRoll) + " shows 0.490000, not 0.500000");
+  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {std::nanf("")}).result.code, core::ResultCode::kRefused);
+  const auto too_long = actuation_->settings().setDataref("sim/" + std::string(600, 'a'), {0.5F});
+  EXPECT_EQ(too_long.result.code, core::ResultCode::kRefused) << too_long.result.text;
+}
+
+TEST_F(ActuationTest, OverrideOfAServiceIsHeldUntilItGivesItBack) {
+  const std::string name = "sim/operation/override/override_joystick_roll";
+  EXPECT_TRUE(actuation_->settings().setDataref(name, {1.0F}).result.success());
+  EXPECT_EQ(actuation_->control().overrides, std::vector<std::string>{name});
+  EXPECT_EQ(sim_.journal()->entries().size(), 1U);
+  EXPECT_TRUE(actuation_->settings().setDataref(name, {0.0F}).result.success());
+  EXPECT_TRUE(actuation_->control().overrides.empty());
+  EXPECT_FLOAT_EQ(sim_.value(name), 0.0F);
+}
+
+TEST_F(ActuationTest, CommandIsSentOrRefused) {
+  EXPECT_EQ(actuation_->settings().runCommand("sim/lights/landing_lights_on").code, core::ResultCode::kAccepted);
+  EXPECT_EQ(sim_.commands().back(), "sim/lights/landing_lights_on");
+  EXPECT_EQ(actuation_->settings().runCommand(std::string(2000, 'a')).code, core::ResultCode::kRefused);
+  EXPECT_EQ(actuation_->settings().runCommand("").code, core::ResultCode::kRefused);
+  sim_.setState(core::LinkState::kLost);
+  EXPECT_EQ(actuation_->settings().runCommand("sim/lights/landing_lights_on").code, core::ResultCode::kNoLink);
+}
+
+TEST_F(ActuationTest, FailsafeIsAWarning) {
+  fly(0.2);
+  run(2.0);
+  const ActuationEvent told = eventsOf(EventKind::kMode).back();
+  EXPECT_TRUE(told.warning);
+  EXPECT_EQ(told.text, "MANUAL: failsafe: timeout of control/manual");
+  EXPECT_TRUE(modes_.back().failsafe);
+}
+
+TEST_F(ActuationTest, LinkIsToldWithItsReason) {
+  sim_.setState(core::LinkState::kLost);
+  actuation_->onLink(sim_.status());
+  EXPECT_EQ(eventsOf(EventKind::kLink).back().text.substr(0, 6), "LOST: ");
+  EXPECT_EQ(actuation_->setPaused(true, "test").code, core::ResultCode::kNoLink);
+  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {0.5F}).result.code, core::ResultCode::kNoLink);
+  EXPECT_EQ(actuation_->jobs().refusal()->code, core::ResultCode::kNoLink);
+}
+
+TEST_F(ActuationTest, EverythingIsGivenBackInTheEnd) {
+  fly(0.2);
+  ASSERT_FALSE(actuation_->control().overrides.empty());
+  const std::string override_name = actuation_->control().overrides.front();
+  actuation_->stop();
+  EXPECT_TRUE(actuation_->undo(1.0));
+  EXPECT_FLOAT_EQ(sim_.value(override_name), 0.0F);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+}  // namespace
+}  // namespace xplane_bridge

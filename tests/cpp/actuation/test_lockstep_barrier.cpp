@@ -1,0 +1,121 @@
+#include <gtest/gtest.h>
+
+#include "xplane_bridge/actuation/lockstep_barrier.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using Names = std::vector<std::string>;
+
+constexpr std::int64_t kT1 = 1000, kT2 = 2000;
+
+class LockstepBarrierTest : public testing::Test {
+ protected:
+  void SetUp() override { barrier_.open(1, kT1); }
+
+  LockstepBarrier barrier_{{"controller", "/other/player"}, "rx_node"};
+};
+
+TEST_F(LockstepBarrierTest, WaitsForEverybodyAndNamesWhoIsMissing) {
+  EXPECT_EQ(barrier_.missing(), (Names{"rx_node", "controller", "/other/player"}));
+  barrier_.answer("/xplane/rx_node", kT1);
+  barrier_.answer("/xplane/controller", kT1);
+  EXPECT_FALSE(barrier_.complete());
+  EXPECT_EQ(barrier_.missing(), Names{"/other/player"});
+  barrier_.answer("/other/player", kT1);
+  EXPECT_TRUE(barrier_.complete());
+}
+
+TEST_F(LockstepBarrierTest, TakesAFullNameAsItIsAndAShortOneInAnyNamespace) {
+  for (const char* who : {"/xplane/rx_node", "/my_controller", "/player", "/another/other/player", "/controller/x"}) {
+    barrier_.answer(who, kT1);
+  }
+  EXPECT_EQ(barrier_.missing(), (Names{"controller", "/other/player"}));
+  barrier_.answer("/controller", kT1);
+  EXPECT_EQ(barrier_.missing(), Names{"/other/player"});
+}
+
+TEST_F(LockstepBarrierTest, AnAnswerToAFrameThatIsGoneCountsForNone) {
+  barrier_.close();
+  barrier_.open(2, kT2);
+  barrier_.answer("/controller", kT1);
+  EXPECT_EQ(barrier_.missing().size(), 3U);
+}
+
+TEST_F(LockstepBarrierTest, AnAnswerThatIsEarlyCountsOnceItsFrameIsHere) {
+  barrier_.answer("/controller", kT2);
+  EXPECT_EQ(barrier_.missing().size(), 3U);
+  barrier_.close();
+  barrier_.open(2, kT2);
+  EXPECT_EQ(barrier_.missing(), (Names{"rx_node", "/other/player"}));
+}
+
+TEST_F(LockstepBarrierTest, InAPauseAnAnswerBelongsToTheFrameThatIsOpenWhenItComes) {
+  const auto answer_all = [this] {
+    for (const char* who : {"/rx_node", "/controller", "/other/player"}) barrier_.answer(who, kT1);
+  };
+  answer_all();
+  EXPECT_TRUE(barrier_.complete());
+  barrier_.close();
+  barrier_.open(2, kT1);
+  EXPECT_FALSE(barrier_.complete());
+  answer_all();
+  EXPECT_TRUE(barrier_.complete());
+  barrier_.close();
+  barrier_.answer("/controller", kT1);  // between two frames: of the next
+  barrier_.open(3, kT1);
+  EXPECT_EQ(barrier_.missing(), (Names{"rx_node", "/other/player"}));
+}
+
+TEST_F(LockstepBarrierTest, NobodyIsAwaitedInAFrameThatHasNothingToAnswer) {
+  barrier_.answerForAll("/xplane/rx_node", kT1);
+  EXPECT_TRUE(barrier_.complete());
+  barrier_.close();
+  barrier_.open(2, kT2);
+  barrier_.answer("/xplane/rx_node", kT2);
+  EXPECT_FALSE(barrier_.complete());
+}
+
+TEST_F(LockstepBarrierTest, Frame0IsTheReadersAlone) {
+  barrier_.open(0, 0);
+  EXPECT_FALSE(barrier_.complete());
+  barrier_.answer("/xplane/rx_node", 0);
+  EXPECT_TRUE(barrier_.complete());
+}
+
+TEST(LockstepBarrierSteps, FliesAsManyFramesAsAreGrantedAndHoldsWithTheLastOneAnswered) {
+  LockstepBarrier barrier({}, "rx_node");
+  barrier.step(0);
+  barrier.open(0, 0);
+  barrier.answer("/rx_node", 0);
+  EXPECT_FALSE(barrier.complete());
+  EXPECT_TRUE(barrier.holds());
+  barrier.step(3);
+  int flown = 0;
+  std::int64_t stamp = 0;
+  while (barrier.complete()) {
+    barrier.close();
+    barrier.open(static_cast<std::uint32_t>(++flown), ++stamp);
+    EXPECT_FALSE(barrier.holds()) << "not answered yet";
+    barrier.answer("/rx_node", stamp);
+  }
+  EXPECT_EQ(flown, 3);
+  EXPECT_TRUE(barrier.holds());
+  barrier.run();
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_TRUE(barrier.complete());
+    barrier.close();
+    barrier.open(static_cast<std::uint32_t>(++flown), ++stamp);
+    barrier.answer("/rx_node", stamp);
+  }
+}
+
+TEST(LockstepBarrierOrder, RanksParticipantsAsNamed) {
+  const LockstepBarrier barrier({"b", "a"}, "rx_node");
+  EXPECT_LT(barrier.rank("/x/rx_node"), barrier.rank("/x/b"));
+  EXPECT_LT(barrier.rank("/x/b"), barrier.rank("/x/a"));
+  EXPECT_LT(barrier.rank("/x/a"), barrier.rank("/x/stranger"));
+}
+
+}  // namespace
+}  // namespace xplane_bridge
