@@ -1,0 +1,202 @@
+/// The parts of the light twin that live in Python objects, and in C++ while a frame is flown.
+#pragma once
+
+#include "xplane_bridge/bindings/python_object.hpp"
+
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "xplane_bridge/bindings/twin_physics.hpp"
+
+namespace xplane_bridge::bindings {
+
+inline double call(const Object& getter) { return number(Object(PyObject_CallObject(getter.get(), nullptr)).get()); }
+
+inline void call(const Object& setter, double value) {
+  const Object argument = makeNumber(value);
+  Object(PyObject_CallFunctionObjArgs(setter.get(), argument.get(), nullptr));
+}
+
+/// A double that lives in an attribute of a Python object while no frame is flown.
+struct Field {
+  Object name;
+  double* value;
+};
+
+/// A Python object and the numbers that it shares with a C++ one.
+struct Mirror {
+  Object object;
+  std::vector<Field> fields;
+
+  void add(const char* name, double& value) { fields.push_back({Object(PyUnicode_InternFromString(name)), &value}); }
+  void read() const {
+    for (const Field& field : fields) *field.value = number(attribute(object.get(), field.name.get()).get());
+  }
+  void write() const {
+    for (const Field& field : fields) {
+      check(PyObject_SetAttr(object.get(), field.name.get(), makeNumber(*field.value).get()));
+    }
+  }
+};
+
+inline double constant(const Object& specification, const char* name) {
+  return number(attribute(specification.get(), name).get());
+}
+
+struct RotorMirror {
+  Rotor rotor;
+  Mirror mirror;
+
+  explicit RotorMirror(const Object& object) {
+    const Object spec = attribute(object.get(), "spec");
+    rotor.direction = constant(spec, "direction") > 0.0 ? 1 : -1;
+    rotor.radius_m = constant(spec, "radius_m");
+    rotor.blade_area_m2 = constant(spec, "blade_area_m2");
+    rotor.inertia_kg_m2 = constant(spec, "inertia_kg_m2");
+    rotor.lift_slope = constant(spec, "lift_slope");
+    rotor.max_lift = constant(spec, "max_lift");
+    rotor.profile_drag = constant(spec, "profile_drag");
+    rotor.zero_lift_deg = constant(spec, "zero_lift_deg");
+    rotor.edgewise_drag = constant(spec, "edgewise_drag");
+    mirror.object = object;
+    mirror.add("omega", rotor.omega);
+    mirror.add("blade_rad", rotor.blade_rad);
+    mirror.add("inflow", rotor.inflow);
+    mirror.add("thrust", rotor.thrust);
+    mirror.add("torque", rotor.torque);
+    mirror.add("shaft_torque", rotor.shaft_torque);
+    mirror.add("axis_x", rotor.axis_x);
+    mirror.add("axis_z", rotor.axis_z);
+    mirror.add("x", rotor.x);
+    mirror.add("y", rotor.y);
+    mirror.add("z", rotor.z);
+    mirror.add("force_x", rotor.force.x);
+    mirror.add("force_y", rotor.force.y);
+    mirror.add("force_z", rotor.force.z);
+    mirror.add("moment_x", rotor.moment.x);
+    mirror.add("moment_y", rotor.moment.y);
+    mirror.add("moment_z", rotor.moment.z);
+  }
+};
+
+struct GovernorMirror {
+  Governor governor;
+  Mirror mirror;
+
+  explicit GovernorMirror(const Object& object) {
+    const Object spec = attribute(object.get(), "spec");
+    governor.minimum_rpm = constant(spec, "minimum_rpm");
+    governor.maximum_rpm = constant(spec, "maximum_rpm");
+    governor.fine_deg = constant(spec, "fine_deg");
+    governor.coarse_deg = constant(spec, "coarse_deg");
+    governor.rate_deg_s = constant(spec, "rate_deg_s");
+    governor.proportional = constant(spec, "proportional");
+    governor.integral = constant(spec, "integral");
+    mirror.object = object;
+    mirror.add("integral_deg", governor.integral_deg);
+  }
+};
+
+struct EngineMirror {
+  PistonEngine engine;
+  Mirror mirror;
+
+  explicit EngineMirror(const Object& object) {
+    const Object spec = attribute(object.get(), "spec");
+    engine.rated_power_w = constant(spec, "rated_power_w");
+    engine.rated_rpm = constant(spec, "rated_rpm");
+    engine.fuel_kg_per_joule = constant(spec, "fuel_kg_per_joule");
+    engine.closed_throttle = constant(spec, "closed_throttle");
+    engine.open_throttle = constant(spec, "open_throttle");
+    engine.friction = constant(spec, "friction");
+    mirror.object = object;
+    mirror.add("manifold_pa", engine.manifold_pa);
+    mirror.add("egt_k", engine.egt_k);
+    mirror.add("cht_k", engine.cht_k);
+    mirror.add("oil_k", engine.oil_k);
+    mirror.add("oil_pa", engine.oil_pa);
+    mirror.add("fuel_flow", engine.fuel_flow);
+    mirror.add("power", engine.power);
+  }
+  void read() {
+    mirror.read();
+    const Object running = attribute(mirror.object.get(), "running");
+    engine.running = PyObject_IsTrue(running.get()) == 1;
+  }
+  void write() const {
+    mirror.write();
+    check(PyObject_SetAttrString(mirror.object.get(), "running", engine.running ? Py_True : Py_False));
+  }
+};
+
+struct SurfaceMirror {
+  SurfaceActuator actuator;
+  Mirror mirror;
+
+  explicit SurfaceMirror(const Object& object) {
+    const Object spec = attribute(object.get(), "spec");
+    actuator.minimum_deg = constant(spec, "minimum_deg");
+    actuator.maximum_deg = constant(spec, "maximum_deg");
+    actuator.rate_deg_s = constant(spec, "rate_deg_s");
+    const Object kind = attribute(spec.get(), "kind");
+    actuator.rudder = text(attribute(kind.get(), "value").get()) == "rudder";
+    mirror.object = object;
+    mirror.add("position_deg", actuator.position_deg);
+    mirror.add("effective_deg", actuator.effective_deg);
+  }
+  void read() {
+    mirror.read();
+    const Object stuck = attribute(mirror.object.get(), "_stuck_deg");
+    actuator.stuck_deg.reset();
+    if (stuck.get() != Py_None) actuator.stuck_deg = number(stuck.get());
+  }
+  void write() const {
+    mirror.write();
+    const Object stuck = actuator.stuck_deg ? makeNumber(*actuator.stuck_deg) : Object::borrowed(Py_None);
+    check(PyObject_SetAttrString(mirror.object.get(), "_stuck_deg", stuck.get()));
+  }
+};
+
+/// DrydenTurbulence, with Python's own generator: random.Random.gauss() on its random().
+struct TurbulenceMirror {
+  Dryden dryden;
+  Object object, generator, random;
+  std::optional<double> next;
+
+  void read() {
+    dryden.intensity_mps = number(attribute(object.get(), "intensity_mps").get());
+    if (!(dryden.intensity_mps > 0.0)) return;
+    generator = attribute(object.get(), "_random");
+    random = attribute(generator.get(), "random");
+    const std::vector<Object> state = items(attribute(object.get(), "_state").get());
+    for (std::size_t i = 0; i < dryden.state.size(); ++i) dryden.state[i] = number(state.at(i).get());
+    const Object kept = attribute(generator.get(), "gauss_next");
+    next.reset();
+    if (kept.get() != Py_None) next = number(kept.get());
+  }
+  void write() const {
+    if (!(dryden.intensity_mps > 0.0)) return;
+    const Object state = attribute(object.get(), "_state");
+    for (std::size_t i = 0; i < dryden.state.size(); ++i) {
+      check(PySequence_SetItem(state.get(), static_cast<Py_ssize_t>(i), makeNumber(dryden.state[i]).get()));
+    }
+    const Object kept = next ? makeNumber(*next) : Object::borrowed(Py_None);
+    check(PyObject_SetAttrString(generator.get(), "gauss_next", kept.get()));
+  }
+  double gauss() {
+    double z = 0.0;
+    if (next) {
+      z = *next;
+      next.reset();
+    } else {
+      const double angle = call(random) * (2.0 * kPi);
+      const double radius = std::sqrt(-2.0 * std::log(1.0 - call(random)));
+      z = std::cos(angle) * radius;
+      next = std::sin(angle) * radius;
+    }
+    return 0.0 + z * 1.0;
+  }
+};
+
+}  // namespace xplane_bridge::bindings

@@ -1,0 +1,28 @@
+#include "xplane_bridge/bindings/python_object.hpp"
+
+namespace {
+
+PyModuleDef definition = {
+    PyModuleDef_HEAD_INIT,
+    "_core",
+    "Parts of xplane_bridge in C++: tx_node's arbiter, and the step of the emulated twin.",
+    -1,
+    nullptr,
+    nullptr,
+    nullptr,
+    nullptr,
+    nullptr,
+};
+
+}  // namespace
+
+PyMODINIT_FUNC PyInit__core() {
+  return xplane_bridge::bindings::guarded([] {
+    xplane_bridge::bindings::Object module(PyModule_Create(&definition));
+    xplane_bridge::bindings::addArbiter(module.get());
+    xplane_bridge::bindings::addTwinLoop(module.get());
+    PyObject* out = module.get();
+    Py_INCREF(out);
+    return out;
+  });
+}

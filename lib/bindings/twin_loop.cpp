@@ -1,0 +1,368 @@
+// The steps of the light twin between two frames, for FixedWing (emulator/aircraft/fixed_wing): reads surfaces,
+// engines, propellers and gusts from the Python objects, steps them with JSBSim through its own getters, setters and
+// `run`, and writes them back. The order of every reading, writing and operation is the Python code's.
+#include "xplane_bridge/bindings/twin_mirrors.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "xplane_bridge/bindings/python_object.hpp"
+#include "xplane_bridge/bindings/twin_physics.hpp"
+
+namespace xplane_bridge::bindings {
+namespace {
+
+constexpr double kFoot = 0.3048;
+constexpr double kCrashWatch = 20.0;  // [m]
+constexpr double kStrutsWorkCosine = 0.5;
+constexpr double kThinnestAir = 1e-3;  // [kg/m3]
+
+struct Throttle {
+  double lever, propeller, mixture;
+  int fault;  // 0 none, 1 stopped, 2 seized
+};
+
+class Loop {
+ public:
+  explicit Loop(PyObject* model) {
+    const auto getters = [model](const char* name) { return items(attribute(model, name).get()); };
+    air_ = getters("_air_getters");
+    if (air_.size() != 7) throw std::invalid_argument("_air_getters: expected 7 of them");
+    alpha_ = attribute(model, "_alpha");
+    pressure_ = attribute(model, "_pressure");
+    temperature_ = attribute(model, "_temperature");
+    agl_ = attribute(model, "_agl");
+    roll_ = attribute(model, "_roll");
+    pitch_ = attribute(model, "_pitch");
+    heading_ = attribute(model, "_heading");
+    airspeed_ = attribute(model, "_airspeed");
+    gear_ = attribute(model, "_gear_setter");
+    wind_ = getters("_wind_setters");
+    const Object fdm = attribute(model, "_fdm");
+    run_ = attribute(fdm.get(), "run");
+    set_dt_ = attribute(fdm.get(), "set_dt");
+    hit_ = attribute(attribute(model, "_contacts").get(), "hit");
+    contact_height_ = number(attribute(model, "contact_height_m").get());
+    contact_runs_ = static_cast<int>(number(attribute(model, "contact_runs").get()));
+    surface_setters_ = getters("_surface_setters");
+    for (const Object& pair : getters("_load_setters")) {
+      const std::vector<Object> both = items(pair.get());
+      load_setters_.push_back({both.at(0), number(both.at(1).get())});
+    }
+    const Object surface_set = attribute(model, "_surface_set");
+    for (const Object& o : items(attribute(surface_set.get(), "actuators").get())) {
+      surfaces_.push_back(std::make_unique<SurfaceMirror>(o));
+    }
+    for (const Object& o : getters("_rotors")) rotors_.push_back(std::make_unique<RotorMirror>(o));
+    for (const Object& o : getters("_governors")) governors_.push_back(std::make_unique<GovernorMirror>(o));
+    for (const Object& o : getters("_engines")) engines_.push_back(std::make_unique<EngineMirror>(o));
+    turbulence_.object = attribute(model, "_turbulence");
+    // Not worked out anew: Python's ** rounds otherwise than a product.
+    const Object units(PyImport_ImportModule("xplane_bridge.emulator.flight.jsbsim_state"));
+    density_unit_ = constant(units, "SLUG_FT3_KG_M3");
+    pressure_unit_ = constant(units, "PSF_PA");
+    temperature_unit_ = constant(units, "RANKINE_K");
+  }
+
+  std::size_t engines() const { return engines_.size(); }
+  std::size_t surfaces() const { return surfaces_.size(); }
+
+  /// Flies `count` steps of `dt` [s]. What had been flown is written back also where JSBSim gives up.
+  void fly(PyObject* model, int count, double dt, const std::vector<SurfaceOrder>& orders,
+           const std::vector<Throttle>& throttles) {
+    read(model);
+    try {
+      for (int i = 0; i < count; ++i) step(dt, orders, throttles);
+    } catch (const PythonError&) {
+      PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
+      PyErr_Fetch(&type, &value, &trace);
+      write(model);
+      PyErr_Restore(type, value, trace);
+      throw;
+    }
+    write(model);
+  }
+
+  /// FixedWing._settle_engines but for its end: the engines alone in the air as it passes now.
+  void settle(PyObject* model, int count, double dt, const std::vector<Throttle>& throttles) {
+    readEngines(model);
+    const Air air = readAir(false);
+    for (std::size_t i = 0; i < engines_.size(); ++i) {
+      for (int k = 0; k < count; ++k) {
+        Rotor& rotor = rotors_[i]->rotor;
+        governors_[i]->governor.step(dt, rotor, throttles[i].propeller);
+        rotor.airLoads(dt, air);
+        const double torque =
+            engines_[i]->engine.torque(dt, rotor.omega, throttles[i].lever, throttles[i].mixture, air, fuel_[i] > 0.0);
+        rotor.turn(dt, torque, air.rates);
+      }
+    }
+    writeEngines(model);
+  }
+
+ private:
+  void readEngines(PyObject* model) {
+    for (auto& rotor : rotors_) rotor->mirror.read();
+    for (auto& governor : governors_) governor->mirror.read();
+    for (auto& engine : engines_) engine->read();
+    const std::vector<Object> fuel = items(attribute(model, "_fuel_kg").get());
+    fuel_.clear();
+    for (const Object& tank : fuel) fuel_.push_back(number(tank.get()));
+    if (fuel_.size() < engines_.size()) throw std::invalid_argument("_fuel_kg: expected a tank for each engine");
+  }
+
+  void writeEngines(PyObject* model) const {
+    for (const auto& rotor : rotors_) rotor->mirror.write();
+    for (const auto& governor : governors_) governor->mirror.write();
+    for (const auto& engine : engines_) engine->write();
+    const Object fuel = attribute(model, "_fuel_kg");
+    for (std::size_t i = 0; i < fuel_.size(); ++i) {
+      check(PySequence_SetItem(fuel.get(), static_cast<Py_ssize_t>(i), makeNumber(fuel_[i]).get()));
+    }
+  }
+
+  void read(PyObject* model) {
+    readEngines(model);
+    for (auto& surface : surfaces_) surface->read();
+    turbulence_.read();
+    const std::vector<Object> wind = items(attribute(model, "_wind").get());
+    const std::vector<Object> gravity = items(attribute(model, "_gravity_force").get());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      steady_wind_[axis] = number(wind.at(axis).get());
+      gravity_[axis] = number(gravity.at(axis).get());
+    }
+    gear_position_ = number(attribute(model, "_gear_position").get());
+    fdm_step_ = number(attribute(model, "_fdm_step").get());
+    crashed_ = PyObject_IsTrue(attribute(model, "_crashed").get()) == 1;
+    blown_ = false;
+  }
+
+  void write(PyObject* model) const {
+    writeEngines(model);
+    for (const auto& surface : surfaces_) surface->write();
+    turbulence_.write();
+    check(PyObject_SetAttrString(model, "_fdm_step", makeNumber(fdm_step_).get()));
+    check(PyObject_SetAttrString(model, "_crashed", crashed_ ? Py_True : Py_False));
+    if (!blown_) return;
+    const Object gusts(PyList_New(3));
+    for (Py_ssize_t axis = 0; axis < 3; ++axis) {
+      PyObject* gust = PyFloat_FromDouble(gusts_[static_cast<std::size_t>(axis)]);
+      if (!gust) throw PythonError{};
+      PyList_SetItem(gusts.get(), axis, gust);
+    }
+    check(PyObject_SetAttrString(model, "_gusts", gusts.get()));
+  }
+
+  Air readAir(bool floor) const {
+    std::array<double, 7> values{};
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = call(air_[i]);
+    Air air;
+    air.velocity = {values[0] * kFoot, values[1] * kFoot, values[2] * kFoot};
+    air.rates = {values[3], values[4], values[5]};
+    const double density = values[6] * density_unit_;
+    air.density = floor ? pythonMax(density, kThinnestAir) : density;
+    air.pressure = call(pressure_) * pressure_unit_;
+    air.temperature = call(temperature_) * temperature_unit_;
+    return air;
+  }
+
+  void blow(double dt) {
+    const double heading = call(heading_);
+    const double speed = call(airspeed_) * kFoot, agl = call(agl_) * kFoot;
+    const Dryden::Gusts g = turbulence_.dryden.step(dt, speed, agl, [this] { return turbulence_.gauss(); });
+    const double sine = std::sin(heading), cosine = std::cos(heading);
+    gusts_ = {g.along * cosine - g.across * sine, g.along * sine + g.across * cosine, g.down};
+    blown_ = true;
+    for (std::size_t axis = 0; axis < 3; ++axis) call(wind_[axis], (steady_wind_[axis] + gusts_[axis]) / kFoot);
+  }
+
+  void advance(double dt, const std::vector<SurfaceOrder>& orders, const std::vector<Throttle>& throttles) {
+    const Air air = readAir(true);
+    const double alpha_deg = degrees(call(alpha_));
+    for (std::size_t i = 0; i < surfaces_.size(); ++i) surfaces_[i]->actuator.step(orders[i], dt, alpha_deg);
+    for (std::size_t i = 0; i < engines_.size(); ++i) {
+      Rotor& rotor = rotors_[i]->rotor;
+      PistonEngine& engine = engines_[i]->engine;
+      governors_[i]->governor.step(dt, rotor, throttles[i].propeller);
+      rotor.airLoads(dt, air);
+      const bool fuel = fuel_[i] > 0.0 && throttles[i].fault == 0;
+      double torque = engine.torque(dt, rotor.omega, throttles[i].lever, throttles[i].mixture, air, fuel);
+      if (throttles[i].fault == 2) torque = rotor.torque - rotor.inertia_kg_m2 * rotor.omega / dt;
+      rotor.turn(dt, torque, air.rates);
+      fuel_[i] = pythonMax(fuel_[i] - engine.fuel_flow * dt, 0.0);
+    }
+  }
+
+  void applyLoads() const {
+    for (std::size_t i = 0; i < surfaces_.size(); ++i) call(surface_setters_[i], surfaces_[i]->actuator.effective_deg);
+    std::array<double, 6> loads{};
+    for (const auto& mirror : rotors_) {
+      const Rotor& rotor = mirror->rotor;
+      loads[0] += rotor.force.x;
+      loads[1] += rotor.force.y;
+      loads[2] += rotor.force.z;
+      loads[3] += rotor.moment.x;
+      loads[4] += rotor.moment.y;
+      loads[5] += rotor.moment.z;
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) loads[axis] += gravity_[axis];
+    for (std::size_t i = 0; i < loads.size(); ++i) call(load_setters_[i].setter, loads[i] * load_setters_[i].factor);
+  }
+
+  void step(double dt, const std::vector<SurfaceOrder>& orders, const std::vector<Throttle>& throttles) {
+    if (turbulence_.dryden.intensity_mps > 0.0) blow(dt);
+    advance(dt, orders, throttles);
+    applyLoads();
+    const int runs = call(agl_) * kFoot > contact_height_ ? 1 : contact_runs_;
+    if (std::fabs(dt / runs - fdm_step_) > 1e-12) {
+      fdm_step_ = dt / runs;
+      call(set_dt_, fdm_step_);
+    }
+    const bool tilted = std::cos(call(roll_)) * std::cos(call(pitch_)) < kStrutsWorkCosine;
+    call(gear_, tilted && call(agl_) * kFoot < kCrashWatch ? 0.0 : gear_position_);
+    for (int i = 0; i < runs; ++i) Object(PyObject_CallObject(run_.get(), nullptr));
+    if (call(agl_) * kFoot < kCrashWatch && !crashed_) {
+      const Object hit(PyObject_CallObject(hit_.get(), nullptr));
+      crashed_ = PyObject_IsTrue(hit.get()) == 1;
+    }
+  }
+
+  struct LoadSetter {
+    Object setter;
+    double factor;
+  };
+  std::vector<Object> air_, wind_, surface_setters_;
+  std::vector<LoadSetter> load_setters_;
+  Object alpha_, pressure_, temperature_, agl_, roll_, pitch_, heading_, airspeed_, gear_, run_, set_dt_, hit_;
+  double contact_height_ = 0.0, density_unit_ = 1.0, pressure_unit_ = 1.0, temperature_unit_ = 1.0;
+  int contact_runs_ = 1;
+  std::vector<std::unique_ptr<SurfaceMirror>> surfaces_;  // pointers: the mirrors point into what they mirror
+  std::vector<std::unique_ptr<RotorMirror>> rotors_;
+  std::vector<std::unique_ptr<GovernorMirror>> governors_;
+  std::vector<std::unique_ptr<EngineMirror>> engines_;
+  TurbulenceMirror turbulence_;
+  std::vector<double> fuel_;
+  std::array<double, 3> steady_wind_{}, gusts_{}, gravity_{};
+  double gear_position_ = 0.0, fdm_step_ = 0.0;
+  bool crashed_ = false, blown_ = false;
+};
+
+struct TwinLoop {
+  PyObject base;
+  Loop* loop;
+};
+
+Loop& loopOf(PyObject* object) { return *reinterpret_cast<TwinLoop*>(object)->loop; }
+
+PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* /*keywords*/) {
+  return guarded([&]() -> PyObject* {
+    PyObject* model = nullptr;
+    if (!PyArg_ParseTuple(arguments, "O", &model)) throw PythonError{};
+    auto loop = std::make_unique<Loop>(model);
+    Object object(type->tp_alloc(type, 0));
+    reinterpret_cast<TwinLoop*>(object.get())->loop = loop.release();
+    PyObject* out = object.get();
+    Py_INCREF(out);
+    return out;
+  });
+}
+
+void destroy(PyObject* object) {
+  delete reinterpret_cast<TwinLoop*>(object)->loop;
+  PyTypeObject* type = Py_TYPE(object);
+  type->tp_free(object);
+  Py_DECREF(type);
+}
+
+// (fault or -1, value or None, target or None, overridden) for each surface, or just the targets.
+std::vector<SurfaceOrder> readOrders(PyObject* sequence, std::size_t count) {
+  std::vector<SurfaceOrder> out;
+  for (const Object& item : items(sequence)) {
+    SurfaceOrder order;
+    if (PyTuple_Check(item.get())) {
+      const std::vector<Object> parts = items(item.get());
+      order.fault = static_cast<SurfaceFault>(static_cast<int>(number(parts.at(0).get())));
+      if (parts.at(1).get() != Py_None) order.value = number(parts.at(1).get());
+      if (parts.at(2).get() != Py_None) order.target_deg = number(parts.at(2).get());
+      order.overridden = PyObject_IsTrue(parts.at(3).get()) == 1;
+    } else {
+      order.target_deg = number(item.get());
+    }
+    out.push_back(order);
+  }
+  if (out.size() != count) throw std::invalid_argument("expected an order for each surface");
+  return out;
+}
+
+// (lever, propeller, mixture, fault) for each engine.
+std::vector<Throttle> readThrottles(PyObject* sequence, std::size_t count) {
+  std::vector<Throttle> out;
+  for (const Object& item : items(sequence)) {
+    const std::vector<Object> parts = items(item.get());
+    out.push_back({number(parts.at(0).get()), number(parts.at(1).get()), number(parts.at(2).get()),
+                   static_cast<int>(number(parts.at(3).get()))});
+  }
+  if (out.size() != count) throw std::invalid_argument("expected levers for each engine");
+  return out;
+}
+
+PyObject* fly(PyObject* object, PyObject* arguments) {
+  return guarded([&]() -> PyObject* {
+    PyObject *model = nullptr, *orders = nullptr, *throttles = nullptr;
+    int count = 0;
+    double dt = 0.0;
+    if (!PyArg_ParseTuple(arguments, "OidOO", &model, &count, &dt, &orders, &throttles)) throw PythonError{};
+    Loop& loop = loopOf(object);
+    loop.fly(model, count, dt, readOrders(orders, loop.surfaces()), readThrottles(throttles, loop.engines()));
+    return none();
+  });
+}
+
+PyObject* settle(PyObject* object, PyObject* arguments) {
+  return guarded([&]() -> PyObject* {
+    PyObject *model = nullptr, *throttles = nullptr;
+    int count = 0;
+    double dt = 0.0;
+    if (!PyArg_ParseTuple(arguments, "OidO", &model, &count, &dt, &throttles)) throw PythonError{};
+    Loop& loop = loopOf(object);
+    loop.settle(model, count, dt, readThrottles(throttles, loop.engines()));
+    return none();
+  });
+}
+
+PyMethodDef methods[] = {
+    {"fly", method(fly), METH_VARARGS,
+     "fly(model, count, dt, orders, levers): `count` JSBSim steps of `dt` [s]. `orders`: an angle [deg] for each "
+     "surface, "
+     "or (fault, value, target, overridden). `levers`: (throttle, propeller, mixture, fault) for each engine."},
+    {"settle", method(settle), METH_VARARGS, "settle(model, count, dt, levers): the engines alone, in the air of now."},
+    {nullptr, nullptr, 0, nullptr},
+};
+
+char description[] = "TwinLoop(model): the steps of a FixedWing between two frames, the same bits as in Python.";
+
+PyType_Slot slots[] = {
+    {Py_tp_new, reinterpret_cast<void*>(create)},
+    {Py_tp_dealloc, reinterpret_cast<void*>(destroy)},
+    {Py_tp_methods, methods},
+    {Py_tp_doc, description},
+    {0, nullptr},
+};
+
+PyType_Spec specification = {"xplane_bridge._core.TwinLoop", sizeof(TwinLoop), 0, Py_TPFLAGS_DEFAULT, slots};
+
+}  // namespace
+
+void addTwinLoop(PyObject* module) {
+  Object type(PyType_FromSpec(&specification));
+  PyObject* owned = type.get();
+  Py_INCREF(owned);
+  check(PyModule_AddObject(module, "TwinLoop", owned));
+}
+
+}  // namespace xplane_bridge::bindings

@@ -1,0 +1,35 @@
+"""The compiled module `xplane_bridge._core`, where it has been built."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+from typing import Any
+
+from xplane_bridge.errors import XplaneBridgeError
+
+core: Any = None  #: the module, or None
+with contextlib.suppress(ImportError):
+    core = importlib.import_module("xplane_bridge._core")
+
+
+class NotCompiledError(XplaneBridgeError):
+    """Something needs the compiled module, and it is not there."""
+
+
+def require(who: str) -> Any:
+    """The module.
+
+    Args:
+        who: Needs it, for the message.
+
+    Raises:
+        NotCompiledError: It has not been built for this Python.
+    """
+    if core is None:
+        msg = (
+            f"{who} flies with tx_node's own arbiter, and the compiled module xplane_bridge._core is not there: run "
+            "scripts/setup in the clone, or pip install the package where a C++ compiler and python3-dev are installed"
+        )
+        raise NotCompiledError(msg)
+    return core

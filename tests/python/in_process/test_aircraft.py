@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from support.room_table import ROOT
+from xplane_bridge.compiled import core
+from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
+from xplane_bridge.emulator.simulator import Simulator
+from xplane_bridge.in_process.aircraft import arbiter_options
+from xplane_bridge.in_process.failures import Failures, NotFlownError, model_surface
+from xplane_bridge.in_process.view import FlightView
+
+
+def test_a_surface_fails_in_the_model_and_an_engine_by_its_dataref() -> None:
+    model = create_model("fixed_wing")
+    failures, controls = Failures(model), Controls()
+    failures.act({"name": "aileron1_wing2_left", "kind": "stuck", "value": 5.0, "clear": False})
+    failures.act({"name": "engine_2", "kind": "failed", "value": None, "clear": False})
+    failures.apply(controls, 1 / 60)
+    assert controls.surface_faults == {"wing2l_ail1": SurfaceFault(SurfaceFaultKind.STUCK, 5.0)}
+    assert [fault.value for fault in controls.engine_faults[:2]] == ["none", "stopped"]
+    failures.act({"name": "aileron1_wing2_left", "kind": "failed", "value": None, "clear": True})
+    failures.apply(controls, 1 / 60)
+    assert controls.surface_faults == {}
+    assert controls.engine_faults[1].value == "stopped"
+    failures.clear()
+    failures.apply(controls, 1 / 60)
+    assert controls.engine_faults[1].value == "none"
+    with pytest.raises(NotFlownError, match="it takes the bridge"):
+        failures.act({"name": "pitot_1", "kind": "failed", "value": None, "clear": False})
+    with pytest.raises(NotFlownError, match="wing2l_ail1"):
+        failures.act({"name": "aileron2_wing1_left", "kind": "stuck", "value": None, "clear": False})
+
+
+def test_surfaces_have_the_names_of_the_core() -> None:
+    text = (ROOT / "docs/surfaces.md").read_text(encoding="utf-8")
+    assert "aileron1_wing2_left" in text
+    assert model_surface("aileron1_wing2_left") == "wing2l_ail1"
+    assert model_surface("elevator1_right") == "hstab2_elv1"
+    assert model_surface("rudder1_fin1") == "vstab1_rud1"
+    assert model_surface("engine_1") == ""
+
+
+def test_the_view_is_what_the_emulator_sends() -> None:
+    """Every field that X-Plane has a dataref for, by lib/core/state/sources.txt, against the emulator's own tables."""
+    simulator = Simulator(create_model, "fixed_wing", initial=InitialState(heading_deg=30.0, airspeed_mps=70.0))
+    simulator.set_weather(200.0, 7.0, 1.0, 3)
+    simulator.inputs._pilot = None
+    for _ in range(60):
+        simulator.step(1 / 60)
+    view = FlightView(simulator.model.info, simulator.model.state, simulator.controls, 60, 1 / 60)
+    units = {
+        "": 1.0,
+        "negated": -1.0,
+        "psf": 4.4482216152605 / 0.3048**2,
+        "g, aft +": -1.0,
+        "g, up +": 1.0,
+        "g, right +": 1.0,
+    }
+    compared = 0
+    section = (ROOT / "lib/core/state/sources.txt").read_text(encoding="utf-8").split("[FlightState: flight")[1]
+    for line in section.split("\n[")[0].splitlines():
+        columns = [column.strip() for column in line.split("|")]
+        match = re.match(r"(sim/[^ ;{]+)(?: \(([^)]*)\))?(?=$|;)", columns[2]) if len(columns) > 2 else None
+        if match is None or not hasattr(view, columns[0]) or match.group(2) not in (None, *units):
+            continue
+        sent = simulator.store.get(*_element(match.group(1))) * units[match.group(2) or ""]
+        assert getattr(view, columns[0]) == pytest.approx(sent, rel=2e-7, abs=1e-6), columns[0]
+        compared += 1
+    assert compared >= 20
+
+
+def _element(path: str) -> tuple:
+    name, _, index = path.rstrip("]").partition("[")
+    return name, int(index or 0)
+
+
+def test_the_options_of_the_arbiter_are_those_of_the_files() -> None:
+    options = arbiter_options("fixed_wing")
+    assert options["engines"] == 2
+    assert options["channels"]["flaps"] == {"slew": 0.5}
+    assert options["command_timeout"] == 0.5
+    assert core.ControlArbiter(options, 0.0).mode == 1
