@@ -1,7 +1,10 @@
 #include "xplane_bridge/vision/picture_checks.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <numeric>
+#include <vector>
 
 namespace xplane_bridge::vision {
 namespace {
@@ -36,6 +39,29 @@ bool samePixels(const cv::Mat& a, const cv::Mat& b) {
     if (std::memcmp(a.ptr(y), b.ptr(y), bytes) != 0) return false;
   }
   return true;
+}
+
+void PeriodMeter::add(std::int64_t time_ns) {
+  constexpr double kNanosecond = 1e-9;
+  if (last_ns_ != 0 && time_ns > last_ns_) {
+    periods_[count_ % kPeriods] = static_cast<float>(static_cast<double>(time_ns - last_ns_) * kNanosecond);
+    ++count_;
+  }
+  last_ns_ = std::max(last_ns_, time_ns);
+}
+
+PeriodMeter::Summary PeriodMeter::summary() const {
+  constexpr double kShare = 0.99;
+  Summary out;
+  out.count = std::min(count_, kPeriods);
+  if (out.count == 0) return out;
+  std::vector<float> sorted(periods_.begin(), periods_.begin() + static_cast<std::ptrdiff_t>(out.count));
+  std::sort(sorted.begin(), sorted.end());
+  const auto size = static_cast<double>(out.count);
+  out.mean = std::accumulate(sorted.begin(), sorted.end(), 0.0) / size;
+  out.p99 = static_cast<double>(sorted[static_cast<std::size_t>(std::ceil(kShare * size)) - 1]);
+  out.worst = static_cast<double>(sorted.back());
+  return out;
 }
 
 }  // namespace xplane_bridge::vision

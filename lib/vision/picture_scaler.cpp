@@ -84,22 +84,27 @@ void PictureScaler::scale(const cv::Mat& source, cv::Mat& bgr) {
   toThreeChannels(scaled_, inside);
 }
 
-Intrinsics PictureScaler::intrinsics(cv::Size source, double horizontal_fov_deg) const {
-  if (!(horizontal_fov_deg > 0.0 && horizontal_fov_deg < 180.0) || source.width < 1 || source.height < 1) {
-    throw std::invalid_argument("field of view " + std::to_string(horizontal_fov_deg) + " deg of a source of " +
+Intrinsics PictureScaler::intrinsics(cv::Size source, const FieldOfView& shown) const {
+  const bool across = shown.horizontal_deg > 0.0 && shown.horizontal_deg < 180.0;
+  const bool upwards = shown.vertical_deg >= 0.0 && shown.vertical_deg < 180.0;
+  if (!across || !upwards || source.width < 1 || source.height < 1) {
+    throw std::invalid_argument("field of view " + std::to_string(shown.horizontal_deg) + " x " +
+                                std::to_string(shown.vertical_deg) + " deg of a source of " +
                                 std::to_string(source.width) + "x" + std::to_string(source.height) +
                                 ": expected an angle in (0, 180) and a source that is not empty");
   }
   const Layout part = layout(source);
-  const double focal = 0.5 * source.width / std::tan(0.5 * horizontal_fov_deg * kDegree);
+  const auto focal = [](int side, double angle_deg) { return 0.5 * side / std::tan(0.5 * angle_deg * kDegree); };
+  const double focal_x = focal(source.width, shown.horizontal_deg);
+  const double focal_y = shown.vertical_deg > 0.0 ? focal(source.height, shown.vertical_deg) : focal_x;
   const double scale_x = static_cast<double>(part.to.width) / part.from.width;
   const double scale_y = static_cast<double>(part.to.height) / part.from.height;
   Intrinsics camera;
-  camera.fx = focal * scale_x;
-  camera.fy = focal * scale_y;
-  // The optical axis is the middle of the source, half a pixel beyond the centre of the pixel before it.
-  camera.cx = (0.5 * source.width - part.from.x) * scale_x + part.to.x - 0.5;
-  camera.cy = (0.5 * source.height - part.from.y) * scale_y + part.to.y - 0.5;
+  camera.fx = focal_x * scale_x;
+  camera.fy = focal_y * scale_y;
+  // Unshifted, the optical axis is the middle of the source, half a pixel beyond the centre of the pixel before it.
+  camera.cx = ((0.5 - shown.shift_right) * source.width - part.from.x) * scale_x + part.to.x - 0.5;
+  camera.cy = ((0.5 + shown.shift_up) * source.height - part.from.y) * scale_y + part.to.y - 0.5;
   camera.horizontal_fov_deg =
       (std::atan((camera.cx + 0.5) / camera.fx) + std::atan((size_.width - camera.cx - 0.5) / camera.fx)) / kDegree;
   return camera;

@@ -180,27 +180,44 @@ std::uint32_t X11Connection::area(xcb_window_t window) const {
   return geometry == nullptr ? 0 : std::uint32_t{geometry->width} * geometry->height;
 }
 
-std::optional<xcb_window_t> X11Connection::findWindow(const X11SourceOptions& options,
-                                                      std::vector<std::string>& titles) const {
-  titles.clear();
+std::pair<int, int> X11Connection::corner(xcb_window_t window) const {
+  const XcbPointer<xcb_translate_coordinates_reply_t> corner(xcb_translate_coordinates_reply(
+      connection_, xcb_translate_coordinates(connection_, window, screen_->root, 0, 0), nullptr));
+  return corner == nullptr ? std::make_pair(0, 0) : std::make_pair(int{corner->dst_x}, int{corner->dst_y});
+}
+
+X11Connection::Found X11Connection::findWindow(const X11SourceOptions& options) const {
+  Found found;
   if (options.window_id != 0) {
-    return viewable(options.window_id) ? std::optional<xcb_window_t>(options.window_id) : std::nullopt;
+    if (viewable(options.window_id)) found.window = options.window_id;
+    return found;
   }
-  std::optional<xcb_window_t> best;
-  std::tuple<bool, bool, std::uint32_t> best_rank{false, false, 0};  // X-Plane's, exact title, area [px]
+  using Rank = std::pair<bool, bool>;  // X-Plane's, exact title
+  Rank best_rank{false, false};
+  std::vector<xcb_window_t> best;
   for (const xcb_window_t window : allWindows()) {
     const std::string text = title(window);
     const bool wanted = fits(window, options, text);
     if ((!wanted && text.empty()) || !viewable(window)) continue;
-    if (!text.empty()) titles.push_back(text);
-    const std::uint32_t size = area(window);
-    if (!wanted || size == 0) continue;
-    const std::tuple<bool, bool, std::uint32_t> rank{isXPlanes(window), text == options.title, size};
-    if (best.has_value() && rank <= best_rank) continue;
-    best = window;
+    if (!text.empty()) found.titles.push_back(text);
+    if (!wanted || area(window) == 0) continue;
+    const Rank rank{isXPlanes(window), text == options.title};
+    if (rank < best_rank) continue;
+    if (rank > best_rank) best.clear();
     best_rank = rank;
+    best.push_back(window);
   }
-  return best;
+  found.alike = best.size();
+  if (options.index < 0) {
+    const auto smaller = [this](xcb_window_t a, xcb_window_t b) { return area(a) < area(b); };
+    const auto largest = std::max_element(best.begin(), best.end(), smaller);
+    if (largest != best.end()) found.window = *largest;
+  } else if (static_cast<std::size_t>(options.index) < best.size()) {
+    std::stable_sort(best.begin(), best.end(),
+                     [this](xcb_window_t a, xcb_window_t b) { return corner(a) < corner(b); });
+    found.window = best[static_cast<std::size_t>(options.index)];
+  }
+  return found;
 }
 
 }  // namespace xplane_bridge::vision

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "xplane_bridge/vision/pixel_format.hpp"
@@ -47,10 +48,13 @@ class X11Connection {
   /// Pixel format of a window's visual; empty when the server does not list it.
   [[nodiscard]] std::optional<PixelFormat> pixelFormat(xcb_visualid_t visual, int depth) const;
 
+  struct Found {
+    std::optional<xcb_window_t> window;
+    std::size_t alike = 0;            ///< windows that fit as well, this one included
+    std::vector<std::string> titles;  ///< of all viewable windows that have one
+  };
   /// Viewable window that fits best, see X11SourceOptions.
-  /// @param[out] titles of all viewable windows that have one
-  [[nodiscard]] std::optional<xcb_window_t> findWindow(const X11SourceOptions& options,
-                                                       std::vector<std::string>& titles) const;
+  [[nodiscard]] Found findWindow(const X11SourceOptions& options) const;
 
   /// Title of a window, as UTF-8 where the window gives it so.
   [[nodiscard]] std::string title(xcb_window_t window) const;
@@ -64,6 +68,8 @@ class X11Connection {
   /// Its process runs on this computer and is called X-Plane or X-Plane-x86_64.
   [[nodiscard]] bool isXPlanes(xcb_window_t window) const;
   [[nodiscard]] std::uint32_t area(xcb_window_t window) const;
+  /// [px] of its upper left corner on the screen: x, y
+  [[nodiscard]] std::pair<int, int> corner(xcb_window_t window) const;
 
   xcb_connection_t* connection_;
   xcb_screen_t* screen_ = nullptr;

@@ -56,6 +56,11 @@ std::string thereAre(std::vector<std::string> titles) {
 }
 
 std::string selection(const X11SourceOptions& options) {
+  if (options.index >= 0) {
+    X11SourceOptions any = options;
+    any.index = -1;
+    return selection(any) + ", number " + std::to_string(options.index) + " from the left";
+  }
   if (options.window_id != 0) return "window " + hex(options.window_id);
   if (!options.class_name.empty()) return "window of class \"" + options.class_name + "\"";
   if (!options.title.empty()) {
@@ -76,6 +81,10 @@ void validate(const X11SourceOptions& options) {
   }
   if (options.title_is_regex && options.title.empty()) {
     throw std::invalid_argument("the window title is to be a regular expression, but none is given");
+  }
+  if (options.index >= 0 && (options.window_id != 0 || !options.region.empty())) {
+    throw std::invalid_argument("window index " + std::to_string(options.index) +
+                                " is given with a window id or a region, which name one already");
   }
   if (options.region.x < 0 || options.region.y < 0) {
     throw std::invalid_argument(selection(options) + ": expected its corner on the screen (x, y >= 0)");
@@ -163,6 +172,9 @@ class X11WindowSource::Impl {
     std::ostringstream text;
     text << wanted_ << ": " << hex(target_.window);
     if (options_.region.empty()) text << " \"" << connection_->title(target_.window) << "\"";
+    if (alike_ > 1 && options_.index < 0) {
+      text << ", the largest of " << alike_ << " that are alike (the window's index chooses one)";
+    }
     text << " on display " << connection_->displayName() << ", " << grabber_->area().width << "x"
          << grabber_->area().height << ", depth " << target_.format.depth
          << (grabber_->sharesMemory() ? ", shared memory" : ", through the socket")
@@ -268,15 +280,20 @@ class X11WindowSource::Impl {
         return false;
       }
     }
-    std::vector<std::string> titles;
-    std::optional<xcb_window_t> window = connection_->root();
-    if (options_.region.empty()) window = connection_->findWindow(options_, titles);
-    if (!window.has_value()) {
-      problem_ = "no visible " + wanted_ + " on display " + connection_->displayName() +
-                 (options_.window_id == 0 ? thereAre(std::move(titles)) : "");
+    X11Connection::Found found;
+    found.window = connection_->root();
+    if (options_.region.empty()) found = connection_->findWindow(options_);
+    alike_ = found.alike;
+    if (!found.window.has_value()) {
+      problem_ = "no visible " + wanted_ + " on display " + connection_->displayName();
+      if (alike_ > 0) {
+        problem_ += "; there are " + std::to_string(alike_) + ", counted from 0";
+      } else if (options_.window_id == 0) {
+        problem_ += thereAre(std::move(found.titles));
+      }
       return false;
     }
-    return open(*window);
+    return open(*found.window);
   }
 
   bool open(xcb_window_t window) {
@@ -437,8 +454,9 @@ class X11WindowSource::Impl {
 
   X11SourceOptions options_;
   Clock clock_;
-  std::string wanted_;   // the window or region, in words
-  std::string problem_;  // empty while there is a picture
+  std::string wanted_;     // the window or region, in words
+  std::string problem_;    // empty while there is a picture
+  std::size_t alike_ = 0;  // windows that fit as well as the one captured
   std::unique_ptr<X11Connection> connection_;
   Target target_;
   std::unique_ptr<X11Grabber> grabber_;

@@ -3,8 +3,11 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace xplane_bridge::vision {
 
@@ -17,9 +20,20 @@ struct Change {
   bool time_known = false;   ///< false: `time_ns` may be late by any amount
 };
 
-/// Pixels of one picture, valid until the source's next grab().
+/// The simulator frame that a picture shows, where its source knows it.
+struct ShownFrame {
+  float sim_time = 0.0F;      ///< [s] the frame's, as X-Plane sent it: the key by which its state is found
+  double delay = 0.0;         ///< [s] from the frame to its display, as applied
+  bool borderline = false;    ///< the picture lies about half way between two frames
+  bool delay_assumed = true;  ///< the delay was not measured, or is not true any more
+};
+
+/// One picture: pixels, valid until the source's next grab(), or JPEG.
 struct Picture {
-  cv::Mat bgr;                       ///< CV_8UC3, or CV_8UC4 whose fourth channel means nothing
+  cv::Mat bgr;  ///< CV_8UC3, or CV_8UC4 whose fourth channel means nothing; empty with `jpeg`
+  std::shared_ptr<const std::vector<std::uint8_t>> jpeg;  ///< as the source has it; empty with `bgr`
+  cv::Size jpeg_size;                                     ///< [px]
+  std::optional<ShownFrame> frame;
   std::int64_t display_time_ns = 0;  ///< [ns] host time at which the picture appeared (Change.time_ns)
   std::int64_t grab_time_ns = 0;     ///< [ns] host time at which the pixels were read
   bool display_time_known = false;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 
@@ -35,6 +37,30 @@ class FrozenCheck {
   std::int64_t after_ns_;
   std::int64_t standing_since_ns_ = 0;  // 0: no picture yet
   std::int64_t moved_at_ns_ = 0;        // 0: never
+};
+
+/// Periods between pictures, the latest kPeriods of them. Allocates nothing after its construction but in summary().
+class PeriodMeter {
+ public:
+  static constexpr std::size_t kPeriods = 1024;
+
+  struct Summary {
+    std::size_t count = 0;  ///< periods it is of; 0: the others are 0
+    double mean = 0.0;      ///< [s]
+    double p99 = 0.0;       ///< 99 of 100 are not longer [s]
+    double worst = 0.0;     ///< [s]
+  };
+
+  /// A picture; of one that is not later than the last nothing is counted.
+  void add(std::int64_t time_ns);
+  /// The next picture begins anew: there was a pause of pictures that is no period.
+  void interrupt() { last_ns_ = 0; }
+  [[nodiscard]] Summary summary() const;
+
+ private:
+  std::array<float, kPeriods> periods_{};  // [s], a ring
+  std::size_t count_ = 0;                  // ever
+  std::int64_t last_ns_ = 0;               // 0: none
 };
 
 }  // namespace xplane_bridge::vision

@@ -15,6 +15,14 @@ enum class FitMode {
 /// @throws std::invalid_argument unless `name` is crop, letterbox or stretch.
 [[nodiscard]] FitMode fitModeFromName(const std::string& name);
 
+/// What a whole source shows.
+struct FieldOfView {
+  double horizontal_deg = 60.0;  ///< between the left and the right edge, before the shift; in (0, 180)
+  double vertical_deg = 0.0;     ///< likewise, lower and upper edge; 0: pixels are square
+  double shift_right = 0.0;      ///< [widths] that the source's middle lies right of the line of sight
+  double shift_up = 0.0;         ///< [heights] that it lies above it
+};
+
 /// Pinhole camera of the output picture; pixel centres at integers, top left pixel (0, 0), no distortion.
 struct Intrinsics {
   double fx = 0.0;                  ///< [px]
@@ -36,9 +44,8 @@ class PictureScaler {
 
   /// Camera of the output.
   /// @param source size of the source, [px]
-  /// @param horizontal_fov_deg of the whole source, in (0, 180); its pixels are square
   /// @throws std::invalid_argument when out of range.
-  [[nodiscard]] Intrinsics intrinsics(cv::Size source, double horizontal_fov_deg) const;
+  [[nodiscard]] Intrinsics intrinsics(cv::Size source, const FieldOfView& shown) const;
 
   [[nodiscard]] cv::Size size() const { return size_; }
 

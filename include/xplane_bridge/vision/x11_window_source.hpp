@@ -11,7 +11,7 @@
 
 namespace xplane_bridge::vision {
 
-/// How a change of the window is noticed.
+/// How a change of the window is noticed; X-Plane's changes with each frame [? window-changes].
 enum class ChangeDetection {
   kAuto,      ///< XDamage events; a checksum as soon as the window changes without any event
   kDamage,    ///< XDamage events only
@@ -27,7 +27,7 @@ const std::vector<std::string>& xplaneWindowTitles();
 
 /// Which part of which screen. At most one of title, class_name, window_id and region is given; none: X-Plane's own
 /// window, which has exactly one of xplaneWindowTitles(). Of several windows that fit, the one whose process is X-Plane
-/// is preferred, then one with exactly the title, then the largest.
+/// is preferred, then one with exactly the title, then the largest, or, of such that are alike in both, number `index`.
 struct X11SourceOptions {
   std::string display;          ///< X display, e.g. ":0"; empty = $DISPLAY
   std::string title;            ///< part of the window's title
@@ -35,6 +35,7 @@ struct X11SourceOptions {
   std::string class_name;       ///< WM_CLASS, either of its two strings, exact
   std::uint32_t window_id = 0;  ///< as xwininfo prints it
   cv::Rect region;              ///< [px] part of the screen, top left corner first
+  int index = -1;               ///< of windows alike, counted from 0, the leftmost, then the topmost; -1: the largest
 
   ChangeDetection change_detection = ChangeDetection::kAuto;
   bool use_composite = true;      ///< read the window also when covered or off the screen

@@ -29,6 +29,28 @@ TEST(SamePixels, ComparesSizeTypeAndEveryPixel) {
   EXPECT_FALSE(vision::samePixels(a, cv::Mat(48, 64, CV_8UC4, cv::Scalar::all(9))));
 }
 
+TEST(PeriodMeter, TellsMeanTheLongestOf99PercentAndTheWorst) {
+  constexpr std::int64_t kMillisecond = 1'000'000;
+  vision::PeriodMeter meter;
+  EXPECT_EQ(meter.summary().count, 0U);
+  std::int64_t now = 5'000 * kMillisecond;
+  meter.add(now);
+  EXPECT_EQ(meter.summary().count, 0U) << "one picture has no period";
+  for (int i = 0; i < 200; ++i) meter.add(now += (i == 70 ? 500 : i == 120 || i == 130 ? 60 : 20) * kMillisecond);
+  const vision::PeriodMeter::Summary all = meter.summary();
+  EXPECT_EQ(all.count, 200U);
+  EXPECT_NEAR(all.mean, (197 * 0.02 + 2 * 0.06 + 0.5) / 200.0, 1e-6);
+  EXPECT_NEAR(all.p99, 0.06, 1e-6);  // the 198th of 200
+  EXPECT_NEAR(all.worst, 0.5, 1e-6);
+  meter.add(now);  // the same picture again
+  meter.interrupt();
+  meter.add(now += 60'000 * kMillisecond);
+  EXPECT_EQ(meter.summary().count, 200U);
+  for (int i = 0; i < 1024; ++i) meter.add(now += 30 * kMillisecond);
+  EXPECT_EQ(meter.summary().count, 1024U);
+  EXPECT_NEAR(meter.summary().worst, 0.03, 1e-6) << "older ones have left";
+}
+
 TEST(FrozenCheck, NeedsAStandingPictureAndAMovingState) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   vision::FrozenCheck check(kSecond);

@@ -40,7 +40,7 @@ cv::Point2d brightest(const cv::Mat& bgr) {
 
 TEST(PictureScaler, SixtyDegreesAt640x480) {
   // fx = 320 / tan(30 deg) = 554.256; the middle of 640 pixels lies between pixels 319 and 320.
-  const Intrinsics camera = PictureScaler(640, 480, FitMode::kCrop).intrinsics({640, 480}, 60.0);
+  const Intrinsics camera = PictureScaler(640, 480, FitMode::kCrop).intrinsics({640, 480}, {60.0});
   EXPECT_NEAR(camera.fx, 554.256, 5e-4);
   EXPECT_NEAR(camera.fy, 554.256, 5e-4);
   EXPECT_DOUBLE_EQ(camera.cx, 319.5);
@@ -50,7 +50,7 @@ TEST(PictureScaler, SixtyDegreesAt640x480) {
 
 TEST(PictureScaler, CropOfAWideWindowNarrowsTheView) {
   // 1920x1080 at 60 deg: f = 960 / tan 30 = 1662.769; the crop is 1440x1080, scaled by 480/1080.
-  const Intrinsics camera = PictureScaler(640, 480, FitMode::kCrop).intrinsics({1920, 1080}, 60.0);
+  const Intrinsics camera = PictureScaler(640, 480, FitMode::kCrop).intrinsics({1920, 1080}, {60.0});
   EXPECT_NEAR(camera.fx, 1662.7688 * 480.0 / 1080.0, 1e-3);
   EXPECT_NEAR(camera.fy, camera.fx, 1e-9);
   EXPECT_NEAR(camera.horizontal_fov_deg, 2.0 * std::atan(720.0 / 1662.7688) * 180.0 / M_PI, 1e-5);
@@ -58,16 +58,28 @@ TEST(PictureScaler, CropOfAWideWindowNarrowsTheView) {
 }
 
 TEST(PictureScaler, LetterboxKeepsTheWholeView) {
-  const Intrinsics camera = PictureScaler(640, 480, FitMode::kLetterbox).intrinsics({1920, 1080}, 60.0);
+  const Intrinsics camera = PictureScaler(640, 480, FitMode::kLetterbox).intrinsics({1920, 1080}, {60.0});
   EXPECT_NEAR(camera.fx, 554.256, 5e-4);
   EXPECT_NEAR(camera.fy, camera.fx, 1e-9);
   EXPECT_NEAR(camera.cy, 239.5, 1e-9);
 }
 
 TEST(PictureScaler, StretchShowsInTheFocalLengths) {
-  const Intrinsics camera = PictureScaler(640, 480, FitMode::kStretch).intrinsics({1920, 1080}, 60.0);
+  const Intrinsics camera = PictureScaler(640, 480, FitMode::kStretch).intrinsics({1920, 1080}, {60.0});
   EXPECT_NEAR(camera.fx, 554.256, 5e-4);
   EXPECT_NEAR(camera.fy, 1662.7688 * 480.0 / 1080.0, 1e-3);
+}
+
+TEST(PictureScaler, NonProportionalAndShiftedFrustum) {
+  // 90 deg across, 2 atan(0.65) upwards; the middle a quarter of the width left and a tenth of the height above the
+  // line of sight: the principal point lies right of the middle and below it.
+  const double upwards = 2.0 * std::atan(0.65) * 180.0 / M_PI;
+  const xplane_bridge::vision::FieldOfView shown{90.0, upwards, -0.25, 0.1};
+  const Intrinsics camera = PictureScaler(320, 240, FitMode::kCrop).intrinsics({640, 480}, shown);
+  EXPECT_NEAR(camera.fx, 160.0, 1e-9);
+  EXPECT_NEAR(camera.fy, 120.0 / 0.65, 1e-9);
+  EXPECT_NEAR(camera.cx, 239.5, 1e-9);
+  EXPECT_NEAR(camera.cy, 143.5, 1e-9);
 }
 
 TEST(PictureScaler, PixelsAreWhereTheIntrinsicsSayTheyAre) {
@@ -76,7 +88,7 @@ TEST(PictureScaler, PixelsAreWhereTheIntrinsicsSayTheyAre) {
   for (const FitMode mode : {FitMode::kCrop, FitMode::kLetterbox, FitMode::kStretch}) {
     for (const cv::Size source : {cv::Size(1920, 1080), cv::Size(800, 900), cv::Size(320, 240), cv::Size(641, 479)}) {
       PictureScaler scaler(640, 480, mode);
-      const Intrinsics camera = scaler.intrinsics(source, 70.0);
+      const Intrinsics camera = scaler.intrinsics(source, {70.0});
       const double f = 0.5 * source.width / std::tan(35.0 * M_PI / 180.0);
       const double x = std::floor(0.61 * source.width);
       const double y = std::floor(0.38 * source.height);
@@ -106,7 +118,7 @@ TEST(PictureScaler, RefusesWhatItCannotDo) {
   EXPECT_THROW(PictureScaler(640, 9000, FitMode::kCrop), std::invalid_argument);
   EXPECT_THROW((void)vision::fitModeFromName("zoom"), std::invalid_argument);
   const PictureScaler scaler(640, 480, FitMode::kCrop);
-  EXPECT_THROW((void)scaler.intrinsics({640, 480}, 180.0), std::invalid_argument);
-  EXPECT_THROW((void)scaler.intrinsics({640, 480}, std::nan("")), std::invalid_argument);
-  EXPECT_THROW((void)scaler.intrinsics({0, 480}, 60.0), std::invalid_argument);
+  EXPECT_THROW((void)scaler.intrinsics({640, 480}, {180.0}), std::invalid_argument);
+  EXPECT_THROW((void)scaler.intrinsics({640, 480}, {std::nan("")}), std::invalid_argument);
+  EXPECT_THROW((void)scaler.intrinsics({0, 480}, {60.0}), std::invalid_argument);
 }

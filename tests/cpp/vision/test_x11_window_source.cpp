@@ -106,7 +106,11 @@ TEST(X11SourceOptions, RefusesContradictions) {
   options.title_is_regex = true;
   EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
   options.title_is_regex = false;
+  options.index = 1;
   EXPECT_NO_THROW(X11WindowSource(options, steadyNow));
+  options.title.clear();
+  options.window_id = 7;
+  EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
   EXPECT_THROW((void)vision::changeDetectionFromName("xdamage"), std::invalid_argument);
 }
 
@@ -255,6 +259,31 @@ TEST_F(X11WindowSourceTest, PrefersTheExactTitleThenTheLargest) {
   X11WindowSource source(titled(server_), steadyNow);
   ASSERT_TRUE(nextPicture(source, picture_));
   EXPECT_EQ(source.window(), large.id());
+}
+
+TEST_F(X11WindowSourceTest, OfWindowsAlikeTheIndexChoosesFromTheLeft) {
+  TestWindow right(server_.display(), "X-System", 320, 240, 400, 0);
+  TestWindow left(server_.display(), "X-System", 100, 80, 10, 20);
+  TestWindow below(server_.display(), "X-System", 200, 160, 10, 300);
+  X11WindowSource largest(titled(server_, ""), steadyNow);
+  ASSERT_TRUE(nextPicture(largest, picture_));
+  EXPECT_EQ(largest.window(), right.id());
+  EXPECT_NE(largest.describe().find("the largest of 3 that are alike"), std::string::npos) << largest.describe();
+  int index = 0;
+  for (const TestWindow* window : {&left, &below, &right}) {
+    X11SourceOptions options = titled(server_, "");
+    options.index = index++;
+    X11WindowSource source(options, steadyNow);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+    EXPECT_EQ(source.window(), window->id()) << "index " << options.index;
+    EXPECT_EQ(source.describe().find("alike"), std::string::npos);
+  }
+  X11SourceOptions options = titled(server_, "");
+  options.index = 3;
+  X11WindowSource none(options, steadyNow);
+  EXPECT_TRUE(becomesLost(none));
+  EXPECT_NE(none.problem().find("number 3 from the left"), std::string::npos) << none.problem();
+  EXPECT_NE(none.problem().find("there are 3, counted from 0"), std::string::npos) << none.problem();
 }
 
 TEST_F(X11WindowSourceTest, FindsXPlanesOwnWindowByExactlyItsTitle) {

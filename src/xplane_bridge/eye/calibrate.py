@@ -1,0 +1,284 @@
+"""Measures the delay from a frame to its picture: steps of the field of view, seen in both.
+
+X-Plane is asked for a wider field of view and back at random times. The frame whose datagram first reports a step is
+the frame whose picture zooms; the random times leave one delay only that explains all steps. The user's value is
+written to a file before the first step, and restored on any exit, or by the next start after a kill.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import statistics
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable, List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from xplane_bridge.errors import XplaneBridgeError
+
+from . import names
+
+#: Frames by which the datagram that reports a step is later than the step in the picture. 0 as long as nobody has seen
+#: a real X-Plane read its network after it answered.
+FIELD_OF_VIEW_REPORT_LAG = 0
+
+_STEPS = 10
+_STEP_DEG = 8.0
+_WIDEST_DEG = 120.0
+_BETWEEN_S = (0.15, 0.3)
+_SETTLE_S = 0.7
+#: Steps that must fit the delay that is found, and how many more than fit any other.
+_ENOUGH = 6
+_MORE = 2
+#: The delay is looked for within these [s].
+_LEAST_S, _MOST_S = -0.02, 0.5
+#: So many more pictures than steps, those that differ most from the one before, may have zoomed; they differ by at
+#: least so many grey levels. No multiple of the usual difference tells them: at few frames a second the aircraft moves
+#: nearly as much between two pictures as a step does.
+_SPARE = 2
+_LEAST_DIFFERENCE = 1.5
+_GREY_SIZE = (56, 80)
+_SAME_DEG = 0.01
+_WRITE_TIMEOUT_S = 2.0
+_WRITE_AGAIN_S = 0.2
+
+
+class CalibrationError(XplaneBridgeError):
+    """The delay could not be measured."""
+
+
+@dataclass(frozen=True)
+class Delay:
+    """What was found: the delay [s], the steps that agree with it, and how far these lie from it (median) [s]."""
+
+    delay_s: float
+    steps: int
+    spread_s: float
+
+
+def default_undo_file() -> Path:
+    """Where the field of view of a running calibration is kept, for each user."""
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home())
+    else:
+        base = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
+    return base / "xplane_bridge" / "eye_undo.json"
+
+
+class UndoFile:
+    """The user's field of view while it is changed: a file, so that it outlives a killed process.
+
+    Args:
+        path: The file.
+        xplane: Which X-Plane, HOST:PORT; another one's value is left alone.
+    """
+
+    def __init__(self, path: Path, xplane: str) -> None:
+        self._path = path
+        self._xplane = xplane
+
+    def keep(self, value: float) -> None:
+        """Writes it down.
+
+        Raises:
+            CalibrationError: The file cannot be written: then nothing may be changed.
+        """
+        draft = self._path.with_suffix(".new")
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            with open(draft, "w", encoding="utf-8") as file:
+                json.dump({"xplane": self._xplane, "field_of_view_deg": value}, file)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(draft, self._path)
+        except OSError as error:
+            raise CalibrationError(
+                f"{self._path} cannot be written ({error.strerror}), and without it X-Plane's field of view could not "
+                "be restored after a crash: it is left alone"
+            ) from None
+
+    def kept(self) -> Optional[float]:
+        """The value, where a calibration of this X-Plane was not undone."""
+        try:
+            content = json.loads(self._path.read_text(encoding="utf-8"))
+            value = float(content["field_of_view_deg"])
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return value if content.get("xplane") == self._xplane and math.isfinite(value) else None
+
+    def forget(self) -> None:
+        """Removes the file: the value is restored."""
+        self._path.unlink()
+
+
+def small_grey(pixels: Any) -> np.ndarray:
+    """A picture as 80x56 grey levels: blocks of it are looked at by one pixel in each 3x3 of theirs."""
+    rows = np.linspace(0, pixels.shape[0] - 1, 3 * _GREY_SIZE[0]).astype(int)
+    columns = np.linspace(0, pixels.shape[1] - 1, 3 * _GREY_SIZE[1]).astype(int)
+    grey = pixels[rows[:, None], columns, 1].astype(np.float32)
+    means: np.ndarray = grey.reshape(_GREY_SIZE[0], 3, _GREY_SIZE[1], 3).mean(axis=(1, 3))
+    return means
+
+
+def step_frames(frames: Sequence[Tuple[int, float]]) -> List[int]:
+    """When frames came that report another field of view than the one before [ns].
+
+    Args:
+        frames: Arrival [ns] and field of view [deg] of each.
+    """
+    return [
+        arrival_ns for (_, before), (arrival_ns, now) in zip(frames, frames[1:]) if abs(now - before) > 0.5 * _STEP_DEG
+    ]
+
+
+def step_pictures(pictures: Sequence[Tuple[int, float]], steps: int) -> List[int]:
+    """When those pictures appeared that may show a step: the ones that differ most from the picture before [ns].
+
+    Args:
+        pictures: Change [ns] and mean difference from the picture before [grey levels] of each.
+        steps: How many steps there were.
+    """
+    seen = [picture for picture in pictures if picture[1] > _LEAST_DIFFERENCE]
+    most = sorted(seen, key=lambda picture: picture[1], reverse=True)[: steps + _SPARE]
+    return sorted(change_ns for change_ns, _ in most)
+
+
+def settle(frames: Sequence[Tuple[int, float]], pictures: Sequence[Tuple[int, float]]) -> Delay:
+    """The delay that explains the steps.
+
+    Args:
+        frames: As for `step_frames`.
+        pictures: As for `step_pictures`.
+
+    Raises:
+        CalibrationError: Too few steps were seen, or they do not agree.
+    """
+    asked = step_frames(frames)
+    shown = step_pictures(pictures, len(asked))
+    if len(asked) < _ENOUGH:
+        raise CalibrationError(
+            f"X-Plane reports {len(asked)} of {_STEPS} steps of its field of view; at least {_ENOUGH} are needed. "
+            "Is it held by an aircraft or a plugin? Give --delay instead (estimate_latency measures it)"
+        )
+    period_ns = statistics.median(b - a for (a, _), (b, _) in zip(frames, frames[1:]))
+
+    def matches(delay_ns: float) -> List[int]:
+        found = []
+        for arrival_ns in asked:
+            nearest = min(
+                (change_ns - arrival_ns for change_ns in shown), key=lambda d: abs(d - delay_ns), default=None
+            )
+            if nearest is not None and abs(nearest - delay_ns) <= 0.5 * period_ns:
+                found.append(nearest)
+        return found
+
+    pairs = (change_ns - arrival_ns for change_ns in shown for arrival_ns in asked)
+    candidates = [delay_ns for delay_ns in pairs if _LEAST_S * 1e9 <= delay_ns <= _MOST_S * 1e9]
+    best = max((matches(delay_ns) for delay_ns in candidates), key=len, default=[])
+    if len(best) < _ENOUGH:
+        raise CalibrationError(
+            f"only {len(best)} of {len(asked)} steps of the field of view were seen in the pictures; at least "
+            f"{_ENOUGH} are needed. Does the window show X-Plane's own view, and does it change with it?"
+        )
+    middle_ns = statistics.median(best)
+    rivals = [len(matches(delay_ns)) for delay_ns in candidates if abs(delay_ns - middle_ns) > 1.5 * period_ns]
+    if len(best) < max(rivals, default=0) + _MORE:
+        raise CalibrationError(
+            f"the steps of the field of view in the pictures fit more than one delay ({len(best)} and {max(rivals)} of "
+            f"{len(asked)}): the view moves too much, or X-Plane draws too few frames"
+        )
+    spread_ns = statistics.median(abs(delay_ns - middle_ns) for delay_ns in best)
+    lag_ns = FIELD_OF_VIEW_REPORT_LAG * period_ns
+    return Delay(1e-9 * (middle_ns + lag_ns), len(best), 1e-9 * spread_ns)
+
+
+class Calibration:
+    """A calibration under way: what was seen, and X-Plane's field of view in the meantime.
+
+    Args:
+        write: Writes a dataref of X-Plane's.
+        read: X-Plane's field of view as of its last frame [deg]; nan while it says none.
+        undo: Where the user's value is kept.
+        wait: Waits some seconds; may raise to end the program.
+    """
+
+    def __init__(
+        self,
+        write: Callable[[str, float], None],
+        read: Callable[[], float],
+        undo: UndoFile,
+        wait: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._write = write
+        self._read = read
+        self._undo = undo
+        self._wait = wait
+        self._frames: List[Tuple[int, float]] = []
+        self._pictures: List[Tuple[int, float]] = []
+        self._before: Optional[np.ndarray] = None
+
+    def add_frame(self, arrival_ns: int, field_of_view_deg: float) -> None:
+        """Takes a frame of X-Plane; from any thread."""
+        self._frames.append((arrival_ns, field_of_view_deg))
+
+    def add_picture(self, change_ns: int, pixels: Any) -> None:
+        """Takes a picture that appeared; from any one thread."""
+        grey = small_grey(pixels)
+        if self._before is not None:
+            self._pictures.append((change_ns, float(np.abs(grey - self._before).mean())))
+        self._before = grey
+
+    def restore(self) -> None:
+        """Gives X-Plane the value back that a killed calibration has left in it, if there is one.
+
+        Raises:
+            CalibrationError: X-Plane does not take it.
+        """
+        value = self._undo.kept()
+        if value is None:
+            return
+        if not self._set(value):
+            raise CalibrationError(
+                f"X-Plane does not take its field of view of {value:g} deg back; it stays noted for the next start"
+            )
+        self._undo.forget()
+
+    def run(self) -> Delay:
+        """Takes about three seconds. X-Plane's field of view is as before when it returns or raises.
+
+        Raises:
+            CalibrationError: The delay could not be measured, or the field of view not restored.
+        """
+        self.restore()
+        own = self._read()
+        if not math.isfinite(own):
+            raise CalibrationError("X-Plane does not say its field of view. Give --delay instead")
+        other = own + _STEP_DEG if own + _STEP_DEG <= _WIDEST_DEG else own - _STEP_DEG
+        self._undo.keep(own)
+        try:
+            self._wait(_SETTLE_S)
+            for step in range(_STEPS):
+                self._write(names.FIELD_OF_VIEW, own if step % 2 else other)
+                self._wait(random.uniform(*_BETWEEN_S))
+            self._wait(_SETTLE_S)
+        finally:
+            self.restore()
+        return settle(list(self._frames), list(self._pictures))
+
+    def _set(self, value: float) -> bool:
+        """Writes the field of view until X-Plane reports it."""
+        end = time.monotonic() + _WRITE_TIMEOUT_S
+        while time.monotonic() < end:
+            self._write(names.FIELD_OF_VIEW, value)
+            again = time.monotonic() + _WRITE_AGAIN_S
+            while time.monotonic() < again:
+                if abs(self._read() - value) < _SAME_DEG:
+                    return True
+                time.sleep(0.01)
+        return False

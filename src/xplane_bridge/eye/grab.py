@@ -1,0 +1,77 @@
+"""What the ways of reading a window have in common."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, Callable, Optional, Sequence, Tuple, TypeVar
+
+from xplane_bridge.errors import XplaneBridgeError
+
+#: Titles of X-Plane's window, exactly: up to early 12, and since.
+TITLES = ("X-System", "X-Plane")
+
+#: Takes a picture (rows x columns x 4 of BGRX, the taker's own) and when it appeared, by time.perf_counter_ns [ns].
+Take = Callable[[Any, int], None]
+
+
+#: Of a window on the screen: x, y, width, height [px].
+Rect = Tuple[int, int, int, int]
+W = TypeVar("W")
+
+
+class GrabError(XplaneBridgeError):
+    """Windows cannot be read on this computer."""
+
+
+class Grabber:
+    """Reads the pictures of a window from a thread of its own; finds a lost window again.
+
+    Args:
+        titles: Of the window, exactly.
+        index: Of several such windows, counted from 0, the leftmost, then the topmost; None: the largest.
+        take: Takes the pictures.
+
+    Attributes:
+        problem: Why there is no picture; empty while there are some.
+        remark: What is to be known of the window that is taken; empty: nothing.
+    """
+
+    def __init__(self, titles: Tuple[str, ...], index: Optional[int], take: Take) -> None:
+        self.remark = ""
+        self.problem = "the window was not looked for yet"
+        self._titles = titles
+        self._index = index
+        self._take = take
+        self._stop = threading.Event()
+        self._thread: Optional[threading.Thread] = None
+
+    def start(self) -> None:
+        """Begins."""
+        self._thread = threading.Thread(target=self.run, name="grab", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ends."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def run(self) -> None:
+        """Hands pictures over until the end; runs in a thread of its own."""
+        raise NotImplementedError
+
+    def _chosen(self, windows: Sequence[Tuple[Rect, W]]) -> Optional[W]:
+        """The window that is asked for, of those that fit; says why there is none, and that there are several."""
+        if self._index is None:
+            count = len(windows)
+            self.remark = f"{count} windows are alike: the largest is taken, --window chooses" if count > 1 else ""
+            return max(windows, key=lambda window: window[0][2] * window[0][3])[1]
+        if self._index < len(windows):
+            return sorted(windows, key=lambda window: window[0][:2])[self._index][1]
+        self.problem = f"there is no window number {self._index}: {len(windows)} are alike, counted from 0"
+        return None
+
+    def _no_window(self, others: Tuple[str, ...]) -> str:
+        wanted = " or ".join(f'"{title}"' for title in self._titles)
+        seen = ", ".join(f'"{title}"' for title in others[:8]) or "none"
+        return f"no window is titled exactly {wanted} (windows with a title: {seen}): is X-Plane running here?"

@@ -1,0 +1,246 @@
+"""The eye: hears frames, sees pictures, brings both together and sends them."""
+
+from __future__ import annotations
+
+import math
+import signal
+import socket
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable, Optional, Tuple
+
+from xplane_bridge.errors import XplaneBridgeError
+
+from .calibrate import Calibration, CalibrationError, UndoFile
+from .grab import Grabber, GrabError, Take
+from .jpeg import encoder
+from .pairing import Pairing
+from .rref import Address, FrameStream, Heard
+from .sender import Sender
+
+_LOOK_S = 0.02
+_CALIBRATE_AGAIN_S = 2.0
+#: From here on neighbouring float32 numbers of simulator time are 8 ms apart: frames above 60/s share them.
+_COARSE_KEY_S = 65536.0
+
+
+@dataclass(frozen=True)
+class EyeOptions:
+    """What the user asks for.
+
+    Attributes:
+        receiver: Where `capture_node` listens, HOST, PORT.
+        xplane: Where X-Plane listens, HOST, PORT.
+        titles: Of the window, exactly.
+        window: Of several such windows, counted from 0, the leftmost, then the topmost; None: the largest.
+        token: Shared with `capture_node`; empty: none.
+        quality: Of the JPEG, 1..100.
+        delay_s: From a frame to its picture [s]; None: to be measured.
+        calibrate: Whether it may be measured.
+        local_port: UDP port that X-Plane answers to.
+        undo_file: Where X-Plane's field of view is kept while it is changed.
+    """
+
+    receiver: Address
+    xplane: Address
+    titles: Tuple[str, ...]
+    window: Optional[int]
+    token: str
+    quality: int
+    delay_s: Optional[float]
+    calibrate: bool
+    local_port: int
+    undo_file: Path
+
+
+class EyeError(XplaneBridgeError):
+    """The eye cannot work as asked."""
+
+
+def grabber_class() -> Callable[[Tuple[str, ...], Optional[int], Take], Grabber]:
+    """The grabber of this system; others' modules are not imported.
+
+    Raises:
+        GrabError: There is none.
+    """
+    if sys.platform.startswith("linux"):
+        from .grab_linux import LinuxGrabber
+
+        return LinuxGrabber
+    if sys.platform == "win32":
+        from .grab_windows import WindowsGrabber
+
+        return WindowsGrabber
+    if sys.platform == "darwin":
+        from .grab_macos import MacGrabber
+
+        return MacGrabber
+    raise GrabError(f"there is no way to read windows on {sys.platform}; Windows, Linux and macOS have one")
+
+
+def resolved(address: Address, what: str) -> Address:
+    """An address in numbers.
+
+    Raises:
+        EyeError: The name is not known.
+    """
+    try:
+        return socket.gethostbyname(address[0]), address[1]
+    except OSError as error:
+        raise EyeError(f"{what} {address[0]!r}: {error.strerror or error}; give a name or an IPv4 address") from None
+
+
+class Eye:
+    """The program while it runs.
+
+    Args:
+        options: As asked for.
+        say: Tells people what happens.
+    """
+
+    def __init__(self, options: EyeOptions, say: Callable[[str], None]) -> None:
+        self._options = options
+        self._say = say
+        self._lock = threading.Lock()
+        self._pairing = Pairing(options.delay_s)
+        self._calibration: Optional[Calibration] = None
+        self._field_of_view_deg = math.nan
+        self._size: Optional[Tuple[int, int]] = None
+        self._publishing = False
+        self._coarse_said = False
+        self._delay_was_sure = True
+        self._remark = ""
+        xplane = resolved(options.xplane, "X-Plane's computer")
+        self._undo = UndoFile(options.undo_file, "{}:{}".format(*xplane))
+        self._grabber = grabber_class()(options.titles, options.window, self._on_picture)
+        self._stream = FrameStream(xplane, options.local_port, self._on_frame)
+        receiver = resolved(options.receiver, "capture_node's computer")
+        name = "{}:{}".format(*xplane)
+        self._sender = Sender(receiver, options.window or 0, options.token, name, encoder(options.quality), say)
+
+    def run(self) -> None:
+        """Runs until Ctrl-C or SIGTERM."""
+        signal.signal(signal.SIGTERM, _end)
+        with self._sender, self._stream:
+            self._grabber.start()
+            try:
+                self._wait_for(lambda: self._stream.alive, "waiting for X-Plane at {}:{}".format(*self._options.xplane))
+                self._prepare()
+                with self._lock:
+                    self._publishing = True
+                while True:
+                    self._sender.tell(self._problem())
+                    self._send_decided()
+                    self._watch_delay()
+                    self._tell_remark()
+                    time.sleep(_LOOK_S)
+            finally:
+                self._grabber.stop()
+
+    # ------------------------------------------------------------------------------------------ other threads
+
+    def _on_frame(self, heard: Heard) -> None:
+        with self._lock:
+            self._field_of_view_deg = heard.field_of_view_deg
+            self._pairing.add_frame(heard.arrival_ns, heard.key)
+            if self._calibration is not None:
+                self._calibration.add_frame(heard.arrival_ns, heard.field_of_view_deg)
+            if heard.key > _COARSE_KEY_S and not self._coarse_said:
+                self._coarse_said = True
+                self._say(
+                    "X-Plane has run for more than 18 h: its time is too coarse to tell frames above 60/s apart; "
+                    "start it anew for exact pairing"
+                )
+        self._send_decided()
+
+    def _on_picture(self, pixels: Any, change_ns: int) -> None:
+        with self._lock:
+            if self._calibration is not None:
+                self._calibration.add_picture(change_ns, pixels)
+            if not self._publishing:
+                return
+            if self._size is not None and pixels.shape[:2] != self._size:
+                self._pairing.doubt_delay()
+            self._size = pixels.shape[:2]
+            self._pairing.add_picture(change_ns, pixels)
+
+    def _send_decided(self) -> None:
+        with self._lock:
+            decisions = self._pairing.decided(time.perf_counter_ns())
+        for decision in decisions:
+            self._sender.offer(decision)
+
+    # -------------------------------------------------------------------------------------------- this thread
+
+    def _problem(self) -> str:
+        if not self._stream.alive:
+            return "X-Plane does not send its frames to the eye"
+        return self._grabber.problem
+
+    def _wait_for(self, condition: Callable[[], bool], what: str) -> None:
+        said = False
+        while not condition():
+            self._sender.tell(what)
+            if not said:
+                said = True
+                self._say(what)
+            time.sleep(_LOOK_S)
+
+    def _prepare(self) -> None:
+        """Measures the delay, where that is wanted; always gives back what a killed eye has left."""
+        if not self._options.calibrate or self._options.delay_s is not None:
+            self._new_calibration().restore()
+            self._calibration = None
+            delay_s = self._options.delay_s
+            self._say(f"delay: {1e3 * delay_s:.1f} ms, as given" if delay_s is not None else "delay: not measured")
+            return
+        while True:
+            self._wait_for(lambda: not self._grabber.problem, "waiting for X-Plane's window")
+            self._sender.tell("the eye is calibrating")
+            self._say("calibrating: X-Plane's field of view changes for about three seconds")
+            try:
+                found = self._new_calibration().run()
+            except CalibrationError as error:
+                self._say(f"not calibrated: {error}")
+                self._sender.tell(f"not calibrated: {error}")
+                time.sleep(_CALIBRATE_AGAIN_S)
+                continue
+            finally:
+                with self._lock:
+                    self._calibration = None
+            with self._lock:
+                self._pairing.set_delay(found.delay_s)
+            self._say(
+                f"delay: {1e3 * found.delay_s:.1f} ms, from {found.steps} steps that lie "
+                f"{1e3 * found.spread_s:.1f} ms from it"
+            )
+            return
+
+    def _new_calibration(self) -> Calibration:
+        calibration = Calibration(self._stream.write, lambda: self._field_of_view_deg, self._undo)
+        with self._lock:
+            self._calibration = calibration
+        return calibration
+
+    def _tell_remark(self) -> None:
+        if self._grabber.remark != self._remark:
+            self._remark = self._grabber.remark
+            if self._remark:
+                self._say(self._remark)
+
+    def _watch_delay(self) -> None:
+        with self._lock:
+            sure = self._pairing.delay_is_sure
+        if self._delay_was_sure and not sure and self._options.calibrate:
+            self._say(
+                "the delay has changed (the window's size, vertical sync?): pictures are flagged DELAY_ASSUMED; "
+                "start xplane_eye anew to calibrate"
+            )
+        self._delay_was_sure = sure
+
+
+def _end(_signal: int, _frame: Any) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,196 @@
+"""Takes pictures to `capture_node`: the newest first, never more than two on their way.
+
+A picture is made JPEG when it may be sent, not before; while `capture_node` is slow, newer pictures replace the one
+that waits. So what arrives is young, however slow the network.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import threading
+import time
+from typing import Any, Callable, Optional, Tuple
+
+from . import wire
+from .jpeg import Encode
+from .pairing import Decision
+
+Address = Tuple[str, int]
+
+#: Pictures that may be on their way: sent and not yet taken over.
+CREDIT = 2
+_RETRY_S = (0.25, 2.0)
+_CONNECT_TIMEOUT_S = 2.0
+_SEND_TIMEOUT_S = 5.0
+_STATUS_S = 0.5
+_BUFFER = 256 * 1024
+
+
+class Sender:
+    """The connection to `capture_node`; use it with ``with``. Connects again, after 0.25 s and up to 2 s.
+
+    Args:
+        receiver: Address and port that `capture_node` listens on (`sender/listen`).
+        window: Number of the window, in each message.
+        token: That of `sender/token`; empty: none.
+        xplane: Which X-Plane, for people.
+        encode: Makes JPEG of pixels.
+        say: Tells people what happens.
+    """
+
+    def __init__(
+        self,
+        receiver: Address,
+        window: int,
+        token: str,
+        xplane: str,
+        encode: Encode,
+        say: Callable[[str], None] = print,
+    ) -> None:
+        self._receiver = receiver
+        self._window = window
+        self._hello = wire.encode_hello(window, token, xplane)
+        self._encode = encode
+        self._say = say
+        self._said = ""
+        self._lock = threading.Lock()
+        self._next: Optional[Decision] = None
+        self._problem = ""
+        self._stop = False
+        # Windows waits for sockets only: a pair of them wakes the thread.
+        self._waker, self._awake = socket.socketpair()
+        self._waker.setblocking(False)
+        self._awake.setblocking(False)
+        self._thread = threading.Thread(target=self._run, name="sender", daemon=True)
+        #: Pictures that newer ones have replaced, and pictures sent.
+        self.replaced = 0
+        self.sent = 0
+
+    def __enter__(self) -> Sender:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop = True
+        self._wake()
+        self._thread.join()
+        self._waker.close()
+        self._awake.close()
+
+    def offer(self, decision: Decision) -> None:
+        """Hands over a picture; it replaces one that waits."""
+        with self._lock:
+            self.replaced += self._next is not None
+            self._next = decision
+        self._wake()
+
+    def tell(self, problem: str) -> None:
+        """Has `capture_node` told why there are no pictures; empty when there are."""
+        self._problem = problem
+
+    def _wake(self) -> None:
+        with contextlib.suppress(BlockingIOError):
+            self._waker.send(b"x")
+
+    def _tell_people(self, text: str) -> None:
+        if text != self._said:
+            self._said = text
+            self._say(text)
+
+    def _run(self) -> None:
+        pause_s = _RETRY_S[0]
+        where = f"{self._receiver[0]}:{self._receiver[1]}"
+        while not self._stop:
+            try:
+                with socket.create_connection(self._receiver, _CONNECT_TIMEOUT_S) as connection:
+                    _Session(self, connection).run()
+            except _WelcomedError as ended:
+                pause_s = _RETRY_S[0]
+                self._tell_people(f"capture_node at {where} is gone ({ended}); looking for it again")
+            except (OSError, wire.WireError) as error:
+                reason = getattr(error, "strerror", None) or str(error)
+                self._tell_people(f"capture_node at {where} does not take pictures ({reason}); trying again")
+            end = time.monotonic() + pause_s
+            while not self._stop and time.monotonic() < end:
+                time.sleep(0.05)
+            pause_s = min(2 * pause_s, _RETRY_S[1])
+
+
+class _WelcomedError(Exception):
+    """A connection ended that had been good: the next is tried soon."""
+
+
+class _Session:
+    """One connection, from its first message to its end."""
+
+    def __init__(self, sender: Sender, connection: socket.socket) -> None:
+        self._sender = sender
+        self._connection = connection
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
+        connection.settimeout(_SEND_TIMEOUT_S)
+        self._replies = wire.ReplyReader()
+        self._credit = 0
+        self._welcome = False
+
+    def run(self) -> None:
+        """Ends by an exception, or when the sender ends."""
+        try:
+            self._connection.sendall(self._sender._hello)
+            told_s = time.monotonic()
+            while not self._sender._stop:
+                readable, _, _ = select.select([self._connection, self._sender._awake], [], [], _STATUS_S)
+                if self._sender._awake in readable:
+                    self._sender._awake.recv(4096)
+                if self._connection in readable:
+                    self._take_replies(self._connection.recv(4096))
+                self._send_newest()
+                if time.monotonic() - told_s >= _STATUS_S and self._welcome:
+                    told_s = time.monotonic()
+                    self._connection.sendall(wire.encode_status(self._sender._window, self._sender._problem))
+        except OSError as error:
+            if self._welcome:
+                raise _WelcomedError(error.strerror or str(error)) from None
+            raise
+
+    def _take_replies(self, data: bytes) -> None:
+        if not data:
+            raise ConnectionError("it closed the connection: is this computer its sender/peer?")
+        for reply in self._replies.feed(data):
+            if reply.code == wire.REFUSED:
+                raise wire.WireError(wire.REFUSALS.get(reply.number, f"refused for reason {reply.number}"))
+            if reply.code == wire.WELCOME:
+                self._welcome = True
+                self._credit = CREDIT
+                self._sender._tell_people("capture_node at {}:{} takes pictures".format(*self._sender._receiver))
+            else:
+                self._credit = min(self._credit + 1, CREDIT)
+
+    def _send_newest(self) -> None:
+        if self._credit == 0:
+            return
+        with self._sender._lock:
+            decision, self._sender._next = self._sender._next, None
+        if decision is not None:
+            self._connection.sendall(self._message(decision))
+            self._credit -= 1
+            self._sender.sent += 1
+
+    def _message(self, decision: Decision) -> bytes:
+        pixels: Any = decision.picture
+        jpeg = self._sender._encode(pixels)
+        header = wire.PictureHeader(
+            width=pixels.shape[1],
+            height=pixels.shape[0],
+            key=decision.frame.key,
+            flags=decision.flags,
+            index=decision.frame.index,
+            change_ns=decision.change_ns,
+            arrival_ns=decision.frame.arrival_ns,
+            sent_ns=time.perf_counter_ns(),
+            delay_s=decision.delay_s,
+            residual_s=decision.residual_s,
+        )
+        return wire.encode_picture(self._sender._window, header, jpeg)

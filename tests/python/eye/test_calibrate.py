@@ -1,0 +1,169 @@
+"""The delay from steps of the field of view; X-Plane is a few lines here, with its own times."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from xplane_bridge.eye import calibrate
+from xplane_bridge.eye.calibrate import Calibration, CalibrationError, UndoFile, settle
+
+PERIOD_NS = 20_000_000
+
+
+def recording(delay_ns: int, seed: int = 1, unseen: int = 0) -> tuple:
+    """Ten steps at random frames, and the differences between pictures; `unseen` steps do not show."""
+    draw = random.Random(seed)
+    steps, at = [], 20
+    for _ in range(10):
+        at += draw.randint(8, 15)
+        steps.append(at)
+    frames, pictures, angle = [], [], 60.0
+    for number in range(at + 40):
+        zooms = number in steps
+        angle += 0.0 if not zooms else (8.0 if steps.index(number) % 2 == 0 else -8.0)
+        seen = zooms and steps.index(number) >= unseen
+        frames.append((number * PERIOD_NS, angle))
+        pictures.append((number * PERIOD_NS + delay_ns, 20.0 if seen else draw.uniform(0.5, 2.0)))
+    return frames, pictures
+
+
+@pytest.mark.parametrize("delay_ns", [0, 5_000_000, 40_000_000, 58_000_000, 200_000_000, 380_000_000])
+def test_regular_frames_do_not_hide_whole_periods(delay_ns: int):
+    found = settle(*recording(delay_ns))
+    assert found.delay_s == pytest.approx(1e-9 * delay_ns, abs=1e-9)
+    assert (found.steps, found.spread_s) == (10, 0.0)
+
+
+def test_steps_that_were_missed_do_no_harm_and_too_many_are_said():
+    assert settle(*recording(58_000_000, unseen=4)).delay_s == pytest.approx(0.058, abs=1e-9)
+    with pytest.raises(CalibrationError, match="were seen in the pictures"):
+        settle(*recording(58_000_000, unseen=9))
+
+
+def test_a_view_that_moves_much_hides_no_steps():
+    frames, pictures = recording(58_000_000)
+    moving = [(change, 20.0 if difference == 20.0 else 9.5 + 0.1 * (change % 7)) for change, difference in pictures]
+    assert settle(frames, moving).delay_s == pytest.approx(0.058, abs=1e-9)
+
+
+def test_steps_that_fit_several_delays_are_no_measurement():
+    """Ten steps at equal times: nine of them fit a delay that is one step longer."""
+    steps = range(20, 120, 10)
+    frames = [(number * PERIOD_NS, 60.0 + 8.0 * (sum(step <= number for step in steps) % 2)) for number in range(160)]
+    pictures = [(number * PERIOD_NS, 20.0 if number in steps else 1.0) for number in range(160)]
+    with pytest.raises(CalibrationError, match=r"more than one delay \(10 and 9 of 10\)"):
+        settle(frames, pictures)
+
+
+def test_an_x_plane_that_does_not_change_its_view_is_said():
+    frames, pictures = recording(0)
+    with pytest.raises(CalibrationError, match=r"reports 0 of 10 steps.*--delay"):
+        settle([(arrival, 60.0) for arrival, _ in frames], pictures)
+
+
+def test_a_still_picture_has_no_steps():
+    assert calibrate.step_pictures([(number, 0.0) for number in range(50)], 10) == []
+
+
+def test_small_grey_is_the_picture_in_small():
+    picture = np.zeros((480, 640, 4), np.uint8)
+    picture[:, 320:, 1] = 200
+    small = calibrate.small_grey(picture)
+    assert small.shape == (56, 80)
+    assert small[:, :39].max() == 0
+    assert small[:, 41:].min() == 200
+
+
+class Simulator:
+    """Takes a field of view as X-Plane does, or refuses; time passes when it is waited for."""
+
+    def __init__(self, takes: bool = True) -> None:
+        self.value = 71.0
+        self.takes = takes
+        self.written: list = []
+
+    def write(self, path: str, value: float) -> None:
+        assert path == "sim/graphics/view/field_of_view_deg"
+        self.written.append(value)
+        if self.takes:
+            self.value = value
+
+
+def make(simulator: Simulator, path: Path, wait=lambda _: None) -> Calibration:
+    return Calibration(simulator.write, lambda: simulator.value, UndoFile(path, "here:49000"), wait)
+
+
+def test_the_field_of_view_is_kept_before_it_is_changed_and_given_back(tmp_path: Path):
+    path = tmp_path / "new" / "undo.json"
+    simulator = Simulator()
+    kept = []
+    calibration = make(simulator, path, lambda _: kept.append(json.loads(path.read_text(encoding="utf-8"))))
+    with pytest.raises(CalibrationError, match="reports 0"):  # nothing is seen: no frames come here
+        calibration.run()
+    assert set(map(str, kept)) == {str({"xplane": "here:49000", "field_of_view_deg": 71.0})}
+    assert {71.0, 79.0} == set(simulator.written)
+    assert simulator.value == 71.0
+    assert not path.exists()
+
+
+def test_ctrl_c_in_the_middle_gives_it_back(tmp_path: Path):
+    simulator = Simulator()
+
+    def interrupt(_: float) -> None:
+        if simulator.value == 79.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make(simulator, tmp_path / "undo.json", interrupt).run()
+    assert simulator.value == 71.0
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_next_start_gives_back_what_a_killed_one_has_left(tmp_path: Path):
+    path = tmp_path / "undo.json"
+    UndoFile(path, "here:49000").keep(71.0)
+    simulator = Simulator()
+    simulator.value = 79.0
+    make(simulator, path).restore()
+    assert simulator.value == 71.0
+    assert not path.exists()
+
+
+def test_another_x_planes_value_is_left_alone(tmp_path: Path):
+    path = tmp_path / "undo.json"
+    UndoFile(path, "elsewhere:49000").keep(50.0)
+    simulator = Simulator()
+    make(simulator, path).restore()
+    assert simulator.written == []
+    assert path.exists()
+
+
+def test_nothing_is_changed_that_could_not_be_restored(tmp_path: Path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    simulator = Simulator()
+    with pytest.raises(CalibrationError, match="cannot be written"):
+        make(simulator, tmp_path / "file" / "undo.json").run()
+    assert simulator.written == []
+
+
+def test_what_x_plane_does_not_take_back_stays_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(calibrate, "_WRITE_TIMEOUT_S", 0.05)
+    path = tmp_path / "undo.json"
+    UndoFile(path, "here:49000").keep(50.0)
+    with pytest.raises(CalibrationError, match="stays noted"):
+        make(Simulator(takes=False), path).restore()
+    assert path.exists()
+
+
+def test_an_x_plane_that_does_not_say_its_field_of_view_is_left_alone(tmp_path: Path):
+    simulator = Simulator()
+    simulator.value = float("nan")
+    with pytest.raises(CalibrationError, match="does not say"):
+        make(simulator, tmp_path / "undo.json").run()
+    assert simulator.written == []

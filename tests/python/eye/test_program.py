@@ -1,0 +1,125 @@
+"""The program on computers of other kinds: what it imports, and that it starts without what only Linux has."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from xplane_bridge.eye.grab import Grabber
+from xplane_bridge.eye.grab_windows import client_area, is_xplane
+
+#: What Windows has not, and all of ROS: to import them is an error here.
+ABSENT = ("fcntl", "termios", "pwd", "resource", "grp", "rospy", "rosbag", "roslib", "genpy", "xplane_bridge.msg")
+
+START = f"""
+import importlib, sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name in {ABSENT!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+for name in {ABSENT!r}:
+    sys.modules.pop(name, None)
+sys.meta_path.insert(0, Absent())
+for module in ("grab_linux", "grab_windows", "grab_macos"):
+    importlib.import_module("xplane_bridge.eye." + module)
+from xplane_bridge.cli.sight.xplane_eye import main
+sys.argv[0] = "xplane_eye"
+code = main(sys.argv[1:])
+emulator = [name for name in sys.modules if name.startswith("xplane_bridge.emulator")]
+assert not emulator, emulator
+sys.exit(code)
+"""
+
+
+def run(*arguments: str, display: str = ":9999") -> subprocess.CompletedProcess:
+    env = {**os.environ, "DISPLAY": display}
+    return subprocess.run(
+        [sys.executable, "-c", START, *arguments], env=env, capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def test_it_starts_without_ros_and_without_what_only_linux_has():
+    shown = run("--help")
+    assert shown.returncode == 0, shown.stderr
+    assert "HOST:PORT" in shown.stdout
+    ended = run("127.0.0.1:9")  # goes as far as the display, which is not there
+    assert ended.returncode == 1
+    assert ended.stderr == (
+        "xplane_eye: the display ':9999' (DISPLAY) takes no connection: start xplane_eye on X-Plane's own desktop\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["127.0.0.1"], "expected HOST:PORT, e.g. 192.168.1.10:49790"),
+        (["127.0.0.1:9", "--delay", "2"], "expected seconds from 0 to 0.5"),
+        (["127.0.0.1:9", "--delay", "0.1", "--no-calibrate"], "not allowed with"),
+        (["127.0.0.1:9", "--quality", "0"], "a whole number from 1 to 100"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_words(arguments: list, text: str):
+    ended = run(*arguments)
+    assert ended.returncode == 2
+    assert text in ended.stderr
+
+
+def test_a_taken_port_is_said():
+    from xplane_bridge.eye.rref import FrameStream, RrefError
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("", 0))
+        with pytest.raises(RrefError, match="another xplane_eye"):
+            FrameStream(("127.0.0.1", 49000), other.getsockname()[1], lambda _: None)
+
+
+def test_the_title_bar_is_not_in_the_picture():
+    # A window composed at (100, 50), 816 x 639; its client area 800 x 600 begins at (108, 81).
+    assert client_area((100, 50, 916, 689), (108, 81), (800, 600), (816, 639)) == (8, 31, 808, 631)
+    # Full screen: all of it.
+    assert client_area((0, 0, 1920, 1080), (0, 0), (1920, 1080), (1920, 1080)) == (0, 0, 1920, 1080)
+    # The picture is still of the size before.
+    assert client_area((100, 50, 916, 689), (108, 81), (800, 600), (640, 480)) is None
+
+
+@pytest.mark.parametrize(
+    ("path", "is_it"),
+    [
+        ("C:\\X-Plane 12\\X-Plane.exe", True),
+        ("D:/Games/X-Plane 11/X-Plane 11.exe", True),
+        ("C:\\Program Files\\Firefox\\firefox.exe", False),
+        ("C:\\X-Plane 12\\Resources\\browser.exe", False),
+        ("", False),
+    ],
+)
+def test_the_window_is_that_of_x_planes_own_process(path: str, is_it: bool):
+    assert is_xplane(path) == is_it
+
+
+class Windows(Grabber):
+    """Chooses as the grabbers do."""
+
+    def choose(self, *windows: tuple) -> object:
+        return self._chosen([(place, name) for place, name in windows])
+
+
+LEFT, BELOW, RIGHT = ((10, 20, 100, 80), "left"), ((10, 300, 200, 160), "below"), ((400, 0, 320, 240), "right")
+
+
+def test_of_windows_alike_the_number_chooses_from_the_left():
+    for number, name in enumerate(("left", "below", "right")):
+        windows = Windows((), number, lambda *_: None)
+        assert windows.choose(RIGHT, BELOW, LEFT) == name
+        assert windows.remark == ""
+    largest = Windows((), None, lambda *_: None)
+    assert largest.choose(LEFT, RIGHT, BELOW) == "right"
+    assert largest.remark == "3 windows are alike: the largest is taken, --window chooses"
+    assert largest.choose(LEFT) == "left"
+    assert largest.remark == ""
+    beyond = Windows((), 3, lambda *_: None)
+    assert beyond.choose(LEFT, RIGHT, BELOW) is None
+    assert beyond.problem == "there is no window number 3: 3 are alike, counted from 0"
