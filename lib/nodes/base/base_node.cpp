@@ -6,7 +6,9 @@
 #include <stdexcept>
 
 #include <ros/xmlrpc_manager.h>
+#include <rosgraph_msgs/Clock.h>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/nodes/base/stop_signals.hpp"
 
 namespace xplane_bridge {
@@ -52,6 +54,15 @@ class StopWatchdog {
   std::thread thread_;
 };
 
+/// One line with the parameters that are not defaults: those of the node's own with a leading ~, as in ROS's names.
+std::string givenText(const ParamLoader& shared, const ParamLoader& own) {
+  std::vector<std::string> texts = shared.given();
+  for (const std::string& text : own.given()) {
+    texts.push_back("~" + text);
+  }
+  return texts.empty() ? "defaults only" : core::join(texts);
+}
+
 }  // namespace
 
 BaseNode::BaseNode() : private_handle_("~") {}
@@ -71,8 +82,13 @@ void BaseNode::requireState(State wanted, const char* call) const {
 
 void BaseNode::initialize() {
   requireState(State::kCreated, "initialize");
-  common_ = loadCommonOptions(ParamLoader::fromServer(handle_.getNamespace()));
-  clock_ = host_clock_;
+  const ParamLoader shared = ParamLoader::fromServer(handle_.getNamespace());
+  common_ = loadCommonOptions(shared);
+  if (common_.lockstep.enabled) {
+    lockstep_clock_.emplace(host_clock_, core::toNanoseconds(common_.lockstep.start_time));
+  }
+  clock_ = lockstep() ? lockstep_clock_->clock() : host_clock_;
+  if (stampsBySimulator()) stampBySimulator();
   timers_ = std::make_unique<ClockTimers>(clock_, ros::getGlobalCallbackQueue());
   const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());
   loadParameters(own);
@@ -81,12 +97,21 @@ void BaseNode::initialize() {
   takeOverShutdownRequest();
   // With its first log line roscpp registers the node once more, for a cached parameter. Were that the line that says
   // why it ends, the master would take the old node for a new one and end the node that has replaced it.
-  ROS_INFO("%s starts", ros::this_node::getName().c_str());
+  ROS_INFO("%s starts with %s", ros::this_node::getName().c_str(), givenText(shared, own).c_str());
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(handle_, private_handle_);
   diagnostics_->setHardwareID("none");
   advertise();
   subscribe();
   state_ = State::kInitialized;
+}
+
+void BaseNode::stampBySimulator() {
+  stamp_ns_ = std::make_shared<std::atomic<std::int64_t>>(stampOf(0.0));
+  clock_.system_ns = [stamp = stamp_ns_] { return stamp->load(); };
+  if (leadsClock()) return;
+  subscribeTopic<rosgraph_msgs::Clock>(kClockTopic, 1, [this](const rosgraph_msgs::ClockConstPtr& clock) {
+    *stamp_ns_ = static_cast<std::int64_t>(clock->clock.toNSec());
+  });
 }
 
 void BaseNode::takeOverShutdownRequest() {
@@ -122,7 +147,7 @@ ExitCode BaseNode::run() {
   if (!stopping()) {
     spinner_->start();
     service_spinner_->start();
-    timers_->start();
+    if (!lockstep()) timers_->start();
   }
   diagnostics_thread_ = std::thread([this] { diagnosticsLoop(); });
   waitForStopRequest();
@@ -167,6 +192,9 @@ void BaseNode::stop() {
       ROS_ERROR("while stopping (%s): %s", step_name, error.what());
     }
   };
+  if (lockstep()) {
+    lockstep_clock_->release();
+  }
   if (started_) {
     step("end inputs", [this] { endInputs(); });
     const Deadline deadline(host_clock_, std::chrono::duration<double>(kUndoTime).count());
@@ -264,6 +292,8 @@ void BaseNode::diagnosticsLoop() {
 
 int runNode(int argc, char** argv, const std::string& default_name,
             const std::function<std::unique_ptr<BaseNode>()>& make_node) {
+  // A file gets every line when it is said, as a terminal does; otherwise it would get whole blocks.
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);
   // Outlives the signal thread, which refers to it.
   std::unique_ptr<BaseNode> node;
   std::atomic<BaseNode*> made{nullptr};

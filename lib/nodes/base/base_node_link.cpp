@@ -3,15 +3,19 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <utility>
 
+#include "xplane_bridge/core/wire/udp_hub.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
+#include "xplane_bridge/nodes/base/conformance_file.hpp"
 #include "xplane_bridge/nodes/base/link_diagnostics.hpp"
 #include "xplane_bridge/nodes/base/user_folder.hpp"
 
 namespace xplane_bridge {
 namespace {
 
-constexpr double kShortestLinkStop_s = 0.3;
+// Time to end a thousand subscriptions, a batch in two frames of X-Plane, also where undoing has taken its time.
+constexpr double kShortestLinkStop_s = 1.0;
 
 void logToRos(core::LogLevel level, const std::string& text) {
   switch (level) {
@@ -37,15 +41,50 @@ void BaseNode::makeLink() {
     return;
   }
   core::SimLinkOptions options = linkOptions(common_);
-  options.jitter_seed = static_cast<std::uint32_t>(getpid());
+  if (!lockstep()) options.jitter_seed = static_cast<std::uint32_t>(getpid());
+  options.otherwise = [file = common_.conformance_file](const core::Endpoint& peer, std::int32_t version) {
+    return readConformance(file, peer, version);
+  };
   configureLink(&options);
+  std::unique_ptr<core::DatagramHub> hub = std::make_unique<core::UdpHub>();
+  if (lockstep()) {
+    auto frames = std::make_unique<core::LockstepHub>(std::move(hub), *lockstep_clock_, host_clock_, lockstepHooks());
+    hub_ = frames.get();
+    hub = std::move(frames);
+  }
   link_ = std::make_unique<core::SimLink>(options, linkCallbacks(), clock_, logToRos,
-                                          core::journalsIn(userFolder(), name()));
+                                          core::journalsIn(userFolder(), name()), std::move(hub));
   addDiagnostics("link to X-Plane", [this, last = core::LinkCounters()](auto& status) mutable {
     const core::LinkCounters now = link_->counters();
     fillLinkDiagnostics(link_->status(), now, last, link_->unansweredDatarefs(), &status);
     last = now;
   });
+}
+
+core::LockstepHooks BaseNode::lockstepHooks() {
+  core::LockstepHooks hooks;
+  hooks.begin = [this, flying = false](const core::LockstepFrame& frame) mutable {
+    if (!std::exchange(flying, true)) {
+      timers_->restart();
+      beginFlight();
+    }
+    beginFrame(frame);
+  };
+  hooks.ready = [this](const core::LockstepFrame& frame) {
+    return (frame.number > 0 || link_->settled()) && frameReady(frame);
+  };
+  hooks.close = [this](const core::LockstepFrame& frame) {
+    closeFrame(frame);
+    timers_->runDue();
+  };
+  hooks.end = [this](const core::LockstepFrame& frame) { endFrame(frame); };
+  return hooks;
+}
+
+void BaseNode::moveClock(const ros::Time& stamp) {
+  const std::int64_t start_ns = core::toNanoseconds(common_.lockstep.start_time);
+  lockstep_clock_->move(static_cast<std::int64_t>(stamp.toNSec()) - start_ns);
+  timers_->runDue();
 }
 
 void BaseNode::startLink() {

@@ -62,6 +62,25 @@ void ClockTimers::start() {
   }
 }
 
+void ClockTimers::runDue() {
+  std::vector<core::TimerSchedule::Timer> due;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (stopped_) {
+      return;
+    }
+    due = schedule_.takeDue(clock_.steady_ns());
+  }
+  for (const core::TimerSchedule::Timer timer : due) {
+    timers_[timer]->callback();
+  }
+}
+
+void ClockTimers::restart() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  schedule_.restart(clock_.steady_ns());
+}
+
 void ClockTimers::stop() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);

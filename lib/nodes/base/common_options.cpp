@@ -16,6 +16,26 @@ std::string frameName(const ParamLoader& shared, const std::string& key, const s
   return frame;
 }
 
+LockstepOptions loadLockstep(const ParamLoader& shared, const CommonOptions& common) {
+  const ParamLoader in = shared.section("lockstep");
+  LockstepOptions out;
+  out.enabled = in.boolean("enabled", out.enabled);
+  out.participants = in.texts("participants");
+  out.stick = in.text("stick", out.stick);
+  out.hold = in.boolean("hold", out.hold);
+  out.watchdog = in.number("watchdog", {1.0, 86400.0}, out.watchdog);
+  out.start_time = in.number("start_time", {0.0, 4e9}, out.start_time);
+  in.refuseUnknown();
+  if (!out.enabled) return out;
+  if (common.transport != core::Transport::kRref) {
+    shared.refuse("transport", "rref with lockstep/enabled: Data Output has no frames that end");
+  }
+  if (common.host.empty()) {
+    shared.refuse("host", "the simulator's address with lockstep/enabled: beacons come by wall time");
+  }
+  return out;
+}
+
 }  // namespace
 
 CommonOptions loadCommonOptions(const ParamLoader& shared) {
@@ -43,7 +63,10 @@ CommonOptions loadCommonOptions(const ParamLoader& shared) {
   if (options.host.empty() && !options.listen_for_beacon) {
     shared.refuse("listen_for_beacon", "true while `host` is empty: X-Plane is then found by its beacon");
   }
+  options.conformance_file = shared.text("conformance_file", options.conformance_file);
   options.beacon_port = shared.integer("beacon_port", {1, 65535}, options.beacon_port);
+  options.publish_clock = shared.boolean("publish_clock", options.publish_clock);
+  options.lockstep = loadLockstep(shared, options);
   shared.refuseMisspelt();
   return options;
 }
@@ -53,6 +76,8 @@ core::SimLinkOptions linkOptions(const CommonOptions& options) {
   link.host = options.host;
   link.port = static_cast<std::uint16_t>(options.port);
   link.listen_for_beacon = options.listen_for_beacon;
+  link.lockstep = options.lockstep.enabled;
+  if (link.lockstep) link.listen_for_beacon = false;
   link.beacon_port = static_cast<std::uint16_t>(options.beacon_port);
   link.stale_after_s = options.stale_after;
   link.lost_after_s = options.lost_after;

@@ -7,6 +7,7 @@ namespace xplane_bridge {
 std::uint32_t EventLog::add(std::uint8_t kind, const std::string& text, double sim_time,
                             const std::string& requested_by, bool success, std::uint32_t number) {
   std::lock_guard<std::mutex> lock(mutex_);
+  if (muted_) return 0;
   Event event;
   event.number = number != 0 ? number : ++number_;
   event.stamp = toRosTime(clock_.system_ns());
@@ -20,6 +21,13 @@ std::uint32_t EventLog::add(std::uint8_t kind, const std::string& text, double s
   list_.header.stamp = event.stamp;
   publisher_.publish(list_);
   return event.number;
+}
+
+void EventLog::mute(bool muted) {
+  std::lock_guard<std::mutex> lock(mutex_);
+  muted_ = muted;
+  number_ = 0;
+  list_.events.clear();
 }
 
 std::uint32_t EventLog::reserve() {

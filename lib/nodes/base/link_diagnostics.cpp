@@ -29,7 +29,9 @@ void fillLinkDiagnostics(const core::LinkStatus& link, const core::LinkCounters&
                          diagnostic_updater::DiagnosticStatusWrapper* status) {
   status->summary(severity(link.state), std::string(core::toString(link.state)) + ": " + link.reason);
   for (const std::string& problem : link.problems) {
-    status->mergeSummary(DiagnosticStatus::WARN, problem);
+    if (link.reason.find(problem) == std::string::npos) {
+      status->mergeSummary(DiagnosticStatus::WARN, problem);
+    }
   }
   if (now.udp.dropped > last.udp.dropped) {
     status->mergeSummaryf(DiagnosticStatus::WARN,
@@ -45,6 +47,7 @@ void fillLinkDiagnostics(const core::LinkStatus& link, const core::LinkCounters&
   status->add("X-Plane", link.peer.valid() ? link.peer.toString() : "not found");
   status->add("X-Plane's computer", link.computer_name);
   status->add("X-Plane version", link.version.known() ? std::to_string(link.version.number) : "unknown");
+  status->add("DATA comes, nothing answers", link.one_way);
   status->add("Link epoch (-)", link.epoch);
   status->add("Silence (s)", link.silence_s);
   status->add("Beacons heard (-)", link.beacons.size());

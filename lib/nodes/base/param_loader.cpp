@@ -58,6 +58,18 @@ std::string show(const XmlRpcValue& value) {
   return out.str();
 }
 
+/// As show(), but lists with their elements.
+std::string showAll(const XmlRpcValue& value) {
+  if (value.getType() != XmlRpcValue::TypeArray) {
+    return show(value);
+  }
+  std::string out;
+  for (int i = 0; i < value.size(); ++i) {
+    out += (i > 0 ? ", " : "") + showAll(value[i]);
+  }
+  return "[" + out + "]";
+}
+
 template <typename T>
 std::string describe(const char* kind, Range<T> range) {
   std::ostringstream out;
@@ -186,39 +198,60 @@ const XmlRpcValue& ParamLoader::require(const std::string& key) const {
 
 bool ParamLoader::has(const std::string& key) const { return find(key) != nullptr; }
 
-bool ParamLoader::boolean(const std::string& key) const { return booleanFrom(fullKey(key), require(key)); }
+const XmlRpcValue& ParamLoader::requireGiven(const std::string& key) const {
+  const XmlRpcValue& value = require(key);
+  record_->given.push_back(key);
+  return value;
+}
 
-bool ParamLoader::boolean(const std::string& key, bool fallback) const { return has(key) ? boolean(key) : fallback; }
+template <typename T, typename Read>
+T ParamLoader::readOr(const std::string& key, const T& fallback, const Read& read) const {
+  const XmlRpcValue* const value = find(key);
+  if (value == nullptr) {
+    return fallback;
+  }
+  const T result = read(*value);
+  if (result != fallback) {
+    record_->given.push_back(key);
+  }
+  return result;
+}
+
+bool ParamLoader::boolean(const std::string& key) const { return booleanFrom(fullKey(key), requireGiven(key)); }
+
+bool ParamLoader::boolean(const std::string& key, bool fallback) const {
+  return readOr(key, fallback, [&](const XmlRpcValue& value) { return booleanFrom(fullKey(key), value); });
+}
 
 int ParamLoader::integer(const std::string& key, Range<int> range) const {
-  return integerFrom(fullKey(key), require(key), range);
+  return integerFrom(fullKey(key), requireGiven(key), range);
 }
 
 int ParamLoader::integer(const std::string& key, Range<int> range, int fallback) const {
-  return has(key) ? integer(key, range) : fallback;
+  return readOr(key, fallback, [&](const XmlRpcValue& value) { return integerFrom(fullKey(key), value, range); });
 }
 
 double ParamLoader::number(const std::string& key, Range<double> range) const {
-  return numberFrom(fullKey(key), require(key), range);
+  return numberFrom(fullKey(key), requireGiven(key), range);
 }
 
 double ParamLoader::number(const std::string& key, Range<double> range, double fallback) const {
-  return has(key) ? number(key, range) : fallback;
+  return readOr(key, fallback, [&](const XmlRpcValue& value) { return numberFrom(fullKey(key), value, range); });
 }
 
-std::string ParamLoader::text(const std::string& key) const { return textFrom(fullKey(key), require(key)); }
+std::string ParamLoader::text(const std::string& key) const { return textFrom(fullKey(key), requireGiven(key)); }
 
 std::string ParamLoader::text(const std::string& key, const std::string& fallback) const {
-  return has(key) ? text(key) : fallback;
+  return readOr(key, fallback, [&](const XmlRpcValue& value) { return textFrom(fullKey(key), value); });
 }
 
 std::string ParamLoader::choice(const std::string& key, const std::vector<std::string>& allowed) const {
-  return choiceFrom(fullKey(key), require(key), allowed);
+  return choiceFrom(fullKey(key), requireGiven(key), allowed);
 }
 
 std::string ParamLoader::choice(const std::string& key, const std::vector<std::string>& allowed,
                                 const std::string& fallback) const {
-  return has(key) ? choice(key, allowed) : fallback;
+  return readOr(key, fallback, [&](const XmlRpcValue& value) { return choiceFrom(fullKey(key), value, allowed); });
 }
 
 std::vector<double> ParamLoader::numbers(const std::string& key, Range<double> range) const {
@@ -226,6 +259,9 @@ std::vector<double> ParamLoader::numbers(const std::string& key, Range<double> r
   if (const XmlRpcValue* list = find(key)) {
     if (list->getType() != XmlRpcValue::TypeArray) {
       throwBad(fullKey(key), *list, "a list of numbers");
+    }
+    if (list->size() > 0) {
+      record_->given.push_back(key);
     }
     for (int i = 0; i < list->size(); ++i) {
       result.push_back(numberFrom(fullKey(element(key, i)), (*list)[i], range));
@@ -239,6 +275,9 @@ std::vector<std::string> ParamLoader::texts(const std::string& key) const {
   if (const XmlRpcValue* list = find(key)) {
     if (list->getType() != XmlRpcValue::TypeArray) {
       throwBad(fullKey(key), *list, "a list of texts");
+    }
+    if (list->size() > 0) {
+      record_->given.push_back(key);
     }
     for (int i = 0; i < list->size(); ++i) {
       result.push_back(textFrom(fullKey(element(key, i)), (*list)[i]));
@@ -289,6 +328,21 @@ std::vector<std::pair<std::string, double>> ParamLoader::namedNumbers(Range<doub
     }
   }
   return result;
+}
+
+std::vector<std::string> ParamLoader::given() const {
+  std::vector<std::string> texts;
+  collectGiven(fullKey("").size(), &texts);
+  return texts;
+}
+
+void ParamLoader::collectGiven(std::size_t skipped, std::vector<std::string>* texts) const {
+  for (const std::string& key : record_->given) {
+    texts->push_back(fullKey(key).substr(skipped) + ": " + showAll(tree_[key]));
+  }
+  for (const ParamLoader& child : record_->children) {
+    child.collectGiven(skipped, texts);
+  }
 }
 
 void ParamLoader::allow(const std::string& key) const { record_->known.insert(key); }

@@ -7,9 +7,7 @@
 #include <cstring>
 #include <utility>
 
-#include <geometry_msgs/TransformStamped.h>
 #include <sensor_msgs/CompressedImage.h>
-#include <sensor_msgs/distortion_models.h>
 #include <sensor_msgs/image_encodings.h>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -32,8 +30,6 @@ constexpr std::uint32_t kImageQueue = 2;
 // What counts as motion that a camera would show.
 constexpr double kMovedDeg = 0.05;
 constexpr double kMovedMetres = 0.2;
-constexpr double kFieldOfViewTimeout = 2.0;  // [s]
-constexpr const char* kFieldOfViewPurpose = "field_of_view";
 
 bool moved(const FlightState& from, const FlightState& to) {
   const auto turned = [](double a, double b) { return std::abs(std::remainder(b - a, 360.0)) > kMovedDeg; };
@@ -52,6 +48,11 @@ CaptureNode::~CaptureNode() = default;
 
 void CaptureNode::loadParameters(const ParamLoader& own) {
   options_ = loadCaptureOptions(own);
+  if (lockstep() || stampsBySimulator()) {
+    throw ParamError(
+        "capture_node pairs pictures by the host's time: expected neither publish_clock nor "
+        "lockstep/enabled; start the bridge with capture:=false");
+  }
   scaler_ = std::make_unique<vision::PictureScaler>(options_.width, options_.height, options_.fit);
   limiter_ = core::RateLimiter(options_.max_rate);
   frozen_check_ = vision::FrozenCheck(core::toNanoseconds(options_.frozen_after));
@@ -63,37 +64,21 @@ void CaptureNode::advertise() {
   jpeg_publisher_ = advertiseTopic<sensor_msgs::CompressedImage>("camera/image_raw/compressed", kImageQueue);
   info_publisher_ = advertiseTopic<sensor_msgs::CameraInfo>("camera/camera_info", kImageQueue);
   frame_state_publisher_ = advertiseTopic<FrameState>("camera/frame_state", kStateQueue);
+  measured_frame_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   pairing_ = std::make_unique<ImagePairing>(common().display_delay, options_.max_wait,
-                                            [this](const FrameState& state) { frame_state_publisher_.publish(state); });
+                                            [this](const FrameState& state) { publishFrameState(state); });
   broadcastFrames();
   addDiagnostics("capture", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnoseCapture(&status); });
   addDiagnostics("pairing", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnosePairing(&status); });
 }
 
-void CaptureNode::broadcastFrames() {
-  std::vector<geometry_msgs::TransformStamped> frames;
-  for (const core::CameraView view : {core::CameraView::kForward, core::CameraView::kRear, core::CameraView::kDown}) {
-    geometry_msgs::TransformStamped frame;
-    frame.header.stamp = stampNow();
-    frame.header.frame_id = common().frames.base_link;
-    frame.child_frame_id = options_.frame_ids[static_cast<std::size_t>(view)];
-    frame.transform.translation.x = options_.camera_offset[0];
-    frame.transform.translation.y = options_.camera_offset[1];
-    frame.transform.translation.z = options_.camera_offset[2];
-    const Eigen::Quaterniond q = core::opticalOrientation(view);
-    frame.transform.rotation.w = q.w();
-    frame.transform.rotation.x = q.x();
-    frame.transform.rotation.y = q.y();
-    frame.transform.rotation.z = q.z();
-    frames.push_back(frame);
-  }
-  static_frames_ = std::make_unique<tf2_ros::StaticTransformBroadcaster>();
-  static_frames_->sendTransform(frames);
-}
-
 void CaptureNode::subscribe() {
   subscribeTopic<FlightState>("flight_state", kStateQueue,
                               [this](const FlightState::ConstPtr& state) { onState(state); });
+  subscribeTopic<WarningState>("mission/warnings", kStateQueue, [this](const WarningState::ConstPtr& warnings) {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    crashed_ = warnings->crashed > 0.5F;
+  });
   addTimer(kOverduePeriod, [this] { pairing_->flush(clock().system_ns()); });
 }
 
@@ -112,7 +97,7 @@ void CaptureNode::start() {
   publisher_ =
       std::make_unique<LatestWorker<Grabbed>>(kPicturesWaiting, [this](Grabbed& grabbed) { publishPicture(&grabbed); });
   encoder_ = std::make_unique<LatestWorker<sensor_msgs::ImageConstPtr>>(
-      kPicturesWaiting, [this](sensor_msgs::ImageConstPtr& image) { publishJpeg(*image); });
+      kPicturesWaiting, [this](sensor_msgs::ImageConstPtr& image) { encodeJpeg(*image); });
   capture_thread_ = std::thread([this] { captureLoop(); });
 }
 
@@ -123,92 +108,6 @@ void CaptureNode::joinThreads() {
   if (capture_thread_.joinable()) capture_thread_.join();
   if (publisher_) publisher_->stop();
   if (encoder_) encoder_->stop();
-}
-
-// --- X-Plane ---------------------------------------------------------------------------------------------------------
-
-void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo& info) {
-  // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
-  const std::int64_t receive_ns = receive_clock_.toHostTime(info.stamp_ns, clock().system_ns(), clock().steady_ns());
-  if (!view_stream_.add(datagram, receive_ns)) return;
-  {
-    const std::lock_guard<std::mutex> lock(camera_mutex_);
-    camera_known_ = true;
-    camera_status_ = view_stream_.status();
-  }
-  pairing_->addFrame(view_stream_.status(), view_stream_.simulatedFramePeriod(), view_stream_.receiveTime());
-}
-
-void CaptureNode::onLinkState(const core::LinkStatus& status) {
-  const bool known = status.state != core::LinkState::kSearching && status.state != core::LinkState::kLost;
-  if (!known) {
-    const std::lock_guard<std::mutex> lock(camera_mutex_);
-    camera_known_ = false;
-  }
-  if (status.epoch == link_epoch_) return;
-  link_epoch_ = status.epoch;
-  view_stream_.reset();
-  pairing_->forgetClock();
-  if (known && options_.set_field_of_view) changeFieldOfView();
-}
-
-void CaptureNode::changeFieldOfView() {
-  const std::string path = view_stream_.fieldOfViewDataref();
-  link().read({path}, kFieldOfViewTimeout, [this, path](const std::vector<core::DatarefValue>& values) {
-    if (!values.front().has_value()) {
-      ROS_ERROR("X-Plane did not say its field of view within %.1f s; it is left as it is", kFieldOfViewTimeout);
-      return;
-    }
-    try {
-      const std::shared_ptr<core::Journal> journal = link().journal();
-      float before = *values.front();
-      // What a crashed run has left is not the user's own value; that is in the journal.
-      for (const core::JournalEntry& entry : journal->orphans(kFieldOfViewPurpose)) {
-        for (const core::UndoOperation& operation : entry.undo) {
-          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
-        }
-      }
-      for (const core::JournalEntry& entry : journal->own()) {
-        if (entry.purpose != kFieldOfViewPurpose) continue;
-        for (const core::UndoOperation& operation : entry.undo) {
-          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
-        }
-      }
-      journal->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {core::UndoDref{path, before}});
-      link().write(path, static_cast<float>(options_.field_of_view_deg));
-    } catch (const core::JournalError& error) {
-      ROS_ERROR("X-Plane's field of view is left as it is, because it could not be restored later: %s", error.what());
-    }
-  });
-}
-
-void CaptureNode::undo(const Deadline& deadline) {
-  if (!options_.set_field_of_view || !link().journal()) return;
-  try {
-    for (const core::JournalEntry& entry : link().journal()->own()) {
-      if (entry.purpose != kFieldOfViewPurpose) continue;
-      if (link().undo(entry.undo, std::max(deadline.left(), 0.1))) link().journal()->remove({entry.id});
-    }
-  } catch (const core::JournalError& error) {
-    ROS_ERROR("X-Plane's field of view may not be restored: %s", error.what());
-  }
-}
-
-CaptureNode::CameraFacts CaptureNode::cameraFacts() const {
-  const std::lock_guard<std::mutex> lock(camera_mutex_);
-  CameraFacts facts;
-  facts.field_of_view_deg = options_.field_of_view_deg;
-  if (!camera_known_) return facts;
-  facts.view = core::classifyView(static_cast<double>(camera_status_.view_heading_deg),
-                                  static_cast<double>(camera_status_.view_pitch_deg), options_.view_tolerance_deg);
-  facts.external = camera_status_.view_external > 0.5F;
-  if (facts.external) facts.view = core::CameraView::kUnknown;
-  const auto field_of_view = static_cast<double>(camera_status_.field_of_view_deg);
-  if (field_of_view > 1.0 && field_of_view < 170.0) {
-    facts.field_of_view_deg = field_of_view;
-    facts.field_of_view_read = true;
-  }
-  return facts;
 }
 
 // --- pictures --------------------------------------------------------------------------------------------------------
@@ -233,6 +132,7 @@ void CaptureNode::captureLoop() {
     {
       const std::lock_guard<std::mutex> lock(capture_mutex_);
       source_problem_ = problem;
+      if (!problem.empty()) periods_.interrupt();
       // Asking the window for its title costs a round trip; only where it may have changed.
       if (result != vision::WaitResult::kChange || source_description_.empty()) {
         source_description_ = source->describe();
@@ -244,10 +144,12 @@ void CaptureNode::captureLoop() {
 
 void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change& change) {
   const core::RateLimiter before = limiter_;
-  const bool due = anybodyListens() && limiter_.due(change.time_ns);
+  const bool heard = anybodyListens();
+  const bool due = heard && limiter_.due(change.time_ns);
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     ++changes_;
+    if (!heard) periods_.interrupt();
     if (!due) {
       ++skipped_;
       return;
@@ -259,8 +161,15 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     return;
   }
   Grabbed grabbed;
-  grabbed.pixels = takeBuffer();
-  picture.bgr.copyTo(grabbed.pixels);
+  if (picture.jpeg) {
+    grabbed.jpeg = picture.jpeg;
+    grabbed.size = picture.jpeg_size;
+  } else {
+    grabbed.pixels = takeBuffer();
+    picture.bgr.copyTo(grabbed.pixels);
+    grabbed.size = grabbed.pixels.size();
+  }
+  grabbed.frame = picture.frame;
   grabbed.display_ns = picture.display_time_ns;
   grabbed.grab_ns = picture.grab_time_ns;
   grabbed.display_known = picture.display_time_known;
@@ -269,6 +178,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     frozen_check_.pictureChanged(picture.grab_time_ns);
     frozen_ = false;
     ++grabbed_;
+    periods_.add(grabbed.display_ns);
     if (grabbed.display_known) {
       const double age = core::toSeconds(grabbed.grab_ns - grabbed.display_ns);
       grab_age_sum_ += age;
@@ -278,7 +188,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     dropped_ = skipped_ + static_cast<std::uint32_t>(publisher_->dropped());
     grabbed.dropped = dropped_;
   }
-  last_pixels_ = grabbed.pixels;
+  last_ = grabbed;
   publisher_->giveDroppingOldest(std::move(grabbed));
 }
 
@@ -287,11 +197,13 @@ void CaptureNode::repeatFrozen(std::int64_t now_ns) {
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     frozen_ = frozen_check_.frozen(now_ns);
-    if (!frozen_ || last_pixels_.empty() || now_ns - frozen_sent_ns_ < kFrozenRepeat) return;
+    if (!frozen_ || last_.size.empty() || now_ns - frozen_sent_ns_ < kFrozenRepeat) return;
     grabbed.dropped = dropped_;
   }
   frozen_sent_ns_ = now_ns;
-  grabbed.pixels = last_pixels_.clone();  // its own buffer may be written to while this one waits
+  grabbed.pixels = last_.pixels.clone();  // its own buffer may be written to while this one waits
+  grabbed.jpeg = last_.jpeg;
+  grabbed.size = last_.size;
   grabbed.display_ns = grabbed.grab_ns = now_ns;
   grabbed.frozen = true;
   publisher_->giveDroppingOldest(std::move(grabbed));
@@ -302,18 +214,33 @@ bool CaptureNode::anybodyListens() const {
          info_publisher_.getNumSubscribers() > 0 || frame_state_publisher_.getNumSubscribers() > 0;
 }
 
+bool CaptureNode::decode(Grabbed* grabbed, bool whole) {
+  if (!grabbed->jpeg) return true;
+  try {
+    grabbed->pixels = cv::imdecode(*grabbed->jpeg, whole ? cv::IMREAD_COLOR : cv::IMREAD_REDUCED_COLOR_8);
+  } catch (const cv::Exception& error) {
+    ROS_WARN_THROTTLE(10.0, "a picture could not be decoded: %s", error.what());
+  }
+  return !grabbed->pixels.empty();
+}
+
 void CaptureNode::publishPicture(Grabbed* grabbed) {
+  const bool raw = image_publisher_.getNumSubscribers() > 0;
+  const bool jpeg = jpeg_publisher_.getNumSubscribers() > 0;
+  // The sender's own JPEG goes out as it is, where it has the size that is asked for.
+  const bool verbatim = grabbed->jpeg && grabbed->size == scaler_->size();
+  if (!decode(grabbed, raw || (jpeg && !verbatim))) return;
   const CameraFacts camera = cameraFacts();
   FrameState state;
   state.header.stamp = toRosTime(grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns);
   state.header.seq = image_count_;
-  const core::CameraView frame = camera.view == core::CameraView::kUnknown ? options_.assumed_view : camera.view;
-  state.header.frame_id = options_.frame_ids[static_cast<std::size_t>(frame)];
-  state.view = static_cast<std::uint8_t>(camera.view);
-  if (camera.view == core::CameraView::kUnknown) state.quality |= FrameState::QUALITY_VIEW_UNKNOWN;
-  if (camera.external) state.quality |= FrameState::QUALITY_EXTERNAL_VIEW;
-  if (!camera.field_of_view_read) state.quality |= FrameState::QUALITY_FOV_ASSUMED;
+  describeCamera(camera, &state);
   if (!grabbed->display_known) state.quality |= FrameState::QUALITY_DISPLAY_UNKNOWN;
+  if (grabbed->frame.has_value()) {
+    state.display_delay = grabbed->frame->delay;
+    if (grabbed->frame->borderline) state.quality |= FrameState::QUALITY_BORDERLINE;
+    if (grabbed->frame->delay_assumed) state.quality |= FrameState::QUALITY_DELAY_ASSUMED;
+  }
   if (grabbed->frozen) {
     state.quality |= FrameState::QUALITY_FROZEN;
     ++frozen_count_;
@@ -324,28 +251,30 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   state.frozen = frozen_count_;
   state.image_count = ++image_count_;
 
-  const sensor_msgs::CameraInfo info = cameraInfo(state.header, grabbed->pixels.size(), camera.field_of_view_deg);
-  state.field_of_view_deg =
-      static_cast<float>(scaler_->intrinsics(grabbed->pixels.size(), camera.field_of_view_deg).horizontal_fov_deg);
+  const core::Frustum& frustum = camera.frustum;
+  const vision::FieldOfView shown{frustum.horizontal_deg, frustum.vertical_deg, frustum.shift_right, frustum.shift_up};
+  const sensor_msgs::CameraInfo info = cameraInfo(state.header, grabbed->size, shown);
+  state.field_of_view_deg = static_cast<float>(scaler_->intrinsics(grabbed->size, shown).horizontal_fov_deg);
 
-  const bool raw = image_publisher_.getNumSubscribers() > 0;
-  const bool jpeg = jpeg_publisher_.getNumSubscribers() > 0;
   const bool black = vision::isBlack(grabbed->pixels);
   if (black) state.quality |= FrameState::QUALITY_BLACK;
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     black_ = black;
   }
-  if (raw || jpeg) {
+  if (jpeg && verbatim) publishJpeg(state.header, *grabbed->jpeg);
+  if (raw || (jpeg && !verbatim)) {
     const sensor_msgs::ImagePtr image = takeMessage();
     image->header = state.header;
     cv::Mat pixels(options_.height, options_.width, CV_8UC3, image->data.data());
     scaler_->scale(grabbed->pixels, pixels);
     if (raw) image_publisher_.publish(image);
-    if (jpeg) encoder_->giveDroppingOldest(image);
+    if (jpeg && !verbatim) encoder_->giveDroppingOldest(image);
   }
   info_publisher_.publish(info);
-  pairing_->addPicture(state, clock().system_ns());
+  pairing_->addPicture(
+      state, clock().system_ns(),
+      grabbed->frame.has_value() ? std::optional<float>(grabbed->frame->sim_time) : std::optional<float>());
   if (!grabbed->frozen) giveBuffer(std::move(grabbed->pixels));
 }
 
@@ -363,30 +292,21 @@ sensor_msgs::ImagePtr CaptureNode::takeMessage() {
   return message;
 }
 
-void CaptureNode::publishJpeg(const sensor_msgs::Image& image) {
-  sensor_msgs::CompressedImage compressed;
-  compressed.header = image.header;
-  compressed.format = "bgr8; jpeg compressed bgr8";
+void CaptureNode::encodeJpeg(const sensor_msgs::Image& image) {
   // OpenCV reads the picture only.
   const cv::Mat pixels(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC3,
                        const_cast<std::uint8_t*>(image.data.data()));
-  cv::imencode(".jpg", pixels, compressed.data, {cv::IMWRITE_JPEG_QUALITY, options_.jpeg_quality});
-  jpeg_publisher_.publish(compressed);
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", pixels, jpeg, {cv::IMWRITE_JPEG_QUALITY, options_.jpeg_quality});
+  publishJpeg(image.header, jpeg);
 }
 
-sensor_msgs::CameraInfo CaptureNode::cameraInfo(const std_msgs::Header& header, cv::Size source,
-                                                double field_of_view_deg) const {
-  const vision::Intrinsics camera = scaler_->intrinsics(source, field_of_view_deg);
-  sensor_msgs::CameraInfo info;
-  info.header = header;
-  info.width = static_cast<std::uint32_t>(options_.width);
-  info.height = static_cast<std::uint32_t>(options_.height);
-  info.distortion_model = sensor_msgs::distortion_models::PLUMB_BOB;
-  info.D.assign(5, 0.0);
-  info.K = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
-  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-  info.P = {camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0};
-  return info;
+void CaptureNode::publishJpeg(const std_msgs::Header& header, const std::vector<std::uint8_t>& jpeg) {
+  sensor_msgs::CompressedImage compressed;
+  compressed.header = header;
+  compressed.format = "bgr8; jpeg compressed bgr8";
+  compressed.data = jpeg;
+  jpeg_publisher_.publish(compressed);
 }
 
 cv::Mat CaptureNode::takeBuffer() {
@@ -418,6 +338,8 @@ void CaptureNode::diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* s
   const std::lock_guard<std::mutex> lock(capture_mutex_);
   if (!source_problem_.empty()) {
     status->summary(diagnostic_msgs::DiagnosticStatus::ERROR, "no picture: " + source_problem_);
+  } else if (frozen_ && crashed_) {
+    status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "the picture stands still: the aircraft has crashed");
   } else if (frozen_) {
     status->summary(diagnostic_msgs::DiagnosticStatus::ERROR, "frozen: the aircraft moves, the picture does not");
   } else if (black_) {
@@ -431,6 +353,11 @@ void CaptureNode::diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* s
   status->add("Pictures left out (above max_rate, or nobody listens)", skipped_);
   status->add("Pictures dropped (no time to scale)", publisher_ ? publisher_->dropped() : 0);
   status->add("JPEG dropped (no time to encode)", encoder_ ? encoder_->dropped() : 0);
+  const vision::PeriodMeter::Summary periods = periods_.summary();
+  status->addf("Period of pictures, mean (ms)", "%.1f", 1e3 * periods.mean);
+  status->addf("Period of pictures, 99 of 100 (ms)", "%.1f", 1e3 * periods.p99);
+  status->addf("Period of pictures, worst (ms)", "%.1f", 1e3 * periods.worst);
+  status->add("Periods counted (-)", periods.count);
   status->add("Change to grab, mean (ms)", grab_ages_ > 0 ? 1e3 * grab_age_sum_ / grab_ages_ : 0.0);
   status->add("Change to grab, longest (ms)", 1e3 * grab_age_max_);
   grab_age_sum_ = grab_age_max_ = 0.0;
@@ -458,6 +385,11 @@ void CaptureNode::diagnosePairing(diagnostic_updater::DiagnosticStatusWrapper* s
   status->add("While paused", counters.paused);
   status->add("Without a state", counters.without_state);
   status->add("Half way between two frames", counters.ambiguous);
+  {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    status->add("Camera's angles are read as", camera_known_ ? pose_report_ : "X-Plane is not heard");
+    status->add("Camera's lever arm moves by (mm)", 1e3 * lever_scatter_);
+  }
   status->add("Frames put in for lost datagrams", counters.frames_inferred);
   status->add("Display delay applied (ms)", 1e3 * common().display_delay);
   status->add("Display beyond that, mean (ms)", 1e3 * report.mean_offset);

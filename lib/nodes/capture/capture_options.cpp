@@ -42,6 +42,7 @@ vision::X11SourceOptions loadWindow(const ParamLoader& window) {
   x11.window_id = windowId(window);
   x11.region = region(window);
   x11.title = window.text("title", "");
+  x11.index = window.integer("index", {-1, 99}, x11.index);
   x11.title_is_regex = window.boolean("title_is_regex", false);
   x11.change_detection = vision::changeDetectionFromName(
       window.choice("change_detection", {"auto", "damage", "checksum", "none"}, "auto"));
@@ -52,19 +53,37 @@ vision::X11SourceOptions loadWindow(const ParamLoader& window) {
   return x11;
 }
 
+/// The section of parameters that belongs to a source.
+const char* sectionOf(CaptureOptions::Source source) {
+  switch (source) {
+    case CaptureOptions::Source::kVideo:
+      return "video";
+    case CaptureOptions::Source::kSender:
+      return "sender";
+    default:
+      return "window";
+  }
+}
+
 }  // namespace
 
 CaptureOptions loadCaptureOptions(const ParamLoader& own) {
   CaptureOptions options;
-  options.from_video = own.choice("source", {"x11", "video"}, "x11") == "video";
+  const std::string source = own.choice("source", {"x11", "video", "sender"}, "x11");
+  if (source == "video") options.source = CaptureOptions::Source::kVideo;
+  if (source == "sender") options.source = CaptureOptions::Source::kSender;
   options.x11 = loadWindow(own.section("window"));
   const ParamLoader video = own.section("video");
   options.video.address = video.text("address", "");
   options.video.loop = video.boolean("loop", false);
   options.video.retry_period = video.number("retry_period", {0.01, 60.0}, options.video.retry_period);
-  if (options.from_video && options.video.address.empty()) {
+  if (options.source == CaptureOptions::Source::kVideo && options.video.address.empty()) {
     video.refuse("address", "a device, a file or a URL when `source` is video");
   }
+  const ParamLoader sender = own.section("sender");
+  options.sender.listen = sender.text("listen", "");
+  options.sender.peer = sender.text("peer", "");
+  options.sender.token = sender.text("token", "");
 
   options.width = own.integer("width", {kSmallestSide, kLargestSide}, options.width);
   options.height = own.integer("height", {kSmallestSide, kLargestSide}, options.height);
@@ -81,6 +100,8 @@ CaptureOptions loadCaptureOptions(const ParamLoader& own) {
     if (name == view) options.assumed_view = candidate;
     options.frame_ids[static_cast<std::size_t>(candidate)] = own.text("frame_" + name, "camera_" + name + "_optical");
   }
+  options.measured_frame = own.text("frame_measured", "camera_optical");
+  options.nominal_frames = own.boolean("nominal_frames", false);
   options.view_tolerance_deg = own.number("view_tolerance_deg", {0.0, 40.0}, options.view_tolerance_deg);
   const std::vector<double> offset = own.numbers("camera_offset", {-100.0, 100.0});
   if (!offset.empty()) {
@@ -93,14 +114,20 @@ CaptureOptions loadCaptureOptions(const ParamLoader& own) {
   try {
     (void)makeSource(options, [] { return std::int64_t{0}; });
   } catch (const std::invalid_argument& error) {
-    throw ParamError(own.fullKey(options.from_video ? "video" : "window") + ": " + error.what());
+    throw ParamError(own.fullKey(sectionOf(options.source)) + ": " + error.what());
   }
   return options;
 }
 
 std::unique_ptr<vision::FrameSource> makeSource(const CaptureOptions& options, vision::Clock clock) {
-  if (options.from_video) return std::make_unique<vision::VideoSource>(options.video, std::move(clock));
-  return std::make_unique<vision::X11WindowSource>(options.x11, std::move(clock));
+  switch (options.source) {
+    case CaptureOptions::Source::kVideo:
+      return std::make_unique<vision::VideoSource>(options.video, std::move(clock));
+    case CaptureOptions::Source::kSender:
+      return std::make_unique<vision::SenderSource>(options.sender, std::move(clock));
+    default:
+      return std::make_unique<vision::X11WindowSource>(options.x11, std::move(clock));
+  }
 }
 
 }  // namespace xplane_bridge

@@ -1,5 +1,6 @@
 #include "xplane_bridge/nodes/capture/image_pairing.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -13,6 +14,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kOffsetSmoothing = 0.05;
+constexpr std::size_t kPoses = 600;  // the frames of several seconds: longer than a picture waits
 
 /// A state that nothing is known of: valid = 0 and NaN, never zero for unknown.
 FlightState unknownState() {
@@ -48,8 +50,15 @@ void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, s
   flushLocked(receive_ns);
 }
 
+void ImagePairing::addPose(const core::CheckedPose& pose) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  poses_.push_back(pose);
+  if (poses_.size() > kPoses) poses_.pop_front();
+}
+
 void ImagePairing::forgetClock() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  poses_.clear();
   clock_.reset();
   status_ = core::SimStatus();
   frame_period_ = 0.0F;
@@ -77,7 +86,7 @@ void ImagePairing::forgetOldStates() {
 void ImagePairing::map(core::ImageMoment* moment) const {
   moment->paused = clock_.paused();
   moment->sim_time = clock_.simTime(moment->host_time_ns);
-  moment->uncertainty = clock_.uncertainty();
+  moment->uncertainty = moment->frame_key.has_value() ? 0.0 : clock_.uncertainty();
   moment->epoch = clock_.epoch();
 }
 
@@ -90,17 +99,20 @@ void ImagePairing::mapAnew(Waiting* picture) const {
   picture->slips = clock_.slips();
 }
 
-void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns) {
+void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns, std::optional<float> frame_key) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Waiting waiting;
   waiting.answer = picture;
-  waiting.answer.display_delay = display_delay_;
-  if (display_delay_ == 0.0) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
+  waiting.moment.frame_key = frame_key;
+  if (!frame_key.has_value()) {
+    waiting.answer.display_delay = display_delay_;
+    if (display_delay_ == 0.0) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
+  }
   if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
   waiting.answer.clock_uncertainty = clock_.fitted() ? clock_.uncertainty() : kNaN;
   waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : std::numeric_limits<float>::quiet_NaN();
   waiting.moment.host_time_ns =
-      static_cast<std::int64_t>(picture.header.stamp.toNSec()) - core::toNanoseconds(display_delay_);
+      static_cast<std::int64_t>(picture.header.stamp.toNSec()) - core::toNanoseconds(waiting.answer.display_delay);
   waiting.deadline_ns = now_ns + max_wait_ns_;
   map(&waiting.moment);
   waiting.slips = clock_.slips();
@@ -119,7 +131,8 @@ void ImagePairing::flushLocked(std::int64_t now_ns) {
     const bool final = now_ns >= picture.deadline_ns;
     mapAnew(&picture);
     // Without the simulator's clock the pairing is a makeshift: not before the deadline, the clock may come.
-    const bool clock_missing = !picture.moment.sim_time.has_value() && !picture.moment.paused;
+    const bool clock_missing =
+        !picture.moment.frame_key.has_value() && !picture.moment.sim_time.has_value() && !picture.moment.paused;
     if (clock_missing && !final) return;
     const core::Association association = associator_.associate(picture.moment, final);
     if (association.pending) return;
@@ -148,8 +161,32 @@ void ImagePairing::complete(const core::Association& association, std::int64_t n
     answer.state_age = core::toSeconds(now_ns - after->second.arrival_ns);
     if (association.frame_known) answer.sim_time_error = association.state_offset;
   }
+  completePose(association, picture);
   answer.unpaired = unpaired_;
   if (association.frame_known) mean_offset_ += kOffsetSmoothing * (association.frame_offset - mean_offset_);
+}
+
+void ImagePairing::completePose(const core::Association& association, Waiting* picture) const {
+  FrameState& answer = picture->answer;
+  if (answer.camera_pose_source != FrameState::POSE_MEASURED || picture->moment.paused) return;
+  const auto of_frame = std::find_if(poses_.rbegin(), poses_.rend(), [&](const core::CheckedPose& pose) {
+    return association.frame_known && pose.sim_time == association.frame_sim_time;
+  });
+  if (of_frame != poses_.rend()) {
+    setPose(*of_frame, &answer);
+  } else {
+    answer.quality |= FrameState::QUALITY_POSE_UNSURE;  // of another frame
+  }
+}
+
+void setPose(const core::CheckedPose& checked, FrameState* answer) {
+  const core::CameraPose& pose = checked.pose;
+  answer->camera_pose_source = FrameState::POSE_MEASURED;
+  answer->body_to_camera = toTransform(pose.orientation, pose.position);
+  answer->camera_pose_uncertainty_deg = static_cast<float>(pose.angle_uncertainty_deg);
+  answer->camera_pose_uncertainty = static_cast<float>(pose.position_uncertainty);
+  answer->quality &= ~std::uint32_t{FrameState::QUALITY_POSE_UNSURE};
+  if (!checked.sure) answer->quality |= FrameState::QUALITY_POSE_UNSURE;
 }
 
 ImagePairing::Report ImagePairing::report() const {

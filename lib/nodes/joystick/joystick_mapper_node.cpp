@@ -10,17 +10,23 @@ void JoystickMapperNode::loadParameters(const ParamLoader& own) {
   period_ = 1.0 / own.number("rate", {1.0, 1000.0}, 50.0);
   mapper_ = std::make_unique<core::JoystickMapper>(loadJoystickOptions(own));
   // Counting from the seconds of the clock, a restarted mapper is not mistaken for an old message.
-  request_sequence_ = static_cast<std::uint32_t>(clock().system_ns() / core::kNanosecondsPerSecond);
+  request_sequence_ =
+      static_cast<std::uint32_t>((lockstep() ? clock() : wallClock()).system_ns() / core::kNanosecondsPerSecond);
 }
 
 void JoystickMapperNode::advertise() {
-  command_publisher_ = advertiseTopic<ControlCommand>("control/manual", 1);
+  // In lock-step none may be lost before tx_node listens.
+  command_publisher_ = advertiseTopic<ControlCommand>("control/manual", lockstep() ? kLockstepQueue : 1, lockstep());
   request_publisher_ = advertiseTopic<ModeRequest>("control/mode_request", 10);
   addDiagnostics("joystick", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { fillDiagnostics(&status); });
   setHardwareId(mapper_->options().device);
 }
 
 void JoystickMapperNode::subscribe() {
+  if (lockstep()) {
+    subscribeInLockstep();
+    return;
+  }
   subscribeTopic<sensor_msgs::Joy>("joy", 1, [this](const sensor_msgs::JoyConstPtr& joy) { onJoy(*joy); });
   subscribeTopic<ControlMode>("control/mode", 1, [this](const ControlModeConstPtr& mode) {
     if (mode->mode != ControlMode::MANUAL && mode->mode != ControlMode::AUTO) return;
@@ -55,7 +61,7 @@ void JoystickMapperNode::onTimer() {
   publish(time);
 }
 
-void JoystickMapperNode::publish(double time) {
+bool JoystickMapperNode::publish(double time) {
   core::JoystickCommand command = mapper_->update(time);
   const ros::Time stamp = stampNow();
   for (const core::FlightMode mode : mapper_->takeModeRequests()) {
@@ -66,7 +72,7 @@ void JoystickMapperNode::publish(double time) {
     request.requester = name();
     request_publisher_.publish(request);
   }
-  if (!command.alive) return;
+  if (!command.alive) return false;
   command.command.sequence = ++command_sequence_;
   ControlCommand message;
   message.header.stamp = stamp;
@@ -74,6 +80,7 @@ void JoystickMapperNode::publish(double time) {
   command_publisher_.publish(message);
   last_publication_ = time;
   reportSelection();
+  return true;
 }
 
 void JoystickMapperNode::reportProblems() {

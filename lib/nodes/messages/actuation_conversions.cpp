@@ -1,5 +1,8 @@
 #include "xplane_bridge/nodes/messages/actuation_conversions.hpp"
 
+#include "xplane_bridge/nodes/base/ros_time.hpp"
+#include "xplane_bridge/nodes/messages/control_conversions.hpp"
+
 namespace xplane_bridge {
 core::FailureRequest toCore(const SetFailure::Request& request) {
   core::FailureRequest out;
@@ -25,11 +28,43 @@ ExcitationRequest toCore(const InjectExcitation::Request& request) {
   return out;
 }
 
+IdentificationRequest toCore(const IdentifySurfaces::Request& request) {
+  IdentificationRequest out;
+  out.save = request.do_not_save == 0;
+  out.max_roll_deg = static_cast<double>(request.max_roll_deg);
+  out.max_pitch_deg = static_cast<double>(request.max_pitch_deg);
+  out.max_rate_deg_s = static_cast<double>(request.max_rate_deg_s);
+  out.max_airspeed_change = static_cast<double>(request.max_airspeed_change);
+  out.min_height = static_cast<double>(request.min_height);
+  return out;
+}
+
 ServiceResult toMessage(const RequestResult& result) {
   ServiceResult out;
   out.code = static_cast<std::uint8_t>(result.code);
   out.message = result.text;
   return out;
+}
+
+void toMessage(const AppliedControls& applied, const std::vector<core::SurfaceDeflection>& surfaces,
+               AppliedCommand* message) {
+  message->header.stamp = toRosTime(applied.sent_ns);
+  toMessage(applied.controls, message);
+  fillSurfaces(surfaces, message);
+  message->read_back = applied.read_back;
+  message->read_back_sim_time = static_cast<float>(applied.read_back_sim_time);
+  message->read_back_frames = static_cast<float>(applied.read_back_frames);
+}
+
+void toMessage(const SurfaceControl::Echo& echo, core::FlightMode mode,
+               const std::vector<core::SurfaceDeflection>& surfaces, AppliedCommand* message) {
+  message->mode = static_cast<std::uint8_t>(mode);
+  message->source = AppliedCommand::SOURCE_NONE;
+  message->sequence = echo.sequence;
+  fillSurfaces(surfaces, message);
+  message->read_back = echo.read_back;
+  message->read_back_sim_time = static_cast<float>(echo.sim_time);
+  message->read_back_frames = static_cast<float>(echo.frames);
 }
 
 void toMessage(const FailureSnapshot& snapshot, FailureState* message) {

@@ -54,6 +54,19 @@ void toMessage(const core::ArbitratedControls& controls, AppliedCommand* message
   forEachChannel(*message, [&value](float& to, Channel channel) { to = value(channel); });
 }
 
+void toMessage(const core::ModeStatus& status, double sim_time, ControlMode* message) {
+  message->mode = static_cast<std::uint8_t>(status.mode);
+  message->previous = status.previous ? static_cast<std::uint8_t>(*status.previous) : std::uint8_t{0};
+  message->requested_by = status.requested_by;
+  message->reason = status.reason;
+  message->request_sequence = status.request_sequence;
+  message->accepted = status.accepted;
+  message->sim_time = static_cast<float>(sim_time);
+  message->manual_alive = status.manual_alive;
+  message->auto_alive = status.auto_alive;
+  message->failsafe = status.failsafe;
+}
+
 void fillSurfaces(const std::vector<core::SurfaceDeflection>& surfaces, AppliedCommand* message) {
   message->surface_names.clear();
   message->surface_deflections_deg.clear();

@@ -75,6 +75,13 @@ void toMessage(const core::LinkStatus& link, const std::string& transport, LinkS
   message->silence = link.silence_s;
 }
 
+geometry_msgs::Transform toTransform(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+  geometry_msgs::Transform transform;
+  putField(translation, &transform.translation);
+  putField(rotation, &transform.rotation);
+  return transform;
+}
+
 bool toOdometry(const core::FlightState& state, const core::TangentFrame& map, const FrameNames& frames,
                 nav_msgs::Odometry* message) {
   if (!state.has(core::FlightState::kValidPosition | core::FlightState::kValidAttitude |

@@ -21,7 +21,9 @@ constexpr double kShortestAge_s = 0.5;
 
 }  // namespace
 
-DatarefPublisher::DatarefPublisher(const std::vector<DatarefEntry>& entries) {
+DatarefPublisher::DatarefPublisher(const std::vector<DatarefEntry>& entries, bool publish_unheard,
+                                   std::optional<core::Clock> stamps)
+    : publish_unheard_(publish_unheard), stamps_(std::move(stamps)) {
   std::map<int, Batch, std::greater<int>> by_rate;
   for (const DatarefEntry& entry : entries) {
     Batch& batch = by_rate[entry.rate];
@@ -68,7 +70,7 @@ void DatarefPublisher::onRref(std::size_t batch_index, const core::RrefView& dat
   for (const Scalar& scalar : scalars_) {
     const bool arrived =
         std::find(batch.positions.begin(), batch.positions.end(), scalar.position) != batch.positions.end();
-    if (arrived && scalar.publisher.getNumSubscribers() > 0) {
+    if (arrived && goesOut(scalar.publisher)) {
       std_msgs::Float64 value;
       value.data = static_cast<double>(message_.values[scalar.position]);
       scalar.publisher.publish(value);
@@ -85,10 +87,10 @@ void DatarefPublisher::publish(std::int64_t receive_ns, float sim_time, std::uin
       }
     }
   }
-  if (publisher_.getNumSubscribers() == 0) {
+  if (!goesOut(publisher_)) {
     return;
   }
-  message_.header.stamp = toRosTime(receive_ns);
+  message_.header.stamp = toRosTime(stamps_ ? stamps_->system_ns() : receive_ns);
   message_.sim_time = sim_time;
   message_.epoch = epoch;
   publisher_.publish(message_);

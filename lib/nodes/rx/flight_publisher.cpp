@@ -13,13 +13,12 @@ constexpr std::int64_t kCompletionTime_ns = 1'000'000'000;
 // Before the clock filter has its fit (a quarter of a second), stamps are receive times with all their jitter: a
 // velocity differenced from the first positions would be wrong.
 const double kUnsettledClock = core::ClockFilter::Options{}.unfitted_uncertainty;
-constexpr std::uint32_t kNeededToStart =
-    core::FlightState::kValidAttitude | core::FlightState::kValidPosition | core::FlightState::kValidRates;
+constexpr std::uint32_t kNeededToStart = core::FlightState::kValidAttitude | core::FlightState::kValidPosition;
 
-/// Publishes what `fill` makes, unless nobody listens or it makes nothing.
+/// Publishes what `fill` makes, unless nobody listens (`unheard`: all the same) or it makes nothing.
 template <class Message, class Fill>
-void publishIfHeard(const ros::Publisher& publisher, Message* message, const Fill& fill) {
-  if (publisher.getNumSubscribers() > 0 && fill(message)) {
+void publishIfHeard(const ros::Publisher& publisher, bool unheard, Message* message, const Fill& fill) {
+  if ((unheard || publisher.getNumSubscribers() > 0) && fill(message)) {
     publisher.publish(*message);
   }
 }
@@ -30,7 +29,7 @@ FlightPublisher::FlightPublisher(const RxOptions& options, const FrameNames& fra
     : options_(options), frames_(frames), state_limiter_(options.max_publish_rate), wind_limiter_(options.wind_rate) {}
 
 void FlightPublisher::advertise(ros::NodeHandle* handle) {
-  state_publisher_ = handle->advertise<FlightState>("flight_state", kQueueSize);
+  state_publisher_ = handle->advertise<FlightState>("flight_state", kQueueSize, options_.publish_unheard);
   odometry_publisher_ = handle->advertise<nav_msgs::Odometry>("odom", kQueueSize);
   imu_publisher_ = handle->advertise<sensor_msgs::Imu>("imu/data", kQueueSize);
   fix_publisher_ = handle->advertise<sensor_msgs::NavSatFix>("global_position/global", kQueueSize);
@@ -51,7 +50,7 @@ void FlightPublisher::restart() {
 }
 
 bool FlightPublisher::mayStart(const core::FlightState& state, std::int64_t receive_ns) {
-  if (!state.has(kNeededToStart)) {
+  if (!state.has(kNeededToStart | (rates_expected_ ? core::FlightState::kValidRates : 0U))) {
     startable_since_ns_.reset();
     return false;
   }
@@ -77,19 +76,20 @@ void FlightPublisher::publish(const core::FlightState& state, const core::Tangen
     return;
   }
   ++published_;
-  publishIfHeard(state_publisher_, &state_message_, [&](FlightState* message) {
+  const bool unheard = options_.publish_unheard;
+  publishIfHeard(state_publisher_, unheard, &state_message_, [&](FlightState* message) {
     toMessage(state, frames_.base_link_frd, message);
     return true;
   });
-  publishIfHeard(odometry_publisher_, &odometry_message_,
+  publishIfHeard(odometry_publisher_, unheard, &odometry_message_,
                  [&](nav_msgs::Odometry* message) { return toOdometry(state, map, frames_, message); });
-  publishIfHeard(imu_publisher_, &imu_message_,
+  publishIfHeard(imu_publisher_, unheard, &imu_message_,
                  [&](sensor_msgs::Imu* message) { return toImu(state, frames_, message); });
-  publishIfHeard(fix_publisher_, &fix_message_, [&](sensor_msgs::NavSatFix* message) {
+  publishIfHeard(fix_publisher_, unheard, &fix_message_, [&](sensor_msgs::NavSatFix* message) {
     return toNavSatFix(state, options_.geoid_undulation, frames_, message);
   });
   if (wind_limiter_.due(state.stamp_ns)) {
-    publishIfHeard(wind_publisher_, &wind_message_, [&](geometry_msgs::TwistWithCovarianceStamped* message) {
+    publishIfHeard(wind_publisher_, unheard, &wind_message_, [&](geometry_msgs::TwistWithCovarianceStamped* message) {
       return toWind(state, map, frames_, message);
     });
   }

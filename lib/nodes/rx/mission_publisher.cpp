@@ -1,6 +1,7 @@
 #include "xplane_bridge/nodes/rx/mission_publisher.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -17,8 +18,14 @@ constexpr int kFirstGuessOfEngines = 2;
 template <class State, class Message>
 class TypedMissionPublisher : public MissionPublisher {
  public:
-  TypedMissionPublisher(int rate, core::Transport transport, std::string frame)
-      : transport_(transport), rate_(rate), frame_(std::move(frame)), limiter_(rate) {
+  TypedMissionPublisher(int rate, core::Transport transport, std::string frame, bool publish_unheard,
+                        std::optional<SimulatorStamps> stamps)
+      : transport_(transport),
+        rate_(rate),
+        frame_(std::move(frame)),
+        publish_unheard_(publish_unheard),
+        stamps_(std::move(stamps)),
+        limiter_(rate) {
     rebuild();
   }
 
@@ -49,14 +56,14 @@ class TypedMissionPublisher : public MissionPublisher {
       return false;
     }
     if (transport_ == core::Transport::kRref) {
-      publish(assembler_->assemble(nullptr, receive_ns, clock));
+      publish(assembler_->assemble(nullptr, receive_ns, clock), clock);
     }
     return adoptEngines();
   }
 
   void onRows(const core::RowStore& rows, std::int64_t receive_ns, const core::ClockFilter& clock) override {
     if (limiter_.due(receive_ns)) {
-      publish(assembler_->assemble(&rows, receive_ns, clock));
+      publish(assembler_->assemble(&rows, receive_ns, clock), clock);
     }
   }
 
@@ -72,12 +79,18 @@ class TypedMissionPublisher : public MissionPublisher {
     assembler_ = std::make_unique<core::MissionAssembler<State>>(options);
   }
 
-  void publish(const State& state) {
+  void publish(State state, const core::ClockFilter& clock) {
+    noteEngines(state);
+    if (stamps_) {
+      state.stamp_ns = std::isfinite(state.sim_time)
+                           ? stamps_->start_ns + core::toNanoseconds(clock.unwrap(state.sim_time))
+                           : stamps_->clock.system_ns();
+    }
+    if (muted_) return;
     ++report_.published;
     report_.missing = allBits() & ~state.valid;
     report_.stamp_ns = state.stamp_ns;
-    noteEngines(state);
-    if (publisher_.getNumSubscribers() > 0) {
+    if (publish_unheard_ || publisher_.getNumSubscribers() > 0) {
       toMessage(state, frame_, &message_);
       publisher_.publish(message_);
     }
@@ -108,6 +121,8 @@ class TypedMissionPublisher : public MissionPublisher {
   int engines_ = kFirstGuessOfEngines;
   int engines_seen_ = 0;
   std::string frame_;
+  bool publish_unheard_;
+  std::optional<SimulatorStamps> stamps_;
   core::RateLimiter limiter_;
   std::unique_ptr<core::MissionAssembler<State>> assembler_;
   ros::Publisher publisher_;
@@ -123,15 +138,16 @@ void forEachType(F f, std::tuple<Types...>*) {
 }  // namespace
 
 std::vector<std::unique_ptr<MissionPublisher>> makeMissionPublishers(
-    const std::array<int, core::kFieldGroupCount>& rates, core::Transport transport, const FrameNames& frames) {
+    const std::array<int, core::kFieldGroupCount>& rates, core::Transport transport, const FrameNames& frames,
+    bool publish_unheard, const std::optional<SimulatorStamps>& stamps) {
   std::vector<std::unique_ptr<MissionPublisher>> publishers;
   const auto add = [&](auto* pair) {
     using State = typename std::remove_pointer_t<decltype(pair)>::first_type;
     using Message = typename std::remove_pointer_t<decltype(pair)>::second_type;
     const int rate = rates[static_cast<std::size_t>(State::kGroup)];
     if (rate > 0) {
-      publishers.push_back(
-          std::make_unique<TypedMissionPublisher<State, Message>>(rate, transport, frames.base_link_frd));
+      publishers.push_back(std::make_unique<TypedMissionPublisher<State, Message>>(
+          rate, transport, frames.base_link_frd, publish_unheard, stamps));
     }
   };
   forEachType(add, static_cast<MissionMessages*>(nullptr));

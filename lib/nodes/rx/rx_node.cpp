@@ -7,10 +7,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include <rosgraph_msgs/Clock.h>
+#include <std_msgs/Header.h>
+
 #include "xplane_bridge/LinkState.h"
 #include "xplane_bridge/core/base/units.hpp"
-#include "xplane_bridge/core/wire/dataref_path.hpp"
-#include "xplane_bridge/nodes/base/service_result.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 
 namespace xplane_bridge {
@@ -28,9 +29,7 @@ constexpr int kFlightPriority = 10;
 constexpr int kDatarefPriority = 1;
 constexpr int kMissionPriority = 0;
 constexpr int kIdentityPriority = -1;
-
-constexpr double kDefaultReadTimeout_s = 1.0;
-constexpr double kLongestReadTimeout_s = 10.0;
+constexpr int kLockstepFlightPriority = -2;  // handled last: who answers a state has all else of its frame
 
 constexpr std::uint32_t kRowsQueueSize = 100;
 
@@ -48,19 +47,30 @@ const char* nameOf(core::Transport transport) { return transport == core::Transp
 
 void RxNode::loadParameters(const ParamLoader& own) {
   options_ = loadRxOptions(own);
+  options_.publish_unheard = lockstep();
+  if (lockstep() && options_.position_source == core::PositionMode::kXpc) {
+    own.refuse("position_source", "auto, local, rpos or float32 with lockstep/enabled: X-Plane Connect has no frames");
+  }
   if (common().transport == core::Transport::kData && common().data_port == 0 && !options_.configure_xplane) {
     own.refuse("configure_xplane", "true while the shared parameter data_port is 0: X-Plane has to be told the port");
   }
   core::FlightStateAssembler::Options assembler;
   assembler.transport = common().transport;
   assembler.position = options_.position_source;
+  assembler.clock.exact = lockstep();
   flight_ = std::make_unique<core::FlightStateAssembler>(assembler);
   if (options_.origin) {
     flight_->setMapOrigin(*options_.origin);
   }
   flight_publisher_ = std::make_unique<FlightPublisher>(options_, common().frames);
-  missions_ = makeMissionPublishers(options_.rates, common().transport, common().frames);
-  datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs);
+  std::optional<SimulatorStamps> stamps;
+  std::optional<core::Clock> stamp_clock;
+  if (stampsBySimulator()) {
+    stamps = SimulatorStamps{clock(), stampOf(0.0)};
+    stamp_clock = clock();
+  }
+  missions_ = makeMissionPublishers(options_.rates, common().transport, common().frames, lockstep(), stamps);
+  datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs, lockstep(), stamp_clock);
   addStreams();
 }
 
@@ -68,7 +78,7 @@ void RxNode::addStreams() {
   const auto add = [this](DatarefStream stream) { streams_.push_back(std::move(stream)); };
   add({"flight",
        options_.rates[static_cast<std::size_t>(core::FieldGroup::kFlight)],
-       kFlightPriority,
+       lockstep() ? kLockstepFlightPriority : kFlightPriority,
        [this] { return pathsOf(flight_->requests()); },
        [this](const core::RrefView& datagram, std::int64_t receive_ns) {
          publishState(flight_->onRref(datagram, receive_ns), receive_ns);
@@ -132,8 +142,18 @@ void RxNode::advertise() {
       "set_origin", [this](const auto& request, auto& response) { setOrigin(request, response); });
   advertiseService<GetDataref::Request, GetDataref::Response>(
       "get_dataref", [this](const auto& request, auto& response) { getDataref(request, response); });
+  advertiseService<GetTerrain::Request, GetTerrain::Response>(
+      "get_terrain", [this](const auto& request, auto& response) { getTerrain(request, response); });
   addTimer(kSupervisePeriod_s, [this] { supervise(); });
   addAllDiagnostics();
+  if (lockstep() || stampsBySimulator()) {
+    clock_publisher_ = handle().advertise<rosgraph_msgs::Clock>(kClockTopic, 1, true);
+  }
+  if (lockstep()) {
+    done_publisher_ = advertiseTopic<std_msgs::Header>(kLockstepDoneTopic, 1, true);
+    mute(true);
+    publishClock();  // the time is known before the flight, as recorders want it
+  }
 }
 
 void RxNode::configureLink(core::SimLinkOptions* options) {
@@ -144,6 +164,7 @@ void RxNode::configureLink(core::SimLinkOptions* options) {
   if (common().transport != core::Transport::kData) {
     return;
   }
+  options->unheard_version = options_.xplane_version;
   options->data_output.enabled = true;
   options->data_output.port = static_cast<std::uint16_t>(common().data_port);
   options->data_output.configure = options_.configure_xplane;
@@ -177,8 +198,9 @@ std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
     consistency_.reset();
     last_state_.reset();
   }
-  const std::int64_t wall_ns = clock().system_ns();
-  return receive_clock_.toHostTime(info.stamp_ns, wall_ns, clock().steady_ns());
+  if (lockstep()) return clock().system_ns();
+  const std::int64_t wall_ns = wallClock().system_ns();
+  return receive_clock_.toHostTime(info.kernel_stamp ? info.stamp_ns : wall_ns, wall_ns, clock().steady_ns());
 }
 
 void RxNode::onRref(std::size_t stream, const core::RrefView& datagram, const core::ReceiveInfo& info) {
@@ -222,16 +244,30 @@ void RxNode::publishState(const core::FlightState* state, std::int64_t receive_n
   if (state == nullptr) {
     return;
   }
-  if (flight_->map()) {
-    flight_publisher_->publish(*state, *flight_->map(), receive_ns);
+  state_is_new_ = true;
+  if (stampsBySimulator()) {
+    setStampTime(state->sim_time_unwrapped);
+    publishClock();
+  }
+  if (flight_->map() && !held()) {
+    flight_publisher_->publish(stamped(*state), *flight_->map(), receive_ns);
   }
   last_state_ = *state;
   last_state_received_ns_ = receive_ns;
   consistency_.add(*state);
 }
 
+core::FlightState RxNode::stamped(const core::FlightState& state) const {
+  core::FlightState out = state;
+  if (stampsBySimulator()) {
+    out.stamp_ns = clock().system_ns();
+    out.stamp_uncertainty = 0.0F;
+  }
+  return out;
+}
+
 void RxNode::publishRows(const core::DataView& datagram, const core::ReceiveInfo& info, std::int64_t receive_ns) {
-  rows_message_.header.stamp = toRosTime(receive_ns);
+  rows_message_.header.stamp = stampsBySimulator() ? stampNow() : toRosTime(receive_ns);
   rows_message_.label.assign(info.label.begin(), info.label.end());
   rows_message_.index.clear();
   rows_message_.values.clear();
@@ -251,9 +287,14 @@ float RxNode::nearSimTime(std::int64_t receive_ns) const {
 }
 
 void RxNode::publishLinkState(const core::LinkStatus& status) {
+  if (held()) return;
   LinkState message;
   toMessage(status, nameOf(common().transport), &message);
   message.header.stamp = stampNow();
+  if (lockstep()) {  // the same in each run
+    message.host.clear();
+    message.port = 0;
+  }
   message.aircraft_icao = aircraft_.identity().icao;
   message.aircraft_description = aircraft_.identity().description;
   link_state_publisher_.publish(message);
@@ -297,6 +338,7 @@ void RxNode::adoptVersion(const core::LinkStatus& status) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     flight_->setVersion(version);
+    flight_publisher_->expectRates(version.known() || common().transport != core::Transport::kData);
     for (const auto& mission : missions_) {
       mission->configure(version);
     }
@@ -359,67 +401,6 @@ std::vector<std::int32_t> RxNode::wantedRows() const {
   }
   rows.insert(options_.extra_rows.begin(), options_.extra_rows.end());
   return {rows.begin(), rows.end()};
-}
-
-void RxNode::setOrigin(const SetOrigin::Request& request, SetOrigin::Response& response) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  response.position_epoch = flight_->positionEpoch();
-  core::GeoPoint origin{request.latitude, request.longitude, request.altitude_msl};
-  if (request.here) {
-    if (!last_state_ || !last_state_->has(core::FlightState::kValidPosition)) {
-      response.result = result(ServiceResult::REFUSED, "the aircraft's position is not known yet");
-      return;
-    }
-    origin = {last_state_->latitude, last_state_->longitude, last_state_->altitude_msl};
-  }
-  if (!(std::abs(origin.latitude_deg) <= 90.0 && std::abs(origin.longitude_deg) <= 180.0 &&
-        std::isfinite(origin.height))) {
-    response.result = result(ServiceResult::REFUSED,
-                             "latitude must be from -90 to 90, longitude from -180 to 180, altitude_msl finite");
-    return;
-  }
-  flight_->setMapOrigin(origin);
-  response.position_epoch = flight_->positionEpoch();
-  flight_publisher_->publishOrigin(*flight_->map(), response.position_epoch, clock().system_ns());
-  response.result = result(ServiceResult::OK, "the next states refer to the new origin");
-  response.success = true;
-}
-
-void RxNode::getDataref(const GetDataref::Request& request, GetDataref::Response& response) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    response.sim_time = last_state_ ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
-  }
-  if (!(request.timeout >= 0.0 && request.timeout <= kLongestReadTimeout_s)) {
-    response.result = result(ServiceResult::REFUSED, "timeout must be from 0 (the default of 1 s) to 10 s");
-    return;
-  }
-  std::vector<std::string> paths;
-  try {
-    paths = core::datarefElements(request.name);
-  } catch (const std::invalid_argument& error) {
-    response.result = result(ServiceResult::REFUSED, error.what());
-    return;
-  }
-  if (!link().status().peer.valid()) {
-    response.result = result(ServiceResult::NO_LINK, "X-Plane has not been found");
-    return;
-  }
-  const double timeout = request.timeout > 0.0 ? request.timeout : kDefaultReadTimeout_s;
-  for (const core::DatarefValue& value : link().read(paths, timeout)) {
-    response.values.push_back(value.value_or(std::numeric_limits<float>::quiet_NaN()));
-  }
-  const auto missing =
-      std::find_if(response.values.begin(), response.values.end(), [](float value) { return std::isnan(value); });
-  if (missing != response.values.end()) {
-    response.result =
-        result(ServiceResult::TIMEOUT, "X-Plane did not answer for " +
-                                           paths[static_cast<std::size_t>(missing - response.values.begin())] +
-                                           ": unknown to it, or the link is down");
-    return;
-  }
-  response.result = result(ServiceResult::OK, "read");
-  response.success = true;
 }
 
 void RxNode::publishFinalState() {

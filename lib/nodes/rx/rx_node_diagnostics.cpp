@@ -100,6 +100,9 @@ void RxNode::diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status)
   const bool should_flow = last_status_.state == core::LinkState::kConnected;
   if (flight_->noFlight()) {
     status->summary(DiagnosticStatus::WARN, "no flight is loaded in X-Plane (all values are 0)");
+  } else if (should_flow && !flowing && counters.without_time > 0) {
+    status->summary(DiagnosticStatus::WARN,
+                    "what X-Plane sends has no simulator time: with transport data, select row 1 (times)");
   } else if (!flowing) {
     status->summary(should_flow ? DiagnosticStatus::WARN : DiagnosticStatus::OK,
                     should_flow ? "X-Plane answers, but no flight state comes" : "no flight state while not connected");
@@ -116,13 +119,14 @@ void RxNode::diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status)
   status->add("States published (-)", flight_publisher_->published());
   status->add("Groups not known", last_state_ ? missingGroups(last_state_->valid) : "all");
   if (last_state_) {
-    status->addf("Age of the last state (s)", "%.3f", core::toSeconds(clock().system_ns() - last_state_received_ns_));
+    status->addf("Age of the last state (s)", "%.3f", core::toSeconds(receiveNow() - last_state_received_ns_));
     status->addf("Frame period (s)", "%.4f", static_cast<double>(last_state_->frame_period));
   }
   status->add("Epoch (-)", flight_->clock().epoch());
   status->add("Duplicate frames dropped (-)", counters.duplicates);
   status->add("Frames out of order dropped (-)", counters.out_of_order);
   status->add("Datagrams without simulator time (-)", counters.without_time);
+  status->add("Frames of X-Plane not received (-)", flight_->clock().missedFrames());
   status->add("Incomplete frames (-)", flight_->frames().counters().incomplete);
   status->add("Datarefs that never answer (-)", flight_->frames().silentCount());
   status->add("Jumps of position (-)", counters.jumps);

@@ -62,6 +62,10 @@ std::vector<DatarefEntry> loadDatarefs(const ParamLoader& own) {
   return entries;
 }
 
+// As X-Plane itself counts: 90000 is 9.00.
+constexpr int kLowestVersion = 90'000;
+constexpr int kHighestVersion = 999'999;
+
 }  // namespace
 
 RxOptions loadRxOptions(const ParamLoader& own) {
@@ -85,6 +89,10 @@ RxOptions loadRxOptions(const ParamLoader& own) {
   options.configure_xplane = own.boolean("configure_xplane", options.configure_xplane);
   options.data_output_rate = own.integer("data_output_rate", {1, 99}, options.data_output_rate);
   options.data_address = own.text("data_address", options.data_address);
+  options.xplane_version = own.integer("xplane_version", {0, kHighestVersion}, options.xplane_version);
+  if (options.xplane_version > 0 && options.xplane_version < kLowestVersion) {
+    own.refuse("xplane_version", "0 (unknown), or X-Plane's internal version such as 115501 (11.55) or 122015 (12.2)");
+  }
   for (const double row : own.numbers("extra_rows", {0.0, core::kDataRowLimit - 1.0})) {
     if (row != std::floor(row)) {
       own.refuse("extra_rows", "a list of row numbers");

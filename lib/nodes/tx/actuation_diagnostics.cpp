@@ -1,5 +1,6 @@
 #include "xplane_bridge/nodes/tx/actuation_diagnostics.hpp"
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,36 @@ namespace {
 using Level = diagnostic_msgs::DiagnosticStatus;
 
 }  // namespace
+
+void fillDiagnostics(const ControlSnapshot& control, diagnostic_updater::DiagnosticStatusWrapper* status) {
+  if (!control.refusal.empty()) {
+    status->summary(Level::WARN, "commands are not sent: " + control.refusal);
+  } else if (control.mode.failsafe) {
+    status->summary(Level::WARN, std::string(core::toString(control.mode.mode)) + ", failsafe: " + control.mode.reason);
+  } else if (!control.not_followed.empty()) {
+    status->summary(Level::WARN, "X-Plane does not show what is sent: " + core::join(control.not_followed));
+  } else {
+    status->summary(Level::OK, core::toString(control.mode.mode));
+  }
+  status->add("Standing", toString(control.standing));
+  status->add("Mode", core::toString(control.mode.mode));
+  status->add("Reason", control.mode.reason);
+  const std::array<std::string, 2> names = {"control/manual", "control/auto"};
+  for (std::size_t source = 0; source < names.size(); ++source) {
+    const std::string& name = names[source];
+    const core::SourceStatistics& statistics = control.received[source];
+    status->add(name + " accepted (-)", statistics.accepted);
+    status->add(name + " refused (-)", statistics.refusedTotal());
+    for (std::size_t i = 0; i < statistics.refused.size(); ++i) {
+      if (statistics.refused[i] == 0) continue;
+      status->add(name + " refused, " + core::toString(static_cast<core::Refusal>(i)) + " (-)", statistics.refused[i]);
+    }
+    if (!statistics.last_refusal.empty()) status->add(name + " last refusal", statistics.last_refusal);
+  }
+  const std::string active = core::join(control.overrides, ", ", core::afterLastSlash);
+  status->add("Overrides set", active.empty() ? "none" : active);
+  status->add("Aircraft loaded", control.aircraft);
+}
 
 void fillDiagnostics(const SurfaceControlStatus& surfaces, diagnostic_updater::DiagnosticStatusWrapper* status) {
   const std::string& blocked = surfaces.blocked_reason;

@@ -1,23 +1,44 @@
 #include "xplane_bridge/nodes/tx/tx_node.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
+#include <std_srvs/SetBool.h>
+
+#include "xplane_bridge/AppliedCommand.h"
+#include "xplane_bridge/ClearFailures.h"
 #include "xplane_bridge/ControlMode.h"
-#include "xplane_bridge/Event.h"
-#include "xplane_bridge/core/base/text.hpp"
-#include "xplane_bridge/core/link/journal.hpp"
+#include "xplane_bridge/ExcitationState.h"
+#include "xplane_bridge/FailureState.h"
+#include "xplane_bridge/IdentifySurfaces.h"
+#include "xplane_bridge/InjectExcitation.h"
+#include "xplane_bridge/LoadAircraft.h"
+#include "xplane_bridge/RunCommand.h"
+#include "xplane_bridge/ServiceResult.h"
+#include "xplane_bridge/SetDataref.h"
+#include "xplane_bridge/SetFailure.h"
+#include "xplane_bridge/SetView.h"
+#include "xplane_bridge/Situation.h"
+#include "xplane_bridge/nodes/base/service_result.hpp"
+#include "xplane_bridge/nodes/messages/actuation_conversions.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
+#include "xplane_bridge/nodes/messages/flight_conversions.hpp"
+#include "xplane_bridge/nodes/tx/actuation_diagnostics.hpp"
 
 namespace xplane_bridge {
 namespace {
 
-constexpr double kWorkPeriod = 0.2;    // [s]
-constexpr double kReleaseWait = 1.0;   // [s] of one attempt
-constexpr double kIdentityWait = 2.0;  // [s] of asking for it once
+const ros::WallDuration kHeartbeat(0.1);
+
+template <class Response>
+void answer(const RequestResult& result, Response* response) {
+  response->result = toMessage(result);
+  response->success = result.success();
+}
 
 }  // namespace
+
+// --- life cycle ---
 
 void TxNode::loadParameters(const ParamLoader& own) { options_ = loadTxOptions(own, common().aircraft); }
 
@@ -27,254 +48,252 @@ void TxNode::advertise() {
   applied_publisher_ = advertiseTopic<AppliedCommand>("control/applied", 100);
   failure_publisher_ = advertiseTopic<FailureState>("failures/state", 10, true);
   excitation_publisher_ = advertiseTopic<ExcitationState>("excitation/state", 10, true);
+  if (lockstep()) makeLockstep();
+  advertiseLockstep();
   advertiseServices();
-  addDiagnostics("control", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { fillDiagnostics(&status); });
-}
-
-void TxNode::subscribe() {
-  subscribeTopic<ControlCommand>("control/manual", 1, [this](const ControlCommandConstPtr& command) {
-    onCommand(core::FlightMode::kManual, *command);
-  });
-  subscribeTopic<ControlCommand>("control/auto", 1, [this](const ControlCommandConstPtr& command) {
-    onCommand(core::FlightMode::kAuto, *command);
-  });
-  // Requests are few and none may be lost.
-  subscribeTopic<ModeRequest>("control/mode_request", 20,
-                              [this](const ModeRequestConstPtr& request) { onModeRequest(*request); });
-  subscribeTopic<SurfaceCommand>("control/surfaces", 1,
-                                 [this](const SurfaceCommandConstPtr& command) { onSurfaceCommand(*command); });
-  addTimer(1.0 / options_.control.rate, [this] { onTimer(); });
-  deadline_ = addAlarm([this] { path_->tick(); });
+  advertiseFailureServices();
+  advertiseFlightServices();
+  advertiseDiagnostics();
 }
 
 core::SimLinkCallbacks TxNode::linkCallbacks() {
   core::SimLinkCallbacks callbacks;
-  callbacks.on_state = [this](const core::LinkStatus& status) { onLinkState(status); };
+  callbacks.on_state = [this](const core::LinkStatus& status) { onLink(status); };
   return callbacks;
 }
 
 void TxNode::start() {
   guardian_.start();
-  overrides_ = std::make_unique<OverrideManager>(&link(), [this](const std::string& text, bool success) {
-    logEvent(Event::OVERRIDE, "overrides: " + text, "", success);
-  });
-  makeSurfaceControl();
-  makeControlPath();
-  {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    subscribeToXPlane();
+  actuation_ = std::make_unique<Actuation>(&link(), options_.actuation, hooks());
+  actuation_->start();
+  lockstep_spinner_->start();
+  if (lockstep()) return;  // a frame may take long: the guardian acts on death only
+  heartbeat_ = handle().createSteadyTimer(kHeartbeat, [this](const ros::SteadyTimerEvent&) { beat(); });
+}
+
+void TxNode::tick() {
+  beat();
+  actuation_->tick();
+}
+
+/// First of all that the control thread does: after a hang nothing may be sent as before.
+void TxNode::beat() {
+  if (!lockstep() && guardian_.beat(options_.hang_timeout)) actuation_->onHang();
+}
+
+void TxNode::onLink(const core::LinkStatus& status) {
+  actuation_->onLink(status);
+  const auto journal = link().journal();
+  if (status.peer.valid() && journal) guardian_.setPeer(status.peer, journal->path());
+}
+
+void TxNode::stopInputs() {
+  heartbeat_.stop();
+  guardian_.rest();
+  if (lockstep_) {
+    lockstep_->stop();
   }
-  makeFlightJobs();
-  worker_ = std::thread([this] { work(); });
+  lockstep_queue_.disable();
+  lockstep_spinner_->stop();
+  if (actuation_) actuation_->stop();
 }
 
-void TxNode::subscribeToXPlane() {
-  watch_subscription_ = link().subscribe(
-      {"flight watch", core::flightWatchDatarefs(), core::kEveryFrameRateHz, 2},
-      [this](const core::RrefView& view, const core::ReceiveInfo&) { onWatch(view); }, mutex_);
-  identity_subscription_ = link().subscribe(
-      {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1},
-      [this](const core::RrefView& view, const core::ReceiveInfo& info) {
-        if (identity_.add(view, info.stamp_ns)) onIdentity();
-      },
-      mutex_);
+void TxNode::undo(const Deadline& deadline) {
+  // Left undone, the guardian tries once more, and the journal keeps it for the next start.
+  if (actuation_ && actuation_->undo(std::max(0.1, deadline.left()))) guardian_.dismiss();
 }
 
-void TxNode::makeControlPath() {
-  ControlPathHooks hooks;
-  hooks.mode = [this](const core::ModeStatus& status, double sim_time) { publishMode(status, sim_time); };
-  hooks.applied = [this](const AppliedControls& applied) { publishApplied(applied); };
-  hooks.stick = [this](const std::array<double, 3>& stick) { surfaces_->setStick(stick); };
-  hooks.excitation = [this] { return excitation_->excitation(); };
-  hooks.end_excitation = [this](const std::string& why) { excitation_->abort(why); };
-  hooks.release_surfaces = [this](const std::string& why) { surfaces_->release(why); };
-  hooks.event = [this](ControlPathHooks::Kind kind, const std::string& text, const std::string& who) {
-    logEvent(kind == ControlPathHooks::Kind::kMode ? Event::MODE : Event::OVERRIDE, text, who);
-  };
+void TxNode::publishFinalState() {
+  if (actuation_) actuation_->publish();
+}
+
+// --- topics ---
+
+template <class Message, class... Values>
+void TxNode::publishAs(const ros::Publisher& publisher, const Values&... values) {
+  if (held()) return;
+  Message message;
+  message.header.stamp = stampNow();
+  toMessage(values..., &message);
+  publisher.publish(message);
+}
+
+ActuationHooks TxNode::hooks() {
+  ActuationHooks hooks;
+  hooks.mode = [this](const auto&... mode) { publishAs<ControlMode>(mode_publisher_, mode...); };
+  hooks.applied = [this](const auto&... applied) { publishAs<AppliedCommand>(applied_publisher_, applied...); };
+  hooks.surfaces_applied = [this](const auto&... echo) { publishAs<AppliedCommand>(applied_publisher_, echo...); };
+  hooks.failures = [this](const auto& snapshot) { publishAs<FailureState>(failure_publisher_, snapshot); };
+  hooks.excitation = [this](const auto& label) { publishAs<ExcitationState>(excitation_publisher_, label); };
+  hooks.event = [this](const ActuationEvent& event) { onEvent(event); };
   hooks.warn = [](const std::string& text) { ROS_WARN("%s", text.c_str()); };
-  auto path = std::make_unique<ControlPath>(&link(), overrides_.get(), options_.control, std::move(hooks), mutex_);
-  std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  path_ = std::move(path);
+  hooks.journal_problem = [](const std::string& text) { ROS_ERROR_THROTTLE(5.0, "%s", text.c_str()); };
+  hooks.stopping = [this] { return stopping(); };
+  return hooks;
+}
+
+void TxNode::onEvent(const ActuationEvent& event) {
+  if (!event.success) {
+    ROS_ERROR("%s", event.text.c_str());
+  } else if (event.warning) {
+    ROS_WARN("%s", event.text.c_str());
+  } else {
+    ROS_INFO("%s", event.text.c_str());
+  }
+  events_.add(static_cast<std::uint8_t>(event.kind), event.text, event.sim_time, event.who, event.success,
+              event.number);
 }
 
 void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
-  if (const auto refusal = path_->command(from, toCore(message))) {
+  beat();
+  ControlPath& path = actuation_->path();
+  if (const auto refusal = path.command(from, toCore(message))) {
     ROS_WARN_THROTTLE(1.0, "control/%s is refused: %s", from == core::FlightMode::kManual ? "manual" : "auto",
                       refusal->text.c_str());
-  } else if (const auto time_ns = path_->deadline()) {
+  } else if (const auto time_ns = path.deadline()) {
     setAlarm(deadline_, *time_ns);
   }
 }
 
-core::RequestOutcome TxNode::onModeRequest(const ModeRequest& message) {
-  return path_->requestMode({message.sequence, message.mode, message.requester, message.header.stamp.toSec()});
+void TxNode::onModeRequest(const ModeRequest& message) {
+  actuation_->path().requestMode({message.sequence, message.mode, message.requester, message.header.stamp.toSec()});
 }
 
-void TxNode::onTimer() {
-  std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  surfaces_->tick(path_->refusal());
-  failures_->tick();
-  path_->tick();
+void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
+  const std::string refusal = actuation_->commandSurfaces(message.names, message.deflections_deg, message.sequence);
+  if (!refusal.empty()) ROS_WARN_THROTTLE(1.0, "control/surfaces is refused: %s", refusal.c_str());
 }
 
-void TxNode::publishMode(const core::ModeStatus& status, double sim_time) {
-  ControlMode message;
+// --- services: they run on the service thread and may wait for X-Plane; the control path never waits for them ---
+
+template <class Service, class Serve>
+void TxNode::advertiseOwn(const std::string& service, Serve serve) {
+  using Request = typename Service::Request;
+  using Response = typename Service::Response;
+  advertiseService<Request, Response>(name() + "/" + service,
+                                      [this, serve](const Request& request, Response& response) {
+                                        if (lockstep_) lockstep_->waitUntilOpen();
+                                        serve(request, &response);
+                                      });
+}
+
+void TxNode::advertiseServices() {
+  advertiseOwn<SetMode>("set_mode", [this](const auto& request, auto* response) { serveSetMode(request, response); });
+  advertiseOwn<SetDataref>("set_dataref", [this](const auto& request, auto* response) {
+    const auto written = actuation_->settings().setDataref(request.name, request.values);
+    answer(written.result, response);
+    response->values = written.values;
+  });
+  advertiseOwn<RunCommand>("run_command", [this](const auto& request, auto* response) {
+    answer(actuation_->settings().runCommand(request.name), response);
+  });
+  advertiseOwn<std_srvs::SetBool>("pause", [this](const auto& request, auto* response) {
+    const RequestResult result = actuation_->setPaused(request.data != 0, name() + "/pause");
+    response->success = result.success();
+    response->message = result.text;
+  });
+  advertiseOwn<SetView>("set_view", [this](const auto& request, auto* response) {
+    const core::ViewWish wish{
+        request.view, {request.roll_deg, request.pitch_deg, request.heading_deg}, request.field_of_view_deg};
+    answer(actuation_->views().setView(wish), response);
+  });
+}
+
+void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* response) {
+  ModeRequest message;
   message.header.stamp = stampNow();
-  message.mode = static_cast<std::uint8_t>(status.mode);
-  message.previous = status.previous ? static_cast<std::uint8_t>(*status.previous) : std::uint8_t{0};
-  message.requested_by = status.requested_by;
-  message.reason = status.reason;
-  message.request_sequence = status.request_sequence;
-  message.accepted = status.accepted;
-  message.sim_time = static_cast<float>(sim_time);
-  message.manual_alive = status.manual_alive;
-  message.auto_alive = status.auto_alive;
-  message.failsafe = status.failsafe;
-  mode_publisher_.publish(message);
+  message.mode = request.mode;
+  message.requester = name() + "/set_mode";
+  onModeRequest(message);
+  const core::ModeStatus status = actuation_->path().mode();
+  response->mode = static_cast<std::uint8_t>(status.mode);
+  response->success = response->mode == request.mode;
+  response->result = response->success ? result(ServiceResult::OK, core::toString(status.mode))
+                                       : result(ServiceResult::REFUSED, status.reason);
 }
 
-void TxNode::publishApplied(const AppliedControls& applied) {
-  AppliedCommand message;
-  message.header.stamp = toRosTime(applied.sent_ns);
-  toMessage(applied.controls, &message);
-  fillSurfaces(surfaces_->individuallyDriven(), &message);
-  message.read_back = applied.read_back;
-  message.read_back_sim_time = static_cast<float>(applied.read_back_sim_time);
-  message.read_back_frames = static_cast<float>(applied.read_back_frames);
-  applied_publisher_.publish(message);
+void TxNode::advertiseFailureServices() {
+  advertiseOwn<SetFailure>("set_failure", [this](const auto& request, auto* response) {
+    answer(actuation_->failures().set(toCore(request), name() + "/set_failure"), response);
+  });
+  advertiseOwn<ClearFailures>("clear_failures", [this](const auto& request, auto* response) {
+    const auto done =
+        actuation_->failures().clear(request.names, request.include_simulator, name() + "/clear_failures");
+    answer(done.result, response);
+    response->cleared = done.cleared;
+  });
+  advertiseOwn<InjectExcitation>("inject_excitation", [this](const auto& request, auto* response) {
+    const auto injected = actuation_->inject(toCore(request), name() + "/inject_excitation");
+    answer(injected.result, response);
+    response->id = injected.id;
+  });
+  advertiseOwn<IdentifySurfaces>("identify_surfaces", [this](const auto& request, auto* response) {
+    const auto begun = actuation_->identifySurfaces(toCore(request), name() + "/identify_surfaces",
+                                                    [this] { return events_.reserve(); });
+    answer(begun.result, response);
+    response->event_number = begun.event_number;
+  });
 }
 
-void TxNode::onLinkState(const core::LinkStatus& status) {
-  surfaces_->onLink(status);
-  std::string text;
-  std::optional<std::string> pause_by;
-  {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    if (status.paused && link_status_.paused && status.paused != link_status_.paused) {
-      pause_by = std::exchange(pause_by_, "");
+/// A flight service: refused for what the request itself says or as X-Plane is now, or accepted, with an event
+/// promised, and begun.
+template <class Service, class Begin>
+void TxNode::advertiseJob(const std::string& service, Begin begin) {
+  advertiseOwn<Service>(service, [this, service, begin](const auto& request, auto* response) {
+    if (const auto wrong = wrongWith(request)) {
+      response->result = result(ServiceResult::REFUSED, *wrong);
+    } else if (const auto refusal = actuation_->jobs().refusal()) {
+      response->result = toMessage(*refusal);
+    } else {
+      response->success = true;
+      response->event_number = events_.reserve();
+      response->result =
+          result(ServiceResult::ACCEPTED, "event " + std::to_string(response->event_number) + " will tell the outcome");
+      begin(actuation_->jobs(), request, response->event_number, name() + "/" + service);
     }
-    if (status.state != link_status_.state) text = std::string(core::toString(status.state)) + ": " + status.reason;
-    if (status.epoch != link_status_.epoch) {
-      identity_.reset();
-      reset_detector_.restart();
-    }
-    link_status_ = status;
-    failures_->onLink(status);
-    path_->onLink(status);
-    const auto journal = link().journal();
-    if (status.peer.valid() && journal) guardian_.setPeer(status.peer, journal->path());
-    work_now_ = true;
-    work_wanted_.notifyAll();
-  }
-  if (!text.empty()) logEvent(Event::LINK, text);
-  if (pause_by) logEvent(Event::PAUSE, *status.paused ? "paused" : "resumed", *pause_by);
+  });
 }
 
-void TxNode::onWatch(const core::RrefView& view) {
-  const bool crashed = watch_.crashed;
-  const double before = watch_.sim_time;
-  core::updateFlightWatch(view, &watch_);
-  // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
-  if (watch_.sim_time < before - core::kOvertaking) reset_detector_.restart();
-  if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
-  sim_time_ = watch_.sim_time;
-  failures_->onFrame(watch_);
-  excitation_->onFrame(watch_);
-  path_->onFrame(watch_);
-  if (watch_.crashed && !crashed) {
-    excitation_->abort("the aircraft has crashed");
-    logEvent(Event::CRASH, "the aircraft has crashed");
-  }
+void TxNode::advertiseFlightServices() {
+  advertiseJob<ResetFlight>("reset_flight", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.reset(toCore(request), number, who);
+  });
+  advertiseJob<SetWind>("set_wind", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.setWind(toCore(request), number, who);
+  });
+  advertiseJob<SetTime>("set_time", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.setTime(toCore(request), number, who);
+  });
+  advertiseJob<SetWeather>("set_weather", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.setWeather(toCore(request), number, who);
+  });
+  advertiseJob<SetLoading>("set_loading", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.setLoading(toCore(request), number, who);
+  });
+  advertiseJob<LoadAircraft>("load_aircraft", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.loadAircraft(request.path, request.livery, number, who);
+  });
+  advertiseJob<Situation>("save_state", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.saveSituation(request.path, number, who);
+  });
+  advertiseJob<Situation>("load_state", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    jobs.loadSituation(request.path, number, who);
+  });
 }
 
-void TxNode::onIdentity() {
-  const core::AircraftIdentity& loaded = identity_.identity();
-  path_->onAircraft(loaded);
-  const bool fits = path_->fits(loaded);
-  logEvent(Event::AIRCRAFT, "aircraft: " + described(loaded) + (fits ? "" : "; not the one of the configuration"),
-           jobs_ ? jobs_->mover() : "");
-  excitation_->abort("another aircraft was loaded");
-  surfaces_->onAircraft(loaded.icao.empty() ? loaded.description : loaded.icao);
-}
+// --- diagnostics ---
 
-void TxNode::askIdentity() {
-  link().read(core::AircraftIdentityReader::datarefs(), kIdentityWait,
-              [this](const std::vector<core::DatarefValue>& values) {
-                std::lock_guard<core::HandlerMutex> lock(*mutex_);
-                if (identity_.add(values)) onIdentity();
-              });
-}
-
-void TxNode::onReset(const std::string& how) {
-  ++resets_;
-  excitation_->abort("the flight was reset");
-  path_->onNewFlight();
-  // Perhaps with another aircraft, which must not be flown until the subscription tells.
-  askIdentity();
-  // What was asked for is told with its outcome.
-  if (!jobs_ || jobs_->mover().empty()) logEvent(Event::RESET, how);
-}
-
-void TxNode::work() {
-  std::unique_lock<core::HandlerMutex> lock(*mutex_);
-  while (!worker_ends_) {
-    work_wanted_.waitUntil(&lock, Deadline(clock(), kWorkPeriod), [this] { return worker_ends_ || work_now_; });
-    work_now_ = false;
-    if (worker_ends_ || !linkIsUp()) continue;
-    const std::uint32_t epoch = link_status_.epoch;
-    lock.unlock();
-    try {
-      if (leftovers_of_epoch_ != epoch && overrides_->releaseLeftovers(kReleaseWait)) leftovers_of_epoch_ = epoch;
-      if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseWait);
-    } catch (const core::JournalError& error) {
-      ROS_ERROR_THROTTLE(5.0, "%s", error.what());
-    }
-    lock.lock();
-  }
-}
-
-void TxNode::stopInputs() {
-  {
-    std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    worker_ends_ = true;
-    if (excitation_) excitation_->abort("tx_node ends");
-  }
-  if (jobs_) jobs_->stop();
-  work_wanted_.notifyAll();
-  if (worker_.joinable()) worker_.join();
-  if (surfaces_) surfaces_->stop();
-  if (failures_) failures_->stop();
-}
-
-void TxNode::undo(const Deadline& deadline) {
-  if (!overrides_) return;
-  // Left undone, the guardian tries once more, and the journal keeps it for the next start.
-  if (!overrides_->releaseAll(std::max(0.1, deadline.left()))) return;
-  guardian_.dismiss();
-  failures_->repaired();
-}
-
-void TxNode::publishFinalState() {
-  std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  if (path_) publishMode(path_->mode(), sim_time_);
-  if (failures_) failures_->publish();
-  if (excitation_) excitation_->publish();
-}
-
-void TxNode::joinThreads() {}
-
-bool TxNode::linkIsUp() const {
-  return link_status_.state == core::LinkState::kConnected || link_status_.state == core::LinkState::kPaused;
-}
-
-std::uint32_t TxNode::logEvent(std::uint8_t kind, const std::string& text, const std::string& who, bool success,
-                               std::uint32_t number) {
-  if (success) {
-    ROS_INFO("%s", text.c_str());
-  } else {
-    ROS_ERROR("%s", text.c_str());
-  }
-  return events_.add(kind, text, sim_time_, who, success, number);
+void TxNode::advertiseDiagnostics() {
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+  addDiagnostics("control", [this](Status& status) {
+    if (actuation_) fillDiagnostics(actuation_->control(), &status);
+  });
+  addDiagnostics("surfaces", [this](Status& status) {
+    if (actuation_) fillDiagnostics(actuation_->surfaces().status(), &status);
+  });
+  addDiagnostics("failures", [this](Status& status) {
+    if (actuation_) fillDiagnostics(actuation_->failures().snapshot(), &status);
+  });
 }
 
 }  // namespace xplane_bridge

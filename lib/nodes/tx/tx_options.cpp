@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "xplane_bridge/core/control/control_channels.hpp"
+#include "xplane_bridge/core/control/control_arbiter.hpp"
+#include "xplane_bridge/nodes/base/user_folder.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -20,48 +21,46 @@ void loadChannels(const ParamLoader& aircraft, bool reverse_thrust, core::Arbite
   const ParamLoader channels = aircraft.section("channels");
   for (const core::ChannelSection& section : core::kChannelSections) {
     const ParamLoader in = channels.section(section.name);
-    core::ChannelRange range = core::commandRange(section.first);
-    // Below 0 a lever means reverse thrust, which most aircraft do not have.
-    if (core::isLever(section.first) && !reverse_thrust) range.low = 0.0;
-    // Sticks, levers, motors and toe brakes follow the aircraft's `failsafe`; handles hold unless they say otherwise.
-    const bool primary = core::channelWire(section.first, {}).refresh == core::Refresh::kContinuous;
-    core::ChannelOptions options;
-    options.low = in.number("low", {range.low, range.high}, range.low);
-    options.high = in.number("high", {options.low, range.high}, range.high);
+    core::ChannelOptions options = core::channelDefaults(section, failsafe, reverse_thrust);
+    const double lowest = options.low, highest = options.high;
+    options.low = in.number("low", {lowest, highest}, lowest);
+    options.high = in.number("high", {options.low, highest}, highest);
     if (in.has("slew")) options.slew = in.number("slew", {1e-3, 1e3});
-    options.failsafe = failsafeOf(in, "failsafe", primary ? failsafe : core::Failsafe::kHold, false);
+    options.failsafe = failsafeOf(in, "failsafe", options.failsafe, false);
     options.neutral = in.number("neutral", {options.low, options.high}, std::clamp(0.0, options.low, options.high));
     for (std::size_t i = core::index(section.first); i <= core::index(section.last); ++i) out->channels[i] = options;
   }
 }
 
-AircraftOptions loadAircraft(const ParamLoader& in, ControlPathOptions* control) {
-  AircraftOptions out;
-  control->aircraft = in.texts("identity");
-  control->reverse_thrust = in.boolean("reverse_thrust", false);
-  control->arbiter.engines = in.integer("engines", {1, core::kMaxEngines});
-  loadChannels(in, control->reverse_thrust, &control->arbiter);
+void loadAircraft(const ParamLoader& in, ActuationOptions* out) {
+  ControlPathOptions& control = out->control;
+  control.aircraft = in.texts("identity");
+  control.reverse_thrust = in.boolean("reverse_thrust", false);
+  control.arbiter.engines = in.integer("engines", {1, core::kMaxEngines});
+  loadChannels(in, control.reverse_thrust, &control.arbiter);
   const ParamLoader excitation = in.section("excitation");
-  out.max_roll_deg = excitation.number("max_roll_deg", {1.0, 180.0}, out.max_roll_deg);
-  out.max_pitch_deg = excitation.number("max_pitch_deg", {1.0, 90.0}, out.max_pitch_deg);
-  const ParamLoader surfaces = in.section("surfaces");
-  out.surfaces.rate_deg_s = surfaces.number("rate_deg_s", {1.0, 1000.0}, out.surfaces.rate_deg_s);
-  out.surfaces.floating_gain = surfaces.number("floating_gain", {0.0, 2.0}, out.surfaces.floating_gain);
-  out.surfaces.floating_time = surfaces.number("floating_time", {0.01, 10.0}, out.surfaces.floating_time);
-  out.flap_rate = surfaces.number("flap_rate", {0.001, 100.0}, out.flap_rate);
-  out.speedbrake_rate = surfaces.number("speedbrake_rate", {0.001, 100.0}, out.speedbrake_rate);
-  return out;
+  out->max_roll_deg = excitation.number("max_roll_deg", {1.0, 180.0}, out->max_roll_deg);
+  out->max_pitch_deg = excitation.number("max_pitch_deg", {1.0, 90.0}, out->max_pitch_deg);
+  const ParamLoader in_surfaces = in.section("surfaces");
+  SurfaceControlOptions& surfaces = out->surfaces;
+  core::DriverOptions& driver = surfaces.driver;
+  driver.rate_deg_s = in_surfaces.number("rate_deg_s", {1.0, 1000.0}, driver.rate_deg_s);
+  driver.floating_gain = in_surfaces.number("floating_gain", {0.0, 2.0}, driver.floating_gain);
+  driver.floating_time = in_surfaces.number("floating_time", {0.01, 10.0}, driver.floating_time);
+  surfaces.flap_rate = in_surfaces.number("flap_rate", {0.001, 100.0}, surfaces.flap_rate);
+  surfaces.speedbrake_rate = in_surfaces.number("speedbrake_rate", {0.001, 100.0}, surfaces.speedbrake_rate);
 }
 
 }  // namespace
 
 TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
-  TxOptions out;
+  TxOptions options;
+  ActuationOptions& out = options.actuation;
   out.control.rate = own.number("rate", {1.0, 500.0}, out.control.rate);
   out.control.max_rate = own.number("max_rate", {1.0, 2000.0}, out.control.max_rate);
   out.service_timeout = own.number("service_timeout", {0.1, 10.0}, out.service_timeout);
-  out.setting_timeout = own.number("setting_timeout", {0.5, 300.0}, out.setting_timeout);
-  out.load_timeout = own.number("load_timeout", {0.5, 3600.0}, out.load_timeout);
+  out.flight.setting_timeout = own.number("setting_timeout", {0.5, 300.0}, out.flight.setting_timeout);
+  out.flight.load_timeout = own.number("load_timeout", {0.5, 3600.0}, out.flight.load_timeout);
   core::ArbiterOptions& arbiter = out.control.arbiter;
   arbiter.command_timeout = own.number("command_timeout", {0.02, 60.0}, arbiter.command_timeout);
   arbiter.resume_grace = own.number("resume_grace", {0.0, 60.0}, arbiter.resume_grace);
@@ -69,8 +68,14 @@ TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
   arbiter.takeover_threshold = own.number("takeover_threshold", {0.0, 2.0}, arbiter.takeover_threshold);
   arbiter.initial_mode = own.choice("initial_mode", {"manual", "auto"}, "manual") == "auto" ? core::FlightMode::kAuto
                                                                                             : core::FlightMode::kManual;
+  out.control.stale_after = own.number("control_stale_after", {0.1, 60.0}, out.control.stale_after);
+  options.hang_timeout = own.number("hang_timeout", {0.5, 60.0}, options.hang_timeout);
+  out.control.resume_auto = own.boolean("resume_auto", false);
+  out.control.rows = own.choice("transport", {"dref", "data"}, "dref") == "data";
+  const bool manual_surfaces = own.choice("surfaces_source", {"auto", "manual"}, "auto") == "manual";
+  arbiter.surfaces_source = manual_surfaces ? core::FlightMode::kManual : core::FlightMode::kAuto;
   const ParamLoader mixing = own.section("mixing");
-  core::MixingRequirements& need = out.mixing;
+  core::MixingRequirements& need = out.surfaces.mixing;
   need.excursion = mixing.number("excursion", {0.05, 1.0}, need.excursion);
   need.independence = mixing.number("independence", {0.001, 0.5}, need.independence);
   need.residual_deg = mixing.number("residual_deg", {0.01, 10.0}, need.residual_deg);
@@ -86,10 +91,12 @@ TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
     file.refuse("name",
                 "\"" + aircraft + "\", the shared parameter `aircraft`: load that aircraft's file, or name this one");
   }
-  out.aircraft = loadAircraft(file, &out.control);
+  loadAircraft(file, &out);
+  out.surfaces.mixing_folder = userFolder() + "/mixing";
+  out.surfaces.shipped_mixing = mixing.text("shipped", "");
   out.control.aircraft_file = "config/aircraft/" + aircraft + ".yaml";
   if (const auto wrong = core::validate(arbiter)) throw ParamError("parameter " + own.fullKey(*wrong));
-  return out;
+  return options;
 }
 
 }  // namespace xplane_bridge

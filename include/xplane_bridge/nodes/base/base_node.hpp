@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,7 +17,9 @@
 #include <boost/make_shared.hpp>
 
 #include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/lockstep_clock.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
+#include "xplane_bridge/core/wire/lockstep_hub.hpp"
 #include "xplane_bridge/nodes/base/clock_timers.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
@@ -53,6 +56,12 @@ enum class ExitCode {
 ///
 /// Time: stamps, ages, deadlines, timers and the link go by clock(), the one clock of the node. Only what must come
 /// about while that clock stands goes by the host's: diagnostics and the stop sequence.
+///
+/// Lock-step (the shared section `lockstep`): clock() is the simulator's, and all that the node does in a frame is done
+/// on the link's thread, in the order of the hooks below; timers too. A node without a link moves its clock itself.
+///
+/// With `publish_clock` and without lock-step, only clock()'s system time is the simulator's: stamps. rx_node moves it,
+/// and the others follow /clock. Receive times of datagrams stay wallClock()'s.
 ///
 /// SIGINT, SIGTERM and SIGHUP are blocked in all threads (see StopSignals): a child process must unblock them.
 class BaseNode {
@@ -107,9 +116,48 @@ class BaseNode {
   /// Join the node's own threads; ROS is down.
   virtual void joinThreads() {}
 
+  // Hooks of lock-step, from the link's thread.
+
+  /// The simulator's first frame is here; what was seen of frame 0 was no flight.
+  virtual void beginFlight() {}
+  /// All of a frame is here and clock() shows its time; nothing of it was handled.
+  virtual void beginFrame(const core::LockstepFrame& frame) { static_cast<void>(frame); }
+  /// All of it was handled; whether closeFrame() may come. Frame 0: whether the flight may begin.
+  virtual bool frameReady(const core::LockstepFrame& frame) {
+    static_cast<void>(frame);
+    return true;
+  }
+  /// To do and send what the frame leads to. Then timers are served.
+  virtual void closeFrame(const core::LockstepFrame& frame) { static_cast<void>(frame); }
+  /// All of that was sent. Frame 0: more than once.
+  virtual void endFrame(const core::LockstepFrame& frame) { static_cast<void>(frame); }
+
+  /// Whether stamps are simulator time without lock-step (`publish_clock`).
+  bool stampsBySimulator() const { return common_.publish_clock && !lockstep(); }
+  /// Whether the node moves them itself, by setStampTime(), and follows nobody.
+  virtual bool leadsClock() const { return false; }
+  /// With stampsBySimulator(): stamps from now on. @param sim_time [s]
+  void setStampTime(double sim_time) { *stamp_ns_ = stampOf(sim_time); }
+  /// [ns] the stamp of a simulator time [s].
+  std::int64_t stampOf(double sim_time) const {
+    return core::toNanoseconds(common_.lockstep.start_time) + core::toNanoseconds(sim_time);
+  }
+
+  bool lockstep() const { return lockstep_clock_.has_value(); }
+  /// In lock-step, before the first frame.
+  bool held() const { return lockstep() && lockstep_clock_->phase() == core::LockstepClock::Phase::kHeld; }
+  /// In lock-step, for a node without a link: moves clock() to a frame's stamp and serves the timers that are due.
+  void moveClock(const ros::Time& stamp);
+  /// Asks frameReady() again. From any thread.
+  void askFrameReady() {
+    if (hub_ != nullptr) hub_->wake();
+  }
+
   const CommonOptions& common() const { return common_; }
   /// The clock everything in the node goes by. From loadParameters() on.
   const core::Clock& clock() const { return clock_; }
+  /// For what must come about while clock() stands.
+  const core::Clock& wallClock() const { return host_clock_; }
   /// The clock's time as a stamp.
   ros::Time stampNow() const { return toRosTime(clock_.system_ns()); }
   /// Valid from start() to the end of undo(), only with usesLink(). What a node changes in X-Plane it records in
@@ -134,15 +182,26 @@ class BaseNode {
         ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
   }
 
-  /// Advertises a service on the service thread. While stopping, calls fail at once. An exception fails the call and
-  /// is logged.
+  /// The same for a callback that needs to know the publisher.
+  template <class Message>
+  void subscribeEvents(const std::string& topic, uint32_t queue_size,
+                       std::function<void(const ros::MessageEvent<const Message>&)> callback) {
+    ros::SubscribeOptions options;
+    options.initByFullCallbackType<const ros::MessageEvent<const Message>&>(topic, queue_size, std::move(callback));
+    options.transport_hints = ros::TransportHints().tcpNoDelay();
+    subscribers_.push_back(handle_.subscribe(options));
+  }
+
+  /// Advertises a service on the service thread, or on that of another `queue`. While stopping, calls fail at once. An
+  /// exception fails the call and is logged.
   template <class Request, class Response>
-  void advertiseService(const std::string& service, std::function<void(const Request&, Response&)> serve) {
+  void advertiseService(const std::string& service, std::function<void(const Request&, Response&)> serve,
+                        ros::CallbackQueue* queue = nullptr) {
     ros::AdvertiseServiceOptions options;
     options.init<Request, Response>(service, [this, service, serve](Request& request, Response& response) {
       return guardedService(service, [&] { serve(request, response); });
     });
-    options.callback_queue = &service_queue_;
+    options.callback_queue = queue != nullptr ? queue : &service_queue_;
     services_.push_back(handle_.advertiseService(options));
   }
 
@@ -165,7 +224,9 @@ class BaseNode {
  private:
   enum class State { kCreated, kInitialized, kRunning, kStopped };
 
+  void stampBySimulator();
   void makeLink();
+  core::LockstepHooks lockstepHooks();
   void startLink();
   void stopLink(const Deadline& deadline);
   void requireState(State wanted, const char* call) const;
@@ -184,6 +245,8 @@ class BaseNode {
   CommonOptions common_;
   const core::Clock host_clock_ = core::hostClock();
   core::Clock clock_;
+  std::optional<core::LockstepClock> lockstep_clock_;
+  std::shared_ptr<std::atomic<std::int64_t>> stamp_ns_;  // with stampsBySimulator()
 
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
@@ -193,6 +256,7 @@ class BaseNode {
   std::unique_ptr<ClockTimers> timers_;
 
   std::unique_ptr<core::SimLink> link_;
+  core::LockstepHub* hub_ = nullptr;  // of the link, in lock-step
 
   std::mutex service_mutex_;
   core::ClockCondition service_idle_;

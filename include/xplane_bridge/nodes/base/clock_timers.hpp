@@ -34,6 +34,10 @@ class ClockTimers {
   void setAlarm(core::TimerSchedule::Timer alarm, std::int64_t due_ns);
   /// Begins with what is due already.
   void start();
+  /// Instead of start(): calls what is due now, on the calling thread.
+  void runDue();
+  /// Periodic ones begin anew: due one period from now.
+  void restart();
   /// No callback begins any more; waits for one that runs.
   void stop();
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "xplane_bridge/core/link/sim_link.hpp"
 #include "xplane_bridge/core/state/field_table.hpp"
@@ -16,6 +18,25 @@ struct FrameNames {
   std::string base_link_frd = "base_link_frd";  ///< the aircraft, FRD
 };
 
+/// Whole-loop lock-step (docs/lockstep.md): the section `lockstep` of the shared parameters.
+struct LockstepOptions {
+  bool enabled = false;
+  std::vector<std::string> participants;  ///< nodes that answer every frame; rx_node does so without being named
+  std::string stick;                      ///< the one of them that publishes joy; empty: none
+  bool hold = false;                      ///< the flight waits for lockstep/run or lockstep/step
+  double watchdog = 60.0;                 ///< [s] wall time without a frame until the run ends
+  double start_time = 1e9;                ///< [s] since 1970: all stamps at simulated time 0
+};
+
+/// Messages that wait at most, in publishers and subscriptions of which none may be lost.
+constexpr std::uint32_t kLockstepQueue = 100;
+/// std_msgs/Header of a node that has done all it does in the frame of that stamp.
+constexpr const char* kLockstepDoneTopic = "lockstep/done";
+/// ControlMode as of the end of every frame, so that participants know that they have missed none.
+constexpr const char* kLockstepModeTopic = "lockstep/mode";
+/// Of lockstep/done: its frame_id where rx_node has published no flight_state in that frame: nobody can answer it.
+constexpr const char* kLockstepNoState = "no flight_state";
+
 /// What all nodes of one namespace must agree on: read from that namespace (config/common.yaml), never from a node's
 /// private one.
 struct CommonOptions {
@@ -23,14 +44,18 @@ struct CommonOptions {
   int port = 49000;       ///< UDP port X-Plane listens on; with an empty host the beacon says it
   int data_port = 49003;  ///< UDP port we receive Data Output rows on; 0: any free one
   core::Transport transport = core::Transport::kRref;  ///< how rx_node gets the flight state
-  std::string aircraft = "fixed_wing";                 ///< stem of config/aircraft/<name>.yaml
-  FrameNames frames;                                   ///< names of coordinate frames
-  double display_delay = 0.0;                          ///< [s] from a simulator frame to its picture on the screen
+  std::string conformance_file;         ///< of the doctor's card; empty: the one it writes for this X-Plane
+  std::string aircraft = "fixed_wing";  ///< stem of config/aircraft/<name>.yaml
+  FrameNames frames;                    ///< names of coordinate frames
+  double display_delay = 0.0;           ///< [s] from a simulator frame to its picture on the screen
 
   double stale_after = 0.4;       ///< [s] silence until the link counts as STALE
   double lost_after = 10.0;       ///< [s] silence until it counts as LOST whatever the beacon says
   bool listen_for_beacon = true;  ///< join X-Plane's multicast announcement; needed with an empty host
   int beacon_port = 49707;        ///< UDP port of the announcement
+  bool publish_clock = false;     ///< stamps are lockstep.start_time + simulator time, on /clock too
+
+  LockstepOptions lockstep;
 };
 
 /// Reads and checks the shared parameters. A key of the namespace that looks like a misspelt shared parameter is

@@ -27,6 +27,8 @@ class EventLog {
   /// reserve() has given.
   std::uint32_t add(std::uint8_t kind, const std::string& text, double sim_time, const std::string& requested_by = "",
                     bool success = true, std::uint32_t number = 0);
+  /// While muted, events are neither published nor kept. Ending it begins the numbers anew.
+  void mute(bool muted);
   /// A number for an event that will happen later.
   std::uint32_t reserve();
 
@@ -36,6 +38,7 @@ class EventLog {
   core::Clock clock_;
   EventList list_;
   std::uint32_t number_ = 0;
+  bool muted_ = false;
 };
 
 }  // namespace xplane_bridge

@@ -73,6 +73,10 @@ class ParamLoader {
   /// The numbers below this one by name, sorted (a map whose keys the user chooses).
   std::vector<std::pair<std::string, double>> namedNumbers(Range<double> range) const;
 
+  /// What was read here and in the sections below and is not the default given at the call, in the order of reading:
+  /// "port: 49010", "limits/upper: 1.5", values as on the parameter server.
+  std::vector<std::string> given() const;
+
   /// Marks `key` as known without reading it (read elsewhere, by a library for instance).
   void allow(const std::string& key) const;
 
@@ -91,11 +95,16 @@ class ParamLoader {
  private:
   struct Record {
     std::set<std::string> known;
+    std::vector<std::string> given;  // keys
     std::vector<ParamLoader> children;
   };
 
   const XmlRpc::XmlRpcValue* find(const std::string& key) const;
   const XmlRpc::XmlRpcValue& require(const std::string& key) const;
+  const XmlRpc::XmlRpcValue& requireGiven(const std::string& key) const;
+  template <typename T, typename Read>
+  T readOr(const std::string& key, const T& fallback, const Read& read) const;
+  void collectGiven(std::size_t skipped, std::vector<std::string>* texts) const;
   ParamLoader child(const std::string& prefix, const XmlRpc::XmlRpcValue& tree) const;
   void throwUnknown(bool only_misspelt) const;
   void collectUnknown(bool only_misspelt, std::vector<std::string>* problems) const;

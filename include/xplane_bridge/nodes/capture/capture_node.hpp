@@ -2,8 +2,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,11 +14,15 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <tf2_ros/static_transform_broadcaster.h>
+#include <tf2_ros/transform_broadcaster.h>
 #include <opencv2/core/mat.hpp>
 
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/rate_limiter.hpp"
+#include "xplane_bridge/core/camera/camera_frustum.hpp"
 #include "xplane_bridge/core/camera/camera_view.hpp"
+#include "xplane_bridge/core/camera/pose_check.hpp"
+#include "xplane_bridge/core/camera/view_stream.hpp"
 #include "xplane_bridge/core/state/clock_filter.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/base/latest_worker.hpp"
@@ -29,7 +35,8 @@ namespace xplane_bridge {
 /// Publishes the cockpit view, and for each picture the state of the frame it shows.
 ///
 /// Publishes camera/image_raw (bgr8), camera/image_raw/compressed (JPEG, ours: there is no other advertiser of it),
-/// camera/camera_info, camera/frame_state, and the three static camera frames; subscribes flight_state.
+/// camera/camera_info, camera/frame_state, the measured camera frame and the three static, nominal ones; subscribes
+/// flight_state.
 ///
 /// Threads besides BaseNode's: one reads pictures and does nothing else; one scales, checks and publishes; one encodes
 /// JPEG. Each drops, and counts, what it has no time for. Nothing is scaled or encoded while nobody listens.
@@ -51,7 +58,10 @@ class CaptureNode : public BaseNode {
  private:
   /// A picture on its way from the source to the topics.
   struct Grabbed {
-    cv::Mat pixels;
+    cv::Mat pixels;                                         // empty where the source has JPEG
+    std::shared_ptr<const std::vector<std::uint8_t>> jpeg;  // empty where it has pixels
+    cv::Size size;                                          // [px]
+    std::optional<vision::ShownFrame> frame;
     std::int64_t display_ns = 0;
     std::int64_t grab_ns = 0;
     bool display_known = false;
@@ -62,20 +72,26 @@ class CaptureNode : public BaseNode {
   struct CameraFacts {
     core::CameraView view = core::CameraView::kUnknown;
     bool external = false;
-    double field_of_view_deg = 0.0;
-    bool field_of_view_read = false;
+    core::Frustum frustum;
+    std::optional<core::CheckedPose> pose;  // of the newest frame
   };
 
   void captureLoop();
   void takePicture(vision::FrameSource* source, const vision::Change& change);
   void repeatFrozen(std::int64_t now_ns);
   void publishPicture(Grabbed* grabbed);
+  bool decode(Grabbed* grabbed, bool whole);
   sensor_msgs::ImagePtr takeMessage();
-  void publishJpeg(const sensor_msgs::Image& image);
+  void encodeJpeg(const sensor_msgs::Image& image);
+  void publishJpeg(const std_msgs::Header& header, const std::vector<std::uint8_t>& jpeg);
   bool anybodyListens() const;
   CameraFacts cameraFacts() const;
-  sensor_msgs::CameraInfo cameraInfo(const std_msgs::Header& header, cv::Size source, double field_of_view_deg) const;
+  sensor_msgs::CameraInfo cameraInfo(const std_msgs::Header& header, cv::Size source,
+                                     const vision::FieldOfView& shown) const;
+  void describeCamera(const CameraFacts& camera, FrameState* state) const;
   void broadcastFrames();
+  void publishFrameState(const FrameState& state);
+  void subscribeFrustumShift(core::SimulatorVersion version);
   void onView(const core::RrefView& datagram, const core::ReceiveInfo& info);
   void onLinkState(const core::LinkStatus& status);
   void onState(const FlightState::ConstPtr& state);
@@ -89,6 +105,7 @@ class CaptureNode : public BaseNode {
   std::unique_ptr<vision::PictureScaler> scaler_;
   std::unique_ptr<ImagePairing> pairing_;
   std::unique_ptr<tf2_ros::StaticTransformBroadcaster> static_frames_;
+  std::unique_ptr<tf2_ros::TransformBroadcaster> measured_frame_;
 
   ros::Publisher image_publisher_;
   ros::Publisher jpeg_publisher_;
@@ -102,20 +119,28 @@ class CaptureNode : public BaseNode {
 
   // Link's thread.
   core::ViewStream view_stream_;
+  core::PoseCheck pose_check_;
   core::ReceiveClock receive_clock_;
   std::uint32_t link_epoch_ = 0;
 
   mutable std::mutex camera_mutex_;
   bool camera_known_ = false;
-  core::SimStatus camera_status_;
+  bool external_ = false;
+  core::FrustumSample frustum_;
+  std::optional<core::CheckedPose> camera_pose_;
+  std::string pose_report_;
+  double lever_scatter_ = 0.0;  // [m]
+  double frustum_shift_up_ = std::numeric_limits<double>::quiet_NaN();
 
   // Capture thread, and who asks it.
   mutable std::mutex capture_mutex_;
   std::string source_description_;
   std::string source_problem_;
   vision::FrozenCheck frozen_check_;
+  vision::PeriodMeter periods_;
   FlightState::ConstPtr moved_from_;
   bool frozen_ = false;
+  bool crashed_ = false;
   bool black_ = false;
   std::uint64_t changes_ = 0;
   std::uint64_t grabbed_ = 0;
@@ -125,7 +150,7 @@ class CaptureNode : public BaseNode {
   std::uint32_t grab_ages_ = 0;
   std::uint32_t dropped_ = 0;
 
-  cv::Mat last_pixels_;  // capture thread only: for repeating a frozen picture
+  Grabbed last_;  // capture thread only: for repeating a frozen picture
   std::int64_t frozen_sent_ns_ = 0;
   core::RateLimiter limiter_;
 
@@ -139,7 +164,9 @@ class CaptureNode : public BaseNode {
 
   core::AssociationCounters reported_;  // diagnostics only: as of the last report
 
-  core::Subscription view_subscription_;  // last: it ends first
+  // Last: they end first.
+  core::Subscription frustum_shift_subscription_;
+  core::Subscription view_subscription_;
 };
 
 }  // namespace xplane_bridge

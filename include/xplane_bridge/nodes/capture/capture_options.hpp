@@ -8,6 +8,7 @@
 #include "xplane_bridge/nodes/base/param_loader.hpp"
 #include "xplane_bridge/vision/frame_source.hpp"
 #include "xplane_bridge/vision/picture_scaler.hpp"
+#include "xplane_bridge/vision/sender_source.hpp"
 #include "xplane_bridge/vision/video_source.hpp"
 #include "xplane_bridge/vision/x11_window_source.hpp"
 
@@ -15,9 +16,15 @@ namespace xplane_bridge {
 
 /// Parameters of capture_node; config/capture.yaml explains them.
 struct CaptureOptions {
-  bool from_video = false;  ///< else from an X11 window or screen region
+  enum class Source {
+    kX11,     ///< an X11 window or screen region
+    kVideo,   ///< a device, file or stream
+    kSender,  ///< what xplane_eye sends
+  };
+  Source source = Source::kX11;
   vision::X11SourceOptions x11;
   vision::VideoSourceOptions video;
+  vision::SenderSourceOptions sender;
 
   int width = 640;   ///< [px]
   int height = 480;  ///< [px]
@@ -30,6 +37,8 @@ struct CaptureOptions {
   core::CameraView assumed_view = core::CameraView::kForward;  ///< where X-Plane does not say
   double view_tolerance_deg = 5.0;
   std::array<std::string, 4> frame_ids;   ///< by CameraView; [kUnknown] is not used
+  std::string measured_frame;             ///< of the camera's measured pose
+  bool nominal_frames = false;            ///< pictures carry `frame_ids` also where the pose is measured
   std::array<double, 3> camera_offset{};  ///< [m] of the camera from base_link, FLU
 
   double max_wait = 0.2;      ///< [s] longest wait for a picture's state

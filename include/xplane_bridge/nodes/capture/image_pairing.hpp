@@ -5,10 +5,12 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 
 #include "xplane_bridge/FlightState.h"
 #include "xplane_bridge/FrameState.h"
 #include "xplane_bridge/core/camera/image_association.hpp"
+#include "xplane_bridge/core/camera/pose_check.hpp"
 #include "xplane_bridge/core/state/clock_filter.hpp"
 #include "xplane_bridge/core/state/mission_state.hpp"
 
@@ -29,13 +31,17 @@ class ImagePairing {
 
   /// A frame heard on the capture host. @param receive_ns [ns] host time, running evenly
   void addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns);
+  /// The camera's pose of a frame, before that frame or after it.
+  void addPose(const core::CheckedPose& pose);
   /// The link is new or gone: the simulator's clock is to be learnt anew.
   void forgetClock();
   /// @param arrival_ns [ns] host time
   void addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns);
   /// A published picture: its FrameState with everything the capture knows (header, times, view, counts, its quality
-  /// bits); the rest is filled in here.
-  void addPicture(const FrameState& picture, std::int64_t now_ns);
+  /// bits, the newest pose); the rest is filled in here, and the pose of the very frame.
+  /// @param frame_key [s] raw simulator time of the frame shown, where the source knows it: then no clock decides, and
+  ///        the display delay is the picture's own
+  void addPicture(const FrameState& picture, std::int64_t now_ns, std::optional<float> frame_key = {});
   /// Publishes what is ready or overdue.
   void flush(std::int64_t now_ns);
 
@@ -66,6 +72,7 @@ class ImagePairing {
   void mapAnew(Waiting* picture) const;
   void flushLocked(std::int64_t now_ns);
   void complete(const core::Association& association, std::int64_t now_ns, Waiting* picture);
+  void completePose(const core::Association& association, Waiting* picture) const;
   void forgetOldStates();
 
   const double display_delay_;
@@ -79,9 +86,13 @@ class ImagePairing {
   float frame_period_ = 0.0F;
   std::map<std::uint64_t, KnownState> states_;
   std::uint64_t next_state_id_ = 0;
+  std::deque<core::CheckedPose> poses_;
   std::deque<Waiting> waiting_;
   std::uint32_t unpaired_ = 0;
   double mean_offset_ = 0.0;
 };
+
+/// Writes a pose into body_to_camera, its source, uncertainties and quality bit.
+void setPose(const core::CheckedPose& checked, FrameState* answer);
 
 }  // namespace xplane_bridge

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -18,6 +19,8 @@ core::JoystickOptions loadJoystickOptions(const ParamLoader& own);
 
 /// `joy` into `control/manual` and `control/mode_request`, by one of config/joysticks/. Publishes on every joy message
 /// and, on a timer of its own, in between; nothing while the device is silent for longer than `joy_timeout`.
+///
+/// In lock-step it answers a frame when `lockstep/stick` has: by its joy, or by its lockstep/done.
 class JoystickMapperNode : public BaseNode {
  protected:
   bool usesLink() const override { return false; }
@@ -26,9 +29,21 @@ class JoystickMapperNode : public BaseNode {
   void subscribe() override;
 
  private:
+  /// What a frame waits for: the stick's answer to it.
+  struct Frame {
+    ros::Time stamp;
+    sensor_msgs::JoyConstPtr joy;  // null: the stick has not moved
+  };
+
+  // Lock-step (joystick_mapper_lockstep.cpp).
+  void subscribeInLockstep();
+  void answerFrames();
+  void answer(const Frame& frame);
+
   void onJoy(const sensor_msgs::Joy& joy);
   void onTimer();
-  void publish(double now);
+  /// Returns whether a command was published.
+  bool publish(double now);
   void reportProblems();
   void reportSelection();
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status);
@@ -46,6 +61,12 @@ class JoystickMapperNode : public BaseNode {
   bool was_alive_ = false;
   std::string reported_problems_;
   std::vector<std::string> reported_selection_;
+
+  // In lock-step, of the subscriptions' thread.
+  ros::Publisher done_publisher_;
+  std::deque<Frame> frames_;
+  std::deque<ControlModeConstPtr> modes_;
+  ros::Time answered_;  // stamp of the last frame
 };
 
 }  // namespace xplane_bridge

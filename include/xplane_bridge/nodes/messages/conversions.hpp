@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <string>
 
+#include <geometry_msgs/Transform.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/TwistWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
@@ -27,6 +28,9 @@ namespace xplane_bridge {
 
 /// All of a link's status except header.stamp and the aircraft.
 void toMessage(const core::LinkStatus& link, const std::string& transport, LinkState* message);
+
+/// @param translation [m]
+geometry_msgs::Transform toTransform(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation);
 
 // Standard messages. Each returns false, with the message untouched, when one of its inputs is not valid; nothing may
 // be published then.

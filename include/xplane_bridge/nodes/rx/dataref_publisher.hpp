@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <ros/node_handle.h>
 
 #include "xplane_bridge/DatarefValues.h"
+#include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/wire/rref_frame_assembler.hpp"
 #include "xplane_bridge/nodes/rx/rx_options.hpp"
 
@@ -16,7 +18,9 @@ namespace xplane_bridge {
 /// ones on scalar topics below `datarefs/`. One thread calls, or the caller locks.
 class DatarefPublisher {
  public:
-  explicit DatarefPublisher(const std::vector<DatarefEntry>& entries);
+  /// @param publish_unheard also what nobody listens to
+  /// @param stamps clock of the stamps; empty: they are receive times
+  DatarefPublisher(const std::vector<DatarefEntry>& entries, bool publish_unheard, std::optional<core::Clock> stamps);
 
   void advertise(ros::NodeHandle* handle);
 
@@ -31,6 +35,8 @@ class DatarefPublisher {
               std::uint32_t epoch);
   /// The link came up anew: nothing of before is known any more.
   void reset();
+  /// Nothing is published while muted.
+  void mute(bool muted) { muted_ = muted; }
 
  private:
   struct Batch {
@@ -48,6 +54,13 @@ class DatarefPublisher {
 
   void publish(std::int64_t receive_ns, float sim_time, std::uint32_t epoch);
 
+  bool goesOut(const ros::Publisher& publisher) const {
+    return !muted_ && (publish_unheard_ || publisher.getNumSubscribers() > 0);
+  }
+
+  const bool publish_unheard_;
+  const std::optional<core::Clock> stamps_;
+  bool muted_ = false;
   std::vector<Batch> batches_;
   std::vector<Scalar> scalars_;
   DatarefValues message_;

@@ -30,6 +30,8 @@ class FlightPublisher {
   /// @param receive_ns host receive time of the state [ns]
   void publish(const core::FlightState& state, const core::TangentFrame& map, std::int64_t receive_ns);
 
+  /// Whether X-Plane tells rates at all, so that publishing waits for them.
+  void expectRates(bool expected) { rates_expected_ = expected; }
   /// The link came up anew: waits for the first complete state again.
   void restart();
   /// A new origin was set before the next state: says so at once.
@@ -46,6 +48,7 @@ class FlightPublisher {
   core::RateLimiter state_limiter_;
   core::RateLimiter wind_limiter_;
   bool started_ = false;
+  bool rates_expected_ = true;
   std::optional<std::int64_t> startable_since_ns_;
   std::optional<std::uint32_t> published_position_epoch_;
   std::uint64_t published_ = 0;

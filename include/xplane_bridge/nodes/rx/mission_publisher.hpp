@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <ros/node_handle.h>
 
+#include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/state/state_assembler.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
 
@@ -45,15 +47,26 @@ class MissionPublisher {
   virtual void onRows(const core::RowStore& rows, std::int64_t receive_ns, const core::ClockFilter& clock) = 0;
   /// The link came up anew.
   virtual void reset() = 0;
+  /// Nothing is published while muted.
+  void mute(bool muted) { muted_ = muted; }
 
   const Report& report() const { return report_; }
 
  protected:
   Report report_;
+  bool muted_ = false;
 };
 
-/// The publishers of all groups whose rate is not 0.
+/// Stamps of simulator time: this clock's, which is that of the newest frame, and the time of simulator time 0.
+struct SimulatorStamps {
+  core::Clock clock;
+  std::int64_t start_ns = 0;  ///< [ns]
+};
+
+/// The publishers of all groups whose rate is not 0. `publish_unheard`: also what nobody listens to. `stamps`: empty:
+/// of the host.
 std::vector<std::unique_ptr<MissionPublisher>> makeMissionPublishers(
-    const std::array<int, core::kFieldGroupCount>& rates, core::Transport transport, const FrameNames& frames);
+    const std::array<int, core::kFieldGroupCount>& rates, core::Transport transport, const FrameNames& frames,
+    bool publish_unheard, const std::optional<SimulatorStamps>& stamps);
 
 }  // namespace xplane_bridge

@@ -10,6 +10,7 @@
 
 #include "xplane_bridge/DataRows.h"
 #include "xplane_bridge/GetDataref.h"
+#include "xplane_bridge/GetTerrain.h"
 #include "xplane_bridge/SetOrigin.h"
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 #include "xplane_bridge/core/state/clock_filter.hpp"
@@ -36,6 +37,10 @@ class RxNode : public BaseNode {
   void configureLink(core::SimLinkOptions* options) override;
   core::SimLinkCallbacks linkCallbacks() override;
   void publishFinalState() override;
+  void beginFlight() override;
+  void beginFrame(const core::LockstepFrame& frame) override;
+  bool frameReady(const core::LockstepFrame& frame) override;
+  void endFrame(const core::LockstepFrame& frame) override;
 
  private:
   /// One group of datarefs kept subscribed.
@@ -68,11 +73,19 @@ class RxNode : public BaseNode {
   std::vector<std::int32_t> wantedRows() const;
 
   void addStreams();
+  void mute(bool muted);
+  void publishClock();
+  /// With the stamp that it is published with.
+  core::FlightState stamped(const core::FlightState& state) const;
+  bool leadsClock() const override { return true; }
+  /// [ns] now, of the clock that receive times are of.
+  std::int64_t receiveNow() const { return lockstep() ? clock().system_ns() : wallClock().system_ns(); }
   void publishLinkState(const core::LinkStatus& status);
   float nearSimTime(std::int64_t receive_ns) const;
 
   void setOrigin(const SetOrigin::Request& request, SetOrigin::Response& response);
   void getDataref(const GetDataref::Request& request, GetDataref::Response& response);
+  void getTerrain(const GetTerrain::Request& request, GetTerrain::Response& response);
 
   // Diagnostics (rx_node_diagnostics.cpp).
   void addAllDiagnostics();
@@ -97,6 +110,8 @@ class RxNode : public BaseNode {
   std::optional<core::FlightState> last_state_;
   std::int64_t last_state_received_ns_ = 0;
   core::LinkStatus last_status_;
+  bool state_is_new_ = false;  // of the frame in lock-step
+  std::optional<std::uint32_t> ended_frame_;
 
   // Timer only.
   std::optional<core::SimulatorVersion> adopted_version_;
@@ -111,6 +126,8 @@ class RxNode : public BaseNode {
   ros::Publisher link_state_publisher_;
   ros::Publisher rows_publisher_;
   DataRows rows_message_;
+  ros::Publisher clock_publisher_;
+  ros::Publisher done_publisher_;
 
   std::vector<DatarefStream> streams_;  // last: their subscriptions end first
 };

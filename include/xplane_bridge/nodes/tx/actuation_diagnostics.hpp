@@ -1,15 +1,17 @@
 #pragma once
 
 /// @file
-/// What driven surfaces and failures say of themselves on /diagnostics.
+/// What controls, driven surfaces and failures say of themselves on /diagnostics.
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 
+#include "xplane_bridge/actuation/actuation.hpp"
 #include "xplane_bridge/actuation/failure_manager.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 
 namespace xplane_bridge {
 
+void fillDiagnostics(const ControlSnapshot& control, diagnostic_updater::DiagnosticStatusWrapper* status);
 void fillDiagnostics(const SurfaceControlStatus& surfaces, diagnostic_updater::DiagnosticStatusWrapper* status);
 void fillDiagnostics(const FailureSnapshot& failures, diagnostic_updater::DiagnosticStatusWrapper* status);
 

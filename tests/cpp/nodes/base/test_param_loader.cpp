@@ -138,5 +138,22 @@ TEST(CommonOptions, refusesWhatCannotWork) {
   EXPECT_EQ(load("somebody_elses_parameter", 3), "");
 }
 
+TEST(ParamLoader, TellsWhatWasGivenThatIsNoDefault) {
+  const ParamLoader loader("/xplane/node", sampleTree());
+  loader.integer("rate", {}, 50);  // given, but what it would be anyway
+  loader.number("gain", {}, 1.0);
+  loader.text("absent", "x");
+  loader.text("name");
+  loader.boolean("on", false);
+  loader.numbers("list", {});
+  const ParamLoader limits = loader.section("limits");
+  limits.number("lower", {}, 0.0);
+  limits.number("upper", {}, 1.5);
+  for (const ParamLoader& item : loader.sections("items")) item.text("name", "first");
+  EXPECT_EQ(loader.given(), (std::vector<std::string>{"gain: 2.5", "name: \"twin\"", "on: true", "list: [1, 2.5]",
+                                                      "limits/lower: -1", "items[1]/name: \"second\""}));
+  EXPECT_TRUE(ParamLoader("/", XmlRpcValue()).given().empty());
+}
+
 }  // namespace
 }  // namespace xplane_bridge

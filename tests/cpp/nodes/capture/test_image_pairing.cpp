@@ -54,7 +54,12 @@ std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, doub
     core::SimStatus status;
     status.sim_time = static_cast<float>(kSimStart + t);
     last_arrival = std::max(last_arrival, t + 1e-4 + clocks.jitter * extra(random));
-    events.emplace_back(clocks.capture.at(last_arrival), [&pairing, status](std::int64_t now) {
+    core::CheckedPose pose;  // the camera moves a metre a frame
+    pose.sim_time = static_cast<double>(status.sim_time);
+    pose.pose.position.x() = k;
+    pose.sure = true;
+    events.emplace_back(clocks.capture.at(last_arrival), [&pairing, status, pose](std::int64_t now) {
+      pairing.addPose(pose);
       pairing.addFrame(status, static_cast<float>(1.0 / kFps), now);
     });
     const auto state = boost::make_shared<FlightState>();
@@ -65,6 +70,7 @@ std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, doub
                         [&pairing, state](std::int64_t now) { pairing.addState(state, now); });
     FrameState picture;
     picture.image_count = k;
+    picture.camera_pose_source = FrameState::POSE_MEASURED;
     const std::int64_t shown = clocks.capture.at(t + kDelay + swap(random));
     picture.header.stamp.fromNSec(static_cast<std::uint64_t>(shown));
     events.emplace_back(shown, [&pairing, picture](std::int64_t now) { pairing.addPicture(picture, now + ns(0.001)); });
@@ -94,6 +100,8 @@ TEST_P(TwoClocks, EveryPictureGetsTheStateOfItsFrame) {
     ASSERT_FLOAT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + k / kFps)) << "frame " << k;
     ASSERT_NEAR(answer.frame_sim_time, kSimStart + k / kFps, 1e-4);
     ASSERT_NEAR(answer.sim_time_error, 0.0, 1e-4);
+    ASSERT_EQ(answer.body_to_camera.translation.x, k);
+    ASSERT_EQ(answer.quality & FrameState::QUALITY_POSE_UNSURE, 0U);
     // The state keeps the stamp of the machine that made it.
     ASSERT_EQ(static_cast<std::int64_t>(answer.state.header.stamp.toNSec()), clocks.rx.at(k / kFps));
     worst_uncertainty = std::max(worst_uncertainty, answer.clock_uncertainty);
@@ -124,6 +132,7 @@ TEST(ImagePairing, DelayWrongByOneFrameIsOneFrameOff) {
     if (k < 60) continue;
     ++judged;
     ASSERT_FLOAT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + (k - 1) / kFps)) << "frame " << k;
+    ASSERT_EQ(answer.body_to_camera.translation.x, k - 1);
   }
   EXPECT_GT(judged, 1100);
 }
@@ -162,6 +171,33 @@ TEST(ImagePairing, StuttersDoNotShiftThePairing) {
   for (const auto& [k, answer] : answers) {
     if (k < 60) continue;
     EXPECT_EQ(answer.state.sim_time, sim_times[k]) << "frame " << k;
+  }
+}
+
+/// A sender's pictures name their frames: no frame was ever heard here, and the stamps are nonsense.
+TEST(ImagePairing, AKeyNeedsNoClock) {
+  std::map<std::uint32_t, FrameState> answers;
+  ImagePairing pairing(kDelay, 0.2, [&answers](const FrameState& answer) { answers[answer.image_count] = answer; });
+  std::mt19937 random(7);
+  for (std::uint32_t k = 0; k < 200; ++k) {
+    const auto state = boost::make_shared<FlightState>();
+    state->sim_time = static_cast<float>(kSimStart + k / kFps);
+    state->header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(k / kFps)));
+    pairing.addState(state, kStart + ns(k / kFps));
+    if (k < 20) continue;
+    FrameState picture;  // of a frame up to 15 frames ago
+    picture.image_count = k;
+    const std::uint32_t shown = k - static_cast<std::uint32_t>(random() % 16);
+    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(static_cast<double>(random() % 1000))));
+    picture.display_delay = 0.06;
+    picture.quality = shown % 2 == 0 ? 0U : static_cast<std::uint32_t>(FrameState::QUALITY_BORDERLINE);
+    const auto key = static_cast<float>(kSimStart + shown / kFps);
+    pairing.addPicture(picture, kStart + ns(k / kFps), key);
+    ASSERT_EQ(answers.count(k), 1U) << "picture " << k << " waits for something";
+    EXPECT_EQ(answers[k].state.sim_time, key);
+    EXPECT_EQ(answers[k].frame_sim_time, static_cast<double>(key));
+    EXPECT_EQ(answers[k].quality, picture.quality);
+    EXPECT_EQ(answers[k].display_delay, 0.06);
   }
 }
 

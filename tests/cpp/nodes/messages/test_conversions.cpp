@@ -100,6 +100,9 @@ TEST(Conversions, validityBitsOfStructAndMessageAgree) {
   EXPECT_EQ(core::WarningState::kValidAll, WarningState::VALID_ALL);
   EXPECT_EQ(core::FuelState::kValidAll, FuelState::VALID_ALL);
   EXPECT_EQ(core::SimStatus::kValidAll, SimStatus::VALID_ALL);
+  EXPECT_EQ(core::NavigationState::kValidAll, NavigationState::VALID_ALL);
+  EXPECT_EQ(core::InstrumentState::kValidAll, InstrumentState::VALID_ALL);
+  EXPECT_EQ(core::EnvironmentState::kValidAll, EnvironmentState::VALID_ALL);
   EXPECT_EQ(static_cast<int>(core::PositionSource::kFloat32), static_cast<int>(FlightState::POSITION_FLOAT32));
   EXPECT_EQ(static_cast<int>(core::LinkState::kLost), static_cast<int>(LinkState::LOST));
   EXPECT_EQ(static_cast<int>(core::LinkState::kPaused), static_cast<int>(LinkState::PAUSED));

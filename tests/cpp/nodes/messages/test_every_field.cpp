@@ -163,6 +163,11 @@ double meanOfMoving(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
+std::vector<double> inCelsius(std::vector<double> fahrenheit) {
+  for (double& value : fahrenheit) value = (value - 32.0) * 5.0 / 9.0;
+  return fahrenheit;
+}
+
 // What is not as it was sent. Surfaces: all of them have been sent other numbers than 0.
 void addComputed(FieldGroup group, const core::ClockFilter& clock, MessageValues* fields) {
   MessageValues& f = *fields;
@@ -175,16 +180,23 @@ void addComputed(FieldGroup group, const core::ClockFilter& clock, MessageValues
     f["delta_elevator"] = {meanOfMoving(f["elevator"])};
     f["delta_rudder"] = {-meanOfMoving(f["rudder"])};
   } else if (group == FieldGroup::kAutopilot) {
-    f["target_airspeed"][0] *= 1852.0 / 3600.0;  // the dial is above 10: knots
+    f["target_mach"] = f["target_airspeed"];  // airspeed_is_mach is a number above 0
+    f["target_airspeed"] = {};
+  } else if (group == FieldGroup::kEngines) {
+    f["itt"] = inCelsius(f["itt"]);
+    f["cht"] = inCelsius(f["cht"]);
   } else if (group == FieldGroup::kControls) {
     f.try_emplace("nacelle_angle_deg");  // X-Plane 12 does not have it: nothing is sent, nothing is to be there
   } else if (group == FieldGroup::kSim) {
     f["time_ratio"] = {clock.timeRatio()};
+    f["frames_missed"] = {3.0};
     if (f["frame_rate"].empty()) f["frame_rate"] = {1.0 / f["frame_period"][0]};
+  } else if (group == FieldGroup::kEnvironment) {
+    f["terrain_height"] = {f["altitude_msl"][0] - f["height_above_ground"][0]};
   }
 }
 
-// In its fifth epoch, at simulator time 100 and X-Plane's own pace.
+// In its fifth epoch, at simulator time 100 and X-Plane's own pace; three frames are missing.
 core::ClockFilter someClock() {
   core::ClockFilter clock;
   for (int i = 0; i < 5; ++i) {
@@ -195,6 +207,11 @@ core::ClockFilter someClock() {
     clock.raiseEpoch();
     clock.update(sample);
   }
+  core::ClockSample late;  // after three frames that did not come
+  late.receive_ns = kNow + 8 * kFrame;
+  late.sim_time = 100.0F + 0.02F * 8.0F;
+  late.frame_period = 0.02F;
+  clock.update(late);
   return clock;
 }
 
@@ -209,7 +226,8 @@ void checkMission() {
       options.transport = c.transport;
       options.version = c.version;
       core::MissionAssembler<State> assembler(options);
-      const Wire wire(State::kGroup, c, layout, pass, {{"count", {8.0}}, {"sim_time", {100.1}}});
+      const Wire wire(State::kGroup, c, layout, pass,
+                      {{"count", {8.0}}, {"sim_time", {100.1}}, {"gauge_in_celsius", {0.0, 1.0, 0.0, 1.0}}});
       core::RowStore rows;
       rows.update(wire.data().data(), kNow);
       EXPECT_EQ(assembler.add(wire.rref().rref(), kNow), !wire.requests().empty());

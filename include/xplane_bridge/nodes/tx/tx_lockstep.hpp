@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <ros/time.h>
+
+#include "xplane_bridge/actuation/lockstep_barrier.hpp"
+#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/wire/lockstep_hub.hpp"
+#include "xplane_bridge/nodes/base/common_options.hpp"
+
+namespace xplane_bridge {
+
+/// tx_node as the barrier of lock-step: keeps what arrives until its frame is answered by all, then carries it out in
+/// an order that does not depend on when it came: participants as named, by topic. Ends the run where an answer stays
+/// away. Thread-safe.
+class TxLockstep {
+ public:
+  using Action = std::function<void()>;
+
+  /// @param host clock of the watchdog
+  /// @param start stamp of frame 0
+  /// @param wake lets the link's thread ask ready() again
+  /// @param give_up ends the run, in words that say why
+  TxLockstep(const LockstepOptions& options, core::Clock host, const ros::Time& start, Action wake,
+             std::function<void(const std::string&)> give_up);
+  /// stop()
+  ~TxLockstep();
+  TxLockstep(const TxLockstep&) = delete;
+  TxLockstep& operator=(const TxLockstep&) = delete;
+
+  // What arrives. `who`: full name of the node.
+
+  /// A command, which answers the frame of its stamp. `topic` orders those of one node.
+  void takeCommand(const std::string& who, const ros::Time& stamp, int topic, Action carry_out);
+  /// A request, which answers nothing. It is carried out in the second frame after that of its stamp: it comes over a
+  /// connection of its own, perhaps after the command that answers its frame, or together with the next one.
+  void takeRequest(const ros::Time& stamp, Action carry_out);
+  /// lockstep/done. `said`: its frame_id.
+  void takeDone(const std::string& who, const ros::Time& stamp, const std::string& said);
+
+  // The link's thread.
+
+  void open(const core::LockstepFrame& frame, const ros::Time& stamp);
+  /// All of the frame was handled. Says whether close() may come.
+  bool ready();
+  /// Carries out what is due.
+  void close();
+  /// The first frame that flies is here.
+  void leaveFrameZero() { barrier_.close(); }
+
+  // Services.
+
+  void step(std::uint32_t frames);
+  void run();
+  /// Waits until a frame is open and was handled, or stop(): a participant may have seen a frame before tx_node has,
+  /// and what it asks for belongs to that frame.
+  void waitUntilOpen();
+  /// Waits until the present frame is answered and held, or stop(). @return whether it is
+  bool waitUntilHeld();
+  std::uint32_t frame() const { return barrier_.number(); }
+
+  /// Ends the watchdog and all waiting.
+  void stop();
+
+ private:
+  struct Command {
+    std::size_t rank;
+    int topic;
+    std::int64_t stamp_ns;
+    Action carry_out;
+  };
+  struct Request {
+    std::int64_t stamp_ns;
+    int frames_waited;
+    Action carry_out;
+  };
+
+  void progress();
+  void watch();
+  std::string whatIsMissing() const;
+
+  const LockstepOptions options_;
+  const core::Clock host_;
+  const Action wake_;
+  const std::function<void(const std::string&)> give_up_;
+  LockstepBarrier barrier_;
+
+  mutable std::mutex mutex_;  // guards the following
+  core::ClockCondition changed_;
+  std::vector<Command> commands_;
+  std::vector<Request> requests_;
+  std::int64_t stamp_ns_;
+  std::int64_t previous_ns_;  // stamp of the frame before
+  bool closed_ = false;       // the present frame
+  bool handled_ = false;      // the present frame, and it is not closed
+  std::int64_t progress_ns_ = 0;
+  bool stopped_ = false;
+  std::thread watchdog_;  // last: it uses all of the above
+};
+
+}  // namespace xplane_bridge

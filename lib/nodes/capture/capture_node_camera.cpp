@@ -1,0 +1,195 @@
+/// CaptureNode's camera: where it is, what it shows, and the field of view it is given.
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include <geometry_msgs/TransformStamped.h>
+#include <sensor_msgs/distortion_models.h>
+
+#include "xplane_bridge/nodes/capture/capture_node.hpp"
+#include "xplane_bridge/nodes/messages/conversions.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr double kFieldOfViewTimeout = 2.0;  // [s]
+constexpr const char* kFieldOfViewPurpose = "field_of_view";
+
+geometry_msgs::Transform nominalPose(core::CameraView view, const CaptureOptions& options) {
+  const auto& offset = options.camera_offset;
+  return toTransform(core::opticalOrientation(view), {offset[0], offset[1], offset[2]});
+}
+
+}  // namespace
+
+// --- frames ----------------------------------------------------------------------------------------------------------
+
+void CaptureNode::broadcastFrames() {
+  std::vector<geometry_msgs::TransformStamped> frames;
+  for (const core::CameraView view : {core::CameraView::kForward, core::CameraView::kRear, core::CameraView::kDown}) {
+    geometry_msgs::TransformStamped frame;
+    frame.header.stamp = stampNow();
+    frame.header.frame_id = common().frames.base_link;
+    frame.child_frame_id = options_.frame_ids[static_cast<std::size_t>(view)];
+    frame.transform = nominalPose(view, options_);
+    frames.push_back(frame);
+  }
+  static_frames_ = std::make_unique<tf2_ros::StaticTransformBroadcaster>();
+  static_frames_->sendTransform(frames);
+}
+
+void CaptureNode::publishFrameState(const FrameState& state) {
+  frame_state_publisher_.publish(state);
+  if (state.camera_pose_source != FrameState::POSE_MEASURED) return;
+  geometry_msgs::TransformStamped frame;
+  frame.header.stamp = state.header.stamp;
+  frame.header.frame_id = common().frames.base_link;
+  frame.child_frame_id = options_.measured_frame;
+  frame.transform = state.body_to_camera;
+  measured_frame_->sendTransform(frame);
+}
+
+// --- X-Plane ---------------------------------------------------------------------------------------------------------
+
+void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo& info) {
+  // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
+  const std::int64_t receive_ns = receive_clock_.toHostTime(info.stamp_ns, clock().system_ns(), clock().steady_ns());
+  if (!view_stream_.add(datagram, receive_ns)) return;
+  const auto pose = pose_check_.add(view_stream_.camera());
+  {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    camera_known_ = true;
+    external_ = view_stream_.camera().external;
+    frustum_ = view_stream_.frustum();
+    frustum_.shift_up = frustum_shift_up_;
+    camera_pose_ = pose;
+    pose_report_ = pose ? pose_check_.report() : "X-Plane does not answer";
+    lever_scatter_ = pose_check_.leverScatter();
+  }
+  if (pose) pairing_->addPose(*pose);
+  pairing_->addFrame(view_stream_.status(), view_stream_.simulatedFramePeriod(), view_stream_.receiveTime());
+}
+
+void CaptureNode::onLinkState(const core::LinkStatus& status) {
+  const bool known = status.state != core::LinkState::kSearching && status.state != core::LinkState::kLost;
+  if (!known) {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    camera_known_ = false;
+  }
+  if (status.epoch == link_epoch_) return;
+  link_epoch_ = status.epoch;
+  view_stream_.reset();
+  pose_check_.reset();
+  pairing_->forgetClock();
+  subscribeFrustumShift(status.version);
+  if (known && options_.set_field_of_view) changeFieldOfView();
+}
+
+void CaptureNode::subscribeFrustumShift(core::SimulatorVersion version) {
+  frustum_shift_subscription_ = {};
+  {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    frustum_shift_up_ = std::numeric_limits<double>::quiet_NaN();
+  }
+  if (version.number < core::kFirstWithFrustumShiftUp) return;
+  core::RrefGroup group;
+  group.name = "frustum";
+  group.datarefs = {core::kFrustumShiftUpDataref};
+  frustum_shift_subscription_ =
+      link().subscribe(group, [this](const core::RrefView& datagram, const core::ReceiveInfo&) {
+        const std::lock_guard<std::mutex> lock(camera_mutex_);
+        if (datagram.size() > 0) frustum_shift_up_ = static_cast<double>(datagram[0].value);
+      });
+}
+
+void CaptureNode::changeFieldOfView() {
+  const std::string path = view_stream_.fieldOfViewDataref();
+  link().read({path}, kFieldOfViewTimeout, [this, path](const std::vector<core::DatarefValue>& values) {
+    if (!values.front().has_value()) {
+      ROS_ERROR("X-Plane did not say its field of view within %.1f s; it is left as it is", kFieldOfViewTimeout);
+      return;
+    }
+    try {
+      const std::shared_ptr<core::Journal> journal = link().journal();
+      float before = *values.front();
+      // What a crashed run has left is not the user's own value; that is in the journal.
+      for (const core::JournalEntry& entry : journal->orphans(kFieldOfViewPurpose)) {
+        for (const core::UndoOperation& operation : entry.undo) {
+          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
+        }
+      }
+      for (const core::JournalEntry& entry : journal->own()) {
+        if (entry.purpose != kFieldOfViewPurpose) continue;
+        for (const core::UndoOperation& operation : entry.undo) {
+          if (const auto* dref = std::get_if<core::UndoDref>(&operation)) before = dref->value;
+        }
+      }
+      journal->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {core::UndoDref{path, before}});
+      link().write(path, static_cast<float>(options_.field_of_view_deg));
+    } catch (const core::JournalError& error) {
+      ROS_ERROR("X-Plane's field of view is left as it is, because it could not be restored later: %s", error.what());
+    }
+  });
+}
+
+void CaptureNode::undo(const Deadline& deadline) {
+  if (!options_.set_field_of_view || !link().journal()) return;
+  try {
+    for (const core::JournalEntry& entry : link().journal()->own()) {
+      if (entry.purpose != kFieldOfViewPurpose) continue;
+      if (link().undo(entry.undo, std::max(deadline.left(), 0.1))) link().journal()->remove({entry.id});
+    }
+  } catch (const core::JournalError& error) {
+    ROS_ERROR("X-Plane's field of view may not be restored: %s", error.what());
+  }
+}
+
+CaptureNode::CameraFacts CaptureNode::cameraFacts() const {
+  const std::lock_guard<std::mutex> lock(camera_mutex_);
+  CameraFacts facts;
+  facts.frustum = core::frustumOf(camera_known_ ? frustum_ : core::FrustumSample(), options_.field_of_view_deg);
+  if (!camera_known_) return facts;
+  facts.external = external_;
+  facts.pose = camera_pose_;
+  if (facts.pose && !facts.external) {
+    facts.view = core::classifyView(facts.pose->pose.orientation, options_.view_tolerance_deg);
+  }
+  return facts;
+}
+
+void CaptureNode::describeCamera(const CameraFacts& camera, FrameState* state) const {
+  const core::CameraView nominal = camera.view == core::CameraView::kUnknown ? options_.assumed_view : camera.view;
+  const bool measured = camera.pose.has_value() && !options_.nominal_frames;
+  state->header.frame_id = measured ? options_.measured_frame : options_.frame_ids[static_cast<std::size_t>(nominal)];
+  state->view = static_cast<std::uint8_t>(camera.view);
+  if (!measured && camera.view == core::CameraView::kUnknown) state->quality |= FrameState::QUALITY_VIEW_UNKNOWN;
+  if (camera.external) state->quality |= FrameState::QUALITY_EXTERNAL_VIEW;
+  if (!camera.frustum.known) state->quality |= FrameState::QUALITY_FOV_ASSUMED;
+  if (camera.pose) {
+    setPose(*camera.pose, state);
+    return;
+  }
+  state->camera_pose_source = FrameState::POSE_NOMINAL;
+  state->body_to_camera = nominalPose(nominal, options_);
+  state->camera_pose_uncertainty = state->camera_pose_uncertainty_deg = std::numeric_limits<float>::quiet_NaN();
+}
+
+// --- what a picture carries ------------------------------------------------------------------------------------------
+
+sensor_msgs::CameraInfo CaptureNode::cameraInfo(const std_msgs::Header& header, cv::Size source,
+                                                const vision::FieldOfView& shown) const {
+  const vision::Intrinsics camera = scaler_->intrinsics(source, shown);
+  sensor_msgs::CameraInfo info;
+  info.header = header;
+  info.width = static_cast<std::uint32_t>(options_.width);
+  info.height = static_cast<std::uint32_t>(options_.height);
+  info.distortion_model = sensor_msgs::distortion_models::PLUMB_BOB;
+  info.D.assign(5, 0.0);
+  info.K = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
+  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  info.P = {camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0};
+  return info;
+}
+
+}  // namespace xplane_bridge

@@ -1,0 +1,175 @@
+#include "xplane_bridge/nodes/tx/tx_lockstep.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <tuple>
+#include <utility>
+
+#include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/core/base/units.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using Lock = std::lock_guard<std::mutex>;
+
+constexpr const char* kReader = "rx_node";
+constexpr double kWatchPeriod = 0.2;  // [s]
+constexpr int kRequestWaits = 2;      // [frames]
+
+std::int64_t nanoseconds(const ros::Time& stamp) { return static_cast<std::int64_t>(stamp.toNSec()); }
+
+}  // namespace
+
+TxLockstep::TxLockstep(const LockstepOptions& options, core::Clock host, const ros::Time& start, Action wake,
+                       std::function<void(const std::string&)> give_up)
+    : options_(options),
+      host_(std::move(host)),
+      wake_(std::move(wake)),
+      give_up_(std::move(give_up)),
+      barrier_(options.participants, kReader),
+      stamp_ns_(nanoseconds(start)),
+      previous_ns_(stamp_ns_) {
+  if (options.hold) barrier_.step(0);
+  barrier_.open(0, stamp_ns_);
+  progress();
+  watchdog_ = std::thread([this] { watch(); });
+}
+
+TxLockstep::~TxLockstep() { stop(); }
+
+void TxLockstep::stop() {
+  {
+    const Lock lock(mutex_);
+    stopped_ = true;
+  }
+  changed_.notifyAll();
+  if (watchdog_.joinable()) watchdog_.join();
+}
+
+void TxLockstep::takeCommand(const std::string& who, const ros::Time& stamp, int topic, Action carry_out) {
+  {
+    const Lock lock(mutex_);
+    commands_.push_back({barrier_.rank(who), topic, nanoseconds(stamp), std::move(carry_out)});
+  }
+  barrier_.answer(who, nanoseconds(stamp));
+  wake_();
+}
+
+void TxLockstep::takeRequest(const ros::Time& stamp, Action carry_out) {
+  const Lock lock(mutex_);
+  requests_.push_back({nanoseconds(stamp), 0, std::move(carry_out)});
+}
+
+void TxLockstep::takeDone(const std::string& who, const ros::Time& stamp, const std::string& said) {
+  if (said == kLockstepNoState) {
+    barrier_.answerForAll(who, nanoseconds(stamp));
+  } else {
+    barrier_.answer(who, nanoseconds(stamp));
+  }
+  wake_();
+}
+
+void TxLockstep::open(const core::LockstepFrame& frame, const ros::Time& stamp) {
+  {
+    const Lock lock(mutex_);
+    previous_ns_ = std::exchange(stamp_ns_, nanoseconds(stamp));
+    closed_ = false;
+  }
+  progress();
+  barrier_.open(frame.number, nanoseconds(stamp));
+}
+
+bool TxLockstep::ready() {
+  const bool complete = barrier_.complete();
+  {
+    const Lock lock(mutex_);
+    // Frame 0 is never closed: once it is answered, what is asked for is of the first frame.
+    handled_ = !complete || barrier_.number() > 0;
+  }
+  changed_.notifyAll();
+  return complete;
+}
+
+void TxLockstep::close() {
+  std::vector<Command> commands;
+  std::vector<Request> requests;
+  {
+    const Lock lock(mutex_);
+    const auto due = [this](const Command& command) {
+      const bool named = command.rank <= options_.participants.size();  // rx_node is the first
+      return !named || command.stamp_ns <= stamp_ns_;
+    };
+    const auto later = std::stable_partition(commands_.begin(), commands_.end(), due);
+    std::move(commands_.begin(), later, std::back_inserter(commands));
+    commands_.erase(commands_.begin(), later);
+    std::vector<Request> kept;
+    for (Request& request : requests_) {
+      const bool due_now = request.frames_waited == kRequestWaits || request.stamp_ns < previous_ns_;
+      ++request.frames_waited;
+      (due_now ? requests : kept).push_back(std::move(request));
+    }
+    requests_ = std::move(kept);
+    closed_ = true;
+    handled_ = false;
+  }
+  std::stable_sort(commands.begin(), commands.end(), [](const Command& a, const Command& b) {
+    return std::tie(a.rank, a.topic) < std::tie(b.rank, b.topic);
+  });
+  for (const Request& request : requests) request.carry_out();
+  for (const Command& command : commands) command.carry_out();
+  barrier_.close();
+  progress();
+}
+
+void TxLockstep::step(std::uint32_t frames) {
+  barrier_.step(frames);
+  progress();
+  wake_();
+}
+
+void TxLockstep::run() {
+  barrier_.run();
+  progress();
+  wake_();
+}
+
+void TxLockstep::waitUntilOpen() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(&lock, [this] { return stopped_ || handled_; });
+}
+
+bool TxLockstep::waitUntilHeld() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(&lock, [this] { return stopped_ || barrier_.holds(); });
+  return !stopped_;
+}
+
+void TxLockstep::progress() {
+  const Lock lock(mutex_);
+  progress_ns_ = host_.steady_ns();
+}
+
+std::string TxLockstep::whatIsMissing() const {
+  const std::string frame = "frame " + std::to_string(barrier_.number());
+  const std::vector<std::string> missing = barrier_.missing();
+  if (closed_ || missing.empty()) return "the simulator has not gone on from " + frame;
+  return frame + " was not answered by " + core::join(missing);
+}
+
+void TxLockstep::watch() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!changed_.waitUntil(&lock, core::Deadline(host_, kWatchPeriod), [this] { return stopped_; })) {
+    if (barrier_.holds()) progress_ns_ = host_.steady_ns();
+    const double silence = core::toSeconds(host_.steady_ns() - progress_ns_);
+    if (silence < options_.watchdog) continue;
+    progress_ns_ = host_.steady_ns();
+    const std::string text = "lock-step ends: for " + std::to_string(std::lround(silence)) + " s " + whatIsMissing();
+    lock.unlock();
+    give_up_(text);
+    lock.lock();
+  }
+}
+
+}  // namespace xplane_bridge
