@@ -1,9 +1,11 @@
 """Installs the Python package: for catkin as package.xml says, for pip alone as pyproject.toml says."""
 
 import os
+import subprocess
 import sys
 
-from setuptools import Distribution, find_packages, setup
+from setuptools import Distribution, Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
 
 
 class CatkinDistribution(Distribution):
@@ -40,8 +42,42 @@ def configuration():
     return sorted(folders.items())
 
 
+class BuildWithMessageCode(build_ext):
+    """Compiles after cmake/message_code has written the headers that follow from the messages."""
+
+    def run(self):
+        """Writes them where the extension looks for them."""
+        generated = os.path.join(self.build_temp, "generated")
+        # Where it fails, so does the compilation, which is optional: everything else is installed all the same.
+        subprocess.run([sys.executable, "-B", os.path.join("cmake", "message_code"), "core", generated], check=False)
+        self.include_dirs.append(generated)
+        super().run()
+
+
+def compiled_module():
+    """xplane_bridge._core, of the same files as lib/bindings/CMakeLists.txt makes it; left out without a compiler."""
+    control = ("control_arbiter", "control_channels", "control_command", "control_rows")
+    bindings = ("arbiter", "module", "twin_loop", "twin_physics")
+    sources = [f"lib/core/control/{name}.cpp" for name in control] + [f"lib/bindings/{name}.cpp" for name in bindings]
+    # The same bits as Python's own arithmetic: nothing fused, and every function the C library's.
+    exact = ["-ffp-contract=off", "-fno-builtin"]
+    return Extension(
+        "xplane_bridge._core",
+        sources,
+        include_dirs=["include"],
+        extra_compile_args=["-std=c++17", "-O2", "-fvisibility=hidden", *exact],
+        language="c++",
+        optional=True,
+    )
+
+
 if "setuptools.build_meta" in sys.modules:  # pip, or another PEP 517 front end
-    setup(package_data=package_data(), data_files=configuration())
+    setup(
+        package_data=package_data(),
+        data_files=configuration(),
+        ext_modules=[compiled_module()],
+        cmdclass={"build_ext": BuildWithMessageCode},
+    )
 else:
     from catkin_pkg.python_setup import generate_distutils_setup
 

@@ -1,7 +1,7 @@
 # Compile settings every C++ target of the project shares, whichever CMakeLists.txt creates it.
 include_guard(GLOBAL)
 
-option(XPLANE_BRIDGE_WERROR "Treat compiler warnings as errors (CI; off for users)" OFF)
+option(XPLANE_BRIDGE_WERROR "Treat compiler warnings as errors (scripts/setup --test; off for users)" OFF)
 set(XPLANE_BRIDGE_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. address,undefined (empty: none)")
 
 # xplane_bridge_configure_target(<target>): C++17 without extensions, the project's warnings, the chosen sanitizers.
@@ -26,17 +26,19 @@ function(xplane_bridge_configure_target target)
   endif()
 endfunction()
 
-# xplane_bridge_message_code(<target> core|nodes <folder>...): what cmake/message_code writes from the messages, made
-# before <target>. Files that stay the same keep their time, hence the stamp.
+# xplane_bridge_message_code(<target> core|nodes <folder>... [SOURCES file...]): what cmake/message_code writes from the
+# messages, made before <target>; SOURCES: those of it that <target> compiles. Files that stay the same keep their time,
+# hence the stamp.
 get_filename_component(XPLANE_BRIDGE_MESSAGE_CODE "${CMAKE_CURRENT_LIST_DIR}/message_code" ABSOLUTE)
 function(xplane_bridge_message_code target part)
+  cmake_parse_arguments(arg "" "" "SOURCES" ${ARGN})
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   get_filename_component(root "${XPLANE_BRIDGE_MESSAGE_CODE}/../.." ABSOLUTE)
   file(GLOB inputs CONFIGURE_DEPENDS
     ${XPLANE_BRIDGE_MESSAGE_CODE}/*.py ${root}/msg/*.msg ${root}/srv/*.srv)
   set(stamp "${CMAKE_CURRENT_BINARY_DIR}/message_code_${part}.stamp")
-  add_custom_command(OUTPUT ${stamp}
-    COMMAND ${Python3_EXECUTABLE} -B ${XPLANE_BRIDGE_MESSAGE_CODE} ${part} ${ARGN}
+  add_custom_command(OUTPUT ${stamp} BYPRODUCTS ${arg_SOURCES}
+    COMMAND ${Python3_EXECUTABLE} -B ${XPLANE_BRIDGE_MESSAGE_CODE} ${part} ${arg_UNPARSED_ARGUMENTS}
     COMMAND ${CMAKE_COMMAND} -E touch ${stamp}
     DEPENDS ${inputs} ${root}/lib/core/state/sources.txt
     COMMENT "Writing what follows from the messages: ${part}"

@@ -18,7 +18,7 @@ def launch(name):
     """Runs `xplane_bridge.cli.<name>.main()` and exits with what it returns.
 
     Args:
-        name: the module's name below `xplane_bridge.cli`.
+        name: the module's name below `xplane_bridge.cli`; its last part is the program's.
     """
     if os.path.isfile(os.path.join(_CLONE, "package.xml")):
         _use_clone()
@@ -28,7 +28,8 @@ def launch(name):
         program = importlib.import_module("xplane_bridge.cli." + name)
     except ModuleNotFoundError as error:
         sys.exit(_explain(error))
-    sys.argv[0] = os.path.join(_HERE, name)  # what its error messages begin with, also when a shell script calls this
+    # What its error messages begin with, also when a shell script calls this.
+    sys.argv[0] = os.path.join(_HERE, name.split(".")[-1])
     sys.exit(program.main())
 
 
