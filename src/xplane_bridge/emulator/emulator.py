@@ -14,7 +14,7 @@ import os
 import socket
 import sys
 import time
-from typing import List, Optional, Protocol, TextIO
+from typing import Any, Callable, Dict, List, Optional, Protocol, TextIO
 
 import numpy as np
 
@@ -23,13 +23,14 @@ from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
 from xplane_bridge.emulator.datarefs.control_inputs import InputOptions
 from xplane_bridge.emulator.flight.flight_model import FlightModel
+from xplane_bridge.emulator.lockstep import Fences, LockstepLoop
 from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.priority import take_realtime_priority
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.emulator.simulator import INTERNAL_VERSIONS, Simulator
 from xplane_bridge.emulator.truth import TruthFile
 from xplane_bridge.emulator.wire.faults import FaultyChannel
-from xplane_bridge.emulator.wire.server import Beacon, Server
+from xplane_bridge.emulator.wire.server import Beacon, Route, Server
 from xplane_bridge.emulator.wire.subscriptions import Address, Subscriptions
 from xplane_bridge.emulator.wire.xplane_connect import XPlaneConnect
 from xplane_bridge.scenario import ScenarioError, load_scenario
@@ -43,6 +44,8 @@ _COLLECT_EVERY = 3600
 
 #: Frames that begin later than this last as long as they really do [s].
 _SCHEDULER_JITTER_S = 0.001
+#: Of X-Plane's own dialogues; whether requests may ask for more is a question [1/s].
+_HIGHEST_RATE_HZ = 99
 #: Longest wait without looking whether to stop [s].
 _PATIENCE_S = 0.25
 
@@ -64,6 +67,7 @@ class Emulator:
         sim: The simulator; another object after a restart.
         port: The port it listens on.
         view: What draws the pictures; None: nobody sees any.
+        wants_status: Set it to have the statistics printed between two frames, as a `STATUS {json}` line.
     """
 
     def __init__(self, options: Options) -> None:
@@ -71,7 +75,10 @@ class Emulator:
         self.period = 1.0 / options.fps
         self.view: Optional[View] = None
         self.stopping = False
-        self._channel = FaultyChannel(options.fault, options.seed)
+        self.wants_status = False
+        self._channel: FaultyChannel[Route] = FaultyChannel(options.fault, options.seed)
+        self._fences = Fences() if options.stepped == "lockstep" else None
+        self._lockstep: Optional[LockstepLoop] = None
         self.sim = self._new_simulator()
         self._server: Optional[Server] = self._new_server(options.port)
         self.port = self._server.port
@@ -89,7 +96,11 @@ class Emulator:
 
     def _new_xplane_connect(self) -> Optional[XPlaneConnect]:
         port = self.options.xplane_connect_port
-        return None if port is None else XPlaneConnect(self.options.bind, port, lambda: self.sim.position())
+        if port is None:
+            return None
+        return XPlaneConnect(
+            self.options.bind, port, lambda: self.sim.position(), lambda: self.sim.model.state.terrain_elevation_m
+        )
 
     def _new_simulator(self) -> Simulator:
         o = self.options
@@ -102,7 +113,6 @@ class Emulator:
             initial=o.initial,
             sim_time_start=o.sim_time_start,
             data_rate=o.rate,
-            level_angles=o.angle_axes == "level",
             bracket_names=o.bracket_names,
             surface_failures=o.surface_failures == "act",
             totals_move=o.overridden_totals == "move",
@@ -110,8 +120,10 @@ class Emulator:
             pilot=pilot,
             inputs=inputs,
             window_size=o.window_size,
+            otherwise=o.otherwise,
         )
         sim.set_weather(*o.wind, o.turbulence, o.seed)
+        sim.on_rows(protocol.RowSelection("DSEL", o.data_rows))
         return sim
 
     def _new_pilot(self) -> Optional[ScenarioPilot]:
@@ -126,12 +138,12 @@ class Emulator:
 
     def _new_server(self, port: int) -> Server:
         sim = self.sim
-        handlers = {
+        handlers: Dict[type, Callable[..., Any]] = {
             protocol.RrefRequest: self._on_rref,
             protocol.RposRequest: self._on_rpos,
             protocol.NetworkTarget: self._on_target,
             protocol.RecoverAll: lambda _request, _sender: sim.repair_all(),
-            protocol.DrefWrite: lambda request, _: sim.on_dref(request),
+            protocol.DrefWrite: self._on_dref,
             protocol.DataPacket: lambda request, _: sim.on_data(request),
             protocol.CommandRequest: lambda request, _: sim.on_command(request),
             protocol.RowSelection: lambda request, _: sim.on_rows(request),
@@ -144,8 +156,12 @@ class Emulator:
             protocol.VehiclePose: lambda request, _: sim.on_vehicle(request),
         }
         o = self.options
-        subscriptions = Subscriptions(o.rref_split)
-        return Server(o.bind, port, handlers, subscriptions, self._channel, o.request_limit, o.answer_from)
+        subscriptions = Subscriptions(o.rref_split, replaces="same-index" not in o.otherwise)
+        # Whatever is lost would have to be asked for again by wall time.
+        limit = o.request_limit if self._fences is None else sys.maxsize
+        server = Server(o.bind, port, handlers, subscriptions, self._channel, limit, o.answer_from)
+        server.data_target = o.data_target
+        return server
 
     def _new_beacon(self) -> Optional[Beacon]:
         o = self.options
@@ -156,11 +172,20 @@ class Emulator:
 
     # --- requests that concern the wire -------------------------------------------------------------------------------
 
+    def _on_dref(self, request: protocol.DrefWrite, _sender: Address) -> Optional[str]:
+        if self._fences is not None and self._fences.write(request):
+            return None
+        return self.sim.on_dref(request)
+
     def _on_rref(self, request: protocol.RrefRequest, sender: Address) -> Optional[str]:
+        if self._fences is not None and self._fences.request(request, sender):
+            return None
         subscriptions = self.server.subscriptions
         if request.rate_hz <= 0:
             subscriptions.stop_rref(sender, request.index)
             return None
+        if request.rate_hz > _HIGHEST_RATE_HZ and "rate-above-99" in self.options.otherwise:
+            return "rate"
         slot = self.sim.store.slot(request.path)
         if slot is None:
             if self.options.unknown_datarefs == "omit":
@@ -210,23 +235,27 @@ class Emulator:
             return
         sim.step(period)
         if self.options.send_while_paused or not sim.clocks.paused:
-            server.send_frame(
-                now, self.period, sim.rows, sim.store.values, sim.selected_rows, sim.data_rate, self._rpos_packet
-            )
+            self._send(now)
         server.flush_delayed(now)
         if self._xplane_connect is not None:
             self._xplane_connect.answer()
         if self._truth is not None and sim.flying:
             self._truth.write(sim.frame, host_time)
-        if self.view is not None:
+        if self.view is not None and not (self._frames % 2 and "window-changes" in self.options.otherwise):
             self.view.show(sim)
             self._wait_for_picture(self.view)
+
+    def _send(self, now: float) -> None:
+        sim = self.sim
+        self.server.send_frame(
+            now, self.period, sim.rows, sim.store.values, sim.selected_rows, sim.data_rate, self._rpos_packet
+        )
 
     def _reads_a_load(self, server: Server) -> bool:
         """Takes what clients sent, up to a request that has files loaded; returns whether there was one."""
         sim, loads = self.sim, self.sim.loads
         takes_time = self.options.loading_time > 0.0
-        server.receive(enough=lambda: takes_time and sim.loads != loads)
+        server.receive(self.options.deaf, lambda: takes_time and sim.loads != loads)
         return takes_time and sim.loads != loads
 
     def _wait_for_picture(self, view: View) -> None:
@@ -251,6 +280,8 @@ class Emulator:
                 self._run_fast()
             elif self.options.stepped == "lines":
                 self._run_lines(sys.stdin, sys.stdout)
+            elif self._fences is not None:
+                self._run_lockstep(self._fences)
             else:
                 self._run_real_time()
         finally:
@@ -280,6 +311,9 @@ class Emulator:
             if self._beacon is not None:
                 self._beacon.poll(begin)
             self.run_frame(period, begin, time.time())
+            if self.wants_status:
+                self.wants_status = False
+                print("STATUS " + json.dumps(self.statistics()), flush=True)
             end = clock()
             self.sim.clocks.work = end - begin
             if len(self._sent_at) < _KEPT_PERIODS:
@@ -355,6 +389,19 @@ class Emulator:
         while self._frames < frames and not self.stopping:
             self.step_frames(1)
 
+    def _run_lockstep(self, fences: Fences) -> None:
+        o = self.options
+        self._lockstep = LockstepLoop(
+            lambda: self.server,
+            fences,
+            lambda: self.step_frames(1),
+            self._send,
+            lambda: self.sim.clocks.running,
+            self.period,
+            o.pace,
+        )
+        self._lockstep.run(None if o.duration is None else round(o.duration * o.fps), lambda: self.stopping)
+
     def _run_lines(self, lines: TextIO, answers: TextIO) -> None:
         """The stepping protocol: a line with a number of frames in, `STEPPED {json}` out; `quit` or the end ends it."""
         for line in lines:
@@ -372,7 +419,7 @@ class Emulator:
 
     # --- reports ------------------------------------------------------------------------------------------------------
 
-    def describe(self) -> dict:
+    def describe(self) -> Dict[str, Any]:
         """What the READY line says."""
         o = self.options
         return {
@@ -388,11 +435,14 @@ class Emulator:
             "pipeline_delay": o.pipeline_delay,
         }
 
-    def statistics(self) -> dict:
+    def statistics(self) -> Dict[str, Any]:
         """What the closing line says; periods [ms] are those between the starts of frames."""
-        report = {"frames": self._frames, "sim_time": self.sim.clocks.running}
+        report: Dict[str, Any] = {"frames": self._frames, "sim_time": self.sim.clocks.running}
         if self._server is not None:
             report["ignored"] = dict(self._server.ignored)
+            report["subscriptions"] = self._server.subscriptions.count_by_client()
+        if self._lockstep is not None:
+            report["waited_s"] = self._lockstep.waited
         if len(self._sent_at) > 2:
             errors = np.abs(np.diff(self._sent_at) - self.period) * 1e3
             report["period_error_ms"] = {

@@ -8,16 +8,19 @@ import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import List, Optional, Sequence, Tuple
+from typing import FrozenSet, List, Optional, Sequence, Tuple
 
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.aircraft import model_names
-from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_longitude
+from xplane_bridge.emulator.datarefs import otherwise
+from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_half_turn
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, parse_faults
 from xplane_bridge.emulator.wire.server import RREF_REQUESTS_PER_FRAME
 
 KINEMATIC = "kinematic"
+#: What `--otherwise` makes of values a datagram and of requests a frame.
+_SMALL_SPLIT, _FEW_REQUESTS = 20, 50
 
 
 class OptionError(ValueError):
@@ -41,7 +44,9 @@ class Options:
     pilot: Optional[Path] = None
     truth: Optional[Path] = None
     duration: Optional[float] = None
-    stepped: Optional[str] = None  #: None: real time; "lines": frames on request; "fast": as fast as it goes
+    #: None: real time; "lines": frames on request; "fast": as fast as it goes; "lockstep": as clients answer
+    stepped: Optional[str] = None
+    pace: float = 0.0  #: of lock-step: simulated time over real time at most; 0: as fast as it goes
     xplane_connect_port: Optional[int] = None
     beacon: bool = True
     beacon_group: str = protocol.BEACON_GROUP
@@ -50,10 +55,10 @@ class Options:
     request_limit: int = RREF_REQUESTS_PER_FRAME
     unknown_datarefs: str = "omit"
     bracket_names: bool = True  #: whether names with brackets are taken as a whole
-    angle_axes: str = "level"
     surface_failures: str = "act"
     overridden_totals: str = "move"
     send_while_paused: bool = True
+    otherwise: FrozenSet[str] = frozenset()  #: of `otherwise.IDS`: where X-Plane is not as the bridge assumes
     wind: Tuple[float, float] = (0.0, 0.0)  #: from [deg], speed [m/s]
     turbulence: float = 0.0
     pipeline_delay: float = 0.0
@@ -66,6 +71,9 @@ class Options:
     auto_coordination: bool = False
     loading_time: float = 0.0  #: of a flight, an aircraft, a situation that a client asks for [s]
     answer_from: Optional[str] = None  #: address of this machine that answers come from
+    data_target: Optional[Tuple[str, int]] = None  #: where DATA goes from the start
+    data_rows: Tuple[int, ...] = ()  #: rows selected for the network from the start
+    deaf: bool = False  #: whether nothing that arrives is read
     second_beacon: Optional[str] = None  #: second address of this machine that beacons come from
     fault: FaultPlan = field(default_factory=FaultPlan)
     realtime: bool = True  #: whether to ask for real-time priority
@@ -73,6 +81,18 @@ class Options:
 
     def __post_init__(self) -> None:
         self.version = xplane_names.NEWEST.get(self.version, self.version)
+        if "unknown-omitted" in self.otherwise:
+            self.unknown_datarefs = "zero"
+        if "samples-whole" in self.otherwise:
+            self.rref_split = min(self.rref_split, _SMALL_SPLIT)
+        if "requests-a-frame" in self.otherwise:
+            self.request_limit = min(self.request_limit, _FEW_REQUESTS)
+        if "paused-output" in self.otherwise:
+            self.send_while_paused = False
+        if "fcon-acts" in self.otherwise:
+            self.surface_failures = "ignored"
+        if "totals-move" in self.otherwise:
+            self.overridden_totals = "frozen"
 
 
 #: roslaunch adds arguments like `__name:=emulator` and `__log:=...`; remappings look the same.
@@ -158,8 +178,17 @@ def _parser() -> argparse.ArgumentParser:
         "--stepped",
         nargs="?",
         const="lines",
-        choices=("lines", "fast"),
-        help="not in real time: frames on request by lines on stdin, or as fast as it goes (needs --duration)",
+        choices=("lines", "fast", "lockstep"),
+        help="not in real time: frames on request by lines on stdin, or as fast as it goes (needs --duration), or each "
+        "when clients have answered the one before",
+    )
+    loop.add_argument(
+        "--pace",
+        type=float,
+        default=0.0,
+        metavar="X",
+        help="of --stepped lockstep: simulated time goes by at most so many times faster than real time (default 0: as "
+        "fast as it goes)",
     )
     loop.add_argument(
         "--priority",
@@ -211,6 +240,22 @@ def _parser() -> argparse.ArgumentParser:
         help=argparse.SUPPRESS,
     )
     wire.add_argument(
+        "--data-target",
+        metavar="IP:PORT",
+        help="DATA goes there from the start, as set on X-Plane's own screen (default: nowhere until ISE4 says)",
+    )
+    wire.add_argument(
+        "--data-rows",
+        default="",
+        metavar="LIST",
+        help="rows selected for the network from the start, e.g. 1,3,16-21 (default none)",
+    )
+    wire.add_argument(
+        "--deaf",
+        action="store_true",
+        help="nothing that arrives is read: a firewall, or version 12 that does not accept incoming connections",
+    )
+    wire.add_argument(
         "--rref-split", type=int, default=protocol.RREF_MAX_PAIRS, metavar="N", help="values a datagram (default 183)"
     )
     wire.add_argument(
@@ -228,7 +273,11 @@ def _parser() -> argparse.ArgumentParser:
         help="sim/weather/wind_speed_kt[0] is a name of its own, or an element of wind_speed_kt (default whole)",
     )
     wire.add_argument(
-        "--angle-axes", choices=("level", "origin"), default="level", help="of row 17 and RPOS (default level)"
+        "--otherwise",
+        type=_ids,
+        default=frozenset(),
+        metavar="ID,...",
+        help="where X-Plane is not as the bridge assumes: questions of docs/doctor.md, or 'all'",
     )
     wire.add_argument(
         "--surface-failures",
@@ -272,6 +321,12 @@ def _options(given: argparse.Namespace) -> Options:
     _require(given.duration is None or given.duration > 0.0, "--duration", given.duration, "more than 0")
     _require(given.speed is None or 0.0 <= given.speed <= 300.0, "--speed", given.speed, "0..300")
     _require(given.stepped != "fast" or given.duration is not None, "--stepped", "fast", "--duration with it")
+    lockstep = given.stepped == "lockstep"
+    _require(0.0 <= given.pace <= 1000.0, "--pace", given.pace, "0..1000")
+    _require(lockstep or given.pace == 0.0, "--pace", given.pace, "--stepped lockstep with it")
+    _require(
+        not (lockstep and given.fault), "--fault", given.fault, "none with --stepped lockstep, whose frames all arrive"
+    )
     _require(given.pilot is None or given.pilot.is_file(), "--pilot", given.pilot, "an existing file")
     try:
         ipaddress.IPv4Address(given.bind)
@@ -293,11 +348,12 @@ def _options(given: argparse.Namespace) -> Options:
     size = re.fullmatch(r"(\d{3,4})x(\d{3,4})", given.window or "640x480")
     xpc_port = given.xpc_port
     _require(xpc_port is None or 0 <= xpc_port <= 65535, "--xpc-port", xpc_port, "0 to 65535")
-    _require(size is not None, "--window", given.window, "WIDTHxHEIGHT, e.g. 640x480")
+    if size is None:
+        raise OptionError(f"--window {given.window}: expected WIDTHxHEIGHT, e.g. 640x480")
     group, _, beacon_port = given.beacon_target.partition(":")
     initial = InitialState(
         latitude_deg=given.lat,
-        longitude_deg=wrap_longitude(given.lon),
+        longitude_deg=wrap_half_turn(given.lon),
         heading_deg=wrap_degrees(given.heading),
         on_ground=given.start == "ground",
         altitude_m=given.alt,
@@ -321,6 +377,7 @@ def _options(given: argparse.Namespace) -> Options:
         truth=given.truth,
         duration=given.duration,
         stepped=given.stepped,
+        pace=given.pace,
         xplane_connect_port=given.xpc_port,
         beacon=given.beacon,
         beacon_group=group,
@@ -328,10 +385,10 @@ def _options(given: argparse.Namespace) -> Options:
         rref_split=given.rref_split,
         request_limit=given.request_limit,
         unknown_datarefs=given.unknown_datarefs,
-        angle_axes=given.angle_axes,
         surface_failures=given.surface_failures,
         overridden_totals=given.overridden_totals,
         send_while_paused=given.paused_output == "on",
+        otherwise=given.otherwise,
         wind=_wind(given.wind),
         turbulence=given.turbulence,
         pipeline_delay=delay,
@@ -344,6 +401,9 @@ def _options(given: argparse.Namespace) -> Options:
         auto_coordination=given.auto_coordination,
         loading_time=given.loading_time,
         answer_from=given.answer_from,
+        data_target=_endpoint("--data-target", given.data_target),
+        data_rows=_rows(given.data_rows),
+        deaf=given.deaf,
         second_beacon=given.second_beacon,
         fault=fault,
         realtime=given.priority == "realtime",
@@ -351,11 +411,42 @@ def _options(given: argparse.Namespace) -> Options:
     )
 
 
+def _ids(text: str) -> FrozenSet[str]:
+    given = frozenset(otherwise.IDS if text == "all" else filter(None, text.split(",")))
+    unknown = sorted(given - set(otherwise.IDS))
+    if unknown:
+        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected some of {', '.join(otherwise.IDS)}")
+    return given
+
+
 def _address(text: str) -> str:
     try:
         return str(ipaddress.IPv4Address(text))
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text}: expected an IPv4 address of this machine") from None
+
+
+def _endpoint(option: str, text: Optional[str]) -> Optional[Tuple[str, int]]:
+    if text is None:
+        return None
+    address, _, port = text.partition(":")
+    try:
+        good = 1 <= int(port) <= 65535 and bool(ipaddress.IPv4Address(address))
+    except ValueError:
+        good = False
+    _require(good, option, text, "IP:PORT, e.g. 192.168.1.20:49003")
+    return address, int(port)
+
+
+def _rows(text: str) -> Tuple[int, ...]:
+    rows: List[int] = []
+    for part in filter(None, (item.strip() for item in text.split(","))):
+        match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
+        first, last = (int(match.group(1)), int(match.group(2) or match.group(1))) if match else (1, 0)
+        good = first <= last < protocol.ROW_COUNT
+        _require(good, "--data-rows", text, f"numbers from 0 to {protocol.ROW_COUNT - 1} and ranges, e.g. 1,3,16-21")
+        rows += range(first, last + 1)
+    return tuple(rows)
 
 
 def _wind(text: str) -> Tuple[float, float]:

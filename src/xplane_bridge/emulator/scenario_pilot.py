@@ -8,6 +8,7 @@ from typing import List, Tuple
 from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands
 from xplane_bridge.emulator.flight.frame import Frame
 from xplane_bridge.scenario import Action, FlightSample, Player, Scenario, ScenarioError
+from xplane_bridge.scenario.world import KINDS as WORLD_KINDS
 
 _FAILURES = "sim/operation/failures/"
 _TRIMS = {"roll_trim": "aileron_trim", "pitch_trim": "elevator_trim", "yaw_trim": "rudder_trim"}
@@ -34,6 +35,8 @@ class ScenarioPilot:
             for kind, value in event.actions:
                 if kind == "failure":
                     failure_dataref(value["name"])
+                if kind in WORLD_KINDS:
+                    raise ScenarioError(f"{kind}: the emulator's pilot only flies; tx_node sets {kind} (set_{kind})")
         self.player = Player(scenario, apply_excitations=True)
         self._failed: List[str] = []
 

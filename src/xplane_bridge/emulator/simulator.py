@@ -5,18 +5,21 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
-from typing import Callable, Dict, List, Optional, Set, Tuple
+from functools import partial
+from typing import Callable, Dict, FrozenSet, List, Optional, Set, Tuple
 
 import numpy as np
 
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.datarefs import commands, data_rows, tables
-from xplane_bridge.emulator.datarefs.aircraft_systems import INHG_PA, Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.camera import Cameras
 from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, InputOptions, Pilot
-from xplane_bridge.emulator.datarefs.failure_effects import FailureEffects
+from xplane_bridge.emulator.datarefs.failure_datarefs import FailureDatarefs
 from xplane_bridge.emulator.datarefs.placement import Placements
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.controls import surface_dataref
+from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
 from xplane_bridge.emulator.flight.frame import Clocks, Frame
 
@@ -37,10 +40,16 @@ _PRESSURE_INHG = (25.5, 32.0)
 _MAX_WIND_MPS = 100.0
 _MAX_TURBULENCE_MPS = 10.0
 _MAX_LOAD_KG = 5000.0
+_STATIONS = 9
+_BAR_PER_PSI = 0.0689476
+_MPS_PER_KT = 1852.0 / 3600.0
 
+#: Place of the other aircraft, which stands where flights start.
+OTHER_AIRCRAFT = tuple(f"sim/multiplayer/position/plane1_{leaf}" for leaf in ("lat", "lon", "el"))
 #: Where the centre of gravity is set: by the first of these that the version has.
 CG_OFFSETS = ("sim/flightmodel2/misc/cg_offset_z", "sim/flightmodel/misc/cgz_ref_to_default")
 _SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot"
+_COPILOT_SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_copilot"
 _SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
 _SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
 _IDENTITY = "sim/aircraft/view/"
@@ -59,14 +68,14 @@ class Simulator:
         initial: Where flights start.
         sim_time_start: Running time at the start [s].
         data_rate: `network_data_rate` at the start [1/s].
-        level_angles: Whether row 17 and RPOS give angles relative to the local level ([?]: else to the origin's axes).
         bracket_names: Whether names with brackets are taken as a whole (see `DatarefStore`).
-        surface_failures: Whether `rel_fcon_*` act ([?]: not on every aircraft).
-        totals_move: Whether `total_*_ratio` follow the stick under `override_control_surfaces` ([?]).
+        surface_failures: Whether `rel_fcon_*` act ([? fcon-acts]: not on every aircraft).
+        totals_move: Whether `total_*_ratio` follow the stick under `override_control_surfaces` ([? totals-move]).
         load_time: Time before the first flight is loaded; until then its values are zeros [s].
         pilot: Flies until a client does.
         inputs: What moves the stick where neither a client nor the pilot does.
         window_size: Width and height of the window that the view is drawn in [px].
+        otherwise: Of `otherwise.IDS`: in what X-Plane is not as the bridge assumes.
     """
 
     def __init__(
@@ -77,7 +86,6 @@ class Simulator:
         initial: Optional[InitialState] = None,
         sim_time_start: float = 0.0,
         data_rate: int = 20,
-        level_angles: bool = True,
         bracket_names: bool = True,
         surface_failures: bool = True,
         totals_move: bool = True,
@@ -85,8 +93,10 @@ class Simulator:
         pilot: Optional[Pilot] = None,
         inputs: Optional[InputOptions] = None,
         window_size: Tuple[int, int] = (1024, 768),
+        otherwise: FrozenSet[str] = frozenset(),
     ) -> None:
         self.version = version
+        self.otherwise = otherwise
         self.is_12 = version.startswith("12")
         self.totals_move = totals_move
         self.internal_version = INTERNAL_VERSIONS[version]
@@ -96,11 +106,13 @@ class Simulator:
         self._make_model = make_model
         self.aircraft = aircraft
         self.model = make_model(aircraft)
-        self.store = DatarefStore(version, bracket_names)
+        self.store = DatarefStore(version, bracket_names and not (not self.is_12 and "wind-names" in otherwise))
         self.clocks = Clocks(running=sim_time_start)
-        self.frame = Frame(self.model.info, self.clocks)
+        self.stations_kg = [0.0] * _STATIONS
+        self.frame = Frame(self.model.info, self.clocks, from_wheels="parked-height" not in otherwise)
         self.controls = Controls()
-        self.electrics, self.instruments, self.weather = Electrics(), Instruments(), Weather()
+        self.electrics, self.weather = Electrics(), Weather()
+        self.instruments, self.copilot_instruments = Instruments(), Instruments(COPILOT)
         self.flying = False
         self.loads = 0  #: how often a flight or a situation was loaded
         self.frozen = False  #: by VEHX: the flight model stands still until an aircraft or a flight is loaded
@@ -112,16 +124,19 @@ class Simulator:
         self._surface_slots = np.zeros(0, dtype=int)
         self._surface_names: List[str] = []
         self.inputs = ControlInputs(self.store, pilot, inputs or InputOptions())
+        self.cameras = Cameras(self)
         self.table = tables.build(self)
-        self.rows = data_rows.DataRows(self.store, self.is_12, level_angles)
-        self._level_angles = level_angles
+        self.rows = data_rows.DataRows(self.store, self.is_12, otherwise)
         #: What unknown datarefs are sent from where they are sent as 0.
         self.unknown_slot = int(self.store.add("_emulator/unknown").slots[0])
         self._placements = Placements(self.store)
-        self._failures = FailureEffects(self.store, surface_failures)
+        self._failures = FailureDatarefs(self.store)
+        self._effects = FailureEffects(surface_failures)
         self.inputs.connect(self)
         self._connect_settings()
         self._bind_aircraft()
+        self.store.set(OTHER_AIRCRAFT[0], self.initial.latitude_deg)
+        self.store.set(OTHER_AIRCRAFT[1], self.initial.longitude_deg)
         if load_time <= 0.0:
             self.start_flight(self.initial)
         self.table.publish(self.frame, self.flying)
@@ -143,7 +158,7 @@ class Simulator:
         if self.flying:
             self._fly(dt)
         elif clocks.elapsed >= self._load_time:
-            self.start_flight(self.initial)
+            self._start_first()
         self.table.publish(self.frame, self.flying)
         if self.flying:
             self._publish_surfaces()
@@ -153,10 +168,12 @@ class Simulator:
             self._failed = self._failures.active()
             self._failures_dirty = False
         try:
+            if dt == 0.0 and "paused-motion" in self.otherwise:
+                self._placements.clear()
             self._placements.apply(self.model, self.frame)
             if dt > 0.0:
                 self.inputs.read(self.controls, self.model, self.frame)
-                self._failures.apply(self.controls, self._failed, self.model, dt)
+                self._effects.apply(self.controls, self._failed, self.model, dt)
                 if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
                     self.model.step(dt, self.controls)
             if not _is_sane(self.model.state):
@@ -164,14 +181,18 @@ class Simulator:
         except (FlightModelError, ArithmeticError, ValueError) as error:
             # an aircraft that broke apart: X-Plane too starts the flight again
             _LOG.warning("the flight model gave up (%s): the flight starts again", error)
-            self.start_flight(self.initial)
+            self._start_first()
         self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
         self.frame.distance += self.frame.ground_speed * dt
         self.electrics.update(dt, self.store, self.frame, self.failed)
-        self.instruments.update(self.frame, self._altimeter_inhg(), self.failed)
+        self._update_instruments()
 
-    def _altimeter_inhg(self) -> float:
-        return _clip(self.store.get(_SETTING), *_PRESSURE_INHG)
+    def _update_instruments(self) -> None:
+        self.instruments.update(self.frame, self._altimeter_inhg(), self.failed)
+        self.copilot_instruments.update(self.frame, self._altimeter_inhg(_COPILOT_SETTING), self.failed)
+
+    def _altimeter_inhg(self, setting: str = _SETTING) -> float:
+        return _clip(self.store.get(setting), *_PRESSURE_INHG)
 
     def _publish_surfaces(self) -> None:
         deflections = self.model.state.surfaces_deg
@@ -193,11 +214,12 @@ class Simulator:
         self._failures_dirty = True
 
     def hydraulic_pressure_psi(self, system: int) -> float:
-        """Pressure of system 1 or 2, driven by engine 1 or 2."""
+        """Pressure of system 1 or 2, driven by engine 1 or 2; bar where that is the switch."""
         engines = self.frame.m.engines
         running = system <= len(engines) and engines[system - 1].running
         pump = "rel_hydpmp" if system == 1 else "rel_hydpmp2"
-        return 3000.0 if running and not self.failed(pump) else 0.0
+        pressure = 3000.0 if running and not self.failed(pump) else 0.0
+        return pressure * _BAR_PER_PSI if "hydraulic-unit" in self.otherwise else pressure
 
     def pause(self, paused: bool) -> None:
         """Stops or continues simulated time."""
@@ -224,6 +246,14 @@ class Simulator:
 
     # --- flights, aircraft, situations --------------------------------------------------------------------------------
 
+    def _start_first(self) -> None:
+        """The flight as configured; on the ground where there is no steady flight with what clients have loaded."""
+        try:
+            self.start_flight(self.initial)
+        except FlightModelError as error:
+            _LOG.warning("%s: the flight starts on the ground", error)
+            self.start_flight(replace(self.initial, on_ground=True))
+
     def start_flight(self, initial: InitialState) -> None:
         """Begins a flight: levers and trims as the flight needs them, the origin where the aircraft is."""
         self._last_start = initial
@@ -233,14 +263,15 @@ class Simulator:
         self.frozen, self.flying = False, True
         self.clocks.flight = 0.0
         self._placements.clear()
-        self.instruments, self.electrics = Instruments(), Electrics()
+        self.instruments, self.copilot_instruments = Instruments(), Instruments(COPILOT)
+        self.electrics = Electrics()
         powered = float(initial.engines_running)
         for name in ("battery_on", "generator_on", "inverter_on"):
             self.store.set(_ELECTRICAL + name, powered)
         self.store.set("sim/cockpit2/switches/avionics_power_on", powered)
         self.frame.start(self.model.state)
         self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
-        self.instruments.update(self.frame, self._altimeter_inhg(), self.failed)
+        self._update_instruments()
         self.electrics.update(0.0, self.store, self.frame, self.failed)
         self._publish_surfaces()
 
@@ -331,6 +362,8 @@ class Simulator:
         """PREL: a new flight. Airports are not modelled: only start type 6 has a place of its own."""
         if request.aircraft != 0:
             return "aircraft"
+        if "prel" in self.otherwise:
+            return "otherwise"
         if request.start_type == Placements.REPEAT_LAST:
             initial: Optional[InitialState] = self._last_start
         elif request.start_type == Placements.START_AT_PLACE:
@@ -383,13 +416,22 @@ class Simulator:
 
     def on_vehicle(self, request: protocol.VehiclePose) -> Optional[str]:
         """VEHX holds the aircraft at the pose without a flight model; VEHS (X-Plane 12) puts it there once."""
-        if request.label == "VEHS" and not self.is_12:
+        if request.label == "VEHS" and (not self.is_12 or "vehs" in self.otherwise):
             return "version"
         if request.aircraft != 0:
-            return "aircraft"
+            return self._place_other(request)
         if not Placements.place_vehicle(self.model, request):
             return "value"
         self.frozen = self.frozen or request.label == "VEHX"
+        return None
+
+    def _place_other(self, request: protocol.VehiclePose) -> Optional[str]:
+        """The one other aircraft, which has a place and nothing else."""
+        if request.aircraft != 1 or "other-aircraft" in self.otherwise:
+            return "aircraft"
+        place = (request.latitude_deg, request.longitude_deg, request.elevation_m)
+        for name, value in zip(OTHER_AIRCRAFT, place):
+            self.store.set(name, value)
         return None
 
     def on_rows(self, request: protocol.RowSelection) -> Optional[str]:
@@ -418,7 +460,7 @@ class Simulator:
         if not self.flying:
             return protocol.RposResponse(*([0.0] * 13))
         f, m = self.frame, self.frame.m
-        level = self._level_angles
+        level = "rpos-axes" not in self.otherwise
         return protocol.RposResponse(
             m.longitude_deg,
             m.latitude_deg,
@@ -444,18 +486,25 @@ class Simulator:
         store.on_write("sim/time/total_flight_time_sec", set_clock("flight"))
         store.on_write("sim/time/zulu_time_sec", lambda _i, value: setattr(self.clocks, "zulu", value % 86400.0))
         store.on_write("sim/flightmodel/weight/m_fixed", self._set_payload)
+        store.on_write("sim/flightmodel/weight/m_stations", self._set_station)
         store.on_write("sim/flightmodel/weight/m_fuel", self._set_fuel)
         store.on_write(next(name for name in CG_OFFSETS if store.dataref(name).visible), self._set_balance)
-        for name in (_SEA_LEVEL, _SEA_LEVEL_TEMPERATURE):
-            store.on_write(name, lambda _i, _v: self._set_atmosphere())
+        store.on_write("sim/time/local_date_days", lambda _i, value: setattr(self.clocks, "date_days", int(value)))
+        # 12 has the sea level's air by two names, one of them in another unit
+        for name, region, factor in (
+            (_SEA_LEVEL, "sim/weather/region/sealevel_pressure_pas", INHG_PA),
+            (_SEA_LEVEL_TEMPERATURE, "sim/weather/region/sealevel_temperature_c", 1.0),
+        ):
+            store.on_write(name, partial(lambda to, k, _, value: self._set_atmosphere(to, value * k), region, factor))
+            store.on_write(region, partial(lambda to, k, _, value: self._set_atmosphere(to, value / k), name, factor))
         if not store.dataref("sim/weather/region/wind_speed_msc").visible:
             layer = "sim/weather/{}[0]"
             names = (layer.format("wind_direction_degt"), layer.format("wind_speed_kt"), layer.format("turbulence"))
-            factor = 1852.0 / 3600.0  # the layers' speed is in knots, unlike the present wind's
+            factor = _MPS_PER_KT  # the layers' speed is in knots, unlike the present wind's
         else:
             region = "sim/weather/region/"
             names = (region + "wind_direction_degt", region + "wind_speed_msc", region + "turbulence")
-            factor = 1.0
+            factor = _MPS_PER_KT if "wind-names" in self.otherwise else 1.0
         direction, speed, turbulence = names
 
         def set_wind(_index: int, _value: float) -> None:
@@ -484,12 +533,21 @@ class Simulator:
         self.model.set_loading(fuel_kg=[_clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in fuel])
 
     def _set_payload(self, _index: int, value: float) -> None:
+        if "stations" in self.otherwise:  # the payload is their sum, whatever is written
+            return
         self.model.set_loading(payload_kg=_clip(value, 0.0, _MAX_LOAD_KG))
+
+    def _set_station(self, _index: int, _value: float) -> None:
+        written = self.store.array("sim/flightmodel/weight/m_stations")
+        self.stations_kg = [_clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in written]
+        self.model.set_loading(payload_kg=sum(self.stations_kg))
 
     def _set_balance(self, _index: int, value: float) -> None:
         self.model.set_loading(cg_aft_m=value)
 
-    def _set_atmosphere(self) -> None:
+    def _set_atmosphere(self, other: str, value: float) -> None:
+        """Takes what was written; `other` is its second name, with the value there."""
+        self.store.set(other, value)
         self.model.set_atmosphere(
             temperature_offset_k=_clip(self.store.get(_SEA_LEVEL_TEMPERATURE), *_TEMPERATURE_C) - 15.0,
             sea_level_pressure_pa=_clip(self.store.get(_SEA_LEVEL), *_PRESSURE_INHG) * INHG_PA,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import struct
 from dataclasses import dataclass
-from typing import Dict, Tuple, Union
+from typing import Callable, Dict, Tuple, Union
 
 from . import constants as c
 from .fields import DecodeError, label_of, pad, require_size, text_of
@@ -207,7 +207,7 @@ class Situation:
 
 @dataclass(frozen=True)
 class VehiclePose:
-    """VEHX or VEHS: put an aircraft at a pose. Angles in degrees, elevation in metres MSL."""
+    """VEHX or VEHS: put an aircraft at a pose [? other-aircraft]. Angles in degrees, elevation in metres MSL."""
 
     label: str
     aircraft: int
@@ -364,7 +364,7 @@ def _decode_recover_all(datagram: bytes) -> RecoverAll:
     return RecoverAll()
 
 
-_REQUEST_DECODERS = {
+_REQUEST_DECODERS: Dict[bytes, Callable[[bytes], Request]] = {
     b"RREF": _decode_rref_request,
     b"RPOS": _decode_rpos_request,
     b"DREF": decode_dref,

@@ -103,6 +103,39 @@ def test_a_major_version_is_the_newest_of_its_lists(given, version):
     assert parse(["--version", given]).version == version
 
 
+def test_data_output_from_the_start():
+    options = parse(["--data-target", "192.168.1.20:49003", "--data-rows", "1, 3,16-18", "--deaf"])
+    assert options.data_target == ("192.168.1.20", 49003)
+    assert options.data_rows == (1, 3, 16, 17, 18)
+    assert options.deaf
+    assert (parse([]).data_target, parse([]).data_rows, parse([]).deaf) == (None, (), False)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("--data-target", "here:1"),
+        ("--data-target", "1.2.3.4"),
+        ("--data-target", "1.2.3.4:0"),
+        ("--data-rows", "3-1"),
+        ("--data-rows", "139"),
+        ("--data-rows", "a"),
+    ],
+)
+def test_bad_data_output_is_refused_with_an_example(option, value, capsys):
+    with pytest.raises(SystemExit):
+        parse([option, value])
+    assert f"{option} {value}: expected" in capsys.readouterr().err
+
+
+def test_sigusr1_has_it_tell_its_statistics_and_fly_on(program):
+    one = program()
+    for _ in range(2):
+        one.process.send_signal(signal.SIGUSR1)
+        assert one.line("STATUS")["subscriptions"] == {}
+    assert one.stop()[0] == 0
+
+
 def test_options_reach_where_they_belong():
     text = (
         "--start ground --lat -23.2 --lon 313.04 --heading -90 --version 12 --fps 30 --rate 50 --seed 7 --port 0 "

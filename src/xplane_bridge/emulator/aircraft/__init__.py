@@ -27,4 +27,5 @@ def create_model(name: str, seed: int = 0) -> FlightModel:
     if name not in _MODELS:
         raise FlightModelError(f"unknown aircraft '{name}': the emulator has {', '.join(_MODELS)}")
     module, cls = _MODELS[name]
-    return getattr(importlib.import_module(module), cls)(seed=seed)
+    model: FlightModel = getattr(importlib.import_module(module), cls)(seed=seed)
+    return model

@@ -76,15 +76,32 @@ class Electrics:
             self.bus_amps[bus] = load / 2.0 if alive else 0.0
 
 
+@dataclass(frozen=True)
+class Seat:
+    """The failures that act on one pilot's instruments, as leaves of `sim/operation/failures/`."""
+
+    pitot: str
+    static: str
+    vacuum: str
+    gauge: str  #: what the gauges' failures begin with
+
+
+PILOT = Seat("rel_pitot", "rel_static", "rel_vacuum", "rel_ss_")
+COPILOT = Seat("rel_pitot2", "rel_static2", "rel_vacuum2", "rel_cop_")
+
+
 @dataclass
 class Instruments:
-    """What the pilot's instruments show, blocked tubes and failed gyros included."""
+    """What one pilot's instruments show, blocked tubes and failed gyros included."""
 
+    seat: Seat = PILOT
     airspeed_kt: float = 0.0
     altitude_ft: float = 0.0
     vertical_speed_fpm: float = 0.0
     pitch_deg: float = 0.0
     roll_deg: float = 0.0
+    heading_deg: float = 0.0  #: magnetic
+    turn_rate_deg_s: float = 0.0
     _trapped_total_pa: Optional[float] = None
     _trapped_static_pa: Optional[float] = None
 
@@ -93,19 +110,33 @@ class Instruments:
         m = frame.m
         impact = m.pressure_pa * ((1.0 + 0.2 * m.mach**2) ** 3.5 - 1.0)
         total, static = m.pressure_pa + impact, m.pressure_pa
-        self._trapped_total_pa = (self._trapped_total_pa or total) if failed("rel_pitot") else None
-        self._trapped_static_pa = (self._trapped_static_pa or static) if failed("rel_static") else None
+        self._trapped_total_pa = (self._trapped_total_pa or total) if failed(self.seat.pitot) else None
+        self._trapped_static_pa = (self._trapped_static_pa or static) if failed(self.seat.static) else None
         blocked = self._trapped_total_pa is not None or self._trapped_static_pa is not None
         total = self._trapped_total_pa or total
         static = self._trapped_static_pa or static
-        if not failed("rel_ss_asi"):
+        gauge = self.seat.gauge
+        if not failed(gauge + "asi"):
             self.airspeed_kt = _calibrated_kt(total - static) if blocked else m.calibrated_airspeed_mps * MPS_TO_KT
-        if not failed("rel_ss_alt"):
+        if not failed(gauge + "alt"):
             self.altitude_ft = indicated_altitude_m(static, setting_inhg * INHG_PA) * _M_TO_FT
-        if not failed("rel_ss_vvi"):
+        if not failed(gauge + "vvi"):
             self.vertical_speed_fpm = 0.0 if self._trapped_static_pa is not None else -m.v_down_mps * MPS_TO_FPM
-        if not (failed("rel_ss_ahz") or failed("rel_vacuum")):
+        sucked = not failed(self.seat.vacuum)
+        if sucked and not failed(gauge + "ahz"):
             self.pitch_deg, self.roll_deg = frame.true_theta, frame.true_phi
+        if sucked and not failed(gauge + "dgy"):
+            self.heading_deg = frame.mag_psi
+        if not failed(gauge + "tsi"):
+            self.turn_rate_deg_s = _turn_rate_deg_s(frame)
+
+
+def _turn_rate_deg_s(frame: Frame) -> float:
+    """Rate of the heading, right +."""
+    m = frame.m
+    steepness = max(abs(math.cos(m.pitch_rad)), 1e-3)
+    rate = (m.q_rad_s * math.sin(m.roll_rad) + m.r_rad_s * math.cos(m.roll_rad)) / steepness
+    return math.degrees(rate)
 
 
 def _calibrated_kt(impact_pa: float) -> float:

@@ -5,33 +5,39 @@ Those that the list of the running version does not have are unknown to it as we
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Callable, Dict, Tuple
 
 from xplane_bridge import xplane_names
+from xplane_bridge.emulator.datarefs import camera
 from xplane_bridge.emulator.datarefs.sources import Actions
 
 _COCKPIT = "sim/cockpit2/controls/"
 _VIEW = "sim/graphics/view/"
+_HOLD = "sim/cockpit2/autopilot/altitude_hold_status"
+_CAPTURED = 2.0
 _FLAP_STEP = 0.25
 _TRIM_STEP = 0.01
 _THROTTLE_STEP = 0.05
 
-#: View commands: (view_type, whether external). The numbers are in no list of Laminar's; X-Plane plugins use these.
+#: View commands: (view_type, whether external).
 VIEWS: Dict[str, Tuple[int, bool]] = {
-    "default_view": (1000, False),
-    "forward_with_2d_panel": (1000, False),
-    "forward_with_hud": (1023, False),
-    "forward_with_nothing": (1024, False),
-    "3d_cockpit_cmnd_look": (1026, False),
-    "tower": (1014, True),
-    "runway": (1015, True),
-    "chase": (1017, True),
-    "circle": (1018, True),
-    "still_spot": (1020, True),
-    "linear_spot": (1021, True),
-    "free_camera": (1028, True),
-    "ridealong": (1031, True),
+    "default_view": (camera.PANEL, False),
+    "forward_with_2d_panel": (camera.PANEL, False),
+    "forward_with_hud": (camera.HUD, False),
+    "forward_with_nothing": (camera.NOTHING, False),
+    "3d_cockpit_cmnd_look": (camera.COCKPIT_3D, False),
+    "tower": (camera.TOWER, True),
+    "runway": (camera.RUNWAY, True),
+    "chase": (camera.CHASE, True),
+    "circle": (camera.CIRCLE, True),
+    "still_spot": (camera.STILL_SPOT, True),
+    "linear_spot": (camera.LINEAR_SPOT, True),
+    "free_camera": (camera.FREE, True),
+    "ridealong": (camera.RIDE_ALONG, True),
 }
+#: Glances: a press holds one until another view is chosen, or springs back at once [? glance-holds].
+GLANCES = {"back": camera.BACK, "straight_down": camera.STRAIGHT_DOWN}
 
 
 def commands(sim: Actions) -> Dict[str, Callable[[], None]]:
@@ -57,6 +63,7 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/operation/pause_on": lambda: sim.pause(True),
         "sim/operation/pause_off": lambda: sim.pause(False),
         "sim/operation/pause_toggle": lambda: sim.pause(not sim.clocks.paused),
+        "sim/autopilot/altitude_hold": lambda: store.set(_HOLD, 0.0 if store.get(_HOLD) else _CAPTURED),
         "sim/operation/fix_all_systems": sim.repair_all,
         "sim/operation/reset_flight": lambda: sim.start_flight(sim.initial),
         "sim/operation/freeze_toggle": toggle("sim/operation/override/override_planepath"),
@@ -96,16 +103,23 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         table[f"sim/{name}_off"] = setter(switch, 0.0)
         table[f"sim/{name}_toggle"] = toggle(switch)
     for engine in range(sim.model.info.engine_count):
-        table[f"sim/starters/engage_starter_{engine + 1}"] = lambda i=engine: sim.run_engine(i, True)
-        table[f"sim/magnetos/magnetos_off_{engine + 1}"] = lambda i=engine: sim.run_engine(i, False)
+        table[f"sim/starters/engage_starter_{engine + 1}"] = partial(sim.run_engine, engine, True)
+        table[f"sim/magnetos/magnetos_off_{engine + 1}"] = partial(sim.run_engine, engine, False)
+    if "glance-holds" not in sim.otherwise:
+        for name, view in GLANCES.items():
+            table[f"sim/view/{name}"] = partial(_look, sim, view, False)
+        table["sim/view/straight_up"] = setter(camera.GLANCE_PITCH, 90.0)
     for name, (view, external) in VIEWS.items():
-        table[f"sim/view/{name}"] = lambda view=view, external=external: _look(sim, view, external)
+        table[f"sim/view/{name}"] = partial(_look, sim, view, external)
     return table
 
 
 def _look(sim: Actions, view: int, external: bool) -> None:
-    """A new view, straight ahead."""
+    """A new view, the pilot's head straight ahead where the aircraft's file puts it."""
     sim.store.set(_VIEW + "view_type", view)
     sim.store.set(_VIEW + "view_is_external", float(external))
-    sim.store.set(_VIEW + "pilots_head_psi", 0.0)
-    sim.store.set(_VIEW + "pilots_head_the", 0.0)
+    sim.store.set(camera.GLANCE_PITCH, 0.0)
+    for angle in ("psi", "the", "phi"):
+        sim.store.set(_VIEW + f"pilots_head_{angle}", 0.0)
+    for axis in "xyz":
+        sim.store.set(_VIEW + f"pilots_head_{axis}", sim.store.get(f"sim/aircraft/view/acf_pe{axis.upper()}"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Callable, Dict, Optional, Sequence, Tuple
 
 import numpy as np
@@ -114,7 +115,9 @@ class ControlInputs:
         """Connects the datarefs that act on others."""
         store = self._store
         for name in ("throttle_ratio", "throttle_jet_rev_ratio", "mixture_ratio", "prop_ratio"):
-            store.on_write(f"{_ACTUATORS}{name}_all", lambda _i, value, name=name: store.set(_ACTUATORS + name, value))
+            store.on_write(
+                f"{_ACTUATORS}{name}_all", partial(lambda lever, _, value: store.set(_ACTUATORS + lever, value), name)
+            )
 
         def set_speed(index: int, value: float) -> None:
             highest = sim.model.info.maximum_rpm * RPM_TO_RAD_S
@@ -188,7 +191,8 @@ class ControlInputs:
             commands = self._pilot(frame.clocks.flight, frame)
             for path, value in commands.datarefs:
                 store.write(path, value)
-            if not joystick:
+            # Who takes an axis flies: the pilot lets go of levers and handles, too.
+            if not joystick and not any(self._overrides("joystick_" + axis) for axis, _attribute, _slot in _AXES):
                 self._move_handles(commands, model)
         for axis, attribute, slot in _AXES:
             name = f"sim/joystick/yoke_{axis}_ratio"

@@ -7,12 +7,13 @@ gives all 139 rows of a frame in one numpy operation; `DataRows.packet` cuts the
 from __future__ import annotations
 
 import math
-from typing import Dict, List, Optional, Sequence, Tuple, Union
+from typing import Dict, FrozenSet, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.controls import WINGS
+from xplane_bridge.emulator.datarefs.tables.systems import BY_ENGINE
 from xplane_bridge.emulator.flight.frame import M_TO_FT, MPS_TO_FPM, MPS_TO_KT, MPS_TO_MPH
 from xplane_bridge.protocol import FIFTH_BYTE, ROW_COUNT, SLOTS_PER_ROW, UNUSED_SLOT
 
@@ -34,6 +35,8 @@ _EL = "sim/cockpit2/electrical/"
 _S = "sim/cockpit2/switches/"
 _A = "sim/cockpit2/annunciators/"
 _AP = "sim/cockpit2/autopilot/"
+_ICE = "sim/cockpit2/ice/ice_"
+_CABIN = "sim/cockpit2/pressurization/"
 _ACT = "sim/cockpit2/engine/actuators/"
 
 
@@ -45,18 +48,21 @@ def _wings(leaf: str) -> List[Source]:
     return [f"sim/flightmodel/controls/{wing}_{leaf}def" for wing in WINGS]
 
 
-def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
+def layout(is_12: bool, otherwise: FrozenSet[str] = frozenset()) -> Dict[int, Sequence[Source]]:
     """Slots by row index; rows that are left out are eight zeros (systems the emulator does not have).
 
     Args:
         is_12: X-Plane 12, not 11.
-        level_angles: Whether row 17's angles are those relative to the local level (else to the origin's axes).
+        otherwise: Of `otherwise.IDS`: rows that are not as the bridge assumes.
     """
-    true = "true_" if level_angles else ""
+    true = "" if "row17-axes" in otherwise else "true_"
+    corner = "row20" in otherwise
+    hours = "row1-hours" not in otherwise
+    bits = [f"_emulator/{name}_bits" if "row115-bits" not in otherwise else f"{_A}{name}[0]" for name in BY_ENGINE]
     deg = 180.0 / math.pi
     rates: Sequence[Source] = (
         ((_P + "Prad", deg), (_P + "Qrad", deg), (_P + "Rrad", deg))
-        if is_12
+        if is_12 != ("row16" in otherwise)
         else (_P + "Qrad", _P + "Prad", _P + "Rrad")
     )
     true_airspeed, ground_speed, keas = _P + "true_airspeed", _P + "groundspeed", "_emulator/keas"
@@ -74,12 +80,12 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
         ),
         1: (
             "sim/time/total_running_time_sec",
-            "sim/time/total_running_time_sec",
+            f"sim/time/total_{'flight' if 'row1-clock' in otherwise else 'running'}_time_sec",
             "sim/time/total_flight_time_sec",
             "sim/time/timer_elapsed_time_sec",
             None,
-            "_emulator/zulu_hours",
-            "_emulator/local_hours",
+            "_emulator/zulu_hours" if hours else "sim/time/zulu_time_sec",
+            "_emulator/local_hours" if hours else "sim/time/local_time_sec",
             "sim/time/hobbs_time",
         ),
         2: (0.0, 0.0, 250000.0),
@@ -99,8 +105,9 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
             _P + "vh_ind_fpm",
             _P + "vh_ind_fpm2",
             _F + "g_nrml",
-            (_F + "g_axil", -1.0),  # the row's axial sign is the opposite of the dataref's
-            _F + "g_side",
+            # the row's axial sign is the opposite of the dataref's
+            (_F + "g_axil", 1.0 if "axial-sign" in otherwise else -1.0),
+            (_F + "g_side", -1.0 if "side-sign" in otherwise else 1.0),
             None,
         ),
         5: (
@@ -175,10 +182,10 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
             _P + "longitude",
             (_P + "elevation", M_TO_FT),
             (_P + "y_agl", M_TO_FT),
-            "sim/flightmodel/failures/onground_any",
+            "_emulator/terrain_ft" if corner else "sim/flightmodel/failures/onground_any",
             "sim/cockpit2/gauges/indicators/altitude_ft_pilot",
-            _P + "lat_ref",
-            _P + "lon_ref",
+            "_emulator/corner_latitude" if corner else _P + "lat_ref",
+            "_emulator/corner_longitude" if corner else _P + "lon_ref",
         ),
         21: (
             _P + "local_x",
@@ -196,7 +203,8 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
         25: _each(_ACT + "throttle_ratio"),
         26: _each(_E + "ENGN_thro_use"),
         27: _each(_E + "ENGN_propmode"),
-        28: _each(_E + "ENGN_prop", RAD_S_TO_RPM),  # [?] rpm or ratio by aircraft
+        # [? row28-unit] rpm or ratio by aircraft
+        28: _each(_ACT + "prop_ratio") if "row28-unit" in otherwise else _each(_E + "ENGN_prop", RAD_S_TO_RPM),
         29: _each(_E + "ENGN_mixt"),
         30: _each(_ACT + "carb_heat_ratio"),
         31: _each(_ACT + "cowl_flap_ratio"),
@@ -277,7 +285,16 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
             0.0,
             0.0,
         ),
-        109: (0.0, 0.0, 0.0, 0.0, "sim/cockpit2/ice/ice_pitot_heat_on_pilot", 0.0, 0.0, 0.0),
+        109: (
+            0.0,
+            0.0,
+            0.0,
+            _ICE + "window_heat_on",
+            _ICE + "pitot_heat_on_pilot",
+            _ICE + "pitot_heat_on_copilot",
+            0.0,
+            0.0,
+        ),
         113: tuple(
             _A + name
             for name in (
@@ -301,19 +318,10 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
             0.0,
             0.0,
         ),
-        115: (
-            _A + "fuel_pressure_low[0]",
-            _A + "oil_pressure_low[0]",
-            _A + "oil_temperature_high[0]",
-            _A + "inverter_off[0]",
-            _A + "generator_off[0]",
-            _A + "chip_detected[0]",
-            _A + "engine_fires[0]",
-            _A + "igniter_on[0]",
-        ),
+        115: (*bits, _A + "igniter_on[0]"),
         116: (
             _AP + "nav_status",
-            _AP + "altitude_hold_status",
+            "_emulator/altitude_hold_on" if "row116-modes" in otherwise else _AP + "altitude_hold_status",
             _AP + "approach_status",
             _AP + "vnav_status",
             0.0,
@@ -340,6 +348,16 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
             _AP + "altitude_hold_ft",
             _AP + "sync_hold_roll_deg",
             _AP + "sync_hold_pitch_deg",
+        ),
+        120: (
+            _CABIN + "actuators/cabin_altitude_ft",
+            _CABIN + "actuators/cabin_vvi_fpm",
+            _CABIN + "indicators/cabin_altitude_ft",
+            _CABIN + "indicators/cabin_vvi_fpm",
+            0.0,
+            _CABIN + "indicators/pressure_diffential_psi",
+            _CABIN + "actuators/dump_all_on",
+            _CABIN + "actuators/bleed_air_mode",
         ),
         121: (_EL + "APU_running", _EL + "APU_N1_percent", 0.0, 0.0, 0.0, _EL + "APU_generator_amps", 0.0, 0.0),
         123: (
@@ -382,13 +400,13 @@ def layout(is_12: bool, level_angles: bool) -> Dict[int, Sequence[Source]]:
 class DataRows:
     """Builds DATA datagrams from the store's present values."""
 
-    def __init__(self, store: DatarefStore, is_12: bool, level_angles: bool) -> None:
+    def __init__(self, store: DatarefStore, is_12: bool, otherwise: FrozenSet[str] = frozenset()) -> None:
         shape = (ROW_COUNT, SLOTS_PER_ROW)
         self._store = store
         self._sources = np.zeros(shape, dtype=int)
         self._factors = np.zeros(shape)
         self._constants = np.zeros(shape)
-        for row, slots in layout(is_12, level_angles).items():
+        for row, slots in layout(is_12, otherwise).items():
             for slot in range(SLOTS_PER_ROW):
                 self._define(row, slot, slots[slot] if slot < len(slots) else None)
         self._selected: Optional[np.ndarray] = None
@@ -396,6 +414,7 @@ class DataRows:
 
     def values(self) -> np.ndarray:
         """All rows, shape (139, 8), in wire units."""
+        self._store.watch(self._sources.ravel())
         return self._store.values[self._sources] * self._factors + self._constants
 
     def packet(self, selected: np.ndarray) -> bytes:
@@ -406,6 +425,7 @@ class DataRows:
             self._selected = selected.copy()
             self._packet = np.zeros(len(selected), dtype=self._packet.dtype)
             self._packet["row"] = selected
+            self._store.watch(self._sources[selected].ravel())
         index = self._sources[selected]
         self._packet["slots"] = self._store.values[index] * self._factors[selected] + self._constants[selected]
         return b"DATA" + bytes([FIFTH_BYTE[b"DATA"]]) + self._packet.tobytes()
@@ -419,5 +439,5 @@ class DataRows:
             path, factor = (source, 1.0) if isinstance(source, str) else source
             name, _, index = path.partition("[")
             element = int(index.rstrip("]")) if index else 0
-            self._sources[row, slot] = self._store.dataref(name).slots[element]
+            self._sources[row, slot] = self._store.locate(name, element)
             self._factors[row, slot] = factor

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Dict, Optional, Sequence
 
 import numpy as np
@@ -55,8 +56,11 @@ class Placements:
     def __init__(self, store: DatarefStore) -> None:
         self._pending: Dict[str, float] = {}
         for leaf in _WRITABLE:
-            store.on_write(_POSITION + leaf, lambda _i, value, leaf=leaf: self._pending.__setitem__(leaf, value))
-        store.on_write(_POSITION + "q", lambda i, value: self._pending.__setitem__(f"q{i}", value))
+            store.on_write(_POSITION + leaf, partial(self._remember, leaf))
+        store.on_write(_POSITION + "q", lambda i, value: self._remember(f"q{i}", i, value))
+
+    def _remember(self, leaf: str, _index: int, value: float) -> None:
+        self._pending[leaf] = value
 
     def clear(self) -> None:
         """Forgets what was written."""
@@ -120,7 +124,7 @@ class Placements:
         on_ground = height < Placements.GROUND_HEIGHT_M and request.speed_mps < Placements.GROUND_SPEED_MPS
         return InitialState(
             latitude_deg=request.latitude_deg,
-            longitude_deg=earth.wrap_longitude(request.longitude_deg),
+            longitude_deg=earth.wrap_half_turn(request.longitude_deg),
             heading_deg=earth.wrap_degrees(request.heading_deg),
             on_ground=on_ground,
             altitude_m=max(request.elevation_m, terrain_m),
@@ -157,7 +161,7 @@ class Placements:
         velocity = rotation @ np.array((state.u_mps, state.v_mps, state.w_mps))
         model.place(
             latitude_deg=request.latitude_deg,
-            longitude_deg=earth.wrap_longitude(request.longitude_deg),
+            longitude_deg=earth.wrap_half_turn(request.longitude_deg),
             altitude_m=request.elevation_m,
             roll_rad=math.radians(request.roll_deg),
             pitch_rad=math.radians(request.pitch_deg),

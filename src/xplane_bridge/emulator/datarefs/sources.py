@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol, Tuple
+from typing import FrozenSet, List, Protocol, Tuple
 
 from xplane_bridge.emulator.datarefs.aircraft_systems import Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.camera import Cameras
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, InitialState
 from xplane_bridge.emulator.flight.frame import Clocks
@@ -22,13 +23,18 @@ class Sources(LoadedAircraft, Protocol):
     internal_version: int  #: as `sim/version/xplane_internal_version` has it
     initial_data_rate: int  #: DATA datagrams a second
     window_size: Tuple[int, int]  #: width and height [px]
+    otherwise: FrozenSet[str]  #: of `otherwise.IDS`: in what X-Plane is not as the bridge assumes
+    stations_kg: List[float]  #: the payload by station, as a client has set it last (12)
     totals_move: bool  #: whether `total_*_ratio` follow the stick under `override_control_surfaces`
     store: DatarefStore
     clocks: Clocks  #: the same object for ever
     controls: Controls
     electrics: Electrics
     instruments: Instruments
+    copilot_instruments: Instruments
+    initial: InitialState  #: where flights start
     weather: Weather
+    cameras: Cameras
 
     def failed(self, leaf: str) -> bool:
         """Whether a failure dataref (`rel_...`) stands at "failed now"."""
@@ -47,6 +53,7 @@ class Actions(LoadedAircraft, Protocol):
     """What commands do to the simulator."""
 
     version: str  #: one of `xplane_names.VERSIONS`
+    otherwise: FrozenSet[str]  #: of `otherwise.IDS`
     store: DatarefStore
     clocks: Clocks
     initial: InitialState  #: where flights start

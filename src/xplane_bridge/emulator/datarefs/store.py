@@ -16,7 +16,7 @@ import enum
 import math
 import re
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Optional, Sequence, Tuple, Union
+from typing import Callable, Dict, Iterable, List, Optional, Sequence, Set, Tuple, Union
 
 import numpy as np
 
@@ -68,8 +68,8 @@ class DatarefStore:
 
     Args:
         version: Whose list holds, one of `xplane_names.VERSIONS`.
-        brackets: Whether names with brackets (`sim/weather/wind_speed_kt[0]`) are taken as a whole ([?]: else the
-            index is cut off first).
+        brackets: Whether names with brackets (`sim/weather/wind_speed_kt[0]`) are taken as a whole ([? wind-names]:
+            else the index is cut off first).
     """
 
     def __init__(self, version: str, brackets: bool = True) -> None:
@@ -78,7 +78,10 @@ class DatarefStore:
         self._version = version
         self._brackets = brackets
         self._by_name: Dict[str, Dataref] = {}
+        self._first: Dict[str, int] = {}  # slot of the first element by name: what is read most
         self._hooks: Dict[str, List[WriteHook]] = {}
+        self._watched: Set[str] = set()  # names that `dataref` has been asked for
+        self._idle: Dict[int, Callable[[], None]] = {}  # slot to what begins to compute it
 
     # --- definition ---------------------------------------------------------------------------------------------------
 
@@ -134,23 +137,58 @@ class DatarefStore:
 
     def dataref(self, name: str) -> Dataref:
         """The dataref of this name (no index); KeyError if there is none."""
-        return self._by_name[name]
+        dataref = self._by_name[name]
+        if name not in self._watched:
+            self._watched.add(name)
+            self.watch(dataref.slots)
+        return dataref
+
+    def locate(self, name: str, index: int = 0) -> int:
+        """The slot of an element, for who calls `watch` before reading it."""
+        return int(self._by_name[name].slots[index])
 
     def get(self, name: str, index: int = 0) -> float:
         """Present value of an element."""
-        return float(self.values[self._by_name[name].slots[index]])
+        slot = self._first[name] if index == 0 else int(self._by_name[name].slots[index])
+        if slot in self._idle:
+            self._idle[slot]()
+        return self.values.item(slot)
 
     def array(self, name: str) -> np.ndarray:
         """A copy of all elements."""
-        return self.values[self._by_name[name].slots]
+        elements: np.ndarray = self.values[self.dataref(name).slots]
+        return elements
+
+    def defer(self, slots: np.ndarray, begin: Callable[[], None]) -> None:
+        """Calls `begin` once, when a client or the emulator asks for one of these slots for the first time."""
+
+        def begin_once() -> None:
+            for slot in slots:
+                self._idle.pop(int(slot), None)
+            begin()
+
+        self._idle.update((int(slot), begin_once) for slot in slots)
+
+    def watch(self, slots: Iterable[int]) -> None:
+        """From now on these slots are read: what is computed has its value at once, and in each frame."""
+        if not self._idle:
+            return
+        for slot in slots:
+            begin = self._idle.get(int(slot))
+            if begin is not None:
+                begin()
+
+    def watch_all(self) -> None:
+        """Everything is computed from now on."""
+        self.watch(list(self._idle))
 
     def set(self, name: str, value: Numbers) -> None:
         """Sets all elements, as the simulator itself (write access and hooks do not apply)."""
-        self.values[self._by_name[name].slots] = value
+        self.values[self.dataref(name).slots] = value
 
     def set_text(self, name: str, text: str) -> None:
         """Sets a byte array from text, NUL-padded, cut to its size."""
-        slots = self._by_name[name].slots
+        slots = self.dataref(name).slots
         raw = text.encode("utf-8")[: len(slots) - 1]
         self.values[slots] = np.frombuffer(raw.ljust(len(slots), b"\0"), dtype=np.uint8)
 
@@ -162,7 +200,11 @@ class DatarefStore:
         An array without an index means its first element; the first element of a scalar is the scalar.
         """
         found = self._resolve(path)
-        return None if found is None or not found[0].visible else int(found[0].slots[found[1]])
+        if found is None or not found[0].visible:
+            return None
+        slot = int(found[0].slots[found[1]])
+        self.watch((slot,))
+        return slot
 
     def write(self, path: str, value: float) -> bool:
         """A client's DREF. Non-finite values are dropped (X-Plane's behaviour on them is unknown).
@@ -178,6 +220,7 @@ class DatarefStore:
         if not dataref.visible or not dataref.writable or dataref.kind is Kind.BYTE:
             return False
         stored = float(int(value)) if dataref.kind is Kind.INT else value
+        self.watch(dataref.slots)  # or who reads it first would find what is computed in place of what was written
         self.values[dataref.slots[index]] = stored
         for hook in self._hooks.get(dataref.name, ()):
             hook(index, stored)
@@ -196,7 +239,7 @@ class DatarefStore:
                 raise ValueError(f"dataref {name} has {len(slots)} elements, in X-Plane {fact.size}")
             writable = bool(fact.writable) and not read_only
             dataref = Dataref(name, Kind(fact.kind), slots, fact.is_array, writable, visible)
-        self._by_name[name] = dataref
+        self._by_name[name], self._first[name] = dataref, int(slots[0])
         return dataref
 
     def _fact(self, name: str) -> Tuple[xplane_names.Dataref, bool]:

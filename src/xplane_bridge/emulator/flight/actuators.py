@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from typing import Any, Sequence
 
 from xplane_bridge.emulator.flight.flight_model import (
     Controls,
@@ -30,7 +30,7 @@ class SurfaceActuator:
         self.spec = spec
         self.position_deg = 0.0
         self.effective_deg = 0.0
-        self._stuck_deg = None  # where a fault without an angle caught the surface
+        self._stuck_deg: float | None = None  # where a fault without an angle caught the surface
 
     def jump(self, position_deg: float) -> None:
         """Moves at once, as a write to X-Plane's dataref does, beyond the stops too."""
@@ -51,6 +51,7 @@ class SurfaceActuator:
     ) -> None:
         """The same with a fault. ``overridden``: ``target_deg`` was written by a client and acts at once."""
         spec, kind = self.spec, fault.kind
+        share = 1.0 if fault.value is None else fault.value  # `check` refuses None where a share is meant
         if kind is not SurfaceFaultKind.STUCK:
             self._stuck_deg = None
         if kind is SurfaceFaultKind.STUCK:
@@ -71,18 +72,18 @@ class SurfaceActuator:
         elif overridden:
             self.position_deg = target_deg
         else:
-            rate = spec.rate_deg_s * (fault.value if kind is SurfaceFaultKind.SLOW else 1.0)
+            rate = spec.rate_deg_s * (share if kind is SurfaceFaultKind.SLOW else 1.0)
             self._approach(min(max(target_deg, spec.minimum_deg), spec.maximum_deg), rate * dt)
-        self.effective_deg = self.position_deg * (fault.value if kind is SurfaceFaultKind.REDUCED else 1.0)
+        self.effective_deg = self.position_deg * (share if kind is SurfaceFaultKind.REDUCED else 1.0)
 
     def _approach(self, target_deg: float, reach_deg: float) -> None:
         self.position_deg += min(max(target_deg - self.position_deg, -reach_deg), reach_deg)
 
-    def save(self) -> list:
+    def save(self) -> list[float | None]:
         """What ``restore`` needs."""
         return [self.position_deg, self.effective_deg, self._stuck_deg]
 
-    def restore(self, saved: Sequence) -> None:
+    def restore(self, saved: Sequence[Any]) -> None:
         """Puts the actuator back into the state of ``save``."""
         self.position_deg, self.effective_deg, self._stuck_deg = saved
 

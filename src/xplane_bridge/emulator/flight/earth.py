@@ -19,6 +19,8 @@ GRAVITY_MPS2 = 9.80665
 #: How far the aircraft must be beyond the line where the origin changes before it jumps, so that flying along that
 #: line does not make it jump every frame [deg].
 ORIGIN_HYSTERESIS_DEG = 0.001
+#: Cosine of the pitch below which roll and heading are one.
+_VERTICAL = 1e-7
 
 
 def wrap_degrees(angle_deg: float) -> float:
@@ -29,15 +31,26 @@ def wrap_degrees(angle_deg: float) -> float:
     return 0.0 if wrapped >= 360.0 else wrapped
 
 
-def wrap_longitude(longitude_deg: float) -> float:
-    """Longitude in [-180, 180)."""
-    return wrap_degrees(longitude_deg + 180.0) - 180.0
+def wrap_half_turn(angle_deg: float) -> float:
+    """Angle or longitude in [-180, 180)."""
+    return wrap_degrees(angle_deg + 180.0) - 180.0
+
+
+def bearing_degrees(
+    latitude_deg: float, longitude_deg: float, to_latitude_deg: float, to_longitude_deg: float
+) -> float:
+    """True bearing in (-180, 180] at which the great circle to another place begins."""
+    lat, to_lat = math.radians(latitude_deg), math.radians(to_latitude_deg)
+    difference = math.radians(to_longitude_deg - longitude_deg)
+    east = math.sin(difference) * math.cos(to_lat)
+    north = math.cos(lat) * math.sin(to_lat) - math.sin(lat) * math.cos(to_lat) * math.cos(difference)
+    return math.degrees(math.atan2(east, north))
 
 
 def nominal_origin(latitude_deg: float, longitude_deg: float) -> Tuple[float, float]:
     """Where X-Plane 11 puts the local frame's origin: floor(latitude) + 0.5, nearest whole degree of longitude."""
     latitude = min(max(math.floor(latitude_deg) + 0.5, -89.5), 89.5)
-    return latitude, wrap_longitude(math.floor(longitude_deg + 0.5))
+    return latitude, wrap_half_turn(math.floor(longitude_deg + 0.5))
 
 
 def level_axes(latitude_deg: float, longitude_deg: float) -> np.ndarray:
@@ -68,7 +81,10 @@ def body_to_level(roll_deg: float, pitch_deg: float, heading_deg: float) -> np.n
 
 
 def euler_degrees(rotation: np.ndarray) -> Tuple[float, float, float]:
-    """Roll, pitch, heading (0..360) of a body-to-level rotation, in degrees."""
+    """Roll, pitch, heading (0..360) of a body-to-level rotation, in degrees; straight up or down, roll is 0."""
+    if math.hypot(rotation[0, 0], rotation[1, 0]) < _VERTICAL:
+        heading = wrap_degrees(math.degrees(math.atan2(-rotation[0, 1], rotation[1, 1])))
+        return 0.0, math.copysign(90.0, -rotation[2, 0]), heading
     roll = math.degrees(math.atan2(rotation[2, 1], rotation[2, 2]))
     pitch = math.degrees(math.asin(min(max(-rotation[2, 0], -1.0), 1.0)))
     heading = wrap_degrees(math.degrees(math.atan2(rotation[1, 0], rotation[0, 0])))
@@ -133,7 +149,7 @@ class LocalFrame:
             Whether the origin jumped.
         """
         north = latitude_deg - self.lat_ref
-        east = wrap_longitude(longitude_deg - self.lon_ref)
+        east = wrap_half_turn(longitude_deg - self.lon_ref)
         limit = 0.5 + ORIGIN_HYSTERESIS_DEG
         if abs(north) <= limit and abs(east) <= limit:
             return False
@@ -158,7 +174,8 @@ class LocalFrame:
 
     def from_level(self, latitude_deg: float, longitude_deg: float) -> np.ndarray:
         """Rotation from the local level (NED) at a place to the origin's north, east, down axes."""
-        return self.origin_axes @ level_axes(latitude_deg, longitude_deg).T
+        axes: np.ndarray = self.origin_axes @ level_axes(latitude_deg, longitude_deg).T
+        return axes
 
     def _move_to(self, lat_ref: float, lon_ref: float) -> None:
         self.lat_ref, self.lon_ref = lat_ref, lon_ref

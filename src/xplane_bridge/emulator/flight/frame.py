@@ -24,11 +24,11 @@ PA_TO_PSI = 1.0 / 6894.757293168
 SEA_LEVEL_DENSITY = 1.225
 SEA_LEVEL_PRESSURE_PA = 101325.0
 
-#: [?] Laminar: hpath + beta = psi, which makes beta positive when the nose points right of the path (wind from the
-#: left): the opposite of the aerospace sign. Working programs disagree; set to +1.0 for the other reading.
+#: [? beta-sign] Laminar: hpath + beta = psi, which makes beta positive when the nose points right of the path (wind
+#: from the left): the opposite of the aerospace sign. Working programs disagree.
 BETA_SIGN = -1.0
-#: [?] Height above ground that X-Plane shows for a parked aircraft: it measures from about the wheels, not from the
-#: centre of gravity (captured: 0.25 and 0.23 ft) [m].
+#: [? parked-height] Height above ground that X-Plane shows for a parked aircraft: it measures from about the wheels,
+#: not from the centre of gravity (captured: 0.25 and 0.23 ft) [m].
 PARKED_HEIGHT_M = 0.076
 #: Below this speed over ground hpath is noise [m/s].
 PATH_NOISE_BELOW_MPS = 0.1
@@ -38,18 +38,15 @@ _MAGNETIC_POLE_DEG = (80.7, -72.7)
 
 def magnetic_declination(latitude_deg: float, longitude_deg: float) -> float:
     """Declination of a dipole field, east positive [deg]."""
-    lat, pole = math.radians(latitude_deg), math.radians(_MAGNETIC_POLE_DEG[0])
-    difference = math.radians(_MAGNETIC_POLE_DEG[1] - longitude_deg)
-    east = math.sin(difference) * math.cos(pole)
-    north = math.cos(lat) * math.sin(pole) - math.sin(lat) * math.cos(pole) * math.cos(difference)
-    return math.degrees(math.atan2(east, north))
+    return earth.bearing_degrees(latitude_deg, longitude_deg, *_MAGNETIC_POLE_DEG)
 
 
 def indicated_altitude_m(static_pressure_pa: float, setting_pa: float) -> float:
     """What an altimeter with this setting shows."""
-    return (
-        (setting_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263 - (static_pressure_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263
-    ) * (288.15 / 0.0065)
+    ratio: float = (setting_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263 - (
+        static_pressure_pa / SEA_LEVEL_PRESSURE_PA
+    ) ** 0.190263
+    return ratio * (288.15 / 0.0065)
 
 
 @dataclass
@@ -66,6 +63,10 @@ class Clocks:
     work: float = 0.0  #: time that computing the last frame took
     elapsed: float = 0.0  #: simulated time since the emulator started, also without a flight
     paused: bool = False
+
+    def local(self, longitude_deg: float) -> float:
+        """Zone time [s]: whole hours from zulu by longitude."""
+        return (self.zulu + 3600.0 * round(longitude_deg / 15.0)) % 86400.0
 
     def advance(self, dt: float, flying: bool) -> None:
         """Simulated time passes."""
@@ -85,6 +86,7 @@ class Frame:
 
     info: ModelInfo
     clocks: Clocks = field(default_factory=Clocks)
+    from_wheels: bool = True  #: whether heights are measured as PARKED_HEIGHT_M says; else from the centre of gravity
     m: ModelState = field(default_factory=ModelState)
     local: earth.LocalFrame = field(default_factory=lambda: earth.LocalFrame(0.0, 0.0))
 
@@ -151,7 +153,7 @@ class Frame:
     @property
     def height(self) -> float:
         """Height above ground as X-Plane gives it [m]; ModelState's is that of the centre of gravity."""
-        return self.m.agl_m - self.info.standing_height_m + PARKED_HEIGHT_M
+        return self.m.agl_m - self.info.standing_height_m + PARKED_HEIGHT_M if self.from_wheels else self.m.agl_m
 
     @property
     def mag_psi(self) -> float:

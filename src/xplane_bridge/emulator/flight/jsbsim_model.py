@@ -10,9 +10,8 @@ from __future__ import annotations
 import json
 import math
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
 from pathlib import Path
-from typing import Sequence
+from typing import Any, Sequence, TypeVar
 
 import jsbsim
 
@@ -56,6 +55,7 @@ DEEPEST_PLACE_M = 0.25
 STRUTS_WORK_COSINE = 0.5
 
 _ROOT = Path(__file__).resolve().parents[1]  # holds aircraft/
+_T = TypeVar("_T")
 
 _AIR_PROPERTIES = (
     "velocities/u-aero-fps",
@@ -183,14 +183,14 @@ class JsbsimModel:
         """Engines, ratios, stall warning."""
         raise NotImplementedError
 
-    def _save_more(self) -> dict:
+    def _save_more(self) -> dict[str, Any]:
         raise NotImplementedError
 
-    def _restore_more(self, saved: dict) -> None:
+    def _restore_more(self, saved: dict[str, Any]) -> None:
         raise NotImplementedError
 
-    def _start_in_air(self, initial: InitialState) -> Controls:
-        """Trims at ``initial.airspeed_mps`` with running engines."""
+    def _start_in_air(self, initial: InitialState, speed: float) -> Controls:
+        """Trims at ``speed`` [m/s, true] with running engines."""
         raise NotImplementedError
 
     def _start_on_ground(self, initial: InitialState) -> Controls:
@@ -227,7 +227,7 @@ class JsbsimModel:
         speeds = self.usual_speeds_mps if initial.airspeed_mps is None else (initial.airspeed_mps,)
         for speed in speeds:
             try:
-                controls = self._start_in_air(replace(initial, airspeed_mps=speed))
+                controls = self._start_in_air(initial, speed)
                 break
             except FlightModelError:
                 if speed == speeds[-1]:
@@ -258,6 +258,10 @@ class JsbsimModel:
         substep = dt / count
         self._move_gear(dt, controls)
         self._correct_gravity()
+        self._run_steps(count, substep, controls)
+
+    def _run_steps(self, count: int, substep: float, controls: Controls) -> None:
+        """The JSBSim steps of a frame."""
         run = self._fdm.run
         for _ in range(count):
             if self._turbulence.intensity_mps > 0.0:
@@ -351,7 +355,7 @@ class JsbsimModel:
         """Moves the aircraft at once, but not into the ground: it is lifted until its lowest point is on it."""
         s = self.state
 
-        def chosen(new, old):
+        def chosen(new: _T | None, old: _T) -> _T:
             return old if new is None else new
 
         roll, pitch = chosen(roll_rad, s.roll_rad), chosen(pitch_rad, s.pitch_rad)
@@ -364,8 +368,8 @@ class JsbsimModel:
                 max(chosen(altitude_m, s.altitude_m), lowest),
             ),
             (roll, pitch, chosen(heading_rad, s.heading_rad)),
-            chosen(v_ned_mps, (s.v_north_mps, s.v_east_mps, s.v_down_mps)),
-            chosen(pqr_rad_s, (s.p_rad_s, s.q_rad_s, s.r_rad_s)),
+            chosen(v_ned_mps, [s.v_north_mps, s.v_east_mps, s.v_down_mps]),
+            chosen(pqr_rad_s, [s.p_rad_s, s.q_rad_s, s.r_rad_s]),
         )
         self._crashed = False
         return self._read_state(self._trimmed)
@@ -471,7 +475,8 @@ class JsbsimModel:
         self, position: Sequence[float], euler: Sequence[float], v_ned: Sequence[float], pqr: Sequence[float]
     ) -> None:
         """Sets the motion, with the loads of surfaces and rotors as they are acting from the first instant."""
-        self._set_motion(*position, euler, v_ned, pqr)
+        latitude_deg, longitude_deg, altitude_m = position
+        self._set_motion(latitude_deg, longitude_deg, altitude_m, euler, v_ned, pqr)
         self._correct_gravity()
         u, v, w, p, q, r, density = [get() for get in self._air_getters]
         for rotor in self._rotors:

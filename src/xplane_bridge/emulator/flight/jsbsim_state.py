@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import Callable, Sequence
+from typing import Any, Callable, Sequence
 
 import jsbsim
 
@@ -116,10 +116,10 @@ def new_jsbsim(root: Path, aircraft: str) -> jsbsim.FGFDMExec:
 class Properties:
     """Finds JSBSim's properties once, so that no step looks a name up."""
 
-    def __init__(self, manager) -> None:
+    def __init__(self, manager: jsbsim.FGPropertyManager) -> None:
         self._manager = manager
 
-    def _node(self, path: str):
+    def _node(self, path: str) -> Any:
         found = self._manager.get_node(path)
         if found is None:
             raise FlightModelError(f"this JSBSim has no property '{path}': jsbsim 1.2 or later is needed")
@@ -127,11 +127,13 @@ class Properties:
 
     def getter(self, path: str) -> Callable[[], float]:
         """Reads the property, in JSBSim's unit."""
-        return self._node(path).get_double_value
+        get: Callable[[], float] = self._node(path).get_double_value
+        return get
 
     def setter(self, path: str) -> Callable[[float], None]:
         """Writes the property, in JSBSim's unit."""
-        return self._node(path).set_double_value
+        put: Callable[[float], None] = self._node(path).set_double_value
+        return put
 
 
 class StateReader:

@@ -135,7 +135,7 @@ class Rotor:
         self.moment_y += -(r * hx - p * hz)
         self.moment_z += reaction * self.axis_z + q * hx
 
-    def save(self) -> list:
+    def save(self) -> list[float]:
         """What ``restore`` needs."""
         return [getattr(self, name) for name in self._SAVED]
 
@@ -271,11 +271,11 @@ class PistonEngine:
         self.cht_k = temperature_k + 70.0 + 95.0 * load
         self.oil_k = temperature_k + 45.0 + 35.0 * load
 
-    def save(self) -> list:
+    def save(self) -> list[float]:
         """What ``restore`` needs."""
         return [getattr(self, name) for name in self._SAVED]
 
-    def restore(self, saved: Sequence) -> None:
+    def restore(self, saved: Sequence[float]) -> None:
         """Puts the engine back into the state of ``save``."""
         for name, value in zip(self._SAVED, saved):
             setattr(self, name, value)

@@ -10,7 +10,7 @@ from xplane_bridge.emulator.flight.flight_model import FlightModelError
 
 
 def newton(
-    residual: Callable[[Sequence[float]], Sequence[float]],
+    residual: Callable[[np.ndarray], Sequence[float]],
     start: Sequence[float],
     steps: Sequence[float],
     limits: Sequence[Sequence[float]],
@@ -34,7 +34,7 @@ def newton(
     """
     x = np.array(start, dtype=float)
     low, high = np.array(limits, dtype=float).T
-    value = np.array(residual(x))
+    value = np.array(residual(x), dtype=float)
     for _ in range(iterations):
         if np.max(np.abs(value)) < tolerance:
             return x
@@ -42,12 +42,12 @@ def newton(
         for i, step in enumerate(steps):
             moved = x.copy()
             moved[i] += step
-            jacobian[:, i] = (np.array(residual(moved)) - value) / step
+            jacobian[:, i] = (np.array(residual(moved), dtype=float) - value) / step
         change = np.linalg.lstsq(jacobian, -value, rcond=None)[0]
         scale = 1.0
         for _ in range(6):
             candidate = np.clip(x + scale * change, low, high)
-            candidate_value = np.array(residual(candidate))
+            candidate_value = np.array(residual(candidate), dtype=float)
             if np.linalg.norm(candidate_value) < np.linalg.norm(value):
                 break
             scale *= 0.5

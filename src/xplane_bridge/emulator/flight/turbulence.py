@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Any
 
 #: Air passes a hovering aircraft too: floor of the speed at which the gust field goes by [m/s].
 MINIMUM_SPEED_MPS = 5.0
@@ -56,12 +57,12 @@ class DrydenTurbulence:
         down = sigma_w * (1.7320508 * s[3] - 0.7320508 * s[4]) / 1.4142136
         return along, across, down
 
-    def save(self) -> list:
+    def save(self) -> list[Any]:
         """What ``restore`` needs, the random generator included."""
         version, internal, gauss_next = self._random.getstate()
         return [self.intensity_mps, list(self._state), version, list(internal), gauss_next]
 
-    def restore(self, saved: list) -> None:
+    def restore(self, saved: list[Any]) -> None:
         """Goes on from the state of ``save``."""
         self.intensity_mps, self._state = saved[0], list(saved[1])
         self._random.setstate((saved[2], tuple(saved[3]), saved[4]))

@@ -9,8 +9,6 @@ from xplane_bridge.emulator.options import Options
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.emulator.view.renderer import RendererOptions, RendererProcess, Scene
 
-_VIEW = "sim/graphics/view/"
-
 
 class CockpitView:
     """What the pilot sees, in a window; see `emulator.View`.
@@ -39,7 +37,11 @@ class CockpitView:
 
     def show(self, sim: Simulator) -> None:
         """Has the frame drawn whose packets were just sent."""
-        frame, get = sim.frame, sim.store.get
+        frame = sim.frame
+        camera = sim.cameras.drawn(frame)
+        roll, pitch, heading = camera.angles
+        forward, right, down = (float(part) for part in camera.lever)
+        horizontal, vertical, shift_right, shift_up = sim.cameras.field_of_view()
         self._renderer.show(
             Scene(
                 frame=sim.clocks.frame,
@@ -52,10 +54,17 @@ class CockpitView:
                 roll_deg=frame.true_phi,
                 pitch_deg=frame.true_theta,
                 heading_deg=frame.true_psi,
-                head_heading_deg=get(_VIEW + "pilots_head_psi"),
-                head_pitch_deg=get(_VIEW + "pilots_head_the"),
-                head_roll_deg=get(_VIEW + "pilots_head_phi"),
-                field_of_view_deg=min(max(get(_VIEW + "field_of_view_deg"), 5.0), 150.0),
+                head_heading_deg=heading,
+                head_pitch_deg=pitch,
+                head_roll_deg=roll,
+                eye_forward_m=forward,
+                eye_right_m=right,
+                eye_down_m=down,
+                floor_down_m=camera.floor_down,
+                field_of_view_deg=horizontal,
+                vertical_field_of_view_deg=vertical,
+                shift_right=shift_right,
+                shift_up=shift_up,
                 airspeed_kt=frame.m.calibrated_airspeed_mps * MPS_TO_KT,
                 vertical_speed_fpm=-frame.m.v_down_mps * MPS_TO_FPM,
             )

@@ -21,7 +21,7 @@ import heapq
 import random
 import re
 from dataclasses import dataclass
-from typing import Generic, List, Optional, Tuple, TypeVar
+from typing import Any, Dict, Generic, List, Optional, Tuple, TypeVar
 
 #: Where a datagram goes to; of no concern here.
 Target = TypeVar("Target")
@@ -67,7 +67,7 @@ def parse_faults(text: str) -> FaultPlan:
     Raises:
         FaultSyntaxError: Says which item, what was expected.
     """
-    values = {}
+    values: Dict[str, Any] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):
         name, given, value = item.partition("=")
         if name in _PROBABILITIES:

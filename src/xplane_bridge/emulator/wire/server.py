@@ -12,7 +12,7 @@ import logging
 import socket
 import struct
 from collections import Counter
-from typing import Callable, Dict, Optional, Tuple
+from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 
@@ -51,14 +51,14 @@ class Server:
         self,
         bind: str,
         port: int,
-        handlers: Dict[type, Callable],
+        handlers: Dict[type, Callable[..., Any]],
         subscriptions: Subscriptions,
         channel: FaultyChannel[Route],
         request_limit: int = RREF_REQUESTS_PER_FRAME,
         answer_from: Optional[str] = None,
     ) -> None:
         self.subscriptions = subscriptions
-        self.ignored: Counter = Counter()
+        self.ignored: Counter[str] = Counter()
         self._handlers = handlers
         self._channel = channel
         self._request_limit = request_limit

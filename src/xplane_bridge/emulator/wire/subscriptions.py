@@ -14,8 +14,6 @@ from xplane_bridge.protocol import FIFTH_BYTE, RREF_MAX_PAIRS
 
 Address = Tuple[str, int]
 
-#: [?] A request for an index in use replaces it, whatever its path (what client authors found); False keeps the first.
-SAME_INDEX_REPLACES = True
 #: A due time may lie this part of a frame ahead and still belong to this frame.
 _EARLY = 0.01
 _PAIR = np.dtype([("index", "<i4"), ("value", "<f4")])
@@ -26,6 +24,10 @@ class Pacer:
 
     def __init__(self, rate_hz: float) -> None:
         self.period = 1.0 / rate_hz
+        self.restart()
+
+    def restart(self) -> None:
+        """Due in the next frame, and from then on at its rate."""
         self._next = float("-inf")
 
     def due(self, now: float, frame_period: float) -> bool:
@@ -47,9 +49,15 @@ class _Group:
 
 
 class RrefClient:
-    """One sender's subscriptions."""
+    """One sender's subscriptions.
 
-    def __init__(self) -> None:
+    Args:
+        replaces: Whether a request for an index in use replaces it, whatever its path, as client authors found
+            [? same-index]; False keeps the first.
+    """
+
+    def __init__(self, replaces: bool = True) -> None:
+        self._replaces = replaces
         self._groups: Dict[int, _Group] = {}
         self._rates: Dict[int, int] = {}  # client's index -> rate
         self._gathers: Dict[Tuple[int, ...], Tuple[np.ndarray, np.ndarray]] = {}
@@ -59,7 +67,7 @@ class RrefClient:
 
     def subscribe(self, index: int, rate_hz: int, slot: int) -> None:
         """Adds or replaces the subscription with this index."""
-        if index in self._rates and not SAME_INDEX_REPLACES:
+        if index in self._rates and not self._replaces:
             return
         self.unsubscribe(index)
         self._groups.setdefault(rate_hz, _Group(rate_hz)).slots[index] = slot
@@ -76,6 +84,11 @@ class RrefClient:
         if not group.slots:
             del self._groups[rate]
         self._gathers.clear()
+
+    def restart_pacers(self) -> None:
+        """Everything is due in the next frame, and from then on at its rate."""
+        for group in self._groups.values():
+            group.pacer.restart()
 
     def datagrams(self, now: float, frame_period: float, values: np.ndarray, split: int) -> Iterator[bytes]:
         """What is due in this frame."""
@@ -105,14 +118,15 @@ class RrefClient:
 class Subscriptions:
     """All clients of RREF and RPOS."""
 
-    def __init__(self, split: int = RREF_MAX_PAIRS) -> None:
+    def __init__(self, split: int = RREF_MAX_PAIRS, replaces: bool = True) -> None:
         self.split = split
+        self._replaces = replaces
         self.rref: Dict[Address, RrefClient] = {}
         self.rpos: Dict[Address, Pacer] = {}
 
     def request_rref(self, client: Address, index: int, rate_hz: int, slot: int) -> None:
         """A client subscribes to a slot."""
-        self.rref.setdefault(client, RrefClient()).subscribe(index, rate_hz, slot)
+        self.rref.setdefault(client, RrefClient(self._replaces)).subscribe(index, rate_hz, slot)
 
     def stop_rref(self, client: Address, index: int) -> None:
         """A client ends a subscription."""
@@ -128,6 +142,20 @@ class Subscriptions:
             self.rpos[client] = Pacer(rate_hz)
         else:
             self.rpos.pop(client, None)
+
+    def restart_pacers(self) -> None:
+        """Everything is due in the next frame, and from then on at its rate."""
+        for client in self.rref.values():
+            client.restart_pacers()
+        for pacer in self.rpos.values():
+            pacer.restart()
+
+    def count_by_client(self) -> Dict[str, int]:
+        """How many datarefs, or one position stream, each client is sent; by `address:port`."""
+        counts = {f"{host}:{port}": len(client) for (host, port), client in self.rref.items()}
+        for host, port in self.rpos:
+            counts[f"{host}:{port}"] = counts.get(f"{host}:{port}", 0) + 1
+        return counts
 
     def clear(self) -> None:
         """What a restart of X-Plane does."""

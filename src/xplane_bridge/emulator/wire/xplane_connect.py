@@ -29,10 +29,18 @@ class XPlaneConnect:
         bind: Address to listen on.
         port: UDP port; 0 for a free one.
         position: Gives the aircraft's position in the frame.
+        ground: Gives the height of the ground, which is level [m above mean sea level].
     """
 
-    def __init__(self, bind: str, port: int, position: Callable[[], protocol.RposResponse]) -> None:
+    def __init__(
+        self,
+        bind: str,
+        port: int,
+        position: Callable[[], protocol.RposResponse],
+        ground: Callable[[], float],
+    ) -> None:
         self._position = position
+        self._ground = ground
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
@@ -79,9 +87,8 @@ class XPlaneConnect:
                 latitude, longitude = here.latitude_deg, here.longitude_deg
             if not (math.isfinite(latitude) and math.isfinite(longitude)):
                 return None
-            ground = here.elevation_m - here.height_agl_m  # the emulator's ground is level
             still = (0.0, 0.0, 0.0)
-            return _TERR.pack(b"TERR\0", aircraft, latitude, longitude, ground, *_UP, *still, 0, 0)
+            return _TERR.pack(b"TERR\0", aircraft, latitude, longitude, self._ground(), *_UP, *still, 0, 0)
         return None
 
     def close(self) -> None:

@@ -394,6 +394,19 @@ def test_loading_is_shown_while_the_flight_stands(bench):
     assert shown == pytest.approx([60.0, 300.0, before - 40.0 + 90.0], abs=0.1)
 
 
+def test_payload_goes_by_stations_in_version_12_only(bench):
+    emulator = bench(aircraft="fixed_wing", version="12.10")
+    weight = "sim/flightmodel/weight/"
+    (before,) = emulator.read(weight + "m_total")
+    (payload,) = emulator.read(weight + "m_fixed")
+    assert emulator.read(weight + "m_stations[0]", weight + "m_stations[8]") == pytest.approx([payload, 0.0])
+    emulator.write({weight + "m_stations[0]": 100.0, weight + "m_stations[8]": 25.0})
+    shown = emulator.read(weight + "m_stations[0]", weight + "m_stations[8]", weight + "m_fixed", weight + "m_total")
+    assert shown == pytest.approx([100.0, 25.0, 125.0, before - payload + 125.0], abs=0.1)
+    emulator.write({weight + "m_fixed": 60.0})
+    assert emulator.read(weight + "m_stations[0]", weight + "m_stations[8]") == pytest.approx([60.0, 0.0])
+
+
 def test_prel_on_a_runway_and_again(bench):
     emulator = bench(aircraft="fixed_wing")
     client = emulator.client()

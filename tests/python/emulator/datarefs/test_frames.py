@@ -313,7 +313,7 @@ def test_rows_3_4_17_18_19_in_their_units(bench):
 def test_angles_of_row_17_can_be_those_of_the_origin(bench):
     start = InitialState(latitude_deg=37.5, longitude_deg=126.49, heading_deg=90.0)
     level = data(bench(initial=start), [17])
-    origin = data(bench(initial=start, angle_axes="origin"), [17])
+    origin = data(bench(initial=start, otherwise=frozenset({"row17-axes"})), [17])
     assert origin[17][0] - level[17][0] == pytest.approx(-0.49 * math.cos(math.radians(37.5)), abs=0.005)
 
 

@@ -227,8 +227,7 @@ def test_xplane_connect_answers_in_doubles(bench):
     assert terrain[:4] == b"TERR"
     assert len(terrain) == 62
     assert struct.unpack_from("<2d", terrain, 6) == (state.latitude_deg, state.longitude_deg)
-    height_agl = emulator.read("sim/flightmodel/position/y_agl")[0]
-    assert struct.unpack_from("<d", terrain, 22)[0] == pytest.approx(state.altitude_m - height_agl, abs=0.5)
+    assert struct.unpack_from("<d", terrain, 22)[0] == 0.0  # the ground, not the aircraft's wheels
     client.close()
 
 
@@ -484,6 +483,31 @@ def test_answers_can_come_from_a_second_address_of_the_machine(bench):
     packet, sender = client.socket.recvfrom(protocol.MAX_DATAGRAM)
     assert packet[:4] == b"RREF"
     assert sender == ("127.0.0.2", emulator.emulator.port)
+
+
+def test_a_deaf_one_sends_what_was_selected_and_answers_nothing(bench):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.settimeout(10.0)
+        emulator = bench(deaf=True, data_target=listener.getsockname(), data_rows=(1, 17, 20), rate=60)
+        client = emulator.client()
+        client.subscribe([TIME])
+        client.send(protocol.DrefWrite("sim/time/sim_speed", 4.0))
+        emulator.step(3)
+        packet = protocol.decode_data(listener.recv(protocol.MAX_DATAGRAM))
+    assert sorted(packet.as_dict()) == [1, 17, 20]
+    assert emulator.emulator.statistics()["subscriptions"] == {}
+    assert emulator.sim.store.get("sim/time/sim_speed") == 1.0
+
+
+def test_statistics_count_subscriptions_by_client(bench):
+    emulator = bench()
+    first, second = emulator.client(), emulator.client()
+    first.subscribe([TIME, "sim/time/paused"])
+    second.send(protocol.RposRequest(10))
+    emulator.step()
+    named = {f"127.0.0.1:{client.socket.getsockname()[1]}": count for client, count in ((first, 2), (second, 1))}
+    assert emulator.emulator.statistics()["subscriptions"] == named
 
 
 def test_a_machine_can_announce_itself_from_two_addresses():

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from typing import Any, Sequence, Tuple
 
+import numpy as np
+
+from xplane_bridge import compiled
 from xplane_bridge.emulator.flight import trim
 from xplane_bridge.emulator.flight.actuators import asymmetric, sided
 from xplane_bridge.emulator.flight.earth import EARTH_RADIUS_M
@@ -16,6 +19,7 @@ from xplane_bridge.emulator.flight.flight_model import (
     ModelInfo,
     ModelState,
     Side,
+    SurfaceFaultKind,
     SurfaceKind,
 )
 from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel
@@ -48,6 +52,9 @@ GOVERNOR = GovernorSpec(minimum_rpm=1400.0, maximum_rpm=2700.0, fine_deg=13.0, c
 ENGINE = PistonSpec(rated_power_w=134.2e3, rated_rpm=2700.0)
 ENGINE_ARM_M = 1.7
 
+_FAULT_NUMBERS = {kind: number for number, kind in enumerate(SurfaceFaultKind)}
+_ENGINE_FAULT_NUMBERS = {kind: number for number, kind in enumerate(EngineFault)}
+
 
 class FixedWing(JsbsimModel):
     """Twin with counter-rotating constant-speed propellers, every surface driven on its own, nothing stabilised."""
@@ -61,6 +68,7 @@ class FixedWing(JsbsimModel):
         tank_count=2,
         gear_names=("nose", "left_main", "right_main"),
         retractable_gear=True,
+        flap_detents=3,
         maximum_power_w=ENGINE.rated_power_w,
         maximum_rpm=ENGINE.rated_rpm,
         never_exceed_mps=105.0,
@@ -97,6 +105,8 @@ class FixedWing(JsbsimModel):
         self._governors = [Governor(GOVERNOR) for _ in self._rotors]
         self._engines = [PistonEngine(ENGINE) for _ in self._rotors]
         self._commands = (0.0, 0.0, 0.0)
+        # The same steps in C++, where they have been built: the same bits, some times as fast.
+        self._loop = None if compiled.core is None else compiled.core.TwinLoop(self)
 
     # ---- one step
 
@@ -121,6 +131,32 @@ class FixedWing(JsbsimModel):
     def _fly(self, dt: float, controls: Controls) -> None:
         super()._fly(dt, controls)
         self._apply_loading()
+
+    def _run_steps(self, count: int, substep: float, controls: Controls) -> None:
+        if self._loop is None:
+            super()._run_steps(count, substep, controls)
+        else:
+            self._loop.fly(self, count, substep, self._orders(controls), self._levers(controls))
+
+    def _orders(self, controls: Controls) -> Sequence[Any]:
+        """What the surfaces are to do in this frame, as `TwinLoop.fly` takes it."""
+        targets = self._mix(controls)
+        faults, overridden = controls.surface_faults, controls.override_surfaces
+        if not faults and not overridden:
+            return targets
+        orders = []
+        for spec, target in zip(self.surfaces, targets):
+            fault = faults.get(spec.name)
+            number, value = (-1, None) if fault is None else (_FAULT_NUMBERS[fault.kind], fault.value)
+            orders.append((number, value, controls.surface_deg.get(spec.name) if overridden else target, overridden))
+        return orders
+
+    def _levers(self, controls: Controls) -> Sequence[Tuple[float, float, float, int]]:
+        throttles = controls.throttle_use if controls.override_throttles else controls.throttle
+        return [
+            (throttles[i], controls.propeller[i], controls.mixture[i], _ENGINE_FAULT_NUMBERS[controls.engine_faults[i]])
+            for i in range(self.info.engine_count)
+        ]
 
     def _mix(self, controls: Controls) -> Sequence[float]:
         """Where the controls want the surfaces, in the order of ``surfaces`` [deg]."""
@@ -168,10 +204,10 @@ class FixedWing(JsbsimModel):
         if running:
             self._rotors[engine].omega = max(self._rotors[engine].omega, 100.0)
 
-    def _save_more(self) -> dict:
+    def _save_more(self) -> dict[str, Any]:
         return {"engines": [e.save() for e in self._engines], "governors": [g.integral_deg for g in self._governors]}
 
-    def _restore_more(self, saved: dict) -> None:
+    def _restore_more(self, saved: dict[str, Any]) -> None:
         for engine, values in zip(self._engines, saved["engines"]):
             engine.restore(values)
         for governor, angle in zip(self._governors, saved["governors"]):
@@ -181,12 +217,21 @@ class FixedWing(JsbsimModel):
 
     def _settle_engines(self, controls: Controls, seconds: float) -> None:
         """Runs the engines alone in the air as it passes now, until they are steady."""
+        dt = 1.0 / 60.0
+        if self._loop is None:
+            self._settle_in_python(controls, int(seconds / dt), dt)
+        else:
+            self._loop.settle(self, int(seconds / dt), dt, self._levers(controls))
+        _, temperature = self._outside_air()
+        for engine in self._engines:
+            engine.warm_up(temperature, max(engine.power / ENGINE.rated_power_w, 0.0))
+
+    def _settle_in_python(self, controls: Controls, count: int, dt: float) -> None:
         u, v, w, p, q, r, density = [get() for get in self._air_getters]
         air, rates, density = (u * FOOT_M, v * FOOT_M, w * FOOT_M), (p, q, r), density * SLUG_FT3_KG_M3
         pressure, temperature = self._outside_air()
-        dt = 1.0 / 60.0
         for i, (engine, governor, rotor) in enumerate(zip(self._engines, self._governors, self._rotors)):
-            for _ in range(int(seconds / dt)):
+            for _ in range(count):
                 governor.step(dt, rotor, controls.propeller[i])
                 rotor.air_loads(dt, air, rates, density)
                 torque = engine.torque(
@@ -199,10 +244,8 @@ class FixedWing(JsbsimModel):
                     self._fuel_kg[i] > 0.0,
                 )
                 rotor.turn(dt, torque, rates)
-            engine.warm_up(temperature, max(engine.power / ENGINE.rated_power_w, 0.0))
 
-    def _start_in_air(self, initial: InitialState) -> Controls:
-        speed = initial.airspeed_mps
+    def _start_in_air(self, initial: InitialState, speed: float) -> Controls:
         if not 30.0 <= speed <= 110.0:
             raise FlightModelError(f"airspeed {speed} m/s: the twin starts in the air at 30..110 m/s")
         controls = Controls(gear_down=False)
@@ -214,7 +257,7 @@ class FixedWing(JsbsimModel):
             engine.running = True
             self._rotors[i].omega = ENGINE.rated_rpm * math.pi / 30.0
 
-        def fly(x: Sequence[float]) -> Sequence[float]:
+        def fly(x: np.ndarray) -> Sequence[float]:
             theta, pitch_trim, throttle, roll, roll_trim, yaw_trim = (float(value) for value in x)
             controls.pitch_trim, controls.roll_trim, controls.yaw_trim = pitch_trim, roll_trim, yaw_trim
             controls.throttle[0] = controls.throttle[1] = throttle

@@ -331,7 +331,7 @@ class KinematicModel:
         north, east, down = map(float, air if on_ground else air + self._wind + self._gust)
         radius = earth.EARTH_RADIUS_M + self._alt
         self._lat += math.degrees(north / radius) * dt
-        self._lon = earth.wrap_longitude(
+        self._lon = earth.wrap_half_turn(
             self._lon + math.degrees(east / (radius * math.cos(math.radians(self._lat)))) * dt
         )
         self._alt -= down * dt

@@ -7,7 +7,9 @@ anticlockwise seen from above, 2 and 3 clockwise.
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from typing import Any, Sequence
+
+import numpy as np
 
 from xplane_bridge.emulator.flight import trim
 from xplane_bridge.emulator.flight.flight_model import (
@@ -121,8 +123,8 @@ class Multirotor(JsbsimModel):
             elif fault is EngineFault.STOPPED or not self._running[i]:
                 torque = -0.002 * min(rotor.omega / 20.0, 1.0)  # bearing friction
             else:
-                wanted = max(MAXIMUM_OMEGA * math.sqrt(self._used[i]), IDLE_OMEGA)
-                torque = electric_torque(rotor, dt, wanted, MOTOR_LAG_S, MAXIMUM_TORQUE_NM)
+                omega = max(MAXIMUM_OMEGA * math.sqrt(self._used[i]), IDLE_OMEGA)
+                torque = electric_torque(rotor, dt, omega, MOTOR_LAG_S, MAXIMUM_TORQUE_NM)
             rotor.turn(dt, torque, rates)
 
     @staticmethod
@@ -157,15 +159,14 @@ class Multirotor(JsbsimModel):
             raise FlightModelError(f"engine {engine}: this aircraft has motors 0 to 3")
         self._running[engine] = running
 
-    def _save_more(self) -> dict:
+    def _save_more(self) -> dict[str, Any]:
         return {"running": self._running, "used": self._used, "integrals": self._stabilisation.integrals}
 
-    def _restore_more(self, saved: dict) -> None:
+    def _restore_more(self, saved: dict[str, Any]) -> None:
         self._running, self._used = list(saved["running"]), list(saved["used"])
         self._stabilisation.integrals = list(saved["integrals"])
 
-    def _start_in_air(self, initial: InitialState) -> Controls:
-        speed = initial.airspeed_mps
+    def _start_in_air(self, initial: InitialState, speed: float) -> Controls:
         if not 0.0 <= speed <= MAXIMUM_SPEED_MPS:
             raise FlightModelError(
                 f"airspeed {speed} m/s: the quadrotor starts in the air at 0..{MAXIMUM_SPEED_MPS} m/s"
@@ -182,7 +183,7 @@ class Multirotor(JsbsimModel):
             ]
         self._running = [True] * 4
 
-        def fly(x: Sequence[float]) -> Sequence[float]:
+        def fly(x: np.ndarray) -> Sequence[float]:
             roll, pitch, throttle, *commands = (float(value) for value in x)
             controls.roll, controls.pitch = (angle / MAXIMUM_TILT_RAD for angle in (roll, pitch))
             controls.throttle = [throttle] * len(controls.throttle)

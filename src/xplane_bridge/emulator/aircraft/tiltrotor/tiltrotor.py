@@ -9,7 +9,9 @@ shaft joins both rotors: one engine can drive both.
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from typing import Any, Sequence
+
+import numpy as np
 
 from xplane_bridge.emulator.flight import trim
 from xplane_bridge.emulator.flight.actuators import sided
@@ -89,6 +91,7 @@ class Tiltrotor(JsbsimModel):
         tank_count=1,
         gear_names=("nose", "left_main", "right_main"),
         retractable_gear=True,
+        flap_detents=1,
         hover_thrust_vector=HOVER_RATIO,
         maximum_power_w=ENGINE_POWER_W,
         maximum_rpm=HOVER_OMEGA * 30.0 / math.pi,
@@ -158,7 +161,7 @@ class Tiltrotor(JsbsimModel):
             math.degrees(self._alpha()),
         )
         if controls.override_throttles:
-            levers, commands = controls.throttle_use, (0.0, 0.0, 0.0)
+            levers, commands = controls.throttle_use, [0.0, 0.0, 0.0]
         else:
             levers, commands = controls.throttle, self._commands
         self._throttle = [min(max(levers[i], 0.0), 1.0) for i in range(2)]
@@ -275,7 +278,7 @@ class Tiltrotor(JsbsimModel):
             raise FlightModelError(f"engine {engine}: this aircraft has engines 0 and 1")
         self._running[engine] = running
 
-    def _save_more(self) -> dict:
+    def _save_more(self) -> dict[str, Any]:
         return {
             "running": self._running,
             "nacelle": self._nacelle_deg,
@@ -286,7 +289,7 @@ class Tiltrotor(JsbsimModel):
             "integrals": self._stabilisation.integrals,
         }
 
-    def _restore_more(self, saved: dict) -> None:
+    def _restore_more(self, saved: dict[str, Any]) -> None:
         self._running, self._cyclic_deg = list(saved["running"]), list(saved["cyclic"])
         self._nacelle_deg, self._throttle = saved["nacelle"], list(saved["throttle"])
         self._power_w, self._gas_temperature_k = saved["power"], saved["temperature"]
@@ -294,8 +297,7 @@ class Tiltrotor(JsbsimModel):
 
     # ---- starts
 
-    def _start_in_air(self, initial: InitialState) -> Controls:
-        speed = initial.airspeed_mps
+    def _start_in_air(self, initial: InitialState, speed: float) -> Controls:
         if not 0.0 <= speed <= MAXIMUM_SPEED_MPS:
             raise FlightModelError(
                 f"airspeed {speed} m/s: the tiltrotor starts in the air at 0..{MAXIMUM_SPEED_MPS} m/s"
@@ -317,7 +319,7 @@ class Tiltrotor(JsbsimModel):
             v_ned = [speed * north + self._wind[0], speed * east + self._wind[1], self._wind[2]]
         pqr = (0.0, -(v_ned[0] * north + v_ned[1] * east) / (EARTH_RADIUS_M + initial.altitude_m), 0.0)
 
-        def fly(x: Sequence[float]) -> Sequence[float]:
+        def fly(x: np.ndarray) -> Sequence[float]:
             roll, pitch, throttle, *commands = (float(value) for value in x)
             controls.roll = roll / MAXIMUM_ROLL_RAD
             controls.pitch_trim = pitch / PITCH_TRIM_RAD

@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 from xplane_bridge.emulator.datarefs.sources import Sources
-from xplane_bridge.emulator.datarefs.tables import controls, engines, failures, flight, systems
+from xplane_bridge.emulator.datarefs.tables import (
+    cabin,
+    controls,
+    engines,
+    failures,
+    flight,
+    instruments,
+    navigation,
+    systems,
+    views,
+    weather,
+)
 from xplane_bridge.emulator.datarefs.tables.base import Table
 
 __all__ = ["Table", "build"]
@@ -12,6 +23,6 @@ __all__ = ["Table", "build"]
 def build(sim: Sources) -> Table:
     """Defines all datarefs in the simulator's store and returns what publishes them."""
     table = Table(sim.store)
-    for part in (flight, controls, engines, systems, failures):
+    for part in (flight, instruments, weather, controls, engines, systems, cabin, views, navigation, failures):
         part.define(table, sim)
     return table

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Callable, List, Sequence, Tuple, Union
+from dataclasses import dataclass
+from typing import Any, Callable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -12,27 +13,38 @@ from xplane_bridge.emulator.flight.frame import Frame
 Number = Union[float, int, bool]
 
 
+@dataclass(frozen=True)
+class _Computed:
+    """A dataref with its source."""
+
+    place: int  #: in the order of definition, in which they are computed
+    slots: np.ndarray
+    source: Callable[[Frame], Any]
+
+
 class Table:
     """Datarefs with their sources.
 
     `value` and `array` define datarefs that the simulator computes each frame; `setting` defines those that keep what
     was written last. Types, sizes and access are X-Plane's, and so is whether clients of this version see the name
-    (`DatarefStore`).
+    (`DatarefStore`). A dataref is not computed before it is asked for; from then on it is, in the order of
+    definition, and has the value of the present frame at once.
     """
 
     def __init__(self, store: DatarefStore) -> None:
         self.store = store
-        self._scalars: List[Tuple[int, Callable[[Frame], Number]]] = []
-        self._arrays: List[Tuple[np.ndarray, Callable[[Frame], Sequence[Number]]]] = []
-        self._always: List[Tuple[int, Callable[[Frame], Number]]] = []
-        self._scalar_slots = np.zeros(0, dtype=int)
+        self._scalars: List[_Computed] = []
+        self._arrays: List[_Computed] = []
+        self._always: List[_Computed] = []
+        self._scalar_slots: Optional[np.ndarray] = None
+        self._defined = 0
+        self._published: Optional[Tuple[Frame, bool]] = None
 
     def value(self, name: str, source: Callable[[Frame], Number], always: bool = False) -> None:
         """A scalar computed each frame; `always` also before a flight is loaded. A write lasts until the next frame."""
-        slot = int(self.store.add(name).slots[0])
-        (self._always if always else self._scalars).append((slot, source))
+        self._define(self.store.add(name).slots, source, self._always if always else self._scalars)
 
-    def array(self, name: str, source: Callable[[Frame], Sequence[Number]], size: int = 0) -> None:
+    def array(self, name: str, source: Callable[[Frame], Union[Sequence[Number], np.ndarray]], size: int = 0) -> None:
         """An array computed each frame; the source may give fewer elements than the array has, the rest stays 0.
 
         Args:
@@ -40,7 +52,7 @@ class Table:
             source: Gives the elements.
             size: Of an array of the emulator's own.
         """
-        self._arrays.append((self.store.add(name, size=size).slots, source))
+        self._define(self.store.add(name, size=size).slots, source, self._arrays)
 
     def setting(self, name: str, initial: Numbers = 0.0, read_only: bool = False) -> None:
         """A dataref that keeps what was written last, by the simulator or, if X-Plane lets it, by a client."""
@@ -51,16 +63,44 @@ class Table:
         self.store.add_alias(name, target)
 
     def publish(self, frame: Frame, flight_loaded: bool) -> None:
-        """Computes everything for this frame; before a flight is loaded, only what exists without one."""
+        """Computes what is asked for; before a flight is loaded, only what exists without one."""
+        self._published = (frame, flight_loaded)
         values = self.store.values
-        for slot, source in self._always:
-            values[slot] = source(frame)
+        for computed in tuple(self._always):
+            values[computed.slots[0]] = computed.source(frame)
         if not flight_loaded:
             return
-        if len(self._scalar_slots) != len(self._scalars):
-            self._scalar_slots = np.array([slot for slot, _ in self._scalars])
-        values[self._scalar_slots] = [source(frame) for _, source in self._scalars]
-        for slots, source in self._arrays:
-            elements = source(frame)
-            count = min(len(elements), len(slots))
-            values[slots[:count]] = elements[:count]
+        scalars = tuple(self._scalars)
+        numbers = [computed.source(frame) for computed in scalars]
+        if len(scalars) == len(self._scalars):  # no source has asked for a further one
+            if self._scalar_slots is None:
+                self._scalar_slots = np.array([computed.slots[0] for computed in scalars], dtype=int)
+            values[self._scalar_slots] = numbers
+        else:
+            values[[computed.slots[0] for computed in scalars]] = numbers
+        for computed in tuple(self._arrays):
+            self._fill(computed, frame)
+
+    def _define(self, slots: np.ndarray, source: Callable[[Frame], Any], kind: List[_Computed]) -> None:
+        computed = _Computed(self._defined, slots, source)
+        self._defined += 1
+        self.store.defer(slots, lambda: self._begin(computed, kind))
+
+    def _begin(self, computed: _Computed, kind: List[_Computed]) -> None:
+        kind.append(computed)
+        kind.sort(key=lambda other: other.place)
+        if kind is self._scalars:
+            self._scalar_slots = None
+        if self._published is None:
+            return
+        frame, flight_loaded = self._published
+        if kind is self._arrays:
+            if flight_loaded:
+                self._fill(computed, frame)
+        elif flight_loaded or kind is self._always:
+            self.store.values[computed.slots[0]] = computed.source(frame)
+
+    def _fill(self, computed: _Computed, frame: Frame) -> None:
+        elements = computed.source(frame)
+        count = min(len(elements), len(computed.slots))
+        self.store.values[computed.slots[:count]] = elements[:count]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Callable, Dict, List, Optional
 
 from xplane_bridge.emulator.datarefs.sources import Sources
@@ -165,7 +166,9 @@ def _stick(t: Table, sim: Sources) -> None:
     ):
         t.setting(f"sim/joystick/yoke_{axis}_ratio")
         t.alias(f"{_COCKPIT}yoke_{axis}_ratio", f"sim/joystick/yoke_{axis}_ratio")
-        t.value(f"sim/joystick/artstab_{axis}_ratio", lambda f, total=total, stick=stick: total(f) - stick())
+        t.value(
+            f"sim/joystick/artstab_{axis}_ratio", partial(lambda after, before, f: after(f) - before(), total, stick)
+        )
         t.setting(f"sim/joystick/servo_{axis}_ratio")
         t.value(f"{_COCKPIT}total_{axis}_ratio", _total(sim, total))
         t.value(f"{_CONTROLS2}{axis}_ratio", total)
@@ -231,14 +234,21 @@ def _limits(t: Table, sim: Sources) -> None:
         return -spec.minimum_deg if low else spec.maximum_deg
 
     for leaf, name in (("ail1", "ail1"), ("ail2", "ail2"), ("elv1", "elev")):
-        t.value(f"{limits}{name}_up", lambda _, leaf=leaf: travel(leaf, True))
-        t.value(f"{limits}{name}_dn", lambda _, leaf=leaf: travel(leaf, False))
+        t.value(f"{limits}{name}_up", partial(lambda part, _: travel(part, True), leaf))
+        t.value(f"{limits}{name}_dn", partial(lambda part, _: travel(part, False), leaf))
     t.value(limits + "rudd_lr", lambda _: travel("rud1", True))
     t.value(limits + "rudd_rr", lambda _: travel("rud1", False))
+    t.value(limits + "splr_up", lambda _: 0.0)
+    t.value(limits + "sbrk_up", lambda _: travel("spo1", False))
+    t.value(limits + "flap_detents", lambda f: f.info.flap_detents)
+    t.value("sim/aircraft/gear/acf_gear_retract", lambda f: f.info.retractable_gear)
+    t.value("sim/aircraft/vtolcontrols/acf_vectEQ", lambda f: f.info.hover_thrust_vector is not None)
+    t.value("sim/aircraft2/metadata/is_vtol", lambda f: f.info.hover_thrust_vector is not None)
+    t.value("sim/aircraft2/metadata/is_helicopter", lambda _: False)
     trims = {"elev": ("elevator", "elv1"), "rudd": ("rudder", "rud1")}
     for name, (kind, leaf) in trims.items():
-        t.value(f"{limits}max_trim_{name}", lambda _, kind=kind, leaf=leaf: _trim_part(sim, kind, leaf))
-        t.value(f"{limits}min_trim_{name}", lambda _, kind=kind, leaf=leaf: _trim_part(sim, kind, leaf))
+        t.value(f"{limits}max_trim_{name}", partial(lambda trim, part, _: _trim_part(sim, trim, part), kind, leaf))
+        t.value(f"{limits}min_trim_{name}", partial(lambda trim, part, _: _trim_part(sim, trim, part), kind, leaf))
 
 
 def _spec(sim: Sources, leaf: str) -> Optional[SurfaceSpec]:

@@ -11,6 +11,7 @@ from xplane_bridge.emulator.flight.flight_model import EngineState
 from xplane_bridge.emulator.flight.frame import PA_TO_INHG, PA_TO_PSI, Frame
 
 _ENGINE = "sim/flightmodel/engine/"
+_GAUGE = "sim/aircraft/engine/acf_"
 _INDICATORS = "sim/cockpit2/engine/indicators/"
 _ACTUATORS = "sim/cockpit2/engine/actuators/"
 RPM_TO_RAD_S = math.pi / 30.0
@@ -36,7 +37,10 @@ def define(t: Table, sim: Sources) -> None:
     t.setting(_ACTUATORS + "throttle_ratio")
     t.alias(_ENGINE + "ENGN_thro", _ACTUATORS + "throttle_ratio")
     # reverse is the negative part of the lever by every name; X-Plane has a mode of its own for it
-    t.alias(_ACTUATORS + "throttle_jet_rev_ratio", _ACTUATORS + "throttle_ratio")
+    if "reverse-lever" in sim.otherwise:
+        t.setting(_ACTUATORS + "throttle_jet_rev_ratio")
+    else:
+        t.alias(_ACTUATORS + "throttle_jet_rev_ratio", _ACTUATORS + "throttle_ratio")
     for name in ("throttle_ratio_all", "throttle_jet_rev_ratio_all"):
         t.setting(_ACTUATORS + name)
     t.setting(_ACTUATORS + "mixture_ratio")
@@ -63,6 +67,8 @@ def define(t: Table, sim: Sources) -> None:
     t.setting(_ACTUATORS + "fadec_on")
     for name in ("carb_heat_ratio", "cowl_flap_ratio"):
         t.setting(_ACTUATORS + name)
+    for gauge in ("ITT", "EGT", "CHT", "oilT"):
+        t.setting(f"{_GAUGE}{gauge}_is_C", 1)
     # what the engines do
     t.array(_ENGINE + "ENGN_running", each(lambda e: e.running))
     for name, source in (
@@ -75,10 +81,10 @@ def define(t: Table, sim: Sources) -> None:
         ("ENGN_power", lambda e: e.power_w),
         ("ENGN_FF_", lambda e: e.fuel_flow_kg_s),
         ("ENGN_MPR", lambda e: e.manifold_pressure_pa * PA_TO_INHG),
-        ("ENGN_EGT_c", lambda e: _celsius(e.exhaust_gas_temperature_k)),
-        ("ENGN_ITT_c", lambda e: _celsius(e.exhaust_gas_temperature_k)),
-        ("ENGN_CHT_c", lambda e: _celsius(e.cylinder_head_temperature_k)),
-        ("ENGN_oil_temp_c", lambda e: _celsius(e.oil_temperature_k)),
+        ("ENGN_EGT_c", lambda e: _shown(e.exhaust_gas_temperature_k, sim, "EGT")),
+        ("ENGN_ITT_c", lambda e: _shown(e.exhaust_gas_temperature_k, sim, "ITT")),
+        ("ENGN_CHT_c", lambda e: _shown(e.cylinder_head_temperature_k, sim, "CHT")),
+        ("ENGN_oil_temp_c", lambda e: _shown(e.oil_temperature_k, sim, "oilT")),
         ("ENGN_oil_press_psi", lambda e: e.oil_pressure_pa * PA_TO_PSI),
         ("ENGN_N1_", lambda e: e.rpm * 100.0 / max(sim.model.info.maximum_rpm, 1.0)),
         ("ENGN_N2_", lambda e: e.rpm * 100.0 / max(sim.model.info.maximum_rpm, 1.0)),
@@ -112,11 +118,18 @@ def define(t: Table, sim: Sources) -> None:
     t.setting(_INDICATORS + "carburetor_temperature_C", 15.0)
     engines2 = "sim/flightmodel2/engines/"
     t.array(engines2 + "nacelle_vertical_angle_deg", each(lambda e: e.nacelle_deg))
+    t.alias(engines2 + "starter_is_running", _ACTUATORS + "starter_hit")
     t.array(engines2 + "engine_is_burning_fuel", each(lambda e: e.running))
     t.array(engines2 + "engine_rotation_speed_rad_sec", each(lambda e: e.rpm * RPM_TO_RAD_S))
     t.array(engines2 + "prop_rotation_speed_rad_sec", each(lambda e: e.prop_rpm * RPM_TO_RAD_S))
     t.array(engines2 + "prop_pitch_deg", each(lambda e: e.blade_pitch_deg))
     t.array(engines2 + "throttle_used_ratio", each(lambda e: e.throttle))
+
+
+def _shown(kelvin: float, sim: Sources, gauge: str) -> float:
+    """What the aircraft's gauge shows: degrees Celsius, or Fahrenheit where its file says so."""
+    celsius = _celsius(kelvin)
+    return celsius if sim.store.get(f"{_GAUGE}{gauge}_is_C") else celsius * 1.8 + 32.0
 
 
 def _celsius(kelvin: float) -> float:

@@ -1,8 +1,9 @@
-"""Identity, electrics, hydraulics, switches, autopilot, annunciators, views, network and version."""
+"""Identity, electrics, hydraulics, switches, autopilot, annunciators, network and version."""
 
 from __future__ import annotations
 
-from typing import List
+from functools import partial
+from typing import Iterable, List
 
 from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import Table
@@ -12,7 +13,16 @@ _ELECTRICAL = "sim/cockpit2/electrical/"
 _SWITCHES = "sim/cockpit2/switches/"
 _AUTOPILOT = "sim/cockpit2/autopilot/"
 _ANNUNCIATORS = "sim/cockpit2/annunciators/"
-_VIEW = "sim/graphics/view/"
+#: Annunciators with an element for each engine, in the order of row 115.
+BY_ENGINE = (
+    "fuel_pressure_low",
+    "oil_pressure_low",
+    "oil_temperature_high",
+    "inverter_off",
+    "generator_off",
+    "chip_detected",
+    "engine_fires",
+)
 
 
 def define(t: Table, sim: Sources) -> None:
@@ -23,8 +33,6 @@ def define(t: Table, sim: Sources) -> None:
     _hydraulics(t, sim)
     _autopilot(t)
     _annunciators(t, sim)
-    _view(t, sim)
-    _radios(t)
 
 
 def _version_and_network(t: Table, sim: Sources) -> None:
@@ -37,6 +45,8 @@ def _version_and_network(t: Table, sim: Sources) -> None:
     t.setting(dataout + "is_external_visual")
     t.setting(dataout + "multiplayer_ip")
     t.setting("sim/operation/misc/debug_network")
+    for leaf in ("lat", "lon", "el"):
+        t.setting(f"sim/multiplayer/position/plane1_{leaf}")
 
 
 def _identity(t: Table) -> None:
@@ -81,15 +91,13 @@ def _electrical(t: Table, sim: Sources) -> None:
         "taxi_light_on",
     ):
         t.setting(_SWITCHES + name)
-    t.setting("sim/cockpit2/ice/ice_pitot_heat_on_pilot")
-    t.setting("sim/cockpit2/ice/ice_pitot_heat_on_copilot")
 
 
 def _hydraulics(t: Table, sim: Sources) -> None:
     for number in (1, 2):
         t.value(
             f"sim/cockpit2/hydraulics/indicators/hydraulic_pressure_{number}",
-            lambda _, n=number: sim.hydraulic_pressure_psi(n),
+            partial(lambda system, _: sim.hydraulic_pressure_psi(system), number),
         )
         t.setting(f"sim/cockpit2/hydraulics/indicators/hydraulic_fluid_ratio_{number}", 1.0)
     t.setting("sim/cockpit2/hydraulics/actuators/electric_hydraulic_pump_on")
@@ -120,6 +128,7 @@ def _autopilot(t: Table) -> None:
         t.setting(_AUTOPILOT + name)
     for name in (
         "airspeed_dial_kts_mach",
+        "airspeed_is_mach",
         "airspeed_dial_kts",
         "heading_dial_deg_mag_pilot",
         "heading_dial_deg_mag_copilot",
@@ -152,6 +161,9 @@ def _annunciators(t: Table, sim: Sources) -> None:
     t.value(a + "stall_warning_ratio", lambda f: f.m.stall_warning)
     t.value(a + "gear_unsafe", lambda f: any(0.01 < wheel.extended < 0.99 for wheel in f.m.gear))
     t.value(a + "gear_warning", lambda f: _gear_warning(f))
+    for name in BY_ENGINE:
+        t.value(f"_emulator/{name}_bits", partial(lambda lights, _: _bits(sim.store.array(a + lights)), name))
+    t.value("_emulator/altitude_hold_on", lambda _: sim.store.get(_AUTOPILOT + "altitude_hold_status") > 0.0)
     t.array(a + "fuel_pressure_low", lambda f: [not e.running for e in f.m.engines])
     t.array(a + "oil_pressure_low", lambda f: [e.oil_pressure_pa < 1e5 for e in f.m.engines])
     t.array(a + "oil_temperature_high", lambda f: [e.oil_temperature_k > 395.0 for e in f.m.engines])
@@ -160,6 +172,10 @@ def _annunciators(t: Table, sim: Sources) -> None:
     t.array(a + "chip_detected", lambda _: _failed(sim, "rel_chipde"))
     t.array(a + "engine_fires", lambda _: _failed(sim, "rel_engfir"))
     t.setting(a + "igniter_on")
+
+
+def _bits(values: Iterable[float]) -> int:
+    return sum(1 << place for place, value in enumerate(values) if value)
 
 
 def _failed(sim: Sources, stem: str) -> List[bool]:
@@ -175,35 +191,3 @@ def _gear_warning(f: Frame) -> bool:
 def _master_caution(f: Frame, sim: Sources) -> bool:
     engines = any(not engine.running for engine in f.m.engines)
     return engines or sim.electrics.bus_volts[0] < 25.0
-
-
-def _view(t: Table, sim: Sources) -> None:
-    t.setting(_VIEW + "view_type", 1000)
-    t.setting(_VIEW + "view_is_external")
-    t.setting(_VIEW + "field_of_view_deg", 60.0)
-    t.setting(_VIEW + "vertical_field_of_view_deg", 46.8264)
-    for name in ("field_of_view_vertical_deg", "field_of_view_horizontal_deg", "field_of_view_roll_deg"):
-        t.setting(_VIEW + name)
-    t.setting(_VIEW + "window_width", sim.window_size[0], read_only=True)
-    t.setting(_VIEW + "window_height", sim.window_size[1], read_only=True)
-    for name in ("pilots_head_x", "pilots_head_y", "pilots_head_z"):
-        t.setting(_VIEW + name)
-    for name in ("pilots_head_psi", "pilots_head_the", "pilots_head_phi"):
-        t.setting(_VIEW + name)
-    t.value(_VIEW + "view_x", lambda f: f.position[0])
-    t.value(_VIEW + "view_y", lambda f: f.position[1])
-    t.value(_VIEW + "view_z", lambda f: f.position[2])
-    t.value(_VIEW + "view_pitch", lambda f: f.theta + sim.store.get(_VIEW + "pilots_head_the"))
-    t.value(_VIEW + "view_roll", lambda f: f.phi)
-    t.value(_VIEW + "view_heading", lambda f: (f.psi + sim.store.get(_VIEW + "pilots_head_psi")) % 360.0)
-    t.setting("sim/graphics/VR/enabled")
-
-
-def _radios(t: Table) -> None:
-    """Frequencies in 10 kHz; nothing transmits."""
-    radios = "sim/cockpit/radios/"
-    for name, frequency in (("com1", 12190), ("com2", 12280), ("nav1", 11030), ("nav2", 11130)):
-        t.setting(f"{radios}{name}_freq_hz", frequency)
-        t.setting(f"{radios}{name}_stdby_freq_hz", frequency + 100)
-    t.setting(radios + "transponder_code", 1200)
-    t.setting(radios + "transponder_mode", 2)

@@ -30,6 +30,8 @@ from xplane_bridge.emulator.view.renderer.scene import RECORD_BYTES, Scene
 _POLL_S = 0.05
 #: Pictures enough for the longest pipeline delay at 120 frames a second; then drawing waits.
 _LONGEST_QUEUE = 26
+#: Of the scene: the camera in the aircraft, as it was drawn.
+CAMERA_COLUMNS = ("eye_forward_m", "eye_right_m", "eye_down_m", "head_roll_deg", "head_pitch_deg", "head_heading_deg")
 #: The swapping thread gets the interpreter so soon from the drawing one [s].
 _SWITCH_INTERVAL_S = 0.0002
 
@@ -166,7 +168,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     log = args.swap_log.open("w", newline="") if args.swap_log else None
     writer = csv.writer(log) if log else None
     if writer:
-        writer.writerow(("frame", "sim_time", "frame_monotonic_ns", "swap_begin_ns", "swap_end_ns"))
+        times = ("frame", "sim_time", "frame_monotonic_ns", "swap_begin_ns", "swap_end_ns")
+        writer.writerow((*times, *CAMERA_COLUMNS))
     if args.realtime:
         take_realtime_priority()
     print("READY", flush=True)
@@ -183,7 +186,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         window.swap()
         if writer:
             scene = picture.scene
-            writer.writerow((scene.frame, repr(scene.sim_time), scene.time_ns, begin, time.time_ns()))
+            camera = (repr(getattr(scene, name)) for name in CAMERA_COLUMNS)
+            writer.writerow((scene.frame, repr(scene.sim_time), scene.time_ns, begin, time.time_ns(), *camera))
     if log:
         log.close()
     return 0

@@ -32,40 +32,56 @@ class Camera:
     Attributes:
         eye: East, north, up [m] over the ground, relative to the anchor.
         to_world: Rotation from camera axes (right, down, forward) to east, north, up.
-        focal: [px]
+        focal: [px] across
+        focals: [px] across and down
     """
 
     def __init__(self, scene: Scene, size: tuple[int, int], anchor: tuple[float, float]) -> None:
         width, height = size
         self.size = size
         self.focal = 0.5 * width / math.tan(math.radians(0.5 * scene.field_of_view_deg))
-        self.centre = ((width - 1) / 2.0, (height - 1) / 2.0)
+        upwards = scene.vertical_field_of_view_deg
+        down = 0.5 * height / math.tan(math.radians(0.5 * upwards)) if upwards else self.focal
+        self.focals = np.array((self.focal, down))
+        self.centre = ((width - 1) / 2.0 - scene.shift_right * width, (height - 1) / 2.0 + scene.shift_up * height)
         north = math.radians(scene.latitude_deg - anchor[0]) * earth.EARTH_RADIUS_M
-        east = math.radians(earth.wrap_longitude(scene.longitude_deg - anchor[1])) * earth.EARTH_RADIUS_M
+        east = math.radians(earth.wrap_half_turn(scene.longitude_deg - anchor[1])) * earth.EARTH_RADIUS_M
         east *= math.cos(math.radians(anchor[0]))
-        self.eye = np.array((east, north, max(scene.altitude_m - scene.terrain_m, _LOWEST_EYE_M)))
         body = earth.body_to_level(scene.roll_deg, scene.pitch_deg, scene.heading_deg)
+        self._lever = np.array((scene.eye_forward_m, scene.eye_right_m, scene.eye_down_m))
+        lever = _ENU_OF_NED @ body @ self._lever
+        height_m = max(scene.altitude_m - scene.terrain_m + lever[2], _LOWEST_EYE_M)
+        self.eye = np.array((east + lever[0], north + lever[1], height_m))
         head = earth.body_to_level(scene.head_roll_deg, scene.head_pitch_deg, scene.head_heading_deg)
-        self.to_world = _ENU_OF_NED @ body @ head @ _CAMERA_IN_BODY
+        self._in_body = head @ _CAMERA_IN_BODY
+        self.to_world = _ENU_OF_NED @ body @ self._in_body
         self.rays = self.to_world @ np.array(
             (
-                (1.0 / self.focal, 0.0, -self.centre[0] / self.focal),
-                (0.0, 1.0 / self.focal, -self.centre[1] / self.focal),
+                (1.0 / self.focals[0], 0.0, -self.centre[0] / self.focals[0]),
+                (0.0, 1.0 / self.focals[1], -self.centre[1] / self.focals[1]),
                 (0.0, 0.0, 1.0),
             )
         )  #: from homogeneous pixels to directions east, north, up of unit depth
 
     def to_camera(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) east, north, up [m] in camera axes."""
-        return (points - self.eye) @ self.to_world
+        turned: np.ndarray = (points - self.eye) @ self.to_world
+        return turned
+
+    def body_to_camera(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) forward, right, down of the aircraft's reference point [m] in camera axes."""
+        turned: np.ndarray = (points - self._lever) @ self._in_body
+        return turned
 
     def directions_to_camera(self, directions: np.ndarray) -> np.ndarray:
         """Directions (..., 3), of things infinitely far away."""
-        return directions @ self.to_world
+        turned: np.ndarray = directions @ self.to_world
+        return turned
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Pixels (n, 2) of points in camera axes, in front of the near plane."""
-        return points[:, :2] * (self.focal / points[:, 2:3]) + self.centre
+        pixels: np.ndarray = points[:, :2] * (self.focals / points[:, 2:3]) + self.centre
+        return pixels
 
     def polygon(self, in_camera: np.ndarray) -> np.ndarray | None:
         """Pixels of a convex polygon in camera axes, cut at the near plane; None when nothing is in front of it."""

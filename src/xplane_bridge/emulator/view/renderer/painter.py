@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,6 +14,8 @@ from xplane_bridge.emulator.view.renderer.strip import draw_strip, strip_height
 from xplane_bridge.emulator.view.renderer.world import GRAINS, make_world
 
 _ZENITH = np.array((200, 120, 52), np.float32)  # blue, green, red
+_FLOOR = (46, 52, 60)
+_FLOOR_M = (0.9, 0.8)  #: half length and half width
 _HAZE = np.array((226, 210, 192), np.float32)
 _MOUNTAIN = np.array((168, 146, 124), np.float32)
 #: Distance at which the haze has taken 63 % of the contrast [m].
@@ -84,6 +87,8 @@ class Painter:
             self._paint_markings(camera)
             self._paint_grain(camera)
             self._paint_boxes(camera)
+        if scene.floor_down_m:
+            self._paint_floor(scene, camera)
         if self._hud:
             self._paint_hud(scene, camera)
         if self._strip:
@@ -119,7 +124,8 @@ class Painter:
         top = np.column_stack((np.sin(azimuth), np.cos(azimuth), np.tan(height)))
         bottom = top * (1.0, 1.0, 0.0) - (0.0, 0.0, 0.01)
         quads = np.stack((bottom[:-1], top[:-1], top[1:], bottom[1:]), axis=1)
-        return quads[np.maximum(height[:-1], height[1:]) > 0.0]
+        seen: np.ndarray = quads[np.maximum(height[:-1], height[1:]) > 0.0]
+        return seen
 
     # --- ground --------------------------------------------------------------------------------------------------
 
@@ -244,7 +250,8 @@ class Painter:
         part = slice(rows[0], rows[-1] + 1)
         falling = toward[0] * np.arange(width, dtype=np.float32) + left[part, np.newaxis]
         sky = falling <= 0.0
-        cv2.max(falling, 1e-7, dst=falling)
+        least: Any = 1e-7  # OpenCV takes a number too, which its types do not say
+        cv2.max(falling, least, dst=falling)
         cv2.divide(-thickness, falling, dst=falling)
         shares = cv2.exp(falling)
         shares[sky] = 1.0
@@ -278,7 +285,9 @@ class Painter:
         large = np.ptp(pixels, axis=1).max(axis=1) > _SMALLEST
         for i in np.nonzero(depth.max(axis=1) > NEAR_M)[0]:
             if not in_front[i]:
-                self._fill(camera.polygon(in_camera[i]), colours[i])
+                corners = camera.polygon(in_camera[i])
+                if corners is not None:
+                    self._fill(corners, colours[i])
             elif large[i]:
                 self._fill(pixels[i], colours[i])
 
@@ -295,6 +304,16 @@ class Painter:
                 polygon = camera.polygon(in_camera[i, _BOX_FACES[face]])
                 if polygon is not None:
                     self._fill(polygon, colours[n] * self._face_light[i, face])
+
+    def _paint_floor(self, scene: Scene, camera: Camera) -> None:
+        """The cockpit's floor, which hides the ground from who looks down in it."""
+        behind, ahead = scene.eye_forward_m - _FLOOR_M[0], scene.eye_forward_m + _FLOOR_M[0]
+        corners = [(behind, -1), (ahead, -1), (ahead, 1), (behind, 1)]
+        floor = np.array([(along, side * _FLOOR_M[1], scene.floor_down_m) for along, side in corners])
+        if scene.eye_down_m < scene.floor_down_m:  # from below, the fuselage is not there
+            polygon = camera.polygon(camera.body_to_camera(floor))
+            if polygon is not None:
+                self._fill(polygon, _FLOOR)
 
     # --- head-up display -----------------------------------------------------------------------------------------
 

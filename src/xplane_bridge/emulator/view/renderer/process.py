@@ -33,7 +33,7 @@ class RendererOptions:
         width, height: Of the window [px].
         pipeline_delay: From the frame (`Scene.time_ns`) to its display [s], 0..0.2; 0: as soon as it is drawn.
         hud, strip: Whether the head-up display and the machine-readable strip are drawn.
-        swap_log: CSV file for frame, simulator time, frame time and swap time of each picture shown.
+        swap_log: CSV file for frame, simulator time, frame time and swap time of each picture shown, and its camera.
         realtime: Whether the thread that swaps asks for real-time priority.
         display: X display; None: `DISPLAY`.
     """

@@ -20,10 +20,17 @@ class Scene:
     roll_deg: float = 0.0
     pitch_deg: float = 0.0
     heading_deg: float = 0.0
-    head_heading_deg: float = 0.0  #: `pilots_head_psi`: of the pilot's head in the aircraft, right +
-    head_pitch_deg: float = 0.0  #: `pilots_head_the`: up +
-    head_roll_deg: float = 0.0  #: `pilots_head_phi`: right +
+    head_heading_deg: float = 0.0  #: of the camera in the aircraft, right +
+    head_pitch_deg: float = 0.0  #: up +
+    head_roll_deg: float = 0.0  #: right +
+    eye_forward_m: float = 0.0  #: of the camera from the aircraft's reference point, in its axes
+    eye_right_m: float = 0.0
+    eye_down_m: float = 0.0
+    floor_down_m: float = 0.0  #: of the cockpit's floor from that point; 0: there is none
     field_of_view_deg: float = 60.0  #: horizontal
+    vertical_field_of_view_deg: float = 0.0  #: 0: pixels are square
+    shift_right: float = 0.0  #: [widths] that the picture's middle lies right of the line of sight
+    shift_up: float = 0.0  #: [heights] that it lies above it
     airspeed_kt: float = 0.0  #: indicated; for the head-up display only
     vertical_speed_fpm: float = 0.0
 

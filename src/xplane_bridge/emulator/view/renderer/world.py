@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Sequence
 
 import cv2
@@ -45,8 +46,9 @@ class World:
     sun: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: direction east, north, up
 
 
+@lru_cache(maxsize=2)
 def make_world(heading_deg: float, seed: int = 7) -> World:
-    """Builds the world around an aerodrome at the anchor, its runway along `heading_deg`."""
+    """Builds the world around an aerodrome at the anchor, its runway along `heading_deg`; not to be changed."""
     random = np.random.default_rng(seed)
     world = World()
     tile = _ground_tile(random)
@@ -114,18 +116,21 @@ def _ground_tile(random: np.random.Generator) -> np.ndarray:
         line = line if random.random() < 0.5 else line[:, ::-1]
         cv2.polylines(tile, [np.ascontiguousarray(line)], False, _ROAD, 2, cv2.LINE_AA)
     tile *= (0.85 + 0.3 * _noise(random, size, 128))[..., np.newaxis]
-    return cv2.GaussianBlur(np.clip(tile, 0, 255).astype(np.uint8), (3, 3), 0.7, borderType=cv2.BORDER_REFLECT)
+    blurred: np.ndarray = cv2.GaussianBlur(
+        np.clip(tile, 0, 255).astype(np.uint8), (3, 3), 0.7, borderType=cv2.BORDER_REFLECT
+    )
+    return blurred
 
 
 def _detail_tile(random: np.random.Generator) -> np.ndarray:
     """Grain of the ground close by, around middle grey."""
-    grain = sum(
-        (_noise(random, _DETAIL_PX, cells) - 0.5) * weight
-        for cells, weight in ((8, 0.35), (32, 0.35), (128, 0.3), (256, 0.3))
-    )
+    grain: np.ndarray = np.zeros((_DETAIL_PX, _DETAIL_PX), np.float32)
+    for cells, weight in ((8, 0.35), (32, 0.35), (128, 0.3), (256, 0.3)):
+        grain = grain + (_noise(random, _DETAIL_PX, cells) - 0.5) * weight
     patches = _noise(random, _DETAIL_PX, 12)[..., np.newaxis] * np.array((-6.0, 4.0, 10.0))
     detail = 128.0 + 90.0 * grain[..., np.newaxis] + patches
-    return np.clip(detail, 0, 255).astype(np.uint8)
+    shades: np.ndarray = np.clip(detail, 0, 255).astype(np.uint8)
+    return shades
 
 
 def _rectangle(along: float, across: float, length: float, width: float, heading_deg: float) -> np.ndarray:
@@ -199,4 +204,4 @@ def _add_aerodrome(world: World, heading_deg: float, random: np.random.Generator
 
 
 def _wall(random: np.random.Generator) -> tuple[int, int, int]:
-    return tuple(int(c) for c in np.array(((140, 160, 190), (120, 130, 200), (190, 200, 205))[random.integers(3)]))
+    return ((140, 160, 190), (120, 130, 200), (190, 200, 205))[int(random.integers(3))]

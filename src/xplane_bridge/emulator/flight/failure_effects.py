@@ -1,17 +1,9 @@
-"""What failed equipment (`rel_*` = 6) does to the controls that reach the flight model.
-
-Electrical and instrument failures act in `aircraft_systems`. Triggers other than "failed now" (2 to 5: at a time,
-speed, height or key press) are kept and read back but never fire.
-"""
+"""What failed equipment (`rel_*`) does to the controls that reach the flight model."""
 
 from __future__ import annotations
 
 from typing import Callable, Dict, Set
 
-import numpy as np
-
-from xplane_bridge.emulator.datarefs.store import DatarefStore
-from xplane_bridge.emulator.datarefs.tables.failures import PREFIX
 from xplane_bridge.emulator.flight.flight_model import (
     Controls,
     EngineFault,
@@ -22,7 +14,6 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceKind,
 )
 
-FAILED_NOW = 6.0
 _TRIM_RUNAWAY_PER_S = 0.05
 
 _EVENTS = {
@@ -37,26 +28,25 @@ _SIDES = {"lft": Side.LEFT, "rgt": Side.RIGHT, "ctr": Side.CENTRE}
 
 
 class FailureEffects:
-    """Reads the failure datarefs and applies what they mean."""
+    """Applies failures to controls, and remembers where what they hold was caught.
 
-    def __init__(self, store: DatarefStore, surfaces_break: bool = True) -> None:
+    Args:
+        surfaces_break: Whether `rel_fcon_*` act.
+    """
+
+    def __init__(self, surfaces_break: bool = True) -> None:
         self._surfaces_break = surfaces_break
-        names = store.listed(PREFIX + "rel_")
-        self._leaves = [name[len(PREFIX) :] for name in names]
-        self._store = store
-        self._slots = np.array([store.dataref(name).slots[0] for name in names])
         self._frozen: Dict[str, float] = {}
 
-    def active(self) -> Set[str]:
-        """Leaves (`rel_...`) of everything that is failed now."""
-        return {self._leaves[i] for i in np.flatnonzero(self._store.values[self._slots] == FAILED_NOW)}
-
-    def repair_all(self) -> None:
-        """Repairs everything (RESE)."""
-        self._store.values[self._slots] = 0.0
-
     def apply(self, controls: Controls, failed: Set[str], model: FlightModel, dt: float) -> None:
-        """Changes the frame's controls as the failures do."""
+        """Changes the frame's controls as the failures do.
+
+        Args:
+            controls: Of this frame.
+            failed: Leaves (`rel_...`) of everything that is failed now.
+            model: Whose surfaces and engines they are.
+            dt: Of the frame [s].
+        """
         acting = failed if self._surfaces_break else {leaf for leaf in failed if not leaf.startswith("rel_fcon_")}
         controls.surface_faults = self._surface_faults(acting, model)
         engines = model.info.engine_count
@@ -144,9 +134,9 @@ class FailureEffects:
             parts = leaf.split("_")
             if parts[:2] != ["rel", "fcon"]:
                 continue
-            _, _, kind, number, side, event = parts
+            _, _, kind, number, where, event = parts
             suffix = _LEAVES[kind] + number.replace("x", "")
-            set_all(_EVENTS[event], lambda s, x=suffix, y=_SIDES[side]: _matches(s.name, x) and s.side is y)
+            set_all(_EVENTS[event], lambda s, x=suffix, y=_SIDES[where]: _matches(s.name, x) and s.side is y)
         return faults
 
 

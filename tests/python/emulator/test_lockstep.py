@@ -1,0 +1,181 @@
+"""Lock-step on the wire: a fence ends every frame on every socket, and the next one waits for its answer."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from support.emulator_fixture import EmulatorFixture, XPlaneClient
+from xplane_bridge import protocol
+from xplane_bridge.emulator.emulator import Emulator
+from xplane_bridge.emulator.options import KINEMATIC, Options, parse
+
+FENCE = "xplane_bridge/lockstep"
+TIME = "sim/time/total_running_time_sec"
+FENCE_INDEX = 900
+
+
+class Client(XPlaneClient):
+    """Asks for fences too, last, and reads what comes up to one."""
+
+    def ask(self, paths, rate_hz=1000):
+        self.subscribe(paths, rate_hz)
+        self.subscribe([f"{FENCE}[{element}]" for element in range(3)], first_index=FENCE_INDEX)
+
+    def answer(self, frame):
+        self.send(protocol.DrefWrite(FENCE, float(frame)))
+
+    def frame(self):
+        """(number, whole seconds, microseconds) of the next fence, and the pairs that came before it."""
+        pairs = []
+        while True:
+            packet = self.wait()
+            assert packet is not None, "no fence in 10 s"
+            found = dict(protocol.decode_rref_response(packet))
+            if FENCE_INDEX in found:
+                return [int(found[FENCE_INDEX + element]) for element in range(3)], pairs
+            pairs += protocol.decode_rref_response(packet)
+
+    def leave_hold(self):
+        """Answers frame 0; gives the first frame that flies."""
+        while self.frame()[0][0] != 0:
+            pass
+        self.answer(0)
+        return self.first_frame()
+
+    def first_frame(self):
+        """The first frame that flies."""
+        while True:
+            fence, pairs = self.frame()
+            if fence[0] != 0:
+                return fence, pairs
+
+
+@pytest.fixture(name="fly")
+def fixture_fly():
+    running = []
+
+    def start(**options):
+        options.setdefault("aircraft", KINEMATIC)
+        options.setdefault("fps", 50.0)
+        emulator = Emulator(Options(bind="127.0.0.1", port=0, beacon=False, stepped="lockstep", **options))
+        thread = threading.Thread(target=emulator.run)
+        thread.start()
+        running.append((emulator, thread))
+        return emulator
+
+    yield start
+    for emulator, thread in running:
+        emulator.stopping = True
+        thread.join(10.0)
+        assert not thread.is_alive()
+
+
+@pytest.fixture(name="bench")
+def fixture_bench():
+    with EmulatorFixture() as bench:
+        yield bench
+
+
+def test_frame_0_is_sent_again_until_it_is_answered(fly):
+    client = Client(fly(sim_time_start=12.5).port)
+    client.ask([TIME])
+    frames = [client.frame() for _ in range(3)]
+    assert [fence for fence, _ in frames] == [[0, 12, 500_000]] * 3
+    assert frames[-1][1] == [(0, 12.5)]
+    fence, pairs = client.leave_hold()
+    assert fence == [1, 12, 520_000]
+    assert pairs == [(0, pytest.approx(12.52))]
+
+
+def test_every_frame_waits_for_its_own_answer(fly):
+    client = Client(fly().port)
+    client.ask([TIME])
+    assert client.leave_hold()[0] == [1, 0, 20_000]
+    client.answer(0)  # of a frame that is gone: no answer
+    client.send(protocol.DrefWrite(FENCE, float("nan")))
+    client.socket.settimeout(0.3)
+    with pytest.raises(OSError, match="timed out"):
+        client.socket.recv(2000)
+    for number in range(1, 6):
+        client.answer(number)
+        assert client.frame()[0] == [number + 1, 0, 20_000 * (number + 1)]
+
+
+def test_fences_come_last_on_every_socket_and_slow_groups_start_with_the_flight(fly):
+    port = fly().port
+    fast, slow = Client(port), Client(port)
+    slow.ask([TIME], rate_hz=10)
+    fast.ask([TIME, "sim/time/paused"])
+    while dict(fast.frame()[1]).get(1) != 0.0:
+        pass
+    _, pairs = slow.leave_hold()
+    counts = [len(pairs)]
+    fast.first_frame()
+    for number in range(1, 10):
+        slow.answer(number)
+        fence, pairs = slow.frame()
+        counts.append(len(pairs))
+        assert fence[0] == number + 1
+        fence, pairs = fast.frame()
+        assert (fence[0], len(pairs)) == (number + 1, 2)
+    assert counts == [1, 0, 0, 0, 0] * 2  # 10 a second at 50 frames a second, wherever the hold ended
+
+
+def test_a_write_before_the_answer_acts_in_the_next_frame(fly):
+    client = Client(fly().port)
+    client.ask(["sim/cockpit2/controls/flap_ratio"])
+    client.leave_hold()
+    for number in range(1, 5):
+        client.send(protocol.DrefWrite("sim/cockpit2/controls/flap_ratio", number / 8))
+        client.answer(number)
+        assert client.frame()[1] == [(0, number / 8)]
+
+
+def test_a_flight_ends_after_its_duration(fly):
+    emulator = fly(duration=0.1)
+    client = Client(emulator.port)
+    client.ask([TIME])
+    assert client.leave_hold()[0][0] == 1
+    for number in range(1, 6):
+        client.answer(number)
+    while emulator.statistics()["frames"] < 5:
+        time.sleep(0.01)
+    assert emulator.sim.clocks.running == pytest.approx(0.1)
+
+
+def test_pace_bounds_the_speed_from_above_only(fly):
+    client = Client(fly(pace=2.0).port)
+    client.ask([TIME])
+    client.leave_hold()
+    began = time.monotonic()
+    for number in range(1, 21):
+        client.answer(number)
+        client.frame()
+    assert time.monotonic() - began >= 20 * 0.02 / 2.0 - 0.001
+
+
+def test_other_modes_do_not_know_the_fence(bench):
+    client = bench.client()
+    client.subscribe([FENCE + "[0]", TIME])
+    bench.step()
+    assert [index for index, _ in protocol.decode_rref_response(client.wait())] == [1]
+    client.send(protocol.DrefWrite(FENCE, 3.0))
+    bench.step()
+    assert bench.emulator.server.ignored["dataref"] >= 2
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("--pace 2", "--pace 2.0: expected --stepped lockstep with it"),
+        ("--stepped lockstep --pace -1", "--pace -1.0: expected 0..1000"),
+        ("--stepped lockstep --fault drop=0.1", "expected none with --stepped lockstep"),
+    ],
+)
+def test_options_that_make_no_sense(given, message, capsys):
+    with pytest.raises(SystemExit):
+        parse(given.split())
+    assert message in capsys.readouterr().err
