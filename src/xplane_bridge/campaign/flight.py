@@ -1,0 +1,219 @@
+"""One flight of a campaign: an aircraft flown in process, its scenario and its controller."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from dataclasses import dataclass, field
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
+
+import numpy as np
+
+from xplane_bridge.analysis.scoring import score
+from xplane_bridge.campaign.definition import FlightPlan, find_controller
+from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.compiled import require
+from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
+from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions
+from xplane_bridge.in_process.view import FlightView
+from xplane_bridge.scenario import FlightSample, Player, excitations, parse_scenario
+from xplane_bridge.scenario.ros_player import command_values, sample_of
+
+#: How a flight can end. Whatever it was, it is a row.
+FLOWN, NO_START, GAVE_UP, CRASHED, UNFINISHED, CONTROLLER_FAILED = (
+    "flown", "no start", "model gave up", "crashed", "not finished", "controller failed",
+)  # fmt: skip
+#: Scenario variables that criteria measure, in the order in which `_measured` gives them.
+_VARIABLES = (
+    "roll", "pitch", "heading", "altitude", "agl", "climb", "speed", "alpha", "beta", "roll_rate", "pitch_rate",
+    "yaw_rate", "load_factor",
+)  # fmt: skip
+_STICK = ("stick_roll", "stick_pitch", "stick_yaw", "throttle")
+
+Controller = Callable[[FlightView], Mapping[str, float]]
+
+
+class _RefusedError(Exception):
+    """The arbiter refused a command of the controller."""
+
+
+@dataclass
+class FlightResult:
+    """What became of a flight.
+
+    Attributes:
+        outcome: One of the words above.
+        reason: In words; empty where it was flown to its end.
+        passed: Whether it was flown to its end and met every criterion.
+        duration: Simulated time [s].
+        values: Criterion to what it measured.
+        met: Criterion to whether it was met.
+        sha256: Of the truth, frame by frame, in doubles.
+        trace: Column to one number a frame, where it was asked for.
+    """
+
+    outcome: str
+    reason: str = ""
+    passed: bool = False
+    duration: float = 0.0
+    values: Dict[str, float] = field(default_factory=dict)
+    met: Dict[str, bool] = field(default_factory=dict)
+    sha256: str = ""
+    trace: Optional[Dict[str, np.ndarray]] = None
+
+
+class Flight:
+    """A flight that has not begun.
+
+    Raises:
+        NotCompiledError: The compiled module is not there.
+        ScenarioError: The scenario of the plan is none.
+    """
+
+    _aircraft: Aircraft
+
+    def __init__(self, plan: FlightPlan) -> None:
+        require("a campaign")
+        self._plan = plan
+        self._scenario = parse_scenario(plan.scenario)
+        self._labels: Dict[str, float] = {}
+        self._excitation: Optional[Tuple[float, Dict[str, Any]]] = None
+        self._truth = hashlib.sha256()
+        self._rows: List[Tuple[float, ...]] = []
+
+    def fly(self, trace: bool = False) -> FlightResult:
+        """Flies it; `trace` keeps what was flown, frame by frame.
+
+        Raises:
+            CampaignError, NotFlownError: The scenario asks for what this aircraft does not have.
+        """
+        try:
+            self._start()
+        except FlightModelError as error:
+            return FlightResult(NO_START, str(error))
+        outcome, reason = self._fly()
+        columns = np.array(self._rows, dtype=float).reshape(len(self._rows), 1 + len(_VARIABLES) + len(_STICK))
+        series = dict(zip(("time", *_VARIABLES, *_STICK), columns.T))
+        scores = score(self._scenario.criteria, series["time"], series, self._labels, {})
+        return FlightResult(
+            outcome,
+            reason,
+            outcome == FLOWN and all(s.passed for s in scores),
+            float(series["time"][-1]),
+            {s.name: s.value for s in scores},
+            {s.name: bool(s.passed) for s in scores},
+            self._truth.hexdigest(),
+            series if trace else None,
+        )
+
+    # ---- start
+
+    def _start(self) -> None:
+        plan = self._plan
+        self._aircraft = Aircraft(
+            Conditions(
+                plan.aircraft,
+                start=self._scenario.start,
+                weather=plan.weather,
+                loading=plan.loading,
+                frame_rate=plan.frame_rate,
+                seed=plan.seed,
+            )
+        )
+        self._player = Player(self._scenario)
+        self._controller = self._make_controller()
+
+    def _make_controller(self) -> Optional[Controller]:
+        """A class is made anew for each flight and its `fly` asked; a function is asked itself."""
+        if not self._plan.controller:
+            return None
+        found = find_controller(self._plan.controller)
+        if isinstance(found, type):
+            try:
+                self._made = found(**self._plan.arguments)
+            except TypeError as error:
+                raise CampaignError(f"arguments: {self._plan.controller} does not take them ({error})") from None
+            controller: Controller = self._made.fly
+        else:
+            self._made = controller = found
+        return controller
+
+    # ---- frames
+
+    def _fly(self) -> Tuple[str, str]:
+        aircraft = self._aircraft
+        while True:
+            now, view = aircraft.now, aircraft.view()
+            sample = sample_of(view, aircraft.mode, view.stall_warning)
+            self._record(now, aircraft.state, sample)
+            commands = self._player.step(now, sample)
+            if commands.finished:
+                return FLOWN, ""
+            if now >= self._plan.longest:
+                return UNFINISHED, f"the scenario has not ended after {self._plan.longest:g} s (longest)"
+            for action in commands.actions:
+                self._act(action.kind, action.value, now)
+            self._command(MANUAL, command_values(commands))
+            try:
+                self._control(view)
+            except Exception as error:
+                return CONTROLLER_FAILED, f"at {now:.2f} s: {type(error).__name__}: {error}"
+            try:
+                state = aircraft.step(*self._excited(now))
+            except (FlightModelError, ArithmeticError) as error:
+                return GAVE_UP, f"at {now:.2f} s: {error}"
+            if state.crashed:
+                self._record(aircraft.now, state, sample_of(aircraft.view(), aircraft.mode, False))
+                return CRASHED, f"at {aircraft.now:.2f} s"
+
+    def _control(self, view: FlightView) -> None:
+        if self._controller is None:
+            return
+        if self._aircraft.mode != AUTO and hasattr(self._made, "restart"):
+            self._made.restart()
+        self._command(AUTO, dict(self._controller(view)))
+
+    def _command(self, mode: int, values: Dict[str, float]) -> None:
+        refusal = self._aircraft.command(mode, values)
+        if refusal is not None:
+            raise _RefusedError(f"command refused: {refusal}")
+
+    def _excited(self, now: float) -> Tuple[Optional[str], float]:
+        """The channel that an excitation moves, and by how much."""
+        if self._excitation is not None:
+            began, parameters = self._excitation
+            if now - began < parameters["duration"]:
+                return parameters["target"], excitations.value(parameters, now - began)
+            self._excitation = None
+        return None, 0.0
+
+    def _act(self, kind: str, value: Any, now: float) -> None:
+        if kind == "mode":
+            self._aircraft.set_mode(value, "scenario")
+        elif kind == "failure":
+            self._aircraft.failures.act(value)
+        elif kind == "clear_failures":
+            self._aircraft.failures.clear()
+        elif kind == "excitation":
+            self._excitation = (now, value)
+        elif kind == "label":
+            self._labels.setdefault(value, now)
+
+    def _record(self, now: float, state: ModelState, s: FlightSample) -> None:
+        self._truth.update(truth_bytes(state))
+        c = self._aircraft.controls
+        self._rows.append((
+            now, s.roll, s.pitch, s.heading, s.altitude, s.agl, s.climb, s.speed, s.alpha, s.beta, s.roll_rate,
+            s.pitch_rate, s.yaw_rate, s.load_factor, c.roll, c.pitch, c.yaw, c.throttle[0],
+        ))  # fmt: skip
+
+
+def truth_bytes(s: ModelState) -> bytes:
+    """What the flight model really did, in doubles: what two flights must share to be the same."""
+    numbers = (
+        s.sim_time_s, s.latitude_deg, s.longitude_deg, s.altitude_m, *s.quaternion, s.p_rad_s, s.q_rad_s, s.r_rad_s,
+        s.v_north_mps, s.v_east_mps, s.v_down_mps, s.alpha_rad, s.beta_rad, s.calibrated_airspeed_mps,
+        s.wind_north_mps, s.wind_east_mps, s.wind_down_mps, s.mass_kg, *s.surfaces_deg.values(),
+        *[engine.thrust_n for engine in s.engines], *[engine.rpm for engine in s.engines],
+    )  # fmt: skip
+    return struct.pack(f"<{len(numbers)}d", *numbers)

@@ -1,0 +1,141 @@
+"""How episodes begin and what they are flown in: fixed values and distributions, drawn anew for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from xplane_bridge.campaign.distributions import Parameter, parse_parameter
+from xplane_bridge.constants import FAILURE_KINDS
+from xplane_bridge.emulator.flight.flight_model import ModelInfo
+from xplane_bridge.gym.errors import GymError
+from xplane_bridge.in_process.aircraft import AUTO, LOADING, START, WEATHER, Conditions
+
+ATTITUDE = ("roll", "pitch")
+#: What can be given, in the order in which it is drawn.
+KEYS = (*START, *ATTITUDE, *WEATHER, *LOADING)
+_FAILURE_KEYS = ("name", "kind", "value", "at")
+#: Shares drawn for a failure: of its name, kind, value and time.
+_FAILURE_SHARES = len(_FAILURE_KEYS)
+_MOST_SEED = 2**31
+
+_Chosen = Union[float, str, Sequence[float], Parameter]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What breaks, and when [s]."""
+
+    at: float
+    action: Mapping[str, Any]  #: as a scenario's `failure`
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One that was drawn."""
+
+    conditions: Conditions
+    failures: Tuple[Failure, ...]  #: by their time
+    options: Dict[str, Any]  #: of `reset`, to have this episode again
+
+
+def _chosen(key: str, item: Any, where: str = "episode.") -> _Chosen:
+    if isinstance(item, Mapping):
+        return parse_parameter(key, item, where)
+    number = isinstance(item, (int, float)) and not isinstance(item, bool) and np.isfinite(item)
+    if key == "fuel" and isinstance(item, (list, tuple)):
+        return [float(kg) for kg in item]
+    if not number:
+        raise GymError(f"{where}{key}: {item!r}; expected a number, or a distribution such as {{'uniform': [0, 1]}}")
+    return float(item)
+
+
+def _value(chosen: Optional[_Chosen], share: float) -> Any:
+    return chosen.at(share) if isinstance(chosen, Parameter) else chosen
+
+
+def _failure(index: int, item: Any) -> Dict[str, Any]:
+    where = f"failures[{index}]"
+    if not isinstance(item, Mapping) or "name" not in item or set(item) - set(_FAILURE_KEYS):
+        raise GymError(f"episode.{where}: {item!r}; expected a mapping with name, and kind, value, at [s]")
+    out: Dict[str, Any] = {"kind": "failed", "at": 0.0}
+    for key, value in item.items():
+        text = key in ("name", "kind") and isinstance(value, str)
+        out[key] = value if text or value is None else _chosen(key, value, f"episode.{where}.")
+    kinds = out["kind"].values if isinstance(out["kind"], Parameter) else (out["kind"],)
+    unknown = [kind for kind in kinds if kind not in FAILURE_KINDS]
+    if unknown:
+        raise GymError(f"episode.{where}.kind: {unknown[0]!r}; expected one of {', '.join(FAILURE_KINDS)}")
+    return out
+
+
+class Episodes:
+    """What episodes are drawn from.
+
+    Args:
+        info: Of the aircraft.
+        frame_rate: [Hz]
+        given: Keys of `KEYS` to a number or a distribution as in a campaign file (`fuel`: of each tank), `failures` to
+            a list of failures with `name`, `kind`, `value`, `at`, and `seed` (of the turbulence).
+
+    Raises:
+        GymError, CampaignError: Something in it is none of these.
+    """
+
+    def __init__(self, info: ModelInfo, frame_rate: float, given: Mapping[str, Any]) -> None:
+        unknown = sorted(set(given) - {*KEYS, "failures", "seed"})
+        if unknown:
+            raise GymError(f"episode.{unknown[0]}: unknown key; expected {', '.join(KEYS)}, failures, seed")
+        failures = given.get("failures") or ()
+        if not isinstance(failures, (list, tuple)):
+            raise GymError(f"episode.failures: {failures!r}; expected a list")
+        seed = given.get("seed")
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer))):
+            raise GymError(f"episode.seed: {seed!r}; expected a whole number")
+        self._info, self._frame_rate, self._given = info, frame_rate, dict(given)
+        self._seed = seed
+        self._chosen = {key: _chosen(key, given[key]) for key in KEYS if given.get(key) is not None}
+        self._failures = [_failure(i, item) for i, item in enumerate(failures)]
+
+    def fixed(self, options: Mapping[str, Any]) -> Episodes:
+        """These with some of it chosen otherwise."""
+        return Episodes(self._info, self._frame_rate, {**self._given, **options}) if options else self
+
+    def draw(self, random: np.random.Generator) -> Episode:
+        """The next episode. As many numbers are drawn whatever is fixed: fixing one thing changes no other."""
+        shares = dict(zip(KEYS, random.random(len(KEYS))))
+        seed = int(random.integers(_MOST_SEED))
+        values = {key: _value(chosen, shares[key]) for key, chosen in self._chosen.items()}
+        if "fuel" in values and not isinstance(values["fuel"], list):
+            values["fuel"] = [values["fuel"]] * self._info.tank_count
+        failures = [self._drawn_failure(item, random.random(_FAILURE_SHARES)) for item in self._failures]
+        seed = seed if self._seed is None else int(self._seed)
+
+        def of(keys: Sequence[str]) -> Dict[str, Any]:
+            return {key: values[key] for key in keys if key in values}
+
+        conditions = Conditions(
+            self._info.name,
+            start=of(tuple(START)),
+            weather=of(WEATHER),
+            loading=of(LOADING),
+            attitude=of(ATTITUDE),
+            frame_rate=self._frame_rate,
+            seed=seed,
+            mode=AUTO,
+        )
+        options: Dict[str, Any] = {**values, "seed": seed}
+        if failures:
+            options["failures"] = [
+                {"name": f.action["name"], "kind": f.action["kind"], "value": f.action["value"], "at": f.at}
+                for f in failures
+            ]
+        return Episode(conditions, tuple(sorted(failures, key=lambda failure: failure.at)), options)
+
+    @staticmethod
+    def _drawn_failure(item: Mapping[str, Any], shares: np.ndarray) -> Failure:
+        drawn: List[Any] = [_value(item.get(key), share) for key, share in zip(_FAILURE_KEYS, shares)]
+        name, kind, value, at = drawn
+        return Failure(at, {"name": name, "kind": kind, "value": value, "clear": False})

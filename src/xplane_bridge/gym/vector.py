@@ -1,0 +1,283 @@
+"""Many environments at once: worker processes of some environments each, numbers in shared memory.
+
+A worker is sent one byte a step and sends one message back, empty but for what cannot be a number in an array: the
+infos of environments whose episode begins or ends. The calling process is a worker too: it would only wait for the
+others, and to be woken costs as much as half a step.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import pickle
+from multiprocessing.connection import Connection
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from xplane_bridge.gym.env import FlyEnv, Observation
+from xplane_bridge.gym.errors import GymError
+
+_STEP, _RESET, _CLOSE = b"s", b"r", b"c"
+#: How long a worker may take to end by itself [s].
+_PATIENCE_S = 5.0
+
+
+class WorkerError(GymError):
+    """A worker process has ended, or its environment raised an error."""
+
+
+class _Layout(NamedTuple):
+    """What lies in shared memory, one row an environment: name to dtype and shape of a row."""
+
+    columns: Dict[str, Tuple[str, Tuple[int, ...]]]
+
+    def allocate(self, context: Any, count: int) -> Dict[str, Any]:
+        return {
+            name: context.RawArray("b", max(1, count * int(np.prod(shape)) * np.dtype(kind).itemsize))
+            for name, (kind, shape) in self.columns.items()
+        }
+
+    def arrays(self, memory: Mapping[str, Any], count: int) -> Dict[str, np.ndarray]:
+        return {
+            name: np.frombuffer(memory[name], kind, count * int(np.prod(shape))).reshape(count, *shape)
+            for name, (kind, shape) in self.columns.items()
+        }
+
+
+def _layout(observation: spaces.Space[Any], action: Any) -> _Layout:
+    parts: Mapping[str, Any] = observation.spaces if isinstance(observation, spaces.Dict) else {"": observation}
+    columns = {f"observation {name}": (part.dtype.str, part.shape) for name, part in parts.items()}
+    columns.update(action=(action.dtype.str, action.shape), reward=("<f8", ()), sim_time=("<f8", ()))
+    columns.update(terminated=("|b1", ()), truncated=("|b1", ()))
+    return _Layout(columns)
+
+
+class _Worker:
+    """The environments of one process."""
+
+    def __init__(self, arguments: Mapping[str, Any], rows: slice, arrays: Mapping[str, np.ndarray]) -> None:
+        self._arrays = {name: array[rows] for name, array in arrays.items()}
+        self._first = rows.start
+        self._envs = [FlyEnv(**arguments) for _ in range(rows.stop - rows.start)]
+        self._ended = [False] * len(self._envs)
+        self._parts = [name[len("observation ") :] for name in arrays if name.startswith("observation ")]
+
+    def reset(self, seeds: Sequence[Optional[int]], options: Any) -> Dict[int, Dict[str, Any]]:
+        self._arrays["terminated"][:] = self._arrays["truncated"][:] = False
+        return {self._first + i: self._begin(i, seed, options) for i, seed in enumerate(seeds)}
+
+    def step(self) -> Dict[int, Dict[str, Any]]:
+        arrays, infos = self._arrays, {}
+        for i, env in enumerate(self._envs):
+            if self._ended[i]:
+                infos[self._first + i] = self._begin(i)
+                arrays["reward"][i], arrays["terminated"][i], arrays["truncated"][i] = 0.0, False, False
+                continue
+            observed, reward, terminated, truncated, info = env.step(arrays["action"][i])
+            self._show(i, observed, info.pop("sim_time"))
+            arrays["reward"][i], arrays["terminated"][i], arrays["truncated"][i] = reward, terminated, truncated
+            self._ended[i] = terminated or truncated
+            if info:
+                infos[self._first + i] = info
+        return infos
+
+    def close(self) -> None:
+        for env in self._envs:
+            env.close()
+
+    def _begin(self, i: int, seed: Optional[int] = None, options: Any = None) -> Dict[str, Any]:
+        observed, info = self._envs[i].reset(seed=seed, options=options)
+        self._show(i, observed, info.pop("sim_time"))
+        self._ended[i] = False
+        return info
+
+    def _show(self, i: int, observed: Observation, sim_time: float) -> None:
+        for part in self._parts:
+            self._arrays[f"observation {part}"][i] = observed[part] if part else observed
+        self._arrays["sim_time"][i] = sim_time
+
+
+def _work(
+    connection: Connection,
+    others: Sequence[Connection],
+    layout: _Layout,
+    memory: Mapping[str, Any],
+    count: int,
+    rows: slice,
+    arguments: Dict[str, Any],
+) -> None:
+    """What a worker process does until it is told to end or its parent is gone.
+
+    `others` are the parent's ends of pipes: held open here, they would hide that the parent is gone.
+    """
+    for other in others:
+        other.close()
+    worker = None
+    try:
+        worker = _Worker(arguments, rows, layout.arrays(memory, count))
+        while True:
+            order = connection.recv_bytes()
+            if order[:1] == _CLOSE:
+                break
+            infos = worker.step() if order[:1] == _STEP else worker.reset(*pickle.loads(order[1:]))
+            connection.send_bytes(pickle.dumps(infos) if infos else b"")
+    except (EOFError, KeyboardInterrupt):
+        pass
+    except Exception as error:
+        connection.send_bytes(pickle.dumps(f"{type(error).__name__}: {error}"))
+    finally:
+        if worker is not None:
+            worker.close()
+
+
+class FlyVectorEnv(VectorEnv[Any, Any, Any]):
+    """`num_envs` of `FlyEnv`, with the observations that they have alone with the seeds `seed + index`.
+
+    An episode that has ended begins anew with the next step, whose action is not flown (gymnasium's NEXT_STEP).
+
+    Args:
+        num_envs: How many.
+        workers: Processes that fly, this one among them; None: one for each processor.
+        context: How processes are started: "fork", "spawn", "forkserver"; None: as Python does.
+        arguments: Of `FlyEnv`; a task must be one that the processes can import.
+
+    Raises:
+        GymError, CampaignError: Something of this makes no sense.
+        WorkerError: A worker could not be started, or has ended.
+    """
+
+    def __init__(
+        self, num_envs: int = 1, workers: Optional[int] = None, context: Optional[str] = None, **arguments: Any
+    ) -> None:
+        self.closed = True  # until there is something to close
+        if num_envs < 1 or (workers is not None and workers < 1):
+            raise GymError(f"num_envs: {num_envs!r}, workers: {workers!r}; expected 1 or more")
+        model = FlyEnv(**arguments)  # tells what is wrong before a process is started
+        self.num_envs, self.render_mode = num_envs, None
+        self.single_observation_space, self.single_action_space = model.observation_space, model.action_space
+        self.observation_space = batch_space(model.observation_space, num_envs)
+        self.action_space = batch_space(model.action_space, num_envs)
+        self.metadata = {**model.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+        model.close()
+        layout = _layout(model.observation_space, model.action_space)
+        processes: Any = multiprocessing.get_context(context)
+        memory = layout.allocate(processes, num_envs)
+        self._arrays = layout.arrays(memory, num_envs)
+        self._connections: List[Connection] = []
+        self._processes: List[Any] = []
+        self.closed = False
+        bounds = np.linspace(0, num_envs, min(workers or os.cpu_count() or 1, num_envs) + 1).astype(int).tolist()
+        self._rows = list(zip(bounds, bounds[1:]))
+        for first, end in self._rows[:-1]:
+            ours, theirs = processes.Pipe()
+            self._connections.append(ours)
+            work = (theirs, list(self._connections), layout, memory, num_envs, slice(first, end), arguments)
+            process = processes.Process(target=_work, args=work, daemon=True)
+            process.start()
+            theirs.close()
+            self._processes.append(process)
+        self._own = _Worker(arguments, slice(*self._rows[-1]), self._arrays)
+
+    def reset(
+        self, *, seed: Union[int, Sequence[Optional[int]], None] = None, options: Optional[Mapping[str, Any]] = None
+    ) -> Tuple[Observation, Dict[str, Any]]:
+        """Begins an episode in each.
+
+        Args:
+            seed: Of the first, the next is that of the second and so on; or a list, one of each.
+            options: As `FlyEnv.reset` has them, for all.
+        """
+        if seed is None or isinstance(seed, (int, np.integer)):
+            seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            raise GymError(f"seed: {len(seeds)} of them; expected one number, or {self.num_envs}")
+        options = None if options is None else dict(options)
+        shares = [seeds[first:end] for first, end in self._rows]
+        self._send([_RESET + pickle.dumps((share, options)) for share in shares[:-1]])
+        infos = self._receive(lambda: self._own.reset(shares[-1], options))
+        return self._observations(), infos
+
+    def step(self, actions: Any) -> Tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]:
+        """Flies on in all."""
+        given = np.asarray(actions, np.float32)
+        if given.shape != self.action_space.shape:
+            raise GymError(f"actions of shape {given.shape}; expected {self.action_space.shape}")
+        arrays = self._arrays
+        arrays["action"][:] = given
+        self._send([_STEP] * len(self._connections))
+        infos = self._receive(self._own.step)
+        reward, terminated, truncated = (arrays[name].copy() for name in ("reward", "terminated", "truncated"))
+        return self._observations(), reward, terminated, truncated, infos
+
+    def close_extras(self, **_kwargs: Any) -> None:
+        """Ends the workers."""
+        for connection in self._connections:
+            with contextlib.suppress(OSError):  # it has ended
+                connection.send_bytes(_CLOSE)
+        for connection, process in zip(self._connections, self._processes):
+            process.join(_PATIENCE_S)
+            if process.is_alive():
+                process.terminate()
+                process.join()
+            connection.close()
+        self._own.close()
+
+    def _observations(self) -> Observation:
+        if isinstance(self.single_observation_space, spaces.Dict):
+            return {name: self._arrays[f"observation {name}"].copy() for name in self.single_observation_space.spaces}
+        return self._arrays["observation "].copy()
+
+    def _send(self, orders: Sequence[bytes]) -> None:
+        if self.closed:
+            raise GymError("the environments are closed")
+        for i, (connection, order) in enumerate(zip(self._connections, orders)):
+            try:
+                connection.send_bytes(order)
+            except OSError:
+                self._fail(i)
+
+    def _receive(self, fly_own: Callable[[], Dict[int, Dict[str, Any]]]) -> Dict[str, Any]:
+        """Flies this process's share, and gathers the infos of all."""
+        infos: Dict[str, Any] = {}
+        try:
+            own = fly_own()
+        except Exception as error:
+            self.close()
+            raise WorkerError(f"{type(error).__name__}: {error}") from error
+        for index, info in own.items():
+            infos = self._add_info(infos, info, index)
+        for i, connection in enumerate(self._connections):
+            try:
+                answer = connection.recv_bytes()
+            except (EOFError, OSError):
+                self._fail(i)
+            if not answer:
+                continue
+            told = pickle.loads(answer)
+            if isinstance(told, str):
+                self.close()
+                raise WorkerError(told)
+            for index, info in told.items():
+                infos = self._add_info(infos, info, index)
+        infos["sim_time"], infos["_sim_time"] = self._arrays["sim_time"].copy(), np.ones(self.num_envs, bool)
+        return infos
+
+    def _fail(self, i: int) -> None:
+        """A worker is gone: says so, or what it has said last."""
+        connection, process = self._connections[i], self._processes[i]
+        process.join(_PATIENCE_S)
+        told = f"it has ended by itself, with exit code {process.exitcode} (negative: by that signal)"
+        try:
+            if connection.poll():
+                told = pickle.loads(connection.recv_bytes())
+        except (EOFError, OSError):
+            pass
+        self.close()
+        raise WorkerError(f"worker {i} of {len(self._processes)}: {told}")

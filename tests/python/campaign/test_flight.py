@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any, Dict
+
+import pytest
+
+from xplane_bridge.campaign.definition import CampaignError, parse_campaign
+from xplane_bridge.campaign.flight import Flight
+from xplane_bridge.compiled import NotCompiledError
+
+EVENTS = [{"at": 0, "mode": "auto", "stick": {"roll": 0, "pitch": 0, "yaw": 0}}, {"at": 1, "end": True}]
+
+
+def campaign(events: Any = EVENTS, **more: Any) -> Any:
+    scenario = {"name": "s", "aircraft": "fixed_wing", "start": {"speed": 70}, "events": events}
+    scenario.update(more.pop("scenario", {}))
+    return parse_campaign({"name": "c", "scenario": scenario, **more})
+
+
+class Recorder:
+    """A controller that remembers what it saw; rolls by a fixed stick."""
+
+    seen: list
+
+    def __init__(self, stick: float = 0.0) -> None:
+        self.stick = stick
+        Recorder.seen = []
+
+    def fly(self, state: Any) -> Dict[str, float]:
+        Recorder.seen.append((state.sim_time_unwrapped, state.control_roll))
+        return {"roll": self.stick * len(Recorder.seen), "pitch": 0.0}
+
+
+def test_a_command_flies_in_the_frame_after_the_state_it_answers_and_as_float32() -> None:
+    # The hand-over from manual to automatic may change 2 a second: this stick is slower.
+    Flight(campaign(controller=f"{__name__}:Recorder", arguments={"stick": 0.01}).plan(0)).fly()
+    times, rolls = zip(*Recorder.seen[:4])
+    assert times == pytest.approx((0.0, 1 / 60, 2 / 60, 3 / 60))
+    exact = [struct.unpack("<f", struct.pack("<f", 0.01 * k))[0] for k in range(4)]
+    assert list(rolls) == exact
+
+
+def nothing(_state: Any) -> Dict[str, float]:
+    return {}
+
+
+def outside(_state: Any) -> Dict[str, float]:
+    return {"roll": 1.5}
+
+
+def broken(state: Any) -> Dict[str, float]:
+    return {"roll": 1.0 / (1.0 if state.sim_time_unwrapped < 0.5 else 0.0)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "outcome", "reason"),
+    [
+        ({"controller": f"{__name__}:nothing"}, "flown", ""),
+        ({"scenario": {"start": {"speed": 200}}}, "no start", "airspeed 200"),
+        ({"controller": f"{__name__}:outside"}, "controller failed", "roll is 1.5: expected -1..1"),
+        ({"controller": f"{__name__}:broken"}, "controller failed", "at 0.50 s: ZeroDivisionError"),
+        ({"longest": 0.5}, "not finished", "has not ended after 0.5 s"),
+        ({"scenario": {"start": {"altitude": 15, "speed": 60}}, "events": [
+            {"at": 0, "stick": {"pitch": -1, "roll": 1}}, {"at": 30, "end": True}]}, "crashed", "at "),
+    ],
+)  # fmt: skip
+def test_however_a_flight_ends_it_has_an_outcome(changes: dict, outcome: str, reason: str) -> None:
+    result = Flight(campaign(**changes).plan(0)).fly()
+    assert (result.outcome, reason in result.reason) == (outcome, True), result.reason
+    assert result.passed == (outcome == "flown")
+    assert bool(result.sha256) == (outcome != "no start")
+
+
+def test_a_flight_is_the_same_again_also_after_others() -> None:
+    c = campaign(weather={"wind_speed": 5, "wind_from": 90, "turbulence": 2}, flights=2)
+    first = Flight(c.plan(0)).fly().sha256
+    other = Flight(c.plan(1)).fly().sha256
+    assert Flight(c.plan(0)).fly().sha256 == first != other
+
+
+def test_the_arbiter_limits_what_flies() -> None:
+    # config/aircraft/fixed_wing.yaml: flaps move by 0.5 a second.
+    events = [{"at": 0, "handles": {"flaps": 0}}, {"at": 0.5, "handles": {"flaps": 1}}, {"at": 1.5, "end": True}]
+    flight = Flight(campaign(events).plan(0))
+    flight.fly()
+    assert flight._aircraft.controls.flap_request == pytest.approx(0.5, abs=0.5 / 60 + 1e-6)
+
+
+def test_what_the_scenario_breaks_is_broken_and_repaired() -> None:
+    broken = [
+        {"at": 0, "stick": {"roll": 0}},
+        {"at": 0.2, "failure": {"name": "aileron1_wing2_left", "kind": "stuck", "value": -7.5}, "label": "stuck"},
+        {"at": 1, "end": True},
+    ]
+    flight = Flight(campaign(broken).plan(0))
+    flight.fly()
+    assert flight._aircraft.state.surfaces_deg["wing2l_ail1"] == -7.5
+    flight = Flight(campaign([*broken[:2], {"at": 0.5, "clear_failures": True}, broken[2]]).plan(0))
+    flight.fly()
+    assert abs(flight._aircraft.state.surfaces_deg["wing2l_ail1"]) < 2.0  # the roll trim is left
+
+
+def test_wind_loading_and_start_are_those_of_the_campaign() -> None:
+    start = {"speed": 60, "altitude": 1500, "heading": 90, "latitude": 10, "longitude": 20}
+    c = campaign(
+        weather={"wind_speed": 10, "wind_from": 270},
+        loading={"payload": 50, "fuel": [20, 30]},
+        scenario={"start": start},
+    )
+    flight = Flight(c.plan(0))
+    flight._start()
+    state = flight._aircraft.state
+    assert (state.wind_north_mps, state.wind_east_mps) == pytest.approx((0.0, 10.0), abs=1e-9)
+    assert (state.payload_kg, state.fuel_kg) == (50.0, [20.0, 30.0])
+    assert (state.latitude_deg, state.longitude_deg, state.altitude_m) == pytest.approx((10.0, 20.0, 1500.0))
+    assert state.true_airspeed_mps == pytest.approx(60.0, abs=1e-3)
+    assert math.degrees(state.heading_rad) == pytest.approx(90.0)
+
+
+def test_an_excitation_is_added_to_what_is_commanded() -> None:
+    events = [
+        {"at": 0, "stick": {"roll": 0.1}},
+        {"at": 0.5, "excitation": {"kind": "doublet", "target": "roll", "amplitude": 0.2, "duration": 1.0}},
+        {"at": 2, "end": True},
+    ]
+    trace = Flight(campaign(events).plan(0)).fly(trace=True).trace
+    # Row k holds what flew into it: the doublet, 30 frames up and 30 down, begins with the command of frame 30.
+    stick = trace["stick_roll"]
+    assert [round(stick[k], 6) for k in (30, 31, 60, 61, 90, 91)] == [0.1, 0.3, 0.3, -0.1, -0.1, 0.1]
+
+
+def test_the_stick_takes_over_from_the_controller() -> None:
+    # config/tx.yaml: by more than 0.3 of movement.
+    events = [
+        {"at": 0, "mode": "auto", "stick": {"roll": 0}},
+        {"at": 0.5, "stick": {"roll": 0.35}},
+        {"after": 0, "when": {"mode": "manual"}, "label": "manual"},
+        {"at": 1, "end": True},
+    ]
+    flight = Flight(campaign(events, controller=f"{__name__}:Recorder").plan(0))
+    assert flight.fly().outcome == "flown"
+    assert flight._labels["manual"] == pytest.approx(0.5 + 1 / 60)
+    assert flight._aircraft.mode == 1
+
+
+def test_without_the_compiled_module_the_way_to_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("xplane_bridge.compiled.core", None)
+    with pytest.raises(NotCompiledError, match="scripts/setup"):
+        Flight(campaign().plan(0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"events": [{"at": 0, "dataref": {"sim/none": 1}}]}, "scenario.events[0].dataref: takes the bridge"),
+        ({"events": [{"at": 0, "stick": {"roll": "$no"}}]}, "expected a parameter of"),
+        ({"controller": "nowhere:Nobody"}, "controller: 'nowhere:Nobody' cannot be had"),
+        ({"controller": "math"}, "expected module:class or module:function"),
+        ({"scenario": {"aircraft": "tiltrotor"}, "aircraft": "fixed_wing"}, "the scenario is for tiltrotor"),
+        ({"weather": {"wind": 3}}, "weather.wind: unknown key"),
+        ({"flights": 0}, "flights: 0; expected a whole number from 1"),
+        ({"stop": {"criterion": "x", "width": 0.1}}, "stop.criterion: 'x'"),
+        ({"parameter": {}}, "campaign.parameter: unknown key"),
+    ],
+)
+def test_a_wrong_campaign_is_named(changes: dict, text: str) -> None:
+    with pytest.raises(CampaignError) as raised:
+        campaign(**changes)
+    assert text in str(raised.value)
+
+
+def test_parameters_go_anywhere_in_the_scenario() -> None:
+    c = campaign(
+        [{"at": "$when", "stick": {"roll": "$roll"}, "label": "roll $roll"}, {"after": 1, "end": True}],
+        parameters={"when": {"uniform": [1, 2]}, "roll": {"choice": [0.25]}},
+    )
+    plan = c.plan(0)
+    event = plan.scenario["events"][0]
+    assert event["at"] == plan.parameters["when"]
+    assert (event["stick"], event["label"]) == ({"roll": 0.25}, "roll 0.25")
+    assert math.isfinite(event["at"])

@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any, List
+
+import pandas as pd
+import pytest
+
+from xplane_bridge.analysis.intervals import wilson
+from xplane_bridge.campaign.cluster import local_cluster
+from xplane_bridge.campaign.definition import Campaign, CampaignError, parse_campaign
+from xplane_bridge.campaign.flight import Flight
+from xplane_bridge.campaign.rows import VARYING, fly_rows
+from xplane_bridge.campaign.runner import TABLE, CampaignFolder, in_process
+from xplane_bridge.resources import program
+
+
+def document(**more: Any) -> dict:
+    """A fifth of a second of flight with a stick that differs."""
+    return {
+        "name": "c",
+        "parameters": {"share": {"uniform": [0, 1]}, "height": {"uniform": [0, 1000]}},
+        "weather": {"turbulence": 1.0},
+        "flights": 14,
+        "scenario": {
+            "name": "s",
+            "aircraft": "fixed_wing",
+            "start": {"speed": 70, "altitude": 1000},
+            "criteria": {"high": {"measure": "maximum", "of": "roll", "below": 90}},
+            "events": [{"at": 0, "stick": {"roll": "$share"}}, {"at": 0.2, "end": True}],
+        },
+        **more,
+    }
+
+
+def same(table: pd.DataFrame) -> pd.DataFrame:
+    """Without the columns that may differ."""
+    return table[[name for name in table.columns if not name.startswith(VARYING)]]
+
+
+def quiet(_count: int) -> None:
+    pass
+
+
+def test_the_table_is_the_same_whoever_flies_and_after_a_resumption(tmp_path: Path) -> None:
+    campaign = parse_campaign(document())
+    alone = CampaignFolder(tmp_path / "alone").fly(campaign, in_process, quiet)
+    assert list(alone["flight"]) == list(range(14))
+    assert set(alone["outcome"]) == {"flown"}
+    assert alone["sha256"].nunique() == 14
+
+    resumed = CampaignFolder(tmp_path / "resumed")
+
+    def dies(campaign: Campaign, chunks: Any) -> Any:
+        yield fly_rows(campaign.document, *chunks[1])  # out of order
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        resumed.fly(campaign, dies, quiet)
+    (tmp_path / "resumed/parts/flights-00000000-0010.parquet.tmp").write_bytes(b"half a part")
+    flown: List[tuple] = []
+
+    def rest(campaign: Campaign, chunks: Any) -> Any:
+        flown.extend(chunks)
+        return in_process(campaign, reversed(chunks))
+
+    table = resumed.fly(campaign, rest, quiet)
+    assert flown == [(0, 10)]
+    pd.testing.assert_frame_equal(same(table), same(alone))
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "resumed" / TABLE), table)
+    assert Flight(campaign.plan(11)).fly().sha256 == alone["sha256"][11]
+
+
+def test_one_and_two_workers_and_a_killed_one_give_the_same_table(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    campaign = parse_campaign(document())
+    expected = same(CampaignFolder(tmp_path / "0").fly(campaign, in_process, quiet))
+    for workers in (1, 2):
+        with local_cluster(workers) as cluster:
+            table = CampaignFolder(tmp_path / str(workers)).fly(campaign, cluster, quiet)
+        pd.testing.assert_frame_equal(same(table), expected)
+    with local_cluster(2) as cluster:
+        killed: List[int] = []
+
+        def kill_one(_count: int) -> None:
+            if not killed:
+                killed.extend(cluster.worker_pids()[:1])
+                os.kill(killed[0], signal.SIGKILL)
+
+        table = CampaignFolder(tmp_path / "killed").fly(campaign, cluster, kill_one)
+    assert killed
+    pd.testing.assert_frame_equal(same(table), expected)
+
+
+def deadly(state: Any) -> dict:
+    if state.sim_time_unwrapped > 0.1 and state.altitude_msl > 1500.0:
+        os._exit(1)  # as a crash in compiled code does
+    return {}
+
+
+@pytest.mark.full
+def test_a_flight_that_ends_its_worker_is_a_row(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    campaign = parse_campaign(
+        document(
+            flights=12,
+            controller=f"{__name__}:deadly",
+            parameters={"share": {"uniform": [0, 1]}, "height": {"choice": [1000, 1000, 1000, 2000]}},
+            sampling="latin_hypercube",
+            scenario={**document()["scenario"], "start": {"speed": 70, "altitude": "$height"}},
+        )
+    )
+    with local_cluster(2) as cluster:
+        table = CampaignFolder(tmp_path).fly(campaign, cluster, quiet)
+    died = table["outcome"] == "worker died"
+    assert list(died) == list(table["parameter_height"] == 2000.0)
+    assert died.sum() == 3
+    assert set(table["outcome"][~died]) == {"flown"}
+    assert not table["passed"][died].any()
+
+
+def test_the_interval_covers_a_known_share(tmp_path: Path) -> None:
+    """The criterion hangs on a parameter alone: a start at 200 m/s, 3 of 10, is refused, and is a row that failed."""
+    parameters = {"speed": {"choice": [70] * 7 + [200] * 3}, "share": {"uniform": [0, 1]}}
+    scenario = {**document()["scenario"], "start": {"speed": "$speed"}}
+    campaign = parse_campaign(document(flights=40, parameters=parameters, scenario=scenario, seed=5))
+    table = CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+    assert len(table) == 40
+    assert list(table["passed"]) == list(table["parameter_speed"] == 70.0)
+    assert set(table["outcome"]) == {"flown", "no start"}
+    assert table["reason"][table["outcome"] == "no start"].str.contains("airspeed 200").all()
+    low, high = wilson(int(table["passed"].sum()), 40)
+    assert low <= 0.7 <= high
+
+
+def test_95_of_100_intervals_cover_a_known_share() -> None:
+    covered = 0
+    for seed in range(200):
+        design = parse_campaign(document(seed=seed, flights=50)).design
+        low, high = wilson(sum(design.values(i)["share"] < 0.3 for i in range(50)), 50)
+        covered += low <= 0.3 <= high
+    assert 0.90 * 200 <= covered <= 0.99 * 200  # three deviations of a binomial count about 95 %
+
+
+def test_it_stops_when_the_interval_is_narrow_enough_and_looks_only_after_whole_rounds(tmp_path: Path) -> None:
+    # All pass: the interval is 1 - 1 / (1 + 3.84 / n) wide, at most 0.2 from n = 16 on; looks at 10 and 20.
+    campaign = parse_campaign(document(flights=60, stop={"width": 0.2, "every": 10}))
+    assert len(CampaignFolder(tmp_path).fly(campaign, in_process, quiet)) == 20
+
+
+def test_a_folder_of_another_campaign_is_refused_and_so_is_one_in_use(tmp_path: Path) -> None:
+    folder = CampaignFolder(tmp_path)
+    campaign = parse_campaign(document(flights=1))
+    folder.fly(campaign, in_process, quiet)
+    with pytest.raises(CampaignError, match="another campaign"):
+        folder.fly(parse_campaign(document(flights=1, seed=1)), in_process, quiet)
+    with folder._locked(), pytest.raises(CampaignError, match="another run_campaign"):
+        CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+    with pytest.raises(CampaignError, match="holds no campaign"):
+        CampaignFolder(tmp_path / "none").load()
+
+
+def test_other_code_under_the_same_campaign_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign = parse_campaign(document(flights=1))
+    CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+    monkeypatch.setattr("jsbsim.__version__", "0.0")
+    with pytest.raises(CampaignError, match="flown with another jsbsim"):
+        CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+
+
+def test_the_program_killed_at_any_moment_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "c.yaml"
+    path.write_text(str(document(flights=13)), encoding="utf-8")  # JSON-like text is YAML
+    command = [str(program("run_campaign")), str(path), "--workers", "0", "-o"]
+    first = subprocess.Popen([*command, str(tmp_path / "killed")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not list((tmp_path / "killed/parts").glob("*.parquet")):
+        assert first.poll() is None
+        time.sleep(0.02)
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    assert not (tmp_path / "killed" / TABLE).exists()
+    for name in ("killed", "whole"):
+        subprocess.run([*command, str(tmp_path / name)], check=True, stdout=subprocess.DEVNULL)
+    tables = [same(pd.read_parquet(tmp_path / name / TABLE)) for name in ("killed", "whole")]
+    pd.testing.assert_frame_equal(*tables)
+    again = [command[0], "-o", str(tmp_path / "killed"), "--refly", "7"]
+    assert subprocess.run(again, check=False, stdout=subprocess.DEVNULL).returncode == 0
+    broken = pd.read_parquet(tmp_path / "killed/parts/flights-00000000-0010.parquet")
+    broken.loc[7, "sha256"] = "0" * 64
+    broken.to_parquet(tmp_path / "killed/parts/flights-00000000-0010.parquet")
+    assert subprocess.run(again, check=False, stdout=subprocess.DEVNULL).returncode == 1

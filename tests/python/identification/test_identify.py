@@ -1,0 +1,300 @@
+"""Flights of the emulator's twin with test signals, identified, against its linearised self."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from support.manoeuvre_flight import LATERAL, PITCH, Manoeuvre, Recording, flown
+from xplane_bridge.bags.flight import Flight
+from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.flight import jsbsim_model
+from xplane_bridge.emulator.flight.flight_model import FlightModel
+from xplane_bridge.identification.coefficients import geometry_of
+from xplane_bridge.identification.identify import AxisResult, identify
+from xplane_bridge.identification.linearisation import Condition, linearise
+from xplane_bridge.identification.model import IdentificationError, LinearModel
+
+GEOMETRY = geometry_of("fixed_wing")
+
+
+@pytest.fixture(scope="module")
+def twin() -> FlightModel:
+    return create_model("fixed_wing")
+
+
+@pytest.fixture(scope="module")
+def truth() -> LinearModel:
+    return linearise(Condition("fixed_wing", 75.0, 1000.0), GEOMETRY)
+
+
+@pytest.fixture(scope="module")
+def calm(twin: FlightModel) -> Recording:
+    return flown(PITCH + LATERAL, model=twin)
+
+
+@pytest.fixture(scope="module")
+def found(calm: Recording) -> dict[str, AxisResult]:
+    return identify(calm.flight(), geometry=GEOMETRY).results
+
+
+def error(result: AxisResult, truth: LinearModel, mode: str) -> float:
+    """Of an eigenvalue, against its size."""
+    expected = truth.axes[result.model.axis.name].mode(mode).eigenvalue
+    return abs(result.model.mode(mode).eigenvalue - expected) / abs(expected)
+
+
+def longitudinal(recording: Recording) -> AxisResult:
+    return identify(recording.flight(), "longitudinal", GEOMETRY).results["longitudinal"]
+
+
+# ---------------------------------------------------------------------------------------------------------- accuracy
+
+
+@pytest.mark.parametrize(
+    ("axis", "mode", "budget"),
+    [("longitudinal", "short_period", 0.02), ("lateral", "roll", 0.02), ("lateral", "dutch_roll", 0.01)],
+)
+def test_modes_in_calm_air_are_within_their_budgets(
+    found: dict[str, AxisResult], truth: LinearModel, axis: str, mode: str, budget: float
+) -> None:
+    assert error(found[axis], truth, mode) < budget
+    assert not found[axis].refusals
+
+
+def test_derivatives_are_those_of_the_aircraft(found: dict[str, AxisResult], truth: LinearModel) -> None:
+    assert found["longitudinal"].model.derivatives["Cm_de"].value == pytest.approx(-1.2, rel=0.03)
+    for axis, names in (("longitudinal", ("Cm_alpha", "Cm_q", "CL_alpha")), ("lateral", ("Cl_p", "Cl_da", "Cn_dr"))):
+        for name in names:
+            expected = truth.axes[axis].derivatives[name].value
+            assert found[axis].model.derivatives[name].value == pytest.approx(expected, rel=0.03), name
+
+
+def test_forces_are_outputs(found: dict[str, AxisResult], truth: LinearModel) -> None:
+    force, expected = found["longitudinal"].model.c[5], truth.axes["longitudinal"].c[5]
+    assert force[1] == pytest.approx(expected[1], rel=0.03)
+    assert found["lateral"].model.c[4, 0] == pytest.approx(truth.axes["lateral"].c[4, 0], rel=0.03)
+
+
+def test_a_window_that_was_not_used_validates(found: dict[str, AxisResult]) -> None:
+    for result, numbers in ((found["longitudinal"], [3]), (found["lateral"], [6, 9])):
+        assert [w.excitation.number for w in result.validation] == numbers
+        assert not set(numbers) & {w.excitation.number for w in result.windows}
+        for values in result.model.facts["validation"].values():
+            assert values["explained"] > 0.99
+        assert not result.model.warnings
+
+
+def test_sensor_noise_changes_little_and_the_intervals_show_it(twin: FlightModel, truth: LinearModel) -> None:
+    result = longitudinal(flown(PITCH, model=twin, noise=1.0, seed=4))
+    assert error(result, truth, "short_period") < 0.025
+    assert 0.001 < result.model.mode("short_period").relative_interval < 0.03
+    assert not result.refusals
+
+
+def changed_aircraft(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pattern: str, value: str) -> FlightModel:
+    """The twin with one number of its file changed."""
+    source = jsbsim_model._ROOT / "aircraft"
+    for name in ("planet.xml", "fixed_wing/fixed_wing.xml"):
+        (tmp_path / "aircraft" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "aircraft" / name).write_bytes((source / name).read_bytes())
+    path = tmp_path / "aircraft/fixed_wing/fixed_wing.xml"
+    text, count = re.subn(pattern, value, path.read_text(encoding="utf-8"))
+    assert count == 1
+    ElementTree.fromstring(text)
+    path.write_text(text, encoding="utf-8")
+    monkeypatch.setattr(jsbsim_model, "_ROOT", tmp_path)
+    return create_model("fixed_wing")
+
+
+def test_an_elevator_of_20_percent_less_is_found(
+    found: dict[str, AxisResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weak = changed_aircraft(tmp_path, monkeypatch, r"-0\.01047", "-0.008376")
+    result = longitudinal(flown(PITCH, model=weak))
+    before, after = (r.model.derivatives["Cm_de"].value for r in (found["longitudinal"], result))
+    assert after / before == pytest.approx(0.8, abs=0.01)
+    assert result.model.derivatives["Cm_q"].value == pytest.approx(-22.0, rel=0.03)
+
+
+def coverage(twin: FlightModel, truth: LinearModel, seeds: range) -> np.ndarray:
+    """Share of the flights in which the intervals of Cm_alpha and of Cm_q hold the true values."""
+    results = (longitudinal(flown(SMALL, model=twin, noise=1.0, seed=seed)) for seed in seeds)
+    return np.mean([covers(result, truth) for result in results], axis=0)
+
+
+def test_intervals_cover_the_truth(twin: FlightModel, truth: LinearModel) -> None:
+    assert coverage(twin, truth, range(6)).mean() > 0.7
+
+
+@pytest.mark.full
+def test_intervals_cover_the_truth_in_nine_of_ten_flights(twin: FlightModel, truth: LinearModel) -> None:
+    assert coverage(twin, truth, range(100)).min() >= 0.9
+
+
+#: Small enough for the aircraft to be linear.
+SMALL = (Manoeuvre("pitch", 0.05), Manoeuvre("pitch", -0.05))
+
+
+def covers(result: AxisResult, truth: LinearModel) -> tuple[bool, bool]:
+    """Whether the intervals of Cm_alpha and Cm_q hold the true values.
+
+    Coefficients: M_alpha goes with the square of the speed, which is 0.2 % lower in the windows than at their start.
+    """
+    expected, found = truth.axes["longitudinal"].derivatives, result.model.derivatives
+    return tuple(abs(found[k].value - expected[k].value) <= found[k].interval for k in ("Cm_alpha", "Cm_q"))
+
+
+# ------------------------------------------------------------------------------------------------ what is to be noticed
+
+
+@pytest.mark.parametrize(("shift", "words"), [(1, "one frame too late"), (-1, "one frame too early")])
+@pytest.mark.parametrize("axis", ["longitudinal", "lateral"])
+def test_inputs_of_another_frame_are_noticed(calm: Recording, axis: str, shift: int, words: str) -> None:
+    flight = shifted(calm.flight(), shift)
+    result = identify(flight, axis, GEOMETRY).results[axis]
+    assert [text for text in result.model.warnings if words in text]
+
+
+def shifted(flight: Flight, frames: int) -> Flight:
+    """The same with the surfaces of so many frames before."""
+    columns = flight.tables["surfaces"].columns
+    for name in ("delta_aileron", "delta_elevator", "delta_rudder"):
+        columns[name] = np.roll(columns[name], frames)
+    return flight
+
+
+@pytest.mark.parametrize("axis", ["longitudinal", "lateral"])
+def test_noise_is_not_taken_for_inputs_of_another_frame(twin: FlightModel, axis: str) -> None:
+    manoeuvres = PITCH if axis == "longitudinal" else LATERAL
+    result = identify(flown(manoeuvres, model=twin, noise=1.0, seed=1).flight(), axis).results[axis]
+    assert not [text for text in result.model.warnings if "one frame" in text]
+
+
+def test_turbulence_is_refused(twin: FlightModel) -> None:
+    result = longitudinal(flown(PITCH, model=twin, turbulence=2.0, seed=1))
+    assert len(result.refusals) >= 1
+    assert "most likely turbulence (the wind changed by" in result.refusals[0]
+    assert "fly in calm air" in result.refusals[0]
+
+
+def test_surfaces_at_20_hz_are_interpolated_with_a_warning(twin: FlightModel, truth: LinearModel) -> None:
+    result = longitudinal(flown(PITCH, model=twin, surfaces_every=3))
+    assert error(result, truth, "short_period") < 0.02
+    assert "rates: surfaces: 999" in result.model.warnings[0]
+    assert "(up to 50 ms apart)" in result.model.warnings[0]
+
+
+def test_a_controller_in_the_loop_is_noticed(twin: FlightModel) -> None:
+    result = longitudinal(flown(PITCH, model=twin, pitch_feedback=2.0))
+    assert "the elevator goes on moving after the excitation's end" in result.model.warnings[0]
+
+
+def test_auto_is_noticed(calm: Recording) -> None:
+    flight = Recording(calm.state, calm.surfaces, calm.excitation, [{"stamp": 0, "mode": 2}]).flight()
+    result = identify(flight, "longitudinal").results["longitudinal"]
+    assert "a controller flew (AUTO)" in result.model.warnings[0]
+
+
+def test_a_manoeuvre_beyond_the_linear_is_noticed(twin: FlightModel) -> None:
+    result = longitudinal(flown((Manoeuvre("pitch", 0.3), Manoeuvre("pitch", -0.3)), model=twin))
+    assert [text for text in result.model.warnings if "where the aircraft is not linear" in text]
+
+
+def test_one_window_leaves_none_for_validation(twin: FlightModel) -> None:
+    result = longitudinal(flown((Manoeuvre("pitch", 0.1),), model=twin))
+    assert not result.validation
+    assert [text for text in result.model.warnings if "no window is left for validation" in text]
+
+
+def test_frames_of_changing_length_are_no_matter(twin: FlightModel, truth: LinearModel) -> None:
+    recording = flown(PITCH, model=twin)
+    kept = [k for k in range(len(recording.state)) if k % 7 not in (2, 5)]
+    few = Recording([recording.state[k] for k in kept], recording.surfaces, recording.excitation)
+    assert error(longitudinal(few), truth, "short_period") < 0.02
+
+
+# ----------------------------------------------------------------------------------------------------------- refusals
+
+
+def without(recording: Recording, **changes: list) -> Flight:
+    roles = {name: getattr(recording, name) for name in ("state", "surfaces", "excitation", "mode", "fuel")}
+    return Recording(**{**roles, **changes}).flight()
+
+
+@pytest.fixture(scope="module")
+def short(twin: FlightModel) -> Recording:
+    return flown(PITCH[:1], model=twin)
+
+
+@pytest.mark.parametrize(
+    ("role", "words"),
+    [
+        ("state", "flown has no flight_state; record all topics"),
+        ("surfaces", "flown has no mission/surfaces; record all topics"),
+        ("excitation", "flown has no excitation/state; record all topics"),
+    ],
+)
+def test_a_bag_without_a_topic_is_refused(short: Recording, role: str, words: str) -> None:
+    with pytest.raises(IdentificationError, match=re.escape(words)):
+        identify(without(short, **{role: []}))
+
+
+def changed(rows: list[dict], **values: object) -> list[dict]:
+    return [{**row, **values} for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("role", "change", "words"),
+    [
+        ("excitation", {"active": False}, "no excitation ran; windows are taken from excitation/state"),
+        ("excitation", {"target": "throttle"}, "(3-2-1-1 on throttle): moves neither elevator nor aileron nor rudder"),
+        ("state", {"valid": 262143 - 512}, "air velocity was not known all the time"),
+        ("state", {"on_ground": True}, "the aircraft was on the ground"),
+        ("state", {"paused": True}, "simulator time stood still in it"),
+        ("surfaces", {"valid": 0}, "elevator not known all the time"),
+        ("surfaces", {"delta_elevator": np.float32(0.0)}, "elevator moves by more than 0.1 deg"),
+    ],
+)
+def test_a_flight_that_says_nothing_is_refused(short: Recording, role: str, change: dict, words: str) -> None:
+    with pytest.raises(IdentificationError, match=re.escape(words)):
+        identify(without(short, **{role: changed(getattr(short, role), **change)}))
+
+
+def test_an_aborted_excitation_is_refused(short: Recording) -> None:
+    begin, end = short.excitation
+    aborted = [begin, {**end, "result": "aborted: roll 46.0 deg is beyond the limit of 45.0 deg"}]
+    with pytest.raises(IdentificationError, match=r"was aborted: roll 46\.0 deg"):
+        identify(without(short, excitation=aborted))
+
+
+def test_a_gap_is_refused(short: Recording) -> None:
+    state = short.state[:100] + short.state[140:]
+    with pytest.raises(IdentificationError, match="have a gap or a reset in it"):
+        identify(without(short, state=state))
+
+
+def test_silent_surfaces_are_refused(short: Recording) -> None:
+    surfaces = short.surfaces[:100] + short.surfaces[140:]
+    with pytest.raises(IdentificationError, match=r"mission/surfaces is silent for 0\.68 s"):
+        identify(without(short, surfaces=surfaces))
+
+
+def test_a_window_that_is_left_out_is_told_and_the_others_are_used(calm: Recording) -> None:
+    begin, end, *rest = calm.excitation
+    found = identify(without(calm, excitation=[begin, {**end, "result": "aborted: stopped by /me"}, *rest]))
+    assert found.notes == ["excitation 1 (3-2-1-1 on pitch) was aborted: stopped by /me"]
+    assert [w.excitation.number for w in found.results["longitudinal"].windows] == [2, 3]
+
+
+def test_an_axis_or_a_window_that_is_not_there_is_refused(short: Recording) -> None:
+    with pytest.raises(IdentificationError, match=r"no excitation moves the lateral axis; there is: excitation 1"):
+        identify(short.flight(), "lateral")
+    with pytest.raises(IdentificationError, match="excitation 7 cannot be kept for validation; flown has: 1"):
+        identify(short.flight(), validate=7)
+    with pytest.raises(IdentificationError, match="is the only window: nothing would be left to fit"):
+        identify(short.flight(), validate=1)

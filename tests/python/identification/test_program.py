@@ -1,0 +1,116 @@
+"""The program identify_model: files, page, refusals; and the example of docs/identification.md as it stands there."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from support.manoeuvre_flight import LATERAL, PITCH, Manoeuvre, flown
+from support.markdown import blocks
+from support.room_table import ROOT
+from xplane_bridge.cli import identify_model
+from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.flight.flight_model import FlightModel
+from xplane_bridge.identification import files
+
+PAGE = ROOT / "docs" / "identification.md"
+
+
+@pytest.fixture(scope="module")
+def twin() -> FlightModel:
+    return create_model("fixed_wing")
+
+
+@pytest.fixture(scope="module")
+def bag(twin: FlightModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flown(PITCH + LATERAL, model=twin).write(tmp_path_factory.mktemp("flown") / "flight.bag")
+
+
+@pytest.fixture(scope="module")
+def gusty(twin: FlightModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("gusty") / "gusty.bag"
+    return flown((Manoeuvre("pitch"), Manoeuvre("pitch", -0.1)), model=twin, turbulence=2.0, seed=1).write(path)
+
+
+def test_the_example_of_the_page_works(bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "flight.bag").write_bytes(bag.read_bytes())
+    example = [block for block in blocks(PAGE) if block.section == "An example"]
+    for block in example:
+        if block.language == "bash":
+            program, *arguments = shlex.split(block.text)
+            assert (ROOT / program).is_file()
+            assert importlib.import_module(f"xplane_bridge.cli.{Path(program).name}").main(arguments) == 0
+    made = {path.name for path in tmp_path.iterdir()}
+    assert made == {"flight.bag", "twin.yaml", "model.yaml", "model.mat", "model.html"}
+    twin, model = files.read_model(tmp_path / "twin.yaml"), files.read_model(tmp_path / "model.yaml")
+    for axis, mode in (("longitudinal", "short_period"), ("lateral", "roll"), ("lateral", "dutch_roll")):
+        expected, found = (m.axes[axis].mode(mode).eigenvalue for m in (twin, model))
+        assert abs(found - expected) < 0.01 * abs(expected), mode
+    assert model.axes["lateral"].a_interval is not None
+    mat = loadmat("model.mat", squeeze_me=True)
+    assert np.allclose(mat["longitudinal"]["A"].item(), model.axes["longitudinal"].a)
+    pytest.importorskip("control")
+    names: dict = {}
+    exec(next(block.text for block in example if block.language == "python"), names)
+    assert names["system"].nstates == 4
+
+
+def test_the_page_needs_no_network_and_shows_every_window(bag: Path, tmp_path: Path) -> None:
+    page = tmp_path / "model.html"
+    arguments = [str(bag), "--axis", "lateral", "-o", str(tmp_path / "model.yaml"), "--report", str(page)]
+    assert identify_model.main(arguments) == 0
+    text = page.read_text(encoding="utf-8")
+    without_plotly = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert not re.search(r"(src|href)=\"(https?:)?//", without_plotly)
+    assert re.findall(r'id="(figure-lateral-[\w-]+)"', text) == [
+        *(f"figure-lateral-fitted-{k}" for k in (4, 5, 7, 8)),
+        *(f"figure-lateral-validation-{k}" for k in (6, 9)),
+    ]
+    for words in ("dutch roll", "Theil coefficient", "Cl_p", "Trim point", "Lateral validation 9: 3-2-1-1 on yaw"):
+        assert words in text, words
+    assert "longitudinal" not in without_plotly.lower()
+
+
+def test_turbulence_ends_with_an_error_and_the_page_shows_why(
+    gusty: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    model, page = tmp_path / "model.yaml", tmp_path / "model.html"
+    assert identify_model.main([str(gusty), "-o", str(model), "--report", str(page)]) == 1
+    error = capsys.readouterr().err
+    assert "no model written: longitudinal: residuals of " in error
+    assert "--accept writes it all the same" in error
+    assert not model.exists()
+    assert "What speaks against the model" in page.read_text(encoding="utf-8")
+    assert identify_model.main([str(gusty), "-o", str(model), "--accept"]) == 0
+    assert "warning: accepted: longitudinal: residuals of " in capsys.readouterr().err
+    assert files.read_model(model).axes["longitudinal"].a.shape == (4, 4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--axis", "lateral"], "no excitation moves the lateral axis"),
+        (["--validate", "9"], "excitation 9 cannot be kept for validation; gusty has: 1, 2"),
+        (["--geometry", "none.yaml"], "none.yaml: No such file or directory; give a file as in config/geometry"),
+        (["--accept", "-o", "model.doc"], "model.doc: expected a file that ends in .yaml, .json, .mat"),
+    ],
+)
+def test_refusals_are_in_words(
+    gusty: Path, arguments: list[str], words: str, capsys: pytest.CaptureFixture, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert identify_model.main([str(gusty), *arguments]) == 1
+    assert words in capsys.readouterr().err
+
+
+def test_no_bag_is_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert identify_model.main([str(tmp_path / "none.bag")]) == 1
+    assert "No such file or directory" in capsys.readouterr().err
