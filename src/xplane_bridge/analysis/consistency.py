@@ -80,12 +80,14 @@ def _neighbours(columns: Mapping[str, np.ndarray], parts: list[slice]) -> np.nda
     pairs = [np.arange(part.start, part.stop - 1) for part in parts if part.stop - part.start > 1]
     index = np.concatenate(pairs) if pairs else np.empty(0, dtype=int)
     sim = columns["sim_time_unwrapped"]
-    return index[sim[index + 1] > sim[index]]
+    later: np.ndarray = index[sim[index + 1] > sim[index]]
+    return later
 
 
 def _sim_steps(columns: Mapping[str, np.ndarray], use: np.ndarray) -> np.ndarray:
     sim = columns["sim_time_unwrapped"]
-    return sim[use + 1] - sim[use]
+    steps: np.ndarray = sim[use + 1] - sim[use]
+    return steps
 
 
 def _vector(columns: Mapping[str, np.ndarray], name: str) -> np.ndarray:

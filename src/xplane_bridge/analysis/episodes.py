@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Sequence
+from typing import Iterable, NamedTuple, Sequence
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def from_values(time: np.ndarray, labels: Sequence[str], end: int) -> list[Episo
     return out
 
 
-def who_flew(time: np.ndarray, modes: Sequence[int], failsafes: Sequence[bool], end: int) -> list[Episode]:
+def who_flew(time: np.ndarray, modes: Iterable[int], failsafes: Iterable[bool], end: int) -> list[Episode]:
     """Give the stretches flown by ``manual``, ``auto`` or, while their source was silent, ``failsafe``.
 
     Args:

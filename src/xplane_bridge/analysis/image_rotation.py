@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Iterable
+from typing import Any, Iterable
 
 import cv2
 import numpy as np
@@ -30,13 +30,14 @@ def rotation_between(before: np.ndarray, after: np.ndarray, mask: np.ndarray | N
     corners = cv2.goodFeaturesToTrack(before, _FEATURES, 0.01, 7, mask=mask)
     if corners is None or len(corners) < _MIN_INLIERS:
         return None
-    window = {
+    window: dict[str, Any] = {
+        "nextPts": None,  # OpenCV's types want an array here
         "winSize": (21, 21),
         "maxLevel": 3,
         "criteria": (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.003),
     }
-    moved, found, _ = cv2.calcOpticalFlowPyrLK(before, after, corners, None, **window)
-    back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, moved, None, **window)
+    moved, found, _ = cv2.calcOpticalFlowPyrLK(before, after, corners, **window)
+    back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, moved, **window)
     good = (found[:, 0] == 1) & (returned[:, 0] == 1) & (np.abs(back - corners).max(axis=(1, 2)) < 0.3)
     if good.sum() < _MIN_INLIERS:
         return None

@@ -76,7 +76,8 @@ def fit_delay(
     length = end - begin
 
     def rise(delay: float) -> np.ndarray:
-        return np.interp(end - delay, lead_time, lead) - np.interp(begin - delay, lead_time, lead)
+        risen: np.ndarray = np.interp(end - delay, lead_time, lead) - np.interp(begin - delay, lead_time, lead)
+        return risen
 
     def solve(delay: float) -> tuple[float, np.ndarray, np.ndarray]:
         return _robust(np.column_stack((rise(delay), length)), increment)

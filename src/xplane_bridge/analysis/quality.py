@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Mapping, NamedTuple
 
 import numpy as np
@@ -24,7 +25,8 @@ BAD_QUALITY = (
 )
 
 
-class Timing(NamedTuple):
+@dataclass(frozen=True)
+class Timing:
     """When the messages of a topic came."""
 
     count: int

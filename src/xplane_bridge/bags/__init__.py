@@ -1,9 +1,11 @@
 """Reads ROS 1 bags: topics into numpy columns, images one at a time. Needs rosbags, not ROS; nothing else reads bags.
 
+A recording that was cut off (a full disk, kill -9) is read to its last whole chunk, and a warning says so.
+
 Messages are decoded with the definitions that the bag itself carries, so bags recorded with older versions of the
-messages read as they were. Messages of one serialised layout (all lengths inside equal) are decoded together by
-numpy; a topic whose lengths vary is split into its layouts, and only messages that hold lists of messages or of
-strings are decoded one by one.
+messages read as they were; fields that came later are there too: NaN, 0, false or empty. Messages of one serialised
+layout (all lengths inside equal) are decoded together by numpy; a topic whose lengths vary is split into its layouts,
+and only messages that hold lists of messages or of strings are decoded one by one.
 
 Columns are named by path: ``header.stamp``, ``angular_velocity.x``, ``gear_deploy_ratio``. Times and durations are
 int64 nanoseconds. A fixed array is a column of shape (n, k); strings, lists of varying length and lists of messages
@@ -12,6 +14,8 @@ are object columns. Units are those of the message definition.
 
 from __future__ import annotations
 
+import functools
+import logging
 import struct
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -20,22 +24,33 @@ from pathlib import Path
 from typing import Any, Iterator, NamedTuple, Sequence, Union
 
 import numpy as np
-from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
-from xplane_bridge.bags.decoding import NeedsObjectsError, Types, decode_bulk, decode_objects, wanted
-from xplane_bridge.bags.units import Unit, parse_units
+from xplane_bridge.bags.chunks import BagFile, Connection, DamagedError
+from xplane_bridge.bags.decoding import (
+    NeedsObjectsError,
+    Types,
+    add_later_fields,
+    decode_bulk,
+    decode_objects,
+    wanted,
+)
+from xplane_bridge.bags.units import Unit, later_units, parse_units
 from xplane_bridge.errors import XplaneBridgeError
 
 PathLike = Union[str, Path]
+_LOG = logging.getLogger(__name__)
+#: Messages are decoded so many bytes at a time.
+_PIECE_BYTES = 16 << 20
 
 
 class BagError(XplaneBridgeError):
     """A bag cannot be read; the text is one line with the remedy."""
 
 
-class TopicInfo(NamedTuple):
+@dataclass(frozen=True)
+class TopicInfo:
     """One topic of the open bags."""
 
     topic: str
@@ -43,6 +58,17 @@ class TopicInfo(NamedTuple):
     count: int
     first_time: int  #: [ns] receive time of the first message
     last_time: int  #: [ns] receive time of the last message
+
+
+class Recorded(NamedTuple):
+    """One topic of one definition as it was recorded, undecoded: for what copies a recording."""
+
+    topic: str
+    msgtype: str  #: ROS 1 name
+    definition: str  #: full text, with the definitions it depends on
+    md5sum: str
+    callerid: str  #: of the publisher; empty where the recorder did not write it
+    latching: bool
 
 
 @dataclass
@@ -108,7 +134,7 @@ class Bags:
             msg = "no bag given: name at least one .bag file"
             raise BagError(msg)
         self._stack: ExitStack | None = None
-        self._readers: list[Reader] = []
+        self._files: list[BagFile] = []
         self._definitions: dict[tuple[str, str], tuple[Types, Any]] = {}
 
     def __enter__(self) -> Bags:
@@ -116,12 +142,12 @@ class Bags:
         stack = ExitStack()
         try:
             for path in self.paths:
-                reader = _open_reader(path)
-                stack.callback(reader.close)
-                self._readers.append(reader)
+                file = _opened(path)
+                stack.callback(file.close)
+                self._files.append(file)
         except BaseException:
             stack.close()
-            self._readers = []
+            self._files = []
             raise
         self._stack = stack
         return self
@@ -131,16 +157,17 @@ class Bags:
         if self._stack:
             self._stack.close()
         self._stack = None
-        self._readers = []
+        self._files = []
 
     @property
     def topics(self) -> dict[str, TopicInfo]:
         """Every topic of the bags, by name; topics without a message included."""
         infos: dict[str, TopicInfo] = {}
-        for reader in self._readers:
-            for connection in reader.connections:
-                times = [entry.time for entry in _ends(reader.indexes.get(connection.id, []))]
-                msgtype = connection.msgtype.replace("/msg/", "/")
+        for file in self._files:
+            for connection in file.connections.values():
+                recorded = file.times(connection.id)
+                times = [int(recorded.min()), int(recorded.max())] if len(recorded) else []
+                msgtype = connection.msgtype
                 old = infos.get(connection.topic)
                 if old is not None:
                     msgtype = old.msgtype
@@ -149,7 +176,7 @@ class Bags:
                 infos[connection.topic] = TopicInfo(
                     connection.topic,
                     msgtype,
-                    connection.msgcount + (old.count if old else 0),
+                    len(recorded) + (old.count if old else 0),
                     min(times, default=0),
                     max(times, default=0),
                 )
@@ -157,12 +184,11 @@ class Bags:
 
     def times(self, topic: str) -> np.ndarray:
         """Give the receive times of a topic's messages, int64 [ns], sorted; read from the index, not from the data."""
-        found = [[entry.time for entry in reader.indexes[c.id]] for reader, c in self._connections(topic)]
-        return np.sort(np.concatenate([np.array(times, dtype=np.int64) for times in found]))
+        return np.sort(np.concatenate([file.times(c.id) for file, c in self._connections(topic)]))
 
     def topic_of_type(self, msgtype: str, suffix: str = "") -> str | None:
         """Find the topic of a message type (``package/Name``); of several, the first whose name ends in `suffix`."""
-        for info in sorted(self.topics.values()):
+        for info in sorted(self.topics.values(), key=lambda info: info.topic):
             if info.msgtype == msgtype and info.topic.endswith(suffix):
                 return info.topic
         return None
@@ -171,12 +197,12 @@ class Bags:
         """Give the constants of a topic's message, from the bag's own definition (e.g. ``VALID_POSITION``)."""
         connection = self._connections(topic)[0][1]
         types, _ = self._definition(connection)
-        return {name: value for name, _, value in types[connection.msgtype][0]}
+        return {name: value for name, _, value in types[_type_name(connection.msgtype)][0]}
 
     def units(self, topic: str) -> dict[str, Unit]:
         """Give the unit of every column of a topic, from the comments of the bag's own definition."""
         connection = self._connections(topic)[0][1]
-        return parse_units(_definition_text(connection), connection.msgtype.replace("/msg/", "/"))
+        return {**later_units(connection.msgtype), **parse_units(connection.definition, connection.msgtype)}
 
     def read(self, topic: str, columns: Sequence[str] | None = None) -> Table:
         """Read one topic into arrays.
@@ -188,69 +214,118 @@ class Bags:
         Raises:
             BagError: No such topic or column, or damaged data.
         """
-        parts = []
+        parts: list[tuple[np.ndarray, dict[str, np.ndarray]]] = []
         msgtype = ""
-        for reader, connection in self._connections(topic):
-            msgtype = connection.msgtype.replace("/msg/", "/")
-            times, raws = _raw(reader, connection)
-            parts.append((times, self._decode(connection, raws, columns)))
+        for file, connection in self._connections(topic):
+            msgtype = connection.msgtype
+            parts += self._pieces(file, connection, columns)
         return _joined(topic, msgtype, parts, columns)
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Yield (receive time [ns], message) of one topic one at a time, in time order: for images and lists."""
-        streams = []
-        for reader, connection in self._connections(topic):
-            streams.append(self._stream(reader, connection))
+        streams = [self._stream(file, connection) for file, connection in self._connections(topic)]
         yield from merge(*streams, key=lambda pair: pair[0])
 
-    def _stream(self, reader: Reader, connection: Any) -> Iterator[tuple[int, Any]]:
-        _, store = self._definition(connection)
-        try:
-            for _, time, raw in reader.messages(connections=[connection]):
-                yield time, store.deserialize_ros1(raw, connection.msgtype)
-        except (ReaderError, SerdeError, struct.error, AssertionError) as err:
-            raise _damaged(reader, err) from None
+    def recorded(self, topics: Sequence[str] = ()) -> Iterator[tuple[Recorded, int, bytes]]:
+        """Yield every message undecoded: (topic, receive time [ns], serialised message), in time order.
 
-    def _connections(self, topic: str) -> list[tuple[Reader, Any]]:
-        found = [(reader, c) for reader in self._readers for c in reader.connections if c.topic == topic]
+        Args:
+            topics: The topics wanted; all when empty.
+
+        Raises:
+            BagError: No such topic, or damaged data.
+        """
+        chosen = [pair for topic in topics or self.topics for pair in self._connections(topic)]
+        streams = [self._undecoded(file, [c for other, c in chosen if other is file]) for file in self._files]
+        yield from merge(*streams, key=lambda item: item[1])
+
+    def types(self, recorded: Recorded) -> Types:
+        """Give the message types of a topic, as rosbags parses them: (constants, fields) by ``package/msg/Name``."""
+        return self._parsed(recorded.topic, recorded.msgtype, recorded.definition)[0]
+
+    def _pieces(
+        self, file: BagFile, connection: Connection, columns: Sequence[str] | None
+    ) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
+        """Receive times and columns, so many messages at a time that their bytes need little memory."""
+        times: list[np.ndarray] = []
+        raws: list[bytes] = []
+        size = 0
+        try:
+            for time, messages in file.by_chunk(connection.id):
+                times.append(time)
+                raws += messages
+                size += sum(map(len, messages))
+                if size > _PIECE_BYTES:
+                    yield np.concatenate(times), self._decode(connection, raws, columns)
+                    times, raws, size = [], [], 0
+        except (DamagedError, OSError) as err:
+            raise _damaged(file, err) from None
+        if raws:
+            yield np.concatenate(times), self._decode(connection, raws, columns)
+
+    def _undecoded(self, file: BagFile, connections: list[Connection]) -> Iterator[tuple[Recorded, int, bytes]]:
+        known = {c.id: Recorded(*c[1:]) for c in connections}
+        try:
+            for id_, time, raw in file.by_time(known):
+                yield known[id_], time, raw
+        except (DamagedError, OSError) as err:
+            raise _damaged(file, err) from None
+
+    def _stream(self, file: BagFile, connection: Connection) -> Iterator[tuple[int, Any]]:
+        _, store = self._definition(connection)
+        name = _type_name(connection.msgtype)
+        try:
+            for _, time, raw in file.by_time([connection.id]):
+                yield time, store.deserialize_ros1(raw, name)
+        except (DamagedError, OSError, SerdeError, struct.error, AssertionError) as err:
+            raise _damaged(file, err) from None
+
+    def _connections(self, topic: str) -> list[tuple[BagFile, Connection]]:
+        found = [(file, c) for file in self._files for c in file.connections.values() if c.topic == topic]
         if not found:
             have = ", ".join(sorted(self.topics)) or "no topic at all"
             msg = f"no topic {topic} in {', '.join(str(p) for p in self.paths)}; there is: {have}"
             raise BagError(msg)
         return found
 
-    def _definition(self, connection: Any) -> tuple[Types, Any]:
-        definition = _definition_text(connection)
-        key = (connection.msgtype, definition)
+    def _definition(self, connection: Connection) -> tuple[Types, Any]:
+        return self._parsed(connection.topic, connection.msgtype, connection.definition)
+
+    def _parsed(self, topic: str, msgtype: str, definition: str) -> tuple[Types, Any]:
+        key = (msgtype, definition)
         if key not in self._definitions:
             store = get_typestore(Stores.EMPTY)
             try:
-                types = get_types_from_msg(definition, connection.msgtype)
+                types = get_types_from_msg(definition, _type_name(msgtype))
                 store.register(types)
             except (TypesysError, SyntaxError) as err:
-                msg = f"{connection.topic}: the bag's definition of {connection.msgtype} does not parse: {err}"
+                msg = f"{topic}: the bag's definition of {msgtype} does not parse: {err}"
                 raise BagError(msg) from None
             self._definitions[key] = (types, store)
         return self._definitions[key]
 
-    def _decode(self, connection: Any, raws: list[bytes], columns: Sequence[str] | None) -> dict[str, np.ndarray]:
+    def _decode(
+        self, connection: Connection, raws: list[bytes], columns: Sequence[str] | None
+    ) -> dict[str, np.ndarray]:
         types, store = self._definition(connection)
-        msgtype = connection.msgtype
+        name = _type_name(connection.msgtype)
         try:
             try:
-                return decode_bulk(types, msgtype, raws, columns)
+                found = decode_bulk(types, name, raws, columns)
             except NeedsObjectsError:
-                return decode_objects(types, lambda raw: store.deserialize_ros1(raw, msgtype), msgtype, raws, columns)
+                found = decode_objects(types, lambda raw: store.deserialize_ros1(raw, name), name, raws, columns)
         except (SerdeError, AssertionError, struct.error, ValueError, IndexError) as err:
-            msg = f"{connection.topic}: a message does not fit its definition {msgtype}: {err}"
+            msg = f"{connection.topic}: a message does not fit its definition {connection.msgtype}: {err}"
             raise BagError(msg) from None
+        return add_later_fields(connection.msgtype, len(raws), columns, found)
 
 
-def _definition_text(connection: Any) -> str:
-    return str(getattr(connection.msgdef, "data", connection.msgdef))  # a plain string before rosbags 0.10
+def _type_name(msgtype: str) -> str:
+    """The name of a type as rosbags has it."""
+    return "/msg/".join(msgtype.rsplit("/", 1))
 
 
-def _open_reader(path: Path) -> Reader:
+def _opened(path: Path) -> BagFile:
     try:
         with path.open("rb") as file:
             magic = file.read(9)
@@ -264,41 +339,23 @@ def _open_reader(path: Path) -> Reader:
         msg = f"{path}: not a ROS 1 bag (it does not start with '#ROSBAG V')"
         raise BagError(msg)
     try:
-        reader = Reader(path)
-        reader.open()
-    except ReaderError as err:
-        text = str(err)
-        if "not indexed" in text:
-            msg = f"{path}: not indexed, the recording was cut off; run `rosbag reindex {path}` and call again"
-        elif "damaged" in text or "Header" in text or "read" in text:
-            msg = f"{path}: damaged or truncated ({text}); run `rosbag reindex {path}` to save what is there"
-        else:
-            msg = f"{path}: {text}"
+        bag = BagFile(path)
+    except DamagedError as err:
+        msg = f"{path}: damaged or truncated ({err}); `rosbag reindex {path}` saves what can be saved"
         raise BagError(msg) from None
-    except (AssertionError, struct.error, ValueError, KeyError, EOFError) as err:
-        msg = f"{path}: damaged or truncated ({err!r}); run `rosbag reindex {path}` to save what is there"
-        raise BagError(msg) from None
-    return reader
+    if bag.lost is not None:
+        _say_cut_off(path, bag.lost)
+    return bag
 
 
-def _damaged(reader: Reader, err: Exception) -> BagError:
-    return BagError(f"{reader.path}: damaged data ({err}); run `rosbag reindex {reader.path}` to save what is there")
+@functools.lru_cache(maxsize=None)
+def _say_cut_off(path: Path, lost: int) -> None:
+    """Once for a file, on stderr unless the program has set up logging."""
+    _LOG.warning("%s: the recording was cut off; read to its last whole chunk, %d bytes behind it are lost", path, lost)
 
 
-def _ends(entries: Sequence[Any]) -> Sequence[Any]:
-    return [entries[0], entries[-1]] if entries else []
-
-
-def _raw(reader: Reader, connection: Any) -> tuple[np.ndarray, list[bytes]]:
-    times: list[int] = []
-    raws: list[bytes] = []
-    try:
-        for _, time, raw in reader.messages(connections=[connection]):
-            times.append(time)
-            raws.append(raw)
-    except (ReaderError, AssertionError, struct.error, OSError, EOFError, RuntimeError) as err:
-        raise _damaged(reader, err) from None
-    return np.array(times, dtype=np.int64), raws
+def _damaged(file: BagFile, err: Exception) -> BagError:
+    return BagError(f"{file.path}: damaged data ({err}); `rosbag reindex {file.path}` saves what can be saved")
 
 
 def _joined(
@@ -321,18 +378,23 @@ def _joined(
             have = sorted({n for _, part in filled for n in part}) if columns is None else []
             msg = f"{topic} ({msgtype}) has no column {column!r}" + (f"; it has: {', '.join(have)}" if have else "")
             raise BagError(msg)
-    if len(filled) == 1:
-        return Table(topic, msgtype, filled[0][0], filled[0][1])
     if not filled:
         return Table(topic, msgtype, np.empty(0, dtype=np.int64), {})
     time = np.concatenate([part[0] for part in filled])
-    order = np.argsort(time, kind="stable")
-    out = {name: _stacked(name, filled)[order] for name in names}
-    return Table(topic, msgtype, time[order], out)
+    order = None if np.all(time[1:] >= time[:-1]) else np.argsort(time, kind="stable")
+    out: dict[str, np.ndarray] = {}
+    for name in names:  # one column at a time, and its parts let go: there is never a second copy of all
+        stacked = _stacked(name, filled)
+        for _, columns_of_part in filled:
+            columns_of_part.pop(name, None)
+        out[name] = stacked if order is None else stacked[order]
+    return Table(topic, msgtype, time if order is None else time[order], out)
 
 
 def _stacked(name: str, parts: list[tuple[np.ndarray, dict[str, np.ndarray]]]) -> np.ndarray:
     have = [part[name] for _, part in parts if name in part]
+    if len(parts) == 1:
+        return have[0]
     shapes = {column.shape[1:] for column in have}
     if len(have) == len(parts) and len(shapes) == 1:
         return np.concatenate(have)

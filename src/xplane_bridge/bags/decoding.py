@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from typing import Any, Callable, Dict, NamedTuple, Sequence, Tuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+
+from xplane_bridge.bags.later_fields import LATER_FIELDS
 
 _DTYPES = {
     "bool": np.dtype("?"),
@@ -35,7 +38,8 @@ _UINT32 = struct.Struct("<I")
 _MAX_LAYOUTS = 64
 
 
-class _Leaf(NamedTuple):
+@dataclass(frozen=True)
+class _Leaf:
     name: str
     dtype: np.dtype
     offset: int
@@ -66,7 +70,7 @@ def _layout(types: Types, msgtype: str, raw: bytes) -> _Layout:
     def length(at: int) -> int:
         (value,) = _UINT32.unpack_from(raw, at)
         guards.append((at, value))
-        return value
+        return int(value)
 
     def walk(typename: str, prefix: str, at: int) -> int:
         for field, (kind, detail) in types[typename][1]:
@@ -127,6 +131,24 @@ def _layout(types: Types, msgtype: str, raw: bytes) -> _Layout:
 def _basename(detail: Any) -> str:
     # rosbags gives (name, string limit) since 0.9.21, the bare name before.
     return str(detail[0]) if isinstance(detail, tuple) else str(detail)
+
+
+def add_later_fields(
+    msgtype: str, total: int, columns: Sequence[str] | None, found: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Add the fields that a message of the package has got after the recording: NaN, 0, false or empty."""
+    for name, (kind, size, _) in LATER_FIELDS.get(msgtype, {}).items():
+        if name in found or not wanted(name, columns) or not total:
+            continue
+        if size < 0 or kind == "string":
+            found[name] = np.array([None] * total, dtype=object)
+            for row in range(total):
+                found[name][row] = "" if kind == "string" else np.empty(0, _DTYPES[kind])
+        else:
+            dtype = _DTYPES[kind]
+            shape = (total, size) if size else (total,)
+            found[name] = np.full(shape, np.nan if dtype.kind == "f" else 0, dtype)
+    return found
 
 
 def decode_bulk(types: Types, msgtype: str, raws: list[bytes], columns: Sequence[str] | None) -> dict[str, np.ndarray]:

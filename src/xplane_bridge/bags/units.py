@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from xplane_bridge.bags.later_fields import LATER_FIELDS
+
 _FIELD = re.compile(r"^\s*([\w/]+)(?:\[\d*\])?\s+(\w+)\s*(?:#\s*(.*))?$")
 _UNIT = re.compile(r"^\[([^\]]+)\]\s*(.*)$")
 _SEPARATOR = re.compile(r"^=+$", re.MULTILINE)
@@ -46,10 +48,15 @@ def parse_units(definition: str, msgtype: str) -> dict[str, Unit]:
         name = msgtype
         if k:
             name, lines = lines[0].replace("MSG:", "").strip(), lines[1:]
-        types[name] = [m.groups(default="") for m in map(_FIELD.match, lines) if m]
+        types[name] = [(m[1], m[2], m[3] or "") for m in map(_FIELD.match, lines) if m]
     units: dict[str, Unit] = {}
     _walk(types, msgtype, "", NO_UNIT, units)
     return units
+
+
+def later_units(msgtype: str) -> dict[str, Unit]:
+    """Give the units of fields that a message of the package has got since its first version."""
+    return {name: _unit(f"[{unit}]") or NO_UNIT for name, (_, _, unit) in LATER_FIELDS.get(msgtype, {}).items()}
 
 
 def _walk(

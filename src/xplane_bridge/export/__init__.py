@@ -1,1 +1,1 @@
-"""Flights as files for other programs: tables, trajectories, and data sets of images with their labels."""
+"""Flights as files for other programs: tables, arrays, trajectories, image data sets, recordings in other formats."""

@@ -1,9 +1,9 @@
 """Many flights, exported side by side: here in processes, or on a Dask cluster; the same files either way.
 
-An export folder holds one entry a flight and format, and ``manifest.json``: versions, parameters, counts, and the
-SHA-256 of every file exported there. A flight is built under a temporary name and renamed when whole, so that an export
-that was cut off goes on where it stopped: flights whose record in ``.flights/<format>/`` fits the bags and parameters
-are not made again. What another record names is never overwritten.
+An export folder holds one entry a flight and format, a data card (README.md), and ``manifest.json``: versions,
+parameters, counts, and the SHA-256 of every file exported there. A flight is built under a temporary name and renamed
+when whole, so that an export that was cut off goes on where it stopped: flights whose record in ``.flights/<format>/``
+fits the bags and parameters are not made again. What another record names is never overwritten.
 """
 
 from __future__ import annotations
@@ -16,45 +16,20 @@ import random
 import shutil
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
-from typing import Any, Callable, Iterable, Iterator, NamedTuple, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Sequence
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import BagError, Bags
-from xplane_bridge.errors import XplaneBridgeError
-from xplane_bridge.export.dataset import Options, export_images
+from xplane_bridge.export.card import CARD, card
+from xplane_bridge.export.flight import ExportError, frame_quality
+from xplane_bridge.export.formats import ALIASES, FORMATS, Job
+
+if TYPE_CHECKING:
+    from xplane_bridge.export.dataset import Options
 
 SCHEMA = 2  #: of the manifest and of the records; 1 knew one format a folder
 MANIFEST = "manifest.json"
 _RECORDS = ".flights"
-#: Format to the ending of a flight's file; "" is a folder.
-_ENDINGS = {"csv": ".csv", "parquet": ".parquet", "tum": ".tum", "euroc": ".euroc.csv", "images": ""}
-FORMATS = tuple(_ENDINGS)
-
-
-class ExportError(XplaneBridgeError):
-    """An export that cannot be done; the text is one line with the remedy."""
-
-
-class Job(NamedTuple):
-    """One flight to export. Plain values: it travels to other processes and machines."""
-
-    name: str  #: folder or file stem in the export
-    bags: tuple[str, ...]
-    output: str
-    format: str
-    rate: float | None
-    topics: tuple[str, ...]
-    dataset: Options
-    train_flight: bool
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """What the user asked for that decides the content of this format."""
-        if self.format == "images":
-            return {**self.dataset._asdict(), "train_flight": self.train_flight}
-        if self.format in ("csv", "parquet"):
-            return {"rate": self.rate, "topics": list(self.topics)}
-        return {"rate": self.rate}
 
 
 class Outcome(NamedTuple):
@@ -118,6 +93,8 @@ def export_flight(job: Job) -> Outcome:
         record = _export(job, output)
         record_file.parent.mkdir(parents=True, exist_ok=True)
         _write_json(record_file, {"key": key, "record": record})
+        for alias in (alias for alias, name in ALIASES.items() if name == job.format):
+            _remove(output / _RECORDS / alias / record_file.name)  # of an earlier version, made anew
         return Outcome(job.name, record, "", False)
     except (BagError, ExportError) as err:
         return Outcome(job.name, None, str(err), False)
@@ -126,35 +103,30 @@ def export_flight(job: Job) -> Outcome:
 
 
 def _export(job: Job, output: Path) -> dict[str, Any]:
-    final = output / f"{job.name}{_ENDINGS[job.format]}"
+    form = FORMATS[job.format]
+    final = output / f"{job.name}{form.ending}"
     _refuse_foreign(final, job)
-    building = final.with_name(f".{final.name}.part")
-    _remove(building)
-    counts: dict[str, Any]
-    with Bags(job.bags) as bags:
-        if job.format == "images":
-            counts = export_images(bags, building, job.dataset, job.train_flight)._asdict()
-        elif job.format in ("csv", "parquet"):
-            from xplane_bridge.export import tables
-
-            frame = tables.flight_table(bags, job.rate, job.topics)
-            (tables.write_csv if job.format == "csv" else tables.write_parquet)(frame, building)
-            counts = {"rows": len(frame), "columns": len(frame.columns)}
-        else:
-            from xplane_bridge.export import trajectories
-
-            stamp, position, orientation = trajectories.trajectory(bags, job.rate)
-            write = trajectories.write_tum if job.format == "tum" else trajectories.write_euroc
-            write(building, stamp, position, orientation)
-            counts = {"poses": len(stamp)}
-    _remove(final)
-    os.replace(building, final)
+    # Under its own name already: some formats write it into their files.
+    folder = final.with_name(f".{final.name}.part")
+    _remove(folder)
+    try:
+        with Bags(job.bags) as bags:
+            folder.mkdir(parents=True)
+            counts = form.write(bags, folder / final.name, job)
+            about = {"topics": {t: [info.msgtype, info.count] for t, info in bags.topics.items() if info.count}}
+            if form.frames:
+                about["quality"] = frame_quality(bags)
+        _remove(final)
+        os.replace(folder / final.name, final)
+    finally:
+        _remove(folder)
     files = sorted(p for p in final.rglob("*") if p.is_file()) if final.is_dir() else [final]
     return {
         "xplane_bridge": __version__,
         "bags": [Path(path).name for path in job.bags],
         "parameters": job.parameters,
         "counts": counts,
+        **about,
         "files": {p.relative_to(output).as_posix(): _sha256(p) for p in files},
     }
 
@@ -174,7 +146,8 @@ def _records(output: Path) -> Iterator[tuple[str, str, dict[str, Any]]]:
     for path in sorted((output / _RECORDS).glob("*/*.json")):
         content = _read_json(path)
         if content is not None and content["key"]["schema"] == SCHEMA:
-            yield path.parent.name, path.stem, content["record"]
+            form = path.parent.name
+            yield ALIASES.get(form, form), path.stem, content["record"]
 
 
 def run_local(jobs: Sequence[Job], workers: int) -> Iterator[Outcome]:
@@ -234,10 +207,25 @@ def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]
     }
     content = {"schema": SCHEMA, "xplane_bridge": __version__, "counts": counts, "exports": exports}
     try:
+        content["files"] = _write_card(output, exports)
         _write_json(output / MANIFEST, content)
     except OSError as err:
         msg = f"{output / MANIFEST}: {err.strerror}"
         raise ExportError(msg) from None
+
+
+def _write_card(output: Path, exports: dict[str, dict[str, Any]]) -> dict[str, str]:
+    """Write the data card, unless there is a file of its name that no export has written, or that a user has changed.
+
+    Returns:
+        Its name and SHA-256 for the manifest; nothing where there is no card of ours.
+    """
+    path = output / CARD
+    written = (_read_json(output / MANIFEST) or {}).get("files", {}).get(CARD)
+    if not exports or (path.exists() and _sha256(path) != written):
+        return {CARD: written} if written else {}
+    _write_text(path, card(__version__, exports))
+    return {CARD: _sha256(path)}
 
 
 def make_folder(output: Path) -> None:
@@ -270,8 +258,8 @@ def verify(output: Path) -> list[str]:
         raise ExportError(msg)
     problems = []
     known = {MANIFEST}
-    records = [record for flights in manifest["exports"].values() for record in flights.values()]
-    for name, checksum in (item for record in records for item in record["files"].items()):
+    records = [manifest, *(record for flights in manifest["exports"].values() for record in flights.values())]
+    for name, checksum in (item for record in records for item in record.get("files", {}).items()):
         known.add(name)
         path = output / name
         if not path.is_file():
@@ -326,6 +314,10 @@ def _read_json(path: Path) -> Any:
 
 
 def _write_json(path: Path, content: Any) -> None:
+    _write_text(path, json.dumps(content, indent=1, sort_keys=True) + "\n")
+
+
+def _write_text(path: Path, text: str) -> None:
     part = path.with_name(path.name + ".part")
-    part.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    part.write_text(text, encoding="utf-8")
     os.replace(part, path)

@@ -28,10 +28,7 @@ def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: 
     for path, values in columns.items():
         if path.split(".")[0] == "header":
             continue
-        base = f"{prefix}_{path}" if prefix else path
-        base = base.replace(".", "_").replace("[", "_").replace("]", "")
-        suffix = units[path].suffix if path in units else ""
-        ending = f"_{suffix}" if suffix and not base.endswith(f"_{suffix}") else ""
+        base, ending = _parts(path, units, prefix)
         if values.ndim == 1:
             out[base + ending] = values
         else:
@@ -39,6 +36,19 @@ def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: 
             for k in range(flat.shape[1]):
                 out[f"{base}_{k}{ending}"] = flat[:, k]
     return out
+
+
+def name_of(path: str, units: Mapping[str, Unit]) -> str:
+    """Name a column, with its unit: ``angular_velocity.x`` is ``angular_velocity_x_radps``."""
+    return "".join(_parts(path, units, ""))
+
+
+def _parts(path: str, units: Mapping[str, Unit], prefix: str) -> tuple[str, str]:
+    """Give a column's name without its unit, and the ending that says the unit."""
+    base = f"{prefix}_{path}" if prefix else path
+    base = base.replace(".", "_").replace("[", "_").replace("]", "")
+    suffix = units[path].suffix if path in units else ""
+    return base, f"_{suffix}" if suffix and not base.endswith(f"_{suffix}") else ""
 
 
 def on_base(

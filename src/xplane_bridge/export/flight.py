@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any, Mapping, Sequence
+
 import numpy as np
 
 from xplane_bridge.analysis.resampling import held
 from xplane_bridge.bags import BagError, Bags, Table
+from xplane_bridge.errors import XplaneBridgeError
 
 STATE = "xplane_bridge/FlightState"
 FRAME_STATE = "xplane_bridge/FrameState"
@@ -13,6 +16,21 @@ MODE = "xplane_bridge/ControlMode"
 FAILURES = "xplane_bridge/FailureState"
 EXCITATION = "xplane_bridge/ExcitationState"
 ODOMETRY = "nav_msgs/Odometry"
+
+
+class ExportError(XplaneBridgeError):
+    """An export that cannot be done; the text is one line with the remedy."""
+
+
+def name_space(bags: Bags) -> str:
+    """Give what precedes the bridge's topics, e.g. ``/xplane``; empty where there is no flight state."""
+    state = bags.topic_of_type(STATE)
+    return state.rsplit("/", 1)[0] if state else ""
+
+
+def full_names(bags: Bags, topics: Sequence[str]) -> list[str]:
+    """Give topics their full names: one that begins with a slash has it, others are below the bridge's name space."""
+    return [topic if topic.startswith("/") else f"{name_space(bags)}/{topic}" for topic in topics]
 
 
 def topic_of(bags: Bags, msgtype: str) -> str:
@@ -27,6 +45,22 @@ def topic_of(bags: Bags, msgtype: str) -> str:
         msg = f"{names}: no message of type {msgtype}; record that topic (launch/record.launch does)"
         raise BagError(msg)
     return topic
+
+
+def quality_bits(constants: Mapping[str, Any]) -> dict[str, int]:
+    """Give FrameState's quality bits by their names in words, from the constants of the bag's definition."""
+    prefix = "QUALITY_"
+    return {k[len(prefix) :].lower().replace("_", " "): int(v) for k, v in constants.items() if k.startswith(prefix)}
+
+
+def frame_quality(bags: Bags) -> dict[str, Any]:
+    """Count the frames in the bags, the perfect ones, and those with each quality bit; empty without frames."""
+    topic = bags.topic_of_type(FRAME_STATE)
+    if topic is None or not bags.topics[topic].count:
+        return {}
+    quality = bags.read(topic, ["quality"])["quality"]
+    counts = {word: int(((quality & bit) != 0).sum()) for word, bit in quality_bits(bags.constants(topic)).items()}
+    return {"frames": len(quality), "perfect": int((quality == 0).sum()), "bits": counts}
 
 
 def labels(bags: Bags, base: np.ndarray) -> dict[str, np.ndarray]:
@@ -53,8 +87,8 @@ def labels(bags: Bags, base: np.ndarray) -> dict[str, np.ndarray]:
     excitation = bags.topic_of_type(EXCITATION)
     if excitation and bags.topics[excitation].count:
         table = bags.read(excitation)
-        rows = zip(table["active"], table["kind"], table["target"])
-        texts = np.array([f"{kind}:{target}" if on else "" for on, kind, target in rows], dtype=object)
+        each = zip(table["active"], table["kind"], table["target"])
+        texts = np.array([f"{kind}:{target}" if on else "" for on, kind, target in each], dtype=object)
         out["excitation"] = _held(base, table, texts)
     return out
 

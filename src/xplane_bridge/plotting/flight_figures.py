@@ -253,9 +253,10 @@ def _path(flight: Flight, in_space: bool) -> PathFigure:
         raise MissingError(msg)
     broken = [part.start for part in flight.parts[1:]]
     columns = [values.astype(np.float64).copy() for values in (east, north, up)]
+    x, y, z = columns
     for values in columns:
         values[~good] = np.nan
         values[broken] = np.nan  # no line across a gap or reset
     colour, label = (t["true_airspeed"], "true airspeed [m/s]") if in_space else (up, "altitude MSL [m]")
     key, title = ("path", "Flight path") if in_space else ("track", "Ground track")
-    return PathFigure(key, title, *columns, colour.astype(np.float64), label, in_space)
+    return PathFigure(key, title, x, y, z, colour.astype(np.float64), label, in_space)

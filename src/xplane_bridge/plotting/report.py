@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import base64
-import datetime
 import html
-from typing import TYPE_CHECKING, Any, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
 
-from xplane_bridge import __version__
 from xplane_bridge.analysis.consistency import check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values, who_flew
 from xplane_bridge.analysis.quality import BAD_QUALITY, bit_shares, pairing, timing
@@ -17,6 +15,7 @@ from xplane_bridge.analysis.summary import summary
 from xplane_bridge.constants import LinkState, words
 from xplane_bridge.plotting import interactive
 from xplane_bridge.plotting.flight_figures import MissingError, all_figures
+from xplane_bridge.plotting.page import Section, day_of, missing, number, page, rows_table
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
@@ -27,56 +26,6 @@ if TYPE_CHECKING:
 STRIP_IMAGES = 12
 _THUMBNAIL_WIDTH = 320
 _LINK_STATES = words(LinkState)
-
-_STYLE = """
-:root { --ink: #1d2733; --soft: #5c6b7a; --line: #dde3e9; --back: #f6f8fa; }
-* { box-sizing: border-box; }
-body { font: 15px/1.45 system-ui, sans-serif; color: var(--ink); background: var(--back); margin: 0; }
-header { background: #14324f; color: #fff; padding: 22px 32px; }
-header h1 { margin: 0 0 4px; font-size: 24px; } header p { margin: 0; opacity: .8; }
-nav { position: sticky; top: 0; z-index: 5; background: #fff; border-bottom: 1px solid var(--line); padding: 8px 32px;
-  display: flex; flex-wrap: wrap; gap: 2px 16px; }
-nav a { color: #0b5cad; text-decoration: none; white-space: nowrap; }
-main { max-width: 1240px; margin: 0 auto; padding: 16px 24px 60px; }
-section { background: #fff; border: 1px solid var(--line); border-radius: 8px; padding: 14px 18px; margin: 18px 0;
-  scroll-margin-top: 52px; }
-h2 { margin: 2px 0 10px; font-size: 19px; } h3 { margin: 18px 0 6px; font-size: 15px; }
-.cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(170px, 1fr)); gap: 10px; }
-.card { border: 1px solid var(--line); border-radius: 6px; padding: 8px 12px; }
-.card b { display: block; font-size: 19px; } .card span { color: var(--soft); font-size: 13px; }
-table { border-collapse: collapse; width: 100%; font-size: 13.5px; }
-th, td { text-align: left; padding: 4px 10px 4px 0; border-bottom: 1px solid var(--line); vertical-align: top; }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
-.missing { color: var(--soft); font-style: italic; }
-.bad { color: #b3261e; font-weight: 600; } .good { color: #1b7f3b; }
-.strip { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 12px; }
-.strip figure { margin: 0; border: 1px solid var(--line); border-radius: 6px; overflow: hidden; }
-.strip img { width: 100%; display: block; }
-.strip figcaption { padding: 6px 9px; font-size: 12.5px; color: var(--soft); }
-"""
-
-#: Zooming one time axis zooms all; the guard keeps the echo of our own change out.
-_LINK = """
-const figures = [...document.querySelectorAll('[data-time] .plotly-graph-div')];
-let busy = false;
-figures.forEach(source => source.on('plotly_relayout', change => {
-  if (busy) return;
-  const key = Object.keys(change).find(k => /^xaxis\\d*\\.(range(\\[0\\])?|autorange)$/.test(k));
-  if (!key) return;
-  const axis = key.split('.')[0];
-  busy = true;
-  const jobs = figures.filter(f => f !== source).map(f => {
-    const wanted = {};
-    Object.keys(f.layout).filter(k => /^xaxis/.test(k)).forEach(k => {
-      if (key.endsWith('autorange')) wanted[k + '.autorange'] = true;
-      else wanted[k + '.range'] = source.layout[axis].range.slice();
-    });
-    return Plotly.relayout(f, wanted);
-  });
-  Promise.all(jobs).finally(() => { busy = false; });
-}));
-document.body.dataset.linked = figures.length;
-"""
 
 
 def build(bags: Bags, flight: Flight) -> tuple[str, list[TimeFigure | PathFigure]]:
@@ -90,12 +39,12 @@ def build(bags: Bags, flight: Flight) -> tuple[str, list[TimeFigure | PathFigure
         The page, and the figures on it (for PNG files).
     """
     made: list[TimeFigure | PathFigure] = []
-    sections: list[tuple[str, str, str]] = [("summary", "Summary", _summary(flight))]
+    sections: list[Section] = [("summary", "Summary", _summary(flight))]
     for key, title, make in all_figures():
         try:
             figure = make(flight)
         except MissingError as err:
-            sections.append((key, title, _missing(str(err))))
+            sections.append((key, title, missing(str(err))))
             continue
         made.append(figure)
         linked = " data-time" if hasattr(figure, "panels") else ""
@@ -105,57 +54,21 @@ def build(bags: Bags, flight: Flight) -> tuple[str, list[TimeFigure | PathFigure
     return _page(flight, bags, sections), made
 
 
-def _page(flight: Flight, bags: Bags, sections: Sequence[tuple[str, str, str]]) -> str:
-    day = datetime.datetime.fromtimestamp(flight.start / 1e9, tz=datetime.timezone.utc)
+def _page(flight: Flight, bags: Bags, sections: Sequence[Section]) -> str:
     names = ", ".join(path.name for path in bags.paths)
-    nav = "".join(f'<a href="#{key}">{html.escape(title.split(":")[0])}</a>' for key, title, _ in sections)
-    body = "".join(
-        f'<section id="{key}"><h2>{html.escape(title)}</h2>{text}</section>' for key, title, text in sections
-    )
-    return (
-        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>Flight report: {html.escape(flight.name)}</title><style>{_STYLE}</style>"
-        f"<script>{interactive.script()}</script></head><body>"
-        f"<header><h1>Flight report: {html.escape(flight.name)}</h1>"
-        f"<p>{html.escape(names)} &middot; {day:%Y-%m-%d %H:%M:%S} UTC &middot; xplane_bridge {__version__}</p>"
-        "</header>"
-        f"<nav>{nav}</nav><main>{body}</main><script>{_LINK}</script></body></html>\n"
-    )
-
-
-def _missing(text: str) -> str:
-    return f'<p class="missing">Not shown: {html.escape(text)}.</p>'
-
-
-def _number(value: Any, digits: int = 4) -> str:
-    number = float(value)
-    if not np.isfinite(number):
-        return "&ndash;"
-    return f"{number:.{digits}g}" if abs(number) < 10**digits else f"{number:,.0f}"
-
-
-def _rows(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Make a table; cells are HTML already, `numbers` are the columns set to the right."""
-
-    def cell(tag: str, k: int, text: str) -> str:
-        return f"<{tag}{' class=n' if k in numbers else ''}>{text}</{tag}>"
-
-    top = "".join(cell("th", k, html.escape(text)) for k, text in enumerate(head))
-    body = "".join("<tr>" + "".join(cell("td", k, text) for k, text in enumerate(row)) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return page(f"Flight report: {flight.name}", f"{names} \u00b7 {day_of(flight.start)}", sections)
 
 
 def _summary(flight: Flight) -> str:
     if "state" not in flight.tables:
-        return _missing("the bag has no flight_state")
+        return missing("the bag has no flight_state")
     state = flight.tables["state"]
     cards = [
-        f'<div class="card"><b>{_number(q.value)} {html.escape(q.unit)}</b><span>{html.escape(q.name)}</span></div>'
+        f'<div class="card"><b>{number(q.value)} {html.escape(q.unit)}</b><span>{html.escape(q.name)}</span></div>'
         for q in summary(state.stamp, state.columns, flight.parts)
     ]
     rate = timing(state.stamp)
-    cards.append(f'<div class="card"><b>{_number(rate.rate)} /s</b><span>flight states</span></div>')
+    cards.append(f'<div class="card"><b>{number(rate.rate)} /s</b><span>flight states</span></div>')
     text = f'<div class="cards">{"".join(cards)}</div>'
     return text + _who_flew(flight) + _links(flight) + _events(flight)
 
@@ -171,7 +84,7 @@ def _who_flew(flight: Flight) -> str:
         who = f'<span class="bad">{stretch.label}</span>' if stretch.label == "failsafe" else stretch.label
         why, asked_by = (html.escape(str(table[name][first])) for name in ("reason", "requested_by"))
         rows.append((_seconds(stretch.start, flight), f"{(stretch.end - stretch.start) / 1e9:.1f}", who, why, asked_by))
-    return "<h3>Who flew</h3>" + _rows(("at [s]", "for [s]", "who", "why", "asked by"), rows, (0, 1))
+    return "<h3>Who flew</h3>" + rows_table(("at [s]", "for [s]", "who", "why", "asked by"), rows, (0, 1))
 
 
 def _links(flight: Flight) -> str:
@@ -183,7 +96,7 @@ def _links(flight: Flight) -> str:
         (_seconds(e.start, flight), f"{(e.end - e.start) / 1e9:.1f}", html.escape(e.label))
         for e in from_values(table.stamp, names, max(flight.end, int(table.stamp[-1])))
     ]
-    return "<h3>Link to X-Plane</h3>" + _rows(("at [s]", "for [s]", "state"), rows, (0, 1))
+    return "<h3>Link to X-Plane</h3>" + rows_table(("at [s]", "for [s]", "state"), rows, (0, 1))
 
 
 def _events(flight: Flight) -> str:
@@ -194,13 +107,13 @@ def _events(flight: Flight) -> str:
         for event in events:
             seen[event.number] = event
     rows = []
-    for number in sorted(seen):
-        event = seen[number]
+    for key in sorted(seen):
+        event = seen[key]
         stamp = event.stamp.sec * 1_000_000_000 + event.stamp.nanosec
         rows.append((_seconds(stamp, flight), html.escape(event.text), html.escape(event.requested_by)))
     if not rows:
         return ""
-    return "<h3>Events</h3>" + _rows(("at [s]", "what", "asked by"), rows, (0,))
+    return "<h3>Events</h3>" + rows_table(("at [s]", "what", "asked by"), rows, (0,))
 
 
 def _seconds(stamp: int, flight: Flight) -> str:
@@ -210,9 +123,9 @@ def _seconds(stamp: int, flight: Flight) -> str:
 def _strip(bags: Bags, flight: Flight) -> str:
     topic = bags.topic_of_type("sensor_msgs/CompressedImage")
     if topic is None or not bags.topics[topic].count:
-        return _missing("the bag has no compressed camera images")
+        return missing("the bag has no compressed camera images")
     if "frames" not in flight.tables:
-        return _missing("the bag has no camera/frame_state")
+        return missing("the bag has no camera/frame_state")
     frames = flight.tables["frames"]
     row_of = {int(stamp): k for k, stamp in enumerate(frames.stamp)}
     count = bags.topics[topic].count
@@ -230,7 +143,7 @@ def _strip(bags: Bags, flight: Flight) -> str:
             f'<figure><img alt="cockpit view" src="data:image/jpeg;base64,{picture}">'
             f"<figcaption>{caption}</figcaption></figure>"
         )
-    return f'<div class="strip">{"".join(figures)}</div>' if figures else _missing("no image could be decoded")
+    return f'<div class="strip">{"".join(figures)}</div>' if figures else missing("no image could be decoded")
 
 
 def _thumbnail(data: np.ndarray) -> str | None:
@@ -272,10 +185,10 @@ def _quality(flight: Flight) -> str:
     for topic in sorted(flight.times):
         t = timing(flight.times[topic])
         gaps = f'<span class="bad">{t.gaps}</span>' if t.gaps else "0"
-        jitter, longest = _number(t.jitter * 1e3, 3), _number(t.longest_gap, 3)
-        rows.append((html.escape(topic), str(t.count), _number(t.rate), jitter, gaps, longest))
+        jitter, longest = number(t.jitter * 1e3, 3), number(t.longest_gap, 3)
+        rows.append((html.escape(topic), str(t.count), number(t.rate), jitter, gaps, longest))
     head = ("topic", "messages", "rate [1/s]", "jitter [ms]", "gaps", "longest pause [s]")
-    text = "<h3>Rates, as received</h3>" + _rows(head, rows, (1, 2, 3, 4, 5))
+    text = "<h3>Rates, as received</h3>" + rows_table(head, rows, (1, 2, 3, 4, 5))
     if "state" in flight.tables:
         text += _clock(flight) + _validity(flight) + _physics(flight)
     return text + _images_quality(flight)
@@ -285,8 +198,8 @@ def _clock(flight: Flight) -> str:
     state = flight.tables["state"]
     uncertainty = state["stamp_uncertainty"][np.isfinite(state["stamp_uncertainty"])]
     epochs = len(np.unique(state["epoch"]))
-    worst = _number(np.max(uncertainty) * 1e3, 3) if len(uncertainty) else "&ndash;"
-    median = _number(np.median(uncertainty) * 1e3, 3) if len(uncertainty) else "&ndash;"
+    worst = number(np.max(uncertainty) * 1e3, 3) if len(uncertainty) else "&ndash;"
+    median = number(np.median(uncertainty) * 1e3, 3) if len(uncertainty) else "&ndash;"
     return (
         f"<h3>Clock</h3><p>Stamps known within {median} ms (median), {worst} ms (worst); {epochs} "
         f"epoch{'s' if epochs != 1 else ''}, {len(flight.parts)} stretch{'es' if len(flight.parts) != 1 else ''} "
@@ -303,7 +216,7 @@ def _validity(flight: Flight) -> str:
     rows = [
         (html.escape(name.lower()), f'<span class="bad">{share * 100:.1f} %</span>') for name, share in poor.items()
     ]
-    return "<h3>Validity</h3>" + _rows(("group of the flight state", "valid in"), rows, (1,))
+    return "<h3>Validity</h3>" + rows_table(("group of the flight state", "valid in"), rows, (1,))
 
 
 def _physics(flight: Flight) -> str:
@@ -319,9 +232,9 @@ def _physics(flight: Flight) -> str:
             verdict = '<span class="good">holds</span>'
         else:
             verdict = '<span class="bad">violated</span>'
-        error = f"{_number(check.error, 3)} {check.unit}"
-        rows.append((html.escape(check.name), error, f"{_number(check.limit, 3)} {check.unit}", verdict))
-    return "<h3>Physics</h3>" + _rows(("relation", "median error", "limit", ""), rows, (1, 2))
+        error = f"{number(check.error, 3)} {check.unit}"
+        rows.append((html.escape(check.name), error, f"{number(check.limit, 3)} {check.unit}", verdict))
+    return "<h3>Physics</h3>" + rows_table(("relation", "median error", "limit", ""), rows, (1, 2))
 
 
 def _odometry(flight: Flight) -> Any:
@@ -349,9 +262,9 @@ def _images_quality(flight: Flight) -> str:
     ]
     text = (
         f"<h3>Images</h3><p>{p.images} images, {p.with_state * 100:.1f} % with a state, {p.perfect * 100:.1f} % "
-        f"without any remark; time error {_number(p.error_p50 * 1e3, 3)} ms (median), "
-        f"{_number(p.error_p95 * 1e3, 3)} ms (95 %), {_number(p.error_max * 1e3, 3)} ms (worst); "
+        f"without any remark; time error {number(p.error_p50 * 1e3, 3)} ms (median), "
+        f"{number(p.error_p95 * 1e3, 3)} ms (95 %), {number(p.error_max * 1e3, 3)} ms (worst); "
         f"{p.dropped} pictures not published, {p.frozen} frozen, {p.unpaired} without a state, "
         "counted from the first image recorded.</p>"
     )
-    return text + (_rows(("remark", "images"), rows, (1,)) if rows else "")
+    return text + (rows_table(("remark", "images"), rows, (1,)) if rows else "")

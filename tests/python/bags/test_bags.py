@@ -177,12 +177,8 @@ def damage(path: Path, change: object) -> Path:
         (lambda raw: bz2.compress(raw), "not a ROS 1 bag"),
         (lambda raw: raw[: len(raw) * 2 // 3], "rosbag reindex"),
         (lambda raw: raw[:40], "rosbag reindex"),
-        (
-            lambda raw: raw.replace(
-                b"index_pos=" + raw[raw.index(b"index_pos=") + 10 :][:8], b"index_pos=" + b"\0" * 8, 1
-            ),
-            "not indexed.*rosbag reindex",
-        ),
+        (lambda raw: raw.replace(b"#ROSBAG V2.0", b"#ROSBAG V1.2"), "not a ROS 1 bag of version 2.0"),
+        (lambda raw: raw.replace(b"op=\x05", b"op=\x06"), "not one whole chunk"),
     ],
 )
 def test_bad_files_are_refused_in_one_line_with_the_remedy(tmp_path: Path, change: object, text: str) -> None:
@@ -200,3 +196,95 @@ def test_missing_paths_are_refused(tmp_path: Path) -> None:
         Bags(tmp_path)
     with pytest.raises(BagError, match="no bag given"):
         Bags([])
+
+
+# -------------------------------------------------------------------------------------- recordings that were cut off
+
+
+def long_flight(path: Path, count: int = 3000) -> tuple[Path, list[int]]:
+    """A bag of several chunks; also where in the file each chunk ends, as its own length says."""
+    large = b"x" * 1000
+    messages = [(10 * (k + 1), header(k, k, 0, large)) for k in range(count)]
+    write(path, [("/s", "pkg/msg/State", STATE, [(15, state(0))]), ("/h", "std_msgs/msg/Header", HEADER, messages)])
+    raw = path.read_bytes()
+    ends, at = [], len("#ROSBAG V2.0\n")
+    while at < len(raw):
+        (size,) = struct.unpack_from("<I", raw, at)
+        is_chunk = b"op=\x05" in raw[at : at + 4 + size]
+        (data,) = struct.unpack_from("<I", raw, at + 4 + size)
+        at += 8 + size + data
+        if is_chunk:
+            ends.append(at)
+    return path, ends
+
+
+def without_index(raw: bytes) -> bytes:
+    """As a recorder leaves it that was killed: the place of the index is not written yet."""
+    at = raw.index(b"index_pos=") + len(b"index_pos=")
+    return raw[:at] + b"\0" * 8 + raw[at + 8 :]
+
+
+@pytest.mark.parametrize("beyond", [0, 5, 4000])
+def test_a_recording_that_was_cut_off_is_read_to_its_last_whole_chunk(tmp_path, caplog, beyond) -> None:
+    path, ends = long_flight(tmp_path / "whole.bag")
+    assert len(ends) >= 3
+    with Bags(path) as bags:
+        whole = bags.read("/h")
+        assert len(whole) == 3000
+    assert not caplog.records
+    cut = tmp_path / "cut.bag"
+    cut.write_bytes(without_index(path.read_bytes())[: ends[-2] + beyond])
+    with Bags(cut) as bags:
+        read = bags.read("/h")
+        assert len(bags.read("/s")) == bags.topics["/s"].count == 1
+        assert [time for time, _ in bags.messages("/h")] == list(read.time)
+    assert 1000 < len(read) < 3000
+    np.testing.assert_array_equal(read.time, whole.time[: len(read)])
+    np.testing.assert_array_equal(read["seq"], np.arange(len(read)))
+    (record,) = caplog.records
+    assert "cut.bag: the recording was cut off; read to its last whole chunk" in record.getMessage()
+
+
+def test_no_chunk_is_lost_that_was_whole(tmp_path: Path) -> None:
+    path, ends = long_flight(tmp_path / "whole.bag")
+    raw = without_index(path.read_bytes())
+    counts = []
+    for k, end in enumerate(ends):
+        for beyond in (-1, 0):
+            cut = tmp_path / f"{k}_{beyond}.bag"
+            cut.write_bytes(raw[: end + beyond])
+            if k or not beyond:
+                with Bags(cut) as bags:
+                    counts.append(bags.topics["/h"].count)
+    assert counts[0] == counts[1] > 0  # one chunk; then the second, but for its last byte
+    assert counts[1] < counts[2] == counts[3] < counts[4]
+    assert counts[-1] == 3000
+
+
+def test_a_recording_with_a_chunk_that_has_no_length_yet_is_read_up_to_it(tmp_path: Path) -> None:
+    path, _ = long_flight(tmp_path / "whole.bag")
+    raw = bytearray(without_index(path.read_bytes()))
+    last = raw.rindex(b"op=\x05")
+    header_end = raw.index(b"size=", last - 60) + 5 + 4
+    raw[header_end : header_end + 4] = b"\0" * 4
+    (tmp_path / "cut.bag").write_bytes(bytes(raw))
+    with Bags(tmp_path / "cut.bag") as bags:
+        assert 0 < bags.topics["/h"].count < 3000
+
+
+def test_many_pieces_read_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, _ = long_flight(tmp_path / "a.bag")
+    with Bags(path) as bags:
+        at_once = bags.read("/h")
+        monkeypatch.setattr("xplane_bridge.bags._PIECE_BYTES", 5000)
+        in_pieces = bags.read("/h")
+    assert at_once.columns.keys() == in_pieces.columns.keys()
+    for name, column in at_once.columns.items():
+        np.testing.assert_array_equal(column, in_pieces[name])
+
+
+def test_a_chunk_that_does_not_unpack_is_named(tmp_path: Path) -> None:
+    path = flight(tmp_path / "a.bag", 200, compression=Writer.CompressionFormat.BZ2)
+    damage(path, lambda raw: raw.replace(b"BZh", b"BZx"))
+    with Bags(path) as bags, pytest.raises(BagError, match=r"a\.bag: damaged data \(a chunk does not unpack"):
+        bags.read("/s")

@@ -1,0 +1,244 @@
+"""Whole flights as arrays, a table for each topic: NumPy's ``.npz`` and MATLAB's ``.mat``.
+
+Of every topic but the pictures there is, with one row a message:
+
+* ``stamp_ns``, host time of the message's header (of its arrival where it has none), and ``receive_ns``, when the
+  recorder had it: int64 nanoseconds since 1970;
+* ``time_s`` since the first flight state, the same zero in every topic;
+* ``sim_time_unwrapped_s``, the simulator's time at the stamp, between flight states interpolated, never across a gap or
+  an epoch (NaN there);
+* every field with its unit in the name, as in the other tables. Fixed arrays are two-dimensional. Lists of varying
+  length are filled up (NaN, 0, false or empty text) beside their lengths, ``<name>_count``; lists of messages are JSON.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+from typing import TYPE_CHECKING, Any, Iterable, NamedTuple, Sequence
+
+import numpy as np
+
+from xplane_bridge import __version__
+from xplane_bridge.analysis.resampling import interpolated
+from xplane_bridge.bags import BagError
+from xplane_bridge.bags.pictures import COMPRESSED, RAW
+from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
+from xplane_bridge.export.columns import name_of
+from xplane_bridge.export.flight import STATE, full_names, name_space
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from xplane_bridge.bags import Bags, Table
+    from xplane_bridge.bags.units import Unit
+
+SIM_TIME = "sim_time_unwrapped_s"
+#: MATLAB takes no longer names.
+_LONGEST_NAME = 63
+#: A variable of MATLAB's file format 5 holds less than this.
+_MAT_LIMIT = 2**31
+
+
+class TopicArrays(NamedTuple):
+    """One topic."""
+
+    name: str  #: a name that MATLAB takes too, e.g. ``mission_engines``
+    topic: str
+    msgtype: str
+    columns: dict[str, np.ndarray]  #: numbers, booleans or texts; the first axis counts messages
+    units: dict[str, str]  #: of the columns that have one, as written in the message, e.g. ``rad/s``
+
+
+class _SimClock(NamedTuple):
+    """The simulator's time against the host's, from the flight states."""
+
+    zero: int  #: [ns] stamp of the first state; without states, the first receive time
+    stamp: np.ndarray  #: int64 [ns], sorted
+    sim_time: np.ndarray  #: [s]
+    parts: list[slice]
+
+    def at(self, stamp: np.ndarray) -> np.ndarray:
+        """Give the simulator's time [s] at host times [ns]; NaN where no two states of one piece lie around."""
+        if not len(self.stamp):
+            return np.full(len(stamp), np.nan)
+        return interpolated(stamp, self.stamp, self.sim_time, self.parts)
+
+
+def topic_arrays(bags: Bags, only: Sequence[str] = ()) -> list[TopicArrays]:
+    """Read the topics of a flight.
+
+    Args:
+        bags: Open bags of one flight.
+        only: The topics to read, by full name or by name below the bridge's name space; all when empty.
+
+    Raises:
+        BagError: No such topic, a topic of pictures, or nothing in the bags.
+    """
+    infos = bags.topics
+    space = name_space(bags)
+    chosen = full_names(bags, only) or sorted(
+        name for name, info in infos.items() if info.count and info.msgtype not in (RAW, COMPRESSED)
+    )
+    if not chosen:
+        msg = f"{', '.join(map(str, bags.paths))}: no message that a table can hold; nothing was recorded but pictures"
+        raise BagError(msg)
+    clock = _sim_clock(bags, bags.topic_of_type(STATE))
+    out: list[TopicArrays] = []
+    for topic in chosen:
+        if topic in infos and infos[topic].msgtype in (RAW, COMPRESSED):
+            msg = f"{topic}: pictures do not go into a table; use --format imagefolder, mcap or ros2"
+            raise BagError(msg)
+        name = topic[len(space) :] if topic.startswith(space + "/") else topic
+        key = _valid_name(name.strip("/"), [other.name for other in out] + ["units", "topics", "about"])
+        out.append(_arrays(key, bags.read(topic), bags.units(topic), clock))
+    return out
+
+
+def counts(topics: Sequence[TopicArrays]) -> dict[str, int]:
+    """Give what the manifest says of such an export."""
+    return {
+        "topics": len(topics),
+        "messages": sum(len(topic.columns["stamp_ns"]) for topic in topics),
+        "columns": sum(len(topic.columns) for topic in topics),
+    }
+
+
+def write_npz(topics: Sequence[TopicArrays], path: Path) -> None:
+    """Write ``<topic>/<column>`` arrays, then ``topics`` (name, topic, type), ``units`` (key, unit) and ``about``."""
+    arrays: dict[str, Any] = {
+        f"{topic.name}/{name}": values for topic in topics for name, values in topic.columns.items()
+    }
+    units = [(f"{topic.name}/{name}", unit) for topic in topics for name, unit in topic.units.items()]
+    arrays["topics"] = _texts([topic[:3] for topic in topics])
+    arrays["units"] = _texts(units)
+    arrays["about"] = np.array(_about())
+    with path.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def write_mat(topics: Sequence[TopicArrays], path: Path) -> None:
+    """Write a struct for each topic, a struct ``units`` of the same shape, ``topics`` and ``about``.
+
+    Raises:
+        BagError: A topic is too large for the file format.
+    """
+    from scipy.io import savemat
+
+    content: dict[str, Any] = {}
+    for topic in topics:
+        size = sum(_mat_bytes(values) for values in topic.columns.values())
+        if size >= _MAT_LIMIT:
+            msg = f"{topic.topic}: {size} bytes are too many for a .mat file (limit {_MAT_LIMIT}); use --format npz"
+            raise BagError(msg)
+        content[topic.name] = {name: _cells(values) for name, values in topic.columns.items()}
+    content["units"] = {topic.name: topic.units for topic in topics}
+    content["topics"] = _cells(_texts([topic[:3] for topic in topics]))
+    content["about"] = _about()
+    with path.open("wb") as file:
+        savemat(file, content, long_field_names=True, oned_as="column", do_compression=True)
+        # SciPy puts the date there; the same flight is to give the same bytes.
+        file.seek(0)
+        file.write(f"MATLAB 5.0 MAT-file, {_about()}".ljust(116).encode("ascii"))
+
+
+def _about() -> str:
+    return f"written by xplane_bridge {__version__}"
+
+
+def _sim_clock(bags: Bags, state: str | None) -> _SimClock:
+    if state is None or not bags.topics[state].count:
+        zero = min((info.first_time for info in bags.topics.values() if info.count), default=0)
+        return _SimClock(zero, np.empty(0, np.int64), np.empty(0), [])
+    table = bags.read(state, ["header.stamp", "sim_time_unwrapped", "epoch"])
+    order = np.argsort(table.stamp, kind="stable")
+    stamp = table.stamp[order]
+    parts = segments(stamp, table["epoch"][order], DEFAULT_MAX_GAP)
+    return _SimClock(int(stamp[0]), stamp, table["sim_time_unwrapped"][order], parts)
+
+
+def _arrays(key: str, table: Table, units: dict[str, Unit], clock: _SimClock) -> TopicArrays:
+    stamp = table.stamp
+    columns = {"stamp_ns": stamp, "receive_ns": table.time, "time_s": (stamp - clock.zero) / 1e9}
+    symbols = {"stamp_ns": "ns", "receive_ns": "ns", "time_s": "s"}
+    if "sim_time_unwrapped" not in table:
+        columns[SIM_TIME], symbols[SIM_TIME] = clock.at(stamp), "s"
+    for path, values in table.columns.items():
+        if path.split(".")[0] == "header":
+            continue
+        name = _valid_name(name_of(path, units), columns)
+        for ending, flat in _without_objects(values).items():
+            columns[name + ending] = flat
+        if path in units and units[path].symbol:
+            symbols[name] = units[path].symbol
+    return TopicArrays(key, table.topic, table.msgtype, columns, symbols)
+
+
+def _valid_name(text: str, taken: Iterable[str]) -> str:
+    """Make a name of letters, digits and underscores that begins with a letter, unlike those taken."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", text)
+    name = name if name[:1].isalpha() else f"x{name}"
+    base = name = name[: _LONGEST_NAME - len("_count")]
+    number = 1
+    while name in taken:
+        number += 1
+        name = f"{base[: _LONGEST_NAME - len('_count') - 4]}_{number}"
+    return name
+
+
+def _without_objects(values: np.ndarray) -> dict[str, np.ndarray]:
+    """Give a column as arrays that need no pickle, by the ending of their names."""
+    if values.dtype != object:
+        return {"": values}
+    filled = [value for value in values if value is not None]
+    if all(isinstance(value, str) for value in filled):
+        return {"": _texts(["" if value is None else value for value in values])}
+    if all(isinstance(value, np.ndarray) for value in filled):
+        return _padded(values, np.result_type(*filled))
+    if all(isinstance(value, list) and all(isinstance(text, str) for text in value) for value in filled):
+        longest = max((len(text) for value in filled for text in value), default=1)
+        return _padded(values, np.dtype(f"U{max(longest, 1)}"))
+    return {"": _texts(["" if value is None else json.dumps(_plain(value)) for value in values])}
+
+
+def _padded(values: np.ndarray, dtype: np.dtype) -> dict[str, np.ndarray]:
+    lengths = np.array([0 if value is None else len(value) for value in values], dtype=np.int64)
+    width = int(lengths.max()) if len(lengths) else 0
+    filler: Any = np.nan if np.issubdtype(dtype, np.floating) else "" if dtype.kind == "U" else 0
+    out = np.full((len(values), width), filler, dtype=dtype)
+    for k, value in enumerate(values):
+        if lengths[k]:
+            out[k, : lengths[k]] = value
+    return {"": out, "_count": lengths}
+
+
+def _plain(value: Any) -> Any:
+    """Give a message as what JSON knows; numbers that are not finite are null."""
+    if dataclasses.is_dataclass(value):
+        # Constants have a default, what was sent has none.
+        fields = [field.name for field in dataclasses.fields(value) if field.default is dataclasses.MISSING]
+        return {name: _plain(getattr(value, name)) for name in fields}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _texts(values: Sequence[Any]) -> np.ndarray:
+    return np.array(values, dtype=str) if len(values) else np.empty(0, dtype="U1")
+
+
+def _mat_bytes(values: np.ndarray) -> int:
+    return values.nbytes if values.dtype.kind != "U" else sum(64 + 2 * len(text) for text in values.flat)
+
+
+def _cells(values: np.ndarray) -> np.ndarray:
+    """Give texts as objects, of which SciPy makes cells; a padded matrix of characters would lose their lengths."""
+    if values.dtype.kind != "U":
+        return values
+    return (values[:, None] if values.ndim == 1 else values).astype(object)

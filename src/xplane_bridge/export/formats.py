@@ -1,0 +1,127 @@
+"""The formats of an export: what each is called, which options it has, and who writes it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Callable, NamedTuple
+
+from xplane_bridge.export.dataset import Options, export_images
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from xplane_bridge.bags import Bags
+
+
+class Job(NamedTuple):
+    """One flight to export. Plain values: it travels to other processes and machines."""
+
+    name: str  #: folder or file stem in the export
+    bags: tuple[str, ...]
+    output: str
+    format: str  #: a key of `FORMATS`
+    rate: float | None
+    topics: tuple[str, ...]
+    dataset: Options
+    train_flight: bool
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What the user asked for that decides the content of this format."""
+        options = FORMATS[self.format].options
+        out: dict[str, Any] = {}
+        if "rate" in options:
+            out["rate"] = self.rate
+        if "topics" in options:
+            out["topics"] = list(self.topics)
+        if "dataset" in options:
+            out.update(self.dataset._asdict(), train_flight=self.train_flight)
+        return out
+
+
+class Format(NamedTuple):
+    """One way to write a flight."""
+
+    ending: str  #: of the flight's file or folder
+    options: tuple[str, ...]  #: of a `Job`, which decide the content: rate, topics, dataset
+    write: Callable[[Bags, Path, Job], dict[str, Any]]  #: gives counts for the manifest
+    frames: bool = False  #: whether it has the pictures, or what is known of each
+
+
+def _csv(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import tables
+
+    frame = tables.flight_table(bags, job.rate, job.topics)
+    tables.write_csv(frame, path)
+    return {"rows": len(frame), "columns": len(frame.columns)}
+
+
+def _parquet(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import tables
+
+    frame = tables.flight_table(bags, job.rate, job.topics)
+    tables.write_parquet(frame, path)
+    return {"rows": len(frame), "columns": len(frame.columns)}
+
+
+def _tum(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import trajectories
+
+    stamp, position, orientation = trajectories.trajectory(bags, job.rate)
+    trajectories.write_tum(path, stamp, position, orientation)
+    return {"poses": len(stamp)}
+
+
+def _euroc(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import trajectories
+
+    stamp, position, orientation = trajectories.trajectory(bags, job.rate)
+    trajectories.write_euroc(path, stamp, position, orientation)
+    return {"poses": len(stamp)}
+
+
+def _imagefolder(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    return export_images(bags, path, job.dataset, job.train_flight)._asdict()
+
+
+def _npz(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import arrays
+
+    topics = arrays.topic_arrays(bags, job.topics)
+    arrays.write_npz(topics, path)
+    return arrays.counts(topics)
+
+
+def _mat(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import arrays
+
+    topics = arrays.topic_arrays(bags, job.topics)
+    arrays.write_mat(topics, path)
+    return arrays.counts(topics)
+
+
+def _mcap(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import recordings
+
+    return recordings.write_mcap(bags, path, job.topics)._asdict()
+
+
+def _ros2(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import recordings
+
+    return recordings.write_ros2(bags, path, job.topics)._asdict()
+
+
+#: Name to format, in the order in which they are listed to users.
+FORMATS = {
+    "csv": Format(".csv", ("rate", "topics"), _csv),
+    "parquet": Format(".parquet", ("rate", "topics"), _parquet),
+    "npz": Format(".npz", ("topics",), _npz, frames=True),
+    "mat": Format(".mat", ("topics",), _mat, frames=True),
+    "tum": Format(".tum", ("rate",), _tum),
+    "euroc": Format(".euroc.csv", ("rate",), _euroc),
+    "imagefolder": Format("", ("dataset",), _imagefolder, frames=True),
+    "mcap": Format(".mcap", ("topics",), _mcap, frames=True),
+    "ros2": Format(".ros2", ("topics",), _ros2, frames=True),
+}
+#: Earlier names of formats.
+ALIASES = {"images": "imagefolder"}

@@ -1,0 +1,164 @@
+"""Flights as NumPy and MATLAB tables, read back with numpy and scipy."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Callable
+
+import numpy as np
+import pytest
+import scipy.io
+
+from support.export_flight import export, write_flight
+from support.synthetic_flight import CLIMB, FlightBag, stamp_ns, state_at
+from xplane_bridge.bags import Bags
+from xplane_bridge.export import arrays
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: Of `write_flight`: states every 20 ms, 1 s missing after 2 s.
+TIMES = np.arange(200) / 50.0 + (np.arange(200) >= 100)
+
+
+def npz(folder: Path) -> Callable[[str, str], np.ndarray]:
+    content = np.load(folder / "flight.npz", allow_pickle=False)
+    return lambda topic, column: content[f"{topic}/{column}"]
+
+
+def mat(folder: Path) -> Callable[[str, str], np.ndarray]:
+    content = scipy.io.loadmat(str(folder / "flight.mat"), simplify_cells=True)
+    return lambda topic, column: content[topic][column]
+
+
+READERS = {"npz": npz, "mat": mat}
+
+
+@pytest.mark.parametrize("form", ["npz", "mat"])
+def test_every_value_time_and_unit_reads_back(tmp_path: Path, form: str) -> None:
+    bag = write_flight(tmp_path / "flight.bag")
+    assert export(bag, "--format", form, "-o", tmp_path) == 0
+    read = READERS[form](tmp_path)
+    stamps = [stamp_ns(t) for t in TIMES]
+    for column in ("stamp_ns", "receive_ns"):
+        assert read("flight_state", column).dtype == np.int64
+        np.testing.assert_array_equal(read("flight_state", column), stamps)
+    np.testing.assert_allclose(read("flight_state", "time_s"), TIMES, atol=1e-9)
+    np.testing.assert_array_equal(read("flight_state", "roll_deg"), [state_at(t)["roll_deg"] for t in TIMES])
+    np.testing.assert_array_equal(read("flight_state", "altitude_msl_m"), 1000.0 + CLIMB * TIMES)
+    np.testing.assert_array_equal(read("flight_state", "angular_velocity_x_radps"), [state_at(t)["p"] for t in TIMES])
+    np.testing.assert_allclose(read("odom", "pose_pose_position_y"), 2 * TIMES, atol=1e-12)
+    # Modes at 0.5, 1.5 and 3.5 s; the simulator's time of this flight is its time.
+    np.testing.assert_array_equal(read("control_mode", "mode"), [1, 2, 2])
+    assert [bool(flag) for flag in read("control_mode", "failsafe")] == [False, False, True]
+    np.testing.assert_allclose(read("control_mode", "sim_time_unwrapped_s"), [0.5, 1.5, 3.5], atol=1e-9)
+    assert list(read("control_mode", "reason")) == ["r", "rr", "rr"]
+
+
+def test_npz_has_units_topics_and_lists_without_pickle(tmp_path: Path) -> None:
+    assert export(write_flight(tmp_path / "flight.bag"), "--format", "npz", "-o", tmp_path) == 0
+    content = np.load(tmp_path / "flight.npz", allow_pickle=False)
+    units = dict(content["units"])
+    assert units["flight_state/roll_deg"] == "deg"
+    assert units["flight_state/angular_velocity_x_radps"] == "rad/s"
+    assert units["camera_frame_state/state_altitude_msl_m"] == "m"
+    assert "control_mode/reason" not in units
+    assert ["failures_state", "/xplane/failures/state", "xplane_bridge/FailureState"] in content["topics"].tolist()
+    assert not any(name.startswith("camera_image") for name, _, _ in content["topics"])
+    assert content["failures_state/names"].tolist() == [["aileron1_left", "engine_1", "pitot_1"]]
+    assert content["failures_state/names_count"].tolist() == [3]
+    np.testing.assert_array_equal(content["failures_state/values_deg"], np.float32([[5.0, np.nan, np.nan]]))
+    assert content["failures_state/active"].tolist() == [[True, True, False]]
+
+
+def test_mat_has_units_and_cells(tmp_path: Path) -> None:
+    assert export(write_flight(tmp_path / "flight.bag"), "--format", "mat", "-o", tmp_path) == 0
+    content = scipy.io.loadmat(str(tmp_path / "flight.mat"), simplify_cells=True)
+    assert content["units"]["flight_state"]["velocity_ned_y_mps"] == "m/s"
+    assert list(content["failures_state"]["names"]) == ["aileron1_left", "engine_1", "pitot_1"]
+    assert "/xplane/odom" in content["topics"][:, 1].tolist()
+    assert content["about"].startswith("written by xplane_bridge ")
+    first = (tmp_path / "flight.mat").read_bytes()
+    assert export(tmp_path / "flight.bag", "--format", "mat", "-o", tmp_path / "again") == 0
+    assert (tmp_path / "again" / "flight.mat").read_bytes() == first
+
+
+def test_simulator_time_is_never_interpolated_across_a_gap(tmp_path: Path) -> None:
+    path = write_flight(tmp_path / "flight.bag")
+    with FlightBag(tmp_path / "more.bag") as bag:
+        for t in (1.0, 2.5, 3.01, 9.0):  # 2.5 s lies in the gap, 9 s after the flight
+            text = {"data": f"at {t}"}
+            bag.add("/xplane/scenario/label", "std_msgs/String", stamp_ns(t), text)
+    with Bags([path, tmp_path / "more.bag"]) as bags:
+        (label,) = arrays.topic_arrays(bags, ["scenario/label"])
+    np.testing.assert_allclose(label.columns["sim_time_unwrapped_s"], [1.0, np.nan, 3.01, np.nan], atol=1e-9)
+    assert label.columns["data"].tolist() == ["at 1.0", "at 2.5", "at 3.01", "at 9.0"]
+
+
+def test_lists_that_vary_are_filled_up_and_lists_of_messages_are_json(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k, axes in enumerate(([0.5], [], [1.0, 2.0])):
+            values = {"header": bag.header(stamp_ns(k), ""), "axes": axes, "buttons": [1] * k}
+            bag.add("/xplane/joy", "sensor_msgs/Joy", stamp_ns(k), values)
+        event = {"number": 7, "stamp": {"sec": 3, "nanosec": 4}, "sim_time": np.nan, "kind": 5, "text": "é"}
+        values = {"header": bag.header(stamp_ns(1), ""), "events": [event]}
+        bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(1), values)
+    assert export(tmp_path / "flight.bag", "--format", "npz", "-o", tmp_path) == 0
+    content = np.load(tmp_path / "flight.npz", allow_pickle=False)
+    axes = content["xplane_joy/axes"]
+    np.testing.assert_array_equal(axes, np.float32([[0.5, np.nan], [np.nan, np.nan], [1.0, 2.0]]))
+    assert content["xplane_joy/axes_count"].tolist() == [1, 0, 2]
+    assert content["xplane_joy/buttons"].tolist() == [[0, 0], [1, 0], [1, 1]]
+    (read,) = json.loads(str(content["xplane_events/events"][0]))
+    assert read.pop("stamp") == {"sec": 3, "nanosec": 4}
+    expected = {"number": 7, "sim_time": None, "kind": 5, "text": "é", "requested_by": "", "success": False}
+    assert read == expected
+
+
+def test_topics_choose_and_pictures_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 0.2)
+    assert export(bag, "--format", "npz", "--topics", "odom", "control/mode", "-o", tmp_path) == 0
+    names = {key.split("/")[0] for key in np.load(tmp_path / "flight.npz").files}
+    assert names == {"odom", "control_mode", "units", "topics", "about"}
+    capsys.readouterr()
+    pictures = "camera/image_raw/compressed"
+    assert export(bag, "--format", "npz", "--topics", pictures, "-o", tmp_path / "o") == 1
+    assert "pictures do not go into a table; use --format imagefolder, mcap or ros2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--format", "npz", "--rate", "50"], "--rate is not for npz; it is for csv, parquet, tum, euroc"),
+        (
+            ["--format", "tum", "--topics", "odom"],
+            "--topics is not for tum; it is for csv, parquet, npz, mat, mcap, ros2",
+        ),
+        (["--format", "coco"], "'coco' (choose from"),
+    ],
+)
+def test_what_a_format_does_not_have_is_refused(arguments: list, text: str, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(SystemExit):
+        export("flight.bag", *arguments)
+    assert text in capsys.readouterr().err
+
+
+def test_names_are_such_as_matlab_takes(tmp_path: Path) -> None:
+    long = "a_very_long_name_space/" * 4
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for topic in (f"/{long}one", f"/{long}two", "/3d/label", "/a/b", "/a_b"):
+            bag.add(topic, "std_msgs/String", stamp_ns(0), {"data": topic})
+    with Bags(tmp_path / "flight.bag") as bags:
+        names = {topic.topic: topic.name for topic in arrays.topic_arrays(bags)}
+    assert len(set(names.values())) == 5
+    assert all(name.isidentifier() and len(name) <= 63 for name in names.values())
+    assert (names["/3d/label"], names["/a/b"], names["/a_b"]) == ("x3d_label", "a_b", "a_b_2")
+
+
+def test_a_topic_beyond_the_limit_of_mat_files_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(arrays, "_MAT_LIMIT", 10_000)
+    assert export(write_flight(tmp_path / "flight.bag"), "--format", "mat", "-o", tmp_path) == 1
+    assert "are too many for a .mat file (limit 10000); use --format npz" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.mat"))
