@@ -54,7 +54,8 @@ def screen(log_dir: Path, headless: bool) -> Iterator[None]:
     if os.environ.get("DISPLAY") and not headless:
         yield
         return
-    with VirtualDisplay(log_dir) as display:
+    display = VirtualDisplay(log_dir)
+    with display:
         before = os.environ.get("DISPLAY")
         os.environ["DISPLAY"] = display.display
         try:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import re
+import signal
 import sys
 from pathlib import Path
-from typing import Sequence
+from typing import Any, Sequence
 
 from xplane_bridge.harness.processes import ManagedProcess
 from xplane_bridge.resources import program
+
+_STATUS_TIMEOUT_S = 10.0
 
 
 class EmulatorProcess(ManagedProcess):
@@ -47,6 +52,19 @@ class EmulatorProcess(ManagedProcess):
         except BaseException:
             self.stop()
             raise
+
+    def status(self) -> dict[str, Any]:
+        """Its statistics as of now: frames, what it ignored, how many subscriptions each client has.
+
+        Raises:
+            HarnessError: It does not answer.
+        """
+        line = r"^STATUS (.*)$"
+        seen = len(re.findall(line, self.output(), re.MULTILINE))
+        self.send_signal(signal.SIGUSR1)
+        self.wait_for_line(rf"(?:{line}(?s:.)*?){{{seen + 1}}}", _STATUS_TIMEOUT_S)
+        status: dict[str, Any] = json.loads(re.findall(line, self.output(), re.MULTILINE)[seen])
+        return status
 
     def restart(self) -> None:
         """Kills it if it runs and starts it anew on the same port."""

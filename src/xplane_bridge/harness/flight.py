@@ -8,11 +8,13 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Callable, Dict, List
+from typing import Any, Callable, Dict, List, Optional
 
 from xplane_bridge.harness.emulator import EmulatorProcess
+from xplane_bridge.harness.lockstep_flight import Lockstep, LockstepRun, wait_for_bridge
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.harness.ros import RosMaster, free_port, roslaunch
+from xplane_bridge.harness.running_flight import RunningFlight
 from xplane_bridge.topics import NAMESPACE
 
 _READY_TIMEOUT_S = 60.0
@@ -38,6 +40,8 @@ class FlightPlan:
     ready: Dict[str, str] = field(default_factory=dict)
     #: Silences that belong to the plan, e.g. a restart of the emulator, are not failures.
     silence_allowed: float = _SILENCE_S  #: [s]
+    #: In lock-step; `duration` is simulated time then, and the player ends the flight by holding it.
+    lockstep: Optional[Lockstep] = None
 
     @property
     def bag(self) -> Path:
@@ -67,19 +71,6 @@ class FlightPlan:
                 f"{self.output} cannot be written to: {err.strerror}; --output takes a folder, or the name of a new one"
             )
             raise HarnessError(msg) from None
-
-
-@dataclass
-class RunningFlight:
-    """What a flight's observer may look at, and shake."""
-
-    emulator: EmulatorProcess
-    master: RosMaster
-    bridge: ManagedProcess
-    elapsed: float = 0.0  #: [s] of flight recorded so far
-    states: int = 0  #: flight states received so far
-    programs: Dict[str, ManagedProcess] = field(default_factory=dict)
-    last: Any = None  #: the newest xplane_bridge/FlightState
 
 
 Observer = Callable[[RunningFlight], None]
@@ -113,11 +104,17 @@ def fly(
     with ExitStack() as stack:
         say("starting the emulator")
         options = ["--aircraft", plan.aircraft, "--truth", str(plan.truth.resolve()), *plan.emulator_options]
+        launch_args = dict(plan.launch_args)
+        if plan.lockstep is not None:
+            options += plan.lockstep.emulator_options()
+            launch_args["common_config"] = stack.enter_context(plan.lockstep.common_config())
         emulator = EmulatorProcess(plan.logs, options)
         stack.enter_context(emulator)
         say(f"starting ROS and the bridge (X-Plane's port: {emulator.port})")
         master = RosMaster(plan.logs)
         stack.enter_context(master)
+        if plan.lockstep is not None:
+            master.set_param("/use_sim_time", True)
         bridge = roslaunch(
             master,
             plan.logs,
@@ -130,19 +127,25 @@ def fly(
             data_port=free_port(socket.SOCK_DGRAM),
             listen_for_beacon=False,
             bag=_RECORDING,  # in ROS_HOME: a path with a space in it cannot be passed through a launch file
-            **plan.launch_args,
+            **launch_args,
         )
         stack.enter_context(bridge)
         flight = RunningFlight(emulator, master, bridge)
         stack.enter_context(_StateListener(flight))
-        _wait_for_state(flight)
+        if plan.lockstep is None:
+            _wait_for_state(flight)
+        else:
+            wait_for_bridge(flight)
         for name, command in plan.programs.items():
             flight.programs[name] = ManagedProcess(name, command, plan.logs, env=master.env)
             stack.enter_context(flight.programs[name])
             if name in plan.ready:
                 flight.programs[name].wait_for_line(plan.ready[name], _READY_TIMEOUT_S)
         say(f"flying; to watch, in a second shell: export ROS_MASTER_URI={master.uri}")
-        _record(plan, flight, observer)
+        if plan.lockstep is None:
+            _record(plan, flight, observer)
+        else:
+            say(_fly_in_lockstep(plan, plan.lockstep, flight, observer))
         say("ending the recording")
         bridge.stop()  # first: the recording is not to show a stick that has fallen silent
         if bridge.returncode != 0:
@@ -186,6 +189,18 @@ def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None
             )
         observer(flight)
         time.sleep(0.1)
+
+
+def _fly_in_lockstep(plan: FlightPlan, lockstep: Lockstep, flight: RunningFlight, observer: Observer) -> str:
+    """Flies it; gives a line on how fast it was. Silence is tx_node's to judge."""
+    run = LockstepRun(flight, lockstep, plan.duration, _RECORDING)
+    run.begin()
+    while not run.over and not _is_over(plan, flight):
+        flight.bridge.check_running()
+        flight.elapsed = flight.states / lockstep.fps
+        observer(flight)
+        time.sleep(0.1)
+    return run.end(plan.player)
 
 
 def _is_over(plan: FlightPlan, flight: RunningFlight) -> bool:

@@ -70,7 +70,7 @@ class TopicSummary:
 # ------------------------------------------------------------------------------------------------------- the table
 
 #: What tells most of a message, by its type: label, column, factor, digits. Other types show their first columns.
-_TELLING: Mapping[str, Sequence[tuple]] = {
+_TELLING: Mapping[str, Sequence[Tuple[str, str, Optional[float], int]]] = {
     "xplane_bridge/FlightState": (
         ("alt", "altitude_msl", 1.0, 0),
         ("roll", "roll_deg", 1.0, 1),

@@ -11,7 +11,14 @@ from xplane_bridge.harness.xplane_client import XPlaneClient
 
 _FOLDER = "sim/operation/override/"
 #: What tx_node may take (docs/journal.md), without the folder.
-OVERRIDES = ("override_joystick", "override_throttles", "override_toe_brakes", "override_control_surfaces")
+OVERRIDES = (
+    "override_joystick_roll",
+    "override_joystick_pitch",
+    "override_joystick_heading",
+    "override_throttles",
+    "override_toe_brakes",
+    "override_control_surfaces",
+)
 _RATE_HZ = 10
 _ASK_AGAIN_S = 1.0
 _ANSWER_S = 5.0

@@ -9,12 +9,13 @@ import subprocess
 import sys
 import xmlrpc.client
 from pathlib import Path
-from typing import Mapping
+from typing import Any, Dict, Mapping, NamedTuple, Set, Tuple
 
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.resources import clone_dir
 
 _MASTER_TIMEOUT_S = 30.0
+_CALLER = "/xplane_bridge_harness"
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
@@ -61,6 +62,24 @@ def _knows_package(env: Mapping[str, str]) -> bool:
         return False
     done = subprocess.run([rospack, "find", "xplane_bridge"], env=dict(env), capture_output=True, check=False)
     return done.returncode == 0
+
+
+class Graph(NamedTuple):
+    """Nodes and topics, by full names."""
+
+    publishers: Dict[str, Set[str]]  #: topic to nodes
+    subscribers: Dict[str, Set[str]]  #: topic to nodes
+    connections: Set[Tuple[str, str, str]]  #: topic, publisher, subscriber
+
+    def unconnected(self) -> Set[Tuple[str, str, str]]:
+        """Topic, publisher and subscriber of the connections that are still to be made."""
+        pairs = {
+            (topic, publisher, subscriber)
+            for topic, nodes in self.subscribers.items()
+            for subscriber in nodes
+            for publisher in self.publishers.get(topic, ())
+        }
+        return pairs - self.connections
 
 
 class RosMaster(ManagedProcess):
@@ -118,11 +137,42 @@ class RosMaster(ManagedProcess):
         self.check_running()
         try:
             with xmlrpc.client.ServerProxy(self.uri) as master:
-                code, _, _ = master.getPid("/xplane_bridge_harness")
-                nodes = master.lookupNode("/xplane_bridge_harness", "/rosout")
+                answer: Any = master.getPid(_CALLER)
+                code, _, _ = answer
+                nodes: Any = master.lookupNode(_CALLER, "/rosout")
         except (OSError, xmlrpc.client.Error):
             return False
-        return code == 1 and nodes[0] == 1
+        return bool(code == 1 and nodes[0] == 1)
+
+    def set_param(self, name: str, value: Any) -> None:
+        """Sets a parameter by its full name."""
+        with xmlrpc.client.ServerProxy(self.uri) as master:
+            master.setParam(_CALLER, name, value)
+
+    def end_node(self, node: str) -> None:
+        """Asks a node to end, as rosnode does."""
+        with xmlrpc.client.ServerProxy(self.uri) as master:
+            answer: Any = master.lookupNode(_CALLER, node)
+        with xmlrpc.client.ServerProxy(answer[2]) as api:
+            api.shutdown(_CALLER, "the flight is over")
+
+    def graph(self, namespace: str) -> Graph:
+        """Who publishes and who subscribes below a namespace, and who is connected, as all nodes say themselves."""
+        with xmlrpc.client.ServerProxy(self.uri) as master:
+            state: Any = master.getSystemState(_CALLER)
+            publishers, subscribers = (
+                {topic: set(nodes) for topic, nodes in each if topic.startswith(namespace.rstrip("/") + "/")}
+                for each in state[2][:2]
+            )
+            found: Dict[str, Any] = {
+                node: master.lookupNode(_CALLER, node) for node in set().union(*publishers.values())
+            }
+        connections = set()
+        for node, answer in found.items():
+            with xmlrpc.client.ServerProxy(answer[2]) as api:
+                rows: Any = api.getBusInfo(_CALLER)
+            connections |= {(row[4], node, row[1]) for row in rows[2] if row[2] == "o" and row[5]}
+        return Graph(publishers, subscribers, connections)
 
     def use_here(self) -> None:
         """Makes this very process use the master: its environment, and rospy's once that is imported."""
@@ -132,8 +182,17 @@ class RosMaster(ManagedProcess):
                 sys.path.insert(0, folder)
 
 
+class MasterInUse:
+    """The ROS master whose node this process is already."""
+
+    @property
+    def env(self) -> dict[str, str]:
+        """The environment of a program that is to use this master."""
+        return ros_environment()
+
+
 def roslaunch(
-    master: RosMaster, log_dir: Path, launch_file: str, name: str = "roslaunch", **args: object
+    master: RosMaster | MasterInUse, log_dir: Path, launch_file: str, name: str = "roslaunch", **args: object
 ) -> ManagedProcess:
     """`roslaunch xplane_bridge <launch_file> key:=value ...` under a master; not started yet.
 

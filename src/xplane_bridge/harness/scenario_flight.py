@@ -6,12 +6,17 @@ from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence
 
 from xplane_bridge.harness.flight import FlightPlan
+from xplane_bridge.harness.lockstep_flight import Lockstep
 from xplane_bridge.resources import config_file, program
 from xplane_bridge.scenario import Scenario, ScenarioError
 
 PLAYER, CONTROLLER = "scenario_player", "controller"
 #: What the player writes when it begins.
 _PLAYS = r"^playing "
+#: What fly_controller writes when it flies.
+_COMMANDS = r"^commanding on "
+#: In lock-step, when it can.
+_IS_READY = r"^ready for "
 #: `start` of a scenario to the emulator's options.
 _START = {"latitude": "--lat", "longitude": "--lon", "altitude": "--alt", "heading": "--heading", "speed": "--speed"}
 
@@ -28,6 +33,7 @@ def scenario_plan(
     emulator_options: Sequence[str] = (),
     launch_args: Optional[Dict[str, Any]] = None,
     transport: str = "rref",
+    lockstep: Optional[Lockstep] = None,
 ) -> FlightPlan:
     """What to start for a scenario.
 
@@ -38,11 +44,12 @@ def scenario_plan(
         duration: [s] after which it ends at the latest.
         aircraft: what to fly; the scenario's first when omitted.
         joystick: device through which to fly; commands when omitted.
-        controller: program that flies in mode auto.
+        controller: program that flies in mode auto; the scenario's own, by fly_controller, when omitted.
         controller_ready: regular expression of what it writes when it can; empty: nobody waits for it.
         emulator_options: beside those of the scenario's `start`, which they override.
         launch_args: for demo.launch.
         transport: rref or data.
+        lockstep: fly in lock-step so; player, joystick_mapper_node and a controller are participants by themselves.
 
     Raises:
         ScenarioError: It is for other aircraft.
@@ -53,22 +60,42 @@ def scenario_plan(
         raise ScenarioError(f"{scenario.name} is for {', '.join(scenario.aircraft)}, not for {chosen}")
     options: List[str] = []
     for key, value in scenario.start.items():
-        options += [_START[key], f"{value:g}"]
+        options += ["--start", "ground"] if key == "on_ground" else [_START[key], f"{value:g}"]
     options += emulator_options
     arguments = dict(launch_args or {})
     player = [str(program("scenario_player")), source, "--log", str((output / "played.json").resolve())]
-    ready = {PLAYER: _PLAYS}
+    ready = {PLAYER: _PLAYS if lockstep is None else _IS_READY}
     programs: Dict[str, List[str]] = {}
     if joystick:
         # Only to see that there is one: its path may hold a space, which roslaunch cannot take.
         config_file("joysticks", f"{joystick}.yaml")
         arguments.update(joystick="mapper", joy_config=joystick)
         player += ["--joystick", "--joy-config", joystick]
+        if lockstep is not None:
+            lockstep.participants.append("joystick_mapper_node")
+            lockstep.stick = PLAYER
+    if scenario.controller and not controller:
+        controller = [str(program("fly_controller")), scenario.controller]
+        if lockstep is None:  # there it commands when the flight begins, which waits for all participants
+            controller_ready = controller_ready or _COMMANDS
+        else:
+            lockstep.participants.append("fly_controller")
     if controller:
         programs[CONTROLLER] = list(controller)
         if controller_ready:
             ready[CONTROLLER] = controller_ready
+    if lockstep is not None:
+        lockstep.participants.append(PLAYER)
     programs[PLAYER] = player  # last: it must not begin before the others can follow
     return FlightPlan(
-        output, duration, chosen, transport, options, arguments, programs=programs, player=PLAYER, ready=ready
+        output,
+        duration,
+        chosen,
+        transport,
+        options,
+        arguments,
+        programs=programs,
+        player=PLAYER,
+        ready=ready,
+        lockstep=lockstep,
     )

@@ -17,7 +17,8 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
         parameters: A checked `excitation`: kind, amplitude, duration [s], frequency, frequency_end [Hz], seed.
         time_s: Time since the start [s].
     """
-    duration, amplitude = parameters["duration"], parameters["amplitude"]
+    duration: float = parameters["duration"]
+    amplitude: float = parameters["amplitude"]
     if not 0.0 <= time_s < duration:
         return 0.0
     part = time_s / duration
@@ -26,7 +27,8 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
         return amplitude if part < 0.5 else -amplitude
     if kind == "3-2-1-1":
         return amplitude if part < 3 / 7 or 5 / 7 <= part < 6 / 7 else -amplitude
-    low, high = parameters["frequency"], parameters["frequency_end"]
+    low: float = parameters["frequency"]
+    high: float = parameters["frequency_end"]
     if kind == "chirp":
         return amplitude * math.sin(2 * math.pi * (low * time_s + 0.5 * (high - low) * time_s * part))
     chance = random.Random(parameters["seed"])

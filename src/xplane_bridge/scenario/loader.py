@@ -25,8 +25,9 @@ from .schema import (
     Scenario,
     ScenarioError,
 )
+from .world import LAYERS, TIME, WEATHER, WIND
 
-_TOP = ("name", "description", "aircraft", "repeat_every", "start", "gains", "criteria", "events")
+_TOP = ("name", "description", "aircraft", "controller", "repeat_every", "start", "gains", "criteria", "events")
 _START = {
     "latitude": (-90.0, 90.0),
     "longitude": (-180.0, 180.0),
@@ -74,7 +75,10 @@ def parse_scenario(document: Any) -> Scenario:
     gains = _mapping(top.get("gains", {}), "gains", [item.name for item in fields(HoldGains)])
     for key in gains:
         _number(gains[key], f"gains.{key}", 0.0, math.inf)
-    start = _ranged(top.get("start", {}), "start", _START)
+    start = _start(top.get("start", {}))
+    controller = _text(top, "controller", "")
+    if controller and not all(controller.partition(":")):
+        raise ScenarioError(f"controller: {controller!r}; expected module:class or module:function")
     repeat = top.get("repeat_every")
     if repeat is not None:
         repeat = _number(repeat, "repeat_every", 1.0, 86400.0)
@@ -84,7 +88,17 @@ def parse_scenario(document: Any) -> Scenario:
     parsed = tuple(_event(item, f"events[{i}]") for i, item in enumerate(events))
     _check_times(parsed, repeat)
     criteria = _criteria(top.get("criteria", {}), parsed)
-    return Scenario(name, _text(top, "description", ""), tuple(aircraft), repeat, start, gains, criteria, parsed)
+    description = _text(top, "description", "")
+    return Scenario(name, description, tuple(aircraft), repeat, start, gains, criteria, parsed, controller)
+
+
+def _start(item: Any) -> Dict[str, float]:
+    given = _mapping(item, "start", (*_START, "on_ground"))
+    on_ground = given.get("on_ground", False)
+    if not isinstance(on_ground, bool):
+        raise ScenarioError(f"start.on_ground: {on_ground!r}; expected true or false")
+    start = _ranged({key: value for key, value in given.items() if key != "on_ground"}, "start", _START)
+    return {**start, **({"on_ground": True} if on_ground else {})}
 
 
 def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:
@@ -113,7 +127,7 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
     measure = given.get("measure")
     if measure not in MEASURES:
         raise ScenarioError(f"{path}.measure: {measure!r}; expected one of {', '.join(MEASURES)}")
-    bounds = {
+    bounds: Dict[str, float] = {
         key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("above", "below") if key in given
     }
     if not bounds:
@@ -122,7 +136,7 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
         surplus = [key for key in ("of", "target", "from", "to", "band") if key in given]
         if surplus:
             raise ScenarioError(f"{path}.{surplus[0]}: does not go with {measure}; expected bounds only")
-        return Criterion(name, measure, **bounds)
+        return Criterion(name, measure, above=bounds.get("above"), below=bounds.get("below"))
     variable = given.get("of")
     if variable not in SCORED:
         raise ScenarioError(f"{path}.of: {variable!r}; expected one of {', '.join(SCORED)}")
@@ -280,6 +294,35 @@ def _datarefs(item: Any, path: str) -> Dict[str, float]:
     return {str(key): _number(value, f"{path}.{key}", -math.inf, math.inf) for key, value in item.items()}
 
 
+def _wind(item: Any, path: str) -> Dict[str, float]:
+    return _ranged(item, path, WIND, some=True)
+
+
+def _time(item: Any, path: str) -> Dict[str, float]:
+    return _ranged(item, path, TIME, some=True)
+
+
+def _weather(item: Any, path: str) -> Dict[str, Any]:
+    given = _mapping(item, path, (*LAYERS, *WEATHER))
+    if not given:
+        raise ScenarioError(f"{path}: is empty; expected some of {', '.join((*LAYERS, *WEATHER))}")
+    out: Dict[str, Any] = _ranged({k: v for k, v in given.items() if k in WEATHER}, path, WEATHER)
+    for key, (ranges, needed) in LAYERS.items():
+        if key not in given:
+            continue
+        if not isinstance(given[key], list) or (key == "wind" and not given[key]):
+            raise ScenarioError(f"{path}.{key}: {_short(given[key])}; expected a list of layers, from the lowest up")
+        out[key] = [_ranged(layer, f"{path}.{key}[{i}]", ranges) for i, layer in enumerate(given[key])]
+        for i, layer in enumerate(out[key]):
+            for name in needed:
+                if name not in layer:
+                    low, high = ranges[name]
+                    raise ScenarioError(
+                        f"{path}.{key}[{i}].{name}: missing; expected a number from {low:g} to {high:g}"
+                    )
+    return out
+
+
 def _word(item: Any, path: str) -> str:
     if not isinstance(item, str) or not item:
         raise ScenarioError(f"{path}: {item!r}; expected a text")
@@ -302,6 +345,9 @@ _ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
     "failure": _failure,
     "clear_failures": _true,
     "excitation": _excitation,
+    "wind": _wind,
+    "weather": _weather,
+    "time": _time,
     "dataref": _datarefs,
     "command": _word,
     "label": _word,

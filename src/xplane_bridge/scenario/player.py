@@ -39,7 +39,10 @@ class FlightSample:
 
 @dataclass(frozen=True)
 class Action:
-    """For the caller to do once: `mode`, `failure`, `clear_failures`, `excitation`, `dataref`, `command`, `label`."""
+    """For the caller to do once.
+
+    `mode`, `failure`, `clear_failures`, `excitation`, `wind`, `weather`, `time`, `dataref`, `command`, `label`.
+    """
 
     kind: str
     value: Any

@@ -11,20 +11,21 @@ import queue
 import threading
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, Dict, Optional, Tuple
 
 from ..constants import COMMAND_FIELDS, FlightMode, words
 from .player import Action, Commands, FlightSample, Player
 from .schema import HANDLE_FIELDS, Scenario, ScenarioError
 from .virtual_stick import VirtualStick
+from .world import time_request, weather_request, wind_request
 
 #: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
 STICK_RATE = 50.0
 _BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_node's failsafe knows better
 _SERVICE_WAIT_S = 15.0
-_MODE_WAIT_S = 5.0
+MODE_WAIT_S = 5.0  #: for a mode to be shown
 _TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
-_MODE_NAMES = words(FlightMode)
+MODE_NAMES = words(FlightMode)
 
 
 def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
@@ -49,17 +50,27 @@ def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
     )
 
 
-def fill_command(commands: Commands, message: Any) -> None:
-    """Stick, throttle and handles into a ControlCommand; nothing else is commanded."""
-    message.fields = message.ROLL | message.PITCH | message.YAW
-    message.roll, message.pitch, message.yaw = (commands.stick[axis] for axis in ("roll", "pitch", "yaw"))
+def command_values(commands: Commands) -> Dict[str, float]:
+    """Stick, throttle and handles as fields of ControlCommand; nothing else is commanded."""
+    values = {axis: commands.stick[axis] for axis in ("roll", "pitch", "yaw")}
     if commands.throttle is not None:
-        message.fields |= message.THROTTLE
-        message.throttle = commands.throttle
+        values["throttle"] = commands.throttle
     for handle, value in commands.handles.items():
-        for name in HANDLE_FIELDS[handle]:
-            message.fields |= COMMAND_FIELDS[name].bit.value
-            setattr(message, name, value)
+        values.update(dict.fromkeys(HANDLE_FIELDS[handle], value))
+    return values
+
+
+def fill_command(commands: Commands, message: Any) -> None:
+    """Puts `command_values` into a ControlCommand."""
+    message.fields = 0
+    for name, value in command_values(commands).items():
+        message.fields |= COMMAND_FIELDS[name].bit.value
+        setattr(message, name, value)
+
+
+def mode_has_not_come(mode: str) -> str:
+    """What is said of a mode that was asked for in vain."""
+    return f"mode {mode} was asked for, but control/mode did not show it in {MODE_WAIT_S:g} s"
 
 
 class ScenarioClock:
@@ -67,7 +78,7 @@ class ScenarioClock:
 
     def __init__(self) -> None:
         self.now = 0.0  #: [s]
-        self._last: Optional[tuple] = None
+        self._last: Optional[Tuple[int, float]] = None
 
     def update(self, epoch: int, sim_time: float) -> float:
         """Takes a state's `epoch` and `sim_time_unwrapped` [s]; gives the scenario time [s]."""
@@ -121,39 +132,50 @@ class RosPlayer:
         Raises:
             ScenarioError: Something the scenario asked for was refused or did not come about.
         """
-        import rospy
-        from sensor_msgs.msg import Joy
-        from std_msgs.msg import String
-
-        from xplane_bridge.msg import ControlCommand, ControlMode, FlightState, ModeRequest, WarningState
-
-        topic = self._namespace + "/"
-        self._label_publisher = rospy.Publisher(topic + "scenario/label", String, queue_size=10, latch=True)
-        self._mode_publisher = rospy.Publisher(topic + "control/mode_request", ModeRequest, queue_size=10)
-        if self._stick is None:
-            publisher = rospy.Publisher(topic + "control/manual", ControlCommand, queue_size=1, tcp_nodelay=True)
-        else:
-            publisher = rospy.Publisher(topic + "joy", Joy, queue_size=1, tcp_nodelay=True)
-        rospy.Subscriber(topic + "control/mode", ControlMode, self._on_mode)
-        rospy.Subscriber(topic + "mission/warnings", WarningState, self._on_warnings)
-        rospy.Subscriber(topic + "flight_state", FlightState, self._on_state, tcp_nodelay=True)
-        worker = threading.Thread(target=self._act_all, daemon=True)
-        worker.start()
         try:
-            while not rospy.is_shutdown() and not self._finished.is_set():
-                self._publish(publisher)
-                self._finished.wait(1.0 / STICK_RATE)
-            self._actions.put(None)
-            # What the last events asked for is still seen through, while the stick is held.
-            while worker.is_alive() and not rospy.is_shutdown():
-                self._publish(publisher)
-                worker.join(1.0 / STICK_RATE)
+            self._play(self._advertise())
         finally:
             self._write_log()
         if self._error is not None:
             raise ScenarioError(self._error)
         if not self._finished.is_set():
             raise ScenarioError(f"{self._player.scenario.name}: ended by ROS after {self._clock.now:.1f} s")
+
+    def _advertise(self, **options: Any) -> Any:
+        """Gives the publisher of stick or commands; `options` are for it."""
+        import rospy
+        from sensor_msgs.msg import Joy
+        from std_msgs.msg import String
+
+        from xplane_bridge.msg import ControlCommand, ModeRequest
+
+        options = {"queue_size": 1, "tcp_nodelay": True, **options}
+        topic = self._namespace + "/"
+        self._label_publisher = rospy.Publisher(topic + "scenario/label", String, queue_size=10, latch=True)
+        self._mode_publisher = rospy.Publisher(topic + "control/mode_request", ModeRequest, queue_size=10)
+        if self._stick is None:
+            return rospy.Publisher(topic + "control/manual", ControlCommand, **options)
+        return rospy.Publisher(topic + "joy", Joy, **options)
+
+    def _play(self, publisher: Any) -> None:
+        import rospy
+
+        from xplane_bridge.msg import ControlMode, FlightState, WarningState
+
+        topic = self._namespace + "/"
+        rospy.Subscriber(topic + "control/mode", ControlMode, self._on_mode)
+        rospy.Subscriber(topic + "mission/warnings", WarningState, self._on_warnings)
+        rospy.Subscriber(topic + "flight_state", FlightState, self._on_state, tcp_nodelay=True)
+        worker = threading.Thread(target=self._act_all, daemon=True)
+        worker.start()
+        while not rospy.is_shutdown() and not self._finished.is_set():
+            self._publish(publisher)
+            self._finished.wait(1.0 / STICK_RATE)
+        self._actions.put(None)
+        # What the last events asked for is still seen through, while the stick is held.
+        while worker.is_alive() and not rospy.is_shutdown():
+            self._publish(publisher)
+            worker.join(1.0 / STICK_RATE)
 
     # --- in -----------------------------------------------------------------------------------------------------------
 
@@ -204,19 +226,23 @@ class RosPlayer:
         commands = self._to_send()
         if commands is None:
             return
+        message = self._message(publisher, commands, time.monotonic())
+        message.header.stamp = rospy.get_rostime()
+        publisher.publish(message)
+
+    def _message(self, publisher: Any, commands: Commands, now: float) -> Any:
+        """Stick or commands; `now` [s] is of the clock by which buttons are tapped."""
         message = publisher.data_class()
-        message.header.stamp = rospy.Time.from_sec(time.time())
         if self._stick is None:
             self._sequence += 1
             message.sequence = self._sequence
             fill_command(commands, message)
         else:
             axes, buttons = self._stick.joy(commands)
-            now = time.monotonic()
             for button, released in list(self._tapped.items()):
                 buttons[button] = int(now < released)
             message.axes, message.buttons = axes, buttons
-        publisher.publish(message)
+        return message
 
     def _act_all(self) -> None:
         while True:
@@ -241,25 +267,26 @@ class RosPlayer:
         if action.kind == "mode":
             self._request_mode(action.value)
             return
-        calls = {
+        calls: Dict[str, Callable[[Any], None]] = {
             "failure": self._failure,
             "clear_failures": self._clear_failures,
             "excitation": self._excitation,
+            "wind": self._wind,
+            "weather": self._weather,
+            "time": self._time,
             "dataref": self._datarefs,
             "command": self._command,
         }
         calls[action.kind](action.value)
 
     def _request_mode(self, wanted: int) -> None:
-        mode = _MODE_NAMES[wanted]
-        deadline = time.monotonic() + _MODE_WAIT_S
+        mode = MODE_NAMES[wanted]
+        deadline = time.monotonic() + MODE_WAIT_S
 
         def wait_for(condition: Callable[[], bool]) -> None:
             while not condition():
                 if time.monotonic() > deadline:
-                    raise ScenarioError(
-                        f"mode {mode} was asked for, but control/mode did not show it in {_MODE_WAIT_S:g} s"
-                    )
+                    raise ScenarioError(mode_has_not_come(mode))
                 time.sleep(0.01)
 
         wait_for(lambda: self._mode is not None)
@@ -271,13 +298,16 @@ class RosPlayer:
             wait_for(lambda: self._mode_publisher.get_num_connections() > 0)
             self._mode_sequence += 1
             request = ModeRequest(sequence=self._mode_sequence, mode=wanted, requester=rospy.get_name())
-            request.header.stamp = rospy.Time.from_sec(time.time())
+            request.header.stamp = rospy.get_rostime()
             self._mode_publisher.publish(request)
         else:
-            button = self._stick.mode_button(mode, _MODE_NAMES.get(self._mode or 0, ""))
-            if button is not None:
-                self._tapped[button] = time.monotonic() + _TAP_S
+            self._tap(self._stick, mode, time.monotonic())
         wait_for(lambda: self._mode == wanted)
+
+    def _tap(self, stick: VirtualStick, mode: str, now: float) -> None:
+        button = stick.mode_button(mode, MODE_NAMES.get(self._mode or 0, ""))
+        if button is not None:
+            self._tapped[button] = now + _TAP_S
 
     def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
         import rospy
@@ -329,6 +359,21 @@ class RosPlayer:
             frequency_max=value["frequency_end"],
             seed=value["seed"],
         )
+
+    def _wind(self, value: Dict[str, float]) -> None:
+        from xplane_bridge.srv import SetWind
+
+        self._call("set_wind", SetWind, "wind", **wind_request(value))
+
+    def _weather(self, value: Dict[str, Any]) -> None:
+        from xplane_bridge.srv import SetWeather, SetWeatherRequest
+
+        self._call("set_weather", SetWeather, "weather", **weather_request(value, SetWeatherRequest))
+
+    def _time(self, value: Dict[str, float]) -> None:
+        from xplane_bridge.srv import SetTime, SetTimeRequest
+
+        self._call("set_time", SetTime, "time", **time_request(value, SetTimeRequest))
 
     def _datarefs(self, values: Dict[str, float]) -> None:
         from xplane_bridge.srv import SetDataref

@@ -97,3 +97,4 @@ class Scenario:
     gains: Mapping[str, float] = field(default_factory=dict)
     criteria: Tuple[Criterion, ...] = ()  #: for run_scenario, which checks them
     events: Tuple[Event, ...] = ()
+    controller: str = ""  #: module:class that flies in mode auto; empty: none of its own

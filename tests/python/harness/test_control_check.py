@@ -224,11 +224,11 @@ def take(xplane, watch, name, value):
 
 
 def test_overrides_that_were_taken_and_given_back_are_released(xplane, watch):
-    take(xplane, watch, "override_joystick", 1.0)
-    take(xplane, watch, "override_joystick", 0.0)
+    take(xplane, watch, "override_joystick_roll", 1.0)
+    take(xplane, watch, "override_joystick_roll", 0.0)
     verdict = watch.judge_end()
     assert verdict.passed
-    assert verdict.text.endswith("on during the flight: override_joystick")
+    assert verdict.text.endswith("on during the flight: override_joystick_roll")
 
 
 def test_an_override_that_is_left_on_is_named(xplane, watch):
@@ -247,8 +247,8 @@ def test_what_was_never_taken_was_not_flown(xplane, watch):
 
 def test_an_xplane_that_is_silent_at_the_end_is_no_proof(xplane, watch, monkeypatch):
     monkeypatch.setattr("xplane_bridge.harness.override_watch._ANSWER_S", 0.5)
-    take(xplane, watch, "override_joystick", 1.0)
-    take(xplane, watch, "override_joystick", 0.0)
+    take(xplane, watch, "override_joystick_roll", 1.0)
+    take(xplane, watch, "override_joystick_roll", 0.0)
     xplane.mute = True
     verdict = watch.judge_end()
     assert not verdict.passed

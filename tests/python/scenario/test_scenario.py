@@ -89,6 +89,10 @@ def test_the_example_of_the_manual_is_a_scenario():
         ({"name": "x", "events": [{"at": 0, "buttons": {"press": [99]}}]}, "button numbers 0..63"),
         ({"name": "x", "gains": {"rol": 1}, "events": [{"at": 0}]}, "gains.rol: unknown key"),
         ({"name": "x", "start": {"altitude": 1e6}, "events": [{"at": 0}]}, "start.altitude: 1000000.0"),
+        ({"name": "x", "start": {"on_ground": 1}, "events": [{"at": 0}]}, "start.on_ground: 1; expected true or false"),
+        ({"name": "x", "start": {"ground": True}, "events": [{"at": 0}]}, "start.ground: unknown key"),
+        ({"name": "x", "controller": "fly", "events": [{"at": 0}]}, "controller: 'fly'; expected module:class"),
+        ({"name": "x", "controller": "fly:", "events": [{"at": 0}]}, "controller: 'fly:'; expected module:class"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_key(document, message):

@@ -1,0 +1,138 @@
+"""Plays a scenario in lock-step: each frame is answered, and all times and deadlines are the simulator's."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Any, Callable, Deque, Optional, Tuple
+
+from xplane_bridge.lockstep import PUBLISHER, ModeInStep, Participant, TopicInStep
+
+from .player import Action
+from .ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
+from .schema import ScenarioError
+
+_WARNINGS_AGE_NS = 200_000_000  # of those that count: all of before have come, at 20 of them a second
+_POLL_S = 0.2
+
+
+class LockstepPlayer(RosPlayer):
+    """Plays one scenario in the ROS node of this process, which is a participant; at the end the flight is held.
+
+    Args:
+        *args: As of RosPlayer.
+        check: Called in the first frame; its error ends the flight.
+        **kwargs: As of RosPlayer.
+    """
+
+    def __init__(self, *args: Any, check: Callable[[], None], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._check: Optional[Callable[[], None]] = check
+        self._failure_of_check: Optional[BaseException] = None
+        self._due: Deque[Action] = deque()
+        self._awaited: Optional[Tuple[int, float]] = None  # mode, and the time [s] by which it must have come
+        self._ending = threading.Event()
+        variables = {c.variable for event in self._player.scenario.events for c in event.when}
+        self._sees_mode = self._stick is not None or "mode" in variables
+        self._sees_stall = "stall_warning" in variables
+
+    def _advertise(self, **options: Any) -> Any:
+        return super()._advertise(**{**PUBLISHER, **options})
+
+    def _play(self, publisher: Any) -> None:
+        import rospy
+        from std_srvs.srv import Trigger
+
+        from xplane_bridge.msg import WarningState
+        from xplane_bridge.srv import LockstepStep
+
+        service = self._namespace + "/lockstep/"
+        self._out = publisher
+        self._hold = rospy.ServiceProxy(service + "hold", Trigger)
+        self._modes = ModeInStep(self._namespace) if self._sees_mode else None
+        warnings = self._namespace + "/mission/warnings"
+        self._warnings = TopicInStep(warnings, WarningState) if self._sees_stall else None
+        self._participant = Participant(self._answer, publisher, self._namespace)
+        self._say(f"ready for {self._player.scenario.name}")
+        while not rospy.is_shutdown() and not self._ending.wait(_POLL_S):
+            pass
+        if self._failure_of_check is not None:
+            raise self._failure_of_check
+        if self._error is None and self._ending.is_set():
+            # No frames more; it is answered when the last answer of this node has come.
+            rospy.ServiceProxy(service + "step", LockstepStep)(frames=0)
+
+    def fail(self, error: str) -> None:
+        """Ends it with an error; the frame stays unanswered."""
+        super().fail(error)
+        self._ending.set()
+
+    # --- a frame ------------------------------------------------------------------------------------------------------
+
+    def _answer(self, state: Any) -> Any:
+        if self._ending.is_set():
+            return None
+        try:
+            return self._play_frame(state)
+        except ScenarioError as error:
+            self.fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error}")
+            raise
+        except Exception as error:  # rospy would log it, and the frame never be answered
+            self.fail(f"{self._player.scenario.name}, at {self._clock.now:.1f} s: {error!r}")
+            raise
+
+    def _play_frame(self, state: Any) -> Any:
+        self._look_around(state)
+        if not self._finished.is_set():
+            self._play_on(state)
+        while not self._actions.empty():
+            action = self._actions.get()
+            assert action is not None  # that ends the worker of the real-time player, which there is none of
+            self._due.append(action)
+        # What is held down in the first message of a stick counts as not pressed.
+        if self._stick is None or state.header.stamp != self._first:
+            self._act_on()
+        assert self._commands is not None
+        message = self._message(self._out, self._commands, self._clock.now)
+        if self._finished.is_set() and not self._due and self._awaited is None:
+            self._hold()
+            self._ending.set()
+        return message
+
+    def _look_around(self, state: Any) -> None:
+        if self._check is not None:
+            check, self._check = self._check, None
+            try:
+                check()
+            except BaseException as error:
+                self._failure_of_check = error
+                raise
+            self._first = state.header.stamp
+        if self._modes is not None:
+            self._mode = self._modes.at(state)
+        if self._warnings is not None:
+            horizon = type(state.header.stamp)(nsecs=state.header.stamp.to_nsec() - _WARNINGS_AGE_NS)
+            last = self._warnings.before(horizon) if horizon > self._first else None
+            self._stall = last is not None and last.stall >= 0.5
+
+    # --- actions ------------------------------------------------------------------------------------------------------
+
+    def _act_on(self) -> None:
+        """What has become due, in its order; a mode that a button asks for is awaited before the next."""
+        if self._awaited is not None:
+            mode, latest = self._awaited
+            if self._mode == mode:
+                self._awaited = None
+            elif self._clock.now > latest:
+                raise ScenarioError(mode_has_not_come(MODE_NAMES[mode]))
+        while self._due and self._awaited is None:
+            self._act(self._due.popleft())
+
+    def _request_mode(self, wanted: int) -> None:
+        if self._stick is not None:
+            self._tap(self._stick, MODE_NAMES[wanted], self._clock.now)
+            self._awaited = (wanted, self._clock.now + MODE_WAIT_S)
+            return
+        from xplane_bridge.srv import SetMode
+
+        self._call("set_mode", SetMode, f"mode {MODE_NAMES[wanted]}", mode=wanted)

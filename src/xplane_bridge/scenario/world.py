@@ -1,0 +1,72 @@
+"""Wind, weather and time of a scenario: their ranges, and the requests to tx_node's services they become."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, Mapping, Tuple
+
+Ranges = Mapping[str, Tuple[float, float]]
+
+#: Of set_wind; what is not given is calm air from north.
+WIND: Ranges = {"speed": (0.0, 100.0), "from_deg": (0.0, 360.0), "turbulence": (0.0, 1.0)}
+#: Of set_time, each with its bit of `fields`.
+TIME: Ranges = {"date_days": (0.0, 365.0), "zulu_time": (0.0, 86400.0), "time_ratio": (1.0, 16.0)}
+_TIME_BITS = {"date_days": "DATE", "zulu_time": "ZULU_TIME", "time_ratio": "TIME_RATIO"}
+_WHOLE = ("date_days", "time_ratio")
+#: Of a wind layer and of a cloud layer; altitude, speed, base and top must be given.
+WIND_LAYER: Ranges = {
+    "altitude": (-500.0, 30000.0),
+    "from_deg": (0.0, 360.0),
+    "speed": (0.0, 100.0),
+    "shear": (0.0, 100.0),
+    "turbulence": (0.0, 1.0),
+}
+CLOUD_LAYER: Ranges = {"base": (-500.0, 30000.0), "top": (-500.0, 30000.0), "cover": (0.0, 1.0), "type": (0.0, 5.0)}
+#: The layers of set_weather, with what each of them must have.
+LAYERS: Mapping[str, Tuple[Ranges, Tuple[str, ...]]] = {
+    "wind": (WIND_LAYER, ("altitude", "from_deg", "speed")),
+    "clouds": (CLOUD_LAYER, ("base", "top", "cover")),
+}
+#: Its numbers.
+WEATHER: Ranges = {
+    "visibility": (10.0, 200000.0),
+    "precipitation": (0.0, 1.0),
+    "sea_level_temperature": (-60.0, 60.0),
+    "sea_level_pressure": (85000.0, 110000.0),
+}
+_WEATHER_BITS = {
+    "wind": "WIND",
+    "clouds": "CLOUDS",
+    "visibility": "VISIBILITY",
+    "precipitation": "PRECIPITATION",
+    "sea_level_temperature": "TEMPERATURE",
+    "sea_level_pressure": "PRESSURE",
+}
+#: Kinds of actions that take tx_node's services, or an X-Plane: nothing that flies in process has them.
+KINDS = ("wind", "weather", "time")
+
+
+def wind_request(value: Mapping[str, float]) -> Dict[str, float]:
+    """Fields of SetWind. Calm air is asked for from 360 deg: the service takes three zeros for nothing."""
+    return {"speed": 0.0, "from_deg": 360.0, "turbulence": 0.0, **value}
+
+
+def time_request(value: Mapping[str, float], bits: Any) -> Dict[str, Any]:
+    """Fields of SetTime; `bits` has its constants."""
+    fields = {key: int(number) if key in _WHOLE else number for key, number in value.items()}
+    return {"fields": sum(getattr(bits, _TIME_BITS[key]) for key in value), **fields}
+
+
+def weather_request(value: Mapping[str, Any], bits: Any) -> Dict[str, Any]:
+    """Fields of SetWeather; `bits` has its constants."""
+    request: Dict[str, Any] = {"fields": sum(getattr(bits, _WEATHER_BITS[key]) for key in value)}
+    for key, given in value.items():
+        if key == "wind":
+            for name in WIND_LAYER:
+                request[f"wind_layer_{name}"] = [layer.get(name, 0.0) for layer in given]
+        elif key == "clouds":
+            for name in CLOUD_LAYER:
+                numbers = [layer.get(name, 0.0) for layer in given]
+                request[f"cloud_{name}"] = [int(number) for number in numbers] if name == "type" else numbers
+        else:
+            request[key] = given
+    return request

@@ -1,0 +1,96 @@
+"""Wind, weather and time of scenarios: what is read of them, and the requests they become."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from xplane_bridge.campaign.definition import CampaignError, _refuse_unflyable
+from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
+from xplane_bridge.scenario import ScenarioError, parse_scenario
+from xplane_bridge.scenario.world import time_request, weather_request, wind_request
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def service(name):
+    """Constants and fields of a request."""
+    text = (ROOT / f"srv/{name}.srv").read_text(encoding="utf-8").split("\n---\n")[0]
+    code = [line.split("#")[0].split() for line in text.splitlines()]
+    constants = {words[1]: int(words[3]) for words in code if len(words) == 4}
+    return SimpleNamespace(**constants), {words[1]: words[0] for words in code if len(words) == 2}
+
+
+def read(**actions):
+    scenario = parse_scenario({"name": "t", "events": [{"at": 0, **actions}]})
+    return dict(scenario.events[0].actions)
+
+
+def test_weather_becomes_the_request_with_its_bits():
+    value = read(
+        weather={
+            "wind": [{"altitude": 0, "from_deg": 270, "speed": 5}, {"altitude": 2000, "from_deg": 300, "speed": 12}],
+            "clouds": [{"base": 900, "top": 1500, "cover": 0.5, "type": 2}],
+            "visibility": 5000,
+        }
+    )["weather"]
+    bits, fields = service("SetWeather")
+    request = weather_request(value, bits)
+    assert request.keys() <= fields.keys()
+    assert request.pop("fields") == 1 + 2 + 4
+    assert request == {
+        "wind_layer_altitude": [0.0, 2000.0],
+        "wind_layer_from_deg": [270.0, 300.0],
+        "wind_layer_speed": [5.0, 12.0],
+        "wind_layer_shear": [0.0, 0.0],
+        "wind_layer_turbulence": [0.0, 0.0],
+        "cloud_base": [900.0],
+        "cloud_top": [1500.0],
+        "cloud_cover": [0.5],
+        "cloud_type": [2],
+        "visibility": 5000.0,
+    }
+    clear = weather_request(read(weather={"clouds": [], "sea_level_pressure": 100000})["weather"], bits)
+    assert (clear["fields"], clear["cloud_base"], clear["sea_level_pressure"]) == (2 + 32, [], 100000.0)
+
+
+def test_time_and_wind_become_requests():
+    bits, fields = service("SetTime")
+    request = time_request(read(time={"date_days": 20, "time_ratio": 2})["time"], bits)
+    assert request == {"fields": 1 + 4, "date_days": 20, "time_ratio": 2}
+    assert request.keys() <= fields.keys()
+    assert time_request({"zulu_time": 3600.5}, bits) == {"fields": 2, "zulu_time": 3600.5}
+    assert wind_request(read(wind={"turbulence": 0.2})["wind"]) == {"speed": 0.0, "from_deg": 360.0, "turbulence": 0.2}
+
+
+@pytest.mark.parametrize(
+    ("actions", "complaint"),
+    [
+        ({"weather": {}}, "weather: is empty; expected some of wind, clouds, visibility"),
+        ({"weather": {"fog": 1}}, "weather.fog: unknown key"),
+        ({"weather": {"wind": []}}, "weather.wind: []; expected a list of layers"),
+        ({"weather": {"wind": [{"altitude": 0, "speed": 5}]}}, "weather.wind[0].from_deg: missing; expected a number"),
+        ({"weather": {"clouds": [{"base": 0, "top": 5, "cover": 2}]}}, "clouds[0].cover: 2; expected a number from 0"),
+        ({"weather": {"sea_level_pressure": 1013}}, "sea_level_pressure: 1013; expected a number from 85000 to 110000"),
+        ({"time": {"zulu_time": 90000}}, "time.zulu_time: 90000; expected a number from 0 to 86400"),
+        ({"wind": {"knots": 5}}, "wind.knots: unknown key; expected one of speed, from_deg, turbulence"),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_key(actions, complaint):
+    with pytest.raises(ScenarioError, match=re.escape(complaint)):
+        read(**actions)
+
+
+@pytest.mark.parametrize(
+    "actions", [{"wind": {"speed": 5}}, {"weather": {"visibility": 500}}, {"time": {"time_ratio": 2}}]
+)
+def test_what_flies_without_the_bridge_refuses_them(actions):
+    scenario = parse_scenario({"name": "t", "events": [{"at": 0, **actions}]})
+    (kind,) = actions
+    with pytest.raises(ScenarioError, match=f"tx_node sets {kind}"):
+        ScenarioPilot(scenario)
+    with pytest.raises(CampaignError, match=f"{kind}: takes the bridge"):
+        _refuse_unflyable(scenario)
