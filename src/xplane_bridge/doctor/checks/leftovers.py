@@ -95,5 +95,7 @@ def _has(entries: Sequence[Entry], path: str) -> bool:
 
 
 def _short(name: str) -> str:
-    """`override_joystick` of `override:sim/operation/override/override_joystick`."""
+    """`override_joystick` of `override:sim/operation/override/override_joystick`, `subscriptions` of a node's."""
+    if name.startswith("subscriptions:"):
+        return "subscriptions"
     return name.rpartition("/")[2]

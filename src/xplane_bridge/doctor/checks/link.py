@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import List, Optional
+from typing import Any, Dict, List, Optional
 
 from xplane_bridge.doctor.evidence import Evidence
 from xplane_bridge.doctor.finding import Finding, note, ok, problem, warning
@@ -45,7 +45,7 @@ def beacons(evidence: Evidence) -> List[Finding]:
 
 def _no_beacon(evidence: Evidence, group: str) -> Finding:
     text = f"no X-Plane announces itself on {group} (listened on {', '.join(evidence.beacons.interfaces)})"
-    facts = {"interfaces": evidence.beacons.interfaces}
+    facts: Dict[str, Any] = {"interfaces": evidence.beacons.interfaces}
     if evidence.answers.any and evidence.target.chosen is Chosen.ASSUMED:
         remedy = f"give host:={evidence.target.host} to every launch file: without a beacon nothing is found"
         return warning("no-beacon", f"{text}, though {evidence.target} answers", remedy, **facts)
@@ -61,7 +61,9 @@ def several(evidence: Evidence) -> List[Finding]:
         return []
     those = ", ".join(f"{_name(seen)} port {seen.port} (version {version_text(seen.version)})" for seen, _ in found)
     text = f"{len(found)} X-Planes announce themselves: {those}"
-    facts = {"simulators": [{"address": seen.address, "port": seen.port, "name": seen.computer} for seen, _ in found]}
+    facts: Dict[str, Any] = {
+        "simulators": [{"address": seen.address, "port": seen.port, "name": seen.computer} for seen, _ in found]
+    }
     if evidence.target.chosen in (Chosen.OPTION, Chosen.PARAMETER):
         return [note("several-simulators", f"{text}; {evidence.target} is examined", **facts)]
     remedy = (
@@ -111,7 +113,7 @@ def answering_address(evidence: Evidence) -> List[Finding]:
     target = evidence.target
     findings = []
     for address, port in sorted(evidence.answers.sources):
-        facts = {"asked": target.address, "asked_port": target.port, "from": address, "from_port": port}
+        facts: Dict[str, Any] = {"asked": target.address, "asked_port": target.port, "from": address, "from_port": port}
         if address != target.address and not (target.here and is_same_computer(address, target.address)):
             text = f"answers come from {address}, but {target.address} is configured: X-Plane's computer has both"
             remedy = f"give host:={address} to every launch file"

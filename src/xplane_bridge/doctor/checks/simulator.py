@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import List
+from typing import Any, Dict, List
 
 from xplane_bridge.doctor import names
 from xplane_bridge.doctor.evidence import Evidence
@@ -37,7 +37,7 @@ def state(evidence: Evidence) -> List[Finding]:
     if names.RUNNING_TIME not in values:
         return []
     time_s = values[names.RUNNING_TIME]
-    facts = {"sim_time_s": time_s}
+    facts: Dict[str, Any] = {"sim_time_s": time_s}
     if values.get(names.PAUSED):
         return [note("paused", "X-Plane is paused: values come, but do not change", **facts)]
     if values.get(names.REPLAY):

@@ -8,10 +8,10 @@ import re
 import socket
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Tuple
+from typing import Any, Dict, List, Tuple
 
-_FORMAT = "xplane_bridge journal"
-_VERSION = 1
+#: What a file says of itself.
+HEAD = {"format": "xplane_bridge journal", "version": 1}
 
 
 class Owner(enum.Enum):
@@ -69,12 +69,13 @@ def read(folder: Path, proc: Path = Path("/proc")) -> Tuple[Journal, ...]:
     """All journals of a folder; none where there is no such folder."""
     found = []
     for file in sorted(folder.glob("*.json")) if folder.is_dir() else []:
-        match = re.fullmatch(r"(.+)_(\d+)\.json", file.name)
+        match = re.fullmatch(r"(.+)_(\d+)(?:_subscriptions)?\.json", file.name)
         if not match:
             continue
         host, port = match.group(1), int(match.group(2))
         try:
-            found.append(Journal(file, host, port, _entries(file, proc)))
+            entries = tuple(_entry(entry, proc) for entry in load(file))
+            found.append(Journal(file, host, port, entries))
         except FileNotFoundError:  # everything was undone just now
             continue
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
@@ -82,12 +83,18 @@ def read(folder: Path, proc: Path = Path("/proc")) -> Tuple[Journal, ...]:
     return tuple(found)
 
 
-def _entries(file: Path, proc: Path) -> Tuple[Entry, ...]:
+def load(file: Path) -> List[Dict[str, Any]]:
+    """The entries of a file as they stand there.
+
+    Raises:
+        FileNotFoundError: There is none: nothing is to be undone.
+        ValueError, KeyError, TypeError, AttributeError: It is no journal.
+    """
     content = json.loads(file.read_text(encoding="utf-8"))
-    if content.get("format") != _FORMAT or content.get("version") != _VERSION:
-        msg = f"expected format {_FORMAT!r} of version {_VERSION}"
+    if {key: content.get(key) for key in HEAD} != HEAD:
+        msg = f"expected format {HEAD['format']!r} of version {HEAD['version']}"
         raise ValueError(msg)
-    return tuple(_entry(entry, proc) for entry in content["entries"])
+    return list(content["entries"])
 
 
 def _entry(entry: Any, proc: Path) -> Entry:
@@ -98,20 +105,30 @@ def _entry(entry: Any, proc: Path) -> Entry:
         node=str(owner["node"]),
         pid=int(owner["pid"]),
         computer=str(owner["computer"]),
-        owner=_owner(owner, proc),
+        owner=judge_owner(owner, proc),
     )
 
 
-def _owner(owner: Any, proc: Path) -> Owner:
-    """As the bridge itself judges it: by boot, process number and start time."""
-    boot = (proc / "sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
-    if owner["boot_id"] != boot:
+def judge_owner(owner: Any, proc: Path) -> Owner:
+    """How the owner's process is, as the bridge itself judges it: by boot, process number and start time."""
+    if owner["boot_id"] != boot_id(proc):
         return Owner.GONE if owner["computer"] == socket.gethostname() else Owner.ELSEWHERE
     try:
-        # Behind the program's name, which is in parentheses and may hold anything: fields 3 (state) and further.
-        fields = (proc / str(owner["pid"]) / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        state, start_ticks = process_status(proc, str(owner["pid"]))
     except OSError:
         return Owner.GONE
-    if int(fields[19]) != int(owner["start_ticks"]) or fields[0] == "Z":
+    if start_ticks != int(owner["start_ticks"]) or state == "Z":
         return Owner.GONE
-    return Owner.STOPPED if fields[0] in "Tt" else Owner.RUNS
+    return Owner.STOPPED if state in "Tt" else Owner.RUNS
+
+
+def process_status(proc: Path, pid: str) -> Tuple[str, int]:
+    """State of a process and when it was started [clock ticks since the boot]; OSError where there is none."""
+    # Behind the program's name, which is in parentheses and may hold anything: fields 3 (state) and further.
+    fields = (proc / pid / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return fields[0], int(fields[19])
+
+
+def boot_id(proc: Path) -> str:
+    """Which boot of this computer it is."""
+    return (proc / "sys/kernel/random/boot_id").read_text(encoding="ascii").strip()

@@ -9,7 +9,7 @@ import threading
 import urllib.parse
 import xmlrpc.client
 from dataclasses import dataclass, field, replace
-from typing import Any, Dict, List, Mapping, Tuple
+from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from .computer import is_own
 
@@ -114,12 +114,19 @@ def _call_master(facts: RosFacts, namespace: str) -> RosFacts:
     try:
         with xmlrpc.client.ServerProxy(facts.uri, transport=_Transport()) as master:
             master.getPid(_CALLER)
-            code, _, parameters = master.getParam(_CALLER, namespace)
+            answer: Any = master.getParam(_CALLER, namespace)
+            code, _, parameters = answer
             found = parameters if code == 1 and isinstance(parameters, dict) else {}
-            _, _, (publishers, subscribers, services) = master.getSystemState(_CALLER)
-            names = {name for group in (publishers, subscribers, services) for _, nodes in group for name in nodes}
+            answer = master.getSystemState(_CALLER)
+            _, _, (publishers, subscribers, services) = answer
+            names: Set[str] = {
+                name for group in (publishers, subscribers, services) for _, nodes in group for name in nodes
+            }
             ours = sorted(name for name in names if name.startswith(namespace + "/"))[:_MOST_NODES]
-            uris = [(name, str(master.lookupNode(_CALLER, name)[2])) for name in ours]
+            uris = []
+            for name in ours:
+                answer = master.lookupNode(_CALLER, name)
+                uris.append((name, str(answer[2])))
     except ConnectionRefusedError as error:
         return replace(facts, refused=True, error=error.strerror or str(error))
     except socket.timeout:

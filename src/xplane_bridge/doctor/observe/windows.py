@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import time
 from dataclasses import dataclass
-from typing import Any, Callable, List, Optional, Tuple
+from typing import Any, Callable, Iterator, List, Optional, Tuple
 
 from .ports import program_name
 
@@ -31,6 +32,7 @@ class Window:
         program: Name of the program it belongs to; empty where it does not say.
         grab_s: Shortest time in which its picture could be read through the display's socket [s]; None where that was
             not tried or failed.
+        number: X's own of it.
     """
 
     title: str
@@ -39,6 +41,7 @@ class Window:
     shown: bool
     program: str = ""
     grab_s: Optional[float] = None
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,26 @@ class Display:
     error: str = ""
 
 
-class _Attributes(ctypes.Structure):
+class Image(ctypes.Structure):
+    """The beginning of XImage."""
+
+    _fields_ = (
+        ("width", ctypes.c_int),
+        ("height", ctypes.c_int),
+        ("xoffset", ctypes.c_int),
+        ("format", ctypes.c_int),
+        ("data", ctypes.c_void_p),
+        ("byte_order", ctypes.c_int),
+        ("bitmap_unit", ctypes.c_int),
+        ("bitmap_bit_order", ctypes.c_int),
+        ("bitmap_pad", ctypes.c_int),
+        ("depth", ctypes.c_int),
+        ("bytes_per_line", ctypes.c_int),
+        ("bits_per_pixel", ctypes.c_int),
+    )
+
+
+class Attributes(ctypes.Structure):
     """XWindowAttributes."""
 
     _fields_ = (
@@ -88,7 +110,7 @@ class _Attributes(ctypes.Structure):
 
 #: Xlib ends the process on an error unless a handler is set; windows may go while they are looked at.
 _ErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
-_IGNORE_ERRORS = _ErrorHandler(lambda _display, _error: 0)
+IGNORE_ERRORS = _ErrorHandler(lambda _display, _error: 0)
 
 
 def observe(name: str, is_wanted: Callable[[str], bool]) -> Display:
@@ -101,10 +123,10 @@ def observe(name: str, is_wanted: Callable[[str], bool]) -> Display:
     if not name:
         return Display()
     try:
-        x11 = _declared(ctypes.CDLL(_LIBRARY))
+        x11 = declared(ctypes.CDLL(_LIBRARY))
     except OSError:
         return Display(name, error=f"there is no {_LIBRARY} on this computer")
-    x11.XSetErrorHandler(_IGNORE_ERRORS)
+    x11.XSetErrorHandler(IGNORE_ERRORS)
     connection = x11.XOpenDisplay(name.encode())
     if not connection:
         return Display(name, error="it takes no connection (is it there, and is this user allowed?)")
@@ -116,6 +138,30 @@ def observe(name: str, is_wanted: Callable[[str], bool]) -> Display:
         return Display(name, tuple(found))
     finally:
         x11.XCloseDisplay(connection)
+
+
+@contextlib.contextmanager
+def reader(name: str) -> Iterator[Callable[[Window], Optional[bytes]]]:
+    """Gives a function that reads a window's picture, or None where that fails; for a display that `observe` saw."""
+    x11 = declared(ctypes.CDLL(_LIBRARY))
+    x11.XSetErrorHandler(IGNORE_ERRORS)
+    connection = x11.XOpenDisplay(name.encode())
+
+    def read(window: Window) -> Optional[bytes]:
+        arguments = (0, 0, window.width, window.height, _ALL_PLANES, _Z_PIXMAP)
+        image = x11.XGetImage(connection, window.number, *arguments) if connection else None
+        if not image:
+            return None
+        head = Image.from_address(image)
+        picture = ctypes.string_at(head.data, head.bytes_per_line * head.height)
+        x11.XDestroyImage(image)
+        return picture
+
+    try:
+        yield read
+    finally:
+        if connection:
+            x11.XCloseDisplay(connection)
 
 
 class _Walker:
@@ -146,13 +192,13 @@ class _Walker:
 
     def _describe(self, window: int) -> Optional[Window]:
         title = self._title(window)
-        attributes = _Attributes()
+        attributes = Attributes()
         if not title or not self._x11.XGetWindowAttributes(self._connection, window, ctypes.byref(attributes)):
             return None
         size = (attributes.width, attributes.height)
         shown = attributes.map_state == _VIEWABLE
         grab_s = self._grab(window, *size) if shown and self._is_wanted(title) else None
-        return Window(title, *size, shown, self._program(window), grab_s)
+        return Window(title, *size, shown, self._program(window), grab_s, window)
 
     def _title(self, window: int) -> str:
         modern = self._property(window, self._net_name)
@@ -199,7 +245,7 @@ class _Walker:
         return min(times)
 
 
-def _declared(x11: Any) -> Any:
+def declared(x11: Any) -> Any:
     """Xlib with the types of what is called: pointers are not ints of 32 bits."""
     pointer, window, integer = ctypes.c_void_p, ctypes.c_ulong, ctypes.c_int
     signatures = {
@@ -219,6 +265,12 @@ def _declared(x11: Any) -> Any:
         "XGetImage": (pointer, [pointer, window, integer, integer, ctypes.c_uint, ctypes.c_uint, window, integer]),
         "XDestroyImage": (integer, [pointer]),
         "XFree": (integer, [pointer]),
+        "XDefaultScreen": (integer, [pointer]),
+        "XDefaultVisual": (pointer, [pointer, integer]),
+        "XDefaultDepth": (integer, [pointer, integer]),
+        "XDefaultRootWindow": (window, [pointer]),
+        "XTranslateCoordinates": (integer, [pointer, window, window, integer, integer, *[pointer] * 3]),
+        "XSync": (integer, [pointer, integer]),
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(x11, name)

@@ -1,0 +1,130 @@
+"""Flies the card: asks the questions one after the other, and puts everything back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Callable, Dict, List, Sequence, Tuple
+
+from xplane_bridge.doctor import names
+
+from .flight import Flight, NoFlightError
+from .journal import Journal, JournalError
+from .link import XPlane
+from .question import Question
+from .questions import CARD
+from .verdict import Answer, NotTestableError, Verdict
+
+#: How long the first answer is waited for [s].
+_PATIENCE_S = 5.0
+
+
+class CannotRunError(Exception):
+    """The card cannot be flown; the text says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What came of a card.
+
+    Attributes:
+        version: X-Plane's, as it gives it.
+        answers: By id, in the order asked.
+        left: What could not be put back, in words; empty: everything is as it was.
+    """
+
+    version: int
+    answers: Dict[str, Answer]
+    left: Tuple[str, ...]
+
+
+def chosen(ids: Sequence[str]) -> List[Question]:
+    """The questions of these ids, in the order of the card; all where none is given.
+
+    Raises:
+        CannotRunError: There is no such id.
+    """
+    known = [question.id for question in CARD]
+    unknown = [id_ for id_ in ids if id_ not in known]
+    if unknown:
+        raise CannotRunError(f"there is no question {', '.join(unknown)}; there are: {', '.join(known)}")
+    return [question for question in CARD if not ids or question.id in ids]
+
+
+def fly(
+    address: str,
+    port: int,
+    journals: Path,
+    questions: Sequence[Question],
+    say: Callable[[Question, Answer], None] = lambda _question, _answer: None,
+) -> Flown:
+    """Flies the card.
+
+    Args:
+        address: IPv4 address of X-Plane.
+        port: UDP port it listens on.
+        journals: Folder of the bridge's journals.
+        questions: What to ask.
+        say: Called with each answer as it comes.
+
+    Raises:
+        CannotRunError: X-Plane does not answer, a node holds its journal, or it brings no aircraft into the air.
+    """
+    try:
+        return _fly(XPlane(address, port, Journal(journals, address, port)), questions, say)
+    except JournalError as error:
+        raise CannotRunError(str(error)) from None
+
+
+def _fly(xplane: XPlane, questions: Sequence[Question], say: Callable[[Question, Answer], None]) -> Flown:
+    holders = xplane.journal.holders()
+    if holders:
+        who = ", ".join(dict.fromkeys(holders))
+        raise CannotRunError(f"{who} holds {xplane.journal.file}: end it first, the card flies the aircraft itself")
+    answers: Dict[str, Answer] = {}
+    left: List[str] = []
+    try:
+        version = xplane.try_read([names.VERSION], _PATIENCE_S).get(names.VERSION)
+        if not version:
+            raise CannotRunError(f"nothing answers on {xplane.address}:{xplane.port}: scripts/xplane_doctor says why")
+        xplane.version = round(version)
+        left += xplane.undo(xplane.journal.orphans())
+        left += _ask_all(xplane, questions, answers, say)
+    finally:
+        left += xplane.undo(xplane.journal.own())
+        xplane.close()
+    return Flown(xplane.version, answers, tuple(left))
+
+
+def _ask_all(
+    xplane: XPlane,
+    questions: Sequence[Question],
+    answers: Dict[str, Answer],
+    say: Callable[[Question, Answer], None],
+) -> List[str]:
+    try:
+        flight = Flight(xplane)
+    except NotTestableError as error:
+        raise CannotRunError(f"{error}: is a flight loaded, and not paused?") from None
+    flying, problem = False, ""
+    try:
+        for question in questions:
+            if question.flies and not flying:
+                flight.begin()
+                flying = True
+            answers[question.id] = _ask(flight, question)
+            say(question, answers[question.id])
+    except NoFlightError as error:
+        raise CannotRunError(str(error)) from None
+    finally:
+        problem = flight.end()
+    return [problem] if problem else []
+
+
+def _ask(flight: Flight, question: Question) -> Answer:
+    try:
+        if question.flies:
+            flight.ready()
+        return question.check(flight)
+    except NotTestableError as error:
+        return Answer(Verdict.NOT_TESTABLE, str(error))

@@ -1,0 +1,166 @@
+"""Notes in the bridge's journal what is to be undone, before it is changed (docs/journal.md)."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import socket
+from pathlib import Path
+from typing import Any, Callable, Dict, Iterator, List, Sequence
+
+from xplane_bridge import protocol
+from xplane_bridge.doctor.observe.journals import HEAD, Owner, boot_id, judge_owner, load, process_status
+
+NODE = "xplane_doctor"
+#: Purposes as the nodes have them: tx_node and rx_node undo what a doctor left that was killed.
+OVERRIDE, DATA_OUTPUT = "override", "data_output"
+_OPERATIONS = ("dref", "data", "usel", "ise4_off")
+
+Operation = Dict[str, Any]
+Entry = Dict[str, Any]
+
+
+class JournalError(Exception):
+    """The journal cannot be used; the text says why and what to do."""
+
+
+def write_dataref(path: str, value: float) -> Operation:
+    """The operation that gives a dataref a value."""
+    return {"op": "dref", "path": path, "value": value}
+
+
+def deselect_rows(rows: Sequence[int]) -> Operation:
+    """The operation that takes rows out of Data Output."""
+    return {"op": "usel", "rows": list(rows)}
+
+
+def target_off(address: str, port: int) -> Operation:
+    """The operation that ends Data Output to an address."""
+    return {"op": "ise4_off", "target": protocol.DATA_OUTPUT_TARGET, "address": address, "port": port}
+
+
+def datagram(operation: Operation) -> bytes:
+    """What carries an operation out."""
+    kind = operation["op"]
+    if kind == "dref":
+        return protocol.DrefWrite(operation["path"], operation["value"]).encode()
+    if kind == "data":
+        return protocol.DataPacket(((operation["row"], tuple(operation["values"])),)).encode()
+    if kind == "usel":
+        return protocol.RowSelection("USEL", tuple(operation["rows"])).encode()
+    if kind == "ise4_off":
+        return protocol.NetworkTarget(operation["target"], operation["address"], operation["port"], False).encode()
+    msg = f"the journal's operation {kind!r} is not known to this doctor: undo it with what wrote it"
+    raise JournalError(msg)
+
+
+class Journal:
+    """The journal of one X-Plane, in the name of this process.
+
+    Args:
+        folder: Of the journals.
+        address: IPv4 address of X-Plane.
+        port: UDP port it listens on.
+        proc: Folder of Linux's process file system.
+    """
+
+    def __init__(self, folder: Path, address: str, port: int, proc: Path = Path("/proc")) -> None:
+        # As the nodes name it: one file whatever loopback address the X-Plane of this computer is called by.
+        name = "127.0.0.1" if address.startswith("127.") else address
+        self.file = folder / f"{name}_{port}.json"
+        self._proc = proc
+        self._self: Dict[str, Any] = {
+            "node": NODE,
+            "pid": os.getpid(),
+            "start_ticks": process_status(proc, "self")[1],
+            "boot_id": boot_id(proc),
+            "computer": socket.gethostname(),
+        }
+
+    def holders(self) -> List[str]:
+        """Who else has changed this X-Plane and still runs, in words."""
+        return [
+            f"{entry['owner']['node']} (process {entry['owner']['pid']} on {entry['owner']['computer']})"
+            for entry in self._entries()
+            if entry["purpose"] in (OVERRIDE, DATA_OUTPUT) and not self._is_gone(entry) and not self._is_own(entry)
+        ]
+
+    def orphans(self) -> List[Entry]:
+        """What processes that are gone have left: to be undone, then removed. Without what only nodes can undo."""
+        return [
+            entry
+            for entry in self._entries()
+            if self._is_gone(entry) and all(operation["op"] in _OPERATIONS for operation in entry["undo"])
+        ]
+
+    def own(self) -> List[Entry]:
+        """What this process has noted, in the order in which it did."""
+        return [entry for entry in self._entries() if self._is_own(entry)]
+
+    def record(self, id_: str, purpose: str, undo: Sequence[Operation]) -> None:
+        """Notes how to undo a change; only when this returns may it be made. The first note of an id counts."""
+
+        def add(entries: List[Entry]) -> List[Entry]:
+            same = [entry for entry in entries if entry["id"] == id_]
+            if any(self._is_own(entry) for entry in same):
+                return entries
+            if same and not self._is_gone(same[0]):
+                msg = f"{id_} belongs to {same[0]['owner']['node']}, which runs: end it first"
+                raise JournalError(msg)
+            kept = [entry for entry in entries if entry["id"] != id_]
+            return [*kept, {"id": id_, "purpose": purpose, "owner": self._self, "undo": list(undo)}]
+
+        self._change(add)
+
+    def remove(self, ids: Sequence[str]) -> None:
+        """Takes entries out that are undone."""
+        self._change(lambda entries: [entry for entry in entries if entry["id"] not in ids])
+
+    def _is_own(self, entry: Entry) -> bool:
+        return all(entry["owner"].get(key) == self._self[key] for key in ("pid", "start_ticks", "boot_id"))
+
+    def _is_gone(self, entry: Entry) -> bool:
+        return judge_owner(entry["owner"], self._proc) is Owner.GONE
+
+    def _entries(self) -> List[Entry]:
+        with self._locked():
+            return self._load()
+
+    def _change(self, how: Callable[[List[Entry]], List[Entry]]) -> None:
+        with self._locked():
+            before = self._load()
+            after = how(before)
+            if after != before:
+                self._store(after)
+
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        with open(f"{self.file}.lock", "a", encoding="utf-8") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
+
+    def _load(self) -> List[Entry]:
+        try:
+            return load(self.file)
+        except FileNotFoundError:
+            return []
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            msg = f"{self.file} cannot be understood ({error}): move it away, or restart X-Plane and delete it"
+            raise JournalError(msg) from None
+
+    def _store(self, entries: List[Entry]) -> None:
+        if entries:
+            new = Path(f"{self.file}.new")
+            with new.open("w", encoding="utf-8") as file:
+                json.dump({**HEAD, "entries": entries}, file, indent=2)
+                file.flush()
+                os.fsync(file.fileno())
+            new.rename(self.file)
+        else:
+            self.file.unlink()
+        folder = os.open(self.file.parent, os.O_RDONLY)
+        os.fsync(folder)
+        os.close(folder)

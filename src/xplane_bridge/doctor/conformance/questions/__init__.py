@@ -1,0 +1,22 @@
+"""The questions, by subject, in the order of the card."""
+
+from __future__ import annotations
+
+from typing import Tuple
+
+from ..question import Question
+from . import airflow, attitude, controls, pausing, placing, rows, systems, views, wire
+
+#: What needs no flight first; what may leave traces (failures, other views, new flights) last.
+CARD: Tuple[Question, ...] = (
+    *wire.QUESTIONS,
+    *systems.QUESTIONS_ON_GROUND,
+    *placing.QUESTIONS,
+    *attitude.QUESTIONS,
+    *rows.QUESTIONS,
+    *airflow.QUESTIONS,
+    *pausing.QUESTIONS,
+    *systems.QUESTIONS,
+    *views.QUESTIONS,
+    *controls.QUESTIONS,
+)

@@ -1,0 +1,296 @@
+"""The test card against the emulator: each question alone, with its switch and without; the journal; refusals."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from support.fake_xplane import FakeXPlane
+from xplane_bridge import protocol, xplane_names
+from xplane_bridge.cli import xplane_doctor
+from xplane_bridge.doctor.conformance import names, results
+from xplane_bridge.doctor.conformance.journal import Journal
+from xplane_bridge.doctor.conformance.questions import CARD
+from xplane_bridge.doctor.conformance.verdict import Verdict
+from xplane_bridge.emulator.datarefs import otherwise
+from xplane_bridge.harness.xplane_client import XPlaneClient
+from xplane_bridge.resources import program
+
+ROOT = Path(__file__).resolve().parents[3]
+IDS = [question.id for question in CARD]
+#: Needs a window: in tests/nodes.
+WITH_WINDOW = {"window-changes"}
+#: What a question needs of the emulator beside its switch.
+OPTIONS = {"parked-height": ["--start", "ground"], "row1-clock": ["--sim-time-start", "100"]}
+#: So many emulators fly side by side.
+SIDE_BY_SIDE = 6
+
+
+def emulator_options(id_, switched, version):
+    words = ["--version", version, "--port", "0", "--bind", "127.0.0.1", "--no-beacon", "--priority", "normal"]
+    return [*words, *OPTIONS.get(id_, []), *(["--otherwise", id_] if switched else [])]
+
+
+@contextlib.contextmanager
+def emulator(*options):
+    """An emulator in real time; gives its port."""
+    command = [sys.executable, program("xplane_emulator"), *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        try:
+            ready = process.stdout.readline()
+            assert ready.startswith("READY"), ready
+            yield json.loads(ready.split(" ", 1)[1])["port"]
+        finally:
+            process.terminate()
+
+
+def doctor(port, home, *words):
+    """The doctor as users run it: exit code, stdout, stderr."""
+    command = [sys.executable, program("xplane_doctor"), "--host", "127.0.0.1", "--port", str(port), "--conformance"]
+    done = subprocess.run(
+        [*command, *words],
+        env={**os.environ, "ROS_HOME": str(home)},
+        capture_output=True,
+        text=True,
+        check=False,
+        stdin=subprocess.DEVNULL,
+        timeout=120.0,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+# --------------------------------------------------------------------------------------------------- lists in step
+
+
+def marks():
+    """Ids behind the mark of an open question, with the files that have them."""
+    command = ["git", "-c", f"safe.directory={ROOT}", "-C", str(ROOT), "ls-files", "-z"]
+    listing = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+    found = {}
+    for name in filter(None, listing.split("\0")):
+        path = ROOT / name
+        if path.suffix in {".py", ".cpp", ".hpp", ".md", ".txt", ".yaml", ".msg", ".srv"} and path.is_file():
+            for mark in re.findall(r"\[\?([^\]\n]*)\]", path.read_text(encoding="utf-8")):
+                found.setdefault(mark.strip(), set()).add(name)
+    return found
+
+
+def test_each_open_question_in_the_sources_is_on_the_card_and_the_other_way_round():
+    found = marks()
+    found.pop("id", None)  # where the mark itself is explained
+    unnamed = {mark: files for mark, files in found.items() if not re.fullmatch(r"[a-z0-9-]+", mark)}
+    # Of regular expressions: [?...] in a pattern.
+    assert {mark: files for mark, files in unnamed.items() if mark == ""} == {}
+    named = {mark for mark in found if re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", mark)}
+    assert named == set(IDS)
+
+
+def test_each_question_has_a_switch_of_the_emulator_and_a_line_in_the_documentation():
+    assert sorted(IDS) == sorted(otherwise.IDS)
+    text = (ROOT / "docs/doctor.md").read_text(encoding="utf-8").split("\n## The card\n", 1)[1]
+    assert re.findall(r"^\| `([a-z0-9-]+)` \|", text, re.MULTILINE)[1:] == IDS
+
+
+@pytest.mark.parametrize("version", xplane_names.VERSIONS)
+def test_names_of_the_card_are_x_planes(version):
+    facts = xplane_names.datarefs(version)
+
+    def fact(path):
+        return facts.get(path) or facts.get(re.sub(r"\[\d+\]$", "", path))
+
+    assert [path for path in names.READ if not fact(path)] == []
+    assert [path for path in names.WRITTEN if not (fact(path) and fact(path).writable)] == []
+    assert [path for path in names.COMMANDS if path not in xplane_names.commands(version)] == []
+    regions = version in ("12.08", "12.10")
+    wind = (
+        (*names.REGION_SPEED, *names.REGION_FROM, *names.REGION_MODE, *names.REGION_WIND_NOW)
+        if regions
+        else (*names.OLD_WIND_SPEED, *names.OLD_WIND_FROM, *names.OLD_WIND_NOW)
+    )
+    assert [path for path in wind if not fact(path)] == []
+    assert bool(fact(names.AILERON_HARD_OVER)) == version.startswith("12")
+
+
+# --------------------------------------------------------------------------------------------------- each question
+
+
+def asked_alone(id_, switched, version, home):
+    with emulator(*emulator_options(id_, switched, version)) as port:
+        code, out, err = doctor(port, home, "--yes", "--only", id_)
+        written = results.file_of(home / "xplane_bridge", "127.0.0.1", port)
+        said = json.loads(written.read_text(encoding="utf-8")) if written.is_file() else None
+        left = Journal(home / "xplane_bridge", "127.0.0.1", port).orphans()
+        return code, out, err, said, left
+
+
+CASES = [
+    (id_, switched, version)
+    for id_ in IDS
+    if id_ not in WITH_WINDOW
+    for switched in (False, True)
+    for version in (("11", "12") if id_ in ("row16", "wind-names") else ("12",))
+]
+
+
+@pytest.fixture(name="asked", scope="module")
+def fixture_asked(request, tmp_path_factory):
+    """All cases that are run, side by side: each waits for an aircraft to fly most of the time."""
+    specs = [getattr(item, "callspec", None) for item in request.session.items]
+    cases = [spec.params["case"] for spec in specs if spec is not None and "case" in spec.params]
+    with ThreadPoolExecutor(SIDE_BY_SIDE) as pool:
+        yield {
+            case: pool.submit(asked_alone, *case, tmp_path_factory.mktemp("home")) for case in cases if case in CASES
+        }
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{'on' if case[1] else 'off'}-{case[2]}")
+def test_a_question_alone_finds_its_switch(asked, case):
+    id_, switched, version = case
+    code, out, err, said, left = asked[case].result()
+    verdict = Verdict.REFUTED if switched else Verdict.CONFIRMED
+    assert code == 0, err
+    assert re.fullmatch(rf"{id_}: {verdict.value} \(.*\d.*\)\n", out), out
+    assert said["questions"].keys() == {id_}
+    assert said["questions"][id_]["verdict"] == verdict.value
+    assert xplane_names.version_of(said["xplane_version"]) == xplane_names.NEWEST[version]
+    assert left == []
+
+
+def test_version_11_cannot_show_what_only_12_has(tmp_path):
+    with emulator("--version", "11", "--port", "0", "--bind", "127.0.0.1", "--no-beacon") as port:
+        code, out, _ = doctor(port, tmp_path, "--yes", "--only", "vehs,fcon-acts")
+    assert code == 0
+    assert [line.split(" (")[0] for line in out.splitlines()] == ["vehs: not testable", "fcon-acts: not testable"]
+
+
+# ------------------------------------------------------------------------------------------------ what is refused
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--only", "no-such"], "there is no question no-such; there are: unknown-omitted"),
+        ([], "not flown"),
+        (["--yes"], "nothing answers on 127.0.0.1:"),
+    ],
+)
+def test_what_cannot_run_says_why(tmp_path, words, says):
+    with FakeXPlane({}) as silent:
+        code, out, err = doctor(silent.port, tmp_path, *words)
+    assert (code, out) == (2, "")
+    assert says in err
+
+
+def test_only_belongs_to_the_card(capsys):
+    with pytest.raises(SystemExit) as ended:
+        xplane_doctor.main(["--only", "prel"])
+    assert ended.value.code == 2
+    assert "--conformance" in capsys.readouterr().err
+
+
+OVERRIDE = names.STICK_OVERRIDES[0]
+
+
+def entry(node, pid, start_ticks):
+    boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    owner = {"node": node, "pid": pid, "start_ticks": start_ticks, "boot_id": boot, "computer": "lab"}
+    undo = [{"op": "dref", "path": OVERRIDE, "value": 0.0}]
+    return {"id": f"override:{OVERRIDE}", "purpose": "override", "owner": owner, "undo": undo}
+
+
+def write_journal(home, port, *entries):
+    file = home / "xplane_bridge" / f"127.0.0.1_{port}.json"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    content = {"format": "xplane_bridge journal", "version": 1, "entries": list(entries)}
+    file.write_text(json.dumps(content), encoding="utf-8")
+    return file
+
+
+def shown(port, path):
+    client = XPlaneClient(port)
+    client.subscribe([path], 50)
+    try:
+        return protocol.decode_rref_response(client.wait())[0][1]
+    finally:
+        client.send(protocol.RrefRequest(0, 0, ""))
+        client.close()
+
+
+def test_it_refuses_while_a_tx_node_holds_the_journal(tmp_path):
+    with emulator(*emulator_options("", False, "11")) as port:
+        ticks = int(Path("/proc/self/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19])
+        file = write_journal(tmp_path, port, entry("/xplane/tx_node", os.getpid(), ticks))
+        code, out, err = doctor(port, tmp_path, "--yes", "--only", "prel")
+        assert (code, out) == (2, "")
+        assert f"/xplane/tx_node (process {os.getpid()}" in err
+        assert len(json.loads(file.read_text(encoding="utf-8"))["entries"]) == 1
+
+
+def test_what_a_dead_node_left_is_undone_first(tmp_path):
+    with emulator(*emulator_options("", False, "11")) as port:
+        client = XPlaneClient(port)
+        client.send(protocol.DrefWrite(OVERRIDE, 1.0))
+        client.close()
+        file = write_journal(tmp_path, port, entry("/xplane/tx_node", 2**22 + 1, 1))
+        assert doctor(port, tmp_path, "--yes", "--only", "same-index")[0] == 0
+        assert not file.exists()
+        assert shown(port, OVERRIDE) == 0.0
+
+
+@pytest.mark.parametrize("how", ["release_overrides", "next start"])
+def test_a_killed_card_is_undone(tmp_path, how):
+    with emulator(*emulator_options("", False, "12")) as port:
+        command = [sys.executable, program("xplane_doctor"), "--host", "127.0.0.1", "--port", str(port)]
+        environment = {**os.environ, "ROS_HOME": str(tmp_path)}
+        words = ["--conformance", "--yes", "--only", "hpath"]
+        with subprocess.Popen([*command, *words], env=environment, stdout=subprocess.DEVNULL) as card:
+            journal = Journal(tmp_path / "xplane_bridge", "127.0.0.1", port)
+            deadline = time.monotonic() + 60.0
+            wind = f"override:{names.REGION_SPEED[0]}"
+            while not (
+                any(each["id"] == wind for each in written(journal)) and shown(port, names.REGION_SPEED[0]) > 10.0
+            ):
+                assert time.monotonic() < deadline
+                time.sleep(0.05)
+            card.send_signal(signal.SIGKILL)
+        assert [shown(port, path) for path in names.STICK_OVERRIDES] == [1.0] * 3
+        if how == "release_overrides":
+            release = [sys.executable, program("release_overrides")]
+            subprocess.run(release, env=environment, check=True, stdout=subprocess.DEVNULL)
+        else:
+            assert doctor(port, tmp_path, "--yes", "--only", "same-index")[0] == 0
+        assert [shown(port, path) for path in names.STICK_OVERRIDES] == [0.0] * 3
+        assert shown(port, names.REGION_SPEED[0]) == 0.0
+        assert not journal.file.exists()
+
+
+def written(journal):
+    return json.loads(journal.file.read_text(encoding="utf-8"))["entries"] if journal.file.exists() else []
+
+
+# --------------------------------------------------------------------------------------------- what is put back
+
+
+def test_the_flight_is_put_back_and_answers_of_this_version_are_kept(tmp_path):
+    with emulator("--alt", "2500", *emulator_options("", False, "12")) as port:
+        before = shown(port, names.LATITUDE)
+        assert doctor(port, tmp_path, "--yes", "--only", "prel")[0] == 0
+        assert doctor(port, tmp_path, "--yes", "--only", "unknown-omitted")[0] == 0
+        assert shown(port, names.LATITUDE) == pytest.approx(before, abs=0.02)
+        assert shown(port, names.ELEVATION) == pytest.approx(2500.0, abs=150.0)
+        assert shown(port, names.PAUSED) == 0.0
+        file = results.file_of(tmp_path / "xplane_bridge", "127.0.0.1", port)
+        assert json.loads(file.read_text(encoding="utf-8"))["questions"].keys() == {"prel", "unknown-omitted"}
+        report = file.with_name(file.stem + "_report.txt").read_text(encoding="utf-8")
+        assert "prel: confirmed" in report
+        assert "X-Plane 122015" in report
