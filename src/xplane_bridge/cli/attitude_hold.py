@@ -9,27 +9,22 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Any, Dict, Mapping, Optional, Sequence
 
+from xplane_bridge.cli.bridge.flown_law import FlownLaw
 from xplane_bridge.cli.entry import guarded, number, ros_arguments, start_node
-from xplane_bridge.cli.loaded_aircraft import AircraftError, LoadedAircraft
-from xplane_bridge.cli.waiting import wait_for_service, wait_for_state
-from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.topics import NAMESPACE
 
 #: Whose gains these are: stem of a file in config/aircraft.
 AIRCRAFT = "fixed_wing"
 _REMEDY = "copy this program and put gains for yours into it, or fly it as it is with --any-aircraft"
+_NEEDED = ("ATTITUDE", "RATES", "POSITION", "VELOCITY", "AIRSPEEDS")  # groups of FlightState that it looks at
 _LONGEST_STEP_S = 0.1  # over a longer gap integrators do not go on
 
 
 def clip(value: float, low: float, high: float) -> float:
     """The value, or the nearer bound."""
     return min(max(value, low), high)
-
-
-class EngageError(XplaneBridgeError):
-    """tx_node refused mode AUTO."""
 
 
 class AttitudeHold:
@@ -55,7 +50,7 @@ class AttitudeHold:
     def fly(self, state: Any) -> Dict[str, float]:
         """Stick and throttle [-1..1; right, nose up, 0..1] for a FlightState."""
         dt = self._step(state)
-        t = self.targets
+        t: Mapping[str, Any] = self.targets
         if t.get("heading") is None:
             wanted_roll = t.get("roll") or 0.0
         else:
@@ -115,64 +110,23 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
+class _Stick:
+    """The law with its pedals: those are held in the middle."""
+
+    def __init__(self, hold: AttitudeHold) -> None:
+        self._hold = hold
+        self.restart = hold.restart
+
+    def fly(self, state: Any) -> Dict[str, float]:
+        return {**self._hold.fly(state), "yaw": 0.0}
+
+
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
     args = parser().parse_args(ros_arguments(argv))
-    rospy = start_node("attitude_hold")
-    from xplane_bridge.msg import ControlCommand, ControlMode, FlightState
-
-    namespace = args.namespace.rstrip("/")
-    topic = namespace + "/"
-    refused: List[str] = []
-
-    def refuse(text: str) -> None:
-        refused.append(text)
-        rospy.signal_shutdown(text)
-
-    LoadedAircraft(namespace, "attitude_hold", [] if args.any_aircraft else [AIRCRAFT], _REMEDY, refuse).check()
-    wait_for_state(namespace, "attitude_hold")
-
+    start_node("attitude_hold")
     hold = AttitudeHold({name: getattr(args, name) for name in ("roll", "heading", "pitch", "altitude", "speed")})
-    publisher = rospy.Publisher(topic + "control/auto", ControlCommand, queue_size=1, tcp_nodelay=True)
-    fields = ControlCommand.ROLL | ControlCommand.PITCH | ControlCommand.YAW | ControlCommand.THROTTLE
-    needed = FlightState.VALID_ATTITUDE | FlightState.VALID_RATES | FlightState.VALID_POSITION
-    needed |= FlightState.VALID_VELOCITY | FlightState.VALID_AIRSPEEDS
-
-    mode, began = ControlMode(), []
-
-    def on_mode(message: Any) -> None:
-        nonlocal mode
-        mode = message
-
-    def on_state(state: Any) -> None:
-        if state.paused or state.valid & needed != needed or refused:
-            return
-        if mode.mode != ControlMode.AUTO:
-            hold.restart()
-        command = ControlCommand(fields=fields, sequence=state.frame_count, **hold.fly(state))
-        command.header.stamp = state.header.stamp
-        publisher.publish(command)
-        if not began:
-            began.append(True)
-            print(f"commanding on {publisher.resolved_name}", flush=True)
-
-    rospy.Subscriber(topic + "control/mode", ControlMode, on_mode, queue_size=1)
-    rospy.Subscriber(topic + "flight_state", FlightState, on_state, queue_size=1, tcp_nodelay=True)
-    if args.engage:
-        _engage(topic + "tx_node/set_mode")
-    rospy.spin()
-    if refused:
-        raise AircraftError(refused[0])
+    aircraft = [] if args.any_aircraft else [AIRCRAFT]
+    FlownLaw(_Stick(hold), "attitude_hold", args.namespace.rstrip("/"), aircraft, _REMEDY, _NEEDED).run(args.engage)
     return 0
-
-
-def _engage(service: str) -> None:
-    import rospy
-
-    from xplane_bridge.srv import SetMode
-
-    wait_for_service(service, "attitude_hold")
-    answer = rospy.ServiceProxy(service, SetMode)(mode=SetMode._request_class.AUTO)
-    if not answer.success:
-        raise EngageError(f"mode AUTO was refused: {answer.result.message}")

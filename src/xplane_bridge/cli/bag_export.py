@@ -1,4 +1,4 @@
-"""bag_export: flights from bags to tables, trajectories and image data sets."""
+"""bag_export: flights from bags to tables, arrays, trajectories and image data sets."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tqdm import tqdm
 from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.export import campaign
 from xplane_bridge.export.dataset import Options
+from xplane_bridge.export.formats import ALIASES, FORMATS, Job
 
 
 def parser() -> argparse.ArgumentParser:
@@ -25,9 +26,10 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("bags", nargs="*", metavar="BAG", help=".bag files, or folders of split bags")
     p.add_argument("-o", "--output", default="export", metavar="DIR", help="where to write (default: %(default)s)")
-    p.add_argument("--format", choices=campaign.FORMATS, default="csv", help="default: %(default)s")
+    names = ", ".join(f"{alias} is {name}" for alias, name in ALIASES.items())
+    p.add_argument("--format", choices=(*FORMATS, *ALIASES), default="csv", help=f"default: %(default)s; {names}")
     p.add_argument("--verify", action="store_true", help="compare DIR with its manifest instead of exporting")
-    table = p.add_argument_group("tables and trajectories")
+    table = p.add_argument_group("tables, arrays and trajectories")
     table.add_argument(
         "--rate", type=positive, metavar="HZ", help="one uniform time base; default: samples as recorded"
     )
@@ -36,7 +38,7 @@ def parser() -> argparse.ArgumentParser:
         nargs="+",
         default=[],
         metavar="TOPIC",
-        help="tables: further topics, newest value in each row",
+        help="csv, parquet: further topics, newest value in each row; npz, mat, mcap, ros2: these topics only, not all",
     )
     data = p.add_argument_group("image data sets")
     data.add_argument("--split-by", choices=("time", "flight"), default="time", help="default: %(default)s")
@@ -62,6 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the program."""
     p = parser()
     args = p.parse_args(argv)
+    args.format = ALIASES.get(args.format, args.format)
     output = Path(args.output)
     if args.verify:
         problems = campaign.verify(output)
@@ -71,6 +74,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         p.error("no BAG given")
     if args.jobs < 1:
         p.error(f"--jobs {args.jobs}: at least 1 process is needed")
+    for option in ("rate", "topics"):
+        if getattr(args, option) and option not in FORMATS[args.format].options:
+            having = ", ".join(name for name, form in FORMATS.items() if option in form.options)
+            p.error(f"--{option} is not for {args.format}; it is for {having}")
     jobs = _jobs(args, output)
     campaign.make_folder(output)
     run = (
@@ -91,14 +98,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 1 if failed else 0
 
 
-def _jobs(args: argparse.Namespace, output: Path) -> list[campaign.Job]:
+def _jobs(args: argparse.Namespace, output: Path) -> list[Job]:
     dataset = Options(args.keep_bad_frames, args.train_share, args.split_by, args.seed)
     named = campaign.flights(args.bags)
     training = campaign.choose_training(named, dataset)
     return [
-        campaign.Job(
-            name, bags, str(output.resolve()), args.format, args.rate, tuple(args.topics), dataset, name in training
-        )
+        Job(name, bags, str(output.resolve()), args.format, args.rate, tuple(args.topics), dataset, name in training)
         for name, bags in sorted(named.items())
     ]
 

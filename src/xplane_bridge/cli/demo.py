@@ -14,9 +14,10 @@ from xplane_bridge.cli.flight_report import write_report
 from xplane_bridge.cli.scenario_player import scenario_of
 from xplane_bridge.harness import control_check, flight_check
 from xplane_bridge.harness.display import screen
-from xplane_bridge.harness.flight import FlightPlan, RunningFlight, fly
+from xplane_bridge.harness.flight import FlightPlan, fly
 from xplane_bridge.harness.override_watch import OverrideWatch
 from xplane_bridge.harness.processes import interrupted_by_signals
+from xplane_bridge.harness.running_flight import RunningFlight
 from xplane_bridge.harness.scenario_flight import scenario_plan
 from xplane_bridge.resources import program
 

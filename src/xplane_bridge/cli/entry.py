@@ -63,6 +63,14 @@ def number(expected: str, low: float = -math.inf, high: float = math.inf) -> Cal
 positive = number("a number above 0", low=sys.float_info.min)
 
 
+def udp_port(text: str) -> int:
+    """The type of an option that takes a UDP port."""
+    if not text.isdecimal() or not 0 < int(text) < 65536:
+        msg = f"{text!r} is no UDP port; expected 1..65535"
+        raise argparse.ArgumentTypeError(msg)
+    return int(text)
+
+
 class NoRosError(XplaneBridgeError):
     """A program that is a ROS node was started where there is no ROS."""
 

@@ -1,11 +1,14 @@
-"""estimate_latency: the display delay, and how fast surfaces follow commands, measured from a recorded flight."""
+"""estimate_latency: the display delay, and how fast surfaces follow commands, measured from a flight."""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import sys
+import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Iterator, Sequence
+from typing import TYPE_CHECKING, Iterator, List, Sequence, Union
 
 import numpy as np
 
@@ -18,8 +21,11 @@ from xplane_bridge.analysis.latency import (
     value_motion,
 )
 from xplane_bridge.bags import Bags
-from xplane_bridge.cli.entry import guarded, number
+from xplane_bridge.cli.bridge.waiting import Listener, told, wait_for_state, wait_until
+from xplane_bridge.cli.entry import guarded, number, start_node
 from xplane_bridge.constants import CameraView, ImageQuality, words
+from xplane_bridge.harness.processes import ManagedProcess
+from xplane_bridge.topics import NAMESPACE
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Table
@@ -31,7 +37,12 @@ _VIEWS = {name: number for number, name in words(CameraView).items() if number !
 _USELESS = ImageQuality.DISPLAY_UNKNOWN | ImageQuality.FROZEN | ImageQuality.BLACK | ImageQuality.EXTERNAL_VIEW
 #: A command that stays the same for longer rests; until then it may be on its way from one value to the next [s].
 _MOVING_S = 0.06
+#: For which a recording may take longer than it is long: its start, and the writing at its end [s].
+_PATIENCE_S = 30.0
 #: Command and the surface that follows it.
+#: What --live records, below the bridge's namespace.
+_PICTURES = "camera/image_raw/compressed"
+_LIVE_TOPICS = ("flight_state", _PICTURES, "camera/frame_state", "control/applied", "mission/surfaces")
 _RESPONSES = (("roll", "delta_aileron"), ("pitch", "delta_elevator"), ("yaw", "delta_rudder"))
 
 
@@ -40,10 +51,17 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="estimate_latency",
         description="Measures the display delay from the pictures' own rotation against the recorded rates, and the "
-        "delay from commands to surfaces. Record 60 s with roll doublets or multisines (inject_excitation).",
+        "delay from commands to surfaces. It takes 60 s with roll doublets or multisines (inject_excitation).",
         epilog="Put the result into the shared parameter display_delay (config/common.yaml).",
     )
-    p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
+    p.add_argument("bags", nargs="*", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
+    p.add_argument(
+        "--live",
+        type=number("5 to 600 s", 5.0, 600.0),
+        metavar="SECONDS",
+        help="instead of a BAG: record the running bridge for so long, while the aircraft rolls",
+    )
+    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge, for --live (%(default)s)")
     p.add_argument("--view", choices=sorted(_VIEWS), help="where camera/frame_state does not say it")
     p.add_argument(
         "--ignore-bottom",
@@ -70,8 +88,13 @@ def _picture(text: str) -> Path:
 @guarded
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program."""
-    args = parser().parse_args(argv)
-    with Bags(args.bags) as bags:
+    p = parser()
+    args = p.parse_args(argv)
+    if bool(args.bags) == bool(args.live):
+        p.error("give a BAG, or --live SECONDS")
+    with contextlib.ExitStack() as stack:
+        paths = [stack.enter_context(_recorded(args.namespace.rstrip("/"), args.live))] if args.live else args.bags
+        bags = stack.enter_context(Bags(paths))
         display = display_delay(bags, _VIEWS[args.view] if args.view else None, args.ignore_bottom)
         responses = command_responses(bags)
     require_usable(display, "pictures")
@@ -96,6 +119,28 @@ def main(argv: Sequence[str] | None = None) -> int:
         msg = f"{err.filename}: {err.strerror}"
         raise LatencyError(msg) from None
     return 0
+
+
+@contextlib.contextmanager
+def _recorded(namespace: str, seconds: float) -> Iterator[Path]:
+    """A bag of the bridge that runs, recorded now."""
+    start_node("estimate_latency", anonymous=True)
+    from sensor_msgs.msg import CompressedImage
+
+    wait_for_state(namespace, "estimate_latency")
+    pictures = Listener(f"{namespace}/{_PICTURES}", CompressedImage)
+    wait_until(pictures.came.is_set, pictures.why_none, told("estimate_latency"))
+    pictures.close()
+    print(f"estimate_latency: recording {seconds:g} s; let the aircraft roll to and fro", file=sys.stderr, flush=True)
+    with tempfile.TemporaryDirectory(prefix="estimate_latency_") as folder:
+        bag = Path(folder) / "live.bag"
+        topics = [f"{namespace}/{topic}" for topic in _LIVE_TOPICS]
+        command: List[Union[str, Path]] = ["rosbag", "record", "-O", bag, f"--duration={round(seconds)}", *topics]
+        with ManagedProcess("record", command, bag.parent) as run:
+            if run.wait(seconds + _PATIENCE_S) != 0 or not bag.is_file():
+                msg = f"nothing was recorded: {run.output().strip()}"
+                raise LatencyError(msg)
+        yield bag
 
 
 def display_delay(bags: Bags, view: int | None = None, ignore_bottom: float = 0.05) -> Delay:
@@ -165,7 +210,8 @@ def _refreshes(sent: np.ndarray, value: np.ndarray) -> np.ndarray:
     """Which samples only repeat what was sent shortly before [bool]; those of a command that rests are kept."""
     first = np.append(True, np.diff(value) != 0.0)
     since = sent - sent[np.maximum.accumulate(np.where(first, np.arange(len(first)), 0))]
-    return ~first & (since < _MOVING_S)
+    refreshes: np.ndarray = ~first & (since < _MOVING_S)
+    return refreshes
 
 
 def _rates(bags: Bags) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,8 @@ import argparse
 import time
 from typing import Any, Optional, Sequence
 
+from xplane_bridge.cli.bridge.waiting import Listener, Patience, link_text
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
-from xplane_bridge.cli.waiting import Listener, Patience, link_text
 from xplane_bridge.topics import NAMESPACE
 
 _POLL_S = 0.1

@@ -16,11 +16,13 @@ from xplane_bridge.cli.entry import guarded, positive
 from xplane_bridge.cli.scenario_player import scenario_of
 from xplane_bridge.harness.display import screen
 from xplane_bridge.harness.flight import FlightPlan, fly
+from xplane_bridge.harness.lockstep_flight import Lockstep
 from xplane_bridge.harness.processes import interrupted_by_signals
 from xplane_bridge.harness.scenario_flight import scenario_plan
 from xplane_bridge.scenario import Scenario, ScenarioError
 from xplane_bridge.scenario.judging import judge
 
+_FPS = 60.0
 _LONGEST_S = 600.0  # a scenario that has not ended by then waits for something that never comes
 
 
@@ -39,7 +41,11 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--aircraft", metavar="NAME", help="aircraft to fly (default: the scenario's first)")
     p.add_argument("--transport", choices=("rref", "data"), default="rref", help="how to ask X-Plane (%(default)s)")
     p.add_argument("--joystick", metavar="NAME", help="fly through joystick_mapper_node as this device")
-    p.add_argument("--controller", metavar="COMMAND", help="program that flies in mode auto, started beside the bridge")
+    p.add_argument(
+        "--controller",
+        metavar="COMMAND",
+        help="program that flies in mode auto, started beside the bridge (default: the scenario's own)",
+    )
     p.add_argument("--camera", action="store_true", help="draw and record the cockpit view")
     p.add_argument("--headless", action="store_true", help="draw it, but not on this screen")
     p.add_argument("--duration", type=positive, metavar="S", help="end after so long; needed where a scenario repeats")
@@ -49,6 +55,18 @@ def parser() -> argparse.ArgumentParser:
         metavar="OPTIONS",
         help='further options of xplane_emulator, e.g. --emulator="--pipeline-delay 50ms --fps 30"',
     )
+    p.add_argument(
+        "--lockstep",
+        action="store_true",
+        help="the emulator waits for all answers to each frame: the same flight every time, as fast as that goes; all "
+        "times are simulated (docs/lockstep.md)",
+    )
+    p.add_argument("--speed", type=positive, metavar="X", help="of --lockstep: at most so many times real time")
+    p.add_argument(
+        "--controller-node",
+        metavar="NAME",
+        help="of --lockstep: name of --controller's node, which answers every frame (default: as its program)",
+    )
     p.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulator's turbulence and faults")
     return p
 
@@ -57,7 +75,8 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
     """What to start for a scenario."""
     if scenario.repeat_every is not None and args.duration is None:
         raise ScenarioError(f"{scenario.name} repeats for ever (repeat_every): give --duration")
-    options = ["--fps", "60", "--seed", str(args.seed), *(["--window"] if args.camera else [])]
+    lockstep = lockstep_of(args)
+    options = ["--fps", f"{_FPS:g}", "--seed", str(args.seed), *(["--window"] if args.camera else [])]
     return scenario_plan(
         scenario,
         args.scenario,
@@ -69,7 +88,29 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
         emulator_options=[*options, *shlex.split(args.emulator)],
         launch_args={} if args.camera else {"capture": False},
         transport=args.transport,
+        lockstep=lockstep,
     )
+
+
+def lockstep_of(args: argparse.Namespace) -> Optional[Lockstep]:
+    """How to fly in lock-step; None: in real time.
+
+    Raises:
+        ScenarioError: That cannot be.
+    """
+    if not args.lockstep:
+        for option in ("speed", "controller_node"):
+            if getattr(args, option) is not None:
+                raise ScenarioError(f"--{option.replace('_', '-')} {getattr(args, option)}: needs --lockstep")
+        return None
+    if args.camera or args.transport != "rref":
+        raise ScenarioError("--lockstep flies without --camera and with --transport rref")
+    words = shlex.split(args.emulator)
+    fps = [words[i + 1] for i, word in enumerate(words[:-1]) if word == "--fps"]
+    lockstep = Lockstep(speed=args.speed or 0.0, fps=float(fps[-1]) if fps else _FPS)
+    if args.controller:
+        lockstep.participants.append(args.controller_node or Path(shlex.split(args.controller)[0]).name)
+    return lockstep
 
 
 def render(scores: Sequence[Score]) -> str:

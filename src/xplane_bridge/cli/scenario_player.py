@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Optional, Sequence
+from typing import Any, Dict, Optional, Sequence
 
+from xplane_bridge import lockstep
+from xplane_bridge.cli.bridge.loaded_aircraft import LoadedAircraft
+from xplane_bridge.cli.bridge.waiting import wait_for_state
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
-from xplane_bridge.cli.loaded_aircraft import LoadedAircraft
-from xplane_bridge.cli.waiting import wait_for_state
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
+from xplane_bridge.scenario.lockstep_player import LockstepPlayer
 from xplane_bridge.scenario.ros_player import RosPlayer
 from xplane_bridge.scenario.virtual_stick import load_stick
 from xplane_bridge.topics import NAMESPACE
@@ -55,10 +57,15 @@ def play(
         stick = load_stick(file, args.stick_mode)
     start_node(node, argv=None if argv is None else list(argv))
     namespace = args.namespace.rstrip("/")
-    player = RosPlayer(scenario, namespace, stick, log, say=lambda text: print(text, flush=True))
     remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"
-    LoadedAircraft(namespace, node, scenario.aircraft, remedy, player.fail).check()
-    wait_for_state(namespace, node)
+    aircraft = LoadedAircraft(namespace, node, scenario.aircraft, remedy, lambda text: player.fail(text))
+    kwargs: Dict[str, Any] = {"stick": stick, "log": log, "say": lambda text: print(text, flush=True)}
+    if lockstep.is_on(namespace):
+        player: RosPlayer = LockstepPlayer(scenario, namespace, check=aircraft.check, **kwargs)
+    else:
+        player = RosPlayer(scenario, namespace, **kwargs)
+        aircraft.check()
+        wait_for_state(namespace, node)
     player.run()
     return 0
 

@@ -40,8 +40,12 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         if options.stepped == "lines":
             raise KeyboardInterrupt  # reading a line is not interrupted otherwise
 
+    def tell(_signal: int, _frame: object) -> None:
+        emulator.wants_status = True
+
     failed = 0
     try:
+        signal.signal(signal.SIGUSR1, tell)
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, stop)
         print("READY " + json.dumps(emulator.describe()), flush=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import subprocess
 import sys
 from pathlib import Path
@@ -13,77 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from support.export_flight import RATE, export, files_of, picture, pictures_in, write_flight
 from support.synthetic_flight import START, FlightBag, stamp_ns, state_at
-from xplane_bridge.cli import bag_export
-
-RATE = 50.0
-FROZEN, INTERPOLATED = 32, 2
-
-
-def picture(k: int) -> np.ndarray:
-    image = np.zeros((24, 32, 3), np.uint8)
-    image[:, :, 0] = 10 * k % 256
-    image[:12, :, 2] = 200
-    return image
-
-
-def write_flight(path: Path, seconds: float = 4.0, offset: float = 0.0, raw_images: bool = False) -> Path:
-    """States at 50 Hz with a gap of 1 s after 2 s, odometry, an image every 0.2 s, mode and failure labels."""
-    with FlightBag(path) as bag:
-        for k in range(round(seconds * RATE)):
-            t = k / RATE + offset + (1.0 if k >= 2 * RATE else 0.0)
-            state = bag.state(t, k)
-            ns = stamp_ns(t)
-            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, state)
-            pose = {"position": {"x": t, "y": 2 * t, "z": 3 * t}, "orientation": {"z": math.sin(t), "w": math.cos(t)}}
-            bag.add(
-                "/xplane/odom",
-                "nav_msgs/Odometry",
-                ns,
-                {"header": bag.header(ns, "map"), "pose": {"pose": pose}},
-            )
-            if k % 10 == 0:
-                number = k // 10
-                header = bag.header(ns, "camera_forward_optical", number)
-                quality = FROZEN if number == 3 else INTERPOLATED if number == 4 else 0
-                frame = {"header": header, "quality": quality, "state": state, "image_count": number}
-                if number != 5:  # image 5 has no frame state
-                    bag.add("/xplane/camera/frame_state", "xplane_bridge/FrameState", ns, frame)
-                if raw_images:
-                    pixels = picture(number)[:, :, ::-1]
-                    values = {"height": 24, "width": 32, "encoding": "rgb8", "step": 96, "data": pixels.reshape(-1)}
-                    bag.add("/xplane/camera/image_raw", "sensor_msgs/Image", ns, {"header": header, **values})
-                else:
-                    data = cv2.imencode(".jpg", picture(number))[1]
-                    values = {"format": "bgr8; jpeg compressed bgr8", "data": data.reshape(-1)}
-                    topic = "/xplane/camera/image_raw/compressed"
-                    bag.add(topic, "sensor_msgs/CompressedImage", ns, {"header": header, **values})
-        for t, mode, failsafe in ((0.5, 1, False), (1.5, 2, False), (3.5, 2, True)):
-            ns = stamp_ns(t + offset)
-            values = {"header": bag.header(ns, ""), "mode": mode, "requested_by": "test", "reason": "r" * mode}
-            values["failsafe"] = failsafe
-            bag.add("/xplane/control/mode", "xplane_bridge/ControlMode", ns, values)
-        ns = stamp_ns(1.0 + offset)
-        failure = {
-            "header": bag.header(ns, ""),
-            "names": ["aileron1_left", "engine_1", "pitot_1"],
-            "kinds": ["stuck", "failed", "failed"],
-            "values": [5.0, math.nan, math.nan],
-            "set_by": ["bridge"] * 3,
-            "active": [True, True, False],
-            "confirmed": [True] * 3,
-            "since_sim_time": [1.0, 1.0, math.nan],
-        }
-        bag.add("/xplane/failures/state", "xplane_bridge/FailureState", ns, failure)
-    return path
-
-
-def export(*arguments: object) -> int:
-    return bag_export.main([str(a) for a in arguments])
-
-
-def files_of(folder: Path) -> dict:
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
@@ -163,17 +93,17 @@ def test_data_sets_hold_good_frames_with_their_own_state(tmp_path: Path, raw_ima
     assert labels["split"].tolist() == ["train" if t < 4.8 * 0.8 else "validation" for t in times]
     assert labels["mode"].tolist()[-1] == 2
     assert labels["failsafe"].dropna().tolist() == [1 if t >= 3.5 else 0 for t in times if t >= 0.5]
-    assert len(list((out / "flight" / "images").iterdir())) == 18
+    assert len(pictures_in(out / "flight")) == 18
     for k, file in zip(kept, labels["file"]):
         image = cv2.imread(str(out / "flight" / file))
         error = np.abs(image.astype(int) - picture(k).astype(int)).mean()
         assert error == 0 if raw_images else error < 3
-    record = json.loads((out / "manifest.json").read_text())["exports"]["images"]["flight"]
+    record = json.loads((out / "manifest.json").read_text())["exports"]["imagefolder"]["flight"]
     assert record["counts"]["left_out"] == {"QUALITY_FROZEN": 1, "no frame_state of the same stamp": 1}
     assert (record["counts"]["images"], record["counts"]["exported"]) == (20, 18)
 
     assert export(bag, "--format", "images", "-o", tmp_path / "all", "--keep-bad-frames") == 0
-    assert len(list((tmp_path / "all" / "flight" / "images").iterdir())) == 19
+    assert len(pictures_in(tmp_path / "all" / "flight")) == 19
 
 
 def test_split_by_flight_keeps_flights_whole_and_is_seeded(tmp_path: Path) -> None:
@@ -206,15 +136,15 @@ def test_an_interrupted_export_goes_on_and_verify_finds_what_changed(
     assert (out / "f1" / "labels.csv").stat().st_mtime_ns == made, "a finished flight was made again"
     assert "(made earlier)" in capsys.readouterr().out
     assert export("--verify", "-o", out) == 0
-    (out / "f1" / "images" / "000001.jpg").write_bytes(b"x")
-    (out / "f2" / "images" / "000000.jpg").unlink()
+    (out / "f1" / "images" / "train" / "000001.jpg").write_bytes(b"x")
+    (out / "f2" / "images" / "train" / "000000.jpg").unlink()
     (out / "f2" / "stray").write_text("")
     capsys.readouterr()
     assert export("--verify", "-o", out) == 1
     lines = capsys.readouterr().out.split("\n")
     assert lines[:3] == [
-        "changed: f1/images/000001.jpg",
-        "missing: f2/images/000000.jpg",
+        "changed: f1/images/train/000001.jpg",
+        "missing: f2/images/train/000000.jpg",
         "not in the manifest: f2/stray",
     ]
 
@@ -234,7 +164,7 @@ def test_formats_share_a_folder_and_one_manifest(tmp_path: Path, capsys: pytest.
     assert {form: sorted(flights) for form, flights in exports.items()} == {
         "csv": ["f1", "f2"],
         "euroc": ["f1"],
-        "images": ["f1"],
+        "imagefolder": ["f1"],
     }
     assert [exports["csv"][name]["parameters"]["rate"] for name in ("f1", "f2")] == [None, 10.0]
     assert export("--verify", "-o", out) == 0

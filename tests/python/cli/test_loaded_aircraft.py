@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from xplane_bridge.cli.loaded_aircraft import AircraftError, identities_of, refusal
+from xplane_bridge.cli.bridge.loaded_aircraft import AircraftError, identities_of, refusal
 
 TWIN, QUAD = {"fixed_wing": ["DA62", "BE58"]}, {"multirotor": ["QUAD"]}
 
@@ -16,6 +16,8 @@ TWIN, QUAD = {"fixed_wing": ["DA62", "BE58"]}, {"multirotor": ["QUAD"]}
         ({**TWIN, **QUAD}, "QUAD", ""),
         ({"anything": []}, "B738", ""),
         ({}, "B738", ""),
+        ({"toy": ["a toy"]}, "", ""),  # by its description, as it has no code
+        ({"nothing": [""]}, "", "but the aircraft loaded is one without"),
         (TWIN, "QUAD", "this is for fixed_wing (DA62, BE58), but the aircraft loaded is QUAD (a toy)"),
         ({**TWIN, **QUAD}, "B738", "fixed_wing (DA62, BE58) or multirotor (QUAD), but the aircraft loaded is B738"),
         (TWIN, "", "but the aircraft loaded is one without ICAO code (a toy)"),
@@ -35,5 +37,5 @@ def test_codes_come_from_the_bridge_before_the_packages_files() -> None:
 
 
 def test_an_aircraft_nobody_knows_is_said_with_those_there_are() -> None:
-    with pytest.raises(AircraftError, match=r"which aircraft is zeppelin\?.*fixed_wing.yaml, multirotor.yaml"):
+    with pytest.raises(AircraftError, match=r"which aircraft is zeppelin\?.*fixed_wing.yaml, .*multirotor.yaml"):
         identities_of(["zeppelin"], {"fixed_wing": []})

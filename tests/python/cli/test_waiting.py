@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from xplane_bridge.cli import waiting
-from xplane_bridge.cli.waiting import Patience, Surroundings, about_service, about_topic
+from xplane_bridge.cli.bridge import waiting
+from xplane_bridge.cli.bridge.waiting import Patience, Surroundings, about_service, about_topic
 
 STATE = "xplane_bridge/FlightState"
 THERE = Surroundings(

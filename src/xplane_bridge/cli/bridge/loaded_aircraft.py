@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
 
 import yaml
 
-from xplane_bridge.cli.waiting import Listener, link_text, told, wait_until
+from xplane_bridge.cli.bridge.waiting import Listener, link_text, told, wait_until
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.resources import ResourceError, config_file
 
@@ -16,14 +16,14 @@ class AircraftError(XplaneBridgeError):
 
 
 def identities_of(names: Sequence[str], bridge_has: Mapping[str, Sequence[str]]) -> Dict[str, List[str]]:
-    """ICAO codes of aircraft: what the bridge was started with, else what config/aircraft/<name>.yaml lists.
+    """Identities of aircraft: what the bridge was started with, else what config/aircraft/<name>.yaml lists.
 
     Args:
         names: Stems of files in config/aircraft.
         bridge_has: Name to codes of the aircraft that tx_node knows.
 
     Returns:
-        Name to codes; no codes stand for any aircraft.
+        Name to ICAO codes, or descriptions of what has no code; none of them stand for any aircraft.
 
     Raises:
         AircraftError: The bridge was started with another one, and there is no such file.
@@ -44,7 +44,8 @@ def identities_of(names: Sequence[str], bridge_has: Mapping[str, Sequence[str]])
 
 def refusal(identities: Mapping[str, Sequence[str]], icao: str, description: str) -> str:
     """Why the loaded aircraft is none of those wanted; empty when it is one, or when any will do."""
-    if not identities or any(not codes or icao in codes for codes in identities.values()):
+    shown = {icao, description} - {""}
+    if not identities or any(not codes or shown & set(codes) for codes in identities.values()):
         return ""
     wanted = " or ".join(f"{name} ({', '.join(codes)})" for name, codes in identities.items())
     loaded = f"{icao or 'one without ICAO code'} ({description})"

@@ -1,0 +1,1 @@
+"""Programs about one kind of aircraft: its file, and controllers that fly it."""

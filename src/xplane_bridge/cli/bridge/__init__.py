@@ -1,0 +1,1 @@
+"""What the programs share that work with a running bridge."""

@@ -1,0 +1,74 @@
+"""identify_model: linear models from the manoeuvres of a recorded flight."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Sequence
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.cli.entry import guarded, number
+from xplane_bridge.cli.linearise_model import add_output_arguments, write_outputs
+from xplane_bridge.identification.coefficients import geometry_of, read_geometry
+from xplane_bridge.identification.model import AXES, IdentificationError
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    p = argparse.ArgumentParser(
+        prog="identify_model",
+        description="Identifies linear models from the excitations (inject_excitation) of a recorded flight.",
+    )
+    p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
+    p.add_argument("--axis", choices=sorted(AXES), help="only this one; default: all that were excited")
+    p.add_argument(
+        "--aircraft", default="fixed_wing", metavar="NAME", help="whose sizes are taken; default: %(default)s"
+    )
+    p.add_argument(
+        "--tail", type=number("a time from 0 to 60 s", 0.0, 60.0), default=2.0, metavar="S",
+        help="how long the motion is followed after each excitation; default: %(default)s",
+    )  # fmt: skip
+    p.add_argument(
+        "--validate", type=int, metavar="ID", help="number of the excitation (excitation/state) kept for validation"
+    )
+    p.add_argument("--report", metavar="FILE", help="also write a page (HTML, needs no network)")
+    p.add_argument("--accept", action="store_true", help="write the model in spite of what speaks against it")
+    add_output_arguments(p)
+    return p
+
+
+@guarded
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    args = parser().parse_args(argv)
+    from xplane_bridge.bags.flight import read_flight
+    from xplane_bridge.identification.identify import identify
+    from xplane_bridge.plotting import identification_page
+
+    geometry = read_geometry(Path(args.geometry)) if args.geometry else geometry_of(args.aircraft)
+    with Bags(args.bags) as bags:
+        flight = read_flight(bags)
+    found = identify(flight, args.axis, geometry, args.aircraft, args.tail, args.validate)
+    for text in found.notes + [text for axis in found.model.axes.values() for text in axis.warnings]:
+        print(f"warning: {text}", file=sys.stderr)
+    if args.report:
+        _write_page(identification_page.build(found, flight), Path(args.report))
+    if found.refusals and not args.accept:
+        there = f" ({args.report} shows what was found)" if args.report else ""
+        msg = f"no model written: {'; '.join(found.refusals)}; --accept writes it all the same{there}"
+        raise IdentificationError(msg)
+    for text in found.refusals:
+        print(f"warning: accepted: {text}", file=sys.stderr)
+    write_outputs(found.model, args.output)
+    return 0
+
+
+def _write_page(page: str, path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        msg = f"{path}: {error.strerror or error}"
+        raise IdentificationError(msg) from None
+    print(path)

@@ -1,0 +1,128 @@
+"""run_campaign: flies a scenario hundreds of times in process, with parameters drawn anew for each flight."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any, Iterator, Optional, Sequence
+
+import pandas as pd
+from tqdm import tqdm
+
+from xplane_bridge.analysis.intervals import wilson
+from xplane_bridge.campaign import cluster, report
+from xplane_bridge.campaign.definition import Campaign, load_campaign
+from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.campaign.flight import Flight
+from xplane_bridge.campaign.runner import TABLE, CampaignFolder, in_process
+from xplane_bridge.cli.entry import guarded
+
+PAGE = "report.html"
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(
+        prog="run_campaign",
+        description=(
+            "Flies a campaign (docs/campaigns.md) into DIR: table.parquet has a row for each flight, report.html shows "
+            "them. What was interrupted, by whatever, goes on where it stopped when it is started again."
+        ),
+    )
+    p.add_argument("campaign", metavar="CAMPAIGN", nargs="?", type=Path, help="file; not needed with --refly")
+    p.add_argument("-o", "--output", required=True, type=Path, metavar="DIR", help="folder of the campaign's results")
+    p.add_argument("--flights", type=int, metavar="N", help="fly so many instead of the file's number")
+    p.add_argument("--workers", type=int, metavar="N", help="processes (default: one a processor); 0: fly in this one")
+    p.add_argument("--scheduler", metavar="ADDRESS", help="fly on a Dask cluster, e.g. tcp://10.0.0.1:8786")
+    p.add_argument(
+        "--refly", type=int, metavar="I", help="fly flight I of DIR again, and compare; writes DIR/refly_I.csv"
+    )
+    return p
+
+
+@contextmanager
+def executor_of(args: argparse.Namespace) -> Iterator[Any]:
+    """Who flies."""
+    # One thread for numpy's linear algebra, in the workers too: flights are the parallel part.
+    for library in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    missing = "dask.distributed is not installed (pip install 'dask[distributed]')"
+    if args.scheduler:
+        if not cluster.available():
+            raise CampaignError(f"--scheduler: {missing}")
+        context: Any = cluster.running_cluster(args.scheduler)
+    else:
+        workers = (os.cpu_count() or 1) if args.workers is None else args.workers
+        if workers < 0:
+            raise CampaignError(f"--workers: {workers}; expected 0 or more")
+        if workers > 0 and not cluster.available():
+            print(f"run_campaign: {missing}: flying in one process", file=sys.stderr)
+            workers = 0
+        context = cluster.local_cluster(workers) if workers else nullcontext(in_process)
+    with context as executor:
+        yield executor
+
+
+def render(campaign: Campaign, table: pd.DataFrame) -> str:
+    """The result in a few lines."""
+    lines = []
+    for name, column in (("all", "passed"), *((name, f"met_{name}") for name in campaign.criteria)):
+        passed = int(table[column].sum())
+        low, high = wilson(passed, len(table))
+        share = passed / len(table)
+        lines.append(f"{name:16} {passed:6} of {len(table)}  {share:7.1%}  (95 %: {low:.1%} .. {high:.1%})")
+    outcomes = ", ".join(f"{count} {name}" for name, count in table["outcome"].value_counts().items())
+    return "\n".join([*lines, f"outcomes: {outcomes}"])
+
+
+def refly(folder: CampaignFolder, flight: int) -> int:
+    """Flies one flight again; exit code 0: it was the same, to the last bit."""
+    campaign, table = folder.load(), folder.table()
+    rows = table[table["flight"] == flight]
+    if not len(rows):
+        raise CampaignError(f"--refly {flight}: {folder.folder} has no such flight; it has {len(table)} of them")
+    result = Flight(campaign.plan(flight)).fly(trace=True)
+    if result.trace is not None:
+        path = folder.folder / f"refly_{flight}.csv"
+        pd.DataFrame(result.trace).to_csv(path, index=False, float_format="%.9g")
+        print(f"flight {flight}: {path}")
+    row = rows.iloc[0]
+    print(f"outcome {result.outcome} {result.reason}; sha256 {result.sha256 or '(none: it did not begin)'}")
+    if (row["outcome"], row["sha256"]) != (result.outcome, result.sha256):
+        print(f"not the same flight: the table has outcome {row['outcome']}, sha256 {row['sha256']}, flown on "
+              f"{row['host_cpu']}")  # fmt: skip
+        return 1
+    print("the same flight as in the table, to the last bit")
+    return 0
+
+
+@guarded
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Runs the program."""
+    args = parser().parse_args(argv)
+    folder = CampaignFolder(args.output)
+    if args.refly is not None:
+        return refly(folder, args.refly)
+    if args.campaign is None:
+        raise CampaignError("CAMPAIGN is missing: expected a file, e.g. config/campaigns/stuck_aileron.yaml")
+    campaign = load_campaign(args.campaign, args.flights)
+    with executor_of(args) as executor, tqdm(total=campaign.flights, unit="flight", disable=None) as bar:
+        table = folder.fly(campaign, executor, bar.update)
+    print(render(campaign, table))
+    write_page(folder, campaign, table)
+    print(f"{campaign.name}: {len(table)} flights in {args.output / TABLE}, drawn in {args.output / PAGE}")
+    return 0
+
+
+def write_page(folder: CampaignFolder, campaign: Campaign, table: pd.DataFrame) -> None:
+    """Draws the campaign; the worst flights are flown again for their traces."""
+    design, traces = campaign.design, {}
+    for flight in report.flights_to_draw(campaign, table):
+        trace = Flight(campaign.plan(flight, design)).fly(trace=True).trace
+        if trace is not None:
+            traces[flight] = trace
+    refly = f"scripts/run_campaign -o {folder.folder} --refly"
+    (folder.folder / PAGE).write_text(report.page(campaign, table, traces, refly), encoding="utf-8")

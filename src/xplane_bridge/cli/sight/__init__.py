@@ -1,0 +1,1 @@
+"""Programs about what X-Plane shows."""

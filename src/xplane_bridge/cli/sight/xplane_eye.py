@@ -1,0 +1,115 @@
+"""The command line of the sender of pictures; docs/windows.md describes it."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Callable, Optional, Sequence, Tuple
+
+from xplane_bridge.cli.entry import guarded, number
+from xplane_bridge.eye.calibrate import default_undo_file
+from xplane_bridge.eye.grab import TITLES
+from xplane_bridge.eye.program import Eye, EyeOptions
+from xplane_bridge.eye.rref import THIS_COMPUTER
+
+_LOCAL_PORT = 49711
+
+
+@guarded
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Sends pictures until Ctrl-C."""
+    given = _parser().parse_args(argv)
+    token = given.token_file.read_text(encoding="utf-8").strip() if given.token_file else ""
+    options = EyeOptions(
+        receiver=given.receiver,
+        xplane=given.xplane,
+        titles=tuple(given.title) if given.title else TITLES,
+        window=given.window,
+        token=token,
+        quality=given.quality,
+        delay_s=given.delay,
+        calibrate=given.calibrate,
+        local_port=given.local_port,
+        undo_file=given.undo_file,
+    )
+    Eye(options, _say).run()
+    return 0
+
+
+def _say(text: str) -> None:
+    print(f"{time.strftime('%H:%M:%S')} {text}", flush=True)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="xplane_eye",
+        description="Sends the pictures of X-Plane's window, each with the frame it shows, to capture_node (source: "
+        "sender) on another computer. Runs beside X-Plane; needs no ROS. At its start it measures the delay from a "
+        "frame to its picture by steps of X-Plane's field of view, which it gives back; start it before recording.",
+    )
+    parser.add_argument("receiver", type=_address, metavar="HOST:PORT", help="capture_node's sender/listen")
+    parser.add_argument(
+        "--xplane",
+        type=_address,
+        default=THIS_COMPUTER,
+        metavar="HOST:PORT",
+        help="where X-Plane listens (default: 127.0.0.1:49000)",
+    )
+    parser.add_argument(
+        "--title",
+        action="append",
+        metavar="TEXT",
+        help="the window's title, exactly; may be repeated (default: X-System, X-Plane)",
+    )
+    parser.add_argument(
+        "--window",
+        type=_within(0, 255),
+        metavar="N",
+        help="of several windows with that title, counted from 0, leftmost first, then topmost (default: the largest)",
+    )
+    parser.add_argument("--token-file", type=Path, metavar="FILE", help="holds the text of capture_node's sender/token")
+    parser.add_argument("--quality", type=_within(1, 100), default=90, help="of the JPEG, 1..100 (default: 90)")
+    delay = parser.add_mutually_exclusive_group()
+    delay.add_argument(
+        "--delay",
+        type=number("seconds from 0 to 0.5", 0.0, 0.5),
+        metavar="S",
+        help="from a frame to its picture, measured before; X-Plane's field of view is then left alone",
+    )
+    delay.add_argument(
+        "--no-calibrate",
+        dest="calibrate",
+        action="store_false",
+        help="leave the field of view alone; each picture is flagged DELAY_ASSUMED",
+    )
+    parser.add_argument(
+        "--local-port",
+        type=_within(0, 65535),
+        default=_LOCAL_PORT,
+        help="UDP port that X-Plane answers to; 0: any (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--undo-file",
+        type=Path,
+        default=default_undo_file(),
+        metavar="FILE",
+        help="keeps X-Plane's field of view while it is changed (default: %(default)s)",
+    )
+    return parser
+
+
+def _address(text: str) -> Tuple[str, int]:
+    host, colon, port = text.rpartition(":")
+    if not (host and colon and port.isdecimal() and 0 < int(port) < 65536):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, e.g. 192.168.1.10:49790")
+    return host, int(port)
+
+
+def _within(low: int, high: int) -> Callable[[str], int]:
+    def convert(text: str) -> int:
+        if not (text.isdecimal() and low <= int(text) <= high):
+            raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from {low} to {high}")
+        return int(text)
+
+    return convert
