@@ -1,6 +1,8 @@
-// The floor of a stick's way into X-Plane: a node that turns sensor_msgs/Joy into ControlCommand, or one that turns
-// ControlCommand into a datagram, and neither does anything else.
+// The floor of ways into X-Plane: nodes that turn sensor_msgs/Joy, or a datagram by way of FlightState, into
+// ControlCommand, or ControlCommand into a datagram, and do nothing else.
 //
+//   bench_bare_hops reader PORT STATE_TOPIC
+//   bench_bare_hops law STATE_TOPIC COMMAND_TOPIC
 //   bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS
 //   bench_bare_hops sender COMMAND_TOPIC PORT
 
@@ -14,6 +16,7 @@
 #include <sensor_msgs/Joy.h>
 
 #include "xplane_bridge/ControlCommand.h"
+#include "xplane_bridge/FlightState.h"
 
 namespace {
 
@@ -47,6 +50,36 @@ void send(char** words) {
   ros::spin();
 }
 
+void read(char** words) {
+  ros::NodeHandle handle;
+  ros::Publisher publisher = handle.advertise<xplane_bridge::FlightState>(words[1], 1);
+  const int in = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  at.sin_port = htons(static_cast<std::uint16_t>(std::stoul(words[0])));
+  bind(in, reinterpret_cast<const sockaddr*>(&at), sizeof at);
+  float number = 0.0F;
+  while (ros::ok() && recv(in, &number, sizeof number, 0) == sizeof number) {
+    xplane_bridge::FlightState state;
+    state.sim_time = number;
+    publisher.publish(state);
+  }
+}
+
+void command(char** words) {
+  ros::NodeHandle handle;
+  ros::Publisher publisher = handle.advertise<xplane_bridge::ControlCommand>(words[1], 1);
+  const auto on_state = [&](const xplane_bridge::FlightStateConstPtr& state) {
+    xplane_bridge::ControlCommand message;
+    message.roll = state->sim_time;
+    publisher.publish(message);
+  };
+  const ros::Subscriber subscriber =
+      handle.subscribe<xplane_bridge::FlightState>(words[0], 1, on_state, nullptr, kHints);
+  ros::spin();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -56,8 +89,15 @@ int main(int argc, char** argv) {
     map(argv + 2);
   } else if (role == "sender" && argc == 4) {
     send(argv + 2);
+  } else if (role == "reader" && argc == 4) {
+    read(argv + 2);
+  } else if (role == "law" && argc == 4) {
+    command(argv + 2);
   } else {
-    ROS_ERROR("usage: bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS | sender COMMAND_TOPIC PORT");
+    ROS_ERROR(
+        "usage: bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS | sender COMMAND_TOPIC PORT | reader PORT "
+        "STATE_TOPIC | "
+        "law STATE_TOPIC COMMAND_TOPIC");
     return 2;
   }
   return 0;

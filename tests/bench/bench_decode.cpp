@@ -62,6 +62,9 @@ double decodePacket() {
   Group<WarningState> warnings;
   Group<FuelState> fuel;
   Group<SimStatus> sim;
+  Group<NavigationState> navigation;
+  Group<InstrumentState> instruments;
+  Group<EnvironmentState> environment;
   return microseconds([&] {
     rows.update(*decodeData(packet), 1);
     flight.decode(rows);
@@ -73,6 +76,9 @@ double decodePacket() {
     warnings.decode(rows);
     fuel.decode(rows);
     sim.decode(rows);
+    navigation.decode(rows);
+    instruments.decode(rows);
+    environment.decode(rows);
   });
 }
 

@@ -86,8 +86,13 @@ class Meter {
     std::set<std::uint32_t> frames;
     std::vector<double> grab_ages;
     std::vector<double> ages;
+    std::vector<double> periods;
+    std::int64_t before = 0;
     for (const Arrival& arrival : arrivals) {
-      frames.insert(arrival.drawn.frame);
+      if (frames.insert(arrival.drawn.frame).second) {
+        if (before != 0) periods.push_back(1e-6 * static_cast<double>(arrival.arrival_ns - before));
+        before = arrival.arrival_ns;
+      }
       ages.push_back(1e-6 * static_cast<double>(arrival.arrival_ns - arrival.drawn.time_ns));
       auto grabbed = static_cast<std::int64_t>(arrival.stamp_ns);
       if (!settings_.text("states").empty()) {
@@ -100,9 +105,11 @@ class Meter {
     const auto drawn = arrivals.back().drawn.frame - arrivals.front().drawn.frame + 1;
     std::printf(
         "{\"elapsed_s\": %f, \"images\": %zu, \"distinct\": %zu, \"drawn\": %u, \"unreadable\": %zu, "
-        "\"grab_p50_ms\": %f, \"grab_p95_ms\": %f, \"age_p50_ms\": %f, \"age_p95_ms\": %f}\n",
+        "\"grab_p50_ms\": %f, \"grab_p95_ms\": %f, \"age_p50_ms\": %f, \"age_p95_ms\": %f, "
+        "\"period_p99_ms\": %f, \"period_worst_ms\": %f}\n",
         elapsed, arrivals.size(), frames.size(), drawn, unreadable_, percentile(grab_ages, 0.5),
-        percentile(grab_ages, 0.95), percentile(ages, 0.5), percentile(ages, 0.95));
+        percentile(grab_ages, 0.95), percentile(ages, 0.5), percentile(ages, 0.95), percentile(periods, 0.99),
+        percentile(periods, 1.0));
   }
 
   const Settings& settings_;

@@ -100,17 +100,46 @@ def measures(run: Run, fps: float, seconds: float) -> List[Measure]:
     ]
 
 
+def _flown(context: Context, fps: float, delay: float, sender: bool) -> Run:
+    """Flies once in a process of its own."""
+    folder = context.folder / f"{fps:g}"
+    command = [sys.executable, Path(__file__).with_name("pairing_run.py"), folder, "--fps", fps]
+    command += ["--seconds", _LENGTHS * context.seconds, "--pipeline-delay", delay, *(["--sender"] if sender else [])]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise HarnessError(f"the flight at {fps:g} frames/s failed:\n{done.stderr.strip()}")
+    return read_run(folder, delay)
+
+
 @benchmark
 def pairing(context: Context) -> List[Measure]:
     """Images paired with the very frame they show, at 30 and 60 frames/s, by the strip drawn into them."""
-    seconds = _LENGTHS * context.seconds
     result: List[Measure] = []
     for fps in (30.0, 60.0):
-        folder = context.folder / f"{fps:g}"
-        command = [sys.executable, Path(__file__).with_name("pairing_run.py"), folder, "--fps", fps]
-        command += ["--seconds", seconds, "--pipeline-delay", _PIPELINE_DELAY_S]
-        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            raise HarnessError(f"the flight at {fps:g} frames/s failed:\n{done.stderr.strip()}")
-        result += measures(read_run(folder, _PIPELINE_DELAY_S), fps, seconds)
+        result += measures(_flown(context, fps, _PIPELINE_DELAY_S, sender=False), fps, _LENGTHS * context.seconds)
+    return result
+
+
+@benchmark
+def pairing_sender(context: Context) -> List[Measure]:
+    """The same for images that xplane_eye sends, and judged by what it says: those without a flag must be right."""
+    result: List[Measure] = []
+    for fps in (30.0, 60.0):
+        run = _flown(context, fps, _PIPELINE_DELAY_S, sender=True)
+        sure = (run.quality == 0) & np.isfinite(run.error)
+        name = f"{fps:g} frames/s: "
+        result += [
+            Measure(name + "pictures", run.pictures / (_LENGTHS * context.seconds), "/s"),
+            Measure(name + "unflagged", 100.0 * float(np.mean(sure)), "%"),
+            Measure(
+                name + "unflagged with the very frame",
+                100.0 * float(np.mean(run.error[sure] == 0.0)),
+                "%",
+                99.0,
+                at_least=True,
+            ),
+            Measure(name + "unflagged, largest error", float(np.abs(run.frame_error[sure]).max()), "frames", 1.0),
+            Measure(name + "all with the very frame", 100.0 * float(np.mean(run.error == 0.0)), "%"),
+            Measure(name + "images without a readable strip", run.unreadable, "-", 0.0),
+        ]
     return result

@@ -8,6 +8,7 @@ A program of its own because one process is one ROS node; `bench_pairing.py` sta
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 import time
@@ -18,7 +19,8 @@ import numpy as np
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.resources import config_file, node_program
+from xplane_bridge.harness.ros import free_port
+from xplane_bridge.resources import config_file, node_program, program
 
 COLUMNS = (
     "shown_frame",  # by the strip; -1: not readable
@@ -64,8 +66,15 @@ class Recorder:
             return (-1, np.nan, *self.states[stamp])
 
 
-def fly(folder: Path, fps: float, seconds: float, delay: float) -> None:
-    """Flies and writes the files."""
+def eye(folder: Path, xplane_port: int, receiver_port: int) -> ManagedProcess:
+    """`xplane_eye` on the same screen; it measures the delay itself."""
+    where = [f"127.0.0.1:{receiver_port}", "--xplane", f"127.0.0.1:{xplane_port}", "--local-port", "0"]
+    command = [program("xplane_eye"), *where, "--undo-file", folder / "undo.json"]
+    return ManagedProcess("xplane_eye", command, folder, env=dict(os.environ))
+
+
+def fly(folder: Path, fps: float, seconds: float, delay: float, sender: bool) -> None:
+    """Flies and writes the files; the pictures come from the window, or from `xplane_eye`."""
     with VirtualDisplay(folder) as display, RosMaster(folder) as master:
         os.environ["DISPLAY"] = display.display
         master.use_here()
@@ -79,7 +88,9 @@ def fly(folder: Path, fps: float, seconds: float, delay: float) -> None:
         options += ["--swap-log", folder / "swaps.csv", "--pilot", config_file("scenarios", "demo.yaml")]
         with EmulatorProcess(folder, list(map(str, options))) as emulator:
             shared = {"host": "127.0.0.1", "port": emulator.port, "listen_for_beacon": False, "display_delay": delay}
-            rospy.set_param(_NAMESPACE, {**shared, "capture_node": {"max_rate": 0.0}})
+            receiver = free_port()
+            source = {"source": "sender", "sender": {"listen": f"127.0.0.1:{receiver}"}} if sender else {}
+            rospy.set_param(_NAMESPACE, {**shared, "capture_node": {"max_rate": 0.0, **source}})
             nodes = [
                 ManagedProcess(name, [node_program(name, env), f"__ns:={_NAMESPACE}"], folder, env=env)
                 for name in ("rx_node", "capture_node")
@@ -91,7 +102,9 @@ def fly(folder: Path, fps: float, seconds: float, delay: float) -> None:
                 ),
                 rospy.Subscriber(f"{_NAMESPACE}/camera/frame_state", FrameState, recorder.on_state, queue_size=1000),
             ]
-            with nodes[0], nodes[1]:
+            with contextlib.ExitStack() as running:
+                for node in [*nodes, *([eye(folder, emulator.port, receiver)] if sender else [])]:
+                    running.enter_context(node)
                 wait_until(lambda: recorder.perfect, _WARM_UP_S, "paired picture")
                 recorder.edges.clear()
                 time.sleep(seconds)
@@ -110,10 +123,11 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--fps", type=float, required=True)
     parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--sender", action="store_true", help="pictures by xplane_eye")
     parser.add_argument("--pipeline-delay", type=float, required=True, metavar="S")
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
-    fly(args.folder.resolve(), args.fps, args.seconds, args.pipeline_delay)
+    fly(args.folder.resolve(), args.fps, args.seconds, args.pipeline_delay, args.sender)
     return 0
 
 

@@ -16,12 +16,16 @@ from xplane_bridge.harness import RosMaster
 from xplane_bridge.resources import program
 
 NO_BAG = "not a ROS 1 bag (it does not start with '#ROSBAG V')"
-AIRCRAFT = "there is fixed_wing, multirotor, tiltrotor; or a file of your own with aircraft_file:=PATH"
+AIRCRAFT = "rv10, tiltrotor; or a file of your own with aircraft_file:=PATH"
 JOYSTICKS = "there is logitech_extreme_3d_pro, logitech_f710, playstation, xbox; or a file of your own"
-SCENARIOS = "has: demo.yaml, demo_flight.yaml, engine_failure.yaml, left_aileron_stuck.yaml"
+SCENARIOS = "has: blocked_pitot.yaml, bus_failure.yaml, demo.yaml, demo_flight.yaml, engine_failure.yaml"
 UNPARSED = "broken.yaml: does not parse as YAML: line 3, column 1: expected the node content"
 
 PROGRAMS = [
+    ("aircraft_config --port 70000", 2, ["'70000' is no UDP port; expected 1..65535"]),
+    ("aircraft_config --port 9", 1, ["X-Plane does not answer at 127.0.0.1:9", "scripts/xplane_doctor"]),
+    ("aircraft_config --host no.such.host.invalid", 1, ["no.such.host.invalid: ", "X-Plane's computer"]),
+    ("aircraft_config --hover-throttle 2", 2, ["--hover-throttle: 2: expected a lever position from 0 to 1"]),
     ("bag_export", 2, ["no BAG given"]),
     ("bag_export none.bag", 1, ["none.bag: No such file or directory"]),
     ("bag_export text.bag", 1, ["text.bag: " + NO_BAG, "0 of 1 flights exported"]),
@@ -29,7 +33,12 @@ PROGRAMS = [
     ("bag_export nothing_in_it", 1, ["nothing_in_it: a directory without any .bag file"]),
     ("bag_export good.bag --rate fast", 2, ["--rate: fast: expected a number above 0"]),
     ("bag_export good.bag --train-share 2", 2, ["--train-share: 2: expected a share from 0 to 1"]),
-    ("bag_export good.bag --format xml", 2, ["'xml' (choose from 'csv', 'parquet', 'tum', 'euroc', 'images')"]),
+    ("bag_export good.bag --format xml", 2, ["'xml' (choose from 'csv', 'parquet', 'npz', 'mat', 'tum',"]),
+    (
+        "bag_export good.bag --format tum --topics odom",
+        2,
+        ["--topics is not for tum; it is for csv, parquet, npz, mat, mcap, ros2"],
+    ),
     ("bag_export good.bag --topics engine", 1, ["no topic /xplane/engine", "there is: /xplane/flight_state"]),
     ("bag_export good.bag -o text.bag", 1, ["text.bag: File exists; -o takes a folder that can be written"]),
     ("bag_export --verify -o nothing_in_it", 1, ["no readable manifest.json", "export first"]),
@@ -37,6 +46,9 @@ PROGRAMS = [
     ("flight_report link.bag", 1, ["link.bag: no flight state in it", "record flight_state"]),
     ("flight_report good.bag -o nothing_in_it", 1, ["nothing_in_it: Is a directory"]),
     ("estimate_latency good.bag", 1, ["no camera images; record camera/image_raw/compressed"]),
+    ("estimate_latency", 2, ["give a BAG, or --live SECONDS"]),
+    ("estimate_latency good.bag --live 20", 2, ["give a BAG, or --live SECONDS"]),
+    ("estimate_latency --live 1", 2, ["--live: 1: expected 5 to 600 s"]),
     ("estimate_latency good.bag --ignore-bottom 2", 2, ["--ignore-bottom: 2: expected a share from 0 to 0.9"]),
     ("estimate_latency good.bag --plot delay.foo", 2, ["delay.foo: expected a file name that ends in one of", "png"]),
     ("run_scenario nothing", 1, ["nothing.yaml does not exist", SCENARIOS]),
@@ -54,7 +66,20 @@ PROGRAMS = [
     ("virtual_joystick left_aileron_stuck --joy-config broken.yaml", 1, [UNPARSED]),
     ("attitude_hold --heading north", 2, ["--heading: north: expected degrees"]),
     ("attitude_hold --speed nan", 2, ["--speed: nan: expected metres per second"]),
+    ("fly_controller xplane_bridge.controllers.twin:Zeppelin", 1, ["'xplane_bridge.controllers.twin:Zeppelin' cannot"]),
+    ("fly_controller xplane_bridge.controllers.twin:Hold --arguments fast", 1, ["'fast': expected a mapping"]),
+    (
+        "fly_controller xplane_bridge.controllers.twin:Hold --arguments {fast:1}",
+        1,
+        ["--arguments: xplane_bridge.controllers.twin:Hold does not take them", "fast"],
+    ),
+    ("fly_controller collections:Counter", 1, ["collections:Counter has no method fly"]),
     ("joy_config_check wheel", 1, ["wheel.yaml does not exist", "xbox.yaml"]),
+    ("identify_model empty.bag", 1, ["empty.bag: the file is empty; the recording never wrote to it"]),
+    ("identify_model good.bag", 1, ["good has no", "record all topics (launch/record.launch)"]),
+    ("identify_model good.bag --tail -1", 2, ["--tail: -1: expected a time from 0 to 60 s"]),
+    ("linearise_model glider", 1, ["unknown aircraft 'glider': the emulator has fixed_wing"]),
+    ("linearise_model fixed_wing --speed 0", 2, ["--speed: 0: expected a number above 0"]),
     ("live_plot /x/y --window 0", 2, ["--window: 0: expected a number above 0"]),
     ("xplane_emulator --aircraft zeppelin", 2, ["--aircraft zeppelin: expected one of fixed_wing, multirotor"]),
     ("xplane_emulator --port 99999", 2, ["--port 99999: expected 0..65535"]),

@@ -47,6 +47,14 @@ def test_signal_ends_it_in_order(world, tiny, number):
     assert f"stopping: {number.name}" in node.output()
 
 
+def test_first_line_comes_at_once_and_tells_what_the_node_was_given(world, tiny):
+    """Its output goes into a file here, as roslaunch's does where that is redirected."""
+    world.set_param("port", 49010)
+    node = tiny(gain=2.5, mode="calm", limits={"upper": 100.0})
+    started = node.wait_for_line(r"^.*tiny_node starts with (.*?)(\x1b\[0m)?$", 10)
+    assert started.group(1) == f'port: 49010, ~gain: 2.5, ~trace_file: "{world.trace}"'
+
+
 def test_master_shutdown_request_ends_it_in_order(world, tiny):
     """What `rosnode kill` does, and the master itself when a node of the same name registers."""
     node = tiny()

@@ -6,26 +6,31 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Dict, List
 
 _RUN = Path(__file__).parents[1] / "bench" / "run.py"
 
 
-def test_benchmarks_of_the_nodes_measure(tmp_path: Path) -> None:
-    """Each gives figures that can be: everything that was sent arrives, nothing takes no time."""
+def measured(tmp_path: Path, names: List[str]) -> Dict[str, float]:
+    """What these benchmarks gave, by `benchmark: measure`."""
     result = tmp_path / "result.json"
-    names = ["flight_state", "control", "link_return", "capture"]
     done = subprocess.run(
         [sys.executable, str(_RUN), "--seconds", "1", "--json", str(result), *names],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         check=False,
-        timeout=300,
+        timeout=500,
     )
     assert result.is_file(), done.stdout.decode()
     report = json.loads(result.read_text(encoding="utf-8"))
     assert report["failed"] == [], done.stdout.decode()
     assert sorted(report["results"]) == sorted(names)
-    measures = {f"{name}: {m['name']}": m["value"] for name in names for m in report["results"][name]}
+    return {f"{name}: {m['name']}": m["value"] for name in names for m in report["results"][name]}
+
+
+def test_benchmarks_of_the_nodes_measure(tmp_path: Path) -> None:
+    """Each gives figures that can be: everything that was sent arrives, nothing takes no time."""
+    measures = measured(tmp_path, ["flight_state", "control", "link_return", "capture"])
     assert measures["flight_state: datagram to callback, p50"] > 1.0
     assert measures["flight_state: bare roscpp publish, p50"] > 1.0
     assert measures["control: joy to datagram, p50"] > 1.0
@@ -33,3 +38,19 @@ def test_benchmarks_of_the_nodes_measure(tmp_path: Path) -> None:
     for grabber in ("capture_node", "ffmpeg", "mss", "GetImage"):
         assert measures[f"capture: 640x480 {grabber}: distinct pictures"] > 1.0
         assert measures[f"capture: 640x480 {grabber}: age at the subscriber, p50"] > 0.0
+
+
+def test_the_benchmark_of_the_environments_measures(tmp_path: Path) -> None:
+    """An environment flies the model and more."""
+    measures = measured(tmp_path, ["gym"])
+    assert measures["gym: env's step of 2 frames / the model's"] > 0.8
+    assert measures["gym: 8 envs in 2 processes / one env"] > 0.01
+    assert measures["gym: pictures of 84x84"] > 1.0
+
+
+def test_the_benchmark_of_lockstep_measures(tmp_path: Path) -> None:
+    """Flights come about, and their frames take time."""
+    measures = measured(tmp_path, ["lockstep"])
+    assert measures["lockstep: rx, tx, mapper, rospy controller, player, record"] > 0.01
+    assert measures["lockstep: the nodes' part of a frame, mean"] > 10.0
+    assert measures["lockstep: three bare roscpp nodes, mean"] > 10.0

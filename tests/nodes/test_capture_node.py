@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import socket
+import sys
+import threading
 from pathlib import Path
 from typing import Iterator
 
@@ -13,8 +16,9 @@ import pytest
 
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
-from xplane_bridge.harness import HarnessError, wait_until
+from xplane_bridge.harness import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
+from xplane_bridge.resources import program
 
 FOCAL_60_DEG = 554.256  # 320 / tan(30 deg)
 HEAD_PSI = "sim/graphics/view/pilots_head_psi"
@@ -23,6 +27,7 @@ FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
 #: Longer than any drawing here takes, so that pictures appear when they are due.
 PIPELINE_DELAY_S = 0.15
 FPS = 20
+STILL = "Still life"
 
 
 @pytest.fixture(scope="module")
@@ -52,6 +57,11 @@ def pixels(image) -> np.ndarray:
 def write_dataref(port: int, path: str, value: float) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(protocol.DrefWrite(path, value).encode(), ("127.0.0.1", port))
+
+
+def send_command(port: int, path: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(protocol.CommandRequest(path).encode(), ("127.0.0.1", port))
 
 
 def topics() -> dict:
@@ -98,7 +108,7 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
     compared = 0
     for image, shown in zip(taken, frames):
         assert (image.width, image.height, image.encoding, image.step) == (640, 480, "bgr8", 1920)
-        assert image.header.frame_id == "camera_forward_optical"
+        assert image.header.frame_id == "camera_optical"
         info, state = info_by_stamp[image.header.stamp], by_stamp[image.header.stamp]
         assert info.header.frame_id == state.header.frame_id == image.header.frame_id
         assert pytest.approx((FOCAL_60_DEG, 0, 319.5, 0, FOCAL_60_DEG, 239.5, 0, 0, 1), abs=5e-4) == info.K
@@ -132,21 +142,49 @@ def test_views_and_field_of_view_are_read_back(world, display) -> None:
     capture(world, display)
     infos, states = watch(world, "info", "state")
     states.wait_for(lambda state: state.view == FrameState.VIEW_FORWARD)
+    write_dataref(emulator.port, HEAD_PSI, 180.0)  # nothing, but in the 3-D cockpit
+    with pytest.raises(HarnessError):
+        states.wait_for_next(lambda state: state.view != FrameState.VIEW_FORWARD, timeout=1.0)
+    send_command(emulator.port, "sim/view/3d_cockpit_cmnd_look")
     write_dataref(emulator.port, HEAD_PSI, 180.0)
     state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_REAR)
-    assert state.header.frame_id == "camera_rear_optical"
+    assert state.header.frame_id == "camera_optical"
     write_dataref(emulator.port, HEAD_PSI, 0.0)
     write_dataref(emulator.port, HEAD_THE, -90.0)
-    state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_DOWN)
-    assert state.header.frame_id == "camera_down_optical"
+    states.wait_for_next(lambda state: state.view == FrameState.VIEW_DOWN)
     write_dataref(emulator.port, HEAD_THE, -30.0)
     state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_UNKNOWN)
-    assert state.quality & FrameState.QUALITY_VIEW_UNKNOWN
+    assert not state.quality & FrameState.QUALITY_VIEW_UNKNOWN, "it is none of the three, but it is known"
+    assert state.camera_pose_source == FrameState.POSE_MEASURED
     write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
     state = states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3)
     assert not state.quality & FrameState.QUALITY_FOV_ASSUMED
     info = infos.wait_for_next()
     assert info.K[0] == pytest.approx(320.0, abs=1e-3)  # 320 / tan(45 deg)
+
+
+def test_nominal_frames_where_wanted(world, display) -> None:
+    emulator = window(world)
+    capture(world, display, nominal_frames=True)
+    (states,) = watch(world, "state")
+    state = states.wait_for(lambda state: state.camera_pose_source == state.POSE_MEASURED)
+    assert state.header.frame_id == "camera_forward_optical"
+    send_command(emulator.port, "sim/view/back")
+    states.wait_for_next(lambda state: state.header.frame_id == "camera_rear_optical")
+
+
+def test_camera_info_follows_the_frustum(world, display) -> None:
+    emulator = window(world)
+    capture(world, display)
+    (infos,) = watch(world, "info")
+    infos.wait_for()
+    write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
+    write_dataref(emulator.port, "sim/graphics/view/vertical_field_of_view_deg", 60.0)
+    write_dataref(emulator.port, "sim/graphics/settings/non_proportional_vertical_FOV", 1.0)
+    write_dataref(emulator.port, "sim/graphics/view/field_of_view_horizontal_ratio", 0.25)
+    # fx = 320 / tan 45 deg, fy = 240 / tan 30 deg; the middle lies a quarter of the width right of the line of sight
+    wanted = (320.0, 159.5, 415.692, 239.5)
+    infos.wait_for_next(lambda info: (info.K[0], info.K[2], info.K[4], info.K[5]) == pytest.approx(wanted, abs=1e-2))
 
 
 def test_three_static_frames(world, display) -> None:
@@ -200,6 +238,74 @@ def test_lost_window_is_said_and_found_again(world, display) -> None:
     node.check_running()
 
 
+def test_a_picture_that_stands_is_an_error_unless_the_aircraft_has_crashed(world, display) -> None:
+    """A window in which nothing happens; the state that moves is the test's."""
+    import rospy
+    from xplane_bridge.msg import FlightState, WarningState
+
+    program = [sys.executable, "-c", f"import tkinter; root = tkinter.Tk(); root.title({STILL!r}); root.mainloop()"]
+    still = ManagedProcess("still", program, world.folder)
+    world.point_to(9)  # nothing answers there
+    capture(world, display, window={"display": display, "search_period": 0.05, "title": STILL})
+    (images,) = watch(world, "image")
+    state = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1)
+    warnings = rospy.Publisher(f"{world.namespace}/mission/warnings", WarningState, queue_size=1, latch=True)
+    wait_until(lambda: state.get_num_connections() and warnings.get_num_connections(), 15.0, "capture_node's ear")
+    ended = threading.Event()
+
+    def move() -> None:
+        roll = 0.0
+        while not ended.wait(0.05):
+            roll += 1.0
+            state.publish(FlightState(roll_deg=roll % 90.0))
+
+    mover = threading.Thread(target=move)
+    mover.start()
+    try:
+        still.start()
+        images.wait_for(timeout=30.0)
+        frozen = world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=30.0)
+        assert frozen.message == "frozen: the aircraft moves, the picture does not"
+        warnings.publish(WarningState(crashed=1.0))
+        crashed = world.wait_for_diagnostics("capture", lambda s: s.level < 2, timeout=30.0)
+        assert (crashed.level, crashed.message) == (1, "the picture stands still: the aircraft has crashed")
+        warnings.publish(WarningState(crashed=0.0))
+        world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=30.0)
+    finally:
+        ended.set()
+        mover.join()
+        still.stop()
+
+
+def test_a_black_picture_is_told(world, display) -> None:
+    from xplane_bridge.msg import FrameState
+
+    # Drawn again and again, all but black: whoever subscribes late sees it as well.
+    code = f"""
+import itertools, tkinter
+root = tkinter.Tk()
+root.title({STILL!r})
+colours = itertools.cycle(("#000000", "#010101"))
+def draw():
+    root.configure(bg=next(colours))
+    root.after(100, draw)
+draw()
+root.mainloop()
+"""
+    black = ManagedProcess("black", [sys.executable, "-c", code], world.folder)
+    world.point_to(9)  # nothing answers there
+    capture(world, display, window={"display": display, "search_period": 0.05, "title": STILL})
+    images, states = watch(world, "image", "state")
+    try:
+        black.start()
+        images.wait_for(timeout=30.0)
+        assert states.wait_for(timeout=30.0).quality & FrameState.QUALITY_BLACK
+        told = world.wait_for_diagnostics("capture", lambda s: s.level == 1, timeout=30.0)
+        assert told.message == "the picture is black"
+    finally:
+        black.stop()
+
+
 def test_works_alone_on_any_window(world, display) -> None:
     from xplane_bridge.msg import FrameState
 
@@ -219,6 +325,10 @@ def test_works_alone_on_any_window(world, display) -> None:
     assert state.state.valid == 0
     assert math.isnan(state.state.latitude)
     assert math.isnan(state.sim_time_error)
+    assert state.header.frame_id == "camera_forward_optical"
+    assert state.camera_pose_source == FrameState.POSE_NOMINAL
+    assert state.body_to_camera.rotation.x == pytest.approx(0.5)
+    assert math.isnan(state.camera_pose_uncertainty)
     assert state.field_of_view_deg == pytest.approx(90.0)
     assert emulator.running
 
@@ -262,6 +372,29 @@ def test_wrong_parameters_are_refused_in_words(world, params: dict, text: str) -
     node = world.start("capture_node", params)
     assert node.wait(20.0) == 1
     assert text in node.output()
+
+
+ROLLS = """
+name: rolls
+repeat_every: 20
+events:
+  - {at: 0, hold: {roll: 0, altitude: 1000, speed: 75}}
+  - at: 0
+    excitation: {kind: multisine, target: roll, amplitude: 0.25, duration: 19, frequency: 0.3, frequency_end: 1.5}
+"""
+
+
+def test_estimate_latency_live_finds_the_delay_of_the_display(world, display, tmp_path: Path) -> None:
+    (tmp_path / "rolls.yaml").write_text(ROLLS, encoding="utf-8")
+    window(world, "--pilot", tmp_path / "rolls.yaml", "--start", "air")
+    world.start("rx_node")
+    command = [program("estimate_latency"), "--live", "15", "--namespace", world.namespace]
+    with ManagedProcess("live", [*command, "--json", tmp_path / "live.json"], tmp_path, env=world.env) as live:
+        live.wait_for_line(f"waiting: nobody publishes {world.namespace}/camera/image_raw/compressed", 60)
+        capture(world, display)
+        assert live.wait(120) == 0, live.output()
+    delay = json.loads((tmp_path / "live.json").read_text(encoding="utf-8"))["display_delay"]["delay"]
+    assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.02)
 
 
 def test_scaled_output(world, display) -> None:

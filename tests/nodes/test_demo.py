@@ -129,7 +129,7 @@ def test_images_of_the_demo_read_back_with_opencv_and_carry_their_states(recordi
 
 def test_an_override_that_is_left_on_fails_the_demo(tmp_path: Path) -> None:
     # Another client takes the stick again and again: also after the bridge has given it back.
-    taking = protocol.DrefWrite("sim/operation/override/override_joystick", 1.0).encode()
+    taking = protocol.DrefWrite("sim/operation/override/override_joystick_roll", 1.0).encode()
     with demo(tmp_path, "--duration", "5") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         port = int(run.wait_for_line(r"X-Plane's port: (\d+)", DEMO_TIMEOUT_S).group(1))
         deadline = time.monotonic() + DEMO_TIMEOUT_S
@@ -137,7 +137,7 @@ def test_an_override_that_is_left_on_fails_the_demo(tmp_path: Path) -> None:
             client.sendto(taking, ("127.0.0.1", port))
             time.sleep(0.02)
         assert run.returncode == 1, run.output()
-    assert re.search(r"^FAILED +released .* still on: override_joystick$", run.output(), re.MULTILINE)
+    assert re.search(r"^FAILED +released .* still on: override_joystick_roll$", run.output(), re.MULTILINE)
     assert "demo: failed: released" in run.output()
     assert re.search(r"^ok +modes +not judged", run.output(), re.MULTILINE), "5 s are too short for that, and say so"
 

@@ -12,6 +12,8 @@ import time
 import pytest
 
 from support.tx_fixtures import (
+    AUTO,
+    MANUAL,
     PITCH,
     ROLL,
     YAW,
@@ -364,10 +366,10 @@ def test_who_takes_the_stick_from_the_bridge_gets_the_surfaces_too(healthy):
     world.manual.fly(fields=ROLL, roll=0.0)
     assert fail(world, name, "stuck", 4.0).success
     world.wire.wait(RUDDER, 4.0)
-    both = "override_control_surfaces, override_joystick"
-    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == both)
-    type(world).wire(world.xplane.port).send(protocol.DrefWrite("sim/operation/override/override_joystick", 0.0))
-    said(world, f"failure of {name} has ended: somebody else has released")
+    both = {"override_control_surfaces", "override_joystick_roll"}
+    world.wait_for_diagnostics("control", lambda s: both <= set(world.values_of(s)["Overrides set"].split(", ")))
+    type(world).wire(world.xplane.port).send(protocol.DrefWrite("sim/operation/override/override_joystick_roll", 0.0))
+    said(world, f"failure of {name} has ended: another client has released")
     world.wire.wait(SURFACES, 0.0)
     wait_until(lambda: not journal_entries(world), 5, "an empty journal")
     assert call(world, "set_mode", "SetMode", mode=1).success  # flies on
@@ -393,6 +395,11 @@ class Surfaces:
 def test_single_surfaces_by_command(healthy):
     world, wire = healthy, healthy.wire
     surfaces = Surfaces(world)
+    surfaces.send(aileron1_wing2_left=3.0)
+    world.wait_for_diagnostics(
+        "surfaces", lambda s: "flies in AUTO" in world.values_of(s).get("control/surfaces last refusal", "")
+    )
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
     refusals = (
         ({"aileron1_wing2_left": 3.0, "wing": 1.0}, "no surface"),
         ({"aileron1_wing2_left": 3.0, "rudder1_fin1": math.nan}, "rudder1_fin1 is nan"),
@@ -430,6 +437,35 @@ def test_single_surfaces_by_command(healthy):
     # Not repeated, the command ends after command_timeout, and the mixing flies again.
     wire.wait(SURFACES, 0.0)
     wait_until(lambda: follows(wire, LEFT) and follows(wire, RIGHT), 5, "the ailerons to follow again")
+    assert call(world, "set_mode", "SetMode", mode=MANUAL).success
+
+
+def test_a_stick_that_takes_over_ends_single_surfaces(healthy):
+    from xplane_bridge.msg import ControlMode
+
+    world, wire = healthy, healthy.wire
+    modes = world.watch("control/mode", ControlMode)
+    surfaces = Surfaces(world)
+    world.manual.fly(fields=ROLL, roll=0.0)
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+
+    def shown():
+        surfaces.send(aileron1_wing2_left=4.0, aileron1_wing2_right=4.0)
+        return abs(wire.value(LEFT) - 4.0) < 1e-4 and abs(wire.value(RIGHT) - 4.0) < 1e-4
+
+    wait_until(shown, 5, "both ailerons down")
+    modes.skip_to_now()
+    world.manual.fly(roll=0.5)
+
+    def over():
+        surfaces.send(aileron1_wing2_left=4.0, aileron1_wing2_right=4.0)  # it goes on commanding
+        return wire.value(SURFACES) == 0.0 and follows(wire, LEFT) and follows(wire, RIGHT)
+
+    wait_until(over, 5, "the ailerons to follow the stick")
+    taken = modes.then_wait_for(lambda m: m.mode == MANUAL)
+    assert taken.reason.startswith("stick take-over")
+    assert taken.reason.endswith("control/surfaces ends")
+    said(world, taken.reason)
 
 
 def test_overrides_and_failures_are_given_back_however_it_ends(new_world, tmp_path):

@@ -129,14 +129,68 @@ def test_the_three_lines_of_readme_fly(shells: Shells) -> None:
     settled(recorded, "heading", 40.0, 3.0)
 
 
+def test_the_first_subscriber_of_readme_shows_states(shells: Shells) -> None:
+    by_hand(shells)
+    subscriber = section(ROOT / "README.md", "I want states")[0]
+    assert subscriber.language == "python"
+    assert len(subscriber.text.splitlines()) <= 10
+    (shells.home / "first.py").write_text(subscriber.text, encoding="utf-8")
+    process = shells.start("subscriber", f"{sys.executable} -u {shells.home}/first.py")
+    process.wait_for_line(r"^ *\d+\.\d{3} s  roll +-?\d+\.\d\d deg  +\d+\.\d m/s$", WAIT_S)
+
+
 def test_the_first_controller_of_readme_flies(shells: Shells) -> None:
     recorded, _ = by_hand(shells)
-    controller = section(ROOT / "README.md", "By hand, without X-Plane")[1]
+    controller = section(ROOT / "README.md", "I want to fly")[0]
     assert controller.language == "python"
-    assert len(controller.text.splitlines()) == 15
+    assert len([line for line in controller.text.splitlines() if line and "import" not in line]) <= 10
     (shells.home / "first.py").write_text(controller.text, encoding="utf-8")
     shells.start("controller", f"{sys.executable} {shells.home}/first.py")
     settled(recorded, "roll", 20.0, 3.0)
+
+
+def flew_on(recorded: RecordedTopics, seconds: float) -> None:
+    """Waits until so much simulator time has passed; the aircraft keeps to its height and near level wings."""
+    states = recorded.all("flight_state")
+    begun, first = states[-1], len(states)
+    recorded.wait_for("flight_state", lambda s: s["sim_time"] > begun["sim_time"] + seconds, "a later state", first)
+    later = recorded.all("flight_state")[first:]
+    assert max(abs(state["altitude"] - begun["altitude"]) for state in later) < 150.0
+    assert max(abs(state["roll"]) for state in later) < 45.0
+
+
+def test_the_first_flight_of_readme_survives_its_end(shells: Shells) -> None:
+    """A hold, Ctrl-C, and a stick by hand: after each the failsafe of the shipped aircraft flies on."""
+    recorded, _ = by_hand(shells)
+    hold, by_hand_line = section(ROOT / "README.md", "I want to fly")[1].text.splitlines()[:2]
+    assert "attitude_hold" in hold
+    assert "control/auto" in by_hand_line
+    shells.start("hold", hold)
+    settled(recorded, "heading", 40.0, 3.0)
+    shells.end("hold")
+    recorded.wait_for("control/mode", lambda m: m["failsafe"], "the failsafe")
+    flew_on(recorded, 30.0)
+    before, first = len(recorded.all("control/mode")), len(recorded.all("flight_state"))
+    shells.run("stick", f"{by_hand_line.split('  #')[0]} || test $? = 124  # timeout's own")
+    recorded.wait_for("control/mode", lambda m: m["failsafe"], "the failsafe after it", before)
+    assert max(state["roll"] for state in recorded.all("flight_state")[first:]) > 5.0, "the stick did nothing"
+    flew_on(recorded, 30.0)
+
+
+def test_the_broken_aileron_of_readme_breaks_on_a_fresh_install(shells: Shells) -> None:
+    recorded, hold = by_hand(shells)
+    shells.start("hold", hold)
+    settled(recorded, "heading", 40.0, 3.0)
+    fly_it = section(ROOT / "README.md", "I want to break things")[0].text.splitlines()
+    assert "aileron1_wing2_left" in fly_it[0]
+    for number, line in enumerate(fly_it):
+        assert "success: True" in shells.run(f"typed_{number}", line)
+        if number == 0:
+            said = shells.run("surfaces", "rostopic echo -n 1 /xplane/mission/surfaces/aileron1")
+            deflections = [float(number) for number in re.findall(r"-?\d+\.\d+", said)]
+            assert deflections[2] == pytest.approx(5.0, abs=0.1), said  # wing 2, left
+            settled(recorded, "heading", 40.0, 5.0)  # the others fly on
+    assert "names: []" in shells.run("failures", "rostopic echo -n 1 /xplane/failures/state")
 
 
 def scores(folder: Path) -> dict[str, dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import signal
 import socket
 import struct
 import threading
@@ -21,7 +22,7 @@ RESET, CRASH, AIRCRAFT, PAUSE, SITUATION, SETTING = 1, 2, 3, 4, 10, 11
 POSITION = "sim/flightmodel/position/"
 WEIGHT = "sim/flightmodel/weight/"
 STICK = "sim/joystick/yoke_roll_ratio"
-OVERRIDE = "sim/operation/override/override_joystick"
+OVERRIDE = "sim/operation/override/override_joystick_roll"
 CG = {11: "sim/flightmodel/misc/cgz_ref_to_default", 12: "sim/flightmodel2/misc/cg_offset_z"}
 WIND = {
     11: ("sim/weather/wind_speed_kt", "sim/weather/wind_direction_degt"),
@@ -118,7 +119,7 @@ def test_reset_of_a_paused_flight_is_exact_and_leaves_it_paused(flight):
         [0.0] * 3, abs=1e-3
     )
     pause(flight, False)
-    done(flight, "set_wind", "SetWind", speed=0.0, from_deg=0.0)
+    done(flight, "set_wind", "SetWind", speed=0.0, from_deg=360.0)
 
 
 def test_reset_of_a_running_flight_flies_on_from_there(flight):
@@ -159,7 +160,58 @@ def test_wind_blows_and_its_absence_is_told(flight):
     assert "(it is paused)" in event.text
     pause(flight, False)
     assert done(flight, "set_wind", "SetWind", speed=8.0, from_deg=20.0, turbulence=0.5)
-    assert done(flight, "set_wind", "SetWind", speed=0.0, from_deg=0.0)
+    assert done(flight, "set_wind", "SetWind", speed=0.0, from_deg=360.0)
+
+
+SEA_LEVEL = {  # temperature [deg C], pressure in X-Plane's unit and Pa of one of these
+    11: ("sim/weather/temperature_sealevel_c", "sim/weather/barometer_sealevel_inhg", 3386.389),
+    12: ("sim/weather/region/sealevel_temperature_c", "sim/weather/region/sealevel_pressure_pas", 1.0),
+}
+
+
+def test_time_is_set_and_runs_on(flight):
+    # DATE | ZULU_TIME
+    assert done(flight, "set_time", "SetTime", fields=3, date_days=10, zulu_time=30000.0).kind == SETTING
+    assert flight.other.read("sim/time/local_date_days") == 10.0
+    assert 30000.0 <= flight.other.read("sim/time/zulu_time_sec") < 30060.0
+    done(flight, "set_time", "SetTime", fields=4, time_ratio=2)
+    assert flight.other.read("sim/time/sim_speed") == 2.0
+    done(flight, "set_time", "SetTime", fields=4, time_ratio=1)
+
+
+def test_weather_is_set_and_flown_in(flight):
+    temperature, pressure, unit = SEA_LEVEL[flight.version]
+    before = flight.other.read("sim/weather/rho")
+    # WIND | VISIBILITY | TEMPERATURE | PRESSURE
+    event = done(
+        flight,
+        "set_weather",
+        "SetWeather",
+        fields=1 + 4 + 16 + 32,
+        wind_layer_altitude=[0.0, 2000.0],
+        wind_layer_from_deg=[90.0, 120.0],
+        wind_layer_speed=[11.0, 20.0],
+        visibility=8000.0,
+        sea_level_temperature=40.0,
+        sea_level_pressure=98000.0,
+    )
+    assert event.text == "the weather is set as asked for"
+    assert flight.other.read(temperature) == pytest.approx(40.0, abs=1e-3)
+    assert flight.other.read(pressure) * unit == pytest.approx(98000.0, abs=1.0)
+    # By the ideal gas, pressure and temperature at the same height shrink alike: 98000/101325 * 288.15/313.15 = 0.890.
+    assert flight.other.read("sim/weather/rho") / before == pytest.approx(0.890, abs=0.02)
+    speed, direction = WIND[flight.version]
+    assert flight.other.read(speed) == pytest.approx(11.0, abs=0.1)
+    assert flight.other.read(direction) == pytest.approx(90.0, abs=1.0)
+    clouds = {"cloud_base": [900.0], "cloud_top": [1500.0], "cloud_cover": [0.5]}
+    done(flight, "set_weather", "SetWeather", fields=2, cloud_type=[2], **clouds)
+    layers = {11: 3, 12: 13}[flight.version] + 1
+    many = {name: [float(k) for k in range(layers)] for name in ("from_deg", "speed", "altitude")}
+    event = ask(flight, "set_weather", "SetWeather", fields=1, **{f"wind_layer_{k}": v for k, v in many.items()})
+    assert not event.success
+    assert f"layers of wind: {layers} are given" in event.text
+    done(flight, "set_weather", "SetWeather", fields=48, sea_level_temperature=15.0, sea_level_pressure=101325.0)
+    done(flight, "set_wind", "SetWind", speed=0.0, from_deg=360.0)
 
 
 def test_loading_changes_weight_and_balance(flight):
@@ -171,6 +223,13 @@ def test_loading_changes_weight_and_balance(flight):
     done(flight, "set_loading", "SetLoading", payload_mass=250.0, cg_offset=0.05)
     assert flight.other.read(WEIGHT + "m_total") == pytest.approx(before - 20.0, abs=1.0)
     assert flight.other.read(CG[flight.version]) == pytest.approx(0.05, abs=0.002)
+    assert flight.other.read(WEIGHT + "m_fixed") == pytest.approx(250.0, abs=0.1)
+    if flight.version == 12:  # half of it elsewhere: as it is spread stays as it is
+        flight.other.send(*(protocol.DrefWrite(f"{WEIGHT}m_stations[{i}]", 125.0) for i in (0, 3)))
+        flight.other.wait_until_reads(WEIGHT + "m_stations[3]", 125.0)
+        done(flight, "set_loading", "SetLoading", payload_mass=200.0, cg_offset=nan)
+        assert flight.other.read(WEIGHT + "m_stations[3]") == pytest.approx(100.0, abs=0.1)
+        done(flight, "set_loading", "SetLoading", payload_mass=250.0, cg_offset=nan)
     event = ask(flight, "set_loading", "SetLoading", fuel_tank=[60.0, 70.0, 5.0], payload_mass=nan, cg_offset=nan)
     assert not event.success
     assert "m_fuel[2] is 0.0" in event.text
@@ -203,6 +262,19 @@ def test_what_cannot_be_is_refused(flight):
     assert "speed is -1: expected 0..100 [m/s]" in refusal("set_wind", "SetWind", speed=-1.0)
     nothing = refusal("set_loading", "SetLoading", payload_mass=math.nan, cg_offset=math.nan)
     assert "expected fuel_tank, payload_mass or cg_offset" in nothing
+    uneven = refusal("set_weather", "SetWeather", fields=1, wind_layer_altitude=[0.0, 500.0], wind_layer_speed=[5.0])
+    assert "wind_layer_from_deg has 0 values: expected 2, one a layer" in uneven
+    for service, kind, words in (  # what a request without a word asks for
+        ("reset_flight", "ResetFlight", "no place is given"),
+        ("set_wind", "SetWind", "nothing is given"),
+        ("set_loading", "SetLoading", "nothing is given"),
+        ("set_time", "SetTime", "nothing is given"),
+        ("set_weather", "SetWeather", "nothing is given"),
+        ("load_aircraft", "LoadAircraft", "is empty"),
+        ("load_state", "Situation", "is empty"),
+        ("save_state", "Situation", "is empty"),
+    ):
+        assert words in refusal(service, kind)
     assert "is absolute: expected a file relative" in refusal("load_aircraft", "LoadAircraft", path="/a/b.acf")
     assert "livery is -1" in refusal("load_aircraft", "LoadAircraft", path="a/b.acf", livery=-1)
     assert "does not end in .sit" in refusal("save_state", "Situation", path="Output/a.acf")
@@ -217,7 +289,7 @@ def test_aircraft_is_loaded_and_flown_only_if_it_is_the_one_configured(flight):
     assert event.kind == AIRCRAFT
     assert "QUAD" in event.text
     texts = [e.text for e in flight.events.last.events]
-    given = max(i for i, text in enumerate(texts) if text == "overrides: gave back override_joystick")
+    given = max(i for i, text in enumerate(texts) if text == "overrides: gave back override_joystick_roll")
     assert given < next(i for i, text in enumerate(texts) if text.startswith("aircraft: QUAD")), "before it was loaded"
     assert flight.seen.value(OVERRIDE) == 0.0
     assert "override:" + OVERRIDE not in journal_entries(flight)
@@ -248,13 +320,26 @@ def test_files_that_are_not_there_are_told(flight):
     assert "the flight goes on as it was" in event.text
 
 
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL], ids=["asked", "killed"])
+def test_weather_that_was_to_end_with_the_node_does(world, end):
+    temperature = SEA_LEVEL[11][0]
+    fly(world)
+    try:
+        done(world, "set_weather", "SetWeather", fields=16, sea_level_temperature=30.0, restore_on_exit=True)
+        assert world.other.read(temperature) == pytest.approx(30.0)
+        world.node.send_signal(end)
+        wait_until(lambda: abs(world.other.read(temperature) - 15.0) < 1e-3, 15.0, "the temperature of before")
+    finally:
+        close(world)
+
+
 def test_without_x_plane_nothing_is_accepted(world):
     world.point_to(9)  # nobody there
     world.set_param("aircraft", "fixed_wing")
     world.start("tx_node", tx_params())
     for service, kind, request in (
         ("reset_flight", "ResetFlight", HERE),
-        ("set_wind", "SetWind", {}),
+        ("set_wind", "SetWind", {"speed": 5.0}),
         ("load_aircraft", "LoadAircraft", {"path": "a/b.acf"}),
     ):
         response = call(world, service, kind, **request)

@@ -36,6 +36,7 @@ events: [{at: 0, hold: {roll: 0, climb: 0}}, {at: 2, end: true}]
 """
 REFUSED = """
 name: refused
+aircraft: tiltrotor
 events:
   - {at: 1, failure: {name: aileron1_wing2_left, kind: stuck, value: 5}}
   - {at: 3, end: true}
@@ -67,6 +68,33 @@ def test_a_flight_that_meets_its_criteria(tmp_path, options):
         assert "doublet" in list(kinds["kind"])
         assert list(kinds["result"])[-1] == "done"
         assert set(bags.read("/xplane/control/mode")["mode"]) >= {1, 2}
+
+
+WEATHER = """
+name: weather
+aircraft: fixed_wing
+start: {altitude: 800, speed: 65, heading: 90}
+events:
+  - {at: 0, hold: {roll: 0, climb: 0, speed: 65}}
+  - {at: 1, time: {date_days: 20, zulu_time: 36000}, wind: {speed: 9, from_deg: 90}}
+  - {at: 4, weather: {wind: [{altitude: 0, from_deg: 180, speed: 6}], sea_level_temperature: 35, visibility: 4000}}
+  - {at: 9, end: true}
+"""
+
+
+def test_time_wind_and_weather_of_a_scenario_come(tmp_path):
+    done = run(tmp_path, WEATHER)
+    assert done.returncode == 0, done.stdout + done.stderr
+    with Bags(tmp_path / "out" / "flight.bag") as bags:
+        states, world = bags.read("/xplane/flight_state"), bags.read("/xplane/mission/environment")
+        told = [event for _, message in bags.messages("/xplane/events") for event in message.events]
+    by = {event.requested_by.rsplit("/", 1)[-1]: event.success for event in told}
+    assert [by[service] for service in ("set_time", "set_wind", "set_weather")] == [True] * 3
+    assert max(states["wind_speed"]) == pytest.approx(9.0, abs=0.1)
+    assert (states["wind_speed"][-1], states["wind_from_deg"][-1]) == pytest.approx((6.0, 180.0), abs=0.5)
+    assert (world["date_days"][-1], world["sea_level_temperature"][-1]) == pytest.approx((20.0, 35.0), abs=1e-3)
+    assert world["zulu_time"][-1] == pytest.approx(36000.0, abs=60.0)
+    assert world["visibility"][-1] == pytest.approx(4000.0, abs=1.0)
 
 
 def test_a_missed_criterion_is_exit_code_1(tmp_path):

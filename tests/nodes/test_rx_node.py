@@ -8,7 +8,9 @@ import math
 import re
 import signal
 import socket
+import struct
 import sys
+import threading
 import xmlrpc.client
 
 import numpy as np
@@ -30,6 +32,9 @@ MISSION = {
     "warnings": "WarningState",
     "fuel": "FuelState",
     "sim": "SimStatus",
+    "navigation": "NavigationState",
+    "instruments": "InstrumentState",
+    "environment": "EnvironmentState",
 }
 
 
@@ -373,6 +378,58 @@ def test_get_dataref(world, rx):
     )
 
 
+def test_get_terrain_of_any_place(world, rx):
+    from xplane_bridge.srv import GetTerrain
+
+    emulator = world.emulator("--terrain", 250, "--alt", 1000, "--xpc-port", 0)
+    rx(xpc_port=int(re.search(r'"xpc_port": (\d+)', emulator.output()).group(1)))
+    world.states.wait_for()
+    answer = world.call("get_terrain", GetTerrain, 36.5, 127.25, 0.0)
+    assert answer.success, answer.result.message
+    assert (answer.latitude, answer.longitude) == (36.5, 127.25)
+    assert answer.terrain_height == pytest.approx(250.0, abs=0.1)
+    assert not answer.is_water
+
+
+def test_get_terrain_says_why_not(world, rx):
+    """A stand-in for the plugin plays what the emulator does not: silence, and a probe that fails."""
+    from xplane_bridge.srv import GetTerrain
+
+    world.emulator(*KINEMATIC)
+    port = free_udp_port()
+    rx(xpc_port=port)
+    world.states.wait_for()
+
+    def refusal(code, *place):
+        answer = world.call("get_terrain", GetTerrain, *place)
+        assert not answer.success
+        assert math.isnan(answer.terrain_height)
+        assert answer.result.code == code, answer.result.message
+        return answer.result.message
+
+    refused, timeout = 2, 5
+    assert "give a place" in refusal(refused, 0.0, 0.0, 0.0)
+    assert "latitude must be from -90 to 90" in refusal(refused, 91.0, 10.0, 0.0)
+    assert "latitude must be from -90 to 90" in refusal(refused, math.nan, 10.0, 0.0)
+    assert "timeout must be" in refusal(refused, 37.0, 127.0, 60.0)
+    assert f"nothing listens on 127.0.0.1:{port}" in refusal(timeout, 37.0, 127.0, 5.0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plugin:
+        plugin.bind(("127.0.0.1", port))
+        assert f"nothing answers from 127.0.0.1:{port}" in refusal(timeout, 37.0, 127.0, 0.5)
+        plugin.settimeout(10.0)
+
+        def fail_the_probe() -> None:
+            question = asker = None
+            while question != struct.pack("<4sxB3d", b"GETT", 0, 38.0, 128.0, 0.0):  # not what was asked until now
+                question, asker = plugin.recvfrom(2048)
+            plugin.sendto(struct.pack("<4sxB3d6f2i", b"TERR", 0, *[-998.0] * 3, *[0.0] * 6, 0, 0), asker)
+
+        probe = threading.Thread(target=fail_the_probe)
+        probe.start()
+        assert "finds no terrain there" in refusal(timeout, 38.0, 128.0, 5.0)
+        probe.join(10.0)
+
+
 @pytest.mark.parametrize(
     ("name", "timeout", "code", "part"),
     [
@@ -446,6 +503,20 @@ def test_bridge_first(world, rx):
     world.emulator(*KINEMATIC, port=port)
     wait_for_link(world, "CONNECTED")
     world.states.wait_for(lambda state: state.valid == ALL_VALID)
+
+
+def test_search_in_vain_is_said_on_the_console_in_link_state_and_in_diagnostics(world, rx):
+    port = free_udp_port()
+    world.point_to(port)
+    node = rx()
+    node.wait_for_line(rf"looking for X-Plane at 127\.0\.0\.1:{port}", 15)
+    # Nothing listens there, and this computer's kernel says so.
+    sentence = f"no answer from 127.0.0.1:{port}: that computer is there, but nothing listens on the port"
+    world.links.wait_for(lambda link: link.state_name == "SEARCHING" and link.reason.startswith(sentence))
+    node.wait_for_line(rf"WARN.*{sentence}", 15)
+    status = world.wait_for_diagnostics("link to X-Plane", lambda status: sentence in status.message)
+    assert status.message.count(sentence) == 1, status.message
+    assert node.output().count(sentence) == 1
 
 
 @both_transports

@@ -7,11 +7,20 @@ import threading
 
 import pytest
 
-from support.tx_fixtures import ROLL, CommandSource, WatchedDatarefs, journal_entries, tx_params, write_mixing
+from support.tx_fixtures import (
+    AUTO,
+    ROLL,
+    CommandSource,
+    WatchedDatarefs,
+    call,
+    journal_entries,
+    tx_params,
+    write_mixing,
+)
 from xplane_bridge.harness import wait_until
 
 SURFACES = "sim/operation/override/override_control_surfaces"
-OVERRIDE = "sim/operation/override/override_joystick"
+OVERRIDE = "sim/operation/override/override_joystick_roll"
 STICK = "sim/joystick/yoke_roll_ratio"
 LEFT = "sim/flightmodel/controls/wing2l_ail1def"
 
@@ -41,7 +50,7 @@ class SurfaceSource:
 
 @pytest.fixture
 def flight(world):
-    """The left aileron held at 4 deg by control/surfaces, the stick by control/manual."""
+    """The left aileron held at 4 deg by control/surfaces, the stick by control/auto."""
     from xplane_bridge.msg import EventList
 
     write_mixing(world)
@@ -54,14 +63,15 @@ def flight(world):
     world.set_param("lost_after", 1.0)
     world.start("tx_node", tx_params())
     world.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
-    world.manual = CommandSource(world, "control/manual")
-    world.manual.fly(fields=ROLL, roll=0.1)
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    world.controller = CommandSource(world, "control/auto")
+    world.controller.fly(fields=ROLL, roll=0.1)
     world.surfaces = SurfaceSource(world)
     world.seen.wait(LEFT, 4.0)
     world.seen.wait(OVERRIDE, 1.0)
     yield world
     world.xplane.send_signal(signal.SIGCONT)
-    world.manual.stop()
+    world.controller.stop()
     world.surfaces.stop()
     world.seen.close()
 
@@ -102,13 +112,13 @@ def test_lost_takes_again_what_is_still_commanded(flight):
         flight.seen.wait(path, value)
     assert sorted(journal_entries(flight)) == ["override:" + SURFACES, "override:" + OVERRIDE]
     # Shown to be held: the next command moves it.
-    flight.manual.fly(roll=-0.1)
+    flight.controller.fly(roll=-0.1)
     flight.seen.wait(STICK, -0.1)
 
 
 def test_lost_gives_back_what_nobody_commands_any_more(flight):
     gap(flight, "LOST")
-    flight.manual.stop()
+    flight.controller.stop()
     flight.surfaces.stop()
     for _ in range(2):  # diagnostics come once a second: longer than command_timeout
         flight.wait_for_diagnostics("control")

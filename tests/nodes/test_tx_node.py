@@ -7,6 +7,7 @@ import math
 import os
 import signal
 import socket
+import sys
 import time
 from pathlib import Path
 
@@ -33,10 +34,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 MODE = 6  # of Event.kind
 STICK = "sim/joystick/yoke_roll_ratio"
-OVERRIDE = "sim/operation/override/override_joystick"
+OVERRIDE = "sim/operation/override/override_joystick_roll"
+AXES = {OVERRIDE[: -len("roll")] + axis for axis in ("roll", "pitch", "heading")}
 THROTTLES = "sim/operation/override/override_throttles"
 LEVER = "sim/cockpit2/engine/actuators/throttle_ratio[0]"
-HEAD = "sim/graphics/view/pilots_head_the"
+VERTICAL_OFFSET, HORIZONTAL_OFFSET = "field_of_view_vertical_deg", "field_of_view_horizontal_deg"
 THROTTLE_OVERRIDE = "sim/flightmodel/engine/ENGN_thro_override[0]"
 FLAP_HANDLE = "sim/cockpit2/controls/flap_ratio"
 
@@ -59,7 +61,7 @@ def tx(world):
         world.set_param("aircraft", aircraft)
         world.node = world.start("tx_node", world.params)
         world.mode.wait_for()
-        world.events.wait_for(lambda e: any("CONNECTED" in event.text for event in e.events))
+        world.events.wait_for(lambda e: has(e, "CONNECTED"))
         return world.node
 
     world.manual = CommandSource(world, "control/manual")
@@ -149,11 +151,7 @@ def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
     world.manual.fly(fields=ROLL, roll=0.5)
     world.wire.wait(OVERRIDE, 1.0)
     world.manual.stop()
-    guardian = next(
-        int(path.parent.name)
-        for path in Path("/proc").glob("[0-9]*/cmdline")
-        if f"override_guardian\0{node.pid}\0".encode() in _read(path)
-    )
+    (guardian,) = guardians_of(node)
     os.kill(guardian, signal.SIGKILL)
     node.send_signal(signal.SIGKILL)
     node.wait(10)
@@ -162,6 +160,56 @@ def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
     world.start("tx_node", world.params)
     world.wire.wait(OVERRIDE, 0.0)
     wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+    world.events.wait_for(lambda e: has(e, "released override_joystick_roll left by a run that crashed"))
+
+
+def test_a_second_bridge_is_told_whose_the_stick_is(tx, world, new_world):
+    tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    second = new_world(world.folder)
+    second.point_to(world.xplane.port)
+    second.set_param("aircraft", "fixed_wing")
+    node = second.start("tx_node", tx_params())
+    stick = CommandSource(second, "control/manual")
+    stick.fly(fields=ROLL, roll=-0.5)
+    wait_until(lambda: "commands are not sent: another bridge is at this X-Plane" in node.output(), 15, "the warning")
+    assert f"belongs to {world.namespace}/tx_node" in node.output()
+    stick.stop()
+    second.close()
+    assert "crash" not in node.output()
+    assert world.wire.value(OVERRIDE) == 1.0
+
+
+def test_xplane_that_went_first_is_no_crash(tx, world):
+    node = tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    world.manual.stop()
+    world.xplane.kill()
+    world.events.wait_for(lambda e: has(e, "STALE"))
+    node.send_signal(signal.SIGINT)
+    assert node.wait(20) == 0
+    assert "override_joystick_roll could not be released, because X-Plane went first, or is silent" in node.output()
+    wait_until(lambda: not guardians_of(node), 15, "the end of its guardian")
+    assert journal_entries(world), "it may only have been silent"
+    world.xplane.restart()
+    again = world.start("tx_node", world.params)
+    wait_until(lambda: not journal_entries(world), 15, "an empty journal")
+    world.events.wait_for(lambda e: has(e, "released override_joystick_roll left because X-Plane went first"))
+    again.stop()
+    assert "crash" not in node.output() + again.output()
+
+
+def has(events, text):
+    """Whether one of the events says this."""
+    return any(text in event.text for event in events.events)
+
+
+def guardians_of(node):
+    """The processes that watch over a node."""
+    mark = f"override_guardian\0{node.pid}\0".encode()
+    return [int(path.parent.name) for path in Path("/proc").glob("[0-9]*/cmdline") if mark in _read(path)]
 
 
 def _read(path):
@@ -171,26 +219,100 @@ def _read(path):
         return b""
 
 
+def test_a_node_that_hangs_is_relieved_and_flies_again_only_on_request(tx, world):
+    node = tx()
+    world.auto.fly(fields=ROLL, roll=0.5)
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    world.wire.wait(OVERRIDE, 1.0)
+    node.send_signal(signal.SIGSTOP)
+    world.wire.wait(OVERRIDE, 0.0)
+    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+    assert "has not run for 1.0 s: giving back what it has set" in node.output()
+    world.mode.skip_to_now()
+    node.send_signal(signal.SIGCONT)
+    said = world.mode.then_wait_for(lambda m: "hung" in m.reason)
+    assert said.mode == MANUAL
+    for _ in range(2):  # longer than overrides take to be sent again, with commands coming all the time
+        status = world.wait_for_diagnostics("control", lambda s: "ask for a mode" in s.message)
+        assert world.values_of(status)["Overrides set"] == "none"
+    assert world.wire.value(OVERRIDE) == 0.0
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    world.wire.wait(OVERRIDE, 1.0)
+    world.wire.wait(STICK, 0.5)
+
+
+def test_a_busy_computer_is_no_hang(tx, world):
+    node = tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    loops = [ManagedProcess(f"busy{i}", [sys.executable, "-c", "while True: pass"], world.folder) for i in range(2)]
+    for loop in loops:
+        loop.start()
+    for _ in range(4):  # diagnostics come once a second
+        world.wait_for_diagnostics("control")
+    for loop in loops:
+        loop.kill()
+    assert world.wire.value(OVERRIDE) == 1.0
+    assert "has not run" not in node.output()
+
+
+def test_killed_in_the_middle_of_a_reset_it_leaves_xplane_running(tx, world):
+    node = tx("--version", "12")
+    paused = "sim/time/paused"
+    wire = WatchedDatarefs(world.xplane.port, paused)
+    place = {"latitude": 47.5, "longitude": 8.5, "altitude_msl": 900.0, "true_airspeed": 60.0}
+    assert call(world, "reset_flight", "ResetFlight", **place).success
+    wire.wait(paused, 1.0)
+    node.send_signal(signal.SIGKILL)
+    wire.wait(paused, 0.0)
+    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+    wire.close()
+
+
+def test_release_overrides_resumes_what_was_left_paused(world):
+    world.xplane = world.emulator("--no-beacon", "--start", "air")
+    paused, lever = "sim/time/paused", LEVER
+    wire = WatchedDatarefs(world.xplane.port, paused, lever, THROTTLES)
+    type(world).wire(world.xplane.port).send(
+        protocol.CommandRequest("sim/operation/pause_toggle"), protocol.DrefWrite(THROTTLES, 1.0)
+    )
+    wire.wait(paused, 1.0)
+    motors = [{"op": "dref", "path": lever, "value": 0.625, "confirm": False}]
+    motors.append({"op": "dref", "path": THROTTLES, "value": 0.0})
+    left_by_a_crash(world, {"override:" + THROTTLES: ("override", motors), "pause:x": ("pause", [{"op": "resume"}])})
+    release_overrides(world)
+    wire.wait(paused, 0.0)
+    wire.wait(lever, 0.625)
+    assert not journal_entries(world)
+    wire.close()
+
+
+def left_by_a_crash(world, entries):
+    """A journal with these entries, id: purpose and operations, of a process that is gone."""
+    folder = world.folder / "ros_home" / "xplane_bridge"
+    folder.mkdir(parents=True)
+    process = {"pid": 1, "start_ticks": 1, "boot_id": "another boot", "computer": socket.gethostname()}
+    owner = {"node": "/crashed", **process}
+    listed = [{"id": i, "purpose": purpose, "owner": owner, "undo": undo} for i, (purpose, undo) in entries.items()]
+    text = json.dumps({"format": "xplane_bridge journal", "version": 1, "entries": listed})
+    (folder / f"127.0.0.1_{world.xplane.port}.json").write_text(text, encoding="utf-8")
+
+
 def test_what_a_crash_left_and_xplane_does_not_know_is_said_once(world):
     from xplane_bridge.msg import EventList
 
     world.xplane = world.emulator("--no-beacon", "--start", "air")
-    folder = world.folder / "ros_home" / "xplane_bridge"
-    folder.mkdir(parents=True)
-    process = {"pid": 1, "start_ticks": 1, "boot_id": "another boot", "computer": socket.gethostname()}
     undo = [{"op": "dref", "path": "sim/operation/failures/rel_of_another_version", "value": 0.0}]
-    owner = {"node": "/crashed", **process}
-    entry = {"id": "override:rel_of_another_version", "purpose": "override", "owner": owner, "undo": undo}
-    text = json.dumps({"format": "xplane_bridge journal", "version": 1, "entries": [entry]})
-    (folder / f"127.0.0.1_{world.xplane.port}.json").write_text(text, encoding="utf-8")
+    entry = "override:rel_of_another_version"
+    left_by_a_crash(world, {entry: ("override", undo)})
     events = world.watch("events", EventList)
     world.set_param("aircraft", "fixed_wing")
     world.start("tx_node", tx_params())
-    events.wait_for(lambda e: any("could not be seen released" in event.text for event in e.events))
+    events.wait_for(lambda e: has(e, "could not be seen released"))
     for _ in range(4):  # seconds, in which it is tried again
         world.wait_for_diagnostics("control")
     assert sum("could not be seen released" in event.text for event in events.last.events) == 1
-    assert journal_entries(world) == [entry["id"]]
+    assert journal_entries(world) == [entry]
 
 
 def release_overrides(world):
@@ -219,9 +341,9 @@ def test_release_overrides_stops_a_node_that_flies_until_a_mode_is_asked_for(tx,
     world.manual.fly(fields=ROLL | FLAPS, roll=0.5, flaps=0.0)
     world.wire.wait(OVERRIDE, 1.0)
     # Shown as set for a while, as it is when somebody panics.
-    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick")
+    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick_roll")
     release_overrides(world)
-    world.events.wait_for(lambda e: "override_joystick was released by another client" in e.events[-1].text)
+    world.events.wait_for(lambda e: "override_joystick_roll was released by another client" in e.events[-1].text)
     told = world.events.wait_for(lambda e: "nothing is sent any more" in e.events[-1].text)
     assert "ask for a mode" in told.events[-1].text
     count = len(world.applied.messages)
@@ -241,14 +363,14 @@ def test_what_x_plane_releases_with_a_new_flight_is_taken_again(tx, world):
     tx()
     world.manual.fly(fields=ROLL, roll=0.5)
     world.wire.wait(OVERRIDE, 1.0)
-    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick")
+    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick_roll")
     other = type(world).wire(world.xplane.port)
     world.events.skip_to_now()
     other.send(protocol.CommandRequest("sim/operation/reset_flight"), protocol.DrefWrite(OVERRIDE, 0.0))
     world.events.then_wait_for(lambda e: e.events[-1].text == "the flight began anew")
     for _ in range(2):  # longer than it takes to see who has released it; 0 may be shown for one frame only
         status = world.wait_for_diagnostics("control")
-        assert world.values_of(status)["Overrides set"] == "override_joystick", status.message
+        assert world.values_of(status)["Overrides set"] == "override_joystick_roll", status.message
     world.wire.wait(OVERRIDE, 1.0)
     assert "override:" + OVERRIDE in journal_entries(world)
     world.manual.fly(roll=0.25)
@@ -270,14 +392,14 @@ def test_modes_are_switched_by_request_and_said(tx, world):
     world.wire.wait(STICK, 0.125)
 
 
-def test_auto_without_a_source_is_zero(tx, world):
+def test_auto_without_a_source_flies_the_failsafe(tx, world):
     tx()
     world.manual.fly(fields=ROLL | THROTTLE, roll=0.2, throttle=0.5)
     world.wire.wait(STICK, 0.2)
     request_mode(world, AUTO)
     world.wire.wait(STICK, 0.0)
-    world.wire.wait(LEVER, 0.0)
     assert world.mode.wait_for(lambda m: m.mode == AUTO and m.failsafe).auto_alive is False
+    assert world.wire.value(LEVER) == 0.5, "at idle it would glide down: it holds"
     assert world.applied.last.source == 3
 
 
@@ -354,6 +476,7 @@ def test_another_aircraft_is_not_flown(tx, world):
     world.manual.fly(fields=ROLL, roll=0.4)
     status = world.wait_for_diagnostics("control", lambda s: "QUAD" in s.message)
     assert "config/aircraft/fixed_wing.yaml is for DA62" in status.message
+    assert "scripts/aircraft_config" in status.message
     assert not world.applied.messages
     assert world.wire.value(OVERRIDE) == 0.0
 
@@ -369,6 +492,38 @@ def test_motors_take_the_throttle_override_and_give_it_back(tx, world):
     wait_until(lambda: "override:" + THROTTLES not in journal_entries(world), 10, "the journal entry's end")
 
 
+def test_axes_that_nobody_commands_stay_with_xplane(tx, world):
+    tx("--auto-coordination")
+    whole, heading = OVERRIDE[: -len("_roll")], OVERRIDE[: -len("roll")] + "heading"
+    pedals = "sim/joystick/yoke_heading_ratio"
+    wire = WatchedDatarefs(world.xplane.port, whole, heading, pedals)
+    world.manual.fly(fields=ROLL | PITCH, roll=0.3, pitch=0.1)
+    world.wire.wait(STICK, 0.3)
+    wait_until(lambda: abs(wire.value(pedals)) > 1e-3, 10, "a rudder that follows the sideslip")
+    assert wire.value(whole) == wire.value(heading) == 0.0
+    assert set(journal_entries(world)) == {"override:" + path for path in AXES - {heading}}
+    world.manual.fly(fields=ROLL | PITCH | YAW, yaw=-0.5)
+    wire.wait(heading, 1.0)
+    wire.wait(pedals, -0.5)
+    wire.close()
+
+
+def test_levers_are_where_the_motors_were_also_after_a_crash(tx, world):
+    node = tx("--aircraft", "multirotor", aircraft="multirotor")
+    world.manual.fly(fields=32, engine_count=4, motors=[0.55] * 4 + [0.0] * 4)
+    world.wire.wait(THROTTLES, 1.0)
+    wait_until(lambda: '"confirm": false' in journal_text(world), 10, "the levers in the journal")
+    assert world.wire.value(LEVER) != pytest.approx(0.55, abs=1e-3), "theirs is the cockpit"
+    node.send_signal(signal.SIGKILL)
+    world.wire.wait(THROTTLES, 0.0)
+    world.wire.wait(LEVER, 0.55, tolerance=0.02)
+
+
+def journal_text(world):
+    """The journals as they are."""
+    return "".join(_read(file).decode() for file in (world.folder / "ros_home" / "xplane_bridge").glob("*.json"))
+
+
 def test_handles_are_sent_on_change_only(tx, world):
     tx()
     world.manual.fly(fields=ROLL | FLAPS, flaps=0.5)
@@ -382,17 +537,65 @@ def test_handles_are_sent_on_change_only(tx, world):
     world.wire.wait(FLAP_HANDLE, 1.0, tolerance=0.02)
 
 
-def test_restarted_xplane_is_flown_on(tx, world):
-    tx()
-    world.manual.fly(fields=ROLL | FLAPS, roll=0.3, flaps=0.5)
-    world.wire.wait(OVERRIDE, 1.0)
-    world.wire.wait(FLAP_HANDLE, 0.5, tolerance=0.02)
+def restart_and_see_flown_on(world):
+    """The new X-Plane is commanded as the one before: roll 0.3, flaps 0.5."""
     world.xplane.restart()
     wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK, FLAP_HANDLE)
     wire.wait(OVERRIDE, 1.0, timeout=20)
     wire.wait(STICK, 0.3)
     wire.wait(FLAP_HANDLE, 0.5, tolerance=0.02)
     wire.close()
+
+
+def test_restarted_xplane_is_flown_on_by_the_stick(tx, world):
+    tx()
+    world.manual.fly(fields=ROLL | FLAPS, roll=0.3, flaps=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+    world.wire.wait(FLAP_HANDLE, 0.5, tolerance=0.02)
+    restart_and_see_flown_on(world)
+
+
+def test_restarted_xplane_is_not_flown_by_auto_until_it_is_asked_for(tx, world):
+    tx()
+    world.auto.fly(fields=ROLL, roll=0.3)
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    world.wire.wait(STICK, 0.3)
+    world.events.skip_to_now()
+    world.xplane.restart()
+    told = world.events.then_wait_for(lambda e: any("AUTO is off until" in event.text for event in e.events), 20)
+    assert any(e.kind == MODE and e.text.startswith("MANUAL: X-Plane was restarted") for e in told.events)
+    wait_until(lambda: world.mode.last.mode == MANUAL, 10, "the mode that the event tells")
+    wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK)
+    world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
+    wire.wait(OVERRIDE, 0.0)
+    assert world.mode.last.reason.startswith("X-Plane was restarted"), "not `start`"
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    wire.wait(STICK, 0.3)
+    wire.close()
+
+
+def test_restarted_xplane_is_flown_on_by_auto_where_that_is_asked_for(tx, world):
+    tx(resume_auto=True)
+    world.auto.fly(fields=ROLL | FLAPS, roll=0.3, flaps=0.5)
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    world.wire.wait(STICK, 0.3)
+    restart_and_see_flown_on(world)
+    assert world.mode.last.mode == AUTO
+
+
+def test_a_failsafe_is_an_event_and_a_warning(tx, world):
+    node = tx()
+    world.auto.fly(fields=ROLL, roll=0.3)
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    world.wire.wait(STICK, 0.3)
+    world.events.skip_to_now()
+    world.auto.stop()
+    begun = world.events.then_wait_for(lambda e: e.events[-1].text == "AUTO: failsafe: timeout of control/auto")
+    assert begun.events[-1].kind == MODE
+    world.auto.fly(roll=0.2)
+    world.events.then_wait_for(lambda e: e.events[-1].text == "AUTO: the failsafe ends: control/auto is back")
+    warned = [line for line in node.output().splitlines() if "failsafe" in line and "WARN" in line]
+    assert len(warned) == 2, node.output()
 
 
 def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
@@ -414,8 +617,9 @@ def test_x_plane_12_takes_commands_view_and_pause(tx, world):
     from std_srvs.srv import SetBool
 
     tx("--version", "12")
+    down, rear, view = (f"sim/graphics/view/{leaf}" for leaf in (VERTICAL_OFFSET, HORIZONTAL_OFFSET, "view_type"))
     other = WatchedDatarefs(
-        world.xplane.port, HEAD, "sim/time/paused", "sim/cockpit2/controls/flap_handle_request_ratio"
+        world.xplane.port, down, rear, view, "sim/time/paused", "sim/cockpit2/controls/flap_handle_request_ratio"
     )
     world.manual.fly(fields=ROLL | PITCH | THROTTLE | FLAPS, roll=0.25, pitch=-0.125, throttle=0.75, flaps=0.5)
     world.wire.wait(STICK, 0.25)
@@ -423,13 +627,33 @@ def test_x_plane_12_takes_commands_view_and_pause(tx, world):
     other.wait("sim/cockpit2/controls/flap_handle_request_ratio", 0.5)
     assert world.applied.wait_for(lambda a: a.read_back and a.sequence > 0).flaps == 0.5
     assert call(world, "set_view", "SetView", view=3).success
-    other.wait(HEAD, -90.0)
-    assert call(world, "set_view", "SetView", view=1).success
-    other.wait(HEAD, 0.0)
+    other.wait(down, -90.0)
+    other.wait(view, 1024.0)
+    assert "view:camera" in journal_entries(world)
+    answer = call(world, "set_view", "SetView", view=5, heading_deg=30.0, pitch_deg=-45.0, roll_deg=10.0)
+    assert answer.success
+    assert "heading 30.0, pitch -45.0, roll 10.0 deg" in answer.result.message
+    assert call(world, "set_view", "SetView", view=4, field_of_view_deg=75.0).success
+    other.wait(view, 1026.0)
     for paused in (True, False):
         assert world.call("tx_node/pause", SetBool, paused).success
         other.wait("sim/time/paused", float(paused))
     other.close()
+
+
+def test_view_is_given_back(tx, world):
+    node = tx()
+    paths = [f"sim/graphics/view/{leaf}" for leaf in (VERTICAL_OFFSET, "view_type", "field_of_view_deg")]
+    wire = WatchedDatarefs(world.xplane.port, *paths)
+    assert call(world, "set_view", "SetView", view=3, field_of_view_deg=80.0).success
+    for path, value in zip(paths, (-90.0, 1024.0, 80.0)):
+        wire.wait(path, value)
+    node.send_signal(signal.SIGINT)
+    for path, value in zip(paths, (0.0, 1000.0, 60.0)):
+        wire.wait(path, value)
+    node.wait(10)
+    assert journal_entries(world) == []
+    wire.close()
 
 
 def test_override_set_by_service_is_given_back(tx, world):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+import json
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -77,6 +80,48 @@ def test_the_rviz_configuration_shows_what_exists() -> None:
             assert TOPICS[display[key][len(NAMESPACE) + 1 :]] == msgtype
             seen += 1
     assert seen == len(wanted)
+
+
+def test_the_rqt_perspective_plots_what_the_paper_does_and_shows_the_picture(definitions: Definitions) -> None:
+    document = json.loads((ROOT / "config/views/flight.perspective").read_text(encoding="utf-8"))
+    manager = document["groups"]["pluginmanager"]
+    running = ast.literal_eval(manager["keys"]["running-plugins"]["repr"])
+    assert running == {"rqt_plot/Plot": [1, 2, 3], "rqt_image_view/ImageView": [1]}
+    settings = {}
+    for plugin, numbers in running.items():
+        for number in numbers:
+            keys = manager["groups"][f"plugin__{plugin.replace('/', '__')}__{number}"]["groups"]["plugin"]["keys"]
+            settings[plugin, number] = {name: ast.literal_eval(key["repr"]) for name, key in keys.items()}
+    assert len(settings) == len(manager["groups"])
+    plotted = [settings["rqt_plot/Plot", number]["topics"] for number in (1, 2, 3)]
+    state = f"{NAMESPACE}/flight_state/"
+    paper = (["roll_deg", "pitch_deg"], ["heading_true_deg"], ["true_airspeed"])  # Fig. 10 b
+    assert plotted == [[state + field for field in fields] for fields in paper]
+    for name in (name for names in plotted for name in names):
+        check(definitions, name)
+    image = settings["rqt_image_view/ImageView", 1]["topic"]
+    assert TOPICS[image[len(NAMESPACE) + 1 :]] == "sensor_msgs/Image"
+
+
+def panels_of(node: Any) -> list:
+    return [node] if isinstance(node, str) else [*panels_of(node["first"]), *panels_of(node["second"])]
+
+
+def test_the_foxglove_layout_shows_what_exists(definitions: Definitions) -> None:
+    document = json.loads((ROOT / "config/views/foxglove.json").read_text(encoding="utf-8"))
+    panels = document["configById"]
+    assert sorted(panels_of(document["layout"])) == sorted(panels)  # each once
+    fields, topics = [], []
+    for panel in panels.values():
+        fields += [path["value"] for path in panel.get("paths", [])]
+        topics += [panel[key] for key in ("topicPath", "topicToRender") if key in panel]
+        topics += [panel["imageMode"]["imageTopic"]] if "imageMode" in panel else []
+    assert len(fields) >= 10
+    for field in fields:
+        check(definitions, field.replace(".", "/"))
+    assert len(topics) == 3
+    for topic in topics:
+        assert topic == "/diagnostics" or topic[len(NAMESPACE) + 1 :] in TOPICS, topic
 
 
 def test_every_topic_has_a_type_that_exists(definitions: Definitions) -> None:

@@ -18,7 +18,7 @@ SOURCES = "lib/core/state/sources.txt"
 @pytest.fixture(name="copy")
 def fixture_copy(tmp_path):
     """A copy of all that the program reads, to be changed."""
-    for folder in ("cmake", "msg", "srv"):
+    for folder in ("cmake", "migration", "msg", "srv"):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "lib/core/state").mkdir(parents=True)
     shutil.copy(ROOT / SOURCES, tmp_path / SOURCES)
@@ -45,6 +45,31 @@ def test_the_committed_constants_are_up_to_date(copy):
     )
 
 
+def test_the_committed_migration_is_up_to_date(copy):
+    assert run(copy, "migration").returncode == 0
+    for name in ("migration/0.1.0.bmr", "src/xplane_bridge/bags/later_fields.py"):
+        made = (copy / name).read_text(encoding="utf-8")
+        assert made == (ROOT / name).read_text(encoding="utf-8"), "run python3 cmake/message_code migration"
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("float32 fuel_total", "float32 fuel_sum"),  # another name
+        ("float32 fuel_total", "float64 fuel_total"),  # another type
+        ("float32[9] fuel_tank ", "float32 first\nfloat32[9] fuel_tank "),  # another place
+    ],
+)
+def test_a_change_that_recordings_do_not_survive_is_refused(copy, old, new):
+    change(copy / "msg/FuelState.msg", old, new)
+    change(copy / SOURCES, "\nfuel_total ", "\nfuel_sum " if "sum" in new else "\nfuel_total ")
+    if "first" in new:
+        change(copy / SOURCES, "\nfuel_tank ", "\nfirst | - | sim/a/b | |\nfuel_tank ")
+    done = run(copy, "migration")
+    assert done.returncode == 1
+    assert re.search("FuelState: recordings have .* write new fields at the end", done.stderr)
+
+
 ENGINES = "msg/EngineStates.msg"
 N2 = "float32[8] n2 "
 
@@ -55,8 +80,8 @@ N2 = "float32[8] n2 "
         (ENGINES, N2, f"float32[8] n3  # [%]\n{N2}", "EngineStates: n3 has no line in lib/core/state/sources.txt"),
         (ENGINES, N2, "# ", r"EngineStates has no field n2 \(did you mean n1\?\): correct the name"),
         (SOURCES, "\nn2  ", "\nn1  ", "EngineStates.*n1 has 2 lines|EngineStates: n2 has no line"),
-        (ENGINES, "VALID_ALL = 8388607", "VALID_ALL = 7", "EngineStates: VALID_ALL is 7, expected 8388607"),
-        ("msg/FuelState.msg", "VALID_ALL = 7", "VALID_ALL = 3", "FuelState: VALID_ALL is 3, expected 7"),
+        (ENGINES, "VALID_ALL = 2147483647", "VALID_ALL = 7", "EngineStates: VALID_ALL is 7, expected 2147483647"),
+        ("msg/FuelState.msg", "VALID_ALL = 15", "VALID_ALL = 3", "FuelState: VALID_ALL is 3, expected 15"),
         (SOURCES, "| CG  ", "| CGG ", "FuelState has no bit VALID_CGG"),
         (SOURCES, "| CG  ", "| -   ", "FuelState: no field counts for VALID_CG"),
         (SOURCES, "62.0 (lb)", "62.0 (lbs)", r"sources.txt:\d+: unit lbs: expected one of .*lb"),

@@ -156,6 +156,8 @@ MAY_USE_HOST_TIME = {
         "waits for the master before there is a node, and for roscpp to send the last words",
         {"sleep_for"},
     ),
+    "include/xplane_bridge/nodes/tx/tx_node.hpp": ("shows its guardian that it runs", {"SteadyTimer"}),
+    "lib/nodes/tx/tx_node.cpp": ("the same, also while the node's clock stands", {"createSteadyTimer"}),
     "lib/actuation/guardian.cpp": ("a process of its own: releases whatever clock the node had", {"hostClock("}),
     "lib/vision/video_source.cpp": ("devices and files play in the host's time", {"steady_clock", "sleep_until"}),
     "lib/vision/x11_window_source.cpp": ("windows are drawn in the host's time", {"steady_clock"}),
@@ -235,7 +237,7 @@ def test_cmake_lists_every_message_and_service(command, folder, suffix):
 
 def launchers():
     return {
-        p.name: re.search(r'^ +launch\("(\w+)"\)', p.read_text(encoding="utf-8"), re.MULTILINE).group(1)
+        p.name: re.search(r'^ +launch\("([\w.]+)"\)', p.read_text(encoding="utf-8"), re.MULTILINE).group(1)
         for p in (ROOT / "scripts").iterdir()
         if p.is_file() and "from launcher import launch" in p.read_text(encoding="utf-8")
     }
@@ -250,7 +252,7 @@ def test_every_launcher_starts_a_program_that_exists():
 def test_pip_installs_the_same_programs():
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     section = re.search(r"^\[project\.scripts\]\n(.*?)^\[", project, re.MULTILINE | re.DOTALL).group(1)
-    scripts = dict(re.findall(r'^(\w+) = "xplane_bridge\.cli\.(\w+):main"$', section, re.MULTILINE))
+    scripts = dict(re.findall(r'^(\w+) = "xplane_bridge\.cli\.([\w.]+):main"$', section, re.MULTILINE))
     assert scripts == launchers()
 
 
@@ -334,3 +336,34 @@ def test_files_end_with_a_newline_and_lines_without_spaces():
         if not text.endswith("\n") or re.search(r"[ \t]+$", text, re.MULTILINE) or "\r" in text:
             wrong.append(str(path.relative_to(ROOT)))
     assert not wrong
+
+
+# ------------------------------------------------------------------------------------------------------------- sizes
+
+
+def data_members(header):
+    """Names of the data members of the only class in a header."""
+    body = without_comments(header).split("private:", 1)[1]
+    return re.findall(r"^  [^()\n]*?\b(\w+_)(?: = [^;]*|\{[^;]*\})?;", body, re.MULTILINE)
+
+
+def test_data_members_are_found():
+    lines = ["void f(int a_);", "int one_ = 0;  // two_", "std::map<int, int> two_;", "X three_{1};"]
+    assert data_members("class A {\n private:\n  " + "\n  ".join(lines) + "\n};") == ["one_", "two_", "three_"]
+
+
+def test_tx_node_is_topics_services_and_diagnostics_only():
+    """What it does beyond that stands in classes of actuation/, which are tested without ROS."""
+    files = sorted((ROOT / "lib" / "nodes" / "tx").glob("tx_node*.cpp"))
+    assert [file.name for file in files] == ["tx_node.cpp"]
+    assert len(files[0].read_text(encoding="utf-8").splitlines()) < 300
+    header = ROOT / "include" / "xplane_bridge" / "nodes" / "tx" / "tx_node.hpp"
+    members = data_members(header.read_text(encoding="utf-8"))
+    assert "actuation_" in members
+    assert len(members) < 20
+
+
+def test_no_source_of_actuation_is_long():
+    lines = {f.name: len(f.read_text(encoding="utf-8").splitlines()) for f in sources("lib/actuation", "lib/nodes/tx")}
+    assert "control_path.cpp" in lines
+    assert not {name: count for name, count in lines.items() if count > 500}

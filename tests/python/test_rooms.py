@@ -20,7 +20,7 @@ ROS = re.compile(
     r"^(ros(py|lib|bag|graph|launch|node|topic|service|param|msg)|tf2?|tf2_\w+|actionlib|message_filters|cv_bridge|"
     r"genpy|(\w+_)?msgs|std_srvs|xplane_bridge\.(msg|srv))(\.|$)"
 )
-ROS_ROOMS = {"cli", "harness", "scenario"}
+ROS_ROOMS = {"cli", "harness", "lockstep", "scenario"}
 #: Rooms for machines that have neither, also by way of the rooms they import.
 WITHOUT_ROS_AND_EMULATOR = {"doctor", "eye"}
 

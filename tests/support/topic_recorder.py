@@ -37,7 +37,12 @@ def _frame_state(message: FrameState) -> Dict[str, Any]:
 
 def _flight_state(state: FlightState) -> Dict[str, Any]:
     attitude = {"roll": state.roll_deg, "pitch": state.pitch_deg, "heading": state.heading_true_deg}
-    return {"sim_time": state.sim_time, "control_roll": state.control_roll, **attitude}
+    return {
+        "sim_time": state.sim_time,
+        "altitude": state.altitude_msl,
+        "control_roll": state.control_roll,
+        **attitude,
+    }
 
 
 def _mode(mode: ControlMode) -> Dict[str, Any]:

@@ -146,6 +146,8 @@ def journal_entries(world: Any) -> list[str]:
     """What the journals of the world's nodes say is to be undone."""
     entries: list[str] = []
     for file in (world.folder / "ros_home" / "xplane_bridge").glob("*.json"):
+        if file.stem.endswith("_subscriptions"):
+            continue
         try:
             text = file.read_text(encoding="utf-8")
         except FileNotFoundError:  # removed since it was listed: nothing is to be undone any more

@@ -1,0 +1,58 @@
+"""Shipped flights through the bridge: emulator, nodes, player and fly_controller; in real time and in lock-step."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.resources import program
+
+
+def fly(name: str, folder: Path, *options: str) -> dict:
+    """Flies a scenario; gives its report. Every criterion is met."""
+    command = [sys.executable, str(program("run_scenario")), name, "--output", str(folder), *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=550, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    report = json.loads((folder / "scores.json").read_text(encoding="utf-8"))
+    assert report["played"]["finished"]
+    assert report["criteria"]
+    return report
+
+
+def test_the_quadrotor_flies_its_square_through_the_bridge_in_real_time(tmp_path):
+    labels = fly("quadrotor_square", tmp_path / "out")["played"]["labels"]
+    assert labels["touchdown"] > labels["hover"] + 20.0
+
+
+@pytest.mark.parametrize("name", ["engine_out_after_takeoff", "tiltrotor_conversion", "twin_circuit"])
+@pytest.mark.full
+def test_flights_meet_their_criteria_in_lock_step(tmp_path, name):
+    fly(name, tmp_path / "out", "--lockstep")
+
+
+def test_a_blocked_pitot_misleads_the_pilots_indicator_and_not_the_controller(tmp_path):
+    fly("blocked_pitot", tmp_path / "out", "--lockstep")
+    with Bags(tmp_path / "out" / "flight.bag") as bags:
+        shown, true = bags.read("/xplane/mission/instruments"), bags.read("/xplane/flight_state")
+    time = shown["sim_time"] - true["sim_time"][0]
+    speeds = np.interp(shown["sim_time"], true["sim_time"], true["calibrated_airspeed"])
+    pilot, copilot = (np.abs(shown["airspeed"][:, seat] - speeds) for seat in (0, 1))
+    assert pilot[time < 14.0].max() < 1.0
+    assert pilot[(time > 60.0) & (time < 200.0)].max() > 8.0  # the total pressure of another height
+    assert copilot.max() < 1.0  # a tube of its own
+
+
+def test_a_bus_that_fails_is_seen_and_flown_without(tmp_path):
+    fly("bus_failure", tmp_path / "out", "--lockstep")
+    with Bags(tmp_path / "out" / "flight.bag") as bags:
+        electrical, began = bags.read("/xplane/mission/electrical"), bags.read("/xplane/flight_state")["sim_time"][0]
+    time, volts = electrical["sim_time"] - began, electrical["bus_voltage"]
+    assert volts[time < 9.0, 0].min() > 20.0
+    assert volts[(time > 12.0) & (time < 55.0), 0].max() < 0.1
+    assert volts[:, 1].min() > 20.0

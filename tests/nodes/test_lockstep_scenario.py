@@ -1,0 +1,167 @@
+"""run_scenario --lockstep: the same bytes on every topic each time, however the processes are delayed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from xplane_bridge.resources import program
+
+#: Not promised to be the same.
+NOT_COMPARED = {"/diagnostics"}
+#: Default tests; LOCKSTEP_RUNS=10 flies the ten of the promise.
+RUNS = int(os.environ.get("LOCKSTEP_RUNS", "4"))
+SCENARIO = """
+name: lockstep
+aircraft: fixed_wing
+start: {altitude: 800, speed: 65, heading: 90}
+events:
+  - {at: 0, hold: {roll: 0, climb: 0, speed: 65}, mode: auto}
+  - {at: 0.5, mode: manual}
+  - {at: 1, hold: {roll: 25}, label: turn}
+  - {at: 2, excitation: {kind: doublet, target: pitch, amplitude: 0.05, duration: 1}}
+  - {at: 3, failure: {name: engine_1}, label: broken}
+  - {at: 4, clear_failures: true, mode: auto}
+  - {after: 0.1, when: {mode: auto}, timeout: 3, label: automatic}
+  - {at: 6, mode: manual, hold: {roll: 0}}
+  - {after: 0.5, when: {mode: manual, stall_warning: false}, timeout: 3, label: manual}
+  - {at: 8, end: true}
+"""
+
+
+def children_of(pid: int) -> list[int]:
+    """A process's children, theirs, and so on."""
+    parents = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            parents[int(folder.name)] = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            continue
+    found: list[int] = []
+    new = {pid}
+    while new:
+        new = {child for child, parent in parents.items() if parent in new}
+        found += new
+    return found
+
+
+def shake(flying: subprocess.Popen, seed: int) -> None:
+    """Stops and continues a flight's processes at random until it ends."""
+    dice = random.Random(seed)
+    while flying.poll() is None:
+        pid = dice.choice([*children_of(flying.pid), 0])
+        if pid == 0:
+            continue
+        try:
+            os.kill(pid, signal.SIGSTOP)
+            time.sleep(dice.uniform(0.0, 0.1))
+            os.kill(pid, signal.SIGCONT)
+        except ProcessLookupError:
+            continue
+        time.sleep(dice.uniform(0.0, 0.1))
+
+
+def fly(folder: Path, *options: str, seed: int | None = None, scenario: str = SCENARIO) -> Path:
+    """Flies it, shaken where there is a seed; gives the recording."""
+    folder.mkdir()
+    file = folder / "scenario.yaml"
+    file.write_text(scenario, encoding="utf-8")
+    command = [sys.executable, str(program("run_scenario")), str(file), "--lockstep", "--output", str(folder / "out")]
+    with (folder / "log").open("w") as log:
+        flying = subprocess.Popen([*command, *options], stdout=log, stderr=subprocess.STDOUT)
+        try:
+            if seed is not None:
+                shake(flying, seed)
+            flying.wait(300)
+        finally:
+            flying.kill()
+    said = (folder / "log").read_text(encoding="utf-8")
+    assert flying.returncode == 0, said
+    print(said)
+    return folder / "out" / "flight.bag"
+
+
+def payloads(bag: Path) -> dict[str, list[bytes]]:
+    """What each topic brought."""
+    import rosbag
+
+    found: dict[str, list[bytes]] = {}
+    with rosbag.Bag(str(bag)) as opened:
+        for topic, (_, payload, *_), _ in opened.read_messages(raw=True):
+            found.setdefault(topic, []).append(payload)
+    return found
+
+
+def hashes(found: dict[str, list[bytes]]) -> dict[str, tuple[int, str]]:
+    """Number of messages and sha256 of each topic."""
+    return {
+        topic: (len(kept), hashlib.sha256(b"".join(kept)).hexdigest())
+        for topic, kept in found.items()
+        if topic not in NOT_COMPARED
+    }
+
+
+def test_runs_with_joystick_mode_failure_and_excitation_are_the_same_bytes(tmp_path):
+    options = ["--joystick", "logitech_extreme_3d_pro", "--controller", f"{program('attitude_hold')} --roll 5"]
+    options += ["--seed", "7", "--emulator=--turbulence 1"]
+    flights = []
+    for number in range(RUNS):
+        bag = fly(tmp_path / str(number), *options, seed=number if number % 2 else None)
+        flights.append(hashes(payloads(bag)))
+        played = json.loads((bag.parent / "played.json").read_text(encoding="utf-8"))
+        assert played["finished"]
+        assert set(played["labels"]) == {"turn", "broken", "automatic", "manual"}
+        assert played["labels"]["automatic"] == pytest.approx(4.25, abs=0.2)
+    frames = flights[0]["/xplane/flight_state"][0]
+    assert frames == pytest.approx(480, abs=5)
+    assert flights[0]["/xplane/joy"][0] == frames
+    assert flights[0]["/xplane/control/auto"][0] == frames
+    for flight in flights[1:]:
+        differing = {
+            topic: (seen, flight.get(topic)) for topic, seen in flights[0].items() if flight.get(topic) != seen
+        }
+        assert not differing
+        assert flight.keys() == flights[0].keys()
+
+
+def test_another_seed_is_another_flight(tmp_path):
+    one, other = (
+        hashes(payloads(fly(tmp_path / seed, "--seed", seed, "--duration", "2", "--emulator=--turbulence 1")))
+        for seed in ("1", "2")
+    )
+    assert one["/xplane/flight_state"][0] == other["/xplane/flight_state"][0] == 120
+    assert one["/xplane/flight_state"] != other["/xplane/flight_state"]
+
+
+def test_speed_is_a_limit(tmp_path):
+    began = time.monotonic()
+    bag = fly(tmp_path / "slow", "--speed", "1", "--duration", "4")
+    assert time.monotonic() - began > 4.0
+    assert len(payloads(bag)["/xplane/flight_state"]) == 240
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--lockstep", "--transport", "data"], "--transport rref"),
+        (["--speed", "2"], "needs --lockstep"),
+    ],
+)
+def test_what_cannot_be_flown_in_lockstep_is_said(tmp_path, options, message):
+    done = subprocess.run(
+        [sys.executable, str(program("run_scenario")), "identification", "--output", str(tmp_path / "out"), *options],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert message in done.stderr

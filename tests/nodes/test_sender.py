@@ -1,0 +1,242 @@
+"""capture_node with the pictures that xplane_eye sends: emulator's window, sender and node, on an Xvfb."""
+
+from __future__ import annotations
+
+import csv
+import random
+import socket
+import threading
+import time
+from pathlib import Path
+from typing import Iterator
+
+import numpy as np
+import pytest
+
+from xplane_bridge.emulator.view.renderer import read_strip
+from xplane_bridge.harness import ManagedProcess, wait_until
+from xplane_bridge.harness.display import VirtualDisplay
+from xplane_bridge.harness.ros import free_port
+from xplane_bridge.resources import program
+
+FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
+FPS = 20
+#: Three periods of perfectly regular frames: timing alone cannot tell this from none. Longer than any drawing takes.
+PIPELINE_DELAY_S = 0.15
+#: A picture that appeared this much off its time, as the machine was busy, says nothing about the pairing.
+LATE_S = 0.2 / FPS
+
+
+@pytest.fixture(scope="module")
+def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with VirtualDisplay(tmp_path_factory.mktemp("display")) as server:
+        yield server.display
+
+
+@pytest.fixture(autouse=True)
+def _screen(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DISPLAY", display)
+
+
+class Relay:
+    """A way to capture_node that stands still at random, as a network that loses packets does."""
+
+    def __init__(self, to_port: int, chance: float, stall_s: float) -> None:
+        self._to_port = to_port
+        self._chance = chance
+        self._stall_s = stall_s
+        self._draw = random.Random(4)
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = self._server.getsockname()[1]
+        self.stalls = 0
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        while True:
+            try:
+                eye, _ = self._server.accept()
+            except OSError:
+                return
+            try:
+                node = socket.create_connection(("127.0.0.1", self._to_port))
+            except OSError:  # capture_node does not listen yet
+                eye.close()
+                continue
+            threading.Thread(target=self._carry, args=(node, eye, 0.0), daemon=True).start()
+            self._carry(eye, node, self._chance)
+
+    def _carry(self, source: socket.socket, target: socket.socket, chance: float) -> None:
+        try:
+            while True:
+                data = source.recv(1448)  # a packet of an Ethernet
+                if not data:
+                    break
+                if self._draw.random() < chance:
+                    self.stalls += 1
+                    time.sleep(self._stall_s)
+                target.sendall(data)
+        except OSError:
+            pass
+        target.close()
+
+    def close(self) -> None:
+        self._server.close()
+
+
+class Scene:
+    """Emulator, rx_node, capture_node and, when asked for, the eye."""
+
+    def __init__(self, world, folder: Path) -> None:
+        from sensor_msgs.msg import CompressedImage, Image
+        from xplane_bridge.msg import FrameState
+
+        self.world = world
+        self.folder = folder
+        self.port = free_port()
+        self.emulator = world.emulator(
+            "--window",
+            "--fps",
+            FPS,
+            "--pipeline-delay",
+            f"{PIPELINE_DELAY_S}s",
+            "--swap-log",
+            folder / "swaps.csv",
+            "--start",
+            "air",
+        )
+        world.start("rx_node")
+        params = {"source": "sender", "sender": {"listen": f"127.0.0.1:{self.port}", "token": "window seat"}}
+        self.node = world.start("capture_node", {**params, "max_rate": 0.0})
+        self.images = world.watch("camera/image_raw", Image)
+        self.jpegs = world.watch("camera/image_raw/compressed", CompressedImage)
+        self.states = world.watch("camera/frame_state", FrameState)
+
+    def eye(self, *options: str, port: int = 0) -> ManagedProcess:
+        """Not started yet."""
+        token = self.folder / "token"
+        token.write_text("window seat\n", encoding="utf-8")
+        where = [f"127.0.0.1:{port or self.port}", "--xplane", f"127.0.0.1:{self.emulator.port}", "--local-port", "0"]
+        own = ["--undo-file", self.folder / "undo.json", "--token-file", token]
+        return ManagedProcess("xplane_eye", [program("xplane_eye"), *where, *own, *options], self.folder)
+
+    def judged(self) -> list:
+        """State and strip of each picture that the emulator showed when it was due; ends the emulator."""
+        self.emulator.stop()
+        offset = time.time_ns() - time.monotonic_ns()
+        with (self.folder / "swaps.csv").open() as file:
+            late = {
+                int(row["frame"]): (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9
+                for row in csv.DictReader(file)
+            }
+        by_stamp = {state.header.stamp: state for state in self.states.messages}
+        pairs = []
+        for image in list(self.images.messages):
+            shown = read_strip(np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3))
+            on_time = abs(late.get(shown.frame, 1.0) - PIPELINE_DELAY_S) < LATE_S
+            if on_time and image.header.stamp in by_stamp:
+                pairs.append((by_stamp[image.header.stamp], shown))
+        return pairs
+
+
+@pytest.fixture
+def scene(world, tmp_path: Path) -> Scene:
+    return Scene(world, tmp_path)
+
+
+def check_exact(pairs: list, at_least: int) -> None:
+    """Each unflagged picture carries the very frame that it shows."""
+    perfect = [(state, shown) for state, shown in pairs if state.quality == 0]
+    wrong = [
+        (shown.frame, shown.sim_time, state.frame_sim_time)
+        for state, shown in perfect
+        if np.float32(state.frame_sim_time) != np.float32(shown.sim_time)
+        or state.state.sim_time != np.float32(shown.sim_time)
+    ]
+    assert wrong == []
+    assert len(perfect) >= at_least
+
+
+def test_regular_frames_and_a_delay_of_three_periods_are_paired_exactly(scene: Scene) -> None:
+    import cv2
+
+    with scene.eye() as eye:
+        eye.wait_for_line(r"delay: (\d+\.\d) ms, from", 90.0)
+        scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
+        scene.images.wait_for_count(80, timeout=60.0)
+        jpegs, images = scene.jpegs.messages[-20:], {image.header.stamp: image for image in scene.images.messages}
+        pairs = scene.judged()
+    check_exact(pairs, 30)
+    assert [state.display_delay for state, _ in pairs] == pytest.approx([PIPELINE_DELAY_S] * len(pairs), abs=LATE_S)
+    compared = 0
+    for jpeg in jpegs:  # image_raw is what the sender's own JPEG decodes to
+        if jpeg.header.stamp in images:
+            compared += 1
+            decoded = cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR)
+            assert decoded.tobytes() == images[jpeg.header.stamp].data
+    assert compared >= 5
+    image = next(iter(images.values()))
+    assert (image.width, image.height, image.encoding) == (640, 480, "bgr8")
+
+
+def test_a_delay_that_is_not_measured_is_flagged_on_each_picture(scene: Scene) -> None:
+    from xplane_bridge.msg import FrameState
+
+    with scene.eye("--no-calibrate"):
+        scene.images.wait_for_count(40, timeout=90.0)
+        pairs = scene.judged()
+    assert pairs
+    assert all(state.quality & FrameState.QUALITY_DELAY_ASSUMED for state, _ in pairs)
+    assert all(state.frame_sim_time > shown.sim_time for state, shown in pairs), "none should be right by itself"
+
+
+@pytest.mark.parametrize(("chance", "stall_s"), [(0.004, 0.2), (0.02, 0.2)], ids=["stalls", "loses packets"])
+def test_a_poor_network_costs_pictures_and_mispairs_none(scene: Scene, chance: float, stall_s: float) -> None:
+    relay = Relay(scene.port, chance, stall_s)
+    try:
+        with scene.eye("--delay", str(PIPELINE_DELAY_S), port=relay.port):
+            scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
+            first, began = len(scene.images.messages), time.monotonic()
+            wait_until(lambda: relay.stalls >= 20 and len(scene.images.messages) > first + 60, 90.0, "stalls")
+            came, due = len(scene.images.messages) - first, FPS * (time.monotonic() - began)
+            pairs = scene.judged()
+    finally:
+        relay.close()
+    assert came < due
+    check_exact(pairs, 15)
+
+
+def test_the_next_start_gives_the_field_of_view_back_after_a_kill(scene: Scene) -> None:
+    wire = scene.world.wire(scene.emulator.port)
+    own = wire.read(FIELD_OF_VIEW)
+    while wire.read(FIELD_OF_VIEW) == own:  # killed between two steps, it may leave the user's value
+        eye = scene.eye()
+        eye.start()
+        wait_until(lambda: wire.read(FIELD_OF_VIEW) != own, 60.0, "a step of the field of view")
+        eye.kill()
+    with scene.eye("--no-calibrate"):
+        wire.wait_until_reads(FIELD_OF_VIEW, own)
+        wait_until(lambda: not (scene.folder / "undo.json").exists(), 15.0, "the end of the note")
+
+
+def test_a_wrong_token_and_a_missing_sender_are_said(scene: Scene) -> None:
+    missing = scene.world.wait_for_diagnostics("capture", lambda status: status.level == 2, timeout=30.0)
+    assert f"no xplane_eye on 127.0.0.1 has connected to 127.0.0.1:{scene.port}" in missing.message
+    eye = scene.eye("--no-calibrate")
+    (scene.folder / "token").write_text("aisle seat", encoding="utf-8")
+    with eye:
+        eye.wait_for_line("the token is not the one in capture_node's sender/token", 30.0)
+        scene.world.wait_for_diagnostics("capture", lambda status: "sender/token" in status.message, timeout=30.0)
+
+
+@pytest.mark.parametrize(
+    ("sender", "text"),
+    [
+        ({}, 'listen ""'),
+        ({"listen": "49790"}, 'listen "49790"'),
+        ({"listen": "127.0.0.1:9", "peer": "pc"}, 'peer "pc"'),
+    ],
+)
+def test_wrong_addresses_are_refused_in_words(world, sender: dict, text: str) -> None:
+    node = world.start("capture_node", {"source": "sender", **({"sender": sender} if sender else {})})
+    assert node.wait(20.0) == 1
+    assert text in node.output()

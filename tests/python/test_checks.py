@@ -1,0 +1,53 @@
+"""The checks of scripts/test: one list for it, pre-commit and the pages that name them."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+
+import yaml
+
+from support.room_table import ROOT
+
+TEST = (ROOT / "scripts/test").read_text(encoding="utf-8")
+
+
+def names(variable: str) -> list[str]:
+    """The words of a list of scripts/test; a list that it starts with is written out."""
+    words = re.search(rf"^{variable}=\((.*)\)$", TEST, re.MULTILINE).group(1)
+    first, _, rest = words.partition('"${static_checks[@]}"')
+    return first.split() if first else [*names("static_checks"), *rest.split()]
+
+
+def test_pre_commit_runs_the_checks_that_need_no_build_and_no_others():
+    config = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))
+    hooks = [hook for repo in config["repos"] if repo["repo"] == "local" for hook in repo["hooks"]]
+    assert [hook["entry"] for hook in hooks] == [f"scripts/test --only {name}" for name in names("static_checks")]
+    assert [hook["id"] for hook in hooks] == names("static_checks")
+    assert not any(hook["pass_filenames"] for hook in hooks)
+
+
+def test_every_check_is_a_function_and_in_the_help():
+    shown = subprocess.run([ROOT / "scripts/test", "--help"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    for name in names("all_checks"):
+        assert re.search(rf"^check_{name}\(\) {{", TEST, re.MULTILINE), name
+        assert re.search(rf"^  (.*  )?{name} {{2,}}\S", shown, re.MULTILINE), name
+
+
+def test_a_check_that_is_none_is_refused_with_the_list():
+    done = subprocess.run(
+        [ROOT / "scripts/test", "--only", "format,typos"], stderr=subprocess.PIPE, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr == f"test: there is no check typos; there are: {' '.join(names('all_checks'))}\n"
+
+
+def test_the_workflow_runs_the_command_of_the_readme_on_both_systems():
+    workflow = yaml.safe_load((ROOT / ".github/workflows/checks.yaml").read_text(encoding="utf-8"))
+    assert set(workflow["jobs"]) == {"debian_12", "ubuntu_20_04"}
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for name, job in workflow["jobs"].items():
+        commands = [step["run"] for step in job["steps"] if "run" in step]
+        assert commands[-1] == "scripts/test", name
+        assert re.search(rf"^{commands[-1]} +# every check", readme, re.MULTILINE)
+        assert job["runs-on"] == "ubuntu-latest", f"{name}: a public runner"
