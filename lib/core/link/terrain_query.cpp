@@ -10,7 +10,7 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr int kLook_ms = 50;
+constexpr int kLookMs = 50;
 constexpr int kLooksAtOneQuestion = 6;  // a datagram may be lost
 
 std::string nothingAnswers(const Endpoint& plugin, bool refused) {
@@ -44,11 +44,11 @@ TerrainAnswer askTerrain(const Endpoint& plugin, double latitude_deg, double lon
   if (!size) return {std::nullopt, std::string("the place cannot be asked for: ") + toString(size.error())};
   try {
     UdpSocket socket{UdpSocketOptions{}};
-    const int looks = static_cast<int>(std::ceil(1e3 * timeout_s / kLook_ms));
+    const int looks = static_cast<int>(std::ceil(1e3 * timeout_s / kLookMs));
     for (int look = 0; look < looks && !stopping(); ++look) {
       if (look % kLooksAtOneQuestion == 0) socket.sendTo({question.data(), *size}, plugin);
       pollfd waiting{socket.fd(), POLLIN, 0};
-      ::poll(&waiting, 1, kLook_ms);
+      ::poll(&waiting, 1, kLookMs);
       if (const auto answer = read(&socket, plugin)) return *answer;
       if (socket.counters().refused > 0) return {std::nullopt, nothingAnswers(plugin, true)};
     }

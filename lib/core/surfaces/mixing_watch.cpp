@@ -164,9 +164,10 @@ std::string MixingWatch::notShown() const {
 }
 
 std::string MixingWatch::refusal() const {
-  if (!model_)
+  if (!model_) {
     return "how the surfaces are moved is not identified yet: call identify_surfaces, or move the stick: " +
            quality_.text();
+  }
   if (off_count_ < kChecked) {
     return "the surfaces have not been seen to follow their mixing for half a second of steady stick yet";
   }

@@ -18,7 +18,7 @@ constexpr std::int32_t kFenceIndex = 0x4C530000;  // far from all indices that a
 constexpr std::int32_t kFenceElements = 3;
 constexpr std::int32_t kFenceRate = 1000;
 constexpr std::size_t kRateAt = 5;    // of a request: after the label
-constexpr int kLongestWait_ms = 5;    // while the clock goes at the host's pace
+constexpr int kLongestWaitMs = 5;    // while the clock goes at the host's pace
 constexpr int kPassesAfterClose = 2;  // of the link: calls posted by the first are carried out in the second
 constexpr std::int64_t kAskAgainNs = 300 * kNanosecondsPerMillisecond;
 
@@ -261,7 +261,7 @@ void LockstepHub::waitHeld(int timeout_ms) {
     stage_ = Stage::kCollecting;
     hooks_.end(frame_);
   }
-  collect(std::min(timeout_ms, kLongestWait_ms));
+  collect(std::min(timeout_ms, kLongestWaitMs));
   askAgain();
   if (frameIsComplete() && frame_.number == 0) {
     // The simulator flies: this frame is the first.
@@ -289,7 +289,7 @@ void LockstepHub::waitReleased(int timeout_ms) {
     released_frame_ = frame_.number;
     hooks_.end(frame_);
   }
-  collect(std::min(timeout_ms, kLongestWait_ms));
+  collect(std::min(timeout_ms, kLongestWaitMs));
   for (const std::shared_ptr<Source>& source : sources()) {
     if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
   }
