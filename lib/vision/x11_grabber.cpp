@@ -12,6 +12,16 @@ namespace {
 
 constexpr std::uint32_t kAllPlanes = 0xffffffff;
 constexpr int kChecksumRows = 12;
+constexpr std::uint64_t kChecksumStart = 14695981039346656037ULL;  // FNV-1a over 8 bytes at a time
+
+std::uint64_t addRow(std::uint64_t sum, const std::uint8_t* row, std::size_t bytes) {
+  for (std::size_t at = 0; at + 8 <= bytes; at += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, row + at, sizeof word);
+    sum = (sum ^ word) * 1099511628211ULL;
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -58,19 +68,19 @@ const std::uint8_t* X11Grabber::readRows(int y, int height, std::size_t offset, 
   const std::size_t bytes = stride_ * static_cast<std::size_t>(height);
   xcb_generic_error_t* failure = nullptr;
   if (segment_.id != XCB_NONE) {
-    const XcbPointer<xcb_shm_get_image_reply_t> reply(xcb_shm_get_image_reply(
-        connection_.get(),
+    const xcb_shm_get_image_cookie_t asked =
         xcb_shm_get_image(connection_.get(), drawable_, x16, y16, width16, height16, kAllPlanes,
-                          XCB_IMAGE_FORMAT_Z_PIXMAP, segment_.id, static_cast<std::uint32_t>(offset)),
-        &failure));
+                          XCB_IMAGE_FORMAT_Z_PIXMAP, segment_.id, static_cast<std::uint32_t>(offset));
+    read_sequence_ = asked.sequence;
+    const XcbPointer<xcb_shm_get_image_reply_t> reply(xcb_shm_get_image_reply(connection_.get(), asked, &failure));
     const XcbPointer<xcb_generic_error_t> error(failure);
     if (reply == nullptr || reply->size < bytes) return nullptr;
     return segment_.memory + offset;
   }
-  const XcbPointer<xcb_get_image_reply_t> reply(xcb_get_image_reply(
-      connection_.get(),
-      xcb_get_image(connection_.get(), XCB_IMAGE_FORMAT_Z_PIXMAP, drawable_, x16, y16, width16, height16, kAllPlanes),
-      &failure));
+  const xcb_get_image_cookie_t asked =
+      xcb_get_image(connection_.get(), XCB_IMAGE_FORMAT_Z_PIXMAP, drawable_, x16, y16, width16, height16, kAllPlanes);
+  read_sequence_ = asked.sequence;
+  const XcbPointer<xcb_get_image_reply_t> reply(xcb_get_image_reply(connection_.get(), asked, &failure));
   const XcbPointer<xcb_generic_error_t> error(failure);
   if (reply == nullptr || static_cast<std::size_t>(xcb_get_image_data_length(reply.get())) < bytes) return nullptr;
   plain.resize(bytes);
@@ -87,18 +97,23 @@ std::uint8_t* X11Grabber::read() {
   return previous_;
 }
 
+int X11Grabber::checksumRows() const { return std::min(kChecksumRows, area_.height); }
+int X11Grabber::checksumRow(int i) const { return (2 * i + 1) * area_.height / (2 * checksumRows()); }
+
 std::optional<std::uint64_t> X11Grabber::checksum() {
-  std::uint64_t sum = 14695981039346656037ULL;  // FNV-1a over 8 bytes at a time
-  const int rows = std::min(kChecksumRows, area_.height);
-  for (int i = 0; i < rows; ++i) {
-    const int y = (2 * i + 1) * area_.height / (2 * rows);
-    const std::uint8_t* data = readRows(y, 1, 2 * picture_bytes_, plain_row_);
+  std::uint64_t sum = kChecksumStart;
+  for (int i = 0; i < checksumRows(); ++i) {
+    const std::uint8_t* data = readRows(checksumRow(i), 1, 2 * picture_bytes_, plain_row_);
     if (data == nullptr) return std::nullopt;
-    for (std::size_t at = 0; at + 8 <= stride_; at += 8) {
-      std::uint64_t word = 0;
-      std::memcpy(&word, data + at, sizeof word);
-      sum = (sum ^ word) * 1099511628211ULL;
-    }
+    sum = addRow(sum, data, stride_);
+  }
+  return sum;
+}
+
+std::uint64_t X11Grabber::checksum(const std::uint8_t* data) const {
+  std::uint64_t sum = kChecksumStart;
+  for (int i = 0; i < checksumRows(); ++i) {
+    sum = addRow(sum, data + static_cast<std::size_t>(checksumRow(i)) * stride_, stride_);
   }
   return sum;
 }

@@ -27,8 +27,13 @@ class X11Grabber {
   /// Whether the last two read() gave the same bytes.
   [[nodiscard]] bool sameAsBefore() const { return same_; }
 
+  /// Number of the last read()'s request: an event of a lower one was raised before the pixels were read.
+  [[nodiscard]] std::uint32_t readSequence() const { return read_sequence_; }
+
   /// Sum over a few rows spread over the rectangle; empty: not readable. Cheap enough to be polled.
   [[nodiscard]] std::optional<std::uint64_t> checksum();
+  /// The same of what read() gave.
+  [[nodiscard]] std::uint64_t checksum(const std::uint8_t* data) const;
 
   [[nodiscard]] cv::Rect area() const { return area_; }
   [[nodiscard]] bool sharesMemory() const { return segment_.id != XCB_NONE; }
@@ -40,6 +45,9 @@ class X11Grabber {
   };
   void attach(std::size_t bytes);
   void detach();
+  [[nodiscard]] int checksumRows() const;
+  /// Row `i` of those the checksum looks at.
+  [[nodiscard]] int checksumRow(int i) const;
   /// Rows [y, y + height) to `offset` of the segment or into `plain`.
   [[nodiscard]] const std::uint8_t* readRows(int y, int height, std::size_t offset, std::vector<std::uint8_t>& plain);
 
@@ -54,6 +62,7 @@ class X11Grabber {
   std::vector<std::uint8_t> plain_row_;
   std::size_t turn_ = 0;
   std::uint8_t* previous_ = nullptr;
+  std::uint32_t read_sequence_ = 0;
   bool same_ = false;
 };
 

@@ -6,13 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <regex>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
 
 #include "x11_connection.hpp"
 #include "x11_grabber.hpp"
+#include "x11_selection.hpp"
 #include "xplane_bridge/vision/server_clock.hpp"
 
 namespace xplane_bridge::vision {
@@ -24,101 +24,12 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr int kSilentChangesToGiveUpDamage = 3;
 // Pause between two of those looks; long enough to cost nothing.
 constexpr std::chrono::milliseconds kDamageWatch{250};
-// Of windows named where the one looked for is missing.
-constexpr std::size_t kMostTitles = 8;
 
 std::chrono::nanoseconds seconds(double value) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(value * 1e9));
 }
 
-std::string hex(std::uint32_t value) {
-  std::ostringstream text;
-  text << "0x" << std::hex << value;
-  return text.str();
-}
-
-// Each in quotation marks.
-std::string quoted(const std::vector<std::string>& texts, const std::string& separator) {
-  std::string out;
-  for (const std::string& text : texts) out += (out.empty() ? "\"" : separator + "\"") + text + "\"";
-  return out;
-}
-
-// What there is instead of the window looked for, for the end of a sentence.
-std::string thereAre(std::vector<std::string> titles) {
-  if (titles.empty()) return "; no visible window has a title";
-  std::sort(titles.begin(), titles.end());
-  titles.erase(std::unique(titles.begin(), titles.end()), titles.end());
-  const std::size_t left_out = titles.size() > kMostTitles ? titles.size() - kMostTitles : 0;
-  titles.resize(titles.size() - left_out);
-  return "; visible windows are titled " + quoted(titles, ", ") +
-         (left_out == 0 ? "" : " and " + std::to_string(left_out) + " more");
-}
-
-std::string selection(const X11SourceOptions& options) {
-  if (options.index >= 0) {
-    X11SourceOptions any = options;
-    any.index = -1;
-    return selection(any) + ", number " + std::to_string(options.index) + " from the left";
-  }
-  if (options.window_id != 0) return "window " + hex(options.window_id);
-  if (!options.class_name.empty()) return "window of class \"" + options.class_name + "\"";
-  if (!options.title.empty()) {
-    return std::string("window whose title ") + (options.title_is_regex ? "matches" : "contains") + " \"" +
-           options.title + "\"";
-  }
-  if (options.region.empty()) return "window titled exactly " + quoted(xplaneWindowTitles(), " or ");
-  return "screen region " + std::to_string(options.region.width) + "x" + std::to_string(options.region.height) + "+" +
-         std::to_string(options.region.x) + "+" + std::to_string(options.region.y);
-}
-
-void validate(const X11SourceOptions& options) {
-  const int given = static_cast<int>(!options.title.empty()) + static_cast<int>(!options.class_name.empty()) +
-                    static_cast<int>(options.window_id != 0) + static_cast<int>(!options.region.empty());
-  if (given > 1) {
-    throw std::invalid_argument(std::to_string(given) +
-                                " of window title, class, id and screen region are given: expected at most one");
-  }
-  if (options.title_is_regex && options.title.empty()) {
-    throw std::invalid_argument("the window title is to be a regular expression, but none is given");
-  }
-  if (options.index >= 0 && (options.window_id != 0 || !options.region.empty())) {
-    throw std::invalid_argument("window index " + std::to_string(options.index) +
-                                " is given with a window id or a region, which name one already");
-  }
-  if (options.region.x < 0 || options.region.y < 0) {
-    throw std::invalid_argument(selection(options) + ": expected its corner on the screen (x, y >= 0)");
-  }
-  if (options.title_is_regex) {
-    try {
-      (void)std::regex(options.title);
-    } catch (const std::regex_error& error) {
-      throw std::invalid_argument("window title \"" + options.title +
-                                  "\" is not an ECMAScript regular expression: " + error.what());
-    }
-  }
-  if (!(options.poll_period > 0.0 && options.poll_period <= 1.0)) {
-    throw std::invalid_argument("poll period " + std::to_string(options.poll_period) + " s: expected (0, 1]");
-  }
-  if (!(options.search_period > 0.0 && options.search_period <= 60.0)) {
-    throw std::invalid_argument("search period " + std::to_string(options.search_period) + " s: expected (0, 60]");
-  }
-}
-
 }  // namespace
-
-const std::vector<std::string>& xplaneWindowTitles() {
-  static const std::vector<std::string> titles{"X-System", "X-Plane"};
-  return titles;
-}
-
-ChangeDetection changeDetectionFromName(const std::string& name) {
-  if (name == "auto") return ChangeDetection::kAuto;
-  if (name == "damage") return ChangeDetection::kDamage;
-  if (name == "checksum") return ChangeDetection::kChecksum;
-  if (name == "none") return ChangeDetection::kNone;
-  throw std::invalid_argument("change detection \"" + name + "\": expected auto, damage, checksum or none");
-}
 
 class X11WindowSource::Impl {
  public:
@@ -152,17 +63,18 @@ class X11WindowSource::Impl {
 
   GrabResult grab(const Change& change, Picture& picture) {
     if (target_.window == XCB_NONE || !grabber_) return GrabResult::kLost;
-    picture.grab_time_ns = clock_();
     std::uint8_t* data = grabber_->read();
+    picture.grab_time_ns = clock_();
     if (data == nullptr) {
       // The window may have been resized under our feet; the next wait finds out.
       lose(connection_->alive() ? unreadable() : connectionLost());
       next_search_ = SteadyClock::now();
       return GrabResult::kLost;
     }
+    const Change shown = lastChangeBeforeRead(change, data, picture.grab_time_ns);
     if (grabber_->sameAsBefore()) return GrabResult::kSame;
-    picture.display_time_ns = change.time_ns;
-    picture.display_time_known = change.time_known;
+    picture.display_time_ns = shown.time_ns;
+    picture.display_time_known = shown.time_known;
     picture.bgr = toBgr(target_.format, data, grabber_->area().width, grabber_->area().height, converted_);
     return GrabResult::kNew;
   }
@@ -254,6 +166,8 @@ class X11WindowSource::Impl {
       }
     }
     target_ = Target();
+    drawn_.reset();
+    gone_ = resized_ = false;
   }
 
   void lose(const std::string& why) {
@@ -358,6 +272,8 @@ class X11WindowSource::Impl {
     last_checksum_.reset();
     next_poll_ = SteadyClock::now();
     first_picture_ = true;
+    resized_ = false;
+    drawn_.reset();
     return true;
   }
 
@@ -366,8 +282,8 @@ class X11WindowSource::Impl {
         options_.change_detection == ChangeDetection::kAuto || options_.change_detection == ChangeDetection::kDamage;
     if (!wanted || !connection_->hasDamage()) return;
     const xcb_damage_damage_t damage = xcb_generate_id(connection_->get());
-    if (connection_->succeeded(
-            xcb_damage_create_checked(connection_->get(), damage, target_.window, XCB_DAMAGE_REPORT_LEVEL_NON_EMPTY))) {
+    if (connection_->succeeded(xcb_damage_create_checked(connection_->get(), damage, target_.window,
+                                                         XCB_DAMAGE_REPORT_LEVEL_RAW_RECTANGLES))) {
       target_.damage = damage;
     }
   }
@@ -379,44 +295,71 @@ class X11WindowSource::Impl {
       change = {clock_(), false};
       return true;
     }
-    bool changed = false;
-    bool gone = false;
-    bool resized = false;
     while (connection_) {
       const XcbPointer<xcb_generic_event_t> event(xcb_poll_for_event(connection_->get()));
       if (event == nullptr) break;
-      const auto type = static_cast<std::uint8_t>(event->response_type & 0x7fU);
-      if (type == connection_->damageEvent() && connection_->hasDamage()) {
-        const auto* notify = reinterpret_cast<const xcb_damage_notify_event_t*>(event.get());
-        if (notify->damage != target_.damage) continue;
-        change = {server_clock_.toHost(notify->timestamp, clock_()), true};
-        // Before the picture is read: what is drawn from here on raises another event.
-        xcb_damage_subtract(connection_->get(), target_.damage, XCB_NONE, XCB_NONE);
-        xcb_flush(connection_->get());
-        changed = true;
-        silent_changes_ = 0;
-        damage_silent_ = false;
-      } else if (type == XCB_DESTROY_NOTIFY || type == XCB_UNMAP_NOTIFY) {
-        const auto* notify = reinterpret_cast<const xcb_unmap_notify_event_t*>(event.get());
-        gone = gone || notify->window == target_.window;
-      } else if (type == XCB_CONFIGURE_NOTIFY) {
-        const auto* notify = reinterpret_cast<const xcb_configure_notify_event_t*>(event.get());
-        resized = resized || (notify->window == target_.window &&
-                              (notify->width != target_.width || notify->height != target_.height));
-      }
+      if (const auto drawn = take(*event, clock_())) drawn_ = drawn;
     }
     if (!connection_->alive()) {
       lose(connectionLost());
       next_search_ = SteadyClock::now();
       return false;
     }
-    if (gone) {
+    if (gone_) {
       lose(wanted_ + " was closed or hidden");
       next_search_ = SteadyClock::now();
       return false;
     }
-    if (resized) return attach() && handleEvents(change);
-    return changed && detection() == ChangeDetection::kDamage;
+    if (resized_) return attach() && handleEvents(change);
+    if (!drawn_.has_value()) return false;
+    change = *drawn_;
+    drawn_.reset();
+    return true;
+  }
+
+  // Remembers what an event says of the window; a drawing is returned.
+  std::optional<Change> take(const xcb_generic_event_t& event, std::int64_t arrival_ns) {
+    const auto type = static_cast<std::uint8_t>(event.response_type & 0x7fU);
+    if (type == connection_->damageEvent() && connection_->hasDamage()) {
+      const auto& notify = reinterpret_cast<const xcb_damage_notify_event_t&>(event);
+      if (notify.damage != target_.damage) return std::nullopt;
+      silent_changes_ = 0;
+      damage_silent_ = false;
+      return Change{server_clock_.toHost(notify.timestamp, arrival_ns), true};
+    }
+    if (type == XCB_DESTROY_NOTIFY || type == XCB_UNMAP_NOTIFY) {
+      const auto& notify = reinterpret_cast<const xcb_unmap_notify_event_t&>(event);
+      gone_ = gone_ || notify.window == target_.window;
+    } else if (type == XCB_CONFIGURE_NOTIFY) {
+      const auto& notify = reinterpret_cast<const xcb_configure_notify_event_t&>(event);
+      resized_ = resized_ || (notify.window == target_.window &&
+                              (notify.width != target_.width || notify.height != target_.height));
+    }
+    return std::nullopt;
+  }
+
+  // The drawing that the pixels just read show. Events and replies come in the server's order, and each event says
+  // which request of ours it followed: those of drawings before the read are here by now, later ones wait for their
+  // turn.
+  Change lastChangeBeforeRead(const Change& change, const std::uint8_t* data, std::int64_t read_ns) {
+    Change shown = change;
+    while (true) {
+      const XcbPointer<xcb_generic_event_t> event(xcb_poll_for_queued_event(connection_->get()));
+      if (event == nullptr) break;
+      const auto drawn = take(*event, read_ns);
+      if (!drawn.has_value()) continue;
+      if (static_cast<std::int32_t>(event->full_sequence - grabber_->readSequence()) < 0) {
+        if (change.time_known) shown = *drawn;
+      } else {
+        drawn_ = drawn;
+      }
+    }
+    if (detection() == ChangeDetection::kChecksum && last_checksum_.has_value()) {
+      const std::uint64_t sum = grabber_->checksum(data);
+      if (sum != *last_checksum_) shown = {read_ns, false};  // drawn between the look and the read
+      last_checksum_ = sum;
+    }
+    return shown;
   }
 
   // Looks at the window itself where events are not to be had (or not to be relied on); true: it changed.
@@ -468,6 +411,9 @@ class X11WindowSource::Impl {
   int silent_changes_ = 0;
   bool damage_silent_ = false;
   bool first_picture_ = false;
+  std::optional<Change> drawn_;  // not reported yet
+  bool gone_ = false;
+  bool resized_ = false;
 };
 
 X11WindowSource::X11WindowSource(const X11SourceOptions& options, Clock clock)

@@ -9,6 +9,8 @@
 #include <opencv2/core.hpp>
 #include <stdexcept>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "xvfb.hpp"
 
@@ -142,6 +144,83 @@ TEST_F(X11WindowSourceTest, ReadsAWindowByTitleAndSeesEveryChangeOnce) {
     EXPECT_GE(picture_.grab_time_ns, picture_.display_time_ns);
     EXPECT_GE(picture_.display_time_ns, before - 1'000'000);  // the server's stamp has milliseconds
     EXPECT_TRUE(staysQuiet(source));
+  }
+}
+
+TEST_F(X11WindowSourceTest, OfSeveralDrawingsTheLastOneIsThePicturesTime) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  for (std::uint32_t i = 1; i <= 10; ++i) {  // seen at once: by these the server's clock is known
+    window.fill(i);
+    ASSERT_TRUE(nextPicture(source, picture_));
+  }
+  std::int64_t last_drawn = 0;
+  for (const std::uint32_t colour : {0xff0000, 0x00ff00, 0x0000ff}) {
+    std::this_thread::sleep_for(milliseconds(100));
+    last_drawn = steadyNow();
+    window.fill(colour);
+  }
+  Change change;
+  ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);
+  ASSERT_EQ(source.grab(change, picture_), GrabResult::kNew);
+  EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kBlue);
+  EXPECT_TRUE(picture_.display_time_known);
+  EXPECT_GE(picture_.display_time_ns, last_drawn - 1'000'000);
+  EXPECT_GE(picture_.grab_time_ns, picture_.display_time_ns);
+  EXPECT_TRUE(staysQuiet(source));
+}
+
+TEST_F(X11WindowSourceTest, ADrawingBetweenChangeAndGrabIsThePicturesTimeAndNoFurtherChange) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  for (std::uint32_t i = 1; i <= 10; ++i) {
+    window.fill(i);
+    ASSERT_TRUE(nextPicture(source, picture_));
+  }
+  window.fill(0xff0000);
+  Change change;
+  ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);
+  std::this_thread::sleep_for(milliseconds(100));
+  const std::int64_t drawn = steadyNow();
+  window.fill(0x00ff00);
+  ASSERT_EQ(source.grab(change, picture_), GrabResult::kNew);
+  EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kGreen);
+  EXPECT_TRUE(picture_.display_time_known);
+  EXPECT_GE(picture_.display_time_ns, drawn - 1'000'000);
+  EXPECT_EQ(source.waitChange(kShort, change), WaitResult::kTimeout);
+}
+
+// Whatever drawing falls before, into and after a read: the time goes with the pixels.
+TEST_F(X11WindowSourceTest, EveryPictureHasTheTimeOfTheDrawingItShows) {
+  constexpr std::uint32_t kDrawings = 120;
+  constexpr std::uint32_t kUnderWay = 20;  // by then the server's clock is known
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  std::vector<std::int64_t> began(kDrawings + 2);
+  std::thread painter([&] {
+    for (std::uint32_t i = 1; i <= kDrawings; ++i) {
+      began[i] = steadyNow();
+      window.fill(i);
+      std::this_thread::sleep_for(milliseconds(10));
+    }
+  });
+  std::vector<std::pair<std::uint32_t, std::int64_t>> seen;
+  std::uint32_t shown = 0;
+  while (shown < kDrawings && nextPicture(source, picture_)) {
+    shown = pixelAt(picture_.bgr, 100, 100)[0];  // the blue byte
+    if (picture_.display_time_known) seen.emplace_back(shown, picture_.display_time_ns);
+    std::this_thread::sleep_for(milliseconds(shown * 7 % 45));
+  }
+  painter.join();
+  ASSERT_EQ(shown, kDrawings);
+  began[kDrawings + 1] = steadyNow();
+  for (const auto& [drawing, time_ns] : seen) {
+    if (drawing < kUnderWay) continue;
+    EXPECT_GE(time_ns, began[drawing] - 1'000'000) << "drawing " << drawing;
+    EXPECT_LT(time_ns, began[drawing + 1] + 1'000'000) << "drawing " << drawing;
   }
 }
 
@@ -345,6 +424,24 @@ TEST_F(X11WindowSourceTest, ChecksumSeesChangesWhereNoEventsAreAskedFor) {
   ASSERT_TRUE(nextPicture(source, picture_));
   EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kGreen);
   EXPECT_TRUE(picture_.display_time_known);
+}
+
+TEST_F(X11WindowSourceTest, ByChecksumADrawingBetweenLookAndReadMakesTheTimeUnknown) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11SourceOptions options = titled(server_);
+  options.change_detection = ChangeDetection::kChecksum;
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_TRUE(staysQuiet(source));
+  window.fill(0x00ff00);
+  Change change;
+  ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);
+  EXPECT_TRUE(change.time_known);
+  window.fill(0x0000ff);
+  ASSERT_EQ(source.grab(change, picture_), GrabResult::kNew);
+  EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kBlue);
+  EXPECT_FALSE(picture_.display_time_known);
+  EXPECT_EQ(source.waitChange(kShort, change), WaitResult::kTimeout);
 }
 
 TEST_F(X11WindowSourceTest, WithoutDetectionTheDisplayTimeIsUnknown) {
