@@ -156,7 +156,7 @@ TEST_F(X11WindowSourceTest, OfSeveralDrawingsTheLastOneIsThePicturesTime) {
     ASSERT_TRUE(nextPicture(source, picture_));
   }
   std::int64_t last_drawn = 0;
-  for (const std::uint32_t colour : {0xff0000, 0x00ff00, 0x0000ff}) {
+  for (const std::uint32_t colour : {0xff0000U, 0x00ff00U, 0x0000ffU}) {
     std::this_thread::sleep_for(milliseconds(100));
     last_drawn = steadyNow();
     window.fill(colour);
