@@ -187,6 +187,14 @@ class World:
         self._processes.append(process)
         return process
 
+    def launch(self, file: str, *arguments: str) -> ManagedProcess:
+        """Starts a launch file of the package in this namespace. Does not wait for its nodes."""
+        words = ["roslaunch", "xplane_bridge", file, f"ns:={self.namespace.lstrip('/')}", *arguments]
+        process = ManagedProcess(f"{file}_{next(_numbers)}", words, self.folder, env=self.env)
+        process.start()
+        self._processes.append(process)
+        return process
+
     def emulator(self, *options: str | Path | int | float, port: int = 0) -> EmulatorProcess:
         """Starts X-Plane's stand-in and makes it the X-Plane of this namespace's nodes (`host` and `port`)."""
         process = EmulatorProcess(

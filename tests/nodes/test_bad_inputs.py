@@ -95,6 +95,7 @@ LAUNCHES = [
     ("demo.launch aircraft:=zeppelin", 1, ["(aircraft:=zeppelin)", AIRCRAFT]),
     ("tx.launch aircraft_file:=none.yaml", 1, ["aircraft_file:=none.yaml: No such file or directory"]),
     ("bridge.launch port:=many", 1, ["port:=many: expected a whole number"]),
+    ("demo.launch xplane_version:=twelve", 1, ["xplane_version:=twelve: expected a whole number"]),
     ("rx.launch max_publish_rate:=fast", 1, ["max_publish_rate:=fast: expected a number"]),
     ("bridge.launch rx:=perhaps", 1, ["rx:=perhaps: expected true or false"]),
     ("rx.launch rx_config:={}/broken.yaml", 1, [UNPARSED]),

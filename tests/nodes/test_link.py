@@ -83,8 +83,11 @@ def test_release_overrides_leaves_a_living_nodes_subscriptions_alone(world):
 # --- one way ----------------------------------------------------------------------------------------------------------
 
 
-def one_way(world, version, **params):
-    """An X-Plane of this version whose Data Output was set by hand and that answers nothing, and its rx_node."""
+def one_way(world, version, *arguments, **params):
+    """An X-Plane of this version whose Data Output was set by hand and that answers nothing, and its rx_node.
+
+    With arguments, rx.launch starts the node instead.
+    """
     from xplane_bridge.msg import DataRows, FlightState, LinkState
 
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -92,12 +95,15 @@ def one_way(world, version, **params):
         port = probe.getsockname()[1]
     rows = ("--data-target", f"127.0.0.1:{port}", "--data-rows", "0,1,3-6,8,14-21", "--rate", "60")
     pilot = config_file("scenarios", "demo.yaml")
-    world.emulator(*KINEMATIC, "--version", version, "--pilot", pilot, "--deaf", *rows)
+    world.xplane = world.emulator(*KINEMATIC, "--version", version, "--pilot", pilot, "--deaf", *rows)
     world.set_param("transport", "data")
     world.set_param("data_port", port)
     world.states = world.watch("flight_state", FlightState)
     world.rows = world.watch("data_rows", DataRows)
     world.links = world.watch("link_state", LinkState)
+    if arguments:
+        where = ("host:=127.0.0.1", f"port:={world.xplane.port}", "listen_for_beacon:=false", f"data_port:={port}")
+        return world.launch("rx.launch", "transport:=data", "configure_xplane:=false", *where, *arguments)
     return world.start("rx_node", {"configure_xplane": False, **params})
 
 
@@ -139,3 +145,9 @@ def test_one_way_with_its_version_given_publishes_rates(world, version, paramete
     link = world.wait_for_diagnostics("link to X-Plane", lambda status: "nothing answers" in status.message)
     assert "xplane_version" not in link.message
     assert world.links.last.xplane_version == parameter
+
+
+def test_one_way_with_its_version_given_to_the_launch_file_publishes_rates(world):
+    one_way(world, "11", "xplane_version:=115501")
+    world.states.wait_for(lambda state: state.valid & RATES, 40.0)
+    assert world.links.last.xplane_version == 115501

@@ -95,7 +95,7 @@ def _scenario(_: str, value: str, __: Given) -> str:
 
 
 CHECKS: Dict[str, Check] = {
-    **dict.fromkeys(("port", "data_port", "stick_mode", "split_size", "buffer"), _whole),
+    **dict.fromkeys(("port", "data_port", "stick_mode", "split_size", "buffer", "xplane_version"), _whole),
     **dict.fromkeys(("display_delay", "max_publish_rate", "image_rate"), _number),
     **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
     **dict.fromkeys(("common_config", "rx_config", "tx_config", "capture_config"), _parameters),
