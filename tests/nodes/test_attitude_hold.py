@@ -6,6 +6,8 @@ import json
 import subprocess
 import sys
 
+from xplane_bridge.bags import Bags
+from xplane_bridge.constants import FlightMode
 from xplane_bridge.resources import program
 
 SCENARIO = """
@@ -27,10 +29,15 @@ events:
 def test_it_turns_and_holds_altitude_and_speed(tmp_path):
     scenario = tmp_path / "controller.yaml"
     scenario.write_text(SCENARIO, encoding="utf-8")
-    controller = f"{sys.executable} {program('attitude_hold')} --heading 40 --altitude 1000 --speed 70"
+    hold = f"{sys.executable} {program('attitude_hold')} --heading 40 --altitude 1000 --speed 70"
+    controller = f"sh -c 'sleep 5; exec {hold}'"  # as late as on a busy machine: the scenario waits for it
     command = [sys.executable, str(program("run_scenario")), str(scenario), "--controller", controller]
     command += ["--output", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     scores = json.loads((tmp_path / "out" / "scores.json").read_text(encoding="utf-8"))["criteria"]
     assert len(scores) == 4
+    with Bags(tmp_path / "out" / "flight.bag") as bags:
+        commands, modes = bags.read("/xplane/control/auto"), bags.read("/xplane/control/mode")
+    engaged = modes.stamp[modes["mode"] == FlightMode.AUTO][0]
+    assert commands.stamp[0] < engaged, "it was asked to fly before it could"

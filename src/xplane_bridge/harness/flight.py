@@ -5,7 +5,8 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from contextlib import ExitStack
+import xmlrpc.client
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional
@@ -19,6 +20,7 @@ from xplane_bridge.topics import NAMESPACE
 
 _READY_TIMEOUT_S = 60.0
 _RECORDING = "flight.bag"
+_COMMANDS = tuple(f"{NAMESPACE}/control/{kind}" for kind in ("auto", "surfaces"))  #: where a controller commands
 _SILENCE_S = 10.0  # without a flight state for this long, a flight has failed
 
 
@@ -38,6 +40,8 @@ class FlightPlan:
     player: str = ""
     #: For those of `programs` that the next one has to wait for: what they write when they are ready, as a pattern.
     ready: Dict[str, str] = field(default_factory=dict)
+    #: The one of `programs` that commands: unless it says in `ready` when, the next one waits until it is connected.
+    controller: str = ""
     #: Silences that belong to the plan, e.g. a restart of the emulator, are not failures.
     silence_allowed: float = _SILENCE_S  #: [s]
     #: In lock-step; `duration` is simulated time then, and the player ends the flight by holding it.
@@ -141,6 +145,8 @@ def fly(
             stack.enter_context(flight.programs[name])
             if name in plan.ready:
                 flight.programs[name].wait_for_line(plan.ready[name], _READY_TIMEOUT_S)
+            elif name == plan.controller and plan.lockstep is None:
+                _wait_for_controller(flight, flight.programs[name])
         say(f"flying; to watch, in a second shell: export ROS_MASTER_URI={master.uri}")
         if plan.lockstep is None:
             _record(plan, flight, observer)
@@ -170,6 +176,22 @@ def _wait_for_state(flight: RunningFlight) -> None:
         wait_until(state_or_failure, _READY_TIMEOUT_S, f"message on {NAMESPACE}/flight_state")
     except HarnessError as err:
         raise HarnessError(flight.bridge.describe(str(err))) from None
+
+
+def _wait_for_controller(flight: RunningFlight, controller: ManagedProcess) -> None:
+    """Waits until states reach a controller and its commands tx_node: begun sooner, a scenario would be flown late."""
+
+    def connected() -> bool:
+        flight.emulator.check_running()
+        flight.bridge.check_running()
+        controller.check_running()
+        with suppress(OSError, xmlrpc.client.Error):
+            graph = flight.master.graph(NAMESPACE)
+            nodes = set().union(*(graph.publishers.get(topic, set()) for topic in _COMMANDS))
+            return bool(nodes) and not any(a in nodes or b in nodes for _, a, b in graph.unconnected())
+        return False
+
+    wait_until(connected, _READY_TIMEOUT_S, f"node that commands on {' or '.join(_COMMANDS)}; log: {controller.log}")
 
 
 def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None:

@@ -45,7 +45,7 @@ def scenario_plan(
         aircraft: what to fly; the scenario's first when omitted.
         joystick: device through which to fly; commands when omitted.
         controller: program that flies in mode auto; the scenario's own, by fly_controller, when omitted.
-        controller_ready: regular expression of what it writes when it can; empty: nobody waits for it.
+        controller_ready: regular expression of what it writes when it can; empty: it can when it is connected.
         emulator_options: beside those of the scenario's `start`, which they override.
         launch_args: for demo.launch.
         transport: rref or data.
@@ -96,6 +96,7 @@ def scenario_plan(
         arguments,
         programs=programs,
         player=PLAYER,
+        controller=CONTROLLER if controller else "",
         ready=ready,
         lockstep=lockstep,
     )
