@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from xplane_bridge import protocol
+from xplane_bridge import protocol, xplane_names
 from xplane_bridge.bags import Bags
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
 from xplane_bridge.harness import ManagedProcess, flight_check, wait_until
@@ -32,10 +32,22 @@ def demo(folder: Path, *options: str) -> ManagedProcess:
     return ManagedProcess("demo", [program("demo"), "--output", folder / "out", "--headless", *options], folder)
 
 
-#: The longer flight goes on until the left aileron has been stuck and repaired.
-@pytest.mark.parametrize(("transport", "seconds"), [("rref", 47), ("data", 12)])
-def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: str, seconds: int) -> None:
-    with demo(tmp_path, "--duration", str(seconds), f"transport:={transport}") as run:
+OLDEST, NEWEST = xplane_names.VERSIONS[0], xplane_names.VERSIONS[-1]
+#: Until the left aileron has been stuck and repaired; until the stick has taken over, also where time passes slowly.
+LONG, SHORT = 47, 24
+#: Transport, seconds, X-Plane's version: oldest and newest; those between, and all by rows, in full tests.
+DEMOS = [
+    ("rref", LONG, NEWEST),
+    ("rref", SHORT, OLDEST),
+    ("data", SHORT, NEWEST),
+    *(pytest.param("rref", SHORT, version, marks=pytest.mark.full) for version in xplane_names.VERSIONS[1:-1]),
+    *(pytest.param("data", SHORT, version, marks=pytest.mark.full) for version in xplane_names.VERSIONS[:-1]),
+]
+
+
+@pytest.mark.parametrize(("transport", "seconds", "version"), DEMOS)
+def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: str, seconds: int, version: str) -> None:
+    with demo(tmp_path, "--duration", str(seconds), "--version", version, f"transport:={transport}") as run:
         assert run.wait(DEMO_TIMEOUT_S) == 0, run.output()
     out = tmp_path / "out"
     verdicts = {v.name: v for v in flight_check.judge(out / "flight.bag", out / "truth.csv")}
@@ -45,6 +57,7 @@ def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: st
         links = bags.read("/xplane/link_state")
         states = bags.read("/xplane/flight_state", ["roll_deg", "altitude_msl"])
     assert links["transport"][-1] == transport
+    assert xplane_names.version_of(int(links["xplane_version"][-1])) == version
     assert np.ptp(states["roll_deg"]) > 20, "the demo's flight is lively"
     output = run.output()
     assert "all well" in output

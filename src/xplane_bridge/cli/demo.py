@@ -9,6 +9,7 @@ from typing import Any, Dict, List, Optional, Sequence
 
 from tqdm import tqdm
 
+from xplane_bridge import xplane_names
 from xplane_bridge.cli.entry import guarded, number
 from xplane_bridge.cli.flight_report import write_report
 from xplane_bridge.cli.scenario_player import scenario_of
@@ -50,6 +51,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--output", type=Path, default=Path("out"), metavar="DIR", help="where to write (%(default)s)")
     p.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help="aircraft to fly (%(default)s)")
     p.add_argument("--transport", choices=("rref", "data"), default="rref", help="how to ask X-Plane (%(default)s)")
+    p.add_argument(
+        "--version",
+        choices=(*xplane_names.NEWEST, *xplane_names.VERSIONS),
+        default="11",
+        help="X-Plane's version, which the emulator plays (%(default)s)",
+    )
     p.add_argument("--fps", type=int, default=_FPS, metavar="N", help="the emulator's frame rate [1/s] (%(default)s)")
     p.add_argument("--headless", action="store_true", help="draw the cockpit view, but not on this screen")
     p.add_argument(
@@ -75,7 +82,10 @@ def _plan(args: argparse.Namespace) -> FlightPlan:
         joystick=_JOYSTICK,
         controller=[str(program("attitude_hold"))],
         controller_ready=r"^commanding on",
-        emulator_options=["--window", "--fps", str(args.fps), "--pipeline-delay", f"{_DISPLAY_DELAY_S}s"],
+        emulator_options=[
+            *("--version", args.version, "--fps", str(args.fps)),
+            *("--window", "--pipeline-delay", f"{_DISPLAY_DELAY_S}s"),
+        ],
         launch_args=launch_args,
         transport=transport,
     )
