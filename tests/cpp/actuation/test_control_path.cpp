@@ -116,6 +116,37 @@ TEST_F(ControlPathTest, OfCommandsWithinOneFrameTheNewestIsReadBackAndNoneTwice)
   EXPECT_EQ(applied[0].controls.sequence, 3u);
 }
 
+TEST_F(ControlPathTest, ReadBackGoesWithTheChannelsThatAreCommanded) {
+  start();
+  runWith(rollCommand(0.25, 1), 0.1);
+  core::ControlCommand pitch;
+  pitch.sequence = 2;
+  pitch.fields = core::kFieldPitch;
+  pitch.pitch = -0.5;
+  path->command(FlightMode::kManual, pitch);
+  EXPECT_EQ(applied.back().sent_ns, sim.clock().system_ns());
+  sim.frame();
+  sim.frame();
+  EXPECT_TRUE(applied.back().read_back);
+  EXPECT_EQ(applied.back().controls.sequence, 2u);
+}
+
+TEST_F(ControlPathTest, WhatStoodThereBeforeTheCommandIsNoReadBack) {
+  start();
+  runWith(rollCommand(0.25, 1), 0.1);
+  const float stands = sim.value(kRunningTime);
+  sim.on_frame = [&] { sim.set(kRunningTime, stands); };  // what X-Plane has sent before the command reached it
+  applied.clear();
+  path->command(FlightMode::kManual, rollCommand(0.25, 2));
+  sim.frame();
+  ASSERT_EQ(applied.size(), 1u);
+  EXPECT_FALSE(applied[0].read_back);
+  sim.on_frame = nullptr;
+  sim.frame();
+  ASSERT_EQ(applied.size(), 2u);
+  EXPECT_TRUE(applied[1].read_back);
+}
+
 TEST_F(ControlPathTest, WhatXPlaneDoesNotShowIsNamed) {
   sim.setReadOnly(kStickRoll);
   start();

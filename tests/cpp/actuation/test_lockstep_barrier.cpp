@@ -110,6 +110,25 @@ TEST(LockstepBarrierSteps, FliesAsManyFramesAsAreGrantedAndHoldsWithTheLastOneAn
   }
 }
 
+TEST_F(LockstepBarrierTest, BetweenTwoFramesItIsNeitherCompleteNorHeld) {
+  for (const char* who : {"/rx_node", "/controller", "/other/player"}) barrier_.answer(who, kT1);
+  EXPECT_TRUE(barrier_.complete());
+  EXPECT_FALSE(barrier_.holds()) << "it may go on";
+  barrier_.close();
+  EXPECT_FALSE(barrier_.complete());
+  barrier_.step(0);
+  EXPECT_FALSE(barrier_.holds());
+}
+
+TEST_F(LockstepBarrierTest, AFrameThatEndsWithNoneGrantedGrantsNone) {
+  barrier_.step(0);
+  barrier_.close();
+  barrier_.open(2, kT2);
+  for (const char* who : {"/rx_node", "/controller", "/other/player"}) barrier_.answer(who, kT2);
+  EXPECT_FALSE(barrier_.complete());
+  EXPECT_TRUE(barrier_.holds());
+}
+
 TEST(LockstepBarrierOrder, RanksParticipantsAsNamed) {
   const LockstepBarrier barrier({"b", "a"}, "rx_node");
   EXPECT_LT(barrier.rank("/x/rx_node"), barrier.rank("/x/b"));
