@@ -64,6 +64,7 @@ class Options:
     pipeline_delay: float = 0.0
     window: bool = False  #: whether the cockpit view is drawn
     window_size: Tuple[int, int] = (640, 480)
+    aerodrome: Optional[Tuple[float, float, float]] = None  #: latitude, longitude, heading [deg]; None: where it starts
     hud: bool = False
     strip: bool = True
     swap_log: Optional[Path] = None
@@ -206,6 +207,12 @@ def _parser() -> argparse.ArgumentParser:
         const="640x480",
         metavar="WxH",
         help="draw it in a window named X-System (default 640x480)",
+    )
+    window.add_argument(
+        "--aerodrome",
+        type=_aerodrome,
+        metavar="LAT,LON,HEADING",
+        help="middle of the runway that is drawn, and its true heading (default: where and as the flight starts)",
     )
     window.add_argument("--hud", action="store_true", help="with a head-up display")
     window.add_argument("--no-strip", dest="strip", action="store_false", help="without the machine-readable strip")
@@ -394,6 +401,7 @@ def _options(given: argparse.Namespace) -> Options:
         pipeline_delay=delay,
         window=given.window is not None,
         window_size=(int(size.group(1)), int(size.group(2))),
+        aerodrome=given.aerodrome,
         hud=given.hud,
         strip=given.strip,
         swap_log=given.swap_log,
@@ -409,6 +417,18 @@ def _options(given: argparse.Namespace) -> Options:
         realtime=given.priority == "realtime",
         verbose=given.verbose,
     )
+
+
+def _aerodrome(text: str) -> Tuple[float, float, float]:
+    try:
+        latitude, longitude, heading = (float(part) for part in text.split(","))
+    except ValueError:
+        latitude = longitude = heading = math.nan
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and math.isfinite(heading)):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: expected latitude,longitude,heading in degrees, e.g. 37.46,126.44,40"
+        )
+    return latitude, longitude, heading
 
 
 def _ids(text: str) -> FrozenSet[str]:

@@ -60,7 +60,10 @@ def scenario_plan(
         raise ScenarioError(f"{scenario.name} is for {', '.join(scenario.aircraft)}, not for {chosen}")
     options: List[str] = []
     for key, value in scenario.start.items():
-        options += ["--start", "ground"] if key == "on_ground" else [_START[key], f"{value:g}"]
+        options += ["--start", "ground"] if key == "on_ground" else [_START[key], f"{value:.9g}"]
+    if scenario.aerodrome:
+        place = (scenario.aerodrome[key] for key in ("latitude", "longitude", "heading"))
+        options.append("--aerodrome=" + ",".join(f"{value:.9g}" for value in place))
     options += emulator_options
     arguments = dict(launch_args or {})
     player = [str(program("scenario_player")), source, "--log", str((output / "played.json").resolve())]

@@ -27,7 +27,10 @@ from .schema import (
 )
 from .world import LAYERS, TIME, WEATHER, WIND
 
-_TOP = ("name", "description", "aircraft", "controller", "repeat_every", "start", "gains", "criteria", "events")
+_TOP = (
+    *("name", "description", "aircraft", "controller", "repeat_every", "start", "aerodrome", "gains", "criteria"),
+    "events",
+)
 _START = {
     "latitude": (-90.0, 90.0),
     "longitude": (-180.0, 180.0),
@@ -35,6 +38,7 @@ _START = {
     "heading": (-360.0, 360.0),
     "speed": (0.0, 300.0),
 }
+_AERODROME = ("latitude", "longitude", "heading")
 _TIMING = ("at", "after", "when", "timeout", "over")
 
 
@@ -76,6 +80,7 @@ def parse_scenario(document: Any) -> Scenario:
     for key in gains:
         _number(gains[key], f"gains.{key}", 0.0, math.inf)
     start = _start(top.get("start", {}))
+    aerodrome = _aerodrome(top.get("aerodrome", {}))
     controller = _text(top, "controller", "")
     if controller and not all(controller.partition(":")):
         raise ScenarioError(f"controller: {controller!r}; expected module:class or module:function")
@@ -89,7 +94,7 @@ def parse_scenario(document: Any) -> Scenario:
     _check_times(parsed, repeat)
     criteria = _criteria(top.get("criteria", {}), parsed)
     description = _text(top, "description", "")
-    return Scenario(name, description, tuple(aircraft), repeat, start, gains, criteria, parsed, controller)
+    return Scenario(name, description, tuple(aircraft), repeat, start, gains, criteria, parsed, controller, aerodrome)
 
 
 def _start(item: Any) -> Dict[str, float]:
@@ -99,6 +104,14 @@ def _start(item: Any) -> Dict[str, float]:
         raise ScenarioError(f"start.on_ground: {on_ground!r}; expected true or false")
     start = _ranged({key: value for key, value in given.items() if key != "on_ground"}, "start", _START)
     return {**start, **({"on_ground": True} if on_ground else {})}
+
+
+def _aerodrome(item: Any) -> Dict[str, float]:
+    given = _ranged(item, "aerodrome", {key: _START[key] for key in _AERODROME})
+    missing = [key for key in _AERODROME if key not in given]
+    if given and missing:
+        raise ScenarioError(f"aerodrome.{missing[0]}: missing; expected {', '.join(_AERODROME)}")
+    return given
 
 
 def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:

@@ -151,6 +151,8 @@ def test_options_reach_where_they_belong():
     assert options.pipeline_delay == pytest.approx(0.05)
     assert options.fault.delay_s == pytest.approx(0.02)
     assert (options.stepped, options.aircraft, options.beacon) == ("lines", "kinematic", False)
+    assert options.aerodrome is None
+    assert parse(["--aerodrome=-33.9,151.2,155"]).aerodrome == (-33.9, 151.2, 155.0)
 
 
 @pytest.mark.parametrize(
@@ -168,6 +170,8 @@ def test_options_reach_where_they_belong():
         ("--stepped fast", "--stepped fast: expected --duration with it"),
         ("--rref-split 184", "--rref-split 184: expected 1..183"),
         ("--version 10", "invalid choice: '10'"),
+        ("--aerodrome 47,8", "'47,8': expected latitude,longitude,heading in degrees"),
+        ("--aerodrome 97,8,0", "'97,8,0': expected latitude,longitude,heading"),
     ],
 )
 def test_wrong_options_are_said(arguments, message, capsys):

@@ -91,6 +91,8 @@ def test_the_example_of_the_manual_is_a_scenario():
         ({"name": "x", "start": {"altitude": 1e6}, "events": [{"at": 0}]}, "start.altitude: 1000000.0"),
         ({"name": "x", "start": {"on_ground": 1}, "events": [{"at": 0}]}, "start.on_ground: 1; expected true or false"),
         ({"name": "x", "start": {"ground": True}, "events": [{"at": 0}]}, "start.ground: unknown key"),
+        ({"name": "x", "aerodrome": {"latitude": 1}, "events": [{"at": 0}]}, "aerodrome.longitude: missing"),
+        ({"name": "x", "aerodrome": {"runway": 1}, "events": [{"at": 0}]}, "aerodrome.runway: unknown key"),
         ({"name": "x", "controller": "fly", "events": [{"at": 0}]}, "controller: 'fly'; expected module:class"),
         ({"name": "x", "controller": "fly:", "events": [{"at": 0}]}, "controller: 'fly:'; expected module:class"),
     ],

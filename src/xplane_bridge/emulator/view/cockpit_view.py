@@ -13,7 +13,7 @@ from xplane_bridge.emulator.view.renderer import RendererOptions, RendererProces
 class CockpitView:
     """What the pilot sees, in a window; see `emulator.View`.
 
-    The aerodrome lies where the flight starts, its runway along the first heading.
+    The aerodrome lies where the options say, else where the flight starts, its runway along the first heading.
 
     Raises:
         RendererError: The window cannot be opened.
@@ -21,10 +21,12 @@ class CockpitView:
 
     def __init__(self, options: Options) -> None:
         initial = options.initial
+        here = (initial.latitude_deg, initial.longitude_deg, initial.heading_deg)
+        latitude, longitude, heading = options.aerodrome or here
         self._renderer = RendererProcess(
             RendererOptions(
-                anchor=(initial.latitude_deg, initial.longitude_deg),
-                runway_heading_deg=initial.heading_deg,
+                anchor=(latitude, longitude),
+                runway_heading_deg=heading,
                 width=options.window_size[0],
                 height=options.window_size[1],
                 pipeline_delay=options.pipeline_delay,

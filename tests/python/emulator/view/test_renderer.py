@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
+from xplane_bridge.emulator.datarefs.tables.views import SUN_HEADING_DEG, SUN_PITCH_DEG
 from xplane_bridge.emulator.view.renderer import (
     RendererError,
     RendererOptions,
@@ -24,6 +25,7 @@ from xplane_bridge.emulator.view.renderer import (
 from xplane_bridge.emulator.view.renderer.camera import Camera, clip
 from xplane_bridge.emulator.view.renderer.painter import Painter
 from xplane_bridge.emulator.view.renderer.strip import draw_strip
+from xplane_bridge.emulator.view.renderer.world import make_world
 
 ANCHOR = (47.0, 8.0)
 FOCAL = 554.256  # 320 / tan(30 deg)
@@ -184,6 +186,12 @@ def test_process_shows_frames_after_the_pipeline_delay(display: str, tmp_path) -
         waited = int(row["swap_begin_ns"]) - offset - int(row["frame_monotonic_ns"])
         assert waited > 0.1499e9
         assert int(row["swap_end_ns"]) >= int(row["swap_begin_ns"])
+
+
+def test_the_sun_is_drawn_where_its_datarefs_say() -> None:
+    east, north, up = make_world(0.0).sun
+    assert math.degrees(math.asin(up)) == pytest.approx(SUN_PITCH_DEG, abs=1e-5)
+    assert math.degrees(math.atan2(east, north)) == pytest.approx(SUN_HEADING_DEG, abs=1e-5)
 
 
 def test_process_says_why_it_has_no_window() -> None:

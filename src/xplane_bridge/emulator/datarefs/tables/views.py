@@ -9,6 +9,10 @@ from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import Table
 from xplane_bridge.emulator.flight.frame import Frame
 
+SCENERY = "sim/graphics/scenery/"
+#: Where the sun always stands; the window draws it there.
+SUN_PITCH_DEG, SUN_HEADING_DEG = 31.101993, 41.576129
+
 
 def define(t: Table, sim: Sources) -> None:
     """Defines this subject's datarefs."""
@@ -37,6 +41,8 @@ def define(t: Table, sim: Sources) -> None:
     t.array(VIEW + "world_matrix", cameras.world_matrix)
     t.array(VIEW + "projection_matrix_3d", cameras.projection_matrix)
     t.setting("sim/graphics/VR/enabled")
+    t.setting(SCENERY + "sun_pitch_degrees", SUN_PITCH_DEG, read_only=True)
+    t.setting(SCENERY + "sun_heading_degrees", SUN_HEADING_DEG, read_only=True)
 
 
 def _angle(cameras: Cameras, place: int) -> Callable[[Frame], float]:
