@@ -1,0 +1,70 @@
+"""label_images: what lies where in a flight's pictures, as a file beside the bag."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Sequence
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.cli.entry import guarded, positive
+from xplane_bridge.labels.apt import read_airport
+from xplane_bridge.labels.flight import Options, label_flight
+from xplane_bridge.labels.heights import read_table
+from xplane_bridge.labels.table import beside
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    p = argparse.ArgumentParser(
+        prog="label_images",
+        description=(
+            "Labels a flight's pictures with runways, horizon and sun, projected from the camera's measured pose: "
+            "FLIGHT.labels.jsonl beside the bag."
+        ),
+        epilog="docs/labels.md tells what is in the file, and how sure it is.",
+    )
+    p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
+    p.add_argument(
+        "--apt",
+        nargs="+",
+        required=True,
+        metavar="FILE",
+        help="X-Plane's apt.dat; several in the order of scenery_packs.ini, the first that has the airport counts",
+    )
+    p.add_argument("--airport", required=True, metavar="ICAO", help="identifier of the airport")
+    p.add_argument("--heights", type=Path, metavar="CSV", help="of runway ends: lines like 15L, 12.3 (metres MSL)")
+    p.add_argument(
+        "--map-sigma",
+        type=positive,
+        default=Options().map_sigma,
+        metavar="M",
+        help="how well apt.dat says where runways are drawn (default: %(default)s)",
+    )
+    p.add_argument(
+        "--flat-world",
+        action="store_true",
+        help="for the emulator, whose ground is drawn flat around the middle of the first runway",
+    )
+    p.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: beside the (first) bag")
+    return p
+
+
+@guarded
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    args = parser().parse_args(argv)
+    airport = read_airport(args.apt, args.airport)
+    heights = read_table(args.heights, airport) if args.heights else {}
+    with Bags(args.bags) as bags:
+        path = args.output or beside(bags.paths[0])
+        count, flight = label_flight(bags, path, airport, heights, Options(args.flat_world, args.map_sigma))
+    about = flight.about()
+    print(f"{path}: {count} pictures labelled; {airport.ident} of {airport.file}")
+    for line in about["heights"]:
+        print(f"height of runway {line}")
+    if not about["sun"]:
+        print("no sun: record sun_pitch_degrees and sun_heading_degrees (docs/labels.md says how)")
+    for reason, number in sorted(flight.left_out.items()):
+        print(f"left out: {number}: {reason}")
+    return 0

@@ -1,0 +1,178 @@
+"""A picture's camera in the world: from FrameState and CameraInfo, and how places come to pixels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from xplane_bridge.labels.world import World
+
+#: Nearest depth that is projected [m].
+NEAR_M = 0.5
+#: Forward, right, down of forward, left, up, and back.
+_FRD_OF_FLU = np.diag((1.0, -1.0, -1.0))
+
+
+class Pose(NamedTuple):
+    """Where aircraft and camera were when a picture was drawn, and how well that is known."""
+
+    latitude: float  #: [deg] of the aircraft
+    longitude: float
+    altitude: float  #: [m MSL]
+    orientation: np.ndarray  #: quaternion x, y, z, w: forward, right, down of the aircraft into north, east, down there
+    lever: np.ndarray  #: [m] the camera's place in base_link: forward, left, up
+    rotation: np.ndarray  #: quaternion x, y, z, w: right, down, forward of the camera into base_link
+    sigma_angle: float = 0.0  #: [rad] bound of the camera's direction
+    sigma_place: float = 0.0  #: [m] of its place
+    turn_rate: float = 0.0  #: [rad/s] of the aircraft
+    velocity: np.ndarray = np.zeros(3)  #: [m/s] north, east, down
+    period: float = 0.0  #: [s] of a frame
+    may_be_neighbour: bool = False  #: the picture may be of the frame before or after
+
+
+class Optics(NamedTuple):
+    """CameraInfo."""
+
+    width: int
+    height: int
+    fx: float  #: [px]
+    fy: float
+    cx: float
+    cy: float
+
+
+class Camera:
+    """One picture's camera.
+
+    Args:
+        world: Where places lie.
+        pose: Of aircraft and camera.
+        optics: Focal lengths and size.
+
+    Attributes:
+        to_optical: Rotation from the world's axes to right, down, forward.
+        place: [m] in the world.
+        height: [m MSL]
+    """
+
+    def __init__(self, world: World, pose: Pose, optics: Optics) -> None:
+        self.pose, self.optics = pose, optics
+        level = world.level(pose.latitude, pose.longitude)
+        body_to_ned = rotation_of(pose.orientation) @ _FRD_OF_FLU
+        lever = body_to_ned @ pose.lever
+        self.height = pose.altitude - float(lever[2])
+        self.place: np.ndarray = world.place(pose.latitude, pose.longitude, pose.altitude) + level.T @ lever
+        self.ned_to_optical: np.ndarray = (body_to_ned @ rotation_of(pose.rotation)).T
+        self.to_optical: np.ndarray = self.ned_to_optical @ level
+        self._velocity = self.ned_to_optical @ pose.velocity
+        self.focal = 0.5 * (optics.fx + optics.fy)
+
+    def optical(self, places: np.ndarray) -> np.ndarray:
+        """Places (n, 3) of the world as right, down, forward of the camera [m]."""
+        turned: np.ndarray = (np.atleast_2d(places) - self.place) @ self.to_optical.T
+        return turned
+
+    def pixels(self, optical: np.ndarray) -> np.ndarray:
+        """Pixels (n, 2) of points (n, 3) before the camera; NaN of those behind it."""
+        optics = self.optics
+        depth = np.where(optical[:, 2] > 0.0, optical[:, 2], np.nan)
+        across, down = optical[:, 0] / depth, optical[:, 1] / depth
+        return np.stack((optics.fx * across + optics.cx, optics.fy * down + optics.cy), axis=1)
+
+    def inside(self, pixels: np.ndarray) -> np.ndarray:
+        """Whether pixels (n, 2) lie in the picture, its outermost pixels included."""
+        low, high = -0.5, np.array((self.optics.width, self.optics.height)) - 0.5
+        within: np.ndarray = np.all((pixels >= low) & (pixels <= high), axis=1)
+        return within
+
+    def polygon(self, optical: np.ndarray) -> np.ndarray:
+        """The part of a polygon (n, 3) that is in the picture, as pixels (m, 2); empty when none is."""
+        ahead = clip(optical, optical[:, 2] - NEAR_M)
+        if len(ahead) < 3:
+            return np.empty((0, 2))
+        seen = self.pixels(ahead)
+        for sign, axis, limit in self._borders():
+            seen = clip(seen, sign * (seen[:, axis] - limit))
+            if len(seen) < 3:
+                return np.empty((0, 2))
+        return seen
+
+    def line(self, optical: np.ndarray) -> list[np.ndarray]:
+        """The parts of a line through points (n, 3) that are in the picture, each as pixels (m, 2)."""
+        parts: list[np.ndarray] = []
+        for begin, end in zip(optical[:-1], optical[1:]):
+            segment = _clip_segment(np.stack((begin, end)), 1.0, 2, NEAR_M)
+            if segment is not None:
+                segment = self.pixels(segment)
+                for sign, axis, limit in self._borders():
+                    segment = None if segment is None else _clip_segment(segment, sign, axis, limit)
+            if segment is None:
+                continue
+            if parts and np.allclose(parts[-1][-1], segment[0], atol=1e-9):
+                parts[-1] = np.vstack((parts[-1], segment[1:]))
+            else:
+                parts.append(segment)
+        return parts
+
+    def sigma(self, distance: float, direction: np.ndarray, sigma_height: float, sigma_place: float) -> float:
+        """How well a place is known in the picture [px].
+
+        Args:
+            distance: [m]; infinite for directions.
+            direction: Unit vector to it: right, down, forward of the camera.
+            sigma_height: [m] of the place's height.
+            sigma_place: [m] of its place on the map.
+        """
+        pose, focal = self.pose, self.focal
+        down = float(direction @ self.ned_to_optical[:, 2])
+        level = (max(0.0, 1.0 - down * down)) ** 0.5  # of the line of sight: height is seen at right angles to it
+        terms = [0.3, focal * pose.sigma_angle]
+        if np.isfinite(distance):
+            terms += [focal * sigma_height * level / distance, focal * sigma_place / distance]
+            terms.append(focal * pose.sigma_place / distance)
+        if pose.may_be_neighbour:
+            terms.append(focal * pose.turn_rate * pose.period)
+            if np.isfinite(distance):
+                across = self._velocity - direction * float(self._velocity @ direction)
+                terms.append(focal * float(np.linalg.norm(across)) * pose.period / distance)
+        return float(np.sqrt(np.sum(np.square(terms))))
+
+    def _borders(self) -> tuple[tuple[float, int, float], ...]:
+        right, below = self.optics.width - 0.5, self.optics.height - 0.5
+        return (1.0, 0, -0.5), (-1.0, 0, right), (1.0, 1, -0.5), (-1.0, 1, below)
+
+
+def clip(points: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """The part of a polygon (n, k) where a linear function, given at its corners, is not negative."""
+    kept: list[np.ndarray] = []
+    for i in range(len(points)):
+        j = (i + 1) % len(points)
+        if inside[i] >= 0.0:
+            kept.append(points[i])
+        if (inside[i] >= 0.0) != (inside[j] >= 0.0):
+            kept.append(points[i] + (points[j] - points[i]) * (inside[i] / (inside[i] - inside[j])))
+    return np.array(kept).reshape(-1, points.shape[1])
+
+
+def _clip_segment(segment: np.ndarray, sign: float, axis: int, limit: float) -> np.ndarray | None:
+    """The part of a segment (2, k) on one side of a limit of one coordinate."""
+    a, b = sign * (segment[:, axis] - limit)
+    if a < 0.0 and b < 0.0:
+        return None
+    if a >= 0.0 and b >= 0.0:
+        return segment
+    cut = segment[0] + (segment[1] - segment[0]) * (a / (a - b))
+    return np.stack((cut, segment[1])) if a < 0.0 else np.stack((segment[0], cut))
+
+
+def rotation_of(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a quaternion x, y, z, w of any length but 0."""
+    x, y, z, w = (float(part) for part in quaternion / np.linalg.norm(quaternion))
+    return np.array(
+        (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+        )
+    )

@@ -1,0 +1,227 @@
+"""A recorded flight's pictures, labelled: poses and optics out of the bag, sun and ground beside them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from pathlib import Path
+from typing import Any, Iterator, Mapping, NamedTuple, Sequence
+
+import numpy as np
+
+from xplane_bridge import __version__
+from xplane_bridge.bags import Bags, Table
+from xplane_bridge.labels import table as label_table
+from xplane_bridge.labels.apt import Airport
+from xplane_bridge.labels.camera import Camera, Optics, Pose
+from xplane_bridge.labels.heights import Ground, Profile, profile
+from xplane_bridge.labels.table import LabelError
+from xplane_bridge.labels.things import MAP_SIGMA_M, Labeller, Other, Sun
+from xplane_bridge.labels.world import Flat, Sphere, World
+
+_FRAME, _STATE, _DATAREFS = "xplane_bridge/FrameState", "xplane_bridge/FlightState", "xplane_bridge/DatarefValues"
+#: Where the sun stands, and the origin whose axes that is in.
+_SUN = ("sim/graphics/scenery/sun_pitch_degrees", "sim/graphics/scenery/sun_heading_degrees")
+_ORIGIN = ("sim/flightmodel/position/lat_ref", "sim/flightmodel/position/lon_ref")
+#: What a picture needs of its state: position and attitude.
+_NEEDED = 2 | 16
+_HAS_AGL = 2 | 4
+_STATE_MISSING, _OFF_FRAME, _BORDERLINE = 1, 4, 16384
+_MEASURED = 2
+#: What cannot be known of the motion is taken for lively, where it matters.
+_TURN_RATE, _SPEED = 0.5, 100.0
+
+
+class Options(NamedTuple):
+    """How to label; goes into the file."""
+
+    flat_world: bool = False  #: the emulator's ground instead of the sphere
+    map_sigma: float = MAP_SIGMA_M  #: [m]
+
+
+class Frame(NamedTuple):
+    """One picture that can be labelled."""
+
+    stamp: int  #: [ns]
+    camera: Camera
+
+
+class Flight:
+    """What labelling needs of a flight.
+
+    Args:
+        bags: Open.
+        airport: What to label.
+        heights: Of runway ends [m MSL], from a user.
+        options: How.
+
+    Raises:
+        LabelError: The bags have no pictures with a measured camera.
+        BagError: The bags cannot be read.
+    """
+
+    def __init__(self, bags: Bags, airport: Airport, heights: Mapping[str, float], options: Options) -> None:
+        self.left_out: Counter[str] = Counter()  #: pictures without labels, by reason
+        self._bags, self.airport, self._options = bags, airport, options
+        self._topic = _filled(bags, _FRAME)
+        self._frames = bags.read(self._topic)
+        self._infos = _optics(bags, f"{self._topic.rsplit('/', 1)[0]}/camera_info")
+        self._sun = _suns(bags, self._frames.stamp)
+        middle = airport.runways[0].ends
+        self._world: World = (
+            Flat(*(0.5 * (getattr(middle[0], name) + getattr(middle[1], name)) for name in ("latitude", "longitude")))
+            if options.flat_world
+            else Sphere()
+        )
+        ground = _ground(bags)
+        self.profiles: list[Profile] = [profile(airport, runway, ground, heights) for runway in airport.runways]
+        self.labeller = Labeller(airport, self.profiles, self._world, options.map_sigma)
+
+    def frames(self) -> Iterator[Frame]:
+        """Give the pictures that can be labelled, in the order of the bag; the others are counted."""
+        self.left_out.clear()
+        for row, stamp in enumerate(self._frames.stamp.tolist()):
+            reason = self._why_not(row, stamp)
+            if reason:
+                self.left_out[reason] += 1
+            else:
+                yield Frame(stamp, Camera(self._world, _pose(self._frames, row), self._infos[stamp]))
+
+    def labels(self, others: Mapping[int, Sequence[Other]] | None = None) -> Iterator[dict[str, Any]]:
+        """Label all pictures: what each line of the file is.
+
+        Args:
+            others: Aircraft beside our own by the stamp [ns] of the picture.
+        """
+        for frame in self.frames():
+            optics = frame.camera.optics
+            seen = self.labeller.label(frame.camera, self._sun.get(frame.stamp), (others or {}).get(frame.stamp, ()))
+            yield {"stamp_ns": frame.stamp, "width": optics.width, "height": optics.height, "objects": seen}
+
+    def about(self) -> dict[str, Any]:
+        """What the first line of the file says."""
+        runways = [
+            f"{r.ends[0].number}/{r.ends[1].number}: {p.source}" for r, p in zip(self.airport.runways, self.profiles)
+        ]
+        return {
+            "xplane_bridge": __version__,
+            "bags": [path.name for path in self._bags.paths],
+            "airport": self.airport.ident,
+            "apt": {
+                "file": Path(self.airport.file).name,
+                "sha256": self.airport.sha256,
+                "version": self.airport.version,
+            },
+            "heights": runways,
+            "sun": bool(self._sun),
+            "other_aircraft": False,
+            **self._options._asdict(),
+        }
+
+    def _why_not(self, row: int, stamp: int) -> str:
+        frames = self._frames
+        if int(frames["quality"][row]) & _STATE_MISSING or int(frames["state.valid"][row]) & _NEEDED != _NEEDED:
+            return "no state, or its position or attitude is not known"
+        if int(frames["camera_pose_source"][row]) != _MEASURED:
+            return "the camera's pose was not measured"
+        if stamp not in self._infos:
+            return "no camera_info of the same stamp"
+        return ""
+
+
+def label_flight(
+    bags: Bags, path: Path, airport: Airport, heights: Mapping[str, float], options: Options
+) -> tuple[int, Flight]:
+    """Label a flight's pictures into a file; gives how many, and the flight with what was left out.
+
+    Raises:
+        LabelError: Nothing can be labelled, or the file cannot be written.
+    """
+    flight = Flight(bags, airport, heights, options)
+    lines = list(flight.labels())
+    if not lines:
+        reasons = ", ".join(f"{count}: {reason}" for reason, count in flight.left_out.items())
+        remedy = "record with this version, from X-Plane's own window"
+        msg = f"{bags.paths[0]}: no picture can be labelled ({reasons}); {remedy}"
+        raise LabelError(msg)
+    about = {**flight.about(), "left_out": dict(sorted(flight.left_out.items()))}
+    return label_table.write(path, about, lines), flight
+
+
+def _filled(bags: Bags, msgtype: str) -> str:
+    topic = bags.topic_of_type(msgtype)
+    if topic is None or not bags.topics[topic].count:
+        names = ", ".join(map(str, bags.paths))
+        msg = f"{names}: no message of type {msgtype}; record camera/frame_state (launch/record.launch does)"
+        raise LabelError(msg)
+    return topic
+
+
+def _optics(bags: Bags, topic: str) -> dict[int, Optics]:
+    if topic not in bags.topics or not bags.topics[topic].count:
+        names = ", ".join(map(str, bags.paths))
+        msg = f"{names}: no {topic}; record camera/camera_info (launch/record.launch does)"
+        raise LabelError(msg)
+    infos = bags.read(topic, ["header.stamp", "width", "height", "K"])
+    out = {}
+    for stamp, width, height, k in zip(infos.stamp.tolist(), infos["width"], infos["height"], infos["K"]):
+        if k[0] > 0.0 and k[4] > 0.0:
+            out[stamp] = Optics(int(width), int(height), float(k[0]), float(k[4]), float(k[2]), float(k[5]))
+    return out
+
+
+def _suns(bags: Bags, stamps: np.ndarray) -> dict[int, Sun]:
+    """Where the sun stood, by stamp: from the datarefs that rx_node was asked to publish; empty when it was not."""
+    topic = bags.topic_of_type(_DATAREFS)
+    if topic is None or not bags.topics[topic].count:
+        return {}
+    rows = []
+    values = bags.read(topic)
+    for stamp, names, numbers in zip(values.stamp.tolist(), values["names"], values["values"]):
+        of = dict(zip(names, numbers))
+        rows.append((stamp, *(float(of.get(name, math.nan)) for name in (*_SUN, *_ORIGIN))))
+    rows = sorted(row for row in rows if math.isfinite(row[1]) and math.isfinite(row[2]))
+    if not rows:
+        return {}
+    at = np.array([row[0] for row in rows])
+    newest = np.searchsorted(at, stamps, side="right") - 1
+    out = {}
+    for stamp, k in zip(stamps.tolist(), newest.tolist()):
+        _, elevation, heading, latitude, longitude = rows[max(k, 0)]  # it hardly moves: the first one holds before, too
+        known = math.isfinite(latitude) and math.isfinite(longitude)
+        out[stamp] = Sun(elevation, heading, (latitude, longitude) if known else None)
+    return out
+
+
+def _ground(bags: Bags) -> Ground | None:
+    topic = bags.topic_of_type(_STATE)
+    if topic is None or not bags.topics[topic].count:
+        return None
+    states = bags.read(topic, ["valid", "latitude", "longitude", "altitude_msl", "altitude_agl"])
+    good = (states["valid"].astype(np.int64) & _HAS_AGL) == _HAS_AGL
+    height = (states["altitude_msl"] - states["altitude_agl"])[good]
+    return Ground(states["latitude"][good], states["longitude"][good], height)
+
+
+def _pose(frames: Table, row: int) -> Pose:
+    def vector(path: str, axes: str = "xyz") -> np.ndarray:
+        return np.array([float(frames[f"{path}.{axis}"][row]) for axis in axes])
+
+    quality = int(frames["quality"][row])
+    rates, velocity = vector("state.angular_velocity"), vector("state.velocity_ned")
+    # A spread as wide as the bound, not an even one: cautious.
+    angle, place = float(frames["camera_pose_uncertainty_deg"][row]), float(frames["camera_pose_uncertainty"][row])
+    return Pose(
+        float(frames["state.latitude"][row]),
+        float(frames["state.longitude"][row]),
+        float(frames["state.altitude_msl"][row]),
+        vector("state.orientation", "xyzw"),
+        vector("body_to_camera.translation"),
+        vector("body_to_camera.rotation", "xyzw"),
+        math.radians(angle) if math.isfinite(angle) else 0.0,
+        place if math.isfinite(place) else 0.0,
+        float(np.linalg.norm(rates)) if np.isfinite(rates).all() else _TURN_RATE,
+        velocity if np.isfinite(velocity).all() else np.full(3, _SPEED / math.sqrt(3.0)),
+        float(frames["frame_period"][row]),
+        bool(quality & (_BORDERLINE | _OFF_FRAME)),
+    )

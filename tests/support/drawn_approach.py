@@ -1,0 +1,121 @@
+"""A bag of an approach as the emulator draws it, made in a second, without ROS: pictures and what is known of each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from support.synthetic_flight import FlightBag, stamp_ns
+from xplane_bridge.emulator.flight import earth
+from xplane_bridge.emulator.view.renderer.painter import Painter
+from xplane_bridge.emulator.view.renderer.scene import Scene
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: The emulator's aerodrome in config/aerodromes/apt.dat.
+ANCHOR, HEADING_DEG = (37.4602, 126.4407), 152.0
+SIZE = (640, 480)
+FOV_DEG = 60.0
+LEVER = (1.2, -0.3, -0.6)  #: [m] of the camera: forward, right, down
+SPEED = 55.0  #: [m/s]
+#: [s] of a frame
+PERIOD = 1.0 / 30.0
+SUN = (31.101993, 41.576129)  #: elevation, heading [deg]
+RADIUS_M = 6378145.0
+
+
+def scene(t: float, far: float = 900.0) -> Scene:
+    """The picture at `t` [s] of an approach in gusts that begins `far` [m] before the threshold, 3 degrees down."""
+    along = -900.0 - far + SPEED * t
+    across = 12.0 * math.sin(0.5 * t)
+    turn = math.radians(HEADING_DEG)
+    north = along * math.cos(turn) - across * math.sin(turn)
+    east = along * math.sin(turn) + across * math.cos(turn)
+    return Scene(
+        frame=round(t / PERIOD),
+        sim_time=t,
+        latitude_deg=ANCHOR[0] + math.degrees(north / RADIUS_M),
+        longitude_deg=ANCHOR[1] + math.degrees(east / (RADIUS_M * math.cos(math.radians(ANCHOR[0])))),
+        altitude_m=max((-600.0 - along) * math.tan(math.radians(3.0)), 8.0),
+        roll_deg=8.0 * math.sin(2.0 * t),
+        pitch_deg=-2.0 + 1.5 * math.sin(4.0 * t),
+        heading_deg=HEADING_DEG + 2.0 + 1.5 * math.cos(3.0 * t),
+        eye_forward_m=LEVER[0],
+        eye_right_m=LEVER[1],
+        eye_down_m=LEVER[2],
+        field_of_view_deg=FOV_DEG,
+    )
+
+
+def frame_state(bag: FlightBag, shown: Scene, ns: int, **changes: Any) -> dict[str, Any]:
+    """FrameState of a picture, with the state of a scene: of the one shown, or of another."""
+    body = earth.body_to_level(shown.roll_deg, shown.pitch_deg, shown.heading_deg)
+    w, x, y, z = earth.quaternion(body)
+    state = bag.state(shown.sim_time, shown.frame)
+    state.update(
+        latitude=shown.latitude_deg,
+        longitude=shown.longitude_deg,
+        altitude_msl=shown.altitude_m,
+        altitude_agl=np.float32(shown.altitude_m - shown.terrain_m),
+        orientation={"x": x, "y": y, "z": z, "w": w},
+        angular_velocity={"x": 0.0, "y": 0.1, "z": 0.0},
+        velocity_ned={"x": SPEED, "y": 0.0, "z": 3.0},
+    )
+    forward, right, down = LEVER
+    return {
+        "header": bag.header(ns, "camera_optical"),
+        "state": state,
+        "frame_period": np.float32(PERIOD),
+        "display_delay": 0.058,
+        "camera_pose_source": 2,
+        "camera_pose_uncertainty_deg": np.float32(0.002),
+        "camera_pose_uncertainty": np.float32(0.004),
+        "body_to_camera": {
+            "translation": {"x": forward, "y": -right, "z": -down},
+            "rotation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5},
+        },
+        **changes,
+    }
+
+
+def write_approach(
+    path: Path, frames: int, late: int = 0, far: float = 900.0, every: int = 15, **turned: float
+) -> Path:
+    """Write a bag of pictures.
+
+    Args:
+        path: Of the bag.
+        frames: So many pictures.
+        late: Their states are of frames so many later.
+        far: [m] before the threshold where it begins.
+        every: Frames of 1/30 s from one picture to the next.
+        **turned: Of every scene, in place of the approach's.
+    """
+    focal = 0.5 * SIZE[0] / math.tan(math.radians(0.5 * FOV_DEG))
+    matrix = [focal, 0.0, 0.5 * (SIZE[0] - 1), 0.0, focal, 0.5 * (SIZE[1] - 1), 0.0, 0.0, 1.0]
+    painter = Painter(*SIZE, ANCHOR, HEADING_DEG)
+    with FlightBag(path) as bag:
+        for k in range(0, frames * every, every):
+            t = k * PERIOD
+            ns = stamp_ns(t)
+            shown, known = (replace(scene(at, far), **turned) for at in (t, t + late * PERIOD))
+            frame = frame_state(bag, known, ns)
+            jpeg = cv2.imencode(".jpg", painter.paint(shown), [cv2.IMWRITE_JPEG_QUALITY, 90])[1]
+            header = frame["header"]
+            bag.add("/xplane/camera/frame_state", "xplane_bridge/FrameState", ns, frame)
+            info = {"header": header, "width": SIZE[0], "height": SIZE[1], "K": matrix}
+            bag.add("/xplane/camera/camera_info", "sensor_msgs/CameraInfo", ns, info)
+            picture = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.reshape(-1)}
+            bag.add("/xplane/camera/image_raw/compressed", "sensor_msgs/CompressedImage", ns, picture)
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, frame["state"])
+            if k % (30 * every) == 0:
+                names = [f"sim/graphics/scenery/sun_{name}_degrees" for name in ("pitch", "heading")]
+                names += [f"sim/flightmodel/position/{name}_ref" for name in ("lat", "lon")]
+                values = {"header": bag.header(ns, ""), "names": names, "values": [*SUN, *ANCHOR]}
+                bag.add("/xplane/datarefs", "xplane_bridge/DatarefValues", ns, values)
+    return path
