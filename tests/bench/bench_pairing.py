@@ -17,6 +17,10 @@ from xplane_bridge.harness import HarnessError
 
 #: Of the emulator: from a frame to its display; longer than any drawing takes.
 _PIPELINE_DELAY_S = 0.05
+#: Delays of the display [s], and of frames at random, at most [s], of `pairing_delays`.
+_DELAYS_S = (0.0, 0.025, 0.06, 0.2)
+_JITTERS_S = {"regular": 0.0, "irregular": 0.015}
+_DELAY_ASSUMED = 8192  #: FrameState.QUALITY_DELAY_ASSUMED
 #: Each flight is this many measurements long: the minute that the budget is for, by default.
 _LENGTHS = 3.0
 #: A picture that appeared, or was noticed, this much off its time is a cause of its own [share of a frame].
@@ -36,19 +40,27 @@ class Run(NamedTuple):
     grab_age: np.ndarray  #: [s] display to grab
     quality: np.ndarray
     frames_drawn: int  #: of the emulator, from the first picture to the last
+    cpu_percent: float  #: of a core, of all cameras
 
 
-def read_run(folder: Path, delay: float) -> Run:
-    """Puts together what `pairing_run.py` and the emulator have written."""
-    with np.load(folder / "pictures.npz") as arrays:
+def read_run(folder: Path, delay: float, camera: str = "") -> Run:
+    """Puts together what `pairing_run.py` and the emulator have written.
+
+    Args:
+        folder: Where.
+        delay: The emulator's [s].
+        camera: "" or, of a second window, "_2".
+    """
+    with np.load(folder / f"pictures{camera}.npz") as arrays:
         columns: Dict[str, np.ndarray] = {name: arrays[name] for name in COLUMNS}
+        cpu_percent = float(arrays["cpu_percent"])
     pictures = len(columns["shown_frame"])
     readable = columns["shown_frame"] >= 0
     columns = {name: values[readable] for name, values in columns.items()}
     with (folder / "truth.csv").open() as file:
         frame_at = {np.float32(row["sim_time"]): int(row["frame"]) for row in csv.DictReader(file)}
     to_host = time.time_ns() - time.monotonic_ns()
-    with (folder / "swaps.csv").open() as file:
+    with (folder / f"swaps{camera}.csv").open() as file:
         swaps = {
             int(row["frame"]): (int(row["frame_monotonic_ns"]) + to_host, int(row["swap_end_ns"]))
             for row in csv.DictReader(file)
@@ -67,6 +79,7 @@ def read_run(folder: Path, delay: float) -> Run:
         1e-9 * (columns["grab_ns"] - columns["display_ns"]),
         columns["quality"],
         int(frame[-1] - frame[0]) + 1,
+        cpu_percent,
     )
 
 
@@ -100,15 +113,32 @@ def measures(run: Run, fps: float, seconds: float) -> List[Measure]:
     ]
 
 
-def _flown(context: Context, fps: float, delay: float, sender: bool) -> Run:
-    """Flies once in a process of its own."""
-    folder = context.folder / f"{fps:g}"
+def _flown(context: Context, fps: float, delay: float, *options: object, name: str = "") -> Path:
+    """Flies once in a process of its own; returns the folder of what it has written."""
+    folder = context.folder / f"{name}{fps:g}"
     command = [sys.executable, Path(__file__).with_name("pairing_run.py"), folder, "--fps", fps]
-    command += ["--seconds", _LENGTHS * context.seconds, "--pipeline-delay", delay, *(["--sender"] if sender else [])]
+    command += ["--seconds", _LENGTHS * context.seconds, "--pipeline-delay", delay, *options]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise HarnessError(f"the flight at {fps:g} frames/s failed:\n{done.stderr.strip()}")
-    return read_run(folder, delay)
+    return folder
+
+
+def _sure(run: Run, name: str, fps: float) -> List[Measure]:
+    """What is wanted of pictures without a flag, or with that of the delay alone, which a delay of 0 does not clear.
+
+    Those that the emulator itself has shown late are left out: no pairing can know that.
+    """
+    on_time = np.abs(run.display_late) <= _OFF_TIME / fps
+    sure = on_time & (run.quality & ~_DELAY_ASSUMED == 0) & np.isfinite(run.error)
+    right = 100.0 * float(np.mean(run.error[sure] == 0.0)) if sure.any() else 0.0
+    worst = float(np.abs(run.frame_error[sure]).max(initial=0.0))
+    return [
+        Measure(name + "shown on time", 100.0 * float(np.mean(on_time)), "%"),
+        Measure(name + "shown on time and unflagged", 100.0 * float(np.mean(sure)), "%"),
+        Measure(name + "unflagged with the very frame", right, "%", 99.0, at_least=True),
+        Measure(name + "unflagged, largest error", worst, "frames", 1.0),
+    ]
 
 
 @benchmark
@@ -116,7 +146,8 @@ def pairing(context: Context) -> List[Measure]:
     """Images paired with the very frame they show, at 30 and 60 frames/s, by the strip drawn into them."""
     result: List[Measure] = []
     for fps in (30.0, 60.0):
-        result += measures(_flown(context, fps, _PIPELINE_DELAY_S, sender=False), fps, _LENGTHS * context.seconds)
+        folder = _flown(context, fps, _PIPELINE_DELAY_S)
+        result += measures(read_run(folder, _PIPELINE_DELAY_S), fps, _LENGTHS * context.seconds)
     return result
 
 
@@ -125,21 +156,55 @@ def pairing_sender(context: Context) -> List[Measure]:
     """The same for images that xplane_eye sends, and judged by what it says: those without a flag must be right."""
     result: List[Measure] = []
     for fps in (30.0, 60.0):
-        run = _flown(context, fps, _PIPELINE_DELAY_S, sender=True)
-        sure = (run.quality == 0) & np.isfinite(run.error)
+        run = read_run(_flown(context, fps, _PIPELINE_DELAY_S, "--sender"), _PIPELINE_DELAY_S)
         name = f"{fps:g} frames/s: "
         result += [
             Measure(name + "pictures", run.pictures / (_LENGTHS * context.seconds), "/s"),
-            Measure(name + "unflagged", 100.0 * float(np.mean(sure)), "%"),
-            Measure(
-                name + "unflagged with the very frame",
-                100.0 * float(np.mean(run.error[sure] == 0.0)),
-                "%",
-                99.0,
-                at_least=True,
-            ),
-            Measure(name + "unflagged, largest error", float(np.abs(run.frame_error[sure]).max()), "frames", 1.0),
+            *_sure(run, name, fps),
             Measure(name + "all with the very frame", 100.0 * float(np.mean(run.error == 0.0)), "%"),
             Measure(name + "images without a readable strip", run.unreadable, "-", 0.0),
         ]
+    return result
+
+
+@benchmark
+def pairing_windows(context: Context) -> List[Measure]:
+    """Two windows of one emulator, forward and down, 640x480 at 30 frames/s: pictures, and those of one frame."""
+    fps = 30.0
+    folder = _flown(context, fps, _PIPELINE_DELAY_S, "--windows", 2)
+    runs = [read_run(folder, _PIPELINE_DELAY_S, camera) for camera in ("", "_2")]
+    result: List[Measure] = []
+    for name, run in zip(("forward: ", "down: "), runs):
+        result.append(Measure(name + "pictures", run.pictures / (_LENGTHS * context.seconds), "/s"))
+        result += _sure(run, name, fps)
+    limit = _OFF_TIME / fps
+    frames = [{f: e for f, e, late in zip(r.frame, r.error, r.display_late) if abs(late) <= limit} for r in runs]
+    both = sorted(set(frames[0]) & set(frames[1]))
+    joined = [frames[0][frame] == 0.0 and frames[1][frame] == 0.0 for frame in both]
+    return [
+        *result,
+        Measure(
+            "frames of which both have a picture", 100.0 * len(both) / max(len(set(frames[0]) | set(frames[1])), 1), "%"
+        ),
+        Measure(
+            "of these with the same, right key", 100.0 * sum(joined) / max(len(joined), 1), "%", 99.0, at_least=True
+        ),
+        Measure("both capture_nodes", runs[0].cpu_percent, "% of a core", 50.0),
+    ]
+
+
+@benchmark
+def pairing_delays(context: Context) -> List[Measure]:
+    """Window, sender and two windows at 30 frames/s, at four delays of the display, frames regular and irregular."""
+    fps = 30.0
+    result: List[Measure] = []
+    for source, options in (("x11", ()), ("sender", ("--sender",)), ("two windows", ("--windows", 2))):
+        for delay in _DELAYS_S:
+            for frames, jitter in _JITTERS_S.items():
+                name = f"{source}, {1e3 * delay:g} ms, {frames}: "
+                place = f"{source}_{delay:g}_{frames}_".replace(" ", "_")
+                folder = _flown(context, fps, delay, "--frame-jitter", jitter, *options, name=place)
+                result += _sure(read_run(folder, delay), name, fps)
+                if source == "two windows":
+                    result += _sure(read_run(folder, delay, "_2"), name + "second: ", fps)
     return result

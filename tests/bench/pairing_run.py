@@ -13,8 +13,10 @@ import os
 import sys
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from measuring import Use
 
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
@@ -40,7 +42,8 @@ class Recorder:
     def __init__(self) -> None:
         self.edges: dict[int, tuple[int, np.ndarray]] = {}  #: by stamp [ns]: first row, rows
         self.states: dict[int, tuple] = {}
-        self.perfect = False  #: whether a picture was paired without any flag
+        self.paired = False  #: whether a picture was paired without any flag but, maybe, that of the delay
+        self.perfect = False  #: whether without any
 
     def on_image(self, image) -> None:
         first = image.height - image.height // 20
@@ -49,12 +52,17 @@ class Recorder:
 
     def on_state(self, state) -> None:
         self.perfect = self.perfect or not state.quality
+        self.paired = self.paired or not state.quality & ~state.QUALITY_DELAY_ASSUMED
         self.states[state.header.stamp.to_nsec()] = (
             np.nan if state.quality & state.QUALITY_STATE_MISSING else state.state.sim_time,
             state.quality,
             state.display_time.to_nsec(),
             state.grab_time.to_nsec(),
         )
+
+    def ready(self, delay: float) -> bool:
+        """Whether pictures are paired as well as they will be: a delay of 0 counts as not measured."""
+        return self.perfect or (delay == 0.0 and self.paired)
 
     def row(self, stamp: int) -> tuple:
         """Values of `COLUMNS`."""
@@ -73,8 +81,26 @@ def eye(folder: Path, xplane_port: int, receiver_port: int) -> ManagedProcess:
     return ManagedProcess("xplane_eye", command, folder, env=dict(os.environ))
 
 
-def fly(folder: Path, fps: float, seconds: float, delay: float, sender: bool) -> None:
+class Flight(NamedTuple):
+    """What is flown."""
+
+    fps: float
+    seconds: float
+    delay: float  #: of the emulator, from a frame to its display [s]
+    jitter: float  #: by which frames come later, at most [s]
+    sender: bool  #: pictures by xplane_eye
+    windows: int  #: a capture_node for each
+
+
+def second_window(shared: dict) -> dict:
+    """Parameters of a further camera's namespace."""
+    own = {"own_field_of_view": True, "field_of_view_deg": 90.0, "mount": {"pitch_deg": -90.0}}
+    return {**shared, "capture_node": {"max_rate": 0.0, "window": {"index": 1}, "frame_measured": "down", **own}}
+
+
+def fly(folder: Path, flight: Flight) -> None:
     """Flies and writes the files; the pictures come from the window, or from `xplane_eye`."""
+    fps, delay, sender = flight.fps, flight.delay, flight.sender
     with VirtualDisplay(folder) as display, RosMaster(folder) as master:
         os.environ["DISPLAY"] = display.display
         master.use_here()
@@ -86,35 +112,54 @@ def fly(folder: Path, fps: float, seconds: float, delay: float, sender: bool) ->
         env = {**master.env, "DISPLAY": display.display}
         options = ["--window", "--fps", f"{fps:g}", "--pipeline-delay", f"{delay}s", "--truth", folder / "truth.csv"]
         options += ["--swap-log", folder / "swaps.csv", "--pilot", config_file("scenarios", "demo.yaml")]
+        options += ["--frame-jitter", f"{flight.jitter}s", *(["--window2", "down@90"] if flight.windows > 1 else [])]
         with EmulatorProcess(folder, list(map(str, options))) as emulator:
             shared = {"host": "127.0.0.1", "port": emulator.port, "listen_for_beacon": False, "display_delay": delay}
             receiver = free_port()
             source = {"source": "sender", "sender": {"listen": f"127.0.0.1:{receiver}"}} if sender else {}
-            rospy.set_param(_NAMESPACE, {**shared, "capture_node": {"max_rate": 0.0, **source}})
+            window = {"window": {"index": 0}} if flight.windows > 1 else {}
+            rospy.set_param(_NAMESPACE, {**shared, "capture_node": {"max_rate": 0.0, **source, **window}})
+            places = [_NAMESPACE]
             nodes = [
                 ManagedProcess(name, [node_program(name, env), f"__ns:={_NAMESPACE}"], folder, env=env)
                 for name in ("rx_node", "capture_node")
             ]
-            recorder = Recorder()
-            topics = [
-                rospy.Subscriber(
-                    f"{_NAMESPACE}/camera/image_raw", Image, recorder.on_image, queue_size=100, buff_size=2**26
-                ),
-                rospy.Subscriber(f"{_NAMESPACE}/camera/frame_state", FrameState, recorder.on_state, queue_size=1000),
-            ]
+            if flight.windows > 1:
+                places.append(f"{_NAMESPACE}/down")
+                rospy.set_param(places[1], second_window(shared))
+                command = [node_program("capture_node", env), f"__ns:={places[1]}"]
+                command += [f"{topic}:={_NAMESPACE}/{topic}" for topic in ("flight_state", "mission/warnings")]
+                nodes.append(ManagedProcess("capture_node_2", command, folder, env=env))
+            recorders = [Recorder() for _ in places]
+            topics = []
+            for place, recorder in zip(places, recorders):
+                topic = f"{place}/camera/image_raw"
+                topics += [
+                    rospy.Subscriber(topic, Image, recorder.on_image, queue_size=100, buff_size=2**26),
+                    rospy.Subscriber(f"{place}/camera/frame_state", FrameState, recorder.on_state, queue_size=1000),
+                ]
             with contextlib.ExitStack() as running:
                 for node in [*nodes, *([eye(folder, emulator.port, receiver)] if sender else [])]:
                     running.enter_context(node)
-                wait_until(lambda: recorder.perfect, _WARM_UP_S, "paired picture")
-                recorder.edges.clear()
-                time.sleep(seconds)
-                stamps = sorted(recorder.edges)
-                wait_until(lambda: all(stamp in recorder.states for stamp in stamps), 5.0, "states of all pictures")
+                wait_until(lambda: all(recorder.ready(delay) for recorder in recorders), _WARM_UP_S, "paired pictures")
+                for recorder in recorders:
+                    recorder.edges.clear()
+                cameras = [Use(node.pid) for node in nodes[1:]]
+                time.sleep(flight.seconds)
+                cpu = sum(camera.cpu_percent(flight.seconds) for camera in cameras)
+                stamps = [sorted(recorder.edges) for recorder in recorders]
+                wait_until(
+                    lambda: all(stamp in r.states for r, of_camera in zip(recorders, stamps) for stamp in of_camera),
+                    5.0,
+                    "states of all pictures",
+                )
                 for topic in topics:
                     topic.unregister()
         rospy.signal_shutdown("measured")
-    rows = [recorder.row(stamp) for stamp in stamps]
-    np.savez(folder / "pictures.npz", **{name: np.array(values) for name, values in zip(COLUMNS, zip(*rows))})
+    for name, recorder, of_camera in zip(("pictures", "pictures_2"), recorders, stamps):
+        columns = zip(*[recorder.row(stamp) for stamp in of_camera])
+        arrays = {column: np.array(values) for column, values in zip(COLUMNS, columns)}
+        np.savez(folder / f"{name}.npz", cpu_percent=cpu, **arrays)
 
 
 def main() -> int:
@@ -123,11 +168,14 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--fps", type=float, required=True)
     parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--frame-jitter", type=float, default=0.0, metavar="S")
+    parser.add_argument("--windows", type=int, choices=(1, 2), default=1, help="of the emulator, a camera for each")
     parser.add_argument("--sender", action="store_true", help="pictures by xplane_eye")
     parser.add_argument("--pipeline-delay", type=float, required=True, metavar="S")
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
-    fly(args.folder.resolve(), args.fps, args.seconds, args.pipeline_delay, args.sender)
+    flight = Flight(args.fps, args.seconds, args.pipeline_delay, args.frame_jitter, args.sender, args.windows)
+    fly(args.folder.resolve(), flight)
     return 0
 
 

@@ -56,7 +56,8 @@ void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo
   // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
   const std::int64_t receive_ns = receive_clock_.toHostTime(info.stamp_ns, clock().system_ns(), clock().steady_ns());
   if (!view_stream_.add(datagram, receive_ns)) return;
-  const auto pose = pose_check_.add(view_stream_.camera());
+  auto pose = pose_check_.add(view_stream_.camera());
+  if (pose) pose->pose.orientation = pose->pose.orientation * options_.mount;
   {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
     camera_known_ = true;
@@ -148,7 +149,9 @@ void CaptureNode::undo(const Deadline& deadline) {
 CaptureNode::CameraFacts CaptureNode::cameraFacts() const {
   const std::lock_guard<std::mutex> lock(camera_mutex_);
   CameraFacts facts;
-  facts.frustum = core::frustumOf(camera_known_ ? frustum_ : core::FrustumSample(), options_.field_of_view_deg);
+  const bool told = camera_known_ && !options_.own_field_of_view;
+  facts.frustum = core::frustumOf(told ? frustum_ : core::FrustumSample(), options_.field_of_view_deg);
+  if (options_.own_field_of_view) facts.frustum.known = true;
   if (!camera_known_) return facts;
   facts.external = external_;
   facts.pose = camera_pose_;

@@ -53,6 +53,13 @@ vision::X11SourceOptions loadWindow(const ParamLoader& window) {
   return x11;
 }
 
+Eigen::Quaterniond mount(const ParamLoader& angles) {
+  const double roll = angles.number("roll_deg", {-180.0, 180.0}, 0.0);
+  const double pitch = angles.number("pitch_deg", {-90.0, 90.0}, 0.0);
+  const double heading = angles.number("heading_deg", {-180.0, 180.0}, 0.0);
+  return core::opticalOrientation(0.0, 0.0, 0.0).inverse() * core::opticalOrientation(roll, pitch, heading);
+}
+
 /// The section of parameters that belongs to a source.
 const char* sectionOf(CaptureOptions::Source source) {
   switch (source) {
@@ -93,6 +100,11 @@ CaptureOptions loadCaptureOptions(const ParamLoader& own) {
 
   options.field_of_view_deg = own.number("field_of_view_deg", {1.0, 170.0}, options.field_of_view_deg);
   options.set_field_of_view = own.boolean("set_field_of_view", false);
+  options.own_field_of_view = own.boolean("own_field_of_view", false);
+  if (options.own_field_of_view && options.set_field_of_view) {
+    own.refuse("own_field_of_view", "false where set_field_of_view is true: X-Plane takes that for its main view");
+  }
+  options.mount = mount(own.section("mount"));
   const std::string view = own.choice("assumed_view", {"forward", "rear", "down"}, "forward");
   for (const core::CameraView candidate :
        {core::CameraView::kForward, core::CameraView::kRear, core::CameraView::kDown}) {

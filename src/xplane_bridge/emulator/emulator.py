@@ -88,6 +88,7 @@ class Emulator:
         self._frames = 0
         self._loading_until = -math.inf
         self._sent_at: List[float] = []
+        self._jitter = np.random.default_rng(options.seed)
 
     # --- construction -------------------------------------------------------------------------------------------------
 
@@ -321,7 +322,7 @@ class Emulator:
             if self._frames % _COLLECT_EVERY == 0:
                 gc.collect()
             # A frame that takes too long (its picture, mostly) makes the next one late, and the frame rate fall.
-            deadline = max(deadline + self.period, end)
+            deadline = max(deadline + self.period + self._jitter.uniform(0.0, o.frame_jitter), end)
 
     def _wait_until(self, deadline: float) -> None:
         """Sleeps until the deadline; sends delayed datagrams on the way."""

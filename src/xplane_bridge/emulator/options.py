@@ -15,6 +15,7 @@ from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.datarefs import otherwise
 from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_half_turn
 from xplane_bridge.emulator.flight.flight_model import InitialState
+from xplane_bridge.emulator.windows import WindowView, window_view
 from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, parse_faults
 from xplane_bridge.emulator.wire.server import RREF_REQUESTS_PER_FRAME
 
@@ -62,9 +63,11 @@ class Options:
     wind: Tuple[float, float] = (0.0, 0.0)  #: from [deg], speed [m/s]
     turbulence: float = 0.0
     pipeline_delay: float = 0.0
+    frame_jitter: float = 0.0  #: by which frames come later, at most and at random [s]
     window: bool = False  #: whether the cockpit view is drawn
     window_size: Tuple[int, int] = (640, 480)
     aerodrome: Optional[Tuple[float, float, float]] = None  #: latitude, longitude, heading [deg]; None: where it starts
+    more_windows: Tuple[WindowView, ...] = ()  #: beside the first, of the same size
     hud: bool = False
     strip: bool = True
     swap_log: Optional[Path] = None
@@ -198,6 +201,7 @@ def _parser() -> argparse.ArgumentParser:
         help="real-time priority where the system grants it, so that frames are punctual on a busy machine (default)",
     )
     loop.add_argument("--pipeline-delay", default="0", metavar="TIME", help="picture later than its packets, 0..200ms")
+    loop.add_argument("--frame-jitter", default="0", metavar="TIME", help="frames longer by up to this, at random")
     loop.add_argument("--truth", type=Path, metavar="FILE", help="CSV of every frame, in doubles")
 
     window = p.add_argument_group("cockpit view")
@@ -213,6 +217,13 @@ def _parser() -> argparse.ArgumentParser:
         type=_aerodrome,
         metavar="LAT,LON,HEADING",
         help="middle of the runway that is drawn, and its true heading (default: where and as the flight starts)",
+    )
+    window.add_argument(
+        "--window2",
+        action="append",
+        type=window_view,
+        metavar="VIEW",
+        help="a further one of the same frames: down, rear, left, right, HEADING/PITCH[/ROLL]; @DEGREES; repeatable",
     )
     window.add_argument("--hud", action="store_true", help="with a head-up display")
     window.add_argument("--no-strip", dest="strip", action="store_false", help="without the machine-readable strip")
@@ -350,6 +361,7 @@ def _options(given: argparse.Namespace) -> Options:
     try:
         fault = parse_faults(given.fault)
         delay = parse_faults(f"delay={given.pipeline_delay}").delay_s
+        jitter = parse_faults(f"delay={given.frame_jitter}").delay_s
     except FaultSyntaxError as error:
         raise OptionError(str(error)) from None
     size = re.fullmatch(r"(\d{3,4})x(\d{3,4})", given.window or "640x480")
@@ -357,6 +369,7 @@ def _options(given: argparse.Namespace) -> Options:
     _require(xpc_port is None or 0 <= xpc_port <= 65535, "--xpc-port", xpc_port, "0 to 65535")
     if size is None:
         raise OptionError(f"--window {given.window}: expected WIDTHxHEIGHT, e.g. 640x480")
+    _require(not given.window2 or given.window is not None, "--window2", given.window2, "--window with it")
     group, _, beacon_port = given.beacon_target.partition(":")
     initial = InitialState(
         latitude_deg=given.lat,
@@ -399,9 +412,11 @@ def _options(given: argparse.Namespace) -> Options:
         wind=_wind(given.wind),
         turbulence=given.turbulence,
         pipeline_delay=delay,
+        frame_jitter=jitter,
         window=given.window is not None,
         window_size=(int(size.group(1)), int(size.group(2))),
         aerodrome=given.aerodrome,
+        more_windows=tuple(given.window2 or ()),
         hud=given.hud,
         strip=given.strip,
         swap_log=given.swap_log,

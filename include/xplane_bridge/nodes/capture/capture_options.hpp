@@ -4,6 +4,8 @@
 #include <memory>
 #include <string>
 
+#include <Eigen/Geometry>
+
 #include "xplane_bridge/core/camera/camera_view.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
 #include "xplane_bridge/vision/frame_source.hpp"
@@ -34,6 +36,9 @@ struct CaptureOptions {
 
   double field_of_view_deg = 60.0;  ///< horizontal, of the whole window; where X-Plane does not say
   bool set_field_of_view = false;   ///< also write it into X-Plane (and restore it)
+  bool own_field_of_view = false;   ///< of this window alone: what X-Plane says is of its first one
+  /// Rotation of this camera's optical vectors into those of X-Plane's main view.
+  Eigen::Quaterniond mount = Eigen::Quaterniond::Identity();
   core::CameraView assumed_view = core::CameraView::kForward;  ///< where X-Plane does not say
   double view_tolerance_deg = 5.0;
   std::array<std::string, 4> frame_ids;   ///< by CameraView; [kUnknown] is not used

@@ -1,81 +1,110 @@
-"""Hands each frame of the emulator to the window that draws the cockpit view."""
+"""Hands each frame of the emulator to the windows that draw its views."""
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
+from typing import List
 
+import numpy as np
+
+from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.frame import MPS_TO_FPM, MPS_TO_KT
 from xplane_bridge.emulator.options import Options
 from xplane_bridge.emulator.simulator import Simulator
-from xplane_bridge.emulator.view.renderer import RendererOptions, RendererProcess, Scene
+from xplane_bridge.emulator.view.renderer import RendererError, RendererOptions, RendererProcess, Scene
+from xplane_bridge.emulator.windows import WindowView
 
 
 class CockpitView:
-    """What the pilot sees, in a window; see `emulator.View`.
+    """What the pilot sees, in a window, and further windows with views of their own; see `emulator.View`.
 
-    The aerodrome lies where the options say, else where the flight starts, its runway along the first heading.
+    The aerodrome lies where the options say, else where the flight starts, its runway along the first heading. Further
+    windows lie right of the first.
 
     Raises:
-        RendererError: The window cannot be opened.
+        RendererError: A window cannot be opened.
     """
 
     def __init__(self, options: Options) -> None:
-        initial = options.initial
-        here = (initial.latitude_deg, initial.longitude_deg, initial.heading_deg)
-        latitude, longitude, heading = options.aerodrome or here
-        self._renderer = RendererProcess(
-            RendererOptions(
-                anchor=(latitude, longitude),
-                runway_heading_deg=heading,
-                width=options.window_size[0],
-                height=options.window_size[1],
-                pipeline_delay=options.pipeline_delay,
-                hud=options.hud,
-                strip=options.strip,
-                swap_log=options.swap_log,
-                realtime=options.realtime,
-            )
-        )
+        self._views = (WindowView(0.0, 0.0), *options.more_windows)
+        self._renderers: List[RendererProcess] = []
+        try:
+            for number in range(len(self._views)):
+                self._renderers.append(RendererProcess(_renderer_options(options, number)))
+        except RendererError:
+            self.close()
+            raise
 
     def show(self, sim: Simulator) -> None:
         """Has the frame drawn whose packets were just sent."""
         frame = sim.frame
         camera = sim.cameras.drawn(frame)
-        roll, pitch, heading = camera.angles
         forward, right, down = (float(part) for part in camera.lever)
         horizontal, vertical, shift_right, shift_up = sim.cameras.field_of_view()
-        self._renderer.show(
-            Scene(
-                frame=sim.clocks.frame,
-                time_ns=time.monotonic_ns(),
-                sim_time=sim.clocks.running,
-                latitude_deg=frame.m.latitude_deg,
-                longitude_deg=frame.m.longitude_deg,
-                altitude_m=frame.m.altitude_m,
-                terrain_m=frame.m.terrain_elevation_m,
-                roll_deg=frame.true_phi,
-                pitch_deg=frame.true_theta,
-                heading_deg=frame.true_psi,
-                head_heading_deg=heading,
-                head_pitch_deg=pitch,
-                head_roll_deg=roll,
-                eye_forward_m=forward,
-                eye_right_m=right,
-                eye_down_m=down,
-                floor_down_m=camera.floor_down,
-                field_of_view_deg=horizontal,
-                vertical_field_of_view_deg=vertical,
-                shift_right=shift_right,
-                shift_up=shift_up,
-                airspeed_kt=frame.m.calibrated_airspeed_mps * MPS_TO_KT,
-                vertical_speed_fpm=-frame.m.v_down_mps * MPS_TO_FPM,
-            )
+        scene = Scene(
+            frame=sim.clocks.frame,
+            time_ns=time.monotonic_ns(),
+            sim_time=sim.clocks.running,
+            latitude_deg=frame.m.latitude_deg,
+            longitude_deg=frame.m.longitude_deg,
+            altitude_m=frame.m.altitude_m,
+            terrain_m=frame.m.terrain_elevation_m,
+            roll_deg=frame.true_phi,
+            pitch_deg=frame.true_theta,
+            heading_deg=frame.true_psi,
+            eye_forward_m=forward,
+            eye_right_m=right,
+            eye_down_m=down,
+            floor_down_m=camera.floor_down,
+            field_of_view_deg=horizontal,
+            vertical_field_of_view_deg=vertical,
+            shift_right=shift_right,
+            shift_up=shift_up,
+            airspeed_kt=frame.m.calibrated_airspeed_mps * MPS_TO_KT,
+            vertical_speed_fpm=-frame.m.v_down_mps * MPS_TO_FPM,
         )
+        for view, renderer in zip(self._views, self._renderers):
+            renderer.show(_seen(scene, view, camera.turn))
 
     def drawn(self, timeout_s: float) -> bool:
-        """Whether that is done (or the window gone); waits for it so long."""
-        return self._renderer.drawn(timeout_s)
+        """Whether that is done (or the window gone) in all windows; waits for it so long."""
+        end = time.monotonic() + timeout_s
+        return all(renderer.drawn(max(end - time.monotonic(), 0.0)) for renderer in self._renderers)
 
     def close(self) -> None:
-        """Closes the window."""
-        self._renderer.close()
+        """Closes the windows."""
+        for renderer in self._renderers:
+            renderer.close()
+
+
+def _renderer_options(options: Options, number: int) -> RendererOptions:
+    initial, (width, height) = options.initial, options.window_size
+    here = (initial.latitude_deg, initial.longitude_deg, initial.heading_deg)
+    latitude, longitude, heading = options.aerodrome or here
+    swap_log = options.swap_log
+    if swap_log is not None and number:
+        swap_log = swap_log.with_name(f"{swap_log.stem}_{number + 1}{swap_log.suffix}")
+    return RendererOptions(
+        anchor=(latitude, longitude),
+        runway_heading_deg=heading,
+        width=width,
+        height=height,
+        pipeline_delay=options.pipeline_delay,
+        hud=options.hud,
+        strip=options.strip,
+        swap_log=swap_log,
+        realtime=options.realtime,
+        place=(number * width, 0) if options.more_windows else None,
+    )
+
+
+def _seen(scene: Scene, view: WindowView, first: np.ndarray) -> Scene:
+    """The scene with a window's own camera, turned in the aircraft from the first window's."""
+    turn = first @ earth.body_to_level(view.roll_deg, view.pitch_deg, view.heading_deg)
+    roll, pitch, heading = earth.euler_degrees(turn)
+    scene = replace(scene, head_roll_deg=roll, head_pitch_deg=pitch, head_heading_deg=heading)
+    if not view.field_of_view_deg:
+        return scene
+    own = view.field_of_view_deg
+    return replace(scene, field_of_view_deg=own, vertical_field_of_view_deg=0.0, shift_right=0.0, shift_up=0.0)

@@ -35,6 +35,7 @@ class RendererOptions:
         hud, strip: Whether the head-up display and the machine-readable strip are drawn.
         swap_log: CSV file for frame, simulator time, frame time and swap time of each picture shown, and its camera.
         realtime: Whether the thread that swaps asks for real-time priority.
+        place: Of the window's upper left corner on the screen [px]; None: where the system puts it.
         display: X display; None: `DISPLAY`.
     """
 
@@ -47,6 +48,7 @@ class RendererOptions:
     strip: bool = True
     swap_log: Path | None = None
     realtime: bool = False
+    place: tuple[int, int] | None = None
     display: str | None = None
 
     def __post_init__(self) -> None:
@@ -79,6 +81,8 @@ class RendererProcess:
         environment = dict(os.environ)
         if options.display is not None:
             environment["DISPLAY"] = options.display
+        if options.place is not None:
+            environment["SDL_VIDEO_WINDOW_POS"] = "{},{}".format(*options.place)
         source = str(Path(__file__).resolve().parents[4])
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, [source, environment.get("PYTHONPATH", "")]))
         self._child = subprocess.Popen(

@@ -1,0 +1,112 @@
+"""Two windows of one X-Plane, a capture_node for each: forward and down, joined by the frame they show."""
+
+from __future__ import annotations
+
+import csv
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from xplane_bridge.emulator.view.renderer import read_strip
+from xplane_bridge.harness import roslaunch, wait_until
+from xplane_bridge.harness.display import VirtualDisplay
+
+FPS = 20
+PIPELINE_DELAY_S = 0.15
+#: A picture that appears this much off its time says nothing about the pairing [s].
+LATE_S = 0.2 / FPS
+ENOUGH = 60
+
+
+def on_time(swaps: Path) -> set:
+    """Frames that a window showed when they were due."""
+    offset = time.time_ns() - time.monotonic_ns()
+    with swaps.open() as file:
+        late = {
+            int(row["frame"]): (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9
+            for row in csv.DictReader(file)
+        }
+    return {frame for frame, delay in late.items() if abs(delay - PIPELINE_DELAY_S) < LATE_S}
+
+
+def test_forward_and_down_join_by_the_frame(world, master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sensor_msgs.msg import CameraInfo, Image
+    from xplane_bridge.msg import FrameState
+
+    with VirtualDisplay(tmp_path) as display:
+        monkeypatch.setenv("DISPLAY", display.display)
+        swaps = tmp_path / "swaps.csv"
+        views = ["--window", "--window2", "down@90", "--swap-log", swaps]
+        emulator = world.emulator(*views, "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", "--start", "air")
+        world.set_param("display_delay", PIPELINE_DELAY_S)
+        world.start("rx_node")
+        world.start("capture_node", {"window": {"display": display.display, "index": 0}})
+        arguments = {
+            "ns": world.namespace.lstrip("/"),
+            "camera": "belly",
+            "window_index": 1,
+            "pitch": -90,
+            "field_of_view": 90,
+            "assumed_view": "down",
+            "display_delay": PIPELINE_DELAY_S,
+            "x_display": display.display,
+            "host": "127.0.0.1",
+            "port": emulator.port,
+            "listen_for_beacon": False,
+        }
+        with roslaunch(master, tmp_path, "camera.launch", **arguments) as launch:
+            cameras = [
+                (
+                    world.watch(f"{place}camera/image_raw", Image),
+                    world.watch(f"{place}camera/camera_info", CameraInfo),
+                    world.watch(f"{place}camera/frame_state", FrameState),
+                )
+                for place in ("", "belly/")
+            ]
+
+            def shared() -> set:
+                """Keys of frames that both cameras have without a flag."""
+                keys = [{s.frame_sim_time for s in list(c[2].messages) if s.quality == 0} for c in cameras]
+                return keys[0] & keys[1]
+
+            wait_until(lambda: len(shared()) >= ENOUGH, 90.0, "frames that both cameras have")
+            launch.check_running()
+        emulator.stop()
+
+    punctual = on_time(swaps) & on_time(tmp_path / "swaps_2.csv")
+    compared = 0
+    states = [{s.frame_sim_time: s for s in camera[2].messages if s.quality == 0} for camera in cameras]
+    images = [{image.header.stamp: image for image in camera[0].messages} for camera in cameras]
+    for key in sorted(shared()):
+        pair = [by_key[key] for by_key in states]
+        assert pair[0].state == pair[1].state, "the same frame, the same state"
+        if not all(state.header.stamp in camera for state, camera in zip(pair, images)):
+            continue  # an image came after the end
+        shown = [read_strip(pixels(camera[state.header.stamp])) for state, camera in zip(pair, images)]
+        if not all(strip.frame in punctual for strip in shown):
+            continue
+        compared += 1
+        assert shown[0] == shown[1]
+        assert np.float32(shown[1].sim_time) == pair[1].state.sim_time
+    assert compared >= 5, "on a busy machine few windows are punctual"
+
+    forward, down = pair
+    assert (forward.header.frame_id, forward.view) == ("camera_optical", FrameState.VIEW_FORWARD)
+    assert (down.header.frame_id, down.view) == ("belly_optical", FrameState.VIEW_DOWN)
+    turn = down.body_to_camera.rotation
+    # Right is right (-y of base_link), down in the picture is aft (-x), the line of sight is down (-z); by hand.
+    wanted = np.array((math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0))
+    assert abs(np.dot((turn.x, turn.y, turn.z, turn.w), wanted)) == pytest.approx(
+        1.0, abs=1e-6
+    )  # q and -q are one turn
+    assert down.body_to_camera.translation == forward.body_to_camera.translation
+    assert down.field_of_view_deg == pytest.approx(90.0)
+    assert cameras[0][1].last.K[0] == pytest.approx(554.256, abs=1e-3)  # 320 / tan(30 deg)
+    assert cameras[1][1].last.K[0] == pytest.approx(320.0, abs=1e-3)  # 320 / tan(45 deg)
+
+
+def pixels(image) -> np.ndarray:
+    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
