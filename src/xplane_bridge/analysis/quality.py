@@ -24,6 +24,26 @@ BAD_QUALITY = (
     "QUALITY_EPOCH_EDGE",
 )
 
+#: What FrameState's bits say of an image, for people who do not know the message.
+QUALITY_WORDS = {
+    "STATE_MISSING": "no state could be paired with it",
+    "INTERPOLATED": "its state lies between two received ones, which come more slowly than frames",
+    "OFF_FRAME": "its state is not of the very frame, but of one close by",
+    "DISPLAY_UNKNOWN": "when it appeared was not seen: it has the time at which it was read",
+    "CLOCK_UNSURE": "the simulator's clock was not known to half a frame",
+    "FROZEN": "the window stood still while the aircraft moved",
+    "BLACK": "it is black, or almost",
+    "PAUSED": "the simulator stood still",
+    "REPLAY": "the simulator played a replay",
+    "VIEW_UNKNOWN": "X-Plane did not say where its camera looks: the configured view is assumed",
+    "FOV_ASSUMED": "X-Plane did not say its field of view, or says two: the configured one is assumed",
+    "EXTERNAL_VIEW": "the camera is outside the aircraft",
+    "EPOCH_EDGE": "its frame lies at a reset, a pause or a gap",
+    "DELAY_ASSUMED": "the delay of the display was not measured: the state may be frames off",
+    "BORDERLINE": "it appeared half way between two frames: the state may be one frame off",
+    "POSE_UNSURE": "where the camera was in the aircraft is not settled",
+}
+
 
 @dataclass(frozen=True)
 class Timing:

@@ -10,7 +10,7 @@ import numpy as np
 
 from xplane_bridge.analysis.consistency import check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values, who_flew
-from xplane_bridge.analysis.quality import BAD_QUALITY, bit_shares, pairing, timing
+from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, pairing, timing
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.constants import LinkState, words
 from xplane_bridge.plotting import interactive
@@ -258,7 +258,9 @@ def _images_quality(flight: Flight) -> str:
     p = pairing(t.columns, constants)
     shares = bit_shares(t["quality"], constants, "QUALITY_")
     rows = [
-        (html.escape(name.lower().replace("_", " ")), f"{share * 100:.1f} %") for name, share in shares.items() if share
+        (html.escape(name.lower().replace("_", " ")), QUALITY_WORDS.get(name, ""), f"{share * 100:.1f} %")
+        for name, share in shares.items()
+        if share
     ]
     text = (
         f"<h3>Images</h3><p>{p.images} images, {p.with_state * 100:.1f} % with a state, {p.perfect * 100:.1f} % "
@@ -267,4 +269,4 @@ def _images_quality(flight: Flight) -> str:
         f"{p.dropped} pictures not published, {p.frozen} frozen, {p.unpaired} without a state, "
         "counted from the first image recorded.</p>"
     )
-    return text + (rows_table(("remark", "images"), rows, (1,)) if rows else "")
+    return text + (rows_table(("remark", "that is", "images"), rows, (2,)) if rows else "")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from xplane_bridge.analysis.consistency import GRAVITY, check_flight, check_odometry
 from xplane_bridge.analysis.decimation import min_max
 from xplane_bridge.analysis.episodes import Episode, from_sets, from_values
-from xplane_bridge.analysis.quality import bit_shares, pairing, timing
+from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, pairing, timing
 from xplane_bridge.analysis.summary import distance, summary
 
 S = 10**9
@@ -119,6 +122,12 @@ def test_timing_counts_gaps_and_jitter() -> None:
     assert got.jitter == pytest.approx(np.sqrt((4 * 4 + 16 + 144) / 6) * 1e-3)
     assert timing(time[:1]).count == 1
     assert np.isnan(timing(time[:1]).rate)
+
+
+def test_every_bit_of_an_image_has_words() -> None:
+    message = (Path(__file__).parents[3] / "msg" / "FrameState.msg").read_text(encoding="utf-8")
+    assert set(QUALITY_WORDS) == set(re.findall(r"^uint32 QUALITY_(\w+) *=", message, re.MULTILINE))
+    assert {name[len("QUALITY_") :] for name in BAD_QUALITY} <= set(QUALITY_WORDS)
 
 
 def test_bit_shares_take_single_bits_only() -> None:
