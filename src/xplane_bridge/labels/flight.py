@@ -160,7 +160,7 @@ def _filled(bags: Bags, msgtype: str) -> str:
 def _optics(bags: Bags, topic: str) -> dict[int, Optics]:
     if topic not in bags.topics or not bags.topics[topic].count:
         names = ", ".join(map(str, bags.paths))
-        msg = f"{names}: no {topic}; record camera/camera_info (launch/record.launch does)"
+        msg = f"{names}: no {topic}; record it (launch/record.launch does)"
         raise LabelError(msg)
     infos = bags.read(topic, ["header.stamp", "width", "height", "K"])
     out = {}
