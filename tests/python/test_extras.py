@@ -25,8 +25,8 @@ EMULATOR = (
 EXTRAS = {
     "emulator": (EMULATOR, set(), set()),
     "report": (("cli.flight_report",), set(), set()),
-    # bag_export says itself how to get dask.distributed (--scheduler); pandas writes Parquet by pyarrow.
-    "export": (("cli.bag_export",), {"distributed"}, {"pyarrow"}),
+    # bag_export says itself how to get dask.distributed (--scheduler).
+    "export": (("cli.bag_export",), {"distributed"}, set()),
     "joystick": (("cli.joy_reader", "cli.joy_config_check"), set(), set()),
 }  # fmt: skip
 

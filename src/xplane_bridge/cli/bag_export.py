@@ -14,7 +14,9 @@ from tqdm import tqdm
 from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.export import campaign
 from xplane_bridge.export.dataset import Options
+from xplane_bridge.export.flight import ExportError
 from xplane_bridge.export.formats import ALIASES, FORMATS, Job
+from xplane_bridge.labels import table
 
 
 def parser() -> argparse.ArgumentParser:
@@ -50,6 +52,13 @@ def parser() -> argparse.ArgumentParser:
         help="default: %(default)s",
     )
     data.add_argument("--seed", type=int, default=0, help="of the draw with --split-by flight (default: %(default)s)")
+    data.add_argument(
+        "--labels",
+        type=Path,
+        metavar="FILE",
+        help="labels of the pictures, made by label_images; for several flights the folder with their "
+        "NAME.labels.jsonl (default: none are exported)",
+    )
     data.add_argument("--keep-bad-frames", action="store_true", help="keep frames whose quality bits say they are bad")
     run = p.add_argument_group("how to run")
     run.add_argument(
@@ -74,7 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         p.error("no BAG given")
     if args.jobs < 1:
         p.error(f"--jobs {args.jobs}: at least 1 process is needed")
-    for option in ("rate", "topics"):
+    for option in ("rate", "topics", "labels"):
         if getattr(args, option) and option not in FORMATS[args.format].options:
             having = ", ".join(name for name, form in FORMATS.items() if option in form.options)
             p.error(f"--{option} is not for {args.format}; it is for {having}")
@@ -85,6 +94,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.scheduler
         else partial(campaign.run_local, workers=args.jobs)
     )
+    if FORMATS[args.format].annotated and args.labels is None:
+        print(f"no labels are exported: {args.format} gets them by --labels, label_images makes them", file=sys.stderr)
     failed = 0
     outcomes = campaign.export(jobs, run)
     bar = tqdm(outcomes, total=len(jobs), unit="flight", disable=not sys.stderr.isatty())
@@ -102,17 +113,42 @@ def _jobs(args: argparse.Namespace, output: Path) -> list[Job]:
     dataset = Options(args.keep_bad_frames, args.train_share, args.split_by, args.seed)
     named = campaign.flights(args.bags)
     training = campaign.choose_training(named, dataset)
-    return [
-        Job(name, bags, str(output.resolve()), args.format, args.rate, tuple(args.topics), dataset, name in training)
-        for name, bags in sorted(named.items())
-    ]
+    jobs = []
+    for name, bags in sorted(named.items()):
+        labels, digest = _labels(args, bags, len(named))
+        job = Job(
+            name, bags, str(output.resolve()), args.format, args.rate, tuple(args.topics), dataset, name in training
+        )
+        jobs.append(job._replace(labels=labels, labels_sha256=digest))
+    return jobs
+
+
+def _labels(args: argparse.Namespace, bags: Sequence[str], flights: int) -> tuple[str, str]:
+    """Give the file of a flight's labels and its SHA-256; empty without.
+
+    Raises:
+        ExportError: One file for several flights.
+        LabelError: It cannot be read.
+    """
+    if args.labels is None:
+        return "", ""
+    path = args.labels
+    if path.is_dir():
+        path = path / table.beside(Path(bags[0])).name
+    elif flights > 1:
+        msg = f"--labels {path}: a file for {flights} flights; expected the folder with one for each"
+        raise ExportError(msg)
+    return str(path.resolve()), table.digest(path)
 
 
 def _summary(outcome: campaign.Outcome) -> str:
     assert outcome.record is not None
     counts = dict(outcome.record["counts"])
     left_out = counts.pop("left_out", {})
+    objects = counts.pop("objects", {})
     text = ", ".join(f"{value} {key}" for key, value in counts.items())
+    if objects:
+        text += ": " + ", ".join(f"{value} {key}" for key, value in objects.items())
     if left_out:
         text += "; left out: " + ", ".join(f"{value} {key}" for key, value in left_out.items())
     return text + (" (made earlier)" if outcome.reused else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any, Mapping
 
 #: Name of the card's file.
@@ -17,7 +18,8 @@ def card(version: str, exports: _Records) -> str:
         version: Of this package.
         exports: Format, then flight, to its record in the manifest.
     """
-    lines = [*_head(exports.get("imagefolder", {})), "# Recorded flights", ""]
+    others = any(form in exports for form in ("coco", "yolo", "lard"))
+    lines = [*_head(exports.get("imagefolder", {}), others), "# Recorded flights", ""]
     lines += [
         f"Made by `bag_export` of xplane_bridge {version} from ROS 1 bags of an X-Plane flight bridge. Names of",
         "columns end in their unit. `manifest.json` has parameters, counts and the SHA-256 of every file, with which",
@@ -30,17 +32,21 @@ def card(version: str, exports: _Records) -> str:
             lines.append("| " + " | ".join(_cell(text) for text in cells) + " |")
     lines += _topics(exports)
     lines += _quality(exports)
+    lines += _labels(exports)
     return "\n".join(lines) + "\n"
 
 
-def _head(flights: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def _head(flights: Mapping[str, Mapping[str, Any]], others: bool) -> list[str]:
     """Name the files of each split, so that words like "test" in a flight's name choose none."""
     splits = [split for split in ("train", "validation") if any(r["counts"][split] for r in flights.values())]
     if not splits:
         return []
     lines = ["---", "configs:", "- config_name: default", "  data_files:"]
     for split in splits:
-        lines += [f"  - split: {split}", f'    path: "*/images/{split}/*"']
+        # By name where other formats have pictures, too.
+        names = sorted(name for name, record in flights.items() if record["counts"][split]) if others else ["*"]
+        paths = [json.dumps(f"{name}/images/{split}/*") for name in names]
+        lines += [f"  - split: {split}", f"    path: {paths[0] if len(paths) == 1 else '[' + ', '.join(paths) + ']'}"]
     return [*lines, "---", ""]
 
 
@@ -84,6 +90,30 @@ def _quality(exports: _Records) -> list[str]:
     for name, quality in sorted(found.items()):
         said = ", ".join(f"{count} {word}" for word, count in sorted(quality["bits"].items()) if count)
         lines.append(f"| {_cell(name)} | {quality['frames']} | {quality['perfect']} | {said or 'nothing'} |")
+    return lines
+
+
+def _labels(exports: _Records) -> list[str]:
+    """Say what is labelled in the pictures, where a format has labels."""
+    found = {
+        name: record["counts"]
+        for records in exports.values()
+        for name, record in sorted(records.items())
+        if "labelled" in record["counts"]
+    }
+    if not found:
+        return []
+    lines = ["", "## Labels of the pictures", ""]
+    if not any(counts["labelled"] for counts in found.values()):
+        return [*lines, "There are none: no pictures are labelled (`label_images`, then `bag_export --labels`)."]
+    lines += [
+        "Projected by `label_images` from the camera's measured pose, not seen in the pixels: what terrain, haze or",
+        "the cockpit hide is labelled too. Each object has its sigma in pixels; `coarse` ones are above 3.",
+        *("", "| flight | pictures labelled | objects |", "|---|---|---|"),
+    ]
+    for name, counts in sorted(found.items()):
+        objects = _pairs(counts.get("objects", {})) or "none"
+        lines.append(f"| {_cell(name)} | {counts['labelled']} of {counts['exported']} | {objects} |")
     return lines
 
 

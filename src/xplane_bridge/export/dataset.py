@@ -7,6 +7,9 @@ Folder of one flight::
     images/train/metadata.parquet the same rows for Hugging Face datasets, with `file_name` relative to this file
     images/validation/...         likewise
 
+With labels (`label_images`) there are also `labels_json`, everything that is labelled in the picture, and in the
+Parquet files `objects`: boxes (left, top, width, height in pixels from the picture's corner), categories and sigmas.
+
 Columns: every field of FrameState with the state of the frame the image shows; the latched labels (`flight.labels`);
 each quality bit, and the bits in words; where the display delay is from; CameraInfo's size and matrix.
 """
@@ -16,7 +19,7 @@ from __future__ import annotations
 import csv
 from collections import Counter
 from pathlib import Path
-from typing import Any, Iterator, Mapping, NamedTuple
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -25,7 +28,11 @@ from xplane_bridge.analysis.quality import BAD_QUALITY
 from xplane_bridge.bags import BagError, Bags, Table
 from xplane_bridge.bags.pictures import COMPRESSED, RAW, image_topic
 from xplane_bridge.export.columns import named
-from xplane_bridge.export.flight import FRAME_STATE, labels, quality_bits, topic_of
+from xplane_bridge.export.flight import FRAME_STATE, quality_bits, topic_of
+from xplane_bridge.export.flight import labels as flight_labels
+
+if TYPE_CHECKING:
+    from xplane_bridge.export.image_labels import ImageLabels
 
 
 class Options(NamedTuple):
@@ -47,8 +54,56 @@ class Counts(NamedTuple):
     left_out: dict[str, int]  #: by reason; an image can have several
 
 
-def export_images(bags: Bags, folder: Path, options: Options, train_flight: bool) -> Counts:
-    """Write the images and labels of one flight.
+class Picture(NamedTuple):
+    """A picture that was written."""
+
+    file: str  #: relative to the flight's folder
+    split: str
+    row: int  #: of what is known of the frames
+    stamp: int  #: [ns]
+    size: tuple[int, int]  #: width, height [px]
+
+
+class Pictures(NamedTuple):
+    """The pictures of a flight, written, and what is known of each frame."""
+
+    kept: list[Picture]
+    stamp: np.ndarray  #: int64 [ns] of the frames
+    columns: dict[str, np.ndarray]  #: by name, one value a frame
+    counts: Counts
+
+
+def export_images(
+    bags: Bags, folder: Path, options: Options, train_flight: bool, labels: ImageLabels | None = None
+) -> dict[str, Any]:
+    """Write the image folder of one flight; gives counts for the manifest.
+
+    Args:
+        bags: Open bags of the flight.
+        folder: Created; must not hold a data set yet.
+        options: What to keep and how to split.
+        train_flight: With ``split_by="flight"``: whether this flight trains.
+        labels: Of its pictures.
+
+    Raises:
+        BagError: No images or no frame states in the bag, or an image encoding that cannot be written.
+        ExportError: The labels are of other pictures.
+    """
+    pictures = write_pictures(bags, folder, options, train_flight)
+    columns = dict(pictures.columns)
+    counts = pictures.counts._asdict()
+    if labels is not None:
+        counts.update(labels.counts([picture.stamp for picture in pictures.kept]))
+        columns["labels_json"] = np.array([labels.text(int(stamp)) for stamp in pictures.stamp], dtype=object)
+    write_frames(folder / "labels.csv", pictures, columns)
+    for split in sorted({picture.split for picture in pictures.kept}):
+        part = [picture for picture in pictures.kept if picture.split == split]
+        _write_metadata(folder / "images" / split / "metadata.parquet", part, pictures.stamp, columns, labels)
+    return counts
+
+
+def write_pictures(bags: Bags, folder: Path, options: Options, train_flight: bool) -> Pictures:
+    """Write the images of one flight below ``images/SPLIT``.
 
     Args:
         bags: Open bags of the flight.
@@ -69,7 +124,7 @@ def export_images(bags: Bags, folder: Path, options: Options, train_flight: bool
 
     folder.mkdir(parents=True)
     left_out: Counter[str] = Counter()
-    kept: list[tuple[str, str, int]] = []  # file, split, row
+    kept: list[Picture] = []
     images = 0
     for image_stamp, suffix, content in _images(bags, topic):
         images += 1
@@ -86,19 +141,30 @@ def export_images(bags: Bags, folder: Path, options: Options, train_flight: bool
         name = f"images/{split}/{len(kept):06d}{suffix}"
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
-        kept.append((name, split, row))
+        kept.append(Picture(name, split, row, image_stamp, (0, 0)))
     columns = _columns(bags, frame_topic, table, constants)
-    _write_labels(folder, kept, stamp, columns)
-    _write_metadata(folder, kept, stamp, columns)
-    splits = Counter(split for _, split, _ in kept)
-    return Counts(images, len(kept), splits["train"], splits["validation"], dict(sorted(left_out.items())))
+    kept = [picture._replace(size=_size(folder / picture.file, columns, picture.row)) for picture in kept]
+    splits = Counter(picture.split for picture in kept)
+    counts = Counts(images, len(kept), splits["train"], splits["validation"], dict(sorted(left_out.items())))
+    return Pictures(kept, stamp, columns, counts)
+
+
+def _size(path: Path, columns: Mapping[str, np.ndarray], row: int) -> tuple[int, int]:
+    """Give a picture's width and height: CameraInfo's, else those of the file."""
+    width, height = (columns[f"camera_{name}_px"][row] for name in ("width", "height"))
+    if width is not None and height is not None:
+        return int(width), int(height)
+    import cv2
+
+    picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    return (0, 0) if picture is None else (int(picture.shape[1]), int(picture.shape[0]))
 
 
 def _columns(bags: Bags, topic: str, table: Table, constants: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Give what is known of each frame, by column; shape (frames,)."""
     columns = named(table.columns, bags.units(topic))
     columns = {k: v for k, v in columns.items() if not k.startswith("state_header")}
-    columns.update(labels(bags, table.stamp))
+    columns.update(flight_labels(bags, table.stamp))
     columns.update(_quality(table["quality"], constants))
     columns.update(_camera(bags, f"{topic.rsplit('/', 1)[0]}/camera_info", table.stamp))
     return columns
@@ -141,30 +207,48 @@ _NULLABLE = {
     "excitation": "string",
     "camera_width_px": "Int32",
     "camera_height_px": "Int32",
+    "labels_json": "string",
 }
 
 
-def _write_labels(
-    folder: Path, kept: list[tuple[str, str, int]], stamp: np.ndarray, columns: Mapping[str, np.ndarray]
-) -> None:
-    with (folder / "labels.csv").open("w", encoding="utf-8", newline="") as file:
+def write_frames(path: Path, pictures: Pictures, columns: Mapping[str, np.ndarray]) -> None:
+    """Write the table of the pictures: file, split, stamp, then the columns."""
+    with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["file", "split", "stamp_ns", *columns])
-        for name, split, row in kept:
-            writer.writerow([name, split, int(stamp[row]), *(_text(values[row]) for values in columns.values())])
+        for picture in pictures.kept:
+            values = (_text(column[picture.row]) for column in columns.values())
+            writer.writerow([picture.file, picture.split, int(pictures.stamp[picture.row]), *values])
 
 
 def _write_metadata(
-    folder: Path, kept: list[tuple[str, str, int]], stamp: np.ndarray, columns: Mapping[str, np.ndarray]
+    path: Path,
+    kept: list[Picture],
+    stamp: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+    labels: ImageLabels | None,
 ) -> None:
-    for split in sorted({split for _, split, _ in kept}):
-        rows = np.array([row for _, of, row in kept if of == split])
-        data: dict[str, Any] = {"file_name": [Path(name).name for name, of, _ in kept if of == split]}
-        data.update(split=split, stamp_ns=stamp[rows])
-        for name, values in columns.items():
-            chosen = values[rows]
-            data[name] = pd.array(chosen, dtype=_NULLABLE[name]) if name in _NULLABLE else chosen
-        pd.DataFrame(data).to_parquet(folder / "images" / split / "metadata.parquet", index=False)
+    import pyarrow
+    from pyarrow import parquet
+
+    rows = np.array([picture.row for picture in kept])
+    data: dict[str, Any] = {"file_name": [Path(picture.file).name for picture in kept]}
+    data.update(split=kept[0].split, stamp_ns=stamp[rows])
+    for name, values in columns.items():
+        chosen = values[rows]
+        data[name] = pd.array(chosen, dtype=_NULLABLE[name]) if name in _NULLABLE else chosen
+    table = pyarrow.Table.from_pandas(pd.DataFrame(data), preserve_index=False)
+    if labels is not None:
+        number = pyarrow.float64()
+        lists = {
+            "bbox": pyarrow.list_(number),
+            "category": pyarrow.string(),
+            "sigma_px": number,
+            "coarse": pyarrow.bool_(),
+        }
+        kind = pyarrow.struct({name: pyarrow.list_(item) for name, item in lists.items()})
+        table = table.append_column("objects", pyarrow.array([labels.boxes(p.stamp) for p in kept], type=kind))
+    parquet.write_table(table, path)
 
 
 def _split_stamp(stamp: np.ndarray, options: Options) -> int:

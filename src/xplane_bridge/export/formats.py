@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, NamedTuple
 
 from xplane_bridge.export.dataset import Options, export_images
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from xplane_bridge.bags import Bags
+    from xplane_bridge.export.image_labels import ImageLabels
 
 
 class Job(NamedTuple):
@@ -23,6 +23,8 @@ class Job(NamedTuple):
     topics: tuple[str, ...]
     dataset: Options
     train_flight: bool
+    labels: str = ""  #: file of the pictures' labels
+    labels_sha256: str = ""
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -35,6 +37,8 @@ class Job(NamedTuple):
             out["topics"] = list(self.topics)
         if "dataset" in options:
             out.update(self.dataset._asdict(), train_flight=self.train_flight)
+        if self.labels_sha256:
+            out["labels_sha256"] = self.labels_sha256
         return out
 
 
@@ -42,9 +46,10 @@ class Format(NamedTuple):
     """One way to write a flight."""
 
     ending: str  #: of the flight's file or folder
-    options: tuple[str, ...]  #: of a `Job`, which decide the content: rate, topics, dataset
+    options: tuple[str, ...]  #: of a `Job`, which decide the content: rate, topics, dataset, labels
     write: Callable[[Bags, Path, Job], dict[str, Any]]  #: gives counts for the manifest
     frames: bool = False  #: whether it has the pictures, or what is known of each
+    annotated: bool = False  #: whether labels of pictures are what it is for
 
 
 def _csv(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
@@ -80,7 +85,31 @@ def _euroc(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 
 
 def _imagefolder(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
-    return export_images(bags, path, job.dataset, job.train_flight)._asdict()
+    return export_images(bags, path, job.dataset, job.train_flight, _labels(job))
+
+
+def _labels(job: Job) -> ImageLabels | None:
+    from xplane_bridge.export.image_labels import ImageLabels
+
+    return ImageLabels(Path(job.labels)) if job.labels else None
+
+
+def _coco(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import annotated
+
+    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(job), annotated.coco)
+
+
+def _yolo(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import annotated
+
+    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(job), annotated.yolo)
+
+
+def _lard(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
+    from xplane_bridge.export import annotated
+
+    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(job), annotated.lard)
 
 
 def _npz(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
@@ -119,7 +148,10 @@ FORMATS = {
     "mat": Format(".mat", ("topics",), _mat, frames=True),
     "tum": Format(".tum", ("rate",), _tum),
     "euroc": Format(".euroc.csv", ("rate",), _euroc),
-    "imagefolder": Format("", ("dataset",), _imagefolder, frames=True),
+    "imagefolder": Format("", ("dataset", "labels"), _imagefolder, frames=True),
+    "coco": Format(".coco", ("dataset", "labels"), _coco, frames=True, annotated=True),
+    "yolo": Format(".yolo", ("dataset", "labels"), _yolo, frames=True, annotated=True),
+    "lard": Format(".lard", ("dataset", "labels"), _lard, frames=True, annotated=True),
     "mcap": Format(".mcap", ("topics",), _mcap, frames=True),
     "ros2": Format(".ros2", ("topics",), _ros2, frames=True),
 }

@@ -11,7 +11,7 @@ from xplane_bridge.labels.world import World
 #: Nearest depth that is projected [m].
 NEAR_M = 0.5
 #: Forward, right, down of forward, left, up, and back.
-_FRD_OF_FLU = np.diag((1.0, -1.0, -1.0))
+FRD_OF_FLU = np.diag((1.0, -1.0, -1.0))
 
 
 class Pose(NamedTuple):
@@ -59,7 +59,7 @@ class Camera:
     def __init__(self, world: World, pose: Pose, optics: Optics) -> None:
         self.pose, self.optics = pose, optics
         level = world.level(pose.latitude, pose.longitude)
-        body_to_ned = rotation_of(pose.orientation) @ _FRD_OF_FLU
+        body_to_ned = rotation_of(pose.orientation) @ FRD_OF_FLU
         lever = body_to_ned @ pose.lever
         self.height = pose.altitude - float(lever[2])
         self.place: np.ndarray = world.place(pose.latitude, pose.longitude, pose.altitude) + level.T @ lever

@@ -134,7 +134,7 @@ def test_topics_choose_and_pictures_are_refused(tmp_path: Path, capsys: pytest.C
             ["--format", "tum", "--topics", "odom"],
             "--topics is not for tum; it is for csv, parquet, npz, mat, mcap, ros2",
         ),
-        (["--format", "coco"], "'coco' (choose from"),
+        (["--format", "voc"], "'voc' (choose from"),
     ],
 )
 def test_what_a_format_does_not_have_is_refused(arguments: list, text: str, capsys: pytest.CaptureFixture) -> None:

@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from support.drawn_approach import write_approach
 from support.export_flight import export, write_flight
 from support.markdown import blocks
+from support.white_lines import airport_file
+from xplane_bridge.cli.sight import label_images
 from xplane_bridge.export.formats import FORMATS
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "datasets.md"
@@ -31,10 +34,14 @@ def test_the_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HF_HOME", str(tmp_path / "home"))
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
-    write_flight(tmp_path / "flight.bag", 2.0)
     command, code = (block.text for block in BLOCKS if block.section == form and block.language in ("bash", "python"))
     program, *arguments = shlex.split(command)
     assert program == "scripts/bag_export"
+    if "--labels" in arguments:
+        bag = write_approach(tmp_path / "flight.bag", 5)
+        assert label_images.main([str(bag), "--apt", str(airport_file()), "--airport", "XEMU", "--flat-world"]) == 0
+    else:
+        write_flight(tmp_path / "flight.bag", 2.0)
     for module in re.findall(r"^(?:import|from) (\w+)", code, re.MULTILINE):
         if importlib.util.find_spec(module) is None:
             pytest.skip(f"{module} is not installed")

@@ -20,7 +20,7 @@ def parser() -> argparse.ArgumentParser:
         prog="label_images",
         description=(
             "Labels a flight's pictures with runways, horizon and sun, projected from the camera's measured pose: "
-            "FLIGHT.labels.jsonl beside the bag."
+            "FLIGHT.labels.jsonl beside the bag, which bag_export takes with --labels."
         ),
         epilog="docs/labels.md tells what is in the file, and how sure it is.",
     )

@@ -1,0 +1,243 @@
+"""Pictures with labels as other programs read them: COCO, YOLO, and the columns of LARD.
+
+Folder of one flight: ``images/SPLIT/...`` as in an image folder, ``frames.csv`` with what is known of each picture, and
+
+* COCO: ``annotations/SPLIT.json``;
+* YOLO: ``labels/SPLIT/*.txt``, ``data.yaml``, and ``sigmas.csv`` for what those cannot say;
+* LARD: ``SPLIT.csv``.
+
+Without labels there are the pictures, and annotations of nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Callable, Mapping, Sequence
+
+import numpy as np
+
+from xplane_bridge import __version__
+from xplane_bridge.export.dataset import Options, Picture, Pictures, write_frames, write_pictures
+from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels, Thing, keypoints
+from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
+
+if TYPE_CHECKING:
+    from xplane_bridge.bags import Bags
+
+#: Lines between keypoints, counted from 1: the outline, both thresholds, the centre line.
+_SKELETON = [[1, 2], [2, 3], [3, 4], [4, 1], [5, 6], [7, 8], [9, 10]]
+_SPLITS = ("train", "validation")
+#: Columns of LARD (deel-ai/LARD, version 2), then ours.
+_LARD = (
+    *("image", "height", "width", "type", "original_dataset", "scenario", "airport", "runway", "time_to_landing"),
+    *("weather", "night", "time", "slant_distance", "along_track_distance", "height_above_runway"),
+    *("lateral_path_angle", "vertical_path_angle", "yaw", "pitch", "roll", "watermark_height"),
+    *("x_TR", "y_TR", "x_TL", "y_TL", "x_BL", "y_BL", "x_BR", "y_BR"),
+    *("sigma_TR_px", "sigma_TL_px", "sigma_BL_px", "sigma_BR_px", "height_source", "stamp_ns"),
+)
+_MILE_M, _FOOT_M = 1852.0, 0.3048
+
+_Write = Callable[[Path, Pictures, "ImageLabels | None"], None]
+
+
+def export_annotated(
+    bags: Bags, folder: Path, options: Options, train_flight: bool, labels: ImageLabels | None, write: _Write
+) -> dict[str, Any]:
+    """Write pictures, what is known of them, and their annotations; gives counts for the manifest.
+
+    Raises:
+        BagError: No images or no frame states in the bag, or an image encoding that cannot be written.
+        ExportError: The labels are of other pictures.
+    """
+    pictures = write_pictures(bags, folder, options, train_flight)
+    stamps = [picture.stamp for picture in pictures.kept]
+    counts = labels.counts(stamps) if labels else {"labelled": 0}
+    write_frames(folder / "frames.csv", pictures, pictures.columns)
+    write(folder, pictures, labels)
+    return {**pictures.counts._asdict(), **counts}
+
+
+def coco(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
+    """Write COCO's JSON, one file a split."""
+    categories: list[dict[str, Any]] = [{"id": k, "name": name} for k, name in enumerate(CATEGORIES, 1)]
+    categories[0].update(keypoints=list(KEYPOINTS), skeleton=_SKELETON)
+    about = {"description": f"xplane_bridge {__version__}", "version": __version__, "labels": _about(labels)}
+    (folder / "annotations").mkdir()
+    number = 0
+    for split in _SPLITS:
+        images, annotations = [], []
+        for image_id, picture in enumerate(pictures.kept, 1):
+            if picture.split != split:
+                continue
+            images.append({"id": image_id, **_image(picture, pictures.columns, labels)})
+            for thing in labels.things(picture.stamp) if labels else ():
+                number += 1
+                annotations.append({"id": number, "image_id": image_id, **_annotation(thing)})
+        content = {
+            "info": about,
+            "licenses": [],
+            "categories": categories,
+            "images": images,
+            "annotations": annotations,
+        }
+        _write_text(folder / "annotations" / f"{split}.json", json.dumps(content, allow_nan=False) + "\n")
+
+
+def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: ImageLabels | None) -> dict[str, Any]:
+    def value(name: str) -> Any:
+        return _plain(columns[name][picture.row]) if name in columns else None
+
+    def vector(prefix: str, axes: Sequence[object]) -> list[Any]:
+        return [value(f"{prefix}_{axis}") for axis in axes]
+
+    return {
+        "file_name": Path(picture.file).name,
+        "width": picture.size[0],
+        "height": picture.size[1],
+        "stamp_ns": picture.stamp,
+        "camera_matrix": vector("camera_matrix", range(9)),
+        "body_to_camera": {
+            "translation_m": vector("body_to_camera_translation", "xyz"),
+            "rotation_xyzw": vector("body_to_camera_rotation", "xyzw"),
+            "uncertainty_m": value("camera_pose_uncertainty_m"),
+            "uncertainty_deg": value("camera_pose_uncertainty_deg"),
+        },
+        "display_delay_s": value("display_delay_s"),
+        "display_delay_source": value("display_delay_source"),
+        "quality": value("quality_words"),
+        "labelled": labels is not None and labels.frame(picture.stamp) is not None,
+        "horizon": labels.horizon(picture.stamp) if labels else None,
+    }
+
+
+def _annotation(thing: Thing) -> dict[str, Any]:
+    out: dict[str, Any] = {
+        "category_id": CATEGORIES.index(thing.category) + 1,
+        "bbox": _rounded(thing.box),
+        "segmentation": [_rounded([part for corner in thing.outline for part in corner])],
+        "area": round(_area(thing.outline), 3),
+        "iscrowd": 0,
+        "sigma_px": thing.label["sigma_px"],
+        "coarse": thing.label["coarse"],
+    }
+    if thing.category == "runway":
+        flat, sigmas = keypoints(thing)
+        seen = sum(flag > 0 for flag in flat[2::3])
+        out.update(keypoints=_rounded(flat), num_keypoints=seen, keypoint_sigmas_px=sigmas)
+    for name in ("name", "opposite", "height", "centre"):
+        if name in thing.label:
+            out[name] = thing.label[name]
+    return out
+
+
+def yolo(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
+    """Write YOLO's text: a line an object, its class and its outline as shares of the picture; boxes follow from it."""
+    rows: list[list[Any]] = []
+    for picture in pictures.kept:
+        if labels is None or labels.frame(picture.stamp) is None:
+            continue
+        path = folder / "labels" / picture.split / f"{Path(picture.file).stem}.txt"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lines = []
+        for number, thing in enumerate(labels.things(picture.stamp)):
+            shares = [min(max(part / side, 0.0), 1.0) for at in thing.outline for part, side in zip(at, picture.size)]
+            lines.append(" ".join([str(CATEGORIES.index(thing.category)), *(f"{share:.6f}" for share in shares)]))
+            label = thing.label
+            rows.append([picture.file, number, thing.category, label["sigma_px"], int(label["coarse"])])
+        _write_text(path, "".join(line + "\n" for line in lines))
+    _write_csv(folder / "sigmas.csv", ("file", "line", "class", "sigma_px", "coarse"), rows, ",")
+    names = "".join(f"  {k}: {name}\n" for k, name in enumerate(CATEGORIES))
+    said = json.dumps(_about(labels))
+    head = f"# xplane_bridge {__version__}; labels: {said}\n"
+    _write_text(folder / "data.yaml", f"{head}train: images/train\nval: images/validation\nnames:\n{names}")
+
+
+def lard(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
+    """Write LARD's table, one file a split: a row a runway, distances in nautical miles, the height in feet."""
+    for split in _SPLITS:
+        rows = []
+        for picture in pictures.kept:
+            if picture.split == split:
+                things = list(labels.things(picture.stamp)) if labels else []
+                rows += [
+                    _lard_row(picture, thing, pictures.columns, labels) for thing in things if "points" in thing.label
+                ]
+        _write_csv(folder / f"{split}.csv", _LARD, rows, ";")
+
+
+def _lard_row(
+    picture: Picture, thing: Thing, columns: Mapping[str, np.ndarray], labels: ImageLabels | None
+) -> list[Any]:
+    label = thing.label
+    heading, pitch, roll = _attitude(columns, picture.row)
+    values: dict[str, Any] = {
+        "image": picture.file,
+        "width": picture.size[0],
+        "height": picture.size[1],
+        "type": "xplane_bridge",
+        "original_dataset": "xplane_bridge",
+        "airport": labels.about["airport"] if labels else "",
+        "runway": label["name"],
+        "slant_distance": label["slant_distance_m"] / _MILE_M,
+        "along_track_distance": label["along_track_distance_m"] / _MILE_M,
+        "height_above_runway": label["height_above_threshold_m"] / _FOOT_M,
+        "lateral_path_angle": label["lateral_path_angle_deg"],
+        "vertical_path_angle": label["vertical_path_angle_deg"],
+        "yaw": heading,
+        "pitch": 90.0 + pitch,  # theirs: 90 is level
+        "roll": roll,
+        "watermark_height": 0,
+        "height_source": label["height"]["source"],
+        "stamp_ns": picture.stamp,
+    }
+    for corner in ("TR", "TL", "BL", "BR"):
+        point = label["points"][corner]
+        for axis, name in (("x", "u"), ("y", "v")):
+            values[f"{axis}_{corner}"] = "" if point[name] is None else round(point[name] + 0.5, 3)
+        values[f"sigma_{corner}_px"] = point["sigma_px"]
+    return [values.get(name, "") for name in _LARD]
+
+
+def _attitude(columns: Mapping[str, np.ndarray], row: int) -> tuple[float, float, float]:
+    """Heading, pitch, roll [deg] of the camera against the local level."""
+
+    def rotation(prefix: str) -> np.ndarray:
+        return rotation_of(np.array([float(columns[f"{prefix}_{axis}"][row]) for axis in "xyzw"]))
+
+    optical = rotation("state_orientation") @ FRD_OF_FLU @ rotation("body_to_camera_rotation")
+    right, down, forward = optical[:, 0], optical[:, 1], optical[:, 2]
+    heading = math.degrees(math.atan2(forward[1], forward[0])) % 360.0
+    pitch = math.degrees(math.asin(float(np.clip(-forward[2], -1.0, 1.0))))
+    return heading, pitch, math.degrees(math.atan2(float(right[2]), float(down[2])))
+
+
+def _about(labels: ImageLabels | None) -> Any:
+    return "none" if labels is None else {key: value for key, value in labels.about.items() if key != "labels"}
+
+
+def _area(outline: Sequence[tuple[float, float]]) -> float:
+    around = [*outline[1:], outline[0]]
+    return abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(outline, around))) / 2.0
+
+
+def _rounded(values: Sequence[float]) -> list[float]:
+    return [round(float(value), 3) for value in values]
+
+
+def _plain(value: Any) -> Any:
+    value = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def _write_csv(path: Path, head: Sequence[str], rows: Sequence[Sequence[Any]], separator: str) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, delimiter=separator, lineterminator="\n")
+        writer.writerow(head)
+        writer.writerows(rows)

@@ -1,0 +1,117 @@
+"""Labels of pictures as exports need them: the file of `label_images`, its objects as boxes and outlines.
+
+Exports count pixels from the picture's corner, as most libraries do: half a pixel more than the labels' own, whose
+whole numbers are centres of pixels.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any, Iterator, NamedTuple, Sequence
+
+from xplane_bridge.export.flight import ExportError
+from xplane_bridge.labels import table
+
+#: Classes of objects, in the order of their numbers.
+CATEGORIES = ("runway", "sun", "aircraft")
+#: Points of a runway, in the order of an export's keypoints.
+KEYPOINTS = (
+    *("TL", "TR", "BR", "BL"),
+    *("threshold_near_left", "threshold_near_right", "threshold_far_left", "threshold_far_right"),
+    *("centre_near", "centre_far"),
+)
+_HALF = 0.5
+
+
+class Thing(NamedTuple):
+    """An object with a box; pixels from the picture's corner."""
+
+    category: str
+    box: tuple[float, float, float, float]  #: left, top, width, height
+    outline: list[tuple[float, float]]
+    label: dict[str, Any]  #: as `label_images` wrote it
+
+
+class ImageLabels:
+    """The labels of one flight.
+
+    Args:
+        path: A file of `label_images`.
+
+    Raises:
+        LabelError: It cannot be used.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.about, self._frames = table.read(path)
+
+    def counts(self, stamps: Sequence[int]) -> dict[str, Any]:
+        """Count for the manifest what is labelled of these pictures.
+
+        Raises:
+            ExportError: Nothing is: they are labels of other pictures.
+        """
+        labelled = [stamp for stamp in stamps if stamp in self._frames]
+        if stamps and not labelled:
+            msg = f"{self._path} labels none of these pictures: it is of {', '.join(self.about['bags'])}"
+            raise ExportError(msg)
+        kinds = Counter(thing["kind"] for stamp in labelled for thing in self._frames[stamp]["objects"])
+        return {"labelled": len(labelled), "objects": dict(sorted(kinds.items()))}
+
+    def frame(self, stamp: int) -> dict[str, Any] | None:
+        """Give everything about a picture; None where it has no labels."""
+        return self._frames.get(stamp)
+
+    def text(self, stamp: int) -> str | None:
+        """Give the objects of a picture as JSON."""
+        frame = self._frames.get(stamp)
+        return None if frame is None else json.dumps(frame["objects"], separators=(",", ":"))
+
+    def things(self, stamp: int) -> Iterator[Thing]:
+        """Give the objects of a picture that have a box."""
+        frame = self._frames.get(stamp)
+        for label in frame["objects"] if frame else ():
+            if label["kind"] not in CATEGORIES:
+                continue
+            left, top, right, bottom = (part + _HALF for part in label["box"])
+            corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
+            outline = [(u + _HALF, v + _HALF) for u, v in label["polygon"]] if "polygon" in label else corners
+            yield Thing(label["kind"], (left, top, right - left, bottom - top), outline, label)
+
+    def horizon(self, stamp: int) -> dict[str, Any] | None:
+        """Give the horizon of a picture, its lines in pixels from the corner."""
+        frame = self._frames.get(stamp)
+        for label in frame["objects"] if frame else ():
+            if label["kind"] == "horizon":
+                lines = {name: [_moved(part) for part in label[name]] for name in ("level", "dipped")}
+                return {**lines, "dip_deg": label["dip_deg"], "sigma_px": label["sigma_px"]}
+        return None
+
+    def boxes(self, stamp: int) -> dict[str, list[Any]]:
+        """Give boxes, categories and sigmas of a picture as lists side by side."""
+        things = list(self.things(stamp))
+        return {
+            "bbox": [list(thing.box) for thing in things],
+            "category": [thing.category for thing in things],
+            "sigma_px": [thing.label["sigma_px"] for thing in things],
+            "coarse": [thing.label["coarse"] for thing in things],
+        }
+
+
+def keypoints(thing: Thing) -> tuple[list[float], list[float | None]]:
+    """Give a runway's points as COCO has them (u, v, 2; zeros where not in the picture), and their sigmas [px]."""
+    flat: list[float] = []
+    sigmas: list[float | None] = []
+    for name in KEYPOINTS:
+        point = thing.label["points"][name]
+        seen = point["state"] == "visible"
+        flat += [point["u"] + _HALF, point["v"] + _HALF, 2] if seen else [0, 0, 0]
+        sigmas.append(point["sigma_px"] if seen else None)
+    return flat, sigmas
+
+
+def _moved(pixels: Sequence[Sequence[float]]) -> list[list[float]]:
+    return [[u + _HALF, v + _HALF] for u, v in pixels]
