@@ -129,7 +129,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(argv)
     scenario = scenario_of(args.scenario)
     path = Path(args.scenario)
-    if path.exists():
+    if path.is_file():
         args.scenario = str(path.resolve())
     plan = plan_of(scenario, args)
     plan.make_folders()
