@@ -26,6 +26,7 @@ TOPICS = {
     "datarefs": "xplane_bridge/DatarefValues",
     "data_rows": "xplane_bridge/DataRows",
     "link_state": "xplane_bridge/LinkState",
+    "experiment": "xplane_bridge/Experiment",
     "origin": "sensor_msgs/NavSatFix",
     "joy": "sensor_msgs/Joy",
     "control/manual": "xplane_bridge/ControlCommand",

@@ -138,6 +138,7 @@ def test_a_flight_is_the_same_bytes_under_random_stops(new_world, tmp_path):
         ("/clock", FRAMES + 1),  # and before the flight
         ("/lockstep/flight_state", FRAMES),
         ("/lockstep/control/auto", FRAMES),
+        ("/lockstep/experiment", 1),
         ("/lockstep/mission/surfaces", FRAMES // 3),
     ):
         assert flights[0][topic][0] == count, topic

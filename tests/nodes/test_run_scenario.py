@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import subprocess
 import sys
@@ -9,7 +10,8 @@ import sys
 import pytest
 
 from xplane_bridge.bags import Bags
-from xplane_bridge.resources import program
+from xplane_bridge.bags.passport import read_passports
+from xplane_bridge.resources import config_file, program
 
 MET = """
 name: short
@@ -61,6 +63,11 @@ def test_a_flight_that_meets_its_criteria(tmp_path, options):
     assert report["played"]["labels"]["turn"] == pytest.approx(2.0, abs=0.1)
     assert {c["name"]: c["passed"] for c in report["criteria"]} == {"turns": True, "levels": True, "begins": True}
     with Bags(tmp_path / "out" / "flight.bag") as bags:
+        passport = read_passports(bags)[-1]
+        aircraft = config_file("aircraft", "fixed_wing.yaml").read_bytes()
+        assert (passport.flight["scenario"], passport.flight["text"]) == ("short", MET)
+        assert passport.flight["options"] == (["=".join(options)] if options else [])
+        assert passport.others["sha256 of the aircraft file"] == hashlib.sha256(aircraft).hexdigest()
         failures = bags.read("/xplane/failures/state")["names"]
         assert any("pitot_1" in names for names in failures)
         assert len(failures[-1]) == 0

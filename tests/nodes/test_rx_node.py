@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 import math
 import re
@@ -16,7 +17,7 @@ import xmlrpc.client
 import numpy as np
 import pytest
 
-from xplane_bridge import protocol
+from xplane_bridge import __version__, protocol
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.resources import config_file, program
 
@@ -356,6 +357,41 @@ def test_data_rows_are_passed_on_as_they_came(world, rx):
     mach_slot = message.index.index(4) * 8
     assert message.values[mach_slot] == pytest.approx(world.states.wait_for().mach, abs=0.01)
     assert message.values[message.index.index(132) * 8 + 2] == -999.0
+
+
+# --- how it was made --------------------------------------------------------------------------------------------------
+
+
+@both_transports
+def test_the_passport_says_how_the_flight_is_made_and_changes_with_it(world, rx):
+    from xplane_bridge.msg import Experiment
+
+    emulator = world.emulator(*KINEMATIC)
+    text = "name: fixed_wing\n"
+    world.set_param("experiment", {"aircraft_file": text, "pilot": "Kim"})
+    passports = world.watch("experiment", Experiment)
+    rx(publish_tf=False)
+    first = passports.wait_for(timeout=30.0)
+    parameters = json.loads(first.parameters)
+    assert parameters["experiment"]["pilot"] == "Kim"
+    assert parameters["rx_node"] == {"publish_tf": False}
+    assert first.parameters_sha256 == hashlib.sha256(first.parameters.encode()).hexdigest()
+    assert first.aircraft_file_sha256 == hashlib.sha256(text.encode()).hexdigest()
+    assert first.aircraft_file == "fixed_wing"
+    assert first.package_version == __version__
+    assert re.fullmatch(r"([0-9a-f]{40}\+?)?", first.commit)
+    assert first.aircraft_description
+    assert first.xplane_version == 115501
+    settings = dict(zip(first.settings, first.setting_values))
+    assert settings["sim/time/sim_speed"] == 1.0
+    assert all(math.isfinite(value) for value in settings.values()), settings
+    assert not first.lockstep
+    world.wire(emulator.port).send(protocol.DrefWrite("sim/time/sim_speed", 2.0))
+    world.set_param("experiment/pilot", "Lee")
+    passports.wait_for(lambda p: dict(zip(p.settings, p.setting_values))["sim/time/sim_speed"] == 2.0, 30.0)
+    last = passports.wait_for(lambda p: "Lee" in p.parameters, 30.0)
+    assert last.header.stamp > first.header.stamp
+    assert len(passports.messages) <= 4
 
 
 # --- services ---------------------------------------------------------------------------------------------------------

@@ -63,6 +63,14 @@ Conformance conformanceFromText(const std::string& text) {
   }
 }
 
+std::vector<std::string> refutedOf(std::uint32_t otherwise) {
+  std::vector<std::string> ids;
+  for (const Switch& each : kSwitches) {
+    if ((otherwise & static_cast<std::uint32_t>(each.bit)) != 0U) ids.emplace_back(each.id);
+  }
+  return ids;
+}
+
 std::string consequenceOf(const std::string& id) {
   const Switch* const found = switchOf(id);
   return found == nullptr ? "" : found->consequence;

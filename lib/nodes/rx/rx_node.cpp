@@ -71,6 +71,7 @@ void RxNode::loadParameters(const ParamLoader& own) {
   }
   missions_ = makeMissionPublishers(options_.rates, common().transport, common().frames, lockstep(), stamps);
   datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs, lockstep(), stamp_clock);
+  experiment_ = std::make_unique<ExperimentPublisher>(common());
   addStreams();
 }
 
@@ -126,6 +127,13 @@ void RxNode::addStreams() {
        },
        false,
        {}});
+  add({"settings",
+       core::XPlaneSettings::kRateHz,
+       kIdentityPriority,
+       [] { return core::XPlaneSettings::datarefs(); },
+       [this](const core::RrefView& datagram, std::int64_t receive_ns) { settings_.add(datagram, receive_ns); },
+       false,
+       {}});
 }
 
 void RxNode::advertise() {
@@ -146,6 +154,8 @@ void RxNode::advertise() {
       "get_terrain", [this](const auto& request, auto& response) { getTerrain(request, response); });
   addTimer(kSupervisePeriod_s, [this] { supervise(); });
   addAllDiagnostics();
+  experiment_->advertise(&handle());
+  experiment_->setParameters(experiment_->readParameters(handle()));
   if (lockstep() || stampsBySimulator()) {
     clock_publisher_ = handle().advertise<rosgraph_msgs::Clock>(kClockTopic, 1, true);
   }
@@ -194,6 +204,7 @@ std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
     }
     datarefs_->reset();
     aircraft_.reset();
+    settings_.reset();
     rows_.clear();
     consistency_.reset();
     last_state_.reset();
@@ -300,12 +311,23 @@ void RxNode::publishLinkState(const core::LinkStatus& status) {
   link_state_publisher_.publish(message);
 }
 
+void RxNode::publishExperiment() {
+  if (!adopted_version_ || aircraft_.told() == 0 || settings_.values().empty()) {
+    return;
+  }
+  experiment_->publish(*adopted_version_, aircraft_.identity(), settings_, stampNow());
+}
+
 void RxNode::supervise() {
   const core::LinkStatus status = link().status();
   adoptVersion(status);
   if (adopted_version_) {
     renewSubscriptions();
     supervisePositionCheck();
+  }
+  if (!lockstep()) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    publishExperiment();
   }
   if (status.state == core::LinkState::kSearching && (!search_word_pause_ || search_word_pause_->over())) {
     search_word_pause_.emplace(clock(), kSearchingPublishPeriod_s);

@@ -7,6 +7,7 @@
 
 #include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/base/units.hpp"
+#include "xplane_bridge/nodes/base/build_info.hpp"
 #include "xplane_bridge/nodes/rx/rx_node.hpp"
 
 namespace xplane_bridge {
@@ -18,6 +19,8 @@ struct GroupName {
   std::uint32_t bit;
   const char* name;
 };
+
+constexpr int kParametersPeriod = 5;  // [diagnostics] between two readings of the parameters
 
 constexpr GroupName kFlightGroups[] = {
     {core::FlightState::kValidSim, "simulator"},
@@ -90,6 +93,20 @@ void RxNode::addAllDiagnostics() {
   if (!missions_.empty()) {
     addDiagnostics("mission state", [this](auto& status) { diagnoseMission(&status); });
   }
+  addDiagnostics("experiment", [this](auto& status) { diagnoseExperiment(&status); });
+}
+
+void RxNode::diagnoseExperiment(diagnostic_updater::DiagnosticStatusWrapper* status) {
+  // Here, because asking the parameter server may take long, and for nodes that are started later.
+  if (!lockstep() && ++parameters_age_ >= kParametersPeriod) {
+    parameters_age_ = 0;
+    const XmlRpc::XmlRpcValue parameters = experiment_->readParameters(handle());
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (parameters.valid()) experiment_->setParameters(parameters);
+  }
+  const std::string commit = packageCommit();
+  status->summaryf(DiagnosticStatus::OK, "xplane_bridge %s%s", packageVersion(),
+                   commit.empty() ? "" : (", commit " + commit).c_str());
 }
 
 void RxNode::diagnoseFlight(diagnostic_updater::DiagnosticStatusWrapper* status) {

@@ -7,13 +7,13 @@ import json
 import shlex
 import sys
 from pathlib import Path
-from typing import Optional, Sequence
+from typing import Any, Dict, Optional, Sequence
 
 from xplane_bridge.analysis.scoring import Score
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import read_flight
 from xplane_bridge.cli.entry import guarded, positive
-from xplane_bridge.cli.scenario_player import scenario_of
+from xplane_bridge.cli.scenario_player import scenario_file, scenario_of
 from xplane_bridge.harness.display import screen
 from xplane_bridge.harness.flight import FlightPlan, fly
 from xplane_bridge.harness.lockstep_flight import Lockstep
@@ -23,6 +23,9 @@ from xplane_bridge.scenario import Scenario, ScenarioError
 from xplane_bridge.scenario.judging import judge
 
 _FPS = 60.0
+#: Options that make a flight what it is.
+_KEPT = ("aircraft", "transport", "joystick", "controller", "camera", "duration", "emulator", "seed")
+_KEPT_LOCKSTEP = ("lockstep", "speed", "controller_node")
 _LONGEST_S = 600.0  # a scenario that has not ended by then waits for something that never comes
 
 
@@ -113,6 +116,19 @@ def lockstep_of(args: argparse.Namespace) -> Optional[Lockstep]:
     return lockstep
 
 
+def asked_for(scenario: Scenario, args: argparse.Namespace) -> Dict[str, Any]:
+    """What the passport of the flight says of how it was started: enough for rerun_flight."""
+    defaults = parser().parse_args([args.scenario])
+    options = []
+    for name in _KEPT + _KEPT_LOCKSTEP:
+        value = getattr(args, name)
+        if value != getattr(defaults, name):
+            option = "--" + name.replace("_", "-")
+            options.append(option if value is True else f"{option}={value}")
+    text = scenario_file(args.scenario).read_text(encoding="utf-8")
+    return {"program": "run_scenario", "scenario": scenario.name, "text": text, "options": options}
+
+
 def render(scores: Sequence[Score]) -> str:
     """A line for each criterion."""
     width = max([len(s.name) for s in scores] + [9])
@@ -132,6 +148,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     if path.is_file():
         args.scenario = str(path.resolve())
     plan = plan_of(scenario, args)
+    plan.experiment = asked_for(scenario, args)
     plan.make_folders()
     with interrupted_by_signals("run_scenario"), screen(plan.logs, args.headless or not args.camera):
         fly(plan, say=lambda text: print(f"run_scenario: {text}", file=sys.stderr))

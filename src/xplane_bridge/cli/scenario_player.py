@@ -24,13 +24,22 @@ def scenario_of(name: str) -> Scenario:
     Raises:
         ScenarioError: There is none, or it is not one.
     """
+    return load_scenario(scenario_file(name))
+
+
+def scenario_file(name: str) -> Path:
+    """The file of a scenario, by its stem in config/scenarios, or by a path.
+
+    Raises:
+        ScenarioError: There is none.
+    """
     path = Path(name)
     if path.suffix not in (".yaml", ".yml"):
         path = config_file("scenarios", f"{name}.yaml")
     if not path.is_file():
         known = ", ".join(sorted(file.stem for file in config_file("scenarios", "README.md").parent.glob("*.yaml")))
         raise ScenarioError(f"there is no scenario {name}; expected a file, or one of: {known}")
-    return load_scenario(path)
+    return path
 
 
 def add_stick_options(p: argparse.ArgumentParser) -> None:

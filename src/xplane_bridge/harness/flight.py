@@ -46,6 +46,8 @@ class FlightPlan:
     silence_allowed: float = _SILENCE_S  #: [s]
     #: In lock-step; `duration` is simulated time then, and the player ends the flight by holding it.
     lockstep: Optional[Lockstep] = None
+    #: How it was asked for, by which it can be flown again: experiment/flight of the passport.
+    experiment: Dict[str, Any] = field(default_factory=dict)
 
     @property
     def bag(self) -> Path:
@@ -119,6 +121,8 @@ def fly(
         stack.enter_context(master)
         if plan.lockstep is not None:
             master.set_param("/use_sim_time", True)
+        if plan.experiment:
+            master.set_param(f"{NAMESPACE}/experiment/flight", plan.experiment)
         bridge = roslaunch(
             master,
             plan.logs,

@@ -12,10 +12,12 @@ from xplane_bridge.analysis.consistency import check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values, who_flew
 from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, pairing, timing
 from xplane_bridge.analysis.summary import summary
+from xplane_bridge.bags.passport import read_passports
 from xplane_bridge.constants import LinkState, words
 from xplane_bridge.plotting import interactive
 from xplane_bridge.plotting.flight_figures import MissingError, all_figures
 from xplane_bridge.plotting.page import Section, day_of, missing, number, page, rows_table
+from xplane_bridge.plotting.passports import passport_section
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
@@ -51,6 +53,7 @@ def build(bags: Bags, flight: Flight) -> tuple[str, list[TimeFigure | PathFigure
         sections.append((key, title, f"<div{linked}>{interactive.draw(figure, flight.start)}</div>"))
     sections.append(("images", "Images and their state", _strip(bags, flight)))
     sections.append(("quality", "Data quality", _quality(flight)))
+    sections.append(("experiment", "How it was made", passport_section(read_passports(bags))))
     return _page(flight, bags, sections), made
 
 

@@ -18,6 +18,7 @@
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 #include "xplane_bridge/core/state/field_table.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
+#include "xplane_bridge/core/state/xplane_settings.hpp"
 #include "xplane_bridge/core/surfaces/surface_watch.hpp"
 #include "xplane_bridge/core/surfaces/surfaces.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
@@ -69,6 +70,7 @@ class Uses {
     }
     readAll(flightWatchDatarefs());
     readAll(AircraftIdentityReader::datarefs());
+    readAll(XPlaneSettings::datarefs());
   }
 
   void controls() const {

@@ -26,6 +26,9 @@ struct Conformance {
 /// @throws ConformanceError
 Conformance conformanceFromText(const std::string& text);
 
+/// Ids of the assumptions that stand for bits of Otherwise.
+std::vector<std::string> refutedOf(std::uint32_t otherwise);
+
 /// What the nodes do about a refuted assumption, in words; empty: nothing.
 std::string consequenceOf(const std::string& id);
 

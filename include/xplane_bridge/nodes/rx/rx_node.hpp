@@ -16,9 +16,11 @@
 #include "xplane_bridge/core/state/clock_filter.hpp"
 #include "xplane_bridge/core/state/consistency_monitor.hpp"
 #include "xplane_bridge/core/state/state_assembler.hpp"
+#include "xplane_bridge/core/state/xplane_settings.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/base/rate_meter.hpp"
 #include "xplane_bridge/nodes/rx/dataref_publisher.hpp"
+#include "xplane_bridge/nodes/rx/experiment_publisher.hpp"
 #include "xplane_bridge/nodes/rx/flight_publisher.hpp"
 #include "xplane_bridge/nodes/rx/mission_publisher.hpp"
 #include "xplane_bridge/nodes/rx/rx_options.hpp"
@@ -81,6 +83,8 @@ class RxNode : public BaseNode {
   /// [ns] now, of the clock that receive times are of.
   std::int64_t receiveNow() const { return lockstep() ? clock().system_ns() : wallClock().system_ns(); }
   void publishLinkState(const core::LinkStatus& status);
+  /// Once X-Plane has said which it is, what is loaded and what is set.
+  void publishExperiment();
   float nearSimTime(std::int64_t receive_ns) const;
 
   void setOrigin(const SetOrigin::Request& request, SetOrigin::Response& response);
@@ -94,6 +98,7 @@ class RxNode : public BaseNode {
   void diagnosePosition(diagnostic_updater::DiagnosticStatusWrapper* status);
   void diagnosePhysics(diagnostic_updater::DiagnosticStatusWrapper* status);
   void diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status);
+  void diagnoseExperiment(diagnostic_updater::DiagnosticStatusWrapper* status);
 
   RxOptions options_;
 
@@ -103,6 +108,8 @@ class RxNode : public BaseNode {
   std::vector<std::unique_ptr<MissionPublisher>> missions_;
   std::unique_ptr<DatarefPublisher> datarefs_;
   core::AircraftIdentityReader aircraft_;
+  core::XPlaneSettings settings_;
+  std::unique_ptr<ExperimentPublisher> experiment_;
   core::RowStore rows_;
   core::ReceiveClock receive_clock_;
   core::ConsistencyMonitor consistency_;
@@ -122,6 +129,7 @@ class RxNode : public BaseNode {
   // Diagnostics thread only.
   RateMeter state_rate_;
   std::vector<RateMeter> mission_rates_;
+  int parameters_age_ = 0;  ///< [diagnostics] since the parameters were read
 
   ros::Publisher link_state_publisher_;
   ros::Publisher rows_publisher_;

@@ -49,5 +49,13 @@ TEST(Conformance, ThatIsOtherwiseIsAnotherVersion) {
   EXPECT_EQ((SimulatorVersion{122015, 1}), (SimulatorVersion{122015, 1}));
 }
 
+TEST(Conformance, BitsAreGivenBackAsTheirIds) {
+  EXPECT_TRUE(refutedOf(0).empty());
+  const std::vector<std::string> ids = {"row16", "beta-sign"};
+  Conformance found;
+  found.refuted = ids;
+  EXPECT_EQ(refutedOf(found.otherwise()), ids);
+}
+
 }  // namespace
 }  // namespace xplane_bridge::core

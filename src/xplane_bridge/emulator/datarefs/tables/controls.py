@@ -170,6 +170,8 @@ def _stick(t: Table, sim: Sources) -> None:
             f"sim/joystick/artstab_{axis}_ratio", partial(lambda after, before, f: after(f) - before(), total, stick)
         )
         t.setting(f"sim/joystick/servo_{axis}_ratio")
+        t.setting(f"sim/joystick/joystick_{axis}_sensitivity", 0.5)
+        t.setting(f"sim/joystick/joystick_{axis}_nullzone")
         t.value(f"{_COCKPIT}total_{axis}_ratio", _total(sim, total))
         t.value(f"{_CONTROLS2}{axis}_ratio", total)
         t.setting(f"{_COCKPIT}{trim}_trim")

@@ -1,0 +1,82 @@
+"""What a recording says of how it was made."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from support.synthetic_flight import FlightBag, stamp_ns
+from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags.passport import read_passports
+from xplane_bridge.plotting.passports import differences_table, passport_section
+
+PARAMETERS = {
+    "aircraft": "fixed_wing",
+    "experiment": {"flight": {"scenario": "demo", "options": ["--seed=3"]}, "aircraft_file": "a:\nb\n"},
+    "rx_node": {"publish_tf": False, "rates": {}},
+}
+
+
+def add(bag, t, **fields):
+    values = {
+        "package_version": "0.2.0",
+        "commit": "abc",
+        "parameters": json.dumps(PARAMETERS),
+        "xplane_version": 122015,
+        "settings": ["sim/time/sim_speed", "sim/time/use_system_time"],
+        "setting_values": [1.0, float("nan")],
+        "refuted": ["row16"],
+        **fields,
+    }
+    bag.add("/xplane/experiment", "xplane_bridge/Experiment", stamp_ns(t), values)
+
+
+def passports(tmp_path, *messages):
+    path = tmp_path / f"{len(list(tmp_path.iterdir()))}.bag"
+    with FlightBag(path) as bag:
+        bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(0), bag.state(0.0, 0))
+        for t, fields in enumerate(messages):
+            add(bag, t, **fields)
+    with Bags(path) as bags:
+        return read_passports(bags)
+
+
+def test_it_is_read_with_parameters_as_paths(tmp_path):
+    (found,) = passports(tmp_path, {})
+    assert found.flight == {"scenario": "demo", "options": ["--seed=3"]}
+    lines = found.lines()
+    assert lines["X-Plane"] == "122015"
+    assert lines["refuted assumptions"] == "row16"
+    assert (lines["sim/time/sim_speed"], lines["sim/time/use_system_time"]) == ("1", "not known")
+    assert (lines["aircraft"], lines["rx_node/publish_tf"], lines["rx_node/rates"]) == ("fixed_wing", "no", "{}")
+    assert "experiment/aircraft_file" not in lines
+
+
+def test_a_repeated_one_counts_once_and_a_change_is_shown(tmp_path):
+    found = passports(tmp_path, {}, {}, {"xplane_version": 121000})
+    assert [p.others["X-Plane"] for p in found] == [122015, 121000]
+    page = passport_section(found)
+    assert "Changed in flight" in page
+    assert "122015" in page.split("Changed in flight")[1]
+
+
+def test_what_differs_is_a_row_and_nothing_else(tmp_path):
+    (first,) = passports(tmp_path, {})
+    (second,) = passports(tmp_path, {"commit": "<def>"})
+    table = differences_table(["a.bag", "b.bag"], [first, second])
+    assert table.count("<tr>") == 2
+    assert "&lt;def&gt;" in table
+    assert "Nothing" in differences_table(["a.bag", "b.bag"], [first, first])
+    assert "none" in differences_table(["a.bag", "b.bag"], [first, None])
+
+
+def test_a_recording_without_one_says_so(tmp_path):
+    assert passports(tmp_path) == []
+    assert "no topic experiment" in passport_section([])
+    assert "no topic experiment" in differences_table(["a", "b"], [None, None])
+
+
+def test_parameters_that_are_no_json_are_an_error(tmp_path):
+    with pytest.raises(BagError, match="/xplane/experiment: the parameters are no JSON"):
+        passports(tmp_path, {"parameters": "{"})
