@@ -1,0 +1,1 @@
+"""Programs for recorded flights, several or once more."""

@@ -1,0 +1,215 @@
+"""compare_flights: what differs between recorded flights, and between how they were made, on one page."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence
+
+import numpy as np
+import yaml
+
+from xplane_bridge.analysis.comparison import SIGNALS, Matched
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.flight import Flight, read_flight
+from xplane_bridge.bags.passport import Passport, read_passports
+from xplane_bridge.cli.entry import guarded
+from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.scenario import ScenarioError, parse_scenario
+from xplane_bridge.scenario.judging import judge
+
+_PLAYED = "played.json"
+
+
+class CompareError(XplaneBridgeError):
+    """The flights cannot be compared."""
+
+
+class Read(NamedTuple):
+    """One flight as it was read."""
+
+    path: Path
+    variant: str
+    flight: Flight
+    labels: Dict[str, int]  #: receive time [ns] of the first message of each text on scenario/label
+    passport: Optional[Passport]
+    played: Mapping[str, Any]  #: of the player's log beside the bag; empty: there is none
+
+    @property
+    def scenario(self) -> str:
+        """Name of the scenario that was played; empty: none, as far as is known."""
+        named = self.passport.flight.get("scenario", "") if self.passport else ""
+        return str(named or self.played.get("scenario", ""))
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the command line."""
+    p = argparse.ArgumentParser(
+        prog="compare_flights",
+        description="Makes one self-contained HTML page of what differs between flights (docs/experiments.md).",
+    )
+    p.add_argument(
+        "flights", nargs="+", type=Path, metavar="BAG",
+        help="a flight's bag, or a folder: each bag below it is a repetition of the same; the first is the reference",
+    )  # fmt: skip
+    p.add_argument(
+        "--match", choices=("scenario", "time"),
+        help="time 0 is when the scenario began, or the first state; default: scenario where all have played the same",
+    )  # fmt: skip
+    p.add_argument(
+        "--event", metavar="TEXT",
+        help="time 0 is the first event, or label of a scenario, that has this text in it",
+    )  # fmt: skip
+    p.add_argument("-o", "--output", type=Path, default=Path("comparison.html"), metavar="FILE", help="(%(default)s)")
+    return p
+
+
+@guarded
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program."""
+    from xplane_bridge.plotting import comparison
+
+    args = parser().parse_args(argv)
+    if args.match and args.event is not None:
+        raise CompareError("--match and --event: give one of them")
+    found = [read(path, variant) for path, variant in paths_of(args.flights)]
+    if len(found) < 2:
+        raise CompareError(f"{found[0].path}: one flight alone; give two or more")
+    by = args.match or ("event" if args.event is not None else usual(found))
+    zero = {"scenario": "the begin of the scenario", "time": "the first flight state"}.get(
+        by, f"the event {args.event!r}"
+    )
+    names = short_names([each.path for each in found])
+    flights = [matched(each, name, by, args.event) for each, name in zip(found, names)]
+    text = comparison.build(flights, [each.passport for each in found], zero)
+    try:
+        args.output.parent.mkdir(parents=True, exist_ok=True)
+        args.output.write_text(text, encoding="utf-8")
+    except OSError as err:
+        raise CompareError(f"{args.output}: {err.strerror}") from None
+    print(args.output)
+    return 0
+
+
+def paths_of(given: Sequence[Path]) -> List[tuple[Path, str]]:
+    """The bags with the variants they belong to.
+
+    Raises:
+        CompareError: A folder has no bag.
+    """
+    out = []
+    for path in given:
+        if not path.is_dir():
+            out.append((path, str(path)))
+            continue
+        bags = sorted(path.rglob("*.bag"))
+        if not bags:
+            raise CompareError(f"{path}: a folder without any .bag file")
+        out += [(bag, str(path)) for bag in bags]
+    return out
+
+
+def short_names(paths: Sequence[Path]) -> List[str]:
+    """The paths without what all have in common; "flight.bag" alone tells nothing."""
+    parts = [path.resolve().parts for path in paths]
+    common = 0
+    while common < min(map(len, parts)) - 1 and len({each[common] for each in parts}) == 1:
+        common += 1
+    return ["/".join(each[common:]) for each in parts]
+
+
+def read(path: Path, variant: str) -> Read:
+    """Read one flight.
+
+    Raises:
+        BagError: The bag cannot be read.
+        CompareError: It holds no flight, or what lies beside it is no log of a player.
+    """
+    labels: Dict[str, int] = {}
+    with Bags(path) as bags:
+        flight = read_flight(bags)
+        passports = read_passports(bags)
+        for topic, info in bags.topics.items():
+            if topic.endswith("scenario/label") and info.count:
+                for time, message in bags.messages(topic):
+                    labels.setdefault(str(message.data), time)
+    if "state" not in flight.tables:
+        raise CompareError(f"{path}: no flight state in it")
+    played: Mapping[str, Any] = {}
+    beside = path.with_name(_PLAYED)
+    if beside.is_file():
+        try:
+            played = json.loads(beside.read_text(encoding="utf-8"))
+        except ValueError as err:
+            raise CompareError(f"{beside}: no log of a scenario's player: {err}") from None
+    return Read(path, variant, flight, labels, passports[-1] if passports else None, played)
+
+
+def usual(found: Sequence[Read]) -> str:
+    """How flights are matched when nothing else is said."""
+    names = {each.scenario for each in found}
+    return (
+        "scenario"
+        if len(names) == 1 and all(each.played.get("begin") for each in found) and "" not in names
+        else "time"
+    )
+
+
+def matched(each: Read, name: str, by: str, event: Optional[str]) -> Matched:
+    """One flight on the time axis of the comparison: simulated time.
+
+    Raises:
+        CompareError: What it is matched by is not in it.
+    """
+    state = each.flight.tables["state"]
+    epoch, sim_time = state["epoch"], state["sim_time_unwrapped"]
+    steps = np.where(np.diff(epoch) == 0, np.maximum(np.diff(sim_time), 0.0), 0.0)
+    elapsed = np.concatenate(([0.0], np.cumsum(steps)))
+    zero = 0.0
+    if by == "scenario":
+        begin = each.played.get("begin")
+        first = np.empty(0, dtype=int)
+        if begin:
+            first = np.flatnonzero((epoch == begin["epoch"]) & (sim_time >= begin["sim_time_unwrapped"] - 1e-6))
+        if not len(first):
+            raise CompareError(
+                f"{each.path}: when its scenario began is not known ({_PLAYED} of run_scenario is not beside it); "
+                "give --match time or --event TEXT"
+            )
+        zero = float(elapsed[first[0]])
+    elif by == "event":
+        zero = float(np.interp(event_time(each, str(event)) - state.stamp[0], state.stamp - state.stamp[0], elapsed))
+    values = {column: np.asarray(state[column]) for column in SIGNALS if column in state}
+    return Matched(name, each.variant, elapsed - zero, values, each.flight.parts, scores_of(each))
+
+
+def event_time(each: Read, text: str) -> int:
+    """[ns] stamp of the first event with `text` in it.
+
+    Raises:
+        CompareError: There is none; the text lists what there is.
+    """
+    times = dict(each.labels)
+    if "events" in each.flight.tables:
+        for events in each.flight.tables["events"]["events"]:
+            for event in events:
+                times.setdefault(str(event.text), event.stamp.sec * 1_000_000_000 + event.stamp.nanosec)
+    fitting = [time for said, time in times.items() if text.lower() in said.lower()]
+    if not fitting:
+        have = "; ".join(times) or "no event at all"
+        raise CompareError(f"{each.path}: no event with {text!r} in it; it has: {have}")
+    return min(fitting)
+
+
+def scores_of(each: Read) -> Dict[str, float]:
+    """What the criteria of the played scenario measure; empty where it is not known."""
+    text = each.passport.flight.get("text") if each.passport else None
+    if not text or not each.played.get("begin"):
+        return {}
+    try:
+        scenario = parse_scenario(yaml.safe_load(text))
+        return {s.name: s.value for s in judge(scenario, each.flight, each.played) if not math.isnan(s.value)}
+    except (yaml.YAMLError, ScenarioError) as err:
+        raise CompareError(f"{each.path}: the scenario in its passport: {err}") from None

@@ -1,0 +1,96 @@
+"""Differences between flights and their intervals, against what is known of made-up flights."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from xplane_bridge.analysis.comparison import (
+    Matched,
+    difference,
+    mean_interval,
+    score_differences,
+    signal_differences,
+    welch,
+)
+
+
+def flight(offset=0.0, shift=0.0, variant="a", scores=None, name="roll_deg", wrap=False):
+    time = np.arange(0.0, 60.0, 0.02) + shift
+    values = 10.0 * np.sin(time) + offset
+    return Matched("f", variant, time, {name: values % 360.0 if wrap else values}, [slice(0, len(time))], scores or {})
+
+
+def test_a_constant_offset_is_found_at_the_times_both_have():
+    time, delta = difference(flight(), flight(2.5, shift=0.007), "roll_deg")
+    assert delta == pytest.approx(2.5, abs=1e-3)
+    assert time[0] == pytest.approx(0.02)
+    (found,) = signal_differences(flight(), flight(2.5))
+    assert found[:3] == ("roll", "deg", pytest.approx(2.5))
+    assert found.interval.low <= 2.5 <= found.interval.high
+    assert (found.rms, found.largest) == (pytest.approx(2.5), pytest.approx(2.5))
+
+
+def test_an_angle_is_compared_the_short_way_round():
+    a, b = flight(0.0, name="heading_true_deg", wrap=True), flight(-3.0, name="heading_true_deg", wrap=True)
+    assert difference(a, b, "heading_true_deg")[1] == pytest.approx(-3.0, abs=1e-6)
+
+
+def test_nothing_is_interpolated_across_a_gap():
+    gappy = flight()
+    keep = (gappy.time < 20.0) | (gappy.time > 30.0)
+    first = int(np.sum(gappy.time < 20.0))
+    cut = Matched(
+        "g", "a", gappy.time[keep], {"roll_deg": gappy.values["roll_deg"][keep]}, [slice(0, first), slice(first, None)]
+    )
+    time, delta = difference(flight(), cut, "roll_deg")
+    assert not ((time > 20.0) & (time < 30.0)).any()
+    assert delta == pytest.approx(0.0, abs=1e-9)
+
+
+def test_flights_without_common_time_have_no_difference():
+    assert signal_differences(flight(), flight(shift=1000.0)) == []
+
+
+def test_the_interval_of_a_mean_covers_it_for_signals_that_remember():
+    dice = np.random.default_rng(7)
+    covered = 0
+    for _ in range(200):
+        noise = dice.normal(size=4000)
+        samples = np.empty(4000)
+        level = 0.0
+        for k, each in enumerate(noise):
+            level = 0.9 * level + each
+            samples[k] = level
+        interval = mean_interval(samples)
+        covered += interval.low <= 0.0 <= interval.high
+    assert 175 <= covered <= 199  # as independent samples it would be some 70
+
+
+def test_a_flight_too_short_for_its_memory_has_no_interval():
+    assert math.isnan(mean_interval(np.linspace(0.0, 1.0, 100)).low)
+    assert math.isnan(mean_interval(np.empty(0)).low)
+    assert mean_interval(np.full(10, 2.0)) == (2.0, 2.0)
+
+
+def test_welchs_interval_is_that_of_scipy():
+    from scipy.stats import ttest_ind
+
+    a, b = np.array([1.0, 2.0, 4.0]), np.array([3.0, 5.0, 9.0, 4.0])
+    interval = welch(a, b)
+    for edge in interval:
+        assert ttest_ind(b - edge, a, equal_var=False).pvalue == pytest.approx(0.05, rel=1e-6)
+    assert math.isnan(welch(a, b[:1]).low)
+    assert welch(np.ones(2), np.ones(3) * 2) == (1.0, 1.0)
+
+
+def test_criteria_are_compared_between_variants_where_all_flights_have_them():
+    before = [flight(scores={"error": 1.0, "lost": math.inf}), flight(scores={"error": 1.2, "lost": 1.0})]
+    after = [flight(scores={"error": 3.0, "lost": 1.0}), flight(scores={"error": 3.4, "lost": 1.0})]
+    (found,) = score_differences(before, after)
+    assert (found.name, found.difference) == ("error", pytest.approx(2.1))
+    assert found.interval.low > 0.0
+    (single,) = score_differences(before[1:], [flight(scores={"error": 2.0})])
+    assert math.isnan(single.interval.low)

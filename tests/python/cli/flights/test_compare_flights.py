@@ -1,0 +1,132 @@
+"""compare_flights: matched by time, scenario or event; one page that a browser shows; refusals in words."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from support.synthetic_flight import START, FlightBag, stamp_ns
+from xplane_bridge.cli.flights import compare_flights
+from xplane_bridge.cli.flights.compare_flights import matched, read
+
+SCENARIO = """
+name: weave
+events: [{at: 0, mode: auto}, {at: 20, end: true}]
+criteria:
+  level: {measure: rms, of: roll, target: 0, below: 30}
+  climb: {measure: maximum, of: altitude, below: 2000}
+"""
+RATE = 10.0
+
+
+def write(path, begin=0.0, event=5.0, higher=0.0, commit="abc", played=True):
+    """20 s of flight; `begin` [s]: when its scenario began; `event` [s]: when an aileron stuck."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    flight = {"scenario": "weave", "text": SCENARIO, "options": []}
+    with FlightBag(path) as bag:
+        for k in range(int(20 * RATE)):
+            t = k / RATE
+            state = bag.state(t, k)
+            state["altitude_msl"] += higher
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
+        values = {"commit": commit, "parameters": json.dumps({"experiment": {"flight": flight}})}
+        bag.add("/xplane/experiment", "xplane_bridge/Experiment", stamp_ns(0.0), values)
+        stamp = {"sec": START + int(event), "nanosec": int(event % 1 * 1e9)}
+        told = {"events": [{"number": 1, "stamp": stamp, "text": "aileron stuck"}]}
+        bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(event), told)
+    if played:
+        first = {"epoch": int(state["epoch"]), "sim_time_unwrapped": first_sim_time(path) + begin}
+        log = {"scenario": "weave", "begin": first, "labels": {}}
+        (path.parent / "played.json").write_text(json.dumps(log), encoding="utf-8")
+    return path
+
+
+def first_sim_time(path):
+    return float(read(path, "").flight.tables["state"]["sim_time_unwrapped"][0])
+
+
+def page_of(*arguments):
+    output = arguments[-1]
+    assert compare_flights.main([*map(str, arguments[:-1]), "-o", str(output)]) == 0
+    return output.read_text(encoding="utf-8")
+
+
+def test_two_flights_of_a_scenario_are_matched_by_its_begin(tmp_path):
+    a = write(tmp_path / "a" / "flight.bag", begin=2.0)
+    b = write(tmp_path / "b" / "flight.bag", begin=3.0, higher=2.0, commit="def")
+    found = [matched(read(path, str(path)), path.parent.name, "scenario", None) for path in (a, b)]
+    assert [round(float(each.time[0]), 3) for each in found] == [-2.0, -3.0]
+    assert found[1].scores["climb"] - found[0].scores["climb"] == pytest.approx(2.0)
+    page = page_of(a, b, tmp_path / "page.html")
+    assert "matched by the begin of the scenario" in page
+    for name in "ab":
+        assert f"{name}/flight.bag" in page
+    row = re.search(r"<tr><td>altitude MSL</td>.*?</tr>", page).group(0)
+    assert "<td class=n>4</td>" in row  # 2 m higher, and 1 s later at 2 m/s
+    assert re.search(r"<tr><td>commit</td><td>abc</td><td>def</td></tr>", page)
+    assert "http" not in re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
+
+
+def test_matched_by_time_equal_flights_are_equal(tmp_path):
+    a, b = (write(tmp_path / name / "flight.bag") for name in "ab")
+    page = page_of(a, b, "--match", "time", tmp_path / "page.html")
+    assert "matched by the first flight state" in page
+    assert re.search(r"<tr><td>roll</td>.*?equal", page)
+    assert "Nothing: all were made alike" in page
+
+
+def test_matched_by_an_event(tmp_path):
+    a, b = write(tmp_path / "a.bag", event=5.0, played=False), write(tmp_path / "b.bag", event=7.5, played=False)
+    found = [matched(read(path, ""), "x", "event", "Stuck") for path in (a, b)]
+    assert [round(float(each.time[0]), 3) for each in found] == [-5.0, -7.5]
+    assert "aileron" in page_of(a, b, "--event", "aileron", tmp_path / "page.html")
+
+
+def test_folders_are_repetitions_and_give_intervals(tmp_path):
+    for k in range(3):
+        write(tmp_path / "before" / str(k) / "flight.bag", higher=0.1 * k)
+        write(tmp_path / "after" / str(k) / "flight.bag", higher=50.0 + 0.1 * k)
+    page = page_of(tmp_path / "before", tmp_path / "after", tmp_path / "page.html")
+    row = re.findall(r"<tr><td>climb</td>.*?</tr>", page)[-1]
+    assert "<td class=n>50</td>" in row
+    assert re.search(r"49\.\d+ to 50\.\d+", row)
+    assert "differs" in row
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{a}"], "one flight alone"),
+        (["{a}", "{none}"], "No such file"),
+        (["{a}", "{empty}"], "a folder without any .bag file"),
+        (["{a}", "{b}", "--event", "flutter"], "no event with 'flutter' in it; it has: aileron stuck"),
+        (["{a}", "{b}", "--match", "scenario"], "give --match time or --event TEXT"),
+        (["{a}", "{b}", "--match", "time", "--event", "x"], "give one of them"),
+        (["{a}", "{b}", "-o", "/dev/null/page.html"], "/dev/null"),
+    ],
+)
+def test_what_cannot_be_compared_is_said(tmp_path, capsys, arguments, message):
+    files = {name: write(tmp_path / f"{name}.bag", played=False) for name in "ab"}
+    files["none"], files["empty"] = tmp_path / "none.bag", tmp_path / "empty"
+    files["empty"].mkdir()
+    assert compare_flights.main([word.format(**files) for word in arguments]) == 1
+    assert message in capsys.readouterr().err
+
+
+def test_a_browser_shows_every_figure_without_an_error(tmp_path):
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
+    a, b = write(tmp_path / "a.bag"), write(tmp_path / "b.bag", higher=5.0)
+    output = tmp_path / "page.html"
+    page_of(a, b, output)
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}/profile"]
+    shown = subprocess.run(
+        [*command, "--virtual-time-budget=20000", "--dump-dom", output.as_uri()],
+        capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    assert 'data-linked="5"' in shown.stdout
+    assert shown.stdout.count("main-svg") >= 5
+    assert "Uncaught" not in shown.stderr
