@@ -1,0 +1,181 @@
+"""Plays the modes and commands of a recording through a running bridge, by simulated time."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any, Callable, List, NamedTuple
+
+import numpy as np
+
+from xplane_bridge import lockstep
+from xplane_bridge.bags import Bags, Table
+from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
+from xplane_bridge.cli.entry import start_node
+from xplane_bridge.errors import XplaneBridgeError
+
+_NODE = "rerun_flight"
+#: Topics that are played, with their types.
+_PLAYED = {
+    "control/manual": "ControlCommand",
+    "control/auto": "ControlCommand",
+    "control/surfaces": "SurfaceCommand",
+    "control/mode": "ControlMode",
+}
+_PLACED_S = 60.0
+_NEAR_M = 100.0
+_EARTH_RADIUS_M = 6378145.0
+
+
+class ReplayError(XplaneBridgeError):
+    """What was recorded cannot be played."""
+
+
+class Played(NamedTuple):
+    """One message to send."""
+
+    time: float  #: [s] of simulated time since the first flight state of the recording
+    topic: str
+    raw: bytes
+    md5sum: str
+
+
+class Commands(NamedTuple):
+    """What a recording holds of who flew, and how."""
+
+    messages: List[Played]  #: by time
+    start: Any  #: fields of the first flight state, by name
+    duration: float  #: [s] of simulated time
+
+
+def read_commands(bag: Path) -> Commands:
+    """Reads modes and commands.
+
+    Raises:
+        BagError: The bag cannot be read.
+        ReplayError: There is no flight, or no command in it.
+    """
+    with Bags(bag) as bags:
+        topic = bags.topic_of_type("xplane_bridge/FlightState")
+        if topic is None or not bags.topics[topic].count:
+            raise ReplayError(f"{bag}: no flight state in it, by whose simulated time commands are played")
+        namespace = topic[: -len("/flight_state")]
+        state = bags.read(topic)
+        elapsed = _elapsed(state)
+        there = [f"{namespace}/{name}" for name in _PLAYED if f"{namespace}/{name}" in bags.topics]
+        messages = []
+        for recorded, time_ns, raw in bags.recorded(there) if there else ():
+            time = float(np.interp(time_ns - state.time[0], state.time - state.time[0], elapsed))
+            messages.append(Played(time, recorded.topic[len(namespace) + 1 :], raw, recorded.md5sum))
+    if not any(message.topic != "control/mode" for message in messages):
+        raise ReplayError(f"{bag}: no command in it: {', '.join(_PLAYED)} were not recorded, or nobody commanded")
+    start = {name: column[0] for name, column in state.columns.items() if column.ndim == 1}
+    return Commands(messages, start, float(elapsed[-1]))
+
+
+def _elapsed(state: Table) -> np.ndarray:
+    steps = np.diff(state["sim_time_unwrapped"])
+    steps = np.where((np.diff(state["epoch"]) == 0) & (steps > 0.0), steps, 0.0)
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None:
+    """Places the aircraft, plays, and gives the stick back: mode MANUAL, from which its commands time out.
+
+    Raises:
+        ReplayError: The bridge refuses, or its messages are others than the recorded ones.
+    """
+    rospy = start_node(_NODE, anonymous=True)
+    from xplane_bridge import msg
+    from xplane_bridge.srv import ResetFlight, SetMode
+
+    if lockstep.is_on(namespace):
+        raise ReplayError(f"{namespace} is in lock-step, where commands answer frames: rerun_flight without --commands")
+    types = {topic: getattr(msg, name) for topic, name in _PLAYED.items()}
+    for message in commands.messages:
+        if message.md5sum != types[message.topic]._md5sum:
+            raise ReplayError(f"{message.topic} of the recording is of another version; `rosbag fix` brings it to this")
+    publishers = {
+        topic: rospy.Publisher(f"{namespace}/{topic}", types[topic], queue_size=100, tcp_nodelay=True)
+        for topic in _PLAYED
+        if topic != "control/mode"
+    }
+    wait_for_state(namespace, _NODE)
+    wait_for_service(f"{namespace}/tx_node/reset_flight", _NODE)
+    set_mode = rospy.ServiceProxy(f"{namespace}/tx_node/set_mode", SetMode)
+    player = _Player(commands, publishers, types, set_mode)
+    start = commands.start
+    answer = rospy.ServiceProxy(f"{namespace}/tx_node/reset_flight", ResetFlight)(
+        latitude=start["latitude"],
+        longitude=start["longitude"],
+        altitude_msl=start["altitude_msl"],
+        roll_deg=start["roll_deg"],
+        pitch_deg=start["pitch_deg"],
+        heading_true_deg=start["heading_true_deg"] % 360.0,
+        true_airspeed=start["true_airspeed"],
+        flight_path_angle_deg=start["flight_path_angle_deg"],
+    )
+    if not answer.success:
+        raise ReplayError(f"the aircraft is not placed: {answer.result.message}")
+    states = rospy.Subscriber(f"{namespace}/flight_state", msg.FlightState, player.on_state, tcp_nodelay=True)
+    try:
+        if not player.placed.wait(_PLACED_S):
+            raise ReplayError(f"the aircraft is not where the recording begins {_PLACED_S:g} s after reset_flight")
+        say(f"playing {len(commands.messages)} messages, {commands.duration:.1f} s")
+        while not player.over.wait(0.1):
+            player.change_mode()
+            if rospy.is_shutdown():
+                raise ReplayError("ended by ROS")
+    finally:
+        states.unregister()
+        if not rospy.is_shutdown():
+            set_mode(mode=SetMode._request_class.MANUAL)
+    say("played")
+
+
+class _Player:
+    """Sends what is due at each flight state."""
+
+    def __init__(self, commands: Commands, publishers: Any, types: Any, set_mode: Any) -> None:
+        self._commands, self._publishers, self._types, self._set_mode = commands, publishers, types, set_mode
+        self._next = 0
+        self._begin = 0.0
+        self._epoch: Any = None
+        self._wanted = self._mode = 0
+        self.placed, self.over = threading.Event(), threading.Event()
+
+    def on_state(self, state: Any) -> None:
+        """Takes a state of the flight."""
+        if self.over.is_set():
+            return
+        if not self.placed.is_set():
+            if self._distance(state) > _NEAR_M:
+                return
+            self._begin, self._epoch = state.sim_time_unwrapped, state.epoch
+            self.placed.set()
+        if state.epoch != self._epoch:  # placed in two steps: the second one is the begin
+            self._begin, self._epoch, self._next = state.sim_time_unwrapped, state.epoch, 0
+        now = state.sim_time_unwrapped - self._begin
+        messages = self._commands.messages
+        while self._next < len(messages) and messages[self._next].time <= now:
+            due = messages[self._next]
+            message = self._types[due.topic]().deserialize(due.raw)
+            if due.topic == "control/mode":
+                self._wanted = message.mode
+            else:
+                self._publishers[due.topic].publish(message)
+            self._next += 1
+        if now >= self._commands.duration:
+            self.over.set()
+
+    def change_mode(self) -> None:
+        """Asks for the recorded mode, where it is another; not from the thread of the states, as it waits."""
+        if self._wanted != self._mode:
+            self._mode = self._wanted
+            self._set_mode(mode=self._mode)
+
+    def _distance(self, state: Any) -> float:
+        start = self._commands.start
+        north = np.radians(state.latitude - start["latitude"])
+        east = np.radians(state.longitude - start["longitude"]) * np.cos(np.radians(start["latitude"]))
+        return float(np.hypot(np.hypot(north, east) * _EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))

@@ -1,0 +1,96 @@
+"""rerun_flight: flies a recorded flight again, from its passport, or by the commands that were recorded."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any, Dict, Optional, Sequence
+
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.passport import Passport, read_passports
+from xplane_bridge.cli import run_scenario
+from xplane_bridge.cli.entry import guarded, ros_arguments
+from xplane_bridge.cli.flights.recorded_commands import play, read_commands
+from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.topics import NAMESPACE
+
+_BAG = "flight.bag"
+
+
+class RerunError(XplaneBridgeError):
+    """The flight cannot be flown again."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(
+        prog="rerun_flight",
+        description=(
+            "Flies a flight of run_scenario again as its passport says (docs/experiments.md): scenario, aircraft, "
+            "seed, options. Exit code as run_scenario's. With --commands: plays what was recorded."
+        ),
+    )
+    p.add_argument("bag", metavar="BAG", type=Path, help="the recording")
+    p.add_argument("--output", type=Path, metavar="DIR", help="where to write (default: rerun_<scenario>)")
+    p.add_argument(
+        "--commands",
+        action="store_true",
+        help="place the aircraft as the recording begins, and play its modes and commands through a running bridge",
+    )
+    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of that bridge (%(default)s)")
+    return p
+
+
+@guarded
+def main(argv: Optional[Sequence[str]] = None) -> int:
+    """Runs the program."""
+    args = parser().parse_args(ros_arguments(argv))
+    if args.commands:
+        if args.output is not None:
+            raise RerunError(f"--output {args.output}: not with --commands, which flies through a bridge that runs")
+        play(read_commands(args.bag), args.namespace.rstrip("/"), lambda text: print(text, flush=True))
+        return 0
+    passport = passport_of(args.bag)
+    flight = passport.flight
+    if flight.get("program") != "run_scenario":
+        raise RerunError(
+            f"{args.bag}: its passport does not say how to start it: run_scenario has not flown it; "
+            "--commands plays what was recorded"
+        )
+    output = args.output or Path(f"rerun_{flight['scenario']}")
+    if (output / _BAG).resolve() == args.bag.resolve():
+        raise RerunError(f"--output {output}: the recording itself is there; expected another folder")
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        scenario = output / "scenario.yaml"
+        scenario.write_text(str(flight["text"]), encoding="utf-8")
+    except OSError as err:
+        raise RerunError(f"{output}: {err.strerror}") from None
+    status = run_scenario.main([str(scenario), *map(str, flight["options"]), "--output", str(output)])
+    if (output / _BAG).is_file():
+        for line in changes(passport, passport_of(output / _BAG)):
+            print(f"made otherwise: {line}")
+    return status
+
+
+def passport_of(bag: Path) -> Passport:
+    """The last passport of a recording.
+
+    Raises:
+        BagError: The bag cannot be read.
+        RerunError: It has none.
+    """
+    with Bags(bag) as bags:
+        found = read_passports(bags)
+    if not found:
+        raise RerunError(f"{bag}: no topic experiment in it, which says how it was made (since version 0.2.0)")
+    return found[-1]
+
+
+def changes(before: Passport, after: Passport) -> Sequence[str]:
+    """What differs, a line each; of parameters that are of one start, nothing."""
+    sides: Sequence[Dict[str, Any]] = (before.lines(), after.lines())
+    own = ("host", "port", "data_port")
+    names = [name for name in dict.fromkeys([*sides[0], *sides[1]]) if name not in own]
+    pairs = [(name, *(side.get(name, "none") for side in sides)) for name in names]
+    return [f"{name}: {was} -> {now}" for name, was, now in pairs if was != now]

@@ -1,0 +1,102 @@
+"""rerun_flight: a flight of run_scenario once more, the same; and recorded commands through a bridge that runs."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+
+import pytest
+
+from support.tx_fixtures import tx_params
+from xplane_bridge.bags import Bags
+from xplane_bridge.resources import program
+
+SCENARIO = """
+name: turning
+aircraft: fixed_wing
+start: {altitude: 800, speed: 65, heading: 90}
+criteria:
+  turns: {measure: maximum, of: roll, above: 10}
+events:
+  - {at: 0, mode: manual, hold: {roll: 0, climb: 0, speed: 65}}
+  - {at: 1, hold: {roll: 25}}
+  - {at: 6, end: true}
+"""
+
+
+def run(name, *arguments, **kwargs):
+    command = [sys.executable, str(program(name)), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, **kwargs)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flown")
+    scenario = folder / "turning.yaml"
+    scenario.write_text(SCENARIO, encoding="utf-8")
+    options = ["--lockstep", "--seed", "3", "--emulator=--turbulence 1", "--output", folder / "out"]
+    done = run("run_scenario", scenario, *options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    scenario.unlink()  # the passport has its text
+    return folder / "out" / "flight.bag"
+
+
+def states(bag):
+    with Bags(bag) as bags:
+        return hashlib.sha256(b"".join(raw for _, _, raw in bags.recorded(["/xplane/flight_state"]))).hexdigest()
+
+
+def test_a_flight_of_run_scenario_is_flown_again_to_the_last_bit(flown, tmp_path):
+    done = run("rerun_flight", flown, "--output", tmp_path / "again")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "turning: 1 of 1 criteria met" in done.stdout
+    assert "made otherwise" not in done.stdout
+    assert states(tmp_path / "again" / "flight.bag") == states(flown)
+
+
+def test_it_does_not_write_over_the_recording(flown):
+    done = run("rerun_flight", flown, "--output", flown.parent)
+    assert done.returncode == 1
+    assert "the recording itself is there" in done.stderr
+
+
+def test_recorded_commands_fly_a_running_bridge_which_has_its_stick_back_afterwards(world, flown):
+    from xplane_bridge.msg import AppliedCommand, ControlMode, FlightState
+
+    world.emulator("--alt", 1500, "--heading", 200)
+    world.start("rx_node")
+    world.start("tx_node", tx_params())
+    flights = world.watch("flight_state", FlightState)
+    applied = world.watch("control/applied", AppliedCommand)
+    modes = world.watch("control/mode", ControlMode)
+    flights.wait_for(timeout=60.0)
+    done = run("rerun_flight", flown, "--commands", "--namespace", world.namespace, env=world.env)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == "played"
+    assert any(abs(state.altitude_msl - 800.0) < 50.0 for state in flights.messages)
+    assert max(state.roll_deg for state in flights.messages) > 10.0
+    assert any(command.roll > 0.1 for command in applied.messages)
+    assert modes.last.mode == ControlMode.MANUAL
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "no topic experiment in it"),
+        (("--commands", "--output", "x"), "not with --commands"),
+        (("--commands",), "no command in it"),
+    ],
+)
+def test_what_cannot_be_flown_again_is_said(tmp_path, arguments, message):
+    from support.synthetic_flight import FlightBag, stamp_ns
+
+    bag = tmp_path / "bare.bag"
+    with FlightBag(bag) as writing:
+        for k in range(3):
+            state = writing.state(k / 10, k)
+            writing.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 10), state)
+    done = run("rerun_flight", bag, *arguments, cwd=tmp_path)
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
