@@ -98,6 +98,10 @@ FlightChangeHooks Actuation::changeHooks() {
   };
   hooks.suspend_control = [this](const std::string& reason) { suspend(reason); };
   hooks.pausing = [this](const std::string& who) { setPausing(who); };
+  hooks.overrides = [this] {
+    const Lock lock(*mutex_);
+    return overrides_.active();
+  };
   return hooks;
 }
 

@@ -105,6 +105,10 @@ void FlightJobs::setWeather(const core::Weather& weather, std::uint32_t number, 
   add(number, who, false, [this, weather] { return changes_.applyWeather(weather); });
 }
 
+void FlightJobs::setAutopilot(const core::AutopilotSetting& setting, std::uint32_t number, const std::string& who) {
+  add(number, who, false, [this, setting] { return changes_.applyAutopilot(setting); });
+}
+
 void FlightJobs::loadAircraft(const std::string& path, std::int32_t livery, std::uint32_t number,
                               const std::string& who) {
   add(number, who, true, [this, path, livery] { return changes_.applyAircraft(path, livery); });

@@ -13,6 +13,7 @@
 #include "xplane_bridge/core/base/message_constants.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
+#include "xplane_bridge/core/simulator/autopilot_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
 #include "xplane_bridge/core/simulator/world_settings.hpp"
@@ -31,6 +32,7 @@ struct FlightChangeHooks {
   std::function<void(const std::string& reason)> suspend_control;
   /// `who` is about to pause or resume the flight; empty: it did not come to that.
   std::function<void(const std::string& who)> pausing;
+  std::function<std::vector<std::string>()> overrides;  ///< that are set now
 };
 
 struct FlightChangeOptions {
@@ -58,6 +60,7 @@ class FlightChanges {
   FlightChangeOutcome applyLoading(const core::Loading& loading);
   FlightChangeOutcome applyTime(const core::TimeSetting& time);
   FlightChangeOutcome applyWeather(const core::Weather& weather);
+  FlightChangeOutcome applyAutopilot(const core::AutopilotSetting& setting);
   FlightChangeOutcome applyAircraft(const std::string& path, std::int32_t livery);
   FlightChangeOutcome saveSituation(const std::string& path);
   FlightChangeOutcome applySituation(const std::string& path);
@@ -87,6 +90,8 @@ class FlightChanges {
   /// Sends them until X-Plane shows them; `done` tells that it does.
   Outcome applySettings(const std::vector<core::SettingWrite>& settings, const std::string& service,
                         const std::string& done, bool restore);
+  /// Presses until X-Plane shows it; returns what it shows instead, empty: it does.
+  std::string press(const core::AutopilotStep& step);
   /// Writes into the journal what X-Plane has now; returns what it does not tell, empty: nothing.
   std::string remember(const std::vector<core::SettingWrite>& settings);
   PauseOutcome pause(bool paused, const std::string& who);

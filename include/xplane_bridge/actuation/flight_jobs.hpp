@@ -36,6 +36,7 @@ class FlightJobs {
   void restoreSettings() { changes_.restoreSettings(); }
   void setTime(const core::TimeSetting& time, std::uint32_t number, const std::string& who);
   void setWeather(const core::Weather& weather, std::uint32_t number, const std::string& who);
+  void setAutopilot(const core::AutopilotSetting& setting, std::uint32_t number, const std::string& who);
   void setLoading(const core::Loading& loading, std::uint32_t number, const std::string& who);
   void loadAircraft(const std::string& path, std::int32_t livery, std::uint32_t number, const std::string& who);
   void saveSituation(const std::string& path, std::uint32_t number, const std::string& who);

@@ -39,6 +39,28 @@ core::Loading toCore(const SetLoading::Request& request) {
   return out;
 }
 
+core::AutopilotSetting toCore(const SetAutopilot::Request& request) {
+  using Request = SetAutopilot::Request;
+  const auto take = [&request](std::uint32_t bit, auto value) {
+    return (request.fields & bit) != 0 ? std::optional(value) : std::nullopt;
+  };
+  const auto wide = [](float value) { return static_cast<double>(value); };
+  core::AutopilotSetting out;
+  out.master = take(Request::MASTER, static_cast<core::AutopilotMaster>(request.master));
+  out.lateral = take(Request::LATERAL, static_cast<core::LateralMode>(request.lateral));
+  out.vertical = take(Request::VERTICAL, static_cast<core::VerticalMode>(request.vertical));
+  out.altitude_armed = take(Request::ALTITUDE_ARMED, request.altitude_armed != 0);
+  out.autothrottle = take(Request::AUTOTHROTTLE, request.autothrottle != 0);
+  out.yaw_damper = take(Request::YAW_DAMPER, request.yaw_damper != 0);
+  out.heading_magnetic_deg = take(Request::HEADING, wide(request.heading_magnetic_deg));
+  out.altitude = take(Request::ALTITUDE, wide(request.altitude));
+  out.vertical_speed = take(Request::VERTICAL_SPEED, wide(request.vertical_speed));
+  out.airspeed = take(Request::AIRSPEED, wide(request.airspeed));
+  out.mach = take(Request::MACH, wide(request.mach));
+  out.restore_on_exit = request.restore_on_exit != 0;
+  return out;
+}
+
 core::TimeSetting toCore(const SetTime::Request& request) {
   core::TimeSetting out;
   if ((request.fields & SetTime::Request::DATE) != 0) out.date_days = request.date_days;
@@ -76,6 +98,7 @@ core::Weather toCore(const SetWeather::Request& request) {
   return out;
 }
 
+std::optional<std::string> wrongWith(const SetAutopilot::Request& request) { return core::check(toCore(request)); }
 std::optional<std::string> wrongWith(const SetTime::Request& request) { return core::check(toCore(request)); }
 
 std::optional<std::string> wrongWith(const SetWeather::Request& request) {

@@ -255,21 +255,17 @@ void TxNode::advertiseJob(const std::string& service, Begin begin) {
 }
 
 void TxNode::advertiseFlightServices() {
-  advertiseJob<ResetFlight>("reset_flight", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.reset(toCore(request), number, who);
-  });
-  advertiseJob<SetWind>("set_wind", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.setWind(toCore(request), number, who);
-  });
-  advertiseJob<SetTime>("set_time", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.setTime(toCore(request), number, who);
-  });
-  advertiseJob<SetWeather>("set_weather", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.setWeather(toCore(request), number, who);
-  });
-  advertiseJob<SetLoading>("set_loading", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.setLoading(toCore(request), number, who);
-  });
+  const auto by = [](auto job) {
+    return [job](auto& jobs, const auto& request, auto number, const auto& who) {
+      (jobs.*job)(toCore(request), number, who);
+    };
+  };
+  advertiseJob<ResetFlight>("reset_flight", by(&FlightJobs::reset));
+  advertiseJob<SetWind>("set_wind", by(&FlightJobs::setWind));
+  advertiseJob<SetTime>("set_time", by(&FlightJobs::setTime));
+  advertiseJob<SetWeather>("set_weather", by(&FlightJobs::setWeather));
+  advertiseJob<SetAutopilot>("set_autopilot", by(&FlightJobs::setAutopilot));
+  advertiseJob<SetLoading>("set_loading", by(&FlightJobs::setLoading));
   advertiseJob<LoadAircraft>("load_aircraft", [](auto& jobs, const auto& request, auto number, const auto& who) {
     jobs.loadAircraft(request.path, request.livery, number, who);
   });

@@ -6,13 +6,14 @@ import logging
 import math
 from dataclasses import replace
 from functools import partial
-from typing import Callable, Dict, FrozenSet, List, Optional, Set, Tuple
+from typing import Callable, Dict, FrozenSet, List, Mapping, Optional, Set, Tuple
 
 import numpy as np
 
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.datarefs import commands, data_rows, tables
 from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.autopilot import Autopilot
 from xplane_bridge.emulator.datarefs.camera import Cameras
 from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, InputOptions, Pilot
 from xplane_bridge.emulator.datarefs.failure_datarefs import FailureDatarefs
@@ -22,6 +23,7 @@ from xplane_bridge.emulator.datarefs.tables.controls import surface_dataref
 from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
 from xplane_bridge.emulator.flight.frame import Clocks, Frame
+from xplane_bridge.emulator.servos import Servos
 
 _LOG = logging.getLogger(__name__)
 
@@ -125,6 +127,7 @@ class Simulator:
         self._surface_names: List[str] = []
         self.inputs = ControlInputs(self.store, pilot, inputs or InputOptions())
         self.cameras = Cameras(self)
+        self._autopilot, self._servos = Autopilot(self.store, self), Servos(self.store)
         self.table = tables.build(self)
         self.rows = data_rows.DataRows(self.store, self.is_12, otherwise)
         #: What unknown datarefs are sent from where they are sent as 0.
@@ -173,6 +176,8 @@ class Simulator:
             self._placements.apply(self.model, self.frame)
             if dt > 0.0:
                 self.inputs.read(self.controls, self.model, self.frame)
+                self._autopilot.update(self.frame, self.instruments.altitude_ft, self.failed("rel_otto"))
+                self._servos.move(dt, self.frame, self.model.info, self.instruments.altitude_ft, self.controls)
                 self._effects.apply(self.controls, self._failed, self.model, dt)
                 if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
                     self.model.step(dt, self.controls)
@@ -203,6 +208,11 @@ class Simulator:
     def failed(self, leaf: str) -> bool:
         """Whether a failure dataref (`rel_...`) stands at "failed now"."""
         return leaf in self._failed
+
+    @property
+    def autopilot_commands(self) -> Mapping[str, Callable[[], None]]:
+        """What X-Plane's own autopilot does by its commands."""
+        return self._autopilot.commands()
 
     def failures_changed(self) -> None:
         """To be called when a failure dataref was written."""
@@ -261,6 +271,7 @@ class Simulator:
         self.loads += 1
         self.inputs.start(self.controls, self.model)
         self.frozen, self.flying = False, True
+        self._autopilot.switch_off()
         self.clocks.flight = 0.0
         self._placements.clear()
         self.instruments, self.copilot_instruments = Instruments(), Instruments(COPILOT)

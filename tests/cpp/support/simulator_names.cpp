@@ -2,6 +2,7 @@
 // separated by tabs. Access is `read`, `write` or `command`; the unit is empty where the code assumes none.
 // tests/python/xplane_names holds them to X-Plane's lists.
 
+#include <algorithm>
 #include <iostream>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include "xplane_bridge/core/failures/failure_names.hpp"
 #include "xplane_bridge/core/failures/failures.hpp"
 #include "xplane_bridge/core/link/data_output.hpp"
+#include "xplane_bridge/core/simulator/autopilot_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
@@ -37,6 +39,7 @@ class Uses {
     surfaces();
     failures();
     settings();
+    autopilot();
     camera();
     link();
   }
@@ -141,6 +144,27 @@ class Uses {
     readAll(aircraftPathDatarefs(kFilePathSize, version_));
     for (const bool pause : {false, true}) print("command", pauseCommand(pause, version_), "");
     read(kPausedDataref);
+  }
+
+  void autopilot() const {
+    AutopilotSetting setting;
+    setting.heading_magnetic_deg = setting.altitude = setting.vertical_speed = setting.mach = 1.0;
+    for (const bool on : {false, true}) {
+      setting.altitude_armed = setting.autothrottle = setting.yaw_damper = on;
+      for (int mode = 0; mode <= 4; ++mode) {
+        setting.master = static_cast<AutopilotMaster>(std::min(mode, 2));
+        setting.lateral = static_cast<LateralMode>(mode);
+        setting.vertical = static_cast<VerticalMode>(mode);
+        for (const float shown : {0.0F, 2.0F}) {
+          for (const AutopilotStep& step : autopilotSteps(setting, shown)) {
+            print("command", step.command, "");
+            readAll(step.shown);
+          }
+        }
+        for (const SettingWrite& each : autopilotRestored(setting, version_)) set({each.write});
+      }
+    }
+    read(kAutopilotMaster);
   }
 
   void camera() const {

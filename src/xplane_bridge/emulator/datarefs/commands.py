@@ -14,8 +14,6 @@ from xplane_bridge.emulator.datarefs.sources import Actions
 
 _COCKPIT = "sim/cockpit2/controls/"
 _VIEW = "sim/graphics/view/"
-_HOLD = "sim/cockpit2/autopilot/altitude_hold_status"
-_CAPTURED = 2.0
 _FLAP_STEP = 0.25
 _TRIM_STEP = 0.01
 _THROTTLE_STEP = 0.05
@@ -63,7 +61,6 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/operation/pause_on": lambda: sim.pause(True),
         "sim/operation/pause_off": lambda: sim.pause(False),
         "sim/operation/pause_toggle": lambda: sim.pause(not sim.clocks.paused),
-        "sim/autopilot/altitude_hold": lambda: store.set(_HOLD, 0.0 if store.get(_HOLD) else _CAPTURED),
         "sim/operation/fix_all_systems": sim.repair_all,
         "sim/operation/reset_flight": lambda: sim.start_flight(sim.initial),
         "sim/operation/freeze_toggle": toggle("sim/operation/override/override_planepath"),
@@ -109,6 +106,7 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         for name, view in GLANCES.items():
             table[f"sim/view/{name}"] = partial(_look, sim, view, False)
         table["sim/view/straight_up"] = setter(camera.GLANCE_PITCH, 90.0)
+    table.update(sim.autopilot_commands)
     for name, (view, external) in VIEWS.items():
         table[f"sim/view/{name}"] = partial(_look, sim, view, external)
     return table

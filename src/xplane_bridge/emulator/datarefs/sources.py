@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import FrozenSet, List, Protocol, Tuple
+from typing import Callable, FrozenSet, List, Mapping, Protocol, Tuple
 
 from xplane_bridge.emulator.datarefs.aircraft_systems import Electrics, Instruments, Weather
 from xplane_bridge.emulator.datarefs.camera import Cameras
@@ -57,6 +57,10 @@ class Actions(LoadedAircraft, Protocol):
     store: DatarefStore
     clocks: Clocks
     initial: InitialState  #: where flights start
+
+    @property
+    def autopilot_commands(self) -> Mapping[str, Callable[[], None]]:
+        """What X-Plane's own autopilot does by its commands."""
 
     def pause(self, paused: bool) -> None:
         """Stops or continues simulated time."""

@@ -276,6 +276,7 @@ class ModelInfo:
     tank_count: int
     gear_names: tuple[str, ...]
     retractable_gear: bool
+    autopilot: bool = False  #: X-Plane's own flies it
     flap_detents: int = 0  #: notches of the flap handle; 0: no flaps
     max_throttle: float = 1.0
     min_throttle: float = 0.0  #: < 0 where the engine reverses

@@ -68,6 +68,7 @@ class FixedWing(JsbsimModel):
         tank_count=2,
         gear_names=("nose", "left_main", "right_main"),
         retractable_gear=True,
+        autopilot=True,
         flap_detents=3,
         maximum_power_w=ENGINE.rated_power_w,
         maximum_rpm=ENGINE.rated_rpm,

@@ -31,7 +31,7 @@ def define(t: Table, sim: Sources) -> None:
     _identity(t)
     _electrical(t, sim)
     _hydraulics(t, sim)
-    _autopilot(t)
+    _autopilot(t, sim)
     _annunciators(t, sim)
 
 
@@ -105,11 +105,10 @@ def _hydraulics(t: Table, sim: Sources) -> None:
     t.setting("sim/cockpit2/hydraulics/actuators/engine_pump", 1)
 
 
-def _autopilot(t: Table) -> None:
-    """X-Plane's autopilot is not modelled: it keeps its dials and stays off."""
+def _autopilot(t: Table, sim: Sources) -> None:
+    """Dials and modes; `datarefs/autopilot.py` switches these, `emulator/servos.py` flies by them."""
     for name in (
         "flight_director_mode",
-        "servos_on",
         "autothrottle_enabled",
         "autothrottle_on",
         "heading_mode",
@@ -125,8 +124,12 @@ def _autopilot(t: Table) -> None:
         "roll_status",
         "glideslope_status",
         "backcourse_status",
+        "altitude_hold_armed",
+        "glideslope_armed",
     ):
         t.setting(_AUTOPILOT + name)
+    t.setting(_AUTOPILOT + "autopilot_electric_master", 1.0)
+    t.value(_AUTOPILOT + "servos_on", lambda _: sim.store.get(_AUTOPILOT + "flight_director_mode") == 2.0)
     for name in (
         "airspeed_dial_kts_mach",
         "airspeed_is_mach",

@@ -1,0 +1,129 @@
+"""X-Plane's own autopilot: its modes, switched by commands, shown by datarefs. `emulator/servos.py` flies by it."""
+
+from __future__ import annotations
+
+from typing import Callable, Dict, Sequence
+
+from xplane_bridge.emulator.datarefs.sources import LoadedAircraft
+from xplane_bridge.emulator.datarefs.store import DatarefStore
+from xplane_bridge.emulator.flight.frame import MPS_TO_FPM, MPS_TO_KT, Frame
+
+AP = "sim/cockpit2/autopilot/"
+YAW_DAMPER = "sim/cockpit2/switches/yaw_damper_on"
+MASTER, AUTOTHROTTLE = AP + "flight_director_mode", AP + "autothrottle_enabled"
+ROLL, HEADING = AP + "roll_status", AP + "heading_status"
+PITCH, CLIMB, SPEED = AP + "pitch_status", AP + "vvi_status", AP + "speed_status"
+ALTITUDE, ALTITUDE_ARMED, HELD_FT = AP + "altitude_hold_status", AP + "altitude_hold_armed", AP + "altitude_hold_ft"
+NAV, APPROACH, GLIDESLOPE_ARMED = AP + "nav_status", AP + "approach_status", AP + "glideslope_armed"
+HEADING_DIAL, ALTITUDE_DIAL = AP + "heading_dial_deg_mag_pilot", AP + "altitude_dial_ft"
+CLIMB_DIAL, SPEED_DIAL, IS_MACH = AP + "vvi_dial_fpm", AP + "airspeed_dial_kts_mach", AP + "airspeed_is_mach"
+HELD_PITCH = AP + "sync_hold_pitch_deg"
+OFF, DIRECTOR, SERVOS = 0.0, 1.0, 2.0  #: of MASTER
+ARMED, CAPTURED = 1.0, 2.0
+_LATERAL, _VERTICAL = (ROLL, HEADING), (PITCH, CLIMB, ALTITUDE, SPEED)
+#: An armed altitude is captured so many seconds before it is reached, and at least so near [ft].
+_CAPTURE_S, _CAPTURE_FT = 6.0, 60.0
+
+
+class Autopilot:
+    """Switches modes, one lateral and one vertical at a time; radio navigation is armed and never captured.
+
+    Aircraft without an autopilot (`ModelInfo.autopilot`) take no command.
+
+    Args:
+        store: Has its datarefs.
+        sim: The loaded aircraft.
+    """
+
+    def __init__(self, store: DatarefStore, sim: LoadedAircraft) -> None:
+        self._store = store
+        self._sim = sim
+        self._altitude_ft = self._climb_fpm = self._speed_kt = self._pitch_deg = 0.0
+
+    def commands(self) -> Dict[str, Callable[[], None]]:
+        """What each of its commands does."""
+        table: Dict[str, Callable[[], None]] = {
+            "fdir_on": lambda: self._set(MASTER, max(self._get(MASTER), DIRECTOR)),
+            "fdir_toggle": lambda: self._set(MASTER, OFF if self._get(MASTER) else DIRECTOR),
+            "servos_on": lambda: self._set(MASTER, SERVOS),
+            "servos_toggle": lambda: self._set(MASTER, DIRECTOR if self._get(MASTER) == SERVOS else SERVOS),
+            "servos_off_any": lambda: self._set(MASTER, min(self._get(MASTER), DIRECTOR)),
+            "servos_fdir_off": self.switch_off,
+            "wing_leveler": lambda: self._engage(_LATERAL, ROLL),
+            "heading": lambda: self._toggle(_LATERAL, HEADING, ROLL),
+            "vertical_speed": lambda: self._toggle(_VERTICAL, CLIMB, PITCH),
+            "level_change": lambda: self._toggle(_VERTICAL, SPEED, PITCH),
+            "altitude_hold": lambda: self._toggle(_VERTICAL, ALTITUDE, PITCH),
+            "altitude_arm": lambda: self._set(ALTITUDE_ARMED, float(not self._get(ALTITUDE_ARMED))),
+            "NAV": lambda: self._set(NAV, OFF if self._get(NAV) else ARMED),
+            "approach": self._toggle_approach,
+            "autothrottle_on": lambda: self._set(AUTOTHROTTLE, 1.0),
+            "autothrottle_off": lambda: self._set(AUTOTHROTTLE, 0.0),
+            "autothrottle_toggle": lambda: self._set(AUTOTHROTTLE, float(not self._get(AUTOTHROTTLE))),
+        }
+        named = {"sim/autopilot/" + name: action for name, action in table.items()}
+        named["sim/systems/yaw_damper_on"] = lambda: self._set(YAW_DAMPER, 1.0)
+        named["sim/systems/yaw_damper_off"] = lambda: self._set(YAW_DAMPER, 0.0)
+        return {name: self._if_there(action) for name, action in named.items()}
+
+    def switch_off(self) -> None:
+        """No flight director, no servos, no modes; dials, autothrottle and yaw damper stay."""
+        for name in (MASTER, *_LATERAL, *_VERTICAL, ALTITUDE_ARMED, NAV, APPROACH, GLIDESLOPE_ARMED):
+            self._set(name, OFF)
+
+    def update(self, frame: Frame, altitude_ft: float, failed: bool) -> None:
+        """A frame in flight: what engaging a mode finds, the modes it begins with, and an altitude that is reached."""
+        if not self._sim.model.info.autopilot:
+            return
+        self._altitude_ft, self._climb_fpm = altitude_ft, -frame.m.v_down_mps * MPS_TO_FPM
+        self._speed_kt, self._pitch_deg = frame.m.calibrated_airspeed_mps * MPS_TO_KT, frame.true_theta
+        if failed:
+            self._set(MASTER, OFF)
+        if self._get(MASTER):
+            for group, basic in ((_LATERAL, ROLL), (_VERTICAL, PITCH)):
+                if not any(self._get(name) for name in group):
+                    self._engage(group, basic)
+        if self._get(ALTITUDE_ARMED) and not self._get(ALTITUDE):
+            left = abs(self._get(ALTITUDE_DIAL) - altitude_ft)
+            if left < max(_CAPTURE_FT, abs(self._climb_fpm) / 60.0 * _CAPTURE_S):
+                self._engage(_VERTICAL, ALTITUDE)
+                self._set(HELD_FT, self._get(ALTITUDE_DIAL))
+                self._set(ALTITUDE_ARMED, OFF)
+
+    def _get(self, name: str) -> float:
+        return self._store.get(name)
+
+    def _set(self, name: str, value: float) -> None:
+        self._store.set(name, value)
+
+    def _if_there(self, action: Callable[[], None]) -> Callable[[], None]:
+        return lambda: action() if self._sim.model.info.autopilot else None
+
+    def _toggle(self, group: Sequence[str], name: str, basic: str) -> None:
+        self._engage(group, basic if self._get(name) else name)
+
+    def _toggle_approach(self) -> None:
+        armed = OFF if self._get(APPROACH) else ARMED
+        self._set(APPROACH, armed)
+        self._set(GLIDESLOPE_ARMED, armed)
+
+    def _engage(self, group: Sequence[str], name: str) -> None:
+        """A mode of a group; like X-Plane's, most turn their dial to what is flown."""
+        for other in group:
+            self._set(other, CAPTURED if other == name else OFF)
+        if name == CLIMB:
+            self._set(CLIMB_DIAL, 100.0 * round(self._climb_fpm / 100.0))
+        elif name == SPEED and not self._get(IS_MACH):
+            self._set(SPEED_DIAL, round(self._speed_kt))
+        elif name == ALTITUDE:
+            self._set(HELD_FT, self._altitude_ft)
+        elif name == PITCH:
+            self._set(HELD_PITCH, self._pitch_deg)
+
+
+def dial_speed_kt(store: DatarefStore, frame: Frame) -> float:
+    """The dial as an indicated airspeed at the present height [kt]."""
+    dial = store.get(SPEED_DIAL)
+    if not store.get(IS_MACH):
+        return dial
+    return dial / max(frame.m.mach, 0.05) * frame.m.calibrated_airspeed_mps * MPS_TO_KT
