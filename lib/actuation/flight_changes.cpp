@@ -113,15 +113,18 @@ FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, cons
     again = pause(true, who);
     problem = waitForMotion(start, &shown);
   }
-  // A silent X-Plane has not shown at first whether it was paused.
-  const PauseOutcome first = before == PauseOutcome::kUnknown ? again : before;
-  if (first != PauseOutcome::kUnknown) {
-    const PauseOutcome last = pause(first == PauseOutcome::kWasSo, who);
-    if (last == PauseOutcome::kWasSo || last == PauseOutcome::kFollowed) forgetPause(link_);
-  }
+  pauseAsBefore(before, again, who);
   if (!problem.empty())
     return {core::EventKind::kReset, "reset_flight: X-Plane did not place the aircraft: " + problem, false};
   return {core::EventKind::kReset, "the flight goes on at the place, attitude and speed asked for", true};
+}
+
+void FlightChanges::pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who) {
+  // A silent X-Plane has not shown at first whether it was paused.
+  const PauseOutcome first = before == PauseOutcome::kUnknown ? again : before;
+  if (first == PauseOutcome::kUnknown) return;
+  const PauseOutcome last = pause(first == PauseOutcome::kWasSo, who);
+  if (last == PauseOutcome::kWasSo || last == PauseOutcome::kFollowed) forgetPause(link_);
 }
 
 std::optional<core::ShownFlight> FlightChanges::shownFlight() {
@@ -139,7 +142,8 @@ std::string FlightChanges::waitForPlacement(const core::FlightStart& start, bool
   *shown = shownFlight();
   // X-Plane 12 moves an aircraft that flies; one that has crashed needs a new flight.
   if (movesAircraft() && moveThere(start, deadline, shown)) return "";
-  if (beginThere(start, deadline, tells, shown)) return "";
+  const auto there = [&start](const std::optional<core::ShownFlight>& now) { return isNear(start, now); };
+  if (beginThere({core::placementOf(start), there, tells, false}, deadline, shown)) return "";
   if (!*shown) return "it does not show where it is" + linkCondition();
   if (!isNear(start, *shown)) return core::differenceOf(start, **shown) + linkCondition();
   return "the flight has not begun anew" + linkCondition();
@@ -163,7 +167,7 @@ bool FlightChanges::moveThere(const core::FlightStart& start, const core::Deadli
   return false;
 }
 
-bool FlightChanges::beginThere(const core::FlightStart& start, const core::Deadline& deadline, bool tells,
+bool FlightChanges::beginThere(const Beginning& wanted, const core::Deadline& deadline,
                                std::optional<core::ShownFlight>* shown) {
   // X-Plane reads nothing while it loads; what is sent meanwhile would begin the flight once more afterwards.
   if (!waitFor(deadline.left(), [this] { return isUp(); })) return false;
@@ -171,17 +175,21 @@ bool FlightChanges::beginThere(const core::FlightStart& start, const core::Deadl
   bool seen = false;  // that the flight began anew, or that X-Plane loads
   core::Deadline again = deadlineAfter(0.0);
   for (int sent = 0; !expired(deadline);) {
-    if (sent < kBeginnings && !seen && again.over() && isUp()) {
-      sendMessage<core::kPrelSize>(link_,
-                                   [&](core::ByteSpan out) { return core::encodePrel(out, core::placementOf(start)); });
-      again = deadlineAfter(kPlaceAgain);
-      ++sent;
+    if (!seen && again.over() && isUp()) {
+      if (sent < kBeginnings) {
+        sendMessage<core::kPrelSize>(link_,
+                                     [&](core::ByteSpan out) { return core::encodePrel(out, wanted.placement); });
+        again = deadlineAfter(kPlaceAgain);
+        ++sent;
+      } else if (wanted.may_be_refused) {
+        return false;
+      }
     }
     *shown = shownFlight();
     seen = seen || hooks_.resets() != resets || !isUp();
     // A flight that has only just begun does not show whether it began anew: then the time it is given has to do.
-    const bool begun = seen || (!tells && again.over());
-    if (begun && isNear(start, *shown)) return true;
+    const bool begun = seen || (!wanted.tells && again.over());
+    if (begun && wanted.there(*shown)) return true;
   }
   return false;
 }

@@ -89,6 +89,10 @@ void FlightJobs::reset(const core::FlightStart& start, std::uint32_t number, con
   add(number, who, true, [this, start, who] { return changes_.place(start, who); });
 }
 
+void FlightJobs::reset(const core::AirportStart& start, std::uint32_t number, const std::string& who) {
+  add(number, who, true, [this, start, who] { return changes_.placeAt(start, who); });
+}
+
 void FlightJobs::setWind(const core::UniformWind& wind, std::uint32_t number, const std::string& who) {
   add(number, who, false, [this, wind] { return changes_.applyWind(wind); });
 }

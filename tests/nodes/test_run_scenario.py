@@ -104,6 +104,28 @@ def test_time_wind_and_weather_of_a_scenario_come(tmp_path):
     assert world["visibility"][-1] == pytest.approx(4000.0, abs=1.0)
 
 
+ON_THE_RUNWAY = """
+name: on_the_runway
+aircraft: fixed_wing
+start: {altitude: 800, speed: 65, heading: 90}
+events:
+  - {at: 2, reset: {start: runway, airport: XEMU, runway_end: 1}}
+  - {when: {on_ground: true}, timeout: 60, label: stands}
+  - {after: 1, end: true}
+"""
+
+
+def test_a_scenario_starts_at_an_airport(tmp_path):
+    done = run(tmp_path, ON_THE_RUNWAY)
+    assert done.returncode == 0, done.stdout + done.stderr
+    with Bags(tmp_path / "out" / "flight.bag") as bags:
+        states = bags.read("/xplane/flight_state")
+        told = [event for _, message in bags.messages("/xplane/events") for event in message.events]
+    assert "the flight begins at runway 0, end 1 of XEMU" in [event.text for event in told if event.success]
+    assert states["on_ground"][-1]
+    assert states["heading_true_deg"][-1] == pytest.approx(270.0, abs=1.0)
+
+
 def test_a_missed_criterion_is_exit_code_1(tmp_path):
     done = run(tmp_path, MISSED)
     assert done.returncode == 1

@@ -13,6 +13,7 @@
 #include "xplane_bridge/core/base/message_constants.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
+#include "xplane_bridge/core/simulator/airport_start.hpp"
 #include "xplane_bridge/core/simulator/autopilot_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
@@ -38,6 +39,7 @@ struct FlightChangeHooks {
 struct FlightChangeOptions {
   double setting_timeout = 10.0;  ///< [s] until X-Plane must show a setting, or attitude and velocity
   double load_timeout = 120.0;    ///< [s] the same of a place, an aircraft or a situation: it may load files
+  std::string airport_data{};     ///< path of X-Plane's apt.dat, for names of ramps and runways; empty: none
 };
 
 /// How a change ended, for an event.
@@ -56,6 +58,8 @@ class FlightChanges {
   /// Puts the aircraft there, with that attitude and velocity; `who` asked for it. X-Plane stands still meanwhile, and
   /// is as it was afterwards: paused or running.
   FlightChangeOutcome place(const core::FlightStart& start, const std::string& who);
+  /// The same at an airport: a new flight on its ramp or runway, or from there before the runway.
+  FlightChangeOutcome placeAt(const core::AirportStart& start, const std::string& who);
   FlightChangeOutcome applyWind(const core::UniformWind& wind);
   FlightChangeOutcome applyLoading(const core::Loading& loading);
   FlightChangeOutcome applyTime(const core::TimeSetting& time);
@@ -77,14 +81,25 @@ class FlightChanges {
  private:
   using Outcome = FlightChangeOutcome;
 
-  // Of place(). `shown` is what X-Plane shows last.
-  // `tells`: X-Plane will show that a flight begins anew.
+  /// A flight that is to begin.
+  struct Beginning {
+    core::Placement placement;
+    std::function<bool(const std::optional<core::ShownFlight>& shown)> there;
+    bool tells;           ///< X-Plane will show that the flight begins anew
+    bool may_be_refused;  ///< if X-Plane answers and begins none, it never will
+  };
+
+  // Of place() and placeAt(). `shown` is what X-Plane shows last.
   bool movesAircraft() const;
+  /// `tells` as in Beginning.
   std::string waitForPlacement(const core::FlightStart& start, bool tells, std::optional<core::ShownFlight>* shown);
   bool moveThere(const core::FlightStart& start, const core::Deadline& deadline,
                  std::optional<core::ShownFlight>* shown);
-  bool beginThere(const core::FlightStart& start, const core::Deadline& deadline, bool tells,
-                  std::optional<core::ShownFlight>* shown);
+  bool beginThere(const Beginning& wanted, const core::Deadline& deadline, std::optional<core::ShownFlight>* shown);
+  /// What went wrong; empty: nothing.
+  std::string waitForAirport(const core::AirportStart& start, std::optional<core::ShownFlight>* shown);
+  /// Paused or running as the first of both says, which were asked for on the way.
+  void pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who);
   std::string waitForMotion(const core::FlightStart& start, std::optional<core::ShownFlight>* shown);
   std::optional<core::ShownFlight> shownFlight();
   /// Sends them until X-Plane shows them; `done` tells that it does.

@@ -31,6 +31,7 @@ class FlightJobs {
 
   /// Starts once what came before has ended. `number`: of the event that will tell the outcome; `who` asked for it.
   void reset(const core::FlightStart& start, std::uint32_t number, const std::string& who);
+  void reset(const core::AirportStart& start, std::uint32_t number, const std::string& who);
   void setWind(const core::UniformWind& wind, std::uint32_t number, const std::string& who);
   /// See FlightChanges.
   void restoreSettings() { changes_.restoreSettings(); }

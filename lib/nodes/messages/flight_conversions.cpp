@@ -122,7 +122,6 @@ std::optional<std::string> wrongWith(const SetWeather::Request& request) {
   return core::check(toCore(request));
 }
 
-std::optional<std::string> wrongWith(const ResetFlight::Request& request) { return core::check(toCore(request)); }
 std::optional<std::string> wrongWith(const SetWind::Request& request) { return core::check(toCore(request)); }
 std::optional<std::string> wrongWith(const SetLoading::Request& request) { return core::check(toCore(request)); }
 

@@ -260,7 +260,9 @@ void TxNode::advertiseFlightServices() {
       (jobs.*job)(toCore(request), number, who);
     };
   };
-  advertiseJob<ResetFlight>("reset_flight", by(&FlightJobs::reset));
+  advertiseJob<ResetFlight>("reset_flight", [](auto& jobs, const auto& request, auto number, const auto& who) {
+    beginReset(&jobs, request, number, who);
+  });
   advertiseJob<SetWind>("set_wind", by(&FlightJobs::setWind));
   advertiseJob<SetTime>("set_time", by(&FlightJobs::setTime));
   advertiseJob<SetWeather>("set_weather", by(&FlightJobs::setWeather));

@@ -61,6 +61,7 @@ TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
   out.service_timeout = own.number("service_timeout", {0.1, 10.0}, out.service_timeout);
   out.flight.setting_timeout = own.number("setting_timeout", {0.5, 300.0}, out.flight.setting_timeout);
   out.flight.load_timeout = own.number("load_timeout", {0.5, 3600.0}, out.flight.load_timeout);
+  out.flight.airport_data = own.text("airport_data", "");
   core::ArbiterOptions& arbiter = out.control.arbiter;
   arbiter.command_timeout = own.number("command_timeout", {0.02, 60.0}, arbiter.command_timeout);
   arbiter.resume_grace = own.number("resume_grace", {0.0, 60.0}, arbiter.resume_grace);

@@ -36,7 +36,8 @@ class ScenarioPilot:
                 if kind == "failure":
                     failure_dataref(value["name"])
                 if kind in WORLD_KINDS:
-                    raise ScenarioError(f"{kind}: the emulator's pilot only flies; tx_node sets {kind} (set_{kind})")
+                    service = "reset_flight" if kind == "reset" else f"set_{kind}"
+                    raise ScenarioError(f"{kind}: the emulator's pilot only flies; tx_node sets {kind} ({service})")
         self.player = Player(scenario, apply_excitations=True)
         self._failed: List[str] = []
 

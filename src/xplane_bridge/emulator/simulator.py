@@ -11,7 +11,7 @@ from typing import Callable, Dict, FrozenSet, List, Mapping, Optional, Set, Tupl
 import numpy as np
 
 from xplane_bridge import protocol, xplane_names
-from xplane_bridge.emulator.datarefs import commands, data_rows, tables
+from xplane_bridge.emulator.datarefs import airport_starts, commands, data_rows, tables
 from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments, Weather
 from xplane_bridge.emulator.datarefs.autopilot import Autopilot
 from xplane_bridge.emulator.datarefs.camera import Cameras
@@ -370,7 +370,7 @@ class Simulator:
         return None
 
     def on_placement(self, request: protocol.Placement) -> Optional[str]:
-        """PREL: a new flight. Airports are not modelled: only start type 6 has a place of its own."""
+        """PREL: a new flight, at a place (start type 6), at the one aerodrome, or where flights start."""
         if request.aircraft != 0:
             return "aircraft"
         if "prel" in self.otherwise:
@@ -379,8 +379,10 @@ class Simulator:
             initial: Optional[InitialState] = self._last_start
         elif request.start_type == Placements.START_AT_PLACE:
             initial = Placements.initial_state(request, self.model.state.terrain_elevation_m)
-        elif request.start_type in Placements.ON_GROUND:
-            initial = replace(self.initial, on_ground=True)
+        elif request.start_type in airport_starts.TYPES:
+            initial = airport_starts.airport_start(request, self.initial)
+            if initial is None:
+                return "airport"
         else:
             initial = self.initial
         if initial is None:

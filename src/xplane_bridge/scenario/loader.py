@@ -14,6 +14,7 @@ from xplane_bridge.errors import yaml_problem
 
 from ..constants import EXCITATION_KINDS, FAILURE_KINDS
 from .holds import HoldGains
+from .resets import NUMBERS, STARTS, TEXTS
 from .schema import (
     HANDLES,
     HOLDS,
@@ -307,6 +308,22 @@ def _datarefs(item: Any, path: str) -> Dict[str, float]:
     return {str(key): _number(value, f"{path}.{key}", -math.inf, math.inf) for key, value in item.items()}
 
 
+def _reset(item: Any, path: str) -> Dict[str, Any]:
+    given = _mapping(item, path, (*TEXTS, *NUMBERS))
+    out: Dict[str, Any] = _ranged({k: v for k, v in given.items() if k in NUMBERS}, path, NUMBERS)
+    start = given.get("start", "place")
+    if start not in STARTS:
+        raise ScenarioError(f"{path}.start: {start!r}; expected one of {', '.join(STARTS)}")
+    needed = ("latitude", "longitude", "altitude_msl") if start == "place" else ("airport",)
+    for key in (*needed, *(("final_distance", "true_airspeed") if start == "final" else ())):
+        if key not in given:
+            raise ScenarioError(f"{path}.{key}: missing; expected it with start {start}")
+    for key in TEXTS:
+        if key in given:
+            out[key] = _word(given[key], f"{path}.{key}")
+    return out
+
+
 def _wind(item: Any, path: str) -> Dict[str, float]:
     return _ranged(item, path, WIND, some=True)
 
@@ -358,6 +375,7 @@ _ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
     "failure": _failure,
     "clear_failures": _true,
     "excitation": _excitation,
+    "reset": _reset,
     "wind": _wind,
     "weather": _weather,
     "time": _time,

@@ -15,6 +15,7 @@ from typing import Any, Callable, Dict, Optional, Tuple
 
 from ..constants import COMMAND_FIELDS, FlightMode, words
 from .player import Action, Commands, FlightSample, Player
+from .resets import reset_request
 from .schema import HANDLE_FIELDS, Scenario, ScenarioError
 from .virtual_stick import VirtualStick
 from .world import time_request, weather_request, wind_request
@@ -271,6 +272,7 @@ class RosPlayer:
             "failure": self._failure,
             "clear_failures": self._clear_failures,
             "excitation": self._excitation,
+            "reset": self._reset,
             "wind": self._wind,
             "weather": self._weather,
             "time": self._time,
@@ -359,6 +361,11 @@ class RosPlayer:
             frequency_max=value["frequency_end"],
             seed=value["seed"],
         )
+
+    def _reset(self, value: Dict[str, Any]) -> None:
+        from xplane_bridge.srv import ResetFlight
+
+        self._call("reset_flight", ResetFlight, "reset", **reset_request(value))
 
     def _wind(self, value: Dict[str, float]) -> None:
         from xplane_bridge.srv import SetWind

@@ -27,6 +27,8 @@ class FakeFlight {
   static constexpr double kLongitude = 8.0;               // [deg]
   static constexpr double kHeight = 1000.0;               // [m]
   static constexpr double kMetersPerLongitude = 75200.0;  // [m] a degree at that latitude, about
+  static constexpr double kAirportEast = 3000.0;          // [m] the runway leads on to the east, the ramp faces north
+  static constexpr double kAirportHeight = 50.0;          // [m] of an aircraft that stands there
   static constexpr const char* kAircraftPath = "Aircraft/Here/here.acf";
 
   explicit FakeFlight(FakeSimulator* sim) : sim_(sim) {
@@ -48,9 +50,10 @@ class FakeFlight {
   double load_time = 0.0;     // [s] that X-Plane is silent for when it begins a flight or loads an aircraft
   bool ignores_vehs = false;  // the build, the pause or a replay does
   bool ignores_prel = false;
-  int lose_prel = 0;     // the next ones get lost on the way
-  bool resumes = false;  // beginning a flight ends a pause
-  bool pauses = false;   // beginning a flight pauses
+  int lose_prel = 0;             // the next ones get lost on the way
+  std::string airport = "FAKE";  // the one X-Plane knows; its one ramp and its runway are kAirportEast of the origin
+  bool resumes = false;          // beginning a flight ends a pause
+  bool pauses = false;           // beginning a flight pauses
   bool ignores_pause = false;
   bool has_files = true;       // aircraft and situations that are asked for are there
   bool tells_aircraft = true;  // and which it is, afterwards
@@ -109,6 +112,8 @@ class FakeFlight {
   }
 
  private:
+  static constexpr std::int32_t kAtPlace = 6, kOnRunway = 11;  // PREL's start types
+  static constexpr double kOneLatitude = 1e-4;                 // [deg] by which a straight way east leads off it
   static constexpr const char* kFlightTime = "sim/time/total_flight_time_sec";
 
   static std::string at(const std::string& leaf) { return "sim/flightmodel/position/" + leaf; }
@@ -144,7 +149,9 @@ class FakeFlight {
       if (message.path == "sim/operation/pause_off" && knows_both) setPaused(false);
     }
     // Start type and aircraft; airport; runway and its direction; then latitude, longitude, elevation.
-    if (message.label == "PREL" && !ignores_prel) {
+    if (message.label == "PREL" && !ignores_prel && read<std::int32_t>(body, 0) != kAtPlace) {
+      standAtAirport(body);
+    } else if (message.label == "PREL" && !ignores_prel) {
       place(read<double>(body, 24), read<double>(body, 32), read<double>(body, 40));
       begin();
     }
@@ -162,7 +169,19 @@ class FakeFlight {
 
   void place(double latitude, double longitude, double height) {
     put((longitude - kLongitude) * kMetersPerLongitude, height);
-    if (latitude != kLatitude) throw std::logic_error("FakeFlight has one latitude");
+    if (std::abs(latitude - kLatitude) > kOneLatitude) throw std::logic_error("FakeFlight has one latitude");
+  }
+
+  void standAtAirport(const std::vector<std::uint8_t>& body) {
+    const std::string asked(reinterpret_cast<const char*>(body.data()) + 8);
+    const bool on_runway = read<std::int32_t>(body, 0) == kOnRunway;
+    if (asked != airport || read<std::int32_t>(body, 16) != 0) return;
+    put(kAirportEast, kAirportHeight);
+    // A quarter turn to the right about the axis down on the runway, none on the ramp.
+    sim_->set(at("q[0]"), on_runway ? std::sqrt(0.5F) : 1.0F);
+    sim_->set(at("q[3]"), on_runway ? std::sqrt(0.5F) : 0.0F);
+    for (const char* axis : {"x", "y", "z"}) sim_->set(at(std::string("local_v") + axis), 0.0F);
+    begin();
   }
 
   void begin() {

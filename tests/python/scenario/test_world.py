@@ -11,6 +11,7 @@ import pytest
 from xplane_bridge.campaign.definition import CampaignError, _refuse_unflyable
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import ScenarioError, parse_scenario
+from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS, reset_request
 from xplane_bridge.scenario.world import time_request, weather_request, wind_request
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -66,6 +67,24 @@ def test_time_and_wind_become_requests():
     assert wind_request(read(wind={"turbulence": 0.2})["wind"]) == {"speed": 0.0, "from_deg": 360.0, "turbulence": 0.2}
 
 
+def test_starts_become_requests():
+    constants, fields = service("ResetFlight")
+    for name, number in STARTS.items():
+        assert getattr(constants, name.upper()) == number
+    value = read(
+        reset={"start": "final", "airport": "XEMU", "runway_end": 1, "final_distance": 4000, "true_airspeed": 60}
+    )["reset"]
+    request = reset_request(value)
+    assert request == {"start": 3, "airport": "XEMU", "runway_end": 1, "final_distance": 4000.0, "true_airspeed": 60.0}
+    assert isinstance(request["runway_end"], int)
+    assert {*NUMBERS, *TEXTS} == fields.keys()
+    assert reset_request(read(reset={"latitude": 47, "longitude": 8, "altitude_msl": 900})["reset"]).keys() == {
+        "latitude",
+        "longitude",
+        "altitude_msl",
+    }
+
+
 @pytest.mark.parametrize(
     ("actions", "complaint"),
     [
@@ -76,6 +95,12 @@ def test_time_and_wind_become_requests():
         ({"weather": {"clouds": [{"base": 0, "top": 5, "cover": 2}]}}, "clouds[0].cover: 2; expected a number from 0"),
         ({"weather": {"sea_level_pressure": 1013}}, "sea_level_pressure: 1013; expected a number from 85000 to 110000"),
         ({"time": {"zulu_time": 90000}}, "time.zulu_time: 90000; expected a number from 0 to 86400"),
+        ({"reset": {"start": "gate"}}, "reset.start: 'gate'; expected one of place, ramp, runway, final"),
+        ({"reset": {}}, "reset.latitude: missing; expected it with start place"),
+        ({"reset": {"start": "ramp"}}, "reset.airport: missing; expected it with start ramp"),
+        ({"reset": {"start": "final", "airport": "A"}}, "reset.final_distance: missing; expected it with start final"),
+        ({"reset": {"start": "ramp", "airport": "A", "runway_end": 2}}, "runway_end: 2; expected a number from 0 to 1"),
+        ({"reset": {"start": "ramp", "airport": 7}}, "reset.airport: 7; expected a text"),
         ({"wind": {"knots": 5}}, "wind.knots: unknown key; expected one of speed, from_deg, turbulence"),
     ],
 )
@@ -85,7 +110,13 @@ def test_what_is_wrong_is_said_with_its_key(actions, complaint):
 
 
 @pytest.mark.parametrize(
-    "actions", [{"wind": {"speed": 5}}, {"weather": {"visibility": 500}}, {"time": {"time_ratio": 2}}]
+    "actions",
+    [
+        {"reset": {"start": "ramp", "airport": "XEMU"}},
+        {"wind": {"speed": 5}},
+        {"weather": {"visibility": 500}},
+        {"time": {"time_ratio": 2}},
+    ],
 )
 def test_what_flies_without_the_bridge_refuses_them(actions):
     scenario = parse_scenario({"name": "t", "events": [{"at": 0, **actions}]})

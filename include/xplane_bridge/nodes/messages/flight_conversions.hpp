@@ -18,6 +18,7 @@
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
 #include "xplane_bridge/core/simulator/world_settings.hpp"
+#include "xplane_bridge/nodes/messages/reset_request.hpp"
 
 namespace xplane_bridge {
 
@@ -30,7 +31,6 @@ core::TimeSetting toCore(const SetTime::Request& request);
 core::Weather toCore(const SetWeather::Request& request);
 
 /// What is wrong with a request, in words that say what was expected; nullopt: nothing.
-std::optional<std::string> wrongWith(const ResetFlight::Request& request);
 std::optional<std::string> wrongWith(const SetWind::Request& request);
 std::optional<std::string> wrongWith(const SetLoading::Request& request);
 std::optional<std::string> wrongWith(const SetAutopilot::Request& request);

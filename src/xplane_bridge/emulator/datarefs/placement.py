@@ -45,10 +45,9 @@ class Placements:
     MAX_RATE_RAD_S = 20.0
     ELEVATION_M = (-1000.0, 30000.0)
 
-    #: PREL start types: repeat the last one; latitude, longitude, elevation; those on a ramp, runway or other ground.
+    #: PREL start types: repeat the last one; latitude, longitude, elevation.
     REPEAT_LAST = 5
     START_AT_PLACE = 6
-    ON_GROUND = (10, 11, 14, 15, 16, 17, 18)
     #: A start at less than this height above the ground, with less than this speed, is one on the ground.
     GROUND_HEIGHT_M = 5.0
     GROUND_SPEED_MPS = 5.0
