@@ -8,18 +8,24 @@ import cv2
 import numpy as np
 
 from xplane_bridge.bags.pictures import COMPRESSED, grey_pictures, image_topic
+from xplane_bridge.labels.apt import read_airport
+from xplane_bridge.labels.flight import Flight, Options
+from xplane_bridge.resources import config_file
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from xplane_bridge.bags import Bags
     from xplane_bridge.labels.camera import Camera
-    from xplane_bridge.labels.flight import Flight
     from xplane_bridge.labels.things import Labeller
 
 #: The emulator's: middle of the lines beside its runway from the centre line, and their width [m].
 LINE_M, WIDTH_M = 21.5, 0.9
 LENGTH_M = 1800.0
+#: How far lines may be off their labels.
+MEDIAN_PX, P95_PX = 0.5, 1.5
+#: Of the emulator's twin: how high it stands, less what y_agl says of it parked [m].
+STANDING_M = 1.131 - 0.076
 #: Looked at so far to each side [px], in steps of a quarter.
 _REACH = 6.0
 _STEP = 0.25
@@ -89,11 +95,17 @@ def _offset(grey: np.ndarray, middle: np.ndarray, normal: np.ndarray, width: flo
     # Asphalt and grass differ: what is above the brighter of the two is the line.
     base = max(np.median(profile[steps < steps[near].min()]), np.median(profile[steps > steps[near].max()]))
     bright = np.clip(profile - base, 0.0, None) * near
+    if not bright.any():
+        return None
     return float((bright * steps).sum() / bright.sum())
+
+
+def flight_of(bags: Bags) -> Flight:
+    """A flight of the emulator's twin over its aerodrome."""
+    airport = read_airport([airport_file()], "XEMU")
+    return Flight(bags, airport, {}, Options(flat_world=True, standing_height=STANDING_M))
 
 
 def airport_file() -> Path:
     """The aerodrome that the emulator draws, as it is shipped."""
-    from xplane_bridge.resources import config_file
-
     return config_file("aerodromes", "apt.dat")

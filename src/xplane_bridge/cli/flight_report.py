@@ -20,6 +20,9 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(prog="flight_report", description="Makes one self-contained HTML page about a flight.")
     p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
     p.add_argument("-o", "--output", default="report.html", metavar="FILE", help="default: %(default)s")
+    p.add_argument(
+        "--labels", type=Path, metavar="FILE", help="draw these labels into ten images (label_images makes them)"
+    )
     p.add_argument("--png", metavar="DIR", help="also write each figure as a PNG there")
     return p
 
@@ -28,32 +31,38 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program."""
     args = parser().parse_args(argv)
-    path = write_report(args.bags, Path(args.output), Path(args.png) if args.png else None)
+    path = write_report(args.bags, Path(args.output), Path(args.png) if args.png else None, args.labels)
     print(path)
     return 0
 
 
-def write_report(bag_paths: Sequence[str | Path], output: Path, png: Path | None = None) -> Path:
+def write_report(
+    bag_paths: Sequence[str | Path], output: Path, png: Path | None = None, labels: Path | None = None
+) -> Path:
     """Write the report of one flight; the function behind the program, for other programs.
 
     Args:
         bag_paths: The flight's bag or split bags.
         output: The HTML file.
         png: Folder for the figures as PNG; none when omitted.
+        labels: File of labels to draw into images.
 
     Returns:
         The file written.
 
     Raises:
         BagError: The bags cannot be read.
+        LabelError: The labels cannot be read.
         ReportError: The file cannot be written; or it is, and shows no flight, because no flight state was recorded.
     """
     from xplane_bridge.bags.flight import read_flight
+    from xplane_bridge.labels import table
     from xplane_bridge.plotting import report, static
 
+    known = table.read(labels) if labels else None
     with Bags(list(bag_paths)) as bags:
         flight = read_flight(bags)
-        page, figures = report.build(bags, flight)
+        page, figures = report.build(bags, flight, known)
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         output.write_text(page, encoding="utf-8")

@@ -14,7 +14,7 @@ from xplane_bridge.bags import Bags, Table
 from xplane_bridge.labels import table as label_table
 from xplane_bridge.labels.apt import Airport
 from xplane_bridge.labels.camera import Camera, Optics, Pose
-from xplane_bridge.labels.heights import Ground, Profile, profile
+from xplane_bridge.labels.heights import MEASURED_SIGMA_M, STANDING_M, STANDING_SIGMA_M, Ground, Profile, profile
 from xplane_bridge.labels.table import LabelError
 from xplane_bridge.labels.things import MAP_SIGMA_M, Labeller, Other, Sun
 from xplane_bridge.labels.world import Flat, Sphere, World
@@ -37,6 +37,7 @@ class Options(NamedTuple):
 
     flat_world: bool = False  #: the emulator's ground instead of the sphere
     map_sigma: float = MAP_SIGMA_M  #: [m]
+    standing_height: float | None = None  #: [m] altitude less y_agl of the parked aircraft; None: not known
 
 
 class Frame(NamedTuple):
@@ -73,7 +74,7 @@ class Flight:
             if options.flat_world
             else Sphere()
         )
-        ground = _ground(bags)
+        ground = _ground(bags, options.standing_height)
         self.profiles: list[Profile] = [profile(airport, runway, ground, heights) for runway in airport.runways]
         self.labeller = Labeller(airport, self.profiles, self._world, options.map_sigma)
 
@@ -193,14 +194,15 @@ def _suns(bags: Bags, stamps: np.ndarray) -> dict[int, Sun]:
     return out
 
 
-def _ground(bags: Bags) -> Ground | None:
+def _ground(bags: Bags, standing: float | None) -> Ground | None:
     topic = bags.topic_of_type(_STATE)
     if topic is None or not bags.topics[topic].count:
         return None
     states = bags.read(topic, ["valid", "latitude", "longitude", "altitude_msl", "altitude_agl"])
     good = (states["valid"].astype(np.int64) & _HAS_AGL) == _HAS_AGL
-    height = (states["altitude_msl"] - states["altitude_agl"])[good]
-    return Ground(states["latitude"][good], states["longitude"][good], height)
+    height = (states["altitude_msl"] - states["altitude_agl"])[good] - (STANDING_M if standing is None else standing)
+    sigma = MEASURED_SIGMA_M if standing is not None else math.hypot(MEASURED_SIGMA_M, STANDING_SIGMA_M)
+    return Ground(states["latitude"][good], states["longitude"][good], height, sigma)
 
 
 def _pose(frames: Table, row: int) -> Pose:

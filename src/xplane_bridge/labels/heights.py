@@ -15,6 +15,9 @@ from xplane_bridge.labels.world import RunwayFrame
 
 #: How well each source knows a height [m].
 MEASURED_SIGMA_M, TABLE_SIGMA_M, AIRPORT_SIGMA_M = 0.3, 2.0, 15.0
+#: [? parked-height] X-Plane's height above the terrain counts from about the wheels, altitudes from the centre of
+#: gravity. Where the user does not say how high that stands over them, so much is taken, and doubted [m].
+STANDING_M, STANDING_SIGMA_M = 1.0, 1.5
 #: Slope of a runway [-] that heights beyond those measured are to be doubted by: 19 m on 3 km were found.
 _SLOPE = 0.006
 #: Heights are measured in stretches of this length along the runway [m].
@@ -38,7 +41,8 @@ class Ground(NamedTuple):
 
     latitude: np.ndarray  #: [deg]
     longitude: np.ndarray  #: [deg]
-    height: np.ndarray  #: [m MSL] altitude less height above the terrain
+    height: np.ndarray  #: [m MSL] altitude less height above the terrain, less how high the aircraft stands
+    sigma: float = MEASURED_SIGMA_M  #: [m] of all of them
 
 
 class Profile:
@@ -109,7 +113,7 @@ def _measured(frame: RunwayFrame, ground: Ground) -> Profile | None:
     if not stretches:
         return None
     medians = np.array([np.median(stretches[key], axis=0) for key in sorted(stretches)])
-    return Profile(medians[:, 0], medians[:, 1], MEASURED_SIGMA_M, "measured", _SLOPE)
+    return Profile(medians[:, 0], medians[:, 1], ground.sigma, "measured", _SLOPE)
 
 
 def read_table(path: Path, airport: Airport) -> dict[str, float]:

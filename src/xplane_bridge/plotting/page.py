@@ -38,7 +38,10 @@ td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
 .strip { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 12px; }
 .strip figure { margin: 0; border: 1px solid var(--line); border-radius: 6px; overflow: hidden; }
 .strip img { width: 100%; display: block; }
-.strip figcaption { padding: 6px 9px; font-size: 12.5px; color: var(--soft); }
+.overlay { display: grid; grid-template-columns: repeat(auto-fill, minmax(460px, 1fr)); gap: 12px; }
+.overlay figure { margin: 0; border: 1px solid var(--line); border-radius: 6px; overflow: hidden; }
+.overlay img { width: 100%; display: block; }
+.strip figcaption, .overlay figcaption { padding: 6px 9px; font-size: 12.5px; color: var(--soft); }
 """
 
 #: Zooming one time axis zooms all; the guard keeps the echo of our own change out.

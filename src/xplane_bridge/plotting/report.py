@@ -14,7 +14,7 @@ from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_share
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.bags.passport import read_passports
 from xplane_bridge.constants import LinkState, words
-from xplane_bridge.plotting import interactive
+from xplane_bridge.plotting import interactive, overlay
 from xplane_bridge.plotting.flight_figures import MissingError, all_figures
 from xplane_bridge.plotting.page import Section, day_of, missing, number, page, rows_table
 from xplane_bridge.plotting.passports import passport_section
@@ -22,6 +22,7 @@ from xplane_bridge.plotting.passports import passport_section
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
     from xplane_bridge.bags.flight import Flight
+    from xplane_bridge.labels.table import Labels
     from xplane_bridge.plotting.spec import PathFigure, TimeFigure
 
 #: Images on the strip, evenly spread over the flight.
@@ -30,12 +31,13 @@ _THUMBNAIL_WIDTH = 320
 _LINK_STATES = words(LinkState)
 
 
-def build(bags: Bags, flight: Flight) -> tuple[str, list[TimeFigure | PathFigure]]:
+def build(bags: Bags, flight: Flight, labels: Labels | None = None) -> tuple[str, list[TimeFigure | PathFigure]]:
     """Make the report.
 
     Args:
         bags: Open; images are streamed from them.
         flight: Read from `bags`.
+        labels: Of its pictures, to be drawn into some.
 
     Returns:
         The page, and the figures on it (for PNG files).
@@ -52,6 +54,8 @@ def build(bags: Bags, flight: Flight) -> tuple[str, list[TimeFigure | PathFigure
         linked = " data-time" if hasattr(figure, "panels") else ""
         sections.append((key, title, f"<div{linked}>{interactive.draw(figure, flight.start)}</div>"))
     sections.append(("images", "Images and their state", _strip(bags, flight)))
+    if labels is not None:
+        sections.append(("labels", "Labels in the images", overlay.section(bags, labels, flight.start)))
     sections.append(("quality", "Data quality", _quality(flight)))
     sections.append(("experiment", "How it was made", passport_section(read_passports(bags))))
     return _page(flight, bags, sections), made

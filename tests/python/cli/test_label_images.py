@@ -58,6 +58,21 @@ def test_heights_of_a_table_make_labels_surer(tmp_path: Path) -> None:
     assert sigmas[1] < 0.4 * sigmas[0]
 
 
+def test_heights_measured_over_the_runway_count_from_where_the_aircraft_stands(tmp_path: Path) -> None:
+    # 3 s of it over the runway, whose ground is at 0 m: what stands 1 m high was never that low.
+    bag = write_approach(tmp_path / "flight.bag", 7, far=20.0)
+    found = {}
+    for arguments in ((), ("--standing-height", "0"), ("--standing-height", "0.25")):
+        assert label(bag, *arguments, "-o", tmp_path / "l.jsonl") == 0
+        frame = next(iter(table.read(tmp_path / "l.jsonl").frames.values()))
+        found[arguments[1:]] = frame["objects"][0]["height"]
+    assert found["0",]["source"] == "measured"
+    assert found["0",]["near_m"] == pytest.approx(0.0, abs=0.01)
+    assert found["0.25",]["near_m"] == pytest.approx(-0.25, abs=0.01)
+    assert found[()]["near_m"] == pytest.approx(-1.0, abs=0.01)
+    assert found[()]["sigma_m"] > found["0",]["sigma_m"]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -8,23 +8,19 @@ import numpy as np
 import pytest
 
 from support.drawn_approach import write_approach
-from support.white_lines import airport_file, measure_flight
+from support.white_lines import MEDIAN_PX, P95_PX, flight_of, measure_flight
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.pictures import grey_pictures
-from xplane_bridge.labels.apt import read_airport
-from xplane_bridge.labels.flight import Flight, Options
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from support.white_lines import Lines
 
-MEDIAN_PX, P95_PX = 0.5, 1.5
-
 
 def lines_of(path: Path) -> Lines:
     with Bags(path) as bags:
-        return measure_flight(bags, Flight(bags, read_airport([airport_file()], "XEMU"), {}, Options(flat_world=True)))
+        return measure_flight(bags, flight_of(bags))
 
 
 def test_white_lines_lie_where_the_labels_say(tmp_path: Path) -> None:
@@ -49,7 +45,7 @@ def test_the_sun_is_where_it_is_drawn(tmp_path: Path) -> None:
     looking = {"heading_deg": 35.0, "pitch_deg": 24.0, "roll_deg": 15.0}
     path = write_approach(tmp_path / "flight.bag", 1, **looking)
     with Bags(path) as bags:
-        flight = Flight(bags, read_airport([airport_file()], "XEMU"), {}, Options(flat_world=True))
+        flight = flight_of(bags)
         (line,) = flight.labels()
         ((_, grey),) = grey_pictures(bags, "/xplane/camera/image_raw/compressed")
     (sun,) = (thing for thing in line["objects"] if thing["kind"] == "sun")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Sequence
 
 from xplane_bridge.bags import Bags
-from xplane_bridge.cli.entry import guarded, positive
+from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.labels.apt import read_airport
 from xplane_bridge.labels.flight import Options, label_flight
 from xplane_bridge.labels.heights import read_table
@@ -20,7 +20,7 @@ def parser() -> argparse.ArgumentParser:
         prog="label_images",
         description=(
             "Labels a flight's pictures with runways, horizon and sun, projected from the camera's measured pose: "
-            "FLIGHT.labels.jsonl beside the bag, which bag_export takes with --labels."
+            "FLIGHT.labels.jsonl beside the bag, which bag_export and flight_report take with --labels."
         ),
         epilog="docs/labels.md tells what is in the file, and how sure it is.",
     )
@@ -34,6 +34,12 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--airport", required=True, metavar="ICAO", help="identifier of the airport")
     p.add_argument("--heights", type=Path, metavar="CSV", help="of runway ends: lines like 15L, 12.3 (metres MSL)")
+    p.add_argument(
+        "--standing-height",
+        type=number("metres from 0 to 30", 0.0, 30.0),
+        metavar="M",
+        help="of the centre of gravity, parked, for heights measured in flight (default: 1, doubted by 1.5)",
+    )
     p.add_argument(
         "--map-sigma",
         type=positive,
@@ -58,13 +64,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     heights = read_table(args.heights, airport) if args.heights else {}
     with Bags(args.bags) as bags:
         path = args.output or beside(bags.paths[0])
-        count, flight = label_flight(bags, path, airport, heights, Options(args.flat_world, args.map_sigma))
+        count, flight = label_flight(
+            bags, path, airport, heights, Options(args.flat_world, args.map_sigma, args.standing_height)
+        )
     about = flight.about()
     print(f"{path}: {count} pictures labelled; {airport.ident} of {airport.file}")
     for line in about["heights"]:
         print(f"height of runway {line}")
     if not about["sun"]:
         print("no sun: record sun_pitch_degrees and sun_heading_degrees (docs/labels.md says how)")
-    for reason, number in sorted(flight.left_out.items()):
-        print(f"left out: {number}: {reason}")
+    for reason, pictures in sorted(flight.left_out.items()):
+        print(f"left out: {pictures}: {reason}")
     return 0
