@@ -64,6 +64,24 @@ std::optional<std::string> checkIntegrated(const IntegratedInput& in, StickMode 
   return std::nullopt;
 }
 
+std::optional<std::string> checkSurface(const SurfaceInput& in, StickMode mode) {
+  constexpr ChannelRange kTravel{-90.0, 90.0};  // [deg]
+  const bool has_axis = in.axis.of(mode) >= 0;
+  const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
+  if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
+  if (!std::isfinite(in.rate)) return wrong(in.key + ".rate", in.rate, "a finite number [1/s]");
+  if (has_buttons && in.rate == 0.0) return wrong(in.key + ".rate", in.rate, "a rate other than 0 [1/s], for buttons");
+  if (!std::isfinite(in.scale) || in.scale == 0.0) return wrong(in.key + ".scale", in.scale, "a number other than 0");
+  if (in.select_button < 0) return wrong(in.key + ".select_button", in.select_button, "the button that chooses it");
+  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0)) return wrong(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
+  if (!inRange(in.low, kTravel)) return wrong(in.key + ".low", in.low, rangeText(kTravel) + " [deg]");
+  if (!inRange(in.high, kTravel) || in.high <= in.low) {
+    return wrong(in.key + ".high", in.high, rangeText(kTravel) + " [deg], above low");
+  }
+  if (inRange(in.initial, {in.low, in.high})) return std::nullopt;
+  return wrong(in.key + ".initial", in.initial, rangeText({in.low, in.high}) + " [deg]");
+}
+
 bool sameSource(const IntegratedInput& a, const IntegratedInput& b, StickMode mode) {
   return a.axis.of(mode) == b.axis.of(mode) && a.increase_button == b.increase_button &&
          a.decrease_button == b.decrease_button;
@@ -108,6 +126,17 @@ std::optional<std::string> validate(const JoystickOptions& o) {
     if (in.released && !inRange(*in.released, range))
       return wrong(in.key + ".released", *in.released, rangeText(range));
   }
+  for (std::size_t i = 0; i < o.surfaces.size(); ++i) {
+    if (auto text = checkSurface(o.surfaces[i], o.stick_mode)) return text;
+    for (std::size_t k = 0; k < i; ++k) {
+      if (o.surfaces[k].select_button != o.surfaces[i].select_button) continue;
+      return wrong(o.surfaces[i].key + ".select_button", o.surfaces[i].select_button,
+                   "another button than that of " + o.surfaces[k].key);
+    }
+  }
+  for (const ActionButton& in : o.actions) {
+    if (in.button < 0) return wrong(in.key + ".button", in.button, "an index from 0");
+  }
   return std::nullopt;
 }
 
@@ -142,6 +171,9 @@ JoystickMapper::JoystickMapper(const JoystickOptions& options)
     }
     if (group == selected_of_group_.size()) selected_of_group_.push_back(i);
     integrated_.push_back({TravelIntegrator(in.low, in.high, in.initial, in.detents), group});
+  }
+  for (const SurfaceInput& in : options_.surfaces) {
+    surfaces_.push_back({TravelIntegrator(in.low, in.high, in.initial), in.initial});
   }
 }
 
@@ -181,7 +213,14 @@ bool JoystickMapper::check(const std::vector<float>& axes, std::size_t button_co
     checkButton(in.decrease_button, in.key + ".decrease_button", button_count);
     checkButton(in.select_button, in.key + ".select_button", button_count);
   }
+  for (const auto& in : options_.surfaces) {
+    checkAxis(in.axis.of(options_.stick_mode), in.key + ".axis", axes);
+    checkButton(in.increase_button, in.key + ".increase_button", button_count);
+    checkButton(in.decrease_button, in.key + ".decrease_button", button_count);
+    checkButton(in.select_button, in.key + ".select_button", button_count);
+  }
   for (const auto& in : options_.buttons) checkButton(in.button, in.key + ".button", button_count);
+  for (const auto& in : options_.actions) checkButton(in.button, in.key + ".button", button_count);
   checkButton(options_.mode.manual, "mode.manual", button_count);
   checkButton(options_.mode.automatic, "mode.auto", button_count);
   checkButton(options_.mode.toggle, "mode.toggle", button_count);
@@ -205,7 +244,8 @@ bool JoystickMapper::pressed(int button) const {
          buttons_[static_cast<std::size_t>(button)].pressed;
 }
 
-double JoystickMapper::source(const IntegratedInput& input) const {
+template <class Input>
+double JoystickMapper::source(const Input& input) const {
   const int index = input.axis.of(options_.stick_mode);
   if (index >= 0) return shapeAxis(axis(index).value_or(0.0), input.dead_zone, 0.0);
   return (held(input.increase_button) ? 1.0 : 0.0) - (held(input.decrease_button) ? 1.0 : 0.0);
@@ -221,8 +261,40 @@ void JoystickMapper::integrateUpTo(double now) {
       integrated_[i].state.integrate(options_.integrated[i].rate, j, dt);
       if (j != 0.0) integrated_[i].moved = true;
     }
+    moveSurface(dt);
   }
   integrated_until_ = std::max(integrated_until_, now);
+}
+
+void JoystickMapper::moveSurface(double dt) {
+  if (!chosen_surface_) return;
+  const SurfaceInput& in = options_.surfaces[*chosen_surface_];
+  Surface& surface = surfaces_[*chosen_surface_];
+  if (in.rate != 0.0) {
+    surface.state.integrate(in.rate, source(in), dt);
+    surface.deflection_deg = surface.state.value();
+    return;
+  }
+  const double j = std::clamp(in.scale * source(in), -1.0, 1.0);
+  if (in.low < 0.0 && in.high > 0.0) {
+    surface.deflection_deg = j < 0.0 ? -j * in.low : j * in.high;  // faired where the axis rests
+  } else {
+    surface.deflection_deg = in.low + 0.5 * (1.0 + j) * (in.high - in.low);
+  }
+}
+
+void JoystickMapper::chooseSurface(int button) {
+  for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+    if (options_.surfaces[i].select_button != button) continue;
+    surfaces_[i].commanded = chosen_surface_ != i;
+    chosen_surface_ = surfaces_[i].commanded ? std::optional(i) : std::nullopt;
+    return;
+  }
+}
+
+void JoystickMapper::releaseSurfaces() {
+  for (Surface& surface : surfaces_) surface.commanded = false;
+  chosen_surface_.reset();
 }
 
 void JoystickMapper::settleButtons(double now, bool edges) {
@@ -248,6 +320,10 @@ void JoystickMapper::onPress(int button) {
     }
     button_used_[i] = 1;
   }
+  chooseSurface(button);
+  for (std::size_t i = 0; i < options_.actions.size(); ++i) {
+    if (options_.actions[i].button == button) actions_.push_back(i);
+  }
   const auto ask = [this](FlightMode mode) {
     requests_.push_back(mode);
     mode_ = mode;
@@ -272,7 +348,10 @@ bool JoystickMapper::onJoy(const std::vector<float>& axes, const std::vector<std
   for (std::size_t i = 0; i < buttons.size(); ++i) buttons_[i].raw = buttons[i] != 0;
   // What is held down when the device appears was not pressed for us, and its levers read 0 until they are touched.
   settleButtons(now, !first);
-  if (first) std::fill(direct_moved_.begin(), direct_moved_.end(), '\0');
+  if (first) {
+    std::fill(direct_moved_.begin(), direct_moved_.end(), '\0');
+    releaseSurfaces();
+  }
   for (std::size_t i = 0; i < options_.direct.size(); ++i) {
     const auto value = axis(options_.direct[i].axis.of(options_.stick_mode));
     if (value && *value != 0.0) direct_moved_[i] = 1;
@@ -311,6 +390,9 @@ JoystickCommand JoystickMapper::update(double now) {
     if (!button_used_[i]) continue;
     command(in.target, pressed(in.button) || !in.released ? in.value : *in.released, out.command);
   }
+  for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+    if (surfaces_[i].commanded) out.surfaces.push_back({options_.surfaces[i].name, surfaces_[i].deflection_deg});
+  }
   return out;
 }
 
@@ -320,9 +402,16 @@ std::vector<FlightMode> JoystickMapper::takeModeRequests() {
   return out;
 }
 
+std::vector<std::size_t> JoystickMapper::takeActions() {
+  std::vector<std::size_t> out;
+  out.swap(actions_);
+  return out;
+}
+
 std::vector<std::string> JoystickMapper::selected() const {
   std::vector<std::string> out;
   for (const std::size_t i : selected_of_group_) out.push_back(options_.integrated[i].key);
+  if (chosen_surface_) out.push_back(options_.surfaces[*chosen_surface_].key);
   return out;
 }
 

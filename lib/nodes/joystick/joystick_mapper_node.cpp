@@ -1,7 +1,9 @@
 #include "xplane_bridge/nodes/joystick/joystick_mapper_node.hpp"
 
 #include "xplane_bridge/ControlCommand.h"
+#include "xplane_bridge/LinkState.h"
 #include "xplane_bridge/ModeRequest.h"
+#include "xplane_bridge/SurfaceCommand.h"
 #include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
 
@@ -9,6 +11,15 @@ namespace xplane_bridge {
 void JoystickMapperNode::loadParameters(const ParamLoader& own) {
   period_ = 1.0 / own.number("rate", {1.0, 1000.0}, 50.0);
   mapper_ = std::make_unique<core::JoystickMapper>(loadJoystickOptions(own));
+  if (!lockstep() && !mapper_->options().actions.empty()) {
+    functions_ = std::make_unique<JoyFunctions>(loadJoyFunctions(own), [](const std::string& text, bool success) {
+      if (success) {
+        ROS_INFO("%s", text.c_str());
+      } else {
+        ROS_WARN("%s", text.c_str());
+      }
+    });
+  }
   // Counting from the seconds of the clock, a restarted mapper is not mistaken for an old message.
   request_sequence_ =
       static_cast<std::uint32_t>((lockstep() ? clock() : wallClock()).system_ns() / core::kNanosecondsPerSecond);
@@ -18,6 +29,9 @@ void JoystickMapperNode::advertise() {
   // In lock-step none may be lost before tx_node listens.
   command_publisher_ = advertiseTopic<ControlCommand>("control/manual", lockstep() ? kLockstepQueue : 1, lockstep());
   request_publisher_ = advertiseTopic<ModeRequest>("control/mode_request", 10);
+  if (!lockstep() && !mapper_->options().surfaces.empty()) {
+    surface_publisher_ = advertiseTopic<SurfaceCommand>("control/surfaces", 1);
+  }
   addDiagnostics("joystick", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { fillDiagnostics(&status); });
   setHardwareId(mapper_->options().device);
 }
@@ -33,7 +47,17 @@ void JoystickMapperNode::subscribe() {
     std::lock_guard<std::mutex> lock(mutex_);
     mapper_->setMode(static_cast<core::FlightMode>(mode->mode));
   });
+  if (functions_) {
+    subscribeTopic<LinkState>("link_state", 1, [this](const LinkStateConstPtr& link) {
+      if (link->state == LinkState::CONNECTED) functions_->setPaused(false);
+      if (link->state == LinkState::PAUSED) functions_->setPaused(true);
+    });
+  }
   addTimer(period_, [this] { onTimer(); });
+}
+
+void JoystickMapperNode::joinThreads() {
+  if (functions_) functions_->stop();
 }
 
 void JoystickMapperNode::onJoy(const sensor_msgs::Joy& joy) {
@@ -72,7 +96,11 @@ bool JoystickMapperNode::publish(double time) {
     request.requester = name();
     request_publisher_.publish(request);
   }
+  for (const std::size_t action : mapper_->takeActions()) {
+    if (functions_) functions_->press(action);
+  }
   if (!command.alive) return false;
+  publishSurfaces(command, stamp);
   command.command.sequence = ++command_sequence_;
   ControlCommand message;
   message.header.stamp = stamp;
@@ -81,6 +109,20 @@ bool JoystickMapperNode::publish(double time) {
   last_publication_ = time;
   reportSelection();
   return true;
+}
+
+/// An empty list, once, gives all of them back.
+void JoystickMapperNode::publishSurfaces(const core::JoystickCommand& command, const ros::Time& stamp) {
+  if (!surface_publisher_ || (command.surfaces.empty() && !surfaces_commanded_)) return;
+  SurfaceCommand message;
+  message.header.stamp = stamp;
+  message.sequence = command_sequence_ + 1;
+  for (const core::SurfaceSetting& surface : command.surfaces) {
+    message.names.push_back(surface.name);
+    message.deflections_deg.push_back(static_cast<float>(surface.deflection_deg));
+  }
+  surface_publisher_.publish(message);
+  surfaces_commanded_ = !command.surfaces.empty();
 }
 
 void JoystickMapperNode::reportProblems() {

@@ -1,3 +1,6 @@
+#include <algorithm>
+
+#include "xplane_bridge/core/surfaces/surfaces.hpp"
 #include "xplane_bridge/nodes/joystick/joystick_mapper_node.hpp"
 
 namespace xplane_bridge {
@@ -78,6 +81,28 @@ core::ButtonInput buttonOf(const std::string& name, const ParamLoader& in) {
   return out;
 }
 
+core::SurfaceInput surfaceOf(const std::string& name, const ParamLoader& in) {
+  constexpr Range<double> kTravel{-core::kMaxDeflectionDeg, core::kMaxDeflectionDeg};
+  core::SurfaceInput out;
+  out.key = "surfaces." + name;
+  out.name = name;
+  if (!core::surfaceNumber(name)) {
+    throw ParamError("parameter " + in.fullKey("") + ": there is no surface \"" + name +
+                     "\"; expected one as aileron1_wing2_left, see docs/surfaces.md");
+  }
+  out.axis = axisOf(in);
+  out.increase_button = in.integer("increase_button", kIndexOrNone, -1);
+  out.decrease_button = in.integer("decrease_button", kIndexOrNone, -1);
+  out.select_button = in.integer("select_button", kIndex);
+  out.rate = in.number("rate", kAnyNumber, 0.0);
+  out.scale = in.number("scale", kAnyNumber, 1.0);
+  out.dead_zone = in.number("dead_zone", {0.0, 0.95}, 0.1);
+  out.low = in.number("low", kTravel);
+  out.high = in.number("high", kTravel);
+  out.initial = in.number("initial", {out.low, out.high}, std::clamp(0.0, out.low, out.high));
+  return out;
+}
+
 }  // namespace
 
 core::JoystickOptions loadJoystickOptions(const ParamLoader& own) {
@@ -91,6 +116,8 @@ core::JoystickOptions loadJoystickOptions(const ParamLoader& own) {
     out.integrated.push_back(integratedOf(name, in));
   }
   for (const auto& [name, in] : own.section("buttons").namedSections()) out.buttons.push_back(buttonOf(name, in));
+  for (const auto& [name, in] : own.section("surfaces").namedSections()) out.surfaces.push_back(surfaceOf(name, in));
+  for (const JoyFunction& function : loadJoyFunctions(own)) out.actions.push_back({function.key, function.button});
   const ParamLoader mode = own.section("mode");
   out.mode.manual = mode.integer("manual", kIndexOrNone, -1);
   out.mode.automatic = mode.integer("auto", kIndexOrNone, -1);

@@ -78,6 +78,10 @@ def load_joy_config(file: Path, stick_mode: Optional[int] = None) -> JoyConfig:
         if "released" in entry:
             text += f", {_number(entry['released'])} when released"
         _note(config.buttons, entry.get("button"), Function(f"buttons.{name}", text, target))
+    for name, entry in _entries(content, "surfaces"):
+        _note_surface(config, name, entry, mode)
+    for name, entry in _entries(content, "functions"):
+        _note(config.buttons, entry.get("button"), Function(f"functions.{name}", _function_text(entry)))
     mode_section = content.get("mode")
     for name, button in (mode_section if isinstance(mode_section, dict) else {}).items():
         _note(config.buttons, button, Function(f"mode.{name}", _MODES.get(name, str(name))))
@@ -107,6 +111,27 @@ def _note_integrated(config: JoyConfig, name: str, entry: Dict[str, Any], mode: 
     for end, word in (("increase_button", "up"), ("decrease_button", "down")):
         _note(config.buttons, entry.get(end), Function(key, f"moves {target} {word}", target, chosen_by))
     _note(config.buttons, entry.get("select_button"), Function(key, f"chooses {target}"))
+
+
+def _note_surface(config: JoyConfig, name: str, entry: Dict[str, Any], mode: int) -> None:
+    key = f"surfaces.{name}"
+    verb = "moves" if entry.get("rate") else "sets"
+    _note(config.axes, _axis(entry, mode), Function(key, f"{verb} {name}", "", True))
+    for end, word in (("increase_button", "down"), ("decrease_button", "up")):
+        _note(config.buttons, entry.get(end), Function(key, f"moves {name} {word}", "", True))
+    _note(config.buttons, entry.get("select_button"), Function(key, f"chooses {name}, or gives it back"))
+
+
+def _function_text(entry: Dict[str, Any]) -> str:
+    does = entry.get("does")
+    if does == "pause":
+        return "pauses and resumes"
+    if does == "view":
+        return f"view {entry.get('view')}"
+    if does == "failure":
+        value = f" at {_number(entry['value'])}" if "value" in entry else ""
+        return f"breaks and repairs {entry.get('name')}: {entry.get('kind')}{value}"
+    return f"command {entry.get('command')}"
 
 
 def _number(value: Any) -> str:

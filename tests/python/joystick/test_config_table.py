@@ -35,6 +35,19 @@ def config(tmp_path):
     return lambda mode=None: load_joy_config(file, mode)
 
 
+FUNCTIONS = """
+device: Buttons
+surfaces:
+  rudder1_fin1:        {axis: 0, low: -20.0, high: 20.0, select_button: 0}
+  aileron1_wing2_left: {increase_button: 1, decrease_button: 2, rate: 0.5, low: -25.0, high: 15.0, select_button: 3}
+functions:
+  halt:   {button: 4, does: pause}
+  astern: {button: 5, does: view, view: rear}
+  stuck:  {button: 6, does: failure, name: rudder1_fin1, kind: stuck, value: 5.0}
+  anew:   {button: 7, does: command, command: sim/operation/reset_flight}
+"""
+
+
 def rows(lines, word):
     """The lines of one table: index to line."""
     begin = next(k for k, line in enumerate(lines) if line.lstrip().startswith(word)) + 2
@@ -174,3 +187,24 @@ def test_a_nodes_last_word_is_told_with_the_keys_of_the_file():
     assert complaint(output, "/check_1/joystick_mapper_node/") == "unknown parameter direct.roll.expos (a)"
     assert complaint("Segmentation fault\n", "/x/") == "Segmentation fault"
     assert complaint("", "/x/") == "joystick_mapper_node ended without a word"
+
+
+def test_surfaces_and_functions_are_in_the_table(tmp_path):
+    file = tmp_path / "buttons.yaml"
+    file.write_text(FUNCTIONS, encoding="utf-8")
+    lines = screen(load_joy_config(file), Live(axes=[0.0], buttons=[0] * 8, chosen=["surfaces.rudder1_fin1"]))
+    assert "sets rudder1_fin1 [surfaces.rudder1_fin1]" in rows(lines, "axis")[0]
+    buttons = rows(lines, "button")
+    for button, text in enumerate(
+        (
+            "chooses rudder1_fin1, or gives it back",
+            "(moves aileron1_wing2_left down)",
+            "(moves aileron1_wing2_left up)",
+            "chooses aileron1_wing2_left, or gives it back",
+            "pauses and resumes",
+            "view rear",
+            "breaks and repairs rudder1_fin1: stuck at 5",
+            "command sim/operation/reset_flight",
+        )
+    ):
+        assert text in buttons[button]

@@ -77,6 +77,28 @@ struct ButtonInput {
   std::optional<double> released;  ///< value while not pressed, once it has been pressed; none: the value stays
 };
 
+/// A single surface, set by an axis, a hat or two buttons once its button has chosen it. One is chosen at a time; those
+/// chosen before stay where they were set. A press on the button of the chosen one gives that surface back.
+struct SurfaceInput {
+  std::string key;   ///< YAML key, for messages
+  std::string name;  ///< of the surface
+  AxisIndex axis;    ///< or
+  int increase_button = -1;
+  int decrease_button = -1;
+  int select_button = -1;
+  double rate = 0.0;             ///< [1/s] fraction of the travel, as IntegratedInput's; 0: the axis sets it
+  double scale = 1.0;            ///< sign and scale of an axis that sets it; not 0
+  double dead_zone = 0.1;        ///< [0, 1)
+  double low = 0.0, high = 0.0;  ///< [deg] ends of the travel
+  double initial = 0.0;          ///< [deg] where it goes when it is chosen first
+};
+
+/// A button that asks for something other than a command; for what, its owner knows.
+struct ActionButton {
+  std::string key;
+  int button = -1;
+};
+
 /// Buttons for automatic and manual; -1: none.
 struct ModeButtons {
   int manual = -1;
@@ -92,6 +114,8 @@ struct JoystickOptions {
   std::vector<DirectInput> direct;
   std::vector<IntegratedInput> integrated;
   std::vector<ButtonInput> buttons;
+  std::vector<SurfaceInput> surfaces;
+  std::vector<ActionButton> actions;
   ModeButtons mode;
 };
 
@@ -130,9 +154,15 @@ struct JoyProblem {
   std::string text;  ///< device, index and YAML key in one sentence
 };
 
+struct SurfaceSetting {
+  std::string name;
+  double deflection_deg = 0.0;
+};
+
 struct JoystickCommand {
-  bool alive = false;      ///< false: nothing must be published
-  ControlCommand command;  ///< `fields` tells what is commanded; `sequence` is the caller's
+  bool alive = false;                    ///< false: nothing must be published
+  ControlCommand command;                ///< `fields` tells what is commanded; `sequence` is the caller's
+  std::vector<SurfaceSetting> surfaces;  ///< that are commanded, beside it
 };
 
 /// One device. Not thread-safe.
@@ -149,6 +179,8 @@ class JoystickMapper {
 
   /// Mode changes asked for by buttons since the last call, in order.
   std::vector<FlightMode> takeModeRequests();
+  /// Actions whose buttons were pressed since the last call, in order: their places in JoystickOptions::actions.
+  std::vector<std::size_t> takeActions();
   /// The present mode, for the toggle button.
   void setMode(FlightMode mode) { mode_ = mode; }
 
@@ -156,7 +188,7 @@ class JoystickMapper {
   /// Problems of the newest message; empty when it was sound.
   const std::vector<JoyProblem>& problems() const { return problems_; }
   std::uint64_t dropped() const { return dropped_; }
-  /// Keys of the integrated inputs that are selected now.
+  /// Keys of the integrated inputs, and of the surface, that are selected now.
   std::vector<std::string> selected() const;
   const JoystickOptions& options() const { return options_; }
 
@@ -171,16 +203,27 @@ class JoystickMapper {
     bool moved = false;
   };
 
+  struct Surface {
+    TravelIntegrator state;
+    double deflection_deg;
+    bool commanded = false;
+  };
+
   void checkAxis(int axis, const std::string& key, const std::vector<float>& axes);
   void checkButton(int button, const std::string& key, std::size_t count);
   bool check(const std::vector<float>& axes, std::size_t button_count);
   std::optional<double> axis(int index) const;
   bool held(int button) const;     // as the device says
   bool pressed(int button) const;  // debounced
-  double source(const IntegratedInput& input) const;
+  template <class Input>
+  double source(const Input& input) const;
   void integrateUpTo(double now);
   void settleButtons(double now, bool edges);
   void onPress(int button);
+
+  void moveSurface(double dt);
+  void chooseSurface(int button);
+  void releaseSurfaces();
 
   JoystickOptions options_;
   std::vector<double> axes_;
@@ -189,7 +232,10 @@ class JoystickMapper {
   std::vector<std::size_t> selected_of_group_;
   std::vector<char> direct_moved_;
   std::vector<char> button_used_;
+  std::vector<Surface> surfaces_;
+  std::optional<std::size_t> chosen_surface_;
   std::vector<FlightMode> requests_;
+  std::vector<std::size_t> actions_;
   std::vector<JoyProblem> problems_;
   FlightMode mode_ = FlightMode::kManual;
   double last_joy_ = -std::numeric_limits<double>::infinity();

@@ -11,22 +11,26 @@
 #include "xplane_bridge/ControlMode.h"
 #include "xplane_bridge/core/control/axis_map.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
+#include "xplane_bridge/nodes/joystick/joy_functions.hpp"
 
 namespace xplane_bridge {
 
 /// Options of a joystick's file (config/joysticks/). @throws ParamError
 core::JoystickOptions loadJoystickOptions(const ParamLoader& own);
 
-/// `joy` into `control/manual` and `control/mode_request`, by one of config/joysticks/. Publishes on every joy message
+/// `joy` into `control/manual`, `control/surfaces`, `control/mode_request` and calls of tx_node's services, by one of
+/// config/joysticks/. Publishes on every joy message
 /// and, on a timer of its own, in between; nothing while the device is silent for longer than `joy_timeout`.
 ///
-/// In lock-step it answers a frame when `lockstep/stick` has: by its joy, or by its lockstep/done.
+/// In lock-step it answers a frame when `lockstep/stick` has: by its joy, or by its lockstep/done. Surfaces and
+/// functions of buttons are left out there.
 class JoystickMapperNode : public BaseNode {
  protected:
   bool usesLink() const override { return false; }
   void loadParameters(const ParamLoader& own) override;
   void advertise() override;
   void subscribe() override;
+  void joinThreads() override;
 
  private:
   /// What a frame waits for: the stick's answer to it.
@@ -44,6 +48,7 @@ class JoystickMapperNode : public BaseNode {
   void onTimer();
   /// Returns whether a command was published.
   bool publish(double now);
+  void publishSurfaces(const core::JoystickCommand& command, const ros::Time& stamp);
   void reportProblems();
   void reportSelection();
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status);
@@ -53,6 +58,9 @@ class JoystickMapperNode : public BaseNode {
   std::unique_ptr<core::JoystickMapper> mapper_;
   ros::Publisher command_publisher_;
   ros::Publisher request_publisher_;
+  ros::Publisher surface_publisher_;  // where the file has surfaces
+  bool surfaces_commanded_ = false;
+  std::unique_ptr<JoyFunctions> functions_;  // where it has functions
   std::uint32_t command_sequence_ = 0;
   std::uint32_t request_sequence_ = 0;
   std::uint64_t joy_count_ = 0;
