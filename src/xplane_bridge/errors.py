@@ -1,8 +1,19 @@
-"""The root of this package's exceptions."""
+"""The root of this package's exceptions, and what readers of files share."""
+
+import math
+from typing import Any
 
 
 class XplaneBridgeError(Exception):
     """Something a user can put right; the text is one line: what was given, what was expected, what to do."""
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of a file is a finite number that fits a double; true and false are none."""
+    try:
+        return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def yaml_problem(error: Exception) -> str:

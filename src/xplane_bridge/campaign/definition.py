@@ -21,7 +21,7 @@ from xplane_bridge.campaign.distributions import (
     parse_parameter,
 )
 from xplane_bridge.emulator.aircraft import model_names
-from xplane_bridge.errors import yaml_problem
+from xplane_bridge.errors import is_number, yaml_problem
 from xplane_bridge.in_process.aircraft import LOADING, WEATHER
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
@@ -190,7 +190,7 @@ def parse_campaign(document: Any) -> Campaign:
         raise CampaignError(f"parameters: {parameters!r}; expected a mapping of names to distributions")
     drawn = tuple(parse_parameter(str(key), value) for key, value in parameters.items())
     sampling = d.get("sampling", "random")
-    if sampling not in SAMPLINGS:
+    if not isinstance(sampling, str) or sampling not in SAMPLINGS:
         raise CampaignError(f"sampling: {sampling!r}; expected one of {', '.join(SAMPLINGS)}")
     if sampling == "sobol" and len(drawn) > MOST_SOBOL:
         raise CampaignError(f"sampling: sobol takes up to {MOST_SOBOL} parameters, there are {len(drawn)}")
@@ -198,7 +198,7 @@ def parse_campaign(document: Any) -> Campaign:
     seed = _whole(d, "seed", 0, 0, 2**63)
     for key, low, high in (("frame_rate", 20.0, 240.0), ("longest", 0.1, 86400.0)):
         value = d.get(key, low)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        if not is_number(value) or not low <= value <= high:
             raise CampaignError(f"{key}: {value!r}; expected a number from {low:g} to {high:g}")
     _mapping(d.get("weather", {}), "weather", WEATHER)
     _mapping(d.get("loading", {}), "loading", LOADING)
@@ -206,8 +206,12 @@ def parse_campaign(document: Any) -> Campaign:
     controller = d.get("controller", "")
     if not isinstance(controller, str) or (controller and ":" not in controller):
         raise CampaignError(f"controller: {controller!r}; expected module:class or module:function")
-    if "arguments" in d and not (controller or d.get("scenario", {}).get("controller")):
+    scenario_document = _mapping(d.get("scenario"), "scenario", None)
+    if "arguments" in d and not (controller or scenario_document.get("controller")):
         raise CampaignError("arguments: without controller; expected what the controller is made with")
+    aircraft = d.get("aircraft")
+    if aircraft is not None and not isinstance(aircraft, str):
+        raise CampaignError(f"aircraft: {aircraft!r}; expected the name of one")
     campaign = Campaign(name, dict(d), drawn, flights, seed, sampling, None)
     scenario = _check_first(campaign)
     stop = _stop(d.get("stop"), [criterion.name for criterion in scenario.criteria])
@@ -216,11 +220,11 @@ def parse_campaign(document: Any) -> Campaign:
 
 def _check_first(campaign: Campaign) -> Scenario:
     """Looks at the first flight, as all others are made of the same document."""
-    plan = campaign.plan(0)
     try:
-        scenario = parse_scenario(plan.scenario)
+        scenario = parse_scenario(substituted(campaign.document["scenario"], campaign.design.values(0), "scenario"))
     except ScenarioError as error:
         raise CampaignError(f"scenario: {error}") from None
+    plan = campaign.plan(0)
     if plan.aircraft not in model_names():
         raise CampaignError(f"aircraft: {plan.aircraft!r}; expected one of {', '.join(model_names())}")
     if scenario.aircraft and plan.aircraft not in scenario.aircraft:
@@ -278,8 +282,8 @@ def _stop(item: Any, criteria: Sequence[str]) -> Optional[Stop]:
     criterion = given.get("criterion", "all")
     if criterion not in (*criteria, "all"):
         raise CampaignError(f"stop.criterion: {criterion!r}; expected all, or one of {', '.join(criteria)}")
-    width = given.get("width")
-    if isinstance(width, bool) or not isinstance(width, (int, float)) or not 0.0 < width < 1.0:
+    width: Any = given.get("width")
+    if not is_number(width) or not 0.0 < width < 1.0:
         raise CampaignError(f"stop.width: {width!r}; expected the width of the 95 % interval, above 0 and below 1")
     return Stop(criterion, float(width), _whole(given, "every", 100, 1, 10_000_000, "stop."))
 

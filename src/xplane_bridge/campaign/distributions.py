@@ -9,7 +9,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.errors import XplaneBridgeError, is_number
 
 Value = Union[float, str]
 SAMPLINGS = ("random", "latin_hypercube", "sobol")
@@ -99,17 +99,17 @@ def parse_parameter(name: str, item: Any, where: str = "parameters.") -> Paramet
     kind, values = kinds[0], item[kinds[0]]
     if kind == "choice":
         types = (
-            {isinstance(v, str) for v in values if isinstance(v, str) or _is_number(v)}
+            {isinstance(v, str) for v in values if isinstance(v, str) or is_number(v)}
             if isinstance(values, list)
             else set()
         )
-        if len(types) != 1 or not all(isinstance(v, str) or _is_number(v) for v in values):
+        if len(types) != 1 or not all(isinstance(v, str) or is_number(v) for v in values):
             raise CampaignError(f"{path}.choice: {values!r}; expected a list of numbers, or of texts")
     else:
         _check_numbers(kind, values, f"{path}.{kind}")
     clip = item.get("clip")
     if clip is not None:
-        if not (isinstance(clip, list) and len(clip) == 2 and all(map(_is_number, clip)) and clip[0] <= clip[1]):
+        if not (isinstance(clip, list) and len(clip) == 2 and all(map(is_number, clip)) and clip[0] <= clip[1]):
             raise CampaignError(f"{path}.clip: {clip!r}; expected [low, high]")
         clip = (float(clip[0]), float(clip[1]))
     numbers = tuple(v if isinstance(v, str) else float(v) for v in values)
@@ -118,7 +118,7 @@ def parse_parameter(name: str, item: Any, where: str = "parameters.") -> Paramet
 
 def _check_numbers(kind: str, values: Any, path: str) -> None:
     count = 3 if kind == "triangular" else 2
-    good = isinstance(values, list) and len(values) == count and all(map(_is_number, values))
+    good = isinstance(values, list) and len(values) == count and all(map(is_number, values))
     if good and kind == "normal":
         good = values[1] >= 0.0
     elif good and kind == "triangular":
@@ -127,10 +127,6 @@ def _check_numbers(kind: str, values: Any, path: str) -> None:
         good = values[0] <= values[1] and (kind != "log_uniform" or values[0] > 0.0)
     if not good:
         raise CampaignError(f"{path}: {values!r}; expected {_NUMBERS[kind]}")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _generator(seed: int, stream: int, number: int) -> np.random.Generator:

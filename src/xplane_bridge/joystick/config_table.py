@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import yaml
 
-from xplane_bridge.errors import XplaneBridgeError, yaml_problem
+from xplane_bridge.errors import XplaneBridgeError, is_number, yaml_problem
 
 _BAR = 8  #: characters of an axis' bar on either side of its middle
 _MODES = {"manual": "asks for MANUAL", "auto": "asks for AUTO", "toggle": "asks for the other mode"}
@@ -135,7 +135,7 @@ def _function_text(entry: Dict[str, Any]) -> str:
 
 
 def _number(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, (int, float)) else str(value)
+    return f"{value:g}" if is_number(value) else str(value)
 
 
 # ----------------------------------------------------------------------------------------------------------- screen

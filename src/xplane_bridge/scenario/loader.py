@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Collection, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import yaml
 
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
-from xplane_bridge.errors import yaml_problem
+from xplane_bridge.errors import is_number, yaml_problem
 
 from ..constants import EXCITATION_KINDS, FAILURE_KINDS
 from .holds import HoldGains
@@ -138,9 +138,7 @@ def _criteria(item: Any, events: Sequence[Event]) -> Tuple[Criterion, ...]:
 
 def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criterion:
     given = _mapping(item, path, ("measure", "of", "target", "from", "to", "band", "above", "below"))
-    measure = given.get("measure")
-    if measure not in MEASURES:
-        raise ScenarioError(f"{path}.measure: {measure!r}; expected one of {', '.join(MEASURES)}")
+    measure = _one_of(given.get("measure"), f"{path}.measure", MEASURES)
     bounds: Dict[str, float] = {
         key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("above", "below") if key in given
     }
@@ -151,9 +149,7 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
         if surplus:
             raise ScenarioError(f"{path}.{surplus[0]}: does not go with {measure}; expected bounds only")
         return Criterion(name, measure, above=bounds.get("above"), below=bounds.get("below"))
-    variable = given.get("of")
-    if variable not in SCORED:
-        raise ScenarioError(f"{path}.of: {variable!r}; expected one of {', '.join(SCORED)}")
+    variable = _one_of(given.get("of"), f"{path}.of", SCORED)
     if measure in TARGETED and "target" not in given:
         raise ScenarioError(f"{path}.target: missing; expected what {measure} compares with")
     if measure == "settling" and "band" not in given:
@@ -199,9 +195,8 @@ def _conditions(item: Any, path: str) -> Tuple[Condition, ...]:
     for variable, bounds in _mapping(item, path, VARIABLES).items():
         place = f"{path}.{variable}"
         if variable == "mode":
-            if bounds not in MODES:
-                raise ScenarioError(f"{place}: {bounds!r}; expected one of {', '.join(MODES)}")
-            conditions.append(Condition(variable, MODES[bounds] - 0.5, MODES[bounds] + 0.5))
+            mode = MODES[_one_of(bounds, place, MODES)]
+            conditions.append(Condition(variable, mode - 0.5, mode + 0.5))
         elif isinstance(bounds, bool):
             conditions.append(Condition(variable, above=0.5) if bounds else Condition(variable, below=0.5))
         elif isinstance(bounds, list):
@@ -258,9 +253,7 @@ def _hat(item: Any, path: str) -> Dict[str, float]:
 
 
 def _mode(item: Any, path: str) -> int:
-    if item not in MODES:
-        raise ScenarioError(f"{path}: {item!r}; expected one of {', '.join(MODES)}")
-    return MODES[item]
+    return MODES[_one_of(item, path, MODES)]
 
 
 def _failure(item: Any, path: str) -> Dict[str, Any]:
@@ -268,8 +261,7 @@ def _failure(item: Any, path: str) -> Dict[str, Any]:
     name, kind = _text(given, "name", "", path), _text(given, "kind", "failed", path)
     if not name:
         raise ScenarioError(f"{path}.name: missing; expected a surface, a system, or a rel_* dataref")
-    if kind not in FAILURE_KINDS:
-        raise ScenarioError(f"{path}.kind: {kind!r}; expected one of {', '.join(FAILURE_KINDS)}")
+    _one_of(kind, f"{path}.kind", FAILURE_KINDS)
     value = given.get("value")
     if value is not None:
         value = _number(value, f"{path}.value", -180.0, 180.0)
@@ -283,8 +275,7 @@ def _excitation(item: Any, path: str) -> Dict[str, Any]:
     known = ("kind", "target", "amplitude", "duration", "frequency", "frequency_end", "seed")
     given = _mapping(item, path, known)
     kind, target = _text(given, "kind", "", path), _text(given, "target", "", path)
-    if kind not in EXCITATION_KINDS:
-        raise ScenarioError(f"{path}.kind: {kind!r}; expected one of {', '.join(EXCITATION_KINDS)}")
+    _one_of(kind, f"{path}.kind", EXCITATION_KINDS)
     if not target:
         raise ScenarioError(f"{path}.target: missing; expected roll, pitch, yaw, throttle or a surface's name")
     out: Dict[str, Any] = {"kind": kind, "target": target, "seed": given.get("seed", 0)}
@@ -405,14 +396,15 @@ def _ranged(item: Any, path: str, ranges: Mapping[str, Tuple[float, float]], som
     return {key: _number(value, f"{path}.{key}", *ranges[key]) for key, value in given.items()}
 
 
+def _one_of(value: Any, path: str, known: Collection[str]) -> str:
+    # A list or a mapping cannot be looked up.
+    if not isinstance(value, str) or value not in known:
+        raise ScenarioError(f"{path}: {_short(value)}; expected one of {', '.join(known)}")
+    return value
+
+
 def _number(value: Any, path: str, low: float, high: float) -> float:
-    good = (
-        isinstance(value, (int, float))
-        and not isinstance(value, bool)
-        and math.isfinite(value)
-        and low <= value <= high
-    )
-    if not good:
+    if not (is_number(value) and low <= value <= high):
         bounds = "a number" if math.isinf(low) and math.isinf(high) else f"a number from {low:g} to {high:g}"
         raise ScenarioError(f"{path}: {_short(value)}; expected {bounds}")
     return float(value)

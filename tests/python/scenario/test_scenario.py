@@ -80,6 +80,11 @@ def test_the_example_of_the_manual_is_a_scenario():
         ({"name": "x", "events": [{"at": 0, "stick": {}}]}, "expected some of roll, pitch"),
         ({"name": "x", "events": [{"at": 0, "hold": {"bank": 3}}]}, "hold.bank: unknown key"),
         ({"name": "x", "events": [{"at": 0, "mode": "off"}]}, "mode: 'off'; expected one of manual, auto"),
+        ({"name": "x", "events": [{"at": 0, "mode": ["auto"]}]}, r"mode: \['auto'\]; expected one of manual, auto"),
+        (
+            {"name": "x", "events": [{"at": 0, "stick": {"roll": 10**400}}]},
+            r"roll: 1000.*; expected a number from -1 to 1",
+        ),
         ({"name": "x", "events": [{"at": 0, "failure": {"kind": "stuck"}}]}, "failure.name: missing"),
         ({"name": "x", "events": [{"at": 0, "failure": {"name": "a", "kind": "bent"}}]}, "failure.kind: 'bent'"),
         ({"name": "x", "events": [{"at": 0, "excitation": {"kind": "chirp", "target": "roll"}}]}, "amplitude: missing"),
