@@ -39,6 +39,7 @@ class Participant:
 
         topic = namespace.rstrip("/") + "/"
         self._answer, self._publisher, self._header = answer, publisher, Header
+        self._closed = False
         self._done = rospy.Publisher(topic + "lockstep/done", Header, queue_size=1, latch=True, tcp_nodelay=True)
         self._states = rospy.Subscriber(topic + "flight_state", FlightState, self._on_state, tcp_nodelay=True)
 
@@ -48,12 +49,15 @@ class Participant:
         return bool(self._states.get_num_connections())
 
     def close(self) -> None:
-        """Answers no more."""
+        """Answers no more, nor what `answer` returns from now on."""
+        self._closed = True
         self._states.unregister()
         self._done.unregister()
 
     def _on_state(self, state: Any) -> None:
         message = self._answer(state)
+        if self._closed:
+            return
         if message is None or self._publisher is None:
             self._done.publish(self._header(stamp=state.header.stamp))
             return

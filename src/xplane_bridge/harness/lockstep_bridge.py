@@ -37,6 +37,7 @@ class LockstepBridge:
     _bridge: ManagedProcess
     _participant: Participant
     _publisher: Any
+    name: str  #: namespace of the newest start
 
     def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="xplane_bridge_")
@@ -62,7 +63,7 @@ class LockstepBridge:
         from xplane_bridge.msg import ControlCommand
         from xplane_bridge.srv import SetMode
 
-        name = f"lockstep_{os.getpid()}_{next(_numbers)}"
+        self.name = name = f"lockstep_{os.getpid()}_{next(_numbers)}"
         self._states, self._answers = queue.Queue(), queue.Queue()
         states, answers = self._states, self._answers
 
@@ -115,8 +116,8 @@ class LockstepBridge:
             return
         self._runs = False
         self._bridge.stop()
-        self._answers.put(None)  # whoever still waits for an answer
         self._participant.close()
+        self._answers.put(None)  # the callback that still waits for an answer
         self._publisher.unregister()
 
     def close(self) -> None:
