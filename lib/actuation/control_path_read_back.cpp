@@ -19,7 +19,7 @@ void ControlPath::sayApplied(const core::ArbitratedControls& controls) {
   applied.sim_time = watch_.sim_time;
   hooks_.applied(applied);
   if (unseen_.empty()) last_seen_ = now();  // until now there was nothing to show
-  unseen_.push_back(std::move(applied));
+  unseen_.push_back(applied);
   if (unseen_.size() > kUnseenKept) unseen_.pop_front();
 }
 

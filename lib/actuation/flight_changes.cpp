@@ -285,6 +285,7 @@ FlightChanges::Outcome FlightChanges::applySettings(const std::vector<core::Sett
     }
   }
   std::vector<core::DatarefWrite> writes;
+  writes.reserve(settings.size());
   for (const core::SettingWrite& each : settings) writes.push_back(each.write);
   const auto names = core::shownDatarefs(settings);
   const auto fits = [settings](const std::vector<core::DatarefValue>& values) {

@@ -23,8 +23,6 @@
 #include "xplane_bridge/actuation/pausing.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
 
-extern char** environ;
-
 namespace xplane_bridge {
 namespace {
 
@@ -194,7 +192,7 @@ bool undoFor(const GuardianOrders& orders, std::int64_t parent) {
     options.journal_subscriptions = false;
     core::SimLink link(
         options, {}, core::hostClock(), [](core::LogLevel, const std::string&) {},
-        [journal](const core::Endpoint&) { return journal; });
+        [journal](const core::Endpoint&) mutable { return journal; });
     link.start();
     const bool done = releaseLeftBehind(&link, [](const std::string& text, bool success) {
       std::fprintf(stderr, "override_guardian: %s%s\n", success ? "" : "NOT DONE: ", text.c_str());

@@ -33,6 +33,7 @@ std::string entryId(const std::string& dataref) { return "override:" + dataref; 
 
 std::vector<std::string> entryIds(const std::set<std::string>& datarefs) {
   std::vector<std::string> out;
+  out.reserve(datarefs.size());
   for (const std::string& dataref : datarefs) out.push_back(entryId(dataref));
   return out;
 }
@@ -45,6 +46,7 @@ core::UndoOperation undoOf(const std::string& dataref) {
 
 std::vector<core::UndoOperation> undoOf(const std::set<std::string>& datarefs) {
   std::vector<core::UndoOperation> out;
+  out.reserve(datarefs.size());
   for (const std::string& dataref : datarefs) out.push_back(undoOf(dataref));
   return out;
 }
@@ -379,6 +381,7 @@ bool OverrideManager::releaseLeftovers(double timeout_s) {
     operations.insert(operations.end(), entry.undo.begin(), entry.undo.end());
   }
   std::vector<std::string> what;
+  what.reserve(names.size());
   for (const auto& [cause, ids] : names) {
     what.push_back(joined(ids) + (cause.empty() ? " left by a run that crashed" : " left because " + cause));
   }

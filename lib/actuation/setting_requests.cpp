@@ -24,6 +24,7 @@ SettingRequests::SettingRequests(core::SimulatorPort* link, OverrideManager* ove
 /// In lock-step X-Plane shows it in the next frame, for which the caller may be awaited.
 void SettingRequests::confirmLater(const std::vector<core::DatarefWrite>& writes, const std::string& what) {
   std::vector<std::string> names;
+  names.reserve(writes.size());
   for (const core::DatarefWrite& write : writes) names.push_back(write.dataref);
   link_->read(names, timeout_, [this, writes, what](const std::vector<core::DatarefValue>& values) {
     for (std::size_t i = 0; i < writes.size(); ++i) {

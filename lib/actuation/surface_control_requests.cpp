@@ -107,7 +107,7 @@ bool SurfaceControl::takeReleasedByAnother() {
 
 std::string SurfaceControl::beginOffset(std::size_t surface, double amplitude_deg) {
   std::lock_guard<std::mutex> lock(mutex_);
-  const std::string blocked = blockReasonForLocked(surface);
+  std::string blocked = blockReasonForLocked(surface);
   if (!blocked.empty()) return blocked;
   if (isBroken(surface)) return nameOf(surface) + " is broken";
   const core::SurfaceLaw* law = watch_.model()->lawOf(surface);
@@ -215,7 +215,7 @@ std::string SurfaceControl::blockReasonFor(std::size_t surface) const {
 }
 
 std::string SurfaceControl::blockReasonForLocked(std::size_t surface) const {
-  const std::string blocked = blockReasonLocked();
+  std::string blocked = blockReasonLocked();
   const core::MixingModel* model = watch_.model();
   if (!blocked.empty() || !model || model->lawOf(surface)) return blocked;
   return nameOf(surface) +
