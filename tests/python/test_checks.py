@@ -29,8 +29,10 @@ def test_pre_commit_runs_the_checks_that_need_no_build_and_no_others():
 
 def test_every_check_is_a_function_and_in_the_help():
     shown = subprocess.run([ROOT / "scripts/test", "--help"], stdout=subprocess.PIPE, text=True, check=True).stdout
-    for name in names("all_checks"):
-        assert re.search(rf"^check_{name}\(\) {{", TEST, re.MULTILINE), name
+    full = (ROOT / "tests/full/checks.bash").read_text(encoding="utf-8")
+    for name in (*names("all_checks"), *names("full_checks")):
+        text = full if name in names("full_checks") else TEST
+        assert re.search(rf"^check_{name}\(\) {{", text, re.MULTILINE), name
         assert re.search(rf"^  (.*  )?{name} {{2,}}\S", shown, re.MULTILINE), name
 
 
@@ -39,7 +41,8 @@ def test_a_check_that_is_none_is_refused_with_the_list():
         [ROOT / "scripts/test", "--only", "format,typos"], stderr=subprocess.PIPE, text=True, check=False
     )
     assert done.returncode == 2
-    assert done.stderr == f"test: there is no check typos; there are: {' '.join(names('all_checks'))}\n"
+    known = " ".join((*names("all_checks"), *names("full_checks")))
+    assert done.stderr == f"test: there is no check typos; there are: {known}\n"
 
 
 def test_the_workflow_runs_the_command_of_the_readme_on_both_systems():
@@ -48,6 +51,6 @@ def test_the_workflow_runs_the_command_of_the_readme_on_both_systems():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for name, job in workflow["jobs"].items():
         commands = [step["run"] for step in job["steps"] if "run" in step]
-        assert commands[-1] == "scripts/test", name
-        assert re.search(rf"^{commands[-1]} +# every check", readme, re.MULTILINE)
+        assert commands[-1] == "scripts/test ${{ github.event_name == 'schedule' && '--full' || '' }}", name
+        assert re.search(r"^scripts/test +# every check", readme, re.MULTILINE)
         assert job["runs-on"] == "ubuntu-latest", f"{name}: a public runner"
