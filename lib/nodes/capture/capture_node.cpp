@@ -22,6 +22,8 @@ constexpr std::chrono::milliseconds kSourceWait{50};
 // [s] between looks at overdue pictures where no picture, frame or state comes, which all look by themselves. Each look
 // wakes two of roscpp's threads: with 5 ms they took a quarter of the node's time at 640x480.
 constexpr double kOverduePeriod = 0.05;
+constexpr double kRestorePeriod = 0.5;  // [s] between looks whether a killed node's field of view is to be given back
+constexpr double kSlowRead = 0.005;     // [s] median above which reading pictures is said to be slow
 constexpr std::int64_t kFrozenRepeat = 1'000'000'000;  // [ns] between repetitions of a frozen picture
 constexpr std::size_t kPicturesWaiting = 2;            // for scaling, and for JPEG: more would only be older
 constexpr std::size_t kSpareBuffers = 4;
@@ -68,6 +70,11 @@ void CaptureNode::advertise() {
   pairing_ = std::make_unique<ImagePairing>(common().display_delay, options_.max_wait,
                                             [this](const FrameState& state) { publishFrameState(state); });
   broadcastFrames();
+  advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
+      name() + "/calibrate_display_delay",
+      [this](const std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+        serveCalibration(&response);
+      });
   addDiagnostics("capture", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnoseCapture(&status); });
   addDiagnostics("pairing", [this](diagnostic_updater::DiagnosticStatusWrapper& status) { diagnosePairing(&status); });
 }
@@ -80,6 +87,7 @@ void CaptureNode::subscribe() {
     crashed_ = warnings->crashed > 0.5F;
   });
   addTimer(kOverduePeriod, [this] { pairing_->flush(clock().system_ns()); });
+  addTimer(kRestorePeriod, [this] { restoreFieldOfView(); });
 }
 
 core::SimLinkCallbacks CaptureNode::linkCallbacks() {
@@ -143,6 +151,10 @@ void CaptureNode::captureLoop() {
 }
 
 void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change& change) {
+  if (calibrating_) {
+    lookForStep(source, change);
+    return;
+  }
   const core::RateLimiter before = limiter_;
   const bool heard = anybodyListens();
   const bool due = heard && limiter_.due(change.time_ns);
@@ -156,7 +168,10 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     }
   }
   vision::Picture picture;
-  if (source->grab(change, picture) != vision::GrabResult::kNew) {
+  const std::int64_t began_ns = clock().steady_ns();
+  const vision::GrabResult result = source->grab(change, picture);
+  const double took = core::toSeconds(clock().steady_ns() - began_ns);
+  if (result != vision::GrabResult::kNew) {
     limiter_ = before;  // what was drawn was not a new picture: the next one is due still
     return;
   }
@@ -178,6 +193,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     frozen_check_.pictureChanged(picture.grab_time_ns);
     frozen_ = false;
     ++grabbed_;
+    reads_.push_back(took);
     periods_.add(grabbed.display_ns);
     if (grabbed.display_known) {
       const double age = core::toSeconds(grabbed.grab_ns - grabbed.display_ns);
@@ -336,6 +352,11 @@ void CaptureNode::onState(const FlightState::ConstPtr& state) {
 
 void CaptureNode::diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* status) {
   const std::lock_guard<std::mutex> lock(capture_mutex_);
+  double read = 0.0;
+  if (!reads_.empty()) {
+    std::sort(reads_.begin(), reads_.end());
+    read = reads_[reads_.size() / 2];
+  }
   if (!source_problem_.empty()) {
     status->summary(diagnostic_msgs::DiagnosticStatus::ERROR, "no picture: " + source_problem_);
   } else if (frozen_ && crashed_) {
@@ -344,6 +365,8 @@ void CaptureNode::diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* s
     status->summary(diagnostic_msgs::DiagnosticStatus::ERROR, "frozen: the aircraft moves, the picture does not");
   } else if (black_) {
     status->summary(diagnostic_msgs::DiagnosticStatus::WARN, "the picture is black");
+  } else if (read > kSlowRead) {
+    status->summaryf(diagnostic_msgs::DiagnosticStatus::WARN, "reading a picture takes %.1f ms", 1e3 * read);
   } else {
     status->summary(diagnostic_msgs::DiagnosticStatus::OK, anybodyListens() ? "capturing" : "nobody listens");
   }
@@ -360,6 +383,9 @@ void CaptureNode::diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* s
   status->add("Periods counted (-)", periods.count);
   status->add("Change to grab, mean (ms)", grab_ages_ > 0 ? 1e3 * grab_age_sum_ / grab_ages_ : 0.0);
   status->add("Change to grab, longest (ms)", 1e3 * grab_age_max_);
+  status->addf("Reading a picture, median (ms)", "%.2f", 1e3 * read);
+  status->addf("Reading a picture, longest (ms)", "%.2f", reads_.empty() ? 0.0 : 1e3 * reads_.back());
+  reads_.clear();
   grab_age_sum_ = grab_age_max_ = 0.0;
   grab_ages_ = 0;
 }
@@ -391,7 +417,7 @@ void CaptureNode::diagnosePairing(diagnostic_updater::DiagnosticStatusWrapper* s
     status->add("Camera's lever arm moves by (mm)", 1e3 * lever_scatter_);
   }
   status->add("Frames put in for lost datagrams", counters.frames_inferred);
-  status->add("Display delay applied (ms)", 1e3 * common().display_delay);
+  status->add("Display delay applied (ms)", 1e3 * report.display_delay);
   status->add("Display beyond that, mean (ms)", 1e3 * report.mean_offset);
   status->add("Clock uncertainty (ms)", 1e3 * report.clock_uncertainty);
   status->add("State spacing over frame spacing (-)", report.state_to_frame_ratio);

@@ -14,7 +14,6 @@ namespace xplane_bridge {
 namespace {
 
 constexpr double kFieldOfViewTimeout = 2.0;  // [s]
-constexpr const char* kFieldOfViewPurpose = "field_of_view";
 
 geometry_msgs::Transform nominalPose(core::CameraView view, const CaptureOptions& options) {
   const auto& offset = options.camera_offset;
@@ -56,6 +55,10 @@ void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo
   // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
   const std::int64_t receive_ns = receive_clock_.toHostTime(info.stamp_ns, clock().system_ns(), clock().steady_ns());
   if (!view_stream_.add(datagram, receive_ns)) return;
+  if (calibrating_) {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    calibration_.addFrame(view_stream_.receiveTime(), view_stream_.frustum().horizontal_deg);
+  }
   auto pose = pose_check_.add(view_stream_.camera());
   if (pose) pose->pose.orientation = pose->pose.orientation * options_.mount;
   {
@@ -85,6 +88,7 @@ void CaptureNode::onLinkState(const core::LinkStatus& status) {
   pairing_->forgetClock();
   subscribeFrustumShift(status.version);
   if (known && options_.set_field_of_view) changeFieldOfView();
+  if (known) field_of_view_left_ = true;
 }
 
 void CaptureNode::subscribeFrustumShift(core::SimulatorVersion version) {
@@ -135,7 +139,7 @@ void CaptureNode::changeFieldOfView() {
 }
 
 void CaptureNode::undo(const Deadline& deadline) {
-  if (!options_.set_field_of_view || !link().journal()) return;
+  if (!link().journal()) return;
   try {
     for (const core::JournalEntry& entry : link().journal()->own()) {
       if (entry.purpose != kFieldOfViewPurpose) continue;

@@ -26,7 +26,10 @@ FlightState unknownState() {
 }  // namespace
 
 ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish)
-    : display_delay_(display_delay), max_wait_ns_(core::toNanoseconds(max_wait)), publish_(std::move(publish)) {}
+    : display_delay_(display_delay),
+      delay_measured_(display_delay != 0.0),
+      max_wait_ns_(core::toNanoseconds(max_wait)),
+      publish_(std::move(publish)) {}
 
 void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -56,6 +59,12 @@ void ImagePairing::addPose(const core::CheckedPose& pose) {
   if (poses_.size() > kPoses) poses_.pop_front();
 }
 
+void ImagePairing::setDisplayDelay(double delay) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  display_delay_ = delay;
+  delay_measured_ = true;
+}
+
 void ImagePairing::forgetClock() {
   const std::lock_guard<std::mutex> lock(mutex_);
   poses_.clear();
@@ -74,6 +83,7 @@ void ImagePairing::addState(const FlightState::ConstPtr& state, std::int64_t arr
   key.paused = state->paused || state->replay;
   associator_.addState(key);
   states_[key.id] = {state, arrival_ns};
+  state_seen_ = true;
   flushLocked(arrival_ns);
   forgetOldStates();
 }
@@ -106,7 +116,7 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns, st
   waiting.moment.frame_key = frame_key;
   if (!frame_key.has_value()) {
     waiting.answer.display_delay = display_delay_;
-    if (display_delay_ == 0.0) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
+    if (!delay_measured_) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
   }
   if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
   waiting.answer.clock_uncertainty = clock_.fitted() ? clock_.uncertainty() : kNaN;
@@ -114,6 +124,9 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns, st
   waiting.moment.host_time_ns =
       static_cast<std::int64_t>(picture.header.stamp.toNSec()) - core::toNanoseconds(waiting.answer.display_delay);
   waiting.deadline_ns = now_ns + max_wait_ns_;
+  if (grace_until_ns_ == 0) grace_until_ns_ = now_ns + core::toNanoseconds(kFirstPictures);
+  const bool starting = !state_seen_ || (!frame_key.has_value() && !clock_.fitted());
+  if (max_wait_ns_ > 0 && starting) waiting.deadline_ns = std::max(waiting.deadline_ns, grace_until_ns_);
   map(&waiting.moment);
   waiting.slips = clock_.slips();
   waiting_.push_back(std::move(waiting));
@@ -193,6 +206,7 @@ ImagePairing::Report ImagePairing::report() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   Report report;
   report.counters = associator_.counters();
+  report.display_delay = display_delay_;
   report.clock_fitted = clock_.fitted();
   report.clock_uncertainty = clock_.uncertainty();
   report.state_to_frame_ratio = associator_.stateToFrameRatio();

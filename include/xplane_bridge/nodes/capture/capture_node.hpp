@@ -13,6 +13,7 @@
 #include <ros/publisher.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
+#include <std_srvs/Trigger.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <opencv2/core/mat.hpp>
@@ -21,6 +22,7 @@
 #include "xplane_bridge/core/base/rate_limiter.hpp"
 #include "xplane_bridge/core/camera/camera_frustum.hpp"
 #include "xplane_bridge/core/camera/camera_view.hpp"
+#include "xplane_bridge/core/camera/delay_calibration.hpp"
 #include "xplane_bridge/core/camera/pose_check.hpp"
 #include "xplane_bridge/core/camera/view_stream.hpp"
 #include "xplane_bridge/core/state/clock_filter.hpp"
@@ -56,6 +58,8 @@ class CaptureNode : public BaseNode {
   void joinThreads() override;
 
  private:
+  static constexpr const char* kFieldOfViewPurpose = "field_of_view";  ///< of the journal's entry, and its id
+
   /// A picture on its way from the source to the topics.
   struct Grabbed {
     cv::Mat pixels;                                         // empty where the source has JPEG
@@ -96,6 +100,19 @@ class CaptureNode : public BaseNode {
   void onLinkState(const core::LinkStatus& status);
   void onState(const FlightState::ConstPtr& state);
   void changeFieldOfView();
+
+  // Calibration: service's thread, but for lookForStep() (capture) and restoreFieldOfView() (timer).
+  void serveCalibration(std_srvs::TriggerResponse* response);
+  /// @throws std::runtime_error with a sentence for people
+  core::MeasuredDelay calibrate();
+  /// @return why it did not come to its end; empty: it did
+  std::string stepFieldOfView(double own, double other);
+  /// @return whether a new entry was made
+  bool noteFieldOfView(double own);
+  void giveFieldOfViewBack(double own, bool noted);
+  void lookForStep(vision::FrameSource* source, const vision::Change& change);
+  /// What a killed node has left.
+  void restoreFieldOfView();
   void diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* status);
   void diagnosePairing(diagnostic_updater::DiagnosticStatusWrapper* status);
   cv::Mat takeBuffer();
@@ -149,6 +166,11 @@ class CaptureNode : public BaseNode {
   double grab_age_max_ = 0.0;
   std::uint32_t grab_ages_ = 0;
   std::uint32_t dropped_ = 0;
+  std::vector<double> reads_;           // [s] how long reading took, since the last report
+  core::DelayCalibration calibration_;  // while `calibrating_`
+  cv::Mat step_before_;                 // the picture before, small and grey
+  std::atomic<bool> calibrating_{false};
+  std::atomic<bool> field_of_view_left_{false};  // a killed node's may have to be given back
 
   Grabbed last_;  // capture thread only: for repeating a frozen picture
   std::int64_t frozen_sent_ns_ = 0;

@@ -22,10 +22,12 @@ namespace xplane_bridge {
 /// simulator's time axis (core/image_association.hpp). All functions may be called from any thread.
 class ImagePairing {
  public:
+  static constexpr double kFirstPictures = 2.0;  ///< [s] from the first one
   using Publish = std::function<void(const FrameState&)>;
 
   /// @param display_delay [s] from a simulator frame to its display; 0 counts as not measured
-  /// @param max_wait [s] after a picture at which it is paired with what is there
+  /// @param max_wait [s] after a picture at which it is paired with what is there; the first pictures wait up to
+  ///        kFirstPictures as long as there is no state, or no clock, yet
   /// @param publish called under the lock, in order; must not call back
   ImagePairing(double display_delay, double max_wait, Publish publish);
 
@@ -33,6 +35,8 @@ class ImagePairing {
   void addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns);
   /// The camera's pose of a frame, before that frame or after it.
   void addPose(const core::CheckedPose& pose);
+  /// The display delay was measured; pictures that wait keep theirs. @param delay [s]
+  void setDisplayDelay(double delay);
   /// The link is new or gone: the simulator's clock is to be learnt anew.
   void forgetClock();
   /// @param arrival_ns [ns] host time
@@ -48,6 +52,7 @@ class ImagePairing {
   struct Report {
     core::AssociationCounters counters;
     double clock_uncertainty = 0.0;  ///< [s]
+    double display_delay = 0.0;      ///< [s] applied
     bool clock_fitted = false;
     double state_to_frame_ratio = 0.0;
     double mean_offset = 0.0;  ///< [s] of the last answers: display minus frame, beyond the display delay
@@ -75,7 +80,8 @@ class ImagePairing {
   void completePose(const core::Association& association, Waiting* picture) const;
   void forgetOldStates();
 
-  const double display_delay_;
+  double display_delay_;
+  bool delay_measured_;
   const std::int64_t max_wait_ns_;
   const Publish publish_;
 
@@ -88,6 +94,8 @@ class ImagePairing {
   std::uint64_t next_state_id_ = 0;
   std::deque<core::CheckedPose> poses_;
   std::deque<Waiting> waiting_;
+  std::int64_t grace_until_ns_ = 0;  // 0: no picture yet
+  bool state_seen_ = false;
   std::uint32_t unpaired_ = 0;
   double mean_offset_ = 0.0;
 };

@@ -174,6 +174,57 @@ TEST(ImagePairing, StuttersDoNotShiftThePairing) {
   }
 }
 
+/// At the start pictures come before the states and the clock do; they wait for both, and are right.
+TEST(ImagePairing, TheFirstPicturesWaitForTheirStates) {
+  std::map<std::uint32_t, FrameState> answers;
+  ImagePairing pairing(kDelay, 0.2, [&answers](const FrameState& answer) { answers[answer.image_count] = answer; });
+  std::vector<FlightState::ConstPtr> states;
+  const double late = 1.5;  // [s] the states' connection
+  for (std::uint32_t k = 0; k < 300; ++k) {
+    const double t = k / kFps;
+    core::SimStatus status;
+    status.sim_time = static_cast<float>(kSimStart + t);
+    pairing.addFrame(status, static_cast<float>(1.0 / kFps), kStart + ns(t));
+    const auto state = boost::make_shared<FlightState>();
+    state->sim_time = status.sim_time;
+    state->header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(t)));
+    states.push_back(state);
+    if (t >= late) {
+      for (const FlightState::ConstPtr& waiting : states) pairing.addState(waiting, kStart + ns(t));
+      states.clear();
+    }
+    if (k < 3) continue;
+    FrameState picture;
+    picture.image_count = k - 3;
+    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(t)));
+    pairing.addPicture(picture, kStart + ns(t));
+    ASSERT_TRUE(t >= late || answers.empty()) << "at " << t << " s";
+  }
+  ASSERT_GT(answers.size(), 250U);
+  for (const auto& [k, answer] : answers) {
+    if (k < 30) continue;  // the clock is being learnt
+    ASSERT_EQ(answer.quality & FrameState::QUALITY_STATE_MISSING, 0U) << "frame " << k;
+    ASSERT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + k / kFps)) << "frame " << k;
+  }
+}
+
+/// Where no state ever comes they go out without one, two seconds after the first at the latest.
+TEST(ImagePairing, TheFirstPicturesDoNotWaitForEver) {
+  int answered = 0;
+  ImagePairing pairing(kDelay, 0.2, [&answered](const FrameState& answer) {
+    ++answered;
+    EXPECT_NE(answer.quality & FrameState::QUALITY_STATE_MISSING, 0U);
+  });
+  for (int k = 0; k < 10; ++k) pairing.addPicture(FrameState(), kStart + ns(0.1 * k));
+  pairing.flush(kStart + ns(1.99));
+  EXPECT_EQ(answered, 0);
+  pairing.flush(kStart + ns(2.0));
+  EXPECT_EQ(answered, 10);
+  pairing.addPicture(FrameState(), kStart + ns(3.0));
+  pairing.flush(kStart + ns(3.2));
+  EXPECT_EQ(answered, 11);
+}
+
 /// A sender's pictures name their frames: no frame was ever heard here, and the stamps are nonsense.
 TEST(ImagePairing, AKeyNeedsNoClock) {
   std::map<std::uint32_t, FrameState> answers;

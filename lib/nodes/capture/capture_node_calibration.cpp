@@ -1,0 +1,181 @@
+/// CaptureNode measures the delay of the display, on request: steps of X-Plane's field of view, seen in the pictures.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <stdexcept>
+
+#include <ros/master.h>
+#include <ros/this_node.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "xplane_bridge/nodes/capture/capture_node.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+// [s]
+constexpr double kSettle = 0.7;
+constexpr double kShortestStep = 0.15;
+constexpr double kLongestStep = 0.3;
+constexpr double kUndoTimeout = 2.0;
+
+/// Of a node that records one of these topics, its name; empty: none does.
+std::string recorderOf(const std::vector<std::string>& topics) {
+  XmlRpc::XmlRpcValue request, response, state;
+  request[0] = ros::this_node::getName();
+  if (!ros::master::execute("getSystemState", request, response, state, false)) return "";
+  XmlRpc::XmlRpcValue& subscribers = state[1];
+  for (int i = 0; i < subscribers.size(); ++i) {
+    const std::string topic = subscribers[i][0];
+    if (std::find(topics.begin(), topics.end(), topic) == topics.end()) continue;
+    XmlRpc::XmlRpcValue& nodes = subscribers[i][1];
+    for (int k = 0; k < nodes.size(); ++k) {
+      const std::string node = nodes[k];
+      // rosbag record's own name, alone and in record.launch, begins so.
+      if (node.compare(node.rfind('/') + 1, 6, "record") == 0 && node.find("record_watch") == std::string::npos) {
+        return node;
+      }
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+void CaptureNode::serveCalibration(std_srvs::TriggerResponse* response) {
+  try {
+    const core::MeasuredDelay found = calibrate();
+    pairing_->setDisplayDelay(found.delay);
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "%.4f s, from %d steps that lie %.1f ms from it; in use until the node ends, display_delay:=%.4f keeps "
+        "it",
+        found.delay, found.steps, 1e3 * found.spread, found.delay);
+    response->success = 1;
+    response->message = text;
+    ROS_INFO("display delay measured: %s", text);
+  } catch (const std::exception& error) {
+    response->success = 0;
+    response->message = error.what();
+    ROS_WARN("display delay not measured: %s", error.what());
+  }
+}
+
+core::MeasuredDelay CaptureNode::calibrate() {
+  if (options_.source != CaptureOptions::Source::kX11) {
+    throw std::runtime_error(
+        "the pictures come from no window of this computer: expected source x11 (xplane_eye "
+        "measures its delay itself; estimate_latency measures it of a video)");
+  }
+  if (options_.own_field_of_view) {
+    throw std::runtime_error(
+        "this window has a field of view of its own, which does not follow X-Plane's: measure it "
+        "with estimate_latency, or set own_field_of_view to false");
+  }
+  const std::string recorder = recorderOf({image_publisher_.getTopic(), jpeg_publisher_.getTopic(),
+                                           info_publisher_.getTopic(), frame_state_publisher_.getTopic()});
+  if (!recorder.empty()) {
+    throw std::runtime_error(recorder +
+                             " records the pictures, and the field of view would change in them: call it "
+                             "before or after a recording");
+  }
+  double own = std::numeric_limits<double>::quiet_NaN();
+  {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    if (camera_known_) own = frustum_.horizontal_deg;
+  }
+  if (!std::isfinite(own))
+    throw std::runtime_error("X-Plane does not say its field of view: is it heard (link_state)?");
+  {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    if (!source_problem_.empty()) throw std::runtime_error("no picture: " + source_problem_);
+    calibration_ = core::DelayCalibration();
+    step_before_.release();
+    calibrating_ = true;
+  }
+  const bool higher = own + core::DelayCalibration::kStepDeg <= core::DelayCalibration::kWidestDeg;
+  const double other = own + (higher ? 1.0 : -1.0) * core::DelayCalibration::kStepDeg;
+  std::string why;
+  try {
+    const bool noted = noteFieldOfView(own);
+    why = stepFieldOfView(own, other);
+    giveFieldOfViewBack(own, noted);
+  } catch (...) {
+    calibrating_ = false;
+    throw;
+  }
+  const std::lock_guard<std::mutex> lock(capture_mutex_);
+  calibrating_ = false;
+  if (!why.empty()) throw std::runtime_error(why);
+  const auto found = calibration_.settle(&why);
+  if (!found.has_value()) throw std::runtime_error(why);
+  return *found;
+}
+
+std::string CaptureNode::stepFieldOfView(double own, double other) {
+  const std::string& path = view_stream_.fieldOfViewDataref();
+  std::mt19937 random{std::random_device{}()};
+  std::uniform_real_distribution<double> pause(kShortestStep, kLongestStep);
+  const auto wait = [this](double seconds) { return !link().waitUntil([this] { return stopping(); }, seconds); };
+  if (!wait(kSettle)) return "the node is stopping";
+  for (int step = 0; step < core::DelayCalibration::kSteps; ++step) {
+    link().write(path, static_cast<float>(step % 2 == 0 ? other : own));
+    if (!wait(pause(random))) return "the node is stopping";
+  }
+  return wait(kSettle) ? "" : "the node is stopping";
+}
+
+bool CaptureNode::noteFieldOfView(double own) {
+  for (const core::JournalEntry& entry : link().journal()->own()) {
+    if (entry.purpose == kFieldOfViewPurpose) return false;  // the user's own is noted already
+  }
+  const core::UndoDref undo{view_stream_.fieldOfViewDataref(), static_cast<float>(own)};
+  link().journal()->record(kFieldOfViewPurpose, kFieldOfViewPurpose, {undo});
+  return true;
+}
+
+void CaptureNode::giveFieldOfViewBack(double own, bool noted) {
+  const core::UndoDref undo{view_stream_.fieldOfViewDataref(), static_cast<float>(own)};
+  if (!link().undo({undo}, kUndoTimeout)) {
+    throw std::runtime_error("X-Plane does not take its field of view of " + std::to_string(own) +
+                             " deg back; it stays noted for the node's end and the next start");
+  }
+  if (noted) link().journal()->remove({kFieldOfViewPurpose});
+}
+
+void CaptureNode::lookForStep(vision::FrameSource* source, const vision::Change& change) {
+  vision::Picture picture;
+  if (source->grab(change, picture) != vision::GrabResult::kNew || picture.bgr.empty()) return;
+  cv::Mat small, grey, difference;
+  cv::resize(picture.bgr, small, {80, 56}, 0.0, 0.0, cv::INTER_AREA);
+  cv::extractChannel(small, grey, 1);
+  const std::lock_guard<std::mutex> lock(capture_mutex_);
+  frozen_check_.pictureChanged(picture.grab_time_ns);
+  ++skipped_;
+  if (!step_before_.empty() && picture.display_time_known) {
+    cv::absdiff(grey, step_before_, difference);
+    calibration_.addPicture(picture.display_time_ns, cv::mean(difference)[0]);
+  }
+  step_before_ = grey;
+}
+
+void CaptureNode::restoreFieldOfView() {
+  if (!field_of_view_left_.exchange(false) || options_.set_field_of_view || !link().journal()) return;
+  try {
+    const std::vector<core::JournalEntry> left = link().journal()->orphans(kFieldOfViewPurpose);
+    std::vector<core::JournalEntry> undone;
+    for (const core::JournalEntry& entry : left) {
+      if (link().undo(entry.undo, kUndoTimeout)) undone.push_back(entry);
+    }
+    if (!undone.empty()) ROS_INFO("X-Plane's field of view, which a killed node had left changed, is given back");
+    link().journal()->removeUndone(undone);
+  } catch (const core::JournalError& error) {
+    ROS_ERROR("what a killed node has left of X-Plane's field of view is not known: %s", error.what());
+  }
+}
+
+}  // namespace xplane_bridge
