@@ -8,12 +8,13 @@ namespace {
 // X-Plane binds this port itself for sending; a client on the same machine must not listen on it.
 constexpr int kXPlaneSendingPort = 49001;
 
-std::string frameName(const ParamLoader& shared, const std::string& key, const std::string& fallback) {
+std::string frameName(const ParamLoader& shared, const std::string& prefix, const std::string& key,
+                      const std::string& fallback) {
   const std::string frame = shared.text(key, fallback);
   if (frame.empty() || frame.front() == '/') {
     shared.refuse(key, "a text: a frame name, not empty and without a leading slash");
   }
-  return frame;
+  return prefix + frame;
 }
 
 LockstepOptions loadLockstep(const ParamLoader& shared, const CommonOptions& common) {
@@ -52,10 +53,15 @@ CommonOptions loadCommonOptions(const ParamLoader& shared) {
   if (options.aircraft.empty()) {
     shared.refuse("aircraft", "a text: the stem of a file in config/aircraft, such as fixed_wing");
   }
-  options.frames.map = frameName(shared, "map_frame", options.frames.map);
-  options.frames.map_ned = frameName(shared, "map_ned_frame", options.frames.map_ned);
-  options.frames.base_link = frameName(shared, "base_link_frame", options.frames.base_link);
-  options.frames.base_link_frd = frameName(shared, "base_link_frd_frame", options.frames.base_link_frd);
+  FrameNames& frames = options.frames;
+  frames.prefix = shared.text("frame_prefix", "");
+  if (!frames.prefix.empty() && frames.prefix.front() == '/') {
+    shared.refuse("frame_prefix", "a text without a leading slash, such as first/");
+  }
+  frames.map = frameName(shared, frames.prefix, "map_frame", frames.map);
+  frames.map_ned = frameName(shared, frames.prefix, "map_ned_frame", frames.map_ned);
+  frames.base_link = frameName(shared, frames.prefix, "base_link_frame", frames.base_link);
+  frames.base_link_frd = frameName(shared, frames.prefix, "base_link_frd_frame", frames.base_link_frd);
   options.display_delay = shared.number("display_delay", {0.0, 1.0}, options.display_delay);
   options.stale_after = shared.number("stale_after", {0.1, 60.0}, options.stale_after);
   options.lost_after = shared.number("lost_after", {options.stale_after, 3600.0}, options.lost_after);

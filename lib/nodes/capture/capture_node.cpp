@@ -50,6 +50,7 @@ CaptureNode::~CaptureNode() = default;
 
 void CaptureNode::loadParameters(const ParamLoader& own) {
   options_ = loadCaptureOptions(own);
+  options_.prefixFrames(common().frames.prefix);
   if (lockstep() || stampsBySimulator()) {
     throw ParamError(
         "capture_node pairs pictures by the host's time: expected neither publish_clock nor "

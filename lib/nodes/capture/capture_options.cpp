@@ -131,6 +131,11 @@ CaptureOptions loadCaptureOptions(const ParamLoader& own) {
   return options;
 }
 
+void CaptureOptions::prefixFrames(const std::string& prefix) {
+  for (std::string& frame : frame_ids) frame.insert(0, prefix);
+  measured_frame.insert(0, prefix);
+}
+
 std::unique_ptr<vision::FrameSource> makeSource(const CaptureOptions& options, vision::Clock clock) {
   switch (options.source) {
     case CaptureOptions::Source::kVideo:

@@ -12,6 +12,7 @@ namespace xplane_bridge {
 
 /// Names of the coordinate frames (`frame_id`) that several nodes use.
 struct FrameNames {
+  std::string prefix;                           ///< stands before the names, of those below already
   std::string map = "map";                      ///< local map, ENU, on X-Plane's sphere
   std::string map_ned = "map_ned";              ///< the same origin, NED
   std::string base_link = "base_link";          ///< the aircraft, FLU

@@ -48,6 +48,9 @@ struct CaptureOptions {
 
   double max_wait = 0.2;      ///< [s] longest wait for a picture's state
   double frozen_after = 1.0;  ///< [s] standing picture with a moving state
+
+  /// Puts the shared `frame_prefix` before the cameras' frames.
+  void prefixFrames(const std::string& prefix);
 };
 
 /// @throws ParamError

@@ -124,6 +124,17 @@ TEST(CommonOptions, defaultsAreTheDocumentedOnes) {
   EXPECT_EQ(options.frames.base_link_frd, "base_link_frd");
 }
 
+TEST(CommonOptions, PrefixStandsBeforeAllFrames) {
+  XmlRpcValue tree;
+  tree["frame_prefix"] = "first/";
+  tree["map_frame"] = "world";
+  const FrameNames frames = loadCommonOptions(ParamLoader("/first", tree)).frames;
+  EXPECT_EQ(frames.map, "first/world");
+  EXPECT_EQ(frames.map_ned, "first/map_ned");
+  EXPECT_EQ(frames.base_link, "first/base_link");
+  EXPECT_EQ(frames.base_link_frd, "first/base_link_frd");
+}
+
 TEST(CommonOptions, refusesWhatCannotWork) {
   const auto load = [](const char* key, const XmlRpcValue& value) {
     XmlRpcValue tree;
@@ -134,6 +145,7 @@ TEST(CommonOptions, refusesWhatCannotWork) {
   EXPECT_TRUE(contains(load("port", 0), "from 1 to 65535"));
   EXPECT_TRUE(contains(load("transport", "udp"), "one of: rref, data"));
   EXPECT_TRUE(contains(load("map_frame", "/map"), "leading slash"));
+  EXPECT_TRUE(contains(load("frame_prefix", "/first"), "without a leading slash"));
   EXPECT_TRUE(contains(load("hots", "192.168.1.2"), "did you mean host?"));
   EXPECT_EQ(load("somebody_elses_parameter", 3), "");
 }
