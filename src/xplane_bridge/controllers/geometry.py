@@ -67,18 +67,19 @@ class Field:
         """Where the aircraft is."""
         north = math.radians(state.latitude - self._latitude) * EARTH_RADIUS_M
         east = math.radians(math.remainder(state.longitude - self._longitude, 360.0)) * EARTH_RADIUS_M * self._scale
-        return self._turned(north, east)
+        return self.seen(north, east)
 
     def velocity(self, state: Any) -> Place:
         """Over the ground [m/s]."""
-        return self._turned(state.velocity_ned.x, state.velocity_ned.y)
+        return self.seen(state.velocity_ned.x, state.velocity_ned.y)
 
     def north_east(self, place: Place) -> Tuple[float, float]:
         """A direction in these axes, to the north and to the east."""
         sine, cosine = self._axes()
         return place.ahead * cosine - place.right * sine, place.ahead * sine + place.right * cosine
 
-    def _turned(self, north: float, east: float) -> Place:
+    def seen(self, north: float, east: float) -> Place:
+        """A direction to the north and east, in these axes."""
         sine, cosine = self._axes()
         return Place(north * cosine + east * sine, east * cosine - north * sine)
 

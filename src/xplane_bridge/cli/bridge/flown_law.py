@@ -19,7 +19,7 @@ class Law(Protocol):
     """What flies: the same as in campaigns (docs/campaigns.md)."""
 
     def fly(self, state: Any) -> Mapping[str, float]:
-        """Fields of ControlCommand for a FlightState."""
+        """Fields of ControlCommand for a FlightState; empty: none for now."""
 
 
 class EngageError(XplaneBridgeError):
@@ -134,9 +134,12 @@ class FlownLaw:
         restart = getattr(self._law, "restart", None)
         if self._mode != FlightMode.AUTO and restart is not None:
             restart()
+        values = self._law.fly(state)
+        if not values:
+            return None
         command = ControlCommand(sequence=state.frame_count)
         command.header.stamp = state.header.stamp
-        for name, value in self._law.fly(state).items():
+        for name, value in values.items():
             command.fields |= COMMAND_FIELDS[name].bit.value
             setattr(command, name, value)
         if not self._began:
