@@ -22,8 +22,8 @@ _PLAYED = {
     "control/surfaces": "SurfaceCommand",
     "control/mode": "ControlMode",
 }
-_PLACED_S = 60.0
-_NEAR_M = 100.0
+PLACED_S = 60.0  #: a flight may take so long to load
+NEAR_M = 100.0  #: [m] within which an aircraft is where it was placed
 _EARTH_RADIUS_M = 6378145.0
 
 
@@ -61,7 +61,7 @@ def read_commands(bag: Path) -> Commands:
             raise ReplayError(f"{bag}: no flight state in it, by whose simulated time commands are played")
         namespace = topic[: -len("/flight_state")]
         state = bags.read(topic)
-        elapsed = _elapsed(state)
+        elapsed = elapsed_of(state)
         there = [f"{namespace}/{name}" for name in _PLAYED if f"{namespace}/{name}" in bags.topics]
         messages = []
         for recorded, time_ns, raw in bags.recorded(there) if there else ():
@@ -69,11 +69,16 @@ def read_commands(bag: Path) -> Commands:
             messages.append(Played(time, recorded.topic[len(namespace) + 1 :], raw, recorded.md5sum))
     if not any(message.topic != "control/mode" for message in messages):
         raise ReplayError(f"{bag}: no command in it: {', '.join(_PLAYED)} were not recorded, or nobody commanded")
-    start = {name: column[0] for name, column in state.columns.items() if column.ndim == 1}
-    return Commands(messages, start, float(elapsed[-1]))
+    return Commands(messages, first_of(state), float(elapsed[-1]))
 
 
-def _elapsed(state: Table) -> np.ndarray:
+def first_of(state: Table) -> Any:
+    """Fields of the first flight state, by name."""
+    return {name: column[0] for name, column in state.columns.items() if column.ndim == 1}
+
+
+def elapsed_of(state: Table) -> np.ndarray:
+    """Simulated time [s] since the first flight state, which stands where it jumps."""
     steps = np.diff(state["sim_time_unwrapped"])
     steps = np.where((np.diff(state["epoch"]) == 0) & (steps > 0.0), steps, 0.0)
     return np.concatenate(([0.0], np.cumsum(steps)))
@@ -87,7 +92,7 @@ def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None
     """
     rospy = start_node(_NODE, anonymous=True)
     from xplane_bridge import msg
-    from xplane_bridge.srv import ResetFlight, SetMode
+    from xplane_bridge.srv import SetMode
 
     if lockstep.is_on(namespace):
         raise ReplayError(f"{namespace} is in lock-step, where commands answer frames: rerun_flight without --commands")
@@ -104,7 +109,33 @@ def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None
     wait_for_service(f"{namespace}/tx_node/reset_flight", _NODE)
     set_mode = rospy.ServiceProxy(f"{namespace}/tx_node/set_mode", SetMode)
     player = _Player(commands, publishers, types, set_mode)
-    start = commands.start
+    place(commands.start, namespace)
+    states = rospy.Subscriber(f"{namespace}/flight_state", msg.FlightState, player.on_state, tcp_nodelay=True)
+    try:
+        if not player.placed.wait(PLACED_S):
+            raise ReplayError(f"the aircraft is not where the recording begins {PLACED_S:g} s after reset_flight")
+        say(f"playing {len(commands.messages)} messages, {commands.duration:.1f} s")
+        while not player.over.wait(0.1):
+            player.change_mode()
+            if rospy.is_shutdown():
+                raise ReplayError("ended by ROS")
+    finally:
+        states.unregister()
+        if not rospy.is_shutdown():
+            set_mode(mode=SetMode._request_class.MANUAL)
+    say("played")
+
+
+def place(start: Any, namespace: str) -> None:
+    """Asks for the aircraft to be placed as a flight state says; does not wait for it.
+
+    Raises:
+        ReplayError: It is refused.
+    """
+    import rospy
+
+    from xplane_bridge.srv import ResetFlight
+
     answer = rospy.ServiceProxy(f"{namespace}/tx_node/reset_flight", ResetFlight)(
         latitude=start["latitude"],
         longitude=start["longitude"],
@@ -117,20 +148,13 @@ def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None
     )
     if not answer.success:
         raise ReplayError(f"the aircraft is not placed: {answer.result.message}")
-    states = rospy.Subscriber(f"{namespace}/flight_state", msg.FlightState, player.on_state, tcp_nodelay=True)
-    try:
-        if not player.placed.wait(_PLACED_S):
-            raise ReplayError(f"the aircraft is not where the recording begins {_PLACED_S:g} s after reset_flight")
-        say(f"playing {len(commands.messages)} messages, {commands.duration:.1f} s")
-        while not player.over.wait(0.1):
-            player.change_mode()
-            if rospy.is_shutdown():
-                raise ReplayError("ended by ROS")
-    finally:
-        states.unregister()
-        if not rospy.is_shutdown():
-            set_mode(mode=SetMode._request_class.MANUAL)
-    say("played")
+
+
+def far(state: Any, start: Any) -> float:
+    """[m] from a flight state to where another one (fields by name) was."""
+    north = np.radians(state.latitude - start["latitude"])
+    east = np.radians(state.longitude - start["longitude"]) * np.cos(np.radians(start["latitude"]))
+    return float(np.hypot(np.hypot(north, east) * _EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))
 
 
 class _Player:
@@ -149,7 +173,7 @@ class _Player:
         if self.over.is_set():
             return
         if not self.placed.is_set():
-            if self._distance(state) > _NEAR_M:
+            if far(state, self._commands.start) > NEAR_M:
                 return
             self._begin, self._epoch = state.sim_time_unwrapped, state.epoch
             self.placed.set()
@@ -173,9 +197,3 @@ class _Player:
         if self._wanted != self._mode:
             self._mode = self._wanted
             self._set_mode(mode=self._mode)
-
-    def _distance(self, state: Any) -> float:
-        start = self._commands.start
-        north = np.radians(state.latitude - start["latitude"])
-        east = np.radians(state.longitude - start["longitude"]) * np.cos(np.radians(start["latitude"]))
-        return float(np.hypot(np.hypot(north, east) * _EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))

@@ -11,6 +11,7 @@ from xplane_bridge.bags.passport import Passport, read_passports
 from xplane_bridge.cli import run_scenario
 from xplane_bridge.cli.entry import guarded, ros_arguments
 from xplane_bridge.cli.flights.recorded_commands import play, read_commands
+from xplane_bridge.cli.flights.recorded_poses import play_poses, read_poses
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.topics import NAMESPACE
 
@@ -27,15 +28,21 @@ def parser() -> argparse.ArgumentParser:
         prog="rerun_flight",
         description=(
             "Flies a flight of run_scenario again as its passport says (docs/experiments.md): scenario, aircraft, "
-            "seed, options. Exit code as run_scenario's. With --commands: plays what was recorded."
+            "seed, options. Exit code as run_scenario's. With --commands or --pose: plays what was recorded."
         ),
     )
     p.add_argument("bag", metavar="BAG", type=Path, help="the recording")
     p.add_argument("--output", type=Path, metavar="DIR", help="where to write (default: rerun_<scenario>)")
-    p.add_argument(
+    played = p.add_mutually_exclusive_group()
+    played.add_argument(
         "--commands",
         action="store_true",
         help="place the aircraft as the recording begins, and play its modes and commands through a running bridge",
+    )
+    played.add_argument(
+        "--pose",
+        action="store_true",
+        help="move the aircraft of a running bridge along the recorded poses; its flight model stands still meanwhile",
     )
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of that bridge (%(default)s)")
     return p
@@ -45,10 +52,14 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
     args = parser().parse_args(ros_arguments(argv))
+    namespace = args.namespace.rstrip("/")
+    if (args.commands or args.pose) and args.output is not None:
+        raise RerunError(f"--output {args.output}: not with --commands or --pose, which play into a running bridge")
     if args.commands:
-        if args.output is not None:
-            raise RerunError(f"--output {args.output}: not with --commands, which flies through a bridge that runs")
-        play(read_commands(args.bag), args.namespace.rstrip("/"), lambda text: print(text, flush=True))
+        play(read_commands(args.bag), namespace, _say)
+        return 0
+    if args.pose:
+        play_poses(read_poses(args.bag), namespace, _say)
         return 0
     passport = passport_of(args.bag)
     flight = passport.flight
@@ -71,6 +82,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         for line in changes(passport, passport_of(output / _BAG)):
             print(f"made otherwise: {line}")
     return status
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
 
 
 def passport_of(bag: Path) -> Passport:

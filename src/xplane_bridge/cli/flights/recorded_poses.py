@@ -1,0 +1,152 @@
+"""Plays the poses of a recording into the simulator of a running bridge, whose flight model stands still meanwhile."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any, Callable, Dict, List, NamedTuple
+
+import numpy as np
+
+from xplane_bridge import lockstep
+from xplane_bridge.bags import Bags
+from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
+from xplane_bridge.cli.entry import start_node
+from xplane_bridge.cli.flights.recorded_commands import NEAR_M, PLACED_S, ReplayError, elapsed_of, far, first_of, place
+from xplane_bridge.harness.pose_sender import PATH_OVERRIDE, SCENERY, PoseSender, Scenery
+
+_NODE = "rerun_flight"
+_COLUMNS = ("latitude", "longitude", "altitude_msl", *(f"orientation.{axis}" for axis in "xyzw"))
+_VELOCITY = tuple(f"velocity_ned.{axis}" for axis in "xyz")
+_LINK_S = 30.0
+_GIVEN_BACK_S = 10.0
+_LOST_M = 10000.0  # further from where it was put, local coordinates mean another place
+
+
+class Poses(NamedTuple):
+    """Where the aircraft was."""
+
+    time: np.ndarray  #: [s] of simulated time since the first
+    columns: Dict[str, np.ndarray]
+    start: Any  #: fields of the first flight state, by name
+
+    def at(self, time: float) -> Dict[str, float]:
+        """The pose at a time, linear between two; the first or last one outside."""
+        k = int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2))
+        span = self.time[k + 1] - self.time[k]
+        share = float(np.clip((time - self.time[k]) / span, 0.0, 1.0)) if span > 0.0 else 0.0
+        ends = [np.array([column[i] for column in self.columns.values()], dtype=float) for i in (k, k + 1)]
+        names = list(self.columns)
+        turn = slice(names.index("orientation.x"), names.index("orientation.w") + 1)
+        if ends[0][turn] @ ends[1][turn] < 0.0:  # both signs are the same attitude
+            ends[1][turn] *= -1.0
+        pose = ends[0] + share * (ends[1] - ends[0])
+        pose[turn] /= np.linalg.norm(pose[turn])
+        return dict(zip(names, map(float, pose)))
+
+
+def read_poses(bag: Path) -> Poses:
+    """Reads where the aircraft was.
+
+    Raises:
+        BagError: The bag cannot be read.
+        ReplayError: There are no two valid poses in it.
+    """
+    with Bags(bag) as bags:
+        topic = bags.topic_of_type("xplane_bridge/FlightState")
+        state = bags.read(topic) if topic is not None and bags.topics[topic].count else None
+    if state is not None:
+        elapsed = elapsed_of(state)
+        columns = {name: np.asarray(state[name], dtype=float) for name in _COLUMNS + _VELOCITY}
+        good = np.all([np.isfinite(column) for column in columns.values()], axis=0)
+        if good.sum() >= 2:
+            return Poses(elapsed[good], {name: column[good] for name, column in columns.items()}, first_of(state))
+    raise ReplayError(f"{bag}: no two flight states with a valid pose in it")
+
+
+def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None:
+    """Plays them, and gives the flight model back: also tx_node does, on its exit, however it ends.
+
+    Raises:
+        ReplayError: The bridge refuses, or does not know its simulator.
+    """
+    rospy = start_node(_NODE, anonymous=True)
+    from xplane_bridge.msg import FlightState, LinkState
+    from xplane_bridge.srv import GetDataref, SetDataref
+
+    if lockstep.is_on(namespace):
+        raise ReplayError(f"{namespace} is in lock-step, where nobody writes beside tx_node; --pose needs real time")
+    wait_for_state(namespace, _NODE)
+    for service in ("tx_node/set_dataref", "tx_node/reset_flight", "get_dataref"):
+        wait_for_service(f"{namespace}/{service}", _NODE)
+    read = rospy.ServiceProxy(f"{namespace}/get_dataref", GetDataref)
+    # By the simulator's own way first: it loads the scenery there, which moves the origin of its coordinates.
+    place(poses.start, namespace)
+    _wait_until_near(poses.start, namespace)
+    answers = [read(name=name, timeout=0.0) for name in SCENERY]
+    for name, answer in zip(SCENERY, answers):
+        if not answer.success:
+            raise ReplayError(f"{name}: {answer.result.message}")
+    try:
+        link = rospy.wait_for_message(f"{namespace}/link_state", LinkState, _LINK_S)
+    except rospy.ROSException as err:
+        raise ReplayError(f"{namespace}/link_state: {err}") from None
+    write = rospy.ServiceProxy(f"{namespace}/tx_node/set_dataref", SetDataref)
+    taken = write(name=PATH_OVERRIDE, values=[1.0])
+    if not taken.success:
+        raise ReplayError(f"{PATH_OVERRIDE}: {taken.result.message}")
+    sender = PoseSender(link.host, link.port, Scenery(*(answer.values[0] for answer in answers)))
+    over = threading.Event()
+    begin: List[float] = []
+    sent: List[Dict[str, float]] = []
+    lost: List[Dict[str, float]] = []
+
+    def on_state(state: Any) -> None:
+        if not begin:
+            begin.append(state.sim_time_unwrapped)
+        time = state.sim_time_unwrapped - begin[0]
+        if sent and far(state, sent[-1]) > _LOST_M:
+            lost.append(sent[-1])
+        if lost or time > poses.time[-1]:
+            over.set()
+            return
+        sent[:] = [poses.at(time)]
+        sender.send(sent[-1])
+
+    states = rospy.Subscriber(f"{namespace}/flight_state", FlightState, on_state, queue_size=1, tcp_nodelay=True)
+    say(f"playing {len(poses.time)} poses, {poses.time[-1]:.1f} s")
+    try:
+        while not over.wait(0.1):
+            if rospy.is_shutdown():
+                raise ReplayError("ended by ROS; tx_node gives the flight model back when it ends")
+    finally:
+        states.unregister()
+        sender.close()
+        if not rospy.is_shutdown():
+            write(name=PATH_OVERRIDE, values=[0.0])
+            shown = read(name=PATH_OVERRIDE, timeout=_GIVEN_BACK_S)  # X-Plane may be slow to show it
+            if not shown.success or shown.values[0] != 0.0:
+                raise ReplayError(f"{PATH_OVERRIDE} is not shown as given back: scripts/release_overrides does it")
+            say("the flight model flies again")
+    if lost:
+        raise ReplayError("the aircraft is not shown where it was put: the simulator has moved its scenery's origin")
+    say("played")
+
+
+def _wait_until_near(start: Any, namespace: str) -> None:
+    import rospy
+
+    from xplane_bridge.msg import FlightState
+
+    there = threading.Event()
+
+    def look(state: Any) -> None:
+        if far(state, start) < NEAR_M:
+            there.set()
+
+    states = rospy.Subscriber(f"{namespace}/flight_state", FlightState, look, queue_size=1, tcp_nodelay=True)
+    try:
+        if not there.wait(PLACED_S):
+            raise ReplayError(f"the aircraft is not where the recording begins {PLACED_S:g} s after reset_flight")
+    finally:
+        states.unregister()
