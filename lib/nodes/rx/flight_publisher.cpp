@@ -86,7 +86,7 @@ void FlightPublisher::publish(const core::FlightState& state, const core::Tangen
   publishIfHeard(imu_publisher_, unheard, &imu_message_,
                  [&](sensor_msgs::Imu* message) { return toImu(state, frames_, message); });
   publishIfHeard(fix_publisher_, unheard, &fix_message_, [&](sensor_msgs::NavSatFix* message) {
-    return toNavSatFix(state, options_.geoid_undulation, frames_, message);
+    return toNavSatFix(state, options_.geoid.undulation(state.latitude, state.longitude), frames_, message);
   });
   if (wind_limiter_.due(state.stamp_ns)) {
     publishIfHeard(wind_publisher_, unheard, &wind_message_, [&](geometry_msgs::TwistWithCovarianceStamped* message) {
@@ -101,7 +101,9 @@ void FlightPublisher::publish(const core::FlightState& state, const core::Tangen
 void FlightPublisher::publishOrigin(const core::TangentFrame& map, std::uint32_t position_epoch,
                                     std::int64_t stamp_ns) {
   sensor_msgs::NavSatFix message;
-  toOrigin(map.origin(), stamp_ns, options_.geoid_undulation, frames_, &message);
+  const core::GeoPoint& origin = map.origin();
+  const double undulation = options_.geoid.undulation(origin.latitude_deg, origin.longitude_deg);
+  toOrigin(origin, stamp_ns, undulation, frames_, &message);
   origin_publisher_.publish(message);
   published_position_epoch_ = position_epoch;
 }

@@ -33,6 +33,19 @@ std::optional<core::GeoPoint> loadOrigin(const ParamLoader& own) {
                         origin.number("altitude_msl", {-1000.0, 100000.0})};
 }
 
+Geoid loadGeoid(const ParamLoader& own) {
+  const double undulation = own.number("geoid_undulation", {-200.0, 200.0}, 0.0);
+  const std::string name = own.text("geoid", "none"), folder = own.text("geoid_folder", "");
+  if (name.empty()) own.refuse("geoid", "none, or a model of GeographicLib such as egm96-5");
+  if (name == "none") return Geoid(undulation);
+  if (undulation != 0.0) own.refuse("geoid_undulation", "0 with geoid " + name + ", which knows it");
+  try {
+    return Geoid::named(name, folder);
+  } catch (const std::runtime_error& error) {
+    throw ParamError("parameter " + own.fullKey("geoid") + " is " + name + ": " + error.what());
+  }
+}
+
 std::vector<DatarefEntry> loadDatarefs(const ParamLoader& own) {
   std::vector<DatarefEntry> entries;
   std::set<std::string> topics;
@@ -82,7 +95,7 @@ RxOptions loadRxOptions(const ParamLoader& own) {
   options.position_source = positionMode(own);
   options.xpc_port = own.integer("xpc_port", {1, 65535}, options.xpc_port);
   options.origin = loadOrigin(own);
-  options.geoid_undulation = own.number("geoid_undulation", {-200.0, 200.0}, options.geoid_undulation);
+  options.geoid = loadGeoid(own);
   options.publish_tf = own.boolean("publish_tf", options.publish_tf);
   options.datarefs = loadDatarefs(own);
 

@@ -11,6 +11,7 @@
 #include "xplane_bridge/core/state/state_assembler.hpp"
 #include "xplane_bridge/core/wire/packets.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
+#include "xplane_bridge/nodes/rx/geoid.hpp"
 
 namespace xplane_bridge {
 
@@ -31,7 +32,7 @@ struct RxOptions {
   core::PositionMode position_source = core::PositionMode::kAuto;
   int xpc_port = core::kXpcPort;
   std::optional<core::GeoPoint> origin;  ///< of `map`; empty: the first valid position
-  double geoid_undulation = 0.0;         ///< [m] added to NavSatFix altitudes
+  Geoid geoid;                           ///< its undulation is added to NavSatFix altitudes
   bool publish_unheard = false;  ///< also what nobody listens to; in lock-step, so that counts do not depend on it
   bool publish_tf = false;       ///< map -> base_link on /tf
   std::vector<DatarefEntry> datarefs;
