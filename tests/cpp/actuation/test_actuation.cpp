@@ -14,6 +14,8 @@ namespace {
 using core::EventKind;
 
 constexpr const char* kRoll = "sim/joystick/yoke_roll_ratio";
+constexpr const char* kRollOverride = "sim/operation/override/override_joystick_roll";
+constexpr const char* kEngineFailure = "sim/operation/failures/rel_engfai0";
 constexpr const char* kFlightTime = "sim/time/total_flight_time_sec";
 
 /// An Actuation on a FakeSimulator that shows a DA62, wired as in tx_node, without its threads.
@@ -32,8 +34,8 @@ class ActuationTest : public testing::Test {
     hooks.mode = [this](const core::ModeStatus& status, double) { modes_.push_back(status); };
     hooks.applied = [this](const AppliedControls& applied, const auto&) { applied_.push_back(applied); };
     hooks.surfaces_applied = [](const SurfaceControl::Echo&, core::FlightMode, const auto&) {};
-    hooks.failures = [](const FailureSnapshot&) {};
-    hooks.excitation = [](const ExcitationLabel&) {};
+    hooks.failures = [this](const FailureSnapshot& snapshot) { broken_.push_back(snapshot); };
+    hooks.excitation = [this](const ExcitationLabel& label) { labels_.push_back(label); };
     hooks.event = [this](const ActuationEvent& event) { events_.push_back(event); };
     hooks.warn = [](const std::string&) {};
     hooks.journal_problem = [](const std::string&) {};
@@ -69,6 +71,27 @@ class ActuationTest : public testing::Test {
       actuation_->tick();
     }
   }
+  /// Excites roll by a tenth; what then happens is to end it.
+  void excite() {
+    fly(0.2);
+    ExcitationRequest request;
+    request.kind = "doublet";
+    request.target = "roll";
+    request.amplitude = 0.1;
+    request.duration = 20.0;
+    EXPECT_EQ(actuation_->inject(request, "test").result.code, core::ResultCode::kAccepted);
+    fly(0.2);
+    EXPECT_NEAR(sim_.value(kRoll), 0.35F, 1e-6);
+    EXPECT_EQ(labels_.back().result, "running");
+    EXPECT_EQ(eventsOf(EventKind::kExcitation).back().who, "test");
+  }
+  /// Breaks engine 1; X-Plane's frames go on while that is waited for.
+  void failEngine() {
+    sim_.set(kEngineFailure, 0.0F);
+    sim_.on_frame = [this] { actuation_->tick(); };
+    EXPECT_TRUE(actuation_->failures().set({"engine_1", "failed", {}, 0, 0.0}, "test").success());
+    EXPECT_FLOAT_EQ(sim_.value(kEngineFailure), 6.0F);
+  }
   void fly(double seconds) {
     core::ControlCommand command;
     command.fields = core::kFieldRoll;
@@ -90,6 +113,8 @@ class ActuationTest : public testing::Test {
   std::vector<core::ModeStatus> modes_;
   std::vector<AppliedControls> applied_;
   std::vector<ActuationEvent> events_;
+  std::vector<FailureSnapshot> broken_;
+  std::vector<ExcitationLabel> labels_;
   std::unique_ptr<Actuation> actuation_;
 };
 
@@ -204,6 +229,100 @@ TEST_F(ActuationTest, LinkIsToldWithItsReason) {
   EXPECT_EQ(actuation_->setPaused(true, "test").code, core::ResultCode::kNoLink);
   EXPECT_EQ(actuation_->settings().setDataref(kRoll, {0.5F}).result.code, core::ResultCode::kNoLink);
   EXPECT_EQ(actuation_->jobs().refusal()->code, core::ResultCode::kNoLink);
+}
+
+TEST_F(ActuationTest, ANewFlightEndsATestSignal) {
+  excite();
+  sim_.set(kFlightTime, 0.0F);
+  fly(0.2);
+  EXPECT_EQ(labels_.back().result, "aborted: the flight was reset");
+}
+
+TEST_F(ActuationTest, ACrashEndsATestSignal) {
+  excite();
+  sim_.set("sim/flightmodel2/misc/has_crashed", 1.0F);
+  fly(0.2);
+  EXPECT_EQ(labels_.back().result, "aborted: the aircraft has crashed");
+}
+
+TEST_F(ActuationTest, AnotherAircraftEndsATestSignal) {
+  excite();
+  showAircraft("QUAD");
+  fly(3.0);
+  EXPECT_EQ(labels_.back().result.find("aborted: "), 0U) << labels_.back().result;
+  EXPECT_EQ(eventsOf(EventKind::kExcitation).back().success, false);
+}
+
+TEST_F(ActuationTest, TheEndEndsATestSignal) {
+  excite();
+  actuation_->stop();
+  EXPECT_EQ(labels_.back().result, "aborted: tx_node ends");
+}
+
+TEST_F(ActuationTest, FailureIsToldPublishedAndRepairedAgain) {
+  failEngine();
+  ASSERT_EQ(eventsOf(EventKind::kFailure).size(), 1U);
+  EXPECT_EQ(eventsOf(EventKind::kFailure)[0].text, "failure: engine_1 failed");
+  EXPECT_EQ(eventsOf(EventKind::kFailure)[0].who, "test");
+  run(1.5);
+  ASSERT_EQ(broken_.back().labels.size(), 1U);
+  EXPECT_EQ(broken_.back().labels[0].name, "engine_1");
+  EXPECT_TRUE(broken_.back().labels[0].confirmed);
+  EXPECT_TRUE(actuation_->undo(1.0));
+  EXPECT_FLOAT_EQ(sim_.value(kEngineFailure), 0.0F);
+  EXPECT_TRUE(actuation_->failures().snapshot().labels.empty());
+}
+
+TEST_F(ActuationTest, AfterAHangNothingIsBrokenOrFlownUntilAModeIsAskedFor) {
+  failEngine();
+  fly(0.2);
+  EXPECT_FLOAT_EQ(sim_.value(kRollOverride), 1.0F);
+  actuation_->onHang();
+  EXPECT_TRUE(actuation_->control().overrides.empty());
+  EXPECT_TRUE(actuation_->failures().snapshot().labels.empty());
+  EXPECT_FLOAT_EQ(sim_.value(kRollOverride), 0.0F);
+  EXPECT_FLOAT_EQ(sim_.value(kEngineFailure), 0.0F);
+  fly(0.5);
+  EXPECT_FLOAT_EQ(sim_.value(kRollOverride), 0.0F) << "the stick alone does not take it again";
+  actuation_->path().requestMode({1, 1, "test", 0.0});
+  fly(0.5);
+  EXPECT_FLOAT_EQ(sim_.value(kRollOverride), 1.0F);
+}
+
+TEST_F(ActuationTest, PauseThatXPlaneDoesNotFollowIsTold) {
+  EXPECT_EQ(actuation_->setPaused(true, "test").code, core::ResultCode::kTimeout);
+  ASSERT_EQ(eventsOf(EventKind::kPause).size(), 1U);
+  EXPECT_EQ(eventsOf(EventKind::kPause)[0].text, "pause asked for: X-Plane did not follow in time");
+  EXPECT_EQ(eventsOf(EventKind::kPause)[0].who, "test");
+  EXPECT_FALSE(eventsOf(EventKind::kPause)[0].success);
+  setPaused(true);
+  EXPECT_EQ(eventsOf(EventKind::kPause).back().who, "") << "that is another's";
+}
+
+TEST_F(ActuationTest, SurfacesThatAreNotKnownAreNotCommanded) {
+  fly(0.2);
+  EXPECT_NE(actuation_->commandSurfaces({"aileron1_wing2_left"}, {5.0F}, 1), "");
+  EXPECT_EQ(actuation_->commandSurfaces({}, {}, 2), "") << "nothing is to be driven";
+  setPaused(true);
+  const auto identifying = actuation_->identifySurfaces({}, "test", [] { return 1U; });
+  EXPECT_EQ(identifying.result.text, "X-Plane is paused: let it run first");
+  EXPECT_EQ(identifying.event_number, 0U);
+}
+
+TEST_F(ActuationTest, FlightIsKnownOnceXPlaneHasToldIt) {
+  EXPECT_TRUE(actuation_->knowsFlight());
+  EXPECT_GT(actuation_->framesFlown(), 0U);
+  sim_.setVersion({});
+  actuation_->onLink(sim_.status());
+  EXPECT_FALSE(actuation_->knowsFlight());
+}
+
+TEST_F(ActuationTest, WhatXPlaneDoesNotShowGivenBackStaysInTheJournal) {
+  fly(0.2);
+  sim_.setReadOnly(kRollOverride);
+  actuation_->stop();
+  EXPECT_FALSE(actuation_->undo(0.5));
+  EXPECT_FALSE(sim_.journal()->entries().empty());
 }
 
 TEST_F(ActuationTest, EverythingIsGivenBackInTheEnd) {

@@ -105,7 +105,47 @@ TEST_F(ExcitationManagerTest, LimitsAreThoseOfTheAircraftUnlessGiven) {
   EXPECT_EQ(manager_.plan(request).signal->spec().pitch_limit_deg, 5.0);
 }
 
+TEST_F(ExcitationManagerTest, PlanTakesBandAndSeed) {
+  ExcitationRequest request = doubletOn("roll");
+  request.frequency_min = 0.5;
+  request.frequency_max = 3.0;
+  request.seed = 7;
+  for (const char* kind : {"multisine", "chirp"}) {
+    request.kind = kind;
+    request.duration = 20.0;
+    const core::ExcitationSpec spec = manager_.plan(request).signal->spec();
+    EXPECT_EQ(spec.frequency_min, 0.5) << kind;
+    EXPECT_EQ(spec.frequency_max, 3.0) << kind;
+    EXPECT_EQ(spec.seed, 7U) << kind;
+  }
+  request.kind = "doublet";
+  request.frequency_max = -1.0;
+  EXPECT_EQ(wrongWith(request), "") << "it has no band";
+}
+
 // ------------------------------------------------------------------------------------------------ an axis
+
+TEST_F(ExcitationManagerTest, AxisThatNobodyCommandsIsTakenAtItsRest) {
+  commanded_.reset();
+  ExcitationRequest request = doubletOn("pitch");
+  EXPECT_EQ(inject(request).code, ResultCode::kRefused);
+  request.rest = 0.125;
+  ASSERT_EQ(inject(request).code, ResultCode::kAccepted);
+  EXPECT_EQ(manager_.excitation().channels, only(Channel::kPitch));
+  EXPECT_EQ(manager_.excitation().rest, 0.125);
+}
+
+TEST_F(ExcitationManagerTest, LabelOfTheNextOneBeginsAnew) {
+  start("roll", 0.2);
+  sim_.run(2.5);
+  ASSERT_TRUE(std::isfinite(labels_.back().end_sim_time));
+  ExcitationRequest longer = doubletOn("roll");
+  longer.duration = 4.0;
+  ASSERT_EQ(inject(longer).code, ResultCode::kAccepted);
+  EXPECT_TRUE(std::isnan(labels_.back().end_sim_time));
+  EXPECT_EQ(labels_.back().duration, 4.0);
+  EXPECT_EQ(labels_.back().id, 2U);
+}
 
 TEST_F(ExcitationManagerTest, SignalOnAnAxisRunsToItsEnd) {
   ASSERT_EQ(labels_.size(), 1U) << "the label of nothing, for a latched topic";

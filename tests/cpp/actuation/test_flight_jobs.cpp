@@ -131,6 +131,70 @@ TEST_F(FlightJobsTest, StopEndsTheOneAtItAndDropsTheOthers) {
   go_on_ = std::promise<void>();
 }
 
+TEST_F(FlightJobsTest, EachKindIsDoneAndSaysWhich) {
+  go_on_.set_value();
+  flight_.has_files = false;
+  core::Weather weather;
+  weather.visibility = 5000.0;
+  core::TimeSetting time;
+  time.zulu_time = 3600.0;
+  core::Loading loading;
+  loading.payload_mass = 100.0;
+  jobs_.setWind({5.0, 270.0, 0.0}, 1, "a");
+  jobs_.setLoading(loading, 2, "b");
+  jobs_.setTime(time, 3, "c");
+  jobs_.setWeather(weather, 4, "d");
+  jobs_.loadSituation("Output/a.sit", 5, "e");
+  // This X-Plane has neither weather nor clock nor scales, and not that file.
+  const auto events = told(5);
+  const std::vector<std::string> kinds = {"set_wind", "set_loading", "set_time", "set_weather", "load_state"};
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    EXPECT_EQ(events[i].number, i + 1);
+    EXPECT_EQ(events[i].text.find(kinds[i]), 0U) << events[i].text;
+    EXPECT_FALSE(events[i].success);
+  }
+  go_on_ = std::promise<void>();
+}
+
+TEST_F(FlightJobsTest, FlightIsPlacedByAJobToo) {
+  core::FlightStart start;
+  start.latitude_deg = core::FakeFlight::kLatitude;
+  start.longitude_deg = core::FakeFlight::kLongitude;
+  start.altitude_msl = 800.0;
+  start.true_airspeed = 60.0;
+  go_on_.set_value();
+  at_it_ = std::promise<void>();
+  jobs_.reset(start, 3, "node/reset_flight");
+  const auto events = told(1);
+  EXPECT_EQ(events[0].number, 3U);
+  EXPECT_TRUE(events[0].success) << events[0].text;
+  EXPECT_GT(flight_.sent("VEHS"), 0U);
+  go_on_ = std::promise<void>();
+}
+
+TEST_F(FlightJobsTest, RefusesWhereXPlaneCannot) {
+  EXPECT_FALSE(jobs_.refusal());
+  sim_.setVersion({105000});
+  ASSERT_TRUE(jobs_.refusal());
+  EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kNotSupported);
+  EXPECT_NE(jobs_.refusal()->text.find("105000"), std::string::npos) << jobs_.refusal()->text;
+  sim_.setVersion({});
+  EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kNoLink) << "it has not told its version yet";
+  sim_.setVersion(core::kXPlane12);
+  sim_.setState(core::LinkState::kLost);
+  EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kNoLink);
+}
+
+TEST_F(FlightJobsTest, RefusesWhileTooManyWait) {
+  jobs_.loadAircraft(kPath, 0, 1, "node/load_aircraft");
+  at_it_.get_future().wait();
+  for (std::uint32_t number = 2; number < 2 + FlightJobs::kMostWaiting; ++number) {
+    jobs_.saveSituation("Output/a.sit", number, "node/save_state");
+  }
+  ASSERT_TRUE(jobs_.refusal());
+  EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kRefused);
+}
+
 TEST_F(FlightJobsTest, ErrorEndsItsJobOnly) {
   aircraft_ = []() -> std::string { throw std::runtime_error("the disk is full"); };
   go_on_.set_value();

@@ -4,12 +4,18 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
+#include <filesystem>
+#include <functional>
+#include <memory>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "fake_simulator.hpp"
+#include "fake_xplane.hpp"
 #include "xplane_bridge/actuation/pausing.hpp"
 
 namespace xplane_bridge {
@@ -187,6 +193,81 @@ TEST_F(ReleaseLeftBehind, GivesUpWhereXPlaneIsNotFound) {
   sim_.forgetPeer();
   EXPECT_FALSE(release());
   EXPECT_TRUE(sim_.messages().empty());
+}
+
+// ------------------------------------------------------------------------------------- the program override_guardian
+
+/// This process with its guardian, which is the program that lies beside the test. X-Plane answers by UDP.
+class GuardianProcess : public testing::Test {
+ protected:
+  struct Flown {
+    Flown() {
+      std::string pattern = (std::filesystem::temp_directory_path() / "guardian-XXXXXX").string();
+      folder = mkdtemp(pattern.data());
+      xplane.datarefs[kJoystick] = 1.0F;
+      journal().record("one", kOverridePurpose, {core::UndoDref{kJoystick, 0.0F}});
+      guardian->start();
+      guardian->setPeer({core::kLoopbackAddress, xplane.port()}, folder + "/journal.json");
+      xplane.startThread();
+    }
+    ~Flown() { std::filesystem::remove_all(folder); }
+    Flown(const Flown&) = delete;
+    Flown& operator=(const Flown&) = delete;
+
+    core::Journal journal() const { return {folder + "/journal.json", core::thisProcess("/test")}; }
+    /// What X-Plane has in the end.
+    float shown() {
+      xplane.stopThread();
+      return xplane.datarefs[kJoystick];
+    }
+
+    std::string folder;
+    FakeXPlane xplane;
+    std::unique_ptr<Guardian> guardian = std::make_unique<Guardian>();
+  };
+
+  static bool comes(const std::function<bool()>& condition) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!condition()) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return true;
+  }
+  static bool undone(const Flown& flown) {
+    return comes([&flown] { return flown.journal().entries().empty(); });
+  }
+};
+
+TEST_F(GuardianProcess, DismissedItEndsAndLeavesEverything) {
+  Flown flown;
+  EXPECT_TRUE(flown.guardian->running());
+  EXPECT_FALSE(flown.guardian->beat(60.0));
+  flown.guardian->dismiss();
+  EXPECT_FALSE(flown.guardian->running());
+  EXPECT_EQ(flown.journal().entries().size(), 1U);
+  EXPECT_EQ(flown.shown(), 1.0F);
+}
+
+TEST_F(GuardianProcess, UndoesWhatADeadParentHasLeft) {
+  Flown flown;
+  flown.guardian.reset();  // without a word, as a process that is killed
+  EXPECT_TRUE(undone(flown));
+  EXPECT_EQ(flown.shown(), 0.0F);
+}
+
+TEST_F(GuardianProcess, UndoesWhatAParentThatHangsHasSetAndTellsItWhenItRunsAgain) {
+  Flown flown, resting;
+  EXPECT_FALSE(resting.guardian->beat(0.2));
+  resting.guardian->rest();
+  EXPECT_FALSE(flown.guardian->beat(1.0));
+  EXPECT_TRUE(undone(flown));
+  EXPECT_TRUE(comes([&flown] { return flown.guardian->beat(60.0); }));
+  EXPECT_EQ(resting.journal().entries().size(), 1U) << "who rests does not hang";
+  flown.guardian->dismiss();
+  resting.guardian->dismiss();
+  EXPECT_EQ(flown.shown(), 0.0F);
+  EXPECT_EQ(resting.shown(), 1.0F);
 }
 
 }  // namespace

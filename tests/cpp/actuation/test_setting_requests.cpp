@@ -1,0 +1,117 @@
+#include "xplane_bridge/actuation/setting_requests.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "fake_simulator.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+using core::ResultCode;
+using Reports = std::vector<std::pair<std::string, bool>>;
+
+constexpr double kTimeout = 2.0;
+constexpr const char* kQnh = "sim/weather/barometer_sealevel_inhg";
+constexpr const char* kFirst = "sim/cockpit2/engine/actuators/throttle_ratio[0]";
+constexpr const char* kSecond = "sim/cockpit2/engine/actuators/throttle_ratio[1]";
+
+class Simulator : public core::FakeSimulator {
+ public:
+  bool inLockstep() const override { return lockstep; }
+  core::SendStatus send(core::ByteView bytes) override {
+    return refusal == core::SendStatus::kSent ? FakeSimulator::send(bytes) : refusal;
+  }
+
+  bool lockstep = false;
+  core::SendStatus refusal = core::SendStatus::kSent;  // of every message
+};
+
+class SettingRequestsTest : public testing::Test {
+ protected:
+  SettingRequestsTest() {
+    sim_.set(kQnh, 29.92F);
+    sim_.setAll({kFirst, kSecond}, 0.0F);
+  }
+
+  Simulator sim_;
+  Reports reports_;
+  OverrideManager overrides_{&sim_, [](const std::string&, bool) {}};
+  SettingRequests settings_{&sim_, &overrides_, kTimeout,
+                            [this](const std::string& text, bool success) { reports_.emplace_back(text, success); }};
+};
+
+TEST_F(SettingRequestsTest, ElementsThatFollowAreWrittenToo) {
+  const auto written = settings_.setDataref(kFirst, {0.25F, 0.75F});
+  EXPECT_EQ(written.result.code, ResultCode::kOk);
+  EXPECT_EQ(written.values, (std::vector<float>{0.25F, 0.75F}));
+  EXPECT_EQ(sim_.value(kSecond), 0.75F);
+  EXPECT_EQ(reports_, (Reports{{std::string("set_dataref ") + kFirst + ": X-Plane shows it", true}}));
+}
+
+TEST_F(SettingRequestsTest, WhatIsNoNumberIsRefusedBeforeAnythingIsSent) {
+  const float infinite = std::numeric_limits<float>::infinity();
+  for (const std::vector<float>& values :
+       {std::vector<float>{}, {std::nanf("")}, {infinite}, {0.5F, -infinite}, {std::nanf(""), 0.5F}}) {
+    const auto written = settings_.setDataref(kFirst, values);
+    EXPECT_EQ(written.result.code, ResultCode::kRefused);
+    EXPECT_EQ(written.result.text, "values: expected one or more finite numbers");
+    EXPECT_TRUE(written.values.empty());
+  }
+  EXPECT_TRUE(sim_.messages().empty());
+  EXPECT_TRUE(reports_.empty());
+}
+
+TEST_F(SettingRequestsTest, WhatCannotBeSentIsSaidAtOnce) {
+  sim_.refusal = core::SendStatus::kNoPeer;
+  const double began = sim_.time();
+  const auto written = settings_.setDataref(kQnh, {29.5F});
+  EXPECT_EQ(written.result.code, ResultCode::kRefused);
+  EXPECT_EQ(written.result.text, std::string(kQnh) + " is not sent: " + core::toString(core::SendStatus::kNoPeer));
+  EXPECT_LT(sim_.time() - began, kTimeout) << "there is nothing to wait for";
+  ASSERT_EQ(reports_.size(), 1U);
+  EXPECT_FALSE(reports_[0].second);
+  const RequestResult command = settings_.runCommand("sim/lights/landing_lights_on");
+  EXPECT_EQ(command.code, ResultCode::kRefused);
+  EXPECT_NE(command.text.find(core::toString(core::SendStatus::kNoPeer)), std::string::npos) << command.text;
+}
+
+TEST_F(SettingRequestsTest, LargeNumbersAreComparedAsFloatsAre) {
+  sim_.set(kQnh, 200000.02F);
+  sim_.setReadOnly(kQnh);
+  EXPECT_EQ(settings_.setDataref(kQnh, {200000.0F}).result.code, ResultCode::kOk);
+  EXPECT_EQ(settings_.setDataref(kQnh, {200100.0F}).result.code, ResultCode::kTimeout);
+}
+
+// ------------------------------------------------------------------------------------------------- in lock-step
+
+TEST_F(SettingRequestsTest, InLockstepTheOutcomeIsToldAfterwards) {
+  sim_.lockstep = true;
+  const double began = sim_.time();
+  const auto written = settings_.setDataref(kFirst, {0.25F, 0.75F});
+  EXPECT_EQ(written.result.code, ResultCode::kAccepted);
+  EXPECT_EQ(sim_.time(), began) << "the caller may be awaited";
+  EXPECT_TRUE(written.values.empty());
+  EXPECT_TRUE(reports_.empty());
+  sim_.frame();
+  EXPECT_EQ(reports_, (Reports{{std::string("set_dataref ") + kFirst + ": X-Plane shows it", true}}));
+}
+
+TEST_F(SettingRequestsTest, InLockstepWhatIsNotShownIsToldWithItsName) {
+  sim_.lockstep = true;
+  sim_.setReadOnly(kSecond);
+  settings_.setDataref(kFirst, {0.25F, 0.75F});
+  sim_.run(kTimeout + 0.1);
+  settings_.setDataref("sim/no/such", {0.0F});
+  sim_.run(kTimeout + 0.1);
+  EXPECT_EQ(reports_,
+            (Reports{{std::string("set_dataref ") + kFirst + ": X-Plane does not show it at " + kSecond, false},
+                     {"set_dataref sim/no/such: X-Plane does not show it at sim/no/such", false}}));
+}
+
+}  // namespace
+}  // namespace xplane_bridge
