@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from support.synthetic_flight import FlightBag, stamp_ns
+from support.white_lines import STANDING_M
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.view.renderer.painter import Painter
 from xplane_bridge.emulator.view.renderer.scene import Scene
@@ -61,7 +62,7 @@ def frame_state(bag: FlightBag, shown: Scene, ns: int, **changes: Any) -> dict[s
         latitude=shown.latitude_deg,
         longitude=shown.longitude_deg,
         altitude_msl=shown.altitude_m,
-        altitude_agl=np.float32(shown.altitude_m - shown.terrain_m),
+        altitude_agl=np.float32(shown.altitude_m - shown.terrain_m - STANDING_M),  # from about the wheels
         orientation={"x": x, "y": y, "z": z, "w": w},
         angular_velocity={"x": 0.0, "y": 0.1, "z": 0.0},
         velocity_ned={"x": SPEED, "y": 0.0, "z": 3.0},

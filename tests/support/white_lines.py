@@ -40,6 +40,7 @@ class Lines(NamedTuple):
 
     error: np.ndarray  #: [px] across the line, a value for each place looked at
     pictures: int  #: in which there was a line to measure
+    unsure: int  #: left out: they may be of the neighbouring frame, as their own flags say
 
 
 def measure(grey: np.ndarray, camera: Camera, labeller: Labeller) -> np.ndarray:
@@ -65,15 +66,16 @@ def measure(grey: np.ndarray, camera: Camera, labeller: Labeller) -> np.ndarray:
 
 
 def measure_flight(bags: Bags, flight: Flight, every: int = 1) -> Lines:
-    """Measure the lines in the pictures of a flight, each n-th."""
+    """Measure the lines in each n-th picture of a flight, but for those whose flags say they may be paired wrong."""
     cameras = {frame.stamp: frame.camera for frame in flight.frames()}
+    sure = {stamp: camera for stamp, camera in cameras.items() if not camera.pose.may_be_neighbour}
     found = []
     topic = image_topic(bags, (COMPRESSED, "sensor_msgs/Image"))
     for number, (stamp, grey) in enumerate(grey_pictures(bags, topic)):
-        if number % every == 0 and stamp in cameras:
-            found.append(measure(grey, cameras[stamp], flight.labeller))
+        if number % every == 0 and stamp in sure:
+            found.append(measure(grey, sure[stamp], flight.labeller))
     errors = np.concatenate(found) if found else np.empty(0)
-    return Lines(errors, sum(len(part) > 0 for part in found))
+    return Lines(errors, sum(len(part) > 0 for part in found), len(cameras) - len(sure))
 
 
 def _inside(pixel: np.ndarray, shape: tuple[int, ...]) -> bool:

@@ -26,7 +26,9 @@ _ORIGIN = ("sim/flightmodel/position/lat_ref", "sim/flightmodel/position/lon_ref
 #: What a picture needs of its state: position and attitude.
 _NEEDED = 2 | 16
 _HAS_AGL = 2 | 4
-_STATE_MISSING, _OFF_FRAME, _BORDERLINE = 1, 4, 16384
+_STATE_MISSING = 1
+#: QUALITY_* by which a picture may be of the neighbouring frame: off frame, clock unsure, delay assumed, borderline.
+_UNSURE = 4 | 16 | 8192 | 16384
 _MEASURED = 2
 #: What cannot be known of the motion is taken for lively, where it matters.
 _TURN_RATE, _SPEED = 0.5, 100.0
@@ -225,5 +227,5 @@ def _pose(frames: Table, row: int) -> Pose:
         float(np.linalg.norm(rates)) if np.isfinite(rates).all() else _TURN_RATE,
         velocity if np.isfinite(velocity).all() else np.full(3, _SPEED / math.sqrt(3.0)),
         float(frames["frame_period"][row]),
-        bool(quality & (_BORDERLINE | _OFF_FRAME)),
+        bool(quality & _UNSURE),
     )

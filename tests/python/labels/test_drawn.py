@@ -55,3 +55,9 @@ def test_the_sun_is_where_it_is_drawn(tmp_path: Path) -> None:
     (left, top, right, bottom), radius = sun["box"], np.radians(0.265)
     assert right - left == pytest.approx(2 * 554.26 * np.tan(radius), rel=0.2)
     assert bottom - top == pytest.approx(right - left)
+
+
+def test_lines_that_run_out_below_the_camera_are_straight(tmp_path: Path) -> None:
+    lines = lines_of(write_approach(tmp_path / "flight.bag", 8, far=-300.0))
+    assert len(lines.error) > 100
+    assert np.percentile(np.abs(lines.error), 95) <= P95_PX

@@ -266,7 +266,11 @@ class Painter:
         if high[0] < 0 or high[1] < 0 or low[0] > self._size[0] or low[1] > self._size[1]:
             return
         if min(low) < -_FAR_PIXELS or max(high) > _FAR_PIXELS:
-            corners = np.clip(corners, -_FAR_PIXELS, _FAR_PIXELS)
+            # Cut off, not moved: a line that runs out below the camera stays straight.
+            for axis, sign in ((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)):
+                corners = clip(corners, _FAR_PIXELS - sign * corners[:, axis])
+            if len(corners) < 3:
+                return
         points = np.round(corners * (1 << _SHIFT)).astype(np.int32)
         cv2.fillConvexPoly(self._picture, points, tuple(float(c) for c in colour), cv2.LINE_AA, _SHIFT)
 
