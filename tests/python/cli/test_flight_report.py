@@ -69,6 +69,8 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "requested_by": "me",
         }
         bag.add("/xplane/events", "xplane_bridge/EventList", ns, {"events": [event]})
+        made = {"package_version": "0.2.0", "parameters": '{"experiment": {"pilot": "Kim"}}', "xplane_version": 115501}
+        bag.add("/xplane/experiment", "xplane_bridge/Experiment", stamp_ns(0.0), made)
         for t, state in ((0.0, 1), (10.0, 3), (12.0, 1)):
             ns = stamp_ns(t)
             bag.add("/xplane/link_state", "xplane_bridge/LinkState", ns, {"header": bag.header(ns, ""), "state": state})
@@ -120,6 +122,12 @@ def test_every_section_is_there_and_filled(page: Path) -> None:
     ]  # fmt: skip
     for key in keys[:-1]:  # this recording does not say how it was made
         assert "Not shown" not in section(page, key), key
+
+
+def test_the_last_section_says_how_it_was_made(page: Path) -> None:
+    text = section(page, "experiment")
+    for name, value in (("package version", "0.2.0"), ("X-Plane", "115501"), ("experiment/pilot", "Kim")):
+        assert f"<td>{name}</td><td>{value}</td>" in text
 
 
 def test_the_quality_section_finds_the_gap_and_judges_physics(page: Path) -> None:
