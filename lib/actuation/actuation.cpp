@@ -45,6 +45,8 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
       settings_(link, &overrides_, options.service_timeout,
                 [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
       views_(link, [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
+      traffic_(link, &overrides_, options.traffic,
+               [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
       jobs_(link, options.flight, changeHooks(),
             [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
               hooks_.event({outcome.kind, outcome.text, who, outcome.success, false, number, sim_time_});
@@ -132,6 +134,7 @@ void Actuation::onLink(const core::LinkStatus& status) {
     if (status.epoch != link_status_.epoch) {
       identity_.reset();
       reset_detector_.restart();
+      traffic_.forget();
     }
     link_status_ = status;
     failures_.onLink(status);
@@ -204,12 +207,14 @@ void Actuation::tick() {
   surfaces_.tick(path_.refusal());
   failures_.tick();
   path_.tick();
+  traffic_.tick(sim_time_);
 }
 
 void Actuation::onHang() {
   const Lock lock(*mutex_);
   overrides_.giveBackAll();
   failures_.repaired();
+  traffic_.forget();
   path_.onGivenBack("tx_node hung, and its guardian has given back what it had set");
 }
 
@@ -224,6 +229,7 @@ void Actuation::stop() {
     const Lock lock(*mutex_);
     endSignals("tx_node ends");
   }
+  traffic_.release("tx_node ends");
   jobs_.stop();
   releases_.stop();
   surfaces_.stop();

@@ -1,11 +1,15 @@
-// SurfaceControl's requests and answers: what others want driven, why it cannot be, and what is. How the surfaces are
-// taken, driven and given back: surface_control.cpp.
+// SurfaceControl's requests and answers: what others want driven, why it cannot be, and what is; and the files of
+// mixings. How the surfaces are taken, driven and given back: surface_control.cpp.
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
 #include <utility>
 
+#include "xplane_bridge/actuation/mixing_files.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 #include "xplane_bridge/core/base/text.hpp"
 
@@ -313,6 +317,39 @@ SurfaceControlStatus SurfaceControl::status() const {
   out.answers_dropped = echoes_dropped_;
   out.last_refusal = last_refusal_;
   return out;
+}
+
+// --- files of mixings ---
+
+std::optional<core::MixingModel> readMixingFile(const std::string& folder, const std::string& aircraft) {
+  const std::string path = core::mixingPath(folder, aircraft);
+  std::ifstream file(path);
+  if (!file) return std::nullopt;
+  std::ostringstream text;
+  text << file.rdbuf();
+  try {
+    core::MixingModel model = core::mixingFromText(text.str());
+    if (model.aircraft != aircraft) {
+      throw core::MixingFileError("mixing file: is of aircraft " + model.aircraft + ", expected " + aircraft);
+    }
+    return model;
+  } catch (const core::MixingFileError& error) {
+    throw core::MixingFileError(path + ": " + error.what());
+  }
+}
+
+std::string writeMixingFile(const std::string& folder, const core::MixingModel& model) {
+  const std::string path = core::mixingPath(folder, model.aircraft);
+  const std::string fresh = path + ".new";
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  std::ofstream file(fresh);
+  file << core::toText(model);
+  file.close();
+  if (!file || std::rename(fresh.c_str(), path.c_str()) != 0) {
+    throw core::MixingFileError(path + " cannot be written");
+  }
+  return path;
 }
 
 }  // namespace xplane_bridge

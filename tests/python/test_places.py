@@ -69,7 +69,7 @@ def groups():
 
 
 #: Of the bridge's namespace, advertised by others than its nodes: joy, controllers, the scenario's player.
-FROM_OUTSIDE = {"joy", "control/auto", "scenario/label"}
+FROM_OUTSIDE = {"joy", "control/auto", "traffic/command", "scenario/label"}
 
 
 def test_the_nodes_advertise_the_topics_of_the_list_with_their_types():

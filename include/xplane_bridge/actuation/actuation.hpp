@@ -19,6 +19,7 @@
 #include "xplane_bridge/actuation/setting_requests.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 #include "xplane_bridge/actuation/surface_identification.hpp"
+#include "xplane_bridge/actuation/traffic_control.hpp"
 #include "xplane_bridge/actuation/view_requests.hpp"
 #include "xplane_bridge/core/base/message_constants.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
@@ -35,6 +36,7 @@ struct ActuationOptions {
   FlightChangeOptions flight;
   ControlPathOptions control;
   SurfaceControlOptions surfaces;
+  TrafficOptions traffic;
 };
 
 /// What happened, for the list of events and the log.
@@ -138,6 +140,7 @@ class Actuation {
   FlightJobs& jobs() { return jobs_; }
   SettingRequests& settings() { return settings_; }
   ViewRequests& views() { return views_; }
+  TrafficControl& traffic() { return traffic_; }
 
   // What is.
 
@@ -187,6 +190,7 @@ class Actuation {
   ControlPath path_;
   SettingRequests settings_;
   ViewRequests views_;
+  TrafficControl traffic_;
   FlightJobs jobs_;
   ReleaseWorker releases_;
 

@@ -72,6 +72,7 @@ void RxNode::loadParameters(const ParamLoader& own) {
   missions_ = makeMissionPublishers(options_.rates, common().transport, common().frames, lockstep(), stamps);
   datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs, lockstep(), stamp_clock);
   experiment_ = std::make_unique<ExperimentPublisher>(common());
+  if (options_.traffic_rate > 0) traffic_ = std::make_unique<TrafficPublisher>(options_.traffic_rate, stamps);
   addStreams();
 }
 
@@ -112,6 +113,18 @@ void RxNode::addStreams() {
          false,
          {}});
   }
+  if (traffic_) {
+    traffic_stream_ = streams_.size();
+    add({"traffic",
+         options_.traffic_rate,
+         kMissionPriority,
+         [this] { return traffic_->requests(); },
+         [this](const core::RrefView& datagram, std::int64_t receive_ns) {
+           traffic_->onRref(datagram, receive_ns, flight_->clock());
+         },
+         false,
+         {}});
+  }
   add({"aircraft",
        core::AircraftIdentityReader::kRateHz,
        kIdentityPriority,
@@ -142,6 +155,7 @@ void RxNode::advertise() {
     mission->advertise(&handle());
   }
   datarefs_->advertise(&handle());
+  if (traffic_) traffic_->advertise(&handle());
   if (common().transport == core::Transport::kData) {
     rows_publisher_ = advertiseTopic<DataRows>("data_rows", kRowsQueueSize);
   }
@@ -203,6 +217,7 @@ std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
       mission->reset();
     }
     datarefs_->reset();
+    if (traffic_) traffic_->reset();
     aircraft_.reset();
     settings_.reset();
     rows_.clear();
@@ -322,6 +337,7 @@ void RxNode::supervise() {
   const core::LinkStatus status = link().status();
   adoptVersion(status);
   if (adopted_version_) {
+    superviseTraffic();
     renewSubscriptions();
     supervisePositionCheck();
   }
@@ -364,6 +380,7 @@ void RxNode::adoptVersion(const core::LinkStatus& status) {
     for (const auto& mission : missions_) {
       mission->configure(version);
     }
+    if (traffic_) traffic_->configure(version);
     for (DatarefStream& stream : streams_) {
       stream.current = false;
     }
@@ -396,6 +413,13 @@ void RxNode::renewSubscriptions() {
     const std::lock_guard<std::mutex> lock(mutex_);
     stream.current = true;
   }
+}
+
+/// What the topic's subscribers want changes without a word of X-Plane.
+void RxNode::superviseTraffic() {
+  if (!traffic_) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (traffic_->wantedChanges()) streams_[traffic_stream_].current = false;
 }
 
 void RxNode::supervisePositionCheck() {

@@ -14,6 +14,7 @@ void RxNode::mute(bool muted) {
     mission->mute(muted);
   }
   datarefs_->mute(muted);
+  if (traffic_) traffic_->mute(muted);
 }
 
 void RxNode::beginFlight() {

@@ -92,6 +92,7 @@ RxOptions loadRxOptions(const ParamLoader& own) {
         rates.integer(core::toString(group), {lowest, core::kEveryFrameRateHz}, core::defaultRate(group));
   }
   options.wind_rate = rates.number("wind", {0.1, kHighestPublishRate}, options.wind_rate);
+  options.traffic_rate = rates.integer("traffic", {0, core::kEveryFrameRateHz}, options.traffic_rate);
   options.position_source = positionMode(own);
   options.xpc_port = own.integer("xpc_port", {1, 65535}, options.xpc_port);
   options.origin = loadOrigin(own);

@@ -80,6 +80,8 @@ void TxNode::subscribe() {
       "control/auto", 1, [this](const ControlCommand& command) { onCommand(core::FlightMode::kAuto, command); });
   subscribeCommands<SurfaceCommand>("control/surfaces", 2,
                                     [this](const SurfaceCommand& command) { onSurfaceCommand(command); });
+  subscribeCommands<TrafficCommand>("traffic/command", 3,
+                                    [this](const TrafficCommand& command) { onTraffic(command); });
   // Requests are few and none may be lost.
   subscribeTopic<ModeRequest>("control/mode_request", 20, [this](const ModeRequestConstPtr& request) {
     if (!lockstep_) {

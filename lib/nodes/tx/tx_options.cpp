@@ -63,6 +63,9 @@ TxOptions loadTxOptions(const ParamLoader& own, const std::string& aircraft) {
   out.flight.load_timeout = own.number("load_timeout", {0.5, 3600.0}, out.flight.load_timeout);
   out.flight.airport_data = own.text("airport_data", "");
   core::ArbiterOptions& arbiter = out.control.arbiter;
+  out.traffic.rate = own.number("traffic_rate", {1.0, 200.0}, out.traffic.rate);
+  out.traffic.timeout = own.number("traffic_timeout", {0.1, 60.0}, out.traffic.timeout);
+  out.traffic.vehx = own.choice("traffic_way", {"written", "vehx"}, "written") == "vehx";
   arbiter.command_timeout = own.number("command_timeout", {0.02, 60.0}, arbiter.command_timeout);
   arbiter.resume_grace = own.number("resume_grace", {0.0, 60.0}, arbiter.resume_grace);
   arbiter.transition_rate = own.number("transition_rate", {0.01, 1000.0}, arbiter.transition_rate);

@@ -122,6 +122,7 @@ class Emulator:
             inputs=inputs,
             window_size=o.window_size,
             otherwise=o.otherwise,
+            traffic=o.traffic,
         )
         sim.set_weather(*o.wind, o.turbulence, o.seed)
         sim.on_rows(protocol.RowSelection("DSEL", o.data_rows))

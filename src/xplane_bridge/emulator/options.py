@@ -13,6 +13,7 @@ from typing import FrozenSet, List, Optional, Sequence, Tuple
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.datarefs import otherwise
+from xplane_bridge.emulator.datarefs.traffic import MOST as MOST_OTHERS
 from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_half_turn
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.windows import WindowView, window_view
@@ -80,6 +81,7 @@ class Options:
     deaf: bool = False  #: whether nothing that arrives is read
     second_beacon: Optional[str] = None  #: second address of this machine that beacons come from
     fault: FaultPlan = field(default_factory=FaultPlan)
+    traffic: int = 0  #: other aircraft that fly
     realtime: bool = True  #: whether to ask for real-time priority
     verbose: bool = False
 
@@ -154,6 +156,13 @@ def _parser() -> argparse.ArgumentParser:
         "--auto-coordination",
         action="store_true",
         help="the rudder follows the sideslip while no override, pilot or client has it",
+    )
+    flight.add_argument(
+        "--traffic",
+        type=int,
+        default=0,
+        metavar="N",
+        help="other aircraft that fly, up to 19 (default 0: one is parked)",
     )
     flight.add_argument("--wind", default="0/0", metavar="FROM/SPEED", help="degrees true / m/s, e.g. 270/8")
     flight.add_argument(
@@ -330,6 +339,7 @@ def _options(given: argparse.Namespace) -> Options:
     _require(-180.0 <= given.lon <= 360.0, "--lon", given.lon, "-180..180")
     _require(1.0 <= given.fps <= 500.0, "--fps", given.fps, "1..500")
     _require(0 <= given.port <= 65535, "--port", given.port, "0..65535")
+    _require(0 <= given.traffic <= MOST_OTHERS, "--traffic", given.traffic, f"0..{MOST_OTHERS}")
     _require(1 <= given.rref_split <= protocol.RREF_MAX_PAIRS, "--rref-split", given.rref_split, "1..183")
     _require(given.request_limit >= 1, "--request-limit", given.request_limit, "1 or more")
     _require(0 <= given.rate <= 99, "--rate", given.rate, "0..99")
@@ -411,6 +421,7 @@ def _options(given: argparse.Namespace) -> Options:
         otherwise=given.otherwise,
         wind=_wind(given.wind),
         turbulence=given.turbulence,
+        traffic=given.traffic,
         pipeline_delay=delay,
         frame_jitter=jitter,
         window=given.window is not None,

@@ -20,6 +20,7 @@ from xplane_bridge.emulator.datarefs.failure_datarefs import FailureDatarefs
 from xplane_bridge.emulator.datarefs.placement import Placements
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.controls import surface_dataref
+from xplane_bridge.emulator.datarefs.traffic import Traffic
 from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
 from xplane_bridge.emulator.flight.frame import Clocks, Frame
@@ -46,8 +47,6 @@ _STATIONS = 9
 _BAR_PER_PSI = 0.0689476
 _MPS_PER_KT = 1852.0 / 3600.0
 
-#: Place of the other aircraft, which stands where flights start.
-OTHER_AIRCRAFT = tuple(f"sim/multiplayer/position/plane1_{leaf}" for leaf in ("lat", "lon", "el"))
 #: Where the centre of gravity is set: by the first of these that the version has.
 CG_OFFSETS = ("sim/flightmodel2/misc/cg_offset_z", "sim/flightmodel/misc/cgz_ref_to_default")
 _SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot"
@@ -78,6 +77,7 @@ class Simulator:
         inputs: What moves the stick where neither a client nor the pilot does.
         window_size: Width and height of the window that the view is drawn in [px].
         otherwise: Of `otherwise.IDS`: in what X-Plane is not as the bridge assumes.
+        traffic: How many other aircraft fly.
     """
 
     def __init__(
@@ -96,6 +96,7 @@ class Simulator:
         inputs: Optional[InputOptions] = None,
         window_size: Tuple[int, int] = (1024, 768),
         otherwise: FrozenSet[str] = frozenset(),
+        traffic: int = 0,
     ) -> None:
         self.version = version
         self.otherwise = otherwise
@@ -138,8 +139,8 @@ class Simulator:
         self.inputs.connect(self)
         self._connect_settings()
         self._bind_aircraft()
-        self.store.set(OTHER_AIRCRAFT[0], self.initial.latitude_deg)
-        self.store.set(OTHER_AIRCRAFT[1], self.initial.longitude_deg)
+        self.traffic = Traffic(self.store, otherwise)
+        self.traffic.start(traffic, self.initial)
         if load_time <= 0.0:
             self.start_flight(self.initial)
         self.table.publish(self.frame, self.flying)
@@ -189,6 +190,7 @@ class Simulator:
             self._start_first()
         self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
         self.frame.distance += self.frame.ground_speed * dt
+        self.traffic.step(dt, self.frame)
         self.electrics.update(dt, self.store, self.frame, self.failed)
         self._update_instruments()
 
@@ -432,19 +434,10 @@ class Simulator:
         if request.label == "VEHS" and (not self.is_12 or "vehs" in self.otherwise):
             return "version"
         if request.aircraft != 0:
-            return self._place_other(request)
+            return None if self.traffic.place(request) else "aircraft"
         if not Placements.place_vehicle(self.model, request):
             return "value"
         self.frozen = self.frozen or request.label == "VEHX"
-        return None
-
-    def _place_other(self, request: protocol.VehiclePose) -> Optional[str]:
-        """The one other aircraft, which has a place and nothing else."""
-        if request.aircraft != 1 or "other-aircraft" in self.otherwise:
-            return "aircraft"
-        place = (request.latitude_deg, request.longitude_deg, request.elevation_m)
-        for name, value in zip(OTHER_AIRCRAFT, place):
-            self.store.set(name, value)
         return None
 
     def on_rows(self, request: protocol.RowSelection) -> Optional[str]:

@@ -15,11 +15,13 @@
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 #include "xplane_bridge/core/simulator/flight_start.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
+#include "xplane_bridge/core/simulator/traffic_motion.hpp"
 #include "xplane_bridge/core/simulator/view_ways.hpp"
 #include "xplane_bridge/core/simulator/world_settings.hpp"
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 #include "xplane_bridge/core/state/field_table.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
+#include "xplane_bridge/core/state/traffic.hpp"
 #include "xplane_bridge/core/state/xplane_settings.hpp"
 #include "xplane_bridge/core/surfaces/surface_watch.hpp"
 #include "xplane_bridge/core/surfaces/surfaces.hpp"
@@ -73,6 +75,15 @@ class Uses {
     }
     readAll(flightWatchDatarefs());
     readAll(AircraftIdentityReader::datarefs());
+    TrafficAssembler traffic({});
+    traffic.configure(version_);
+    readAll(traffic.requests());
+    for (int number = 1; number <= kMaxOtherAircraft; ++number) {
+      TrafficPose pose;
+      pose.number = number;
+      for (const DatarefWrite& each : trafficWrites(pose, TangentFrame())) write(each.dataref);
+      set({{trafficOverride(number), 1.0F}});
+    }
     readAll(XPlaneSettings::datarefs());
   }
 

@@ -24,6 +24,7 @@
 #include "xplane_bridge/nodes/rx/flight_publisher.hpp"
 #include "xplane_bridge/nodes/rx/mission_publisher.hpp"
 #include "xplane_bridge/nodes/rx/rx_options.hpp"
+#include "xplane_bridge/nodes/rx/traffic_publisher.hpp"
 
 namespace xplane_bridge {
 
@@ -71,6 +72,7 @@ class RxNode : public BaseNode {
   void supervise();
   void adoptVersion(const core::LinkStatus& status);
   void renewSubscriptions();
+  void superviseTraffic();
   void supervisePositionCheck();
   std::vector<std::int32_t> wantedRows() const;
 
@@ -107,6 +109,8 @@ class RxNode : public BaseNode {
   std::unique_ptr<FlightPublisher> flight_publisher_;
   std::vector<std::unique_ptr<MissionPublisher>> missions_;
   std::unique_ptr<DatarefPublisher> datarefs_;
+  std::unique_ptr<TrafficPublisher> traffic_;  ///< null: not wanted
+  std::size_t traffic_stream_ = 0;
   core::AircraftIdentityReader aircraft_;
   core::XPlaneSettings settings_;
   std::unique_ptr<ExperimentPublisher> experiment_;

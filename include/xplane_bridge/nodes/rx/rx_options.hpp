@@ -26,6 +26,7 @@ struct DatarefEntry {
 struct RxOptions {
   double max_publish_rate = 0.0;  ///< [1/s] of flight_state and what goes with it; 0: every simulator frame
   double wind_rate = 10.0;        ///< [1/s] highest
+  int traffic_rate = 10;          ///< [1/s] of traffic/state; 0: there is no such topic
   /// Requests [1/s] by group, index is core::FieldGroup; 0: the group is not asked for. The flight group's is the rate
   /// of flight_state as long as X-Plane renders that fast.
   std::array<int, core::kFieldGroupCount> rates{};

@@ -13,6 +13,7 @@
 #include "xplane_bridge/ModeRequest.h"
 #include "xplane_bridge/SetMode.h"
 #include "xplane_bridge/SurfaceCommand.h"
+#include "xplane_bridge/TrafficCommand.h"
 #include "xplane_bridge/actuation/actuation.hpp"
 #include "xplane_bridge/actuation/guardian.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
@@ -49,6 +50,7 @@ class TxNode : public BaseNode {
   void onCommand(core::FlightMode from, const ControlCommand& message);
   void onModeRequest(const ModeRequest& message);
   void onSurfaceCommand(const SurfaceCommand& message);
+  void onTraffic(const TrafficCommand& message);  // tx_world.cpp
 
   // Lock-step (tx_lockstep_hooks.cpp).
   void makeLockstep();

@@ -53,6 +53,8 @@ VIEW_TYPE = "sim/graphics/view/view_type"
 CAMERA_BACK = tuple(f"sim/graphics/view/world_matrix[{i}]" for i in (2, 6, 10))
 OTHER_LATITUDE = "sim/multiplayer/position/plane1_lat"
 OTHER_LONGITUDE = "sim/multiplayer/position/plane1_lon"
+OTHER_PLACE = tuple(f"sim/multiplayer/position/plane1_{axis}" for axis in "xyz")
+OTHER_OVERRIDE = _OVERRIDE + "planepath[1]"
 
 READ = tuple(
     path
@@ -85,6 +87,8 @@ WRITTEN = (
     LEVER,
     GENERATORS,
     VISUAL_OFFSET,
+    *OTHER_PLACE,
+    OTHER_OVERRIDE,
 )
 #: Weather before 12.08: names with brackets, knots; from then on elements by region, and the air at the aircraft.
 OLD_WIND_SPEED = tuple(f"sim/weather/wind_speed_kt[{layer}]" for layer in range(3))

@@ -14,6 +14,7 @@ IDS = (
     "mass-unit",
     "offset-turns",
     "other-aircraft",
+    "other-written",
     "parked-height",
     "paused-motion",
     "paused-output",

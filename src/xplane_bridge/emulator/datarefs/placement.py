@@ -117,7 +117,7 @@ class Placements:
             request.heading_deg,
             request.speed_mps,
         )
-        if not (_is_place(numbers) and 0.0 <= request.speed_mps <= Placements.MAX_SPEED_MPS):
+        if not (is_place(numbers) and 0.0 <= request.speed_mps <= Placements.MAX_SPEED_MPS):
             return None
         height = request.elevation_m - terrain_m
         on_ground = height < Placements.GROUND_HEIGHT_M and request.speed_mps < Placements.GROUND_SPEED_MPS
@@ -153,7 +153,7 @@ class Placements:
             request.pitch_deg,
             request.roll_deg,
         )
-        if not _is_place(numbers):
+        if not is_place(numbers):
             return False
         state = model.state
         rotation = earth.body_to_level(request.roll_deg, request.pitch_deg, request.heading_deg)
@@ -171,7 +171,7 @@ class Placements:
         return True
 
 
-def _is_place(numbers: Sequence[float]) -> bool:
+def is_place(numbers: Sequence[float]) -> bool:
     """Whether latitude, longitude, elevation, and finite further numbers, are those of a place on X-Plane's earth."""
     if not all(map(math.isfinite, numbers)):
         return False

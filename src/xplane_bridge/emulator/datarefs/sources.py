@@ -7,6 +7,7 @@ from typing import Callable, FrozenSet, List, Mapping, Protocol, Tuple
 from xplane_bridge.emulator.datarefs.aircraft_systems import Electrics, Instruments, Weather
 from xplane_bridge.emulator.datarefs.camera import Cameras
 from xplane_bridge.emulator.datarefs.store import DatarefStore
+from xplane_bridge.emulator.datarefs.traffic import Traffic
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, InitialState
 from xplane_bridge.emulator.flight.frame import Clocks
 
@@ -35,6 +36,7 @@ class Sources(LoadedAircraft, Protocol):
     initial: InitialState  #: where flights start
     weather: Weather
     cameras: Cameras
+    traffic: Traffic
 
     def failed(self, leaf: str) -> bool:
         """Whether a failure dataref (`rel_...`) stands at "failed now"."""

@@ -63,6 +63,7 @@ class CockpitView:
             shift_up=shift_up,
             airspeed_kt=frame.m.calibrated_airspeed_mps * MPS_TO_KT,
             vertical_speed_fpm=-frame.m.v_down_mps * MPS_TO_FPM,
+            others=sim.traffic.poses(),
         )
         for view, renderer in zip(self._views, self._renderers):
             renderer.show(_seen(scene, view, camera.turn))

@@ -103,6 +103,21 @@ def test_horizon_tilts_against_the_roll() -> None:
     assert horizon(120) - horizon(520) == pytest.approx(400 * math.tan(math.radians(20.0)), abs=30)
 
 
+def test_another_aircraft_appears_where_it_is_and_as_large_as_it_is() -> None:
+    # 300 m north at the eye's height, seen from behind: a span of 12 m is f * 12 / 300 = 22 px, 1.5 m of fin 2.8 px.
+    north = 47.0 + math.degrees(300.0 / 6378145.0)
+    other = (north, 8.0, 600.0, 0.0, 0.0, 0.0)
+    empty = Painter(640, 480, ANCHOR, strip=False).paint(LEVEL).astype(int)
+    picture = Painter(640, 480, ANCHOR, strip=False).paint(replace(LEVEL, others=(other,)))
+    rows, columns = np.nonzero(np.abs(picture - empty).max(axis=2) > 8)
+    assert 20 <= np.ptp(columns) <= 25
+    assert columns.mean() == pytest.approx(319.5, abs=1.0)
+    assert rows.min() >= 235
+    assert rows.max() <= 242
+    behind = (47.0 - (north - 47.0), 8.0, 600.0, 0.0, 0.0, 0.0)
+    assert np.array_equal(Painter(640, 480, ANCHOR, strip=False).paint(replace(LEVEL, others=(behind,))), empty)
+
+
 def test_painting_twice_gives_the_same_picture() -> None:
     first = Painter(320, 240, ANCHOR).paint(LEVEL).copy()
     assert np.array_equal(first, Painter(320, 240, ANCHOR).paint(LEVEL))
@@ -135,6 +150,12 @@ def test_a_damaged_strip_is_refused() -> None:
     picture[-8:, 160:176] ^= 255
     with pytest.raises(StripError):
         read_strip(picture)
+
+
+def test_scene_record_round_trip_with_other_aircraft() -> None:
+    scene = replace(LEVEL, others=((1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (7.0, 8.0, 9.0, 10.0, 11.0, 12.0)))
+    assert Scene.unpack(scene.pack()) == scene
+    assert len(scene.pack()) <= 4096  # a write to the pipe stays whole
 
 
 def test_scene_record_round_trip() -> None:

@@ -16,6 +16,7 @@ from ..verdict import Answer, NotTestableError, judged
 #: So far from the aircraft, so that being moved shows [m].
 _MOVE_M = 4000.0
 _EXACT_M = 150.0
+_M_PER_DEG = 111320.0
 
 
 def _prel(flight: Flight) -> Answer:
@@ -55,9 +56,10 @@ def _other_aircraft(flight: Flight) -> Answer:
         raise NotTestableError("there is no other aircraft in this flight")
     wanted = flight.place.north(2.0 * _MOVE_M)
     place = (wanted.latitude_deg, wanted.longitude_deg, wanted.elevation_m, wanted.heading_deg, 0.0, 0.0)
-    flight.xplane.send(protocol.VehiclePose("VEHX", 1, *place))
-    time.sleep(0.5)
-    after = flight.xplane.read(*paths)
+    with flight.xplane.changed({names.OTHER_OVERRIDE: 1.0}, {names.OTHER_OVERRIDE: 0.0}):
+        flight.xplane.send(protocol.VehiclePose("VEHX", 1, *place))
+        time.sleep(0.5)
+        after = flight.xplane.read(*paths)
     off = math.hypot(
         after[names.OTHER_LATITUDE] - wanted.latitude_deg,
         (after[names.OTHER_LONGITUDE] - wanted.longitude_deg) * math.cos(math.radians(wanted.latitude_deg)),
@@ -65,8 +67,26 @@ def _other_aircraft(flight: Flight) -> Answer:
     return judged(off < 0.005, f"aircraft 1 is {off:.4f} deg from where VEHX put it", off_deg=off)
 
 
+def _other_written(flight: Flight) -> Answer:
+    paths = (names.OTHER_LATITUDE, *names.OTHER_PLACE)
+    before = flight.xplane.read(*paths)
+    if not any(before.values()):
+        raise NotTestableError("there is no other aircraft in this flight")
+    x, y, z = (before[path] for path in names.OTHER_PLACE)
+    writes = dict(zip(names.OTHER_PLACE, (x, y, z - _MOVE_M)))  # z is south
+    with flight.xplane.changed({names.OTHER_OVERRIDE: 1.0}, {names.OTHER_OVERRIDE: 0.0}):
+        for path, value in writes.items():
+            flight.xplane.write(path, value)
+        time.sleep(0.5)
+        after = flight.xplane.read(*paths)
+    moved = (after[names.OTHER_LATITUDE] - before[names.OTHER_LATITUDE]) * _M_PER_DEG
+    text = f"aircraft 1 goes {moved:.0f} m north where {_MOVE_M:.0f} m are written under override_planepath"
+    return judged(abs(moved - _MOVE_M) < _EXACT_M, text, moved_m=moved)
+
+
 QUESTIONS = (
     Question("prel", "PREL begins a flight at its place with its heading and true airspeed", _prel),
     Question("vehs", "VEHS moves the aircraft that flies", _vehs),
     Question("other-aircraft", "VEHX puts another aircraft where it says", _other_aircraft),
+    Question("other-written", "a written position of another aircraft under override_planepath holds", _other_written),
 )

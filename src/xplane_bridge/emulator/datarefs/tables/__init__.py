@@ -12,6 +12,7 @@ from xplane_bridge.emulator.datarefs.tables import (
     instruments,
     navigation,
     systems,
+    traffic,
     views,
     weather,
 )
@@ -23,6 +24,6 @@ __all__ = ["Table", "build"]
 def build(sim: Sources) -> Table:
     """Defines all datarefs in the simulator's store and returns what publishes them."""
     table = Table(sim.store)
-    for part in (flight, instruments, weather, controls, engines, systems, cabin, views, navigation, failures):
+    for part in (flight, instruments, weather, controls, engines, systems, cabin, views, navigation, traffic, failures):
         part.define(table, sim)
     return table

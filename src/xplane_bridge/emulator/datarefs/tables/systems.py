@@ -46,8 +46,6 @@ def _version_and_network(t: Table, sim: Sources) -> None:
     t.setting(dataout + "multiplayer_ip")
     t.setting("sim/operation/misc/debug_network")
     t.setting("sim/graphics/settings/rendering_res", 3)
-    for leaf in ("lat", "lon", "el"):
-        t.setting(f"sim/multiplayer/position/plane1_{leaf}")
 
 
 def _identity(t: Table) -> None:

@@ -44,9 +44,7 @@ class Camera:
         down = 0.5 * height / math.tan(math.radians(0.5 * upwards)) if upwards else self.focal
         self.focals = np.array((self.focal, down))
         self.centre = ((width - 1) / 2.0 - scene.shift_right * width, (height - 1) / 2.0 + scene.shift_up * height)
-        north = math.radians(scene.latitude_deg - anchor[0]) * earth.EARTH_RADIUS_M
-        east = math.radians(earth.wrap_half_turn(scene.longitude_deg - anchor[1])) * earth.EARTH_RADIUS_M
-        east *= math.cos(math.radians(anchor[0]))
+        east, north = flat(scene.latitude_deg, scene.longitude_deg, anchor)
         body = earth.body_to_level(scene.roll_deg, scene.pitch_deg, scene.heading_deg)
         self._lever = np.array((scene.eye_forward_m, scene.eye_right_m, scene.eye_down_m))
         lever = _ENU_OF_NED @ body @ self._lever
@@ -91,6 +89,13 @@ class Camera:
         if depth.max() < NEAR_M:
             return None
         return self.project(clip(in_camera, depth - NEAR_M))
+
+
+def flat(latitude_deg: float, longitude_deg: float, anchor: tuple[float, float]) -> tuple[float, float]:
+    """East and north [m] of the anchor, on the flat earth that is drawn around it."""
+    north = math.radians(latitude_deg - anchor[0]) * earth.EARTH_RADIUS_M
+    east = math.radians(earth.wrap_half_turn(longitude_deg - anchor[1])) * earth.EARTH_RADIUS_M
+    return east * math.cos(math.radians(anchor[0])), north
 
 
 def clip(points: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from xplane_bridge.emulator.view.renderer.camera import NEAR_M, Camera, clip
+from xplane_bridge.emulator.view.renderer.others import outlines
 from xplane_bridge.emulator.view.renderer.scene import Scene
 from xplane_bridge.emulator.view.renderer.strip import draw_strip, strip_height
 from xplane_bridge.emulator.view.renderer.world import GRAINS, make_world
@@ -87,6 +88,8 @@ class Painter:
             self._paint_markings(camera)
             self._paint_grain(camera)
             self._paint_boxes(camera)
+        for corners, colour, distance in outlines(scene, self._anchor, camera):
+            self._fill(corners, self._hazed(np.array([colour], float), np.array([distance]))[0])
         if scene.floor_down_m:
             self._paint_floor(scene, camera)
         if self._hud:

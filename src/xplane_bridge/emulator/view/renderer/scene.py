@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 import struct
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
+from typing import Tuple
+
+#: Latitude, longitude [deg], altitude [m MSL], roll, pitch, heading [deg] of another aircraft.
+Pose = Tuple[float, float, float, float, float, float]
+_MOST_OTHERS = 19
+_NONE: Pose = (math.nan,) * 6
 
 
 @dataclass(frozen=True)
@@ -33,16 +41,22 @@ class Scene:
     shift_up: float = 0.0  #: [heights] that it lies above it
     airspeed_kt: float = 0.0  #: indicated; for the head-up display only
     vertical_speed_fpm: float = 0.0
+    others: Tuple[Pose, ...] = ()  #: at most 19
 
     def pack(self) -> bytes:
         """Fixed-size record for the pipe; short enough for a write to be all or nothing."""
-        return _FORMAT.pack(*astuple(self))
+        *numbers, others = astuple(self)
+        padded = [*others, *[_NONE] * (_MOST_OTHERS - len(others))]
+        return _FORMAT.pack(*numbers, *itertools.chain(*padded))
 
     @classmethod
     def unpack(cls, record: bytes) -> Scene:
         """The scene of a record made by `pack`."""
-        return cls(*_FORMAT.unpack(record))
+        numbers = _FORMAT.unpack(record)
+        own, rest = numbers[: len(fields(cls)) - 1], numbers[len(fields(cls)) - 1 :]
+        poses = (rest[i : i + len(_NONE)] for i in range(0, len(rest), len(_NONE)))
+        return replace(cls(*own), others=tuple(pose for pose in poses if not math.isnan(pose[0])))
 
 
-_FORMAT = struct.Struct("=QQ" + "d" * (len(fields(Scene)) - 2))
+_FORMAT = struct.Struct("=QQ" + "d" * (len(fields(Scene)) - 3 + _MOST_OTHERS * len(_NONE)))
 RECORD_BYTES = _FORMAT.size
