@@ -18,7 +18,7 @@ from xplane_bridge.resources import program
 NO_BAG = "not a ROS 1 bag (it does not start with '#ROSBAG V')"
 AIRCRAFT = "rv10, tiltrotor; or a file of your own with aircraft_file:=PATH"
 JOYSTICKS = "there is logitech_extreme_3d_pro, logitech_f710, playstation, xbox; or a file of your own"
-SCENARIOS = "has: blocked_pitot.yaml, bus_failure.yaml, demo.yaml, demo_flight.yaml, engine_failure.yaml"
+SCENARIOS = "has: approach.yaml, blocked_pitot.yaml, bus_failure.yaml, conflict.yaml, demo.yaml, demo_flight.yaml"
 UNPARSED = "broken.yaml: does not parse as YAML: line 3, column 1: expected the node content"
 
 PROGRAMS = [

@@ -36,8 +36,8 @@ class ScenarioPilot:
                 if kind == "failure":
                     failure_dataref(value["name"])
                 if kind in WORLD_KINDS:
-                    service = "reset_flight" if kind == "reset" else f"set_{kind}"
-                    raise ScenarioError(f"{kind}: the emulator's pilot only flies; tx_node sets {kind} ({service})")
+                    way = {"reset": "reset_flight", "traffic": "traffic/command"}.get(kind, f"set_{kind}")
+                    raise ScenarioError(f"{kind}: the emulator's pilot only flies; tx_node sets {kind} ({way})")
         self.player = Player(scenario, apply_excitations=True)
         self._failed: List[str] = []
 

@@ -26,6 +26,7 @@ from .schema import (
     Scenario,
     ScenarioError,
 )
+from .traffic import MOST, RANGES
 from .world import LAYERS, TIME, WEATHER, WIND
 
 _TOP = (
@@ -344,6 +345,17 @@ def _weather(item: Any, path: str) -> Dict[str, Any]:
     return out
 
 
+def _traffic(item: Any, path: str) -> List[Dict[str, float]]:
+    if not isinstance(item, list) or len(item) > MOST:
+        raise ScenarioError(f"{path}: {_short(item)}; expected a list of up to {MOST} aircraft, [] gives them back")
+    out = [_ranged(each, f"{path}[{i}]", {"number": (1, MOST), **RANGES}) for i, each in enumerate(item)]
+    numbers = [each.get("number") for each in out]
+    for i, number in enumerate(numbers):
+        if number is None or number != int(number) or number in numbers[:i]:
+            raise ScenarioError(f"{path}[{i}].number: {number}; expected a whole number from 1 to {MOST}, each once")
+    return out
+
+
 def _word(item: Any, path: str) -> str:
     if not isinstance(item, str) or not item:
         raise ScenarioError(f"{path}: {item!r}; expected a text")
@@ -370,6 +382,7 @@ _ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
     "wind": _wind,
     "weather": _weather,
     "time": _time,
+    "traffic": _traffic,
     "dataref": _datarefs,
     "command": _word,
     "label": _word,

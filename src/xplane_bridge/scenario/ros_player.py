@@ -17,6 +17,7 @@ from ..constants import COMMAND_FIELDS, FlightMode, words
 from .player import Action, Commands, FlightSample, Player
 from .resets import reset_request
 from .schema import HANDLE_FIELDS, Scenario, ScenarioError
+from .traffic import ScenarioTraffic
 from .virtual_stick import VirtualStick
 from .world import time_request, weather_request, wind_request
 
@@ -121,6 +122,7 @@ class RosPlayer:
         self._heard = -math.inf  # when the last flight state came
         self._mode: Optional[int] = None
         self._stall = False
+        self._traffic = ScenarioTraffic()
         self._sequence = self._mode_sequence = 0
         self._tapped: Dict[int, float] = {}  # button to the time of its release
         self._actions: queue.Queue[Optional[Action]] = queue.Queue()
@@ -148,12 +150,14 @@ class RosPlayer:
         from sensor_msgs.msg import Joy
         from std_msgs.msg import String
 
-        from xplane_bridge.msg import ControlCommand, ModeRequest
+        from xplane_bridge.msg import ControlCommand, ModeRequest, TrafficCommand
 
         options = {"queue_size": 1, "tcp_nodelay": True, **options}
         topic = self._namespace + "/"
         self._label_publisher = rospy.Publisher(topic + "scenario/label", String, queue_size=10, latch=True)
         self._mode_publisher = rospy.Publisher(topic + "control/mode_request", ModeRequest, queue_size=10)
+        if any(kind == "traffic" for event in self._player.scenario.events for kind, _ in event.actions):
+            self._traffic_publisher = rospy.Publisher(topic + "traffic/command", TrafficCommand, queue_size=1)
         if self._stick is None:
             return rospy.Publisher(topic + "control/manual", ControlCommand, **options)
         return rospy.Publisher(topic + "joy", Joy, **options)
@@ -210,9 +214,19 @@ class RosPlayer:
             self._commands = self._player.step(now, sample_of(state, self._mode or 1, self._stall))
             commands = self._commands
         for action in commands.actions:
-            self._actions.put(action)
+            if action.kind == "traffic":
+                self._traffic.begin(action.value, state, now)
+            else:
+                self._actions.put(action)
+        self._send_traffic(state, now)
         if commands.finished:
             self._finished.set()
+
+    def _send_traffic(self, state: Any, now: float) -> None:
+        if self._traffic.due(now):
+            message = self._traffic_publisher.data_class(**self._traffic.command(now))
+            message.header.stamp = state.header.stamp
+            self._traffic_publisher.publish(message)
 
     # --- out ----------------------------------------------------------------------------------------------------------
 

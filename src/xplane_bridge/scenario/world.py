@@ -42,7 +42,7 @@ _WEATHER_BITS = {
     "sea_level_pressure": "PRESSURE",
 }
 #: Kinds of actions that take tx_node's services, or an X-Plane: nothing that flies in process has them.
-KINDS = ("reset", "wind", "weather", "time")
+KINDS = ("reset", "wind", "weather", "time", "traffic")
 
 
 def wind_request(value: Mapping[str, float]) -> Dict[str, float]:
