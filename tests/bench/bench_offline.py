@@ -52,6 +52,18 @@ def decode(_: Context) -> List[Measure]:
 
 
 @benchmark
+def wire_log(context: Context) -> List[Measure]:
+    """What a wire log costs the link's thread for each datagram."""
+    command = [cpp_program("bench_wire_log"), str(context.folder)]
+    ours = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    return [
+        Measure("a datagram, median of batches", ours["median_us"], "us", budget=1.0),
+        Measure("a datagram, worst batch", ours["worst_us"], "us"),
+        Measure("records left out", ours["lost"], "", budget=0.0),
+    ]
+
+
+@benchmark
 def emulator_period(context: Context) -> List[Measure]:
     """Error of the emulator's frame period at 60 fps, flying the demonstration."""
     options = ["--fps", "60", "--pilot", config_file("scenarios", "demo.yaml"), "--duration", f"{context.seconds:g}"]

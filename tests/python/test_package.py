@@ -152,6 +152,9 @@ MAY_USE_HOST_TIME = {
         "makes the node's clock; also for the stop, which must not hang with the node's clock",
         {"hostClock("},
     ),
+    "lib/core/wire/capture_hub.cpp": ("lets a replay that is over not run hot", {"sleep_for"}),
+    "lib/core/wire/replay_hub.cpp": ("lets a replay that is over not run hot", {"sleep_for"}),
+    "lib/nodes/base/base_node_wire.cpp": ("waits until a replay is to begin", {"sleep_for"}),
     "lib/nodes/base/base_node.cpp": (
         "waits for the master before there is a node, and for roscpp to send the last words",
         {"sleep_for"},
