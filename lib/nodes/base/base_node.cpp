@@ -15,16 +15,16 @@ namespace xplane_bridge {
 namespace {
 
 constexpr std::int64_t kDiagnosticsPeriodNs = core::kNanosecondsPerSecond;
-constexpr double kServiceGrace = 0.3;  // [s]
+constexpr double kServiceGrace = 0.3;      // [s]
+constexpr double kReplayStopTime = 150.0;  // [s] with all that is still to be delivered
 constexpr std::chrono::milliseconds kFlushTime{100};
 constexpr std::chrono::milliseconds kMasterPollPeriod{200};
 
 /// Ends the process when the stop sequence hangs; says in which step.
 class StopWatchdog {
  public:
-  explicit StopWatchdog(const core::Clock& host_clock)
-      : deadline_(host_clock, std::chrono::duration<double>(BaseNode::kStopTime).count()),
-        thread_([this] { watch(); }) {}
+  StopWatchdog(const core::Clock& host_clock, double stop_time)
+      : deadline_(host_clock, stop_time), thread_([this] { watch(); }) {}
 
   ~StopWatchdog() {
     {
@@ -65,7 +65,7 @@ std::string givenText(const ParamLoader& shared, const ParamLoader& own) {
 
 }  // namespace
 
-BaseNode::BaseNode() : private_handle_("~") {}
+BaseNode::BaseNode() : private_handle_("~"), topics_(&handle_) {}
 
 BaseNode::~BaseNode() {
   if (diagnostics_thread_.joinable()) {
@@ -88,9 +88,10 @@ void BaseNode::initialize() {
     lockstep_clock_.emplace(host_clock_, core::toNanoseconds(common_.lockstep.start_time));
   }
   clock_ = lockstep() ? lockstep_clock_->clock() : host_clock_;
+  const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());
+  openWire(shared, own);
   if (stampsBySimulator()) stampBySimulator();
   timers_ = std::make_unique<ClockTimers>(clock_, ros::getGlobalCallbackQueue());
-  const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());
   loadParameters(own);
   own.refuseUnknown();
 
@@ -137,6 +138,7 @@ ExitCode BaseNode::run() {
       makeLink();
       started_ = true;
       start();
+      startWire();
       startLink();
     }
   } catch (const std::exception& error) {
@@ -147,7 +149,7 @@ ExitCode BaseNode::run() {
   if (!stopping()) {
     spinner_->start();
     service_spinner_->start();
-    if (!lockstep()) timers_->start();
+    if (!lockstep() && !wire_) timers_->start();
   }
   diagnostics_thread_ = std::thread([this] { diagnosticsLoop(); });
   waitForStopRequest();
@@ -183,7 +185,8 @@ void BaseNode::waitForStopRequest() {
 }
 
 void BaseNode::stop() {
-  StopWatchdog watchdog(host_clock_);
+  const double stop_time = replays() ? kReplayStopTime : std::chrono::duration<double>(kStopTime).count();
+  StopWatchdog watchdog(host_clock_, stop_time);
   const auto step = [&watchdog](const char* step_name, const std::function<void()>& action) {
     watchdog.enter(step_name);
     try {
@@ -201,6 +204,7 @@ void BaseNode::stop() {
     step("undo in X-Plane", [&] { undo(deadline); });
     step("stop the link", [&] { stopLink(deadline); });
     step("publish the final state", [this] {
+      reportReplay();
       publishFinalState();
       flushPublishers();
     });
@@ -219,6 +223,7 @@ void BaseNode::endInputs() {
   for (ros::Subscriber& subscriber : subscribers_) {
     subscriber.shutdown();
   }
+  if (wire_) wire_->close();
   timers_->stop();
   spinner_->stop();
   service_queue_.disable();
@@ -230,6 +235,10 @@ void BaseNode::endInputs() {
 }
 
 void BaseNode::flushPublishers() {
+  if (replays()) {
+    waitForReplayDelivery();
+    return;
+  }
   // roscpp hands messages to its network thread and offers no way to learn when they are written.
   std::this_thread::sleep_for(kFlushTime);
 }

@@ -3,12 +3,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 #include "xplane_bridge/core/wire/udp_hub.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/base/conformance_file.hpp"
 #include "xplane_bridge/nodes/base/link_diagnostics.hpp"
+#include "xplane_bridge/nodes/base/log_to_ros.hpp"
 #include "xplane_bridge/nodes/base/user_folder.hpp"
 
 namespace xplane_bridge {
@@ -16,6 +18,10 @@ namespace {
 
 // Time to end a thousand subscriptions, a batch in two frames of X-Plane, also where undoing has taken its time.
 constexpr double kShortestLinkStop_s = 1.0;
+// Of a node whose wire is logged, in the place of its process number.
+constexpr std::uint32_t kLoggedJitterSeed = 7;
+
+}  // namespace
 
 void logToRos(core::LogLevel level, const std::string& text) {
   switch (level) {
@@ -34,19 +40,19 @@ void logToRos(core::LogLevel level, const std::string& text) {
   }
 }
 
-}  // namespace
-
 void BaseNode::makeLink() {
   if (!usesLink()) {
     return;
   }
   core::SimLinkOptions options = linkOptions(common_);
-  if (!lockstep()) options.jitter_seed = static_cast<std::uint32_t>(getpid());
+  if (!lockstep()) options.jitter_seed = wire_ ? kLoggedJitterSeed : static_cast<std::uint32_t>(getpid());
   options.otherwise = [file = common_.conformance_file](const core::Endpoint& peer, std::int32_t version) {
     return readConformance(file, peer, version);
   };
   configureLink(&options);
-  std::unique_ptr<core::DatagramHub> hub = std::make_unique<core::UdpHub>();
+  std::unique_ptr<core::DatagramHub> hub = std::move(hub_of_link_);
+  if (!hub) hub = std::make_unique<core::UdpHub>();
+  waking_ = hub.get();
   if (lockstep()) {
     auto frames = std::make_unique<core::LockstepHub>(std::move(hub), *lockstep_clock_, host_clock_, lockstepHooks());
     hub_ = frames.get();
@@ -97,6 +103,7 @@ void BaseNode::stopLink(const Deadline& deadline) {
   if (!link_) {
     return;
   }
+  if (wire_) wire_->holdForStop();
   if (!link_->stop(std::max(deadline.left(), kShortestLinkStop_s))) {
     const std::shared_ptr<core::Journal> journal = link_->journal();
     ROS_WARN("not everything could be undone in X-Plane; the rest is in %s and is undone at the next start",

@@ -62,6 +62,11 @@ void ClockTimers::start() {
   }
 }
 
+std::optional<std::int64_t> ClockTimers::next() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return stopped_ ? std::nullopt : schedule_.next();
+}
+
 void ClockTimers::runDue() {
   std::vector<core::TimerSchedule::Timer> due;
   {

@@ -72,6 +72,9 @@ CommonOptions loadCommonOptions(const ParamLoader& shared) {
   options.conformance_file = shared.text("conformance_file", options.conformance_file);
   options.beacon_port = shared.integer("beacon_port", {1, 65535}, options.beacon_port);
   options.publish_clock = shared.boolean("publish_clock", options.publish_clock);
+  options.wire_log = shared.text("wire_log", options.wire_log);
+  options.wire_log_size = shared.integer("wire_log_size", {1, 100'000}, options.wire_log_size);
+  options.wire_log_parts = shared.integer("wire_log_parts", {1, 1000}, options.wire_log_parts);
   options.lockstep = loadLockstep(shared, options);
   shared.refuseMisspelt();
   return options;

@@ -345,6 +345,14 @@ void ParamLoader::collectGiven(std::size_t skipped, std::vector<std::string>* te
   }
 }
 
+XmlRpcValue ParamLoader::known() const {
+  XmlRpcValue out;
+  for (const std::string& key : record_->known) {
+    if (tree_.valid() && tree_.hasMember(key)) out[key] = tree_[key];
+  }
+  return out;
+}
+
 void ParamLoader::allow(const std::string& key) const { record_->known.insert(key); }
 
 void ParamLoader::refuse(const std::string& key, const std::string& requirement) const {

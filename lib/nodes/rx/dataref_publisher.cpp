@@ -46,13 +46,13 @@ DatarefPublisher::DatarefPublisher(const std::vector<DatarefEntry>& entries, boo
   message_.values.assign(message_.names.size(), std::numeric_limits<float>::quiet_NaN());
 }
 
-void DatarefPublisher::advertise(ros::NodeHandle* handle) {
+void DatarefPublisher::advertise(const Advertiser& topics) {
   if (batches_.empty()) {
     return;
   }
-  publisher_ = handle->advertise<DatarefValues>("datarefs", kQueueSize);
+  publisher_ = topics.advertise<DatarefValues>("datarefs", kQueueSize);
   for (Scalar& scalar : scalars_) {
-    scalar.publisher = handle->advertise<std_msgs::Float64>("datarefs/" + scalar.topic, kQueueSize);
+    scalar.publisher = topics.advertise<std_msgs::Float64>("datarefs/" + scalar.topic, kQueueSize);
   }
 }
 

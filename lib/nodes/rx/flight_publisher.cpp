@@ -28,13 +28,13 @@ void publishIfHeard(const ros::Publisher& publisher, bool unheard, Message* mess
 FlightPublisher::FlightPublisher(const RxOptions& options, const FrameNames& frames)
     : options_(options), frames_(frames), state_limiter_(options.max_publish_rate), wind_limiter_(options.wind_rate) {}
 
-void FlightPublisher::advertise(ros::NodeHandle* handle) {
-  state_publisher_ = handle->advertise<FlightState>("flight_state", kQueueSize, options_.publish_unheard);
-  odometry_publisher_ = handle->advertise<nav_msgs::Odometry>("odom", kQueueSize);
-  imu_publisher_ = handle->advertise<sensor_msgs::Imu>("imu/data", kQueueSize);
-  fix_publisher_ = handle->advertise<sensor_msgs::NavSatFix>("global_position/global", kQueueSize);
-  wind_publisher_ = handle->advertise<geometry_msgs::TwistWithCovarianceStamped>("wind", kQueueSize);
-  origin_publisher_ = handle->advertise<sensor_msgs::NavSatFix>("origin", 1, true);
+void FlightPublisher::advertise(const Advertiser& topics) {
+  state_publisher_ = topics.advertise<FlightState>("flight_state", kQueueSize, options_.latch_state);
+  odometry_publisher_ = topics.advertise<nav_msgs::Odometry>("odom", kQueueSize);
+  imu_publisher_ = topics.advertise<sensor_msgs::Imu>("imu/data", kQueueSize);
+  fix_publisher_ = topics.advertise<sensor_msgs::NavSatFix>("global_position/global", kQueueSize);
+  wind_publisher_ = topics.advertise<geometry_msgs::TwistWithCovarianceStamped>("wind", kQueueSize);
+  origin_publisher_ = topics.advertise<sensor_msgs::NavSatFix>("origin", 1, true);
   if (options_.publish_tf) {
     tf_broadcaster_.emplace();
   }

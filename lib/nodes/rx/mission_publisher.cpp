@@ -32,8 +32,8 @@ class TypedMissionPublisher : public MissionPublisher {
   core::FieldGroup group() const override { return State::kGroup; }
   int rate() const override { return rate_; }
 
-  void advertise(ros::NodeHandle* handle) override {
-    publisher_ = handle->advertise<Message>(std::string("mission/") + core::toString(group()), kQueueSize);
+  void advertise(const Advertiser& topics) override {
+    publisher_ = topics.advertise<Message>(std::string("mission/") + core::toString(group()), kQueueSize);
   }
 
   void configure(core::SimulatorVersion version) override {

@@ -47,7 +47,8 @@ const char* nameOf(core::Transport transport) { return transport == core::Transp
 
 void RxNode::loadParameters(const ParamLoader& own) {
   options_ = loadRxOptions(own);
-  options_.publish_unheard = lockstep();
+  options_.publish_unheard = lockstep() || wired();
+  options_.latch_state = lockstep();
   if (lockstep() && options_.position_source == core::PositionMode::kXpc) {
     own.refuse("position_source", "auto, local, rpos or float32 with lockstep/enabled: X-Plane Connect has no frames");
   }
@@ -69,8 +70,9 @@ void RxNode::loadParameters(const ParamLoader& own) {
     stamps = SimulatorStamps{clock(), stampOf(0.0)};
     stamp_clock = clock();
   }
-  missions_ = makeMissionPublishers(options_.rates, common().transport, common().frames, lockstep(), stamps);
-  datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs, lockstep(), stamp_clock);
+  missions_ =
+      makeMissionPublishers(options_.rates, common().transport, common().frames, options_.publish_unheard, stamps);
+  datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs, options_.publish_unheard, stamp_clock);
   experiment_ = std::make_unique<ExperimentPublisher>(common());
   if (options_.traffic_rate > 0) traffic_ = std::make_unique<TrafficPublisher>(options_.traffic_rate, stamps);
   addStreams();
@@ -150,17 +152,17 @@ void RxNode::addStreams() {
 }
 
 void RxNode::advertise() {
-  flight_publisher_->advertise(&handle());
+  flight_publisher_->advertise(topics());
   for (const auto& mission : missions_) {
-    mission->advertise(&handle());
+    mission->advertise(topics());
   }
-  datarefs_->advertise(&handle());
-  if (traffic_) traffic_->advertise(&handle());
+  datarefs_->advertise(topics());
+  if (traffic_) traffic_->advertise(topics());
   if (common().transport == core::Transport::kData) {
     rows_publisher_ = advertiseTopic<DataRows>("data_rows", kRowsQueueSize);
   }
   link_state_publisher_ = advertiseTopic<LinkState>("link_state", 1, true);
-  advertiseService<SetOrigin::Request, SetOrigin::Response>(
+  advertiseInput<SetOrigin::Request, SetOrigin::Response>(
       "set_origin", [this](const auto& request, auto& response) { setOrigin(request, response); });
   advertiseService<GetDataref::Request, GetDataref::Response>(
       "get_dataref", [this](const auto& request, auto& response) { getDataref(request, response); });
@@ -171,7 +173,7 @@ void RxNode::advertise() {
   experiment_->advertise(&handle());
   experiment_->setParameters(experiment_->readParameters(handle()));
   if (lockstep() || stampsBySimulator()) {
-    clock_publisher_ = handle().advertise<rosgraph_msgs::Clock>(kClockTopic, 1, true);
+    clock_publisher_ = topics().advertise<rosgraph_msgs::Clock>(kClockTopic, 1, true);
   }
   if (lockstep()) {
     done_publisher_ = advertiseTopic<std_msgs::Header>(kLockstepDoneTopic, 1, true);
@@ -225,7 +227,7 @@ std::int64_t RxNode::begin(const core::ReceiveInfo& info) {
     last_state_.reset();
   }
   if (lockstep()) return clock().system_ns();
-  const std::int64_t wall_ns = wallClock().system_ns();
+  const std::int64_t wall_ns = receiveClock().system_ns();
   return receive_clock_.toHostTime(info.kernel_stamp ? info.stamp_ns : wall_ns, wall_ns, clock().steady_ns());
 }
 
@@ -245,7 +247,7 @@ void RxNode::onData(const core::DataView& datagram, const core::ReceiveInfo& inf
   for (const auto& mission : missions_) {
     mission->onRows(rows_, receive_ns, flight_->clock());
   }
-  if (rows_publisher_.getNumSubscribers() > 0) {
+  if (options_.publish_unheard || rows_publisher_.getNumSubscribers() > 0) {
     publishRows(datagram, info, receive_ns);
   }
 }

@@ -23,8 +23,8 @@ core::TrafficAssembler::Options at(int rate) {
 TrafficPublisher::TrafficPublisher(int rate, const std::optional<SimulatorStamps>& stamps)
     : traffic_(at(rate)), stamps_(stamps) {}
 
-void TrafficPublisher::advertise(ros::NodeHandle* handle) {
-  publisher_ = handle->advertise<TrafficState>("traffic/state", kQueueSize);
+void TrafficPublisher::advertise(const Advertiser& topics) {
+  publisher_ = topics.advertise<TrafficState>("traffic/state", kQueueSize);
 }
 
 std::vector<std::string> TrafficPublisher::requests() const {

@@ -7,8 +7,10 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <diagnostic_updater/diagnostic_updater.h>
@@ -20,8 +22,11 @@
 #include "xplane_bridge/core/base/lockstep_clock.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
 #include "xplane_bridge/core/wire/lockstep_hub.hpp"
+#include "xplane_bridge/core/wire/replay_hub.hpp"
+#include "xplane_bridge/nodes/base/advertiser.hpp"
 #include "xplane_bridge/nodes/base/clock_timers.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
+#include "xplane_bridge/nodes/base/node_wire.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
 
@@ -62,6 +67,10 @@ enum class ExitCode {
 ///
 /// With `publish_clock` and without lock-step, only clock()'s system time is the simulator's: stamps. rx_node moves it,
 /// and the others follow /clock. Receive times of datagrams stay wallClock()'s.
+///
+/// With a wire log (`wire_log`, without lock-step), messages, timers and the calls of advertiseInput() are the link's
+/// thread's too, and clock() shows the time of the newest datagram or turn (core::WireClock): what the node does
+/// follows from the log, and `wire_replay` plays that back.
 ///
 /// SIGINT, SIGTERM and SIGHUP are blocked in all threads (see StopSignals): a child process must unblock them.
 class BaseNode {
@@ -105,6 +114,8 @@ class BaseNode {
   virtual void configureLink(core::SimLinkOptions* options) { static_cast<void>(options); }
   /// Called from the link's thread; must return quickly.
   virtual core::SimLinkCallbacks linkCallbacks() { return {}; }
+  /// Whether all that the node does follows from datagrams, messages, timers and inputs, so that it can be replayed.
+  virtual bool wireIsOrdered() const { return false; }
   /// Subscribe datarefs with link(), open sockets, start threads. Callbacks come once this returns.
   virtual void start() {}
   /// Subscriptions, timers and services have ended; end the node's own inputs.
@@ -158,6 +169,8 @@ class BaseNode {
   const core::Clock& clock() const { return clock_; }
   /// For what must come about while clock() stands.
   const core::Clock& wallClock() const { return host_clock_; }
+  /// The time at which something came; of the recording, in a replay.
+  const core::Clock& receiveClock() const { return receive_clock_; }
   /// The clock's time as a stamp.
   ros::Time stampNow() const { return toRosTime(clock_.system_ns()); }
   /// Valid from start() to the end of undo(), only with usesLink(). What a node changes in X-Plane it records in
@@ -170,13 +183,18 @@ class BaseNode {
 
   template <class Message>
   ros::Publisher advertiseTopic(const std::string& topic, uint32_t queue_size, bool latch = false) {
-    return handle_.advertise<Message>(topic, queue_size, latch);
+    return topics_.advertise<Message>(topic, queue_size, latch);
   }
+  const Advertiser& topics() const { return topics_; }
+  /// Whether all that the node does is logged, or replayed.
+  bool wired() const { return wire_ != nullptr; }
 
   /// Subscribes without Nagle's delay. Use queue size 1 for control topics: the newest command counts.
   template <class Message>
   void subscribeTopic(const std::string& topic, uint32_t queue_size,
                       std::function<void(const boost::shared_ptr<const Message>&)> callback) {
+    if (wire_) callback = throughWire<Message>("topic " + topic, std::move(callback));
+    if (wire_ && wire_->replays()) return;
     subscribers_.push_back(handle_.subscribe<Message>(
         topic, queue_size, boost::function<void(const boost::shared_ptr<const Message>&)>(std::move(callback)),
         ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
@@ -205,6 +223,30 @@ class BaseNode {
     services_.push_back(handle_.advertiseService(options));
   }
 
+  /// The same for a service that does not wait, and on which later topics depend: it is part of the wire log.
+  template <class Request, class Response>
+  void advertiseInput(const std::string& service, std::function<void(const Request&, Response&)> serve) {
+    if (!wire_) {
+      advertiseService<Request, Response>(service, std::move(serve));
+      return;
+    }
+    const std::string input = "service " + service;
+    wire_->onInput(input, [serve](core::ByteView bytes) {
+      Request request;
+      Response response;
+      fromBytes(bytes, &request);
+      serve(request, response);
+    });
+    if (wire_->replays()) return;
+    advertiseService<Request, Response>(service, [this, serve, input](const Request& request, Response& response) {
+      const auto given = std::make_shared<std::pair<Request, Response>>(request, Response());
+      if (!wire_->call(input, toBytes(request), [serve, given] { serve(given->first, given->second); })) {
+        throw std::runtime_error("the link's thread does not take it up");
+      }
+      response = given->second;
+    });
+  }
+
   /// Calls `callback` every `period` [s] of clock(), on the thread of the subscriptions. From advertise() and
   /// subscribe() only.
   void addTimer(double period, std::function<void()> callback);
@@ -225,6 +267,25 @@ class BaseNode {
   enum class State { kCreated, kInitialized, kRunning, kStopped };
 
   void stampBySimulator();
+  void openWire(const ParamLoader& shared, const ParamLoader& own);
+  void startWire();
+  void reportReplay() const;
+  bool replays() const;
+  /// Until who asked for the replay has all that was published.
+  void waitForReplayDelivery();
+  /// A message's callback that goes through the wire log.
+  template <class Message>
+  std::function<void(const boost::shared_ptr<const Message>&)> throughWire(
+      const std::string& input, std::function<void(const boost::shared_ptr<const Message>&)> callback) {
+    wire_->onInput(input, [callback](core::ByteView bytes) {
+      const auto message = boost::make_shared<Message>();
+      fromBytes(bytes, message.get());
+      callback(message);
+    });
+    return [this, input, callback](const boost::shared_ptr<const Message>& message) {
+      wire_->post(input, toBytes(*message), [callback, message] { callback(message); });
+    };
+  }
   void makeLink();
   core::LockstepHooks lockstepHooks();
   void startLink();
@@ -242,9 +303,11 @@ class BaseNode {
   bool started_ = false;
   ros::NodeHandle handle_;
   ros::NodeHandle private_handle_;
+  Advertiser topics_;
   CommonOptions common_;
   const core::Clock host_clock_ = core::hostClock();
   core::Clock clock_;
+  core::Clock receive_clock_ = host_clock_;
   std::optional<core::LockstepClock> lockstep_clock_;
   std::shared_ptr<std::atomic<std::int64_t>> stamp_ns_;  // with stampsBySimulator()
 
@@ -255,6 +318,10 @@ class BaseNode {
   std::unique_ptr<ros::AsyncSpinner> service_spinner_;
   std::unique_ptr<ClockTimers> timers_;
 
+  std::unique_ptr<NodeWire> wire_;  // null: the wire is neither logged nor replayed, or not in order
+  const std::shared_ptr<core::ReplayProgress> replayed_ = std::make_shared<core::ReplayProgress>();
+  std::unique_ptr<core::DatagramHub> hub_of_link_;  // until there is a link
+  core::DatagramHub* waking_ = nullptr;             // the link's
   std::unique_ptr<core::SimLink> link_;
   core::LockstepHub* hub_ = nullptr;  // of the link, in lock-step
 

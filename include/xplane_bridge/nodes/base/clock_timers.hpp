@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -34,6 +35,8 @@ class ClockTimers {
   void setAlarm(core::TimerSchedule::Timer alarm, std::int64_t due_ns);
   /// Begins with what is due already.
   void start();
+  /// [ns, steady] when one is due next.
+  std::optional<std::int64_t> next();
   /// Instead of start(): calls what is due now, on the calling thread.
   void runDue();
   /// Periodic ones begin anew: due one period from now.

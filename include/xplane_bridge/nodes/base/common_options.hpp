@@ -56,6 +56,10 @@ struct CommonOptions {
   int beacon_port = 49707;        ///< UDP port of the announcement
   bool publish_clock = false;     ///< stamps are lockstep.start_time + simulator time, on /clock too
 
+  std::string wire_log;      ///< file of the wire log, without the node's name (docs/wire_log.md); empty: none
+  int wire_log_size = 1000;  ///< [MB] of one part of it
+  int wire_log_parts = 4;    ///< parts kept; the oldest is deleted for a further one
+
   LockstepOptions lockstep;
 };
 

@@ -77,6 +77,11 @@ class ParamLoader {
   /// "port: 49010", "limits/upper: 1.5", values as on the parameter server.
   std::vector<std::string> given() const;
 
+  /// What is set of the keys that were read so far; a struct, or invalid where there is none of them.
+  XmlRpc::XmlRpcValue known() const;
+  /// All that is set; invalid where nothing is.
+  const XmlRpc::XmlRpcValue& tree() const { return tree_; }
+
   /// Marks `key` as known without reading it (read elsewhere, by a library for instance).
   void allow(const std::string& key) const;
 

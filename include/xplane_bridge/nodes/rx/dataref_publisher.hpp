@@ -10,6 +10,7 @@
 #include "xplane_bridge/DatarefValues.h"
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/wire/rref_frame_assembler.hpp"
+#include "xplane_bridge/nodes/base/advertiser.hpp"
 #include "xplane_bridge/nodes/rx/rx_options.hpp"
 
 namespace xplane_bridge {
@@ -22,7 +23,7 @@ class DatarefPublisher {
   /// @param stamps clock of the stamps; empty: they are receive times
   DatarefPublisher(const std::vector<DatarefEntry>& entries, bool publish_unheard, std::optional<core::Clock> stamps);
 
-  void advertise(ros::NodeHandle* handle);
+  void advertise(const Advertiser& topics);
 
   /// Datarefs are asked for in batches of the same rate.
   std::size_t batches() const { return batches_.size(); }

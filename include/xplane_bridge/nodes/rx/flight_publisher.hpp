@@ -9,6 +9,7 @@
 
 #include "xplane_bridge/core/base/rate_limiter.hpp"
 #include "xplane_bridge/core/state/state_assembler.hpp"
+#include "xplane_bridge/nodes/base/advertiser.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 #include "xplane_bridge/nodes/rx/rx_options.hpp"
 
@@ -24,7 +25,7 @@ class FlightPublisher {
   FlightPublisher(const RxOptions& options, const FrameNames& frames);
 
   /// Advertises the topics and sends the static frames.
-  void advertise(ros::NodeHandle* handle);
+  void advertise(const Advertiser& topics);
 
   /// @param map the frame state.position_* refers to
   /// @param receive_ns host receive time of the state [ns]

@@ -10,6 +10,7 @@
 
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/state/state_assembler.hpp"
+#include "xplane_bridge/nodes/base/advertiser.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
 
 namespace xplane_bridge {
@@ -32,7 +33,7 @@ class MissionPublisher {
 
   virtual core::FieldGroup group() const = 0;
   virtual int rate() const = 0;
-  virtual void advertise(ros::NodeHandle* handle) = 0;
+  virtual void advertise(const Advertiser& topics) = 0;
 
   /// X-Plane's version is known, or another: requests() and rows() change.
   virtual void configure(core::SimulatorVersion version) = 0;

@@ -81,9 +81,10 @@ class RxNode : public BaseNode {
   void publishClock();
   /// With the stamp that it is published with.
   core::FlightState stamped(const core::FlightState& state) const;
+  bool wireIsOrdered() const override { return true; }
   bool leadsClock() const override { return true; }
   /// [ns] now, of the clock that receive times are of.
-  std::int64_t receiveNow() const { return lockstep() ? clock().system_ns() : wallClock().system_ns(); }
+  std::int64_t receiveNow() const { return lockstep() ? clock().system_ns() : receiveClock().system_ns(); }
   void publishLinkState(const core::LinkStatus& status);
   /// Once X-Plane has said which it is, what is loaded and what is set.
   void publishExperiment();

@@ -34,8 +34,10 @@ struct RxOptions {
   int xpc_port = core::kXpcPort;
   std::optional<core::GeoPoint> origin;  ///< of `map`; empty: the first valid position
   Geoid geoid;                           ///< its undulation is added to NavSatFix altitudes
-  bool publish_unheard = false;  ///< also what nobody listens to; in lock-step, so that counts do not depend on it
-  bool publish_tf = false;       ///< map -> base_link on /tf
+  /// Also what has no subscriber: in lock-step and with a wire log, so that counts do not depend on that.
+  bool publish_unheard = false;
+  bool latch_state = false;  ///< a late subscriber gets the newest flight_state; in lock-step
+  bool publish_tf = false;   ///< map -> base_link on /tf
   std::vector<DatarefEntry> datarefs;
 
   // transport `data` only

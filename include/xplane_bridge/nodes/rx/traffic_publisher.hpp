@@ -10,6 +10,7 @@
 #include "xplane_bridge/TrafficState.h"
 #include "xplane_bridge/core/state/clock_filter.hpp"
 #include "xplane_bridge/core/state/traffic.hpp"
+#include "xplane_bridge/nodes/base/advertiser.hpp"
 #include "xplane_bridge/nodes/rx/mission_publisher.hpp"
 
 namespace xplane_bridge {
@@ -22,7 +23,7 @@ class TrafficPublisher {
   /// @param stamps of simulator time; empty: of the host
   TrafficPublisher(int rate, const std::optional<SimulatorStamps>& stamps);
 
-  void advertise(ros::NodeHandle* handle);
+  void advertise(const Advertiser& topics);
   void configure(core::SimulatorVersion version) { traffic_.configure(version); }
   /// Datarefs to ask for, the position is the index; empty while they are not wanted.
   std::vector<std::string> requests() const;

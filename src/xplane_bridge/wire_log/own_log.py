@@ -1,0 +1,179 @@
+"""What the bridge wrote with `wire_log`: all that a node did at its wire, in the order in which it did it."""
+
+from __future__ import annotations
+
+import re
+import xmlrpc.client
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Set, Tuple
+
+from xplane_bridge.wire_log import records
+from xplane_bridge.wire_log.capture import Capture, CaptureError, Packet
+from xplane_bridge.wire_log.datagrams import USER0, Address, datagram_in
+
+_PART = re.compile(r"_part(\d+)$")
+
+
+class Event(NamedTuple):
+    """One record of the log."""
+
+    kind: int  #: as in `records`
+    number: int  #: in the order of processing
+    source: int = 0
+    wall_ns: int = 0
+    steady_ns: int = 0
+    kernel_ns: int = 0
+    peer: Address = ("0.0.0.0", 0)
+    counted: int = 0
+    payload: bytes = b""
+
+
+class OwnLog:
+    """The wire log of one node, with all of its parts.
+
+    Args:
+        path: the first part, or a later one; those that follow it are read as well.
+
+    Raises:
+        CaptureError: It is no wire log of the bridge.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        first = Capture.open(path)
+        about = about_of(first)
+        if about is None:
+            msg = f"{path} was not written with wire_log"
+            raise CaptureError(msg)
+        self.about = about
+        self.problem = ""  #: why the log ends before its node did; known once events() is through
+        self.sources: List[Tuple[str, int]] = []  #: name and port, by number
+
+    @property
+    def node(self) -> str:
+        """The node's full name."""
+        return str(self.about["node"])
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether it holds all that the node went by, not datagrams alone."""
+        return bool(self.about.get("ordered"))
+
+    def parts(self) -> List[Path]:
+        """The files of the log, from the one given on."""
+        match = _PART.search(self.path.stem)
+        number = int(match.group(1)) if match else 1
+        stem = self.path.stem[: match.start()] if match else self.path.stem
+        out = [self.path]
+        while True:
+            number += 1
+            following = self.path.with_name(f"{stem}_part{number}{self.path.suffix}")
+            if not following.is_file():
+                return out
+            out.append(following)
+
+    def events(self) -> Iterator[Event]:
+        """The records, up to the first gap.
+
+        Raises:
+            CaptureError: A part is damaged.
+        """
+        self.sources, self.problem = [], ""
+        dropped: Dict[int, int] = {}
+        number: Optional[int] = None
+        for part in self.parts():
+            capture = Capture.open(part)
+            opened: Set[int] = set()
+            for packet in capture.packets():
+                yield from self._opened(capture, opened)
+                notes = dict(item.split("=", 1) for item in packet.comment.split(" ") if "=" in item)
+                if "n" not in notes:
+                    self.problem = f"{part} was changed by another program: a packet has no number"
+                    return
+                if number is not None and int(notes["n"]) != number:
+                    self.problem = f"{part} has a gap before packet {notes['n']}: packets were taken out"
+                    return
+                for times in filter(None, notes.get("t", "").split(";")):
+                    wall, steady = times.split(",")
+                    yield Event(records.WAITED, int(notes["n"]), wall_ns=int(wall), steady_ns=int(steady))
+                event = self._event(capture, packet, notes, dropped)
+                number = int(notes["n"]) + 1
+                if event.kind == records.LOST:
+                    self.problem = f"{part} has a gap of {event.counted} records, which were not written in time"
+                    return
+                if event.kind:
+                    yield event
+            yield from self._opened(capture, opened)
+            if capture.cut:
+                self.problem = f"{part} is cut off"
+                return
+
+    def _opened(self, capture: Capture, seen: Set[int]) -> Iterator[Event]:
+        """Sources of which the part has told since the last call, and no earlier part."""
+        for index in range(1, len(capture.interfaces)):
+            if index in seen:
+                continue
+            seen.add(index)
+            if index <= len(self.sources):
+                continue
+            interface = capture.interfaces[index]
+            name = interface.name.partition("/")[2]
+            self.sources.append((name, interface.port))
+            yield Event(records.OPENED, 0, source=index - 1, peer=("0.0.0.0", interface.port), payload=name.encode())
+
+    @staticmethod
+    def _event(capture: Capture, packet: Packet, notes: Dict[str, str], dropped: Dict[int, int]) -> Event:
+        number, wall, steady = int(notes["n"]), int(notes["w"]), int(notes["s"])
+        link_type = capture.interfaces[packet.interface].link_type
+        if link_type == USER0:
+            name, _, rest = packet.data.partition(b"\0")
+            if name == b"waited":
+                return Event(0, number)
+            if name in (b"lost", b"refused"):
+                count, place = rest.split()
+                kind = records.LOST if name == b"lost" else records.REFUSED
+                return Event(kind, number, int(place), wall, steady, counted=int(count))
+            return Event(records.INPUT, number, 0, wall, steady, payload=packet.data)
+        datagram = datagram_in(link_type, packet.data)
+        source = packet.interface - 1
+        if datagram is None:
+            return Event(0, number)
+        if packet.outbound:
+            refused = int(notes.get("e", "0"))
+            return Event(records.SENT, number, source, wall, steady, 0, datagram.destination, refused, datagram.payload)
+        dropped[source] = dropped.get(source, 0) + packet.dropped
+        kernel = packet.time_ns if "k" in notes else 0
+        return Event(
+            records.RECEIVED, number, source, wall, steady, kernel, datagram.source, dropped[source], datagram.payload
+        )
+
+
+def about_of(capture: Capture) -> Optional[Dict[str, Any]]:
+    """What the head of a wire log says of its node; None of another capture."""
+    for _ in capture.packets():
+        break
+    if not capture.comment.startswith("<value><struct>"):
+        return None
+    text = f"<methodResponse><params><param>{capture.comment}</param></params></methodResponse>"
+    try:
+        value = xmlrpc.client.loads(text)[0][0]
+    except Exception as error:  # expat's and xmlrpc's own, of all kinds
+        msg = f"{capture.name} has a damaged head: {error}"
+        raise CaptureError(msg) from None
+    return value if isinstance(value, dict) and "node" in value else None
+
+
+def replayable(log: OwnLog) -> Iterator[bytes]:
+    """The file that a node plays, in pieces."""
+    yield records.MAGIC
+    for event in log.events():
+        yield records.encode(
+            event.kind,
+            event.payload,
+            event.source,
+            event.wall_ns,
+            event.steady_ns,
+            event.kernel_ns,
+            event.peer,
+            event.counted,
+        )

@@ -1,0 +1,137 @@
+"""Captures that the bridge did not write: what X-Plane sent to whatever program, for a node that asks anew.
+
+X-Plane answers with numbers that the asker has chosen; the names of the datarefs stand in the requests only. So a
+capture must hold both directions, and begin before the program has asked.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import Counter
+from pathlib import Path
+from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
+
+from xplane_bridge.wire_log import records
+from xplane_bridge.wire_log.capture import Capture, CaptureError
+from xplane_bridge.wire_log.datagrams import Address, Datagram, datagram_in
+
+MAGIC = b"xplane_bridge wire capture 1\n"
+_REQUEST, _ANSWER = b"RREF\0", b"RREF,"
+_PAIR = struct.Struct("<if")
+_ROW_BYTES = 36
+#: Steady time of the first packet [ns]: clocks of a computer do not begin at 0.
+_START_NS = 1000 * 1_000_000_000
+
+
+class Sighting(NamedTuple):
+    """A datagram and its time."""
+
+    time_ns: int
+    datagram: Datagram
+
+
+class StrangersCapture:
+    """The traffic of one X-Plane in a capture.
+
+    Args:
+        path: pcap or pcapng.
+        xplane: its address; found by its answers when None.
+
+    Raises:
+        CaptureError: There is none, or nothing of it can be read.
+    """
+
+    def __init__(self, path: Path, xplane: Optional[str] = None) -> None:
+        capture = Capture.open(path)
+        self.path = path
+        seen = []
+        for packet in capture.packets():
+            datagram = datagram_in(capture.interfaces[packet.interface].link_type, packet.data)
+            if datagram is not None and packet.whole:
+                seen.append(Sighting(packet.time_ns, datagram))
+        seen.sort(key=lambda each: each.time_ns)
+        self.xplane = xplane or self._find(seen)
+        #: Where it was asked.
+        self.port = next(
+            (to[1] for _, (_, to, data) in seen if data.startswith(_REQUEST) and to[0] == self.xplane), 49000
+        )
+        self.paths: List[str] = []  #: of all datarefs, by their numbers
+        self.answers = 0  #: datagrams with values that have a name
+        self.nameless = 0  #: values whose request is not in the capture
+        self.rows = 0  #: datagrams of Data Output
+        self._events = list(self._read(seen))
+        if not self._events:
+            lacking = (
+                "requests for them are not in it: capture from before the program starts"
+                if self.nameless
+                else ("expected answers (RREF), Data Output (DATA) or positions (RPOS)")
+            )
+            msg = f"{path} has no values of X-Plane at {self.xplane} that can be used; {lacking}"
+            raise CaptureError(msg)
+
+    def _find(self, seen: List[Sighting]) -> str:
+        votes: Counter[str] = Counter()
+        for _, (source, to, data) in seen:
+            if data.startswith(_REQUEST):
+                votes[to[0]] += 1
+            elif data.startswith((_ANSWER, b"BECN", b"RPOS")) or _is_rows(data):
+                votes[source[0]] += 1
+        if not votes:
+            msg = f"{self.path} has no datagrams of X-Plane; expected RREF, DATA, RPOS or BECN over UDP"
+            raise CaptureError(msg)
+        return votes.most_common(1)[0][0]
+
+    def _read(self, seen: List[Sighting]) -> Iterator[bytes]:
+        clients: Dict[Address, int] = {}
+        names: Dict[Tuple[int, int], int] = {}  # client and its number: of the dataref
+        numbers: Dict[str, int] = {}
+        first: Optional[int] = None
+        for time_ns, (source, to, data) in seen:
+            if to[0] == self.xplane and data.startswith(_REQUEST) and len(data) > 13:
+                rate, index = struct.unpack_from("<ii", data, 5)
+                path = data[13:].split(b"\0")[0].decode("ascii", "replace")
+                client = clients.setdefault(source, len(clients))
+                if rate > 0 and path:
+                    number = numbers.setdefault(path, len(numbers))
+                    if number == len(self.paths):
+                        self.paths.append(path)
+                    names[client, index] = number
+                    yield records.encode(records.NAMED, path.encode(), client, counted=number)
+                continue
+            if source[0] != self.xplane:
+                continue
+            first = time_ns if first is None else first
+            kind, client, payload = self._useful(data, clients.get(to, -1), names)
+            if kind:
+                steady_ns = _START_NS + time_ns - first
+                yield records.encode(kind, payload, max(client, 0), time_ns, steady_ns, time_ns, source)
+
+    def _useful(self, data: bytes, client: int, names: Dict[Tuple[int, int], int]) -> Tuple[int, int, bytes]:
+        """Kind of the record, client and payload; a kind of 0 where there is nothing of use."""
+        if data.startswith(_ANSWER):
+            values = b""
+            for at in range(5, len(data) - 7, _PAIR.size):
+                index, _ = _PAIR.unpack_from(data, at)
+                number = names.get((client, index))
+                if number is None:
+                    self.nameless += 1
+                else:
+                    values += struct.pack("<I", number) + data[at + 4 : at + 8]
+            self.answers += bool(values)
+            return (records.VALUES if values else 0, client, values)
+        for label, name in ((b"RPOS", b"rpos"), (b"BECN", b"beacon")):
+            if data.startswith(label):
+                return (records.RECEIVED, client, name + b"\0" + data)
+        if _is_rows(data):
+            self.rows += 1
+            return (records.RECEIVED, client, b"data\0" + data)
+        return (0, client, b"")
+
+    def playable(self) -> Iterator[bytes]:
+        """The file that a node plays, in pieces."""
+        yield MAGIC
+        yield from self._events
+
+
+def _is_rows(data: bytes) -> bool:
+    return data.startswith(b"DATA") and len(data) > 5 and (len(data) - 5) % _ROW_BYTES == 0

@@ -1,0 +1,141 @@
+"""A flight's wire, logged, read and replayed by the programs that users run."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from xplane_bridge.bags.chunks import BagFile
+from xplane_bridge.harness.processes import wait_until
+from xplane_bridge.resources import program
+from xplane_bridge.wire_log import records
+from xplane_bridge.wire_log.own_log import OwnLog
+
+TOPICS = ("flight_state", "odom", "imu/data", "wind", "link_state", "mission/surfaces", "mission/engines", "datarefs")
+REPLAY_S = 300.0
+
+
+class RawTopics:
+    """The payloads of topics, as a recorder gets them.
+
+    Args:
+        namespace: of the bridge.
+    """
+
+    def __init__(self, namespace: str) -> None:
+        import rospy
+
+        self.payloads: dict[str, list[bytes]] = {}
+        self._subscribers = [
+            rospy.Subscriber(f"{namespace}/{topic}", rospy.AnyMsg, self._take, f"{namespace}/{topic}", tcp_nodelay=True)
+            for topic in TOPICS
+        ]
+
+    def _take(self, message: Any, topic: str) -> None:
+        self.payloads.setdefault(topic, []).append(message._buff)
+
+    def close(self) -> None:
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+
+def replay(*args: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(program("wire_replay")), *map(str, args)], capture_output=True, text=True, timeout=REPLAY_S, check=False
+    )
+
+
+def payloads_in(bag: Path) -> dict[str, list[bytes]]:
+    file = BagFile(bag)
+    out: dict[str, list[bytes]] = {}
+    for id_, connection in file.connections.items():
+        out[connection.topic] = [each for _, chunk in file.by_chunk(id_) for each in chunk]
+    file.close()
+    return out
+
+
+@pytest.fixture(scope="module")
+def flight(new_world, tmp_path_factory):
+    """A flight with datagrams lost and overtaken, and X-Plane ended and started again: its log, and what was heard."""
+    folder = tmp_path_factory.mktemp("wire")
+    world = new_world(folder)
+    try:
+        emulator = world.emulator("--fps", 60, "--fault", "drop=0.05,reorder", "--seed", 3)
+        world.set_param("wire_log", str(folder / "wire.pcapng"))
+        heard = RawTopics(world.namespace)
+        node = world.start("rx_node", {"datarefs": [{"name": "sim/cockpit2/gauges/indicators/airspeed_kts_pilot"}]})
+        states = f"{world.namespace}/flight_state"
+
+        def count() -> int:
+            return len(heard.payloads.get(states, ()))
+
+        wait_until(lambda: count() >= 300, 60, "300 states")
+        emulator.restart()
+        before = count()
+        wait_until(lambda: count() >= before + 200, 60, "200 states after the restart")
+        node.stop()
+        heard.close()
+        log = folder / "wire.rx_node.pcapng"
+        assert node.returncode == 0, node.describe("")
+        yield world.namespace, log, heard.payloads, folder
+    finally:
+        world.close()
+
+
+def test_the_log_holds_the_flight(flight):
+    _, path, _, _ = flight
+    log = OwnLog(path)
+    events = list(log.events())
+    assert log.problem == ""
+    assert log.is_ordered
+    kinds = {event.kind for event in events}
+    assert {records.OPENED, records.RECEIVED, records.SENT, records.WAITED, records.INPUT} <= kinds
+    assert {name for name, _ in log.sources} >= {"control", "flight"}
+    steady = [event.steady_ns for event in events if event.kind in (records.RECEIVED, records.WAITED)]
+    assert steady == sorted(steady)
+    flight_source = [name for name, _ in log.sources].index("flight")
+    answers = [e for e in events if e.kind == records.RECEIVED and e.source == flight_source]
+    assert len(answers) > 300
+    assert all(e.kernel_ns and 0 <= e.wall_ns - e.kernel_ns < 30e9 for e in answers)
+
+
+def test_the_replay_is_the_flight_byte_for_byte(flight):
+    namespace, path, live, folder = flight
+    bag = folder / "replay.bag"
+    done = replay(path, "-o", bag, "--logs", folder / "logs")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert " 0 otherwise than recorded" in done.stdout
+    replayed = payloads_in(bag)
+    for topic in (f"{namespace}/{name}" for name in TOPICS):
+        sent = live[topic]
+        here = replayed[topic]
+        start = here.index(sent[0])
+        assert here[start : start + len(sent)] == sent, topic
+    # Its own summary says the same.
+    line = next(line for line in done.stdout.splitlines() if line.startswith(f"{namespace}/flight_state "))
+    digest = hashlib.sha256()
+    for payload in replayed[f"{namespace}/flight_state"]:
+        digest.update(len(payload).to_bytes(4, "little") + payload)
+    assert line.split()[2] == digest.hexdigest()[:16]
+
+
+def test_a_changed_byte_is_noticed(flight):
+    _, path, _, folder = flight
+    bag = folder / "reference.bag"
+    done = replay(path, "-o", bag)
+    assert done.returncode == 0, done.stdout + done.stderr
+    data = bytearray(path.read_bytes())
+    at = data.index(b"RREF,", len(data) * 2 // 3)
+    while len(data) - at < 400 or data[at - 28] != 0x45:
+        at = data.index(b"RREF,", at + 1)
+    data[at + 11] ^= 0x10
+    other = folder / "other.rx_node.pcapng"
+    other.write_bytes(data)
+    # The bag of the replay has the names of the flight's publisher, as a recording of the flight has.
+    done = replay(other, "--against", bag)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "DIFFERS" in done.stdout
