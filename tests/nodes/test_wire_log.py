@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import struct
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,8 @@ from xplane_bridge.bags.chunks import BagFile
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.resources import program
 from xplane_bridge.wire_log import records
+from xplane_bridge.wire_log.capture import Capture
+from xplane_bridge.wire_log.datagrams import USER0
 from xplane_bridge.wire_log.own_log import OwnLog
 
 TOPICS = ("flight_state", "odom", "imu/data", "wind", "link_state", "mission/surfaces", "mission/engines", "datarefs")
@@ -139,3 +143,59 @@ def test_a_changed_byte_is_noticed(flight):
     done = replay(other, "--against", bag)
     assert done.returncode == 1, done.stdout + done.stderr
     assert "DIFFERS" in done.stdout
+
+
+def test_a_strangers_capture_gives_the_same_values(flight):
+    """The flight's traffic as tcpdump would have written it: Ethernet, microseconds, without numbers and clocks."""
+    namespace, path, live, folder = flight
+    capture = Capture.open(path)
+    out = [struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 1)]
+    for packet in capture.packets():
+        if capture.interfaces[packet.interface].link_type != USER0:
+            frame = bytes(12) + b"\x08\x00" + packet.data
+            out.append(
+                struct.pack("<IIII", packet.time_ns // 10**9, packet.time_ns % 10**9 // 1000, len(frame), len(frame))
+            )
+            out.append(frame)
+    file, bag = folder / "tcpdump.pcap", folder / "tcpdump.bag"
+    file.write_bytes(b"".join(out))
+    done = replay(file, "-o", bag, "--logs", folder / "tcpdump_logs")
+    assert done.returncode == 0, done.stdout + done.stderr
+    there, here = (
+        states_by_time(live[f"{namespace}/flight_state"]),
+        states_by_time(payloads_in(bag)["/xplane/flight_state"]),
+    )
+    common = sorted(set(there) & set(here))
+    assert len(common) > 0.6 * len(there)
+    for sim_time in common:
+        mine, theirs = here[sim_time], there[sim_time]
+        assert (mine.roll_deg, mine.pitch_deg, mine.latitude) == (theirs.roll_deg, theirs.pitch_deg, theirs.latitude)
+        assert abs((mine.header.stamp - theirs.header.stamp).to_sec()) < 1.0
+
+
+def states_by_time(payloads: list[bytes]) -> dict[float, Any]:
+    """Flight states by simulator time; of the same time in both runs of X-Plane, the first."""
+    from xplane_bridge.msg import FlightState
+
+    out: dict[float, Any] = {}
+    for payload in payloads:
+        state = FlightState().deserialize(payload)
+        out.setdefault(state.sim_time, state)
+    return out
+
+
+def test_a_recording_becomes_a_regression_test(flight):
+    _, path, _, folder = flight
+    kept = folder / "kept"
+    done = replay(path, "--regression", kept)
+    assert done.returncode == 0, done.stdout + done.stderr
+    expected = json.loads((kept / "wire.json").read_text(encoding="utf-8"))
+    assert expected
+    done = replay(kept / "wire.pcapng", "--expect", kept / "wire.json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    topic = next(name for name in expected if name.endswith("/odom"))
+    expected[topic]["sha256"] = "0" * 64
+    (kept / "wire.json").write_text(json.dumps(expected), encoding="utf-8")
+    done = replay(kept / "wire.pcapng", "--expect", kept / "wire.json")
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert f"DIFFERS {topic}" in done.stdout

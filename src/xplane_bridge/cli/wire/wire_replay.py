@@ -27,6 +27,10 @@ from xplane_bridge.wire_log.strangers import StrangersCapture
 _NOT_REPLAYED = ("wire_log", "wire_log_size", "wire_log_parts", "listen_for_beacon")
 
 
+#: Says how a node was started, and so another thing of a replay.
+_OF_THE_START = "/experiment"
+
+
 class ReplayError(XplaneBridgeError):
     """A recording cannot be replayed; the text says why."""
 
@@ -72,7 +76,8 @@ def payloads_of(bag: Path, node: str) -> Dict[str, List[bytes]]:
     try:
         out: Dict[str, List[bytes]] = {}
         for connection in file.connections.values():
-            if connection.callerid == node and connection.topic not in ("/rosout", "/diagnostics"):
+            of_ros = connection.topic in ("/rosout", "/diagnostics") or connection.topic.endswith(_OF_THE_START)
+            if connection.callerid == node and not of_ros:
                 for _, messages in file.by_chunk(connection.id):
                     out.setdefault(connection.topic, []).extend(messages)
         return out
@@ -223,6 +228,8 @@ def _replay(args: argparse.Namespace, folder: Path) -> int:
     print(replay.run(args.timeout))
     messages: Dict[str, List[bytes]] = {}
     for message in replay.messages:
+        if message.topic.endswith(_OF_THE_START):
+            continue
         messages.setdefault(message.topic, []).append(message.data)
     for topic, digest in sorted(hashes(messages).items()):
         print(f"{topic}  {len(messages[topic])}  {digest[:16]}")

@@ -1,0 +1,72 @@
+"""What wire_replay says of what it has found, without ROS."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from xplane_bridge.cli.wire.wire_replay import ReplayError, compare, hashes, main, prepare, start_of
+from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
+from xplane_bridge.wire_log.own_log import OwnLog
+
+ABOUT = (
+    "<value><struct><member><name>node</name><value>/x/rx_node</value></member><member><name>program</name>"
+    "<value>rx_node</value></member><member><name>namespace</name><value>/x</value></member><member><name>ordered</name>"
+    "<value><boolean>{ordered}</boolean></value></member><member><name>shared</name><value><struct><member>"
+    "<name>host</name><value>there</value></member><member><name>wire_log</name><value>/tmp/a</value></member></struct>"
+    "</value></member></struct></value>"
+)
+SENT = bytes([0x45, 0, 0, 29, 0, 0, 0, 0, 64, 17, 0, 0, 10, 9, 8, 6, 10, 9, 8, 7]) + struct.pack(
+    ">HHHHB", 50000, 49000, 9, 0, 7
+)
+
+
+def log(path, ordered=1):
+    packets = [Packet(1, 5, SENT, "n=0 w=5 s=5", outbound=True)]
+    interfaces = [(147, "rx_node/notes", ""), (101, "rx_node/control", "port 50000")]
+    path.write_bytes(b"".join(write_pcapng(interfaces, iter(packets), ABOUT.format(ordered=ordered), "a test")))
+    return path
+
+
+def test_a_late_recorder_has_fewer_messages_and_any_other_difference_is_told():
+    replayed = {"/a": [b"1", b"2", b"3", b"4"], "/b": [b"1"]}
+    assert compare({"/a": [b"2", b"3"], "/b": [b"1"]}, replayed) == [("/a", ""), ("/b", "")]
+    assert compare({"/a": [b"2", b"4"]}, replayed) == [("/a", "message 1 of 2 differs")]
+    assert compare({"/a": [b"4", b"5"]}, replayed) == [("/a", "message 1 of 2 differs")]
+    assert compare({"/a": [b"9"]}, replayed) == [("/a", "the first live message is not in the replay")]
+    assert compare({"/c": [b"1"]}, replayed) == [("/c", "not in the replay (1 live)")]
+
+
+def test_hashes_tell_where_messages_begin():
+    assert hashes({"/a": [b"12", b"3"]}) != hashes({"/a": [b"1", b"23"]})
+
+
+def test_the_node_is_started_as_it_was_and_finds_x_plane_by_its_address(tmp_path):
+    start = start_of(OwnLog(log(tmp_path / "w.rx_node.pcapng")))
+    assert (start.program, start.node, start.namespace) == ("rx_node", "/x/rx_node", "/x")
+    assert start.shared == {"host": "10.9.8.7", "listen_for_beacon": True}
+    start, word = prepare(tmp_path / "w.rx_node.pcapng", tmp_path / "records", None, {"host": "10.1.1.1"})
+    assert start.shared["host"] == "10.1.1.1"
+    assert word == ""
+    assert (tmp_path / "records").read_bytes().startswith(b"xplane_bridge wire records 1\n")
+
+
+def test_datagrams_alone_cannot_be_replayed(tmp_path):
+    with pytest.raises(ReplayError, match="but not what else it went by"):
+        start_of(OwnLog(log(tmp_path / "w.tx_node.pcapng", ordered=0)))
+
+
+def test_the_program_anonymises(tmp_path, capsys):
+    path, out = log(tmp_path / "w.rx_node.pcapng"), tmp_path / "out.pcapng"
+    assert main([str(path), "--anonymise", str(out)]) == 0
+    assert b"there" not in out.read_bytes()
+    assert len(list(Capture.open(out).packets())) == 1
+    assert main([str(tmp_path / "nothing.pcapng")]) == 1
+    assert "cannot be read: No such file" in capsys.readouterr().err
+
+
+def test_a_parameter_is_given_as_key_and_value(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / "x"), "--set", "transport"])
+    assert "expected KEY=VALUE" in capsys.readouterr().err
