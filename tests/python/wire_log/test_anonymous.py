@@ -38,7 +38,7 @@ def test_a_log_keeps_all_but_addresses_and_names(tmp_path):
         "program": "rx_node",
         "namespace": "/x",
         "ordered": True,
-        "shared": {"host": "peters-laptop", "conformance_file": "/home/peter/card.yaml", "port": 49000},
+        "shared": {"host": "peters-laptop", "conformance_file": "/srv/peter/card.yaml", "port": 49000},
         "own": {"data_address": "172.16.20.30", "rates": {"flight": 60}},
     }
     text = xmlrpc.client.dumps((about,))
