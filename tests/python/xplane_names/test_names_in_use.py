@@ -49,6 +49,7 @@ NO_NAMES = {
     "sim/weather/wet": "made up, in tests of the syntax of sources",
     "sim/fuel/pump": "made up, in tests of the syntax of sources",
     "sim/a/b": "made up, in tests of the syntax of paths",
+    "sim/a/lever": "made up, in a test of the release worker",
     "sim/x/y": "made up, in a comment on the syntax of paths",
     "sim/none": "a name that X-Plane does not have, in tests",
     "sim/no/such": "a name that X-Plane does not have, in tests",
