@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Mapping
+from typing import Mapping, Optional
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -16,7 +16,7 @@ class ResourceError(XplaneBridgeError):
     """A file that belongs to the package is not there; the text says where it was looked for."""
 
 
-def clone_dir() -> Path | None:
+def clone_dir() -> Optional[Path]:
     """The root of the source tree this package is used from; None when it is used from an installation."""
     root = _PACKAGE.parents[1]
     return root if (root / "package.xml").is_file() else None

@@ -39,7 +39,7 @@ namespace xplane_bridge {
 namespace {
 
 constexpr const char* kRollPath = "sim/joystick/yoke_roll_ratio";
-constexpr std::int64_t kPeriod_ns = 20'000'000;
+constexpr std::int64_t kPeriod = 20'000'000;  // [ns]
 constexpr std::size_t kAxes = 8;
 constexpr std::size_t kButtons = 12;
 constexpr float kDeflection = 0.5F;
@@ -182,18 +182,18 @@ void run(const bench::Settings& settings) {
       chain->sent_ns = bench::now_ns();
       publisher.publish(message);
     };
-    std::int64_t next = bench::now_ns() / kPeriod_ns * kPeriod_ns;
+    std::int64_t next = bench::now_ns() / kPeriod * kPeriod;
     std::int64_t end = next + 60'000'000'000;
     bool measuring = false;
     for (std::uint64_t turn = 0; bench::now_ns() < end; ++turn) {
-      next += kPeriod_ns;
+      next += kPeriod;
       bench::sleepUntil(next);
       publish(joy, &ours, turn);
-      bench::sleepUntil(next + kPeriod_ns / 2);
+      bench::sleepUntil(next + kPeriod / 2);
       publish(bare_joy, &floor, turn);
       sent += measuring ? 1 : 0;
       if (!measuring && ours.arrived > 50 && floor.arrived > 50) {
-        bench::sleepUntil(next + kPeriod_ns - 2'000'000);
+        bench::sleepUntil(next + kPeriod - 2'000'000);
         measuring = true;
         ours.latencies_us.clear();
         floor.latencies_us.clear();

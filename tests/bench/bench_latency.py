@@ -96,8 +96,8 @@ def latency(context: Context) -> List[Measure]:
             response = command_responses(bags)["roll command"]
         try:
             require_usable(found, "pictures")
-        except LatencyError as err:
-            raise HarnessError(f"{name}{err}") from None
+        except LatencyError as error:
+            raise HarnessError(f"{name}{error}") from None
         result += [
             Measure(name + "frame to display, by the strips", 1e3 * truth, "ms"),
             Measure(name + "frame to display, estimated", 1e3 * found.delay, "ms"),

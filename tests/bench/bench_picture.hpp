@@ -1,5 +1,6 @@
-/// What bench_window draws into the upper left corner of each picture, and how it is read back.
 #pragma once
+
+/// What bench_window draws into the upper left corner of each picture, and how it is read back.
 
 #include <array>
 #include <cstddef>

@@ -1,5 +1,6 @@
-/// What the measuring programs share: settings from the command line, the steady clock, percentiles.
 #pragma once
+
+/// What the measuring programs share: settings from the command line, the steady clock, percentiles.
 
 #include <algorithm>
 #include <cerrno>

@@ -48,11 +48,11 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr std::size_t kPairsPerDatagram = 183;  // as X-Plane
-constexpr double kFirstSimTime = 100.0;         // [s] float32 tells steps of 8 us apart there
-constexpr int kSlowRateHz = 60;                 // subscriptions below this are not of the flight group
-constexpr std::int64_t kOutage_ns = 1'000'000'000;
-constexpr double kPatience = 60.0;  // [s] for topics to begin
+constexpr std::size_t kPairsPerDatagram = 183;   // as X-Plane
+constexpr double kFirstSimTime = 100.0;          // [s] float32 tells steps of 8 us apart there
+constexpr int kSlowRateHz = 60;                  // subscriptions below this are not of the flight group
+constexpr std::int64_t kOutage = 1'000'000'000;  // [ns]
+constexpr double kPatience = 60.0;               // [s] for topics to begin
 
 using bench::now_ns;
 using bench::percentile;
@@ -310,14 +310,14 @@ class Meter {
       const std::int64_t silent_since = now_ns();
       silence_noticed_ns_ = 0;
       waiting_for_silence_ = true;
-      sleepUntil(silent_since + kOutage_ns);
+      sleepUntil(silent_since + kOutage);
       waiting_for_silence_ = false;
       open();
       const std::int64_t returned = now_ns();
       state_back_ns_ = 0;
       waiting_for_state_ = true;
       frame_ += static_cast<std::uint64_t>(1.0 / period_);
-      frames([&] { return state_back_ns_ != 0 || now_ns() > returned + 10 * kOutage_ns; });
+      frames([&] { return state_back_ns_ != 0 || now_ns() > returned + 10 * kOutage; });
       waiting_for_state_ = false;
       const std::int64_t seen = silence_noticed_ns_ != 0 ? silence_noticed_ns_ - silent_since : 1'000'000'000'000;
       const std::int64_t flowing = state_back_ns_ != 0 ? state_back_ns_ - returned : 1'000'000'000'000;

@@ -81,9 +81,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             print(f"{name}", flush=True)
             try:
                 results[name] = BENCHMARKS[name](Context(Path(folder) / name, args.seconds))
-            except HarnessError as err:
+            except HarnessError as error:
                 failed.append(name)
-                print(f"  failed: {err}")
+                print(f"  failed: {error}")
                 continue
             for measure in results[name]:
                 print(_row(measure), flush=True)

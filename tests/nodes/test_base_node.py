@@ -193,8 +193,8 @@ def test_waiting_service_does_not_delay_callbacks_nor_the_end(world, tiny):
     def wait_long():
         try:
             answers.append(call("x", 3.0))
-        except rospy.ServiceException as err:
-            answers.append(err)
+        except rospy.ServiceException as error:
+            answers.append(error)
 
     waiting = threading.Thread(target=wait_long)
     waiting.start()

@@ -193,5 +193,5 @@ def why_no_machines() -> str:
         try:
             with TwoMachines(Path(folder)):
                 return ""
-        except HarnessError as err:
-            return f"two network namespaces and a veth pair are not permitted here: {err}"
+        except HarnessError as error:
+            return f"two network namespaces and a veth pair are not permitted here: {error}"

@@ -1,5 +1,6 @@
-/// References to Python objects, and Python's errors as C++ exceptions.
 #pragma once
+
+/// References to Python objects, and Python's errors as C++ exceptions.
 
 // Python.h has to come before every other header.
 #define PY_SSIZE_T_CLEAN

@@ -1,5 +1,6 @@
-/// The parts of the light twin that live in Python objects, and in C++ while a frame is flown.
 #pragma once
+
+/// The parts of the light twin that live in Python objects, and in C++ while a frame is flown.
 
 #include "xplane_bridge/bindings/python_object.hpp"
 

@@ -1,9 +1,10 @@
+#pragma once
+
 /// The light twin's surfaces, engines, propellers and gusts, operation by operation as the emulator's Python does them
 /// (src/xplane_bridge/emulator/flight: actuators.py, rotors.py, turbulence.py): the same bits come out of both.
 ///
 /// So nothing here may be reordered or simplified, and the files are compiled without contraction and without the
 /// compiler's own versions of the mathematical functions. SI units but for `_deg`; axes FRD.
-#pragma once
 
 #include <array>
 #include <cmath>

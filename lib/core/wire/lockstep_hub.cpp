@@ -18,7 +18,7 @@ constexpr std::int32_t kFenceIndex = 0x4C530000;  // far from all indices that a
 constexpr std::int32_t kFenceElements = 3;
 constexpr std::int32_t kFenceRate = 1000;
 constexpr std::size_t kRateAt = 5;    // of a request: after the label
-constexpr int kLongestWaitMs = 5;    // while the clock goes at the host's pace
+constexpr int kLongestWaitMs = 5;     // while the clock goes at the host's pace
 constexpr int kPassesAfterClose = 2;  // of the link: calls posted by the first are carried out in the second
 constexpr std::int64_t kAskAgainNs = 300 * kNanosecondsPerMillisecond;
 

@@ -1,5 +1,6 @@
-/// What the codecs of X-Plane's packets share: fields in a row, labels and lengths, limits. Of lib/core/wire alone.
 #pragma once
+
+/// What the codecs of X-Plane's packets share: fields in a row, labels and lengths, limits. Of lib/core/wire alone.
 
 #include <cmath>
 #include <cstdint>

@@ -17,7 +17,7 @@ namespace xplane_bridge {
 namespace {
 
 // Time to end a thousand subscriptions, a batch in two frames of X-Plane, also where undoing has taken its time.
-constexpr double kShortestLinkStop_s = 1.0;
+constexpr double kShortestLinkStop = 1.0;  // [s]
 // Of a node whose wire is logged, in the place of its process number.
 constexpr std::uint32_t kLoggedJitterSeed = 7;
 
@@ -104,7 +104,7 @@ void BaseNode::stopLink(const Deadline& deadline) {
     return;
   }
   if (wire_) wire_->holdForStop();
-  if (!link_->stop(std::max(deadline.left(), kShortestLinkStop_s))) {
+  if (!link_->stop(std::max(deadline.left(), kShortestLinkStop))) {
     const std::shared_ptr<core::Journal> journal = link_->journal();
     ROS_WARN("not everything could be undone in X-Plane; the rest is in %s and is undone at the next start",
              journal ? journal->path().c_str() : "no journal");

@@ -17,7 +17,7 @@ constexpr std::uint32_t kQueueSize = 100;
 constexpr double kJoinPeriods = 1.5;
 // Values older than this many of their periods (but not younger than the shortest age) are unknown.
 constexpr double kFreshPeriods = 2.5;
-constexpr double kShortestAge_s = 0.5;
+constexpr double kShortestAge = 0.5;  // [s]
 
 }  // namespace
 
@@ -81,7 +81,7 @@ void DatarefPublisher::onRref(std::size_t batch_index, const core::RrefView& dat
 void DatarefPublisher::publish(std::int64_t receive_ns, float sim_time, std::uint32_t epoch) {
   for (const Batch& batch : batches_) {
     const double age = core::toSeconds(receive_ns - batch.received_ns);
-    if (age > std::max(kFreshPeriods / batch.rate, kShortestAge_s)) {
+    if (age > std::max(kFreshPeriods / batch.rate, kShortestAge)) {
       for (const std::size_t position : batch.positions) {
         message_.values[position] = std::numeric_limits<float>::quiet_NaN();
       }

@@ -9,7 +9,7 @@ namespace {
 
 // A slow subscriber loses old states rather than delaying new ones.
 constexpr std::uint32_t kQueueSize = 100;
-constexpr std::int64_t kCompletionTime_ns = 1'000'000'000;
+constexpr std::int64_t kCompletionTime = 1'000'000'000;  // [ns]
 // Before the clock filter has its fit (a quarter of a second), stamps are receive times with all their jitter: a
 // velocity differenced from the first positions would be wrong.
 const double kUnsettledClock = core::ClockFilter::Options{}.unfitted_uncertainty;
@@ -59,7 +59,7 @@ bool FlightPublisher::mayStart(const core::FlightState& state, std::int64_t rece
   }
   const bool complete = state.has(core::FlightState::kValidAll);
   const bool clock_settled = state.stamp_uncertainty < kUnsettledClock;
-  return (complete && clock_settled) || receive_ns - *startable_since_ns_ >= kCompletionTime_ns;
+  return (complete && clock_settled) || receive_ns - *startable_since_ns_ >= kCompletionTime;
 }
 
 void FlightPublisher::publish(const core::FlightState& state, const core::TangentFrame& map, std::int64_t receive_ns) {

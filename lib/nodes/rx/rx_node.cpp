@@ -17,13 +17,13 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kSupervisePeriod_s = 0.1;
+constexpr double kSupervisePeriod = 0.1;  // [s]
 // An X-Plane that answers but does not say its version within this is treated as of unknown version.
-constexpr double kVersionPatience_s = 2.0;
-constexpr double kSearchingPublishPeriod_s = 1.0;
+constexpr double kVersionPatience = 2.0;         // [s]
+constexpr double kSearchingPublishPeriod = 1.0;  // [s]
 constexpr std::int32_t kRposCheckRateHz = 20;
 // Further away, a flight state says nothing about the time of another datagram.
-constexpr double kNearState_s = 0.1;
+constexpr double kNearState = 0.1;  // [s]
 
 constexpr int kFlightPriority = 10;
 constexpr int kDatarefPriority = 1;
@@ -168,7 +168,7 @@ void RxNode::advertise() {
       "get_dataref", [this](const auto& request, auto& response) { getDataref(request, response); });
   advertiseService<GetTerrain::Request, GetTerrain::Response>(
       "get_terrain", [this](const auto& request, auto& response) { getTerrain(request, response); });
-  addTimer(kSupervisePeriod_s, [this] { supervise(); });
+  addTimer(kSupervisePeriod, [this] { supervise(); });
   addAllDiagnostics();
   experiment_->advertise(&handle());
   experiment_->setParameters(experiment_->readParameters(handle()));
@@ -311,7 +311,7 @@ void RxNode::publishRows(const core::DataView& datagram, const core::ReceiveInfo
 
 float RxNode::nearSimTime(std::int64_t receive_ns) const {
   const double age = core::toSeconds(receive_ns - last_state_received_ns_);
-  return last_state_ && std::abs(age) < kNearState_s ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
+  return last_state_ && std::abs(age) < kNearState ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
 }
 
 void RxNode::publishLinkState(const core::LinkStatus& status) {
@@ -348,7 +348,7 @@ void RxNode::supervise() {
     publishExperiment();
   }
   if (status.state == core::LinkState::kSearching && (!search_word_pause_ || search_word_pause_->over())) {
-    search_word_pause_.emplace(clock(), kSearchingPublishPeriod_s);
+    search_word_pause_.emplace(clock(), kSearchingPublishPeriod);
     const std::lock_guard<std::mutex> lock(mutex_);
     publishLinkState(status);
   }
@@ -365,7 +365,7 @@ void RxNode::adoptVersion(const core::LinkStatus& status) {
       return;
     }
     if (!version_patience_) {
-      version_patience_.emplace(clock(), kVersionPatience_s);
+      version_patience_.emplace(clock(), kVersionPatience);
     }
     if (!version_patience_->over()) {
       return;

@@ -80,7 +80,7 @@ const char* nameOf(core::PositionSource source) {
 
 // A group counts as not arriving when its last message is older than this many of its periods and a bit.
 constexpr double kLatePeriods = 2.5;
-constexpr double kLateMargin_s = 0.5;
+constexpr double kLateMargin = 0.5;  // [s]
 
 }  // namespace
 
@@ -233,7 +233,7 @@ void RxNode::diagnoseMission(diagnostic_updater::DiagnosticStatusWrapper* status
     const std::string name = core::toString(mission.group());
     const double age = report.stamp_ns == 0 ? std::numeric_limits<double>::infinity()
                                             : core::toSeconds(clock().system_ns() - report.stamp_ns);
-    if (age > kLatePeriods / mission.rate() + kLateMargin_s) {
+    if (age > kLatePeriods / mission.rate() + kLateMargin) {
       silent_groups.push_back(name);
     }
     status->addf(name + " (1/s)", "%.1f", mission_rates_[i].update(report.published, clock().steady_ns()));

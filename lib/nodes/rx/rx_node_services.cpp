@@ -13,8 +13,8 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kDefaultReadTimeout_s = 1.0;
-constexpr double kLongestReadTimeout_s = 10.0;
+constexpr double kDefaultReadTimeout = 1.0;   // [s]
+constexpr double kLongestReadTimeout = 10.0;  // [s]
 
 }  // namespace
 
@@ -52,7 +52,7 @@ void RxNode::getDataref(const GetDataref::Request& request, GetDataref::Response
     const std::lock_guard<std::mutex> lock(mutex_);
     response.sim_time = last_state_ ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
   }
-  if (!(request.timeout >= 0.0 && request.timeout <= kLongestReadTimeout_s)) {
+  if (!(request.timeout >= 0.0 && request.timeout <= kLongestReadTimeout)) {
     response.result = result(ServiceResult::REFUSED, "timeout must be from 0 (the default of 1 s) to 10 s");
     return;
   }
@@ -67,7 +67,7 @@ void RxNode::getDataref(const GetDataref::Request& request, GetDataref::Response
     response.result = result(ServiceResult::NO_LINK, "X-Plane has not been found");
     return;
   }
-  const double timeout = request.timeout > 0.0 ? request.timeout : kDefaultReadTimeout_s;
+  const double timeout = request.timeout > 0.0 ? request.timeout : kDefaultReadTimeout;
   for (const core::DatarefValue& value : link().read(paths, timeout)) {
     response.values.push_back(value.value_or(std::numeric_limits<float>::quiet_NaN()));
   }
@@ -93,7 +93,7 @@ void RxNode::getTerrain(const GetTerrain::Request& request, GetTerrain::Response
                "latitude must be from -90 to 90 and longitude from -180 to 180, not both 0: give a place");
     return;
   }
-  if (!(request.timeout >= 0.0 && request.timeout <= kLongestReadTimeout_s)) {
+  if (!(request.timeout >= 0.0 && request.timeout <= kLongestReadTimeout)) {
     response.result = result(ServiceResult::REFUSED, "timeout must be from 0 (the default of 1 s) to 10 s");
     return;
   }
@@ -104,7 +104,7 @@ void RxNode::getTerrain(const GetTerrain::Request& request, GetTerrain::Response
   }
   const core::TerrainAnswer answer = core::askTerrain(
       {peer.address, static_cast<std::uint16_t>(options_.xpc_port)}, request.latitude, request.longitude,
-      request.timeout > 0.0 ? request.timeout : kDefaultReadTimeout_s, [this] { return stopping(); });
+      request.timeout > 0.0 ? request.timeout : kDefaultReadTimeout, [this] { return stopping(); });
   if (!answer.terrain) {
     response.result = result(ServiceResult::TIMEOUT, answer.problem);
     return;

@@ -10,7 +10,7 @@ from typing import Dict, List, Optional, Tuple
 
 import yaml
 
-from .observed import Observed
+from xplane_bridge.aircraft_file.observed import Observed
 
 FIXED_WING, MULTIROTOR, TILTROTOR, HELICOPTER = KINDS = ("fixed_wing", "multirotor", "tiltrotor", "helicopter")
 FAILSAFES = ("neutral", "hold", "manual")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Iterable
+from typing import Any, Iterable, Optional
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ _MIN_INLIERS = 25
 _MAX_TURN_RAD = 0.35
 
 
-def rotation_between(before: np.ndarray, after: np.ndarray, mask: np.ndarray | None = None) -> float | None:
+def rotation_between(before: np.ndarray, after: np.ndarray, mask: Optional[np.ndarray] = None) -> Optional[float]:
     """Angle that the camera turned about its line of sight, clockwise as the pilot sees it [rad].
 
     Args:
@@ -59,7 +59,7 @@ def rotation_motion(pictures: Iterable[tuple[float, np.ndarray]], ignore_bottom:
         ignore_bottom: Share of the height at the lower edge that does not show the scene (instruments).
     """
     begin, end, turn = [], [], []
-    before: tuple[float, np.ndarray] | None = None
+    before: Optional[tuple[float, np.ndarray]] = None
     mask = None
     for stamp, picture in pictures:
         if mask is None or mask.shape != picture.shape:

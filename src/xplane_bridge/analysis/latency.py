@@ -5,7 +5,7 @@ Both compare a signal that is late by an unknown, constant time with the one it 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Optional
 
 import numpy as np
 
@@ -103,7 +103,7 @@ def fit_delay(
     return Delay(delay, sigma, low, high, float(gain), float(drift), correlation, len(begin), coarse, relative)
 
 
-def require_usable(result: Delay, what: str, gain_range: tuple[float, float] | None = GAIN_RANGE) -> None:
+def require_usable(result: Delay, what: str, gain_range: Optional[tuple[float, float]] = GAIN_RANGE) -> None:
     """Refuse a result that the recording does not support.
 
     Args:

@@ -21,7 +21,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
-from typing import Any, Iterator, NamedTuple, Sequence, Union
+from typing import Any, Iterator, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 from rosbags.serde import SerdeError
@@ -133,7 +133,7 @@ class Bags:
         if not self.paths:
             msg = "no bag given: name at least one .bag file"
             raise BagError(msg)
-        self._stack: ExitStack | None = None
+        self._stack: Optional[ExitStack] = None
         self._files: list[BagFile] = []
         self._definitions: dict[tuple[str, str], tuple[Types, Any]] = {}
 
@@ -186,7 +186,7 @@ class Bags:
         """Give the receive times of a topic's messages, int64 [ns], sorted; read from the index, not from the data."""
         return np.sort(np.concatenate([file.times(c.id) for file, c in self._connections(topic)]))
 
-    def topic_of_type(self, msgtype: str, suffix: str = "") -> str | None:
+    def topic_of_type(self, msgtype: str, suffix: str = "") -> Optional[str]:
         """Find the topic of a message type (``package/Name``); of several, the first whose name ends in `suffix`."""
         for info in sorted(self.topics.values(), key=lambda info: info.topic):
             if info.msgtype == msgtype and info.topic.endswith(suffix):
@@ -204,7 +204,7 @@ class Bags:
         connection = self._connections(topic)[0][1]
         return {**later_units(connection.msgtype), **parse_units(connection.definition, connection.msgtype)}
 
-    def read(self, topic: str, columns: Sequence[str] | None = None) -> Table:
+    def read(self, topic: str, columns: Optional[Sequence[str]] = None) -> Table:
         """Read one topic into arrays.
 
         Args:
@@ -244,7 +244,7 @@ class Bags:
         return self._parsed(recorded.topic, recorded.msgtype, recorded.definition)[0]
 
     def _pieces(
-        self, file: BagFile, connection: Connection, columns: Sequence[str] | None
+        self, file: BagFile, connection: Connection, columns: Optional[Sequence[str]]
     ) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
         """Receive times and columns, so many messages at a time that their bytes need little memory."""
         times: list[np.ndarray] = []
@@ -258,8 +258,8 @@ class Bags:
                 if size > _PIECE_BYTES:
                     yield np.concatenate(times), self._decode(connection, raws, columns)
                     times, raws, size = [], [], 0
-        except (DamagedError, OSError) as err:
-            raise _damaged(file, err) from None
+        except (DamagedError, OSError) as error:
+            raise _damaged(file, error) from None
         if raws:
             yield np.concatenate(times), self._decode(connection, raws, columns)
 
@@ -268,8 +268,8 @@ class Bags:
         try:
             for id_, time, raw in file.by_time(known):
                 yield known[id_], time, raw
-        except (DamagedError, OSError) as err:
-            raise _damaged(file, err) from None
+        except (DamagedError, OSError) as error:
+            raise _damaged(file, error) from None
 
     def _stream(self, file: BagFile, connection: Connection) -> Iterator[tuple[int, Any]]:
         _, store = self._definition(connection)
@@ -277,8 +277,8 @@ class Bags:
         try:
             for _, time, raw in file.by_time([connection.id]):
                 yield time, store.deserialize_ros1(raw, name)
-        except (DamagedError, OSError, SerdeError, struct.error, AssertionError) as err:
-            raise _damaged(file, err) from None
+        except (DamagedError, OSError, SerdeError, struct.error, AssertionError) as error:
+            raise _damaged(file, error) from None
 
     def _connections(self, topic: str) -> list[tuple[BagFile, Connection]]:
         found = [(file, c) for file in self._files for c in file.connections.values() if c.topic == topic]
@@ -298,14 +298,14 @@ class Bags:
             try:
                 types = get_types_from_msg(definition, _type_name(msgtype))
                 store.register(types)
-            except (TypesysError, SyntaxError) as err:
-                msg = f"{topic}: the bag's definition of {msgtype} does not parse: {err}"
+            except (TypesysError, SyntaxError) as error:
+                msg = f"{topic}: the bag's definition of {msgtype} does not parse: {error}"
                 raise BagError(msg) from None
             self._definitions[key] = (types, store)
         return self._definitions[key]
 
     def _decode(
-        self, connection: Connection, raws: list[bytes], columns: Sequence[str] | None
+        self, connection: Connection, raws: list[bytes], columns: Optional[Sequence[str]]
     ) -> dict[str, np.ndarray]:
         types, store = self._definition(connection)
         name = _type_name(connection.msgtype)
@@ -314,8 +314,8 @@ class Bags:
                 found = decode_bulk(types, name, raws, columns)
             except NeedsObjectsError:
                 found = decode_objects(types, lambda raw: store.deserialize_ros1(raw, name), name, raws, columns)
-        except (SerdeError, AssertionError, struct.error, ValueError, IndexError) as err:
-            msg = f"{connection.topic}: a message does not fit its definition {connection.msgtype}: {err}"
+        except (SerdeError, AssertionError, struct.error, ValueError, IndexError) as error:
+            msg = f"{connection.topic}: a message does not fit its definition {connection.msgtype}: {error}"
             raise BagError(msg) from None
         return add_later_fields(connection.msgtype, len(raws), columns, found)
 
@@ -329,8 +329,8 @@ def _opened(path: Path) -> BagFile:
     try:
         with path.open("rb") as file:
             magic = file.read(9)
-    except OSError as err:
-        msg = f"{path}: {err.strerror}"
+    except OSError as error:
+        msg = f"{path}: {error.strerror}"
         raise BagError(msg) from None
     if not magic:
         msg = f"{path}: the file is empty; the recording never wrote to it"
@@ -340,8 +340,8 @@ def _opened(path: Path) -> BagFile:
         raise BagError(msg)
     try:
         bag = BagFile(path)
-    except DamagedError as err:
-        msg = f"{path}: damaged or truncated ({err}); `rosbag reindex {path}` saves what can be saved"
+    except DamagedError as error:
+        msg = f"{path}: damaged or truncated ({error}); `rosbag reindex {path}` saves what can be saved"
         raise BagError(msg) from None
     if bag.lost is not None:
         _say_cut_off(path, bag.lost)
@@ -362,7 +362,7 @@ def _joined(
     topic: str,
     msgtype: str,
     parts: list[tuple[np.ndarray, dict[str, np.ndarray]]],
-    columns: Sequence[str] | None,
+    columns: Optional[Sequence[str]],
 ) -> Table:
     """Put the parts of several files in receive order; a column that a part lacks is NaN or None there."""
     filled = [part for part in parts if len(part[0])]

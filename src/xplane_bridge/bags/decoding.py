@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -57,7 +57,7 @@ class NeedsObjectsError(Exception):
     """The message holds a list of messages."""
 
 
-def wanted(name: str, columns: Sequence[str] | None) -> bool:
+def wanted(name: str, columns: Optional[Sequence[str]]) -> bool:
     """Tell whether the column `name` is, or lies below, one of `columns` (None: all)."""
     return columns is None or any(name == c or name.startswith((c + ".", c + "[")) for c in columns)
 
@@ -134,7 +134,7 @@ def _basename(detail: Any) -> str:
 
 
 def add_later_fields(
-    msgtype: str, total: int, columns: Sequence[str] | None, found: dict[str, np.ndarray]
+    msgtype: str, total: int, columns: Optional[Sequence[str]], found: dict[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Add the fields that a message of the package has got after the recording: NaN, 0, false or empty."""
     for name, (kind, size, _) in LATER_FIELDS.get(msgtype, {}).items():
@@ -151,7 +151,9 @@ def add_later_fields(
     return found
 
 
-def decode_bulk(types: Types, msgtype: str, raws: list[bytes], columns: Sequence[str] | None) -> dict[str, np.ndarray]:
+def decode_bulk(
+    types: Types, msgtype: str, raws: list[bytes], columns: Optional[Sequence[str]]
+) -> dict[str, np.ndarray]:
     """Decode all messages of one layout at a time.
 
     Raises:
@@ -191,7 +193,7 @@ def _view(block: np.ndarray, offset: int, dtype: np.dtype, count: int) -> np.nda
     return out.reshape(len(block)) if count < 0 else out.reshape(len(block), count)
 
 
-def _extract(block: np.ndarray, layout: _Layout, columns: Sequence[str] | None) -> dict[str, np.ndarray]:
+def _extract(block: np.ndarray, layout: _Layout, columns: Optional[Sequence[str]]) -> dict[str, np.ndarray]:
     out: dict[str, np.ndarray] = {}
     for leaf in layout.leaves:
         if not wanted(leaf.name, columns):
@@ -240,7 +242,7 @@ def _scatter(total: int, pieces: list[tuple[np.ndarray, dict[str, np.ndarray]]])
 
 
 def decode_objects(
-    types: Types, deserialise: Callable[[bytes], Any], msgtype: str, raws: list[bytes], columns: Sequence[str] | None
+    types: Types, deserialise: Callable[[bytes], Any], msgtype: str, raws: list[bytes], columns: Optional[Sequence[str]]
 ) -> dict[str, np.ndarray]:
     """Decode one by one; used for messages with lists of messages or of strings."""
     rows: dict[str, list[Any]] = {}

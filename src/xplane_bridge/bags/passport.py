@@ -74,8 +74,8 @@ def read_passports(bags: Bags) -> list[Passport]:
 def _passport(message: Any, topic: str) -> Passport:
     try:
         parameters = json.loads(message.parameters) or {}
-    except ValueError as err:
-        msg = f"{topic}: the parameters are no JSON: {err}"
+    except ValueError as error:
+        msg = f"{topic}: the parameters are no JSON: {error}"
         raise BagError(msg) from None
     settings = {str(name): float(value) for name, value in zip(message.settings, message.setting_values)}
     others = {

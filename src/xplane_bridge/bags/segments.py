@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Optional
+
 import numpy as np
 
 #: [s] Two samples further apart than this are a gap.
 DEFAULT_MAX_GAP = 0.5
 
 
-def segments(time: np.ndarray, epoch: np.ndarray | None = None, max_gap: float = DEFAULT_MAX_GAP) -> list[slice]:
+def segments(time: np.ndarray, epoch: Optional[np.ndarray] = None, max_gap: float = DEFAULT_MAX_GAP) -> list[slice]:
     """Cut a recording where it must not be bridged.
 
     Args:

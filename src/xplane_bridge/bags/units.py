@@ -7,7 +7,7 @@ A field line reads ``float64 roll_deg  # [deg] -180..180, right wing down +; sou
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import NamedTuple, Optional
 
 from xplane_bridge.bags.later_fields import LATER_FIELDS
 
@@ -79,7 +79,7 @@ def _resolve(types: dict[str, list[tuple[str, str, str]]], typename: str, inside
     return ""
 
 
-def _unit(comment: str) -> Unit | None:
+def _unit(comment: str) -> Optional[Unit]:
     match = _UNIT.match(comment)
     if not match:
         return None

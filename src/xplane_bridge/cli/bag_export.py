@@ -7,7 +7,7 @@ import os
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Sequence
+from typing import Optional, Sequence
 
 from tqdm import tqdm
 
@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 @guarded
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     p = parser()
     args = p.parse_args(argv)

@@ -8,7 +8,7 @@ import importlib
 import math
 import os
 import sys
-from typing import Any, Callable, Sequence
+from typing import Any, Callable, Optional, Sequence
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -23,11 +23,11 @@ def guarded(main: Main) -> Main:
     """
 
     @functools.wraps(main)
-    def wrapped(argv: Sequence[str] | None = None) -> int:
+    def wrapped(argv: Optional[Sequence[str]] = None) -> int:
         try:
             return main(argv)
-        except XplaneBridgeError as err:
-            print(f"{os.path.basename(sys.argv[0])}: {err}", file=sys.stderr)
+        except XplaneBridgeError as error:
+            print(f"{os.path.basename(sys.argv[0])}: {error}", file=sys.stderr)
             return 1
         except KeyboardInterrupt:
             return 130
@@ -88,7 +88,7 @@ def rospy_module() -> Any:
         raise NoRosError(msg) from None
 
 
-def ros_arguments(argv: Sequence[str] | None) -> list[str]:
+def ros_arguments(argv: Optional[Sequence[str]]) -> list[str]:
     """Give the arguments without those that roslaunch adds (`__name:=...`)."""
     given = list(sys.argv[1:] if argv is None else argv)
     return [word for word in given if ":=" not in word]
@@ -107,7 +107,7 @@ def start_node(name: str, **options: Any) -> Any:
     rospy = rospy_module()
     try:
         rospy.init_node(name, **options)
-    except rospy.exceptions.ROSInitException as err:
-        msg = f"no ROS master at {os.environ.get('ROS_MASTER_URI', '(ROS_MASTER_URI is not set)')}: {err}"
+    except rospy.exceptions.ROSInitException as error:
+        msg = f"no ROS master at {os.environ.get('ROS_MASTER_URI', '(ROS_MASTER_URI is not set)')}: {error}"
         raise NoRosError(msg) from None
     return rospy

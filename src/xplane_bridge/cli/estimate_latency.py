@@ -8,7 +8,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Iterator, List, Sequence, Union
+from typing import TYPE_CHECKING, Iterator, List, Optional, Sequence, Union
 
 import numpy as np
 
@@ -86,7 +86,7 @@ def _picture(text: str) -> Path:
 
 
 @guarded
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     p = parser()
     args = p.parse_args(argv)
@@ -102,8 +102,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name, result in responses.items():
         try:
             require_usable(result, name, gain_range=None)
-        except LatencyError as err:
-            print(f"{name:<19} not determined: {err}")
+        except LatencyError as error:
+            print(f"{name:<19} not determined: {error}")
         else:
             print(f"{name:<19} {_text(result)}")
     try:
@@ -115,8 +115,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.json:
             numbers = {name: _numbers(value) for name, value in {"display_delay": display, **responses}.items()}
             args.json.write_text(json.dumps(numbers, indent=2) + "\n")
-    except OSError as err:
-        msg = f"{err.filename}: {err.strerror}"
+    except OSError as error:
+        msg = f"{error.filename}: {error.strerror}"
         raise LatencyError(msg) from None
     return 0
 
@@ -143,7 +143,7 @@ def _recorded(namespace: str, seconds: float) -> Iterator[Path]:
         yield bag
 
 
-def display_delay(bags: Bags, view: int | None = None, ignore_bottom: float = 0.05) -> Delay:
+def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float = 0.05) -> Delay:
     """Delay from a simulator frame to its display: mean of picture stamp minus host time of the frame shown.
 
     Args:
@@ -231,7 +231,7 @@ def _rates(bags: Bags) -> tuple[np.ndarray, np.ndarray]:
     return time[order], rates[use][order]
 
 
-def _frame_states(bags: Bags) -> tuple[set[int] | None, int]:
+def _frame_states(bags: Bags) -> tuple[Optional[set[int]], int]:
     """Stamps [ns] of the pictures to use (None: all), and the view of most of them."""
     table = _first_of_type(bags, "xplane_bridge/FrameState")
     if table is None:
@@ -242,7 +242,7 @@ def _frame_states(bags: Bags) -> tuple[set[int] | None, int]:
     return {int(stamp) for stamp in table.stamp[use]}, view
 
 
-def _first_of_type(bags: Bags, msgtype: str) -> Table | None:
+def _first_of_type(bags: Bags, msgtype: str) -> Optional[Table]:
     topic = bags.topic_of_type(msgtype)
     return bags.read(topic) if topic is not None and bags.topics[topic].count else None
 

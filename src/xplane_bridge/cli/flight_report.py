@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Sequence
+from typing import Optional, Sequence
 
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.entry import guarded
@@ -28,7 +28,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 @guarded
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     args = parser().parse_args(argv)
     path = write_report(args.bags, Path(args.output), Path(args.png) if args.png else None, args.labels)
@@ -37,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def write_report(
-    bag_paths: Sequence[str | Path], output: Path, png: Path | None = None, labels: Path | None = None
+    bag_paths: Sequence[str | Path], output: Path, png: Optional[Path] = None, labels: Optional[Path] = None
 ) -> Path:
     """Write the report of one flight; the function behind the program, for other programs.
 
@@ -70,8 +70,8 @@ def write_report(
             png.mkdir(parents=True, exist_ok=True)
             for figure in figures:
                 static.save(figure, flight.start, png / f"{figure.key}.png")
-    except OSError as err:
-        msg = f"{err.filename or output}: {err.strerror}"
+    except OSError as error:
+        msg = f"{error.filename or output}: {error.strerror}"
         raise ReportError(msg) from None
     if "state" not in flight.tables:
         names = ", ".join(str(path) for path in bag_paths)

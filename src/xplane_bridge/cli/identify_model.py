@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Sequence
+from typing import Optional, Sequence
 
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.entry import guarded, number
@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 @guarded
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     args = parser().parse_args(argv)
     from xplane_bridge.bags.flight import read_flight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Sequence
+from typing import Optional, Sequence
 
 from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.identification.coefficients import geometry_of, read_geometry
@@ -45,7 +45,7 @@ def add_output_arguments(p: argparse.ArgumentParser) -> None:
 
 
 @guarded
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     args = parser().parse_args(argv)
     from xplane_bridge.identification.linearisation import Condition, linearise
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def write_outputs(model: LinearModel, outputs: Sequence[str] | None) -> None:
+def write_outputs(model: LinearModel, outputs: Optional[Sequence[str]]) -> None:
     """Write the files and say what they hold."""
     for output in outputs or ["model.yaml"]:
         write_model(model, Path(output))

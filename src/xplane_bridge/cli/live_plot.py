@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import time
-from typing import Any, Callable, NamedTuple, Sequence
+from typing import Any, Callable, NamedTuple, Optional, Sequence
 
 from xplane_bridge.cli.entry import guarded, positive, ros_arguments, start_node
 from xplane_bridge.errors import XplaneBridgeError
@@ -50,7 +50,7 @@ def split(argument: str) -> list[str]:
     return [first, *(other if other.startswith("/") else f"{parent}/{other}" for other in others)]
 
 
-def locate(name: str, topics: Sequence[str]) -> Field | None:
+def locate(name: str, topics: Sequence[str]) -> Optional[Field]:
     """Divide a full name into topic and path by the longest published topic that begins it."""
     fitting = [topic for topic in topics if name.startswith(topic + "/")]
     if not fitting:
@@ -65,7 +65,7 @@ def getter(path: str, message_type: Any) -> Callable[[Any], float]:
     Raises:
         LivePlotError: No such field, or it is no number; the text lists the fields there are.
     """
-    steps: list[tuple[str, int | None]] = []
+    steps: list[tuple[str, Optional[int]]] = []
     sample = message_type()
     for part in path.split("/"):
         match = _PART.match(part)
@@ -96,7 +96,7 @@ def getter(path: str, message_type: Any) -> Callable[[Any], float]:
 
 
 @guarded
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     args = parser().parse_args(ros_arguments(argv))
     if args.after is None and not can_show():

@@ -6,19 +6,18 @@ from dataclasses import dataclass, field
 from typing import Dict, Sequence
 
 from xplane_bridge import protocol
-
-from .observe.beacons import BeaconWatch
-from .observe.clock import ClockWatch
-from .observe.computer import Computer
-from .observe.data_output import DataWatch
-from .observe.journals import Journal
-from .observe.joysticks import Joysticks
-from .observe.ports import Holder
-from .observe.ros import RosFacts
-from .observe.simulator import Answers
-from .observe.target import Target
-from .observe.windows import Display
-from .settings import Settings
+from xplane_bridge.doctor.observe.beacons import BeaconWatch
+from xplane_bridge.doctor.observe.clock import ClockWatch
+from xplane_bridge.doctor.observe.computer import Computer
+from xplane_bridge.doctor.observe.data_output import DataWatch
+from xplane_bridge.doctor.observe.journals import Journal
+from xplane_bridge.doctor.observe.joysticks import Joysticks
+from xplane_bridge.doctor.observe.ports import Holder
+from xplane_bridge.doctor.observe.ros import RosFacts
+from xplane_bridge.doctor.observe.simulator import Answers
+from xplane_bridge.doctor.observe.target import Target
+from xplane_bridge.doctor.observe.windows import Display
+from xplane_bridge.doctor.settings import Settings
 
 
 @dataclass(frozen=True)

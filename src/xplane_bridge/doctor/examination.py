@@ -8,13 +8,23 @@ import time
 from typing import Any, Callable, Dict, List, Tuple
 
 from xplane_bridge import protocol
-
-from .checks import CHECKS
-from .evidence import Evidence
-from .finding import Finding, problem
-from .observe import beacons, computer, data_output, journals, joysticks, ports, ros, simulator, target, windows
-from .observe.clock import ClockWatcher
-from .settings import Settings
+from xplane_bridge.doctor.checks import CHECKS
+from xplane_bridge.doctor.evidence import Evidence
+from xplane_bridge.doctor.finding import Finding, problem
+from xplane_bridge.doctor.observe import (
+    beacons,
+    computer,
+    data_output,
+    journals,
+    joysticks,
+    ports,
+    ros,
+    simulator,
+    target,
+    windows,
+)
+from xplane_bridge.doctor.observe.clock import ClockWatcher
+from xplane_bridge.doctor.settings import Settings
 
 #: Each of the two rounds of observations gets so long [s]; the second needs to know where X-Plane is.
 _ROUND_S = 6.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import List, Sequence
 
-from .finding import Finding
+from xplane_bridge.doctor.finding import Finding
 
 
 def as_text(findings: Sequence[Finding]) -> str:

@@ -15,7 +15,7 @@ import csv
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -40,11 +40,11 @@ _LARD = (
 )
 _MILE_M, _FOOT_M = 1852.0, 0.3048
 
-_Write = Callable[[Path, Pictures, "ImageLabels | None"], None]
+_Write = Callable[[Path, Pictures, "Optional[ImageLabels]"], None]
 
 
 def export_annotated(
-    bags: Bags, folder: Path, options: Options, train_flight: bool, labels: ImageLabels | None, write: _Write
+    bags: Bags, folder: Path, options: Options, train_flight: bool, labels: Optional[ImageLabels], write: _Write
 ) -> dict[str, Any]:
     """Write pictures, what is known of them, and their annotations; gives counts for the manifest.
 
@@ -60,7 +60,7 @@ def export_annotated(
     return {**pictures.counts._asdict(), **counts}
 
 
-def coco(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
+def coco(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> None:
     """Write COCO's JSON, one file a split."""
     categories: list[dict[str, Any]] = [{"id": k, "name": name} for k, name in enumerate(CATEGORIES, 1)]
     categories[0].update(keypoints=list(KEYPOINTS), skeleton=_SKELETON)
@@ -86,7 +86,7 @@ def coco(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
         _write_text(folder / "annotations" / f"{split}.json", json.dumps(content, allow_nan=False) + "\n")
 
 
-def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: ImageLabels | None) -> dict[str, Any]:
+def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: Optional[ImageLabels]) -> dict[str, Any]:
     def value(name: str) -> Any:
         return _plain(columns[name][picture.row]) if name in columns else None
 
@@ -133,7 +133,7 @@ def _annotation(thing: Thing) -> dict[str, Any]:
     return out
 
 
-def yolo(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
+def yolo(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> None:
     """Write YOLO's text: a line an object, its class and its outline as shares of the picture; boxes follow from it."""
     rows: list[list[Any]] = []
     for picture in pictures.kept:
@@ -155,7 +155,7 @@ def yolo(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
     _write_text(folder / "data.yaml", f"{head}train: images/train\nval: images/validation\nnames:\n{names}")
 
 
-def lard(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
+def lard(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> None:
     """Write LARD's table, one file a split: a row a runway, distances in nautical miles, the height in feet."""
     for split in _SPLITS:
         rows = []
@@ -169,7 +169,7 @@ def lard(folder: Path, pictures: Pictures, labels: ImageLabels | None) -> None:
 
 
 def _lard_row(
-    picture: Picture, thing: Thing, columns: Mapping[str, np.ndarray], labels: ImageLabels | None
+    picture: Picture, thing: Thing, columns: Mapping[str, np.ndarray], labels: Optional[ImageLabels]
 ) -> list[Any]:
     label = thing.label
     heading, pitch, roll = _attitude(columns, picture.row)
@@ -214,7 +214,7 @@ def _attitude(columns: Mapping[str, np.ndarray], row: int) -> tuple[float, float
     return heading, pitch, math.degrees(math.atan2(float(right[2]), float(down[2])))
 
 
-def _about(labels: ImageLabels | None) -> Any:
+def _about(labels: Optional[ImageLabels]) -> Any:
     return "none" if labels is None else {key: value for key, value in labels.about.items() if key != "labels"}
 
 

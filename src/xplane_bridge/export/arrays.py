@@ -17,7 +17,7 @@ import dataclasses
 import json
 import math
 import re
-from typing import TYPE_CHECKING, Any, Iterable, NamedTuple, Sequence
+from typing import TYPE_CHECKING, Any, Iterable, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -148,7 +148,7 @@ def _about() -> str:
     return f"written by xplane_bridge {__version__}"
 
 
-def _sim_clock(bags: Bags, state: str | None) -> _SimClock:
+def _sim_clock(bags: Bags, state: Optional[str]) -> _SimClock:
     if state is None or not bags.topics[state].count:
         zero = min((info.first_time for info in bags.topics.values() if info.count), default=0)
         return _SimClock(zero, np.empty(0, np.int64), np.empty(0), [])

@@ -16,7 +16,7 @@ import random
 import shutil
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import BagError, Bags
@@ -36,7 +36,7 @@ class Outcome(NamedTuple):
     """What became of a job."""
 
     name: str
-    record: dict[str, Any] | None  #: the flight's part of the manifest
+    record: Optional[dict[str, Any]]  #: the flight's part of the manifest
     error: str  #: empty, or one line
     reused: bool  #: an earlier run had made it
 
@@ -96,10 +96,10 @@ def export_flight(job: Job) -> Outcome:
         for alias in (alias for alias, name in ALIASES.items() if name == job.format):
             _remove(output / _RECORDS / alias / record_file.name)  # of an earlier version, made anew
         return Outcome(job.name, record, "", False)
-    except (BagError, ExportError) as err:
-        return Outcome(job.name, None, str(err), False)
-    except OSError as err:
-        return Outcome(job.name, None, f"{err.filename}: {err.strerror}", False)
+    except (BagError, ExportError) as error:
+        return Outcome(job.name, None, str(error), False)
+    except OSError as error:
+        return Outcome(job.name, None, f"{error.filename}: {error.strerror}", False)
 
 
 def _export(job: Job, output: Path) -> dict[str, Any]:
@@ -174,8 +174,10 @@ def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:
         raise ExportError(msg) from None
     try:
         client = Client(address, timeout="10s")
-    except (OSError, ValueError) as err:
-        msg = f"no Dask scheduler at {address} ({err}); start one with `dask scheduler` and workers with `dask worker`"
+    except (OSError, ValueError) as error:
+        msg = (
+            f"no Dask scheduler at {address} ({error}); start one with `dask scheduler` and workers with `dask worker`"
+        )
         raise ExportError(msg) from None
     with client:
         futures = [client.submit(export_flight, job, key=f"export-{job.name}", pure=False) for job in jobs]
@@ -209,8 +211,8 @@ def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]
     try:
         content["files"] = _write_card(output, exports)
         _write_json(output / MANIFEST, content)
-    except OSError as err:
-        msg = f"{output / MANIFEST}: {err.strerror}"
+    except OSError as error:
+        msg = f"{output / MANIFEST}: {error.strerror}"
         raise ExportError(msg) from None
 
 
@@ -238,8 +240,8 @@ def make_folder(output: Path) -> None:
         output.mkdir(parents=True, exist_ok=True)
         if not os.access(output, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    except OSError as err:
-        msg = f"{output}: {err.strerror}; -o takes a folder that can be written, or the name of a new one"
+    except OSError as error:
+        msg = f"{output}: {error.strerror}; -o takes a folder that can be written, or the name of a new one"
         raise ExportError(msg) from None
 
 
@@ -279,8 +281,8 @@ def _key(job: Job) -> dict[str, Any]:
     for path in job.bags:
         try:
             status = os.stat(path)
-        except OSError as err:
-            msg = f"{path}: {err.strerror}"
+        except OSError as error:
+            msg = f"{path}: {error.strerror}"
             raise BagError(msg) from None
         sources.append([path, status.st_size, status.st_mtime_ns])
     return {

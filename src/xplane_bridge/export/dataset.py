@@ -19,7 +19,7 @@ from __future__ import annotations
 import csv
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterator, Mapping, NamedTuple
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, NamedTuple, Optional
 
 import numpy as np
 import pandas as pd
@@ -74,7 +74,7 @@ class Pictures(NamedTuple):
 
 
 def export_images(
-    bags: Bags, folder: Path, options: Options, train_flight: bool, labels: ImageLabels | None = None
+    bags: Bags, folder: Path, options: Options, train_flight: bool, labels: Optional[ImageLabels] = None
 ) -> dict[str, Any]:
     """Write the image folder of one flight; gives counts for the manifest.
 
@@ -226,7 +226,7 @@ def _write_metadata(
     kept: list[Picture],
     stamp: np.ndarray,
     columns: Mapping[str, np.ndarray],
-    labels: ImageLabels | None,
+    labels: Optional[ImageLabels],
 ) -> None:
     import pyarrow
     from pyarrow import parquet

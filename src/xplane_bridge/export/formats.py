@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, NamedTuple
+from typing import TYPE_CHECKING, Any, Callable, NamedTuple, Optional
 
 from xplane_bridge.export.dataset import Options, export_images
 
@@ -19,7 +19,7 @@ class Job(NamedTuple):
     bags: tuple[str, ...]
     output: str
     format: str  #: a key of `FORMATS`
-    rate: float | None
+    rate: Optional[float]
     topics: tuple[str, ...]
     dataset: Options
     train_flight: bool
@@ -88,7 +88,7 @@ def _imagefolder(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     return export_images(bags, path, job.dataset, job.train_flight, _labels(job))
 
 
-def _labels(job: Job) -> ImageLabels | None:
+def _labels(job: Job) -> Optional[ImageLabels]:
     from xplane_bridge.export.image_labels import ImageLabels
 
     return ImageLabels(Path(job.labels)) if job.labels else None

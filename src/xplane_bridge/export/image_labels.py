@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Any, Iterator, NamedTuple, Sequence
+from typing import Any, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.labels import table
@@ -61,11 +61,11 @@ class ImageLabels:
         kinds = Counter(thing["kind"] for stamp in labelled for thing in self._frames[stamp]["objects"])
         return {"labelled": len(labelled), "objects": dict(sorted(kinds.items()))}
 
-    def frame(self, stamp: int) -> dict[str, Any] | None:
+    def frame(self, stamp: int) -> Optional[dict[str, Any]]:
         """Give everything about a picture; None where it has no labels."""
         return self._frames.get(stamp)
 
-    def text(self, stamp: int) -> str | None:
+    def text(self, stamp: int) -> Optional[str]:
         """Give the objects of a picture as JSON."""
         frame = self._frames.get(stamp)
         return None if frame is None else json.dumps(frame["objects"], separators=(",", ":"))
@@ -81,7 +81,7 @@ class ImageLabels:
             outline = [(u + _HALF, v + _HALF) for u, v in label["polygon"]] if "polygon" in label else corners
             yield Thing(label["kind"], (left, top, right - left, bottom - top), outline, label)
 
-    def horizon(self, stamp: int) -> dict[str, Any] | None:
+    def horizon(self, stamp: int) -> Optional[dict[str, Any]]:
         """Give the horizon of a picture, its lines in pixels from the corner."""
         frame = self._frames.get(stamp)
         for label in frame["objects"] if frame else ():
@@ -101,10 +101,10 @@ class ImageLabels:
         }
 
 
-def keypoints(thing: Thing) -> tuple[list[float], list[float | None]]:
+def keypoints(thing: Thing) -> tuple[list[float], list[Optional[float]]]:
     """Give a runway's points as COCO has them (u, v, 2; zeros where not in the picture), and their sigmas [px]."""
     flat: list[float] = []
-    sigmas: list[float | None] = []
+    sigmas: list[Optional[float]] = []
     for name in KEYPOINTS:
         point = thing.label["points"][name]
         seen = point["state"] == "visible"

@@ -95,8 +95,8 @@ def write_ros2(bags: Bags, path: Path, only: Sequence[str] = ()) -> Counts:
                 types[name] = types[msgtype]
                 try:
                     store.register(_for_ros2(types, _fields(known)))
-                except TypesysError as err:
-                    msg = f"{source.topic}: its messages have two definitions ({err}); export the bags one by one"
+                except TypesysError as error:
+                    msg = f"{source.topic}: its messages have two definitions ({error}); export the bags one by one"
                     raise BagError(msg) from None
                 if (source.topic, name) not in connections:
                     latched = {"offered_qos_profiles": LATCH} if source.latching else {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Sequence
+from typing import TYPE_CHECKING, Any, Optional, Sequence
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
 
 
-def flight_table(bags: Bags, rate: float | None = None, topics: Sequence[str] = ()) -> pd.DataFrame:
+def flight_table(bags: Bags, rate: Optional[float] = None, topics: Sequence[str] = ()) -> pd.DataFrame:
     """Make the table of a flight.
 
     Args:

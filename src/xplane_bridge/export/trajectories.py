@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
@@ -19,7 +19,7 @@ _POSITION = [f"pose.pose.position.{axis}" for axis in "xyz"]
 _ORIENTATION = [f"pose.pose.orientation.{axis}" for axis in "xyzw"]
 
 
-def trajectory(bags: Bags, rate: float | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Read the trajectory of a flight.
 
     Args:

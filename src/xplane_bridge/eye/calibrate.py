@@ -21,8 +21,7 @@ from typing import Any, Callable, List, Optional, Sequence, Tuple
 import numpy as np
 
 from xplane_bridge.errors import XplaneBridgeError
-
-from . import names
+from xplane_bridge.eye import names
 
 #: Frames by which the datagram that reports a step is later than the step in the picture. 0 as long as nobody has seen
 #: a real X-Plane read its network after it answered.

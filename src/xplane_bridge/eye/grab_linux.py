@@ -14,8 +14,7 @@ from typing import Any, Optional, Tuple
 import numpy as np
 
 from xplane_bridge.doctor.observe import windows
-
-from .grab import Grabber, GrabError, Rect, Take
+from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take
 
 _SEARCH_S = 0.5
 _POLL_S = 0.002

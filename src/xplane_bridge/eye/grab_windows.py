@@ -14,7 +14,7 @@ from typing import Any, List, Optional, Tuple
 
 import numpy as np
 
-from .grab import Grabber, GrabError, Rect, Take
+from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take
 
 _SEARCH_S = 0.5
 _CHECK_S = 0.25

@@ -14,7 +14,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any, Deque, List, Optional, Tuple
 
-from .wire import BORDERLINE, DELAY_ASSUMED
+from xplane_bridge.eye.wire import BORDERLINE, DELAY_ASSUMED
 
 #: A picture that is farther from its frame than this share of the gap to the next may be the neighbour's.
 _SURE_SHARE = 0.35

@@ -13,13 +13,12 @@ from pathlib import Path
 from typing import Any, Callable, Optional, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
-
-from .calibrate import Calibration, CalibrationError, UndoFile
-from .grab import Grabber, GrabError, Take
-from .jpeg import encoder
-from .pairing import Pairing
-from .rref import Address, FrameStream, Heard
-from .sender import Sender
+from xplane_bridge.eye.calibrate import Calibration, CalibrationError, UndoFile
+from xplane_bridge.eye.grab import Grabber, GrabError, Take
+from xplane_bridge.eye.jpeg import encoder
+from xplane_bridge.eye.pairing import Pairing
+from xplane_bridge.eye.rref import Address, FrameStream, Heard
+from xplane_bridge.eye.sender import Sender
 
 _LOOK_S = 0.02
 _CALIBRATE_AGAIN_S = 2.0
@@ -67,15 +66,15 @@ def grabber_class() -> Callable[[Tuple[str, ...], Optional[int], Take], Grabber]
         GrabError: There is none.
     """
     if sys.platform.startswith("linux"):
-        from .grab_linux import LinuxGrabber
+        from xplane_bridge.eye.grab_linux import LinuxGrabber
 
         return LinuxGrabber
     if sys.platform == "win32":
-        from .grab_windows import WindowsGrabber
+        from xplane_bridge.eye.grab_windows import WindowsGrabber
 
         return WindowsGrabber
     if sys.platform == "darwin":
-        from .grab_macos import MacGrabber
+        from xplane_bridge.eye.grab_macos import MacGrabber
 
         return MacGrabber
     raise GrabError(f"there is no way to read windows on {sys.platform}; Windows, Linux and macOS have one")

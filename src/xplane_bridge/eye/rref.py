@@ -14,8 +14,7 @@ from typing import Callable, Optional, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.errors import XplaneBridgeError
-
-from . import names
+from xplane_bridge.eye import names
 
 Address = Tuple[str, int]
 

@@ -13,9 +13,9 @@ import threading
 import time
 from typing import Any, Callable, Optional, Tuple
 
-from . import wire
-from .jpeg import Encode
-from .pairing import Decision
+from xplane_bridge.eye import wire
+from xplane_bridge.eye.jpeg import Encode
+from xplane_bridge.eye.pairing import Decision
 
 Address = Tuple[str, int]
 

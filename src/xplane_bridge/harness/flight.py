@@ -72,11 +72,10 @@ class FlightPlan:
         """
         try:
             self.logs.mkdir(parents=True, exist_ok=True)
-        except OSError as err:
-            msg = (
-                f"{self.output} cannot be written to: {err.strerror}; --output takes a folder, or the name of a new one"
-            )
-            raise HarnessError(msg) from None
+        except OSError as error:
+            raise HarnessError(
+                f"{self.output} cannot be written to: {error.strerror}; --output takes a folder or a new name"
+            ) from None
 
 
 Observer = Callable[[RunningFlight], None]
@@ -178,8 +177,8 @@ def _wait_for_state(flight: RunningFlight) -> None:
 
     try:
         wait_until(state_or_failure, _READY_TIMEOUT_S, f"message on {NAMESPACE}/flight_state")
-    except HarnessError as err:
-        raise HarnessError(flight.bridge.describe(str(err))) from None
+    except HarnessError as error:
+        raise HarnessError(flight.bridge.describe(str(error))) from None
 
 
 def _wait_for_controller(flight: RunningFlight, controller: ManagedProcess) -> None:

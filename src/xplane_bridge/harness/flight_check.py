@@ -347,13 +347,13 @@ def read_truth(path: Path) -> Dict[str, np.ndarray]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-    except OSError as err:
-        msg = f"{path}: {err.strerror}"
+    except OSError as error:
+        msg = f"{path}: {error.strerror}"
         raise CheckError(msg) from None
     try:
         columns = {name: np.array([float(row[name]) for row in rows]) for name in wanted}
-    except (KeyError, TypeError, ValueError) as err:
-        msg = f"{path}: not a truth file of the emulator with the columns {', '.join(wanted)} ({err!r})"
+    except (KeyError, TypeError, ValueError) as error:
+        msg = f"{path}: not a truth file of the emulator with the columns {', '.join(wanted)} ({error!r})"
         raise CheckError(msg) from None
     if not rows:
         msg = f"{path}: the emulator wrote no frame into it"

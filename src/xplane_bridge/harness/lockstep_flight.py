@@ -105,8 +105,8 @@ class LockstepRun:
 
         try:
             wait_until(ready, _CONNECTED_TIMEOUT_S, "connections of all nodes")
-        except HarnessError as err:
-            raise HarnessError(f"{err}; there is still to come: {missing}") from None
+        except HarnessError as error:
+            raise HarnessError(f"{error}; there is still to come: {missing}") from None
         self._began = time.monotonic()
         self._thread.start()
 
@@ -136,8 +136,8 @@ class LockstepRun:
 
         try:
             self._answer = rospy.ServiceProxy(f"{NAMESPACE}/lockstep/step", LockstepStep)(frames=self._frames)
-        except rospy.ServiceException as err:
-            self._error = str(err)
+        except rospy.ServiceException as error:
+            self._error = str(error)
         self._took = time.monotonic() - self._began
 
     @property

@@ -54,8 +54,8 @@ class OverrideWatch:
         self._values.clear()
         try:
             wait_until(lambda: len(self.poll()) == len(OVERRIDES), _ANSWER_S, "answer of X-Plane")
-        except HarnessError as err:
-            return Verdict("released", False, f"{err}: whether overrides are left on is not known")
+        except HarnessError as error:
+            return Verdict("released", False, f"{error}: whether overrides are left on is not known")
         left: List[str] = [name for name, value in self.poll().items() if value != 0.0]
         if left:
             return Verdict("released", False, f"X-Plane says that these are still on: {', '.join(left)}")

@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 from types import FrameType
-from typing import Callable, Iterator, Mapping, Sequence, TypeVar
+from typing import Callable, Iterator, Mapping, Optional, Sequence, TypeVar
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -57,7 +57,7 @@ def interrupted_by_signals(name: str) -> Iterator[None]:
         name: the program's, for the line that says it ends.
     """
 
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
+    def interrupt(_number: int, _frame: Optional[FrameType]) -> None:
         for number in numbers:
             signal.signal(number, signal.SIG_IGN)
         print(f"\n{name}: ending", file=sys.stderr)
@@ -91,15 +91,15 @@ class ManagedProcess:
         name: str,
         command: Sequence[str | Path],
         log_dir: Path,
-        env: Mapping[str, str] | None = None,
-        cwd: Path | None = None,
+        env: Optional[Mapping[str, str]] = None,
+        cwd: Optional[Path] = None,
     ) -> None:
         self.name = name
         self.command = [str(part) for part in command]
         self.log = Path(log_dir) / f"{name}.log"
         self._env = dict(env) if env is not None else None
         self._cwd = cwd
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: Optional[subprocess.Popen[bytes]] = None
 
     def __enter__(self) -> ManagedProcess:
         self.start()
@@ -138,8 +138,8 @@ class ManagedProcess:
                     start_new_session=True,
                     preexec_fn=end_with_parent,
                 )
-            except OSError as err:
-                msg = f"{self.name}: {self.command[0]} cannot be started: {err.strerror}"
+            except OSError as error:
+                msg = f"{self.name}: {self.command[0]} cannot be started: {error.strerror}"
                 raise HarnessError(msg) from None
 
     @property
@@ -160,7 +160,7 @@ class ManagedProcess:
         return self._process.pid
 
     @property
-    def returncode(self) -> int | None:
+    def returncode(self) -> Optional[int]:
         """Its exit status, negative for a signal; None while it runs."""
         return None if self._process is None else self._process.poll()
 

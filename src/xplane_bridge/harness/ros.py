@@ -9,7 +9,7 @@ import subprocess
 import sys
 import xmlrpc.client
 from pathlib import Path
-from typing import Any, Dict, Mapping, NamedTuple, Set, Tuple
+from typing import Any, Dict, Mapping, NamedTuple, Optional, Set, Tuple
 
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.resources import clone_dir
@@ -25,7 +25,7 @@ def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
         return int(probe.getsockname()[1])
 
 
-def ros_environment(base: Mapping[str, str] | None = None) -> dict[str, str]:
+def ros_environment(base: Optional[Mapping[str, str]] = None) -> dict[str, str]:
     """An environment in which ROS's programs find this package.
 
     Args:

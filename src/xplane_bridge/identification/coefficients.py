@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, List, Tuple
+from typing import Any, List, Optional, Tuple
 
 import numpy as np
 import yaml
@@ -58,7 +58,7 @@ def read_geometry(path: Path) -> Geometry:
     return Geometry(**{name: _size(path, content, name) for name in _checked_keys(path, content, known)})
 
 
-def geometry_of(aircraft: str) -> Geometry | None:
+def geometry_of(aircraft: str) -> Optional[Geometry]:
     """Read config/geometry/<aircraft>.yaml; None where there is no such file."""
     path = share_dir() / "config" / "geometry" / f"{aircraft}.yaml"
     return read_geometry(path) if path.is_file() else None
@@ -86,7 +86,7 @@ def _size(path: Path, content: dict[str, Any], name: str) -> float:
 
 
 def derivatives(
-    model: AxisModel, geometry: Geometry, speed: float, pressure: float, mass: float | None = None
+    model: AxisModel, geometry: Geometry, speed: float, pressure: float, mass: Optional[float] = None
 ) -> dict[str, Estimate]:
     """Give the derivatives of an axis, per rad and, of rates, per unit of rate times c/2V or b/2V.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any, Callable, Optional
 
 import numpy as np
 import yaml
@@ -176,11 +176,11 @@ def _rounded(value: float) -> float:
 class _Dumper(yaml.SafeDumper):  # type: ignore[misc]  # PyYAML has no types
     """Rows of matrices and small maps on one line."""
 
-    def represent_sequence(self, tag: str, sequence: Any, flow_style: bool | None = None) -> Any:
+    def represent_sequence(self, tag: str, sequence: Any, flow_style: Optional[bool] = None) -> Any:
         flat = all(isinstance(item, (int, float)) for item in sequence)
         return super().represent_sequence(tag, sequence, flat or flow_style)
 
-    def represent_mapping(self, tag: str, mapping: Any, flow_style: bool | None = None) -> Any:
+    def represent_mapping(self, tag: str, mapping: Any, flow_style: Optional[bool] = None) -> Any:
         items = mapping.values() if isinstance(mapping, dict) else []
         flat = bool(items) and len(items) <= 3 and all(isinstance(item, (int, float, str)) for item in items)
         return super().represent_mapping(tag, mapping, flat or flow_style)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -75,11 +75,11 @@ class Identification:
 
 def identify(
     flight: Flight,
-    axis: str | None = None,
-    geometry: Geometry | None = None,
+    axis: Optional[str] = None,
+    geometry: Optional[Geometry] = None,
     aircraft: str = "",
     tail: float = TAIL_S,
-    validate: int | None = None,
+    validate: Optional[int] = None,
 ) -> Identification:
     """Identify the axes that a flight's excitations move.
 
@@ -118,7 +118,7 @@ def identify(
 
 
 def identify_axis(
-    windows: list[Window], axis: Axis, geometry: Geometry | None = None, validate: int | None = None
+    windows: list[Window], axis: Axis, geometry: Optional[Geometry] = None, validate: Optional[int] = None
 ) -> AxisResult:
     """Identify one axis from its windows.
 
@@ -173,7 +173,7 @@ def _moved_inputs(windows: list[Window], axis: Axis) -> tuple[Signal, ...]:
     return moved
 
 
-def _split(windows: list[Window], validate: int | None) -> tuple[list[Window], list[Window]]:
+def _split(windows: list[Window], validate: Optional[int]) -> tuple[list[Window], list[Window]]:
     """The windows to fit, and those kept for validation: of each target that has enough its last one."""
     if validate is not None:
         spare = [w for w in windows if w.excitation.number == validate]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Sequence
+from typing import Optional, Sequence
 
 import numpy as np
 from scipy.linalg import logm
@@ -69,13 +69,13 @@ class Condition:
     """What to linearise: SI units; None is the aircraft's usual value."""
 
     aircraft: str
-    airspeed_mps: float | None = None
+    airspeed_mps: Optional[float] = None
     altitude_m: float = 1000.0
-    fuel_kg: tuple[float, ...] | None = None
-    payload_kg: float | None = None
+    fuel_kg: Optional[tuple[float, ...]] = None
+    payload_kg: Optional[float] = None
 
 
-def linearise(condition: Condition, geometry: Geometry | None = None, scale: float = 1.0) -> LinearModel:
+def linearise(condition: Condition, geometry: Optional[Geometry] = None, scale: float = 1.0) -> LinearModel:
     """Work out the linear model of an aircraft of the emulator in trimmed level flight.
 
     Args:
@@ -96,7 +96,7 @@ def linearise(condition: Condition, geometry: Geometry | None = None, scale: flo
         raise IdentificationError(str(error)) from None
 
 
-def linearise_present(model: FlightModel, geometry: Geometry | None = None, scale: float = 1.0) -> LinearModel:
+def linearise_present(model: FlightModel, geometry: Optional[Geometry] = None, scale: float = 1.0) -> LinearModel:
     """Work out the linear model of a flight model about where it has just been trimmed; see `linearise`."""
     speed = model.state.true_airspeed_mps
     if speed < SLOWEST_MPS:
@@ -209,7 +209,7 @@ def _axis_model(
     runs: Sequence[_Run],
     speed: float,
     trimmed: ModelState,
-    geometry: Geometry | None,
+    geometry: Optional[Geometry],
 ) -> AxisModel:
     states, forces, moved = (signal_names(signals) for signals in (axis.states, axis.forces, inputs))
     parts = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Mapping, Sequence
+from typing import Any, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -108,8 +108,8 @@ class AxisModel:
     d: np.ndarray
     modes: list[Mode]
     derivatives: dict[str, Estimate] = field(default_factory=dict)
-    a_interval: np.ndarray | None = None
-    b_interval: np.ndarray | None = None
+    a_interval: Optional[np.ndarray] = None
+    b_interval: Optional[np.ndarray] = None
     facts: dict[str, Any] = field(default_factory=dict)  #: how it was found, plain enough for YAML
     warnings: list[str] = field(default_factory=list)
 

@@ -8,7 +8,7 @@ weighted by the inverse of their residuals' variance, which is estimated with th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Sequence, Tuple
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -50,7 +50,7 @@ class Fit:
     converged: bool
 
 
-def fit(samples: Sequence[Samples], a: np.ndarray, b: np.ndarray, free: np.ndarray | None = None) -> Fit:
+def fit(samples: Sequence[Samples], a: np.ndarray, b: np.ndarray, free: Optional[np.ndarray] = None) -> Fit:
     """Fit A and B to the windows.
 
     Args:
@@ -74,7 +74,7 @@ def fit(samples: Sequence[Samples], a: np.ndarray, b: np.ndarray, free: np.ndarr
     return problem.describe(vector, variance, bool(result.success), float(2.0 * result.cost))
 
 
-def refit(samples: Sequence[Samples], found: Fit, free: np.ndarray | None = None) -> list[np.ndarray]:
+def refit(samples: Sequence[Samples], found: Fit, free: Optional[np.ndarray] = None) -> list[np.ndarray]:
     """Fit other samples from a fit that is there, by its weights; gives their residuals."""
     problem = _Problem(samples, np.hstack([found.a, found.b]), free)
     problem.weights = 1.0 / np.sqrt(found.variance)
@@ -91,7 +91,7 @@ def simulate(samples: Samples, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 class _Problem:
     """Residuals and their derivatives for a vector of A and B, and initial state and bias of each window."""
 
-    def __init__(self, samples: Sequence[Samples], system: np.ndarray, free: np.ndarray | None) -> None:
+    def __init__(self, samples: Sequence[Samples], system: np.ndarray, free: Optional[np.ndarray]) -> None:
         self._n = system.shape[0]
         self._system = system.copy()
         self._free = np.argwhere(np.ones(system.shape, dtype=bool) if free is None else free)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from pathlib import Path
-from typing import Iterable, Iterator, NamedTuple, Sequence, Tuple
+from typing import Iterable, Iterator, NamedTuple, Optional, Sequence, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -88,10 +88,10 @@ class _Block(NamedTuple):
     ended: bool  #: whether anything came after it
 
 
-def _search(path: Path, ident: str) -> tuple[Airport | None, int]:
+def _search(path: Path, ident: str) -> tuple[Optional[Airport], int]:
     """Find an airport in a file; gives how many there are up to it, too."""
     count = 0
-    by_code: Airport | None = None
+    by_code: Optional[Airport] = None
     try:
         with path.open(encoding="utf-8-sig", errors="replace", newline=None) as file:
             lines = enumerate(file, 1)
@@ -103,8 +103,8 @@ def _search(path: Path, ident: str) -> tuple[Airport | None, int]:
                     return _airport(path, version, block), count
                 if by_code is None and _code(block) == ident:
                     by_code = _airport(path, version, block)
-    except OSError as err:
-        msg = f"{path}: {err.strerror}"
+    except OSError as error:
+        msg = f"{path}: {error.strerror}"
         raise AptError(msg) from None
     return by_code, count
 

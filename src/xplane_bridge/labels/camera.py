@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Optional
 
 import numpy as np
 
@@ -155,7 +155,7 @@ def clip(points: np.ndarray, inside: np.ndarray) -> np.ndarray:
     return np.array(kept).reshape(-1, points.shape[1])
 
 
-def _clip_segment(segment: np.ndarray, sign: float, axis: int, limit: float) -> np.ndarray | None:
+def _clip_segment(segment: np.ndarray, sign: float, axis: int, limit: float) -> Optional[np.ndarray]:
     """The part of a segment (2, k) on one side of a limit of one coordinate."""
     a, b = sign * (segment[:, axis] - limit)
     if a < 0.0 and b < 0.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from pathlib import Path
-from typing import Any, Iterator, Mapping, NamedTuple, Sequence
+from typing import Any, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -39,7 +39,7 @@ class Options(NamedTuple):
 
     flat_world: bool = False  #: the emulator's ground instead of the sphere
     map_sigma: float = MAP_SIGMA_M  #: [m]
-    standing_height: float | None = None  #: [m] altitude less y_agl of the parked aircraft; None: not known
+    standing_height: Optional[float] = None  #: [m] altitude less y_agl of the parked aircraft; None: not known
 
 
 class Frame(NamedTuple):
@@ -90,7 +90,7 @@ class Flight:
             else:
                 yield Frame(stamp, Camera(self._world, _pose(self._frames, row), self._infos[stamp]))
 
-    def labels(self, others: Mapping[int, Sequence[Other]] | None = None) -> Iterator[dict[str, Any]]:
+    def labels(self, others: Optional[Mapping[int, Sequence[Other]]] = None) -> Iterator[dict[str, Any]]:
         """Label all pictures: what each line of the file is.
 
         Args:
@@ -196,7 +196,7 @@ def _suns(bags: Bags, stamps: np.ndarray) -> dict[int, Sun]:
     return out
 
 
-def _ground(bags: Bags, standing: float | None) -> Ground | None:
+def _ground(bags: Bags, standing: Optional[float]) -> Optional[Ground]:
     topic = bags.topic_of_type(_STATE)
     if topic is None or not bags.topics[topic].count:
         return None

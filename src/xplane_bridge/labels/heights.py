@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
-from typing import Mapping, NamedTuple
+from typing import Mapping, NamedTuple, Optional
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class Profile:
         return self._source
 
 
-def profile(airport: Airport, runway: Runway, ground: Ground | None, table: Mapping[str, float]) -> Profile:
+def profile(airport: Airport, runway: Runway, ground: Optional[Ground], table: Mapping[str, float]) -> Profile:
     """Give a runway's heights from the best source there is.
 
     Args:
@@ -98,7 +98,7 @@ def profile(airport: Airport, runway: Runway, ground: Ground | None, table: Mapp
     return Profile(np.zeros(1), np.array([airport.elevation]), AIRPORT_SIGMA_M, "apt.dat", 0.0)
 
 
-def _measured(frame: RunwayFrame, ground: Ground) -> Profile | None:
+def _measured(frame: RunwayFrame, ground: Ground) -> Optional[Profile]:
     """The medians of stretches of the runway that the aircraft was above, as it lies; None: it never was."""
     # Degrees first: most of a flight is elsewhere.
     reach = math.degrees((frame.length + frame.width) / 6378145.0)
@@ -144,7 +144,7 @@ def read_table(path: Path, airport: Airport) -> dict[str, float]:
                     msg = f"{path}: line {number}: {airport.ident} has no runway {words[0]}; it has: {have}"
                     raise HeightError(msg)
                 heights[words[0]] = metres
-    except (OSError, UnicodeDecodeError) as err:
-        msg = f"{path}: {getattr(err, 'strerror', None) or 'no text file'}"
+    except (OSError, UnicodeDecodeError) as error:
+        msg = f"{path}: {getattr(error, 'strerror', None) or 'no text file'}"
         raise HeightError(msg) from None
     return heights

@@ -48,8 +48,8 @@ def write(path: Path, about: Mapping[str, Any], frames: Iterable[Mapping[str, An
                 file.write(_line(frame))
                 count += 1
         part.replace(path)
-    except OSError as err:
-        msg = f"{path}: {err.strerror}; --output takes another file"
+    except OSError as error:
+        msg = f"{path}: {error.strerror}; --output takes another file"
         raise LabelError(msg) from None
     finally:
         if part.exists():
@@ -66,8 +66,8 @@ def read(path: Path) -> Labels:
     try:
         with path.open(encoding="utf-8") as file:
             lines = [json.loads(line) for line in file]
-    except OSError as err:
-        msg = f"{path}: {err.strerror}; label_images writes it"
+    except OSError as error:
+        msg = f"{path}: {error.strerror}; label_images writes it"
         raise LabelError(msg) from None
     except ValueError:
         lines = []
@@ -85,8 +85,8 @@ def digest(path: Path) -> str:
     """
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as err:
-        msg = f"{path}: {err.strerror}; label_images writes it"
+    except OSError as error:
+        msg = f"{path}: {error.strerror}; label_images writes it"
         raise LabelError(msg) from None
 
 

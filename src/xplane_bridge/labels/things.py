@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Mapping, NamedTuple, Sequence
+from typing import Any, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class Sun(NamedTuple):
 
     elevation: float  #: [deg] above the level there
     heading: float  #: [deg] true
-    origin: tuple[float, float] | None = None  #: latitude, longitude [deg]; None: not known
+    origin: Optional[tuple[float, float]] = None  #: latitude, longitude [deg]; None: not known
 
 
 class Labeller:
@@ -60,7 +60,7 @@ class Labeller:
         frames = [(RunwayFrame(runway, 0), RunwayFrame(runway, 1)) for runway in airport.runways]
         self._runways = list(zip(airport.runways, frames, profiles))
 
-    def label(self, camera: Camera, sun: Sun | None, others: Sequence[Other] = ()) -> list[dict[str, Any]]:
+    def label(self, camera: Camera, sun: Optional[Sun], others: Sequence[Other] = ()) -> list[dict[str, Any]]:
         """Label one picture; what lies outside it altogether is left out."""
         objects = [self._runway(camera, *runway) for runway in self._runways]
         objects.append(self._horizon(camera))
@@ -73,7 +73,7 @@ class Labeller:
 
     def _runway(
         self, camera: Camera, runway: Runway, frames: tuple[RunwayFrame, RunwayFrame], profile: Profile
-    ) -> dict[str, Any] | None:
+    ) -> Optional[dict[str, Any]]:
         frame = frames[_looked_along(camera, frames[0])]
         half, length = 0.5 * frame.width, frame.length
         parts = np.linspace(0.0, length, SIDE_PARTS + 1)
@@ -173,7 +173,7 @@ class Labeller:
 
     # --- what is far away ----------------------------------------------------------------------------------------
 
-    def _horizon(self, camera: Camera) -> dict[str, Any] | None:
+    def _horizon(self, camera: Camera) -> Optional[dict[str, Any]]:
         dip = self._world.dip(camera.height)
         lines = {name: _horizon_line(camera, angle) for name, angle in (("level", 0.0), ("dipped", dip))}
         if not any(lines.values()):
@@ -187,7 +187,7 @@ class Labeller:
             **_sure([sigma]),
         }
 
-    def _sun(self, camera: Camera, sun: Sun) -> dict[str, Any] | None:
+    def _sun(self, camera: Camera, sun: Sun) -> Optional[dict[str, Any]]:
         if sun.elevation < -math.degrees(_SUN_RADIUS + self._world.dip(camera.height)):
             return None
         elevation, heading = math.radians(sun.elevation), math.radians(sun.heading)
@@ -211,7 +211,7 @@ class Labeller:
             **_sure([sigma]),
         }
 
-    def _other(self, camera: Camera, other: Other) -> dict[str, Any] | None:
+    def _other(self, camera: Camera, other: Other) -> Optional[dict[str, Any]]:
         place = self._world.place(other.latitude, other.longitude, other.altitude)
         optical = camera.optical(place)[0]
         point = _point(camera, optical, other.sigma, other.sigma)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from typing import TYPE_CHECKING, Sequence
+from typing import TYPE_CHECKING, Optional, Sequence
 
 import numpy as np
 
@@ -28,7 +28,7 @@ _FIGURES = (
 _LAST_COLOUR = len(COLOURS)
 
 
-def build(flights: Sequence[Matched], passports: Sequence[Passport | None], matched_by: str) -> str:
+def build(flights: Sequence[Matched], passports: Sequence[Optional[Passport]], matched_by: str) -> str:
     """Make the page.
 
     Args:

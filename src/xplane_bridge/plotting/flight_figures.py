@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Callable, Sequence
+from typing import TYPE_CHECKING, Callable, Optional, Sequence
 
 import numpy as np
 
@@ -182,7 +182,7 @@ def _controls(flight: Flight) -> TimeFigure:
     return _figure("controls", "Controls: commanded and achieved", flight, panels)
 
 
-def _commanded(flight: Flight, column: str, index: int | None = None) -> list[Series]:
+def _commanded(flight: Flight, column: str, index: Optional[int] = None) -> list[Series]:
     if "applied" not in flight.tables:
         return []
     t = flight.tables["applied"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
@@ -105,7 +105,7 @@ def _width(value: float) -> str:
     return number(value, 2) if math.isfinite(value) else "&ndash;"
 
 
-def _matrix(name: str, matrix: np.ndarray, widths: np.ndarray | None, left: list[str], top: list[str]) -> str:
+def _matrix(name: str, matrix: np.ndarray, widths: Optional[np.ndarray], left: list[str], top: list[str]) -> str:
     rows = []
     for i, label in enumerate(left):
         cells = [html.escape(label)]

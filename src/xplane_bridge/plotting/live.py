@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import threading
 import time
-from typing import Sequence
+from typing import Optional, Sequence
 
 import matplotlib
 import numpy as np
@@ -90,7 +90,7 @@ class LiveWindow:
         self._title()
         self.figure.canvas.mpl_connect("key_press_event", self._key)
 
-    def run(self, seconds: float | None = None) -> None:
+    def run(self, seconds: Optional[float] = None) -> None:
         """Show the window until it is closed; or for so long [s], and write the PNG then, also without any window."""
         if seconds is not None and not can_show():
             time.sleep(seconds)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from typing import TYPE_CHECKING, Sequence
+from typing import TYPE_CHECKING, Optional, Sequence
 
 from xplane_bridge.plotting.page import missing, rows_table
 
@@ -35,7 +35,7 @@ def passport_section(passports: Sequence[Passport]) -> str:
     return text
 
 
-def differences_table(names: Sequence[str], passports: Sequence[Passport | None]) -> str:
+def differences_table(names: Sequence[str], passports: Sequence[Optional[Passport]]) -> str:
     """Show the lines in which passports differ, one column a flight; None: that flight has none."""
     if all(passport is None for passport in passports):
         return missing(_NONE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
-from typing import TYPE_CHECKING, Any, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -31,7 +31,7 @@ _THUMBNAIL_WIDTH = 320
 _LINK_STATES = words(LinkState)
 
 
-def build(bags: Bags, flight: Flight, labels: Labels | None = None) -> tuple[str, list[TimeFigure | PathFigure]]:
+def build(bags: Bags, flight: Flight, labels: Optional[Labels] = None) -> tuple[str, list[TimeFigure | PathFigure]]:
     """Make the report.
 
     Args:
@@ -47,8 +47,8 @@ def build(bags: Bags, flight: Flight, labels: Labels | None = None) -> tuple[str
     for key, title, make in all_figures():
         try:
             figure = make(flight)
-        except MissingError as err:
-            sections.append((key, title, missing(str(err))))
+        except MissingError as error:
+            sections.append((key, title, missing(str(error))))
             continue
         made.append(figure)
         linked = " data-time" if hasattr(figure, "panels") else ""
@@ -153,7 +153,7 @@ def _strip(bags: Bags, flight: Flight) -> str:
     return f'<div class="strip">{"".join(figures)}</div>' if figures else missing("no image could be decoded")
 
 
-def _thumbnail(data: np.ndarray) -> str | None:
+def _thumbnail(data: np.ndarray) -> Optional[str]:
     import cv2
 
     image = cv2.imdecode(np.frombuffer(data.tobytes(), dtype=np.uint8), cv2.IMREAD_COLOR)
@@ -174,7 +174,7 @@ def _remarks(quality: int, constants: Mapping[str, Any]) -> str:
     )
 
 
-def _caption(frames: Any, row: int | None, at: str, constants: Mapping[str, Any]) -> str:
+def _caption(frames: Any, row: Optional[int], at: str, constants: Mapping[str, Any]) -> str:
     if row is None:
         return f"{at} s &middot; no state"
     names = ("roll_deg", "pitch_deg", "heading_true_deg", "altitude_msl", "indicated_airspeed")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class Panel:
     label: str  #: quantity and unit, e.g. ``roll [deg]``
     series: list[Series]
 
-    def flat_range(self) -> tuple[float, float] | None:
+    def flat_range(self) -> Optional[tuple[float, float]]:
         """Bounds for values that do not move but for rounding, which would fill the axes with noise; else None."""
         values = np.concatenate([np.asarray(s.values, dtype=float) for s in self.series])
         values = values[np.isfinite(values)]

@@ -3,9 +3,9 @@
 Written from the protocol reference alone, independently of the C++ codec; both are held to the same golden packets.
 """
 
-from .constants import *  # noqa: F403
-from .fields import DecodeError
-from .requests import (
+from xplane_bridge.protocol.constants import *  # noqa: F403
+from xplane_bridge.protocol.fields import DecodeError
+from xplane_bridge.protocol.requests import (
     AircraftLoad,
     AircraftLoadAndPlacement,
     CommandRequest,
@@ -23,7 +23,7 @@ from .requests import (
     decode_data,
     decode_request,
 )
-from .responses import (
+from xplane_bridge.protocol.responses import (
     Beacon,
     RposResponse,
     decode_beacon,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import constants as c
+from xplane_bridge.protocol import constants as c
 
 
 class DecodeError(ValueError):

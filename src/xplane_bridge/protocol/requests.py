@@ -11,8 +11,8 @@ import struct
 from dataclasses import dataclass
 from typing import Callable, Dict, Tuple, Union
 
-from . import constants as c
-from .fields import DecodeError, label_of, pad, require_size, text_of
+from xplane_bridge.protocol import constants as c
+from xplane_bridge.protocol.fields import DecodeError, label_of, pad, require_size, text_of
 
 _RREF_REQUEST = struct.Struct("<4sxii400s")
 _DREF = struct.Struct("<4sBf500s")

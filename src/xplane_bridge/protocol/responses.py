@@ -6,9 +6,9 @@ import struct
 from dataclasses import dataclass
 from typing import List, Sequence, Tuple
 
-from . import constants as c
-from .fields import DecodeError, label_of, require_size
-from .requests import DrefWrite, decode_dref
+from xplane_bridge.protocol import constants as c
+from xplane_bridge.protocol.fields import DecodeError, label_of, require_size
+from xplane_bridge.protocol.requests import DrefWrite, decode_dref
 
 _RREF_PAIR = struct.Struct("<if")
 _RPOS = struct.Struct("<4sB3d10f")

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Dict, List, Mapping
 import numpy as np
 
 from xplane_bridge.analysis.scoring import Score, score
-
-from .schema import Scenario, ScenarioError
+from xplane_bridge.scenario.schema import Scenario, ScenarioError
 
 if TYPE_CHECKING:
     from xplane_bridge.bags.flight import Flight

@@ -10,12 +10,11 @@ from typing import Any, Callable, Collection, Dict, List, Mapping, Optional, Seq
 import yaml
 
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
+from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
 from xplane_bridge.errors import is_number, yaml_problem
-
-from ..constants import EXCITATION_KINDS, FAILURE_KINDS
-from .holds import HoldGains
-from .resets import NUMBERS, STARTS, TEXTS
-from .schema import (
+from xplane_bridge.scenario.holds import HoldGains
+from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS
+from xplane_bridge.scenario.schema import (
     HANDLES,
     HOLDS,
     MODES,
@@ -26,8 +25,8 @@ from .schema import (
     Scenario,
     ScenarioError,
 )
-from .traffic import MOST, RANGES
-from .world import LAYERS, TIME, WEATHER, WIND
+from xplane_bridge.scenario.traffic import MOST, RANGES
+from xplane_bridge.scenario.world import LAYERS, TIME, WEATHER, WIND
 
 _TOP = (
     *("name", "description", "aircraft", "controller", "repeat_every", "start", "aerodrome", "gains", "criteria"),

@@ -7,10 +7,9 @@ from collections import deque
 from typing import Any, Callable, Deque, Optional, Tuple
 
 from xplane_bridge.lockstep import PUBLISHER, ModeInStep, Participant, TopicInStep
-
-from .player import Action
-from .ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
-from .schema import ScenarioError
+from xplane_bridge.scenario.player import Action
+from xplane_bridge.scenario.ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
+from xplane_bridge.scenario.schema import ScenarioError
 
 _WARNINGS_AGE_NS = 200_000_000  # of those that count: all of before have come, at 20 of them a second
 _POLL_S = 0.2

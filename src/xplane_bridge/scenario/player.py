@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Dict, List, Optional, Set, Tuple
 
-from . import excitations
-from .holds import HoldAutopilot, HoldGains, Targets
-from .schema import STICK_AXES, Event, Scenario
+from xplane_bridge.scenario import excitations
+from xplane_bridge.scenario.holds import HoldAutopilot, HoldGains, Targets
+from xplane_bridge.scenario.schema import STICK_AXES, Event, Scenario
 
 #: Longest time step that the holds integrate over; after a gap they go on as if nothing had happened [s].
 _MAX_STEP_S = 0.1

@@ -13,13 +13,13 @@ import time
 from pathlib import Path
 from typing import Any, Callable, Dict, Optional, Tuple
 
-from ..constants import COMMAND_FIELDS, FlightMode, words
-from .player import Action, Commands, FlightSample, Player
-from .resets import reset_request
-from .schema import HANDLE_FIELDS, Scenario, ScenarioError
-from .traffic import ScenarioTraffic
-from .virtual_stick import VirtualStick
-from .world import time_request, weather_request, wind_request
+from xplane_bridge.constants import COMMAND_FIELDS, FlightMode, words
+from xplane_bridge.scenario.player import Action, Commands, FlightSample, Player
+from xplane_bridge.scenario.resets import reset_request
+from xplane_bridge.scenario.schema import HANDLE_FIELDS, Scenario, ScenarioError
+from xplane_bridge.scenario.traffic import ScenarioTraffic
+from xplane_bridge.scenario.virtual_stick import VirtualStick
+from xplane_bridge.scenario.world import time_request, weather_request, wind_request
 
 #: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
 STICK_RATE = 50.0

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any, Dict, Mapping, Optional, Tuple
 
 from xplane_bridge.analysis.criteria import SCORED, Criterion
-
-from ..constants import COMMAND_FIELDS, FlightMode, words
-from ..errors import XplaneBridgeError
+from xplane_bridge.constants import COMMAND_FIELDS, FlightMode, words
+from xplane_bridge.errors import XplaneBridgeError
 
 
 def _range(field: str) -> Tuple[float, float]:

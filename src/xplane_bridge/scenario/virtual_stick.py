@@ -12,9 +12,8 @@ import numpy as np
 import yaml
 
 from xplane_bridge.errors import yaml_problem
-
-from .player import Commands
-from .schema import ScenarioError
+from xplane_bridge.scenario.player import Commands
+from xplane_bridge.scenario.schema import ScenarioError
 
 AXIS_COUNT, BUTTON_COUNT = 8, 12
 _GRID = np.linspace(0.0, 1.0, 2001)

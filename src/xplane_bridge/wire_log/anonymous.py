@@ -6,7 +6,7 @@ import ipaddress
 import struct
 import xmlrpc.client
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Tuple
 
 from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
 from xplane_bridge.wire_log.datagrams import RAW, USER0, Datagram, datagram_in
@@ -79,7 +79,7 @@ def anonymised(path: Path) -> Iterator[bytes]:
         CaptureError: It cannot be read.
     """
     capture = Capture.open(path)
-    seen: List[Tuple[Packet, int, Datagram | None]] = []
+    seen: List[Tuple[Packet, int, Optional[Datagram]]] = []
     disguise = Disguise()
     for packet in capture.packets():
         link_type = capture.interfaces[packet.interface].link_type

@@ -1,5 +1,6 @@
-/// Sizes that X-Plane's datarefs and this package's messages share.
 #pragma once
+
+/// Sizes that X-Plane's datarefs and this package's messages share.
 
 namespace xplane_bridge::core {
 

@@ -1,10 +1,11 @@
+#pragma once
+
 /// Joystick axes and buttons to commands: the paper's equations (1) and (2).
 ///
 /// (1)  delta = xi * j                      primary controls; j after dead zone and expo, saturated to the channel
 /// (2)  delta = sat[map{integ(xi * j)}]     secondary controls from hats, arrow keys and self-centring sticks
 ///
 /// Axes are as in sensor_msgs/Joy: -1..1. Times are seconds of one steady clock passed in by the caller.
-#pragma once
 
 #include <cstdint>
 #include <limits>

@@ -1,7 +1,8 @@
+#pragma once
+
 /// Who flies: manual or automatic commands, their limits, time-outs and failsafes.
 ///
 /// All times are seconds of one steady clock passed in by the caller. Not thread-safe: one owner.
-#pragma once
 
 #include <array>
 #include <cstdint>

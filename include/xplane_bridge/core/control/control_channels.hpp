@@ -1,5 +1,6 @@
-/// Channels to X-Plane's datarefs: the one place that knows their names (protocol.md 8.1).
 #pragma once
+
+/// Channels to X-Plane's datarefs: the one place that knows their names (protocol.md 8.1).
 
 #include <string>
 #include <vector>

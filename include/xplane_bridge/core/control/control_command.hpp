@@ -1,7 +1,8 @@
+#pragma once
+
 /// What a pilot or controller can command, and what makes a command acceptable.
 ///
 /// Signs: roll right +, pitch nose up +, yaw nose right +; trims likewise. Bits and ranges are ControlCommand.msg's.
-#pragma once
 
 #include <array>
 #include <bitset>

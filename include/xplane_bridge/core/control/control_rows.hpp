@@ -1,6 +1,7 @@
+#pragma once
+
 /// Channels in the DATA rows that X-Plane takes as commands (the paper's Table 2): 8 joystick and 11 flight controls,
 /// both with the stick, 13 trims, flaps and speed brake, 25 levers. A slot holds what it was given until -999 comes.
-#pragma once
 
 #include <cstdint>
 #include <optional>

@@ -1,9 +1,10 @@
+#pragma once
+
 /// Test signals for system identification and delay estimation, and the state machine that plays one safely.
 ///
 /// Signals are functions of simulator time since the start, so they stand still while X-Plane is paused and do not
 /// depend on the rate at which they are sampled. No randomness beyond the given seed: the same specification gives the
 /// same signal on every machine.
-#pragma once
 
 #include <cstdint>
 #include <optional>

@@ -1,5 +1,6 @@
-/// Every failure X-Plane has a dataref for.
 #pragma once
+
+/// Every failure X-Plane has a dataref for.
 
 #include <string>
 #include <vector>

@@ -1,8 +1,9 @@
+#pragma once
+
 /// Failures: what can break, how each X-Plane version is told, when it comes true, and the labels of it.
 ///
 /// X-Plane's own failures are datarefs sim/operation/failures/rel_* (6 failed now, 0 works). Surface failures that
 /// X-Plane cannot express are flown by SurfaceDriver.
-#pragma once
 
 #include <limits>
 #include <map>

@@ -1,5 +1,6 @@
-/// The terrain under any place, asked of NASA's X-Plane Connect plugin.
 #pragma once
+
+/// The terrain under any place, asked of NASA's X-Plane Connect plugin.
 
 #include <functional>
 #include <optional>

@@ -1,6 +1,7 @@
+#pragma once
+
 /// A flight that begins at an airport: what is asked of X-Plane, and whether it shows it. X-Plane alone knows where its
 /// airports are; a file of its own (apt.dat) gives the names of runways and ramps.
-#pragma once
 
 #include <cstdint>
 #include <istream>

@@ -1,6 +1,7 @@
+#pragma once
+
 /// X-Plane's own autopilot that tx_node's service sets: its dials, and the commands that engage its modes with the
 /// datarefs that show them. Names after Laminar's lists of 11.40 to 12.10, which have all of them.
-#pragma once
 
 #include <cstdint>
 #include <optional>

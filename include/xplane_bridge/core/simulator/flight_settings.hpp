@@ -1,6 +1,7 @@
+#pragma once
+
 /// Wind, loading and files that tx_node's services set: what is sent, and whether X-Plane shows it. Datarefs after
 /// Laminar's lists of 11.40 and 12.08 (DataRefs.txt of XPlane2Blender).
-#pragma once
 
 #include <optional>
 #include <string>

@@ -1,5 +1,6 @@
-/// Placing the aircraft in the air (protocol.md 8.4): what is sent, and whether X-Plane shows it.
 #pragma once
+
+/// Placing the aircraft in the air (protocol.md 8.4): what is sent, and whether X-Plane shows it.
 
 #include <optional>
 #include <string>

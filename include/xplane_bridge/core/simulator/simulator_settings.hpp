@@ -1,5 +1,6 @@
-/// Commands and datarefs behind tx_node's services: pause, and datarefs by name.
 #pragma once
+
+/// Commands and datarefs behind tx_node's services: pause, and datarefs by name.
 
 #include <string>
 #include <vector>

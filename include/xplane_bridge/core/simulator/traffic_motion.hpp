@@ -1,6 +1,7 @@
+#pragma once
+
 /// Other aircraft that clients place: how they move between two commands, and what X-Plane is sent. Datarefs after
 /// Laminar's lists of 11.40 to 12.10.
-#pragma once
 
 #include <optional>
 #include <string>

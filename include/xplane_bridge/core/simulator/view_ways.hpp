@@ -1,6 +1,7 @@
+#pragma once
+
 /// How tx_node's set_view brings X-Plane's camera where a client wants it: without a plugin there is no camera message,
 /// so each wish has several ways, the best one first.
-#pragma once
 
 #include <Eigen/Geometry>
 #include <optional>

@@ -1,6 +1,7 @@
+#pragma once
+
 /// Time of day and weather that tx_node's services set: what is sent, and whether X-Plane shows it. Datarefs after
 /// Laminar's lists of 11.40 to 12.10.
-#pragma once
 
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,7 @@
+#pragma once
+
 /// The few quantities tx_node watches every frame: triggers, attitude limits, read-back times, resets. Not a state
 /// source: that is the state assembler's (field_table.hpp).
-#pragma once
 
 #include <cmath>
 #include <string>

@@ -1,6 +1,7 @@
+#pragma once
+
 /// The other aircraft that X-Plane has: what is asked for, and what the answers say. Datarefs after Laminar's lists of
 /// 11.40 to 12.10.
-#pragma once
 
 #include <cmath>
 #include <cstdint>

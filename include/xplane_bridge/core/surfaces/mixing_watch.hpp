@@ -1,5 +1,6 @@
-/// Learns a mixing while the aircraft flies normally, and holds a known one against what is flown.
 #pragma once
+
+/// Learns a mixing while the aircraft flies normally, and holds a known one against what is flown.
 
 #include <optional>
 #include <string>

@@ -1,5 +1,6 @@
-/// Drives every surface from an identified mixing, some of them broken (protocol.md 8.3, steps 2 and 3).
 #pragma once
+
+/// Drives every surface from an identified mixing, some of them broken (protocol.md 8.3, steps 2 and 3).
 
 #include <optional>
 #include <string>

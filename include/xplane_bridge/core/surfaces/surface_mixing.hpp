@@ -1,9 +1,10 @@
+#pragma once
+
 /// How X-Plane moves each surface with stick, trims and flaps: identified from normal flight (protocol.md 8.3).
 ///
 /// For each surface a linear law with separate slopes for positive and negative stick:
 ///   deflection = bias + k_roll+ max(roll, 0) + k_roll- min(roll, 0) + ... + k_trim trim + k_flap flap + ...
 /// The stick values are X-Plane's total_*_ratio (pilot, autopilot and stability augmentation together).
-#pragma once
 
 #include <array>
 #include <cstddef>

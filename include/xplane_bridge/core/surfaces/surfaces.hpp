@@ -1,7 +1,8 @@
+#pragma once
+
 /// Every control surface X-Plane can show and take one by one: names, datarefs, and commands to single surfaces.
 ///
 /// Deflections in degrees with X-Plane's sign: trailing edge down +, rudder trailing edge right +. docs/surfaces.md.
-#pragma once
 
 #include <cstddef>
 #include <cstdint>

@@ -67,7 +67,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 @guarded
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     from xplane_bridge.plotting import comparison
 
@@ -87,8 +87,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         args.output.parent.mkdir(parents=True, exist_ok=True)
         args.output.write_text(text, encoding="utf-8")
-    except OSError as err:
-        raise CompareError(f"{args.output}: {err.strerror}") from None
+    except OSError as error:
+        raise CompareError(f"{args.output}: {error.strerror}") from None
     print(args.output)
     return 0
 
@@ -142,8 +142,8 @@ def read(path: Path, variant: str) -> Read:
     if beside.is_file():
         try:
             played = json.loads(beside.read_text(encoding="utf-8"))
-        except ValueError as err:
-            raise CompareError(f"{beside}: no log of a scenario's player: {err}") from None
+        except ValueError as error:
+            raise CompareError(f"{beside}: no log of a scenario's player: {error}") from None
     return Read(path, variant, flight, labels, passports[-1] if passports else None, played)
 
 
@@ -211,5 +211,5 @@ def scores_of(each: Read) -> Dict[str, float]:
     try:
         scenario = parse_scenario(yaml.safe_load(text))
         return {s.name: s.value for s in judge(scenario, each.flight, each.played) if not math.isnan(s.value)}
-    except (yaml.YAMLError, ScenarioError) as err:
-        raise CompareError(f"{each.path}: the scenario in its passport: {err}") from None
+    except (yaml.YAMLError, ScenarioError) as error:
+        raise CompareError(f"{each.path}: the scenario in its passport: {error}") from None

@@ -89,8 +89,8 @@ def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None
             raise ReplayError(f"{name}: {answer.result.message}")
     try:
         link = rospy.wait_for_message(f"{namespace}/link_state", LinkState, _LINK_S)
-    except rospy.ROSException as err:
-        raise ReplayError(f"{namespace}/link_state: {err}") from None
+    except rospy.ROSException as error:
+        raise ReplayError(f"{namespace}/link_state: {error}") from None
     write = rospy.ServiceProxy(f"{namespace}/tx_node/set_dataref", SetDataref)
     taken = write(name=PATH_OVERRIDE, values=[1.0])
     if not taken.success:

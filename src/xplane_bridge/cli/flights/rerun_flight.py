@@ -75,8 +75,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         output.mkdir(parents=True, exist_ok=True)
         scenario = output / "scenario.yaml"
         scenario.write_text(str(flight["text"]), encoding="utf-8")
-    except OSError as err:
-        raise RerunError(f"{output}: {err.strerror}") from None
+    except OSError as error:
+        raise RerunError(f"{output}: {error.strerror}") from None
     status = run_scenario.main([str(scenario), *map(str, flight["options"]), "--output", str(output)])
     if (output / _BAG).is_file():
         for line in changes(passport, passport_of(output / _BAG)):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Callable, FrozenSet, List, Tuple
 
+from xplane_bridge.doctor.checks import clock, data_output, joystick, leftovers, link, ros, simulator, window
 from xplane_bridge.doctor.evidence import Evidence
 from xplane_bridge.doctor.finding import Finding
-
-from . import clock, data_output, joystick, leftovers, link, ros, simulator, window
 
 Check = Callable[[Evidence], List[Finding]]
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, Optional
 
+from xplane_bridge.doctor.checks import hints
+from xplane_bridge.doctor.checks.simulator import version_text
 from xplane_bridge.doctor.evidence import Evidence
 from xplane_bridge.doctor.finding import Finding, note, ok, problem, warning
 from xplane_bridge.doctor.observe.beacons import Sighting
 from xplane_bridge.doctor.observe.computer import is_same_computer
 from xplane_bridge.doctor.observe.target import Chosen, distinct
-
-from . import hints
-from .simulator import version_text
 
 
 def beacons(evidence: Evidence) -> List[Finding]:

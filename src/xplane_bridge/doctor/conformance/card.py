@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Callable, Dict, List, Sequence, Tuple
 
 from xplane_bridge.doctor import names
-
-from .flight import Flight, NoFlightError
-from .journal import Journal, JournalError
-from .link import XPlane
-from .question import Question
-from .questions import CARD
-from .verdict import Answer, NotTestableError, Verdict
+from xplane_bridge.doctor.conformance.flight import Flight, NoFlightError
+from xplane_bridge.doctor.conformance.journal import Journal, JournalError
+from xplane_bridge.doctor.conformance.link import XPlane
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.questions import CARD
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, Verdict
 
 #: How long the first answer is waited for [s].
 _PATIENCE_S = 5.0

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 from xplane_bridge import protocol
-
-from . import names
-from .link import Sample, XPlane
-from .pilot import Pilot
-from .verdict import NotTestableError
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.link import Sample, XPlane
+from xplane_bridge.doctor.conformance.pilot import Pilot
+from xplane_bridge.doctor.conformance.verdict import NotTestableError
 
 #: Above the present ground [m]; below the second a question is broken off, below the third it never gets.
 START_HEIGHT_M, LOW_M, LOWEST_M = 1500.0, 600.0, 300.0

@@ -11,9 +11,17 @@ from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Set,
 
 from xplane_bridge import protocol
 from xplane_bridge.doctor import names
-
-from .journal import DATA_OUTPUT, OVERRIDE, Journal, Operation, datagram, deselect_rows, target_off, write_dataref
-from .verdict import NotTestableError
+from xplane_bridge.doctor.conformance.journal import (
+    DATA_OUTPUT,
+    OVERRIDE,
+    Journal,
+    Operation,
+    datagram,
+    deselect_rows,
+    target_off,
+    write_dataref,
+)
+from xplane_bridge.doctor.conformance.verdict import NotTestableError
 
 #: The highest rate in X-Plane's own dialogues, and so taken for sure: a value each frame, or nearly so [1/s].
 FAST_HZ = 99

@@ -7,10 +7,9 @@ import time
 import zlib
 from dataclasses import dataclass
 
+from xplane_bridge.doctor.conformance.verdict import NotTestableError
 from xplane_bridge.doctor.observe import windows
 from xplane_bridge.doctor.settings import WINDOW_TITLES
-
-from .verdict import NotTestableError
 
 
 @dataclass(frozen=True)

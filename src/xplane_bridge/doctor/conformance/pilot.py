@@ -6,8 +6,8 @@ import threading
 import time
 from typing import Optional, Tuple
 
-from . import names
-from .link import FAST_HZ, Sample, XPlane
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.link import FAST_HZ, Sample, XPlane
 
 #: Stick for each degree and each degree a second off.
 _PER_DEG, _PER_DEG_S = 0.03, 0.015

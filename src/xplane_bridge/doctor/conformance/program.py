@@ -5,12 +5,11 @@ from __future__ import annotations
 import sys
 from typing import Sequence
 
+from xplane_bridge.doctor.conformance import card, results
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.verdict import Answer
 from xplane_bridge.doctor.observe import beacons, target
 from xplane_bridge.doctor.settings import Settings
-
-from . import card, results
-from .question import Question
-from .verdict import Answer
 
 _QUESTION = """\
 The card flies X-Plane {where} for about two minutes:

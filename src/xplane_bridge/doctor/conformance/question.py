@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Callable
 
-from .flight import Flight
-from .verdict import Answer
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.verdict import Answer
 
 
 @dataclass(frozen=True)

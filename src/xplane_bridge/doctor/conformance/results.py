@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 from typing import Any, Dict
 
-from .card import Flown
-from .question import Question
-from .questions import CARD
-from .verdict import Answer
+from xplane_bridge.doctor.conformance.card import Flown
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.questions import CARD
+from xplane_bridge.doctor.conformance.verdict import Answer
 
 _FORMAT = "xplane_bridge conformance"
 _VERSION = 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Sequence, Tuple
 
-from . import names
-from .link import Sample
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.link import Sample
 
 Vector = Tuple[float, float, float]
 

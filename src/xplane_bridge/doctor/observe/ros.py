@@ -11,7 +11,7 @@ import xmlrpc.client
 from dataclasses import dataclass, field, replace
 from typing import Any, Dict, List, Mapping, Set, Tuple
 
-from .computer import is_own
+from xplane_bridge.doctor.observe.computer import is_own
 
 _CALLER = "/xplane_doctor"
 _TIMEOUT_S = 2.0

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Any, List, Mapping, Sequence, Tuple
 
 from xplane_bridge import protocol
+from xplane_bridge.doctor.observe.beacons import BeaconWatch, Sighting
+from xplane_bridge.doctor.observe.computer import is_own, is_same_computer
 from xplane_bridge.doctor.settings import Settings
-
-from .beacons import BeaconWatch, Sighting
-from .computer import is_own, is_same_computer
 
 
 class Chosen(enum.Enum):

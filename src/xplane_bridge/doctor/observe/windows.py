@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass
 from typing import Any, Callable, Iterator, List, Optional, Tuple
 
-from .ports import program_name
+from xplane_bridge.doctor.observe.ports import program_name
 
 _LIBRARY = "libX11.so.6"
 _VIEWABLE = 2  # IsViewable

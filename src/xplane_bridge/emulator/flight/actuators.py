@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Sequence
+from typing import Any, Optional, Sequence
 
 from xplane_bridge.emulator.flight.flight_model import (
     Controls,
@@ -30,7 +30,7 @@ class SurfaceActuator:
         self.spec = spec
         self.position_deg = 0.0
         self.effective_deg = 0.0
-        self._stuck_deg: float | None = None  # where a fault without an angle caught the surface
+        self._stuck_deg: Optional[float] = None  # where a fault without an angle caught the surface
 
     def jump(self, position_deg: float) -> None:
         """Moves at once, as a write to X-Plane's dataref does, beyond the stops too."""
@@ -79,7 +79,7 @@ class SurfaceActuator:
     def _approach(self, target_deg: float, reach_deg: float) -> None:
         self.position_deg += min(max(target_deg - self.position_deg, -reach_deg), reach_deg)
 
-    def save(self) -> list[float | None]:
+    def save(self) -> list[Optional[float]]:
         """What ``restore`` needs."""
         return [self.position_deg, self.effective_deg, self._stuck_deg]
 

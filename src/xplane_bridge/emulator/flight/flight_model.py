@@ -14,7 +14,7 @@ from __future__ import annotations
 import copy
 import enum
 from dataclasses import dataclass, field
-from typing import Protocol, Sequence
+from typing import Optional, Protocol, Sequence
 
 MAX_ENGINES = 8
 
@@ -76,7 +76,7 @@ class SurfaceFault:
     """One broken surface; see ``SurfaceFaultKind`` for what ``value`` means."""
 
     kind: SurfaceFaultKind
-    value: float | None = None
+    value: Optional[float] = None
 
 
 class EngineFault(enum.Enum):
@@ -258,7 +258,7 @@ class InitialState:
     heading_deg: float = 0.0
     on_ground: bool = False
     altitude_m: float = 1000.0  #: MSL; ignored on the ground
-    airspeed_mps: float | None = None  #: true; None: cruise, or hover of what can
+    airspeed_mps: Optional[float] = None  #: true; None: cruise, or hover of what can
     terrain_elevation_m: float = 0.0
     engines_running: bool = True
     sim_time_s: float = 0.0
@@ -280,7 +280,7 @@ class ModelInfo:
     flap_detents: int = 0  #: notches of the flap handle; 0: no flaps
     max_throttle: float = 1.0
     min_throttle: float = 0.0  #: < 0 where the engine reverses
-    hover_thrust_vector: float | None = None  #: tiltrotor only
+    hover_thrust_vector: Optional[float] = None  #: tiltrotor only
     maximum_power_w: float = 0.0  #: per engine
     maximum_rpm: float = 0.0
     never_exceed_mps: float = 0.0  #: indicated
@@ -315,14 +315,14 @@ class FlightModel(Protocol):
 
     def place(
         self,
-        latitude_deg: float | None = None,
-        longitude_deg: float | None = None,
-        altitude_m: float | None = None,
-        roll_rad: float | None = None,
-        pitch_rad: float | None = None,
-        heading_rad: float | None = None,
-        v_ned_mps: Sequence[float] | None = None,
-        pqr_rad_s: Sequence[float] | None = None,
+        latitude_deg: Optional[float] = None,
+        longitude_deg: Optional[float] = None,
+        altitude_m: Optional[float] = None,
+        roll_rad: Optional[float] = None,
+        pitch_rad: Optional[float] = None,
+        heading_rad: Optional[float] = None,
+        v_ned_mps: Optional[Sequence[float]] = None,
+        pqr_rad_s: Optional[Sequence[float]] = None,
     ) -> ModelState:
         """Moves the aircraft at once (PREL, VEHS, writes to position, q, ...), never into the ground. None: stays."""
 
@@ -335,7 +335,7 @@ class FlightModel(Protocol):
     def set_wind(self, north_mps: float, east_mps: float, down_mps: float = 0.0) -> None:
         """Steady velocity of the air (a wind from the north has north_mps < 0)."""
 
-    def set_turbulence(self, intensity_mps: float, seed: int | None = None) -> None:
+    def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
         """Dryden turbulence: standard deviation of the vertical gust [m/s]; 0 ends it. ``seed``: starts anew."""
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
@@ -346,9 +346,9 @@ class FlightModel(Protocol):
 
     def set_loading(
         self,
-        fuel_kg: Sequence[float] | None = None,
-        payload_kg: float | None = None,
-        cg_aft_m: float | None = None,
+        fuel_kg: Optional[Sequence[float]] = None,
+        payload_kg: Optional[float] = None,
+        cg_aft_m: Optional[float] = None,
     ) -> None:
         """Fuel per tank, payload, and where the centre of gravity is now; what is None stays as it is.
 

@@ -11,7 +11,7 @@ import json
 import math
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Any, Sequence, TypeVar
+from typing import Any, Optional, Sequence, TypeVar
 
 import jsbsim
 
@@ -343,19 +343,19 @@ class JsbsimModel:
 
     def place(
         self,
-        latitude_deg: float | None = None,
-        longitude_deg: float | None = None,
-        altitude_m: float | None = None,
-        roll_rad: float | None = None,
-        pitch_rad: float | None = None,
-        heading_rad: float | None = None,
-        v_ned_mps: Sequence[float] | None = None,
-        pqr_rad_s: Sequence[float] | None = None,
+        latitude_deg: Optional[float] = None,
+        longitude_deg: Optional[float] = None,
+        altitude_m: Optional[float] = None,
+        roll_rad: Optional[float] = None,
+        pitch_rad: Optional[float] = None,
+        heading_rad: Optional[float] = None,
+        v_ned_mps: Optional[Sequence[float]] = None,
+        pqr_rad_s: Optional[Sequence[float]] = None,
     ) -> ModelState:
         """Moves the aircraft at once, but not into the ground: it is lifted until its lowest point is on it."""
         s = self.state
 
-        def chosen(new: _T | None, old: _T) -> _T:
+        def chosen(new: Optional[_T], old: _T) -> _T:
             return old if new is None else new
 
         roll, pitch = chosen(roll_rad, s.roll_rad), chosen(pitch_rad, s.pitch_rad)
@@ -505,7 +505,7 @@ class JsbsimModel:
         for setter, wind, gust in zip(self._wind_setters, self._wind, self._gusts):
             setter((wind + gust) / FOOT_M)
 
-    def set_turbulence(self, intensity_mps: float, seed: int | None = None) -> None:
+    def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
         """Dryden turbulence."""
         if not 0.0 <= intensity_mps <= 20.0:
             raise FlightModelError(f"turbulence of {intensity_mps} m/s: expected 0..20 (light 1, moderate 2, severe 4)")
@@ -536,9 +536,9 @@ class JsbsimModel:
 
     def set_loading(
         self,
-        fuel_kg: Sequence[float] | None = None,
-        payload_kg: float | None = None,
-        cg_aft_m: float | None = None,
+        fuel_kg: Optional[Sequence[float]] = None,
+        payload_kg: Optional[float] = None,
+        cg_aft_m: Optional[float] = None,
     ) -> None:
         """Fuel, payload, balance."""
         if fuel_kg is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from typing import Any
+from typing import Any, Optional
 
 #: Air passes a hovering aircraft too: floor of the speed at which the gust field goes by [m/s].
 MINIMUM_SPEED_MPS = 5.0
@@ -21,7 +21,7 @@ class DrydenTurbulence:
         self._random = random.Random(seed)
         self._state = [0.0] * 5
 
-    def start(self, intensity_mps: float, seed: int | None = None) -> None:
+    def start(self, intensity_mps: float, seed: Optional[int] = None) -> None:
         """Standard deviation of the vertical gust; 0 ends it. ``seed`` restarts the sequence."""
         self.intensity_mps = intensity_mps
         if seed is not None:

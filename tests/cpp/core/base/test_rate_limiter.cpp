@@ -17,30 +17,30 @@ std::vector<int> passed(RateLimiter limiter, const std::vector<std::int64_t>& st
   return indices;
 }
 
-TEST(RateLimiter, zeroPassesEverything) {
+TEST(RateLimiter, ZeroPassesEverything) {
   EXPECT_EQ(passed(RateLimiter(0.0), {0, 1, 1, 2}), (std::vector<int>{0, 1, 2, 3}));
 }
 
-TEST(RateLimiter, slowerStreamsPassWhole) {
+TEST(RateLimiter, SlowerStreamsPassWhole) {
   EXPECT_EQ(passed(RateLimiter(50.0), {0, 40, 79, 121, 160}), (std::vector<int>{0, 1, 2, 3, 4}));
 }
 
-TEST(RateLimiter, halvesAStreamEvenlyInSpiteOfJitter) {
+TEST(RateLimiter, HalvesAStreamEvenlyInSpiteOfJitter) {
   // 100 Hz with +-1 ms, limited to 50 Hz: every second one.
   EXPECT_EQ(passed(RateLimiter(50.0), {0, 11, 19, 30, 41, 49, 59, 70, 81}), (std::vector<int>{0, 2, 4, 6, 8}));
 }
 
-TEST(RateLimiter, keepsTheRateOnAverage) {
+TEST(RateLimiter, KeepsTheRateOnAverage) {
   std::vector<std::int64_t> stamps;
   for (int i = 0; i < 1000; ++i) stamps.push_back(10 * i);  // 100 Hz, 10 s
   EXPECT_NEAR(static_cast<double>(passed(RateLimiter(30.0), stamps).size()), 300.0, 1.0);
 }
 
-TEST(RateLimiter, gapsAreNotCaughtUp) {
+TEST(RateLimiter, GapsAreNotCaughtUp) {
   EXPECT_EQ(passed(RateLimiter(50.0), {0, 20, 1000, 1005, 1010, 1020}), (std::vector<int>{0, 1, 2, 5}));
 }
 
-TEST(RateLimiter, startsAnewWhenTimeRunsBack) {
+TEST(RateLimiter, StartsAnewWhenTimeRunsBack) {
   EXPECT_EQ(passed(RateLimiter(50.0), {1000, 1005, 0, 5, 20}), (std::vector<int>{0, 2, 4}));
 }
 

@@ -36,13 +36,13 @@ class Feeder {
   std::int64_t now_ns_ = 0;
 };
 
-TEST(AircraftIdentity, asksForOneElementACharacter) {
+TEST(AircraftIdentity, AsksForOneElementACharacter) {
   const std::vector<std::string>& datarefs = AircraftIdentityReader::datarefs();
   EXPECT_EQ(datarefs.front(), "sim/aircraft/view/acf_ICAO[0]");
   EXPECT_EQ(datarefs.back(), "sim/aircraft/view/acf_descrip[63]");
 }
 
-TEST(AircraftIdentity, readsBothStringsAndSaysWhenTheyChange) {
+TEST(AircraftIdentity, ReadsBothStringsAndSaysWhenTheyChange) {
   AircraftIdentityReader reader;
   Feeder feeder;
   EXPECT_FALSE(reader.known());
@@ -59,7 +59,7 @@ TEST(AircraftIdentity, readsBothStringsAndSaysWhenTheyChange) {
   EXPECT_EQ(reader.told(), 3u);
 }
 
-TEST(AircraftIdentity, takesAnAnswerReadAtOnceLikeOneOfTheStream) {
+TEST(AircraftIdentity, TakesAnAnswerReadAtOnceLikeOneOfTheStream) {
   AircraftIdentityReader reader;
   std::vector<DatarefValue> values(AircraftIdentityReader::datarefs().size(), 0.0F);
   values[0] = static_cast<float>('Q');
@@ -74,7 +74,7 @@ TEST(AircraftIdentity, takesAnAnswerReadAtOnceLikeOneOfTheStream) {
   EXPECT_EQ(reader.told(), 2u);
 }
 
-TEST(AircraftIdentity, charactersOutsideAsciiAreMarked) {
+TEST(AircraftIdentity, CharactersOutsideAsciiAreMarked) {
   AircraftIdentityReader reader;
   Feeder feeder;
   feeder.set("sim/aircraft/view/acf_descrip", "a\x01z");

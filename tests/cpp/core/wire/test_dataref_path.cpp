@@ -9,16 +9,16 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-TEST(DatarefPath, plainNamesAndElementsStandForThemselves) {
+TEST(DatarefPath, PlainNamesAndElementsStandForThemselves) {
   EXPECT_EQ(datarefElements("sim/time/paused"), Names{"sim/time/paused"});
   EXPECT_EQ(datarefElements("sim/a/b[12]"), Names{"sim/a/b[12]"});
 }
 
-TEST(DatarefPath, rangesExcludeTheirEnd) {
+TEST(DatarefPath, RangesExcludeTheirEnd) {
   EXPECT_EQ(datarefElements("sim/a/b[2:5]"), (Names{"sim/a/b[2]", "sim/a/b[3]", "sim/a/b[4]"}));
 }
 
-TEST(DatarefPath, refusesWhatXPlaneWouldSilentlyIgnore) {
+TEST(DatarefPath, RefusesWhatXPlaneWouldSilentlyIgnore) {
   for (const char* bad : {"", "paused", "sim/a b", "sim/a[", "sim/a[x]", "sim/a[-1]", "sim/a[3:3]", "sim/a[5:2]",
                           "sim/a[0:5000]", "sim/a[1][2]", "sim/a]0[", "sim/\xC3\xA9"}) {
     EXPECT_THROW(datarefElements(bad), std::invalid_argument) << bad;

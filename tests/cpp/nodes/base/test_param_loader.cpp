@@ -38,7 +38,7 @@ std::string messageOf(const std::function<void()>& action) {
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-TEST(ParamLoader, readsEachTypeAndTakesAnIntegerForANumber) {
+TEST(ParamLoader, ReadsEachTypeAndTakesAnIntegerForANumber) {
   const ParamLoader loader("/xplane/rx_node", sampleTree());
   EXPECT_EQ(loader.integer("rate", {1, 100}), 50);
   EXPECT_DOUBLE_EQ(loader.number("rate", {}), 50.0);
@@ -54,7 +54,7 @@ TEST(ParamLoader, readsEachTypeAndTakesAnIntegerForANumber) {
   EXPECT_DOUBLE_EQ(limits[0].second, -1.0);
 }
 
-TEST(ParamLoader, missingKeysTakeTheDefaultOrAreRequired) {
+TEST(ParamLoader, MissingKeysTakeTheDefaultOrAreRequired) {
   const ParamLoader loader("/n", XmlRpcValue());
   EXPECT_EQ(loader.integer("rate", {1, 100}, 20), 20);
   EXPECT_TRUE(loader.numbers("list", {}).empty());
@@ -63,7 +63,7 @@ TEST(ParamLoader, missingKeysTakeTheDefaultOrAreRequired) {
   EXPECT_TRUE(contains(message, "/n/gain") && contains(message, "required")) << message;
 }
 
-TEST(ParamLoader, errorsNameKeyValueAndWhatIsAllowed) {
+TEST(ParamLoader, ErrorsNameKeyValueAndWhatIsAllowed) {
   const ParamLoader loader("/n", sampleTree());
   std::string message = messageOf([&] { loader.integer("rate", {60, 100}); });
   EXPECT_TRUE(contains(message, "/n/rate is 50") && contains(message, "an integer from 60 to 100")) << message;
@@ -79,7 +79,7 @@ TEST(ParamLoader, errorsNameKeyValueAndWhatIsAllowed) {
   EXPECT_TRUE(contains(message, "/n/list[1]")) << message;
 }
 
-TEST(ParamLoader, wrongTypesAndNonFiniteNumbersAreRefused) {
+TEST(ParamLoader, WrongTypesAndNonFiniteNumbersAreRefused) {
   const ParamLoader loader("/n", sampleTree());
   EXPECT_THROW(loader.integer("gain", {}), ParamError);
   EXPECT_THROW(loader.number("bad", {}), ParamError);
@@ -92,7 +92,7 @@ TEST(ParamLoader, wrongTypesAndNonFiniteNumbersAreRefused) {
   EXPECT_THROW(ParamLoader("/n", XmlRpcValue(3)), ParamError);
 }
 
-TEST(ParamLoader, unknownKeysAreRefusedWithTheNearestKnownOne) {
+TEST(ParamLoader, UnknownKeysAreRefusedWithTheNearestKnownOne) {
   XmlRpcValue tree;
   tree["max_publsh_rate"] = 50;
   tree["zzz"] = 1;
@@ -109,13 +109,13 @@ TEST(ParamLoader, unknownKeysAreRefusedWithTheNearestKnownOne) {
   EXPECT_FALSE(contains(messageOf([&] { loader.refuseUnknown(); }), "/n/max_publsh_rate"));
 }
 
-TEST(ParamLoader, nearestWordIsEmptyWhenNothingIsNear) {
+TEST(ParamLoader, NearestWordIsEmptyWhenNothingIsNear) {
   EXPECT_EQ(nearestWord("hots", {"port", "host"}), "host");
   EXPECT_EQ(nearestWord("dataport", {"port", "data_port"}), "data_port");
   EXPECT_EQ(nearestWord("joystick", {"port", "host"}), "");
 }
 
-TEST(CommonOptions, defaultsAreTheDocumentedOnes) {
+TEST(CommonOptions, DefaultsAreTheDocumentedOnes) {
   const CommonOptions options = loadCommonOptions(ParamLoader("/xplane", XmlRpcValue()));
   EXPECT_EQ(options.host, "");
   EXPECT_EQ(options.port, 49000);
@@ -135,7 +135,7 @@ TEST(CommonOptions, PrefixStandsBeforeAllFrames) {
   EXPECT_EQ(frames.base_link_frd, "first/base_link_frd");
 }
 
-TEST(CommonOptions, refusesWhatCannotWork) {
+TEST(CommonOptions, RefusesWhatCannotWork) {
   const auto load = [](const char* key, const XmlRpcValue& value) {
     XmlRpcValue tree;
     tree[key] = value;

@@ -55,13 +55,13 @@ void expectVector(const Vector& v, double x, double y, double z, double toleranc
   EXPECT_NEAR(v.z, z, tolerance);
 }
 
-TEST(Conversions, stampKeepsNanoseconds) {
+TEST(Conversions, StampKeepsNanoseconds) {
   const ros::Time stamp = toRosTime(1'700'000'000'123'456'789);
   EXPECT_EQ(stamp.sec, 1'700'000'000U);
   EXPECT_EQ(stamp.nsec, 123'456'789U);
 }
 
-TEST(Conversions, flightStateIsCopiedFieldByField) {
+TEST(Conversions, FlightStateIsCopiedFieldByField) {
   core::FlightState state = sampleState();
   state.sim_time = 12.5F;
   state.sim_time_unwrapped = 12.5001;
@@ -88,7 +88,7 @@ TEST(Conversions, flightStateIsCopiedFieldByField) {
   expectQuaternion(message.orientation, 0.579447545275577, -0.059528479339501, 0.369503998558946, -0.723991503728176);
 }
 
-TEST(Conversions, validityBitsOfStructAndMessageAgree) {
+TEST(Conversions, ValidityBitsOfStructAndMessageAgree) {
   EXPECT_EQ(core::FlightState::kValidAll, FlightState::VALID_ALL);
   EXPECT_EQ(core::FlightState::kValidContact, FlightState::VALID_CONTACT);
   EXPECT_EQ(core::FlightState::kValidLoad, FlightState::VALID_LOAD);
@@ -108,7 +108,7 @@ TEST(Conversions, validityBitsOfStructAndMessageAgree) {
   EXPECT_EQ(static_cast<int>(core::LinkState::kPaused), static_cast<int>(LinkState::PAUSED));
 }
 
-TEST(Conversions, missionStatesAreCopiedWithTheirArrays) {
+TEST(Conversions, MissionStatesAreCopiedWithTheirArrays) {
   core::SurfaceStates surfaces;
   surfaces.stamp_ns = 2'000'000'000;
   surfaces.sim_time = 7.0F;
@@ -137,7 +137,7 @@ TEST(Conversions, missionStatesAreCopiedWithTheirArrays) {
   EXPECT_EQ(engine_message.torque[1], 300.0F);
 }
 
-TEST(Conversions, odometryIsInMapAxesWithTheTwistInFlu) {
+TEST(Conversions, OdometryIsInMapAxesWithTheTwistInFlu) {
   nav_msgs::Odometry odometry;
   ASSERT_TRUE(toOdometry(sampleState(), kMap, FrameNames(), &odometry));
   EXPECT_EQ(odometry.header.frame_id, "map");
@@ -155,7 +155,7 @@ TEST(Conversions, odometryIsInMapAxesWithTheTwistInFlu) {
   EXPECT_EQ(odometry.pose.covariance[1], 0.0);
 }
 
-TEST(Conversions, transformIsTheOdometryPose) {
+TEST(Conversions, TransformIsTheOdometryPose) {
   geometry_msgs::TransformStamped transform;
   ASSERT_TRUE(toTransform(sampleState(), kMap, FrameNames(), &transform));
   EXPECT_EQ(transform.header.frame_id, "map");
@@ -165,7 +165,7 @@ TEST(Conversions, transformIsTheOdometryPose) {
                    -0.920772276199353);
 }
 
-TEST(Conversions, imuIsFluWithTheLocalLevelEnuOrientation) {
+TEST(Conversions, ImuIsFluWithTheLocalLevelEnuOrientation) {
   sensor_msgs::Imu imu;
   ASSERT_TRUE(toImu(sampleState(), FrameNames(), &imu));
   EXPECT_EQ(imu.header.frame_id, "base_link");
@@ -174,7 +174,7 @@ TEST(Conversions, imuIsFluWithTheLocalLevelEnuOrientation) {
   expectVector(imu.linear_acceleration, 1.0, -2.0, 9.0);
 }
 
-TEST(Conversions, imuAtRestReadsPlusG) {
+TEST(Conversions, ImuAtRestReadsPlusG) {
   core::FlightState state = sampleState();
   state.orientation = Eigen::Quaterniond(1.0, 0.0, 0.0, 0.0);  // level, nose north
   state.specific_force = {0.0, 0.0, -9.80665};
@@ -185,7 +185,7 @@ TEST(Conversions, imuAtRestReadsPlusG) {
   expectQuaternion(imu.orientation, half, 0.0, 0.0, half);  // forward is north: +90 degrees from east
 }
 
-TEST(Conversions, navSatFixAddsTheUndulationAndNothingElse) {
+TEST(Conversions, NavSatFixAddsTheUndulationAndNothingElse) {
   sensor_msgs::NavSatFix fix;
   ASSERT_TRUE(toNavSatFix(sampleState(), 25.5, FrameNames(), &fix));
   EXPECT_EQ(fix.latitude, 38.2);
@@ -200,7 +200,7 @@ TEST(Conversions, navSatFixAddsTheUndulationAndNothingElse) {
   EXPECT_EQ(fix.header.frame_id, "map");
 }
 
-TEST(Conversions, windIsTheAirsVelocityInMapAxes) {
+TEST(Conversions, WindIsTheAirsVelocityInMapAxes) {
   geometry_msgs::TwistWithCovarianceStamped wind;
   ASSERT_TRUE(toWind(sampleState(), kMap, FrameNames(), &wind));
   EXPECT_EQ(wind.header.frame_id, "map");
@@ -214,7 +214,7 @@ TEST(Conversions, windIsTheAirsVelocityInMapAxes) {
   expectVector(wind.twist.twist.linear, -4.0, 3.0, -0.5);  // at the origin itself: plain ENU
 }
 
-TEST(Conversions, nothingIsFilledWhileAnInputIsInvalid) {
+TEST(Conversions, NothingIsFilledWhileAnInputIsInvalid) {
   const auto without = [](std::uint32_t bit) {
     core::FlightState state = sampleState();
     state.valid &= ~bit;
@@ -239,7 +239,7 @@ TEST(Conversions, nothingIsFilledWhileAnInputIsInvalid) {
   EXPECT_FALSE(toWind(without(core::FlightState::kValidWind), kMap, FrameNames(), &wind));
 }
 
-TEST(Conversions, staticFramesSwapTheAxes) {
+TEST(Conversions, StaticFramesSwapTheAxes) {
   const auto turn = [](const geometry_msgs::TransformStamped& transform, const Eigen::Vector3d& v) {
     const auto& q = transform.transform.rotation;
     return Eigen::Vector3d(Eigen::Quaterniond(q.w, q.x, q.y, q.z) * v);

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from typing import Tuple
 
-from ..question import Question
-from . import airflow, attitude, controls, pausing, placing, rows, systems, views, wire
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.questions import (
+    airflow,
+    attitude,
+    controls,
+    pausing,
+    placing,
+    rows,
+    systems,
+    views,
+    wire,
+)
 
 #: What needs no flight first; what may leave traces (failures, other views, new flights) last.
 CARD: Tuple[Question, ...] = (

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import List, Sequence, Tuple
 
-from .. import names
-from ..flight import Flight
-from ..link import Sample
-from ..question import Question
-from ..vectors import body_axes, dot, length, median, rms, turn
-from ..verdict import Answer, NotTestableError, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.link import Sample
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.vectors import body_axes, dot, length, median, rms, turn
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
 
 _WIND_MPS = 15.0
 _SLIP_DEG = 1.0

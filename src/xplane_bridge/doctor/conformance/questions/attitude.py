@@ -7,13 +7,12 @@ import time
 from typing import Callable, Dict, List, Sequence, Tuple
 
 from xplane_bridge import protocol
-
-from .. import names
-from ..flight import Flight
-from ..link import Sample
-from ..question import Question
-from ..vectors import body_axes, dot, median, rms, turn
-from ..verdict import Answer, NotTestableError, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.link import Sample
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.vectors import body_axes, dot, median, rms, turn
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
 
 _G = 9.80665
 #: Both kinds of angles must differ by so much [deg].

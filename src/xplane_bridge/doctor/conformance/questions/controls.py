@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 from typing import Iterator
 
-from .. import names
-from ..flight import Flight
-from ..question import Question
-from ..verdict import Answer, NotTestableError, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
 
 _MOVED = 0.1
 _MOVED_DEG = 3.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import time
 
-from .. import names
-from ..flight import Flight
-from ..question import Question
-from ..vectors import length
-from ..verdict import Answer, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.vectors import length
+from xplane_bridge.doctor.conformance.verdict import Answer, judged
 
 _BANK_DEG = 15.0
 _FASTER = 1.1

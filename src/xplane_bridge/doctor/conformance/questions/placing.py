@@ -6,12 +6,11 @@ import math
 import time
 
 from xplane_bridge import protocol
-
-from .. import names
-from ..flight import Flight
-from ..question import Question
-from ..vectors import turn
-from ..verdict import Answer, NotTestableError, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.vectors import turn
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
 
 #: So far from the aircraft, so that being moved shows [m].
 _MOVE_M = 4000.0

@@ -7,13 +7,12 @@ import time
 from typing import Callable, Dict, List, Sequence, Tuple
 
 from xplane_bridge import protocol
-
-from .. import names
-from ..flight import Flight
-from ..link import Row, Sample
-from ..question import Question
-from ..vectors import median
-from ..verdict import Answer, NotTestableError, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.link import Row, Sample
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.vectors import median
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
 
 _FT_PER_M = 1.0 / 0.3048
 _RPM = 30.0 / math.pi

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 
-from .. import names
-from ..flight import Flight
-from ..question import Question
-from ..verdict import Answer, NotTestableError, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
 
 _KG_PER_LB = 0.45359237
 #: Working pressures of hydraulic systems [psi].

@@ -8,12 +8,11 @@ import time
 from typing import Iterator
 
 from xplane_bridge import protocol
-
-from .. import names, pictures
-from ..flight import Flight
-from ..link import FAST_HZ
-from ..question import Question
-from ..verdict import Answer, NotTestableError, judged
+from xplane_bridge.doctor.conformance import names, pictures
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.link import FAST_HZ
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
 
 _WATCH_S = 1.5
 _DOWN_DEG, _OFFSET_DEG = -60.0, -40.0

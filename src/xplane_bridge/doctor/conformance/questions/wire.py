@@ -7,12 +7,11 @@ from typing import Dict, List, Sequence, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.doctor import names as doctor_names
-
-from .. import names
-from ..flight import Flight
-from ..link import FAST_HZ
-from ..question import Question
-from ..verdict import Answer, judged
+from xplane_bridge.doctor.conformance import names
+from xplane_bridge.doctor.conformance.flight import Flight
+from xplane_bridge.doctor.conformance.link import FAST_HZ
+from xplane_bridge.doctor.conformance.question import Question
+from xplane_bridge.doctor.conformance.verdict import Answer, judged
 
 #: What the nodes send at a time, and what other clients found to be the most in one frame.
 _BATCH, _MOST = 100, 148

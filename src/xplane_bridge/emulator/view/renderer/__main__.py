@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import NamedTuple, Sequence
+from typing import NamedTuple, Optional, Sequence
 
 import cv2
 import numpy as np
@@ -54,8 +54,8 @@ class Window:
             pygame.display.init()
             pygame.display.set_caption(WINDOW_TITLE, WINDOW_TITLE)
             self._surface = pygame.display.set_mode((width, height))
-        except pygame.error as err:
-            msg = f"X display {os.environ.get('DISPLAY') or '(DISPLAY is not set)'}: {err}"
+        except pygame.error as error:
+            msg = f"X display {os.environ.get('DISPLAY') or '(DISPLAY is not set)'}: {error}"
             raise SystemExit(msg) from None
         if self._surface.get_bytesize() != 4:
             bits = self._surface.get_bitsize()
@@ -118,7 +118,7 @@ class SwapChain:
         with self._changed:
             return self._ended and not self._pictures
 
-    def next(self, timeout_s: float) -> Picture | None:
+    def next(self, timeout_s: float) -> Optional[Picture]:
         """The next picture to be shown, the newest of those that are due already; None: there is none."""
         with self._changed:
             self._changed.wait_for(lambda: self._pictures or self._ended, timeout_s)
@@ -156,7 +156,7 @@ def _draw(painter: Painter, chain: SwapChain, delay_ns: int) -> None:
             os.write(answers, b".")
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Optional[Sequence[str]] = None) -> int:
     """Shows scenes until the pipe or the window is closed."""
     args = _parser().parse_args(argv)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's Ctrl-C is for the emulator, which closes the pipe

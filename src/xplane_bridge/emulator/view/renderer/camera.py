@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from typing import Optional, Sequence
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class Camera:
         pixels: np.ndarray = points[:, :2] * (self.focals / points[:, 2:3]) + self.centre
         return pixels
 
-    def polygon(self, in_camera: np.ndarray) -> np.ndarray | None:
+    def polygon(self, in_camera: np.ndarray) -> Optional[np.ndarray]:
         """Pixels of a convex polygon in camera axes, cut at the near plane; None when nothing is in front of it."""
         depth = in_camera[:, 2]
         if depth.min() >= NEAR_M:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Optional
 
 import cv2
 import numpy as np
@@ -150,7 +150,7 @@ class Painter:
 
     def _band(
         self, at_corners: np.ndarray, falling: np.ndarray, lowest: float, steepest: float
-    ) -> tuple[np.ndarray, tuple[int, int, int, int]] | None:
+    ) -> Optional[tuple[np.ndarray, tuple[int, int, int, int]]]:
         """Corners and bounding box (x, y, width, height) of the part of the picture between two depths."""
         region = clip(self._frame, at_corners - lowest)
         if len(region) >= 3 and math.isfinite(steepest):

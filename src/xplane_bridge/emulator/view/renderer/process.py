@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Optional
 
 from xplane_bridge.emulator.view.renderer.scene import RECORD_BYTES, Scene
 from xplane_bridge.errors import XplaneBridgeError
@@ -46,10 +47,10 @@ class RendererOptions:
     pipeline_delay: float = 0.0
     hud: bool = False
     strip: bool = True
-    swap_log: Path | None = None
+    swap_log: Optional[Path] = None
     realtime: bool = False
-    place: tuple[int, int] | None = None
-    display: str | None = None
+    place: Optional[tuple[int, int]] = None
+    display: Optional[str] = None
 
     def __post_init__(self) -> None:
         if not (320 <= self.width <= 4096 and 240 <= self.height <= 4096):
