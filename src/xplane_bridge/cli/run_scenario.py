@@ -108,9 +108,7 @@ def lockstep_of(args: argparse.Namespace) -> Optional[Lockstep]:
         return None
     if args.camera or args.transport != "rref":
         raise ScenarioError("--lockstep flies without --camera and with --transport rref")
-    words = shlex.split(args.emulator)
-    fps = [words[i + 1] for i, word in enumerate(words[:-1]) if word == "--fps"]
-    lockstep = Lockstep(speed=args.speed or 0.0, fps=float(fps[-1]) if fps else _FPS)
+    lockstep = Lockstep(speed=args.speed or 0.0, fps=_fps_of(args.emulator))
     if args.controller:
         lockstep.participants.append(args.controller_node or Path(shlex.split(args.controller)[0]).name)
     return lockstep
@@ -127,6 +125,13 @@ def asked_for(scenario: Scenario, args: argparse.Namespace) -> Dict[str, Any]:
             options.append(option if value is True else f"{option}={value}")
     text = scenario_file(args.scenario).read_text(encoding="utf-8")
     return {"program": "run_scenario", "scenario": scenario.name, "text": text, "options": options}
+
+
+def _fps_of(emulator_options: str) -> float:
+    """Frames a second that further options of the emulator ask for, written either way."""
+    p = argparse.ArgumentParser(prog="run_scenario --emulator", add_help=False, allow_abbrev=False)
+    p.add_argument("--fps", type=positive, default=_FPS)
+    return float(p.parse_known_args(shlex.split(emulator_options))[0].fps)
 
 
 def render(scores: Sequence[Score]) -> str:
