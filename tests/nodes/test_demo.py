@@ -40,8 +40,8 @@ DEMOS = [
     ("rref", LONG, NEWEST),
     ("rref", SHORT, OLDEST),
     ("data", SHORT, NEWEST),
-    *(pytest.param("rref", SHORT, version, marks=pytest.mark.full) for version in xplane_names.VERSIONS[1:-1]),
-    *(pytest.param("data", SHORT, version, marks=pytest.mark.full) for version in xplane_names.VERSIONS[:-1]),
+    *(pytest.param("rref", SHORT, version, marks=pytest.mark.nightly) for version in xplane_names.VERSIONS[1:-1]),
+    *(pytest.param("data", SHORT, version, marks=pytest.mark.nightly) for version in xplane_names.VERSIONS[:-1]),
 ]
 
 

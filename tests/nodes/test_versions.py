@@ -24,7 +24,7 @@ THERE = {"latitude": 47.2, "longitude": 8.3, "altitude_msl": 1500.0, "heading_tr
 def versions():
     """All that have a list; between the oldest and the newest only in full tests."""
     between = xplane_names.VERSIONS[1:-1]
-    return [pytest.param(v, marks=[pytest.mark.full] if v in between else []) for v in xplane_names.VERSIONS]
+    return [pytest.param(v, marks=[pytest.mark.nightly] if v in between else []) for v in xplane_names.VERSIONS]
 
 
 @pytest.fixture(scope="module", params=versions())
