@@ -183,7 +183,7 @@ namespace {
 bool undoFor(const GuardianOrders& orders, std::int64_t parent) {
   if (orders.journal.empty()) return true;
   try {
-    const auto journal = guardedJournal(orders.journal, parent);
+    auto journal = guardedJournal(orders.journal, parent);
     if (journal->orphans(kOverridePurpose).empty() && journal->orphans(kPausePurpose).empty()) return true;
     core::SimLinkOptions options;
     options.host = orders.address;
@@ -192,7 +192,7 @@ bool undoFor(const GuardianOrders& orders, std::int64_t parent) {
     options.journal_subscriptions = false;
     core::SimLink link(
         options, {}, core::hostClock(), [](core::LogLevel, const std::string&) {},
-        [journal](const core::Endpoint&) mutable { return journal; });
+        [journal](const core::Endpoint&) { return journal; });
     link.start();
     const bool done = releaseLeftBehind(&link, [](const std::string& text, bool success) {
       std::fprintf(stderr, "override_guardian: %s%s\n", success ? "" : "NOT DONE: ", text.c_str());

@@ -131,7 +131,7 @@ class WireReplay:
             ours = [topic for topic, nodes in state[2][0] if self._start.node in nodes]
             # The node has advertised everything when its diagnostics' timer runs.
             ready = self._param(master, "wire_replay") is not None and self._has_begun(node)
-            return [(topic, kinds[topic]) for topic in ours if topic not in _NOT_RECORDED] if ready else []
+            return [(topic, kinds[topic]) for topic in ours if not _left_out(topic)] if ready else []
 
         topics = wait_until(published, _READY_S, f"topic of {self._start.node}")
         subscribers = []
@@ -165,9 +165,7 @@ class WireReplay:
             stats: Any = slave.getBusStats(_CALLER)
         # roscpp answers without the status code and its text.
         published: Any = stats[2][0] if isinstance(stats[0], int) else stats[0]
-        sent = {
-            topic: max((row[3] for row in rows), default=0) for topic, rows in published if topic not in _NOT_RECORDED
-        }
+        sent = {topic: max((row[3] for row in rows), default=0) for topic, rows in published if not _left_out(topic)}
         with self._lock:
             return all(self._counts.get(topic, 0) >= count for topic, count in sent.items())
 
@@ -201,3 +199,9 @@ def _has_header(connection: Mapping[str, str]) -> bool:
         if words and "=" not in line.split("#")[0]:
             return words[0] in ("Header", "std_msgs/Header")
     return False
+
+
+def _left_out(topic: str) -> bool:
+    # rx_node asks X-Plane for other aircraft only while traffic/state has a subscriber: one here would make it send
+    # what it has not sent then.
+    return topic in _NOT_RECORDED or topic.endswith("/traffic/state")
