@@ -65,6 +65,10 @@ class FlightResult:
 class Flight:
     """A flight that has not begun.
 
+    Args:
+        plan: What to fly.
+        watch: Called with what is seen of each frame.
+
     Raises:
         NotCompiledError: The compiled module is not there.
         ScenarioError: The scenario of the plan is none.
@@ -72,8 +76,9 @@ class Flight:
 
     _aircraft: Aircraft
 
-    def __init__(self, plan: FlightPlan) -> None:
+    def __init__(self, plan: FlightPlan, watch: Optional[Callable[[FlightView], None]] = None) -> None:
         require("a campaign")
+        self._watch = watch
         self._plan = plan
         self._scenario = parse_scenario(plan.scenario)
         self._labels: Dict[str, float] = {}
@@ -109,17 +114,7 @@ class Flight:
     # ---- start
 
     def _start(self) -> None:
-        plan = self._plan
-        self._aircraft = Aircraft(
-            Conditions(
-                plan.aircraft,
-                start=self._scenario.start,
-                weather=plan.weather,
-                loading=plan.loading,
-                frame_rate=plan.frame_rate,
-                seed=plan.seed,
-            )
-        )
+        self._aircraft = Aircraft(conditions_of(self._plan))
         self._player = Player(self._scenario)
         self._controller = self._make_controller()
 
@@ -144,6 +139,8 @@ class Flight:
         aircraft = self._aircraft
         while True:
             now, view = aircraft.now, aircraft.view()
+            if self._watch is not None:
+                self._watch(view)
             sample = sample_of(view, aircraft.mode, view.stall_warning)
             self._record(now, aircraft.state, sample)
             commands = self._player.step(now, sample)
@@ -206,6 +203,18 @@ class Flight:
             now, s.roll, s.pitch, s.heading, s.altitude, s.agl, s.climb, s.speed, s.alpha, s.beta, s.roll_rate,
             s.pitch_rate, s.yaw_rate, s.load_factor, c.roll, c.pitch, c.yaw, c.throttle[0],
         ))  # fmt: skip
+
+
+def conditions_of(plan: FlightPlan) -> Conditions:
+    """How a flight begins and what it flies in."""
+    return Conditions(
+        plan.aircraft,
+        start=parse_scenario(plan.scenario).start,
+        weather=plan.weather,
+        loading=plan.loading,
+        frame_rate=plan.frame_rate,
+        seed=plan.seed,
+    )
 
 
 def truth_bytes(s: ModelState) -> bytes:

@@ -7,7 +7,7 @@ import os
 import sys
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Any, Iterator, Optional, Sequence
+from typing import Any, Iterator, List, Optional, Sequence
 
 import pandas as pd
 from tqdm import tqdm
@@ -19,6 +19,8 @@ from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.campaign.flight import Flight
 from xplane_bridge.campaign.runner import TABLE, CampaignFolder, in_process
 from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.flights import through_nodes
+from xplane_bridge.in_process.view import FlightView
 
 PAGE = "report.html"
 
@@ -39,6 +41,12 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--scheduler", metavar="ADDRESS", help="fly on a Dask cluster, e.g. tcp://10.0.0.1:8786")
     p.add_argument(
         "--refly", type=int, metavar="I", help="fly flight I of DIR again, and compare; writes DIR/refly_I.csv"
+    )
+    p.add_argument(
+        "--through-nodes",
+        action="store_true",
+        help="of --refly: fly it also with emulator and bridge in lock-step, and compare; writes DIR/refly_I/ with the "
+        "recording and its report",
     )
     return p
 
@@ -78,13 +86,17 @@ def render(campaign: Campaign, table: pd.DataFrame) -> str:
     return "\n".join([*lines, f"outcomes: {outcomes}"])
 
 
-def refly(folder: CampaignFolder, flight: int) -> int:
-    """Flies one flight again; exit code 0: it was the same, to the last bit."""
+def refly(folder: CampaignFolder, flight: int, nodes: bool) -> int:
+    """Flies one flight again, also through the nodes if asked for; exit code 0: it was the same, to the last bit."""
     campaign, table = folder.load(), folder.table()
     rows = table[table["flight"] == flight]
     if not len(rows):
         raise CampaignError(f"--refly {flight}: {folder.folder} has no such flight; it has {len(table)} of them")
-    result = Flight(campaign.plan(flight)).fly(trace=True)
+    plan = campaign.plan(flight)
+    if nodes:
+        through_nodes.check(plan)
+    seen: List[FlightView] = []
+    result = Flight(plan, seen.append if nodes else None).fly(trace=True)
     if result.trace is not None:
         path = folder.folder / f"refly_{flight}.csv"
         pd.DataFrame(result.trace).to_csv(path, index=False, float_format="%.9g")
@@ -96,7 +108,11 @@ def refly(folder: CampaignFolder, flight: int) -> int:
               f"{row['host_cpu']}")  # fmt: skip
         return 1
     print("the same flight as in the table, to the last bit")
-    return 0
+    if not nodes:
+        return 0
+    if not seen:
+        raise CampaignError(f"--through-nodes: flight {flight} did not begin ({result.reason}); expected one that did")
+    return 0 if through_nodes.compare(plan, result, seen, folder.folder / f"refly_{flight}") else 1
 
 
 @guarded
@@ -105,7 +121,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(argv)
     folder = CampaignFolder(args.output)
     if args.refly is not None:
-        return refly(folder, args.refly)
+        return refly(folder, args.refly, args.through_nodes)
+    if args.through_nodes:
+        raise CampaignError("--through-nodes: flies one flight again; expected --refly I with it")
     if args.campaign is None:
         raise CampaignError("CAMPAIGN is missing: expected a file, e.g. config/campaigns/stuck_aileron.yaml")
     campaign = load_campaign(args.campaign, args.flights)

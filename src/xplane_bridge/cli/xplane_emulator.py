@@ -7,7 +7,7 @@ import json
 import logging
 import signal
 import sys
-from typing import TYPE_CHECKING, Optional, Sequence
+from typing import TYPE_CHECKING, Callable, Optional, Sequence
 
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
@@ -19,8 +19,12 @@ if TYPE_CHECKING:
     from xplane_bridge.emulator.view.cockpit_view import CockpitView
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> int:
+def main(arguments: Optional[Sequence[str]] = None, make: Callable[[Options], Emulator] = Emulator) -> int:
     """Runs an emulator until a signal, the end of `--duration`, or (stepped) the end of stdin.
+
+    Args:
+        arguments: Of the command line.
+        make: Makes the emulator.
 
     Returns:
         0, or 1 when it could not start.
@@ -28,7 +32,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     options = parse(sys.argv[1:] if arguments is None else arguments)
     logging.basicConfig(level=logging.DEBUG if options.verbose else logging.WARNING, format="%(levelname)s %(message)s")
     try:
-        emulator = Emulator(options)
+        emulator = make(options)
         view = _open_view(options, emulator)
     except (OSError, FlightModelError, ScenarioError, XplaneBridgeError) as error:
         text = error.strerror if isinstance(error, OSError) and error.strerror else error

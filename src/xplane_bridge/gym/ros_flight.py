@@ -5,52 +5,19 @@ from __future__ import annotations
 import threading
 from typing import Any, Mapping
 
-from xplane_bridge.emulator.emulator import Emulator
-from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, ModelState
+from xplane_bridge.emulator.flight.flight_model import Controls, ModelState
 from xplane_bridge.emulator.options import Options
-from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.gym.episodes import Episode
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.gym.flights import CRASHED, GAVE_UP
 from xplane_bridge.harness.lockstep_bridge import LockstepBridge
-from xplane_bridge.in_process.aircraft import Conditions, initial_state
-
-
-class _Emulator(Emulator):
-    """Begins with the conditions of an episode."""
-
-    def __init__(self, conditions: Conditions) -> None:
-        self._conditions = conditions
-        weather = conditions.weather
-        super().__init__(
-            Options(
-                aircraft=conditions.aircraft,
-                initial=initial_state(conditions.start),
-                bind="127.0.0.1",
-                port=0,
-                beacon=False,
-                realtime=False,
-                fps=conditions.frame_rate,
-                seed=conditions.seed,
-                wind=(weather.get("wind_from", 0.0), weather.get("wind_speed", 0.0)),
-                turbulence=weather.get("turbulence", 0.0),
-                stepped="lockstep",
-            )
-        )
-
-    def _make_model(self, name: str) -> FlightModel:  # noqa: ARG002
-        return self._conditions.model()
-
-    def _new_simulator(self) -> Simulator:
-        simulator = super()._new_simulator()
-        self._conditions.disturb(simulator.model)
-        return simulator
+from xplane_bridge.in_process.emulated import ConditionedEmulator
 
 
 class RosFlight:
     """An emulator in a thread, rx_node and tx_node beside it, all of them anew for each episode."""
 
-    _emulator: _Emulator
+    _emulator: ConditionedEmulator
     _thread: threading.Thread
     _state: Any
 
@@ -69,7 +36,8 @@ class RosFlight:
         if episode.failures:
             raise GymError("failures: over the bridge, tx_node breaks things (service set_failure); expected none here")
         self._end()
-        self._emulator = _Emulator(episode.conditions)
+        options = Options(bind="127.0.0.1", port=0, beacon=False, realtime=False, stepped="lockstep")
+        self._emulator = ConditionedEmulator(options, episode.conditions)
         self._thread = threading.Thread(target=self._emulator.run, name="emulator", daemon=True)
         self._thread.start()
         self._runs = True

@@ -25,15 +25,22 @@ class EmulatorProcess(ManagedProcess):
         options: further options, e.g. ``["--fps", "60", "--pilot", path]``.
         name: of the log, for programs that start several.
         port: UDP port to listen on; 0 for a free one.
+        command: that starts it, to which options are appended; xplane_emulator when empty.
     """
 
     _READY = r"^READY\b.*?\bport\W+(\d+)"
     _START_TIMEOUT_S = 60.0
 
     def __init__(
-        self, log_dir: Path, options: Sequence[str | Path] = (), name: str = "xplane_emulator", port: int = 0
+        self,
+        log_dir: Path,
+        options: Sequence[str | Path] = (),
+        name: str = "xplane_emulator",
+        port: int = 0,
+        command: Sequence[str] = (),
     ) -> None:
         self._options = list(options)
+        self._program = list(command) or [sys.executable, str(program("xplane_emulator"))]
         #: The UDP port it listens on; known after `start`.
         self.port = port
         super().__init__(name, [], log_dir)
@@ -45,7 +52,7 @@ class EmulatorProcess(ManagedProcess):
             HarnessError: It ends before that, or is silent for a minute.
         """
         where = ["--bind", "127.0.0.1", "--port", self.port, "--no-beacon"]
-        self.command = [str(part) for part in [sys.executable, program("xplane_emulator"), *where, *self._options]]
+        self.command = [str(part) for part in [*self._program, *where, *self._options]]
         super().start()
         try:
             self.port = int(self.wait_for_line(self._READY, self._START_TIMEOUT_S).group(1))

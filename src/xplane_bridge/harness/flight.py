@@ -48,6 +48,8 @@ class FlightPlan:
     lockstep: Optional[Lockstep] = None
     #: How it was asked for, by which it can be flown again: experiment/flight of the passport.
     experiment: Dict[str, Any] = field(default_factory=dict)
+    #: What starts the emulator, before its options; empty: xplane_emulator.
+    emulator_command: List[str] = field(default_factory=list)
 
     @property
     def bag(self) -> Path:
@@ -113,7 +115,7 @@ def fly(
         if plan.lockstep is not None:
             options += plan.lockstep.emulator_options()
             launch_args["common_config"] = stack.enter_context(plan.lockstep.common_config())
-        emulator = EmulatorProcess(plan.logs, options)
+        emulator = EmulatorProcess(plan.logs, options, command=plan.emulator_command)
         stack.enter_context(emulator)
         say(f"starting ROS and the bridge (X-Plane's port: {emulator.port})")
         master = RosMaster(plan.logs)
