@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <sstream>
 #include <utility>
 #include <vector>
 
+#include "setting_texts.hpp"
 #include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 
@@ -22,18 +22,6 @@ constexpr double kThresholdHeight = 15.0;  // [m]
 constexpr double kStands = 3.0;            // [m/s]
 constexpr double kNearSpot = 500.0;        // [m] X-Plane lines up somewhat behind the threshold
 constexpr double kSameHeadingDeg = 15.0;
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
-std::optional<std::string> outside(const char* name, double value, double low, double high, const char* unit) {
-  if (value >= low && value <= high) return std::nullopt;
-  return std::string(name) + " is " + number(value) + ": expected " + number(low) + ".." + number(high) + " [" + unit +
-         "]";
-}
 
 // Rows of apt.dat that count here.
 constexpr int kAirport = 1, kSeaplaneBase = 16, kHeliport = 17, kRunwayRow = 100, kRampRow = 1300, kOldRampRow = 15;

@@ -1,9 +1,9 @@
 #include "xplane_bridge/core/simulator/autopilot_settings.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
+#include "setting_texts.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 
 namespace xplane_bridge::core {
@@ -20,19 +20,12 @@ const std::string kFolder = "sim/cockpit2/autopilot/";
 const std::string kCommands = "sim/autopilot/";
 constexpr const char* kYawDamper = "sim/cockpit2/switches/yaw_damper_on";
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
+std::optional<std::string> outsideIfGiven(const std::string& name, const std::optional<double>& value, double low,
+                                          double high, const char* unit) {
+  return value ? outside(name, *value, low, high, unit) : std::nullopt;
 }
 
-std::optional<std::string> outside(const std::string& name, const std::optional<double>& value, double low, double high,
-                                   const char* unit) {
-  if (!value || (*value >= low && *value <= high)) return std::nullopt;
-  return name + " is " + number(*value) + ": expected " + number(low) + ".." + number(high) + " [" + unit + "]";
-}
-
-std::optional<std::string> outside(const std::string& name, int value, int low, int high, const char* words) {
+std::optional<std::string> notAmong(const std::string& name, int value, int low, int high, const char* words) {
   if (value >= low && value <= high) return std::nullopt;
   return name + " is " + std::to_string(value) + ": expected " + words;
 }
@@ -103,22 +96,22 @@ std::optional<std::string> check(const AutopilotSetting& setting) {
   if (s.airspeed && s.mach) return "AIRSPEED and MACH are given: expected one of them, they are one dial";
   if (s.master) {
     const int master = static_cast<int>(*s.master);
-    if (auto wrong = outside("master", master, 0, 2, "OFF, FLIGHT_DIRECTOR or SERVOS")) return wrong;
+    if (auto wrong = notAmong("master", master, 0, 2, "OFF, FLIGHT_DIRECTOR or SERVOS")) return wrong;
   }
   if (s.lateral) {
     const int lateral = static_cast<int>(*s.lateral);
-    if (auto wrong = outside("lateral", lateral, 1, 4, "WING_LEVEL, HEADING_SELECT, NAV or APPROACH")) return wrong;
+    if (auto wrong = notAmong("lateral", lateral, 1, 4, "WING_LEVEL, HEADING_SELECT, NAV or APPROACH")) return wrong;
   }
   if (s.vertical) {
     const int vertical = static_cast<int>(*s.vertical);
     const char* const words = "VERTICAL_SPEED_HOLD, ALTITUDE_HOLD or SPEED_BY_PITCH";
-    if (auto wrong = outside("vertical", vertical, 1, 3, words)) return wrong;
+    if (auto wrong = notAmong("vertical", vertical, 1, 3, words)) return wrong;
   }
-  if (auto wrong = outside("heading_magnetic_deg", s.heading_magnetic_deg, 0.0, kFullTurn, "deg")) return wrong;
-  if (auto wrong = outside("altitude", s.altitude, -500.0, 30000.0, "m")) return wrong;
-  if (auto wrong = outside("vertical_speed", s.vertical_speed, -60.0, 60.0, "m/s")) return wrong;
-  if (auto wrong = outside("airspeed", s.airspeed, 10.0, 600.0, "m/s")) return wrong;
-  return outside("mach", s.mach, 0.1, 5.0, "-");
+  if (auto wrong = outsideIfGiven("heading_magnetic_deg", s.heading_magnetic_deg, 0.0, kFullTurn, "deg")) return wrong;
+  if (auto wrong = outsideIfGiven("altitude", s.altitude, -500.0, 30000.0, "m")) return wrong;
+  if (auto wrong = outsideIfGiven("vertical_speed", s.vertical_speed, -60.0, 60.0, "m/s")) return wrong;
+  if (auto wrong = outsideIfGiven("airspeed", s.airspeed, 10.0, 600.0, "m/s")) return wrong;
+  return outsideIfGiven("mach", s.mach, 0.1, 5.0, "-");
 }
 
 std::vector<SettingWrite> autopilotDials(const AutopilotSetting& setting, SimulatorVersion version) {

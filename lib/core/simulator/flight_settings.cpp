@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 
+#include "setting_texts.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/core/state/frames.hpp"
 #include "xplane_bridge/core/state/mission_state.hpp"
@@ -32,21 +32,7 @@ constexpr std::size_t kStationCount = 9;
 constexpr const char* kCgOld = "sim/flightmodel/misc/cgz_ref_to_default";
 constexpr const char* kCg = "sim/flightmodel2/misc/cg_offset_z";
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
-std::optional<std::string> outside(const std::string& name, double value, double low, double high, const char* unit) {
-  if (value >= low && value <= high) return std::nullopt;
-  return name + " is " + number(value) + ": expected " + number(low) + ".." + number(high) + " [" + unit + "]";
-}
-
 std::string element(const std::string& name, std::size_t i) { return name + "[" + std::to_string(i) + "]"; }
-
-/// Whether the weather is set by region, under names of its own.
-bool hasRegions(SimulatorVersion version) { return version.number >= kFirstOf1208; }
 
 bool isCg(const std::string& dataref) { return dataref == kCgOld || dataref == kCg; }
 

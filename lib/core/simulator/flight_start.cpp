@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "setting_texts.hpp"
 #include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
@@ -60,20 +60,11 @@ Eigen::Matrix3d originFromLevel(const TangentFrame& scenery, const GeoPoint& pla
   return out;
 }
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
 }  // namespace
 
 std::optional<std::string> check(const FlightStart& start) {
   for (const Range& range : kRanges) {
-    const double value = start.*range.value;
-    if (value >= range.low && value <= range.high) continue;
-    return std::string(range.name) + " is " + number(value) + ": expected " + number(range.low) + ".." +
-           number(range.high) + " [" + range.unit + "]";
+    if (auto wrong = outside(range.name, start.*range.value, range.low, range.high, range.unit)) return wrong;
   }
   // A request that leaves them out has 0 in both, a place in the open sea.
   if (start.latitude_deg == 0.0 && start.longitude_deg == 0.0) {

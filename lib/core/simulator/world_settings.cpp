@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "setting_texts.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/core/simulator/flight_settings.hpp"
 
@@ -20,19 +20,6 @@ constexpr double kMetersPerMile = 1609.344;
 constexpr double kOktasOf11 = 6.0;  // cloud_coverage there goes from 0 to 6
 constexpr int kLastType11 = 5, kLastType12 = 3;
 constexpr double kShare = 1e-4;  // of a value, by which float32 may show it otherwise
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
-std::optional<std::string> outside(const std::string& name, double value, double low, double high, const char* unit) {
-  if (value >= low && value <= high) return std::nullopt;
-  return name + " is " + number(value) + ": expected " + number(low) + ".." + number(high) + " [" + unit + "]";
-}
-
-bool hasRegions(SimulatorVersion version) { return version.number >= kFirstOf1208; }
 
 /// Collects settings under the weather's folder of a version.
 class Sheet {
