@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Callable, Sequence
 
 import cv2
 import numpy as np
@@ -13,7 +13,7 @@ from support.synthetic_flight import FlightBag, stamp_ns
 from support.white_lines import STANDING_M
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.view.renderer.painter import Painter
-from xplane_bridge.emulator.view.renderer.scene import Scene
+from xplane_bridge.emulator.view.renderer.scene import Pose, Scene
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,20 +28,20 @@ SPEED = 55.0  #: [m/s]
 PERIOD = 1.0 / 30.0
 SUN = (31.101993, 41.576129)  #: elevation, heading [deg]
 RADIUS_M = 6378145.0
+#: States of other aircraft a second; their times are those of no picture.
+TRAFFIC_HZ = 4.0
 
 
 def scene(t: float, far: float = 900.0) -> Scene:
     """The picture at `t` [s] of an approach in gusts that begins `far` [m] before the threshold, 3 degrees down."""
     along = -900.0 - far + SPEED * t
     across = 12.0 * math.sin(0.5 * t)
-    turn = math.radians(HEADING_DEG)
-    north = along * math.cos(turn) - across * math.sin(turn)
-    east = along * math.sin(turn) + across * math.cos(turn)
+    latitude, longitude = geodetic(along, across)
     return Scene(
         frame=round(t / PERIOD),
         sim_time=t,
-        latitude_deg=ANCHOR[0] + math.degrees(north / RADIUS_M),
-        longitude_deg=ANCHOR[1] + math.degrees(east / (RADIUS_M * math.cos(math.radians(ANCHOR[0])))),
+        latitude_deg=latitude,
+        longitude_deg=longitude,
         altitude_m=max((-600.0 - along) * math.tan(math.radians(3.0)), 8.0),
         roll_deg=8.0 * math.sin(2.0 * t),
         pitch_deg=-2.0 + 1.5 * math.sin(4.0 * t),
@@ -84,8 +84,36 @@ def frame_state(bag: FlightBag, shown: Scene, ns: int, **changes: Any) -> dict[s
     }
 
 
+def geodetic(along: float, across: float) -> tuple[float, float]:
+    """Latitude, longitude [deg] so far along the runway's heading from its middle, and right of that [m]."""
+    turn = math.radians(HEADING_DEG)
+    north = along * math.cos(turn) - across * math.sin(turn)
+    east = along * math.sin(turn) + across * math.cos(turn)
+    cosine = math.cos(math.radians(ANCHOR[0]))
+    return ANCHOR[0] + math.degrees(north / RADIUS_M), ANCHOR[1] + math.degrees(east / (RADIUS_M * cosine))
+
+
+def traffic_state(bag: FlightBag, t: float, poses: Sequence[Pose]) -> dict[str, Any]:
+    """TrafficState of aircraft 1, 2, ... at `t` [s]; nan: that one is not there."""
+    there = [k for k, pose in enumerate(poses) if not math.isnan(pose[0])]
+    names = ("latitude", "longitude", "altitude_msl", "roll_deg", "pitch_deg", "heading_true_deg")
+    return {
+        "header": bag.header(stamp_ns(t), ""),
+        "sim_time": np.float32(t),
+        "epoch": 1,
+        "number": [k + 1 for k in there],
+        **{name: [poses[k][axis] for k in there] for axis, name in enumerate(names)},
+    }
+
+
 def write_approach(
-    path: Path, frames: int, late: int = 0, far: float = 900.0, every: int = 15, **turned: float
+    path: Path,
+    frames: int,
+    late: int = 0,
+    far: float = 900.0,
+    every: int = 15,
+    traffic: Callable[[float], Sequence[Pose]] = lambda _: (),
+    **turned: float,
 ) -> Path:
     """Write a bag of pictures.
 
@@ -95,6 +123,7 @@ def write_approach(
         late: Their states are of frames so many later.
         far: [m] before the threshold where it begins.
         every: Frames of 1/30 s from one picture to the next.
+        traffic: Where other aircraft are at a time [s]; recorded between the pictures.
         **turned: Of every scene, in place of the approach's.
     """
     focal = 0.5 * SIZE[0] / math.tan(math.radians(0.5 * FOV_DEG))
@@ -104,7 +133,9 @@ def write_approach(
         for k in range(0, frames * every, every):
             t = k * PERIOD
             ns = stamp_ns(t)
-            shown, known = (replace(scene(at, far), **turned) for at in (t, t + late * PERIOD))
+            shown, known = (
+                replace(scene(at, far), others=tuple(traffic(at)), **turned) for at in (t, t + late * PERIOD)
+            )
             frame = frame_state(bag, known, ns)
             jpeg = cv2.imencode(".jpg", painter.paint(shown), [cv2.IMWRITE_JPEG_QUALITY, 90])[1]
             header = frame["header"]
@@ -119,4 +150,9 @@ def write_approach(
                 names += [f"sim/flightmodel/position/{name}_ref" for name in ("lat", "lon")]
                 values = {"header": bag.header(ns, ""), "names": names, "values": [*SUN, *ANCHOR]}
                 bag.add("/xplane/datarefs", "xplane_bridge/DatarefValues", ns, values)
+        for k in range(-10, math.ceil(frames * every * PERIOD * TRAFFIC_HZ) + 10):
+            t = (k + 0.3) / TRAFFIC_HZ
+            if traffic(t):
+                state = traffic_state(bag, t, traffic(t))
+                bag.add("/xplane/traffic/state", "xplane_bridge/TrafficState", stamp_ns(t), state)
     return path

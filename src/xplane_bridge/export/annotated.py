@@ -93,6 +93,7 @@ def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: Optional
     def vector(prefix: str, axes: Sequence[object]) -> list[Any]:
         return [value(f"{prefix}_{axis}") for axis in axes]
 
+    frame = labels.frame(picture.stamp) if labels else None
     return {
         "file_name": Path(picture.file).name,
         "width": picture.size[0],
@@ -108,7 +109,8 @@ def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: Optional
         "display_delay_s": value("display_delay_s"),
         "display_delay_source": value("display_delay_source"),
         "quality": value("quality_words"),
-        "labelled": labels is not None and labels.frame(picture.stamp) is not None,
+        "labelled": frame is not None,
+        "others_known": bool(frame and frame.get("others_known")),
         "horizon": labels.horizon(picture.stamp) if labels else None,
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from pathlib import Path
-from typing import Any, Iterator, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Iterator, Mapping, NamedTuple, Optional
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from xplane_bridge.labels.apt import Airport
 from xplane_bridge.labels.camera import Camera, Optics, Pose
 from xplane_bridge.labels.heights import MEASURED_SIGMA_M, STANDING_M, STANDING_SIGMA_M, Ground, Profile, profile
 from xplane_bridge.labels.table import LabelError
-from xplane_bridge.labels.things import MAP_SIGMA_M, Labeller, Other, Sun
+from xplane_bridge.labels.things import MAP_SIGMA_M, SPAN_M, Labeller, Sun
+from xplane_bridge.labels.traffic import RecordedTraffic
 from xplane_bridge.labels.world import Flat, Sphere, World
 
 _FRAME, _STATE, _DATAREFS = "xplane_bridge/FrameState", "xplane_bridge/FlightState", "xplane_bridge/DatarefValues"
@@ -40,6 +41,7 @@ class Options(NamedTuple):
     flat_world: bool = False  #: the emulator's ground instead of the sphere
     map_sigma: float = MAP_SIGMA_M  #: [m]
     standing_height: Optional[float] = None  #: [m] altitude less y_agl of the parked aircraft; None: not known
+    span: float = SPAN_M  #: [m] of other aircraft, whose size X-Plane does not tell
 
 
 class Frame(NamedTuple):
@@ -47,6 +49,8 @@ class Frame(NamedTuple):
 
     stamp: int  #: [ns]
     camera: Camera
+    epoch: int  #: of its state
+    sim_time: float  #: [s] of its state
 
 
 class Flight:
@@ -79,6 +83,8 @@ class Flight:
         ground = _ground(bags, options.standing_height)
         self.profiles: list[Profile] = [profile(airport, runway, ground, heights) for runway in airport.runways]
         self.labeller = Labeller(airport, self.profiles, self._world, options.map_sigma)
+        self.traffic = RecordedTraffic(bags, options.span)
+        self.others_unknown = 0  #: labelled pictures of which it is not known where other aircraft were
 
     def frames(self) -> Iterator[Frame]:
         """Give the pictures that can be labelled, in the order of the bag; the others are counted."""
@@ -88,18 +94,24 @@ class Flight:
             if reason:
                 self.left_out[reason] += 1
             else:
-                yield Frame(stamp, Camera(self._world, _pose(self._frames, row), self._infos[stamp]))
+                camera = Camera(self._world, _pose(self._frames, row), self._infos[stamp])
+                epoch, time = (self._frames[f"state.{name}"][row] for name in ("epoch", "sim_time"))
+                yield Frame(stamp, camera, int(epoch), float(time))
 
-    def labels(self, others: Optional[Mapping[int, Sequence[Other]]] = None) -> Iterator[dict[str, Any]]:
-        """Label all pictures: what each line of the file is.
-
-        Args:
-            others: Aircraft beside our own by the stamp [ns] of the picture.
-        """
+    def labels(self) -> Iterator[dict[str, Any]]:
+        """Label all pictures: what each line of the file is."""
+        self.others_unknown = 0
         for frame in self.frames():
             optics = frame.camera.optics
-            seen = self.labeller.label(frame.camera, self._sun.get(frame.stamp), (others or {}).get(frame.stamp, ()))
-            yield {"stamp_ns": frame.stamp, "width": optics.width, "height": optics.height, "objects": seen}
+            others = self.traffic.at(frame.epoch, frame.sim_time)
+            self.others_unknown += others is None
+            yield {
+                "stamp_ns": frame.stamp,
+                "width": optics.width,
+                "height": optics.height,
+                "others_known": others is not None,
+                "objects": self.labeller.label(frame.camera, self._sun.get(frame.stamp), others or ()),
+            }
 
     def about(self) -> dict[str, Any]:
         """What the first line of the file says."""
@@ -117,7 +129,8 @@ class Flight:
             },
             "heights": runways,
             "sun": bool(self._sun),
-            "other_aircraft": False,
+            "other_aircraft": self.traffic.recorded,
+            "others_unknown": self.others_unknown,
             **self._options._asdict(),
         }
 

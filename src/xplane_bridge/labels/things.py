@@ -8,14 +8,16 @@ from typing import Any, Mapping, NamedTuple, Optional, Sequence
 import numpy as np
 
 from xplane_bridge.labels.apt import Airport, Runway
-from xplane_bridge.labels.camera import Camera
+from xplane_bridge.labels.camera import NEAR_M, Camera
 from xplane_bridge.labels.heights import Height, Profile
-from xplane_bridge.labels.world import SIDE_PARTS, RunwayFrame, World
+from xplane_bridge.labels.world import EARTH_RADIUS_M, SIDE_PARTS, RunwayFrame, World
 
 #: A label less sure than this is `coarse` [px].
 COARSE_PX = 3.0
 #: How well a file's latitudes and longitudes say what X-Plane draws [m].
 MAP_SIGMA_M = 0.5
+#: What other aircraft are taken to measure across where nobody says [m].
+SPAN_M = 12.0
 #: Half of the sun's disc [rad].
 _SUN_RADIUS = math.radians(0.53 / 2)
 #: How well the sun's direction is known [rad]: with the scenery's origin, and without it, whose axes it is against.
@@ -32,7 +34,7 @@ class Other(NamedTuple):
     longitude: float  #: [deg]
     altitude: float  #: [m MSL]
     sigma: float  #: [m] of its place, in every direction
-    span: float = 12.0  #: [m] a ball of this diameter is its box
+    span: float = SPAN_M  #: [m] a ball of this diameter is its box
 
 
 class Sun(NamedTuple):
@@ -207,26 +209,38 @@ class Labeller:
         return {
             "kind": "sun",
             "centre": _rounded(pixel)[0],
-            "box": _clipped_box(camera, pixel[0], radius),
+            "box": _in_picture(camera, _ball(pixel[0], radius)),
             **_sure([sigma]),
         }
 
     def _other(self, camera: Camera, other: Other) -> Optional[dict[str, Any]]:
         place = self._world.place(other.latitude, other.longitude, other.altitude)
         optical = camera.optical(place)[0]
-        point = _point(camera, optical, other.sigma, other.sigma)
-        if point["state"] != "visible":
+        distance = float(np.linalg.norm(optical))
+        if optical[2] <= NEAR_M or distance > self._farthest_seen(camera.height, other.altitude):
             return None
-        centre = np.array((point["u"], point["v"]))
+        centre = camera.pixels(optical[np.newaxis])[0]
         radius = camera.focal * 0.5 * other.span / float(optical[2])
+        whole = _ball(centre, radius)
+        box = _in_picture(camera, whole)
+        if box[0] >= box[2] or box[1] >= box[3]:
+            return None
         return {
             "kind": "aircraft",
             "name": other.name,
             "centre": _rounded(centre[np.newaxis])[0],
-            "distance_m": point["distance_m"],
-            "box": _clipped_box(camera, centre, radius),
-            **_sure([point["sigma_px"]]),
+            "distance_m": round(distance, 1),
+            "box": box,
+            "size_px": round(2.0 * radius, 3),
+            "state": "visible" if box == whole else "cut",
+            "seen": "geometric",  # terrain, clouds and the own cockpit stand before it
+            **_sure([camera.sigma(distance, optical / distance, other.sigma, other.sigma)]),
         }
+
+    def _farthest_seen(self, *heights: float) -> float:
+        """How far apart two at these heights [m MSL] still see each other over the earth's curve [m]."""
+        dips = [self._world.dip(height) for height in heights]
+        return math.inf if not all(dips) else EARTH_RADIUS_M * sum(map(math.tan, dips))
 
 
 def _looked_along(camera: Camera, frame: RunwayFrame) -> int:
@@ -272,9 +286,13 @@ def _box(pixels: np.ndarray) -> list[float]:
     return [round(float(part), 3) for part in (*pixels.min(axis=0), *pixels.max(axis=0))]
 
 
-def _clipped_box(camera: Camera, centre: np.ndarray, radius: float) -> list[float]:
+def _ball(centre: np.ndarray, radius: float) -> list[float]:
+    return _box(np.stack((centre - radius, centre + radius)))
+
+
+def _in_picture(camera: Camera, box: Sequence[float]) -> list[float]:
     high = np.array((camera.optics.width, camera.optics.height)) - 0.5
-    return _box(np.clip(np.stack((centre - radius, centre + radius)), -0.5, high))
+    return _box(np.clip(np.reshape(box, (2, 2)), -0.5, high))
 
 
 def _rounded(pixels: np.ndarray) -> list[list[float]]:

@@ -32,7 +32,7 @@ def test_the_file_lies_beside_the_bag_and_says_how_it_was_made(
     path = tmp_path / "flight.labels.jsonl"
     assert out[0] == f"{path}: 3 pictures labelled; XEMU of {airport_file()}"
     assert out[1] == "height of runway 15/33: apt.dat"
-    assert len(out) == 2, "the sun is there, nothing was left out"
+    assert out[2:] == ["no other aircraft: record traffic/state (launch/record.launch does)"], "nothing was left out"
     labels = table.read(path)
     assert list(labels.frames) == [stamp_ns(k * 0.5) for k in range(3)]
     assert labels.about["bags"] == ["flight.bag"]
@@ -110,7 +110,8 @@ def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: py
     out = capsys.readouterr().out.splitlines()
     assert out[0].endswith(f"4 pictures labelled; XEMU of {airport_file()}")
     assert out[2].startswith("no sun: record sun_pitch_degrees")
-    assert out[3:] == [
+    assert out[3].startswith("no other aircraft")
+    assert out[4:] == [
         "left out: 1: no camera_info of the same stamp",
         "left out: 2: no state, or its position or attitude is not known",
         "left out: 1: the camera's pose was not measured",

@@ -19,7 +19,7 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="label_images",
         description=(
-            "Labels a flight's pictures with runways, horizon and sun, projected from the camera's measured pose: "
+            "Labels a flight's pictures with runways, horizon, sun and other aircraft, by the camera's measured pose: "
             "FLIGHT.labels.jsonl beside the bag, which bag_export and flight_report take with --labels."
         ),
         epilog="docs/labels.md tells what is in the file, and how sure it is.",
@@ -48,6 +48,13 @@ def parser() -> argparse.ArgumentParser:
         help="how well apt.dat says where runways are drawn (default: %(default)s)",
     )
     p.add_argument(
+        "--span",
+        type=positive,
+        default=Options().span,
+        metavar="M",
+        help="of other aircraft, whose size X-Plane does not tell: how large their boxes are (default: %(default)s)",
+    )
+    p.add_argument(
         "--flat-world",
         action="store_true",
         help="for the emulator, whose ground is drawn flat around the middle of the first runway",
@@ -64,15 +71,18 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     heights = read_table(args.heights, airport) if args.heights else {}
     with Bags(args.bags) as bags:
         path = args.output or beside(bags.paths[0])
-        count, flight = label_flight(
-            bags, path, airport, heights, Options(args.flat_world, args.map_sigma, args.standing_height)
-        )
+        options = Options(args.flat_world, args.map_sigma, args.standing_height, args.span)
+        count, flight = label_flight(bags, path, airport, heights, options)
     about = flight.about()
     print(f"{path}: {count} pictures labelled; {airport.ident} of {airport.file}")
     for line in about["heights"]:
         print(f"height of runway {line}")
     if not about["sun"]:
         print("no sun: record sun_pitch_degrees and sun_heading_degrees (docs/labels.md says how)")
+    if flight.traffic.recorded:
+        print(f"other aircraft: known in {count - flight.others_unknown} of {count} pictures")
+    else:
+        print("no other aircraft: record traffic/state (launch/record.launch does)")
     for reason, pictures in sorted(flight.left_out.items()):
         print(f"left out: {pictures}: {reason}")
     return 0
