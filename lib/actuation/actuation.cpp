@@ -13,9 +13,9 @@ namespace {
 using Lock = std::lock_guard<core::HandlerMutex>;
 using core::EventKind;
 
-constexpr double kIdentityWait = 2.0;    // [s] of asking for it once
-constexpr double kLeastUndo = 0.2;       // [s] for the view, however long the overrides took
-constexpr double kSuspensionWait = 1.0;  // [s] until everything must be given back
+constexpr double kIdentityReadTimeout = 2.0;  // [s] of asking for it once
+constexpr double kLeastUndo = 0.2;            // [s] for the view, however long the overrides took
+constexpr double kSuspensionWait = 1.0;       // [s] until everything must be given back
 
 }  // namespace
 
@@ -92,7 +92,7 @@ FlightChangeHooks Actuation::changeHooks() {
   };
   hooks.identities = [this] {
     const Lock lock(*mutex_);
-    return identity_.told();
+    return identity_.answers();
   };
   hooks.aircraft = [this] {
     const Lock lock(*mutex_);
@@ -177,13 +177,13 @@ void Actuation::onIdentity() {
   path_.onAircraft(loaded);
   const bool fits = path_.fits(loaded);
   say(EventKind::kAircraft, "aircraft: " + described(loaded) + (fits ? "" : "; not the one of the configuration"),
-      jobs_.mover());
+      jobs_.movingCaller());
   endSignals("another aircraft was loaded");
   surfaces_.onAircraft(loaded.icao.empty() ? loaded.description : loaded.icao, loaded.icao + " " + loaded.description);
 }
 
 void Actuation::askIdentity() {
-  link_->read(core::AircraftIdentityReader::datarefs(), kIdentityWait,
+  link_->read(core::AircraftIdentityReader::datarefs(), kIdentityReadTimeout,
               [this](const std::vector<core::DatarefValue>& values) {
                 const Lock lock(*mutex_);
                 if (identity_.add(values)) onIdentity();
@@ -197,7 +197,7 @@ void Actuation::onReset(const std::string& how) {
   // Perhaps with another aircraft, which must not be flown until the subscription tells.
   askIdentity();
   // What was asked for is told with its outcome.
-  if (jobs_.mover().empty()) say(EventKind::kReset, how);
+  if (jobs_.movingCaller().empty()) say(EventKind::kReset, how);
 }
 
 // --- what drives it ---
@@ -308,12 +308,12 @@ RequestResult Actuation::setPaused(bool paused, const std::string& who) {
   if (link_->inLockstep()) {
     return {core::ResultCode::kNotSupported, "in lock-step the simulator stands between frames: call lockstep/hold"};
   }
-  const auto shown = [this] {
+  const auto pausedNow = [this] {
     const core::LinkStatus status = link_->status();
     return isUp(status) ? status.paused : std::nullopt;
   };
-  if (!shown()) return noLink();
-  if (shown() != paused) setPausing(who);
+  if (!pausedNow()) return noLink();
+  if (pausedNow() != paused) setPausing(who);
   const PauseOutcome outcome = xplane_bridge::setPaused(link_, paused, options_.service_timeout, hooks_.stopping);
   if (outcome == PauseOutcome::kWasSo || outcome == PauseOutcome::kFollowed) {
     return {core::ResultCode::kOk, paused ? "paused" : "running"};  // told as an event when it happened
@@ -341,7 +341,7 @@ void Actuation::suspend(const std::string& reason) {
 
 bool Actuation::knowsFlight() const {
   const Lock lock(*mutex_);
-  return link_status_.version.known() && std::isfinite(watch_.sim_time) && identity_.told() > 0;
+  return link_status_.version.known() && std::isfinite(watch_.sim_time) && identity_.answers() > 0;
 }
 
 ControlSnapshot Actuation::control() const {

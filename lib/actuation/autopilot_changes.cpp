@@ -41,7 +41,7 @@ std::vector<std::string> takenFromAutopilot(const std::vector<std::string>& over
 }  // namespace
 
 std::string FlightChanges::press(const core::AutopilotStep& step) {
-  const auto fits = [step](const std::vector<core::DatarefValue>& values) { return core::shows(step, values); };
+  const auto fits = [step](const std::vector<core::DatarefValue>& values) { return core::matches(step, values); };
   std::vector<core::DatarefValue> values = link_->read(step.shown, kPressWait);
   for (int i = 0; i < kPresses && !fits(values) && !stopping_; ++i) {
     link_->command(step.command);
@@ -58,9 +58,9 @@ FlightChanges::Outcome FlightChanges::applyAutopilot(const core::AutopilotSettin
   };
   const core::SimulatorVersion version = link_->status().version;
   if (setting.restore_on_exit) {
-    const std::string untold = remember(core::autopilotRestored(setting, version));
-    if (!untold.empty()) {
-      return failed("X-Plane does not tell " + untold + ", which could not be put back on exit" + linkCondition());
+    const std::string unknown = remember(core::autopilotRestored(setting, version));
+    if (!unknown.empty()) {
+      return failed("X-Plane does not tell " + unknown + ", which could not be put back on exit" + linkCondition());
     }
   }
   const std::vector<core::SettingWrite> dials = core::autopilotDials(setting, version);

@@ -44,9 +44,9 @@ ControlPath::ControlPath(core::SimulatorPort* link, OverrideManager* overrides, 
       arbiter_(options.arbiter, now()),
       encoder_(core::EncoderOptions{{}, options.reverse_thrust, options.rows}) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  arbiter_.setFlowing(false, now());
+  arbiter_.setTimeRunning(false, now());
   settle();
-  sayMode();
+  publishMode();
 }
 
 double ControlPath::now() const { return link_->clock().steadySeconds(); }
@@ -81,7 +81,7 @@ void ControlPath::settle() {
     why_not_.clear();
   }
   if (standing_ == Standing::kFlying) {
-    said_.clear();
+    last_warning_.clear();
   } else {
     hooks_.end_excitation("nothing is sent: " + why_not_);
   }
@@ -89,7 +89,7 @@ void ControlPath::settle() {
 
 /// Whether the arbiter's time goes on: while X-Plane runs, and through a hitch of it as long as the source that flies
 /// goes on. One that has become silent with X-Plane waits for its frames.
-bool ControlPath::flows(double time) {
+bool ControlPath::timeRuns(double time) {
   if (link_status_.state == core::LinkState::kConnected) return true;
   if (link_status_.state != core::LinkState::kStale || link_status_.paused.value_or(false)) return false;
   const double silence = time - last_frame_;
@@ -116,7 +116,7 @@ void ControlPath::onLink(const core::LinkStatus& status) {
   const std::uint32_t epoch = std::exchange(link_status_, status).epoch;
   // X-Plane has come back, or another one has come: which, its first frame shows.
   if (status.epoch != epoch && epoch != 0) flight_shown_ = false;
-  arbiter_.setFlowing(flows(now()), now());
+  arbiter_.setTimeRunning(timeRuns(now()), now());
   if (status.version.known() && status.version != encoder_.options().version) {
     encoder_ = core::ControlEncoder(core::EncoderOptions{status.version, options_.reverse_thrust, options_.rows});
     watched_.reset();
@@ -143,7 +143,7 @@ void ControlPath::endAuto(const std::string& why, double time) {
   if (options_.resume_auto || before != core::FlightMode::kAuto) return;
   arbiter_.setMode(core::FlightMode::kManual, "tx_node", why + "; AUTO is off until it is asked for", time);
   afterModeChange(before);
-  sayMode();
+  publishMode();
 }
 
 /// Whether it is the flight of before the gap: both of X-Plane's times have run on, and no further than the gap was
@@ -178,17 +178,17 @@ void ControlPath::onFrame(const core::FlightWatch& watch) {
   const bool same_flight = !another && continues(watch);
   watch_ = watch;
   last_frame_ = now();
-  if (!flight_shown_ || another) comeBack(same_flight, last_frame_);
+  if (!flight_shown_ || another) resetAfterReconnect(same_flight, last_frame_);
   // A test signal goes out with every frame, however rarely commands come, and so does its end.
   if (!options_.each_frame && (excited_ || hooks_.excitation().channels.any())) send(now());
 }
 
-void ControlPath::comeBack(bool same_flight, double time) {
+void ControlPath::resetAfterReconnect(bool same_flight, double time) {
   flight_shown_ = true;
   settle();
   if (!same_flight) endAuto("X-Plane was restarted", time);
   overrides_->forgetShown();
-  unseen_.clear();
+  awaiting_read_back_.clear();
   ever_sent_.reset();  // another X-Plane does not know where the handles are
   const core::ModeStatus& status = arbiter_.status();
   if (time - lastCommandOf(status.mode) <= options_.arbiter.command_timeout) {
@@ -199,7 +199,7 @@ void ControlPath::comeBack(bool same_flight, double time) {
   const std::string silent = core::toString(status.mode) + std::string(" is not commanded");
   arbiter_.forgetCommands((status.since == time ? status.reason : "X-Plane came back") + "; " + silent, time);
   watchSurfaces();
-  sayMode();
+  publishMode();
   overrides_->setRequired({});
 }
 
@@ -219,7 +219,7 @@ void ControlPath::onGivenBack(const std::string& why) {
   const core::FlightMode before = arbiter_.status().mode;
   arbiter_.setMode(core::FlightMode::kManual, "tx_node", why + "; nothing is sent until a mode is asked for", time);
   afterModeChange(before);
-  sayMode();
+  publishMode();
   halt(why, time);
 }
 
@@ -264,7 +264,7 @@ core::RequestOutcome ControlPath::requestMode(const core::ModeRequest& request) 
   if (outcome == core::RequestOutcome::kChanged) {
     send(time);
   } else {
-    sayMode();
+    publishMode();
   }
   return outcome;
 }
@@ -313,7 +313,7 @@ void ControlPath::afterModeChange(core::FlightMode before) {
 void ControlPath::tick() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const double time = now();
-  arbiter_.setFlowing(flows(time), time);
+  arbiter_.setTimeRunning(timeRuns(time), time);
   watchReleases();
   if (isUp(link_status_) && time - last_override_refresh_ > kOverrideRefresh) {
     overrides_->refresh();
@@ -348,7 +348,7 @@ void ControlPath::send(double time) {
   watchFailsafe();
   excited_ = controls.excited != 0u;
   if (excitation.channels.any() && !excited_) hooks_.end_excitation("nobody commands the axis any more");
-  sayMode();
+  publishMode();
   std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
   if (fly(controls, time)) {
     const core::Channel axes[] = {core::Channel::kRoll, core::Channel::kPitch, core::Channel::kYaw};
@@ -367,16 +367,16 @@ bool ControlPath::fly(const core::ArbitratedControls& controls, double time) {
       return false;
     }
     if (standing_ != Standing::kFlying) {
-      if (std::exchange(said_, why_not_) != why_not_) hooks_.warn("commands are not sent: " + why_not_);
+      if (std::exchange(last_warning_, why_not_) != why_not_) hooks_.warn("commands are not sent: " + why_not_);
       if (isUp(link_status_)) overrides_->setRequired({});
       return false;
     }
     overrides_->setRequired(core::requiredOverrides(controls.active, encoder_.options()));
-    said_.clear();
+    last_warning_.clear();
     taken_ = controls.source == core::CommandSource::kNone;
   } catch (const core::JournalError& error) {
     const std::string why = core::whyNotChanged(error);
-    if (std::exchange(said_, why) != why) hooks_.warn("commands are not sent: " + why);
+    if (std::exchange(last_warning_, why) != why) hooks_.warn("commands are not sent: " + why);
     return false;
   }
   writes_.clear();
@@ -386,7 +386,7 @@ bool ControlPath::fly(const core::ArbitratedControls& controls, double time) {
   sendRows(controls, now);
   prepareLevers(controls);
   last_send_ = time;
-  sayApplied(controls);
+  publishApplied(controls);
   watchReadBack(controls.active);
   return true;
 }
@@ -432,10 +432,10 @@ core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& con
   return out;
 }
 
-void ControlPath::sayMode() {
+void ControlPath::publishMode() {
   const core::ModeStatus& status = arbiter_.status();
-  if (said_revision_ == status.revision) return;
-  said_revision_ = status.revision;
+  if (published_revision_ == status.revision) return;
+  published_revision_ = status.revision;
   hooks_.mode(status, watch_.sim_time);
 }
 

@@ -7,27 +7,27 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kDoesNotFollow = 1.0;   // [s] without read-back until it is said
-constexpr std::size_t kUnseenKept = 64;  // two frames of 200 commands and 20 frames a second, three times
+constexpr double kReadBackTimeout = 1.0;          // [s] without read-back until it is said
+constexpr std::size_t kMaxAwaitingReadBack = 64;  // two frames of 200 commands and 20 frames a second, three times
 
 }  // namespace
 
-void ControlPath::sayApplied(const core::ArbitratedControls& controls) {
+void ControlPath::publishApplied(const core::ArbitratedControls& controls) {
   AppliedControls applied;
   applied.controls = controls;
   applied.sent_ns = link_->clock().system_ns();
   applied.sim_time = watch_.sim_time;
   hooks_.applied(applied);
-  if (unseen_.empty()) last_seen_ = now();  // until now there was nothing to show
-  unseen_.push_back(applied);
-  if (unseen_.size() > kUnseenKept) unseen_.pop_front();
+  if (awaiting_read_back_.empty()) last_followed_ = now();  // until now there was nothing to show
+  awaiting_read_back_.push_back(applied);
+  if (awaiting_read_back_.size() > kMaxAwaitingReadBack) awaiting_read_back_.pop_front();
 }
 
 void ControlPath::watchReadBack(const core::ChannelSet& channels) {
   if (channels == watched_) return;
   watched_ = channels;
   watched_order_.clear();
-  shown_known_.reset();
+  read_back_known_.reset();
   core::RrefGroup group{"read-back", {core::flightWatchDatarefs().front()}, core::kEveryFrameRateHz, 1};
   for (std::size_t i = 0; i < core::kChannelCount; ++i) {
     if (!channels.test(i)) continue;
@@ -49,15 +49,16 @@ void ControlPath::onReadBack(const core::RrefView& view) {
     if (pair.index == 0) sim_time = static_cast<double>(pair.value);
     if (pair.index < 1 || static_cast<std::size_t>(pair.index) > watched_order_.size()) continue;
     const std::size_t channel = core::index(watched_order_[static_cast<std::size_t>(pair.index) - 1]);
-    shown_[channel] = static_cast<double>(pair.value);
-    shown_known_.set(channel);
+    read_back_values_[channel] = static_cast<double>(pair.value);
+    read_back_known_.set(channel);
   }
   // The newest that fits: older ones were overtaken.
-  for (auto it = unseen_.rbegin(); it != unseen_.rend(); ++it) {
+  for (auto it = awaiting_read_back_.rbegin(); it != awaiting_read_back_.rend(); ++it) {
     bool all = true;
     for (std::size_t i = 0; i < core::kChannelCount && all; ++i) {
       if (!it->controls.active.test(i)) continue;
-      all = shown_known_.test(i) && encoder_.shows(static_cast<core::Channel>(i), it->controls.values[i], shown_[i]);
+      all = read_back_known_.test(i) &&
+            encoder_.matches(static_cast<core::Channel>(i), it->controls.values[i], read_back_values_[i]);
     }
     // What stood there before the command reached X-Plane is not its doing.
     const bool too_early = link_status_.state != core::LinkState::kPaused && sim_time <= it->sim_time;
@@ -66,8 +67,8 @@ void ControlPath::onReadBack(const core::RrefView& view) {
     it->read_back_sim_time = sim_time;
     it->read_back_frames = (sim_time - it->sim_time) / watch_.frame_period;
     hooks_.applied(*it);
-    last_seen_ = now();
-    unseen_.erase(unseen_.begin(), it.base());
+    last_followed_ = now();
+    awaiting_read_back_.erase(awaiting_read_back_.begin(), it.base());
     return;
   }
 }
@@ -75,13 +76,16 @@ void ControlPath::onReadBack(const core::RrefView& view) {
 std::vector<std::string> ControlPath::notFollowed() const {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   std::vector<std::string> out;
-  if (unseen_.empty() || link_status_.state != core::LinkState::kConnected || now() - last_seen_ <= kDoesNotFollow) {
+  if (awaiting_read_back_.empty() || link_status_.state != core::LinkState::kConnected ||
+      now() - last_followed_ <= kReadBackTimeout) {
     return out;
   }
-  const core::ArbitratedControls& last = unseen_.back().controls;
+  const core::ArbitratedControls& last = awaiting_read_back_.back().controls;
   for (std::size_t i = 0; i < core::kChannelCount; ++i) {
     const auto channel = static_cast<core::Channel>(i);
-    if (!last.active.test(i) || (shown_known_.test(i) && encoder_.shows(channel, last.values[i], shown_[i]))) continue;
+    if (!last.active.test(i) ||
+        (read_back_known_.test(i) && encoder_.matches(channel, last.values[i], read_back_values_[i])))
+      continue;
     out.push_back(core::channelName(channel));
   }
   return out;

@@ -134,7 +134,7 @@ void FailureManager::carryOut(const core::FailurePlan& plan) {
   pending.who = asked_by_[plan.name];
   pending.since = pending.sent = now();
   if (plan.surface) {
-    const double shown = surfaces_->shown(plan.surface->surface);
+    const double shown = surfaces_->readBack(plan.surface->surface);
     if (plan.surface->fault == core::SurfaceFault::kStuck && !plan.value) registry_.setValue(plan.name, shown);
     pending.expected_deg = expectedAngle(*plan.surface, shown, surfaces_->lawOf(plan.surface->surface));
   }
@@ -226,7 +226,7 @@ bool FailureManager::settled(Pending* pending) {
     const auto& surface = pending->plan.surface;
     // Where it got stuck is known only now.
     if (surface && surface->fault == core::SurfaceFault::kStuck && !surface->value) {
-      registry_.setValue(name, surfaces_->shown(surface->surface));
+      registry_.setValue(name, surfaces_->readBack(surface->surface));
     }
     return true;
   };
@@ -266,7 +266,7 @@ bool FailureManager::settled(Pending* pending) {
     return false;
   }
   if (!pending->plan.surface || !pending->expected_deg) return settle();
-  const double off = surfaces_->shown(pending->plan.surface->surface) - *pending->expected_deg;
+  const double off = surfaces_->readBack(pending->plan.surface->surface) - *pending->expected_deg;
   if (now() - pending->confirmed < kBehaviourWait) return false;
   if (std::abs(off) <= kBehaviourDeg) return settle();
   pending->since = now();

@@ -16,17 +16,17 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kPoll = 0.2;          // [s] longest wait without looking at anything else
-constexpr double kPlaceAgain = 3.0;    // [s] until a placement of which nothing is seen is sent once more
-constexpr int kMoves = 2;              // attempts at moving the aircraft before a new flight is begun
-constexpr int kBeginnings = 2;         // attempts at beginning a flight
-constexpr double kTellsAnew = 0.5;     // [s] of flight from which on its beginning anew can be seen
-constexpr double kTellsWait = 1.0;     // [s] for that
-constexpr double kWriteAgain = 0.3;    // [s] until datarefs that are not shown are written once more
-constexpr double kStationsWait = 0.5;  // [s] until a payload that the stations do not take is written as a sum
-constexpr double kWindAgain = 1.0;     // [s] the same of the weather
-constexpr double kPauseWait = 1.0;     // [s] until a pause must be shown
-constexpr double kIdentityWait = 3.0;  // [s] until X-Plane must have shown its aircraft
+constexpr double kPoll = 0.2;                   // [s] longest wait without looking at anything else
+constexpr double kPlaceAgain = 3.0;             // [s] until a placement of which nothing is seen is sent once more
+constexpr int kMoves = 2;                       // attempts at moving the aircraft before a new flight is begun
+constexpr int kBeginnings = 2;                  // attempts at beginning a flight
+constexpr double kBeginningVisibleAfter = 0.5;  // [s] of flight from which on its beginning anew can be seen
+constexpr double kBeginningVisibleWait = 1.0;   // [s] for that
+constexpr double kWriteAgain = 0.3;             // [s] until datarefs that are not shown are written once more
+constexpr double kStationsWait = 0.5;           // [s] until a payload that the stations do not take is written as a sum
+constexpr double kWindAgain = 1.0;              // [s] the same of the weather
+constexpr double kPauseWait = 1.0;              // [s] until a pause must be shown
+constexpr double kIdentityWait = 3.0;           // [s] until X-Plane must have shown its aircraft
 constexpr const char* kSettingsEntry = "override:settings of the flight";
 constexpr const char* kLoading = "another aircraft is being loaded";
 
@@ -47,7 +47,7 @@ std::string loadingDifference(const std::vector<core::DatarefWrite>& writes,
   std::vector<std::string> out;
   for (std::size_t i = 0; i < writes.size(); ++i) {
     const bool answered = i < values.size() && values[i];
-    if (answered && core::shows(writes[i], static_cast<double>(*values[i]))) continue;
+    if (answered && core::matches(writes[i], static_cast<double>(*values[i]))) continue;
     out.push_back(writes[i].dataref +
                   (answered ? " is " + std::to_string(*values[i]) + ", not " + std::to_string(writes[i].value)
                             : " does not answer"));
@@ -96,10 +96,10 @@ void FlightChanges::write(const std::vector<core::DatarefWrite>& writes) {
   for (const core::DatarefWrite& each : writes) link_->write(each.dataref, each.value);
 }
 
-bool FlightChanges::tellsBeginning() {
-  const auto tells = [this] { return hooks_.watch().flight_time > kTellsAnew; };
-  if (!link_->status().paused.value_or(false)) waitFor(kTellsWait, tells);
-  return tells();
+bool FlightChanges::beginningIsVisible() {
+  const auto visible = [this] { return hooks_.watch().flight_time > kBeginningVisibleAfter; };
+  if (!link_->status().paused.value_or(false)) waitFor(kBeginningVisibleWait, visible);
+  return visible();
 }
 
 bool FlightChanges::isUp() const { return xplane_bridge::isUp(link_->status()); }
@@ -125,12 +125,12 @@ PauseOutcome FlightChanges::pause(bool paused, const std::string& who) {
 // --- placing ---
 
 FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, const std::string& who) {
-  const bool tells = movesAircraft() || tellsBeginning();
+  const bool visible = movesAircraft() || beginningIsVisible();
   // Paused, so that the aircraft does not fly between place and motion. A new flight may begin in the other state.
   const PauseOutcome before = pause(true, who);
   PauseOutcome again = PauseOutcome::kUnknown;
   std::optional<core::ShownFlight> shown;
-  std::string problem = waitForPlacement(start, tells, &shown);
+  std::string problem = waitForPlacement(start, visible, &shown);
   if (problem.empty()) {
     again = pause(true, who);
     problem = waitForMotion(start, &shown);
@@ -158,14 +158,14 @@ bool FlightChanges::movesAircraft() const {
   return version.is12() && !version.is(core::Otherwise::kVehs) && !hooks_.watch().crashed;
 }
 
-std::string FlightChanges::waitForPlacement(const core::FlightStart& start, bool tells,
+std::string FlightChanges::waitForPlacement(const core::FlightStart& start, bool visible,
                                             std::optional<core::ShownFlight>* shown) {
   const core::Deadline deadline = deadlineAfter(options_.load_timeout);  // scenery may have to be loaded
   *shown = shownFlight();
   // X-Plane 12 moves an aircraft that flies; one that has crashed needs a new flight.
   if (movesAircraft() && moveThere(start, deadline, shown)) return "";
   const auto there = [&start](const std::optional<core::ShownFlight>& now) { return isNear(start, now); };
-  if (beginThere({core::placementOf(start), there, tells, false}, deadline, shown)) return "";
+  if (beginThere({core::placementOf(start), there, visible, false}, deadline, shown)) return "";
   if (!*shown) return "it does not show where it is" + linkCondition();
   if (!isNear(start, *shown)) return core::differenceOf(start, **shown) + linkCondition();
   return "the flight has not begun anew" + linkCondition();
@@ -173,7 +173,7 @@ std::string FlightChanges::waitForPlacement(const core::FlightStart& start, bool
 
 bool FlightChanges::moveThere(const core::FlightStart& start, const core::Deadline& deadline,
                               std::optional<core::ShownFlight>* shown) {
-  // Where it was near already, only the very place tells that it was moved.
+  // Where it was near already, only the very place shows that it was moved.
   const bool was_near = isNear(start, *shown);
   for (int attempt = 0; attempt < kMoves; ++attempt) {
     // Twice: the elevation is wrong the first time.
@@ -210,7 +210,7 @@ bool FlightChanges::beginThere(const Beginning& wanted, const core::Deadline& de
     *shown = shownFlight();
     seen = seen || hooks_.resets() != resets || !isUp();
     // A flight that has only just begun does not show whether it began anew: then the time it is given has to do.
-    const bool begun = seen || (!wanted.tells && again.over());
+    const bool begun = seen || (!wanted.visible && again.over());
     if (begun && wanted.there(*shown)) return true;
   }
   return false;
@@ -239,7 +239,7 @@ FlightChanges::Outcome FlightChanges::placeAt(const core::AirportStart& asked, c
   };
   core::AirportStart start = asked;
   if (const std::string problem = resolve(options_.airport_data, &start); !problem.empty()) return failed(problem);
-  if (!tellsBeginning()) {
+  if (!beginningIsVisible()) {
     return failed("the flight has only just begun, so X-Plane would not show a new one" + linkCondition() +
                   ": let it fly for a second, then ask again");
   }
@@ -281,7 +281,7 @@ std::string FlightChanges::waitForAirport(const core::AirportStart& start, std::
 
 FlightChanges::Outcome FlightChanges::applyWind(const core::UniformWind& wind) {
   const auto names = core::shownWindDatarefs(link_->status().version);
-  const auto fits = [wind](const std::vector<core::DatarefValue>& values) { return core::shows(wind, values); };
+  const auto fits = [wind](const std::vector<core::DatarefValue>& values) { return core::matches(wind, values); };
   std::vector<core::DatarefValue> values;
   for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !expired(deadline);) {
     write(core::windWrites(wind, link_->status().version));
@@ -298,12 +298,12 @@ FlightChanges::Outcome FlightChanges::applyWind(const core::UniformWind& wind) {
 }
 
 std::string FlightChanges::remember(const std::vector<core::SettingWrite>& settings) {
-  std::vector<std::string> names, untold;
+  std::vector<std::string> names, unknown;
   for (const core::SettingWrite& each : settings) names.push_back(each.write.dataref);
-  const auto told = [](const std::vector<core::DatarefValue>& values) {
+  const auto all_known = [](const std::vector<core::DatarefValue>& values) {
     return std::all_of(values.begin(), values.end(), [](const core::DatarefValue& value) { return value.has_value(); });
   };
-  const std::vector<core::DatarefValue> values = link_->readUntil(names, options_.setting_timeout, told);
+  const std::vector<core::DatarefValue> values = link_->readUntil(names, options_.setting_timeout, all_known);
   const std::lock_guard<std::mutex> lock(restores_mutex_);
   std::vector<core::UndoOperation> all = restores_;
   for (std::size_t i = 0; i < settings.size(); ++i) {
@@ -315,11 +315,11 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
       // Not looked at: time runs on, and X-Plane's own weather may change it at once.
       all.push_back(core::UndoDref{names[i], *values[i], false});
     } else if (settings[i].is_shown) {
-      untold.push_back(names[i]);
+      unknown.push_back(names[i]);
     }
   }
   const auto journal = link_->journal();
-  if (!untold.empty() || !journal) return core::join(untold.empty() ? names : untold);
+  if (!unknown.empty() || !journal) return core::join(unknown.empty() ? names : unknown);
   journal->record(kSettingsEntry, kOverridePurpose, all);
   restores_ = std::move(all);
   return "";
@@ -345,11 +345,12 @@ void FlightChanges::restoreSettings() {
 FlightChanges::Outcome FlightChanges::applySettings(const std::vector<core::SettingWrite>& settings,
                                                     const std::string& service, const std::string& done, bool restore) {
   if (restore) {
-    const std::string untold = remember(settings);
-    if (!untold.empty()) {
-      return {core::EventKind::kSetting,
-              service + ": X-Plane does not tell " + untold + ", which could not be put back on exit" + linkCondition(),
-              false};
+    const std::string unknown = remember(settings);
+    if (!unknown.empty()) {
+      return {
+          core::EventKind::kSetting,
+          service + ": X-Plane does not tell " + unknown + ", which could not be put back on exit" + linkCondition(),
+          false};
     }
   }
   std::vector<core::DatarefWrite> writes;
@@ -426,7 +427,7 @@ std::string FlightChanges::waitForAircraft(const std::string& path, std::int32_t
   const bool shows_file = !names.empty();
   const auto isShown = [&] { return !shows_file || core::isSamePath(core::textFrom(link_->read(names, kPoll)), path); };
   const bool same = isShown();
-  if (same) tellsBeginning();
+  if (same) beginningIsVisible();
   const unsigned resets = hooks_.resets();
   const std::string aircraft = hooks_.aircraft();
   bool begun = false;  // the flight anew, or loading
@@ -457,7 +458,7 @@ FlightChanges::Outcome FlightChanges::saveSituation(const std::string& path) {
 }
 
 FlightChanges::Outcome FlightChanges::applySituation(const std::string& path) {
-  tellsBeginning();
+  beginningIsVisible();
   const unsigned resets = hooks_.resets();
   const bool sent = sendSituation(link_, core::SituationAction::kLoadSituation, path);
   const bool loaded = sent && waitFor(options_.load_timeout, [&] { return hooks_.resets() != resets; });

@@ -48,9 +48,9 @@ std::optional<RequestResult> FlightJobs::refusal() const {
   return std::nullopt;
 }
 
-std::string FlightJobs::mover() const {
+std::string FlightJobs::movingCaller() const {
   std::lock_guard<std::mutex> lock(mutex_);
-  return mover_;
+  return moving_caller_;
 }
 
 void FlightJobs::add(std::uint32_t number, const std::string& who, bool moves,
@@ -70,7 +70,7 @@ void FlightJobs::loop() {
     if (changes_.stopping()) return;
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
-    if (job.moves) mover_ = job.who;
+    if (job.moves) moving_caller_ = job.who;
     lock.unlock();
     FlightChangeOutcome outcome;
     try {
@@ -81,7 +81,7 @@ void FlightJobs::loop() {
     if (changes_.stopping() && !outcome.success) outcome.text += " (tx_node ends)";
     report_(job.number, outcome, job.who);
     lock.lock();
-    mover_.clear();
+    moving_caller_.clear();
   }
 }
 

@@ -16,7 +16,7 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kDoesNotFollow = 1.0;    // [s] until it is said
+constexpr double kReadBackTimeout = 1.0;  // [s] until it is said
 constexpr double kTravelMarginDeg = 1.0;  // [deg] a command may go beyond the identified travel
 
 std::string degrees(double value) {
@@ -254,7 +254,7 @@ bool SurfaceControl::follows(std::size_t surface) const {
   return state_ == State::kDriving && followsLocked(surface);
 }
 
-double SurfaceControl::shown(std::size_t surface) const {
+double SurfaceControl::readBack(std::size_t surface) const {
   std::lock_guard<std::mutex> lock(mutex_);
   return surface < sample_.deflections_deg.size() ? sample_.deflections_deg[surface] : std::nan("");
 }
@@ -300,7 +300,7 @@ SurfaceControlStatus SurfaceControl::status() const {
   out.blocked_reason = blockReasonLocked();
   out.file_problem = file_problem_;
   for (std::size_t i = 0; i < not_following_.size() && state_ == State::kDriving; ++i) {
-    if (not_following_[i] > kDoesNotFollow) out.not_following.push_back(nameOf(i));
+    if (not_following_[i] > kReadBackTimeout) out.not_following.push_back(nameOf(i));
   }
   out.aircraft = watch_.aircraft();
   if (const core::MixingModel* model = watch_.model()) {

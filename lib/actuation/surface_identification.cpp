@@ -55,7 +55,7 @@ double fastestRate(const core::FlightWatch& watch) {
   return std::max({std::abs(watch.roll_rate_deg_s), std::abs(watch.pitch_rate_deg_s), std::abs(watch.yaw_rate_deg_s)});
 }
 
-bool shown(const core::FlightWatch& watch) {
+bool isKnown(const core::FlightWatch& watch) {
   const std::array<double, 9> values{watch.sim_time,        watch.height_agl,       watch.indicated_airspeed,
                                      watch.roll_deg,        watch.pitch_deg,        watch.elevation,
                                      watch.roll_rate_deg_s, watch.pitch_rate_deg_s, watch.yaw_rate_deg_s};
@@ -108,7 +108,7 @@ std::string SurfaceIdentification::unsteady(const core::FlightWatch& watch) cons
 }
 
 std::string SurfaceIdentification::beyondLimits(const core::FlightWatch& watch) const {
-  if (!shown(watch)) return "X-Plane does not show the flight any more";
+  if (!isKnown(watch)) return "X-Plane does not show the flight any more";
   if (watch.crashed) return "the aircraft has crashed";
   if (fastestRate(watch) > limits_.max_rate_deg_s) {
     return beyond("", fastestRate(watch), limits_.max_rate_deg_s, " deg/s");
@@ -151,7 +151,7 @@ RequestResult SurfaceIdentification::begin(const IdentificationRequest& request,
   if (const auto wrong = wrongLimit(request)) return refused(*wrong);
   if (excitation_->running()) return refused("an excitation runs: wait for it, or stop it");
   if (!now.blocked_reason.empty()) return {core::ResultCode::kNoLink, now.blocked_reason};
-  if (!shown(watch)) return {core::ResultCode::kNoLink, "X-Plane has not shown the flight yet"};
+  if (!isKnown(watch)) return {core::ResultCode::kNoLink, "X-Plane has not shown the flight yet"};
   limits_ = request;
   limits_.max_roll_deg = orDefault(request.max_roll_deg, std::min(kMaxRollDeg, max_roll_deg_));
   limits_.max_pitch_deg = orDefault(request.max_pitch_deg, std::min(kMaxPitchDeg, max_pitch_deg_));

@@ -171,7 +171,7 @@ class Loop {
     return air;
   }
 
-  void blow(double dt) {
+  void updateGusts(double dt) {
     const double heading = call(heading_);
     const double speed = call(airspeed_) * kFoot, agl = call(agl_) * kFoot;
     const Dryden::Gusts g = turbulence_.dryden.step(dt, speed, agl, [this] { return turbulence_.gauss(); });
@@ -215,7 +215,7 @@ class Loop {
   }
 
   void step(double dt, const std::vector<SurfaceOrder>& orders, const std::vector<Throttle>& throttles) {
-    if (turbulence_.dryden.intensity_mps > 0.0) blow(dt);
+    if (turbulence_.dryden.intensity_mps > 0.0) updateGusts(dt);
     advance(dt, orders, throttles);
     applyLoads();
     const int runs = call(agl_) * kFoot > contact_height_ ? 1 : contact_runs_;

@@ -32,7 +32,14 @@ from xplane_bridge.scenario.loader import parse_scenario
 
 ROOT = Path(__file__).resolve().parents[2]
 _WORDS: Sequence[Any] = (None, True, 0, -1, 1e400, float("nan"), 10**400, "", "x", [], {}, [[]], {"at": 0}, "0", 0.5)
-_TELLING = (b"\0\0\0\0", b"\xff\xff\xff\x7f", b"\0\0\0\x80", b"\xff\xff\xff\xff", b"\0\0\xc0\x7f", b"\0\0\x80\x7f")
+_BOUNDARY_WORDS = (
+    b"\0\0\0\0",
+    b"\xff\xff\xff\x7f",
+    b"\0\0\0\x80",
+    b"\xff\xff\xff\xff",
+    b"\0\0\xc0\x7f",
+    b"\0\0\x80\x7f",
+)
 
 
 class Target(NamedTuple):
@@ -58,7 +65,7 @@ def changed_bytes(seed: bytes, seeds: List[bytes], chance: random.Random) -> byt
         elif kind == 3:
             del data[at : at + length]
         elif kind == 4:
-            data[at : at + 4] = chance.choice(_TELLING)
+            data[at : at + 4] = chance.choice(_BOUNDARY_WORDS)
         else:
             other = chance.choice(seeds)
             start = chance.randrange(len(other) + 1)

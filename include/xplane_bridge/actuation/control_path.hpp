@@ -137,9 +137,9 @@ class ControlPath {
  private:
   double now() const;
   void settle();
-  bool flows(double time);
+  bool timeRuns(double time);
   void halt(const std::string& why, double time);
-  void comeBack(bool same_flight, double time);
+  void resetAfterReconnect(bool same_flight, double time);
   bool isAnotherXPlane(const core::FlightWatch& watch) const;
   bool continues(const core::FlightWatch& watch) const;
   void endAuto(const std::string& why, double time);
@@ -152,8 +152,8 @@ class ControlPath {
   void sendRows(const core::ArbitratedControls& controls, const core::ChannelSet& now);
   void prepareLevers(const core::ArbitratedControls& controls);
   core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
-  void sayMode();
-  void sayApplied(const core::ArbitratedControls& controls);
+  void publishMode();
+  void publishApplied(const core::ArbitratedControls& controls);
   void watchReadBack(const core::ChannelSet& channels);
   void onReadBack(const core::RrefView& view);
   void watchReleases();
@@ -176,7 +176,7 @@ class ControlPath {
 
   core::ControlArbiter arbiter_;
   core::ControlEncoder encoder_;
-  std::optional<std::uint32_t> said_revision_;
+  std::optional<std::uint32_t> published_revision_;
   core::FlightWatch watch_;
   double last_frame_ = -1e9;                           // [s] steady
   bool failsafe_ = false;                              // as told last
@@ -188,19 +188,19 @@ class ControlPath {
   bool surfaces_fly_ = false;  // control/surfaces commands, as far as end_surface_commands has not been called
   bool excited_ = false;       // what was sent last
   bool taken_ = false;         // overrides, for a test signal of what nobody commands
-  std::string said_;           // why commands are not sent, as warned of last
+  std::string last_warning_;   // why commands are not sent, as warned of last
 
   core::ChannelValues last_values_{};                     // of Refresh::kOnChange channels
   std::array<double, core::kChannelCount> changed_at_{};  // [s] steady; of the same
   core::ChannelSet ever_sent_;
   std::vector<core::DatarefWrite> writes_;
 
-  std::deque<AppliedControls> unseen_;  // oldest first
+  std::deque<AppliedControls> awaiting_read_back_;  // oldest first
   core::ChannelSet watched_;
   std::vector<core::Channel> watched_order_;  // as subscribed, after the time
-  core::ChannelValues shown_{};
-  core::ChannelSet shown_known_;
-  double last_seen_ = -1e9;       // [s] steady; X-Plane last showed all that was sent
+  core::ChannelValues read_back_values_{};
+  core::ChannelSet read_back_known_;
+  double last_followed_ = -1e9;   // [s] steady; X-Plane last showed all that was sent
   core::Subscription read_back_;  // last: it ends first
 };
 

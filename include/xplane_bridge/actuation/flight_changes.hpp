@@ -85,14 +85,14 @@ class FlightChanges {
   struct Beginning {
     core::Placement placement;
     std::function<bool(const std::optional<core::ShownFlight>& shown)> there;
-    bool tells;           ///< X-Plane will show that the flight begins anew
+    bool visible;         ///< X-Plane will show that the flight begins anew
     bool may_be_refused;  ///< if X-Plane answers and begins none, it never will
   };
 
   // Of place() and placeAt(). `shown` is what X-Plane shows last.
   bool movesAircraft() const;
-  /// `tells` as in Beginning.
-  std::string waitForPlacement(const core::FlightStart& start, bool tells, std::optional<core::ShownFlight>* shown);
+  /// `visible` as in Beginning.
+  std::string waitForPlacement(const core::FlightStart& start, bool visible, std::optional<core::ShownFlight>* shown);
   bool moveThere(const core::FlightStart& start, const core::Deadline& deadline,
                  std::optional<core::ShownFlight>* shown);
   bool beginThere(const Beginning& wanted, const core::Deadline& deadline, std::optional<core::ShownFlight>* shown);
@@ -102,7 +102,7 @@ class FlightChanges {
   void pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who);
   std::string waitForMotion(const core::FlightStart& start, std::optional<core::ShownFlight>* shown);
   std::optional<core::ShownFlight> shownFlight();
-  /// Sends them until X-Plane shows them; `done` tells that it does.
+  /// Sends them until X-Plane shows them; `done` is the text for when it does.
   Outcome applySettings(const std::vector<core::SettingWrite>& settings, const std::string& service,
                         const std::string& done, bool restore);
   /// Presses until X-Plane shows it; returns what it shows instead, empty: it does.
@@ -120,7 +120,7 @@ class FlightChanges {
   /// Waits until `condition()` is true, a stop is asked for or so many seconds have passed; returns whether it is.
   bool waitFor(double seconds, const std::function<bool()>& condition);
   /// Waits until the flight is old enough to show when it begins anew, unless it stands still; returns whether it is.
-  bool tellsBeginning();
+  bool beginningIsVisible();
   void write(const std::vector<core::DatarefWrite>& writes);
   bool isUp() const;
   /// Why X-Plane may not have shown it, for the end of a sentence; empty: no reason is known.

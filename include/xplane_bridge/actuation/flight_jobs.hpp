@@ -48,7 +48,7 @@ class FlightJobs {
   /// Why X-Plane could not be asked for anything now; nullopt: it could.
   std::optional<RequestResult> refusal() const;
   /// Who asked for the job at it, if that places the aircraft or loads files; empty: none does.
-  std::string mover() const;
+  std::string movingCaller() const;
   /// The one at it ends where it is, X-Plane resumed if it was paused for it; the others are dropped. Waits for that.
   void stop();
 
@@ -69,7 +69,7 @@ class FlightJobs {
   mutable std::mutex mutex_;
   std::condition_variable wanted_;
   std::deque<Job> jobs_;
-  std::string mover_;
+  std::string moving_caller_;
   std::thread thread_;  // last: it uses all of the others
 };
 

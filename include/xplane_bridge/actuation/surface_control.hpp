@@ -81,7 +81,7 @@ class SurfaceControl {
   void release(const std::string& why);
   /// At least ten times a second. `blocked_reason`: why nothing may be sent to X-Plane now; empty: it may.
   void tick(const std::string& blocked_reason);
-  /// Ends all driving; overrides are the keeper's to give back.
+  /// Ends all driving; OverrideManager releases the overrides.
   void stop();
   /// What was seen until now was no flight: it says nothing about the mixing.
   void restart();
@@ -148,7 +148,7 @@ class SurfaceControl {
   /// X-Plane shows what was sent to this surface.
   bool follows(std::size_t surface) const;
   /// [deg] as X-Plane shows it; NaN: unknown.
-  double shown(std::size_t surface) const;
+  double readBack(std::size_t surface) const;
   /// The law of a surface; nullopt where none is known.
   std::optional<core::SurfaceLaw> lawOf(std::size_t surface) const;
 

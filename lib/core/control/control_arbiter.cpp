@@ -81,24 +81,24 @@ ControlArbiter::ControlArbiter(const ArbiterOptions& options, double now) : opti
 }
 
 void ControlArbiter::advance(double now) {
-  if (flowing_ && now > now_) flow_time_ += now - now_;
+  if (time_running_ && now > now_) running_time_ += now - now_;
   now_ = std::max(now_, now);
 }
 
-void ControlArbiter::setFlowing(bool flowing, double now) {
+void ControlArbiter::setTimeRunning(bool running, double now) {
   advance(now);
-  if (flowing && !flowing_) {
-    // Sources that were alive when the flow stopped get time to be heard again.
-    const double until = flow_time_ + options_.resume_grace;
+  if (running && !time_running_) {
+    // Sources that were alive when time stopped get time to be heard again.
+    const double until = running_time_ + options_.resume_grace;
     if (surfacesFly()) surfaces_until_ = std::max(surfaces_until_, until);
     for (Source& source : sources_) {
-      if (source.alive_until > flow_time_) source.alive_until = std::max(source.alive_until, until);
+      if (source.alive_until > running_time_) source.alive_until = std::max(source.alive_until, until);
       for (double& expires : source.expires) {
-        if (expires > flow_time_) expires = std::max(expires, until);
+        if (expires > running_time_) expires = std::max(expires, until);
       }
     }
   }
-  flowing_ = flowing;
+  time_running_ = running;
 }
 
 std::optional<CommandRefusal> ControlArbiter::onCommand(FlightMode from, const ControlCommand& command, double now) {
@@ -111,7 +111,7 @@ std::optional<CommandRefusal> ControlArbiter::onCommand(FlightMode from, const C
   }
   ++source.statistics.accepted;
   const bool was_alive = alive(from);
-  const double until = flow_time_ + options_.command_timeout;
+  const double until = running_time_ + options_.command_timeout;
   source.arrival = now_;
   source.sequence = command.sequence;
   source.alive_until = std::max(source.alive_until, until);
@@ -170,7 +170,7 @@ std::string ControlArbiter::refusalOfSurfaces(double now) {
 
 void ControlArbiter::onSurfaces(double now) {
   advance(now);
-  surfaces_until_ = flow_time_ + options_.command_timeout;
+  surfaces_until_ = running_time_ + options_.command_timeout;
   surfaces_heard_ = true;
 }
 
@@ -322,8 +322,8 @@ void ControlArbiter::excite(std::size_t i, double base, double value) {
 
 const ArbitratedControls& ControlArbiter::step(double now, const ChannelExcitation& excitation) {
   advance(now);
-  const double dt = flow_time_ - last_step_flow_;
-  last_step_flow_ = flow_time_;
+  const double dt = running_time_ - last_step_time_;
+  last_step_time_ = running_time_;
   const Source& source = sourceOf(status_.mode);
 
   out_ = {};

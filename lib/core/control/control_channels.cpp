@@ -26,7 +26,7 @@ struct Row {
   ChannelWire wire;
 };
 
-// protocol.md 8.1.
+// docs/protocol.md 8.1.
 constexpr Row kRows[] = {
     {Channel::kRoll,
      Channel::kRoll,
@@ -176,7 +176,7 @@ void ControlEncoder::encode(const ChannelValues& values, const ChannelSet& chann
   }
 }
 
-bool ControlEncoder::shows(Channel channel, double sent, double shown) const {
+bool ControlEncoder::matches(Channel channel, double sent, double shown) const {
   const double wire = static_cast<double>(wireValue(channel, sent));
   return std::abs(shown - wire) <= channelWire(channel, options_).read_back_tolerance;
 }

@@ -176,9 +176,9 @@ FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion ve
   FailurePlanResult out;
   out.plan = {request.name, request.kind, std::nullopt, {}, std::nullopt};
   const std::string bare = failureName(request.name);
-  const bool wordy = bare.size() <= kLongestName &&
+  const bool plain = bare.size() <= kLongestName &&
                      std::all_of(bare.begin(), bare.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
-  if (bare.compare(0, 4, "rel_") == 0 && bare.size() > 4 && wordy) {
+  if (bare.compare(0, 4, "rel_") == 0 && bare.size() > 4 && plain) {
     out.plan.name = bare;
     out.plan.datarefs.push_back(failureDataref(bare));
   } else {

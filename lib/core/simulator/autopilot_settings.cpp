@@ -167,7 +167,7 @@ std::vector<SettingWrite> autopilotRestored(const AutopilotSetting& setting, Sim
   return out;
 }
 
-bool shows(const AutopilotStep& step, const std::vector<DatarefValue>& values) {
+bool matches(const AutopilotStep& step, const std::vector<DatarefValue>& values) {
   return std::any_of(values.begin(), values.end(),
                      [&step](const DatarefValue& value) { return value && *value >= step.low && *value <= step.high; });
 }

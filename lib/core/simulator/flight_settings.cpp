@@ -77,7 +77,7 @@ std::vector<std::string> shownWindDatarefs(SimulatorVersion version) {
   return {"sim/weather/wind_speed_kt", "sim/weather/wind_direction_degt"};
 }
 
-bool shows(const UniformWind& wind, const std::vector<DatarefValue>& values) {
+bool matches(const UniformWind& wind, const std::vector<DatarefValue>& values) {
   if (values.size() != 2 || !values[0] || !values[1]) return false;
   const auto vector = [](double speed, double from_deg) {
     return windNedFromDirection(from_deg * kRadiansPerDegree, speed);
@@ -148,7 +148,7 @@ std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion
   return out;
 }
 
-bool shows(const DatarefWrite& loading, double shown) {
+bool matches(const DatarefWrite& loading, double shown) {
   const auto wanted = static_cast<double>(loading.value);
   const double tolerance = isCg(loading.dataref) ? kCgTolerance : kMassTolerance + kMassShare * wanted;
   return std::abs(shown - wanted) <= tolerance;

@@ -76,7 +76,7 @@ bool AircraftIdentityReader::add(const std::vector<DatarefValue>& values) {
 bool AircraftIdentityReader::take(const std::vector<float>& characters) {
   AircraftIdentity identity{textFrom(characters, 0, kIcaoLength),
                             textFrom(characters, kIcaoLength, kDescriptionLength)};
-  ++told_;
+  ++answers_;
   if (identity == identity_) {
     return false;
   }

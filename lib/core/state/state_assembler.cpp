@@ -189,7 +189,7 @@ PositionFix FlightStateAssembler::choosePosition(std::int64_t receive_ns) {
       (coarse.source == PositionSource::kNone || distance(local.place, coarse.place) < kFloat32Tolerance);
   if (!plausible) local = PositionFix{};
   if (plausible) position_check_.addComputed(local.place);
-  const PositionFix rpos = fromAid(rpos_, PositionSource::kRpos, receive_ns);
+  const PositionFix rpos = fromExternalPosition(rpos_, PositionSource::kRpos, receive_ns);
 
   switch (options_.position) {
     case PositionMode::kLocal:
@@ -197,7 +197,7 @@ PositionFix FlightStateAssembler::choosePosition(std::int64_t receive_ns) {
     case PositionMode::kRpos:
       return rpos;
     case PositionMode::kXpc:
-      return fromAid(xpc_, PositionSource::kXpc, receive_ns);
+      return fromExternalPosition(xpc_, PositionSource::kXpc, receive_ns);
     case PositionMode::kFloat32:
       return coarse;
     case PositionMode::kAuto:
@@ -213,13 +213,14 @@ PositionFix FlightStateAssembler::choosePosition(std::int64_t receive_ns) {
   return coarse;
 }
 
-PositionFix FlightStateAssembler::fromAid(const Aid& aid, PositionSource source, std::int64_t receive_ns) const {
-  const double age = toSeconds(receive_ns - aid.receive_ns);
-  if (!aid.known || std::abs(age) > options_.max_aid_age) return {};
-  // The aid has no simulator time: it is moved by its age along the velocity. Origin axes do, over so short a way.
+PositionFix FlightStateAssembler::fromExternalPosition(const ExternalPosition& position, PositionSource source,
+                                                       std::int64_t receive_ns) const {
+  const double age = toSeconds(receive_ns - position.receive_ns);
+  if (!position.known || std::abs(age) > options_.max_external_position_age) return {};
+  // The position has no simulator time: it is moved by its age along the velocity. Origin axes do, over so short a way.
   const Eigen::Vector3d velocity = enuFromOpengl(inputs_.local_velocity);
-  if (!velocity.allFinite()) return {aid.place, source};
-  return {TangentFrame(aid.place, usableEarthRadius(inputs_)).geoPoint(velocity * age), source};
+  if (!velocity.allFinite()) return {position.place, source};
+  return {TangentFrame(position.place, usableEarthRadius(inputs_)).geoPoint(velocity * age), source};
 }
 
 bool FlightStateAssembler::jumped(const FlightState& state) const {

@@ -21,7 +21,7 @@ LockstepOptions loadLockstep(const ParamLoader& shared, const CommonOptions& com
   const ParamLoader in = shared.section("lockstep");
   LockstepOptions out;
   out.enabled = in.boolean("enabled", out.enabled);
-  out.participants = in.texts("participants");
+  out.participants = in.textList("participants");
   out.stick = in.text("stick", out.stick);
   out.hold = in.boolean("hold", out.hold);
   out.watchdog = in.number("watchdog", {1.0, 86400.0}, out.watchdog);

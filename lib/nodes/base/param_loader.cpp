@@ -270,7 +270,7 @@ std::vector<double> ParamLoader::numbers(const std::string& key, Range<double> r
   return result;
 }
 
-std::vector<std::string> ParamLoader::texts(const std::string& key) const {
+std::vector<std::string> ParamLoader::textList(const std::string& key) const {
   std::vector<std::string> result;
   if (const XmlRpcValue* list = find(key)) {
     if (list->getType() != XmlRpcValue::TypeArray) {

@@ -124,19 +124,19 @@ void CaptureNode::joinThreads() {
 void CaptureNode::captureLoop() {
   prctl(PR_SET_NAME, "capture");
   const std::unique_ptr<vision::FrameSource> source = makeSource(options_, clock().system_ns);
-  std::string problem_said;
+  std::string logged_problem;
   while (!stop_) {
     vision::Change change;
     const vision::WaitResult result = source->waitChange(kSourceWait, change);
     if (result == vision::WaitResult::kChange) takePicture(source.get(), change);
     const std::string problem = source->problem();
-    if (problem != problem_said) {
+    if (problem != logged_problem) {
       if (problem.empty()) {
         ROS_INFO_STREAM("capturing " << source->describe());
       } else {
         ROS_WARN_STREAM("no picture: " << problem);
       }
-      problem_said = problem;
+      logged_problem = problem;
     }
     {
       const std::lock_guard<std::mutex> lock(capture_mutex_);
@@ -206,7 +206,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     grabbed.dropped = dropped_;
   }
   last_ = grabbed;
-  publisher_->giveDroppingOldest(std::move(grabbed));
+  publisher_->pushDroppingOldest(std::move(grabbed));
 }
 
 void CaptureNode::repeatFrozen(std::int64_t now_ns) {
@@ -223,7 +223,7 @@ void CaptureNode::repeatFrozen(std::int64_t now_ns) {
   grabbed.size = last_.size;
   grabbed.display_ns = grabbed.grab_ns = now_ns;
   grabbed.frozen = true;
-  publisher_->giveDroppingOldest(std::move(grabbed));
+  publisher_->pushDroppingOldest(std::move(grabbed));
 }
 
 bool CaptureNode::anybodyListens() const {
@@ -286,7 +286,7 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
     cv::Mat pixels(options_.height, options_.width, CV_8UC3, image->data.data());
     scaler_->scale(grabbed->pixels, pixels);
     if (raw) image_publisher_.publish(image);
-    if (jpeg && !verbatim) encoder_->giveDroppingOldest(image);
+    if (jpeg && !verbatim) encoder_->pushDroppingOldest(image);
   }
   info_publisher_.publish(info);
   pairing_->addPicture(

@@ -55,7 +55,7 @@ JoyFunctions::JoyFunctions(std::vector<JoyFunction> functions, Report report)
       report_(std::move(report)),
       worker_(kMostWaiting, [this](std::size_t index) { carryOut(index); }) {}
 
-void JoyFunctions::press(std::size_t function) { worker_.giveDroppingOldest(function); }
+void JoyFunctions::press(std::size_t function) { worker_.pushDroppingOldest(function); }
 
 void JoyFunctions::carryOut(std::size_t index) {
   const JoyFunction& function = functions_[index];

@@ -329,7 +329,7 @@ void RxNode::publishLinkState(const core::LinkStatus& status) {
 }
 
 void RxNode::publishExperiment() {
-  if (!adopted_version_ || aircraft_.told() == 0 || settings_.values().empty()) {
+  if (!adopted_version_ || aircraft_.answers() == 0 || settings_.values().empty()) {
     return;
   }
   experiment_->publish(*adopted_version_, aircraft_.identity(), settings_, stampNow());

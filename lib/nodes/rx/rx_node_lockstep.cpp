@@ -47,7 +47,7 @@ bool RxNode::frameReady(const core::LockstepFrame& frame) {
   const bool current = std::all_of(streams_.begin(), streams_.end(), [](const auto& stream) { return stream.current; });
   const bool checked = flight_->positionCheck().verdict() != core::PositionCheck::Verdict::kUnknown &&
                        (rpos_rate_ == 0 || rpos_rate_ == core::kEveryFrameRateHz);
-  const bool known = aircraft_.told() > 0 && !settings_.values().empty();
+  const bool known = aircraft_.answers() > 0 && !settings_.values().empty();
   return adopted_version_ && known && current && (checked || !flight_->wantsRpos()) && last_state_ &&
          last_state_->has(core::FlightState::kValidAttitude | core::FlightState::kValidPosition);
 }

@@ -34,7 +34,7 @@ void loadChannels(const ParamLoader& aircraft, bool reverse_thrust, core::Arbite
 
 void loadAircraft(const ParamLoader& in, ActuationOptions* out) {
   ControlPathOptions& control = out->control;
-  control.aircraft = in.texts("identity");
+  control.aircraft = in.textList("identity");
   control.reverse_thrust = in.boolean("reverse_thrust", false);
   control.arbiter.engines = in.integer("engines", {1, core::kMaxEngines});
   loadChannels(in, control.reverse_thrust, &control.arbiter);

@@ -81,7 +81,7 @@ class _Node:
             now = time.monotonic()
             if now >= next_diagnostics:
                 next_diagnostics = now + _DIAGNOSTICS_S
-                self._tell()
+                self._publish_diagnostics()
             for state in self._reader.handle(self._wait(self._reader.patience(now)), time.monotonic()):
                 self._publish(state)
 
@@ -97,7 +97,7 @@ class _Node:
         self._joy.publish(message)
         self._count += 1
 
-    def _tell(self) -> None:
+    def _publish_diagnostics(self) -> None:
         from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
         message = self._diagnostics.data_class()

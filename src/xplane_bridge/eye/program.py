@@ -134,7 +134,7 @@ class Eye:
                     self._sender.tell(self._problem())
                     self._send_decided()
                     self._watch_delay()
-                    self._tell_remark()
+                    self._report_remark()
                     time.sleep(_LOOK_S)
             finally:
                 self._grabber.stop()
@@ -224,7 +224,7 @@ class Eye:
             self._calibration = calibration
         return calibration
 
-    def _tell_remark(self) -> None:
+    def _report_remark(self) -> None:
         if self._grabber.remark != self._remark:
             self._remark = self._grabber.remark
             if self._remark:

@@ -94,7 +94,7 @@ class Sender:
         with contextlib.suppress(BlockingIOError):
             self._waker.send(b"x")
 
-    def _tell_people(self, text: str) -> None:
+    def _report(self, text: str) -> None:
         if text != self._said:
             self._said = text
             self._say(text)
@@ -108,10 +108,10 @@ class Sender:
                     _Session(self, connection).run()
             except _WelcomedError as ended:
                 pause_s = _RETRY_S[0]
-                self._tell_people(f"capture_node at {where} is gone ({ended}); looking for it again")
+                self._report(f"capture_node at {where} is gone ({ended}); looking for it again")
             except (OSError, wire.WireError) as error:
                 reason = getattr(error, "strerror", None) or str(error)
-                self._tell_people(f"capture_node at {where} does not take pictures ({reason}); trying again")
+                self._report(f"capture_node at {where} does not take pictures ({reason}); trying again")
             end = time.monotonic() + pause_s
             while not self._stop and time.monotonic() < end:
                 time.sleep(0.05)
@@ -139,7 +139,7 @@ class _Session:
         """Ends by an exception, or when the sender ends."""
         try:
             self._connection.sendall(self._sender._hello)
-            told_s = time.monotonic()
+            last_status_s = time.monotonic()
             while not self._sender._stop:
                 readable, _, _ = select.select([self._connection, self._sender._awake], [], [], _STATUS_S)
                 if self._sender._awake in readable:
@@ -147,8 +147,8 @@ class _Session:
                 if self._connection in readable:
                     self._take_replies(self._connection.recv(4096))
                 self._send_newest()
-                if time.monotonic() - told_s >= _STATUS_S and self._welcome:
-                    told_s = time.monotonic()
+                if time.monotonic() - last_status_s >= _STATUS_S and self._welcome:
+                    last_status_s = time.monotonic()
                     self._connection.sendall(wire.encode_status(self._sender._window, self._sender._problem))
         except OSError as error:
             if self._welcome:
@@ -164,7 +164,7 @@ class _Session:
             if reply.code == wire.WELCOME:
                 self._welcome = True
                 self._credit = CREDIT
-                self._sender._tell_people("capture_node at {}:{} takes pictures".format(*self._sender._receiver))
+                self._sender._report("capture_node at {}:{} takes pictures".format(*self._sender._receiver))
             else:
                 self._credit = min(self._credit + 1, CREDIT)
 

@@ -70,7 +70,7 @@ class TopicSummary:
 # ------------------------------------------------------------------------------------------------------- the table
 
 #: What tells most of a message, by its type: label, column, factor, digits. Other types show their first columns.
-_TELLING: Mapping[str, Sequence[Tuple[str, str, Optional[float], int]]] = {
+_SUMMARY_COLUMNS: Mapping[str, Sequence[Tuple[str, str, Optional[float], int]]] = {
     "xplane_bridge/FlightState": (
         ("alt", "altitude_msl", 1.0, 0),
         ("roll", "roll_deg", 1.0, 1),
@@ -126,13 +126,13 @@ def summarise_table(table: Table) -> TopicSummary:
         rate = len(steps) / ((table.time[-1] - table.time[0]) / 1e9) if len(steps) > 1 else math.nan
         longest = float(steps.max())
         gaps = int(np.count_nonzero(steps > 1.5 * np.median(steps)))
-    first, last = (_telling(table, row) for row in (0, -1))
+    first, last = (_row_summary(table, row) for row in (0, -1))
     return TopicSummary(table.topic, table.msgtype, len(table), rate, gaps, longest, first, last)
 
 
-def _telling(table: Table, row: int) -> str:
+def _row_summary(table: Table, row: int) -> str:
     parts = (
-        _TELLING.get(table.msgtype)
+        _SUMMARY_COLUMNS.get(table.msgtype)
         or [
             (name.rsplit(".", 1)[-1], name, 1.0, 2)
             for name, column in table.columns.items()

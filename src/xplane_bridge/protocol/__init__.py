@@ -1,6 +1,6 @@
 """X-Plane's UDP protocol: messages, their bytes, and the rows of the Data Output table.
 
-Written from the protocol reference alone, independently of the C++ codec; both are held to the same golden packets.
+Written from docs/protocol.md alone, independently of the C++ codec; both are held to the same golden packets.
 """
 
 from xplane_bridge.protocol.constants import *  # noqa: F403

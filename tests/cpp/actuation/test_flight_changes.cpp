@@ -493,7 +493,7 @@ TEST_F(FlightChangesTest12, AircraftThatIsNotThereIsTold) {
 }
 
 TEST_F(FlightChangesTest12, AircraftThatXPlaneDoesNotTellIsAFailure) {
-  flight_.tells_aircraft = false;
+  flight_.shows_aircraft = false;
   expectFailure(changes_.applyAircraft("Aircraft/Other/other.acf", 0), EventKind::kAircraft,
                 "X-Plane has loaded it, but does not tell which aircraft it is");
 }

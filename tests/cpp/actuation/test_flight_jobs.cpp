@@ -22,7 +22,7 @@ constexpr const char* kPath = "Aircraft/Other/other.acf";
 /// The fake X-Plane is touched by the jobs' thread only, once there are jobs.
 class FlightJobsTest : public testing::Test {
  protected:
-  struct Told {
+  struct Outcome {
     std::uint32_t number;
     std::string text;
     std::string who;
@@ -45,7 +45,7 @@ class FlightJobsTest : public testing::Test {
     out.aircraft = [this] { return aircraft_(); };
     out.suspend_control = [this](const std::string& reason) {
       if (reason.empty()) return;
-      movers_.push_back(jobs_.mover());
+      callers_.push_back(jobs_.movingCaller());
       at_it_.set_value();
       released_.wait();
     };
@@ -53,28 +53,28 @@ class FlightJobsTest : public testing::Test {
     return out;
   }
   /// The events, once there are so many.
-  std::vector<Told> told(std::size_t count) {
+  std::vector<Outcome> outcomes(std::size_t count) {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [&] { return told_.size() >= count; });
-    return told_;
+    changed_.wait(lock, [&] { return outcomes_.size() >= count; });
+    return outcomes_;
   }
 
   core::FakeSimulator sim_{core::kXPlane12};
   core::FakeFlight flight_{&sim_};
   std::function<std::string()> aircraft_ = [] { return "OTHER"; };
-  std::vector<std::string> movers_;  // while an aircraft is being loaded
-  std::promise<void> at_it_;         // the loading of an aircraft has begun, and waits for
+  std::vector<std::string> callers_;  // while an aircraft is being loaded
+  std::promise<void> at_it_;          // the loading of an aircraft has begun, and waits for
   std::promise<void> go_on_;
   std::shared_future<void> released_ = go_on_.get_future().share();
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<Told> told_;
+  std::vector<Outcome> outcomes_;
   FlightJobs jobs_{&sim_,
                    {2.0, 20.0},
                    hooks(),
                    [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
                      std::lock_guard<std::mutex> lock(mutex_);
-                     told_.push_back({number, outcome.text, who, outcome.success});
+                     outcomes_.push_back({number, outcome.text, who, outcome.success});
                      changed_.notify_all();
                    }};
 };
@@ -82,7 +82,7 @@ class FlightJobsTest : public testing::Test {
 TEST_F(FlightJobsTest, JobsAreDoneInOrderEachWithItsNumber) {
   jobs_.saveSituation("Output/a.sit", 7, "node/save_state");
   jobs_.saveSituation("Output/b.sit", 9, "other");
-  const auto events = told(2);
+  const auto events = outcomes(2);
   EXPECT_EQ(events[0].number, 7U);
   EXPECT_EQ(events[0].who, "node/save_state");
   EXPECT_NE(events[0].text.find("Output/a.sit"), std::string::npos);
@@ -92,15 +92,15 @@ TEST_F(FlightJobsTest, JobsAreDoneInOrderEachWithItsNumber) {
 }
 
 TEST_F(FlightJobsTest, WhoMovesTheAircraftIsKnownForAsLong) {
-  EXPECT_EQ(jobs_.mover(), "");
+  EXPECT_EQ(jobs_.movingCaller(), "");
   jobs_.loadAircraft(kPath, 0, 1, "node/load_aircraft");
   at_it_.get_future().wait();
-  EXPECT_EQ(jobs_.mover(), "node/load_aircraft");
+  EXPECT_EQ(jobs_.movingCaller(), "node/load_aircraft");
   go_on_.set_value();
-  EXPECT_EQ(told(1)[0].text, std::string("loaded ") + kPath + ": OTHER");
+  EXPECT_EQ(outcomes(1)[0].text, std::string("loaded ") + kPath + ": OTHER");
   jobs_.saveSituation("Output/a.sit", 2, "node/save_state");
-  told(2);
-  EXPECT_EQ(jobs_.mover(), "") << "saving moves nothing";
+  outcomes(2);
+  EXPECT_EQ(jobs_.movingCaller(), "") << "saving moves nothing";
   go_on_ = std::promise<void>();
 }
 
@@ -123,9 +123,9 @@ TEST_F(FlightJobsTest, StopEndsTheOneAtItAndDropsTheOthers) {
   while (!jobs_.full()) std::this_thread::yield();  // until the stop has been asked for
   go_on_.set_value();
   stopping.join();
-  ASSERT_EQ(told_.size(), 1U);
-  EXPECT_FALSE(told_[0].success);
-  EXPECT_NE(told_[0].text.find(" (tx_node ends)"), std::string::npos) << told_[0].text;
+  ASSERT_EQ(outcomes_.size(), 1U);
+  EXPECT_FALSE(outcomes_[0].success);
+  EXPECT_NE(outcomes_[0].text.find(" (tx_node ends)"), std::string::npos) << outcomes_[0].text;
   jobs_.saveSituation("Output/b.sit", 3, "node/save_state");
   EXPECT_EQ(flight_.sent("SIMO"), 0U);
   go_on_ = std::promise<void>();
@@ -146,7 +146,7 @@ TEST_F(FlightJobsTest, EachKindIsDoneAndSaysWhich) {
   jobs_.setWeather(weather, 4, "d");
   jobs_.loadSituation("Output/a.sit", 5, "e");
   // This X-Plane has neither weather nor clock nor scales, and not that file.
-  const auto events = told(5);
+  const auto events = outcomes(5);
   const std::vector<std::string> kinds = {"set_wind", "set_loading", "set_time", "set_weather", "load_state"};
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     EXPECT_EQ(events[i].number, i + 1);
@@ -165,7 +165,7 @@ TEST_F(FlightJobsTest, FlightIsPlacedByAJobToo) {
   go_on_.set_value();
   at_it_ = std::promise<void>();
   jobs_.reset(start, 3, "node/reset_flight");
-  const auto events = told(1);
+  const auto events = outcomes(1);
   EXPECT_EQ(events[0].number, 3U);
   EXPECT_TRUE(events[0].success) << events[0].text;
   EXPECT_GT(flight_.sent("VEHS"), 0U);
@@ -200,7 +200,7 @@ TEST_F(FlightJobsTest, ErrorEndsItsJobOnly) {
   go_on_.set_value();
   jobs_.loadAircraft(kPath, 0, 1, "node/load_aircraft");
   jobs_.saveSituation("Output/a.sit", 2, "node/save_state");
-  const auto events = told(2);
+  const auto events = outcomes(2);
   EXPECT_EQ(events[0].text, "node/load_aircraft: the disk is full");
   EXPECT_FALSE(events[0].success);
   EXPECT_TRUE(events[1].success);

@@ -9,7 +9,7 @@
 
 namespace xplane_bridge::core {
 
-/// Bytes of a datagram and how the tests make them, from the layout in the protocol reference.
+/// Bytes of a datagram and how the tests make them, from the layout in docs/protocol.md.
 struct Datagram {
   std::vector<std::uint8_t> bytes;
 

@@ -56,7 +56,7 @@ class FakeFlight {
   bool pauses = false;           // beginning a flight pauses
   bool ignores_pause = false;
   bool has_files = true;       // aircraft and situations that are asked for are there
-  bool tells_aircraft = true;  // and which it is, afterwards
+  bool shows_aircraft = true;  // and which it is, afterwards
 
   // What the test looks at.
 
@@ -104,7 +104,7 @@ class FakeFlight {
       for (const auto& message : std::exchange(queue_, {})) act(message);
       if (silent()) return;
     }
-    if (tells_aircraft && ++frames_ % 50 == 0) ++identities;
+    if (shows_aircraft && ++frames_ % 50 == 0) ++identities;
     if (detector_.add(watch())) ++resets_;
     if (!paused_) {
       sim_->set(kFlightTime, sim_->value(kFlightTime) + static_cast<float>(FakeSimulator::kFrame));

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the golden packets that were never captured (numbers 20 and up) and their decoded values.
 
-Written from the protocol reference with nothing but struct: neither the C++ nor the Python codec of this project is
+Written from docs/protocol.md with nothing but struct: neither the C++ nor the Python codec of this project is
 used, so that both can be held to the result. Run it only to add a packet; the files are kept in the repository.
 """
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes xp11.json and xp12.json: a stretch of flight as the emulator sends it, with the truth beside it.
 
-The emulator's codec, earth and axes are written from the protocol reference apart from the C++ core, so these files
+The emulator's codec, earth and axes are written from docs/protocol.md apart from the C++ core, so these files
 hold the core's decoding and computing to a second opinion. They change only when this program is run:
 
     field_table_doc --requests > REQUESTS

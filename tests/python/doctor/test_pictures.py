@@ -29,8 +29,8 @@ def seen_with(frames_by_reading, frames_by_picture, patience_s=30.0):
 def test_a_picture_that_changes_is_told_from_one_that_stays_for_two_frames(frames_by_reading):
     changing, staying = seen_with(frames_by_reading, 1), seen_with(frames_by_reading, 2)
     assert min(changing.frames, staying.frames) >= WANTED
-    assert changing.changes == changing.told_apart
-    assert staying.changes < 0.7 * staying.told_apart
+    assert changing.changes == changing.distinct
+    assert staying.changes < 0.7 * staying.distinct
 
 
 def test_readings_in_bursts_do_not_count_as_pictures_that_stay():
@@ -43,4 +43,4 @@ def test_readings_in_bursts_do_not_count_as_pictures_that_stay():
 def test_a_busy_while_is_left_out():
     seen = seen_with((5,) * 20 + (1,) * 100, 2)
     assert seen.frames >= WANTED
-    assert seen.changes < 0.7 * seen.told_apart
+    assert seen.changes < 0.7 * seen.distinct

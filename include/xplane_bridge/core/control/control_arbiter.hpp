@@ -118,7 +118,7 @@ class ControlArbiter {
   ControlArbiter(const ArbiterOptions& options, double now);
 
   /// True while X-Plane runs: connected, not paused, not stale. Otherwise no time-out advances and no slew moves.
-  void setFlowing(bool flowing, double now);
+  void setTimeRunning(bool running, double now);
 
   /// A command that arrived at `now`. A refused one changes nothing: the last good command goes on until its time-out.
   std::optional<CommandRefusal> onCommand(FlightMode from, const ControlCommand& command, double now);
@@ -131,7 +131,7 @@ class ControlArbiter {
   /// They were given up by those who command them.
   void endSurfaces() { surfaces_until_ = kNever; }
   /// Single surfaces are commanded, as of the last call.
-  bool surfacesFly() const { return surfaces_until_ > flow_time_; }
+  bool surfacesFly() const { return surfaces_until_ > running_time_; }
 
   RequestOutcome onModeRequest(const ModeRequest& request, double now);
 
@@ -156,7 +156,7 @@ class ControlArbiter {
 
   struct Source {
     ChannelValues values{};
-    std::array<double, kChannelCount> expires;  // on the flowing clock; kNever: not commanded
+    std::array<double, kChannelCount> expires;  // by running_time_; kNever: not commanded
     double alive_until = kNever;
     double arrival = 0.0;
     std::uint32_t sequence = 0;
@@ -171,8 +171,8 @@ class ControlArbiter {
 
   Source& sourceOf(FlightMode mode) { return sources_[mode == FlightMode::kManual ? 0 : 1]; }
   const Source& sourceOf(FlightMode mode) const { return sources_[mode == FlightMode::kManual ? 0 : 1]; }
-  bool fresh(FlightMode mode, std::size_t channel) const { return sourceOf(mode).expires[channel] > flow_time_; }
-  bool alive(FlightMode mode) const { return sourceOf(mode).alive_until > flow_time_; }
+  bool fresh(FlightMode mode, std::size_t channel) const { return sourceOf(mode).expires[channel] > running_time_; }
+  bool alive(FlightMode mode) const { return sourceOf(mode).alive_until > running_time_; }
   void advance(double now);
   void watchStick(const ChannelSet& commanded, const ChannelValues& values, bool was_alive, double now);
   void dropOtherThrottleKind();
@@ -186,15 +186,15 @@ class ControlArbiter {
 
   ArbiterOptions options_;
   std::array<Source, 2> sources_;
-  bool flowing_ = true;
+  bool time_running_ = true;
   double now_;
-  double flow_time_ = 0.0;       // [s] runs only while flowing
-  double last_step_flow_ = 0.0;  // flow_time_ of the previous step
+  double running_time_ = 0.0;    // [s] advances while X-Plane runs, see setTimeRunning
+  double last_step_time_ = 0.0;  // running_time_ of the previous step
   std::array<double, kChannelCount> output_{};
   std::array<Origin, kChannelCount> origin_{};
   std::bitset<kChannelCount> blending_;  // changes hands: transition_rate applies until it has caught up
   std::array<double, 3> stick_reference_;
-  double surfaces_until_ = kNever;  // on the flowing clock
+  double surfaces_until_ = kNever;  // by running_time_
   bool heard_ = false;              // the topic of the mode, since the mode was asked for
   bool surfaces_heard_ = false;     // control/surfaces, likewise
   struct Seen {

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Channels to X-Plane's datarefs: the one place that knows their names (protocol.md 8.1).
+/// Channels to X-Plane's datarefs: the one place that knows their names (docs/protocol.md 8.1).
 
 #include <string>
 #include <vector>
@@ -52,7 +52,7 @@ std::string readBackDataref(Channel channel, const EncoderOptions& options);
 /// Overrides the commanded channels need, each once, in a fixed order; behind them the DATA rows that hold them.
 std::vector<std::string> requiredOverrides(const ChannelSet& channels, const EncoderOptions& options);
 
-/// Overrides whose effect is on all surfaces (protocol.md 8.2).
+/// Overrides whose effect is on all surfaces (docs/protocol.md 8.2).
 extern const char* const kSurfaceOverride;
 
 /// A throttle for all engines in place of their levers'; -2 gives it back.
@@ -73,7 +73,7 @@ class ControlEncoder {
   void encode(const ChannelValues& values, const ChannelSet& channels, std::vector<DatarefWrite>& out) const;
 
   /// True if X-Plane's `shown` is the `sent` value of `channel`.
-  bool shows(Channel channel, double sent, double shown) const;
+  bool matches(Channel channel, double sent, double shown) const;
 
  private:
   EncoderOptions options_;

@@ -54,6 +54,6 @@ std::vector<AutopilotStep> autopilotSteps(const AutopilotSetting& setting, const
 /// What must be remembered to put it back by writing.
 std::vector<SettingWrite> autopilotRestored(const AutopilotSetting& setting, SimulatorVersion version);
 /// @param values of step.shown
-bool shows(const AutopilotStep& step, const std::vector<DatarefValue>& values);
+bool matches(const AutopilotStep& step, const std::vector<DatarefValue>& values);
 
 }  // namespace xplane_bridge::core

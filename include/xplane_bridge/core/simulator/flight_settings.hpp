@@ -33,7 +33,7 @@ std::vector<DatarefWrite> windWrites(const UniformWind& wind, SimulatorVersion v
 /// Speed [m/s] and direction [deg, from, true] of the air at the aircraft.
 std::vector<std::string> shownWindDatarefs(SimulatorVersion version);
 /// The values of shownWindDatarefs() are this wind, gusts of its turbulence allowed.
-bool shows(const UniformWind& wind, const std::vector<DatarefValue>& values);
+bool matches(const UniformWind& wind, const std::vector<DatarefValue>& values);
 
 // --- loading ---
 
@@ -57,7 +57,7 @@ inline std::vector<DatarefWrite> loadingShown(const Loading& loading, SimulatorV
   return loadingWrites(loading, version);
 }
 /// One of loadingShown() is shown [? stations]; engines burn fuel meanwhile.
-bool shows(const DatarefWrite& loading, double shown);
+bool matches(const DatarefWrite& loading, double shown);
 
 // --- files ---
 

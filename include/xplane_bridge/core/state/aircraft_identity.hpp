@@ -38,8 +38,8 @@ class AircraftIdentityReader {
   const AircraftIdentity& identity() const { return identity_; }
   /// The same, from single values of datarefs(), in that order; false while one is missing.
   bool add(const std::vector<DatarefValue>& values);
-  /// Answers that have told an identity, the same or another.
-  unsigned told() const { return told_; }
+  /// Answers that held an identity, the same or another.
+  unsigned answers() const { return answers_; }
   /// An identity with at least one character has come.
   bool known() const { return !identity_.icao.empty() || !identity_.description.empty(); }
   /// The subscription starts anew; the identity is kept until another one comes.
@@ -50,7 +50,7 @@ class AircraftIdentityReader {
 
   RrefFrameAssembler frames_;
   AircraftIdentity identity_;
-  unsigned told_ = 0;
+  unsigned answers_ = 0;
 };
 
 }  // namespace xplane_bridge::core

@@ -32,11 +32,11 @@ struct GeoPoint {
   double height = 0.0;  ///< [m]
 };
 
-/// X-Plane's earth is a sphere of this radius [m] (protocol reference 1.8; `sim/physics/earth_radius_m` says it).
+/// X-Plane's earth is a sphere of this radius [m] (docs/protocol.md 1.8; `sim/physics/earth_radius_m` says it).
 inline constexpr double kEarthRadius = 6378145.0;
 
 /// Signs that turn X-Plane's load values into load factors (axial forward +, side right +, normal up +), in units of g.
-/// DATA row 4 and the datarefs `sim/flightmodel/forces/g_*` differ in the axial sign (protocol reference 1.9)
+/// DATA row 4 and the datarefs `sim/flightmodel/forces/g_*` differ in the axial sign (docs/protocol.md 1.9)
 /// [? axial-sign] [? side-sign]: at rest the axial load factor must be +sin(pitch).
 inline constexpr double kRowAxialSign = +1.0;
 inline constexpr double kRowSideSign = +1.0;

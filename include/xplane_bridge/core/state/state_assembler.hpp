@@ -37,10 +37,10 @@ class FlightStateAssembler {
     SimulatorVersion version;
     PositionMode position = PositionMode::kAuto;
     AttitudeReference row_attitude_reference = kDefaultRowAttitudeReference;
-    double max_supplement_age = 1.0;  ///< kData: values from RREF older than this are unknown [s]
-    double max_aid_age = 0.25;        ///< RPOS and X-Plane Connect positions older than this are not used [s]
-    double jump_distance = 100.0;     ///< off the predicted position by more: a reset [m]
-    double join_window = 0.005;       ///< kRref: pieces of one frame arrive within this [s]
+    double max_supplement_age = 1.0;          ///< kData: values from RREF older than this are unknown [s]
+    double max_external_position_age = 0.25;  ///< RPOS and X-Plane Connect positions older than this are not used [s]
+    double jump_distance = 100.0;             ///< off the predicted position by more: a reset [m]
+    double join_window = 0.005;               ///< kRref: pieces of one frame arrive within this [s]
     ClockFilter::Options clock;
   };
 
@@ -98,7 +98,7 @@ class FlightStateAssembler {
   const Counters& counters() const { return counters_; }
 
  private:
-  struct Aid {
+  struct ExternalPosition {
     GeoPoint place;
     std::int64_t receive_ns = 0;
     bool known = false;
@@ -108,7 +108,8 @@ class FlightStateAssembler {
   const std::vector<float>& unknown(std::size_t size);
   const FlightState* assemble(std::int64_t receive_ns, AttitudeReference attitude_reference);
   PositionFix choosePosition(std::int64_t receive_ns);
-  PositionFix fromAid(const Aid& aid, PositionSource source, std::int64_t receive_ns) const;
+  PositionFix fromExternalPosition(const ExternalPosition& position, PositionSource source,
+                                   std::int64_t receive_ns) const;
   bool jumped(const FlightState& state) const;
   void noteOriginShift();
 
@@ -121,8 +122,8 @@ class FlightStateAssembler {
   PositionCheck position_check_;
   std::optional<TangentFrame> map_;
   std::uint32_t position_epoch_ = 0;
-  Aid rpos_;
-  Aid xpc_;
+  ExternalPosition rpos_;
+  ExternalPosition xpc_;
   FlightInputs inputs_;
   FlightState state_;
   bool has_previous_ = false;  ///< state_ holds a position of the current epoch

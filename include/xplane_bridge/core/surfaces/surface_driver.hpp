@@ -1,6 +1,6 @@
 #pragma once
 
-/// Drives every surface from an identified mixing, some of them broken (protocol.md 8.3, steps 2 and 3).
+/// Drives every surface from an identified mixing, some of them broken (docs/protocol.md 8.3, steps 2 and 3).
 
 #include <optional>
 #include <string>

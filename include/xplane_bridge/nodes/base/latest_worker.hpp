@@ -11,8 +11,8 @@
 
 namespace xplane_bridge {
 
-/// A thread that works on what it is given, newest first in importance: when it cannot keep up, the oldest waiting item
-/// is dropped and counted, and whoever gives never waits.
+/// A thread that works on the items pushed to it: when it cannot keep up, the oldest waiting item
+/// is dropped and counted, and the caller of pushDroppingOldest never waits.
 template <class Item>
 class LatestWorker {
  public:
@@ -26,7 +26,7 @@ class LatestWorker {
   LatestWorker& operator=(const LatestWorker&) = delete;
 
   /// Hands an item over. @return false when an older one had to be dropped for it
-  bool giveDroppingOldest(Item item) {
+  bool pushDroppingOldest(Item item) {
     bool kept_all = true;
     {
       const std::lock_guard<std::mutex> lock(mutex_);

@@ -62,7 +62,7 @@ class ParamLoader {
                      const std::string& fallback) const;
   /// A list; an absent key gives an empty list.
   std::vector<double> numbers(const std::string& key, Range<double> range) const;
-  std::vector<std::string> texts(const std::string& key) const;
+  std::vector<std::string> textList(const std::string& key) const;
 
   /// A struct below this one; empty (has() is false for all) when absent.
   ParamLoader section(const std::string& key) const;

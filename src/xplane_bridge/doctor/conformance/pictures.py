@@ -13,7 +13,7 @@ from xplane_bridge.doctor.observe import windows
 from xplane_bridge.doctor.settings import WINDOW_TITLES
 
 #: A piece of the watch has so many frames, and counts if so many of them fell between two readings of their own.
-_PIECE_FRAMES, _TOLD_APART = 10, 0.8
+_PIECE_FRAMES, _DISTINCT = 10, 0.8
 
 
 @dataclass(frozen=True)
@@ -22,14 +22,14 @@ class Seen:
 
     Attributes:
         frames: Frames in these pieces.
-        told_apart: Readings with a frame since the one before: so many pictures could be told apart.
+        distinct: Readings with a frame since the one before: so many different pictures could be seen.
         changes: How often a reading differed from the one before.
         grabs: All readings, of other pieces too.
         duration_s: Of the whole watch [s].
     """
 
     frames: int
-    told_apart: int
+    distinct: int
     changes: int
     grabs: int
     duration_s: float
@@ -72,7 +72,7 @@ def compare(checks: Iterator[int], new_frames: Callable[[], int], wanted: int, p
         piece = _sum(piece, (came, int(came > 0), int(check != last)))
         last = check
         if piece[0] >= _PIECE_FRAMES:
-            if piece[1] >= _TOLD_APART * piece[0]:
+            if piece[1] >= _DISTINCT * piece[0]:
                 total = _sum(total, piece)
             piece = (0, 0, 0)
     return Seen(*total, grabs, time.monotonic() - begin)

@@ -44,7 +44,7 @@ class DrawnCamera:
 
     lever: np.ndarray  #: from the aircraft's reference point, in its axes [m]
     turn: np.ndarray  #: rotation from the camera's axes into the aircraft's, as drawn
-    told: np.ndarray  #: likewise, as `view_*` tell it
+    reported: np.ndarray  #: likewise, as `view_*` report it
     floor_down: float = 0.0  #: where the cockpit's floor lies, down from the reference point [m]; 0: there is none
 
     @property
@@ -54,7 +54,7 @@ class DrawnCamera:
 
 
 @dataclass(frozen=True)
-class Told:
+class ReportedView:
     """What `view_*` say of a frame: roll, pitch, heading [deg] and X, Y, Z [m]."""
 
     angles: Tuple[float, float, float]
@@ -79,8 +79,8 @@ class Cameras:
         self._key: Optional[Tuple[float, ...]] = None
         self._frame_number = -1
         self._drawn: Optional[DrawnCamera] = None
-        self._told: Optional[Told] = None
-        self._told_before: Optional[Told] = None
+        self._reported: Optional[ReportedView] = None
+        self._reported_before: Optional[ReportedView] = None
 
     def drawn(self, frame: Frame) -> DrawnCamera:
         """The camera that the frame is drawn with."""
@@ -88,12 +88,12 @@ class Cameras:
         assert self._drawn is not None
         return self._drawn
 
-    def told(self, frame: Frame) -> Told:
+    def reported(self, frame: Frame) -> ReportedView:
         """What `view_*` say with that frame; see [? view-angles] for how X-Plane may do otherwise."""
         self._update(frame)
-        told = self._told_before if "view-angles" in self._sim.otherwise else self._told
-        assert told is not None
-        return told
+        reported = self._reported_before if "view-angles" in self._sim.otherwise else self._reported
+        assert reported is not None
+        return reported
 
     def field_of_view(self) -> Tuple[float, float, float, float]:
         """Horizontal angle, vertical angle (0: pixels are square) [deg], shift right and up [widths, heights]."""
@@ -137,17 +137,17 @@ class Cameras:
         if key == self._key and number == self._frame_number:
             return
         camera = self._camera(frame)
-        told = self._tell(frame, camera)
-        if number != self._frame_number or self._told_before is None:
-            self._told_before = self._told or told
-        self._key, self._frame_number, self._drawn, self._told = key, number, camera, told
+        reported = self._report(frame, camera)
+        if number != self._frame_number or self._reported_before is None:
+            self._reported_before = self._reported or reported
+        self._key, self._frame_number, self._drawn, self._reported = key, number, camera, reported
 
-    def _tell(self, frame: Frame, camera: DrawnCamera) -> Told:
+    def _report(self, frame: Frame, camera: DrawnCamera) -> ReportedView:
         if "view-angles" in self._sim.otherwise:  # against the local level
             body = earth.body_to_level(frame.true_phi, frame.true_theta, frame.true_psi)
         else:
             body = earth.body_to_level(frame.phi, frame.theta, frame.psi)
-        return Told(earth.euler_degrees(body @ camera.told), self._position(frame, camera))
+        return ReportedView(earth.euler_degrees(body @ camera.reported), self._position(frame, camera))
 
     def _position(self, frame: Frame, camera: DrawnCamera) -> np.ndarray:
         body = earth.body_to_level(frame.phi, frame.theta, frame.psi)

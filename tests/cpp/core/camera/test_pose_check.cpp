@@ -39,7 +39,7 @@ class Flight {
   double view_type = 1024.0;
   AnglesDeg head{0.0, 0.0, 0.0};
   Eigen::Vector3d lever{0.4, -0.3, -1.0};  // [m] forward, right, down
-  bool eye_told = true;
+  bool eye_known = true;
 
   CameraSample next() {
     CameraSample now;
@@ -67,7 +67,7 @@ class Flight {
     now.head = head;
     const Eigen::Vector3d aircraft_axes{lever.y(), -lever.z(), -lever.x()};  // right, up, aft
     now.head_position = aircraft_axes;
-    if (eye_told) now.eye_position = aircraft_axes;
+    if (eye_known) now.eye_position = aircraft_axes;
     for (AnglesDeg* angles : {&now.view, &now.aircraft, &now.aircraft_true}) {
       *angles = {wire(angles->roll), wire(angles->pitch), wire(angles->heading)};
     }
@@ -128,7 +128,7 @@ TEST(PoseCheck, EvenFramesInLevelFlightAreToldApartByTheEye) {
   flight.expectRight(pose);
 
   Flight blind;  // nothing says where the eye is: the lever arm stands still either way
-  blind.eye_told = false;
+  blind.eye_known = false;
   PoseCheck unsure;
   const core::CheckedPose open = blind.fly(&unsure, 10.0);
   EXPECT_FALSE(open.sure);

@@ -185,10 +185,10 @@ TEST(ControlArbiter, TimersStandStillWhilePausedAndGraceFollows) {
   ControlArbiter arbiter(options, 0.0);
   arbiter.onCommand(kManual, stick(0.4), 0.0);
   arbiter.step(0.3);
-  arbiter.setFlowing(false, 0.3);
+  arbiter.setTimeRunning(false, 0.3);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(100.0)), 0.4);
   EXPECT_TRUE(arbiter.status().manual_alive);
-  arbiter.setFlowing(true, 200.0);
+  arbiter.setTimeRunning(true, 200.0);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(200.99)), 0.4);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(201.01)), 0.0);
 }
@@ -198,8 +198,8 @@ TEST(ControlArbiter, GraceDoesNotReviveWhatWasSilentBeforeThePause) {
   arbiter.onCommand(kManual, stick(0.4), 0.0);
   arbiter.step(0.0);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(0.6)), 0.0);
-  arbiter.setFlowing(false, 0.6);
-  arbiter.setFlowing(true, 0.7);
+  arbiter.setTimeRunning(false, 0.6);
+  arbiter.setTimeRunning(true, 0.7);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(0.8)), 0.0);
   EXPECT_FALSE(arbiter.status().manual_alive);
 }
@@ -210,10 +210,10 @@ TEST(ControlArbiter, SlewStandsStillWhilePaused) {
   ControlArbiter arbiter(options, 0.0);
   arbiter.onCommand(kManual, stick(0.0), 0.0);
   arbiter.step(0.0);
-  arbiter.setFlowing(false, 0.0);
+  arbiter.setTimeRunning(false, 0.0);
   arbiter.onCommand(kManual, stick(1.0), 1.0);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(5.0)), 0.0);
-  arbiter.setFlowing(true, 5.0);
+  arbiter.setTimeRunning(true, 5.0);
   EXPECT_NEAR(roll(arbiter.step(5.2)), 0.2, 1e-12);
 }
 
@@ -468,10 +468,10 @@ TEST(ControlArbiter, SurfacesHaveToBeRepeatedWhileXPlaneRuns) {
   arbiter.onSurfaces(0.0);
   arbiter.step(0.49);
   EXPECT_TRUE(arbiter.surfacesFly());
-  arbiter.setFlowing(false, 0.49);
+  arbiter.setTimeRunning(false, 0.49);
   arbiter.step(10.0);
   EXPECT_TRUE(arbiter.surfacesFly()) << "paused";
-  arbiter.setFlowing(true, 10.0);
+  arbiter.setTimeRunning(true, 10.0);
   arbiter.step(10.9);
   EXPECT_TRUE(arbiter.surfacesFly()) << "a second of grace";
   arbiter.step(11.1);

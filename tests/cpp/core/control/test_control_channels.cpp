@@ -17,7 +17,7 @@ ChannelSet setOf(std::initializer_list<Channel> channels) {
 }
 
 TEST(ControlChannels, WritesTheDatarefsOfTheReference) {
-  // protocol.md 8.1, X-Plane 11 column.
+  // docs/protocol.md 8.1, X-Plane 11 column.
   const std::map<Channel, std::string> expected = {
       {Channel::kRoll, "sim/joystick/yoke_roll_ratio"},
       {Channel::kPitch, "sim/joystick/yoke_pitch_ratio"},
@@ -103,11 +103,11 @@ TEST(ControlChannels, HandlesAreSentOnChangeAndOverriddenChannelsContinuously) {
 
 TEST(ControlChannels, ReadBackAllowsForFloat32AndDetents) {
   const ControlEncoder encoder(kXp11);
-  EXPECT_TRUE(encoder.shows(Channel::kRoll, 0.1, static_cast<double>(0.1f)));
-  EXPECT_FALSE(encoder.shows(Channel::kRoll, 0.1, 0.1001));
-  EXPECT_TRUE(encoder.shows(Channel::kFlaps, 0.33, 0.3333));
-  EXPECT_FALSE(encoder.shows(Channel::kFlaps, 0.33, 0.5));
-  EXPECT_TRUE(encoder.shows(Channel::kGear, 0.7, 1.0));
+  EXPECT_TRUE(encoder.matches(Channel::kRoll, 0.1, static_cast<double>(0.1f)));
+  EXPECT_FALSE(encoder.matches(Channel::kRoll, 0.1, 0.1001));
+  EXPECT_TRUE(encoder.matches(Channel::kFlaps, 0.33, 0.3333));
+  EXPECT_FALSE(encoder.matches(Channel::kFlaps, 0.33, 0.5));
+  EXPECT_TRUE(encoder.matches(Channel::kGear, 0.7, 1.0));
 }
 
 }  // namespace

@@ -81,13 +81,13 @@ TEST(Autopilot, SwitchesComeInTheirOrderEachWithWhatShowsIt) {
   EXPECT_EQ(shown, (std::vector<std::string>{kAutopilotMaster, kFolder + "heading_status", kFolder + "vvi_status",
                                              kFolder + "altitude_hold_armed", kFolder + "autothrottle_enabled",
                                              "sim/cockpit2/switches/yaw_damper_on"}));
-  EXPECT_TRUE(shows(steps[1], {1.0F})) << "armed";
-  EXPECT_TRUE(shows(steps[1], {2.0F})) << "captured";
-  EXPECT_FALSE(shows(steps[1], {0.0F}));
-  EXPECT_FALSE(shows(steps[1], {std::nullopt}));
-  EXPECT_TRUE(shows(steps[3], {0.0F, 2.0F})) << "the altitude is captured already";
-  EXPECT_TRUE(shows(steps[5], {0.0F}));
-  EXPECT_FALSE(shows(steps[5], {1.0F}));
+  EXPECT_TRUE(matches(steps[1], {1.0F})) << "armed";
+  EXPECT_TRUE(matches(steps[1], {2.0F})) << "captured";
+  EXPECT_FALSE(matches(steps[1], {0.0F}));
+  EXPECT_FALSE(matches(steps[1], {std::nullopt}));
+  EXPECT_TRUE(matches(steps[3], {0.0F, 2.0F})) << "the altitude is captured already";
+  EXPECT_TRUE(matches(steps[5], {0.0F}));
+  EXPECT_FALSE(matches(steps[5], {1.0F}));
 }
 
 TEST(Autopilot, FlightDirectorIsReachedFromBothSides) {
@@ -96,8 +96,8 @@ TEST(Autopilot, FlightDirectorIsReachedFromBothSides) {
   EXPECT_EQ(autopilotSteps(director, 0.0F)[0].command, "sim/autopilot/fdir_on");
   const AutopilotStep down = autopilotSteps(director, 2.0F)[0];
   EXPECT_EQ(down.command, "sim/autopilot/servos_off_any");
-  EXPECT_FALSE(shows(down, {2.0F}));
-  EXPECT_TRUE(shows(down, {1.0F}));
+  EXPECT_FALSE(matches(down, {2.0F}));
+  EXPECT_TRUE(matches(down, {1.0F}));
 }
 
 TEST(Autopilot, EveryModeHasACommandOfItsOwn) {

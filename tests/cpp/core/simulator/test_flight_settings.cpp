@@ -49,13 +49,13 @@ TEST(UniformWind, GoesToTheOldNamesWhereThereAreNoRegionsYet) {
 
 TEST(UniformWind, IsShownByTheAirAtTheAircraft) {
   const UniformWind north{10.0, 350.0, 0.0};
-  EXPECT_TRUE(shows(north, {10.2F, 351.0F}));
-  EXPECT_FALSE(shows(north, {10.0F, 20.0F}));
-  EXPECT_FALSE(shows(north, {9.0F, 350.0F}));
-  EXPECT_FALSE(shows(north, {10.0F, std::nullopt}));
-  EXPECT_TRUE(shows({10.0, 360.0, 0.0}, {10.0F, 0.0F}));
-  EXPECT_TRUE(shows({0.0, 90.0, 0.0}, {0.0F, 0.0F})) << "calm has no direction";
-  EXPECT_TRUE(shows({10.0, 350.0, 0.2}, {12.0F, 340.0F})) << "gusts";
+  EXPECT_TRUE(matches(north, {10.2F, 351.0F}));
+  EXPECT_FALSE(matches(north, {10.0F, 20.0F}));
+  EXPECT_FALSE(matches(north, {9.0F, 350.0F}));
+  EXPECT_FALSE(matches(north, {10.0F, std::nullopt}));
+  EXPECT_TRUE(matches({10.0, 360.0, 0.0}, {10.0F, 0.0F}));
+  EXPECT_TRUE(matches({0.0, 90.0, 0.0}, {0.0F, 0.0F})) << "calm has no direction";
+  EXPECT_TRUE(matches({10.0, 350.0, 0.2}, {12.0F, 340.0F})) << "gusts";
 }
 
 TEST(UniformWind, ImpossibleOnesAreNamed) {
@@ -132,11 +132,11 @@ TEST(LoadingTest, ImpossibleOnesAreNamed) {
 
 TEST(LoadingTest, IsShownWhileEnginesBurn) {
   const DatarefWrite fuel{"sim/flightmodel/weight/m_fuel[0]", 100.0F};
-  EXPECT_TRUE(shows(fuel, 99.6));
-  EXPECT_FALSE(shows(fuel, 99.0));
+  EXPECT_TRUE(matches(fuel, 99.6));
+  EXPECT_FALSE(matches(fuel, 99.0));
   const DatarefWrite cg{"sim/flightmodel/misc/cgz_ref_to_default", 0.05F};
-  EXPECT_TRUE(shows(cg, 0.053));
-  EXPECT_FALSE(shows(cg, 0.0));
+  EXPECT_TRUE(matches(cg, 0.053));
+  EXPECT_FALSE(matches(cg, 0.0));
 }
 
 TEST(XPlanePath, IsAFileBelowXPlanesFolder) {

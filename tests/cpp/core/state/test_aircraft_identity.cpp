@@ -56,7 +56,7 @@ TEST(AircraftIdentity, ReadsBothStringsAndSaysWhenTheyChange) {
   feeder.set("sim/aircraft/view/acf_ICAO", "BE58");
   EXPECT_TRUE(feeder.feed(&reader));
   EXPECT_EQ(reader.identity().icao, "BE58");
-  EXPECT_EQ(reader.told(), 3u);
+  EXPECT_EQ(reader.answers(), 3u);
 }
 
 TEST(AircraftIdentity, TakesAnAnswerReadAtOnceLikeOneOfTheStream) {
@@ -71,7 +71,7 @@ TEST(AircraftIdentity, TakesAnAnswerReadAtOnceLikeOneOfTheStream) {
   values[0] = static_cast<float>('R');
   values[3].reset();
   EXPECT_FALSE(reader.add(values)) << "one character is missing";
-  EXPECT_EQ(reader.told(), 2u);
+  EXPECT_EQ(reader.answers(), 2u);
 }
 
 TEST(AircraftIdentity, CharactersOutsideAsciiAreMarked) {

@@ -94,7 +94,7 @@ TEST(FieldTable, EveryFieldHasASourceOrADerivation) {
   }
 }
 
-// Row 16: X-Plane 9 to 11 Q, P, R in rad/s; 12 P, Q, R in deg/s (protocol reference 1.6).
+// Row 16: X-Plane 9 to 11 Q, P, R in rad/s; 12 P, Q, R in deg/s (docs/protocol.md 1.6).
 TEST(FieldTable, Row16DiffersBetweenVersions) {
   const FieldSpec& p = find(FieldGroup::kFlight, "roll_rate");
   EXPECT_EQ(p.row.row11, 16);

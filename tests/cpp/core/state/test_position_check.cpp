@@ -90,7 +90,7 @@ TEST(PositionCheck, ChangesItsMind) {
   EXPECT_EQ(check.verdict(), PositionCheck::Verdict::kDisagrees);
 }
 
-// A wrong radius of the sphere: 26 to 35 m at 39 km (protocol reference 1.8) must not pass.
+// A wrong radius of the sphere: 26 to 35 m at 39 km (docs/protocol.md 1.8) must not pass.
 TEST(PositionCheck, SeesAWrongEarthRadius) {
   const TangentFrame right(GeoPoint{37.5, 127.0, 0.0}, 6378145.0), wrong(GeoPoint{37.5, 127.0, 0.0}, 6371000.0);
   PositionCheck check;

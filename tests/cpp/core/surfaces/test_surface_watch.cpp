@@ -50,12 +50,12 @@ SurfaceSample frame(double stick, double total, double flap_handle = 0.0, double
   return out;
 }
 
-const std::array<double, 3> kNobody = {kNan, kNan, kNan};
+const std::array<double, 3> kNoCommands = {kNan, kNan, kNan};
 
 TEST(DrivenInputs, OwnCommandsActAtOnceOnTopOfWhatXPlaneAdds) {
   DrivenInputs inputs;
   inputs.begin(frame(0.25, 0.375));  // trim or stability augmentation: 0.125
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0.25, 0.375), kNobody, 0.02).roll, 0.375);
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0.25, 0.375), kNoCommands, 0.02).roll, 0.375);
   EXPECT_DOUBLE_EQ(inputs.step(frame(0.25, 0.375), {0.5, kNan, kNan}, 0.02).roll, 0.625);
   EXPECT_DOUBLE_EQ(inputs.step(frame(0.25, 0.375), {1.0, kNan, kNan}, 0.02).roll, 1.0) << "no more than full stick";
 }
@@ -64,20 +64,20 @@ TEST(DrivenInputs, ATotalThatStandsStillIsReplacedByTheStick) {
   DrivenInputs inputs;
   inputs.begin(frame(0.0, 0.125));
   double roll = 0.0;
-  for (int i = 0; i < 20; ++i) roll = inputs.step(frame(0.5, 0.125), kNobody, 0.02).roll;
+  for (int i = 0; i < 20; ++i) roll = inputs.step(frame(0.5, 0.125), kNoCommands, 0.02).roll;
   EXPECT_DOUBLE_EQ(roll, 0.625);
   // One that follows late is believed again.
-  roll = inputs.step(frame(0.5, 0.6), kNobody, 0.02).roll;
+  roll = inputs.step(frame(0.5, 0.6), kNoCommands, 0.02).roll;
   EXPECT_DOUBLE_EQ(roll, 0.6);
 }
 
 TEST(DrivenInputs, FlapsRunToTheirHandleOnceItIsMoved) {
   DrivenInputs inputs(0.5);
   inputs.begin(frame(0.0, 0.0, 0.25, 0.2));  // still running when the surfaces were taken
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 0.25, 0.2), kNobody, 1.0).flap1, 0.2) << "they stay where they are";
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNobody, 1.0).flap1, 0.7);
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNobody, 1.0).flap1, 1.0);
-  const MixingInputs up = inputs.step(frame(0, 0, 0.0, 0.2), kNobody, 1.0);
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 0.25, 0.2), kNoCommands, 1.0).flap1, 0.2) << "they stay where they are";
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 0.7);
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 1.0);
+  const MixingInputs up = inputs.step(frame(0, 0, 0.0, 0.2), kNoCommands, 1.0);
   EXPECT_DOUBLE_EQ(up.flap1, 0.5);
   EXPECT_DOUBLE_EQ(up.flap2, 0.5);
 }
@@ -85,10 +85,11 @@ TEST(DrivenInputs, FlapsRunToTheirHandleOnceItIsMoved) {
 TEST(DrivenInputs, AHandleThatIsNotToldForAFrameStopsNothing) {
   DrivenInputs inputs(0.5);
   inputs.begin(frame(0.0, 0.0, kNan, 0.2));
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 0.25, 0.2), kNobody, 1.0).flap1, 0.2) << "where it is when it is first told";
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNobody, 1.0).flap1, 0.7);
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, kNan, 0.2), kNobody, 1.0).flap1, 0.7);
-  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNobody, 1.0).flap1, 1.0);
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 0.25, 0.2), kNoCommands, 1.0).flap1, 0.2)
+      << "where it is when it is first told";
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 0.7);
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, kNan, 0.2), kNoCommands, 1.0).flap1, 0.7);
+  EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 1.0);
 }
 
 }  // namespace

@@ -100,9 +100,9 @@ def _window(flight: Flight) -> Answer:
     if seen.frames < _WATCH_FRAMES:
         text = f"{seen.grabs} pictures in {seen.duration_s:.1f} s could not tell {_WATCH_FRAMES} frames apart"
         raise NotTestableError(f"{text}: end other programs, or lower X-Plane's frame rate")
-    text = f"{seen.changes} changes of the window's picture in {seen.told_apart} of {seen.frames} frames"
-    kept = {"changes": seen.changes, "told_apart": seen.told_apart, "frames": seen.frames, "grabs": seen.grabs}
-    return judged(seen.changes > _CHANGED * seen.told_apart, text, **kept)
+    text = f"{seen.changes} changes of the window's picture in {seen.distinct} of {seen.frames} frames"
+    kept = {"changes": seen.changes, "distinct": seen.distinct, "frames": seen.frames, "grabs": seen.grabs}
+    return judged(seen.changes > _CHANGED * seen.distinct, text, **kept)
 
 
 QUESTIONS = (

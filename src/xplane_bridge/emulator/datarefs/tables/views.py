@@ -46,8 +46,8 @@ def define(t: Table, sim: Sources) -> None:
 
 
 def _angle(cameras: Cameras, place: int) -> Callable[[Frame], float]:
-    return lambda f: cameras.told(f).angles[place]
+    return lambda f: cameras.reported(f).angles[place]
 
 
 def _coordinate(cameras: Cameras, place: int) -> Callable[[Frame], float]:
-    return lambda f: float(cameras.told(f).position[place])
+    return lambda f: float(cameras.reported(f).position[place])
