@@ -67,6 +67,7 @@ BITS = (
 WORDS = (
     Words("SetFailure", "kind", r"surfaces: ([^;]+);", "SurfaceFault", "What a broken surface does."),
     Words("InjectExcitation", "kind", r"([^;]+);", "ExcitationShape", "Form of a test signal."),
+    Words("SetDisturbance", "kind", r"([^;]+);", "DisturbanceKind", "What is added to the wind."),
 )
 #: Messages and services that repeat another's numbers.
 REPEATED = (("ModeRequest", "ControlMode"), ("SetMode", "ControlMode"))

@@ -36,12 +36,13 @@ def python_file(sources: Sources) -> str:
         '    """Each number of an enumeration and its name in small letters."""\n'
         "    return {each.value: each.name.lower() for each in numbers}\n"
     )
-    faults, shapes = WORDS
+    faults, shapes, disturbances = WORDS
     words = (
         _words("SURFACE_FAILURE_KINDS", "What a surface can do, SetFailure.kind.", faults.values)
         + '#: Every SetFailure.kind; "failed" is for whatever is no surface.\n'
         'FAILURE_KINDS = (*SURFACE_FAILURE_KINDS, "failed")\n'
         + _words("EXCITATION_KINDS", "Every InjectExcitation.kind that starts a signal.", shapes.values)
+        + _words("DISTURBANCE_KINDS", "Every SetDisturbance.kind that starts one.", disturbances.values)
     )
     return (
         '"""Numbers and words of the messages, for programs that run without ROS.\n\n'

@@ -362,3 +362,10 @@ EXCITATION_KINDS = (
     "multisine",
     "chirp",
 )
+#: Every SetDisturbance.kind that starts one.
+DISTURBANCE_KINDS = (
+    "gust",
+    "turbulence",
+    "shear",
+    "microburst",
+)
