@@ -57,6 +57,20 @@ def test_driver_virtual_plays_a_scenario_as_the_same_device(master):
     assert words[words.index("--stick-mode") + 1] == "2"
 
 
+def test_driver_xplane_reads_the_stick_of_the_x_plane_that_is_meant(master):
+    given = ("host:=192.168.1.20", "port:=49010", "listen_for_beacon:=false", "wire_log:=/tmp/stick.pcapng")
+    nodes, params = load(master, "joystick.launch", "driver:=xplane", "joy_config:=xplane", *given)
+    assert set(nodes) == {"joystick_mapper_node", "xplane_joy_node"}
+    assert params["/xplane/joystick_mapper_node/device"] == "X-Plane's joystick"
+    shared = {key: params[f"/xplane/{key}"] for key in ("host", "port", "listen_for_beacon", "wire_log")}
+    assert shared == {
+        "host": "192.168.1.20",
+        "port": 49010,
+        "listen_for_beacon": False,
+        "wire_log": "/tmp/stick.pcapng",
+    }
+
+
 def test_driver_joy_is_ros_joy_node_where_it_is_installed(master, tmp_path, monkeypatch):
     package = tmp_path / "joy"
     package.mkdir()
@@ -85,7 +99,7 @@ def test_driver_joy_without_ros_joy_says_what_to_take(master, monkeypatch):
     ("file", "argument"), [("joystick.launch", "driver:=bluetooth"), ("bridge.launch", "joystick:=bluetooth")]
 )
 def test_an_unknown_driver_is_named(master, file, argument):
-    with pytest.raises(Exception, match="driver:=bluetooth is unknown: expected joy, sdl, virtual or none"):
+    with pytest.raises(Exception, match="driver:=bluetooth is unknown: expected joy, sdl, virtual, xplane or none"):
         load(master, file, argument)
 
 
@@ -96,6 +110,7 @@ def test_an_unknown_driver_is_named(master, file, argument):
         ("mapper", {"joystick_mapper_node"}),
         ("sdl", {"joystick_mapper_node", "joy_reader"}),
         ("virtual", {"joystick_mapper_node", "virtual_joystick"}),
+        ("xplane", {"joystick_mapper_node", "xplane_joy_node"}),
     ],
 )
 def test_the_bridge_with_a_joystick(master, joystick, started):

@@ -23,6 +23,10 @@ _ENGINE = "sim/flightmodel/engine/"
 
 #: Stick axes: X-Plane's name, `Controls` attribute, slot in rows 8 and 11.
 _AXES = (("pitch", "pitch", 0), ("roll", "roll", 1), ("heading", "yaw", 2))
+#: The joystick that the pilot holds: for each of its axes what X-Plane's settings assign it to (X-Plane's numbers),
+#: whether they reverse it, and the attribute of `PilotCommands`.
+_JOYSTICK = "sim/joystick/joystick_"
+_JOYSTICK_AXES = ((2, False, "roll"), (1, False, "pitch"), (3, False, "yaw"), (4, True, "throttle"))
 #: Slots of DATA rows that move handles: (row, slot) -> (dataref, lowest, highest value).
 _HANDLES = {
     (13, 0): (_COCKPIT + "elevator_trim", -1.0, 1.0),
@@ -102,6 +106,7 @@ class ControlInputs:
         self._surface_commands: Dict[int, float] = {}
         self._throttle_commands: Dict[int, float] = {}
         self._surface_slots: Dict[str, int] = {}
+        self._joystick_slots = np.zeros(0, dtype=int)
 
     # --- definition ---------------------------------------------------------------------------------------------------
 
@@ -127,6 +132,12 @@ class ControlInputs:
         store.on_write(_ENGINE + "ENGN_prop", set_speed)
         store.on_write(_ACTUATORS + "prop_rotation_speed_rad_sec", set_speed)
         store.on_write(_ENGINE + "ENGN_thro_use", self._throttle_commands.__setitem__)
+        if self._options.joystick:
+            store.set("sim/joystick/has_joystick", 1.0)
+            for axis, (assignment, reverse, _attribute) in enumerate(_JOYSTICK_AXES):
+                store.values[store.locate(_JOYSTICK + "axis_assignments", axis)] = assignment
+                store.values[store.locate(_JOYSTICK + "axis_reverse", axis)] = reverse
+        self._joystick_slots = store.dataref(_JOYSTICK + "axis_values").slots[: len(_JOYSTICK_AXES)]
 
     # --- flights ------------------------------------------------------------------------------------------------------
 
@@ -191,6 +202,7 @@ class ControlInputs:
             commands = self._pilot(frame.clocks.flight, frame)
             for path, value in commands.datarefs:
                 store.write(path, value)
+            self._move_joystick(commands)
             # Who takes an axis flies: the pilot lets go of levers and handles, too.
             if not joystick and not any(self._overrides("joystick_" + axis) for axis, _attribute, _slot in _AXES):
                 self._move_handles(commands, model)
@@ -208,6 +220,16 @@ class ControlInputs:
         self._read_handles(controls)
         self._read_engines(controls, model)
         self._read_surfaces(controls)
+
+    def _move_joystick(self, commands: PilotCommands) -> None:
+        """The joystick's raw axes [0..1], which no override stops."""
+        if not self._options.joystick:
+            return
+        for slot, (_assignment, reverse, attribute) in zip(self._joystick_slots, _JOYSTICK_AXES):
+            value = getattr(commands, attribute)
+            if value is not None:
+                raw = _clip(value if attribute == "throttle" else 0.5 * (1.0 + value), 0.0, 1.0)
+                self._store.values[slot] = 1.0 - raw if reverse else raw
 
     def _move_unowned(self, name: str, axis: str, frame: Frame) -> None:
         """An axis that no client has taken and no pilot moves."""

@@ -179,7 +179,10 @@ def _stick(t: Table, sim: Sources) -> None:
         t.alias(f"{_CONTROLS}{trim[:3] if trim != 'elevator' else 'elv'}_trim", f"{_COCKPIT}{trim}_trim")
     t.setting("sim/cockpit2/switches/artificial_stability_on", 1)
     t.setting("sim/cockpit2/switches/yaw_damper_on")
-    t.setting("sim/joystick/joystick_axis_values")
+    t.setting("sim/joystick/has_joystick")
+    t.setting("sim/joystick/joystick_axis_values", 0.5)
+    for name in ("axis_assignments", "axis_reverse", "button_values"):
+        t.setting(f"sim/joystick/joystick_{name}")
 
 
 def _total(sim: Sources, total: Callable[[Frame], float]) -> Callable[[Frame], float]:
