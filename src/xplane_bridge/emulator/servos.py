@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Optional
 
+from xplane_bridge.emulator.beam import Beam
 from xplane_bridge.emulator.datarefs import autopilot as ap
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight.flight_model import Controls, ModelInfo
@@ -39,7 +40,15 @@ class Servos:
         self._holds: Optional[HoldAutopilot] = None
         self._throttle: Optional[HoldAutopilot] = None
 
-    def move(self, dt: float, frame: Frame, info: ModelInfo, altitude_ft: float, controls: Controls) -> None:
+    def move(
+        self,
+        dt: float,
+        frame: Frame,
+        info: ModelInfo,
+        altitude_ft: float,
+        controls: Controls,
+        beam: Optional[Beam],
+    ) -> None:
         """Adds to `controls`, which have stick and pedals, and moves the levers for the next frame.
 
         Args:
@@ -48,6 +57,7 @@ class Servos:
             info: Of the loaded aircraft.
             altitude_ft: As indicated.
             controls: Of this frame.
+            beam: What the radios show; None where they hear no station.
         """
         if not info.autopilot:
             return
@@ -57,7 +67,7 @@ class Servos:
         deflections = {"roll": 0.0, "pitch": 0.0, "yaw": 0.0}
         if flies:
             self._holds = self._holds or HoldAutopilot(HoldGains())
-            targets = self._targets(frame)
+            targets = self._targets(frame, beam)
             rates = math.degrees(m.p_rad_s), math.degrees(m.q_rad_s)
             climb, altitude = -m.v_down_mps, altitude_ft * _M_PER_FT
             deflections["roll"] = self._holds.roll(targets, frame.true_phi, rates[0], frame.mag_psi) or 0.0
@@ -77,12 +87,16 @@ class Servos:
             setattr(controls, axis, min(max(getattr(controls, axis) + deflection, -1.0), 1.0))
         self._move_levers(dt, frame, info, controls)
 
-    def _targets(self, frame: Frame) -> Targets:
+    def _targets(self, frame: Frame, beam: Optional[Beam]) -> Targets:
         get = self._store.get
         targets = Targets(roll=0.0)
         if get(ap.HEADING):
             targets.update({"heading": get(ap.HEADING_DIAL)})
-        if get(ap.ALTITUDE):
+        elif beam is not None and ap.CAPTURED in (get(ap.NAV), get(ap.APPROACH)):
+            targets.update({"heading": beam.heading_deg(frame)})
+        if beam is not None and get(ap.GLIDESLOPE):
+            targets.climb = beam.climb_mps(frame)
+        elif get(ap.ALTITUDE):
             targets.altitude = get(ap.HELD_FT) * _M_PER_FT
         elif get(ap.CLIMB):
             targets.climb = get(ap.CLIMB_DIAL) / MPS_TO_FPM

@@ -11,6 +11,7 @@ from typing import Callable, Dict, FrozenSet, List, Mapping, Optional, Set, Tupl
 import numpy as np
 
 from xplane_bridge import protocol, xplane_names
+from xplane_bridge.emulator.beam import Beam
 from xplane_bridge.emulator.datarefs import airport_starts, commands, data_rows, tables
 from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments, Weather
 from xplane_bridge.emulator.datarefs.autopilot import Autopilot
@@ -177,8 +178,10 @@ class Simulator:
             self._placements.apply(self.model, self.frame)
             if dt > 0.0:
                 self.inputs.read(self.controls, self.model, self.frame)
-                self._autopilot.update(self.frame, self.instruments.altitude_ft, self.failed("rel_otto"))
-                self._servos.move(dt, self.frame, self.model.info, self.instruments.altitude_ft, self.controls)
+                beam = Beam.heard(self.store) if self._autopilot.follows_radio() else None
+                altitude_ft = self.instruments.altitude_ft
+                self._autopilot.update(self.frame, altitude_ft, self.failed("rel_otto"), beam)
+                self._servos.move(dt, self.frame, self.model.info, altitude_ft, self.controls, beam)
                 self._effects.apply(self.controls, self._failed, self.model, dt)
                 if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
                     self.model.step(dt, self.controls)

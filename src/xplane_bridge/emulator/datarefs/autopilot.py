@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable, Dict, Sequence
+from typing import Callable, Dict, Optional, Protocol, Sequence
 
 from xplane_bridge.emulator.datarefs.sources import LoadedAircraft
 from xplane_bridge.emulator.datarefs.store import DatarefStore
@@ -14,19 +14,34 @@ MASTER, AUTOTHROTTLE = AP + "flight_director_mode", AP + "autothrottle_enabled"
 ROLL, HEADING = AP + "roll_status", AP + "heading_status"
 PITCH, CLIMB, SPEED = AP + "pitch_status", AP + "vvi_status", AP + "speed_status"
 ALTITUDE, ALTITUDE_ARMED, HELD_FT = AP + "altitude_hold_status", AP + "altitude_hold_armed", AP + "altitude_hold_ft"
-NAV, APPROACH, GLIDESLOPE_ARMED = AP + "nav_status", AP + "approach_status", AP + "glideslope_armed"
+NAV, APPROACH = AP + "nav_status", AP + "approach_status"
+GLIDESLOPE, GLIDESLOPE_ARMED = AP + "glideslope_status", AP + "glideslope_armed"
 HEADING_DIAL, ALTITUDE_DIAL = AP + "heading_dial_deg_mag_pilot", AP + "altitude_dial_ft"
 CLIMB_DIAL, SPEED_DIAL, IS_MACH = AP + "vvi_dial_fpm", AP + "airspeed_dial_kts_mach", AP + "airspeed_is_mach"
 HELD_PITCH = AP + "sync_hold_pitch_deg"
 OFF, DIRECTOR, SERVOS = 0.0, 1.0, 2.0  #: of MASTER
 ARMED, CAPTURED = 1.0, 2.0
-_LATERAL, _VERTICAL = (ROLL, HEADING), (PITCH, CLIMB, ALTITUDE, SPEED)
+_LATERAL, _VERTICAL = (ROLL, HEADING, NAV, APPROACH), (PITCH, CLIMB, ALTITUDE, SPEED, GLIDESLOPE)
 #: An armed altitude is captured so many seconds before it is reached, and at least so near [ft].
 _CAPTURE_S, _CAPTURE_FT = 6.0, 60.0
+#: An armed line is captured where its needle is off the stop, an armed path where it is near.
+_LINE_DOTS, _PATH_DOTS = 2.4, 0.5
+
+
+class NeedlesShown(Protocol):
+    """What the receiver that the autopilot follows shows."""
+
+    @property
+    def dots(self) -> float:
+        """Of the line's needle."""
+
+    @property
+    def path_dots(self) -> Optional[float]:
+        """Of the path's needle; None: no path is heard."""
 
 
 class Autopilot:
-    """Switches modes, one lateral and one vertical at a time; radio navigation is armed and never captured.
+    """Switches modes, one lateral and one vertical at a time; lines and paths of radios are captured from armed modes.
 
     Aircraft without an autopilot (`ModelInfo.autopilot`) take no command.
 
@@ -55,7 +70,7 @@ class Autopilot:
             "level_change": lambda: self._toggle(_VERTICAL, SPEED, PITCH),
             "altitude_hold": lambda: self._toggle(_VERTICAL, ALTITUDE, PITCH),
             "altitude_arm": lambda: self._set(ALTITUDE_ARMED, float(not self._get(ALTITUDE_ARMED))),
-            "NAV": lambda: self._set(NAV, OFF if self._get(NAV) else ARMED),
+            "NAV": lambda: self._arm_or_end(NAV),
             "approach": self._toggle_approach,
             "autothrottle_on": lambda: self._set(AUTOTHROTTLE, 1.0),
             "autothrottle_off": lambda: self._set(AUTOTHROTTLE, 0.0),
@@ -68,27 +83,53 @@ class Autopilot:
 
     def switch_off(self) -> None:
         """No flight director, no servos, no modes; dials, autothrottle and yaw damper stay."""
-        for name in (MASTER, *_LATERAL, *_VERTICAL, ALTITUDE_ARMED, NAV, APPROACH, GLIDESLOPE_ARMED):
+        for name in (MASTER, *_LATERAL, *_VERTICAL, ALTITUDE_ARMED, GLIDESLOPE_ARMED):
             self._set(name, OFF)
 
-    def update(self, frame: Frame, altitude_ft: float, failed: bool) -> None:
-        """A frame in flight: what engaging a mode finds, the modes it begins with, and an altitude that is reached."""
+    def follows_radio(self) -> bool:
+        """Whether a mode that goes by radio is armed or captured."""
+        return self._sim.model.info.autopilot and any(self._get(name) for name in (NAV, APPROACH))
+
+    def update(self, frame: Frame, altitude_ft: float, failed: bool, needles: Optional[NeedlesShown]) -> None:
+        """A frame in flight: what engaging a mode finds, the modes it begins with, and what is captured.
+
+        Args:
+            frame: The present one.
+            altitude_ft: As indicated.
+            failed: Whether it has failed.
+            needles: Of the receiver that it follows; None where that hears no station.
+        """
         if not self._sim.model.info.autopilot:
             return
         self._altitude_ft, self._climb_fpm = altitude_ft, -frame.m.v_down_mps * MPS_TO_FPM
         self._speed_kt, self._pitch_deg = frame.m.calibrated_airspeed_mps * MPS_TO_KT, frame.true_theta
         if failed:
             self._set(MASTER, OFF)
+        self._follow(needles)
         if self._get(MASTER):
             for group, basic in ((_LATERAL, ROLL), (_VERTICAL, PITCH)):
-                if not any(self._get(name) for name in group):
+                if not any(self._get(name) == CAPTURED for name in group):
                     self._engage(group, basic)
-        if self._get(ALTITUDE_ARMED) and not self._get(ALTITUDE):
+        if self._get(ALTITUDE_ARMED) and not self._get(ALTITUDE) and not self._get(GLIDESLOPE):
             left = abs(self._get(ALTITUDE_DIAL) - altitude_ft)
             if left < max(_CAPTURE_FT, abs(self._climb_fpm) / 60.0 * _CAPTURE_S):
                 self._engage(_VERTICAL, ALTITUDE)
                 self._set(HELD_FT, self._get(ALTITUDE_DIAL))
                 self._set(ALTITUDE_ARMED, OFF)
+
+    def _follow(self, needles: Optional[NeedlesShown]) -> None:
+        """Captures armed lines and paths, and lets go of those that are not heard any more."""
+        for name in (NAV, APPROACH):
+            if needles is None and self._get(name) == CAPTURED:
+                self._set(name, OFF)
+            elif needles is not None and self._get(name) == ARMED and abs(needles.dots) < _LINE_DOTS:
+                self._engage(_LATERAL, name)
+        path = None if needles is None else needles.path_dots
+        if path is None or self._get(APPROACH) != CAPTURED:
+            self._set(GLIDESLOPE, OFF)
+        elif self._get(GLIDESLOPE_ARMED) and abs(path) < _PATH_DOTS:
+            self._engage(_VERTICAL, GLIDESLOPE)
+            self._set(GLIDESLOPE_ARMED, OFF)
 
     def _get(self, name: str) -> float:
         return self._store.get(name)
@@ -102,15 +143,18 @@ class Autopilot:
     def _toggle(self, group: Sequence[str], name: str, basic: str) -> None:
         self._engage(group, basic if self._get(name) else name)
 
+    def _arm_or_end(self, name: str) -> None:
+        self._set(name, OFF if self._get(name) else ARMED)
+
     def _toggle_approach(self) -> None:
-        armed = OFF if self._get(APPROACH) else ARMED
-        self._set(APPROACH, armed)
-        self._set(GLIDESLOPE_ARMED, armed)
+        self._arm_or_end(APPROACH)
+        self._set(GLIDESLOPE_ARMED, self._get(APPROACH))
 
     def _engage(self, group: Sequence[str], name: str) -> None:
-        """A mode of a group; like X-Plane's, most turn their dial to what is flown."""
+        """A mode of a group; like X-Plane's, most turn their dial to what is flown. What is armed stays so."""
         for other in group:
-            self._set(other, CAPTURED if other == name else OFF)
+            if other == name or self._get(other) != ARMED:
+                self._set(other, CAPTURED if other == name else OFF)
         if name == CLIMB:
             self._set(CLIMB_DIAL, 100.0 * round(self._climb_fpm / 100.0))
         elif name == SPEED and not self._get(IS_MACH):

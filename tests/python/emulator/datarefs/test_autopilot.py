@@ -12,6 +12,7 @@ from xplane_bridge.emulator.flight.flight_model import InitialState
 
 AP = "sim/cockpit2/autopilot/"
 OVERRIDE = "sim/operation/override/override_"
+RADIOS = "sim/cockpit2/radios/"
 RATE = 60
 
 
@@ -80,12 +81,104 @@ def test_modes_are_toggled_and_begin_with_level_wings(emulator):
     assert shown(emulator, "roll_status", "heading_status") == [0.0, 2.0]
     press(emulator, "heading")
     assert shown(emulator, "roll_status", "heading_status") == [2.0, 0.0]
+    emulator.write({RADIOS + "actuators/nav1_obs_deg_mag_pilot": 90.0})  # the VOR's line is far away
     press(emulator, "NAV", "approach")
     assert shown(emulator, "nav_status", "approach_status", "glideslope_armed") == [1.0, 1.0, 1.0]
     press(emulator, "servos_off_any")
     assert shown(emulator, "flight_director_mode", "servos_on", "roll_status") == [1.0, 0.0, 2.0]
     press(emulator, "servos_fdir_off")
     assert shown(emulator, "flight_director_mode", "roll_status", "pitch_status", "nav_status") == [0.0] * 4
+
+
+def tune(emulator, frequency_khz, course_true_deg):
+    """Receiver 1, its course selector set to a true course. The receivers' alive a frame later."""
+    course = (course_true_deg - emulator.sim.frame.declination) % 360.0
+    emulator.write(
+        {
+            RADIOS + "actuators/nav1_frequency_hz": frequency_khz // 10,
+            RADIOS + "actuators/nav1_obs_deg_mag_pilot": course,
+        }
+    )
+    emulator.step()
+    return course
+
+
+def seconds_until(emulator, condition, most):
+    for second in range(most):
+        if condition():
+            return second
+        fly(emulator, 1)
+    pytest.fail(f"not within {most} s of flight")
+
+
+def needle(emulator, name="hdef"):
+    return emulator.read(f"{RADIOS}indicators/nav1_{name}_dots_pilot")[0]
+
+
+def test_an_ils_is_captured_and_flown_down(emulator):
+    # 10 nautical miles before the runway of heading 40, then 1200 m to the left of its line, 30 degrees towards it.
+    emulator.client().send(protocol.Placement(13, airport="XEMU"))
+    emulator.step()
+    state = emulator.sim.model.state
+    per_metre = 180.0 / (math.pi * 6378145.0)
+    course = math.radians(40.0)
+    emulator.sim.model.place(
+        latitude_deg=state.latitude_deg + 1200.0 * math.sin(course) * per_metre,
+        longitude_deg=state.longitude_deg
+        - 1200.0 * math.cos(course) * per_metre / math.cos(math.radians(state.latitude_deg)),
+        altitude_m=state.altitude_m - 150.0,
+    )
+    tune(emulator, 111300, 40.0)
+    altitude = emulator.sim.instruments.altitude_ft
+    dials(
+        emulator,
+        heading_dial_deg_mag_pilot=(70.0 - emulator.sim.frame.declination) % 360.0,
+        altitude_dial_ft=altitude,
+        airspeed_dial_kts_mach=120.0,
+    )
+    press(emulator, "servos_on", "heading", "altitude_hold", "autothrottle_on", "approach")
+    modes = ("heading_status", "approach_status", "altitude_hold_status", "glideslope_armed", "glideslope_status")
+    assert needle(emulator) > 2.4
+    assert shown(emulator, *modes) == [2.0, 1.0, 2.0, 1.0, 0.0]
+    seconds_until(emulator, lambda: shown(emulator, "approach_status") == [2.0], 60)
+    assert shown(emulator, *modes)[:3] == [0.0, 2.0, 2.0]
+    seconds_until(emulator, lambda: shown(emulator, "glideslope_status") == [2.0], 120)
+    assert shown(emulator, *modes) == [0.0, 2.0, 0.0, 0.0, 2.0]
+    assert abs(emulator.sim.instruments.altitude_ft - altitude) < 60.0, "level until the path came"
+    fly(emulator, 60)
+    for _ in range(60):
+        fly(emulator, 1)
+        assert abs(needle(emulator)) < 0.2
+        assert abs(needle(emulator, "vdef")) < 0.4
+    m = emulator.sim.frame.m
+    assert m.v_down_mps == pytest.approx(0.0524 * math.hypot(m.v_north_mps, m.v_east_mps), abs=0.6)
+
+
+def test_a_radial_of_the_vor_is_captured_in_a_cross_wind(emulator):
+    emulator.sim.set_weather(270.0, 10.0, 0.0, 0)
+    course = tune(emulator, 110300, 20.0)
+    assert abs(needle(emulator)) == 2.5
+    dials(emulator, heading_dial_deg_mag_pilot=(heading(emulator) - 60.0) % 360.0, airspeed_dial_kts_mach=130.0)
+    press(emulator, "servos_on", "heading", "altitude_hold", "autothrottle_on", "NAV")
+    assert shown(emulator, "heading_status", "nav_status") == [2.0, 1.0]
+    seconds_until(emulator, lambda: shown(emulator, "nav_status") == [2.0], 240)
+    assert shown(emulator, "heading_status") == [0.0]
+    fly(emulator, 110)
+    assert abs(needle(emulator)) < 0.03
+    # Across the course of 20 degrees the wind from 270 has 9.4 m/s, for 70 m/s of airspeed: 7.7 degrees into it.
+    assert math.remainder(heading(emulator) - course, 360.0) == pytest.approx(-7.7, abs=0.7)
+    press(emulator, "heading")
+    assert shown(emulator, "heading_status", "nav_status") == [2.0, 0.0]
+
+
+def test_what_is_not_heard_any_more_is_let_go(emulator):
+    tune(emulator, 110300, 0.0)
+    press(emulator, "servos_on", "NAV")
+    emulator.step()
+    assert shown(emulator, "nav_status", "roll_status") == [2.0, 0.0]
+    emulator.write({RADIOS + "actuators/nav1_frequency_hz": 10800.0})
+    emulator.step(3)
+    assert shown(emulator, "nav_status", "roll_status") == [0.0, 2.0]
 
 
 def test_vertical_speed_begins_with_what_is_flown(emulator):
