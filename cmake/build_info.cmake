@@ -7,7 +7,7 @@ execute_process(COMMAND ${CMAKE_COMMAND} -E env GIT_OPTIONAL_LOCKS=0 git describ
 execute_process(COMMAND git rev-parse --show-toplevel
   WORKING_DIRECTORY "${ROOT}" OUTPUT_VARIABLE top ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)
 get_filename_component(root "${ROOT}" REALPATH)
-if(failed OR NOT top STREQUAL root)  # a copy inside somebody's repository is not of its commit
+if(failed OR NOT top STREQUAL root)  # a copy inside another repository is not of its commit
   set(commit "")
 endif()
 set(text "#include \"xplane_bridge/nodes/base/build_info.hpp\"

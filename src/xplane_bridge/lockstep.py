@@ -45,7 +45,7 @@ class Participant:
 
     @property
     def connected(self) -> bool:
-        """Whether somebody publishes flight states for it."""
+        """Whether a node publishes flight states for it."""
         return bool(self._states.get_num_connections())
 
     def close(self) -> None:

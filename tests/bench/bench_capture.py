@@ -21,7 +21,7 @@ from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ros import free_port
 
 _TITLE = "bench window"
-_DRAWN_FPS = 57.0  # not a divisor of anybody's rate: periods vary, too
+_DRAWN_FPS = 57.0  # not a divisor of any rate here: periods vary, too
 _ASKED_FPS = 60.0  # of all that run at a rate
 _SYSTEM_PYTHON = "/usr/lib/python3/dist-packages"
 _OURS = "capture_node"

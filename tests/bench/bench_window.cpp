@@ -1,6 +1,6 @@
 // A window like a simulator's: every pixel changes with every picture, and each picture says its number and when it was
-// drawn. Through shared memory, one request a picture. Periods vary by 15 % (seeded), so that nobody runs in step with
-// it.
+// drawn. Through shared memory, one request a picture. Periods vary by 15 % (seeded), so that no reader runs in step
+// with it.
 //
 //   bench_window title=TEXT width=PX height=PX fps=RATE
 //

@@ -1,5 +1,5 @@
-// X-Plane's place on the wire, at any frame rate, with a stop watch: answers the RREF subscriptions of whoever asks
-// with the values of a file, and times the flight states that come back on topics. A frame's simulator time tells which
+// X-Plane's place on the wire, at any frame rate, with a stop watch: answers the RREF subscriptions of any client
+// with the values of a file, and times the flight states that come back on topics. A frame's simulator time shows which
 // datagram a state was made of.
 //
 //   bench_xplane key=value ...
@@ -8,7 +8,7 @@
 //     rate=HZ             frames per second
 //     seconds=S           how long states are timed, after every topic has begun to flow
 //     topics=A,B          flight_state topics that clients publish
-//     bare=TOPIC          flight_state topic of bench_bare_publisher, whose stamps tell when it published (or empty)
+//     bare=TOPIC          flight_state topic of bench_bare_publisher, whose stamps show when it published (or empty)
 //     extra=N             datagrams of a single value sent to each client with every frame, besides the frame's own
 //     outages=N           how often it falls silent for a second afterwards, forgetting its subscriptions
 //     link_state=TOPIC    for outages
@@ -49,7 +49,7 @@ namespace xplane_bridge {
 namespace {
 
 constexpr std::size_t kPairsPerDatagram = 183;   // as X-Plane
-constexpr double kFirstSimTime = 100.0;          // [s] float32 tells steps of 8 us apart there
+constexpr double kFirstSimTime = 100.0;          // [s] float32 has steps of 8 us there
 constexpr int kSlowRateHz = 60;                  // subscriptions below this are not of the flight group
 constexpr std::int64_t kOutage = 1'000'000'000;  // [ns]
 constexpr double kPatience = 60.0;               // [s] for topics to begin
@@ -228,7 +228,7 @@ class Meter {
     std::size_t sent = 0;
     while (sent < messages.size()) {
       const int count = sendmmsg(socket_, messages.data() + sent, static_cast<unsigned int>(messages.size() - sent), 0);
-      if (count < 0) break;  // nobody listens there any more
+      if (count < 0) break;  // no client listens there any more
       sent += static_cast<std::size_t>(count);
     }
     datagrams_ += sent;
@@ -251,7 +251,7 @@ class Meter {
       }
       sleepUntil(next);
       for (std::size_t turn = 0; turn < flying.size(); ++turn) {
-        // They change places with every frame: whoever comes after a busy one finds the machine awake.
+        // They change places with every frame: the one that comes after a busy one finds the machine awake.
         const std::size_t which = (turn + frame_) % flying.size();
         sleepUntil(next + static_cast<std::int64_t>(turn) * 2 * period_ns / 3);
         sendFrame(frame_, which, flying[which]);

@@ -43,7 +43,7 @@ _BOUNDARY_WORDS = (
 
 
 class Target(NamedTuple):
-    """What is given to whom."""
+    """Inputs, and the decoder for each."""
 
     seeds: Callable[[], List[Any]]
     change: Callable[[Any, List[Any], random.Random], Any]

@@ -101,8 +101,8 @@ class Mutator {
   std::ptrdiff_t place(const Bytes& bytes) { return static_cast<std::ptrdiff_t>(below(bytes.size() + 1)); }
 
   void change(Bytes& bytes) {
-    static constexpr std::array<std::uint32_t, 8> kTelling{0,          1,          0x7FFFFFFF, 0x80000000, 0xFFFFFFFF,
-                                                           0x7F800000, 0x7FC00000, 0xC479C000};  // inf, NaN, -999 last
+    static constexpr std::array<std::uint32_t, 8> kBoundaryWords{
+        0, 1, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 0x7F800000, 0x7FC00000, 0xC479C000};  // inf, NaN, -999 last
     switch (below(bytes.empty() ? 1 : 7)) {
       case 0:
         bytes.insert(bytes.begin() + place(bytes), 1 + below(8), static_cast<std::uint8_t>(random_()));
@@ -122,7 +122,7 @@ class Mutator {
         break;
       }
       case 5: {
-        const std::uint32_t number = kTelling[below(kTelling.size())];
+        const std::uint32_t number = kBoundaryWords[below(kTelling.size())];
         const std::size_t at = below(bytes.size());
         std::memcpy(bytes.data() + at, &number, std::min(sizeof number, bytes.size() - at));
         break;

@@ -277,10 +277,10 @@ def test_a_picture_that_stands_is_an_error_unless_the_aircraft_has_crashed(world
         still.stop()
 
 
-def test_a_black_picture_is_told(world, display) -> None:
+def test_a_black_picture_is_reported(world, display) -> None:
     from xplane_bridge.msg import FrameState
 
-    # Drawn again and again, all but black: whoever subscribes late sees it as well.
+    # Drawn again and again, all but black: a late subscriber sees it as well.
     code = f"""
 import itertools, tkinter
 root = tkinter.Tk()
@@ -300,8 +300,8 @@ root.mainloop()
         black.start()
         images.wait_for(timeout=30.0)
         assert states.wait_for(timeout=30.0).quality & FrameState.QUALITY_BLACK
-        told = world.wait_for_diagnostics("capture", lambda s: s.level == 1, timeout=30.0)
-        assert told.message == "the picture is black"
+        reported = world.wait_for_diagnostics("capture", lambda s: s.level == 1, timeout=30.0)
+        assert reported.message == "the picture is black"
     finally:
         black.stop()
 
@@ -390,7 +390,7 @@ def test_estimate_latency_live_finds_the_delay_of_the_display(world, display, tm
     world.start("rx_node")
     command = [program("estimate_latency"), "--live", "15", "--namespace", world.namespace]
     with ManagedProcess("live", [*command, "--json", tmp_path / "live.json"], tmp_path, env=world.env) as live:
-        live.wait_for_line(f"waiting: nobody publishes {world.namespace}/camera/image_raw/compressed", 60)
+        live.wait_for_line(f"waiting: no node publishes {world.namespace}/camera/image_raw/compressed", 60)
         capture(world, display)
         assert live.wait(120) == 0, live.output()
     delay = json.loads((tmp_path / "live.json").read_text(encoding="utf-8"))["display_delay"]["delay"]

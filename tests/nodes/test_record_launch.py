@@ -12,7 +12,7 @@ def test_it_warns_while_no_states_come_and_takes_it_back(world):
     namespace = world.namespace.strip("/")
     launch = roslaunch(world.master, world.folder, "record.launch", ns=namespace, bag=world.folder / "empty.bag")
     with launch:
-        launch.wait_for_line(rf"no flight is recorded: nobody publishes {world.namespace}/flight_state", 60)
+        launch.wait_for_line(rf"no flight is recorded: no node publishes {world.namespace}/flight_state", 60)
         publisher = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1, latch=True)
         publisher.publish(FlightState())
         launch.wait_for_line("flight states are recorded now", 60)

@@ -21,7 +21,7 @@ from xplane_bridge.resources import program
 
 FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
 FPS = 20
-#: Three periods of perfectly regular frames: timing alone cannot tell this from none. Longer than any drawing takes.
+#: Three periods of perfectly regular frames: timing alone cannot show them. Longer than any drawing takes.
 PIPELINE_DELAY_S = 0.15
 #: A picture that appeared this much off its time, as the machine was busy, says nothing about the pairing.
 LATE_S = 0.2 / FPS

@@ -63,7 +63,7 @@ def test_without_a_bridge_they_say_which_bridges_there_are(world, bridge, name, 
     bridge.link(0, "no answer yet")
     with start(world, name, *arguments, "--namespace", "/nowhere") as waiting:
         line = waiting.wait_for_line(r"^.*waiting: (.*)$", 60).group(0)
-    assert line.startswith(f"{name}: waiting: nobody publishes /nowhere/link_state (xplane_bridge/LinkState)")
+    assert line.startswith(f"{name}: waiting: no node publishes /nowhere/link_state (xplane_bridge/LinkState)")
     assert f"{world.namespace}/link_state" in line
     assert "--namespace" in line
 

@@ -303,7 +303,7 @@ def test_sources_in_lib_are_not_ignored():
     assert git("check-ignore", "-q", "build/x").returncode == 0
 
 
-def test_no_file_names_a_path_of_somebodys_machine():
+def test_no_file_names_a_path_of_one_machine():
     pattern = re.compile(r"(?<![\w.$}])/(home|root|Users)/(?!(u|user|me)\b)\w+")  # but for made-up users
     wrong = []
     for path in tracked_files():

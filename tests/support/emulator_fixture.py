@@ -1,4 +1,4 @@
-"""An emulator in this process that flies only when told to, and clients of it, for tests without wall time."""
+"""An emulator in this process that flies only when a test says so, and clients of it, for tests without wall time."""
 
 from __future__ import annotations
 

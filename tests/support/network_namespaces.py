@@ -16,7 +16,7 @@ from xplane_bridge.harness.ros import ros_environment
 
 _INTERFACE = "veth0"
 _TIMEOUT_S = 30.0
-# Root makes namespaces as it is; anybody else as root of a user namespace, where the kernel lets users make those.
+# Root makes namespaces as it is; any other user as root of a user namespace, where the kernel lets users make those.
 _ROOT = os.geteuid() == 0
 _OWN_USER = () if _ROOT else ("--user", "--map-root-user")
 _INTO_USER = () if _ROOT else ("--user", "--preserve-credentials")

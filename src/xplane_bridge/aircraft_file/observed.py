@@ -58,7 +58,7 @@ class Observed:
         version: X-Plane's, as it numbers itself, e.g. 115501.
         icao: Type designator; empty where the aircraft's author gave none.
         description: In the author's words.
-        path: Of the .acf file below X-Plane's folder; empty where the version does not tell it.
+        path: Of the .acf file below X-Plane's folder; empty where the version does not show it.
         engines: Number of engines.
         surfaces: Kinds of surfaces that have travel, of `TRAVELS`.
         flap_detents: Number of notches of the flap handle; 0: no flaps.

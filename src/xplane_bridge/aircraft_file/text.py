@@ -23,7 +23,7 @@ _WIDTH = 120
 
 @dataclass(frozen=True)
 class Facts:
-    """What X-Plane does not show, and so somebody has to say.
+    """What X-Plane does not show, and so the user has to enter.
 
     Attributes:
         name: Stem of the file, and value of the parameter `aircraft`.

@@ -122,7 +122,7 @@ def require_usable(result: Delay, what: str, gain_range: Optional[tuple[float, f
         raise LatencyError(msg)
     if 2.0 * result.sigma > MAX_HALF_WIDTH_S:
         msg = (
-            f"{what}: the motion is too small to tell the delay: {1e3 * result.delay:.1f} ms +- "
+            f"{what}: the motion is too small to measure the delay: {1e3 * result.delay:.1f} ms +- "
             f"{2e3 * result.sigma:.1f} ms (2 sigma), expected +- {1e3 * MAX_HALF_WIDTH_S:.0f} ms or less. Fly 60 s of "
             "roll doublets or multisines (inject_excitation); about 14 deg/s^2 rms of roll acceleration is needed"
         )

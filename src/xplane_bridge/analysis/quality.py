@@ -138,7 +138,7 @@ def pairing(frames: Mapping[str, np.ndarray], constants: Mapping[str, int]) -> P
 
 
 def _counted(counter: np.ndarray, first: int) -> int:
-    """Tell how far a node's counter went during the recording.
+    """Returns how far a node's counter went during the recording.
 
     Args:
         counter: Since the node's start, which begins anew at 0 when the node does; shape (n,).

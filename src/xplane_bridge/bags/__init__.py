@@ -85,7 +85,7 @@ class Table:
         return len(self.time)
 
     def __contains__(self, name: str) -> bool:
-        """Tell whether there is a column of this name."""
+        """Returns whether there is a column of this name."""
         return name in self.columns
 
     def __getitem__(self, name: str) -> np.ndarray:

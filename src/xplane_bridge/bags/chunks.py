@@ -167,7 +167,7 @@ class BagFile:
                 self._entries.setdefault(id_, []).append((len(self._chunks) - 1, np.frombuffer(data, dtype=_ENTRY)))
 
     def _open_by_scan(self, position: int) -> None:
-        """What the chunks themselves tell, up to the first that is not whole."""
+        """What the chunks themselves hold, up to the first that is not whole."""
         size = self._file.seek(0, 2)
         self._file.seek(position)
         whole = position

@@ -58,7 +58,7 @@ class NeedsObjectsError(Exception):
 
 
 def wanted(name: str, columns: Optional[Sequence[str]]) -> bool:
-    """Tell whether the column `name` is, or lies below, one of `columns` (None: all)."""
+    """Returns whether the column `name` is, or lies below, one of `columns` (None: all)."""
     return columns is None or any(name == c or name.startswith((c + ".", c + "[")) for c in columns)
 
 

@@ -49,7 +49,7 @@ class FlightResult:
         values: Criterion to what it measured.
         met: Criterion to whether it was met.
         sha256: Of the truth, frame by frame, in doubles.
-        trace: Column to one number a frame, where it was asked for.
+        trace: Column to one number per frame, where it was asked for.
     """
 
     outcome: str

@@ -44,7 +44,7 @@ class AttitudeHold:
         self._pitch, self._elevator, self._throttle = 0.0, 0.0, 0.5
 
     def restart(self) -> None:
-        """The next state is the first one: while somebody else flies, integrators must follow and not run away."""
+        """The next state is the first one: while another source flies, integrators must follow and not run away."""
         self._epoch = None
 
     def fly(self, state: Any) -> Dict[str, float]:

@@ -21,7 +21,7 @@ from xplane_bridge.analysis.latency import (
     value_motion,
 )
 from xplane_bridge.bags import Bags
-from xplane_bridge.cli.bridge.waiting import Listener, told, wait_for_state, wait_until
+from xplane_bridge.cli.bridge.waiting import Listener, print_waiting, wait_for_state, wait_until
 from xplane_bridge.cli.entry import guarded, number, start_node
 from xplane_bridge.constants import CameraView, ImageQuality, words
 from xplane_bridge.harness.processes import ManagedProcess
@@ -129,7 +129,7 @@ def _recorded(namespace: str, seconds: float) -> Iterator[Path]:
 
     wait_for_state(namespace, "estimate_latency")
     pictures = Listener(f"{namespace}/{_PICTURES}", CompressedImage)
-    wait_until(pictures.came.is_set, pictures.why_none, told("estimate_latency"))
+    wait_until(pictures.came.is_set, pictures.why_none, print_waiting("estimate_latency"))
     pictures.close()
     print(f"estimate_latency: recording {seconds:g} s; let the aircraft roll to and fro", file=sys.stderr, flush=True)
     with tempfile.TemporaryDirectory(prefix="estimate_latency_") as folder:
@@ -153,7 +153,7 @@ def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float =
 
     Raises:
         BagError: No pictures or states.
-        LatencyError: The recording cannot tell.
+        LatencyError: The recording does not show it.
     """
     from xplane_bridge.analysis.image_rotation import rotation_motion
     from xplane_bridge.bags.pictures import grey_pictures, image_topic

@@ -1,7 +1,7 @@
 """joy_config_check: shows live what each axis and button of a joystick does under a file of config/joysticks.
 
 What is shown as command comes from joystick_mapper_node itself: one is started with the file, in a namespace of its
-own, where its commands reach nobody.
+own, where no node receives its commands.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def parser() -> argparse.ArgumentParser:
         description=(
             "Shows live what each axis and button on NS/joy does under a joystick's file: raw value, command and "
             "function, what is not mapped, and what is wrong in the file. The file may be edited meanwhile: it is read "
-            "again when it is saved. Nothing reaches the aircraft. Somebody has to publish the joystick, for example "
-            "joystick.launch driver:=sdl."
+            "again when it is saved. Nothing reaches the aircraft. Another program has to publish the joystick, for "
+            "example joystick.launch driver:=sdl."
         ),
     )
     p.add_argument("joy_config", nargs="?", metavar="JOY_CONFIG", help="file, or stem of a file in config/joysticks")

@@ -14,7 +14,7 @@ _POLL_S = 0.1
 
 
 class StateWatch:
-    """Tells when flight states stop coming, and when they come again.
+    """Reports when flight states stop coming, and when they come again.
 
     Args:
         patience: Says why there are none.

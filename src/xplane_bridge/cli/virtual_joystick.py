@@ -1,4 +1,4 @@
-"""virtual_joystick: plays a scenario's stick movements as sensor_msgs/Joy, as if somebody held a device."""
+"""virtual_joystick: plays a scenario's stick movements as sensor_msgs/Joy, as if a pilot held a device."""
 
 from __future__ import annotations
 

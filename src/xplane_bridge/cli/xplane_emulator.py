@@ -44,12 +44,12 @@ def main(arguments: Optional[Sequence[str]] = None, make: Callable[[Options], Em
         if options.stepped == "lines":
             raise KeyboardInterrupt  # reading a line is not interrupted otherwise
 
-    def tell(_signal: int, _frame: object) -> None:
+    def request_status(_signal: int, _frame: object) -> None:
         emulator.wants_status = True
 
     failed = 0
     try:
-        signal.signal(signal.SIGUSR1, tell)
+        signal.signal(signal.SIGUSR1, request_status)
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, stop)
         print("READY " + json.dumps(emulator.describe()), flush=True)
@@ -62,7 +62,7 @@ def main(arguments: Optional[Sequence[str]] = None, make: Callable[[Options], Em
     emulator.close()
     if view is not None:
         view.close()
-    with contextlib.suppress(BrokenPipeError):  # whoever started it does not listen any more
+    with contextlib.suppress(BrokenPipeError):  # the program that started it does not read any more
         print("STOPPED " + json.dumps(emulator.statistics()), flush=True)
     return failed
 

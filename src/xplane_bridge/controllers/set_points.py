@@ -8,7 +8,7 @@ from xplane_bridge.controllers.geometry import Field, Pace
 from xplane_bridge.controllers.multirotor import AIRCRAFT as AIRCRAFT
 from xplane_bridge.controllers.multirotor import Command, Loops
 
-#: A set-point is followed for so long; whoever wants more repeats it, as for other autopilots [s].
+#: A set-point is followed for so long; repeat it to hold it longer, as for other autopilots [s].
 HOLDS_S = 0.5
 
 
@@ -25,7 +25,7 @@ class SetPoints:
         self.restart()
 
     def restart(self) -> None:
-        """Somebody else flies."""
+        """Another source flies."""
         self._loops = Loops()
         self._heading = None
 

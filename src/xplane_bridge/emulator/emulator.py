@@ -66,7 +66,7 @@ class Emulator:
     Attributes:
         sim: The simulator; another object after a restart.
         port: The port it listens on.
-        view: What draws the pictures; None: nobody sees any.
+        view: What draws the pictures; None: there are none.
         wants_status: Set it to have the statistics printed between two frames, as a `STATUS {json}` line.
     """
 

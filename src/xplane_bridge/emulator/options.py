@@ -124,7 +124,7 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="xplane_emulator",
         description="Speaks X-Plane's UDP protocol and flies aircraft of its own. Prints `READY {json}` with its port.",
-        epilog="docs/emulator.md tells what is modelled, the faults, and the stepping protocol.",
+        epilog="docs/emulator.md describes what is modelled, the faults, and the stepping protocol.",
     )
     flight = p.add_argument_group("flight")
     flight.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help=f"{', '.join(model_names())}")
@@ -149,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
         "--joystick",
         choices=("attached", "none"),
         default="attached",
-        help="attached: centres the stick that nobody has taken; none: the yoke datarefs take writes without an "
+        help="attached: centres a stick without an override; none: the yoke datarefs take writes without an "
         "override (default attached)",
     )
     flight.add_argument(

@@ -14,7 +14,7 @@ _PRIORITY = 1
 def take_realtime_priority() -> None:
     """Makes the calling thread, not its children, punctual; a system that does not grant it is no error.
 
-    For threads that use little processor time, so that nobody else is kept waiting.
+    For threads that use little processor time, so that no other thread is kept waiting.
     """
     try:
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK

@@ -1,6 +1,6 @@
 """Whole flights as arrays, a table for each topic: NumPy's ``.npz`` and MATLAB's ``.mat``.
 
-Of every topic but the pictures there is, with one row a message:
+Of every topic but the pictures there is, with one row per message:
 
 * ``stamp_ns``, host time of the message's header (of its arrival where it has none), and ``receive_ns``, when the
   recorder had it: int64 nanoseconds since 1970;

@@ -1,6 +1,6 @@
 """Many flights, exported side by side: here in processes, or on a Dask cluster; the same files either way.
 
-An export folder holds one entry a flight and format, a data card (README.md), and ``manifest.json``: versions,
+An export folder holds one entry per flight and format, a data card (README.md), and ``manifest.json``: versions,
 parameters, counts, and the SHA-256 of every file exported there. A flight is built under a temporary name and renamed
 when whole, so that an export that was cut off goes on where it stopped: flights whose record in ``.flights/<format>/``
 fits the bags and parameters are not made again. What another record names is never overwritten.
@@ -45,7 +45,7 @@ def flights(arguments: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Name the flights given on a command line: a bag is a flight, a folder of (split) bags is one too.
 
     Returns:
-        Unique name to bag paths; names take as many parent folders as it needs to tell them apart.
+        Unique name to bag paths; names take as many parent folders as are needed to be unique.
 
     Raises:
         BagError: A folder without bags.

@@ -69,7 +69,7 @@ class Pictures(NamedTuple):
 
     kept: list[Picture]
     stamp: np.ndarray  #: int64 [ns] of the frames
-    columns: dict[str, np.ndarray]  #: by name, one value a frame
+    columns: dict[str, np.ndarray]  #: by name, one value per frame
     counts: Counts
 
 

@@ -130,7 +130,7 @@ def _for_ros2(own: Mapping[str, Any], known: Mapping[str, Any]) -> dict[str, Any
 
 
 def _alike(own: Mapping[str, Any], known: Mapping[str, Any], name: str) -> bool:
-    """Tell whether a type's data lie alike in ROS 1 and in ROS 2, whatever the fields are called."""
+    """Returns whether a type's data lie alike in ROS 1 and in ROS 2, whatever the fields are called."""
     if name == _HEADER:
         return True  # the conversion leaves out `seq`
     if name not in own or name not in known:

@@ -1,4 +1,4 @@
-"""Flights as tables: CSV and Parquet, one row a flight state or one row an instant of a uniform time base."""
+"""Flights as tables: CSV and Parquet, one row per flight state or one row an instant of a uniform time base."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def flight_table(bags: Bags, rate: Optional[float] = None, topics: Sequence[str]
 
     Args:
         bags: Open bags of one flight.
-        rate: [1/s] of a uniform time base; None: one row a flight state, nothing interpolated.
+        rate: [1/s] of a uniform time base; None: one row per flight state, nothing interpolated.
         topics: Further topics whose newest values at each row are added, prefixed by their name below the name space.
 
     Returns:

@@ -23,8 +23,8 @@ import numpy as np
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.eye import names
 
-#: Frames by which the datagram that reports a step is later than the step in the picture. 0 as long as nobody has seen
-#: a real X-Plane read its network after it answered.
+#: Frames by which the datagram that reports a step is later than the step in the picture. 0 until a real
+#: X-Plane has been seen to read its network after it answered.
 FIELD_OF_VIEW_REPORT_LAG = 0
 
 _STEPS = 10
@@ -38,8 +38,8 @@ _MORE = 2
 #: The delay is looked for within these [s].
 _LEAST_S, _MOST_S = -0.02, 0.5
 #: So many more pictures than steps, those that differ most from the one before, may have zoomed; they differ by at
-#: least so many grey levels. No multiple of the usual difference tells them: at few frames a second the aircraft moves
-#: nearly as much between two pictures as a step does.
+#: least so many grey levels. No multiple of the usual difference separates them: at few frames a second the aircraft
+#: moves nearly as much between two pictures as a step does.
 _SPARE = 2
 _LEAST_DIFFERENCE = 1.5
 _GREY_SIZE = (56, 80)

@@ -1,7 +1,7 @@
 """Which of X-Plane's frames does a picture show? Decided where both are seen, on one clock; no input or output here.
 
 A picture appears some delay after the datagrams of its frame. With that delay known (`calibrate`), the frame is the one
-whose arrival is nearest to the picture's change less the delay. Timing alone cannot tell the delay: with regular frames
+whose arrival is nearest to the picture's change less the delay. Timing alone cannot give the delay: with regular frames
 it is as good one period longer.
 """
 

@@ -97,7 +97,7 @@ class Eye:
 
     Args:
         options: As asked for.
-        say: Tells people what happens.
+        say: Prints what happens.
     """
 
     def __init__(self, options: EyeOptions, say: Callable[[str], None]) -> None:
@@ -131,7 +131,7 @@ class Eye:
                 with self._lock:
                     self._publishing = True
                 while True:
-                    self._sender.tell(self._problem())
+                    self._sender.report_problem(self._problem())
                     self._send_decided()
                     self._watch_delay()
                     self._report_remark()
@@ -150,7 +150,7 @@ class Eye:
             if heard.key > _COARSE_KEY_S and not self._coarse_said:
                 self._coarse_said = True
                 self._say(
-                    "X-Plane has run for more than 18 h: its time is too coarse to tell frames above 60/s apart; "
+                    "X-Plane has run for more than 18 h: its time is too coarse to distinguish frames above 60/s; "
                     "start it anew for exact pairing"
                 )
         self._send_decided()
@@ -182,7 +182,7 @@ class Eye:
     def _wait_for(self, condition: Callable[[], bool], what: str) -> None:
         said = False
         while not condition():
-            self._sender.tell(what)
+            self._sender.report_problem(what)
             if not said:
                 said = True
                 self._say(what)
@@ -198,13 +198,13 @@ class Eye:
             return
         while True:
             self._wait_for(lambda: not self._grabber.problem, "waiting for X-Plane's window")
-            self._sender.tell("the eye is calibrating")
+            self._sender.report_problem("the eye is calibrating")
             self._say("calibrating: X-Plane's field of view changes for about three seconds")
             try:
                 found = self._new_calibration().run()
             except CalibrationError as error:
                 self._say(f"not calibrated: {error}")
-                self._sender.tell(f"not calibrated: {error}")
+                self._sender.report_problem(f"not calibrated: {error}")
                 time.sleep(_CALIBRATE_AGAIN_S)
                 continue
             finally:

@@ -118,7 +118,7 @@ class FrameStream:
                     self._subscribe(_EVERY_FRAME_HZ)
             try:
                 heard = self._receive()
-            except (OSError, protocol.DecodeError):  # silence, ICMP's answer, or a datagram of somebody else's
+            except (OSError, protocol.DecodeError):  # silence, ICMP's answer, or a datagram from another program
                 continue
             if heard is not None:
                 self._heard_ns = heard.arrival_ns

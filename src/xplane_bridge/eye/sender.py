@@ -37,7 +37,7 @@ class Sender:
         token: That of `sender/token`; empty: none.
         xplane: Which X-Plane, for people.
         encode: Makes JPEG of pixels.
-        say: Tells people what happens.
+        say: Prints what happens.
     """
 
     def __init__(
@@ -86,8 +86,8 @@ class Sender:
             self._next = decision
         self._wake()
 
-    def tell(self, problem: str) -> None:
-        """Has `capture_node` told why there are no pictures; empty when there are."""
+    def report_problem(self, problem: str) -> None:
+        """Reports to `capture_node` why there are no pictures; empty when there are."""
         self._problem = problem
 
     def _wake(self) -> None:

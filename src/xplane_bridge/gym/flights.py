@@ -62,11 +62,11 @@ class InProcessFlight:
         """
         self._aircraft = Aircraft(episode.conditions)
         trial = Failures(self._aircraft.model)
-        for failure in episode.failures:  # a wrong one is told now, not when it is due
+        for failure in episode.failures:  # a wrong one raises now, not when it is due
             trial.act(failure.action)
         self._to_come = list(episode.failures)
-        # The first state that the bridge can publish is that of the first frame: nobody commands into it, and a stick
-        # that nobody has taken is centred.
+        # The first state that the bridge can publish is that of the first frame: no command acts in it, and a stick
+        # without an override is centred.
         controls = self._aircraft.controls
         controls.roll = controls.pitch = controls.yaw = 0.0
         self._fly()

@@ -1,6 +1,6 @@
 """Many environments at once: worker processes of some environments each, numbers in shared memory.
 
-A worker is sent one byte a step and sends one message back, empty but for what cannot be a number in an array: the
+A worker is sent one byte per step and sends one message back, empty but for what cannot be a number in an array: the
 infos of environments whose episode begins or ends. The calling process is a worker too: it would only wait for the
 others, and to be woken costs as much as half a step.
 """
@@ -111,7 +111,7 @@ def _work(
     rows: slice,
     arguments: Dict[str, Any],
 ) -> None:
-    """What a worker process does until it is told to end or its parent is gone.
+    """What a worker process does until a message ends it or its parent is gone.
 
     `others` are the parent's ends of pipes: held open here, they would hide that the parent is gone.
     """
@@ -157,7 +157,7 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         self.closed = True  # until there is something to close
         if num_envs < 1 or (workers is not None and workers < 1):
             raise GymError(f"num_envs: {num_envs!r}, workers: {workers!r}; expected 1 or more")
-        model = FlyEnv(**arguments)  # tells what is wrong before a process is started
+        model = FlyEnv(**arguments)  # raises what is wrong before a process is started
         self.num_envs, self.render_mode = num_envs, None
         self.single_observation_space, self.single_action_space = model.observation_space, model.action_space
         self.observation_space = batch_space(model.observation_space, num_envs)
@@ -260,11 +260,11 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
                 self._fail(i)
             if not answer:
                 continue
-            told = pickle.loads(answer)
-            if isinstance(told, str):
+            received = pickle.loads(answer)
+            if isinstance(received, str):
                 self.close()
-                raise WorkerError(told)
-            for index, info in told.items():
+                raise WorkerError(received)
+            for index, info in received.items():
                 infos = self._add_info(infos, info, index)
         infos["sim_time"], infos["_sim_time"] = self._arrays["sim_time"].copy(), np.ones(self.num_envs, bool)
         return infos
@@ -273,11 +273,11 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         """A worker is gone: says so, or what it has said last."""
         connection, process = self._connections[i], self._processes[i]
         process.join(_PATIENCE_S)
-        told = f"it has ended by itself, with exit code {process.exitcode} (negative: by that signal)"
+        reason = f"it has ended by itself, with exit code {process.exitcode} (negative: by that signal)"
         try:
             if connection.poll():
-                told = pickle.loads(connection.recv_bytes())
+                reason = pickle.loads(connection.recv_bytes())
         except (EOFError, OSError):
             pass
         self.close()
-        raise WorkerError(f"worker {i} of {len(self._processes)}: {told}")
+        raise WorkerError(f"worker {i} of {len(self._processes)}: {reason}")

@@ -84,7 +84,7 @@ Observer = Callable[[RunningFlight], None]
 
 
 def _ignore(_: object) -> None:
-    """Does nothing with what it is told."""
+    """Ignores the text it is given."""
 
 
 def fly(

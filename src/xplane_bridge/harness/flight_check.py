@@ -69,7 +69,7 @@ class TopicSummary:
 
 # ------------------------------------------------------------------------------------------------------- the table
 
-#: What tells most of a message, by its type: label, column, factor, digits. Other types show their first columns.
+#: Columns of a message in its line, by its type: label, column, factor, digits. Other types show their first columns.
 _SUMMARY_COLUMNS: Mapping[str, Sequence[Tuple[str, str, Optional[float], int]]] = {
     "xplane_bridge/FlightState": (
         ("alt", "altitude_msl", 1.0, 0),

@@ -46,7 +46,7 @@ class LockstepBridge:
         self._answers: queue.Queue[Any] = queue.Queue()
 
     def begin(self, port: int, aircraft: str) -> Any:
-        """Starts the nodes; gives the first FlightState, of frame 1, into which nobody has commanded anything.
+        """Starts the nodes; gives the first FlightState, of frame 1, before any command.
 
         Args:
             port: UDP port of a simulator on this machine that waits.

@@ -69,7 +69,7 @@ def wait_for_bridge(flight: RunningFlight) -> None:
 
 
 class LockstepRun:
-    """Flies a flight whose programs were all started: begins when everybody hears everybody.
+    """Flies a flight whose programs were all started: begins when all programs are connected to each other.
 
     Args:
         flight: what runs.
@@ -89,10 +89,10 @@ class LockstepRun:
         self._thread = threading.Thread(target=self._step, daemon=True)
 
     def begin(self) -> None:
-        """Waits until nobody will miss anything, and lets the flight begin.
+        """Waits until no program will miss a message, and lets the flight begin.
 
         Raises:
-            HarnessError: Somebody does not come.
+            HarnessError: A program does not appear.
         """
         missing = "answer of the nodes"
 

@@ -19,7 +19,7 @@ _CALLER = "/xplane_bridge_harness"
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
-    """A port of the loopback interface that nobody uses now: TCP, or UDP with `socket.SOCK_DGRAM`."""
+    """A port of the loopback interface that is free now: TCP, or UDP with `socket.SOCK_DGRAM`."""
     with socket.socket(socket.AF_INET, kind) as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -89,7 +89,7 @@ class RosMaster(ManagedProcess):
         log_dir: folder of its log, of the nodes' logs, and of what else ROS keeps (ROS_HOME).
     """
 
-    _ATTEMPTS = 5  # of finding a port that nobody takes in the meantime
+    _ATTEMPTS = 5  # of finding a port that stays free meanwhile
 
     def __init__(self, log_dir: Path) -> None:
         #: ROS_HOME of this master and of all that runs under it; nodes start in this folder.

@@ -29,7 +29,7 @@ class Geometry:
     wing_area: float  #: [m^2]
     chord: float  #: [m] mean aerodynamic
     span: float  #: [m]
-    mass: float  #: [kg] where the flight does not tell it
+    mass: float  #: [kg] where the flight does not determine it
     ixx: float  #: [kg m^2]
     iyy: float
     izz: float

@@ -20,7 +20,7 @@ _ROUNDS, _SETTLED = 6, 0.02
 _MOST_EVALUATIONS = 100
 #: Residuals below this share of an output's movement are not weighted up further: the motion is not that linear.
 _FLOOR = 1e-3
-#: Times between frames are told apart to this [s]: a simulator's frames have a handful of lengths, not thousands.
+#: Times between frames that differ by less are equal [s]; a simulator's frames have a handful of lengths.
 _TIME_GRAIN = 1e-5
 #: Of the series of a step's exponential; a frame is short against every mode.
 _TERMS = 16

@@ -44,7 +44,7 @@ _SURFACES = {
 
 @dataclass
 class Excitation:
-    """One injection, as excitation/state tells it."""
+    """One injection, as excitation/state reports it."""
 
     number: int
     kind: str

@@ -147,7 +147,7 @@ class Live:
 
     axes: Optional[Sequence[float]] = None  #: None: no message has come
     buttons: Sequence[int] = ()
-    name: str = ""  #: of the device, where the driver tells it
+    name: str = ""  #: of the device, where the driver gives it
     rate: float = 0.0  #: [1/s] of messages
     commands: Dict[str, float] = field(default_factory=dict)  #: target to value, those that are commanded
     chosen: Sequence[str] = ()  #: keys of the integrated inputs that are chosen

@@ -15,18 +15,18 @@ from typing import Any, Dict, Iterable, List, Optional, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
 
-#: What SDL has to be told before it starts, as environment variables.
+#: Settings that SDL reads when it starts, as environment variables.
 SDL_ENVIRONMENT = {
     "SDL_VIDEODRIVER": "dummy",  # events come without a window, and without a display
     "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",
     # SDL's own drivers for some gamepads number axes and buttons differently from the kernel.
     "SDL_JOYSTICK_HIDAPI": "0",
-    "SDL_LINUX_JOYSTICK_DEADZONES": "1",  # the small ones a driver tells of: the kernel's interface has them
+    "SDL_LINUX_JOYSTICK_DEADZONES": "1",  # the small ones a driver reports: the kernel's interface has them
     "SDL_NO_SIGNAL_HANDLERS": "1",  # Ctrl-C is ROS's
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",
 }
-#: For so long after a joystick was lost nothing is published, though it be back at once, so that whoever listens has
-#: seen it go: its levers read 0 until they are touched, which is not where they stood before [s].
+#: For so long after a joystick was lost nothing is published, though it be back at once, so that subscribers see
+#: it go: its levers read 0 until they are touched, which is not where they stood before [s].
 _REST_S = 1.0
 
 
@@ -175,7 +175,7 @@ class JoyReader:
                     self._look()
             elif event.type == kinds.JOYDEVICEREMOVED:
                 if self._is_ours(event):
-                    # Just before, SDL has let every axis and button go; nobody did that.
+                    # Just before, SDL has let every axis and button go; the user did not.
                     out.clear()
                     self._lose(now)
                 elif self._device is None:
@@ -240,7 +240,7 @@ class JoyReader:
         self._read = self.name
         self._hats_from = device.get_numaxes()
         self._state = JoyState([0.0] * (device.get_numaxes() + 2 * device.get_numhats()), [0] * device.get_numbuttons())
-        self._changed_at = float("-inf")  # that it is there is told at once
+        self._changed_at = float("-inf")  # its presence is published at once
         self.notice = (
             f"reading {device.get_name()!r}: {device.get_numaxes()} axes, {device.get_numhats()} hats as "
             f"{2 * device.get_numhats()} more, {device.get_numbuttons()} buttons"

@@ -41,7 +41,7 @@ class Options(NamedTuple):
     flat_world: bool = False  #: the emulator's ground instead of the sphere
     map_sigma: float = MAP_SIGMA_M  #: [m]
     standing_height: Optional[float] = None  #: [m] altitude less y_agl of the parked aircraft; None: not known
-    span: float = SPAN_M  #: [m] of other aircraft, whose size X-Plane does not tell
+    span: float = SPAN_M  #: [m] of other aircraft, whose size X-Plane does not show
 
 
 class Frame(NamedTuple):

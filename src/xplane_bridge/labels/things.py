@@ -16,7 +16,7 @@ from xplane_bridge.labels.world import EARTH_RADIUS_M, SIDE_PARTS, RunwayFrame, 
 COARSE_PX = 3.0
 #: How well a file's latitudes and longitudes say what X-Plane draws [m].
 MAP_SIGMA_M = 0.5
-#: What other aircraft are taken to measure across where nobody says [m].
+#: What other aircraft are taken to measure across by default [m].
 SPAN_M = 12.0
 #: Half of the sun's disc [rad].
 _SUN_RADIUS = math.radians(0.53 / 2)

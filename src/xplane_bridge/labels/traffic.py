@@ -1,6 +1,6 @@
 """Other aircraft at the times of pictures: from the states recorded of them, interpolated to each picture's frame.
 
-Times are the simulator's own, by which a picture's frame and the states of other aircraft are told exactly.
+Times are the simulator's own, by which a picture's frame and the states of other aircraft are matched exactly.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class RecordedTraffic:
 
     Args:
         bags: Open.
-        span: Diameter of the ball that stands for each [m]; X-Plane does not tell their size.
+        span: Diameter of the ball that stands for each [m]; X-Plane does not show their size.
 
     Raises:
         BagError: The bags cannot be read.

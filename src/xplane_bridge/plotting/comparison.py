@@ -124,7 +124,7 @@ def _verdict(interval: Interval) -> str:
         return ""
     if interval.low == interval.high == 0.0:
         return '<span class="good">equal</span>'
-    return '<span class="bad">differs</span>' if interval.low > 0.0 or interval.high < 0.0 else "not told apart"
+    return '<span class="bad">differs</span>' if interval.low > 0.0 or interval.high < 0.0 else "not significant"
 
 
 def _figure(key: str, title: str, panels: list[Panel]) -> Section:

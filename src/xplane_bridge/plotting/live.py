@@ -17,7 +17,7 @@ _WINDOWLESS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")  #: matplo
 
 
 def can_show() -> bool:
-    """Tell whether a window can be opened: matplotlib falls back to drawing into memory where it cannot."""
+    """Returns whether a window can be opened: matplotlib falls back to drawing into memory where it cannot."""
     from matplotlib import pyplot
 
     pyplot.figure()  # only now the backend is chosen

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 #: Pictures on the page, evenly spread over those with a runway.
 PICTURES = 10
-#: Width that pictures are drawn at, so that thin lines can be told from what they lie on [px].
+#: Width that pictures are drawn at, so that thin lines stand out [px].
 _WIDTH = 960
 _RUNWAY, _THRESHOLD, _CENTRE = (60, 220, 60), (40, 60, 255), (255, 220, 40)  # blue, green, red
 _LEVEL, _DIPPED, _SUN, _AIRCRAFT = (200, 120, 255), (255, 80, 200), (0, 215, 255), (255, 160, 60)

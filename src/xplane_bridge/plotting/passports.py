@@ -36,7 +36,7 @@ def passport_section(passports: Sequence[Passport]) -> str:
 
 
 def differences_table(names: Sequence[str], passports: Sequence[Optional[Passport]]) -> str:
-    """Show the lines in which passports differ, one column a flight; None: that flight has none."""
+    """Show the lines in which passports differ, one column per flight; None: that flight has none."""
     if all(passport is None for passport in passports):
         return missing(_NONE)
     lines = [{} if passport is None else passport.lines() for passport in passports]

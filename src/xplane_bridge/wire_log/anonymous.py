@@ -23,7 +23,7 @@ class Disguise:
         self._addresses: Dict[str, str] = {}
 
     def address(self, address: str) -> str:
-        """What stands for an address; the computer itself, everybody and nobody keep theirs."""
+        """What stands for an address; loopback, multicast, broadcast and the unspecified address keep theirs."""
         ip = ipaddress.IPv4Address(address)
         if ip.is_loopback or ip.is_multicast or ip.is_unspecified or address == "255.255.255.255":
             return address

@@ -109,7 +109,7 @@ class OwnLog:
                 return
 
     def _opened(self, capture: Capture, seen: Set[int]) -> Iterator[Event]:
-        """Sources of which the part has told since the last call, and no earlier part."""
+        """Sources that the part has named since the last call, and no earlier part."""
         for index in range(1, len(capture.interfaces)):
             if index in seen:
                 continue

@@ -34,9 +34,9 @@ class Dataref:
 
     Attributes:
         kind: `int`, `float`, `double` or `byte`; "" where the list gives only the name.
-        shape: Sizes of an array, outermost first; 0 where the list does not tell one; () is a scalar.
+        shape: Sizes of an array, outermost first; 0 where the list does not give one; () is a scalar.
         writable: None where the list does not say.
-        unit: As written in the list; "" where it tells none.
+        unit: As written in the list; "" where it gives none.
     """
 
     kind: str = ""
@@ -51,7 +51,7 @@ class Dataref:
 
     @property
     def size(self) -> int:
-        """Number of elements; 0 where the list does not tell it."""
+        """Number of elements; 0 where the list does not give it."""
         count = 1
         for length in self.shape:
             count *= length

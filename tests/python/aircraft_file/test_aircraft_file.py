@@ -113,7 +113,7 @@ def test_a_hover_is_seen_only_while_it_is_flown() -> None:
         assert taken(115501, {**flown, path: value}).hover is None
 
 
-def test_nobody_is_asked_where_there_is_no_terminal_or_yes_was_given() -> None:
+def test_no_question_is_asked_where_there_is_no_terminal_or_yes_was_given() -> None:
     seen = Observed(icao="QUAD", description="Quad", engines=4)
     with pytest.raises(UnansweredError, match="name of the aircraft: X-Plane does not show it; give --name, or --yes"):
         facts_of(seen, asker())

@@ -108,7 +108,7 @@ def test_picture_turns_with_the_roll(turn: float) -> None:
     assert math.degrees(angle) == pytest.approx(turn, abs=0.05)
 
 
-def test_blank_pictures_tell_nothing() -> None:
+def test_blank_pictures_show_nothing() -> None:
     assert rotation_between(np.zeros((240, 320), np.uint8), np.zeros((240, 320), np.uint8)) is None
 
 

@@ -76,7 +76,7 @@ def test_strings_of_changing_length_keep_order_and_values(tmp_path: Path) -> Non
     np.testing.assert_array_equal(table["x"], [0.5, 1.5, 2.5, 3.5, 4.5])
 
 
-def test_equal_sizes_with_lengths_moved_between_fields_are_told_apart(tmp_path: Path) -> None:
+def test_equal_sizes_with_lengths_moved_between_fields_are_distinguished(tmp_path: Path) -> None:
     definition = "string a\nstring b\n"
     raws = [b"\1\0\0\0x\3\0\0\0abc", b"\3\0\0\0abc\1\0\0\0x", b"\1\0\0\0y\3\0\0\0def"]
     with Bags(write(tmp_path / "a.bag", [("/t", "pkg/msg/T", definition, list(enumerate(raws)))])) as bags:

@@ -156,7 +156,7 @@ def test_without_the_compiled_module_the_way_to_it_is_said(monkeypatch: pytest.M
     [
         ({"events": [{"at": 0, "dataref": {"sim/none": 1}}]}, "scenario.events[0].dataref: takes the bridge"),
         ({"events": [{"at": 0, "stick": {"roll": "$no"}}]}, "expected a parameter of"),
-        ({"controller": "nowhere:Nobody"}, "controller: 'nowhere:Nobody' cannot be had"),
+        ({"controller": "nowhere:Missing"}, "controller: 'nowhere:Missing' cannot be had"),
         ({"controller": "math"}, "expected module:class or module:function"),
         ({"scenario": {"aircraft": "tiltrotor"}, "aircraft": "fixed_wing"}, "the scenario is for tiltrotor"),
         ({"weather": {"wind": 3}}, "weather.wind: unknown key"),

@@ -46,7 +46,7 @@ def quiet(_count: int) -> None:
     pass
 
 
-def test_the_table_is_the_same_whoever_flies_and_after_a_resumption(tmp_path: Path) -> None:
+def test_the_table_is_the_same_for_any_worker_and_after_a_resumption(tmp_path: Path) -> None:
     campaign = parse_campaign(document())
     alone = CampaignFolder(tmp_path / "alone").fly(campaign, in_process, quiet)
     assert list(alone["flight"]) == list(range(14))

@@ -1,4 +1,4 @@
-"""The example controller's law between flights of its own: it follows while somebody else flies."""
+"""The example controller's law between flights of its own: it follows while another source flies."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def state(time, **changed):
     return SimpleNamespace(**{**values, **changed})
 
 
-def test_engaged_after_a_minute_of_somebody_elses_flight_it_goes_on_from_what_was_flown():
+def test_engaged_after_a_minute_of_another_sources_flight_it_goes_on_from_what_was_flown():
     hold = AttitudeHold({})
     for k in range(600):
         hold.restart()  # not engaged; the aircraft climbs away from where it was

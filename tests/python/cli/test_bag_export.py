@@ -241,7 +241,7 @@ def test_bags_without_images_say_what_to_record(tmp_path: Path, capsys: pytest.C
     assert "record camera/image_raw/compressed" in capsys.readouterr().err
 
 
-def test_flights_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+def test_flights_of_one_name_are_distinguished_by_their_folders(tmp_path: Path) -> None:
     for name in ("monday", "tuesday"):
         (tmp_path / name).mkdir()
         write_flight(tmp_path / name / "flight.bag", 0.2)

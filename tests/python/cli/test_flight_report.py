@@ -89,7 +89,7 @@ def section(page: Path, key: str) -> str:
     return text[text.index(f'<section id="{key}">') :].split("</section>")[0]
 
 
-def test_the_summary_tells_the_flight(page: Path) -> None:
+def test_the_summary_reports_the_flight(page: Path) -> None:
     text = section(page, "summary")
     assert "<b>21.98 s</b><span>duration</span>" in text
     # 60 m/s over two stretches of 499 periods of 20 ms
@@ -98,7 +98,7 @@ def test_the_summary_tells_the_flight(page: Path) -> None:
     assert re.search(r">stale</td>", text)
 
 
-def test_a_failsafe_is_told_apart_from_the_automatic_flight_it_interrupts(page: Path) -> None:
+def test_a_failsafe_is_distinguished_from_the_automatic_flight_it_interrupts(page: Path) -> None:
     table = section(page, "summary").split("<h3>Who flew</h3>")[1].split("</table>")[0]
     rows = [re.findall(r"<td.*?>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
     assert rows == [

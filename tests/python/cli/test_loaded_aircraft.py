@@ -36,6 +36,6 @@ def test_codes_come_from_the_bridge_before_the_packages_files() -> None:
     assert codes["mine"] == []
 
 
-def test_an_aircraft_nobody_knows_is_said_with_those_there_are() -> None:
+def test_an_unknown_aircraft_is_said_with_those_there_are() -> None:
     with pytest.raises(AircraftError, match=r"which aircraft is zeppelin\?.*fixed_wing.yaml, .*multirotor.yaml"):
         identities_of(["zeppelin"], {"fixed_wing": []})

@@ -17,7 +17,7 @@ THERE = Surroundings(
 
 def test_a_topic_in_another_namespace_is_offered() -> None:
     assert about_topic("/xplane/flight_state", STATE, THERE) == (
-        f"nobody publishes /xplane/flight_state ({STATE}); topics of that type: /lab/flight_state "
+        f"no node publishes /xplane/flight_state ({STATE}); topics of that type: /lab/flight_state "
         "(choose with --namespace)"
     )
 

@@ -29,7 +29,7 @@ def log(path, ordered=1):
     return path
 
 
-def test_a_late_recorder_has_fewer_messages_and_any_other_difference_is_told():
+def test_a_late_recorder_has_fewer_messages_and_any_other_difference_is_reported():
     replayed = {"/a": [b"1", b"2", b"3", b"4"], "/b": [b"1"]}
     assert compare({"/a": [b"2", b"3"], "/b": [b"1"]}, replayed) == [("/a", ""), ("/b", "")]
     assert compare({"/a": [b"2", b"4"]}, replayed) == [("/a", "message 1 of 2 differs")]
@@ -38,7 +38,7 @@ def test_a_late_recorder_has_fewer_messages_and_any_other_difference_is_told():
     assert compare({"/c": [b"1"]}, replayed) == [("/c", "not in the replay (1 live)")]
 
 
-def test_hashes_tell_where_messages_begin():
+def test_hashes_show_where_messages_begin():
     assert hashes({"/a": [b"12", b"3"]}) != hashes({"/a": [b"1", b"23"]})
 
 

@@ -90,7 +90,7 @@ def shown(name: str) -> Dict[str, float]:
 
 
 def assert_shown(name: str, result: FlightResult) -> None:
-    """The page tells what was measured; another processor may differ in the last digits of a flight of minutes."""
+    """The page states what was measured; another processor may differ in the last digits of a flight of minutes."""
     assert_met(result)
     assert shown(name) == pytest.approx(result.values, rel=0.02, abs=0.05)
 

@@ -76,7 +76,7 @@ def test_where_all_is_well_no_check_has_anything_to_do():
 # ---------------------------------------------------------------------------------------------------------- beacons
 
 
-def test_a_beacon_is_told_with_all_addresses_of_its_computer():
+def test_a_beacon_is_reported_with_all_addresses_of_its_computer():
     twice = (LAB, Sighting("198.51.100.1", 49000, 115501, "lab-pc"))
     evidence = Evidence(beacons=BeaconWatch(twice), target=Target(chosen=Chosen.BEACON))
     only(link.beacons(evidence), OK, "beacon", "11.55 (115501)", "lab-pc", FAR, "198.51.100.1", "port 49000")
@@ -177,7 +177,7 @@ def test_from_wsl_x_plane_is_on_the_gateway():
     only(link.answer(evidence), PROBLEM, "no-simulator", "host:=172.20.80.1", "WSL2")
 
 
-def test_answers_are_told_with_where_they_come_from():
+def test_answers_are_reported_with_where_they_come_from():
     only(link.answer(Evidence(target=FAR_TARGET, answers=answers())), OK, "answer", "192.0.2.1:49000")
     evidence = Evidence(target=FAR_TARGET, answers=answers(sources={("192.0.2.3", 49000): 4}))
     found = only(
@@ -244,7 +244,7 @@ def test_who_sits_on_the_port_of_the_rows():
     only(data_output.receiving_port(Evidence(data_port=49001)), WARNING, "data-port", "49001")
 
 
-def test_rows_that_nobody_here_has_asked_for():
+def test_rows_that_no_program_here_requested():
     evidence = Evidence(data=DataWatch({(49003, FAR): (3, 17, 20)}))
     only(data_output.rows(evidence), WARNING, "unasked-data", "3, 17, 20", FAR, "49003", "switch it off")
 
@@ -275,14 +275,14 @@ def entry(owner, id_=f"override:{JOYSTICK}"):
         (Owner.RUNS, OK, "journal", ["runs", "override_joystick"]),
     ],
 )  # fmt: skip
-def test_what_a_journal_tells_depends_on_its_owner(owner, severity, id_, words):
+def test_what_a_journal_reports_depends_on_its_owner(owner, severity, id_, words):
     journal = Journal(Path("192.0.2.1_49000.json"), FAR, 49000, (entry(owner),))
     evidence = Evidence(target=FAR_TARGET, answers=answers(values={JOYSTICK: 1.0}), journals=[journal])
     only(leftovers.journals(evidence), severity, id_, "192.0.2.1:49000", *words)
-    assert leftovers.overrides(evidence) == [], "what a journal has is not told twice"
+    assert leftovers.overrides(evidence) == [], "what a journal has is not reported twice"
 
 
-def test_leftovers_that_x_plane_does_not_show_any_more_are_still_told():
+def test_leftovers_that_x_plane_does_not_show_any_more_are_still_reported():
     journal = Journal(Path("192.0.2.1_49000.json"), FAR, 49000, (entry(Owner.GONE),))
     evidence = Evidence(target=FAR_TARGET, answers=answers(values={JOYSTICK: 0.0}), journals=[journal])
     found = only(leftovers.journals(evidence), PROBLEM, "leftovers")

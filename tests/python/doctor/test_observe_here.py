@@ -91,7 +91,7 @@ def test_owners_before_a_reboot_and_on_other_computers(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"format": "xplane_bridge journal", "version": 2, "entries": []}', "{}"])
-def test_what_is_no_journal_is_told(text, tmp_path):
+def test_what_is_no_journal_is_reported(text, tmp_path):
     (tmp_path / "192.0.2.1_49000.json").write_text(text, encoding="utf-8")
     (journal,) = journals.read(tmp_path)
     assert journal.error
@@ -152,7 +152,7 @@ def test_a_master_its_parameters_and_nodes_are_seen():
     with socket.socket() as node, socket.socket() as gone:
         node.bind(("127.0.0.1", 0))
         node.listen()
-        gone.bind(("127.0.0.1", 0))  # nobody listens there
+        gone.bind(("127.0.0.1", 0))  # no program listens there
         uris = {
             "/xplane/rx_node": f"http://127.0.0.1:{node.getsockname()[1]}/",
             "/xplane/tx_node": f"http://127.0.0.1:{gone.getsockname()[1]}/",

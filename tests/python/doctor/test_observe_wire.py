@@ -158,14 +158,14 @@ def test_requests_come_in_batches_that_one_frame_takes():
         assert batches == [100, 100, 50]
 
 
-def test_answers_from_another_address_are_taken_and_told():
+def test_answers_from_another_address_are_taken_and_reported():
     with FakeXPlane(VALUES, reply_from="127.0.0.2") as xplane:
         answers = simulator.ask("127.0.0.1", xplane.port, 5.0)
     assert answers.any
     assert list(answers.sources) == [("127.0.0.2", xplane.port)]
 
 
-def test_nothing_listening_is_told_from_silence():
+def test_nothing_listening_is_distinguished_from_silence():
     refused = simulator.ask("127.0.0.1", free_udp_port(), 0.3)
     assert (refused.any, refused.refused) == (False, True)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
@@ -253,9 +253,9 @@ def test_wsl_its_gateway_and_a_firewall_are_seen(tmp_path):
     assert (other.wsl, other.firewall) == (False, "")
 
 
-def test_own_addresses_are_told_from_others():
+def test_own_addresses_are_distinguished_from_others():
     assert computer.is_own("127.0.0.1")
-    assert not computer.is_own("192.0.2.1")  # of the block for documentation: nobody's
+    assert not computer.is_own("192.0.2.1")  # of the block for documentation: in use nowhere
     assert computer.is_same_computer("127.0.0.1", "127.0.0.2")
     assert not computer.is_same_computer("127.0.0.1", "192.0.2.1")
 

@@ -1,4 +1,4 @@
-"""The watch of the window counts frames only where readings tell them apart."""
+"""The watch of the window counts frames only where readings can distinguish them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def seen_with(frames_by_reading, frames_by_picture, patience_s=30.0):
 
 
 @pytest.mark.parametrize("frames_by_reading", [(0, 0, 1), (1,), (1, 1, 1, 1, 1, 1, 1, 2)])
-def test_a_picture_that_changes_is_told_from_one_that_stays_for_two_frames(frames_by_reading):
+def test_a_picture_that_changes_is_distinguished_from_one_that_stays_for_two_frames(frames_by_reading):
     changing, staying = seen_with(frames_by_reading, 1), seen_with(frames_by_reading, 2)
     assert min(changing.frames, staying.frames) >= WANTED
     assert changing.changes == changing.distinct

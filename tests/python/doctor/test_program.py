@@ -103,7 +103,7 @@ def test_help_names_the_options_and_exit_codes(capsys):
     assert all(word in text for word in ("--host", "--port", "--json", "0 all is well, 1 findings, 2 cannot run"))
 
 
-def test_what_was_not_seen_is_told_and_not_judged():
+def test_what_was_not_seen_is_reported_and_not_judged():
     seen = examination.judge(Evidence())
     findings = examination.judge(Evidence(unfinished={"ros": "it took too long"}))
     assert {finding.id for finding in seen} - {finding.id for finding in findings} == {"no-ros"}

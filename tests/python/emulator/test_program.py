@@ -128,7 +128,7 @@ def test_bad_data_output_is_refused_with_an_example(option, value, capsys):
     assert f"{option} {value}: expected" in capsys.readouterr().err
 
 
-def test_sigusr1_has_it_tell_its_statistics_and_fly_on(program):
+def test_sigusr1_has_it_print_its_statistics_and_fly_on(program):
     one = program()
     for _ in range(2):
         one.process.send_signal(signal.SIGUSR1)

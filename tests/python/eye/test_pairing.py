@@ -38,8 +38,8 @@ def test_each_picture_has_its_own_frame_when_the_delay_is_known(delay_ms: float,
     assert not any(decision.flags for decision in decisions)
 
 
-def test_a_delay_that_nobody_measured_is_wrong_by_whole_frames_and_said_so():
-    """Perfectly regular frames and a delay of three periods: nothing in the times tells it from none."""
+def test_a_delay_that_was_not_measured_is_wrong_by_whole_frames_and_said_so():
+    """Perfectly regular frames and a delay of three periods: nothing in the times distinguishes it from none."""
     decisions = fly(Pairing(None), 100, 20.0, 60.0)
     assert {decision.picture - decision.frame.key for decision in decisions} == {-3.0}
     assert all(decision.flags == DELAY_ASSUMED for decision in decisions)
@@ -145,7 +145,7 @@ def test_a_jump_of_the_phase_raises_the_flag():
     assert not pairing.delay_is_sure
     assert decisions[-1].flags & DELAY_ASSUMED
     assert decisions[0].flags == BORDERLINE
-    assert pairing.delay_s == pytest.approx(0.030, abs=1e-4)  # nobody can tell which way: it is not followed
+    assert pairing.delay_s == pytest.approx(0.030, abs=1e-4)  # which way is not known: it is not followed
 
 
 def test_slow_drift_is_followed_at_most_a_quarter_of_a_frame_an_hour():

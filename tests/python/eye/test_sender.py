@@ -146,15 +146,15 @@ def test_a_refusal_is_said_in_words(receiver: Receiver):
         wait_until(lambda: any("sender/token" in line for line in said), 10.0, "the reason")
 
 
-def test_a_status_tells_why_there_are_no_pictures(receiver: Receiver):
+def test_a_status_reports_why_there_are_no_pictures(receiver: Receiver):
     with start(receiver) as eye:
-        eye.tell("no window")
+        eye.report_problem("no window")
         receiver.accept()
         receiver.reply(WELCOME)
         assert receiver.message(STATUS)[1] == b"no window"
 
 
-def test_it_ends_while_nobody_answers(monkeypatch: pytest.MonkeyPatch):
+def test_it_ends_while_no_receiver_answers(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(sender_module, "_CONNECT_TIMEOUT_S", 0.1)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))  # does not listen

@@ -241,13 +241,13 @@ def test_pictures_show_the_flight_and_are_the_same_again() -> None:
         ({"bridge": "udp"}, "bridge: 'udp'; expected None or 'ros'"),
     ],
 )
-def test_a_wrong_environment_is_told(arguments: dict, text: str) -> None:
+def test_a_wrong_environment_is_reported(arguments: dict, text: str) -> None:
     with pytest.raises(GymError) as raised:
         FlyEnv(**arguments)
     assert text in str(raised.value)
 
 
-def test_a_wrong_reset_or_action_is_told() -> None:
+def test_a_wrong_reset_or_action_is_reported() -> None:
     env = FlyEnv(axes=("roll",))
     with pytest.raises(GymError, match="call reset first"):
         env.step(np.zeros(1, np.float32))

@@ -163,7 +163,7 @@ def test_workers_end_when_their_parent_is_killed() -> None:
 
 
 def runs(process: Path) -> bool:
-    """Whether it is there, and not only as one that nobody has waited for."""
+    """Whether it is there, and not only as one that was not waited for."""
     try:
         return (process / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except FileNotFoundError:
@@ -178,13 +178,13 @@ def runs(process: Path) -> bool:
         ({"num_envs": 2, "fields": ("x",)}, "fields: ['x']"),
     ],
 )
-def test_wrong_arguments_are_told_before_a_process_starts(arguments: dict, text: str) -> None:
+def test_wrong_arguments_are_reported_before_a_process_starts(arguments: dict, text: str) -> None:
     with pytest.raises(GymError) as raised:
         FlyVectorEnv(**arguments)
     assert text in str(raised.value)
 
 
-def test_wrong_actions_and_seeds_are_told() -> None:
+def test_wrong_actions_and_seeds_are_reported() -> None:
     envs = FlyVectorEnv(2, workers=1, axes=("roll",))
     with pytest.raises(GymError, match="seed: 3 of them; expected one number, or 2"):
         envs.reset(seed=[1, 2, 3])

@@ -67,7 +67,7 @@ def test_a_controller_that_was_engaged_and_taken_over_has_flown():
     ("changes", "sources", "part"),
     [
         (GOOD[:1], ((0.0, 1),), "no automatic flight"),
-        ((GOOD[0], (4.0, 2, "somebody", "request"), GOOD[2]), FLOWN, "no automatic flight"),
+        ((GOOD[0], (4.0, 2, "operator", "request"), GOOD[2]), FLOWN, "no automatic flight"),
         ((GOOD[0], GOOD[1], (4.5, 1, "", TAKEOVER)), ((0.0, 1), (4.0, 2), (4.5, 1)), "no automatic flight of 1 s"),
         (GOOD[:2], ((0.0, 1), (4.0, 2)), "never ended by the stick"),
         (GOOD, ((0.0, 1),), "of the commands from whose turn it was"),
@@ -98,25 +98,25 @@ def frames(*time):
     return table(time, sim_time=time)
 
 
-def test_a_command_is_told_when_it_is_sent_and_again_when_it_is_shown():
+def test_a_command_is_reported_when_it_is_sent_and_again_when_it_is_shown():
     joy = table([0.0, 1.0], axes=[0, 1])
-    told = sent((0.0, 1, 1, 0), (0.01, 1, 1, 1), (0.02, 1, 2, 0), (0.03, 1, 2, 1))
-    verdict = check_stick(joy, joy, told, frames(-0.1, 0.005, 0.015, 0.025))
+    reported = sent((0.0, 1, 1, 0), (0.01, 1, 1, 1), (0.02, 1, 2, 0), (0.03, 1, 2, 1))
+    verdict = check_stick(joy, joy, reported, frames(-0.1, 0.005, 0.015, 0.025))
     assert verdict.passed
     assert "2 commands of it sent, 2 seen in X-Plane within 3 frames (wanted 1)" in verdict.text
-    assert not check_stick(table([], axes=[]), joy, told, frames(0.005)).passed
+    assert not check_stick(table([], axes=[]), joy, reported, frames(0.005)).passed
 
 
 def test_commands_that_xplane_does_not_show_are_found():
     joy = table([0.0, 1.0], axes=[0, 1])
-    told = [(0.01 * k, 1, k, int(k == 0)) for k in range(8)] + [(0.09, 2, 9, 1)]
+    reported = [(0.01 * k, 1, k, int(k == 0)) for k in range(8)] + [(0.09, 2, 9, 1)]
     every_frame = frames(*(0.01 * k + 0.005 for k in range(8)), 0.1)
-    verdict = check_stick(joy, joy, sent(*told), every_frame)
+    verdict = check_stick(joy, joy, sent(*reported), every_frame)
     assert not verdict.passed
     assert "8 commands of it sent, 1 seen in X-Plane within 8 frames (wanted 4)" in verdict.text
     # A simulator of two frames cannot show eight commands.
-    assert check_stick(joy, joy, sent(*told), frames(0.005, 0.045)).passed
-    assert not check_stick(joy, joy, sent(*((t, s, n, 0) for t, s, n, _ in told)), frames(0.005)).passed
+    assert check_stick(joy, joy, sent(*reported), frames(0.005, 0.045)).passed
+    assert not check_stick(joy, joy, sent(*((t, s, n, 0) for t, s, n, _ in reported)), frames(0.005)).passed
 
 
 # ------------------------------------------------------------------------------------------------------------ failure

@@ -284,7 +284,7 @@ def test_silent_surfaces_are_refused(short: Recording) -> None:
         identify(without(short, surfaces=surfaces))
 
 
-def test_a_window_that_is_left_out_is_told_and_the_others_are_used(calm: Recording) -> None:
+def test_a_window_that_is_left_out_is_reported_and_the_others_are_used(calm: Recording) -> None:
     begin, end, *rest = calm.excitation
     found = identify(without(calm, excitation=[begin, {**end, "result": "aborted: stopped by /me"}, *rest]))
     assert found.notes == ["excitation 1 (3-2-1-1 on pitch) was aborted: stopped by /me"]

@@ -172,7 +172,7 @@ def test_a_skeleton_is_a_device_file_with_what_is_there(tmp_path, axes, buttons,
     ],
 )
 def test_what_needs_no_ros_is_said_without_it(monkeypatch, capsys, arguments, part):
-    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")  # nobody there; rospy would wait for ever
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")  # no master there; rospy would wait for ever
     assert joy_config_check.main(arguments) == 1
     assert part in capsys.readouterr().err
 
@@ -182,7 +182,7 @@ def test_a_device_without_a_stick_has_no_skeleton():
         skeleton("Pedal", 1, 0)
 
 
-def test_a_nodes_last_word_is_told_with_the_keys_of_the_file():
+def test_a_nodes_last_words_are_reported_with_the_keys_of_the_file():
     output = "\x1b[31m[FATAL] [1700.5]: unknown parameter /check_1/joystick_mapper_node/direct/roll/expos (a)\x1b[0m\n"
     assert complaint(output, "/check_1/joystick_mapper_node/") == "unknown parameter direct.roll.expos (a)"
     assert complaint("Segmentation fault\n", "/x/") == "Segmentation fault"

@@ -45,7 +45,7 @@ class Played:
         return self.reader.handle(self.pygame.event.get(), self.now)
 
     def settle(self):
-        """What is published when all is told."""
+        """What is published in all."""
         return (self.step() + self.step(1.0))[-1]
 
 
@@ -55,7 +55,7 @@ class Played:
 def test_right_and_down_are_negative_and_full_travel_is_one(pygame, device):
     played = Played(pygame)
     first = played.settle()
-    assert first.axes == [0.0] * 6, "nothing is told of an axis that was not moved"
+    assert first.axes == [0.0] * 6, "nothing is published of an axis that was not moved"
     assert first.buttons == [0, 0, 0]
     for index, value in enumerate((32767, -32768, 16384, -3277)):
         device.axis(index, value)
@@ -139,7 +139,7 @@ def test_a_joystick_is_looked_for_read_lost_and_read_again(pygame):
     device.button(0, 1)
     assert played.settle().axes == [-1.0, 0.0]
     device.pull_out()
-    assert played.step() == [], "SDL lets everything go before it says that the device is gone; nobody did"
+    assert played.step() == [], "SDL lets everything go before it says that the device is gone; the user did not"
     assert played.step(5.0) == []
     assert played.reader.name == ""
     assert played.reader.notice.startswith("'Virtual Flight Stick' was pulled out; no joystick is there")
@@ -198,7 +198,7 @@ def fakes(pygame, monkeypatch):
     return there
 
 
-def test_nobody_is_handed_another_joystick(pygame, fakes):
+def test_no_other_joystick_is_taken_instead(pygame, fakes):
     fakes[:] = [FakeDevice("Stick", 7), FakeDevice("Gamepad", 8)]
     played = Played(pygame)
     played.settle()

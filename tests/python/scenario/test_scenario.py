@@ -345,7 +345,7 @@ def test_multisine_shakes_enough_to_measure_a_delay_by_and_stays_where_it_is():
         assert bench.sim.model.state.altitude_m == pytest.approx(1000.0, abs=10.0)
 
 
-def test_pilot_holds_what_it_is_told(tmp_path):
+def test_pilot_holds_what_it_is_given(tmp_path):
     text = "name: t\nevents:\n- {hold: {heading: 30, altitude: 1050, speed: 72}}\n"
     bench = fly(tmp_path, text, 90.0, aircraft="fixed_wing")
     state = bench.sim.model.state

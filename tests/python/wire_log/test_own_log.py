@@ -44,13 +44,13 @@ def write(path: Path, packets: list[Packet], comment: str = "") -> Path:
     return path
 
 
-def told(log: OwnLog) -> list[tuple[object, ...]]:
+def reported(log: OwnLog) -> list[tuple[object, ...]]:
     return [(e.kind, e.source, e.wall_ns, e.steady_ns, e.kernel_ns, e.counted, e.payload) for e in log.events()]
 
 
 def test_events_in_the_order_of_processing(tmp_path):
     log = OwnLog(write(tmp_path / "w.rx_node.pcapng", PACKETS))
-    assert told(log) == [
+    assert reported(log) == [
         (records.OPENED, 0, 0, 0, 0, 0, b"control"),
         (records.OPENED, 1, 0, 0, 0, 0, b"flight"),
         (records.WAITED, 0, 1000, 1, 0, 0, b""),

@@ -20,7 +20,7 @@ PROGRAM = ROOT / ".workspace/devel/lib/xplane_bridge/simulator_names"
 
 #: Paths that are used although a list speaks against it, and why.
 EXCEPTIONS = {
-    "sim/cockpit2/autopilot/airspeed_dial_kts_mach": "knots or Mach, told apart by size and made m/s after decoding",
+    "sim/cockpit2/autopilot/airspeed_dial_kts_mach": "knots or Mach, distinguished by size and made m/s after decoding",
     **{
         f"sim/cockpit2/radios/actuators/com{number}_{standby}frequency_hz_833": "kHz in the newest list and in panels"
         for number in (1, 2)
@@ -199,7 +199,7 @@ def test_each_kind_of_mistake_is_found(use, complaint):
         Use("", "sim/flightmodel/engine/ENGN_thro[8]", "write", ("12.08", "12.10")),
         Use("", "sim/weather/wind_speed_kt[0]", "write", unit="kt", versions=("11.40", "11.55", "12.00")),
         Use("", "sim/time/paused[0]", "read"),
-        Use("", "sim/flightmodel/engine/ENGN_power", "read", unit="W"),  # the list tells no unit
+        Use("", "sim/flightmodel/engine/ENGN_power", "read", unit="W"),  # the list gives no unit
     ],
 )
 def test_what_is_right_passes(use):

@@ -58,7 +58,7 @@ class Asker:
 
     Args:
         given: The options.
-        ask: Reads a line after a prompt; None: nobody can be asked.
+        ask: Reads a line after a prompt; None: there is no terminal to ask at.
     """
 
     def __init__(self, given: argparse.Namespace, ask: Optional[Callable[[str], str]]) -> None:
@@ -75,7 +75,7 @@ class Asker:
             convert: Of what is typed; raises argparse.ArgumentTypeError.
 
         Raises:
-            UnansweredError: There is no option, nothing likely, and nobody to ask.
+            UnansweredError: There is no option, nothing likely, and no terminal to ask at.
         """
         if self._given[option] is not None:
             return self._given[option]

@@ -30,7 +30,7 @@ class FlownLaw:
     """The node's side of a law.
 
     Args:
-        law: What flies; its `restart`, if it has one, is called while somebody else does.
+        law: What flies; its `restart`, if it has one, is called while another source does.
         program: Name of the node, for messages.
         namespace: Of the bridge, without a slash at its end.
         aircraft: Stems of files in config/aircraft; empty: any.

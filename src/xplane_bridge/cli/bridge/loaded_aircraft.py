@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
 
 import yaml
 
-from xplane_bridge.cli.bridge.waiting import Listener, link_text, told, wait_until
+from xplane_bridge.cli.bridge.waiting import Listener, link_text, print_waiting, wait_until
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.resources import ResourceError, config_file
 
@@ -76,7 +76,7 @@ class LoadedAircraft:
         self._wanted = list(wanted)
 
     def check(self) -> None:
-        """Waits until the aircraft is known; from then on `on_change` is told of others.
+        """Waits until the aircraft is known; from then on `on_change` is called with others.
 
         Raises:
             AircraftError: It is none of those wanted.
@@ -87,7 +87,7 @@ class LoadedAircraft:
         from xplane_bridge.msg import LinkState
 
         link = self._link = Listener(f"{self._namespace}/link_state", LinkState, self._look)
-        wait_until(lambda: _flies(link.last), self._why, told(self._program))
+        wait_until(lambda: _flies(link.last), self._why, print_waiting(self._program))
         self._identities = identities_of(self._wanted, self._of_bridge())
         text = self._refusal(link.last)
         if text:

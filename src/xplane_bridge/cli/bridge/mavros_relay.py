@@ -28,7 +28,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def rotated(orientation: Any, vector: Any) -> Tuple[float, float, float]:
-    """A vector turned by a unit quaternion (x, y, z, w): of the body into the frame its attitude is told in."""
+    """A vector turned by a unit quaternion (x, y, z, w): of the body into the frame its attitude is given in."""
     x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
     tx = 2.0 * (y * vector.z - z * vector.y)
     ty = 2.0 * (z * vector.x - x * vector.z)

@@ -41,7 +41,7 @@ def surroundings() -> Optional[Surroundings]:
 
 
 def about_topic(topic: str, msgtype: str, there: Optional[Surroundings], link: str = "") -> str:
-    """Why no message comes on a topic, as far as the master can tell.
+    """Why no message comes on a topic, as far as the master knows.
 
     Args:
         topic: Full name.
@@ -56,9 +56,11 @@ def about_topic(topic: str, msgtype: str, there: Optional[Surroundings], link: s
         return f"{text}; link to X-Plane: {link}" if link else text
     others = sorted(name for name, nodes in there.publishers.items() if nodes and there.types.get(name) == msgtype)
     if others:
-        return f"nobody publishes {topic} ({msgtype}); topics of that type: {_listed(others)} (choose with --namespace)"
+        return (
+            f"no node publishes {topic} ({msgtype}); topics of that type: {_listed(others)} (choose with --namespace)"
+        )
     return (
-        f"nobody publishes {topic} ({msgtype}), and there is no other topic of that type: "
+        f"no node publishes {topic} ({msgtype}), and there is no other topic of that type: "
         "start the bridge (roslaunch xplane_bridge bridge.launch)"
     )
 
@@ -151,7 +153,7 @@ class Listener:
         self._subscriber.unregister()
 
 
-def told(program: str) -> Callable[[str], None]:
+def print_waiting(program: str) -> Callable[[str], None]:
     """A function that writes lines of a waiting program to stderr."""
     return lambda text: print(f"{program}: waiting: {text}", file=sys.stderr, flush=True)
 
@@ -183,7 +185,7 @@ def wait_for_state(namespace: str, program: str) -> None:
     link = Listener(f"{namespace}/link_state", LinkState)
     state = Listener(f"{namespace}/flight_state", FlightState)
     try:
-        wait_until(state.came.is_set, lambda: state.why_none(link_text(link.last)), told(program))
+        wait_until(state.came.is_set, lambda: state.why_none(link_text(link.last)), print_waiting(program))
     finally:
         link.close()
         state.close()
@@ -208,4 +210,4 @@ def wait_for_service(service: str, program: str) -> None:
         except rosservice.ROSServiceIOException:
             return False
 
-    wait_until(there, lambda: about_service(service, surroundings()), told(program))
+    wait_until(there, lambda: about_service(service, surroundings()), print_waiting(program))

@@ -112,7 +112,7 @@ def paths_of(given: Sequence[Path]) -> List[tuple[Path, str]]:
 
 
 def short_names(paths: Sequence[Path]) -> List[str]:
-    """The paths without what all have in common; "flight.bag" alone tells nothing."""
+    """The paths without what all have in common; "flight.bag" alone identifies no flight."""
     parts = [path.resolve().parts for path in paths]
     common = 0
     while common < min(map(len, parts)) - 1 and len({each[common] for each in parts}) == 1:

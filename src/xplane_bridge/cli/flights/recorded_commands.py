@@ -68,7 +68,7 @@ def read_commands(bag: Path) -> Commands:
             time = float(np.interp(time_ns - state.time[0], state.time - state.time[0], elapsed))
             messages.append(Played(time, recorded.topic[len(namespace) + 1 :], raw, recorded.md5sum))
     if not any(message.topic != "control/mode" for message in messages):
-        raise ReplayError(f"{bag}: no command in it: {', '.join(_PLAYED)} were not recorded, or nobody commanded")
+        raise ReplayError(f"{bag}: no command in it: {', '.join(_PLAYED)} were not recorded, or no command was sent")
     return Commands(messages, first_of(state), float(elapsed[-1]))
 
 

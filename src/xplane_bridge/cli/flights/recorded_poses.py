@@ -75,7 +75,7 @@ def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None
     from xplane_bridge.srv import GetDataref, SetDataref
 
     if lockstep.is_on(namespace):
-        raise ReplayError(f"{namespace} is in lock-step, where nobody writes beside tx_node; --pose needs real time")
+        raise ReplayError(f"{namespace} is in lock-step, where only tx_node may write; --pose needs real time")
     wait_for_state(namespace, _NODE)
     for service in ("tx_node/set_dataref", "tx_node/reset_flight", "get_dataref"):
         wait_for_service(f"{namespace}/{service}", _NODE)

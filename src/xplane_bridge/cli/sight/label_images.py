@@ -22,7 +22,7 @@ def parser() -> argparse.ArgumentParser:
             "Labels a flight's pictures with runways, horizon, sun and other aircraft, by the camera's measured pose: "
             "FLIGHT.labels.jsonl beside the bag, which bag_export and flight_report take with --labels."
         ),
-        epilog="docs/labels.md tells what is in the file, and how sure it is.",
+        epilog="docs/labels.md describes what is in the file, and how sure it is.",
     )
     p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
     p.add_argument(
@@ -52,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
         type=positive,
         default=Options().span,
         metavar="M",
-        help="of other aircraft, whose size X-Plane does not tell: how large their boxes are (default: %(default)s)",
+        help="of other aircraft, whose size X-Plane does not show: how large their boxes are (default: %(default)s)",
     )
     p.add_argument(
         "--flat-world",

@@ -54,7 +54,7 @@ def _no_beacon(evidence: Evidence, group: str) -> Finding:
 
 
 def several(evidence: Evidence) -> List[Finding]:
-    """More than one X-Plane, and nobody has said which."""
+    """More than one X-Plane, and neither option nor parameter names one."""
     found = distinct(evidence.beacons.sightings)
     if len(found) < 2:
         return []

@@ -1,4 +1,4 @@
-"""The test card: a flight of two minutes that settles what only a live X-Plane can tell.
+"""The test card: a flight of two minutes that settles what only a live X-Plane can show.
 
 `questions` has the card, a function a question; `flight` and `pilot` place the aircraft and keep it level and high;
 `link` reads and writes; `journal` notes what is to be undone before it is changed; `card` runs the questions and puts

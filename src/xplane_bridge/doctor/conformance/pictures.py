@@ -52,13 +52,13 @@ def watch(new_frames: Callable[[], int], wanted: int, patience_s: float) -> Seen
 
 
 def compare(checks: Iterator[int], new_frames: Callable[[], int], wanted: int, patience_s: float) -> Seen:
-    """Compares readings with frames until enough frames were told apart.
+    """Compares readings with frames until enough frames were distinct.
 
     A busy computer may read slower than X-Plane draws for a while; what falls between two readings then says nothing.
 
     Args:
         checks: Reads the picture; gives a number that differs when the picture does.
-        new_frames: Tells how many frames came since it was asked last.
+        new_frames: Gives the number of frames since the call before.
         wanted: Ends after so many frames in pieces that count.
         patience_s: Ends after so long [s].
     """

@@ -1,4 +1,4 @@
-"""Listens on a port for Data Output rows that nobody here has asked for."""
+"""Listens on a port for Data Output rows that no program here has requested."""
 
 from __future__ import annotations
 

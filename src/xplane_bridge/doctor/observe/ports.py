@@ -33,7 +33,7 @@ class Holder:
 
 
 def holders(ports: Iterable[int], proc: Path = Path("/proc")) -> Dict[int, List[Holder]]:
-    """Who holds each of these UDP ports; nothing where nobody does, or on systems without a /proc."""
+    """Who holds each of these UDP ports; nothing where no process does, or on systems without a /proc."""
     inodes: Dict[int, Set[str]] = {port: set() for port in ports}
     for table in ("udp", "udp6"):
         with contextlib.suppress(OSError):

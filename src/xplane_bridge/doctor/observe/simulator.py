@@ -64,7 +64,7 @@ class Questions:
         self._to = (address, port)
         # Not connected: X-Plane may answer from another address of its computer.
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        # Connected: only such a socket is told of ICMP's answers, and that on all systems.
+        # Connected: only such a socket gets ICMP's answers, and that on all systems.
         self._probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._paths: Dict[int, str] = {}
         self._answers = Answers()

@@ -19,7 +19,7 @@ class Chosen(enum.Enum):
     OPTION = "--host"
     PARAMETER = "the nodes' parameter host"
     BEACON = "its beacon"
-    ASSUMED = "nobody: this computer is assumed"
+    ASSUMED = "default: this computer is assumed"
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ Failed = Callable[[str], bool]
 
 @dataclass
 class Electrics:
-    """Two buses with a battery and one generator an engine; the elements X-Plane has beyond those stay 0."""
+    """Two buses with a battery and one generator per engine; the elements X-Plane has beyond those stay 0."""
 
     bus_volts: List[float] = field(default_factory=lambda: [0.0] * 6)
     bus_amps: List[float] = field(default_factory=lambda: [0.0] * 6)

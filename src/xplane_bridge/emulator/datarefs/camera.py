@@ -1,4 +1,4 @@
-"""The camera of each view: where it stands in the aircraft, as X-Plane draws it and as its datarefs tell it."""
+"""The camera of each view: where it stands in the aircraft, as X-Plane draws it and as its datarefs report it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who moves the controls: clients (overrides, DREF, DATA rows), the scripted pilot, or nobody."""
+"""What moves the controls: clients (overrides, DREF, DATA rows), the scripted pilot, or nothing."""
 
 from __future__ import annotations
 
@@ -279,7 +279,7 @@ class ControlInputs:
         for side, slot in (("left", 2), ("right", 3)):
             name = f"{_COCKPIT}{side}_brake_ratio"
             if not self._overrides("toe_brakes") and (14, slot) not in self._held:
-                store.set(name, 0.0)  # pedals that nobody presses
+                store.set(name, 0.0)  # pedals that are not pressed
             setattr(controls, f"brake_{side}", _clip(store.get(name), 0.0, 1.0))
         controls.thrust_vector = max(store.get(_COCKPIT + "thrust_vector_ratio"), 0.0)
         controls.artificial_stability = store.get(

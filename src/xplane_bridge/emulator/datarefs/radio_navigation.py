@@ -147,7 +147,7 @@ def _needle(dots: float) -> float:
 
 
 class Receivers:
-    """The aircraft's receivers. `failed` tells of failure datarefs by leaf, `powered` whether the avionics live."""
+    """The aircraft's receivers. `failed` returns failure datarefs by leaf, `powered` whether the avionics live."""
 
     def __init__(self, failed: Callable[[str], bool], powered: Callable[[], bool]) -> None:
         self._failed, self._powered = failed, powered

@@ -92,7 +92,7 @@ class DatarefStore:
             name: A name of X-Plane's lists, or one of the emulator's own (HIDDEN_PREFIX).
             initial: Its value, or one for each element.
             read_only: Clients cannot write it, whatever the list says.
-            size: Of an array of the emulator's own; the lists tell that of all others.
+            size: Of an array of the emulator's own; the lists give that of all others.
 
         Raises:
             ValueError: The name is taken, or is in no list.

@@ -150,7 +150,7 @@ class Traffic:
                 store.values[store.locate(plane + leaf)] = value
 
     def relative(self, frame: Frame) -> Dict[int, Tuple[float, float, float]]:
-        """What TCAS tells of each: distance [m], bearing from the nose [deg], height above the user's aircraft [m]."""
+        """What TCAS reports of each: distance [m], bearing from the nose [deg], height above the user's [m]."""
         out = {}
         for number, other in self.aircraft.items():
             place = (frame.m.latitude_deg, frame.m.longitude_deg)

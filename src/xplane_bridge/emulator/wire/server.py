@@ -187,7 +187,7 @@ class Server:
                 source.sendto(packet, target)
             else:
                 send_from(source, packet, target, self._answer_from)
-        except OSError as error:  # nobody there, no route, buffer full: X-Plane goes on, so do we
+        except OSError as error:  # no such host, no route, buffer full: X-Plane goes on, so do we
             _LOG.debug("could not send %d bytes to %s:%d: %s", len(packet), target[0], target[1], error)
             self.ignored["send"] += 1
 

@@ -36,8 +36,8 @@ def write(path, begin=0.0, event=5.0, higher=0.0, commit="abc", played=True):
         values = {"commit": commit, "parameters": json.dumps({"experiment": {"flight": flight}})}
         bag.add("/xplane/experiment", "xplane_bridge/Experiment", stamp_ns(0.0), values)
         stamp = {"sec": START + int(event), "nanosec": int(event % 1 * 1e9)}
-        told = {"events": [{"number": 1, "stamp": stamp, "text": "aileron stuck"}]}
-        bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(event), told)
+        reported = {"events": [{"number": 1, "stamp": stamp, "text": "aileron stuck"}]}
+        bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(event), reported)
     if played:
         first = {"epoch": int(state["epoch"]), "sim_time_unwrapped": first_sim_time(path) + begin}
         log = {"scenario": "weave", "begin": first, "labels": {}}

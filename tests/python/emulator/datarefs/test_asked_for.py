@@ -1,4 +1,4 @@
-"""Datarefs are computed once somebody asks for them; who asks sees no difference."""
+"""Datarefs are computed once a client asks for them; the client sees no difference."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_clients_see_the_same_as_if_everything_was_computed(version: str, load_t
     np.testing.assert_array_equal(lazy.store.values, eager.store.values)
 
 
-def test_what_nobody_asks_for_is_not_computed() -> None:
+def test_what_no_client_asks_for_is_not_computed() -> None:
     sim = simulator("11.55", False)
     calls: List[int] = []
     sim.table.value("_emulator/counted", lambda f: calls.append(f.clocks.frame) or 7.0)

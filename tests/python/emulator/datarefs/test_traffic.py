@@ -98,7 +98,7 @@ def test_vehx_holds_another_aircraft_too(bench):
     assert emulator.read(PLANE.format(5) + "lat")[0] == pytest.approx(37.5, abs=1e-5)
 
 
-def test_tcas_tells_distance_bearing_and_height(bench):
+def test_tcas_reports_distance_bearing_and_height(bench):
     emulator = bench()
     m = emulator.sim.model.state
     client = emulator.client()

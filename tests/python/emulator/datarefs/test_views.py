@@ -1,4 +1,4 @@
-"""Views: which camera X-Plane draws, and what its datarefs tell of it; worked out by hand."""
+"""Views: which camera X-Plane draws, and what its datarefs report of it; worked out by hand."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_glances_and_views_from_outside_have_their_own_cameras(emulator):
     assert np.linalg.norm(arm(emulator)) == pytest.approx(math.hypot(30.0, 6.0), abs=0.02)
 
 
-def test_visual_offset_turns_what_is_drawn_but_not_what_is_told(emulator):
+def test_visual_offset_turns_what_is_drawn_but_not_what_is_reported(emulator):
     look(emulator, "forward_with_nothing")
     write(emulator, "field_of_view_vertical_deg", -90.0)
     assert relative(emulator) == pytest.approx((0.0, 0.0), abs=1e-4)

@@ -9,7 +9,7 @@ from xplane_bridge import protocol
 from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, FaultyChannel, Outage, parse_faults
 
 TIME = "sim/time/total_running_time_sec"
-NOBODY = ("127.0.0.1", 9)
+NO_CLIENT = ("127.0.0.1", 9)
 
 
 def test_all_faults_are_read():
@@ -55,7 +55,7 @@ def send(plan, count=2000, seed=1):
     channel = FaultyChannel(plan, seed)
     out = []
     for i in range(count):
-        channel.put(i * 1e-3, b"%05d" % i, NOBODY)
+        channel.put(i * 1e-3, b"%05d" % i, NO_CLIENT)
         out += [(i * 1e-3, packet) for packet, _ in channel.ready(i * 1e-3)]
     out += [(channel.next_due(), packet) for packet, _ in channel.ready(1e9)]
     return out
@@ -139,7 +139,7 @@ def test_restart_closes_the_port_and_forgets_clients():
         client.subscribe([TIME])
         bench.step(31)
         client.received()
-        client.send(protocol.RrefRequest(100, 0, TIME))  # nobody is there: lost
+        client.send(protocol.RrefRequest(100, 0, TIME))  # no server is there: lost
         bench.step(65)
         assert client.received() == []
         client.subscribe([TIME])

@@ -1,4 +1,4 @@
-"""The emulator on the wire: what X-Plane answers, to whom, when, also where that is unfriendly."""
+"""The emulator on the wire: what X-Plane answers, to which client, when, also where that is unfriendly."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_rref_splits_at_183_pairs(bench):
     assert [len(packet) for packet in client.received()] == [5 + 8 * 183, 5 + 8 * 7]
 
 
-def test_rref_splits_as_told(bench):
+def test_rref_splits_as_set(bench):
     emulator = bench(rref_split=2)
     client = emulator.client()
     client.subscribe([TIME, LATITUDE, THETA, PAUSED, LONGITUDE])
@@ -359,7 +359,7 @@ def test_zeros_before_a_flight_is_loaded(bench):
     assert client.values()[0] == pytest.approx(37.46, abs=0.01)
 
 
-def test_sim_time_starts_where_told_and_steps_as_float32(bench):
+def test_sim_time_starts_where_set_and_steps_as_float32(bench):
     emulator = bench(sim_time_start=32768.0, fps=100.0)
     client = emulator.client()
     client.subscribe([TIME])

@@ -14,8 +14,8 @@ from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, j
 
 _WIND_MPS = 15.0
 _SLIP_DEG = 1.0
-_TELLS_DEG = 2.0
-_TELLS_MPS = 2.0
+_MEANINGFUL_DEG = 2.0
+_MEANINGFUL_MPS = 2.0
 
 
 def _through_air(flight: Flight, sample: Sample) -> Tuple[float, ...]:
@@ -65,7 +65,7 @@ def _hpath(flight: Flight) -> Answer:
         over_ground.append(turn(sample[names.HPATH], track))
         through_air.append(turn(sample[names.HPATH], path))
         apart.append(turn(track, path))
-    if rms(apart) < _TELLS_DEG:
+    if rms(apart) < _MEANINGFUL_DEG:
         raise NotTestableError(f"there is no wind across: both paths are the same, within {rms(apart):.1f} deg")
     ground, air = rms(over_ground), rms(through_air)
     text = f"hpath is {ground:.2f} deg off the path over ground, {air:.2f} deg off that through the air"
@@ -97,7 +97,7 @@ def _wind_direction(flight: Flight) -> Answer:
         flight.wait(0.3)
         samples = flight.fly((*names.LOCAL_VELOCITY, *flight.wind_now, names.TRUE_AIRSPEED), 1.0)
     wind = median([length([sample[path] for path in flight.wind_now]) for sample in samples])
-    if wind < _TELLS_MPS:
+    if wind < _MEANINGFUL_MPS:
         raise NotTestableError(f"the wind is {wind:.1f} m/s only")
 
     def off(sign: float) -> float:

@@ -16,8 +16,8 @@ from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, j
 
 _G = 9.80665
 #: Both kinds of angles must differ by so much [deg].
-_TELLS_DEG = 0.03
-#: Rates and forces below these tell nothing.
+_MEANINGFUL_DEG = 0.03
+#: Rates and forces below these prove nothing.
 _RATE_DEG_S, _AXIAL_G, _SIDE_G = 3.0, 0.03, 0.01
 
 
@@ -33,7 +33,7 @@ def _which_axes(pairs: Sequence[Tuple[Sequence[float], Sample]]) -> Tuple[float,
 
 def _judged_axes(pairs: Sequence[Tuple[Sequence[float], Sample]], more: str = "") -> Answer:
     level, origin, apart = _which_axes(pairs)
-    if apart < _TELLS_DEG:
+    if apart < _MEANINGFUL_DEG:
         raise NotTestableError(f"both kinds of angles are the same here, within {apart:.3f} deg")
     text = (
         f"{level:.3f} deg off the angles at the local level, {origin:.3f} deg off those at the scenery's origin{more}"

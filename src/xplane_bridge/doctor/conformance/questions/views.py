@@ -59,7 +59,7 @@ def _offset(flight: Flight) -> Answer:
             after = flight.xplane.read(*names.CAMERA_BACK)
     cosine = sum(before[name] * after[name] for name in names.CAMERA_BACK)
     if not abs(cosine) <= 1.001 or not any(before.values()):
-        raise NotTestableError("world_matrix does not tell where the camera looks: watch the picture instead")
+        raise NotTestableError("world_matrix does not give where the camera looks: watch the picture instead")
     turned = math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
     text = f"a visual offset of {_OFFSET_DEG:.0f} deg turned the camera of world_matrix by {turned:.0f} deg"
     return judged(turned > 0.5 * abs(_OFFSET_DEG), text, turned_deg=turned)
@@ -98,7 +98,7 @@ def _window(flight: Flight) -> Answer:
 
         seen = pictures.watch(new_frames, _WATCH_FRAMES, _WATCH_S)
     if seen.frames < _WATCH_FRAMES:
-        text = f"{seen.grabs} pictures in {seen.duration_s:.1f} s could not tell {_WATCH_FRAMES} frames apart"
+        text = f"{seen.grabs} pictures in {seen.duration_s:.1f} s could not distinguish {_WATCH_FRAMES} frames"
         raise NotTestableError(f"{text}: end other programs, or lower X-Plane's frame rate")
     text = f"{seen.changes} changes of the window's picture in {seen.distinct} of {seen.frames} frames"
     kept = {"changes": seen.changes, "distinct": seen.distinct, "frames": seen.frames, "grabs": seen.grabs}

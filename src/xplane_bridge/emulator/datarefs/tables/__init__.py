@@ -1,4 +1,4 @@
-"""Which datarefs the emulator has, and where their values come from: one line a dataref, by subject."""
+"""Which datarefs the emulator has, and where their values come from: one line per dataref, by subject."""
 
 from __future__ import annotations
 

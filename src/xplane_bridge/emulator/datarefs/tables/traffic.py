@@ -1,4 +1,4 @@
-"""Other aircraft: their poses, and what TCAS tells of them."""
+"""Other aircraft: their poses, and what TCAS reports of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MODE_S, _SQUAWK = 0x710000, 0o2000
 
 
 def define(t: Table, sim: Sources) -> None:
-    """Defines this subject's datarefs. Element 0 of TCAS is the user's aircraft, of which nothing is told."""
+    """Defines this subject's datarefs. Element 0 of TCAS is the user's aircraft, of which TCAS reports nothing."""
     for number in range(1, MOST + 1):
         for leaf in (*WRITTEN, *GEODETIC):
             t.setting(PLANE.format(number) + leaf)

@@ -67,7 +67,7 @@ class Window:
         return any(event.type == self._pygame.QUIT for event in self._pygame.event.get())
 
     def prepare(self, bgrx: np.ndarray) -> None:
-        """Takes a picture of 4 channels over; nobody sees it yet."""
+        """Takes a picture of 4 channels over; it is not shown yet."""
         pixels = self._pygame.surfarray.pixels2d(self._surface)
         pixels.T[:] = bgrx.view(np.uint32)[..., 0]
         del pixels  # unlocks the surface
