@@ -13,6 +13,8 @@ namespace {
 
 using core::ResultCode;
 
+constexpr std::size_t kShownOfName = 80;  // [characters] of a name that is too long
+
 // X-Plane keeps float32; integers come back exactly.
 float toleranceOf(float value) { return 1e-4F * std::max(1.0F, std::abs(value)); }
 
@@ -94,6 +96,10 @@ SettingRequests::Written SettingRequests::setDataref(const std::string& name, co
 RequestResult SettingRequests::runCommand(const std::string& name) {
   if (!isUp(link_->status())) return noLink();
   const core::SendStatus sent = link_->command(name);
+  if (sent == core::SendStatus::kNotEncoded) {
+    return {ResultCode::kRefused, "name is \"" + name.substr(0, kShownOfName) +
+                                      "\": expected one of X-Plane's commands, e.g. sim/operation/pause_toggle"};
+  }
   if (sent != core::SendStatus::kSent) return {ResultCode::kRefused, name + ": " + core::toString(sent)};
   return {ResultCode::kAccepted, "sent; X-Plane never answers to a command"};
 }

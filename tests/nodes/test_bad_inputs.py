@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,6 +16,7 @@ from support.synthetic_flight import FlightBag, stamp_ns, write_states
 from xplane_bridge.harness import RosMaster
 from xplane_bridge.resources import program
 
+ROOT = Path(__file__).resolve().parents[2]
 NO_BAG = "not a ROS 1 bag (it does not start with '#ROSBAG V')"
 AIRCRAFT = "rv10, tiltrotor; or a file of your own with aircraft_file:=PATH"
 JOYSTICKS = "there is logitech_extreme_3d_pro, logitech_f710, playstation, xbox; or a file of your own"
@@ -109,6 +111,25 @@ LAUNCHES = [
     ("failure.launch scenario:=nothing", 1, ["scenario:=nothing: ", SCENARIOS]),
     ("failure.launch scenario:={}/typo.yaml", 1, ["typo.yaml: scenario.evnts: unknown key; expected one of"]),
     ("record.launch split_size:=big", 1, ["split_size:=big: expected a whole number"]),
+    ("record.launch compression:=zip", 1, ["compression:=zip: expected one of none, lz4, bz2"]),
+    ("bridge.launch joystick:=wheel", 1, ["joystick:=wheel: expected one of none, mapper, joy, sdl, virtual"]),
+    ("failure.launch scenario:=left_aileron_stuck joystick:=yes", 1, ["joystick:=yes: expected true or false"]),
+    (
+        "failure.launch scenario:=left_aileron_stuck joystick:=true joy_config:=wheel",
+        1,
+        ["(joy_config:=wheel)", JOYSTICKS],
+    ),
+    ("camera.launch window_index:=left", 1, ["window_index:=left: expected a whole number"]),
+    ("camera.launch heading:=north", 1, ["heading:=north: expected a number"]),
+    ("camera.launch field_of_view:=wide", 1, ["field_of_view:=wide: expected a number, or main"]),
+    ("mavros.launch engage:=perhaps", 1, ["engage:=perhaps: expected true or false"]),
+    ("mavros.launch aircraft:=zeppelin", 1, ["(aircraft:=zeppelin)", AIRCRAFT]),
+    ("two_bridges.launch first_host:=127.0.0.1 second_host:=127.0.0.1 first_port:=a", 1, ["port:=a: expected a whole"]),
+    (
+        "two_bridges.launch first_host:=127.0.0.1 second_host:=127.0.0.1 second_aircraft:=zeppelin",
+        1,
+        ["(aircraft:=zeppelin)", AIRCRAFT],
+    ),
 ]
 
 
@@ -148,3 +169,13 @@ def test_a_program_refuses(master: RosMaster, folder: Path, typed: str, code: in
 def test_a_launch_file_refuses(master: RosMaster, folder: Path, typed: str, code: int, expected: list[str]) -> None:
     words = ["roslaunch", "xplane_bridge", *typed.format(folder).split()]
     check(words, folder, master.env, code, expected)
+
+
+def test_an_argument_that_roslaunch_ignores_is_missing_in_the_nodes_first_line(world: Any) -> None:
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert "roslaunch itself ignores misspelt arguments; each node's first line lists what it was given" in readme
+    launch = world.launch("rx.launch", "hots:=192.0.2.9", "host:=127.0.0.1", "port:=9")
+    given = launch.wait_for_line(r"rx_node starts with (.*)", 60).group(1)
+    assert 'host: "127.0.0.1"' in given
+    assert "port: 9" in given
+    assert "192.0.2.9" not in given

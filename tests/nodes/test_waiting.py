@@ -53,18 +53,23 @@ def start(world: Any, name: str, *arguments: str) -> ManagedProcess:
 
 ALL = [
     ("attitude_hold", []),
+    ("fly_controller", ["xplane_bridge.controllers.twin:Hold"]),
     ("scenario_player", ["left_aileron_stuck"]),
     ("virtual_joystick", ["demo_flight"]),
 ]
+#: What they wait for first.
+LINK, STATE = "link_state (xplane_bridge/LinkState)", "flight_state (xplane_bridge/FlightState)"
+WAITING = [*((*program, LINK) for program in ALL), ("estimate_latency", ["--live", "5"], STATE)]
 
 
-@pytest.mark.parametrize(("name", "arguments"), ALL)
-def test_without_a_bridge_they_say_which_bridges_there_are(world, bridge, name, arguments):
+@pytest.mark.parametrize(("name", "arguments", "first"), WAITING)
+def test_without_a_bridge_they_say_which_bridges_there_are(world, bridge, name, arguments, first):
     bridge.link(0, "no answer yet")
+    bridge.fly()
     with start(world, name, *arguments, "--namespace", "/nowhere") as waiting:
         line = waiting.wait_for_line(r"^.*waiting: (.*)$", 60).group(0)
-    assert line.startswith(f"{name}: waiting: no node publishes /nowhere/link_state (xplane_bridge/LinkState)")
-    assert f"{world.namespace}/link_state" in line
+    assert line.startswith(f"{name}: waiting: no node publishes /nowhere/{first}")
+    assert f"{world.namespace}/{first.split()[0]}" in line
     assert "--namespace" in line
 
 

@@ -45,6 +45,30 @@ def _flag(_: str, value: str, __: Given) -> str:
     return "" if value.lower() in _FLAGS else "expected true or false"
 
 
+def _field_of_view(name: str, value: str, given: Given) -> str:
+    return "" if value == "main" or not _number(name, value, given) else "expected a number, or main"
+
+
+def _one_of(*choices: str) -> Check:
+    return lambda _, value, __: "" if value in choices else f"expected one of {', '.join(choices)}"
+
+
+def _joystick(name: str, value: str, given: Given) -> str:
+    """Who publishes joy; for failure.launch, which has no joy_config_file: whether the player plays a joystick."""
+    check = _one_of("none", "mapper", "joy", "sdl", "virtual") if "joy_config_file" in given else _flag
+    return check(name, value, given)
+
+
+def _joy_config(_: str, value: str, given: Given) -> str:
+    """The joystick where no argument names its file: failure.launch, whose player finds it by itself."""
+    if "joy_config_file" in given:
+        return ""
+    path = Path(value)
+    if path.suffix != ".yaml":
+        path = config_file("joysticks", "README.md").with_name(f"{value}.yaml")
+    return _shipped("joystick", "joysticks", "joy_config")("joy_config", str(path), given)
+
+
 def _parameters(_: str, value: str, __: Given) -> str:
     """A file of parameters: there, readable, YAML, a mapping."""
     try:
@@ -96,8 +120,14 @@ def _scenario(_: str, value: str, __: Given) -> str:
 
 CHECKS: Dict[str, Check] = {
     **dict.fromkeys(("port", "data_port", "stick_mode", "split_size", "buffer", "xplane_version"), _whole),
-    **dict.fromkeys(("display_delay", "max_publish_rate", "image_rate"), _number),
+    "window_index": _whole,
+    **dict.fromkeys(("display_delay", "max_publish_rate", "image_rate", "heading", "pitch", "roll"), _number),
+    "field_of_view": _field_of_view,
     **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
+    **dict.fromkeys(("set_points", "engage"), _flag),
+    "compression": _one_of("none", "lz4", "bz2"),
+    "joystick": _joystick,
+    "joy_config": _joy_config,
     **dict.fromkeys(("common_config", "rx_config", "tx_config", "capture_config"), _parameters),
     "aircraft_file": _shipped("aircraft", "aircraft", "aircraft"),
     "joy_config_file": _shipped("joystick", "joysticks", "joy_config"),

@@ -80,6 +80,15 @@ TEST_F(SettingRequestsTest, WhatCannotBeSentIsSaidAtOnce) {
   EXPECT_NE(command.text.find(core::toString(core::SendStatus::kNoPeer)), std::string::npos) << command.text;
 }
 
+TEST_F(SettingRequestsTest, ACommandWithoutANameIsRefusedWithWhatIsExpected) {
+  for (const std::string& name : {std::string(), std::string(2000, 'a')}) {
+    const RequestResult command = settings_.runCommand(name);
+    EXPECT_EQ(command.code, ResultCode::kRefused);
+    EXPECT_EQ(command.text, "name is \"" + name.substr(0, 80) +
+                                "\": expected one of X-Plane's commands, e.g. sim/operation/pause_toggle");
+  }
+}
+
 TEST_F(SettingRequestsTest, LargeNumbersAreComparedAsFloatsAre) {
   sim_.set(kQnh, 200000.02F);
   sim_.setReadOnly(kQnh);
