@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import os
 import random
+import signal
 import socket
 import threading
 import time
@@ -14,12 +16,18 @@ import numpy as np
 import pytest
 
 from xplane_bridge.emulator.view.renderer import read_strip
-from xplane_bridge.harness import ManagedProcess, wait_until
+from xplane_bridge.eye import program as eye_program
+from xplane_bridge.eye.grab import TITLES
+from xplane_bridge.eye.pairing import Decision
+from xplane_bridge.eye.verify import Verification
+from xplane_bridge.harness import EmulatorProcess, ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ros import free_port
 from xplane_bridge.resources import program
 
 FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
+TIMES_ON_SCREEN = "sim/network/dataout/data_to_screen[1]"
+LONGEST_S = 150.0
 FPS = 20
 #: Three periods of perfectly regular frames: timing alone cannot show them. Longer than any drawing takes.
 PIPELINE_DELAY_S = 0.15
@@ -240,3 +248,66 @@ def test_wrong_addresses_are_refused_in_words(world, sender: dict, text: str) ->
     node = world.start("capture_node", {"source": "sender", **({"sender": sender} if sender else {})})
     assert node.wait(20.0) == 1
     assert text in node.output()
+
+
+def flown_window(world) -> EmulatorProcess:
+    return world.emulator("--window", "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", "--start", "air")
+
+
+def test_the_pairing_is_verified_by_the_time_that_x_plane_prints(world, tmp_path: Path) -> None:
+    emulator = flown_window(world)
+    wire = world.wire(emulator.port)
+    own = ["--local-port", "0", "--undo-file", tmp_path / "undo.json", "--xplane", f"127.0.0.1:{emulator.port}"]
+    with ManagedProcess("xplane_eye", [program("xplane_eye"), "--verify", *own], tmp_path) as eye:
+        eye.wait_for_line("learning its digits", 90.0)
+        assert wire.read(TIMES_ON_SCREEN) == 1.0
+        said = eye.wait_for_line(r"(\d+) of (\d+) stills show the frame that they are paired with", 180.0)
+        assert int(said.group(2)) > 100
+        eye.wait(20.0)
+    assert wire.read(TIMES_ON_SCREEN) == 0.0
+    assert wire.read(FIELD_OF_VIEW) == pytest.approx(60.0)
+    assert list(tmp_path.glob("undo*")) == []
+
+
+@pytest.mark.parametrize("frames", [0, 1])
+def test_pictures_that_are_a_frame_off_are_found_by_the_time_that_x_plane_prints(
+    world, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, frames: int
+) -> None:
+    emulator = flown_window(world)
+    shown = {}
+
+    class Watched(Verification):
+        def offer(self, decision: Decision) -> None:
+            shown[decision.frame.index] = round((read_strip(decision.picture).sim_time - decision.frame.key) * FPS)
+            super().offer(decision)
+
+    monkeypatch.setattr(eye_program, "Verification", Watched)
+    eye = eye_program.Eye(
+        eye_program.EyeOptions(
+            receiver=None,
+            xplane=("127.0.0.1", emulator.port),
+            titles=TITLES,
+            window=None,
+            token="",
+            quality=90,
+            delay_s=PIPELINE_DELAY_S + frames / FPS,
+            calibrate=False,
+            local_port=0,
+            undo_file=tmp_path / "undo.json",
+        ),
+        print,
+    )
+    limit = threading.Timer(LONGEST_S, os.kill, (os.getpid(), signal.SIGTERM))  # its run ends by that with Ctrl-C
+    limit.start()
+    try:
+        eye.run()
+    except KeyboardInterrupt:
+        pytest.fail("no findings in time")
+    finally:
+        limit.cancel()
+    found = eye.findings
+    assert found is not None
+    assert len(found.stills) > 150
+    # Each as its strip says, whenever it appeared; pictures are late on a busy machine.
+    assert [still.off for still in found.stills] == [shown[still.index] for still in found.stills]
+    assert found.off.most_common(1)[0][0] == frames

@@ -43,7 +43,7 @@ _LEAST_S, _MOST_S = -0.02, 0.5
 _SPARE = 2
 _LEAST_DIFFERENCE = 1.5
 _GREY_SIZE = (56, 80)
-_SAME_DEG = 0.01
+_SAME_VALUE = 0.01
 _WRITE_TIMEOUT_S = 2.0
 _WRITE_AGAIN_S = 0.2
 
@@ -71,16 +71,22 @@ def default_undo_file() -> Path:
 
 
 class UndoFile:
-    """The user's field of view while it is changed: a file, so that it outlives a killed process.
+    """A setting of the user's while it is changed: a file, so that it outlives a killed process.
 
     Args:
         path: The file.
         xplane: Which X-Plane, HOST:PORT; another one's value is left alone.
+        name: Of the value in the file.
+        words: The setting's name for people.
     """
 
-    def __init__(self, path: Path, xplane: str) -> None:
+    def __init__(
+        self, path: Path, xplane: str, name: str = "field_of_view_deg", words: str = "X-Plane's field of view"
+    ) -> None:
         self._path = path
         self._xplane = xplane
+        self._name = name
+        self._words = words
 
     def keep(self, value: float) -> None:
         """Writes it down.
@@ -92,21 +98,21 @@ class UndoFile:
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with open(draft, "w", encoding="utf-8") as file:
-                json.dump({"xplane": self._xplane, "field_of_view_deg": value}, file)
+                json.dump({"xplane": self._xplane, self._name: value}, file)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(draft, self._path)
         except OSError as error:
             raise CalibrationError(
-                f"{self._path} cannot be written ({error.strerror}), and without it X-Plane's field of view could not "
-                "be restored after a crash: it is left alone"
+                f"{self._path} cannot be written ({error.strerror}), and without it {self._words} could not be "
+                "restored after a crash: it is left alone"
             ) from None
 
     def kept(self) -> Optional[float]:
         """The value, where a calibration of this X-Plane was not undone."""
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))
-            value = float(content["field_of_view_deg"])
+            value = float(content[self._name])
         except (OSError, ValueError, KeyError, TypeError):
             return None
         return value if content.get("xplane") == self._xplane and math.isfinite(value) else None
@@ -271,13 +277,26 @@ class Calibration:
         return settle(list(self._frames), list(self._pictures))
 
     def _set(self, value: float) -> bool:
-        """Writes the field of view until X-Plane reports it."""
-        end = time.monotonic() + _WRITE_TIMEOUT_S
-        while time.monotonic() < end:
-            self._write(names.FIELD_OF_VIEW, value)
-            again = time.monotonic() + _WRITE_AGAIN_S
-            while time.monotonic() < again:
-                if abs(self._read() - value) < _SAME_DEG:
-                    return True
-                time.sleep(0.01)
-        return False
+        return write_until_reported(self._write, self._read, names.FIELD_OF_VIEW, value)
+
+
+def write_until_reported(
+    write: Callable[[str, float], None], read: Callable[[], float], path: str, value: float
+) -> bool:
+    """Writes a dataref until X-Plane reports it; False when that takes longer than two seconds.
+
+    Args:
+        write: Writes a dataref of X-Plane's.
+        read: What it said of this one in its last frame.
+        path: The dataref.
+        value: For it.
+    """
+    end = time.monotonic() + _WRITE_TIMEOUT_S
+    while time.monotonic() < end:
+        write(path, value)
+        again = time.monotonic() + _WRITE_AGAIN_S
+        while time.monotonic() < again:
+            if abs(read() - value) < _SAME_VALUE:
+                return True
+            time.sleep(0.01)
+    return False

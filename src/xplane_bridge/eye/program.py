@@ -1,4 +1,4 @@
-"""The eye: hears frames, sees pictures, brings both together and sends them."""
+"""The eye: hears frames, sees pictures, brings both together and sends them, or verifies that they belong together."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Optional, Tuple
+from typing import Any, Callable, Optional, Tuple, Union
 
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.eye.calibrate import Calibration, CalibrationError, UndoFile
@@ -18,7 +18,9 @@ from xplane_bridge.eye.grab import Grabber, GrabError, Take
 from xplane_bridge.eye.jpeg import encoder
 from xplane_bridge.eye.pairing import Pairing
 from xplane_bridge.eye.rref import Address, FrameStream, Heard
+from xplane_bridge.eye.screen import TimesOnScreen
 from xplane_bridge.eye.sender import Sender
+from xplane_bridge.eye.verify import Findings, Verification
 
 _LOOK_S = 0.02
 _CALIBRATE_AGAIN_S = 2.0
@@ -31,7 +33,7 @@ class EyeOptions:
     """What the user asks for.
 
     Attributes:
-        receiver: Where `capture_node` listens, HOST, PORT.
+        receiver: Where `capture_node` listens, HOST, PORT; None: nothing is sent, the pairing is verified.
         xplane: Where X-Plane listens, HOST, PORT.
         titles: Of the window, exactly.
         window: Of several such windows, counted from 0, the leftmost, then the topmost; None: the largest.
@@ -43,7 +45,7 @@ class EyeOptions:
         undo_file: Where X-Plane's field of view is kept while it is changed.
     """
 
-    receiver: Address
+    receiver: Optional[Address]
     xplane: Address
     titles: Tuple[str, ...]
     window: Optional[int]
@@ -106,45 +108,75 @@ class Eye:
         self._lock = threading.Lock()
         self._pairing = Pairing(options.delay_s)
         self._calibration: Optional[Calibration] = None
-        self._field_of_view_deg = math.nan
+        self._field_of_view_deg = self._times_on_screen = math.nan
         self._size: Optional[Tuple[int, int]] = None
         self._publishing = False
         self._coarse_said = False
         self._delay_was_sure = True
         self._remark = ""
         xplane = resolved(options.xplane, "X-Plane's computer")
-        self._undo = UndoFile(options.undo_file, "{}:{}".format(*xplane))
+        name = "{}:{}".format(*xplane)
+        self._undo = UndoFile(options.undo_file, name)
         self._grabber = grabber_class()(options.titles, options.window, self._on_picture)
         self._stream = FrameStream(xplane, options.local_port, self._on_frame)
-        receiver = resolved(options.receiver, "capture_node's computer")
-        name = "{}:{}".format(*xplane)
-        self._sender = Sender(receiver, options.window or 0, options.token, name, encoder(options.quality), say)
+        screen_file = options.undo_file.with_name(f"{options.undo_file.stem}_screen{options.undo_file.suffix}")
+        undo = UndoFile(screen_file, name, "times_on_screen", "what X-Plane prints")
+        self._screen = TimesOnScreen(self._stream.write, lambda: self._times_on_screen, undo)
+        self._verification: Optional[Verification] = None
+        if options.receiver is None:
+            self._verification = Verification(say)
+            self._sender: Union[Sender, Verification] = self._verification
+        else:
+            receiver = resolved(options.receiver, "capture_node's computer")
+            self._sender = Sender(receiver, options.window or 0, options.token, name, encoder(options.quality), say)
+
+    @property
+    def findings(self) -> Optional[Findings]:
+        """What was found where the pairing is verified, in the end."""
+        return self._verification.findings if self._verification else None
 
     def run(self) -> None:
-        """Runs until Ctrl-C or SIGTERM."""
+        """Runs until Ctrl-C or SIGTERM; to verify the pairing, until that is done.
+
+        Raises:
+            VerifyError: No printed time could be read.
+            ScreenError: X-Plane does not print it.
+        """
         signal.signal(signal.SIGTERM, _end)
         with self._sender, self._stream:
             self._grabber.start()
             try:
                 self._wait_for(lambda: self._stream.alive, "waiting for X-Plane at {}:{}".format(*self._options.xplane))
                 self._prepare()
-                with self._lock:
-                    self._publishing = True
-                while True:
-                    self._sender.report_problem(self._problem())
-                    self._send_decided()
-                    self._watch_delay()
-                    self._report_remark()
-                    time.sleep(_LOOK_S)
+                if self._verification:
+                    self._say("X-Plane prints its times into the picture; learning its digits for half a minute")
+                    with self._screen:
+                        self._work(self._verification.work)
+                else:
+                    self._work(lambda: None)
             finally:
                 self._grabber.stop()
+
+    def _work(self, each_time: Callable[[], None]) -> None:
+        with self._lock:
+            self._publishing = True
+        while not self.findings:
+            self._sender.report_problem(self._problem())
+            self._send_decided()
+            self._watch_delay()
+            self._report_remark()
+            each_time()
+            time.sleep(_LOOK_S)
 
     # ------------------------------------------------------------------------------------------ other threads
 
     def _on_frame(self, heard: Heard) -> None:
         with self._lock:
             self._field_of_view_deg = heard.field_of_view_deg
-            self._pairing.add_frame(heard.arrival_ns, heard.key)
+            self._times_on_screen = heard.times_on_screen
+            frame = self._pairing.add_frame(heard.arrival_ns, heard.key)
+            if self._verification is not None:
+                self._verification.add_frame(frame)
             if self._calibration is not None:
                 self._calibration.add_frame(heard.arrival_ns, heard.field_of_view_deg)
             if heard.key > _COARSE_KEY_S and not self._coarse_said:
@@ -190,6 +222,7 @@ class Eye:
 
     def _prepare(self) -> None:
         """Measures the delay, where that is wanted; always gives back what a killed eye has left."""
+        self._screen.restore()
         if not self._options.calibrate or self._options.delay_s is not None:
             self._new_calibration().restore()
             self._calibration = None

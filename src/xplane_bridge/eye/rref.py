@@ -43,11 +43,13 @@ class Heard:
         arrival_ns: When it came, on the clock of time.perf_counter_ns [ns].
         key: Simulator time, the float32 as received [s].
         field_of_view_deg: Horizontal [deg]; nan where X-Plane does not say.
+        times_on_screen: Whether it prints its times into the picture, 0 or 1; nan where it does not say.
     """
 
     arrival_ns: int
     key: float
     field_of_view_deg: float
+    times_on_screen: float
 
 
 class FrameStream:
@@ -140,10 +142,8 @@ class FrameStream:
         if sender[0] != self._xplane[0]:
             return None
         values = dict(protocol.decode_rref_response(datagram))
-        key = values.get(names.SUBSCRIBED.index(names.RUNNING_TIME), math.nan)
-        if not math.isfinite(key):
-            return None
-        return Heard(arrival_ns, key, values.get(names.SUBSCRIBED.index(names.FIELD_OF_VIEW), math.nan))
+        key, field_of_view_deg, times_on_screen = (values.get(k, math.nan) for k in range(len(names.SUBSCRIBED)))
+        return Heard(arrival_ns, key, field_of_view_deg, times_on_screen) if math.isfinite(key) else None
 
 
 def _both_clocks() -> Tuple[int, int]:

@@ -18,8 +18,11 @@ _LOCAL_PORT = 49711
 
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Sends pictures until Ctrl-C."""
-    given = _parser().parse_args(argv)
+    """Sends pictures until Ctrl-C, or verifies the pairing once; then 1 means that it is not as good as promised."""
+    parser = _parser()
+    given = parser.parse_args(argv)
+    if (given.receiver is None) != given.verify:
+        parser.error("expected either HOST:PORT of capture_node, to send pictures there, or --verify, which sends none")
     token = given.token_file.read_text(encoding="utf-8").strip() if given.token_file else ""
     options = EyeOptions(
         receiver=given.receiver,
@@ -33,8 +36,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         local_port=given.local_port,
         undo_file=given.undo_file,
     )
-    Eye(options, _say).run()
-    return 0
+    eye = Eye(options, _say)
+    eye.run()
+    for line in eye.findings.lines() if eye.findings else ():
+        _say(line)
+    return 0 if eye.findings is None or eye.findings.good else 1
 
 
 def _say(text: str) -> None:
@@ -48,7 +54,13 @@ def _parser() -> argparse.ArgumentParser:
         "sender) on another computer. Runs beside X-Plane; needs no ROS. At its start it measures the delay from a "
         "frame to its picture by steps of X-Plane's field of view, which it gives back; start it before recording.",
     )
-    parser.add_argument("receiver", type=_address, metavar="HOST:PORT", help="capture_node's sender/listen")
+    parser.add_argument("receiver", nargs="?", type=_address, metavar="HOST:PORT", help="capture_node's sender/listen")
+    parser.add_argument(
+        "--verify",
+        action="store_true",
+        help="send nothing; let X-Plane print its time into the picture for a minute, read it, and report how many "
+        "pictures show the frame that they are paired with",
+    )
     parser.add_argument(
         "--xplane",
         type=_address,

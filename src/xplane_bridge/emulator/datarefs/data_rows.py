@@ -417,6 +417,13 @@ class DataRows:
         self._store.watch(self._sources.ravel())
         return self._store.values[self._sources] * self._factors + self._constants
 
+    def of(self, rows: np.ndarray) -> np.ndarray:
+        """Some rows by their indices, shape (number of rows, 8), in wire units."""
+        index = self._sources[rows]
+        self._store.watch(index.ravel())
+        values: np.ndarray = self._store.values[index] * self._factors[rows] + self._constants[rows]
+        return values
+
     def packet(self, selected: np.ndarray) -> bytes:
         """The datagram with the selected rows (indices, ascending); empty if none is."""
         if len(selected) == 0:

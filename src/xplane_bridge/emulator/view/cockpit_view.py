@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import List
+from typing import List, Tuple
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from xplane_bridge.emulator.flight.frame import MPS_TO_FPM, MPS_TO_KT
 from xplane_bridge.emulator.options import Options
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.emulator.view.renderer import RendererError, RendererOptions, RendererProcess, Scene
+from xplane_bridge.emulator.view.renderer.scene import Row
 from xplane_bridge.emulator.windows import WindowView
+from xplane_bridge.protocol import ROW_COUNT
 
 
 class CockpitView:
@@ -64,6 +66,7 @@ class CockpitView:
             airspeed_kt=frame.m.calibrated_airspeed_mps * MPS_TO_KT,
             vertical_speed_fpm=-frame.m.v_down_mps * MPS_TO_FPM,
             others=sim.traffic.poses(),
+            rows=_printed(sim),
         )
         for view, renderer in zip(self._views, self._renderers):
             renderer.show(_seen(scene, view, camera.turn))
@@ -98,6 +101,14 @@ def _renderer_options(options: Options, number: int) -> RendererOptions:
         realtime=options.realtime,
         place=(number * width, 0) if options.more_windows else None,
     )
+
+
+def _printed(sim: Simulator) -> Tuple[Row, ...]:
+    """Rows of the Data Output table that clients want on the screen."""
+    numbers = np.flatnonzero(sim.store.array("sim/network/dataout/data_to_screen")[:ROW_COUNT])
+    if not len(numbers):
+        return ()
+    return tuple((float(number), *values) for number, values in zip(numbers, sim.rows.of(numbers).tolist()))
 
 
 def _seen(scene: Scene, view: WindowView, first: np.ndarray) -> Scene:

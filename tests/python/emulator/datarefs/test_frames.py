@@ -358,6 +358,8 @@ def test_data_rows_are_selected_by_their_dataref_too(bench):
     assert [index for index, _ in protocol.decode_data(client.received()[-1]).rows] == [20]
     client.send(protocol.RowSelection("DSEL", (0, 3)))
     assert emulator.read(*(f"sim/network/dataout/data_to_internet[{i}]" for i in (0, 3, 4, 20))) == [1, 1, 0, 1]
+    some = np.array((1, 3))
+    np.testing.assert_array_equal(emulator.sim.rows.of(some), emulator.sim.rows.values()[some])
 
 
 @pytest.mark.parametrize(("rate", "packets"), [(20, 20), (99, 60), (0, 0)])

@@ -158,6 +158,22 @@ def test_scene_record_round_trip_with_other_aircraft() -> None:
     assert len(scene.pack()) <= 4096  # a write to the pipe stays whole
 
 
+def test_scene_record_round_trip_with_printed_rows() -> None:
+    rows = tuple((float(number), *(0.5 * k for k in range(8))) for number in range(9))
+    packed = replace(LEVEL, rows=rows, others=((1.0, 2.0, 3.0, 4.0, 5.0, 6.0),)).pack()
+    assert len(packed) <= 4096
+    assert Scene.unpack(packed).rows == rows[:8], "there is room for eight"
+
+
+def test_rows_are_printed_at_the_upper_left_and_unused_values_are_left_out() -> None:
+    empty = Painter(640, 480, ANCHOR, strip=False).paint(LEVEL).astype(int)
+    row = (1.0, 12.34, *([-999.0] * 7))
+    picture = Painter(640, 480, ANCHOR, strip=False).paint(replace(LEVEL, rows=(row,)))
+    rows, columns = np.nonzero(np.abs(picture - empty).max(axis=2) > 30)
+    assert rows.max() < 30
+    assert columns.max() < 100
+
+
 def test_scene_record_round_trip() -> None:
     scene = replace(LEVEL, frame=7, time_ns=123456789012345, head_roll_deg=-3.0, vertical_speed_fpm=250.0)
     assert Scene.unpack(scene.pack()) == scene

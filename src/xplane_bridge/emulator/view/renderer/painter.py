@@ -13,8 +13,10 @@ from xplane_bridge.emulator.view.renderer.others import outlines
 from xplane_bridge.emulator.view.renderer.scene import Scene
 from xplane_bridge.emulator.view.renderer.strip import draw_strip, strip_height
 from xplane_bridge.emulator.view.renderer.world import GRAINS, make_world
+from xplane_bridge.protocol import UNUSED_SLOT
 
 _ZENITH = np.array((200, 120, 52), np.float32)  # blue, green, red
+_PRINT = (255, 255, 255)
 _FLOOR = (46, 52, 60)
 _FLOOR_M = (0.9, 0.8)  #: half length and half width
 _HAZE = np.array((226, 210, 192), np.float32)
@@ -94,6 +96,8 @@ class Painter:
             self._paint_floor(scene, camera)
         if self._hud:
             self._paint_hud(scene, camera)
+        if scene.rows:
+            self._print_rows(scene)
         if self._strip:
             draw_strip(self._picture, scene.frame, scene.sim_time)
         return self._picture
@@ -353,3 +357,15 @@ class Painter:
         for text, x, y in texts:
             at = (int(x * width), int(y * (height - strip_height(height))))
             cv2.putText(self._picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, 1.0 * scale, green, thick, cv2.LINE_AA)
+
+    # --- Data Output -------------------------------------------------------------------------------------------------
+
+    def _print_rows(self, scene: Scene) -> None:
+        """Prints rows as X-Plane does with those chosen for the cockpit: numbers at the upper left."""
+        width, height = self._size
+        line = 0.035 * height
+        for k, (number, *values) in enumerate(scene.rows):
+            texts = [f"{number:.0f}"] + ["" if value == UNUSED_SLOT else f"{value:.2f}" for value in values]
+            for column, text in enumerate(texts):
+                at = (int((0.01 + 0.12 * column - (0.07 if column else 0.0)) * width), int((k + 1.2) * line))
+                cv2.putText(self._picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, line / 36.0, _PRINT, 1, cv2.LINE_AA)

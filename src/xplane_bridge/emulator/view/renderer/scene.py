@@ -6,12 +6,16 @@ import itertools
 import math
 import struct
 from dataclasses import astuple, dataclass, fields, replace
-from typing import Tuple
+from typing import Iterator, Tuple
 
 #: Latitude, longitude [deg], altitude [m MSL], roll, pitch, heading [deg] of another aircraft.
 Pose = Tuple[float, float, float, float, float, float]
 _MOST_OTHERS = 19
 _NONE: Pose = (math.nan,) * 6
+#: A row of the Data Output table as it is printed into the picture: its number and eight values.
+Row = Tuple[float, ...]
+_MOST_ROWS, _ROW_LENGTH = 8, 9
+_NO_ROW: Row = (math.nan,) * _ROW_LENGTH
 
 
 @dataclass(frozen=True)
@@ -42,21 +46,32 @@ class Scene:
     airspeed_kt: float = 0.0  #: indicated; for the head-up display only
     vertical_speed_fpm: float = 0.0
     others: Tuple[Pose, ...] = ()  #: at most 19
+    rows: Tuple[Row, ...] = ()  #: printed into the picture; those after the eighth are left out
 
     def pack(self) -> bytes:
         """Fixed-size record for the pipe; short enough for a write to be all or nothing."""
-        *numbers, others = astuple(self)
+        *numbers, others, rows = astuple(self)
         padded = [*others, *[_NONE] * (_MOST_OTHERS - len(others))]
+        padded += [*rows[:_MOST_ROWS], *[_NO_ROW] * (_MOST_ROWS - len(rows))]
         return _FORMAT.pack(*numbers, *itertools.chain(*padded))
 
     @classmethod
     def unpack(cls, record: bytes) -> Scene:
         """The scene of a record made by `pack`."""
         numbers = _FORMAT.unpack(record)
-        own, rest = numbers[: len(fields(cls)) - 1], numbers[len(fields(cls)) - 1 :]
-        poses = (rest[i : i + len(_NONE)] for i in range(0, len(rest), len(_NONE)))
-        return replace(cls(*own), others=tuple(pose for pose in poses if not math.isnan(pose[0])))
+        own, rest = numbers[: len(fields(cls)) - 2], numbers[len(fields(cls)) - 2 :]
+        poses, rows = rest[:_OTHERS_LENGTH], rest[_OTHERS_LENGTH:]
+        return replace(
+            cls(*own),
+            others=tuple(pose for pose in _cut(poses, len(_NONE)) if not math.isnan(pose[0])),  # type: ignore[misc]
+            rows=tuple(row for row in _cut(rows, _ROW_LENGTH) if not math.isnan(row[0])),
+        )
 
 
-_FORMAT = struct.Struct("=QQ" + "d" * (len(fields(Scene)) - 3 + _MOST_OTHERS * len(_NONE)))
+def _cut(numbers: Tuple[float, ...], length: int) -> Iterator[Tuple[float, ...]]:
+    return (numbers[i : i + length] for i in range(0, len(numbers), length))
+
+
+_OTHERS_LENGTH = _MOST_OTHERS * len(_NONE)
+_FORMAT = struct.Struct("=QQ" + "d" * (len(fields(Scene)) - 4 + _OTHERS_LENGTH + _MOST_ROWS * _ROW_LENGTH))
 RECORD_BYTES = _FORMAT.size
