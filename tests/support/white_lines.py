@@ -42,6 +42,16 @@ class Lines(NamedTuple):
     pictures: int  #: in which there was a line to measure
     unsure: int  #: left out: they may be of the neighbouring frame, as their own flags say
 
+    @property
+    def median(self) -> float:
+        """How far lines are off their labels [px]."""
+        return float(np.median(np.abs(self.error)))
+
+    @property
+    def p95(self) -> float:
+        """The same of all but the worst twentieth [px]."""
+        return float(np.percentile(np.abs(self.error), 95))
+
 
 def measure(grey: np.ndarray, camera: Camera, labeller: Labeller) -> np.ndarray:
     """Measure the lines of one picture; gives an error [px] for each place where one is clear."""
@@ -65,17 +75,30 @@ def measure(grey: np.ndarray, camera: Camera, labeller: Labeller) -> np.ndarray:
     return np.array(errors)
 
 
-def measure_flight(bags: Bags, flight: Flight, every: int = 1) -> Lines:
-    """Measure the lines in each n-th picture of a flight, but for those whose flags say they may be paired wrong."""
-    cameras = {frame.stamp: frame.camera for frame in flight.frames()}
+def measure_flight(bags: Bags, flight: Flight, every: int = 1, late: int = 0) -> Lines:
+    """Measure the lines in each n-th picture of a flight, but for those whose flags say they may be paired wrong.
+
+    Args:
+        bags: Open.
+        flight: Of them.
+        every: n.
+        late: With the camera of so many frames later: of another picture, which shows that frame.
+    """
+    frames = {frame.stamp: frame for frame in flight.frames()}
+    cameras = {stamp: frame.camera for stamp, frame in frames.items()}
     sure = {stamp: camera for stamp, camera in cameras.items() if not camera.pose.may_be_neighbour}
+    unsure = len(cameras) - len(sure)
+    if late:
+        at = {round(frame.sim_time / frame.camera.pose.period): frame.camera for frame in frames.values()}
+        numbers = {stamp: round(frames[stamp].sim_time / frames[stamp].camera.pose.period) + late for stamp in sure}
+        sure = {stamp: at[number] for stamp, number in numbers.items() if number in at}
     found = []
     topic = image_topic(bags, (COMPRESSED, "sensor_msgs/Image"))
     for number, (stamp, grey) in enumerate(grey_pictures(bags, topic)):
         if number % every == 0 and stamp in sure:
             found.append(measure(grey, sure[stamp], flight.labeller))
     errors = np.concatenate(found) if found else np.empty(0)
-    return Lines(errors, sum(len(part) > 0 for part in found), len(cameras) - len(sure))
+    return Lines(errors, sum(len(part) > 0 for part in found), unsure)
 
 
 def _inside(pixel: np.ndarray, shape: tuple[int, ...]) -> bool:

@@ -1,0 +1,97 @@
+"""Labels of an approach as it is flown, captured and recorded: lines and aircraft are where the pictures show them."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import Iterator, List, Tuple
+
+import numpy as np
+import pytest
+import yaml
+
+from support.drawn_approach import geodetic
+from support.white_lines import MEDIAN_PX, P95_PX, flight_of, measure_flight
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.pictures import COMPRESSED, grey_pictures, image_topic
+from xplane_bridge.harness import ManagedProcess
+from xplane_bridge.harness.ros import ros_environment
+from xplane_bridge.resources import config_file
+
+TESTS = Path(__file__).parents[1]
+TIMEOUT_S = 240.0
+#: Flies in a process of its own: rospy knows one master a process, and the tests' process has its own already.
+FLY = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from support.approach_flight import fly_approach
+fly_approach(Path(sys.argv[2]), Path(sys.argv[3]))
+"""
+#: The last seconds of the approach: from 800 m before the threshold, 300 m behind another aircraft.
+START_ALONG, END_S = -900.0 - 800.0, 13
+
+
+def scenario(file: Path) -> Path:
+    """Shortens the scenario that is shipped."""
+    content = yaml.safe_load(config_file("scenarios", "approach.yaml").read_text(encoding="utf-8"))
+    latitude, longitude = geodetic(START_ALONG, 0.0)
+    content["start"].update(latitude=latitude, longitude=longitude, altitude=60)
+    wind, final, roll, *_ = content["events"]
+    roll["at"] = 1
+    ahead = {"number": 1, "ahead": 300, "right": 60, "turned": 0, "speed": 40}
+    content["events"] = [wind, final, roll, {"at": 1, "traffic": [ahead]}, {"at": END_S, "end": True}]
+    del content["criteria"]
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module", name="bags")
+def fixture_bags(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bags]:
+    folder = tmp_path_factory.mktemp("approach")
+    arguments = [str(TESTS), folder / "out", scenario(folder / "short.yaml")]
+    with ManagedProcess("flight", [sys.executable, "-c", FLY, *arguments], folder, env=ros_environment()) as flight:
+        assert flight.wait(TIMEOUT_S) == 0, flight.output()
+    with Bags(folder / "out" / "flight.bag") as bags:
+        yield bags
+
+
+def test_white_lines_lie_where_the_labels_say(bags: Bags) -> None:
+    lines = measure_flight(bags, flight_of(bags), every=2)
+    assert lines.pictures > 10
+    assert len(lines.error) > 300
+    assert lines.median <= MEDIAN_PX
+    assert lines.p95 <= P95_PX
+
+
+@pytest.mark.parametrize("late", [-1, 1])
+def test_pictures_that_are_paired_a_frame_wrong_are_found(bags: Bags, late: int) -> None:
+    lines = measure_flight(bags, flight_of(bags), every=2, late=late)
+    assert len(lines.error) > 300
+    assert lines.median > MEDIAN_PX or lines.p95 > P95_PX
+
+
+def contrast(grey: np.ndarray, centre: Tuple[float, float], size: float) -> float:
+    """How much brighter it is in the middle of a label than around it."""
+    u, v = (round(part) for part in centre)
+    around = max(math.ceil(size), 12)
+    near = grey[max(v - 3, 0) : v + 4, max(u - 3, 0) : u + 4]
+    wide = grey[max(v - around, 0) : v + around, max(u - around, 0) : u + around]
+    return float(near.max()) - float(np.median(wide))
+
+
+def test_the_other_aircraft_is_where_its_label_says(bags: Bags) -> None:
+    lines = {line["stamp_ns"]: line for line in flight_of(bags).labels()}
+    known = [line["others_known"] for line in lines.values()]
+    assert sum(known) > 0.8 * len(known)
+    there: List[float] = []
+    beside: List[float] = []
+    for stamp, grey in grey_pictures(bags, image_topic(bags, (COMPRESSED, "sensor_msgs/Image"))):
+        for thing in lines[stamp]["objects"] if stamp in lines else ():
+            if thing["kind"] == "aircraft" and thing["state"] == "visible" and 15.0 < thing["size_px"] < 80.0:
+                u, v = thing["centre"]
+                there.append(contrast(grey, (u, v), thing["size_px"]))
+                beside.append(contrast(grey, (u, v - thing["size_px"]), thing["size_px"]))
+    assert len(there) > 50
+    assert np.median(there) > np.median(beside) + 20.0
