@@ -194,9 +194,9 @@ void Actuation::onReset(const std::string& how) {
   ++resets_;
   endSignals("the flight was reset");
   path_.onNewFlight(how);
-  // Perhaps with another aircraft, which must not be flown until the subscription tells.
+  // Perhaps with another aircraft, which must not be flown until the subscription shows which.
   askIdentity();
-  // What was asked for is told with its outcome.
+  // A requested reset is published with its outcome.
   if (jobs_.movingCaller().empty()) say(EventKind::kReset, how);
 }
 
@@ -316,9 +316,9 @@ RequestResult Actuation::setPaused(bool paused, const std::string& who) {
   if (pausedNow() != paused) setPausing(who);
   const PauseOutcome outcome = xplane_bridge::setPaused(link_, paused, options_.service_timeout, hooks_.stopping);
   if (outcome == PauseOutcome::kWasSo || outcome == PauseOutcome::kFollowed) {
-    return {core::ResultCode::kOk, paused ? "paused" : "running"};  // told as an event when it happened
+    return {core::ResultCode::kOk, paused ? "paused" : "running"};  // published as an event when it happened
   }
-  const std::string text = outcome == PauseOutcome::kUnknown ? "X-Plane does not tell whether it is paused"
+  const std::string text = outcome == PauseOutcome::kUnknown ? "X-Plane does not report whether it is paused"
                                                              : "X-Plane did not follow in time";
   setPausing("");
   say(EventKind::kPause, (paused ? "pause asked for: " : "resume asked for: ") + text, who, false);

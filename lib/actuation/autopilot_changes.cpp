@@ -60,7 +60,7 @@ FlightChanges::Outcome FlightChanges::applyAutopilot(const core::AutopilotSettin
   if (setting.restore_on_exit) {
     const std::string unknown = remember(core::autopilotRestored(setting, version));
     if (!unknown.empty()) {
-      return failed("X-Plane does not tell " + unknown + ", which could not be put back on exit" + linkCondition());
+      return failed("X-Plane does not report " + unknown + ", which could not be put back on exit" + linkCondition());
     }
   }
   const std::vector<core::SettingWrite> dials = core::autopilotDials(setting, version);

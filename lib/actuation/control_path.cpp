@@ -71,7 +71,7 @@ void ControlPath::settle() {
     why_not_ = halted_ + ": ask for a mode to fly on";
   } else if (!fits && aircraft_ == core::AircraftIdentity{}) {
     standing_ = Standing::kWrongAircraft;
-    why_not_ = "X-Plane has not told which aircraft is loaded";
+    why_not_ = "X-Plane has not reported which aircraft is loaded";
   } else if (!fits) {
     standing_ = Standing::kWrongAircraft;
     why_not_ = "the aircraft loaded is " + described(aircraft_) + ", but " + options_.aircraft_file + " is for " +
@@ -347,7 +347,7 @@ void ControlPath::send(double time) {
   watchSurfaces();
   watchFailsafe();
   excited_ = controls.excited != 0u;
-  if (excitation.channels.any() && !excited_) hooks_.end_excitation("nobody commands the axis any more");
+  if (excitation.channels.any() && !excited_) hooks_.end_excitation("the commands of the axis have ended");
   publishMode();
   std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
   if (fly(controls, time)) {

@@ -90,7 +90,7 @@ RequestResult ExcitationManager::inject(const ExcitationRequest& request, const 
   }
   if (plan.channels.any() && (plan.channels & commanded).none() && !request.rest) {
     return {core::ResultCode::kRefused,
-            "nobody commands " + request.target + ": an excitation is added to a command (control/manual or auto)"};
+            "no source commands " + request.target + ": an excitation is added to a command (control/manual or auto)"};
   }
   if (!std::isfinite(watch.sim_time) || !std::isfinite(watch.roll_deg) || !std::isfinite(watch.pitch_deg)) {
     return {core::ResultCode::kNoLink, "X-Plane has not shown the attitude yet"};
@@ -108,7 +108,7 @@ RequestResult ExcitationManager::inject(const ExcitationRequest& request, const 
   surface_ = plan.surface;
   who_ = who;
   begin(request, spec, watch.sim_time);
-  return {core::ResultCode::kAccepted, "it runs; excitation/state tells its end"};
+  return {core::ResultCode::kAccepted, "it runs; its end is published on excitation/state"};
 }
 
 void ExcitationManager::begin(const ExcitationRequest& request, const core::ExcitationSpec& spec, double sim_time) {

@@ -22,7 +22,7 @@ constexpr double kRepairedAfter = 0.5;  // [s] without it until a failure counts
 constexpr double kRepairWait = 0.5;     // [s] in which values from before a repair may still come
 constexpr double kSendAgain = 0.3;      // [s] until what X-Plane does not show is sent once more
 
-// Where X-Plane's own failure brings a surface; nullopt where that cannot be told from the law.
+// Where X-Plane's own failure brings a surface; nullopt where the law does not give that.
 std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double shown,
                                     const std::optional<core::SurfaceLaw>& law) {
   switch (failure.fault) {
@@ -92,7 +92,7 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
     const core::RrefPair pair = view[i];
     if (pair.index < 0 || static_cast<std::size_t>(pair.index) >= datarefs.size()) continue;
     const std::string& dataref = datarefs[static_cast<std::size_t>(pair.index)];
-    // What was on its way when it was repaired here says nothing.
+    // Ignores values that were on their way when it was repaired here.
     const auto undone = undone_.find(dataref);
     if (undone != undone_.end() && now() - undone->second < kRepairWait) continue;
     const std::string name = core::failureName(dataref);
@@ -207,7 +207,7 @@ void FailureManager::end(bool driven_only, const std::string& why) {
     dirty_ = true;
   }
   watchOwn();
-  applySurfaces();  // which may have been told of them again meanwhile
+  applySurfaces();  // which may have been given them again meanwhile
 }
 
 void FailureManager::useDriver(const Pending& pending) {

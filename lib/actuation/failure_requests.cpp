@@ -96,8 +96,9 @@ RequestResult FailureManager::set(const core::FailureRequest& request, const std
     if (const auto refused = add(request, who)) return *refused;
   }
   if (request.trigger != 0)
-    return {core::ResultCode::kAccepted, "armed; events and failures/state tell when it comes true"};
-  if (!waits) return {core::ResultCode::kAccepted, "events and failures/state tell when X-Plane shows it"};
+    return {core::ResultCode::kAccepted, "armed; published on events and failures/state when it comes true"};
+  if (!waits)
+    return {core::ResultCode::kAccepted, "sent; published on events and failures/state when X-Plane shows it"};
   return await(planned.plan.name);
 }
 
@@ -140,7 +141,7 @@ FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>
     return out;
   }
   if (link_->inLockstep()) {
-    out.result = {core::ResultCode::kAccepted, "repaired; failures/state tells when X-Plane shows it"};
+    out.result = {core::ResultCode::kAccepted, "repaired; published on failures/state when X-Plane shows it"};
     return out;
   }
   out.result = awaitRepair(datarefs, given_back);

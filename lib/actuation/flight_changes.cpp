@@ -349,7 +349,7 @@ FlightChanges::Outcome FlightChanges::applySettings(const std::vector<core::Sett
     if (!unknown.empty()) {
       return {
           core::EventKind::kSetting,
-          service + ": X-Plane does not tell " + unknown + ", which could not be put back on exit" + linkCondition(),
+          service + ": X-Plane does not report " + unknown + ", which could not be put back on exit" + linkCondition(),
           false};
     }
   }
@@ -446,7 +446,7 @@ std::string FlightChanges::waitForAircraft(const std::string& path, std::int32_t
   }
   const unsigned identities = hooks_.identities();
   const bool shown = waitFor(kIdentityWait, [&] { return hooks_.identities() != identities; });
-  return shown ? "" : "X-Plane has loaded it, but does not tell which aircraft it is";
+  return shown ? "" : "X-Plane has loaded it, but does not report which aircraft it is";
 }
 
 FlightChanges::Outcome FlightChanges::saveSituation(const std::string& path) {

@@ -83,7 +83,7 @@ void Guardian::start() {
 }
 
 /// With mutex_ held.
-void Guardian::tell(const std::string& line) {
+void Guardian::sendLine(const std::string& line) {
   if (socket_ < 0) return;
   const ssize_t sent = send(socket_, line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   // Half a line would spoil the next one; a child that does not read for so long does not guard any more.
@@ -99,7 +99,7 @@ bool Guardian::running() const {
 
 void Guardian::setPeer(const core::Endpoint& peer, const std::string& journal_path) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  tell("peer " + peer.addressString() + " " + std::to_string(peer.port) + " " + journal_path + "\n");
+  sendLine("peer " + peer.addressString() + " " + std::to_string(peer.port) + " " + journal_path + "\n");
 }
 
 bool Guardian::beat(double hang_timeout) {
@@ -108,20 +108,20 @@ bool Guardian::beat(double hang_timeout) {
   if (socket_ < 0 || now - last_beat_ < kBeatPeriod) return false;
   last_beat_ = now;
   char released = 0;
-  bool told = false;
-  while (recv(socket_, &released, 1, MSG_DONTWAIT) == 1) told = true;
-  tell("beat " + std::to_string(hang_timeout) + "\n");
-  return told;
+  bool undone = false;
+  while (recv(socket_, &released, 1, MSG_DONTWAIT) == 1) undone = true;
+  sendLine("beat " + std::to_string(hang_timeout) + "\n");
+  return undone;
 }
 
 void Guardian::rest() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  tell("rest\n");
+  sendLine("rest\n");
 }
 
 void Guardian::dismiss() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  tell("bye\n");
+  sendLine("bye\n");
   if (socket_ >= 0) close(socket_);
   socket_ = -1;
   int status = 0;

@@ -284,7 +284,7 @@ void OverrideManager::refresh() {
 
 void OverrideManager::resend(const std::string& dataref, float value) {
   const auto found = shown_.find(dataref);
-  if (found != shown_.end() && found->second.released > 0) return;  // by whom is not known yet
+  if (found != shown_.end() && found->second.released > 0) return;  // by which client is not known yet
   if (found == shown_.end() || found->second.in_journal) {
     link_->write(dataref, value);
     return;

@@ -49,7 +49,7 @@ RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWr
   }
   if (link_->inLockstep()) {
     confirmLater(writes, what);
-    return {ResultCode::kAccepted, "sent; an event tells whether X-Plane shows it"};
+    return {ResultCode::kAccepted, "sent; an event will report whether X-Plane shows it"};
   }
   for (const core::DatarefWrite& write : writes) {
     const auto [fits, shown] =

@@ -21,7 +21,7 @@ constexpr double kMovementDeg = 0.05;  // [deg] of a step by which the lag is me
 constexpr double kSettleWait = 2.0;    // [s] of frames in which surfaces must have gone back to the law
 constexpr double kSettledDeg = 0.5;    // [deg] off the law that is no jump
 constexpr double kFollowsAgain = 0.5;  // [s] after the release until X-Plane must move the surfaces
-constexpr double kOffLawDeg = 2.0;     // [deg] off the law that tells a surface left standing
+constexpr double kOffLawDeg = 2.0;     // [deg] off the law that shows a surface left standing
 constexpr double kLagSmoothing = 0.1;
 constexpr std::size_t kMaxAwaitingReadBack = 64;
 
@@ -133,7 +133,7 @@ void SurfaceControl::onSample() {
       if (wanted() && !overridden) {
         // The panic tool, or another client: it is not taken again.
         released_by_another_ = released_by_another_ || !commands_.empty();
-        abandon("somebody else has released the surface override");
+        abandon("another client has released the surface override");
       } else if (!wanted() && (settled() || !overridden)) {
         giveBack();
       } else if (blocked_reason_.empty()) {

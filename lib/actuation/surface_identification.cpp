@@ -170,7 +170,7 @@ RequestResult SurfaceIdentification::begin(const IdentificationRequest& request,
   gain_ = 1.0;
   number_ = reserve();
   enter(Phase::kSteadying, watch);
-  return {core::ResultCode::kAccepted, "event " + std::to_string(number_) + " will tell the outcome"};
+  return {core::ResultCode::kAccepted, "event " + std::to_string(number_) + " will report the outcome"};
 }
 
 void SurfaceIdentification::onFrame(const core::FlightWatch& watch, const IdentificationConditions& now) {

@@ -290,7 +290,7 @@ class X11WindowSource::Impl {
 
   // Takes what the server has sent; true: the window was drawn to.
   bool handleEvents(Change& change) {
-    if (first_picture_) {  // what the window shows already, drawn nobody knows when
+    if (first_picture_) {  // what the window shows already, drawn at an unknown time
       first_picture_ = false;
       change = {clock_(), false};
       return true;

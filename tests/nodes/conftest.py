@@ -70,7 +70,7 @@ class TopicLog:
     ) -> Any:
         """The same, among the messages after the one found last (or the ones before skip_to_now()).
 
-        For topics that tell of changes: the change may be told before the test asks for it.
+        For topics that report changes: the change may be published before the test asks for it.
         """
         return self._find(self._after_found, condition, timeout, what)
 

@@ -47,14 +47,14 @@ def flight(request, new_world, tmp_path_factory):
 
 
 def ask(world, **request):
-    """Calls the service, which accepts; returns the event that tells the outcome."""
+    """Calls the service, which accepts; returns the event with the outcome."""
     flies = "sim/time/total_flight_time_sec"
     wait_until(lambda: world.other.read(flies) > 1.0, 30.0, "a flight that has begun")
     response = call(world, "reset_flight", "ResetFlight", **request)
     assert (response.success, response.result.code) == (True, ACCEPTED), response.result.message
     number = response.event_number
-    told = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 60)
-    return next(event for event in told.events if event.number == number)
+    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 60)
+    return next(event for event in reported.events if event.number == number)
 
 
 def where(world):
@@ -103,7 +103,7 @@ def test_final_is_on_the_glide_path_and_flies_on(flight):
     assert flight.other.read("sim/flightmodel/failures/onground_any") == 0.0
 
 
-def test_what_x_plane_does_not_have_is_told(flight):
+def test_what_x_plane_does_not_have_is_reported(flight):
     event = ask(flight, start=RAMP, airport="RKSI")
     assert (event.kind, event.success) == (event.RESET, False)
     assert "X-Plane begins no flight at ramp 0 of RKSI: does it have that airport" in event.text

@@ -19,7 +19,7 @@ FLY_S = 240.0  # of a busy machine, for a minute and a half of flight
 
 @contextlib.contextmanager
 def flown(world, *options, aircraft="fixed_wing"):
-    """Emulator, nobody at its stick, and tx_node."""
+    """Emulator without a pilot, and tx_node."""
     from xplane_bridge.msg import EventList
 
     world.xplane = world.emulator("--no-beacon", "--start", "air", "--aircraft", aircraft, *options)
@@ -32,12 +32,12 @@ def flown(world, *options, aircraft="fixed_wing"):
 
 
 def ask(world, **request):
-    """The event that tells the outcome."""
+    """The event with the outcome."""
     response = call(world, "set_autopilot", "SetAutopilot", **request)
     assert (response.success, response.result.code) == (True, ACCEPTED), response.result.message
     number = response.event_number
-    told = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 60.0)
-    event = next(event for event in told.events if event.number == number)
+    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 60.0)
+    event = next(event for event in reported.events if event.number == number)
     assert (event.kind, event.requested_by.rsplit("/", 1)[-1]) == (SETTING, "set_autopilot")
     return event
 
@@ -114,7 +114,7 @@ def test_what_cannot_be_is_refused(world):
             manual.stop()
 
 
-def test_an_aircraft_without_one_is_told(world):
+def test_an_aircraft_without_one_is_reported(world):
     with flown(world, aircraft="multirotor"):
         event = ask(world, fields=bits("MASTER"), master=2)
         assert not event.success

@@ -47,7 +47,7 @@ def test_signal_ends_it_in_order(world, tiny, number):
     assert f"stopping: {number.name}" in node.output()
 
 
-def test_first_line_comes_at_once_and_tells_what_the_node_was_given(world, tiny):
+def test_first_line_comes_at_once_and_reports_what_the_node_was_given(world, tiny):
     """Its output goes into a file here, as roslaunch's does where that is redirected."""
     world.set_param("port", 49010)
     node = tiny(gain=2.5, mode="calm", limits={"upper": 100.0})

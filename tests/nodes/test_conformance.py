@@ -143,8 +143,8 @@ def test_a_vehs_that_moves_nothing_is_not_sent(world):
     there = {"latitude": 47.2, "longitude": 8.3, "altitude_msl": 1500.0, "heading_true_deg": 250.0}
     answer = call(world, "reset_flight", "ResetFlight", true_airspeed=75.0, **there)
     assert answer.result.code == ACCEPTED, answer.result.message
-    told = events.wait_for(lambda e: any(event.number == answer.event_number for event in e.events), 30)
-    assert next(event for event in told.events if event.number == answer.event_number).success
+    reported = events.wait_for(lambda e: any(event.number == answer.event_number for event in e.events), 30)
+    assert next(event for event in reported.events if event.number == answer.event_number).success
     assert "vehs is refuted: flights are placed by PREL, not by VEHS" in log_of(world)
     world.xplane.stop()
     ignored = re.search(r'^STOPPED .*"version": (\d+)', log_of(world), re.MULTILINE)

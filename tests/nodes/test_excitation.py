@@ -134,21 +134,21 @@ def test_a_source_that_falls_silent_ends_it(flown):
     assert began.success
     flown.manual.stop()
     ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
-    assert ended.result == "aborted: nobody commands the axis any more"
+    assert ended.result == "aborted: the commands of the axis have ended"
     flown.mode.wait_for(lambda m: m.failsafe)
     refused = inject(flown)
     assert (refused.success, refused.result.code) == (False, REFUSED)
-    assert "nobody commands roll" in refused.result.message
+    assert "no source commands roll" in refused.result.message
 
 
-def test_a_surface_that_somebody_else_releases_is_not_taken_again(flown):
+def test_a_surface_that_another_client_releases_is_not_taken_again(flown):
     began = inject(flown, kind="chirp", target="aileron1_wing2_left", amplitude=1.0, duration=60.0)
     assert began.success, began.result.message
     flown.wire.wait(SURFACES, 1.0)
     wait_until(lambda: abs(flown.wire.value(LEFT)) > 0.3, 10, "the left aileron to move")
     type(flown).wire(flown.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
     ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
-    assert ended.result == "aborted: somebody else has released the surface override"
+    assert ended.result == "aborted: another client has released the surface override"
     flown.wire.wait(SURFACES, 0.0)
     flown.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
     assert flown.wire.value(SURFACES) == 0.0
@@ -188,7 +188,7 @@ def test_one_surface_is_excited_while_the_others_fly(flown):
         ({"amplitude": 1.5}, "at most 1"),
         ({"duration": -1.0}, "duration"),
         ({"kind": "chirp", "frequency_min": 3.0}, "frequency"),
-        ({"target": "pitch"}, "nobody commands pitch"),
+        ({"target": "pitch"}, "no source commands pitch"),
         ({"target": "aileron2_wing4_left", "amplitude": 1.0}, "aileron2_wing4_left"),
         ({"target": "aileron1_wing2_left", "amplitude": 21.0}, "expected at most half of its travel, 20.0"),
     ],

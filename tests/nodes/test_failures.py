@@ -66,7 +66,7 @@ WATCHED = (
 
 
 def fly(world, *emulator_options, known=True, **params):
-    """Starts emulator (its own pilot flies level) and tx_node; a mixing file is there unless told otherwise."""
+    """Starts emulator (its own pilot flies level) and tx_node; with a mixing file by default."""
     from xplane_bridge.msg import AppliedCommand, EventList, FailureState
 
     if known:
@@ -349,12 +349,12 @@ def test_the_simulators_menu(healthy):
     wait_until(lambda: not label_of(world, "generator_1"), 5, "the label to go")
 
 
-def test_override_that_somebody_else_releases_is_not_taken_again(healthy):
+def test_override_that_another_client_releases_is_not_taken_again(healthy):
     world, name = healthy, "rudder1_fin1"
     assert fail(world, name, "stuck", 4.0).success
     world.wire.wait(RUDDER, 4.0)
     type(world).wire(world.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
-    said(world, f"failure of {name} has ended: somebody else has released the surface override")
+    said(world, f"failure of {name} has ended: another client has released the surface override")
     wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
     wait_until(lambda: "override:" + SURFACES not in journal_entries(world), 5, "the journal's entry to go")
     assert world.wire.value(SURFACES) == 0.0

@@ -1,4 +1,4 @@
-"""What README, tutorial and examples tell a new user to type does what they say.
+"""What README, tutorial and examples give a new user to type does what they say.
 
 Their blocks run as they stand there, on a machine of their own: a network namespace, where no port is taken. Only
 folders are the test's. Where this computer permits no namespaces, the tests say so and are skipped.

@@ -1,4 +1,4 @@
-"""Flight services of tx_node, accepted and then told on `events`; and what the simulator does by itself, told there."""
+"""Flight services of tx_node, accepted, with the outcome on `events`; and what the simulator does by itself."""
 
 from __future__ import annotations
 
@@ -66,20 +66,20 @@ def flight(request, new_world, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def menu(new_world, tmp_path_factory):
-    """A flight in whose simulator somebody else does things."""
+    """A flight in whose simulator another client does things."""
     world = fly(new_world(tmp_path_factory.mktemp("menu")))
     yield world
     close(world)
 
 
 def ask(world, service, kind, **request):
-    """Calls a flight service that accepts; returns the event that tells the outcome."""
+    """Calls a flight service that accepts; returns the event with the outcome."""
     response = call(world, service, kind, **request)
     assert (response.success, response.result.code) == (True, ACCEPTED), response.result.message
     number = response.event_number
     assert str(number) in response.result.message
-    told = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 30)
-    return next(event for event in told.events if event.number == number)
+    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 30)
+    return next(event for event in reported.events if event.number == number)
 
 
 def done(world, service, kind, **request):
@@ -130,14 +130,14 @@ def test_reset_of_a_running_flight_flies_on_from_there(flight):
     assert flight.other.read(POSITION + "latitude") == pytest.approx(46.9, abs=0.01)
     assert flight.other.read(POSITION + "elevation") == pytest.approx(900.0, abs=30.0)
     assert flight.other.read("sim/time/total_running_time_sec") > time
-    # The pause of the reset is told as its own, and no reset by somebody else.
+    # The pause of the reset is reported as its own, and no reset by another client.
     since = [event for event in flight.events.last.events if event.sim_time >= time - 1e-3]
     paused = [(event.text, event.requested_by.rsplit("/", 1)[-1]) for event in since if event.kind == PAUSE]
     assert paused == [("paused", "reset_flight"), ("resumed", "reset_flight")]
     assert [event.requested_by != "" for event in since if event.kind == RESET] == [True]
 
 
-def test_reset_to_where_x_plane_does_not_put_it_is_told(flight):
+def test_reset_to_where_x_plane_does_not_put_it_is_reported(flight):
     event = ask(flight, "reset_flight", "ResetFlight", **{**HERE, "altitude_msl": -400.0})
     assert not event.success
     assert "its altitude is" in event.text
@@ -145,7 +145,7 @@ def test_reset_to_where_x_plane_does_not_put_it_is_told(flight):
     done(flight, "reset_flight", "ResetFlight", **HERE)
 
 
-def test_wind_blows_and_its_absence_is_told(flight):
+def test_wind_blows_and_its_absence_is_reported(flight):
     assert done(flight, "set_wind", "SetWind", speed=12.0, from_deg=250.0).kind == SETTING
     speed, direction = WIND[flight.version]
     assert flight.other.read(speed) == pytest.approx(12.0, abs=0.1)
@@ -294,8 +294,8 @@ def test_aircraft_is_loaded_and_flown_only_if_it_is_the_one_configured(flight):
     assert flight.seen.value(OVERRIDE) == 0.0
     assert "override:" + OVERRIDE not in journal_entries(flight)
     flight.wait_for_diagnostics("control", lambda s: "QUAD" in s.message)
-    told = [e for e in flight.events.last.events if e.kind == AIRCRAFT and "not the one of the" in e.text]
-    assert told[-1].requested_by.endswith("/load_aircraft")
+    reported = [e for e in flight.events.last.events if e.kind == AIRCRAFT and "not the one of the" in e.text]
+    assert reported[-1].requested_by.endswith("/load_aircraft")
     done(flight, "load_aircraft", "LoadAircraft", path=aircraft_path("fixed_wing"))
     flight.seen.wait(OVERRIDE, 1.0)
     flight.seen.wait(STICK, 0.25)
@@ -306,10 +306,10 @@ def test_aircraft_is_loaded_and_flown_only_if_it_is_the_one_configured(flight):
 
 
 @pytest.mark.parametrize("flight", ["11.40"], indirect=True)  # it waits for two time-outs
-def test_files_that_are_not_there_are_told(flight):
+def test_files_that_are_not_there_are_reported(flight):
     flight.manual.fly(fields=ROLL, roll=0.125)
     flight.seen.wait(STICK, 0.125)
-    event = ask(flight, "load_aircraft", "LoadAircraft", path="Aircraft/nobody/built.acf")
+    event = ask(flight, "load_aircraft", "LoadAircraft", path="Aircraft/missing/built.acf")
     assert not event.success
     assert "is the path that of a file below its folder?" in event.text
     flight.seen.wait(OVERRIDE, 1.0)  # the present one is flown on
@@ -334,7 +334,7 @@ def test_weather_that_was_to_end_with_the_node_does(world, end):
 
 
 def test_without_x_plane_nothing_is_accepted(world):
-    world.point_to(9)  # nobody there
+    world.point_to(9)  # no X-Plane there
     world.set_param("aircraft", "fixed_wing")
     world.start("tx_node", tx_params())
     for service, kind, request in (
@@ -398,7 +398,7 @@ def test_x_plane_10_is_not_supported_and_why(world):
 
 
 def wait_for_event(world, kind, text=""):
-    """Waits for an event after those looked at before; it is nobody's of the bridge."""
+    """Waits for an event after those looked at before; none of the bridge's own."""
 
     def fits(e):
         return e.events[-1].kind == kind and text in e.events[-1].text
@@ -408,7 +408,7 @@ def wait_for_event(world, kind, text=""):
     return event
 
 
-def test_pause_of_somebody_else_is_told(menu):
+def test_pause_by_another_client_is_reported(menu):
     menu.events.skip_to_now()
     menu.other.send(protocol.CommandRequest("sim/operation/pause_toggle"))
     wait_for_event(menu, PAUSE, "paused")
@@ -416,22 +416,22 @@ def test_pause_of_somebody_else_is_told(menu):
     wait_for_event(menu, PAUSE, "resumed")
 
 
-def test_pause_by_service_is_told_with_its_name(menu):
+def test_pause_by_service_is_reported_with_its_name(menu):
     menu.events.skip_to_now()
     pause(menu, True)
-    told = menu.events.then_wait_for(lambda e: e.events[-1].kind == PAUSE).events[-1]
-    assert (told.text, told.requested_by.rsplit("/", 1)[-1]) == ("paused", "pause")
+    reported = menu.events.then_wait_for(lambda e: e.events[-1].kind == PAUSE).events[-1]
+    assert (reported.text, reported.requested_by.rsplit("/", 1)[-1]) == ("paused", "pause")
     pause(menu, False)
     menu.events.then_wait_for(lambda e: e.events[-1].text == "resumed")
 
 
-def test_reset_of_somebody_else_is_told(menu):
+def test_reset_by_another_client_is_reported(menu):
     menu.events.skip_to_now()
     menu.other.send(protocol.CommandRequest("sim/operation/reset_flight"))
     wait_for_event(menu, RESET, "the flight began anew")
 
 
-def test_placement_and_situation_of_somebody_else_are_told(menu):
+def test_placement_and_situation_by_another_client_are_reported(menu):
     menu.other.send(protocol.Situation(protocol.Situation.SAVE, "Output/situations/mine.sit"))
     menu.events.skip_to_now()
     menu.other.send(protocol.DrefWrite(POSITION + "local_y", 2500.0))
@@ -440,7 +440,7 @@ def test_placement_and_situation_of_somebody_else_are_told(menu):
     wait_for_event(menu, RESET)
 
 
-def test_crash_is_told_and_its_reset(menu):
+def test_crash_is_reported_and_its_reset(menu):
     menu.events.skip_to_now()
     lower = menu.other.read(POSITION + "y_agl") - 30.0
     menu.other.send(protocol.DrefWrite(POSITION + "local_y", menu.other.read(POSITION + "local_y") - lower))
@@ -451,13 +451,13 @@ def test_crash_is_told_and_its_reset(menu):
     assert menu.other.read("sim/flightmodel2/misc/has_crashed") == 0.0
 
 
-def test_aircraft_of_somebody_else_is_told_and_not_flown(menu):
+def test_aircraft_by_another_client_is_reported_and_not_flown(menu):
     menu.manual.fly(fields=ROLL, roll=0.25)
     menu.seen.wait(OVERRIDE, 1.0)
     menu.events.skip_to_now()
     menu.other.send(protocol.AircraftLoad(0, aircraft_path("multirotor")))
-    told = menu.events.then_wait_for(lambda e: e.events[-1].kind == AIRCRAFT).events[-1]
-    assert "QUAD" in told.text
-    assert told.requested_by == ""
+    reported = menu.events.then_wait_for(lambda e: e.events[-1].kind == AIRCRAFT).events[-1]
+    assert "QUAD" in reported.text
+    assert reported.requested_by == ""
     menu.seen.wait(OVERRIDE, 0.0)
     menu.manual.stop()

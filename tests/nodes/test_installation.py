@@ -214,6 +214,6 @@ def test_without_ros_nodes_say_that_they_need_it(name, arguments, wheel_folder, 
 
 
 def test_environment_leaves_the_arguments_of_a_script_alone(tmp_path):
-    """catkin's setup.bash takes the arguments of whoever sources it, and answers --help itself."""
+    """catkin's setup.bash takes the arguments of the script that sources it, and answers --help itself."""
     script = f'set -- --help; source "{WORKSPACE}/env.bash"; echo "arguments: $*"'
     assert run(["bash", "-c", script], env={"HOME": str(tmp_path), "PATH": "/usr/bin:/bin"}) == "arguments: --help\n"

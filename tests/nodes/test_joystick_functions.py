@@ -69,7 +69,7 @@ def release(joy, world):
     hear(world)
 
 
-def told(world, text):
+def reported(world, text):
     wait_until(lambda: text in world.mapper.output(), WAIT_S, f"{text!r} on the mapper's console")
 
 
@@ -97,13 +97,13 @@ def test_functions_ask_tx_node(stick, world):
         world.wire.wait(PAUSED, value, WAIT_S)
         release(stick, world)
     stick.press(3)
-    told(world, "functions.astern: done")
+    reported(world, "functions.astern: done")
     for value in (6.0, 0.0):
         stick.press(4)
         world.wire.wait(ENGINE, value, WAIT_S)
         release(stick, world)
     stick.press(6)
-    told(world, "functions.nonsense: ")
+    reported(world, "functions.nonsense: ")
     assert "functions.nonsense: done" not in world.mapper.output()
     wait_until(lambda: world.wire.value(FLIGHT) > 3.0, WAIT_S, "a flight of some seconds")
     stick.press(5)

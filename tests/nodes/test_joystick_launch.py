@@ -30,7 +30,7 @@ def load(master, file, *arguments):
     return {node.name: node for node in config.nodes}, {key: param.value for key, param in config.params.items()}
 
 
-def test_the_mapper_alone_where_somebody_else_reads_the_device(master):
+def test_the_mapper_alone_where_another_program_reads_the_device(master):
     nodes, params = load(master, "joystick.launch", "joy_config:=xbox", "stick_mode:=1")
     assert set(nodes) == {"joystick_mapper_node"}
     assert params["/xplane/joystick_mapper_node/device"] == "Xbox-type gamepad"

@@ -84,7 +84,7 @@ def test_trigger_asks_for_the_other_mode_once_a_press(world, mapper):
     world.commands.wait_for_count(20)  # held: no further request
     assert len(world.requests.messages) == 1
 
-    # Somebody else went back to MANUAL: the next press asks for AUTO again.
+    # Another node went back to MANUAL: the next press asks for AUTO again.
     publisher = rospy.Publisher(f"{world.namespace}/control/mode", ControlMode, queue_size=1, latch=True)
     publisher.publish(ControlMode(mode=1))
     wait_until(lambda: publisher.get_num_connections() > 0, 15, "the mapper's subscription")

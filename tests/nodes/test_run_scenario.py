@@ -94,8 +94,8 @@ def test_time_wind_and_weather_of_a_scenario_come(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     with Bags(tmp_path / "out" / "flight.bag") as bags:
         states, world = bags.read("/xplane/flight_state"), bags.read("/xplane/mission/environment")
-        told = [event for _, message in bags.messages("/xplane/events") for event in message.events]
-    by = {event.requested_by.rsplit("/", 1)[-1]: event.success for event in told}
+        reported = [event for _, message in bags.messages("/xplane/events") for event in message.events]
+    by = {event.requested_by.rsplit("/", 1)[-1]: event.success for event in reported}
     assert [by[service] for service in ("set_time", "set_wind", "set_weather")] == [True] * 3
     assert max(states["wind_speed"]) == pytest.approx(9.0, abs=0.1)
     assert (states["wind_speed"][-1], states["wind_from_deg"][-1]) == pytest.approx((6.0, 180.0), abs=0.5)
@@ -120,8 +120,8 @@ def test_a_scenario_starts_at_an_airport(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     with Bags(tmp_path / "out" / "flight.bag") as bags:
         states = bags.read("/xplane/flight_state")
-        told = [event for _, message in bags.messages("/xplane/events") for event in message.events]
-    assert "the flight begins at runway 0, end 1 of XEMU" in [event.text for event in told if event.success]
+        reported = [event for _, message in bags.messages("/xplane/events") for event in message.events]
+    assert "the flight begins at runway 0, end 1 of XEMU" in [event.text for event in reported if event.success]
     assert states["on_ground"][-1]
     assert states["heading_true_deg"][-1] == pytest.approx(270.0, abs=1.0)
 

@@ -338,7 +338,7 @@ def test_an_unknown_dataref_is_named(world, rx, unknown):
     if unknown == "omit":
         assert math.isnan(values.wait_for().values[0])
         world.wait_for_diagnostics("link to X-Plane", lambda s: "sim/no/such_dataref" in s.message, 40.0)
-    else:  # X-Plane then gives no way to tell it from a real zero
+    else:  # X-Plane then gives no way to distinguish it from a real zero
         assert values.wait_for().values[0] == 0.0
     world.states.wait_for_count(10)
 
@@ -570,7 +570,7 @@ def test_no_flight_loaded_yet(world, rx):
 def test_x_plane_killed_and_restarted(world, rx):
     emulator = world.emulator(*KINEMATIC)
     rx()
-    # A restart is told from a gap by simulator time that runs anew.
+    # A restart differs from a gap by simulator time that runs anew.
     before = world.states.wait_for(lambda state: state.sim_time > 5.0, 30.0)
     epoch = wait_for_link(world, "CONNECTED").link_epoch
     emulator.kill()
@@ -639,7 +639,7 @@ def test_pause_and_resume(world, rx):
     assert np.all(np.diff(stamps) > 0)
 
 
-def test_another_aircraft_is_told_and_starts_an_epoch(world, rx):
+def test_another_aircraft_is_reported_and_starts_an_epoch(world, rx):
     emulator = world.emulator()
     rx()
     link = world.links.wait_for(lambda m: m.aircraft_icao)

@@ -94,7 +94,7 @@ def command_of(number, now, **more):
 
 @pytest.fixture(name="placed")
 def fixture_placed(world):
-    """Starts both nodes and commands aircraft 3 at 5 Hz, by simulator time, until it is told to stop."""
+    """Starts both nodes and commands aircraft 3 at 5 Hz, by simulator time, until it is stopped."""
     import rospy
     from xplane_bridge.msg import FlightState, TrafficCommand, TrafficState
 

@@ -1,6 +1,6 @@
 """Two X-Planes in one graph, by two_bridges.launch: each bridge has its own flight, frames, journal and window.
 
-The emulators fly on meridians of their own, by which every message tells whose it is.
+The emulators fly on meridians of their own, by which every message shows whose it is.
 """
 
 from __future__ import annotations

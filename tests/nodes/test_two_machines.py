@@ -31,7 +31,7 @@ STATES = 4 * FPS
 #: So many pictures with nothing to say against are waited for.
 PERFECT = 90
 WAIT_S = 40.0
-#: What both machines are told: the namespace's parameters are shared.
+#: What both machines are given: the namespace's parameters are shared.
 _SHARED = f"display_delay:={PIPELINE_DELAY_S}"
 _NOT_PERMITTED = why_no_machines()
 
@@ -65,7 +65,7 @@ class Flight:
         self.launch(self.simulator, "capture.launch", "image_rate:=0", _SHARED, prefix=environment)
 
     def start_bridge(self) -> None:
-        """All other nodes, and somebody who holds the stick to the right."""
+        """All other nodes, and a stick held to the right."""
         self.launch(self.bridge, "bridge.launch", "capture:=false", _SHARED)
         self.launch(self.bridge, "joystick.launch")
         right = "{axes: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0], buttons: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}"
@@ -173,12 +173,12 @@ def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(fl
     here.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
     there.wait_for("flight_state", lambda _: True, "a state")
 
-    told = len(there.all("link_state"))
+    reported = len(there.all("link_state"))
     flight.bridge.plug(False)
-    there.wait_for("link_state", lambda link: link["state"] in ("STALE", "LOST"), "a pulled cable", after=told)
-    told = len(there.all("link_state"))
+    there.wait_for("link_state", lambda link: link["state"] in ("STALE", "LOST"), "a pulled cable", after=reported)
+    reported = len(there.all("link_state"))
     flight.bridge.plug(True)
-    there.wait_for("link_state", lambda link: link["state"] == "CONNECTED", "the cable again", after=told)
+    there.wait_for("link_state", lambda link: link["state"] == "CONNECTED", "the cable again", after=reported)
 
     flight.bridge.lose_power()
     pictures = len(here.all("camera/frame_state"))
@@ -191,9 +191,9 @@ def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(fl
     here.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a picture with", after=pictures)
     there.wait_for("flight_state", lambda _: True, "a state")
 
-    told = len(there.all("link_state"))
+    reported = len(there.all("link_state"))
     flight.simulator.lose_power()
-    lost = there.wait_for("link_state", lambda link: link["state"] == "LOST", "the end of X-Plane", after=told)
+    lost = there.wait_for("link_state", lambda link: link["state"] == "LOST", "the end of X-Plane", after=reported)
     assert "beacon" in lost["reason"], lost
     for node in ("rx_node", "tx_node"):
         there.wait_for_status(node, lambda level, _: level == 2, f"an error of {node}")

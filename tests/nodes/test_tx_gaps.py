@@ -116,7 +116,7 @@ def test_lost_takes_again_what_is_still_commanded(flight):
     flight.seen.wait(STICK, -0.1)
 
 
-def test_lost_gives_back_what_nobody_commands_any_more(flight):
+def test_lost_gives_back_what_is_not_commanded_any_more(flight):
     gap(flight, "LOST")
     flight.controller.stop()
     flight.surfaces.stop()

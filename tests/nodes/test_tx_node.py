@@ -163,7 +163,7 @@ def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
     world.events.wait_for(lambda e: has(e, "released override_joystick_roll left by a run that crashed"))
 
 
-def test_a_second_bridge_is_told_whose_the_stick_is(tx, world, new_world):
+def test_a_second_bridge_learns_whose_the_stick_is(tx, world, new_world):
     tx()
     world.manual.fly(fields=ROLL, roll=0.5)
     world.wire.wait(OVERRIDE, 1.0)
@@ -329,7 +329,7 @@ def test_release_overrides_frees_what_a_crash_left(tx, world):
     world.manual.fly(fields=ROLL, roll=0.5)
     world.wire.wait(OVERRIDE, 1.0)
     world.manual.stop()
-    node.send_signal(signal.SIGSTOP)  # it hangs: nobody is gone, nothing releases by itself
+    node.send_signal(signal.SIGSTOP)  # it hangs: no process ends, nothing releases by itself
     release_overrides(world)
     world.wire.wait(OVERRIDE, 0.0)
     assert not journal_entries(world)
@@ -340,12 +340,12 @@ def test_release_overrides_stops_a_node_that_flies_until_a_mode_is_asked_for(tx,
     tx()
     world.manual.fly(fields=ROLL | FLAPS, roll=0.5, flaps=0.0)
     world.wire.wait(OVERRIDE, 1.0)
-    # Shown as set for a while, as it is when somebody panics.
+    # Shown as set for a while, as it is when a user panics.
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick_roll")
     release_overrides(world)
     world.events.wait_for(lambda e: "override_joystick_roll was released by another client" in e.events[-1].text)
-    told = world.events.wait_for(lambda e: "nothing is sent any more" in e.events[-1].text)
-    assert "ask for a mode" in told.events[-1].text
+    reported = world.events.wait_for(lambda e: "nothing is sent any more" in e.events[-1].text)
+    assert "ask for a mode" in reported.events[-1].text
     count = len(world.applied.messages)
     for _ in range(2):  # longer than overrides take to be sent again, with commands coming all the time
         status = world.wait_for_diagnostics("control", lambda s: s.level == 1)
@@ -414,8 +414,8 @@ def test_stick_takes_over(tx, world):
     mode = world.mode.then_wait_for(lambda m: m.mode == MANUAL)
     assert mode.reason.startswith("stick take-over")
     log = world.events.wait_for(lambda e: sum(event.kind == MODE for event in e.events) == 2)
-    told = [(e.text.split(":")[0], e.requested_by) for e in log.events if e.kind == MODE]
-    assert told == [("AUTO", "test"), ("MANUAL", "control/manual")]
+    reported = [(e.text.split(":")[0], e.requested_by) for e in log.events if e.kind == MODE]
+    assert reported == [("AUTO", "test"), ("MANUAL", "control/manual")]
     world.wire.wait(STICK, 0.6)
 
 
@@ -492,7 +492,7 @@ def test_motors_take_the_throttle_override_and_give_it_back(tx, world):
     wait_until(lambda: "override:" + THROTTLES not in journal_entries(world), 10, "the journal entry's end")
 
 
-def test_axes_that_nobody_commands_stay_with_xplane(tx, world):
+def test_axes_without_commands_stay_with_xplane(tx, world):
     tx("--auto-coordination")
     whole, heading = OVERRIDE[: -len("_roll")], OVERRIDE[: -len("roll")] + "heading"
     pedals = "sim/joystick/yoke_heading_ratio"
@@ -562,9 +562,9 @@ def test_restarted_xplane_is_not_flown_by_auto_until_it_is_asked_for(tx, world):
     world.wire.wait(STICK, 0.3)
     world.events.skip_to_now()
     world.xplane.restart()
-    told = world.events.then_wait_for(lambda e: any("AUTO is off until" in event.text for event in e.events), 20)
-    assert any(e.kind == MODE and e.text.startswith("MANUAL: X-Plane was restarted") for e in told.events)
-    wait_until(lambda: world.mode.last.mode == MANUAL, 10, "the mode that the event tells")
+    reported = world.events.then_wait_for(lambda e: any("AUTO is off until" in event.text for event in e.events), 20)
+    assert any(e.kind == MODE and e.text.startswith("MANUAL: X-Plane was restarted") for e in reported.events)
+    wait_until(lambda: world.mode.last.mode == MANUAL, 10, "the mode that the event names")
     wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK)
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
     wire.wait(OVERRIDE, 0.0)
@@ -598,7 +598,7 @@ def test_a_failsafe_is_an_event_and_a_warning(tx, world):
     assert len(warned) == 2, node.output()
 
 
-def test_restarted_xplane_is_left_alone_when_nobody_flies(tx, world):
+def test_restarted_xplane_is_left_alone_without_commands(tx, world):
     tx()
     world.manual.fly(fields=ROLL, roll=0.3)
     world.wire.wait(OVERRIDE, 1.0)

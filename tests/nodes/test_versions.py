@@ -59,12 +59,12 @@ def flight(request, new_world, tmp_path_factory):
 
 
 def done(world, service, kind, **request):
-    """Calls a service that accepts, and waits for the event that tells that X-Plane did it."""
+    """Calls a service that accepts, and waits for the event that X-Plane did it."""
     response = call(world, service, kind, **request)
     assert response.result.code == ACCEPTED, response.result.message
     number = response.event_number
-    told = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 30)
-    event = next(event for event in told.events if event.number == number)
+    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 30)
+    event = next(event for event in reported.events if event.number == number)
     assert event.success, event.text
 
 

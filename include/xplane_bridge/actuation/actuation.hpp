@@ -70,7 +70,7 @@ struct ActuationHooks {
   std::function<bool()> stopping;
 };
 
-/// What diagnostics tell of the controls.
+/// What diagnostics show of the controls.
 struct ControlSnapshot {
   core::ModeStatus mode;
   Standing standing = Standing::kNotConnected;
@@ -82,8 +82,8 @@ struct ControlSnapshot {
 };
 
 /// Everything that changes X-Plane, wired together: the control path, driven surfaces, failures, excitations, flight
-/// services, single settings, and the overrides all of these take. Tells them what X-Plane shows: frames, resets,
-/// aircraft, pauses.
+/// services, single settings, and the overrides all of these take. Passes on to them what X-Plane shows: frames,
+/// resets, aircraft, pauses.
 ///
 /// Threads: commands and tick() come on one thread, X-Plane's answers on the link's, requests on any; flight jobs and
 /// releases have threads of their own. One mutex guards what they share; nothing waits while holding it but for the
@@ -106,7 +106,7 @@ class Actuation {
   /// The guardian has given everything back because this process hung: nothing is broken, excited, driven or flown
   /// until a mode is asked for.
   void onHang();
-  /// What was seen until now was no flight, but frames of a simulator that stands (lock-step): tells all once more.
+  /// What was seen until now was no flight, but frames of a simulator that stands (lock-step): reports all once more.
   void beginFlight();
   /// Ends what moves and what waits; nothing is broken, excited or driven from here on. Waits for jobs.
   void stop();
@@ -128,7 +128,7 @@ class Actuation {
   Injected inject(const ExcitationRequest& request, const std::string& who);
   struct Identifying {
     RequestResult result;
-    std::uint32_t event_number = 0;  ///< that will tell the outcome; 0: refused
+    std::uint32_t event_number = 0;  ///< of the event with the outcome; 0: refused
   };
   /// @param reserve gives the number of the event; called if it begins
   Identifying identifySurfaces(const IdentificationRequest& request, const std::string& who,
@@ -146,7 +146,7 @@ class Actuation {
 
   const SurfaceControl& surfaces() const { return surfaces_; }
   ControlSnapshot control() const;
-  /// X-Plane has told its version, its time and the aircraft.
+  /// X-Plane has shown its version, its time and the aircraft.
   bool knowsFlight() const;
   /// [s] raw simulator time of the newest frame; NaN before the first
   double simTime() const { return sim_time_; }

@@ -103,7 +103,7 @@ class ControlPath {
   // What drives it.
 
   void onLink(const core::LinkStatus& status);
-  /// X-Plane has told which aircraft is loaded.
+  /// X-Plane has shown which aircraft is loaded.
   void onAircraft(const core::AircraftIdentity& aircraft);
   /// The flight began anew, or was placed elsewhere: `how`, in words.
   void onNewFlight(const std::string& how);
@@ -179,7 +179,7 @@ class ControlPath {
   std::optional<std::uint32_t> published_revision_;
   core::FlightWatch watch_;
   double last_frame_ = -1e9;                           // [s] steady
-  bool failsafe_ = false;                              // as told last
+  bool failsafe_ = false;                              // as published last
   std::array<double, 2> last_command_of_{-1e9, -1e9};  // [s] steady; MANUAL, AUTO with its surfaces
   std::int64_t next_command_ns_ = 0;                   // [ns] steady; when the next one may be sent
   bool command_waits_ = false;                         // for that
@@ -187,7 +187,7 @@ class ControlPath {
   double last_override_refresh_ = -1e9;                // [s] steady
   bool surfaces_fly_ = false;  // control/surfaces commands, as far as end_surface_commands has not been called
   bool excited_ = false;       // what was sent last
-  bool taken_ = false;         // overrides, for a test signal of what nobody commands
+  bool taken_ = false;         // overrides, for a test signal on channels without a command
   std::string last_warning_;   // why commands are not sent, as warned of last
 
   core::ChannelValues last_values_{};                     // of Refresh::kOnChange channels

@@ -25,7 +25,7 @@ struct ExcitationRequest {
   std::uint32_t seed = 0;
   double max_roll_deg = 0.0;   ///< 0: the aircraft's
   double max_pitch_deg = 0.0;  ///< 0: the aircraft's
-  /// [-1..1] where an axis that nobody commands is, which is taken for as long; none: such an axis is refused.
+  /// [-1..1] where an axis without a command is, which is taken for as long; none: such an axis is refused.
   std::optional<double> rest;
 };
 
@@ -57,7 +57,7 @@ class ExcitationManager {
   ExcitationManager(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg, Publish publish,
                     Report report);
 
-  /// What a request asks for, as far as it tells by itself.
+  /// What a request asks for, as far as it says by itself.
   struct Plan {
     std::string wrong;  ///< with the request, in words; empty: nothing
     core::ChannelSet channels;

@@ -29,7 +29,7 @@ class FlightJobs {
   FlightJobs(const FlightJobs&) = delete;
   FlightJobs& operator=(const FlightJobs&) = delete;
 
-  /// Starts once what came before has ended. `number`: of the event that will tell the outcome; `who` asked for it.
+  /// Starts once what came before has ended. `number`: of the event with the outcome; `who` requested it.
   void reset(const core::FlightStart& start, std::uint32_t number, const std::string& who);
   void reset(const core::AirportStart& start, std::uint32_t number, const std::string& who);
   void setWind(const core::UniformWind& wind, std::uint32_t number, const std::string& who);
@@ -47,7 +47,7 @@ class FlightJobs {
   bool full() const;
   /// Why X-Plane could not be asked for anything now; nullopt: it could.
   std::optional<RequestResult> refusal() const;
-  /// Who asked for the job at it, if that places the aircraft or loads files; empty: none does.
+  /// The caller of the job that runs, if that places the aircraft or loads files; empty: none does.
   std::string movingCaller() const;
   /// The one at it ends where it is, X-Plane resumed if it was paused for it; the others are dropped. Waits for that.
   void stop();

@@ -41,7 +41,7 @@ class Guardian {
   bool running() const;
 
  private:
-  void tell(const std::string& line);
+  void sendLine(const std::string& line);
 
   mutable std::mutex mutex_;
   int socket_ = -1;
@@ -49,7 +49,7 @@ class Guardian {
   double last_beat_ = -1e9;  // [s] steady
 };
 
-/// What the parent has told its guardian, line by line.
+/// What the parent has sent its guardian, line by line.
 struct GuardianOrders {
   std::string address;
   std::uint16_t port = 0;
@@ -63,8 +63,8 @@ struct GuardianOrders {
   void take(const std::string& line);
 };
 
-/// Tells when a parent has not shown for too long that it runs. Counts only time in which this process got to run: on a
-/// computer that is too busy for both, the parent does not count as hung.
+/// Notices when a parent has not shown for too long that it runs. Counts only time in which this process got to run: on
+/// a computer that is too busy for both, the parent does not count as hung.
 class HangWatch {
  public:
   static constexpr double kLongestLook = 0.1;  ///< [s] that one call of passed() counts at most

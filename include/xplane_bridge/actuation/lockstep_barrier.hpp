@@ -10,7 +10,7 @@
 
 namespace xplane_bridge {
 
-/// Whether a frame of a simulator in lock-step is answered: by everybody named, with the frame's own stamp.
+/// Whether a frame of a simulator in lock-step is answered: by every participant, with the frame's own stamp.
 /// Thread-safe.
 ///
 /// An answer to another frame than the present one does not count for it; one that comes before its frame waits for it,
@@ -19,7 +19,7 @@ namespace xplane_bridge {
 class LockstepBarrier {
  public:
   /// @param participants names of nodes: "/a/b" is that one, "b" is /b and any /.../b
-  /// @param reader the node without which nobody can answer; its answer is awaited like the others'
+  /// @param reader the node without which no participant can answer; its answer is awaited like the others'
   LockstepBarrier(std::vector<std::string> participants, std::string reader);
 
   /// The next frame is here. Number 0 is answered by the reader alone: the others have seen nothing of it.

@@ -11,7 +11,7 @@ enum class PauseOutcome : std::uint8_t {
   kWasSo,        ///< nothing was sent
   kFollowed,     ///< X-Plane shows it
   kNotFollowed,  ///< sent, but X-Plane does not show it in time
-  kUnknown,      ///< X-Plane does not tell whether it is paused; nothing was sent
+  kUnknown,      ///< X-Plane does not report whether it is paused; nothing was sent
 };
 
 /// Pauses X-Plane or lets it go on. What X-Plane shows decides whether anything is sent at all, and it is sent once:

@@ -36,7 +36,7 @@ enum class SurfaceControlState : std::uint8_t {
 };
 const char* toString(SurfaceControlState state);
 
-/// What diagnostics tell of driven surfaces.
+/// What diagnostics show of driven surfaces.
 struct SurfaceControlStatus {
   SurfaceControlState state = SurfaceControlState::kIdle;
   bool wanted = false;                     ///< something needs the surfaces driven
@@ -56,7 +56,7 @@ struct SurfaceControlStatus {
   std::string last_refusal;
 };
 
-/// Every control surface, driven one by one while somebody needs that (a broken surface, a command to single surfaces,
+/// Every control surface, driven one by one while something needs that (a broken surface, a command to single surfaces,
 /// an excitation of one), and left to X-Plane otherwise. Learns the mixing that takes (docs/surfaces.md).
 ///
 /// X-Plane's frames drive it: what is sent goes out on arrival of each. It goes by the link's clock. Thread-safe;
@@ -225,7 +225,7 @@ class SurfaceControl {
 
   core::MixingWatch watch_;
   std::string file_problem_;
-  bool keeps_ = true;  // in a file, what normal flight tells of this aircraft
+  bool keeps_ = true;  // in a file, what normal flight shows of this aircraft
   bool identifying_ = false;
   std::string identification_lost_;  // why, where its end was not asked for
 

@@ -32,7 +32,7 @@ struct IdentificationConditions {
 };
 
 /// Learns how the aircraft moves its surfaces by test signals: two periods of a sine on roll, pitch and yaw, one after
-/// the other, repeated with more where a controller works against them. An axis that nobody commands is taken for as
+/// the other, repeated with more where a controller works against them. An axis without a command is taken for as
 /// long, from where its stick is. On X-Plane's frames and its time; not thread-safe: its owner's mutex guards it.
 class SurfaceIdentification {
  public:

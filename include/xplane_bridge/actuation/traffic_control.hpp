@@ -33,7 +33,7 @@ class TrafficControl {
   std::string command(const std::vector<core::TrafficPose>& poses, double sim_time);
   /// Sends what is due. Often.
   void tick(double sim_time);
-  /// Gives all back; `why` is told, where there are any.
+  /// Gives all back; reports `why`, where there are any.
   void release(const std::string& why);
   /// Another process has given everything back, or X-Plane is another one: none is placed any more.
   void forget();
@@ -54,7 +54,7 @@ class TrafficControl {
   std::set<int> lost_;         // given back by another client while it was commanded
   double commanded_at_ = 0.0;  // [s] simulator time
   double due_ = -1e9;          // [s] steady
-  float latitude_ = 0.0F;      // of the scenery's origin, as X-Plane has told it last
+  float latitude_ = 0.0F;      // of the scenery's origin, as X-Plane has sent it last
   float longitude_ = 0.0F;
   bool knows_scenery_ = false;
   core::Subscription scenery_;  // last: it ends first

@@ -98,7 +98,7 @@ enum class Refusal : std::uint64_t { kToken = 1, kVersion = 2, kBusy = 3, kMalfo
 /// Width and height [px] as the JPEG itself says; empty: it is none.
 [[nodiscard]] std::optional<std::pair<int, int>> jpegSize(const std::uint8_t* bytes, std::size_t size);
 
-/// Compares in a time that does not tell where the difference is.
+/// Compares in a time that does not depend on where the difference is.
 [[nodiscard]] bool sameSecret(const std::string& given, const std::string& expected);
 
 }  // namespace xplane_bridge::vision

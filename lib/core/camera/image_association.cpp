@@ -356,7 +356,7 @@ std::uint32_t pairingQuality(const ImageMoment& moment, const Association& answe
   if (answer.method == PairingMethod::kNone) quality |= kQualityStateMissing;
   if (answer.method == PairingMethod::kInterpolated) quality |= kQualityInterpolated;
   if (answer.method == PairingMethod::kNearestFrame) quality |= kQualityOffFrame;
-  // By stamps alone the very frame cannot be told.
+  // Stamps alone do not show which frame it is.
   if (answer.method == PairingMethod::kStamp) quality |= kQualityOffFrame | kQualityClockUnsure;
   if (answer.frame_known && moment.uncertainty > 0.5 * answer.frame_period) quality |= kQualityClockUnsure;
   if (moment.paused || answer.method == PairingMethod::kPaused) quality |= kQualityPaused;

@@ -252,7 +252,7 @@ double JoystickMapper::source(const Input& input) const {
 }
 
 void JoystickMapper::integrateUpTo(double now) {
-  // Beyond the last message's life nobody holds the hat any more.
+  // Beyond the last message's life the hat counts as released.
   const double end = std::min(now, last_joy_ + options_.joy_timeout);
   const double dt = end - std::max(integrated_until_, last_joy_);
   if (dt > 0.0) {

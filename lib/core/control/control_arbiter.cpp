@@ -304,7 +304,7 @@ void ControlArbiter::moveTowards(std::size_t i, const Target& target, double dt)
   if (output_[i] != target.value) out_.limited |= fieldOf(static_cast<Channel>(i));
 }
 
-/// Whether a channel takes a test signal: commanded, or without anybody's command if the signal brings its own rest. A
+/// Whether a channel takes a test signal: commanded, or without a command if the signal brings its own rest. A
 /// failsafe that flies takes none.
 bool ControlArbiter::takesSignal(std::size_t i, bool has_target, const ChannelExcitation& excitation) const {
   if (!excitation.channels.test(i)) return false;

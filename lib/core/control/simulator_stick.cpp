@@ -38,8 +38,8 @@ SimulatorStick::SimulatorStick(const Options& options)
 SimulatorStick::Sources SimulatorStick::sourcesOf(const std::vector<float>& settings) const {
   const auto first = [&](int assignment) {
     for (int axis = 0; axis < options_.axes; ++axis) {
-      const float told = settings[2 * static_cast<std::size_t>(axis)];
-      if (assignment != 0 && told == static_cast<float>(assignment)) return axis;
+      const float reported = settings[2 * static_cast<std::size_t>(axis)];
+      if (assignment != 0 && reported == static_cast<float>(assignment)) return axis;
     }
     return -1;
   };
@@ -57,11 +57,11 @@ SimulatorStick::Sources SimulatorStick::sourcesOf(const std::vector<float>& sett
 
 bool SimulatorStick::addSettings(const RrefView& datagram, std::int64_t receive_ns) {
   if (!settings_.add(datagram, receive_ns)) return false;
-  Sources told = sourcesOf(settings_.values());
-  const bool changed = !sources_ || !std::equal(told.begin(), told.end(), sources_->begin(),
+  Sources reported = sourcesOf(settings_.values());
+  const bool changed = !sources_ || !std::equal(reported.begin(), reported.end(), sources_->begin(),
                                                 [](const Source& a, const Source& b) { return !(a != b); });
   if (!changed) return false;
-  sources_ = std::move(told);
+  sources_ = std::move(reported);
   askForValues();
   return true;
 }
@@ -101,7 +101,7 @@ bool SimulatorStick::addValues(const RrefView& datagram, std::int64_t receive_ns
 std::string SimulatorStick::problem() const {
   if (!attached_) return "X-Plane has not shown its joystick yet";
   if (!*attached_) return "X-Plane has no joystick: plug one in at its computer";
-  if (!sources_) return "X-Plane has not told yet what its axes are assigned to";
+  if (!sources_) return "X-Plane has not reported yet what its axes are assigned to";
   if ((*sources_)[kRoll].axis >= 0 || (*sources_)[kPitch].axis >= 0) return "";
   return "none of X-Plane's first " + std::to_string(options_.axes) +
          " axes rolls or pitches: assign them in X-Plane's joystick settings, or raise the parameter axes";

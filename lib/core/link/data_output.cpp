@@ -116,7 +116,7 @@ void DataOutput::configure(const std::vector<DatarefValue>& values) {
     }
   }
   if (!rows_unknown.empty()) {
-    services_.log(LogLevel::kWarn, "X-Plane does not tell whether Data Output rows " + listOf(rows_unknown) +
+    services_.log(LogLevel::kWarn, "X-Plane does not report whether Data Output rows " + listOf(rows_unknown) +
                                        " were selected: they are selected now and will stay so");
   }
   try {

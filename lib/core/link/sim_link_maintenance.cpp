@@ -309,7 +309,7 @@ void SimLink::removeGroup(const RrefDelivery* delivery) {
 void SimLink::stopGroup(const Group& group) {
   retired_udp_ += group.source->counters();
   if (!monitor_.alive()) {
-    return;  // X-Plane has forgotten us, or will find nobody on that port
+    return;  // X-Plane has forgotten us, or will find no program on that port
   }
   const RrefGroup& stopped = group.subscription.group();
   for (std::size_t i = 0; i < stopped.datarefs.size(); ++i) {

@@ -11,7 +11,7 @@ namespace xplane_bridge::core {
 namespace {
 
 constexpr double kPatienceS = 5.0;        // before a fruitless search is called a problem
-constexpr double kRecentS = 5.0;          // what was noticed within this is told
+constexpr double kRecentS = 5.0;          // what was noticed within this is reported
 constexpr double kAnswerPatienceS = 2.0;  // without an answer, while DATA comes
 
 std::string namesOf(const std::vector<BeaconSighting>& sightings) {
@@ -75,7 +75,7 @@ std::vector<std::string> SimLink::findProblems(std::int64_t now_ns) const {
     findSearchProblems(now_ns, &problems);
   } else if (isOneWay(now_ns)) {
     problems.push_back("X-Plane sends Data Output, but nothing answers on " + peer_.toString() +
-                       ": only what its rows tell is known (a firewall there; in X-Plane 12, Settings > Network > " +
+                       ": only what its rows contain is known (a firewall there; in X-Plane 12, Settings > Network > " +
                        "Accept incoming connections)");
     if (!versionNow(now_ns).known()) {
       problems.emplace_back(

@@ -59,7 +59,7 @@ void MixingWatch::add(const SurfaceSample& sample) {
   const double dt = time - last_time_;
   if (dt == 0.0) return;  // paused
   if (dt < 0.0 || dt > kGap) interrupt();
-  // The first frame after a gap does not tell how fast the stick is.
+  // The first frame after a gap does not show how fast the stick is.
   const bool first = !std::isfinite(last_time_);
   last_time_ = time;
   const double window = std::max(time - speed_time_, kSpeedWindow);

@@ -26,7 +26,7 @@ constexpr AxisHalf kAxisHalves[] = {
     {MixingTerm::kYawPlus, "yaw right"},       {MixingTerm::kYawMinus, "yaw left"},
 };
 
-// Which terms can be told apart, by elimination in the order of MixingTerm.
+// Which terms can be separated, by elimination in the order of MixingTerm.
 struct Elimination {
   std::vector<int> terms;    // kept
   MixingVector independent;  // rms movement of each term that the kept ones before it do not explain

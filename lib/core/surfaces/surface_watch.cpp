@@ -63,7 +63,7 @@ void DrivenInputs::begin(const SurfaceSample& sample) {
 }
 
 double DrivenInputs::run(Handle* handle, double shown, double now, double rate, double dt) {
-  if (!std::isfinite(shown)) return now;  // not told in this frame
+  if (!std::isfinite(shown)) return now;  // not received in this frame
   if (!std::isfinite(handle->at_begin)) handle->at_begin = shown;
   if (std::abs(shown - handle->at_begin) > kHandleMoved) handle->moved = true;
   if (!handle->moved) return now;

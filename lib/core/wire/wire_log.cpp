@@ -57,11 +57,11 @@ std::uint64_t WireLog::lost() const {
 }
 
 void WireLog::run() {
-  bool told = false;
+  bool logged = false;
   const auto write = [&](bool last) {
     const bool written = file_.write(writing_) && (!last || file_.finish());
     writing_.clear();
-    if (!written && !std::exchange(told, true)) log_(LogLevel::kError, file_.problem());
+    if (!written && !std::exchange(logged, true)) log_(LogLevel::kError, file_.problem());
   };
   std::unique_lock<std::mutex> lock(mutex_);
   for (bool last = false; !last;) {

@@ -319,8 +319,8 @@ int runNode(int argc, char** argv, const std::string& default_name,
       }
     });
     ros::init(argc, argv, default_name, ros::init_options::NoSigintHandler);
-    for (bool told = false; !ros::master::check(); told = true) {
-      if (!told) {
+    for (bool logged = false; !ros::master::check(); logged = true) {
+      if (!logged) {
         ROS_WARN("no ROS master at %s yet; waiting (start one with roslaunch or roscore)",
                  ros::master::getURI().c_str());
       }

@@ -67,7 +67,7 @@ void fillLinkDiagnostics(const core::LinkStatus& link, const core::LinkCounters&
   }
   status->add("Unknown DATA rows (-)", now.unknown_rows);
   status->add("Non-finite values (-)", now.non_finite_values);
-  status->add("Values nobody asked for (-)", now.unknown_indices);
+  status->add("Values not requested (-)", now.unknown_indices);
   status->add("Subscription requests (-)", now.requests);
   status->add("Subscriptions repeated (-)", now.resubscriptions);
   status->add("Calls refused, link behind (-)", now.refused_calls);

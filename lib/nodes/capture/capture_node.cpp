@@ -157,7 +157,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     return;
   }
   const core::RateLimiter before = limiter_;
-  const bool heard = anybodyListens();
+  const bool heard = hasSubscribers();
   const bool due = heard && limiter_.due(change.time_ns);
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
@@ -226,7 +226,7 @@ void CaptureNode::repeatFrozen(std::int64_t now_ns) {
   publisher_->pushDroppingOldest(std::move(grabbed));
 }
 
-bool CaptureNode::anybodyListens() const {
+bool CaptureNode::hasSubscribers() const {
   return image_publisher_.getNumSubscribers() > 0 || jpeg_publisher_.getNumSubscribers() > 0 ||
          info_publisher_.getNumSubscribers() > 0 || frame_state_publisher_.getNumSubscribers() > 0;
 }
@@ -369,12 +369,12 @@ void CaptureNode::diagnoseCapture(diagnostic_updater::DiagnosticStatusWrapper* s
   } else if (read > kSlowRead) {
     status->summaryf(diagnostic_msgs::DiagnosticStatus::WARN, "reading a picture takes %.1f ms", 1e3 * read);
   } else {
-    status->summary(diagnostic_msgs::DiagnosticStatus::OK, anybodyListens() ? "capturing" : "nobody listens");
+    status->summary(diagnostic_msgs::DiagnosticStatus::OK, hasSubscribers() ? "capturing" : "no subscriber");
   }
   status->add("Source", source_description_);
   status->add("Changes of the picture", changes_);
   status->add("Pictures taken", grabbed_);
-  status->add("Pictures left out (above max_rate, or nobody listens)", skipped_);
+  status->add("Pictures left out (above max_rate, or no subscriber)", skipped_);
   status->add("Pictures dropped (no time to scale)", publisher_ ? publisher_->dropped() : 0);
   status->add("JPEG dropped (no time to encode)", encoder_ ? encoder_->dropped() : 0);
   const vision::PeriodMeter::Summary periods = periods_.summary();

@@ -153,8 +153,8 @@ void CaptureNode::undo(const Deadline& deadline) {
 CaptureNode::CameraFacts CaptureNode::cameraFacts() const {
   const std::lock_guard<std::mutex> lock(camera_mutex_);
   CameraFacts facts;
-  const bool told = camera_known_ && !options_.own_field_of_view;
-  facts.frustum = core::frustumOf(told ? frustum_ : core::FrustumSample(), options_.field_of_view_deg);
+  const bool known = camera_known_ && !options_.own_field_of_view;
+  facts.frustum = core::frustumOf(known ? frustum_ : core::FrustumSample(), options_.field_of_view_deg);
   if (options_.own_field_of_view) facts.frustum.known = true;
   if (!camera_known_) return facts;
   facts.external = external_;

@@ -15,7 +15,7 @@ constexpr std::int64_t kCompletionTime = 1'000'000'000;  // [ns]
 const double kUnsettledClock = core::ClockFilter::Options{}.unfitted_uncertainty;
 constexpr std::uint32_t kNeededToStart = core::FlightState::kValidAttitude | core::FlightState::kValidPosition;
 
-/// Publishes what `fill` makes, unless nobody listens (`unheard`: all the same) or it makes nothing.
+/// Publishes what `fill` makes, unless it has no subscriber (`unheard`: all the same) or it makes nothing.
 template <class Message, class Fill>
 void publishIfHeard(const ros::Publisher& publisher, bool unheard, Message* message, const Fill& fill) {
   if ((unheard || publisher.getNumSubscribers() > 0) && fill(message)) {

@@ -53,7 +53,7 @@ void RxNode::loadParameters(const ParamLoader& own) {
     own.refuse("position_source", "auto, local, rpos or float32 with lockstep/enabled: X-Plane Connect has no frames");
   }
   if (common().transport == core::Transport::kData && common().data_port == 0 && !options_.configure_xplane) {
-    own.refuse("configure_xplane", "true while the shared parameter data_port is 0: X-Plane has to be told the port");
+    own.refuse("configure_xplane", "true while the shared parameter data_port is 0: X-Plane has to be given the port");
   }
   core::FlightStateAssembler::Options assembler;
   assembler.transport = common().transport;

@@ -220,7 +220,7 @@ void RxNode::diagnosePhysics(diagnostic_updater::DiagnosticStatusWrapper* status
   if (status->level == DiagnosticStatus::OK) {
     status->summary(DiagnosticStatus::OK, consistent == results.size()
                                               ? "all quantities agree"
-                                              : "nothing disagrees; the flight does not tell about all quantities");
+                                              : "nothing disagrees; the flight does not show all quantities");
   }
 }
 

@@ -59,7 +59,7 @@ void RxNode::endFrame(const core::LockstepFrame& frame) {
   ended_frame_ = frame.number;
   std_msgs::Header done;
   done.stamp = stampNow();
-  // Nobody can answer a state that has not come.
+  // No participant can answer a state that has not come.
   done.frame_id = frame.number > 0 && !state_is_new_ ? kLockstepNoState : "";
   done_publisher_.publish(done);
 }

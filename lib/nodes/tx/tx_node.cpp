@@ -247,8 +247,8 @@ void TxNode::advertiseJob(const std::string& service, Begin begin) {
     } else {
       response->success = true;
       response->event_number = events_.reserve();
-      response->result =
-          result(ServiceResult::ACCEPTED, "event " + std::to_string(response->event_number) + " will tell the outcome");
+      response->result = result(ServiceResult::ACCEPTED,
+                                "event " + std::to_string(response->event_number) + " will report the outcome");
       begin(actuation_->jobs(), request, response->event_number, name() + "/" + service);
     }
   });

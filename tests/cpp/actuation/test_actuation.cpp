@@ -118,7 +118,7 @@ class ActuationTest : public testing::Test {
   std::unique_ptr<Actuation> actuation_;
 };
 
-TEST_F(ActuationTest, AircraftThatXPlaneShowsIsFlownAndTold) {
+TEST_F(ActuationTest, AircraftThatXPlaneShowsIsFlownAndReported) {
   ASSERT_EQ(eventsOf(EventKind::kAircraft).size(), 1U);
   EXPECT_EQ(eventsOf(EventKind::kAircraft)[0].text, "aircraft: DA62 (Twin)");
   EXPECT_EQ(actuation_->control().aircraft, "DA62");
@@ -128,7 +128,7 @@ TEST_F(ActuationTest, AircraftThatXPlaneShowsIsFlownAndTold) {
   EXPECT_EQ(actuation_->control().received[0].accepted, 25U);
 }
 
-TEST_F(ActuationTest, AnotherAircraftIsToldAndNotFlown) {
+TEST_F(ActuationTest, AnotherAircraftIsReportedAndNotFlown) {
   fly(0.2);
   showAircraft("QUAD");
   fly(2.0);
@@ -137,7 +137,7 @@ TEST_F(ActuationTest, AnotherAircraftIsToldAndNotFlown) {
   EXPECT_TRUE(actuation_->control().overrides.empty());
 }
 
-TEST_F(ActuationTest, NewFlightIsToldAndEndsAuto) {
+TEST_F(ActuationTest, NewFlightIsReportedAndEndsAuto) {
   actuation_->path().requestMode({1, 2, "test", 0.0});
   ASSERT_EQ(actuation_->control().mode.mode, core::FlightMode::kAuto);
   sim_.set(kFlightTime, 0.0F);
@@ -148,13 +148,13 @@ TEST_F(ActuationTest, NewFlightIsToldAndEndsAuto) {
   EXPECT_EQ(eventsOf(EventKind::kReset)[0].sim_time, eventsOf(EventKind::kMode).back().sim_time);
 }
 
-TEST_F(ActuationTest, CrashIsToldOnce) {
+TEST_F(ActuationTest, CrashIsReportedOnce) {
   sim_.set("sim/flightmodel2/misc/has_crashed", 1.0F);
   run(0.2);
   EXPECT_EQ(eventsOf(EventKind::kCrash).size(), 1U);
 }
 
-TEST_F(ActuationTest, PauseIsToldWithWhoAskedForIt) {
+TEST_F(ActuationTest, PauseIsReportedWithWhoAskedForIt) {
   setPaused(true);
   setPaused(false);
   ASSERT_EQ(eventsOf(EventKind::kPause).size(), 2U);
@@ -216,13 +216,13 @@ TEST_F(ActuationTest, CommandIsSentOrRefused) {
 TEST_F(ActuationTest, FailsafeIsAWarning) {
   fly(0.2);
   run(2.0);
-  const ActuationEvent told = eventsOf(EventKind::kMode).back();
-  EXPECT_TRUE(told.warning);
-  EXPECT_EQ(told.text, "MANUAL: failsafe: timeout of control/manual");
+  const ActuationEvent reported = eventsOf(EventKind::kMode).back();
+  EXPECT_TRUE(reported.warning);
+  EXPECT_EQ(reported.text, "MANUAL: failsafe: timeout of control/manual");
   EXPECT_TRUE(modes_.back().failsafe);
 }
 
-TEST_F(ActuationTest, LinkIsToldWithItsReason) {
+TEST_F(ActuationTest, LinkIsReportedWithItsReason) {
   sim_.setState(core::LinkState::kLost);
   actuation_->onLink(sim_.status());
   EXPECT_EQ(eventsOf(EventKind::kLink).back().text.substr(0, 6), "LOST: ");
@@ -259,7 +259,7 @@ TEST_F(ActuationTest, TheEndEndsATestSignal) {
   EXPECT_EQ(labels_.back().result, "aborted: tx_node ends");
 }
 
-TEST_F(ActuationTest, FailureIsToldPublishedAndRepairedAgain) {
+TEST_F(ActuationTest, FailureIsReportedPublishedAndRepairedAgain) {
   failEngine();
   ASSERT_EQ(eventsOf(EventKind::kFailure).size(), 1U);
   EXPECT_EQ(eventsOf(EventKind::kFailure)[0].text, "failure: engine_1 failed");
@@ -289,7 +289,7 @@ TEST_F(ActuationTest, AfterAHangNothingIsBrokenOrFlownUntilAModeIsAskedFor) {
   EXPECT_FLOAT_EQ(sim_.value(kRollOverride), 1.0F);
 }
 
-TEST_F(ActuationTest, PauseThatXPlaneDoesNotFollowIsTold) {
+TEST_F(ActuationTest, PauseThatXPlaneDoesNotFollowIsReported) {
   EXPECT_EQ(actuation_->setPaused(true, "test").code, core::ResultCode::kTimeout);
   ASSERT_EQ(eventsOf(EventKind::kPause).size(), 1U);
   EXPECT_EQ(eventsOf(EventKind::kPause)[0].text, "pause asked for: X-Plane did not follow in time");
@@ -309,7 +309,7 @@ TEST_F(ActuationTest, SurfacesThatAreNotKnownAreNotCommanded) {
   EXPECT_EQ(identifying.event_number, 0U);
 }
 
-TEST_F(ActuationTest, FlightIsKnownOnceXPlaneHasToldIt) {
+TEST_F(ActuationTest, FlightIsKnownOnceXPlaneHasShownIt) {
   EXPECT_TRUE(actuation_->knowsFlight());
   EXPECT_GT(actuation_->framesFlown(), 0U);
   sim_.setVersion({});

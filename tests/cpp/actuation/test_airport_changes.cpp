@@ -114,7 +114,7 @@ TEST_F(AirportChangesTest, LostDatagramIsSentOnceMore) {
   EXPECT_EQ(flight_.sent("PREL"), 2U);
 }
 
-TEST_F(AirportChangesTest, AirportThatXPlaneDoesNotHaveIsTold) {
+TEST_F(AirportChangesTest, AirportThatXPlaneDoesNotHaveIsReported) {
   flight_.put(3000.0, 50.0);  // it stands where it would be put
   core::AirportStart elsewhere = at(AirportSpot::kRamp);
   elsewhere.airport = "NONE";

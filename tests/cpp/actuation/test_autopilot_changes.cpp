@@ -81,7 +81,7 @@ TEST_F(AutopilotChangesTest, LostPressIsRepeated) {
   EXPECT_EQ(sim_.value(kHeading), 2.0F);
 }
 
-TEST_F(AutopilotChangesTest, AircraftWithoutTheModeIsTold) {
+TEST_F(AutopilotChangesTest, AircraftWithoutTheModeIsReported) {
   AutopilotSetting setting;
   setting.vertical = core::VerticalMode::kVerticalSpeed;
   const FlightChangeOutcome outcome = changes_.applyAutopilot(setting);
@@ -92,7 +92,7 @@ TEST_F(AutopilotChangesTest, AircraftWithoutTheModeIsTold) {
   EXPECT_EQ(sim_.commands(), Names(3, "sim/autopilot/vertical_speed"));
 }
 
-TEST_F(AutopilotChangesTest, XPlaneThatDoesNotShowTheModeIsTold) {
+TEST_F(AutopilotChangesTest, XPlaneThatDoesNotShowTheModeIsReported) {
   AutopilotSetting setting;
   setting.lateral = LateralMode::kNav;
   const FlightChangeOutcome outcome = changes_.applyAutopilot(setting);
@@ -136,7 +136,7 @@ TEST_F(AutopilotChangesTest, WhatCouldNotBePutBackIsNotChanged) {
   setting.restore_on_exit = true;
   const FlightChangeOutcome outcome = changes_.applyAutopilot(setting);
   EXPECT_FALSE(outcome.success);
-  EXPECT_EQ(outcome.text, "set_autopilot: X-Plane does not tell " + kFolder +
+  EXPECT_EQ(outcome.text, "set_autopilot: X-Plane does not report " + kFolder +
                               "altitude_dial_ft, which could not be put back on exit");
   EXPECT_TRUE(sim_.writes().empty());
 }

@@ -82,7 +82,7 @@ TEST_F(ControlPathTest, ACommandGoesDownOnceAfterItsOverride) {
   EXPECT_EQ(applied[0].controls.sequence, 7u);
   EXPECT_FALSE(applied[0].read_back);
   EXPECT_DOUBLE_EQ(stick[0], 0.25);
-  EXPECT_TRUE(std::isnan(stick[1])) << "nobody commands pitch";
+  EXPECT_TRUE(std::isnan(stick[1])) << "no source commands pitch";
 }
 
 TEST_F(ControlPathTest, ReadBackComesHomeOnceWithTheFrameThatShowsIt) {
@@ -512,7 +512,7 @@ TEST_F(ControlPathTest, AnExcitationGoesOutWithEveryFrameAndItsEndToo) {
   EXPECT_EQ(writesTo(kStickRoll), (Floats{0.4F, 0.4F, 0.1F})) << "without it, once";
 }
 
-TEST_F(ControlPathTest, AnAxisThatNobodyCommandsIsTakenForASignalAndGivenBack) {
+TEST_F(ControlPathTest, AnAxisWithoutCommandsIsTakenForASignalAndGivenBack) {
   start();
   excitation.channels.set(core::index(core::Channel::kRoll));
   excitation.value = 0.3;
@@ -536,7 +536,7 @@ TEST_F(ControlPathTest, AnExcitationEndsWithTheSourceAndIsNotSentOnTheFailsafe) 
   run(0.4);
   EXPECT_TRUE(excitation_ends.empty());
   run(0.2);
-  EXPECT_EQ(excitation_ends, Texts{"nobody commands the axis any more"});
+  EXPECT_EQ(excitation_ends, Texts{"the commands of the axis have ended"});
   const Floats rolls = writesTo(kStickRoll);
   EXPECT_EQ(rolls.back(), 0.0F);
   EXPECT_EQ(std::count(rolls.begin(), rolls.end(), 0.3F), 0) << "the signal on the failsafe's 0";
@@ -609,7 +609,7 @@ TEST_F(ControlPathTest, AfterALossItWaitsForAFrameAndTakesTheOverrideAgain) {
   EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.3F);
 }
 
-TEST_F(ControlPathTest, AfterALossNobodyFliesXPlaneIsLeftAlone) {
+TEST_F(ControlPathTest, AfterALossWithoutCommandsXPlaneIsLeftAlone) {
   start();
   runWith(rollCommand(0.3), 0.2);
   setState(LinkState::kLost);
@@ -758,7 +758,7 @@ TEST_F(ControlPathTest, WhatWasGivenBackWithoutItsDoingStopsItUntilAModeIsAskedF
   EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.3F);
 }
 
-TEST_F(ControlPathTest, AxesThatNobodyCommandsStayWithXPlane) {
+TEST_F(ControlPathTest, AxesWithoutCommandsStayWithXPlane) {
   start();
   core::ControlCommand command = rollCommand(0.3);
   command.fields = core::kFieldRoll | core::kFieldPitch;
@@ -791,7 +791,7 @@ TEST_F(ControlPathTest, AnXPlaneThatHasRunNoLongerThanTheGapIsAnotherOne) {
 TEST_F(ControlPathTest, AnotherAircraftIsNotFlown) {
   start(LinkState::kConnected, "");
   EXPECT_EQ(path->standing(), Standing::kWrongAircraft);
-  EXPECT_EQ(path->refusal(), "X-Plane has not told which aircraft is loaded");
+  EXPECT_EQ(path->refusal(), "X-Plane has not reported which aircraft is loaded");
   path->onAircraft({"QUAD", "Quadrotor"});
   EXPECT_EQ(path->standing(), Standing::kWrongAircraft);
   EXPECT_EQ(path->refusal(),

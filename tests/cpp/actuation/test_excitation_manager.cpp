@@ -60,11 +60,11 @@ class ExcitationManagerTest : public DrivenSurfacesTest {
   core::FlightWatch watch_;
   core::ChannelSet commanded_ = only(Channel::kRoll);
   bool excited_ = false;
-  std::vector<ExcitationLabel> labels_;                           // as published
-  std::vector<std::tuple<std::string, std::string, bool>> told_;  // text, who, success
+  std::vector<ExcitationLabel> labels_;                               // as published
+  std::vector<std::tuple<std::string, std::string, bool>> reported_;  // text, who, success
   ExcitationManager manager_{&surfaces_, 45.0, 20.0, [this](const ExcitationLabel& label) { labels_.push_back(label); },
                              [this](const std::string& text, const std::string& who, bool success) {
-                               told_.emplace_back(text, who, success);
+                               reported_.emplace_back(text, who, success);
                              }};
 };
 
@@ -125,7 +125,7 @@ TEST_F(ExcitationManagerTest, PlanTakesBandAndSeed) {
 
 // ------------------------------------------------------------------------------------------------ an axis
 
-TEST_F(ExcitationManagerTest, AxisThatNobodyCommandsIsTakenAtItsRest) {
+TEST_F(ExcitationManagerTest, AxisWithoutCommandsIsTakenAtItsRest) {
   commanded_.reset();
   ExcitationRequest request = doubletOn("pitch");
   EXPECT_EQ(inject(request).code, ResultCode::kRefused);
@@ -177,8 +177,8 @@ TEST_F(ExcitationManagerTest, SignalOnAnAxisRunsToItsEnd) {
   EXPECT_EQ(labels_[2].result, "done");
   EXPECT_FALSE(labels_[2].active);
   EXPECT_NEAR(labels_[2].end_sim_time - begin, 2.0, 0.03);
-  EXPECT_EQ(told_, (decltype(told_){{"excitation 1: doublet on roll begins", "node/inject", true},
-                                    {"excitation 1 on roll: done", "node/inject", true}}));
+  EXPECT_EQ(reported_, (decltype(reported_){{"excitation 1: doublet on roll begins", "node/inject", true},
+                                            {"excitation 1 on roll: done", "node/inject", true}}));
   EXPECT_FALSE(excited_);
   EXPECT_TRUE(sim_.messages().empty()) << "surfaces have nothing to do with it";
 }
@@ -230,7 +230,7 @@ TEST_F(ExcitationManagerTest, RefusesWhatIsNotSafeNow) {
   stop.kind = "stop";
   refused(stop, ResultCode::kRefused, "no excitation runs");
   refused(doubletOn("yaw"), ResultCode::kRefused,
-          "nobody commands yaw: an excitation is added to a command (control/manual or auto)");
+          "no source commands yaw: an excitation is added to a command (control/manual or auto)");
   blocked_ = "X-Plane is not connected";
   refused(doubletOn("roll"), ResultCode::kNoLink, "X-Plane is not connected");
   blocked_.clear();
@@ -281,7 +281,7 @@ TEST_F(ExcitationManagerTest, FlightThatDoesNotFitAborts) {
     EXPECT_TRUE(manager_.excitation().channels.none());
     EXPECT_EQ(labels_.back().result, each.result);
     EXPECT_FALSE(labels_.back().active);
-    EXPECT_FALSE(std::get<2>(told_.back()));
+    EXPECT_FALSE(std::get<2>(reported_.back()));
   }
 }
 
@@ -293,8 +293,8 @@ TEST_F(ExcitationManagerTest, OwnerAbortsWithItsReason) {
   EXPECT_EQ(labels_.back().result, "aborted: the mode changed");
   manager_.abort("the link is lost");
   EXPECT_EQ(labels_.back().result, "aborted: the mode changed") << "it had ended";
-  EXPECT_EQ(told_.back(), (std::tuple<std::string, std::string, bool>{"excitation 1 on roll: aborted: the mode changed",
-                                                                      "node/inject", false}));
+  EXPECT_EQ(reported_.back(), (std::tuple<std::string, std::string, bool>{
+                                  "excitation 1 on roll: aborted: the mode changed", "node/inject", false}));
 }
 
 TEST_F(ExcitationManagerTest, StopEndsTheOneThatRuns) {
@@ -350,7 +350,7 @@ TEST_F(ExcitationManagerTest, WhatTheSurfaceSuffersAborts) {
   running();
   sim_.set(core::kSurfaceOverride, 0.0F);
   sim_.run(0.04);
-  EXPECT_EQ(labels_.back().result, "aborted: somebody else has released the surface override");
+  EXPECT_EQ(labels_.back().result, "aborted: another client has released the surface override");
   sim_.run(1.2);  // the mixing has to be seen to hold once more
   running();
   surfaces_.onAircraft("OTHER");

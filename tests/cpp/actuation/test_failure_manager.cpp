@@ -101,8 +101,8 @@ class FailureManagerTest : public DrivenSurfacesTest {
     for (const core::FailureLabel& each : failures_.snapshot().labels) out.push_back(each.name);
     return out;
   }
-  bool told(const std::string& text, const std::string& who, bool success) const {
-    return std::find(told_.begin(), told_.end(), std::make_tuple(text, who, success)) != told_.end();
+  bool reported(const std::string& text, const std::string& who, bool success) const {
+    return std::find(reported_.begin(), reported_.end(), std::make_tuple(text, who, success)) != reported_.end();
   }
   bool isInJournal(const std::string& dataref) {
     const auto entries = sim_.journal()->entries();
@@ -113,14 +113,14 @@ class FailureManagerTest : public DrivenSurfacesTest {
   core::FlightWatch watch_;
   std::vector<std::pair<double, std::function<void()>>> events_;  // [s] of the fake clock
   std::vector<FailureSnapshot> published_;
-  std::vector<std::tuple<std::string, std::string, bool>> told_;  // text, who, success
+  std::vector<std::tuple<std::string, std::string, bool>> reported_;  // text, who, success
   FailureManager failures_{&sim_,
                            &overrides_,
                            &surfaces_,
                            2.0,
                            [this](const FailureSnapshot& snapshot) { published_.push_back(snapshot); },
                            [this](const std::string& text, const std::string& who, bool success) {
-                             told_.emplace_back(text, who, success);
+                             reported_.emplace_back(text, who, success);
                            }};
 };
 
@@ -147,7 +147,7 @@ TEST_F(FailureManagerTest, FailureIsSetWrittenDownSeenAndLabelled) {
   EXPECT_TRUE(engine.active);
   EXPECT_TRUE(engine.confirmed);
   EXPECT_NEAR(engine.since_sim_time, begin, 0.05);
-  EXPECT_TRUE(told("failure: engine_1 failed", kWho, true));
+  EXPECT_TRUE(reported("failure: engine_1 failed", kWho, true));
   sim_.frame();
   ASSERT_FALSE(published_.empty());
   EXPECT_TRUE(published_.back().labels.at(0).confirmed);
@@ -184,7 +184,7 @@ TEST_F(FailureManagerTest, FullDatarefIsLabelledWithoutItsFolder) {
   require(failed(kPitot));
   EXPECT_EQ(labelNames(), Names{"rel_pitot"});
   requireClear({kPitot});
-  EXPECT_TRUE(told("cleared: rel_pitot", kWho, true));
+  EXPECT_TRUE(reported("cleared: rel_pitot", kWho, true));
 }
 
 TEST_F(FailureManagerTest, LostDatagramIsSentAgain) {
@@ -205,7 +205,7 @@ TEST_F(FailureManagerTest, WhatXPlaneDoesNotShowIsGivenUp) {
   EXPECT_EQ(std::count(sent.begin(), sent.end(), 6.0F), 7) << "at once and six times at 0.3 s";
   EXPECT_EQ(sent.back(), 0.0F);
   EXPECT_TRUE(labelNames().empty());
-  EXPECT_TRUE(told("failure of engine_1 is given up: X-Plane does not show it", kWho, false));
+  EXPECT_TRUE(reported("failure of engine_1 is given up: X-Plane does not show it", kWho, false));
   EXPECT_TRUE(overrides_.releasesPending());
 }
 
@@ -322,8 +322,8 @@ TEST_F(FailureManagerTest, RestartedXPlaneHasNothingBroken) {
   surfaces_.onLink(sim_.status());
   sim_.run(0.1);
   EXPECT_TRUE(labelNames().empty());
-  EXPECT_TRUE(told("failure of engine_1 has ended: X-Plane was restarted", "", true));
-  EXPECT_TRUE(told("failure of aileron1_wing2_left has ended: X-Plane was restarted", "", true));
+  EXPECT_TRUE(reported("failure of engine_1 has ended: X-Plane was restarted", "", true));
+  EXPECT_TRUE(reported("failure of aileron1_wing2_left has ended: X-Plane was restarted", "", true));
   EXPECT_EQ(state(), SurfaceControlState::kIdle);
 }
 
@@ -333,7 +333,7 @@ TEST_F(FailureManagerTest, AnotherAircraftEndsWhatIsDriven) {
   surfaces_.onAircraft("OTHER");
   sim_.run(0.1);
   EXPECT_EQ(labelNames(), Names{"engine_1"}) << "X-Plane keeps its own";
-  EXPECT_TRUE(told("failure of aileron1_wing2_left has ended: another aircraft was loaded", "", true));
+  EXPECT_TRUE(reported("failure of aileron1_wing2_left has ended: another aircraft was loaded", "", true));
   EXPECT_EQ(state(), SurfaceControlState::kIdle);
 }
 
@@ -375,12 +375,12 @@ TEST_F(FailureManagerTest, ArmedFailureComesTrueAtItsTrigger) {
   };
   for (const TriggerCase& each : cases) {
     SCOPED_TRACE(static_cast<int>(each.trigger));
-    told_.clear();
+    reported_.clear();
     watch_.*each.member = each.before;
     const RequestResult result = set(triggered("engine_1", each.trigger, each.value));
     EXPECT_EQ(result.code, ResultCode::kAccepted);
-    EXPECT_EQ(result.text, "armed; events and failures/state tell when it comes true");
-    EXPECT_TRUE(told("failure armed: engine_1 failed", kWho, true));
+    EXPECT_EQ(result.text, "armed; published on events and failures/state when it comes true");
+    EXPECT_TRUE(reported("failure armed: engine_1 failed", kWho, true));
     watch_.*each.member = std::nan("");
     sim_.run(0.5);
     watch_.*each.member = each.before;
@@ -393,7 +393,7 @@ TEST_F(FailureManagerTest, ArmedFailureComesTrueAtItsTrigger) {
     EXPECT_TRUE(label("engine_1").active);
     EXPECT_TRUE(label("engine_1").confirmed);
     EXPECT_EQ(sim_.value(kEngine), 6.0F);
-    EXPECT_TRUE(told("failure: engine_1 failed", kWho, true));
+    EXPECT_TRUE(reported("failure: engine_1 failed", kWho, true));
     requireClear();
   }
 }
@@ -483,11 +483,11 @@ TEST_F(FailureManagerTest, FailureOfTheMenuIsNoticedAndSoIsItsRepair) {
   EXPECT_FALSE(label("rel_pitot").by_bridge);
   EXPECT_TRUE(label("rel_pitot").active);
   EXPECT_TRUE(label("rel_pitot").confirmed);
-  EXPECT_TRUE(told("rel_pitot was failed in the simulator", "", true));
+  EXPECT_TRUE(reported("rel_pitot was failed in the simulator", "", true));
   sim_.set(kPitot, 0.0F);
   sim_.run(1.1);
   EXPECT_TRUE(labelNames().empty());
-  EXPECT_TRUE(told("rel_pitot was repaired in the simulator", "", true));
+  EXPECT_TRUE(reported("rel_pitot was repaired in the simulator", "", true));
   EXPECT_TRUE(sim_.messages().empty());
 }
 
@@ -506,13 +506,13 @@ TEST_F(FailureManagerTest, FailureOfTheMenuIsClearedOnRequestOnly) {
 TEST_F(FailureManagerTest, ValuesFromBeforeARepairAreIgnored) {
   sim_.set(kPitot, 6.0F);
   sim_.run(1.1);
-  told_.clear();
+  reported_.clear();
   sim_.setReadOnly(kPitot);
   after(0.3, [this] { sim_.set(kPitot, 0.0F); });
   requireClear({}, true);
   sim_.run(2.0);
   EXPECT_TRUE(labelNames().empty());
-  EXPECT_FALSE(told("rel_pitot was failed in the simulator", "", true));
+  EXPECT_FALSE(reported("rel_pitot was failed in the simulator", "", true));
 }
 
 TEST_F(FailureManagerTest, FailureOfTheMenuGivesWayToOneOfTheBridge) {
@@ -532,7 +532,7 @@ TEST_F(FailureManagerTest, OursThatIsRepairedInTheSimulatorIsLetGo) {
   EXPECT_FALSE(label("engine_1").confirmed);
   sim_.run(0.3);
   EXPECT_TRUE(labelNames().empty());
-  EXPECT_TRUE(told("engine_1 was repaired in the simulator", "", true));
+  EXPECT_TRUE(reported("engine_1 was repaired in the simulator", "", true));
   EXPECT_TRUE(overrides_.releasesPending()) << "its journal entry goes";
 }
 
@@ -589,7 +589,7 @@ TEST_F(FailureManagerTest, EachKindOfASurfaceIsDriven) {
   }
 }
 
-TEST_F(FailureManagerTest, LabelTellsWhereASurfaceGotStuck) {
+TEST_F(FailureManagerTest, LabelShowsWhereASurfaceGotStuck) {
   airframe_.setStick(0.25);
   sim_.run(0.1);
   require(broken(FakeAirframe::kLeft, "stuck"));
@@ -658,9 +658,9 @@ TEST_F(FailureManagerTest12, DriverTakesOverWhereXPlanesOwnFailureDoesNotAct) {
   const double begin = sim_.time();
   require(broken(FakeAirframe::kLeft, "stuck"));
   EXPECT_TRUE(
-      told("aileron1_wing2_left: X-Plane's own failure does not act as it says, so that tx_node drives the "
-           "surfaces",
-           kWho, true));
+      reported("aileron1_wing2_left: X-Plane's own failure does not act as it says, so that tx_node drives the "
+               "surfaces",
+               kWho, true));
   EXPECT_GE(sim_.time() - begin, 1.0) << "it is given a second";
   EXPECT_EQ(sim_.value(kLock), 0.0F) << "it is repaired";
   EXPECT_EQ(state(), SurfaceControlState::kDriving);

@@ -202,7 +202,7 @@ TEST_F(FlightChangesTest, PlaceNearbyWithoutANewFlightIsAFailure) {
   expectFailure(place(), EventKind::kReset, "the flight has not begun anew (it is paused)");
 }
 
-TEST_F(FlightChangesTest, FlightThatHasOnlyJustBegunIsLeftToRunUntilItTells) {
+TEST_F(FlightChangesTest, FlightThatHasOnlyJustBegunIsLeftToRunUntilItsBeginningIsVisible) {
   flight_.put(50.0, 1000.0);  // too near to be seen by its place
   justBegun();
   const double begin = sim_.time();
@@ -263,14 +263,14 @@ TEST_F(FlightChangesTest, PlaceIsTakenAlsoWhereXPlaneDoesNotPause) {
   EXPECT_EQ(pausing_, "") << "it did not come to that";
 }
 
-TEST_F(FlightChangesTest, AttitudeThatIsNotTakenIsTold) {
+TEST_F(FlightChangesTest, AttitudeThatIsNotTakenIsReported) {
   sim_.setReadOnly(kPosition + "q[3]");
   const double begin = sim_.time();
   expectFailure(place(), EventKind::kReset, "did not place the aircraft: its attitude is 90 deg off");
   EXPECT_NEAR(sim_.time() - begin, 2.1, 0.3);
 }
 
-TEST_F(FlightChangesTest, PlaceThatIsNotShownIsTold) {
+TEST_F(FlightChangesTest, PlaceThatIsNotShownIsReported) {
   FlightChanges changes(&sim_, {2.0, 20.0}, hooks());
   sim_.setState(LinkState::kLost);
   expectFailure(changes.place(here(), "node/reset_flight"), EventKind::kReset,
@@ -336,7 +336,7 @@ TEST_F(FlightChangesTest, WindIsWrittenUntilTheAirShowsIt) {
   EXPECT_EQ(sim_.writes().size(), 2 * once) << "again after a second";
 }
 
-TEST_F(FlightChangesTest, WindThatDoesNotBlowIsTold) {
+TEST_F(FlightChangesTest, WindThatDoesNotBlowIsReported) {
   const auto shown = core::shownWindDatarefs(core::kXPlane11);
   sim_.set(shown[0], 3.0F);
   sim_.set(shown[1], 90.0F);
@@ -386,7 +386,7 @@ TEST_F(FlightChangesTest12, PayloadOfAnAircraftWithoutStationsGoesAsASum) {
   EXPECT_EQ(sim_.value("sim/flightmodel/weight/m_fixed"), 120.0F);
 }
 
-TEST_F(FlightChangesTest, LoadingThatIsNotTakenIsTold) {
+TEST_F(FlightChangesTest, LoadingThatIsNotTakenIsReported) {
   sim_.set("sim/flightmodel/weight/m_fuel[0]", 5.0F);
   sim_.setReadOnly("sim/flightmodel/weight/m_fuel[0]");
   expectFailure(changes_.applyLoading({{80.0}, 100.0, {}}), EventKind::kSetting,
@@ -426,7 +426,7 @@ TEST_F(FlightChangesTest, SettingsThatEndWithTheNodeAreInTheJournalAndComeBack) 
   EXPECT_TRUE(sim_.journal()->entries().empty());
 }
 
-TEST_F(FlightChangesTest, SettingsStayWhereNobodyAskedToPutThemBack) {
+TEST_F(FlightChangesTest, SettingsStayWithoutRestoreOnExit) {
   const std::string name = "sim/weather/temperature_sealevel_c";
   sim_.set(name, 15.0F);
   core::Weather weather;
@@ -442,12 +442,12 @@ TEST_F(FlightChangesTest, WhatCouldNotBePutBackIsNotChanged) {
   weather.sea_level_temperature = 30.0;
   weather.restore_on_exit = true;
   expectFailure(changes_.applyWeather(weather), EventKind::kSetting,
-                "set_weather: X-Plane does not tell sim/weather/temperature_sealevel_c, which could not be put back "
+                "set_weather: X-Plane does not report sim/weather/temperature_sealevel_c, which could not be put back "
                 "on exit");
   EXPECT_TRUE(sim_.writes().empty());
 }
 
-TEST_F(FlightChangesTest, WeatherThatIsNotTakenIsTold) {
+TEST_F(FlightChangesTest, WeatherThatIsNotTakenIsReported) {
   const std::string name = "sim/weather/temperature_sealevel_c";
   sim_.set(name, 15.0F);
   sim_.setReadOnly(name);
@@ -481,7 +481,7 @@ TEST_F(FlightChangesTest12, SameAircraftIsLoadedAnew) {
   EXPECT_EQ(flight_.beginnings, 1U);
 }
 
-TEST_F(FlightChangesTest12, AircraftThatIsNotThereIsTold) {
+TEST_F(FlightChangesTest12, AircraftThatIsNotThereIsReported) {
   flight_.has_files = false;
   for (const std::string path : {"Aircraft/Other/other.acf", FakeFlight::kAircraftPath}) {
     const double begin = sim_.time();
@@ -492,10 +492,10 @@ TEST_F(FlightChangesTest12, AircraftThatIsNotThereIsTold) {
   }
 }
 
-TEST_F(FlightChangesTest12, AircraftThatXPlaneDoesNotTellIsAFailure) {
+TEST_F(FlightChangesTest12, AircraftThatXPlaneDoesNotReportIsAFailure) {
   flight_.shows_aircraft = false;
   expectFailure(changes_.applyAircraft("Aircraft/Other/other.acf", 0), EventKind::kAircraft,
-                "X-Plane has loaded it, but does not tell which aircraft it is");
+                "X-Plane has loaded it, but does not report which aircraft it is");
 }
 
 TEST_F(FlightChangesTest, Version11ShowsALoadedAircraftByANewFlight) {
@@ -558,7 +558,7 @@ TEST_F(FlightChangesTest, SituationLoadedIntoAFlightThatHasOnlyJustBegunIsSeen) 
   expect(changes_.applySituation("Output/a.sit"), EventKind::kSituation, "the situation Output/a.sit is loaded");
 }
 
-TEST_F(FlightChangesTest, SituationThatIsNotThereIsTold) {
+TEST_F(FlightChangesTest, SituationThatIsNotThereIsReported) {
   flight_.has_files = false;
   const double begin = sim_.time();
   expectFailure(changes_.applySituation("Output/a.sit"), EventKind::kSituation,

@@ -179,7 +179,7 @@ TEST_F(FlightJobsTest, RefusesWhereXPlaneCannot) {
   EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kNotSupported);
   EXPECT_NE(jobs_.refusal()->text.find("105000"), std::string::npos) << jobs_.refusal()->text;
   sim_.setVersion({});
-  EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kNoLink) << "it has not told its version yet";
+  EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kNoLink) << "it has not reported its version yet";
   sim_.setVersion(core::kXPlane12);
   sim_.setState(core::LinkState::kLost);
   EXPECT_EQ(jobs_.refusal()->code, core::ResultCode::kNoLink);

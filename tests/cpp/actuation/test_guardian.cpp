@@ -256,7 +256,7 @@ TEST_F(GuardianProcess, UndoesWhatADeadParentHasLeft) {
   EXPECT_EQ(flown.shown(), 0.0F);
 }
 
-TEST_F(GuardianProcess, UndoesWhatAParentThatHangsHasSetAndTellsItWhenItRunsAgain) {
+TEST_F(GuardianProcess, UndoesWhatAParentThatHangsHasSetAndReportsItWhenItRunsAgain) {
   Flown flown, resting;
   EXPECT_FALSE(resting.guardian->beat(0.2));
   resting.guardian->rest();

@@ -16,7 +16,7 @@ class LockstepBarrierTest : public testing::Test {
   LockstepBarrier barrier_{{"controller", "/other/player"}, "rx_node"};
 };
 
-TEST_F(LockstepBarrierTest, WaitsForEverybodyAndNamesWhoIsMissing) {
+TEST_F(LockstepBarrierTest, WaitsForAllParticipantsAndNamesThoseMissing) {
   EXPECT_EQ(barrier_.missing(), (Names{"rx_node", "controller", "/other/player"}));
   barrier_.answer("/xplane/rx_node", kT1);
   barrier_.answer("/xplane/controller", kT1);
@@ -67,7 +67,7 @@ TEST_F(LockstepBarrierTest, InAPauseAnAnswerBelongsToTheFrameThatIsOpenWhenItCom
   EXPECT_EQ(barrier_.missing(), (Names{"rx_node", "/other/player"}));
 }
 
-TEST_F(LockstepBarrierTest, NobodyIsAwaitedInAFrameThatHasNothingToAnswer) {
+TEST_F(LockstepBarrierTest, NoParticipantIsAwaitedInAFrameThatHasNothingToAnswer) {
   barrier_.answerForAll("/xplane/rx_node", kT1);
   EXPECT_TRUE(barrier_.complete());
   barrier_.close();

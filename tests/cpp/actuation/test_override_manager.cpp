@@ -31,7 +31,7 @@ constexpr const char* kFailure = "sim/operation/failures/rel_elv_L_jam";
 constexpr const char* kThrottle12 = "sim/flightmodel/engine/ENGN_thro_override[0]";
 
 /// Expectations are worked out by hand from the contract in override_manager.hpp: overrides are 1 while set and 0 when
-/// given back, X-Plane is asked at 10 Hz, and five answers in a row tell a release.
+/// given back, X-Plane is asked at 10 Hz, and five answers in a row confirm a release.
 class OverrideManagerTest : public testing::Test {
  protected:
   OverrideManagerTest() { sim_.setAll({kJoystick, kThrottles, core::kSurfaceOverride, kFailure}, 0.0F); }
@@ -397,7 +397,7 @@ TEST_F(OverrideManagerTest, WhatXPlaneShowsReleasedIsNotTakenBack) {
   manager_.setRequired({kJoystick});
   sim_.run(0.2);
   sim_.set(kJoystick, 0.0F);
-  sim_.run(0.12);  // one answer, so it is not known yet by whom
+  sim_.run(0.12);  // one answer, so it is not known yet which client did
   manager_.refresh();
   EXPECT_EQ(sim_.value(kJoystick), 0.0F);
 }
@@ -638,7 +638,7 @@ TEST_F(OverrideManagerTest, LeftoversOfACrashedRunAreReleased) {
             (std::pair<std::string, bool>{"released override_joystick left by a run that crashed", true}));
 }
 
-TEST_F(OverrideManagerTest, LeftoversAreToldByTheirCause) {
+TEST_F(OverrideManagerTest, LeftoversAreReportedByTheirCause) {
   crashedRunHas(kJoystick);
   core::Journal gone = sim_.journalOfAnother();
   gone.record("override:" + std::string(kThrottles), kOverridePurpose, {core::UndoDref{kThrottles, 0.0F}});
@@ -656,7 +656,7 @@ TEST_F(OverrideManagerTest, LeftoversAreToldByTheirCause) {
   EXPECT_EQ(reports_[1].first, "released " + what);
 }
 
-TEST_F(OverrideManagerTest, WhatItsRunHasToldIsNotToldAgain) {
+TEST_F(OverrideManagerTest, WhatItsRunHasReportedIsNotReportedAgain) {
   core::Journal gone = sim_.journalOfAnother();
   gone.record("override:x", kOverridePurpose, {core::UndoDref{kJoystick, 0.0F}});
   gone.leave({"override:x"}, "X-Plane went first");

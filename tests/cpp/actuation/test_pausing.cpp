@@ -74,7 +74,7 @@ TEST(Pausing, HasCommandsOfItsOwnFrom12_10) {
   EXPECT_EQ(sim.commands(), (Names{"sim/operation/pause_on", "sim/operation/pause_off"}));
 }
 
-TEST(Pausing, SendsNothingWhereXPlaneDoesNotTell) {
+TEST(Pausing, SendsNothingWhereXPlaneDoesNotReportIt) {
   core::FakeSimulator sim(core::kXPlane11);
   sim.setState(core::LinkState::kStale);
   EXPECT_EQ(setPaused(&sim, true, kTimeout, never), PauseOutcome::kUnknown);

@@ -29,9 +29,9 @@ class ReleaseWorkerTest : public testing::Test {
   core::FakeSimulator sim_;
   std::vector<std::string> problems_;
   std::promise<void> released_;  // for the thread: nothing else of the fake is touched until then
-  bool tells_ = false;
+  bool wants_release_ = false;
   OverrideManager overrides_{&sim_, [this](const std::string& text, bool) {
-                               if (tells_ && text.rfind("released ", 0) == 0) released_.set_value();
+                               if (wants_release_ && text.rfind("released ", 0) == 0) released_.set_value();
                              }};
   ReleaseWorker worker_{&sim_, &overrides_, [this](const std::string& text) { problems_.push_back(text); }};
 };
@@ -117,7 +117,7 @@ TEST_F(ReleaseWorkerTest, SaysThatTheJournalCannotBeUsedAndGoesOnWhenItCan) {
 
 TEST_F(ReleaseWorkerTest, ThreadLooksWhenItIsWokenAndEnds) {
   crashedRunHas(kJoystick);
-  tells_ = true;
+  wants_release_ = true;
   worker_.start();
   worker_.wake();  // the clock stands: the period is never over
   ASSERT_EQ(released_.get_future().wait_for(std::chrono::seconds(60)), std::future_status::ready);

@@ -98,7 +98,7 @@ TEST_F(SettingRequestsTest, LargeNumbersAreComparedAsFloatsAre) {
 
 // ------------------------------------------------------------------------------------------------- in lock-step
 
-TEST_F(SettingRequestsTest, InLockstepTheOutcomeIsToldAfterwards) {
+TEST_F(SettingRequestsTest, InLockstepTheOutcomeIsReportedAfterwards) {
   sim_.lockstep = true;
   const double began = sim_.time();
   const auto written = settings_.setDataref(kFirst, {0.25F, 0.75F});
@@ -110,7 +110,7 @@ TEST_F(SettingRequestsTest, InLockstepTheOutcomeIsToldAfterwards) {
   EXPECT_EQ(reports_, (Reports{{std::string("set_dataref ") + kFirst + ": X-Plane shows it", true}}));
 }
 
-TEST_F(SettingRequestsTest, InLockstepWhatIsNotShownIsToldWithItsName) {
+TEST_F(SettingRequestsTest, InLockstepWhatIsNotShownIsReportedWithItsName) {
   sim_.lockstep = true;
   sim_.setReadOnly(kSecond);
   settings_.setDataref(kFirst, {0.25F, 0.75F});

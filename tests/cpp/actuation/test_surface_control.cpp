@@ -377,14 +377,14 @@ TEST_F(SurfaceControlTest, AnotherClientThatReleasesTheOverrideEndsEverything) {
   ASSERT_FALSE(surfaces_.command({FakeAirframe::kRight}, {4.0F}, 1));
   sim_.set(kSurfaceOverride, 0.0F);
   sim_.frame();
-  EXPECT_EQ(surfaces_.takeAbandoned(), "somebody else has released the surface override");
-  EXPECT_EQ(surfaces_.takeAbandoned(), std::nullopt) << "told once";
+  EXPECT_EQ(surfaces_.takeAbandoned(), "another client has released the surface override");
+  EXPECT_EQ(surfaces_.takeAbandoned(), std::nullopt) << "reported once";
   sim_.run(0.1);
   sim_.clearMessages();
   sim_.run(10.0);
   EXPECT_TRUE(sim_.messages().empty()) << "it is not taken again";
   EXPECT_EQ(state(), State::kIdle);
-  EXPECT_EQ(reports_, (Reports{{"the surfaces are given back: somebody else has released the surface override", true},
+  EXPECT_EQ(reports_, (Reports{{"the surfaces are given back: another client has released the surface override", true},
                                {"X-Plane drives the surfaces again", true}}));
 }
 
@@ -395,7 +395,7 @@ TEST_F(SurfaceControlTest, ExcitationLearnsWhyItLostItsSurface) {
   EXPECT_EQ(surfaces_.setOffset(1.0), "");
   sim_.set(kSurfaceOverride, 0.0F);
   sim_.frame();
-  EXPECT_EQ(surfaces_.setOffset(1.0), "somebody else has released the surface override");
+  EXPECT_EQ(surfaces_.setOffset(1.0), "another client has released the surface override");
 }
 
 TEST_F(SurfaceControlTest, AnotherAircraftEndsEverything) {
@@ -547,7 +547,7 @@ TEST_F(SurfaceControlTest, RefusedCommandLeavesTheLastOneGoingOn) {
 
 // ------------------------------------------------------------------------------------------------ control/surfaces
 
-TEST_F(SurfaceControlTest, CommandIsToldWhenSentAndWhenShown) {
+TEST_F(SurfaceControlTest, CommandIsReportedWhenSentAndWhenShown) {
   ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 7));
   sim_.frame();
   ASSERT_EQ(echoes_.size(), 1U);
@@ -567,7 +567,7 @@ TEST_F(SurfaceControlTest, CommandIsToldWhenSentAndWhenShown) {
   EXPECT_EQ(surfaces_.individuallyDriven()[0].surface, kLeftNumber);
 }
 
-TEST_F(SurfaceControlTest, CommandThatIsOvertakenIsNotToldAsShown) {
+TEST_F(SurfaceControlTest, CommandThatIsOvertakenIsNotReportedAsShown) {
   ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {12.0F}, 1));
   sim_.frame();
   ASSERT_FALSE(surfaces_.command({FakeAirframe::kLeft}, {6.0F}, 2));
@@ -600,7 +600,7 @@ TEST_F(SurfaceControlTest, CommandsThatEndGoBackToTheStickWithoutAJump) {
   }
 }
 
-TEST_F(SurfaceControlTest, AnotherClientThatReleasesTheOverrideUnderACommandIsToldOnce) {
+TEST_F(SurfaceControlTest, AnotherClientThatReleasesTheOverrideUnderACommandIsReportedOnce) {
   drive();
   sim_.set(kSurfaceOverride, 0.0F);
   sim_.frame();

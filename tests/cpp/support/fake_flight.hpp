@@ -19,7 +19,7 @@ namespace xplane_bridge::core {
 /// The flight of a FakeSimulator: where the aircraft is, what PREL, VEHS, ACFN and SIMO do to it, weather, pausing.
 ///
 /// The scenery's origin is at kLatitude, kLongitude, and the aircraft is above it or east of it, so that the local axes
-/// are east, up and south of the place, and the quaternion is the attitude. X-Plane is as quick as a frame unless told
+/// are east, up and south of the place, and the quaternion is the attitude. X-Plane is as quick as a frame unless set
 /// otherwise, reads nothing while it loads, and then reads all that was sent meanwhile, in order.
 class FakeFlight {
  public:
@@ -197,7 +197,7 @@ class FakeFlight {
   void setAircraft(const std::string& path) {
     for (std::size_t i = 0; i < 64; ++i) {
       const float character = i < path.size() ? static_cast<float>(path[i]) : 0.0F;
-      // Version 11 does not tell it.
+      // Version 11 does not show it.
       if (sim_->status().version.is12()) {
         sim_->set("sim/aircraft/view/acf_relative_path[" + std::to_string(i) + "]", character);
       }

@@ -25,7 +25,8 @@ class SimLinkRig : public testing::Test {
     folder_ = mkdtemp(pattern.data());
   }
   ~SimLinkRig() override {
-    tick_ns_ = 50 * kNanosecondsPerMillisecond;  // nobody answers any more: let the link's last words time out quickly
+    tick_ns_ =
+        50 * kNanosecondsPerMillisecond;  // no X-Plane answers any more: let the link's last requests time out quickly
     link_.reset();
     std::filesystem::remove_all(folder_);
   }

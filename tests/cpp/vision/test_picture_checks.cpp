@@ -29,7 +29,7 @@ TEST(SamePixels, ComparesSizeTypeAndEveryPixel) {
   EXPECT_FALSE(vision::samePixels(a, cv::Mat(48, 64, CV_8UC4, cv::Scalar::all(9))));
 }
 
-TEST(PeriodMeter, TellsMeanTheLongestOf99PercentAndTheWorst) {
+TEST(PeriodMeter, ReportsMeanTheLongestOf99PercentAndTheWorst) {
   constexpr std::int64_t kMillisecond = 1'000'000;
   vision::PeriodMeter meter;
   EXPECT_EQ(meter.summary().count, 0U);

@@ -6,7 +6,7 @@
 
 namespace stand_in_transport {
 
-/// Stands in for compressed_image_transport's publisher: the same name, the same topic; `format` tells it apart.
+/// Stands in for compressed_image_transport's publisher: the same name, the same topic; `format` shows which it is.
 class CompressedPublisher : public image_transport::SimplePublisherPlugin<sensor_msgs::CompressedImage> {
  public:
   [[nodiscard]] std::string getTransportName() const override { return "compressed"; }

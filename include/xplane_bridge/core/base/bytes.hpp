@@ -10,7 +10,7 @@
 
 namespace xplane_bridge::core {
 
-/// Bytes somebody else owns, read only. The owner must outlive the view.
+/// Bytes of another owner, read only. The owner must outlive the view.
 class ByteView {
  public:
   constexpr ByteView() = default;
@@ -35,7 +35,7 @@ class ByteView {
   std::size_t size_ = 0;
 };
 
-/// Bytes somebody else owns, to be written. The owner must outlive the span.
+/// Bytes of another owner, to be written. The owner must outlive the span.
 class ByteSpan {
  public:
   constexpr ByteSpan() = default;

@@ -30,8 +30,8 @@ class ClockWaiters {
   std::vector<ClockCondition*> waiting_;
 };
 
-/// Time source handed to whoever needs the time; a copy is the same clock. The functions may be called from any thread
-/// and must not wait for a lock that is held while `waiters` are woken.
+/// Time source handed to all code that needs the time; a copy is the same clock. The functions may be called from any
+/// thread and must not wait for a lock that is held while `waiters` are woken.
 struct Clock {
   std::function<std::int64_t()> steady_ns;  ///< [ns] never steps; for deadlines and ages
   std::function<std::int64_t()> system_ns;  ///< [ns] since the Unix epoch; for stamps

@@ -94,7 +94,7 @@ std::optional<CameraPose> worldMatrixPose(const CameraSample& sample);
 std::optional<Eigen::Quaterniond> expectedOrientation(const CameraSample& sample);
 
 /// Whether `view_*` contain the visual offset.
-/// @return nothing where no reference tells
+/// @return nothing where no reference shows it
 std::optional<bool> offsetsWithin(const CameraSample& view, const CameraSample& aircraft, PoseReading reading);
 
 /// [deg] of the picture's turn by the visual offset.

@@ -24,9 +24,9 @@ inline constexpr const char* kFrustumShiftUpDataref = "sim/graphics/view/field_o
 /// First version that has it.
 inline constexpr std::int32_t kFirstWithFrustumShiftUp = 120000;
 
-/// The subscription of whoever pairs pictures with states: simulator time, frame period, paused, replay, and where the
-/// camera is and what it shows, every frame and in one datagram. Sources and units of SimStatus come from the field
-/// table.
+/// The subscription of a program that pairs pictures with states: simulator time, frame period, paused, replay, and
+/// where the camera is and what it shows, every frame and in one datagram. Sources and units of SimStatus come from the
+/// field table.
 class ViewStream {
  public:
   ViewStream();

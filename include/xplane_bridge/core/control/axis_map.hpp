@@ -162,7 +162,7 @@ struct SurfaceSetting {
 
 struct JoystickCommand {
   bool alive = false;                    ///< false: nothing must be published
-  ControlCommand command;                ///< `fields` tells what is commanded; `sequence` is the caller's
+  ControlCommand command;                ///< `fields`: what is commanded; `sequence` is the caller's
   std::vector<SurfaceSetting> surfaces;  ///< that are commanded, beside it
 };
 

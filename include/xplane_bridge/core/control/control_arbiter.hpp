@@ -56,7 +56,7 @@ struct ModeRequest {
   std::uint32_t sequence = 0;  ///< the sender's counter; 0: not counted, always taken as new
   int mode = 0;                ///< FlightMode
   std::string requester;
-  double stamp = 0.0;  ///< [s] the sender's time; tells a restarted counter from an old message
+  double stamp = 0.0;  ///< [s] the sender's time; distinguishes a restarted counter from an old message
 };
 
 enum class RequestOutcome : std::uint8_t {
@@ -72,7 +72,7 @@ struct ModeStatus {
   std::optional<FlightMode> previous;  ///< none at the start
   std::string requested_by;
   std::string reason = "start";
-  std::uint32_t request_sequence = 0;  ///< 0 when nobody asked
+  std::uint32_t request_sequence = 0;  ///< 0 when it changed without a request
   bool accepted = true;
   double since = 0.0;  ///< [s] steady time of the last change of mode
   bool manual_alive = false;
@@ -95,7 +95,7 @@ struct SourceStatistics {
 struct ChannelExcitation {
   ChannelSet channels;  ///< only those that the active source commands are excited, unless `rest` is set
   double value = 0.0;
-  /// Where the channels that nobody commands are meanwhile; they are X-Plane's again afterwards.
+  /// Where the channels without a command are meanwhile; they are X-Plane's again afterwards.
   std::optional<double> rest;
 };
 

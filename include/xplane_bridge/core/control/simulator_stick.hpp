@@ -84,7 +84,7 @@ class SimulatorStick {
   Options options_;
   std::vector<std::string> setting_requests_;
   RrefFrameAssembler settings_;
-  std::optional<Sources> sources_;  // once X-Plane has told its settings
+  std::optional<Sources> sources_;  // once X-Plane has sent its settings
   std::vector<std::string> value_requests_;
   RrefFrameAssembler values_{0};
   std::optional<bool> attached_;

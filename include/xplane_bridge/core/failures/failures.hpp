@@ -1,6 +1,6 @@
 #pragma once
 
-/// Failures: what can break, how each X-Plane version is told, when it comes true, and the labels of it.
+/// Failures: what can break, what is sent to each X-Plane version, when it comes true, and the labels of it.
 ///
 /// X-Plane's own failures are datarefs sim/operation/failures/rel_* (6 failed now, 0 works). Surface failures that
 /// X-Plane cannot express are flown by SurfaceDriver.
@@ -84,7 +84,7 @@ class FailureRegistry {
   /// The label's value, e.g. the angle at which a surface was when it got stuck.
   void setValue(const std::string& name, double value);
 
-  /// A failure dataref's value as read. Failures somebody set in the simulator's menu appear and go by this.
+  /// A failure dataref's value as read. Failures set in the simulator's menu appear and go by this.
   /// Returns true when the labels changed.
   bool observe(const std::string& dataref, double value, double sim_time);
 

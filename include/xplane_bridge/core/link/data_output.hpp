@@ -35,7 +35,7 @@ struct DataOutputOptions {
 /// Makes X-Plane's Data Output send to us what we want, keeps it so, and puts it back. No I/O of its own except the
 /// journal's. Times are the steady clock's [ns].
 ///
-/// X-Plane has one target for DATA and does not tell which it is. So: rows, rate and target are set when the link comes
+/// X-Plane has one target for DATA and does not show which it is. So: rows, rate and target are set when the link comes
 /// up, written to the journal first; when DATA stays away while X-Plane answers and is not paused, the target is set
 /// once more, and if that does not last, another client owns Data Output and is left in peace.
 class DataOutput {

@@ -12,7 +12,7 @@
 #include "xplane_bridge/core/wire/packets.hpp"
 #include "xplane_bridge/core/wire/udp_socket.hpp"
 
-/// What we changed in X-Plane, written down before it is changed, so that it can be undone by whoever comes next: the
+/// What we changed in X-Plane, written down before it is changed, so that it can be undone by another process: the
 /// same node on exit, its guardian, its next start, or scripts/release_overrides. Format: docs/journal.md.
 namespace xplane_bridge::core {
 
@@ -79,7 +79,7 @@ JournalOwner thisProcess(const std::string& node);
 /// file may lie on a shared disk) is taken to run: its changes are not ours to undo.
 bool isAlive(const JournalOwner& owner);
 
-/// What X-Plane sends to one UDP port of ours until it is told to stop: by datagrams from that port.
+/// What X-Plane sends to one UDP port of ours until we ask it to stop: by datagrams from that port.
 struct JournalSubscription {
   std::uint16_t port = 0;
   std::vector<std::string> datarefs;  ///< RREF, the position is the index

@@ -35,7 +35,7 @@ struct LinkCounters {
   std::array<std::uint64_t, kDecodeErrorCount> decode_errors{};  ///< by DecodeError
   std::uint64_t unknown_rows = 0;                                ///< DATA rows with an index outside 0..199: skipped
   std::uint64_t non_finite_values = 0;  ///< NaN or infinite values in DATA and RREF: passed on, to be judged
-  std::uint64_t unknown_indices = 0;    ///< RREF values nobody asked for
+  std::uint64_t unknown_indices = 0;    ///< RREF values that were not requested
   std::uint64_t data_datagrams = 0;
   std::uint64_t rref_datagrams = 0;
   std::uint64_t rpos_datagrams = 0;

@@ -56,7 +56,8 @@ class RrefDelivery {
 ///
 /// Locks: the handler is called with the HandlerMutex held that was given to subscribe(), and replace(), reset() and
 /// the destructor take that mutex. So an owner that guards its data by this mutex may call them while it holds it, and
-/// its handler needs no lock. Whoever gives no mutex must not call them while holding a mutex that the handler takes.
+/// its handler needs no lock. A caller that gives no mutex must not call them while holding a mutex that the handler
+/// takes.
 class Subscription {
  public:
   /// Asks X-Plane for `group` as list number `list` instead of the list before; nullopt: for nothing any more.

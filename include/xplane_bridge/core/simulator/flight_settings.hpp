@@ -64,11 +64,11 @@ bool matches(const DatarefWrite& loading, double shown);
 /// A path below X-Plane's folder for ACFN and SIMO: what is wrong with it; nullopt: nothing.
 /// @param ending e.g. ".acf"
 std::optional<std::string> checkXPlanePath(const std::string& path, const std::string& ending);
-/// The first `characters` of the loaded aircraft's path, one dataref each; empty: that version does not tell it.
+/// The first `characters` of the loaded aircraft's path, one dataref each; empty: that version does not show it.
 std::vector<std::string> aircraftPathDatarefs(std::size_t characters, SimulatorVersion version);
 /// The text of such datarefs, up to the first NUL or missing one.
 std::string textFrom(const std::vector<DatarefValue>& characters);
-/// The same file: X-Plane writes separators as its platform does, which may not tell capitals either.
+/// The same file: X-Plane writes separators as its platform does, which may ignore capitals.
 bool isSamePath(const std::string& a, const std::string& b);
 
 }  // namespace xplane_bridge::core

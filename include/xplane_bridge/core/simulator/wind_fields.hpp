@@ -6,7 +6,7 @@
 
 namespace xplane_bridge::core {
 
-/// Height [m] of the wind by which turbulence and shear are told: 20 ft.
+/// Height [m] of the wind by which turbulence and shear are given: 20 ft.
 inline constexpr double kWindHeight = 6.096;
 
 /// The 1-cosine gust (CS 25.341): 0 where it begins, 1 in its middle, 0 at its end and outside.

@@ -64,7 +64,7 @@ struct ClockEstimate {
   bool usable = false;        ///< false: duplicate or out of order, to be dropped
   std::int64_t stamp_ns = 0;  ///< host time of the simulator frame; strictly increasing within an epoch [ns]
   double sim_time = 0.0;      ///< unwrapped simulator time, no float32 steps; starts at the raw value of each epoch [s]
-  double uncertainty = 0.0;   ///< half width around stamp_ns, without the constant smallest delay nobody can see [s]
+  double uncertainty = 0.0;   ///< half width around stamp_ns, without the smallest delay, which cannot be measured [s]
   double time_ratio = 1.0;    ///< simulator time over host time
   std::uint32_t epoch = 0;
   ClockEvent event = ClockEvent::kNone;

@@ -22,7 +22,7 @@ inline constexpr std::size_t kConsistencyCheckCount = 4;
 const char* toString(ConsistencyCheck check);
 
 enum class ConsistencyVerdict : std::uint8_t {
-  kUnknown,  ///< too few samples, or the flight does not tell (no turns, no wind, no climb)
+  kUnknown,  ///< too few samples, or the flight does not show it (no turns, no wind, no climb)
   kConsistent,
   kInconsistent,  ///< `fault` says what would explain it
 };
@@ -63,7 +63,7 @@ struct ConsistencyResult {
 };
 
 /// Watches a stream of flight states for contradictions: swapped axes, degrees taken for radians, a wind with the wrong
-/// sign, on a simulator nobody has tried yet.
+/// sign, on a simulator that has not been tried yet.
 ///
 /// The states are compared over intervals of about a tenth of a second in a sliding window. A check answers only when
 /// the flight moves enough for the answer to mean something. Intervals across an epoch, a pause, a gap or ground

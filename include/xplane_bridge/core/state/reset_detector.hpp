@@ -7,8 +7,8 @@
 
 namespace xplane_bridge::core {
 
-/// Tells from frame to frame whether the flight was reset or placed anew, by whomever: X-Plane says nothing of it, but
-/// the flight's time begins again, or the aircraft is where it cannot have flown.
+/// Detects from frame to frame that the flight was reset or placed anew, whatever the cause: X-Plane says nothing of
+/// it, but the flight's time begins again, or the aircraft is where it cannot have flown.
 class ResetDetector {
  public:
   struct Options {

@@ -26,7 +26,7 @@ struct OtherAircraft {
   double pitch_deg = 0.0;                                  ///< nose up +
   double heading_deg = 0.0;                                ///< 0..360, true
   Eigen::Vector3d velocity_ned = Eigen::Vector3d::Zero();  ///< [m/s] over ground
-  float tcas_distance = std::nanf("");                     ///< [m] from the user's aircraft; NaN: not told
+  float tcas_distance = std::nanf("");                     ///< [m] from the user's aircraft; NaN: not known
   float tcas_bearing_deg = std::nanf("");                  ///< [deg] -180..180 from the nose, right +
   float tcas_altitude_difference = std::nanf("");          ///< [m] above it +
   std::int32_t mode_s_id = 0;                              ///< 0: none

@@ -11,7 +11,7 @@ namespace xplane_bridge::core {
 /// Whether both have the same values at the same places; a NaN is the same as another.
 bool sameValues(const std::vector<float>& a, const std::vector<float>& b);
 
-/// What a user has set in X-Plane and what a flight depends on, of what every version tells: speed of time, whether the
+/// What a user has set in X-Plane and what a flight depends on, of what every version shows: speed of time, whether the
 /// date is the computer's, how the joystick is read, how fast Data Output comes, and the resolution of textures.
 class XPlaneSettings {
  public:

@@ -33,7 +33,7 @@ class MixingWatch {
   /// worth keeping.
   bool solve();
 
-  /// From here on test signals move each axis by itself, which tells more in less time than a pilot: less of it is
+  /// From here on test signals move each axis by itself, which shows more in less time than a pilot: less of it is
   /// needed. solve() is not to be called until it is concluded. What was seen before and contradicts is forgotten.
   void beginIdentification();
   /// What came of it.

@@ -28,7 +28,7 @@ struct MixingInputs {
   double speedbrake = 0.0;                                   ///< [0..1.5] where they are
 };
 
-/// Terms of the law, in the order in which they are believed where the flight cannot tell them apart.
+/// Terms of the law, in the order in which they are believed where the flight cannot separate them.
 enum class MixingTerm : std::uint8_t {
   kBias,
   kRollPlus,
@@ -75,7 +75,7 @@ struct SurfaceLaw {
 struct MixingModel {
   std::string aircraft;                       ///< identity: ICAO code or .acf path
   std::vector<SurfaceLaw> laws;               ///< of the surfaces that moved, by rising number
-  std::array<bool, kMixingTerms> known{};     ///< which terms the flight could tell
+  std::array<bool, kMixingTerms> known{};     ///< which terms the flight could determine
   MixingVector level = MixingVector::Zero();  ///< where the unknown terms stood while it was identified
   std::size_t samples = 0;
 

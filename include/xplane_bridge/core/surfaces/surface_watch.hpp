@@ -1,6 +1,6 @@
 #pragma once
 
-/// What tx_node watches of the control surfaces every frame: deflections, what moves them, and whether somebody has
+/// What tx_node watches of the control surfaces every frame: deflections, what moves them, and whether a client has
 /// taken them from X-Plane (docs/protocol.md 8.3, step 1).
 
 #include <array>

@@ -41,7 +41,7 @@ class BeaconTracker {
   /// Since when [ns] the X-Plane at this place has not announced itself; 0 when it never has.
   std::int64_t lastHeard(const Endpoint& endpoint) const;
 
-  /// The only X-Plane there is, once nobody else has announced itself for the settling time. Empty while waiting, or
+  /// The only X-Plane there is, once no other has announced itself for the settling time. Empty while waiting, or
   /// when there are several.
   std::optional<BeaconSighting> onlyOne(std::int64_t now_ns) const;
   /// The one X-Plane that has begun to announce itself after `since_ns`: the old one after a restart, as long as there

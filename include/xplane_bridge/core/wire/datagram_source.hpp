@@ -51,7 +51,7 @@ struct UdpCounters {
   std::uint64_t received = 0;  ///< datagrams read
   std::uint64_t received_bytes = 0;
   std::uint64_t truncated = 0;  ///< datagrams longer than the caller's buffer
-  std::uint64_t dropped = 0;    ///< datagrams the kernel dropped because nobody read them (SO_RXQ_OVFL)
+  std::uint64_t dropped = 0;    ///< datagrams the kernel dropped because they were not read in time (SO_RXQ_OVFL)
   std::uint64_t sent = 0;
   std::uint64_t sent_bytes = 0;
   std::uint64_t send_failures = 0;  ///< datagrams the kernel refused to send

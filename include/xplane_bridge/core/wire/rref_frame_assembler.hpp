@@ -29,7 +29,7 @@ class RrefFrameAssembler {
   struct Counters {
     std::uint64_t samples = 0;
     std::uint64_t incomplete = 0;     ///< frames given up because pieces were missing
-    std::uint64_t foreign_index = 0;  ///< pairs with an index nobody asked for
+    std::uint64_t foreign_index = 0;  ///< pairs with an index that was not requested
     std::uint64_t non_finite = 0;     ///< NaN or infinite values
   };
 

@@ -73,7 +73,7 @@ class RrefSubscription {
 
   /// Everything has to be asked for again: X-Plane is new, or was away.
   void restart(std::int64_t now_ns);
-  /// Nothing is asked for until restart(): X-Plane does not answer anybody.
+  /// Nothing is asked for until restart(): X-Plane answers no client.
   void suspend() { suspended_ = true; }
 
   /// The next dataref to ask for at `now_ns`; marks it as asked. Empty: none is due.

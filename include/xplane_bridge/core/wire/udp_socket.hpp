@@ -10,7 +10,7 @@
 
 namespace xplane_bridge::core {
 
-/// The same computer, as far as addresses tell: equal, or both in 127.0.0.0/8 (many systems resolve their own name to
+/// The same computer, as far as addresses show: equal, or both in 127.0.0.0/8 (many systems resolve their own name to
 /// 127.0.1.1 and answer from 127.0.0.1).
 bool isSameHost(std::uint32_t a, std::uint32_t b);
 

@@ -103,7 +103,7 @@ class BaseNode {
 
   // Hooks, in the order they are called.
 
-  /// Fill option structs from `own` (the node's private namespace), throw ParamError on anything wrong. Keys nobody
+  /// Fill option structs from `own` (the node's private namespace), throw ParamError on anything wrong. Keys not
   /// asked for are refused afterwards. The shared ones are in common() already.
   virtual void loadParameters(const ParamLoader& own) = 0;
   virtual void advertise() {}
@@ -145,7 +145,7 @@ class BaseNode {
 
   /// Whether stamps are simulator time without lock-step (`publish_clock`).
   bool stampsBySimulator() const { return common_.publish_clock && !lockstep(); }
-  /// Whether the node moves them itself, by setStampTime(), and follows nobody.
+  /// Whether the node moves them itself, by setStampTime(), and follows no other clock.
   virtual bool leadsClock() const { return false; }
   /// With stampsBySimulator(): stamps from now on. @param sim_time [s]
   void setStampTime(double sim_time) { *stamp_ns_ = stampOf(sim_time); }

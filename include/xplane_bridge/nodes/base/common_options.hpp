@@ -35,7 +35,8 @@ constexpr std::uint32_t kLockstepQueue = 100;
 constexpr const char* kLockstepDoneTopic = "lockstep/done";
 /// ControlMode as of the end of every frame, so that participants know that they have missed none.
 constexpr const char* kLockstepModeTopic = "lockstep/mode";
-/// Of lockstep/done: its frame_id where rx_node has published no flight_state in that frame: nobody can answer it.
+/// Of lockstep/done: its frame_id where rx_node has published no flight_state in that frame: no participant can answer
+/// it.
 constexpr const char* kLockstepNoState = "no flight_state";
 
 /// What all nodes of one namespace must agree on: read from that namespace (config/common.yaml), never from a node's

@@ -89,7 +89,7 @@ class ParamLoader {
   /// getters cannot express, such as one key depending on another.
   [[noreturn]] void refuse(const std::string& key, const std::string& requirement) const;
 
-  /// @throws ParamError naming every key here and in the sections read that nobody asked for, each with the nearest
+  /// @throws ParamError naming every key here and in the sections read that was not asked for, each with the nearest
   /// known one.
   void refuseUnknown() const;
 

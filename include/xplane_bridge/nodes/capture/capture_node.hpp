@@ -41,7 +41,7 @@ namespace xplane_bridge {
 /// flight_state.
 ///
 /// Threads besides BaseNode's: one reads pictures and does nothing else; one scales, checks and publishes; one encodes
-/// JPEG. Each drops, and counts, what it has no time for. Nothing is scaled or encoded while nobody listens.
+/// JPEG. Each drops, and counts, what it has no time for. Nothing is scaled or encoded without a subscriber.
 class CaptureNode : public BaseNode {
  public:
   CaptureNode();
@@ -88,7 +88,7 @@ class CaptureNode : public BaseNode {
   sensor_msgs::ImagePtr takeMessage();
   void encodeJpeg(const sensor_msgs::Image& image);
   void publishJpeg(const std_msgs::Header& header, const std::vector<std::uint8_t>& jpeg);
-  bool anybodyListens() const;
+  bool hasSubscribers() const;
   CameraFacts cameraFacts() const;
   sensor_msgs::CameraInfo cameraInfo(const std_msgs::Header& header, cv::Size source,
                                      const vision::FieldOfView& shown) const;
@@ -180,7 +180,8 @@ class CaptureNode : public BaseNode {
   std::vector<cv::Mat> buffers_;
 
   // Publisher thread only.
-  std::vector<sensor_msgs::ImagePtr> messages_;  // used again once nobody else holds them: memory once touched is cheap
+  std::vector<sensor_msgs::ImagePtr>
+      messages_;  // used again once no publisher holds them: memory once touched is cheap
   std::uint32_t image_count_ = 0;
   std::uint32_t frozen_count_ = 0;
 

@@ -19,7 +19,7 @@ namespace xplane_bridge {
 /// ones on scalar topics below `datarefs/`. One thread calls, or the caller locks.
 class DatarefPublisher {
  public:
-  /// @param publish_unheard also what nobody listens to
+  /// @param publish_unheard also without a subscriber
   /// @param stamps clock of the stamps; empty: they are receive times
   DatarefPublisher(const std::vector<DatarefEntry>& entries, bool publish_unheard, std::optional<core::Clock> stamps);
 

@@ -31,7 +31,7 @@ class FlightPublisher {
   /// @param receive_ns host receive time of the state [ns]
   void publish(const core::FlightState& state, const core::TangentFrame& map, std::int64_t receive_ns);
 
-  /// Whether X-Plane tells rates at all, so that publishing waits for them.
+  /// Whether X-Plane sends rates at all, so that publishing waits for them.
   void expectRates(bool expected) { rates_expected_ = expected; }
   /// The link came up anew: waits for the first complete state again.
   void restart();

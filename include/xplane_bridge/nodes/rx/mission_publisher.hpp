@@ -19,7 +19,7 @@ namespace xplane_bridge {
 /// calls, or the caller locks.
 class MissionPublisher {
  public:
-  /// What the diagnostics tell about a group.
+  /// What the diagnostics show of a group.
   struct Report {
     std::uint64_t published = 0;
     std::uint32_t missing = 0;  ///< valid bits that the last message lacked
@@ -64,7 +64,7 @@ struct SimulatorStamps {
   std::int64_t start_ns = 0;  ///< [ns]
 };
 
-/// The publishers of all groups whose rate is not 0. `publish_unheard`: also what nobody listens to. `stamps`: empty:
+/// The publishers of all groups whose rate is not 0. `publish_unheard`: also without a subscriber. `stamps`: empty:
 /// of the host.
 std::vector<std::unique_ptr<MissionPublisher>> makeMissionPublishers(
     const std::array<int, core::kFieldGroupCount>& rates, core::Transport transport, const FrameNames& frames,

@@ -59,7 +59,7 @@ class TxNode : public BaseNode {
   void subscribeCommands(const std::string& topic, int rank, std::function<void(const Message&)> take);
   void advertiseLockstep();
   void serveStep(const LockstepStep::Request& request, LockstepStep::Response* response);
-  /// The same of a simulator that does not wait for anybody.
+  /// The same of a simulator that does not wait for participants.
   void serveFreeStep(const LockstepStep::Request& request, LockstepStep::Response* response);
   /// lockstep/run and lockstep/hold: answers `done`, or what was in the way.
   std::string setRunning(bool running);

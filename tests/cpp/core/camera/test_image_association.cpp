@@ -229,7 +229,7 @@ TEST(ImageAssociator, SaysWhenTheMomentIsHalfWayBetweenFrames) {
   EXPECT_FALSE(associator.associate(momentAt(30.2 / 60.0), false).ambiguous);
 }
 
-TEST(ImageAssociator, SaysWhenTheRawFloatCanNoLongerTellFramesApart) {
+TEST(ImageAssociator, SaysWhenTheRawFloatCanNoLongerDistinguishFrames) {
   core::ImageAssociator associator;  // at 3e5 s a float32 steps by 1/32 s: two frames at 60 Hz
   feed(associator, 60, 60.0, 300000.0);
   EXPECT_TRUE(associator.associate(momentAt(300000.5), true).ambiguous);

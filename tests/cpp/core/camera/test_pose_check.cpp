@@ -53,13 +53,13 @@ class Flight {
     CameraSample drawn;
     drawn.view = anglesOf(true_axes ? Eigen::Matrix3d(level * camera) : camera);
     drawn.view_position = openglFromNed(position_ + body * lever);
-    const CameraSample told = frame_before && told_ ? *told_ : drawn;
-    told_ = drawn;
+    const CameraSample reported = frame_before && reported_ ? *reported_ : drawn;
+    reported_ = drawn;
 
     now.sim_time = wire(time_);
     now.view_type = view_type;
-    now.view = told.view;
-    now.view_position = told.view_position;
+    now.view = reported.view;
+    now.view_position = reported.view_position;
     now.visual_offset = {0.0, 0.0, 0.0};
     now.aircraft = anglesOf(body);
     now.aircraft_true = anglesOf(level * body);
@@ -94,7 +94,7 @@ class Flight {
   std::normal_distribution<double> noise_;
   double time_ = 100.0;
   Eigen::Vector3d position_{9000.0, -7000.0, -800.0};
-  std::optional<CameraSample> told_;
+  std::optional<CameraSample> reported_;
 };
 
 }  // namespace
@@ -119,7 +119,7 @@ TEST(PoseCheck, FindsEachOfTheFourReadings) {
   }
 }
 
-TEST(PoseCheck, EvenFramesInLevelFlightAreToldApartByTheEye) {
+TEST(PoseCheck, EvenFramesInLevelFlightAreDistinguishedByTheEye) {
   Flight flight;
   flight.frame_before = true;
   PoseCheck check;
@@ -170,7 +170,7 @@ TEST(PoseCheck, ACameraThatWandersInTheCockpitIsUnsure) {
   PoseCheck check;
   ASSERT_TRUE(flight.fly(&check, 4.5).sure);
   for (int i = 0; i < 300; ++i) {
-    flight.lever.x() = 0.4 + 0.1 * std::sin(0.1 * i);  // no dataref tells it
+    flight.lever.x() = 0.4 + 0.1 * std::sin(0.1 * i);  // no dataref shows it
     check.add(flight.next());
   }
   EXPECT_FALSE(check.add(flight.next())->sure);

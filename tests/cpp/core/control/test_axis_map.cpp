@@ -242,7 +242,7 @@ TEST(AxisMap, ToggleAsksForTheOtherMode) {
   o.mode.toggle = 0;
   JoystickMapper mapper(o);
   mapper.onJoy({}, {0}, 0.0);
-  mapper.setMode(FlightMode::kAuto);  // somebody else engaged it
+  mapper.setMode(FlightMode::kAuto);  // another node engaged it
   mapper.onJoy({}, {1}, 0.1);
   mapper.onJoy({}, {0}, 0.2);
   mapper.onJoy({}, {1}, 0.3);
@@ -351,7 +351,7 @@ TEST(AxisMap, MessageWithABadAxisIsDroppedSoThatTheDeviceDies) {
   o.direct = {direct(JoyTarget::kRoll, 0)};
   JoystickMapper mapper(o);
   mapper.onJoy({0.5f, kNan}, {}, 0.0);
-  EXPECT_TRUE(mapper.problems().empty()) << "an axis nobody uses";
+  EXPECT_TRUE(mapper.problems().empty()) << "an axis without use";
   for (const float bad : {kNan, std::numeric_limits<float>::infinity(), 1.01f, -1.01f}) {
     EXPECT_FALSE(mapper.onJoy({bad, 0.0f}, {}, 0.4));
     ASSERT_EQ(mapper.problems().size(), 1u);
@@ -580,7 +580,7 @@ TEST(JoySurfaces, ValidateNamesKeyAndValue) {
   EXPECT_NE(validate(o)->find("the button that chooses it"), std::string::npos);
 }
 
-TEST(JoyActions, AreToldOnceAPress) {
+TEST(JoyActions, AreReportedOnceAPress) {
   JoystickOptions o = options();
   o.debounce = 0.0;
   o.actions = {{"functions.pause", 2}, {"functions.rear", 1}, {"functions.both", 1}};

@@ -395,7 +395,7 @@ TEST(ControlArbiter, ExcitationIsAddedOnlyToWhatALivingSourceCommands) {
   EXPECT_TRUE(arbiter.commanded().none());
 }
 
-TEST(ControlArbiter, ExcitationWithItsOwnRestMovesWhatNobodyCommandsForAsLong) {
+TEST(ControlArbiter, ExcitationWithItsOwnRestMovesChannelsWithoutCommandsForAsLong) {
   ControlArbiter arbiter(direct(), 0.0);
   ChannelExcitation excitation;
   excitation.channels.set(index(Channel::kRoll));
@@ -406,7 +406,7 @@ TEST(ControlArbiter, ExcitationWithItsOwnRestMovesWhatNobodyCommandsForAsLong) {
   EXPECT_EQ(taken.active.count(), 1u);
   EXPECT_EQ(taken.fields, static_cast<std::uint32_t>(kFieldRoll));
   EXPECT_EQ(taken.excited, static_cast<std::uint32_t>(kFieldRoll));
-  EXPECT_EQ(taken.source, CommandSource::kNone) << "nobody commands";
+  EXPECT_EQ(taken.source, CommandSource::kNone) << "no source commands";
   EXPECT_TRUE(arbiter.step(0.1).active.none()) << "leaves no trace";
   EXPECT_FALSE(arbiter.status().failsafe);
   arbiter.onCommand(kManual, stick(0.4), 0.2);
@@ -535,7 +535,7 @@ TEST(ControlArbiter, SurfacesAloneFlyWithoutAFailsafeAndTheirSilenceIsOne) {
   const auto& out = arbiter.step(0.2);
   EXPECT_FALSE(arbiter.status().failsafe);
   EXPECT_EQ(out.source, CommandSource::kAuto);
-  EXPECT_DOUBLE_EQ(roll(out), 0.0) << "nobody commands it";
+  EXPECT_DOUBLE_EQ(roll(out), 0.0) << "no source commands it";
   EXPECT_EQ(arbiter.step(0.7).source, CommandSource::kFailsafe);
   EXPECT_EQ(arbiter.status().reason, "timeout of control/surfaces");
   EXPECT_EQ(arbiter.refusalOfSurfaces(0.8), "") << "it may come back";
@@ -556,7 +556,7 @@ TEST(ControlArbiter, AModeThatBeginsWithAFailsafeKeepsItsReason) {
   EXPECT_EQ(arbiter.status().requested_by, "joystick");
 }
 
-TEST(ControlArbiter, RevisionTellsEveryChangeOfStatus) {
+TEST(ControlArbiter, RevisionShowsEveryChangeOfStatus) {
   ControlArbiter arbiter(direct(), 0.0);
   auto revision = arbiter.status().revision;
   const auto changed = [&] {

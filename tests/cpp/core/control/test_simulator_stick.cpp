@@ -87,7 +87,7 @@ TEST(SimulatorStick, SaysWhyNothingIsPublished) {
   SimulatorStick stick({2, 0, 0, 50});
   EXPECT_EQ(stick.problem(), "X-Plane has not shown its joystick yet");
   EXPECT_FALSE(move(&stick, {}));
-  EXPECT_EQ(stick.problem(), "X-Plane has not told yet what its axes are assigned to");
+  EXPECT_EQ(stick.problem(), "X-Plane has not reported yet what its axes are assigned to");
   settings(&stick, {{"joystick_axis_assignments[0]", 4.0F}});
   EXPECT_FALSE(move(&stick, {}));
   EXPECT_EQ(stick.problem(),

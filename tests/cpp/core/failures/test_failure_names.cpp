@@ -49,7 +49,7 @@ TEST(FailureNames, ComeAndGoWithinAVersion) {
   EXPECT_TRUE(has(120800, "rel_prpsep0"));
 }
 
-TEST(FailureNames, TellWhatKeepsSurfacesFromFollowing) {
+TEST(FailureNames, NameWhatKeepsSurfacesFromFollowing) {
   for (const char* name : {"rel_conlock", "rel_fcon_elev_1_lft_lock", "sim/operation/failures/rel_fc_ail_L",
                            "rel_ail_L_jam", "rel_trim_elv", "rel_elv_trim_run", "rel_flap_act", "rel_L_flp_off"}) {
     EXPECT_TRUE(touchesSurfaces(name)) << name;

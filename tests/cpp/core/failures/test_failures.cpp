@@ -231,7 +231,7 @@ TEST(FailureRegistry, SecondRequestOfANameReplacesTheFirst) {
   EXPECT_EQ(registry.drivenSurfaces()[0].value, 10.0);
 }
 
-TEST(FailureRegistry, TellsWhatIsDrivenAndWhatShowsAFailure) {
+TEST(FailureRegistry, ReportsWhatIsDrivenAndWhatShowsAFailure) {
   FailureRegistry registry;
   const auto stuck = request("aileron1_wing2_left", "stuck");
   registry.add(stuck, planFailure(stuck, k12).plan, at(1.0));

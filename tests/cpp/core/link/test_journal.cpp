@@ -165,7 +165,7 @@ TEST_F(JournalTest, EntryOfADeadProcessIsTakenOver) {
   EXPECT_EQ(journal().entries()[0].owner.node, "/next");
 }
 
-TEST_F(JournalTest, WhatWasUndoneIsRemovedUnlessSomebodyHasTakenItOver) {
+TEST_F(JournalTest, WhatWasUndoneIsRemovedUnlessAnotherProcessHasTakenItOver) {
   for (const char* id : {"a", "b"}) Journal(path_, deadOwner()).record(id, "override", kReleaseJoystick);
   const std::vector<JournalEntry> orphans = journal().orphans("override");
   ASSERT_EQ(orphans.size(), 2U);

@@ -29,7 +29,7 @@ class LeftoverSubscriptionsTest : public SimLinkRig {
     const auto found = sim.subscriptions.find({INADDR_LOOPBACK, port});
     return found == sim.subscriptions.end() ? Indices() : found->second;
   }
-  /// A port that nobody has.
+  /// A port that no program has.
   static std::uint16_t freePort() { return UdpSocket(UdpSocketOptions()).localPort(); }
 };
 
@@ -101,7 +101,7 @@ TEST_F(LeftoverSubscriptionsTest, LostRequestsAreSentAgain) {
   EXPECT_GE(runUntil([&] { return sentTo(sim, port).empty(); }, 3.0, {&sim}), 0.0);
 }
 
-TEST_F(LeftoverSubscriptionsTest, APortThatSomebodyHasNowIsSaid) {
+TEST_F(LeftoverSubscriptionsTest, APortThatAnotherProgramHasNowIsSaid) {
   FakeXPlane sim;
   const UdpSocket taken{UdpSocketOptions()};
   journalOf(sim, killed("/test"))

@@ -66,7 +66,7 @@ TEST(LinkMonitor, BeaconGoneWithAnswersIsNoLoss) {
   EXPECT_TRUE(monitor.beaconGone(60'100 * kMs));
 }
 
-TEST(LinkMonitor, LongSilenceThatNobodyWatchedStillIsALoss) {
+TEST(LinkMonitor, LongSilenceDuringAStallStillIsALoss) {
   LinkMonitor monitor(options());
   monitor.heard(0);
   monitor.heard(20'000 * kMs);

@@ -160,7 +160,7 @@ TEST_F(SimLinkTest, RestartWithoutSilenceIsNoticedBySimulatorTime) {
   const int first = subscribe(group({"a/b"}));
   ASSERT_GE(runUntil([&] { return datagrams_[first] > 0; }, 1.0, {&sim}), 0.0);
   run(0.5, {&sim});
-  // The link's own subscription survives (asked for by somebody quick), the group's does not.
+  // The link's own subscription survives (asked for by a quick client), the group's does not.
   auto kept = sim.subscriptions;
   sim.restart();
   for (auto& [client, indices] : kept) {
@@ -713,7 +713,7 @@ TEST_F(ThreadedSimLink, WaitsForACondition) {
   link_->stop(2.0);
 }
 
-TEST_F(ThreadedSimLink, StopsAlsoWhenNobodyAnswers) {
+TEST_F(ThreadedSimLink, StopsAlsoWhenNoXPlaneAnswers) {
   link_->start();
   sim_.stopThread();
   link_->stop(0.5);

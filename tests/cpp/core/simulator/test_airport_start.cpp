@@ -101,7 +101,7 @@ TEST(AirportStart, RampsAreFoundByName) {
   EXPECT_EQ(ramp.at->longitude_deg, 20.006);
 }
 
-TEST(AirportStart, WhatAnAirportDoesNotHaveIsToldWithWhatItHas) {
+TEST(AirportStart, WhatAnAirportDoesNotHaveIsReportedWithWhatItHas) {
   AirportStart runway = start(AirportSpot::kRunway);
   EXPECT_EQ(find(&runway, "33L"), "AAAA has no runway \"33L\", but 01, 19, 09, 27");
   AirportStart ramp = start();
@@ -117,7 +117,7 @@ TEST(AirportStart, MessagesCarryTheSpot) {
   given.index = 2;
   given.end = 1;
   const Placement final = placementOf(given);
-  EXPECT_EQ(final.start, StartType::kRunway) << "an approach begins with the runway, which tells where it is";
+  EXPECT_EQ(final.start, StartType::kRunway) << "an approach begins with the runway, which shows where it is";
   EXPECT_EQ(final.airport, "AAAA");
   EXPECT_EQ(final.runway, 2);
   EXPECT_EQ(final.runway_direction, 1);

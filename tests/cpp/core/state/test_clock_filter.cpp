@@ -224,7 +224,7 @@ TEST(ClockFilter, FollowsFramesThatAllLastLongerThanTheySimulate) {
 }
 
 // Without frame periods a slip shows only in that all later samples are late by the same.
-TEST(ClockFilter, SlipIsSeenByItsEvennessWhereNoPeriodTellsIt) {
+TEST(ClockFilter, SlipIsSeenByItsEvennessWhereNoPeriodShowsIt) {
   ClockFilter filter;
   Simulator::Options options;
   options.periods = false;
@@ -550,7 +550,7 @@ TEST(ReceiveClock, FollowsAStepOnceItPersists) {
     return clock.toHostTime(now + wall_offset, now + wall_offset, now);
   };
   for (int i = 0; i < 100; ++i) EXPECT_EQ(read(0.01 * i), kStart + ns(0.01 * i));
-  wall_offset += ns(2.5);  // somebody sets the clock
+  wall_offset += ns(2.5);  // NTP or an operator sets the clock
   EXPECT_EQ(read(1.0), kStart + ns(1.0));
   for (int i = 0; i < 2 * ReceiveClock::kReadings; ++i) read(1.0 + 0.01 * i);
   EXPECT_EQ(clock.steps(), 1U);

@@ -24,26 +24,26 @@ TEST(ResetDetector, LetsAFlightGoOn) {
   EXPECT_FALSE(detector.add(late)) << "datagrams overtake each other";
 }
 
-TEST(ResetDetector, TellsAFlightThatBeginsAnewWhereItIs) {
+TEST(ResetDetector, ReportsAFlightThatBeginsAnewWhereItIs) {
   ResetDetector detector;
   detector.add(flying(10.0));
   FlightWatch again = flying(10.02);
   again.flight_time = 0.0;
-  const auto told = detector.add(again);
-  ASSERT_TRUE(told);
-  EXPECT_EQ(*told, "the flight began anew");
+  const auto reported = detector.add(again);
+  ASSERT_TRUE(reported);
+  EXPECT_EQ(*reported, "the flight began anew");
   again.flight_time = 0.02;
   EXPECT_FALSE(detector.add(again)) << "once";
 }
 
-TEST(ResetDetector, TellsAPlaceThatCannotHaveBeenFlownTo) {
+TEST(ResetDetector, ReportsAPlaceThatCannotHaveBeenFlownTo) {
   ResetDetector detector;
   detector.add(flying(10.0));
   FlightWatch away = flying(10.02);
   away.latitude_deg += 0.01;  // 1113 m, and 1.4 m flown
-  const auto told = detector.add(away);
-  ASSERT_TRUE(told);
-  EXPECT_EQ(*told, "the aircraft was placed 1115 m away");
+  const auto reported = detector.add(away);
+  ASSERT_TRUE(reported);
+  EXPECT_EQ(*reported, "the aircraft was placed 1115 m away");
 
   detector.add(flying(10.0));
   FlightWatch up = flying(10.02);
@@ -54,7 +54,7 @@ TEST(ResetDetector, TellsAPlaceThatCannotHaveBeenFlownTo) {
   EXPECT_TRUE(detector.add(up));
 }
 
-TEST(ResetDetector, TellsAPlacementWhilePaused) {
+TEST(ResetDetector, ReportsAPlacementWhilePaused) {
   ResetDetector detector;
   detector.add(flying(10.0));
   FlightWatch away = flying(10.0);

@@ -95,7 +95,7 @@ TEST(Traffic, TurnsFromTheSceneryAxesToTheLocalLevel) {
   EXPECT_NEAR(other.roll_deg, -1.0, 1e-4);
   EXPECT_NEAR(other.velocity_ned.y(), -10.0 * std::sin(kRadiansPerDegree), 1e-5);
   EXPECT_NEAR(other.velocity_ned.z(), -10.0 * std::cos(kRadiansPerDegree), 1e-5);
-  EXPECT_EQ(other.mode_s_id, 0) << "not told by a version without targets";
+  EXPECT_EQ(other.mode_s_id, 0) << "not sent by a version without targets";
 }
 
 }  // namespace

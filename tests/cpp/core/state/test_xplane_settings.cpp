@@ -22,7 +22,7 @@ bool feed(XPlaneSettings* settings, const std::vector<float>& values, std::int64
   return settings->add(RrefView(pairs.data(), values.size()), receive_ns);
 }
 
-TEST(XPlaneSettings, TellsValuesWhenTheyAreAnother) {
+TEST(XPlaneSettings, ReportsValuesWhenTheyAreAnother) {
   XPlaneSettings settings;
   EXPECT_TRUE(settings.values().empty());
   std::vector<float> values(XPlaneSettings::datarefs().size(), 0.5F);
@@ -38,9 +38,10 @@ TEST(XPlaneSettings, TellsValuesWhenTheyAreAnother) {
 TEST(XPlaneSettings, WhatXPlaneDoesNotAnswerIsNoNumberAndHoldsUpNothing) {
   XPlaneSettings settings;
   const std::vector<float> values(XPlaneSettings::datarefs().size() - 1, 0.5F);
-  bool told = false;
-  for (std::int64_t second = 1; second < 10; ++second) told = feed(&settings, values, second * 1'000'000'000) || told;
-  ASSERT_TRUE(told);
+  bool reported = false;
+  for (std::int64_t second = 1; second < 10; ++second)
+    reported = feed(&settings, values, second * 1'000'000'000) || reported;
+  ASSERT_TRUE(reported);
   EXPECT_EQ(settings.values().front(), 0.5F);
   EXPECT_TRUE(std::isnan(settings.values().back()));
 }

@@ -82,11 +82,11 @@ TEST(DrivenInputs, FlapsRunToTheirHandleOnceItIsMoved) {
   EXPECT_DOUBLE_EQ(up.flap2, 0.5);
 }
 
-TEST(DrivenInputs, AHandleThatIsNotToldForAFrameStopsNothing) {
+TEST(DrivenInputs, AHandleThatIsNotReceivedForAFrameStopsNothing) {
   DrivenInputs inputs(0.5);
   inputs.begin(frame(0.0, 0.0, kNan, 0.2));
   EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 0.25, 0.2), kNoCommands, 1.0).flap1, 0.2)
-      << "where it is when it is first told";
+      << "where it is when it is first received";
   EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 0.7);
   EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, kNan, 0.2), kNoCommands, 1.0).flap1, 0.7);
   EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 1.0);

@@ -129,7 +129,7 @@ TEST_F(DatarefReaderTest, CallbackMayStartTheNextRead) {
   EXPECT_TRUE(result_.has_value());
 }
 
-TEST_F(DatarefReaderTest, CancelAnswersEverybody) {
+TEST_F(DatarefReaderTest, CancelAnswersAllCallers) {
   reader_.start({"a"}, 0, 100 * kMs, keep());
   reader_.cancelAll();
   ASSERT_TRUE(result_.has_value());

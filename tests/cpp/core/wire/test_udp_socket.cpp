@@ -126,19 +126,19 @@ TEST(UdpSocket, PortCanBeSharedWhenAsked) {
 
 TEST(UdpSocket, RefusalIsCountedAndHarmless) {
   UdpSocket socket(onLoopback());
-  Endpoint nobody;
+  Endpoint closed_port;
   {
     UdpSocket gone(onLoopback());
-    nobody = endpointOf(gone);
+    closed_port = endpointOf(gone);
   }
-  ASSERT_TRUE(socket.sendTo(kPayload, nobody));
+  ASSERT_TRUE(socket.sendTo(kPayload, closed_port));
   std::array<std::uint8_t, 8> buffer{};
   Received received;
   // The refusal ends the wait or is found by the read; either way there is nothing to read and no busy loop later.
   EXPECT_EQ(receiveWithin(20, &socket, buffer, &received), ReceiveStatus::kNothing);
   EXPECT_EQ(socket.counters().refused, 1U);
-  EXPECT_TRUE(socket.sendTo(kPayload, nobody)) << "a later send must not fail because of an earlier refusal";
-  EXPECT_TRUE(socket.sendTo(kPayload, endpointOf(socket))) << "nor to somebody else";
+  EXPECT_TRUE(socket.sendTo(kPayload, closed_port)) << "a later send must not fail because of an earlier refusal";
+  EXPECT_TRUE(socket.sendTo(kPayload, endpointOf(socket))) << "nor to another address";
   EXPECT_EQ(receiveWithin(kPatienceMs, &socket, buffer, &received), ReceiveStatus::kReceived);
   EXPECT_EQ(socket.counters().send_failures, 0U);
 }

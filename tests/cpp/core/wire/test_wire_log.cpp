@@ -160,16 +160,16 @@ TEST_F(WireLogTest, LeavesOutWhatHasNoRoomAndSaysHowMuch) {
   }
   ASSERT_GT(lost, 0U);
   std::uint64_t datagrams = 0;
-  std::uint64_t told = 0;
+  std::uint64_t logged = 0;
   for (const Block& packet : packetsOf(path())) {
     const Bytes bytes = packet.packet();
     if (packet.word(0) == 1) {
       ++datagrams;
     } else {
-      told += std::stoul(std::string(bytes.begin() + 5, bytes.end()));
+      logged += std::stoul(std::string(bytes.begin() + 5, bytes.end()));
     }
   }
-  EXPECT_EQ(told, lost);
+  EXPECT_EQ(logged, lost);
   EXPECT_EQ(datagrams + lost, kCount);
 }
 
@@ -189,7 +189,7 @@ TEST_F(WireLogTest, AGapIsARecordOfItsOwn) {
   EXPECT_EQ(packets[2].text(1).substr(0, 5), "n=19 ");
 }
 
-TEST_F(WireLogTest, WaitsAreToldByTheNextPacket) {
+TEST_F(WireLogTest, WaitsAreLoggedByTheNextPacket) {
   WireFile file(options_);
   Bytes records;
   appendRecord(opened(name_, 51000), &records);

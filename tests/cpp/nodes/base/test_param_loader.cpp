@@ -147,10 +147,10 @@ TEST(CommonOptions, RefusesWhatCannotWork) {
   EXPECT_TRUE(contains(load("map_frame", "/map"), "leading slash"));
   EXPECT_TRUE(contains(load("frame_prefix", "/first"), "without a leading slash"));
   EXPECT_TRUE(contains(load("hots", "192.168.1.2"), "did you mean host?"));
-  EXPECT_EQ(load("somebody_elses_parameter", 3), "");
+  EXPECT_EQ(load("another_nodes_parameter", 3), "");
 }
 
-TEST(ParamLoader, TellsWhatWasGivenThatIsNoDefault) {
+TEST(ParamLoader, ReportsWhatWasGivenThatIsNoDefault) {
   const ParamLoader loader("/xplane/node", sampleTree());
   loader.integer("rate", {}, 50);  // given, but what it would be anyway
   loader.number("gain", {}, 1.0);
