@@ -122,7 +122,7 @@ class Mutator {
         break;
       }
       case 5: {
-        const std::uint32_t number = kBoundaryWords[below(kTelling.size())];
+        const std::uint32_t number = kBoundaryWords[below(kBoundaryWords.size())];
         const std::size_t at = below(bytes.size());
         std::memcpy(bytes.data() + at, &number, std::min(sizeof number, bytes.size() - at));
         break;
