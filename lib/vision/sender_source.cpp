@@ -231,7 +231,7 @@ class SenderSource::Impl {
     greeted_ = true;
     xplane_ = hello.xplane;
     last_end_.clear();
-    reply(client_, ReplyCode::kWelcome, 0);
+    reply(client_, ReplyCode::kWelcome, options_.recorded && options_.recorded() ? kWelcomeRecorded : 0);
   }
 
   WaitResult changed(Change& change) {

@@ -226,6 +226,29 @@ def test_the_next_start_gives_the_field_of_view_back_after_a_kill(scene: Scene) 
         wait_until(lambda: not (scene.folder / "undo.json").exists(), 15.0, "the end of the note")
 
 
+def test_nothing_is_measured_while_the_pictures_are_recorded_but_on_request(scene: Scene) -> None:
+    import rosgraph
+    from xplane_bridge.msg import FrameState
+
+    topic = f"{scene.world.namespace}/camera/frame_state"
+
+    def recorders() -> list:
+        _, subscribers, _ = rosgraph.Master("/test_sender").getSystemState()
+        return [node for name, nodes in subscribers if name == topic for node in nodes if "/record" in node]
+
+    wire = scene.world.wire(scene.emulator.port)
+    bag = ["rosbag", "record", "-O", str(scene.folder / "pictures.bag"), topic]
+    with ManagedProcess("rosbag", bag, scene.folder, env=scene.world.env):
+        wait_until(lambda: recorders() != [], 60.0, "the recorder")
+        with scene.eye() as eye:
+            eye.wait_for_line("delay: not measured, as capture_node's pictures are being recorded", 60.0)
+            assert wire.read(FIELD_OF_VIEW) == pytest.approx(60.0)
+            state = scene.states.wait_for(lambda _: True, 60.0, "a picture")
+        assert state.quality & FrameState.QUALITY_DELAY_ASSUMED
+        with scene.eye("--calibrate-now") as eye:
+            eye.wait_for_line("calibrating: X-Plane's field of view changes", 60.0)
+
+
 def test_a_wrong_token_and_a_missing_sender_are_said(scene: Scene) -> None:
     missing = scene.world.wait_for_diagnostics("capture", lambda status: status.level == 2, timeout=30.0)
     assert f"no xplane_eye on 127.0.0.1 has connected to 127.0.0.1:{scene.port}" in missing.message
@@ -292,6 +315,7 @@ def test_pictures_that_are_a_frame_off_are_found_by_the_time_that_x_plane_prints
             quality=90,
             delay_s=PIPELINE_DELAY_S + frames / FPS,
             calibrate=False,
+            while_recorded=False,
             local_port=0,
             undo_file=tmp_path / "undo.json",
         ),

@@ -86,10 +86,13 @@ class PictureStreamReader {
 
 /// What the receiver says; it says nothing else.
 enum class ReplyCode : std::uint16_t {
-  kWelcome = 0,
+  kWelcome = 0,  ///< with kWelcomeRecorded or 0
   kTaken = 1,    ///< with the index of the picture
   kRefused = 2,  ///< with a Refusal
 };
+
+/// Of a welcome: the pictures are being recorded, so the view is not to be changed.
+constexpr std::uint64_t kWelcomeRecorded = 1;
 
 enum class Refusal : std::uint64_t { kToken = 1, kVersion = 2, kBusy = 3, kMalformed = 4 };
 

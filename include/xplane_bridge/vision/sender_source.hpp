@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -11,6 +12,8 @@ struct SenderSourceOptions {
   std::string listen;  ///< "ADDRESS:PORT" of this computer, numbers
   std::string peer;    ///< address of the only computer that is let in; empty: this one
   std::string token;   ///< that the sender must know; empty: none
+  /// Whether the pictures are being recorded, asked when a sender connects; empty: they are not.
+  std::function<bool()> recorded{};
 };
 
 /// Pictures that `xplane_eye` sends from X-Plane's computer, each with the frame it shows.

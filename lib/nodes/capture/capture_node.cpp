@@ -107,6 +107,7 @@ void CaptureNode::start() {
       std::make_unique<LatestWorker<Grabbed>>(kPicturesWaiting, [this](Grabbed& grabbed) { publishPicture(&grabbed); });
   encoder_ = std::make_unique<LatestWorker<sensor_msgs::ImageConstPtr>>(
       kPicturesWaiting, [this](sensor_msgs::ImageConstPtr& image) { encodeJpeg(*image); });
+  options_.sender.recorded = [this] { return !recorder().empty(); };
   capture_thread_ = std::thread([this] { captureLoop(); });
 }
 

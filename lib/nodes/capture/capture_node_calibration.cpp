@@ -45,6 +45,11 @@ std::string recorderOf(const std::vector<std::string>& topics) {
 
 }  // namespace
 
+std::string CaptureNode::recorder() const {
+  return recorderOf({image_publisher_.getTopic(), jpeg_publisher_.getTopic(), info_publisher_.getTopic(),
+                     frame_state_publisher_.getTopic()});
+}
+
 void CaptureNode::serveCalibration(std_srvs::TriggerResponse* response) {
   try {
     const core::MeasuredDelay found = calibrate();
@@ -76,10 +81,9 @@ core::MeasuredDelay CaptureNode::calibrate() {
         "this window has a field of view of its own, which does not follow X-Plane's: measure it "
         "with estimate_latency, or set own_field_of_view to false");
   }
-  const std::string recorder = recorderOf({image_publisher_.getTopic(), jpeg_publisher_.getTopic(),
-                                           info_publisher_.getTopic(), frame_state_publisher_.getTopic()});
-  if (!recorder.empty()) {
-    throw std::runtime_error(recorder +
+  const std::string recording = recorder();
+  if (!recording.empty()) {
+    throw std::runtime_error(recording +
                              " records the pictures, and the field of view would change in them: call it "
                              "before or after a recording");
   }

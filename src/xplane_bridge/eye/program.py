@@ -24,6 +24,8 @@ from xplane_bridge.eye.verify import Findings, Verification
 
 _LOOK_S = 0.02
 _CALIBRATE_AGAIN_S = 2.0
+#: capture_node answers within so long, or is not there.
+_ANSWER_S = 3.0
 #: From here on neighbouring float32 numbers of simulator time are 8 ms apart: frames above 60/s share them.
 _COARSE_KEY_S = 65536.0
 
@@ -41,6 +43,7 @@ class EyeOptions:
         quality: Of the JPEG, 1..100.
         delay_s: From a frame to its picture [s]; None: to be measured.
         calibrate: Whether it may be measured.
+        while_recorded: Whether also while the pictures are being recorded.
         local_port: UDP port that X-Plane answers to.
         undo_file: Where X-Plane's field of view is kept while it is changed.
     """
@@ -53,6 +56,7 @@ class EyeOptions:
     quality: int
     delay_s: Optional[float]
     calibrate: bool
+    while_recorded: bool
     local_port: int
     undo_file: Path
 
@@ -223,11 +227,12 @@ class Eye:
     def _prepare(self) -> None:
         """Measures the delay, where that is wanted; always gives back what a killed eye has left."""
         self._screen.restore()
-        if not self._options.calibrate or self._options.delay_s is not None:
+        reason = self._why_not_measured()
+        if reason:
             self._new_calibration().restore()
             self._calibration = None
-            delay_s = self._options.delay_s
-            self._say(f"delay: {1e3 * delay_s:.1f} ms, as given" if delay_s is not None else "delay: not measured")
+            self._delay_was_sure = self._options.delay_s is not None
+            self._say(reason)
             return
         while True:
             self._wait_for(lambda: not self._grabber.problem, "waiting for X-Plane's window")
@@ -250,6 +255,25 @@ class Eye:
                 f"{1e3 * found.spread_s:.1f} ms from it"
             )
             return
+
+    def _why_not_measured(self) -> str:
+        """What is said of the delay where it is not to be measured; else empty."""
+        if self._options.delay_s is not None:
+            return f"delay: {1e3 * self._options.delay_s:.1f} ms, as given"
+        if not self._options.calibrate:
+            return "delay: not measured"
+        if self._recorded() and not self._options.while_recorded:
+            return (
+                "delay: not measured, as capture_node's pictures are being recorded and X-Plane's view would zoom: "
+                "they are flagged DELAY_ASSUMED; start xplane_eye before the recording, or with --calibrate-now"
+            )
+        return ""
+
+    def _recorded(self) -> bool:
+        if not isinstance(self._sender, Sender):
+            return False
+        self._sender.tried.wait(_ANSWER_S)
+        return self._sender.recorded
 
     def _new_calibration(self) -> Calibration:
         calibration = Calibration(self._stream.write, lambda: self._field_of_view_deg, self._undo)

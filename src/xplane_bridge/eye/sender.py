@@ -65,6 +65,9 @@ class Sender:
         self._awake.setblocking(False)
         self._thread = threading.Thread(target=self._run, name="sender", daemon=True)
         #: Pictures that newer ones have replaced, and pictures sent.
+        #: Whether `capture_node` has answered, or does not; and whether its pictures were being recorded then.
+        self.tried = threading.Event()
+        self.recorded = False
         self.replaced = 0
         self.sent = 0
 
@@ -112,6 +115,7 @@ class Sender:
             except (OSError, wire.WireError) as error:
                 reason = getattr(error, "strerror", None) or str(error)
                 self._report(f"capture_node at {where} does not take pictures ({reason}); trying again")
+            self.tried.set()
             end = time.monotonic() + pause_s
             while not self._stop and time.monotonic() < end:
                 time.sleep(0.05)
@@ -163,6 +167,8 @@ class _Session:
                 raise wire.WireError(wire.REFUSALS.get(reply.number, f"refused for reason {reply.number}"))
             if reply.code == wire.WELCOME:
                 self._welcome = True
+                self._sender.recorded = reply.number == wire.RECORDED
+                self._sender.tried.set()
                 self._credit = CREDIT
                 self._sender._report("capture_node at {}:{} takes pictures".format(*self._sender._receiver))
             else:

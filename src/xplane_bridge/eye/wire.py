@@ -33,6 +33,8 @@ _REPLY_MAGIC = b"XEYA"
 
 #: Codes of replies: the eye may send; a picture was taken over; the connection is refused.
 WELCOME, TAKEN, REFUSED = 0, 1, 2
+#: The number of a welcome while the pictures are being recorded: the view is not to be changed.
+RECORDED = 1
 #: Why, by the number of a refusal.
 REFUSALS = {
     1: "the token is not the one in capture_node's sender/token",
@@ -77,7 +79,7 @@ class PictureHeader:
 
 @dataclass(frozen=True)
 class Reply:
-    """An answer of `capture_node`: WELCOME, TAKEN or REFUSED, and the picture's index or the reason's number."""
+    """An answer of `capture_node`: WELCOME and RECORDED or 0, TAKEN and the picture's index, REFUSED and the reason."""
 
     code: int
     number: int

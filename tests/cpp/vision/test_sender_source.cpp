@@ -62,6 +62,7 @@ class SenderSourceTest : public ::testing::Test {
   void start(const std::string& peer = "", const std::string& token = "secret") {
     port_ = freePort();
     vision::SenderSourceOptions options{"127.0.0.1:" + std::to_string(port_), peer, token};
+    options.recorded = [this] { return recorded_; };
     source_ = std::make_unique<vision::SenderSource>(options, [this] { return now_ns_; });
     wait(std::chrono::milliseconds(1));  // listens
   }
@@ -116,9 +117,18 @@ class SenderSourceTest : public ::testing::Test {
   std::unique_ptr<vision::SenderSource> source_;
   vision::Change change_;
   std::vector<int> sockets_;
+  bool recorded_ = false;
 };
 
 }  // namespace
+
+TEST_F(SenderSourceTest, ASenderHearsWhetherItsPicturesAreRecorded) {
+  start();
+  recorded_ = true;
+  const int fd = connectFrom("127.0.0.1");
+  send(fd, golden("hello"));
+  EXPECT_EQ(answer(fd), reply(ReplyCode::kWelcome, vision::kWelcomeRecorded));
+}
 
 TEST_F(SenderSourceTest, APictureComesWithItsFrameAndIsAcknowledged) {
   start();

@@ -33,6 +33,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         quality=given.quality,
         delay_s=given.delay,
         calibrate=given.calibrate,
+        while_recorded=given.calibrate_now,
         local_port=given.local_port,
         undo_file=given.undo_file,
     )
@@ -94,6 +95,11 @@ def _parser() -> argparse.ArgumentParser:
         dest="calibrate",
         action="store_false",
         help="leave the field of view alone; each picture is flagged DELAY_ASSUMED",
+    )
+    delay.add_argument(
+        "--calibrate-now",
+        action="store_true",
+        help="measure the delay also while capture_node's pictures are being recorded",
     )
     parser.add_argument(
         "--local-port",
