@@ -47,11 +47,13 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
       views_(link, [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
       traffic_(link, &overrides_, options.traffic,
                [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
-      jobs_(link, options.flight, changeHooks(),
-            [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
-              hooks_.event({outcome.kind, outcome.text, who, outcome.success, false, number, sim_time_});
-            }),
-      releases_(link, &overrides_, hooks_.journal_problem) {
+      jobs_(
+          link, options.flight, changeHooks(),
+          [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
+            hooks_.event({outcome.kind, outcome.text, who, outcome.success, false, number, sim_time_});
+          },
+          options.turns),
+      releases_(link, &overrides_, hooks_.journal_problem, options.turns) {
   const Lock lock(*mutex_);
   subscribe();
 }

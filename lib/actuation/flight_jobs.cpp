@@ -13,8 +13,12 @@ constexpr std::int32_t kOldest = 110000;  // X-Plane 11.00: earlier ones have ot
 }  // namespace
 
 FlightJobs::FlightJobs(core::SimulatorPort* link, const FlightChangeOptions& options, FlightChangeHooks hooks,
-                       Report report)
-    : link_(link), changes_(link, options, std::move(hooks)), report_(std::move(report)), thread_([this] { loop(); }) {}
+                       Report report, std::shared_ptr<core::ThreadTurns> turns)
+    : link_(link),
+      changes_(link, options, std::move(hooks)),
+      report_(std::move(report)),
+      seat_(std::move(turns)),
+      thread_([this] { loop(); }) {}
 
 FlightJobs::~FlightJobs() { stop(); }
 
@@ -24,8 +28,10 @@ void FlightJobs::stop() {
     changes_.stop();
     jobs_.clear();
   }
-  wanted_.notify_all();
-  if (thread_.joinable()) thread_.join();
+  wanted_.notifyAll();
+  if (!thread_.joinable()) return;
+  seat_.letEnd();
+  thread_.join();
 }
 
 bool FlightJobs::full() const {
@@ -60,13 +66,14 @@ void FlightJobs::add(std::uint32_t number, const std::string& who, bool moves,
     if (changes_.stopping()) return;
     jobs_.push_back({number, who, moves, std::move(run)});
   }
-  wanted_.notify_all();
+  wanted_.notifyAll();
 }
 
 void FlightJobs::loop() {
+  const core::ThreadSeat::Taken turns(&seat_);
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
-    wanted_.wait(lock, [this] { return changes_.stopping() || !jobs_.empty(); });
+    wanted_.wait(&lock, [this] { return changes_.stopping() || !jobs_.empty(); });
     if (changes_.stopping()) return;
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();

@@ -15,12 +15,13 @@ constexpr double kReleaseWait = 1.0;  // [s] of one attempt
 }  // namespace
 
 ReleaseWorker::ReleaseWorker(core::SimulatorPort* link, OverrideManager* overrides,
-                             std::function<void(const std::string&)> problem)
-    : link_(link), overrides_(overrides), problem_(std::move(problem)) {}
+                             std::function<void(const std::string&)> problem, std::shared_ptr<core::ThreadTurns> turns)
+    : link_(link), overrides_(overrides), problem_(std::move(problem)), turns_(std::move(turns)) {}
 
 ReleaseWorker::~ReleaseWorker() { stop(); }
 
 void ReleaseWorker::start() {
+  seat_ = std::make_unique<core::ThreadSeat>(turns_);
   thread_ = std::thread([this] { loop(); });
 }
 
@@ -38,10 +39,13 @@ void ReleaseWorker::stop() {
     ends_ = true;
   }
   wanted_.notifyAll();
-  if (thread_.joinable()) thread_.join();
+  if (!thread_.joinable()) return;
+  seat_->letEnd();
+  thread_.join();
 }
 
 void ReleaseWorker::loop() {
+  const core::ThreadSeat::Taken turns(seat_.get());
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
     wanted_.waitUntil(&lock, core::Deadline(link_->clock(), kPeriod), [this] { return ends_ || now_; });

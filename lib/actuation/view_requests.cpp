@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <mutex>
 #include <utility>
 
 #include "xplane_bridge/actuation/link_condition.hpp"
@@ -65,7 +66,7 @@ RequestResult ViewRequests::setView(const core::ViewWish& wish) {
     return {ResultCode::kNotSupported,
             "in lock-step there are no pictures, and the camera is not measured between frames"};
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<core::TurnMutex> lock(mutex_);
   RequestResult result;
   try {
     result = setViewLocked(wish);
@@ -166,7 +167,7 @@ RequestResult ViewRequests::setFieldOfView(double field_of_view_deg) {
 }
 
 bool ViewRequests::giveBack(double timeout_s) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<core::TurnMutex> lock(mutex_);
   try {
     return giveBackLocked(timeout_s);
   } catch (const core::JournalError& error) {

@@ -5,61 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-import subprocess
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from xplane_bridge.bags.chunks import BagFile
+from support.wire_replays import RawTopics, payloads_in, replay
 from xplane_bridge.harness.processes import wait_until
-from xplane_bridge.resources import program
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import Capture
 from xplane_bridge.wire_log.datagrams import USER0
 from xplane_bridge.wire_log.own_log import OwnLog
 
 TOPICS = ("flight_state", "odom", "imu/data", "wind", "link_state", "mission/surfaces", "mission/engines", "datarefs")
-REPLAY_S = 300.0
-
-
-class RawTopics:
-    """The payloads of topics, as a recorder gets them.
-
-    Args:
-        namespace: of the bridge.
-    """
-
-    def __init__(self, namespace: str) -> None:
-        import rospy
-
-        self.payloads: dict[str, list[bytes]] = {}
-        self._subscribers = [
-            rospy.Subscriber(f"{namespace}/{topic}", rospy.AnyMsg, self._take, f"{namespace}/{topic}", tcp_nodelay=True)
-            for topic in TOPICS
-        ]
-
-    def _take(self, message: Any, topic: str) -> None:
-        self.payloads.setdefault(topic, []).append(message._buff)
-
-    def close(self) -> None:
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-
-
-def replay(*args: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [str(program("wire_replay")), *map(str, args)], capture_output=True, text=True, timeout=REPLAY_S, check=False
-    )
-
-
-def payloads_in(bag: Path) -> dict[str, list[bytes]]:
-    file = BagFile(bag)
-    out: dict[str, list[bytes]] = {}
-    for id_, connection in file.connections.items():
-        out[connection.topic] = [each for _, chunk in file.by_chunk(id_) for each in chunk]
-    file.close()
-    return out
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +27,7 @@ def flight(new_world, tmp_path_factory):
     try:
         emulator = world.emulator("--fps", 60, "--fault", "drop=0.05,reorder", "--seed", 3)
         world.set_param("wire_log", str(folder / "wire.pcapng"))
-        heard = RawTopics(world.namespace)
+        heard = RawTopics(world.namespace, TOPICS)
         node = world.start("rx_node", {"datarefs": [{"name": "sim/cockpit2/gauges/indicators/airspeed_kts_pilot"}]})
         states = f"{world.namespace}/flight_state"
 

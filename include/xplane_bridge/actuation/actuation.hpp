@@ -22,6 +22,7 @@
 #include "xplane_bridge/actuation/traffic_control.hpp"
 #include "xplane_bridge/actuation/view_requests.hpp"
 #include "xplane_bridge/core/base/message_constants.hpp"
+#include "xplane_bridge/core/base/thread_turns.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
@@ -37,6 +38,7 @@ struct ActuationOptions {
   ControlPathOptions control;
   SurfaceControlOptions surfaces;
   TrafficOptions traffic;
+  std::shared_ptr<core::ThreadTurns> turns;  ///< of the threads that wait for X-Plane; null: they run as they like
 };
 
 /// What happened, for the list of events and the log.

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -11,6 +11,8 @@
 
 #include "xplane_bridge/actuation/flight_changes.hpp"
 #include "xplane_bridge/actuation/request_result.hpp"
+#include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/thread_turns.hpp"
 
 namespace xplane_bridge {
 
@@ -23,7 +25,9 @@ class FlightJobs {
   /// The outcome of a job, as the event with the number promised. Called from the jobs' thread, without a lock held.
   using Report = std::function<void(std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who)>;
 
-  FlightJobs(core::SimulatorPort* link, const FlightChangeOptions& options, FlightChangeHooks hooks, Report report);
+  /// @param turns of the thread; null: it runs as it likes
+  FlightJobs(core::SimulatorPort* link, const FlightChangeOptions& options, FlightChangeHooks hooks, Report report,
+             std::shared_ptr<core::ThreadTurns> turns = nullptr);
   /// stop()
   ~FlightJobs();
   FlightJobs(const FlightJobs&) = delete;
@@ -67,9 +71,10 @@ class FlightJobs {
   FlightChanges changes_;
   Report report_;
   mutable std::mutex mutex_;
-  std::condition_variable wanted_;
+  core::ClockCondition wanted_;
   std::deque<Job> jobs_;
   std::string moving_caller_;
+  core::ThreadSeat seat_;
   std::thread thread_;  // last: it uses all of the others
 };
 

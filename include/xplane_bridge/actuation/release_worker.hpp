@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
 
 #include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/core/base/clock.hpp"
+#include "xplane_bridge/core/base/thread_turns.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 
 namespace xplane_bridge {
@@ -17,8 +19,10 @@ namespace xplane_bridge {
 class ReleaseWorker {
  public:
   /// `problem(text)`: the journal cannot be used; called again and again while that lasts.
+  /// @param turns of the thread; null: it runs as it likes
   ReleaseWorker(core::SimulatorPort* link, OverrideManager* overrides,
-                std::function<void(const std::string& text)> problem);
+                std::function<void(const std::string& text)> problem,
+                std::shared_ptr<core::ThreadTurns> turns = nullptr);
   /// stop()
   ~ReleaseWorker();
   ReleaseWorker(const ReleaseWorker&) = delete;
@@ -44,6 +48,8 @@ class ReleaseWorker {
   core::ClockCondition wanted_;
   bool now_ = false;  // without waiting for the end of the period
   bool ends_ = false;
+  const std::shared_ptr<core::ThreadTurns> turns_;
+  std::unique_ptr<core::ThreadSeat> seat_;  // from start() on
   std::thread thread_;
 };
 

@@ -2,12 +2,12 @@
 
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "xplane_bridge/actuation/request_result.hpp"
+#include "xplane_bridge/core/base/thread_turns.hpp"
 #include "xplane_bridge/core/camera/camera_pose.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/simulator/view_ways.hpp"
@@ -47,7 +47,7 @@ class ViewRequests {
 
   core::SimulatorPort* link_;
   Report report_;
-  std::mutex mutex_;
+  core::TurnMutex mutex_;                // held while waiting for X-Plane
   std::map<std::string, float> before_;  // as the first setView() found it
   int view_before_ = 0;
   std::vector<std::string> answered_;  // of core::cameraDatarefs()

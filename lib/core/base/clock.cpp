@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "xplane_bridge/core/base/thread_turns.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -47,10 +49,12 @@ ClockCondition::~ClockCondition() { pthread_cond_destroy(&changed_); }
 
 void ClockCondition::notifyAll() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  ThreadTurns::notify(*this);
   pthread_cond_broadcast(&changed_);
 }
 
 void ClockCondition::beginWait(const Deadline* deadline) {
+  if (ThreadTurns::taken()) return;  // who gives turns looks at the time
   if (ClockWaiters* const waiters = waitersOf(deadline)) {
     const std::lock_guard<std::mutex> lock(waiters->mutex_);
     waiters->waiting_.push_back(this);
@@ -59,6 +63,7 @@ void ClockCondition::beginWait(const Deadline* deadline) {
 
 void ClockCondition::sleep(std::unique_lock<std::mutex>* sleeping, const Deadline* deadline) {
   constexpr double kLongest = 3600.0;  // [s] of one sleep: far below what a time holds
+  if (ThreadTurns::sleep(*this, sleeping, deadline)) return;
   pthread_mutex_t* const mutex = sleeping->mutex()->native_handle();
   if (deadline == nullptr || waitersOf(deadline) != nullptr) {
     if (deadline == nullptr || !deadline->over()) {
@@ -74,7 +79,9 @@ void ClockCondition::sleep(std::unique_lock<std::mutex>* sleeping, const Deadlin
 void ClockCondition::endWait(const Deadline* deadline) {
   if (ClockWaiters* const waiters = waitersOf(deadline)) {
     const std::lock_guard<std::mutex> lock(waiters->mutex_);
-    waiters->waiting_.erase(std::find(waiters->waiting_.begin(), waiters->waiting_.end(), this));
+    auto& waiting = waiters->waiting_;
+    const auto found = std::find(waiting.begin(), waiting.end(), this);
+    if (found != waiting.end()) waiting.erase(found);
   }
 }
 

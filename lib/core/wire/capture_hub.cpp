@@ -198,9 +198,7 @@ void CaptureHub::wait(int timeout_ms) {
       if (!progress_->ended.exchange(true)) turn_->end();
       moveTo(end_ns);
       std::this_thread::sleep_for(kPause);
-      return;
-    }
-    if (record.steady_ns > end_ns) {
+    } else if (record.steady_ns > end_ns) {
       moveTo(end_ns);
       if (clock_.steady() < start_ns_ && clock_.steady() - answered_ns_ >= kEarlyAnswerNs) answerEarly();
     } else {

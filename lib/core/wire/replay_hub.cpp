@@ -154,8 +154,8 @@ void ReplayHub::wait(int timeout_ms) {
   }
   if (!progress_->ended) {
     for (std::vector<std::uint8_t> input; nextInput(&input);) turn_->act(input);
-    turn_->runDue();
   }
+  turn_->runDue();
 }
 
 /// After the last record.

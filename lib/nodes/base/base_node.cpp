@@ -200,7 +200,7 @@ void BaseNode::stop() {
   }
   if (started_) {
     step("end inputs", [this] { endInputs(); });
-    const Deadline deadline(host_clock_, std::chrono::duration<double>(kUndoTime).count());
+    const Deadline deadline(wire_ ? clock_ : host_clock_, std::chrono::duration<double>(kUndoTime).count());
     step("undo in X-Plane", [&] { undo(deadline); });
     step("stop the link", [&] { stopLink(deadline); });
     step("publish the final state", [this] {
@@ -216,6 +216,7 @@ void BaseNode::stop() {
       joinThreads();
     }
     service_spinner_->stop();
+    if (wire_) wire_->endWorkers();
   });
 }
 
@@ -228,8 +229,15 @@ void BaseNode::endInputs() {
   spinner_->stop();
   service_queue_.disable();
   stopInputs();
-  std::unique_lock<std::mutex> lock(service_mutex_);
-  if (!service_idle_.waitUntil(&lock, Deadline(host_clock_, kServiceGrace), [this] { return !service_busy_; })) {
+  std::unique_lock<std::mutex> lock(service_mutex_, std::defer_lock);
+  bool idle = true;
+  if (wire_) {
+    idle = wire_->waitForWorkers(kServiceGrace);
+  } else {
+    lock.lock();
+    idle = service_idle_.waitUntil(&lock, Deadline(host_clock_, kServiceGrace), [this] { return !service_busy_; });
+  }
+  if (!idle) {
     ROS_WARN("a service call is still waiting for X-Plane; stopping without it");
   }
 }

@@ -103,8 +103,10 @@ void BaseNode::stopLink(const Deadline& deadline) {
   if (!link_) {
     return;
   }
-  if (wire_) wire_->holdForStop();
-  if (!link_->stop(std::max(deadline.left(), kShortestLinkStop))) {
+  if (wire_) wire_->leaveOnWake();
+  const bool undone = link_->stop(std::max(deadline.left(), kShortestLinkStop));
+  if (wire_) wire_->free();
+  if (!undone) {
     const std::shared_ptr<core::Journal> journal = link_->journal();
     ROS_WARN("not everything could be undone in X-Plane; the rest is in %s and is undone at the next start",
              journal ? journal->path().c_str() : "no journal");

@@ -1,6 +1,12 @@
 // The part of BaseNode that logs its wire, and plays a log back.
 
 #include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <string>
+#include <system_error>
 #include <utility>
 
 #include "xplane_bridge/core/wire/capture_hub.hpp"
@@ -9,6 +15,7 @@
 #include "xplane_bridge/core/wire/wire_log_hub.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/base/log_to_ros.hpp"
+#include "xplane_bridge/nodes/base/user_folder.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -20,6 +27,7 @@ constexpr const char* kReplayPublished = "wire_replay_published";  // the node h
 constexpr const char* kReplayReceived = "wire_replay_received";    // and the recorder has all of it
 constexpr double kLongestDelivery = 120.0;                         // [s]
 constexpr std::uint64_t kBytesOfMegabyte = 1'000'000;
+const std::string kUserFile = "file ";  // scripts/wire_replay puts it where the node reads it
 
 }  // namespace
 
@@ -73,7 +81,9 @@ void BaseNode::openWire(const ParamLoader& shared, const ParamLoader& own) {
 
 void BaseNode::startWire() {
   if (!wire_) return;
-  if (wire_->replays()) {
+  if (!wire_->replays()) {
+    logUserFiles();
+  } else {
     ROS_INFO("waiting for scripts/wire_replay to record");
     bool go = false;
     while (!go && !stopping()) {
@@ -82,6 +92,22 @@ void BaseNode::startWire() {
     }
   }
   wire_->serve(timers_.get(), [this] { waking_->wake(); });
+}
+
+/// What earlier flights have left for this one, such as the mixing of its surfaces: the first inputs of a log.
+void BaseNode::logUserFiles() {
+  namespace fs = std::filesystem;
+  const fs::path folder = userFolder();
+  std::error_code none;
+  std::set<fs::path> files;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder, none)) {
+    if (entry.is_regular_file(none) && entry.path().extension() == ".yaml") files.insert(entry.path());
+  }
+  for (const fs::path& file : files) {
+    std::ifstream in(file, std::ios::binary);
+    const NodeWire::Bytes bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    wire_->post(kUserFile + file.lexically_relative(folder).string(), bytes, [] {});
+  }
 }
 
 bool BaseNode::replays() const { return wire_ && wire_->replays(); }

@@ -2,30 +2,36 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
+#include <stdexcept>
 #include <utility>
 
 namespace xplane_bridge {
 namespace {
 
 // Of the host: the link's thread takes far less, unless it hangs; then the node's stop must not hang, too.
-constexpr double kLongestHold = 1.0;     // [s]
-constexpr double kLongestReplay = 2.0;   // [s] of what a recording has of a stop
-constexpr double kLongestCall = 5.0;     // [s]
+constexpr double kLongestClose = 1.0;    // [s]
 constexpr const char* kClose = "close";  // no timer and no input from here on
-constexpr const char* kHold = "stop link";
+
+NodeWire::Bytes inputOf(const std::string& name, const NodeWire::Bytes& bytes) {
+  NodeWire::Bytes all(name.begin(), name.end());
+  all.push_back(0);
+  all.insert(all.end(), bytes.begin(), bytes.end());
+  return all;
+}
 
 }  // namespace
 
 NodeWire::NodeWire(core::WireClock clock, core::Clock host, bool replays, std::function<void(const std::string&)> ended)
     : clock_(std::move(clock)), host_(std::move(host)), replays_(replays), ended_(std::move(ended)) {
-  onInput(kClose, [this](core::ByteView) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      closed_ = true;
-    }
-    ended_("the recorded node was stopped here");
-  });
-  onInput(kHold, [this](core::ByteView) { hold(); });
+  onInput(kClose, [this](core::ByteView) { acceptClose("the recorded node was stopped here"); });
+}
+
+NodeWire::~NodeWire() { free(); }
+
+bool NodeWire::closed() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return closed_;
 }
 
 void NodeWire::onInput(const std::string& name, std::function<void(core::ByteView)> act) {
@@ -33,20 +39,17 @@ void NodeWire::onInput(const std::string& name, std::function<void(core::ByteVie
 }
 
 void NodeWire::post(const std::string& name, const Bytes& bytes, std::function<void()> act) {
-  Bytes all(name.begin(), name.end());
-  all.push_back(0);
-  all.insert(all.end(), bytes.begin(), bytes.end());
   std::function<void()> wake;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (closed_ && name != kHold) return;
-    inputs_.push_back({std::move(all), std::move(act)});
+    if (closed_) return;
+    inputs_.push_back({inputOf(name, bytes), std::move(act)});
     wake = wake_;
   }
   if (wake) wake();
 }
 
-bool NodeWire::call(const std::string& name, const Bytes& bytes, std::function<void()> act) {
+void NodeWire::call(const std::string& name, const Bytes& bytes, std::function<void()> act) {
   const auto done = std::make_shared<bool>(false);
   post(name, bytes, [this, act = std::move(act), done] {
     act();
@@ -55,7 +58,59 @@ bool NodeWire::call(const std::string& name, const Bytes& bytes, std::function<v
     changed_.notifyAll();
   });
   std::unique_lock<std::mutex> lock(mutex_);
-  return changed_.waitUntil(&lock, core::Deadline(host_, kLongestCall), [&] { return *done; });
+  changed_.wait(&lock, [&] { return *done || ends_; });
+  if (!*done) throw std::runtime_error("the node ends");
+}
+
+std::size_t NodeWire::addWorker() {
+  workers_.push_back(std::make_unique<TurnWorker>(turns_));
+  return workers_.size() - 1;
+}
+
+void NodeWire::work(std::size_t worker, std::function<void()> act) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++working_;
+  }
+  workers_[worker]->add([this, act = std::move(act)] {
+    try {
+      act();
+    } catch (const std::exception&) {  // callWorker() has kept it; nobody waits for what a recording did
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    --working_;
+    changed_.notifyAll();
+  });
+}
+
+void NodeWire::callWorker(const std::string& name, const Bytes& bytes, std::size_t worker, std::function<void()> act) {
+  struct Outcome {
+    bool known = false;
+    std::exception_ptr error;
+  };
+  const auto outcome = std::make_shared<Outcome>();
+  post(name, bytes, [this, worker, act = std::move(act), outcome] {
+    work(worker, [this, act, outcome] {
+      std::exception_ptr error;
+      try {
+        act();
+      } catch (const std::exception&) {
+        error = std::current_exception();
+      }
+      const std::lock_guard<std::mutex> lock(mutex_);
+      *outcome = {true, error};
+      changed_.notifyAll();
+    });
+  });
+  std::unique_lock<std::mutex> lock(mutex_);
+  changed_.wait(&lock, [&] { return outcome->known || ends_; });
+  if (!outcome->known) throw std::runtime_error("the node ends");
+  if (outcome->error) std::rethrow_exception(outcome->error);
+}
+
+void NodeWire::poll(const std::string& name, std::function<bool()> asks, std::function<void()> act) {
+  onInput(name, [act](core::ByteView) { act(); });
+  polls_.push_back({inputOf(name, {}), std::move(asks), std::move(act)});
 }
 
 void NodeWire::serve(ClockTimers* timers, std::function<void()> wake) {
@@ -66,31 +121,45 @@ void NodeWire::serve(ClockTimers* timers, std::function<void()> wake) {
 }
 
 void NodeWire::close() {
-  if (replays_) return;
-  post(kClose, {}, [this] {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    closed_ = true;
-    changed_.notifyAll();
-  });
+  if (!replays_) post(kClose, {}, [this] { acceptClose(""); });
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.waitUntil(&lock, core::Deadline(host_, kLongestHold), [this] { return closed_; });
+  changed_.waitUntil(&lock, core::Deadline(host_, kLongestClose), [this] { return closed_; });
   closed_ = true;
-}
-
-void NodeWire::holdForStop() {
-  if (!replays_) post(kHold, {}, [this] { hold(); });
-  std::unique_lock<std::mutex> lock(mutex_);
-  changed_.waitUntil(&lock, core::Deadline(host_, replays_ ? kLongestReplay : kLongestHold),
-                     [this] { return holds_ || records_ended_; });
-}
-
-void NodeWire::hold() {
-  std::unique_lock<std::mutex> lock(mutex_);
-  holds_ = true;
-  released_ = false;
+  ends_ = true;
   changed_.notifyAll();
-  changed_.waitUntil(&lock, core::Deadline(host_, replays_ ? kLongestReplay : kLongestHold),
-                     [this] { return released_; });
+  lock.unlock();
+  if (stop_seat_) {
+    stop_seat_->enter();
+  } else {
+    turns_->free();  // the link's thread does not come to it, or there is none
+  }
+}
+
+/// On the link's thread. It waits for the thread that stops the node when it next gives turns.
+void NodeWire::acceptClose(const std::string& why) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (closed_) return;
+    closed_ = true;
+    stop_seat_ = std::make_unique<core::ThreadSeat>(turns_);
+    changed_.notifyAll();
+  }
+  ended_(why);
+}
+
+bool NodeWire::waitForWorkers(double seconds) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  return changed_.waitUntil(&lock, core::Deadline(clock_.clock(), seconds), [this] { return working_ == 0; });
+}
+
+void NodeWire::leaveOnWake() { leaves_on_wake_ = std::this_thread::get_id(); }
+
+void NodeWire::free() {
+  turns_->free();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  closed_ = true;
+  ends_ = true;
+  changed_.notifyAll();
 }
 
 std::int64_t NodeWire::nextDue() {
@@ -104,6 +173,14 @@ bool NodeWire::hasInput() {
 }
 
 bool NodeWire::takeInput(Bytes* input) {
+  if (!closed()) {
+    const auto found = std::find_if(polls_.begin(), polls_.end(), [](const Poll& each) { return each.asks(); });
+    if (found != polls_.end()) {
+      *input = found->name;
+      taken_ = found->act;
+      return true;
+    }
+  }
   const std::lock_guard<std::mutex> lock(mutex_);
   if (inputs_.empty()) return false;
   *input = std::move(inputs_.front().bytes);
@@ -124,29 +201,21 @@ void NodeWire::act(core::ByteView input) {
 }
 
 void NodeWire::runDue() {
+  bool timers = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (closed_ || timers_ == nullptr) return;
+    timers = !closed_ && timers_ != nullptr;
   }
-  timers_->runDue();
+  if (timers) timers_->runDue();
+  turns_->give();
 }
 
 void NodeWire::woken() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    released_ = true;
-  }
-  changed_.notifyAll();
+  if (leaves_on_wake_ != std::this_thread::get_id() || !stop_seat_) return;
+  leaves_on_wake_ = std::thread::id();
+  stop_seat_->leave();
 }
 
-void NodeWire::end() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    records_ended_ = true;
-    closed_ = true;
-  }
-  changed_.notifyAll();
-  ended_("the recording ends here");
-}
+void NodeWire::end() { acceptClose("the recording ends here"); }
 
 }  // namespace xplane_bridge

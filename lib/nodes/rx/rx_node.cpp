@@ -166,7 +166,7 @@ void RxNode::advertise() {
       "set_origin", [this](const auto& request, auto& response) { setOrigin(request, response); });
   advertiseService<GetDataref::Request, GetDataref::Response>(
       "get_dataref", [this](const auto& request, auto& response) { getDataref(request, response); });
-  advertiseService<GetTerrain::Request, GetTerrain::Response>(
+  advertiseApart<GetTerrain::Request, GetTerrain::Response>(
       "get_terrain", [this](const auto& request, auto& response) { getTerrain(request, response); });
   addTimer(kSupervisePeriod, [this] { supervise(); });
   addAllDiagnostics();

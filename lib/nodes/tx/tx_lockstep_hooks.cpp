@@ -147,9 +147,9 @@ void TxNode::serveFreeStep(const LockstepStep::Request& request, LockstepStep::R
   const std::uint64_t before = actuation_->framesFlown();
   const auto flown = [this, before] { return actuation_->framesFlown() - before; };
   std::string why_not = request.frames > 0 ? setRunning(true) : "";
-  while (why_not.empty() && flown() < request.frames && !stopping()) {
+  while (why_not.empty() && flown() < request.frames && !ending()) {
     const std::uint64_t seen = flown();
-    if (!link().waitUntil([&] { return flown() != seen || stopping(); }, kFrameWait)) why_not = "no frame comes";
+    if (!link().waitUntil([&] { return flown() != seen || ending(); }, kFrameWait)) why_not = "no frame comes";
   }
   const std::string not_held = setRunning(false);
   if (why_not.empty()) why_not = not_held;

@@ -28,8 +28,6 @@
 namespace xplane_bridge {
 namespace {
 
-const ros::WallDuration kHeartbeat(0.1);
-
 template <class Response>
 void answer(const RequestResult& result, Response* response) {
   response->result = toMessage(result);
@@ -63,22 +61,17 @@ core::SimLinkCallbacks TxNode::linkCallbacks() {
 }
 
 void TxNode::start() {
-  guardian_.start();
+  if (!replays()) guardian_.start();  // it would write to the X-Plane of the recording
+  options_.actuation.turns = turns();
   actuation_ = std::make_unique<Actuation>(&link(), options_.actuation, hooks());
   actuation_->start();
   lockstep_spinner_->start();
-  if (lockstep()) return;  // a frame may take long: the guardian acts on death only
-  heartbeat_ = handle().createSteadyTimer(kHeartbeat, [this](const ros::SteadyTimerEvent&) { beat(); });
+  startBeating();
 }
 
 void TxNode::tick() {
   beat();
   actuation_->tick();
-}
-
-/// First of all that the control thread does: after a hang nothing may be sent as before.
-void TxNode::beat() {
-  if (!lockstep() && guardian_.beat(options_.hang_timeout)) actuation_->onHang();
 }
 
 void TxNode::onLink(const core::LinkStatus& status) {
@@ -128,7 +121,7 @@ ActuationHooks TxNode::hooks() {
   hooks.event = [this](const ActuationEvent& event) { onEvent(event); };
   hooks.warn = [](const std::string& text) { ROS_WARN("%s", text.c_str()); };
   hooks.journal_problem = [](const std::string& text) { ROS_ERROR_THROTTLE(5.0, "%s", text.c_str()); };
-  hooks.stopping = [this] { return stopping(); };
+  hooks.stopping = [this] { return ending(); };
   return hooks;
 }
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import shutil
 import struct
 import threading
 import xmlrpc.client
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
@@ -29,6 +31,7 @@ class Start(NamedTuple):
     namespace: str  #: of its topics
     shared: Mapping[str, Any]  #: parameters of the namespace
     own: Mapping[str, Any]  #: parameters of the node
+    files: Mapping[str, bytes] = MappingProxyType({})  #: that the node finds in its folder of the user
 
 
 class Message(NamedTuple):
@@ -86,6 +89,12 @@ class WireReplay:
         base = start.namespace.rstrip("/")
         for key, value in start.shared.items():
             master.set_param(f"{base}/{key}", value)
+        folder = master.ros_home / "xplane_bridge"
+        shutil.rmtree(folder, ignore_errors=True)  # what an earlier replay has left
+        for file, content in start.files.items():
+            path = folder / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
         own = {**start.own, "wire_replay": str(self._records.resolve())}
         for key, value in own.items():
             master.set_param(f"{start.node}/{key}", value)

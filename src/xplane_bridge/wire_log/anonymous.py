@@ -10,7 +10,7 @@ from typing import Any, Dict, Iterator, List, Optional, Tuple
 
 from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
 from xplane_bridge.wire_log.datagrams import RAW, USER0, Datagram, datagram_in
-from xplane_bridge.wire_log.own_log import about_of
+from xplane_bridge.wire_log.own_log import USER_FILE, about_of
 
 _BEACON_NAME = 21  #: where the computer's name begins
 _NAME = b"computer"
@@ -39,6 +39,15 @@ class Disguise:
         for old, new in list(self._addresses.items()):
             data = _replaced(data, old.encode(), new.encode())
         return data
+
+    def note(self, data: bytes) -> bytes:
+        """An input; a file's name may hold an address."""
+        name, zero, rest = data.partition(b"\0")
+        if not name.startswith(USER_FILE):
+            return data
+        for old, new in self._addresses.items():
+            name = name.replace(old.encode(), new.encode())
+        return name + zero + rest
 
     def value(self, value: Any, hosts: Dict[str, str]) -> Any:
         """A parameter: addresses and hosts replaced, of paths the last part kept."""
@@ -109,7 +118,7 @@ def anonymised(path: Path) -> Iterator[bytes]:
             if datagram is not None:
                 yield packet._replace(data=_raw(disguise, datagram), comment=packet.comment if about else "")
             elif link_type == USER0 and about is not None:
-                yield packet
+                yield packet._replace(data=disguise.note(packet.data))
 
     return write_pcapng(interfaces, packets(), comment, "xplane_bridge wire_replay --anonymise")
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 import xmlrpc.client
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Set, Tuple
 
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import Capture, CaptureError, Packet
 from xplane_bridge.wire_log.datagrams import USER0, Address, datagram_in
 
+#: Inputs of that name are files.
+USER_FILE = b"file "
 _PART = re.compile(r"_part(\d+)$")
 
 
@@ -161,6 +163,22 @@ def about_of(capture: Capture) -> Optional[Dict[str, Any]]:
         msg = f"{capture.name} has a damaged head: {error}"
         raise CaptureError(msg) from None
     return value if isinstance(value, dict) and "node" in value else None
+
+
+def user_files(log: OwnLog) -> Dict[str, bytes]:
+    """What earlier flights had left for the node, in its folder of the user, by path there."""
+    out: Dict[str, bytes] = {}
+    for event in log.events():
+        name, _, content = event.payload.partition(b"\0")
+        if event.kind == records.INPUT and name.startswith(USER_FILE):
+            path = PurePosixPath(name[len(USER_FILE) :].decode())
+            if path.is_absolute() or ".." in path.parts:
+                msg = f"{log.path} has a file {path}: expected a path in the node's folder"
+                raise CaptureError(msg)
+            out[str(path)] = content
+        elif event.kind == records.RECEIVED:
+            break
+    return out
 
 
 def replayable(log: OwnLog) -> Iterator[bytes]:

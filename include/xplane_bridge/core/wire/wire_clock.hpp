@@ -51,7 +51,7 @@ class WireTurn {
   virtual bool takeInput(std::vector<std::uint8_t>* input) = 0;
   /// Acts on an input.
   virtual void act(ByteView input) = 0;
-  /// Does what is due.
+  /// Does what is due, and lets the node's other threads have their turns.
   virtual void runDue() = 0;
   /// Another thread has asked for the end of wait(). From that thread.
   virtual void woken() = 0;

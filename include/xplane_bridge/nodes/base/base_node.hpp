@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -69,8 +70,9 @@ enum class ExitCode {
 /// and the others follow /clock. Receive times of datagrams stay wallClock()'s.
 ///
 /// With a wire log (`wire_log`, without lock-step), messages, timers and the calls of advertiseInput() are the link's
-/// thread's too, and clock() shows the time of the newest datagram or turn (core::WireClock): what the node does
-/// follows from the log, and `wire_replay` plays that back.
+/// thread's too, and clock() shows the time of the newest datagram or turn (core::WireClock). Services, the node's own
+/// threads and the stop sequence run in turns() then. So what the node does follows from the log, and `wire_replay`
+/// plays that back.
 ///
 /// SIGINT, SIGTERM and SIGHUP are blocked in all threads (see StopSignals): a child process must unblock them.
 class BaseNode {
@@ -188,6 +190,17 @@ class BaseNode {
   const Advertiser& topics() const { return topics_; }
   /// Whether all that the node does is logged, or replayed.
   bool wired() const { return wire_ != nullptr; }
+  /// Whether a log is played to the node.
+  bool replays() const;
+  /// What a thread of the node's own needs that sends datagrams. Null without wired().
+  std::shared_ptr<core::ThreadTurns> turns() const { return wire_ ? wire_->turns() : nullptr; }
+  /// What else is to be asked, with wired(): `asks` before any other input of the link's thread; true: `act` follows,
+  /// and is part of the wire log. From start() at the latest.
+  void pollInput(const std::string& name, std::function<bool()> asks, std::function<void()> act) {
+    wire_->poll(name, std::move(asks), std::move(act));
+  }
+  /// For what waits for X-Plane: whether to give up, because the node is stopping.
+  bool ending() const { return wire_ ? wire_->closed() : stopping(); }
 
   /// Subscribes without Nagle's delay. Use queue size 1 for control topics: the newest command counts.
   template <class Message>
@@ -215,36 +228,42 @@ class BaseNode {
   template <class Request, class Response>
   void advertiseService(const std::string& service, std::function<void(const Request&, Response&)> serve,
                         ros::CallbackQueue* queue = nullptr) {
+    if (wire_) serve = throughWorker<Request, Response>("service " + service, std::move(serve), queue != nullptr);
+    advertiseApart<Request, Response>(service, std::move(serve), queue);
+  }
+
+  /// The same for a service that does not wait, and on which later topics depend: the wire log has it done by the
+  /// link's thread.
+  template <class Request, class Response>
+  void advertiseInput(const std::string& service, std::function<void(const Request&, Response&)> serve) {
+    const std::string input = "service " + service;
+    if (wire_) {
+      wire_->onInput(input, [serve](core::ByteView bytes) {
+        Request request;
+        Response response;
+        fromBytes(bytes, &request);
+        serve(request, response);
+      });
+      serve = [this, serve, input](const Request& request, Response& response) {
+        const auto given = std::make_shared<std::pair<Request, Response>>(request, Response());
+        wire_->call(input, toBytes(request), [serve, given] { serve(given->first, given->second); });
+        response = given->second;
+      };
+    }
+    advertiseApart<Request, Response>(service, std::move(serve));
+  }
+
+  /// The same for a service on which nothing else of the node depends: it is no part of the wire log.
+  template <class Request, class Response>
+  void advertiseApart(const std::string& service, std::function<void(const Request&, Response&)> serve,
+                      ros::CallbackQueue* queue = nullptr) {
+    if (replays()) return;
     ros::AdvertiseServiceOptions options;
     options.init<Request, Response>(service, [this, service, serve](Request& request, Response& response) {
       return guardedService(service, [&] { serve(request, response); });
     });
     options.callback_queue = queue != nullptr ? queue : &service_queue_;
     services_.push_back(handle_.advertiseService(options));
-  }
-
-  /// The same for a service that does not wait, and on which later topics depend: it is part of the wire log.
-  template <class Request, class Response>
-  void advertiseInput(const std::string& service, std::function<void(const Request&, Response&)> serve) {
-    if (!wire_) {
-      advertiseService<Request, Response>(service, std::move(serve));
-      return;
-    }
-    const std::string input = "service " + service;
-    wire_->onInput(input, [serve](core::ByteView bytes) {
-      Request request;
-      Response response;
-      fromBytes(bytes, &request);
-      serve(request, response);
-    });
-    if (wire_->replays()) return;
-    advertiseService<Request, Response>(service, [this, serve, input](const Request& request, Response& response) {
-      const auto given = std::make_shared<std::pair<Request, Response>>(request, Response());
-      if (!wire_->call(input, toBytes(request), [serve, given] { serve(given->first, given->second); })) {
-        throw std::runtime_error("the link's thread does not take it up");
-      }
-      response = given->second;
-    });
   }
 
   /// Calls `callback` every `period` [s] of clock(), on the thread of the subscriptions. From advertise() and
@@ -269,8 +288,8 @@ class BaseNode {
   void stampBySimulator();
   void openWire(const ParamLoader& shared, const ParamLoader& own);
   void startWire();
+  void logUserFiles();
   void reportReplay() const;
-  bool replays() const;
   /// Until who asked for the replay has all that was published.
   void waitForReplayDelivery();
   /// A message's callback that goes through the wire log.
@@ -284,6 +303,27 @@ class BaseNode {
     });
     return [this, input, callback](const boost::shared_ptr<const Message>& message) {
       wire_->post(input, toBytes(*message), [callback, message] { callback(message); });
+    };
+  }
+  /// A service that a worker serves, so that it goes through the wire log and may wait. @param alone it has its own
+  template <class Request, class Response>
+  std::function<void(const Request&, Response&)> throughWorker(const std::string& input,
+                                                               std::function<void(const Request&, Response&)> serve,
+                                                               bool alone) {
+    if (!alone && !service_worker_) service_worker_ = wire_->addWorker();
+    const std::size_t worker = alone ? wire_->addWorker() : *service_worker_;
+    wire_->onInput(input, [this, serve, worker](core::ByteView bytes) {
+      const auto request = std::make_shared<Request>();
+      fromBytes(bytes, request.get());
+      wire_->work(worker, [serve, request] {
+        Response response;
+        serve(*request, response);
+      });
+    });
+    return [this, serve, worker, input](const Request& request, Response& response) {
+      const auto given = std::make_shared<std::pair<Request, Response>>(request, Response());
+      wire_->callWorker(input, toBytes(request), worker, [serve, given] { serve(given->first, given->second); });
+      response = given->second;
     };
   }
   void makeLink();
@@ -319,6 +359,7 @@ class BaseNode {
   std::unique_ptr<ClockTimers> timers_;
 
   std::unique_ptr<NodeWire> wire_;  // null: the wire is neither logged nor replayed, or not in order
+  std::optional<std::size_t> service_worker_;
   const std::shared_ptr<core::ReplayProgress> replayed_ = std::make_shared<core::ReplayProgress>();
   std::unique_ptr<core::DatagramHub> hub_of_link_;  // until there is a link
   core::DatagramHub* waking_ = nullptr;             // the link's

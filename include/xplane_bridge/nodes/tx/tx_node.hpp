@@ -31,6 +31,7 @@ class TxNode : public BaseNode {
   void advertise() override;
   void subscribe() override;
   core::SimLinkCallbacks linkCallbacks() override;
+  bool wireIsOrdered() const override { return true; }
   void start() override;
   void stopInputs() override;
   void undo(const Deadline& deadline) override;
@@ -44,6 +45,7 @@ class TxNode : public BaseNode {
  private:
   ActuationHooks hooks();
   void tick();
+  void startBeating();  // tx_guard.cpp
   void beat();
   void onLink(const core::LinkStatus& status);
   void onEvent(const ActuationEvent& event);

@@ -102,7 +102,7 @@ def start_of(log: OwnLog) -> Start:
         if sent is not None:
             shared["host"] = sent.peer[0]
     shared["listen_for_beacon"] = bool(about.get("shared", {}).get("listen_for_beacon", True))
-    return Start(str(about["program"]), log.node, str(about["namespace"]), shared, own)
+    return Start(str(about["program"]), log.node, str(about["namespace"]), shared, own, own_log.user_files(log))
 
 
 @guarded

@@ -1,0 +1,189 @@
+#include "xplane_bridge/core/base/thread_turns.hpp"
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace xplane_bridge::core {
+namespace {
+
+/// A thread that says what it does, and waits for a word in between.
+class Talker {
+ public:
+  Talker(std::string name, const std::shared_ptr<ThreadTurns>& turns, std::vector<std::string>* said)
+      : seat_(turns), thread_([this, name = std::move(name), said] {
+          const ThreadSeat::Taken taken(&seat_);
+          std::unique_lock<std::mutex> lock(mutex_);
+          for (int heard = 0; !ends_; ++heard) {
+            said->push_back(name + std::to_string(heard));
+            changed_.wait(&lock, [&] { return words_ > heard || ends_; });
+          }
+          said->push_back(name + " ends");
+        }) {}
+  ~Talker() {
+    if (thread_.joinable()) end();
+  }
+  void speak() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++words_;
+    }
+    changed_.notifyAll();
+  }
+  void end() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ends_ = true;
+    }
+    changed_.notifyAll();
+    seat_.letEnd();
+    thread_.join();
+  }
+
+ private:
+  std::mutex mutex_;
+  ClockCondition changed_;
+  int words_ = 0;
+  bool ends_ = false;
+  ThreadSeat seat_;
+  std::thread thread_;
+};
+
+using Said = std::vector<std::string>;
+
+TEST(ThreadTurns, GoByTheSeatsAndNotByWhoIsFirst) {
+  const auto turns = std::make_shared<ThreadTurns>();
+  Said said;
+  Talker a("a", turns, &said);
+  Talker b("b", turns, &said);
+  EXPECT_TRUE(said.empty());  // however fast the threads are
+  turns->give();
+  EXPECT_EQ(said, (Said{"a0", "b0"}));
+  turns->give();
+  EXPECT_EQ(said.size(), 2U) << "nobody had anything to go on with";
+  b.speak();
+  a.speak();
+  EXPECT_EQ(said.size(), 2U) << "nobody had a turn";
+  turns->give();
+  EXPECT_EQ(said, (Said{"a0", "b0", "a1", "b1"}));
+}
+
+TEST(ThreadTurns, AThreadGoesOnOnceItsDeadlineIsOver) {
+  const auto turns = std::make_shared<ThreadTurns>();
+  std::atomic<std::int64_t> now{0};
+  const Clock clock{[&] { return now.load(); }, [&] { return now.load(); }, std::make_shared<ClockWaiters>()};
+  std::atomic<int> passed{0};
+  ThreadSeat seat(turns);
+  std::thread thread([&] {
+    const ThreadSeat::Taken taken(&seat);
+    std::mutex mutex;
+    std::unique_lock<std::mutex> lock(mutex);
+    ClockCondition changed;
+    changed.waitUntil(&lock, Deadline(clock, 1.0), [] { return false; });
+    ++passed;
+  });
+  turns->give();
+  now = 999'999'999;
+  clock.waiters->wakeAll();
+  turns->give();
+  EXPECT_EQ(passed, 0);
+  now = 1'000'000'000;
+  turns->give();
+  EXPECT_EQ(passed, 1);
+  thread.join();
+}
+
+TEST(ThreadTurns, WhoEndsAnotherLetsItHaveItsTurn) {
+  const auto turns = std::make_shared<ThreadTurns>();
+  Said said;
+  Talker a("a", turns, &said);
+  turns->give();
+  ThreadSeat seat(turns);
+  std::thread thread([&] {
+    const ThreadSeat::Taken taken(&seat);
+    said.push_back("stop");
+    a.end();
+    said.push_back("stopped");
+  });
+  turns->give();
+  EXPECT_EQ(said, (Said{"a0", "stop", "a ends", "stopped"}));
+  thread.join();
+}
+
+TEST(ThreadTurns, AMutexHeldWhileWaitingHoldsNobodyUp) {
+  const auto turns = std::make_shared<ThreadTurns>();
+  Said said;
+  TurnMutex mutex;
+  std::atomic<bool> done{false};
+  ClockCondition changed;
+  ThreadSeat first(turns);
+  ThreadSeat second(turns);
+  std::thread waits([&] {
+    const ThreadSeat::Taken taken(&first);
+    const std::lock_guard<TurnMutex> held(mutex);
+    said.push_back("holds");
+    std::mutex own;
+    std::unique_lock<std::mutex> lock(own);
+    changed.wait(&lock, [&] { return done.load(); });
+    said.push_back("gives");
+  });
+  std::thread wants([&] {
+    const ThreadSeat::Taken taken(&second);
+    said.push_back("wants");
+    const std::lock_guard<TurnMutex> held(mutex);
+    said.push_back("has");
+  });
+  turns->give();
+  EXPECT_EQ(said, (Said{"holds", "wants"}));
+  done = true;
+  changed.notifyAll();
+  turns->give();
+  EXPECT_EQ(said, (Said{"holds", "wants", "gives", "has"}));
+  waits.join();
+  wants.join();
+}
+
+TEST(ThreadTurns, FreedThreadsWaitAsAnyOther) {
+  const auto turns = std::make_shared<ThreadTurns>();
+  std::atomic<int> passed{0};
+  std::mutex mutex;
+  ClockCondition changed;
+  int words = 0;
+  ThreadSeat seat(turns);
+  std::thread thread([&] {
+    const ThreadSeat::Taken taken(&seat);
+    std::unique_lock<std::mutex> lock(mutex);
+    changed.wait(&lock, [&] { return words > 0; });
+    ++passed;
+  });
+  turns->give();
+  turns->free();
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++words;
+  }
+  changed.notifyAll();
+  thread.join();
+  EXPECT_EQ(passed, 1);
+  turns->give();  // of nobody
+}
+
+TEST(ThreadTurns, WithoutTurnsASeatDoesNothing) {
+  ThreadSeat seat(nullptr);
+  bool taken = true;
+  std::thread thread([&] {
+    const ThreadSeat::Taken here(&seat);
+    taken = ThreadTurns::taken();
+  });
+  seat.letEnd();
+  thread.join();
+  EXPECT_FALSE(taken);
+}
+
+}  // namespace
+}  // namespace xplane_bridge::core

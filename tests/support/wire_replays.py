@@ -1,0 +1,72 @@
+"""What tests of the wire log share: topics as bytes, and scripts/wire_replay."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from typing import Any, Callable, Sequence
+
+from xplane_bridge.bags.chunks import BagFile
+from xplane_bridge.harness.processes import wait_until
+from xplane_bridge.resources import program
+
+REPLAY_S = 300.0
+
+
+class RawTopics:
+    """The payloads of topics, as a recorder gets them.
+
+    Args:
+        namespace: of the bridge.
+        topics: below it.
+    """
+
+    def __init__(self, namespace: str, topics: Sequence[str]) -> None:
+        import rospy
+
+        self.payloads: dict[str, list[bytes]] = {}
+        self._subscribers = [
+            rospy.Subscriber(f"{namespace}/{topic}", rospy.AnyMsg, self._take, f"{namespace}/{topic}", tcp_nodelay=True)
+            for topic in topics
+        ]
+
+    def _take(self, message: Any, topic: str) -> None:
+        self.payloads.setdefault(topic, []).append(message._buff)
+
+    def wait_for(self, topic: str, message_type: Any, condition: Callable[[Any], bool], timeout: float = 20.0) -> Any:
+        """Waits for a message, from the first one on, that fulfils `condition`, and returns it."""
+        seen = 0
+
+        def look() -> Any:
+            nonlocal seen
+            payloads = self.payloads.get(topic, [])
+            while seen < len(payloads):
+                message = message_type().deserialize(payloads[seen])
+                seen += 1
+                if condition(message):
+                    return message
+            return None
+
+        return wait_until(look, timeout, f"fitting message on {topic}")
+
+    def close(self) -> None:
+        """Hears no more."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+
+def replay(*args: str | Path) -> subprocess.CompletedProcess[str]:
+    """Runs scripts/wire_replay."""
+    return subprocess.run(
+        [str(program("wire_replay")), *map(str, args)], capture_output=True, text=True, timeout=REPLAY_S, check=False
+    )
+
+
+def payloads_in(bag: Path) -> dict[str, list[bytes]]:
+    """All messages of a bag by topic."""
+    file = BagFile(bag)
+    out: dict[str, list[bytes]] = {}
+    for id_, connection in file.connections.items():
+        out[connection.topic] = [each for _, chunk in file.by_chunk(id_) for each in chunk]
+    file.close()
+    return out
