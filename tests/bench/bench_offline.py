@@ -54,6 +54,7 @@ def decode(_: Context) -> List[Measure]:
 @benchmark
 def wire_log(context: Context) -> List[Measure]:
     """What a wire log costs the link's thread for each datagram."""
+    context.folder.mkdir(parents=True, exist_ok=True)
     command = [cpp_program("bench_wire_log"), str(context.folder)]
     ours = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
     return [

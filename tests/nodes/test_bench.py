@@ -40,6 +40,13 @@ def test_benchmarks_of_the_nodes_measure(tmp_path: Path) -> None:
         assert measures[f"capture: 640x480 {grabber}: age at the subscriber, p50"] > 0.0
 
 
+def test_the_benchmark_of_the_wire_log_measures(tmp_path: Path) -> None:
+    """Taking a record costs something, and far less than a datagram's own way."""
+    measures = measured(tmp_path, ["wire_log"])
+    assert 0.0 < measures["wire_log: a datagram, median of batches"] < 1000.0
+    assert measures["wire_log: records left out"] >= 0.0
+
+
 def test_the_benchmark_of_the_environments_measures(tmp_path: Path) -> None:
     """An environment flies the model and more."""
     measures = measured(tmp_path, ["gym"])
