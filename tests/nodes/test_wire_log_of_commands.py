@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import struct
 
 import pytest
 
 from support.tx_fixtures import AUTO, PITCH, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
-from support.wire_replays import RawTopics, payloads_in, replay
+from support.wire_replays import RawTopics, by_number, payloads_in, replay
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.own_log import OwnLog
@@ -153,11 +152,6 @@ def test_the_replay_sends_the_flights_datagrams(flight):
     there, here = (by_number(topics[f"{namespace}/events"]) for topics in (live, replayed))
     assert max(there) == max(here)
     assert {number: there[number] for number in here if number in there} == {n: here[n] for n in here if n in there}
-
-
-def by_number(messages):
-    """Messages by header.seq."""
-    return {struct.unpack_from("<I", message)[0]: message for message in messages}
 
 
 def test_two_replays_are_the_same(flight):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 from pathlib import Path
 from typing import Any, Callable, Sequence
@@ -70,3 +71,8 @@ def payloads_in(bag: Path) -> dict[str, list[bytes]]:
         out[connection.topic] = [each for _, chunk in file.by_chunk(id_) for each in chunk]
     file.close()
     return out
+
+
+def by_number(messages: Sequence[bytes]) -> dict[int, bytes]:
+    """Messages that begin with a header, by header.seq."""
+    return {struct.unpack_from("<I", message)[0]: message for message in messages}
