@@ -17,7 +17,8 @@ import dataclasses
 import json
 import math
 import re
-from typing import TYPE_CHECKING, Any, Iterable, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Iterable, Iterator, NamedTuple, Optional, Sequence
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 
@@ -67,8 +68,8 @@ class _SimClock(NamedTuple):
         return interpolated(stamp, self.stamp, self.sim_time, self.parts)
 
 
-def topic_arrays(bags: Bags, only: Sequence[str] = ()) -> list[TopicArrays]:
-    """Read the topics of a flight.
+def topic_arrays(bags: Bags, only: Sequence[str] = ()) -> Iterator[TopicArrays]:
+    """Read the topics of a flight, one after the other: only one needs to be in memory.
 
     Args:
         bags: Open bags of one flight.
@@ -86,62 +87,95 @@ def topic_arrays(bags: Bags, only: Sequence[str] = ()) -> list[TopicArrays]:
         msg = f"{', '.join(map(str, bags.paths))}: no message that a table can hold; nothing was recorded but pictures"
         raise BagError(msg)
     clock = _sim_clock(bags, bags.topic_of_type(STATE))
-    out: list[TopicArrays] = []
+    taken = ["units", "topics", "about"]
     for topic in chosen:
         if topic in infos and infos[topic].msgtype in (RAW, COMPRESSED):
             msg = f"{topic}: pictures do not go into a table; use --format imagefolder, mcap or ros2"
             raise BagError(msg)
+    for topic in chosen:
         name = topic[len(space) :] if topic.startswith(space + "/") else topic
-        key = _valid_name(name.strip("/"), [other.name for other in out] + ["units", "topics", "about"])
-        out.append(_arrays(key, bags.read(topic), bags.units(topic), clock))
-    return out
+        taken.append(_valid_name(name.strip("/"), taken))
+        yield _arrays(taken[-1], bags.read(topic), bags.units(topic), clock)
 
 
-def counts(topics: Sequence[TopicArrays]) -> dict[str, int]:
-    """Give what the manifest says of such an export."""
-    return {
-        "topics": len(topics),
-        "messages": sum(len(topic.columns["stamp_ns"]) for topic in topics),
-        "columns": sum(len(topic.columns) for topic in topics),
-    }
+class _Written:
+    """What is to be said of the topics that were written."""
+
+    def __init__(self) -> None:
+        self.names: list[tuple[str, str, str]] = []
+        self.units: dict[str, dict[str, str]] = {}
+        self.messages = 0
+        self.columns = 0
+
+    def add(self, topic: TopicArrays) -> None:
+        self.names.append(topic[:3])
+        self.units[topic.name] = topic.units
+        self.messages += len(topic.columns["stamp_ns"])
+        self.columns += len(topic.columns)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """For the manifest."""
+        return {"topics": len(self.names), "messages": self.messages, "columns": self.columns}
 
 
-def write_npz(topics: Sequence[TopicArrays], path: Path) -> None:
-    """Write ``<topic>/<column>`` arrays, then ``topics`` (name, topic, type), ``units`` (key, unit) and ``about``."""
-    arrays: dict[str, Any] = {
-        f"{topic.name}/{name}": values for topic in topics for name, values in topic.columns.items()
-    }
-    units = [(f"{topic.name}/{name}", unit) for topic in topics for name, unit in topic.units.items()]
-    arrays["topics"] = _texts([topic[:3] for topic in topics])
-    arrays["units"] = _texts(units)
-    arrays["about"] = np.array(_about())
-    with path.open("wb") as file:
-        np.savez_compressed(file, **arrays)
+def write_npz(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
+    """Write ``<topic>/<column>`` arrays, then ``topics`` (name, topic, type), ``units`` (key, unit) and ``about``.
+
+    Returns:
+        What the manifest says of it.
+    """
+    written = _Written()
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+
+        def add(name: str, values: np.ndarray) -> None:
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, values, allow_pickle=False)
+
+        for topic in topics:
+            written.add(topic)
+            for name, values in topic.columns.items():
+                add(f"{topic.name}/{name}", values)
+        units = [
+            (f"{topic}/{name}", unit) for topic, of_topic in written.units.items() for name, unit in of_topic.items()
+        ]
+        add("topics", _texts(written.names))
+        add("units", _texts(units))
+        add("about", np.array(_about()))
+    return written.counts
 
 
-def write_mat(topics: Sequence[TopicArrays], path: Path) -> None:
+def write_mat(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
     """Write a struct for each topic, a struct ``units`` of the same shape, ``topics`` and ``about``.
+
+    Returns:
+        What the manifest says of it.
 
     Raises:
         BagError: A topic is too large for the file format.
     """
     from scipy.io import savemat
 
-    content: dict[str, Any] = {}
-    for topic in topics:
-        size = sum(_mat_bytes(values) for values in topic.columns.values())
-        if size >= _MAT_LIMIT:
-            msg = f"{topic.topic}: {size} bytes are too many for a .mat file (limit {_MAT_LIMIT}); use --format npz"
-            raise BagError(msg)
-        content[topic.name] = {name: _cells(values) for name, values in topic.columns.items()}
-    content["units"] = {topic.name: topic.units for topic in topics}
-    content["topics"] = _cells(_texts([topic[:3] for topic in topics]))
-    content["about"] = _about()
-    with path.open("wb") as file:
-        savemat(file, content, long_field_names=True, oned_as="column", do_compression=True)
+    written = _Written()
+    with path.open("w+b") as file:
+
+        def add(name: str, value: Any) -> None:  # SciPy begins a file only at its start
+            savemat(file, {name: value}, long_field_names=True, oned_as="column", do_compression=True)
+
+        for topic in topics:
+            written.add(topic)
+            size = sum(_mat_bytes(values) for values in topic.columns.values())
+            if size >= _MAT_LIMIT:
+                msg = f"{topic.topic}: {size} bytes are too many for a .mat file (limit {_MAT_LIMIT}); use --format npz"
+                raise BagError(msg)
+            add(topic.name, {name: _cells(values) for name, values in topic.columns.items()})
+        add("units", written.units)
+        add("topics", _cells(_texts(written.names)))
+        add("about", _about())
         # SciPy puts the date there; the same flight is to give the same bytes.
         file.seek(0)
         file.write(f"MATLAB 5.0 MAT-file, {_about()}".ljust(116).encode("ascii"))
+    return written.counts
 
 
 def _about() -> str:

@@ -115,17 +115,13 @@ def _lard(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 def _npz(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import arrays
 
-    topics = arrays.topic_arrays(bags, job.topics)
-    arrays.write_npz(topics, path)
-    return arrays.counts(topics)
+    return arrays.write_npz(arrays.topic_arrays(bags, job.topics), path)
 
 
 def _mat(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import arrays
 
-    topics = arrays.topic_arrays(bags, job.topics)
-    arrays.write_mat(topics, path)
-    return arrays.counts(topics)
+    return arrays.write_mat(arrays.topic_arrays(bags, job.topics), path)
 
 
 def _mcap(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
