@@ -300,7 +300,6 @@ void SimLink::removeGroup(const RrefDelivery* delivery) {
                                 [delivery](const Group& each) { return each.delivery.get() == delivery; });
   if (old != groups_.end()) {
     stopGroup(*old);
-    hub_->ignore(*old->source);  // it may live on for requests that are still to be sent
     groups_.erase(old);
     subscriptions_changed_ = true;
   }
@@ -308,6 +307,7 @@ void SimLink::removeGroup(const RrefDelivery* delivery) {
 
 void SimLink::stopGroup(const Group& group) {
   retired_udp_ += group.source->counters();
+  hub_->ignore(*group.source);  // it may live on for requests that are still to be sent
   if (!monitor_.alive()) {
     return;  // X-Plane has forgotten us, or will find no program on that port
   }
