@@ -62,28 +62,41 @@ void LockstepBarrier::answerForAll(const std::string& reader, std::int64_t stamp
   take(find(reader), stamp_ns, true);
 }
 
-std::vector<std::string> LockstepBarrier::missingLocked() const {
-  std::vector<std::string> out;
+bool LockstepBarrier::isMissing(std::size_t participant) const {
+  const bool spared = participant != kReader && (for_all_ || number_ == 0);
+  return !spared && answered_.count(participant) == 0;
+}
+
+bool LockstepBarrier::answeredLocked() const {
+  if (!open_) return false;
   for (std::size_t i = 0; i < names_.size(); ++i) {
-    const bool spared = i != kReader && (for_all_ || number_ == 0);
-    if (!spared && answered_.count(i) == 0) out.push_back(names_[i]);
+    if (isMissing(i)) return false;
   }
-  return out;
+  return true;
 }
 
 std::vector<std::string> LockstepBarrier::missing() const {
   const Lock lock(mutex_);
-  return missingLocked();
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < names_.size(); ++i) {
+    if (isMissing(i)) out.push_back(names_[i]);
+  }
+  return out;
 }
 
 bool LockstepBarrier::complete() const {
   const Lock lock(mutex_);
-  return open_ && granted_ > 0 && missingLocked().empty();
+  return granted_ > 0 && answeredLocked();
 }
 
 bool LockstepBarrier::holds() const {
   const Lock lock(mutex_);
-  return open_ && granted_ == 0 && missingLocked().empty();
+  return granted_ == 0 && answeredLocked();
+}
+
+bool LockstepBarrier::answered() const {
+  const Lock lock(mutex_);
+  return answeredLocked();
 }
 
 void LockstepBarrier::close() {

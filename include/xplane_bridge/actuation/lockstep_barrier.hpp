@@ -40,6 +40,8 @@ class LockstepBarrier {
   void run();
   /// Whether the present frame is answered, and held.
   bool holds() const;
+  /// Whether the present frame is answered: complete() or holds().
+  bool answered() const;
   /// Who has not answered the present frame, as named.
   std::vector<std::string> missing() const;
   std::uint32_t number() const;
@@ -51,7 +53,8 @@ class LockstepBarrier {
 
   std::size_t find(const std::string& who) const;
   void take(std::size_t participant, std::int64_t stamp_ns, bool for_all);
-  std::vector<std::string> missingLocked() const;
+  bool isMissing(std::size_t participant) const;
+  bool answeredLocked() const;
 
   struct Early {
     std::int64_t stamp_ns;

@@ -39,6 +39,8 @@ class Object {
   }
 
   PyObject* get() const { return object_; }
+  /// Gives the reference to the caller.
+  PyObject* release() { return std::exchange(object_, nullptr); }
 
  private:
   PyObject* object_ = nullptr;
@@ -104,8 +106,9 @@ PyCFunction method(Function* function) {
   return reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(function));
 }
 
-/// The types of the module; each is added by its own file.
+/// What is in the module; each is added by its own file.
 void addArbiter(PyObject* module);
+void addDatagrams(PyObject* module);
 void addTwinLoop(PyObject* module);
 
 }  // namespace xplane_bridge::bindings

@@ -193,6 +193,31 @@ void LockstepHub::take(Source* source) {
 
 void LockstepHub::collect(int timeout_ms) {
   inner_->wait(timeout_ms);
+  takeAll();
+}
+
+/// Waits for one source whose fence is missing: the same each time while that is the last to come, so that a frame
+/// wakes the thread once and not with each of its datagrams.
+void LockstepHub::collectFrame(int timeout_ms) {
+  const std::vector<std::shared_ptr<Source>> all = sources();
+  std::shared_ptr<Source> awaited;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const std::shared_ptr<Source>& source : all) {
+      const bool missing = source->fenced && (!source->seen || source->newest.number != frame_.number + 1);
+      if (missing && (!awaited || source.get() == awaited_)) awaited = source;
+    }
+  }
+  awaited_ = awaited.get();
+  if (awaited) {
+    inner_->waitFor(*awaited->inner, timeout_ms);
+  } else {
+    inner_->wait(timeout_ms);
+  }
+  takeAll();
+}
+
+void LockstepHub::takeAll() {
   for (const std::shared_ptr<Source>& source : sources()) {
     if (inner_->hasInput(*source->inner)) take(source.get());
   }
@@ -319,7 +344,7 @@ bool LockstepHub::advance(int timeout_ms) {
     case Stage::kCollecting:
       break;
   }
-  if (!frameIsComplete()) collect(timeout_ms);
+  if (!frameIsComplete()) collectFrame(timeout_ms);
   if (!frameIsComplete()) {
     askAgain();
     return false;

@@ -1,9 +1,11 @@
 #include "xplane_bridge/core/wire/udp_hub.hpp"
 
+#include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -74,6 +76,12 @@ void UdpHub::wait(int timeout_ms) {
     std::uint64_t woken = 0;
     [[maybe_unused]] const ssize_t size = ::read(wake_fd_, &woken, sizeof(woken));
   }
+}
+
+void UdpHub::waitFor(const DatagramSource& source, int timeout_ms) {
+  std::array<pollfd, 2> ends{pollfd{wake_fd_, POLLIN, 0}, pollfd{fdOf(source), POLLIN, 0}};
+  poll(ends.data(), ends.size(), timeout_ms);  // interrupted: whatever there is
+  wait(0);
 }
 
 bool UdpHub::hasInput(const DatagramSource& source) const { return isReady(&source); }

@@ -44,7 +44,9 @@ void TxLockstep::stop() {
     const Lock lock(mutex_);
     stopped_ = true;
   }
-  changed_.notifyAll();
+  opened_.notifyAll();
+  held_.notifyAll();
+  ended_.notifyAll();
   if (watchdog_.joinable()) watchdog_.join();
 }
 
@@ -54,7 +56,7 @@ void TxLockstep::takeCommand(const std::string& who, const ros::Time& stamp, int
     commands_.push_back({barrier_.rank(who), topic, nanoseconds(stamp), std::move(carry_out)});
   }
   barrier_.answer(who, nanoseconds(stamp));
-  wake_();
+  wakeIfAnswered();
 }
 
 void TxLockstep::takeRequest(const ros::Time& stamp, Action carry_out) {
@@ -68,7 +70,11 @@ void TxLockstep::takeDone(const std::string& who, const ros::Time& stamp, const 
   } else {
     barrier_.answer(who, nanoseconds(stamp));
   }
-  wake_();
+  wakeIfAnswered();
+}
+
+void TxLockstep::wakeIfAnswered() {
+  if (barrier_.answered()) wake_();
 }
 
 void TxLockstep::open(const core::LockstepFrame& frame, const ros::Time& stamp) {
@@ -83,12 +89,16 @@ void TxLockstep::open(const core::LockstepFrame& frame, const ros::Time& stamp) 
 
 bool TxLockstep::ready() {
   const bool complete = barrier_.complete();
+  bool opened = false;
   {
     const Lock lock(mutex_);
     // Frame 0 is never closed: once it is answered, what is asked for is of the first frame.
-    handled_ = !complete || barrier_.number() > 0;
+    const bool handled = !complete || barrier_.number() > 0;
+    opened = handled && !handled_;
+    handled_ = handled;
   }
-  changed_.notifyAll();
+  if (opened) opened_.notifyAll();
+  if (barrier_.holds()) held_.notifyAll();
   return complete;
 }
 
@@ -137,12 +147,12 @@ void TxLockstep::run() {
 
 void TxLockstep::waitUntilOpen() {
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(&lock, [this] { return stopped_ || handled_; });
+  opened_.wait(&lock, [this] { return stopped_ || handled_; });
 }
 
 bool TxLockstep::waitUntilHeld() {
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(&lock, [this] { return stopped_ || barrier_.holds(); });
+  held_.wait(&lock, [this] { return stopped_ || barrier_.holds(); });
   return !stopped_;
 }
 
@@ -160,7 +170,7 @@ std::string TxLockstep::whatIsMissing() const {
 
 void TxLockstep::watch() {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (!changed_.waitUntil(&lock, core::Deadline(host_, kWatchPeriod), [this] { return stopped_; })) {
+  while (!ended_.waitUntil(&lock, core::Deadline(host_, kWatchPeriod), [this] { return stopped_; })) {
     if (barrier_.holds()) progress_ns_ = host_.steady_ns();
     const double silence = core::toSeconds(host_.steady_ns() - progress_ns_);
     if (silence < options_.watchdog) continue;

@@ -11,6 +11,7 @@ import argparse
 import math
 from typing import Any, Dict, Mapping, Optional, Sequence
 
+from xplane_bridge import lockstep
 from xplane_bridge.cli.bridge.flown_law import FlownLaw
 from xplane_bridge.cli.entry import guarded, number, ros_arguments, start_node
 from xplane_bridge.topics import NAMESPACE
@@ -125,8 +126,9 @@ class _Stick:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
     args = parser().parse_args(ros_arguments(argv))
-    start_node("attitude_hold")
+    namespace = args.namespace.rstrip("/")
+    start_node("attitude_hold", **lockstep.node_options(namespace))
     hold = AttitudeHold({name: getattr(args, name) for name in ("roll", "heading", "pitch", "altitude", "speed")})
     aircraft = [] if args.any_aircraft else [AIRCRAFT]
-    FlownLaw(_Stick(hold), "attitude_hold", args.namespace.rstrip("/"), aircraft, _REMEDY, _NEEDED).run(args.engage)
+    FlownLaw(_Stick(hold), "attitude_hold", namespace, aircraft, _REMEDY, _NEEDED).run(args.engage)
     return 0

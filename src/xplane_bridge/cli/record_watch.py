@@ -6,6 +6,7 @@ import argparse
 import time
 from typing import Any, Optional, Sequence
 
+from xplane_bridge import lockstep
 from xplane_bridge.cli.bridge.waiting import Listener, Patience, link_text
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.topics import NAMESPACE
@@ -50,6 +51,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     from xplane_bridge.msg import FlightState, LinkState
 
     namespace = args.namespace.rstrip("/")
+    if lockstep.is_on(namespace):
+        return 0  # who keeps a frame waiting is tx_node's to say, and a listener to each frame slows the flight down
     link = Listener(f"{namespace}/link_state", LinkState)
     states = Listener(f"{namespace}/flight_state", FlightState)
     patience = Patience(

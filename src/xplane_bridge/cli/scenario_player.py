@@ -64,8 +64,8 @@ def play(
         if file.suffix != ".yaml":
             file = config_file("joysticks", f"{args.joy_config}.yaml")
         stick = load_stick(file, args.stick_mode)
-    start_node(node, argv=None if argv is None else list(argv))
     namespace = args.namespace.rstrip("/")
+    start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
     remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"
     aircraft = LoadedAircraft(namespace, node, scenario.aircraft, remedy, lambda text: player.fail(text))
     kwargs: Dict[str, Any] = {"stick": stick, "log": log, "say": lambda text: print(text, flush=True)}

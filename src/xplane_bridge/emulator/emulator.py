@@ -188,7 +188,7 @@ class Emulator:
             return None
         if request.rate_hz > _HIGHEST_RATE_HZ and "rate-above-99" in self.options.otherwise:
             return "rate"
-        slot = self.sim.store.slot(request.path)
+        slot = self.sim.store.find(request.path)
         if slot is None:
             if self.options.unknown_datarefs == "omit":
                 return "dataref"
@@ -250,7 +250,14 @@ class Emulator:
     def _send(self, now: float) -> None:
         sim = self.sim
         self.server.send_frame(
-            now, self.period, sim.rows, sim.store.values, sim.selected_rows, sim.data_rate, self._rpos_packet
+            now,
+            self.period,
+            sim.rows,
+            sim.store.values,
+            sim.selected_rows,
+            sim.data_rate,
+            self._rpos_packet,
+            sim.table.plan,
         )
 
     def _reads_a_load(self, server: Server) -> bool:

@@ -13,13 +13,15 @@ import math
 import re
 import select
 import time
-from typing import Callable, Dict, Optional
+from typing import Callable, Dict, Optional, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.emulator.wire.server import Server
 from xplane_bridge.emulator.wire.subscriptions import Address
 
 FENCE = "xplane_bridge/lockstep"
+#: Of a client: its index and the element.
+Pairs = Tuple[Tuple[int, int], ...]
 _ELEMENT = re.compile(re.escape(FENCE) + r"(?:\[([0-2])\])?")
 _MICROSECONDS = 1_000_000
 #: Longest wait without looking whether to stop [s].
@@ -66,9 +68,14 @@ class Fences:
         """
         microseconds = round(sim_time * _MICROSECONDS)
         values = (float(frame), float(microseconds // _MICROSECONDS), float(microseconds % _MICROSECONDS))
+        packets: Dict[Pairs, bytes] = {}  # mostly one: clients ask for the elements alike
+        datagrams = []
         for client, indices in self._clients.items():
-            pairs = [(index, values[element]) for index, element in indices.items()]
-            server.send(now, protocol.encode_rref_response(pairs), client)
+            key = tuple(indices.items())
+            if key not in packets:
+                packets[key] = protocol.encode_rref_response([(index, values[element]) for index, element in key])
+            datagrams.append((packets[key], client))
+        server.send_all(now, datagrams)
 
 
 class LockstepLoop:

@@ -140,7 +140,7 @@ def fly(
         )
         stack.enter_context(bridge)
         flight = RunningFlight(emulator, master, bridge)
-        stack.enter_context(_StateListener(flight))
+        stack.enter_context(_StateListener(flight, plan.lockstep is not None))
         if plan.lockstep is None:
             _wait_for_state(flight)
         else:
@@ -224,7 +224,7 @@ def _fly_in_lockstep(plan: FlightPlan, lockstep: Lockstep, flight: RunningFlight
     run.begin()
     while not run.over and not _is_over(plan, flight):
         flight.bridge.check_running()
-        flight.elapsed = flight.states / lockstep.fps
+        flight.elapsed = flight.last.sim_time if flight.last is not None else 0.0
         observer(flight)
         time.sleep(0.1)
     return run.end(plan.player)
@@ -242,21 +242,27 @@ def _is_over(plan: FlightPlan, flight: RunningFlight) -> bool:
 
 
 class _StateListener:
-    """Counts flight states. rospy is imported and used only here, in the program's one ROS node."""
+    """Counts flight states. rospy is imported and used only here, in the program's one ROS node.
 
-    def __init__(self, flight: RunningFlight) -> None:
+    In lock-step, where each listener to every frame slows the flight down, the states of mission/sim.
+    """
+
+    def __init__(self, flight: RunningFlight, in_lockstep: bool) -> None:
         self._flight = flight
+        self._in_lockstep = in_lockstep
         self._subscriber: Any = None
 
     def __enter__(self) -> _StateListener:
         self._flight.master.use_here()
         import rospy
 
-        from xplane_bridge.msg import FlightState
+        from xplane_bridge.msg import FlightState, SimStatus
 
         if not rospy.core.is_initialized():
-            rospy.init_node("xplane_bridge_observer", anonymous=True, disable_signals=True, disable_rosout=True)
-        self._subscriber = rospy.Subscriber(f"{NAMESPACE}/flight_state", FlightState, self._received, tcp_nodelay=True)
+            options = {"anonymous": True, "disable_signals": True, "disable_rosout": True}
+            rospy.init_node("xplane_bridge_observer", disable_rostime=self._in_lockstep, **options)
+        topic, message = ("mission/sim", SimStatus) if self._in_lockstep else ("flight_state", FlightState)
+        self._subscriber = rospy.Subscriber(f"{NAMESPACE}/{topic}", message, self._received, tcp_nodelay=True)
         return self
 
     def _received(self, state: Any) -> None:

@@ -15,7 +15,7 @@ import yaml
 from xplane_bridge.constants import COMMAND_FIELDS, ControlField
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.harness.ros import MasterInUse, RosMaster, roslaunch
-from xplane_bridge.lockstep import Participant
+from xplane_bridge.lockstep import Participant, advertise
 from xplane_bridge.resources import config_file
 
 _START_S, _ANSWER_S = 60.0, 60.0
@@ -72,7 +72,7 @@ class LockstepBridge:
             return answers.get()
 
         topic = f"/{name}/control/auto"
-        publisher = rospy.Publisher(topic, ControlCommand, queue_size=10, latch=True, tcp_nodelay=True)
+        publisher = advertise(topic, ControlCommand)
         self._participant = Participant(answer, publisher, f"/{name}")
         self._publisher = publisher
         self._bridge = roslaunch(

@@ -18,6 +18,6 @@ class RunningFlight:
     master: RosMaster
     bridge: ManagedProcess
     elapsed: float = 0.0  #: [s] of flight recorded so far
-    states: int = 0  #: flight states received so far
+    states: int = 0  #: flight states received so far; in lock-step those of mission/sim
     programs: Dict[str, ManagedProcess] = field(default_factory=dict)
-    last: Any = None  #: the newest xplane_bridge/FlightState
+    last: Any = None  #: the newest of them

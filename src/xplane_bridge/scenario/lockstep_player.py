@@ -6,7 +6,8 @@ import threading
 from collections import deque
 from typing import Any, Callable, Deque, Optional, Tuple
 
-from xplane_bridge.lockstep import PUBLISHER, ModeInStep, Participant, TopicInStep
+from xplane_bridge import lockstep
+from xplane_bridge.lockstep import ModeInStep, Participant, TopicInStep
 from xplane_bridge.scenario.player import Action
 from xplane_bridge.scenario.ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
 from xplane_bridge.scenario.schema import ScenarioError
@@ -39,8 +40,8 @@ class LockstepPlayer(RosPlayer):
         self._sees_mode = self._stick is not None or "mode" in variables
         self._sees_stall = "stall_warning" in variables
 
-    def _advertise(self, **options: Any) -> Any:
-        return super()._advertise(**{**PUBLISHER, **options})
+    def _publisher(self, topic: str, message_type: Any) -> Any:
+        return lockstep.advertise(topic, message_type)
 
     def _play(self, publisher: Any) -> None:
         import rospy

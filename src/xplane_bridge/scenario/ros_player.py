@@ -144,23 +144,28 @@ class RosPlayer:
         if not self._finished.is_set():
             raise ScenarioError(f"{self._player.scenario.name}: ended by ROS after {self._clock.now:.1f} s")
 
-    def _advertise(self, **options: Any) -> Any:
-        """Gives the publisher of stick or commands; `options` are for it."""
+    def _advertise(self) -> Any:
+        """Gives the publisher of stick or commands."""
         import rospy
         from sensor_msgs.msg import Joy
         from std_msgs.msg import String
 
         from xplane_bridge.msg import ControlCommand, ModeRequest, TrafficCommand
 
-        options = {"queue_size": 1, "tcp_nodelay": True, **options}
         topic = self._namespace + "/"
         self._label_publisher = rospy.Publisher(topic + "scenario/label", String, queue_size=10, latch=True)
         self._mode_publisher = rospy.Publisher(topic + "control/mode_request", ModeRequest, queue_size=10)
         if any(kind == "traffic" for event in self._player.scenario.events for kind, _ in event.actions):
             self._traffic_publisher = rospy.Publisher(topic + "traffic/command", TrafficCommand, queue_size=1)
         if self._stick is None:
-            return rospy.Publisher(topic + "control/manual", ControlCommand, **options)
-        return rospy.Publisher(topic + "joy", Joy, **options)
+            return self._publisher(topic + "control/manual", ControlCommand)
+        return self._publisher(topic + "joy", Joy)
+
+    def _publisher(self, topic: str, message_type: Any) -> Any:
+        """A publisher of stick or commands."""
+        import rospy
+
+        return rospy.Publisher(topic, message_type, queue_size=1, tcp_nodelay=True)
 
     def _play(self, publisher: Any) -> None:
         import rospy

@@ -26,6 +26,19 @@ TEST_F(LockstepBarrierTest, WaitsForAllParticipantsAndNamesThoseMissing) {
   EXPECT_TRUE(barrier_.complete());
 }
 
+TEST_F(LockstepBarrierTest, IsAnsweredWhenAllHaveAnsweredWhetherItIsHeldOrNot) {
+  barrier_.step(0);
+  for (const char* who : {"/xplane/rx_node", "/xplane/controller"}) barrier_.answer(who, kT1);
+  EXPECT_FALSE(barrier_.answered());
+  barrier_.answer("/other/player", kT1);
+  EXPECT_TRUE(barrier_.answered());
+  EXPECT_TRUE(barrier_.holds());
+  barrier_.run();
+  EXPECT_TRUE(barrier_.answered());
+  barrier_.close();
+  EXPECT_FALSE(barrier_.answered());
+}
+
 TEST_F(LockstepBarrierTest, TakesAFullNameAsItIsAndAShortOneInAnyNamespace) {
   for (const char* who : {"/xplane/rx_node", "/my_controller", "/player", "/another/other/player", "/controller/x"}) {
     barrier_.answer(who, kT1);

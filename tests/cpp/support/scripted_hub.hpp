@@ -44,6 +44,7 @@ class ScriptedHub : public DatagramHub {
     bool refuses = false;       // to send
     std::uint64_t dropped = 0;  // as the kernel counts it, of each source
     std::vector<std::string> opened;
+    std::vector<std::string> awaited;  // of waitFor()
 
     Clock clock() {
       return {[this] { return now_ns; }, [this] { return now_ns + kSystemMinusSteady; }};
@@ -75,6 +76,10 @@ class ScriptedHub : public DatagramHub {
       }
       arrivals.pop_front();
     }
+  }
+  void waitFor(const DatagramSource& source, int timeout_ms) override {
+    wire_->awaited.push_back(static_cast<const Source&>(source).name);
+    wait(timeout_ms);
   }
   bool hasInput(const DatagramSource& source) const override {
     const auto& scripted = static_cast<const Source&>(source);

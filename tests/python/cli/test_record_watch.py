@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from xplane_bridge.cli import record_watch
 from xplane_bridge.cli.record_watch import StateWatch
 
 
@@ -36,3 +37,10 @@ def test_it_waits_while_nothing_new_comes_and_takes_a_warning_back() -> None:
     watch.look(second)
     assert patience.calls[4:] == ["restart", "forget", "look"]
     assert said == ["flight states are recorded now"]
+
+
+def test_in_lockstep_it_leaves_the_watching_to_tx_node(monkeypatch) -> None:
+    """There every frame would wake it; tx_node names the node that keeps a frame waiting."""
+    monkeypatch.setattr(record_watch, "start_node", lambda *_args, **_options: None)
+    monkeypatch.setattr(record_watch.lockstep, "is_on", lambda namespace: namespace == "/there")
+    assert record_watch.main(["--namespace", "/there/"]) == 0

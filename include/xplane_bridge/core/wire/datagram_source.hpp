@@ -108,6 +108,12 @@ class DatagramHub {
   virtual void ignore(const DatagramSource& source) = 0;
   /// Waits up to `timeout_ms` until a source has a datagram.
   virtual void wait(int timeout_ms) = 0;
+  /// The same for who can go on only once this source has one: what comes to others may not end the waiting, but is
+  /// found with it.
+  virtual void waitFor(const DatagramSource& source, int timeout_ms) {
+    static_cast<void>(source);
+    wait(timeout_ms);
+  }
   /// Whether the last wait() found a datagram there.
   virtual bool hasInput(const DatagramSource& source) const = 0;
 };

@@ -57,6 +57,8 @@ class LockstepHub : public DatagramHub {
   void askForFence(Source* source);
   void askAgain();
   void collect(int timeout_ms);
+  void collectFrame(int timeout_ms);
+  void takeAll();
   void take(Source* source);
   bool frameIsComplete() const;
   void handOut(bool whole_frame);
@@ -80,6 +82,7 @@ class LockstepHub : public DatagramHub {
   LockstepFrame frame_;
   std::uint32_t released_frame_ = 0;  // newest one let go after release()
   std::int64_t asked_ns_ = 0;         // [ns] of the host's steady clock
+  const Source* awaited_ = nullptr;   // whose fence was missing last; compared only
   std::vector<std::uint8_t> buffer_;
 };
 

@@ -23,6 +23,7 @@ class UdpHub : public DatagramHub {
   void wake() override;
   void ignore(const DatagramSource& source) override;
   void wait(int timeout_ms) override;
+  void waitFor(const DatagramSource& source, int timeout_ms) override;
   bool hasInput(const DatagramSource& source) const override;
 
  private:

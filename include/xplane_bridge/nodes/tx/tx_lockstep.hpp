@@ -81,6 +81,8 @@ class TxLockstep {
     Action carry_out;
   };
 
+  /// Lets the link's thread look, if there is something to see: an answer that is not the last one does not wake it.
+  void wakeIfAnswered();
   void progress();
   void watch();
   std::string whatIsMissing() const;
@@ -92,7 +94,10 @@ class TxLockstep {
   LockstepBarrier barrier_;
 
   mutable std::mutex mutex_;  // guards the following
-  core::ClockCondition changed_;
+  // Each for who waits for that: a frame is answered several times, and a thread that is woken for nothing costs time.
+  core::ClockCondition opened_;
+  core::ClockCondition held_;
+  core::ClockCondition ended_;
   std::vector<Command> commands_;
   std::vector<Request> requests_;
   std::int64_t stamp_ns_;

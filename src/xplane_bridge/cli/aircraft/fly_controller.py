@@ -10,6 +10,7 @@ from typing import Any, Dict, List, Optional, Sequence
 
 import yaml
 
+from xplane_bridge import lockstep
 from xplane_bridge.campaign.definition import find_controller
 from xplane_bridge.cli.bridge.flown_law import FlownLaw, Law
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
@@ -81,6 +82,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     sys.path.append(os.getcwd())
     law = made(args.controller, arguments_of(args.arguments))
     wanted = [] if args.any_aircraft else aircraft_of(args.controller)
-    start_node("fly_controller")
-    FlownLaw(law, "fly_controller", args.namespace.rstrip("/"), wanted).run(args.engage)
+    namespace = args.namespace.rstrip("/")
+    start_node("fly_controller", **lockstep.node_options(namespace))
+    FlownLaw(law, "fly_controller", namespace, wanted).run(args.engage)
     return 0

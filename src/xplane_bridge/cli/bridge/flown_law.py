@@ -76,8 +76,6 @@ class FlownLaw:
 
     def _take_part(self, engage: bool) -> None:
         """Answers every frame of lock-step from now on."""
-        import rospy
-
         from xplane_bridge.msg import ControlCommand
 
         modes = lockstep.ModeInStep(self._namespace)
@@ -97,7 +95,7 @@ class FlownLaw:
                     self._refuse(str(error))
             return self.command(state)
 
-        publisher = rospy.Publisher(self._topic, ControlCommand, **lockstep.PUBLISHER)
+        publisher = lockstep.advertise(self._topic, ControlCommand)
         lockstep.Participant(answer, publisher, self._namespace)
 
     def _fly(self, engage: bool) -> None:

@@ -195,16 +195,21 @@ class DatarefStore:
     # --- the clients' side --------------------------------------------------------------------------------------------
 
     def slot(self, path: str) -> Optional[int]:
-        """The slot behind a client's path (`name` or `name[i]`); None if X-Plane would not know it.
+        """The slot behind a client's path (`name` or `name[i]`), computed from now on; see `find`."""
+        slot = self.find(path)
+        if slot is not None:
+            self.watch((slot,))
+        return slot
+
+    def find(self, path: str) -> Optional[int]:
+        """The slot behind a client's path, for who sees to its computing; None if X-Plane would not know it.
 
         An array without an index means its first element; the first element of a scalar is the scalar.
         """
         found = self._resolve(path)
         if found is None or not found[0].visible:
             return None
-        slot = int(found[0].slots[found[1]])
-        self.watch((slot,))
-        return slot
+        return int(found[0].slots[found[1]])
 
     def write(self, path: str, value: float) -> bool:
         """A client's DREF. Non-finite values are dropped (X-Plane's behaviour on them is unknown).

@@ -59,9 +59,12 @@ class Traffic:
         self._store = store
         self._placeable, self._written = "other-aircraft" not in otherwise, "other-written" not in otherwise
         self._pending: Dict[int, Dict[str, float]] = {}
+        self._shown: Dict[int, Tuple[object, ...]] = {}  # of each: what its datarefs show; gone where one was written
         for number in range(1, MOST + 1):
             for leaf in WRITTEN:
                 store.on_write(PLANE.format(number) + leaf, partial(self._remember, number, leaf))
+            for leaf in (*WRITTEN, *GEODETIC):
+                store.on_write(PLANE.format(number) + leaf, partial(self._forget, number))
 
     def start(self, count: int, initial: InitialState) -> None:
         """`count` aircraft that the emulator flies, ahead of where a flight starts; with none, one is parked there."""
@@ -119,6 +122,9 @@ class Traffic:
     def _remember(self, number: int, leaf: str, _index: int, value: float) -> None:
         self._pending.setdefault(number, {})[leaf] = value
 
+    def _forget(self, number: int, _index: int, _value: float) -> None:
+        self._shown.pop(number, None)
+
     def _move(self, number: int, written: Dict[str, float], frame: Frame) -> None:
         now = self._in_scenery(self.aircraft[number], frame) if number in self.aircraft else dict.fromkeys(WRITTEN, 0.0)
         new = {**now, **written}
@@ -143,6 +149,10 @@ class Traffic:
     def _show(self, frame: Frame) -> None:
         store = self._store
         for number, other in self.aircraft.items():
+            shown = (*vars(other).values(), frame.local.lat_ref, frame.local.lon_ref)
+            if self._shown.get(number) == shown:
+                continue  # most often it is parked
+            self._shown[number] = shown
             plane = PLANE.format(number)
             for leaf, value in self._in_scenery(other, frame).items():
                 store.values[store.locate(plane + leaf)] = value

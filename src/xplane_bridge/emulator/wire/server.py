@@ -12,14 +12,14 @@ import logging
 import socket
 import struct
 from collections import Counter
-from typing import Any, Callable, Dict, Optional, Tuple
+from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
-from xplane_bridge import protocol
+from xplane_bridge import compiled, protocol
 from xplane_bridge.emulator.datarefs.data_rows import DataRows
 from xplane_bridge.emulator.wire.faults import FaultyChannel
-from xplane_bridge.emulator.wire.subscriptions import Address, Pacer, Subscriptions
+from xplane_bridge.emulator.wire.subscriptions import Address, Datagram, Pacer, Planner, Subscriptions
 
 _LOG = logging.getLogger(__name__)
 
@@ -136,6 +136,7 @@ class Server:
         selected: Callable[[], np.ndarray],
         data_rate: int,
         position: Callable[[], bytes],
+        plan: Planner,
     ) -> None:
         """Sends what is due in this frame: DATA, RREF, RPOS.
 
@@ -147,6 +148,7 @@ class Server:
             selected: Gives the rows selected for the network.
             data_rate: DATA datagrams a second, at most one a frame.
             position: Gives the RPOS datagram.
+            plan: Gives what computes slots, where they are not computed in each frame.
         """
         if self.data_target is not None and data_rate > 0:
             if self._data_pacer is None or data_rate != self._data_rate:
@@ -155,14 +157,23 @@ class Server:
                 packet = rows.packet(selected())
                 if packet:
                     self.send(now, packet, self.data_target, self._data_socket)
-        for client, subscriptions in self.subscriptions.rref.items():
-            for packet in subscriptions.datagrams(now, frame_period, values, self.subscriptions.split):
-                self.send(now, packet, client)
+        datagrams = self.subscriptions.datagrams(now, frame_period, values, plan)
         due = [client for client, pacer in self.subscriptions.rpos.items() if pacer.due(now, frame_period)]
         if due:
             packet = position()
-            for client in due:
-                self.send(now, packet, client)
+            datagrams += [(packet, client) for client in due]
+        self.send_all(now, datagrams)
+
+    def send_all(self, now: float, datagrams: Sequence[Datagram]) -> None:
+        """Sends datagrams in their order, through the faults if there are any."""
+        send = getattr(compiled.core, "send_datagrams", None)
+        if send is None or self._channel.active or self._answer_from is not None:
+            for packet, target in datagrams:
+                self.send(now, packet, target)
+        elif datagrams:
+            refused = send(self._socket.fileno(), datagrams)
+            if refused:
+                self.ignored["send"] += refused
 
     def send(self, now: float, packet: bytes, target: Address, source: Optional[socket.socket] = None) -> None:
         """Sends one datagram, through the faults if there are any."""

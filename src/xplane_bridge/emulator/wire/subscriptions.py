@@ -6,16 +6,23 @@ of up to 183 pairs, or fewer with `split`.
 
 from __future__ import annotations
 
-from typing import Dict, Iterator, List, Tuple
+import itertools
+from typing import Callable, Dict, Iterable, Iterator, List, Tuple
 
 import numpy as np
 
 from xplane_bridge.protocol import FIFTH_BYTE, RREF_MAX_PAIRS
 
 Address = Tuple[str, int]
+Rates = Tuple[int, ...]
+
+Datagram = Tuple[bytes, Address]
+Planner = Callable[[Iterable[int]], Callable[[], None]]
 
 #: A due time may lie this part of a frame ahead and still belong to this frame.
 _EARLY = 0.01
+#: Of plans that are kept: combinations of rates that are due together.
+_MOST_PLANS = 256
 _PAIR = np.dtype([("index", "<i4"), ("value", "<f4")])
 
 
@@ -60,7 +67,7 @@ class RrefClient:
         self._replaces = replaces
         self._groups: Dict[int, _Group] = {}
         self._rates: Dict[int, int] = {}  # client's index -> rate
-        self._gathers: Dict[Tuple[int, ...], Tuple[np.ndarray, np.ndarray]] = {}
+        self._gathers: Dict[Rates, Tuple[np.ndarray, np.ndarray]] = {}
 
     def __len__(self) -> int:
         return len(self._rates)
@@ -90,11 +97,16 @@ class RrefClient:
         for group in self._groups.values():
             group.pacer.restart()
 
-    def datagrams(self, now: float, frame_period: float, values: np.ndarray, split: int) -> Iterator[bytes]:
-        """What is due in this frame."""
-        due = tuple(rate for rate, group in self._groups.items() if group.pacer.due(now, frame_period))
-        if not due:
-            return
+    def due(self, now: float, frame_period: float) -> Rates:
+        """The rates that are due in this frame; to be asked once a frame."""
+        return tuple(rate for rate, group in self._groups.items() if group.pacer.due(now, frame_period))
+
+    def slots(self, due: Rates) -> Iterable[int]:
+        """What is sent at these rates."""
+        return itertools.chain.from_iterable(self._groups[rate].slots.values() for rate in due)
+
+    def datagrams(self, due: Rates, values: np.ndarray, split: int) -> Iterator[bytes]:
+        """What is sent at these rates."""
         gather = self._gathers.get(due)
         if gather is None:
             gather = self._gather(due)
@@ -106,7 +118,7 @@ class RrefClient:
         for start in range(0, len(pairs), split):
             yield header + pairs[start : start + split].tobytes()
 
-    def _gather(self, rates: Tuple[int, ...]) -> Tuple[np.ndarray, np.ndarray]:
+    def _gather(self, rates: Rates) -> Tuple[np.ndarray, np.ndarray]:
         items: List[Tuple[int, int]] = []
         for rate in rates:
             items += self._groups[rate].slots.items()
@@ -123,16 +135,19 @@ class Subscriptions:
         self._replaces = replaces
         self.rref: Dict[Address, RrefClient] = {}
         self.rpos: Dict[Address, Pacer] = {}
+        self._plans: Dict[Tuple[Tuple[Address, Rates], ...], Callable[[], None]] = {}
 
     def request_rref(self, client: Address, index: int, rate_hz: int, slot: int) -> None:
         """A client subscribes to a slot."""
         self.rref.setdefault(client, RrefClient(self._replaces)).subscribe(index, rate_hz, slot)
+        self._plans.clear()
 
     def stop_rref(self, client: Address, index: int) -> None:
         """A client ends a subscription."""
         subscriptions = self.rref.get(client)
         if subscriptions is not None:
             subscriptions.unsubscribe(index)
+            self._plans.clear()
             if not len(subscriptions):
                 del self.rref[client]
 
@@ -142,6 +157,30 @@ class Subscriptions:
             self.rpos[client] = Pacer(rate_hz)
         else:
             self.rpos.pop(client, None)
+
+    def datagrams(self, now: float, frame_period: float, values: np.ndarray, plan: Planner) -> List[Datagram]:
+        """RREF datagrams that are due in this frame; to be asked once a frame.
+
+        Args:
+            now: Time of the frame [s].
+            frame_period: Time between frames [s].
+            values: The store's values.
+            plan: Gives what computes slots, where they are not computed in each frame.
+        """
+        asked = ((client, each.due(now, frame_period)) for client, each in self.rref.items())
+        due = tuple((client, rates) for client, rates in asked if rates)
+        compute = self._plans.get(due)
+        if compute is None:
+            if len(self._plans) >= _MOST_PLANS:
+                self._plans.clear()
+            slots = itertools.chain.from_iterable(self.rref[client].slots(rates) for client, rates in due)
+            compute = self._plans[due] = plan(slots)
+        compute()
+        return [
+            (packet, client)
+            for client, rates in due
+            for packet in self.rref[client].datagrams(rates, values, self.split)
+        ]
 
     def restart_pacers(self) -> None:
         """Everything is due in the next frame, and from then on at its rate."""
@@ -161,3 +200,4 @@ class Subscriptions:
         """What a restart of X-Plane does."""
         self.rref.clear()
         self.rpos.clear()
+        self._plans.clear()

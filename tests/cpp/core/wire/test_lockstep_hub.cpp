@@ -130,6 +130,22 @@ TEST_F(LockstepHubTest, HandsOutAFrameWhenAllSourcesShowItsFenceAndGoesThroughIt
   EXPECT_EQ(steps(6), " close2 end2");
 }
 
+TEST_F(LockstepHubTest, WaitsForTheSourceWhoseFenceCameLast) {
+  takeOff();
+  fence("a", 2.0F);
+  steps(2);  // the one that comes first shows that the other is the last
+  fence("b", 2.0F);
+  steps(6);
+  wire_->awaited.clear();
+  for (const float frame : {3.0F, 4.0F}) {
+    fence("a", frame);
+    fence("b", frame);
+    steps(6);
+  }
+  ASSERT_FALSE(wire_->awaited.empty());
+  for (const std::string& source : wire_->awaited) EXPECT_EQ(source, "b");
+}
+
 TEST_F(LockstepHubTest, WaitsForTheAnswersAfterTheFrameWasHandled) {
   takeOff();
   ready_ = false;

@@ -54,6 +54,26 @@ TEST_F(UdpHubTest, IgnoredSourcesMayStillSend) {
   EXPECT_TRUE(hub_.hasInput(*first));
 }
 
+TEST_F(UdpHubTest, WaitsForOneSourceAndFindsTheOthersWithIt) {
+  const auto first = open();
+  const auto second = open();
+  send(first.get(), *first);
+  hub_.waitFor(*second, 50);
+  EXPECT_TRUE(hub_.hasInput(*first)) << "found, when the time is over";
+  EXPECT_FALSE(hub_.hasInput(*second));
+  send(first.get(), *second);
+  hub_.waitFor(*second, 600'000);  // would last ten minutes
+  EXPECT_TRUE(hub_.hasInput(*first));
+  EXPECT_TRUE(hub_.hasInput(*second));
+}
+
+TEST_F(UdpHubTest, WakeEndsTheWaitForOneSource) {
+  const auto source = open();
+  hub_.wake();
+  hub_.waitFor(*source, 600'000);  // would last ten minutes
+  EXPECT_FALSE(hub_.hasInput(*source));
+}
+
 TEST_F(UdpHubTest, WakeEndsTheNextWaitOnce) {
   hub_.wake();
   hub_.wake();

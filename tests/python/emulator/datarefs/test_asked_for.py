@@ -59,6 +59,40 @@ def test_clients_see_the_same_as_if_everything_was_computed(version: str, load_t
     np.testing.assert_array_equal(lazy.store.values, eager.store.values)
 
 
+@pytest.mark.parametrize("version", ["11.55", "12.10"])
+def test_what_is_sent_now_and_then_is_as_if_it_was_computed_in_each_frame(version: str) -> None:
+    sometimes, eager = simulator(version, False), simulator(version, True)
+    chance = random.Random(8)
+    names = sorted(sometimes.store.names())
+    slots = [sometimes.store.find(name) for name in names]
+    groups = [chance.sample(slots, 300) for _ in range(4)]
+    plans = [sometimes.table.plan(group) for group in groups]
+    for frame in range(60):
+        if frame % 7 == 0:
+            written = chance.choice(names)
+            for sim in (sometimes, eager):
+                sim.on_dref(DrefWrite(written, 0.25))
+        for sim in (sometimes, eager):
+            sim.step(1 / 60)
+        for index in chance.sample(range(4), chance.randint(0, 2)):
+            plans[index]()
+            mine, other = (sim.store.values[groups[index]] for sim in (sometimes, eager))
+            np.testing.assert_array_equal(mine, other, err_msg=f"frame {frame}")
+
+
+def test_a_plan_computes_its_slots_when_it_is_called() -> None:
+    sim = simulator("11.55", False)
+    calls: List[int] = []
+    sim.table.value("_emulator/counted", lambda f: calls.append(f.clocks.frame) or 7.0)
+    compute = sim.table.plan([sim.store.locate("_emulator/counted")])
+    for _ in range(3):
+        sim.step(1 / 60)
+    assert calls == []
+    compute()
+    assert calls == [3]
+    assert sim.store.values[sim.store.locate("_emulator/counted")] == 7.0
+
+
 def test_what_no_client_asks_for_is_not_computed() -> None:
     sim = simulator("11.55", False)
     calls: List[int] = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Callable, List, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -28,7 +28,8 @@ class Table:
     `value` and `array` define datarefs that the simulator computes each frame; `setting` defines those that keep what
     was written last. Types, sizes and access are X-Plane's, and so is whether clients of this version see the name
     (`DatarefStore`). A dataref is not computed before it is asked for; from then on it is, in the order of
-    definition, and has the value of the present frame at once.
+    definition, and has the value of the present frame at once. What is sent to clients now and then is computed when
+    it is sent (`plan`): values follow from the frame alone, so a client sees no difference.
     """
 
     def __init__(self, store: DatarefStore) -> None:
@@ -38,6 +39,7 @@ class Table:
         self._always: List[_Computed] = []
         self._scalar_slots: Optional[np.ndarray] = None
         self._defined = 0
+        self._idle: Dict[int, Tuple[_Computed, List[_Computed]]] = {}  # what is not computed yet, by slot; and its kind
         self._published: Optional[Tuple[Frame, bool]] = None
 
     def value(self, name: str, source: Callable[[Frame], Number], always: bool = False) -> None:
@@ -81,12 +83,41 @@ class Table:
         for computed in tuple(self._arrays):
             self._fill(computed, frame)
 
+    def plan(self, slots: Iterable[int]) -> Callable[[], None]:
+        """What brings those of the slots that are not computed in each frame up to the frame published last."""
+        idle = (self._idle[slot] for slot in slots if slot in self._idle)
+        found = {computed.place: (computed, kind) for computed, kind in idle}
+        ordered = [found[place] for place in sorted(found)]
+        scalars = [computed for computed, kind in ordered if kind is self._scalars]
+        always = [computed for computed, kind in ordered if kind is self._always]
+        arrays = [computed for computed, kind in ordered if kind is self._arrays]
+        scalar_slots = np.array([computed.slots[0] for computed in scalars], dtype=int)
+
+        def compute() -> None:
+            if self._published is None:
+                return
+            frame, flight_loaded = self._published
+            values = self.store.values
+            for computed in always:
+                values[computed.slots[0]] = computed.source(frame)
+            if not flight_loaded:
+                return
+            if scalars:
+                values[scalar_slots] = [computed.source(frame) for computed in scalars]
+            for computed in arrays:
+                self._fill(computed, frame)
+
+        return compute
+
     def _define(self, slots: np.ndarray, source: Callable[[Frame], Any], kind: List[_Computed]) -> None:
         computed = _Computed(self._defined, slots, source)
         self._defined += 1
+        self._idle.update((int(slot), (computed, kind)) for slot in slots)
         self.store.defer(slots, lambda: self._begin(computed, kind))
 
     def _begin(self, computed: _Computed, kind: List[_Computed]) -> None:
+        for slot in computed.slots:
+            self._idle.pop(int(slot), None)
         kind.append(computed)
         kind.sort(key=lambda other: other.place)
         if kind is self._scalars:
