@@ -8,8 +8,8 @@ from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel
 
 #: Channels of one number, and what of `Controls` they are.
 ATTRIBUTES = {
-    "roll": "roll", "pitch": "pitch", "yaw": "yaw", "trim_roll": "roll_trim", "trim_pitch": "pitch_trim",
-    "trim_yaw": "yaw_trim", "flaps": "flap_request", "speedbrake": "speed_brake", "parking_brake": "parking_brake",
+    "roll": "roll", "pitch": "pitch", "yaw": "yaw", "trim_roll": "trim_roll", "trim_pitch": "trim_pitch",
+    "trim_yaw": "trim_yaw", "flaps": "flap_request", "speedbrake": "speedbrake", "parking_brake": "parking_brake",
     "left_brake": "brake_left", "right_brake": "brake_right", "thrust_vector": "thrust_vector",
 }  # fmt: skip
 

@@ -11,7 +11,7 @@ from xplane_bridge.scenario import Action, FlightSample, Player, Scenario, Scena
 from xplane_bridge.scenario.world import KINDS as WORLD_KINDS
 
 _FAILURES = "sim/operation/failures/"
-_TRIMS = {"roll_trim": "aileron_trim", "pitch_trim": "elevator_trim", "yaw_trim": "rudder_trim"}
+_TRIMS = {"trim_roll": "aileron_trim", "trim_pitch": "elevator_trim", "trim_yaw": "rudder_trim"}
 _FAILED, _REPAIRED = 6.0, 0.0
 #: Failures of systems by their plain names; {} is the number counted from 0.
 _SYSTEMS = {
@@ -55,7 +55,7 @@ class ScenarioPilot:
             throttle=commands.throttle,
             flaps=handles.get("flaps"),
             gear_down=handles["gear"] >= 0.5 if "gear" in handles else None,
-            speed_brake=handles.get("speed_brake"),
+            speedbrake=handles.get("speedbrake"),
             thrust_vector=handles.get("thrust_vector"),
             brakes=handles.get("brakes"),
             datarefs=tuple(writes),

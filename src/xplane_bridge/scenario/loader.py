@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Callable, Collection, Dict, List, Mapping, Optional, Sequence, Tuple, Union
@@ -18,6 +19,7 @@ from xplane_bridge.scenario.schema import (
     HANDLES,
     HOLDS,
     MODES,
+    OLD_HANDLES,
     STICK_AXES,
     VARIABLES,
     Condition,
@@ -234,6 +236,10 @@ def _hold(item: Any, path: str) -> Dict[str, Optional[float]]:
 
 
 def _handles(item: Any, path: str) -> Dict[str, float]:
+    if isinstance(item, dict):
+        for key in OLD_HANDLES.keys() & item.keys():
+            warnings.warn(f"{path}.{key}: is now called {OLD_HANDLES[key]}", FutureWarning, stacklevel=2)
+        item = {OLD_HANDLES.get(key, key): value for key, value in item.items()}
     return _ranged(item, path, HANDLES, some=True)
 
 

@@ -20,12 +20,19 @@ STICK_AXES: Dict[str, Tuple[float, float]] = {name: _range(name) for name in ("r
 HANDLE_FIELDS: Dict[str, Tuple[str, ...]] = {
     "flaps": ("flaps",),
     "gear": ("gear",),
-    "speed_brake": ("speedbrake",),
+    "speedbrake": ("speedbrake",),
     "thrust_vector": ("thrust_vector",),
     "brakes": ("left_brake", "right_brake"),
-    "roll_trim": ("trim_roll",),
-    "pitch_trim": ("trim_pitch",),
-    "yaw_trim": ("trim_yaw",),
+    "trim_roll": ("trim_roll",),
+    "trim_pitch": ("trim_pitch",),
+    "trim_yaw": ("trim_yaw",),
+}
+#: Earlier names of handles, still accepted.
+OLD_HANDLES: Dict[str, str] = {
+    "speed_brake": "speedbrake",
+    "roll_trim": "trim_roll",
+    "pitch_trim": "trim_pitch",
+    "yaw_trim": "trim_yaw",
 }
 #: Handles and their ranges; gear: 1 down.
 HANDLES: Dict[str, Tuple[float, float]] = {handle: _range(fields[0]) for handle, fields in HANDLE_FIELDS.items()}

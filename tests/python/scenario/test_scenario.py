@@ -203,6 +203,14 @@ def test_stick_moves_at_once_or_over_a_time():
     assert steps[4.0].throttle == 1.0
 
 
+def test_handles_have_the_names_of_the_command_and_old_names_still_work():
+    old = {"speed_brake": 0.5, "roll_trim": 0.1, "pitch_trim": -0.2, "yaw_trim": 0.3}
+    new = {"speedbrake": 0.5, "trim_roll": 0.1, "trim_pitch": -0.2, "trim_yaw": 0.3}
+    with pytest.warns(FutureWarning, match="handles.speed_brake: is now called speedbrake"):
+        accepted = parse_scenario({"name": "s", "events": [{"at": 0, "handles": old}]})
+    assert accepted == parse_scenario({"name": "s", "events": [{"at": 0, "handles": new}]})
+
+
 def test_buttons_hat_and_handles():
     player = Player(
         scenario(

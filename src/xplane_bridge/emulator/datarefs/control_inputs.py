@@ -73,7 +73,7 @@ class PilotCommands:
     throttle: Optional[float] = None  #: all levers, 0..1
     flaps: Optional[float] = None
     gear_down: Optional[bool] = None
-    speed_brake: Optional[float] = None
+    speedbrake: Optional[float] = None
     thrust_vector: Optional[float] = None
     brakes: Optional[float] = None
     datarefs: Tuple[Tuple[str, float], ...] = ()  #: to write once
@@ -153,11 +153,11 @@ class ControlInputs:
             slots = self._store.dataref(_ACTUATORS + name).slots[:engines]
             self._store.values[slots] = values[:engines]
         for name, value in (
-            (_COCKPIT + "elevator_trim", controls.pitch_trim),
-            (_COCKPIT + "aileron_trim", controls.roll_trim),
-            (_COCKPIT + "rudder_trim", controls.yaw_trim),
+            (_COCKPIT + "elevator_trim", controls.trim_pitch),
+            (_COCKPIT + "aileron_trim", controls.trim_roll),
+            (_COCKPIT + "rudder_trim", controls.trim_yaw),
             (_COCKPIT + "flap_ratio", controls.flap_request),
-            (_COCKPIT + "speedbrake_ratio", controls.speed_brake),
+            (_COCKPIT + "speedbrake_ratio", controls.speedbrake),
             (_COCKPIT + "gear_handle_down", float(controls.gear_down)),
             (_COCKPIT + "parking_brake_ratio", controls.parking_brake),
             (_COCKPIT + "thrust_vector_ratio", controls.thrust_vector),
@@ -260,7 +260,7 @@ class ControlInputs:
         for name, value in (
             ("flap_ratio", commands.flaps),
             ("gear_handle_down", commands.gear_down),
-            ("speedbrake_ratio", commands.speed_brake),
+            ("speedbrake_ratio", commands.speedbrake),
             ("thrust_vector_ratio", commands.thrust_vector),
             ("parking_brake_ratio", commands.brakes),
         ):
@@ -269,11 +269,11 @@ class ControlInputs:
 
     def _read_handles(self, controls: Controls) -> None:
         store = self._store
-        controls.pitch_trim = _clip(store.get(_COCKPIT + "elevator_trim"), -1.0, 1.0)
-        controls.roll_trim = _clip(store.get(_COCKPIT + "aileron_trim"), -1.0, 1.0)
-        controls.yaw_trim = _clip(store.get(_COCKPIT + "rudder_trim"), -1.0, 1.0)
+        controls.trim_pitch = _clip(store.get(_COCKPIT + "elevator_trim"), -1.0, 1.0)
+        controls.trim_roll = _clip(store.get(_COCKPIT + "aileron_trim"), -1.0, 1.0)
+        controls.trim_yaw = _clip(store.get(_COCKPIT + "rudder_trim"), -1.0, 1.0)
         controls.flap_request = _clip(store.get(_COCKPIT + "flap_ratio"), 0.0, 1.0)
-        controls.speed_brake = _clip(store.get(_COCKPIT + "speedbrake_ratio"), -0.5, 1.0)
+        controls.speedbrake = _clip(store.get(_COCKPIT + "speedbrake_ratio"), -0.5, 1.0)
         controls.gear_down = store.get(_COCKPIT + "gear_handle_down") != 0.0
         controls.parking_brake = _clip(store.get(_COCKPIT + "parking_brake_ratio"), 0.0, 1.0)
         for side, slot in (("left", 2), ("right", 3)):

@@ -60,7 +60,7 @@ class FailureEffects:
         self._freeze(controls, "roll", lock or bool(failed & {"rel_ail_L_jam", "rel_ail_R_jam"}))
         self._freeze(controls, "pitch", lock or bool(failed & {"rel_elv_L_jam", "rel_elv_R_jam"}))
         self._freeze(controls, "yaw", lock or bool(failed & {"rel_rud_L_jam", "rel_rud_R_jam"}))
-        for attribute, leaf in (("roll_trim", "ail"), ("pitch_trim", "elv"), ("yaw_trim", "rud")):
+        for attribute, leaf in (("trim_roll", "ail"), ("trim_pitch", "elv"), ("trim_yaw", "rud")):
             if f"rel_{leaf}_trim_run" in failed:
                 value = self._frozen.setdefault(attribute, getattr(controls, attribute)) + _TRIM_RUNAWAY_PER_S * dt
                 self._frozen[attribute] = min(value, 1.0)

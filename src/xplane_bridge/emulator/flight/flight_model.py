@@ -35,7 +35,7 @@ class SurfaceKind(enum.Enum):
     ELEVATOR = "elevator"
     RUDDER = "rudder"
     FLAP = "flap"
-    SPEED_BRAKE = "speed_brake"
+    SPEED_BRAKE = "speedbrake"
 
 
 class Side(enum.Enum):
@@ -97,11 +97,11 @@ class Controls:
     throttle: list[float] = field(default_factory=lambda: [0.0] * MAX_ENGINES)  #: levers, 0..1
     propeller: list[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = highest speed)
     mixture: list[float] = field(default_factory=lambda: [1.0] * MAX_ENGINES)  #: levers, 0..1 (1 = rich)
-    roll_trim: float = 0.0  #: -1..1
-    pitch_trim: float = 0.0
-    yaw_trim: float = 0.0
+    trim_roll: float = 0.0  #: -1..1
+    trim_pitch: float = 0.0
+    trim_yaw: float = 0.0
     flap_request: float = 0.0  #: handle, 0..1
-    speed_brake: float = 0.0  #: handle, -0.5 (armed) .. 1
+    speedbrake: float = 0.0  #: handle, -0.5 (armed) .. 1
     gear_down: bool = True
     brake_left: float = 0.0  #: 0..1
     brake_right: float = 0.0

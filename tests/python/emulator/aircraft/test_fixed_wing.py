@@ -272,10 +272,10 @@ def test_brakes_hold_one_wheel_and_a_dive_into_the_ground_is_a_crash(twin):
 
 def test_flaps_and_speed_brake_move_at_their_pace(twin):
     controls = twin.reset(InitialState(airspeed_mps=50.0))
-    controls.flap_request, controls.speed_brake = 1.0, 1.0
+    controls.flap_request, controls.speedbrake = 1.0, 1.0
     state = fly(twin, controls, 3.0)
     assert state.flap_ratio == pytest.approx(0.5, abs=0.01)  # 7 deg/s of 42 deg
     assert state.speed_brake_ratio == pytest.approx(1.0)
     assert state.drag_n > 1800.0
-    controls.speed_brake = -0.5  # armed: stowed
+    controls.speedbrake = -0.5  # armed: stowed
     assert fly(twin, controls, 2.0).speed_brake_ratio == 0.0

@@ -54,9 +54,9 @@ def test_the_twin_moves_its_surfaces_by_the_shipped_law() -> None:
     chance = random.Random(7)
     reached = {name: [0.0, 0.0] for name in law["surfaces"]}
     for _ in range(40):
-        for name in ("roll", "pitch", "yaw", "roll_trim", "pitch_trim", "yaw_trim"):
+        for name in ("roll", "pitch", "yaw", "trim_roll", "trim_pitch", "trim_yaw"):
             setattr(controls, name, chance.uniform(-1.0, 1.0))
-        controls.flap_request, controls.speed_brake = chance.random(), chance.random()
+        controls.flap_request, controls.speedbrake = chance.random(), chance.random()
         for _ in range(360):  # flaps take six seconds
             model.step(FRAME_S, controls)
         values = terms(model.state)

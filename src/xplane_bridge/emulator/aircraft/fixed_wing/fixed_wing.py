@@ -161,13 +161,13 @@ class FixedWing(JsbsimModel):
 
     def _mix(self, controls: Controls) -> Sequence[float]:
         """Where the controls want the surfaces, in the order of ``surfaces`` [deg]."""
-        roll = min(max(controls.roll + ROLL_TRIM * controls.roll_trim, -1.0), 1.0)
-        pitch = min(max(controls.pitch + PITCH_TRIM * controls.pitch_trim, -1.0), 1.0)
-        yaw = min(max(controls.yaw + YAW_TRIM * controls.yaw_trim, -1.0), 1.0)
+        roll = min(max(controls.roll + ROLL_TRIM * controls.trim_roll, -1.0), 1.0)
+        pitch = min(max(controls.pitch + PITCH_TRIM * controls.trim_pitch, -1.0), 1.0)
+        yaw = min(max(controls.yaw + YAW_TRIM * controls.trim_yaw, -1.0), 1.0)
         self._commands = (roll, pitch, yaw)
         elevator = asymmetric(-pitch, ELEVATOR_UP_DEG, ELEVATOR_DOWN_DEG)
         flap = FLAP_DEG * controls.flap_request
-        brake = SPEED_BRAKE_DEG * controls.speed_brake
+        brake = SPEED_BRAKE_DEG * controls.speedbrake
         return (
             asymmetric(roll, AILERON_UP_DEG, AILERON_DOWN_DEG),
             asymmetric(-roll, AILERON_UP_DEG, AILERON_DOWN_DEG),
@@ -259,8 +259,8 @@ class FixedWing(JsbsimModel):
             self._rotors[i].omega = ENGINE.rated_rpm * math.pi / 30.0
 
         def fly(x: np.ndarray) -> Sequence[float]:
-            theta, pitch_trim, throttle, roll, roll_trim, yaw_trim = (float(value) for value in x)
-            controls.pitch_trim, controls.roll_trim, controls.yaw_trim = pitch_trim, roll_trim, yaw_trim
+            theta, trim_pitch, throttle, roll, trim_roll, trim_yaw = (float(value) for value in x)
+            controls.trim_pitch, controls.trim_roll, controls.trim_yaw = trim_pitch, trim_roll, trim_yaw
             controls.throttle[0] = controls.throttle[1] = throttle
             for actuator, target in zip(self._surface_set.actuators, self._mix(controls)):
                 actuator.jump(target)

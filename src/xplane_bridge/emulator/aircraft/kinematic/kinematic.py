@@ -279,9 +279,9 @@ class KinematicModel:
         self._publish(dt, controls, (roll, pitch, yaw))
 
     def _move_surfaces(self, dt: float, controls: Controls) -> None:
-        roll = controls.roll + controls.roll_trim
-        pitch = controls.pitch + controls.pitch_trim
-        yaw = controls.yaw + controls.yaw_trim
+        roll = controls.roll + controls.trim_roll
+        pitch = controls.pitch + controls.trim_pitch
+        yaw = controls.yaw + controls.trim_yaw
         wanted = {
             "wing2l_ail1": roll * _LIMIT_DEG,
             "wing2r_ail1": -roll * _LIMIT_DEG,
@@ -389,7 +389,7 @@ class KinematicModel:
         s.stall_warning = not on_ground and s.true_airspeed_mps < self.info.stall_mps
         s.surfaces_deg = dict(self._surface_deg)
         s.roll_ratio, s.pitch_ratio, s.yaw_ratio = command
-        s.flap_ratio, s.speed_brake_ratio = self._flap, max(controls.speed_brake, 0.0)
+        s.flap_ratio, s.speed_brake_ratio = self._flap, max(controls.speedbrake, 0.0)
         s.thrust_vector_ratio = self._tilt
         s.engines = [self._engine(i, controls) for i in range(_ENGINES)]
         s.fuel_kg = list(self._fuel_kg)

@@ -181,7 +181,7 @@ class Tiltrotor(JsbsimModel):
         # On the wing a bank turns; the pedals then only add to the turn.
         turn = (1.0 - upright) * GRAVITY_MPS2 / speed * math.tan(min(max(roll, -1.0), 1.0))
         turn += stick[2] * MAXIMUM_YAW_RATE_RAD_S * (0.5 + 0.5 * upright)
-        wanted_pitch = stick[1] * MAXIMUM_PITCH_RAD + controls.pitch_trim * PITCH_TRIM_RAD
+        wanted_pitch = stick[1] * MAXIMUM_PITCH_RAD + controls.trim_pitch * PITCH_TRIM_RAD
         return self._stabilisation.step(dt, (wanted_roll, wanted_pitch, turn), (roll, pitch), rates)
 
     @staticmethod
@@ -322,7 +322,7 @@ class Tiltrotor(JsbsimModel):
         def fly(x: np.ndarray) -> Sequence[float]:
             roll, pitch, throttle, *commands = (float(value) for value in x)
             controls.roll = roll / MAXIMUM_ROLL_RAD
-            controls.pitch_trim = pitch / PITCH_TRIM_RAD
+            controls.trim_pitch = pitch / PITCH_TRIM_RAD
             controls.throttle = [throttle] * len(controls.throttle)
             self._throttle = [throttle, throttle]
             self._stabilisation.integrals = list(commands)
