@@ -160,7 +160,7 @@ MAY_USE_HOST_TIME = {
         {"sleep_for"},
     ),
     "include/xplane_bridge/nodes/tx/tx_node.hpp": ("shows its guardian that it runs", {"SteadyTimer"}),
-    "lib/nodes/tx/tx_node.cpp": ("the same, also while the node's clock stands", {"createSteadyTimer"}),
+    "lib/nodes/tx/tx_guard.cpp": ("the same, also while the node's clock stands", {"createSteadyTimer"}),
     "lib/actuation/guardian.cpp": ("a process of its own: releases whatever clock the node had", {"hostClock("}),
     "lib/vision/video_source.cpp": ("devices and files play in the host's time", {"steady_clock", "sleep_until"}),
     "lib/vision/x11_window_source.cpp": ("windows are drawn in the host's time", {"steady_clock"}),

@@ -75,7 +75,7 @@ void NodeWire::work(std::size_t worker, std::function<void()> act) {
   workers_[worker]->add([this, act = std::move(act)] {
     try {
       act();
-    } catch (const std::exception&) {  // callWorker() has kept it; nobody waits for what a recording did
+    } catch (const std::exception&) {  // callWorker() has kept it; in a replay no caller waits for it
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     --working_;

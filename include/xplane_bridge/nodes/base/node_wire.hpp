@@ -106,7 +106,7 @@ class NodeWire : public core::WireTurn {
   std::deque<Input> inputs_;
   std::function<void()> taken_;  // of the input that is acted on
   bool closed_ = false;
-  bool ends_ = false;                            // nobody waits for a call any more
+  bool ends_ = false;                            // no call is waited for any more
   std::size_t working_ = 0;                      // pieces of work that have not ended
   std::unique_ptr<core::ThreadSeat> stop_seat_;  // of the thread that calls close()
   std::atomic<std::thread::id> leaves_on_wake_{};

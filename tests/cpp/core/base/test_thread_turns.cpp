@@ -65,10 +65,10 @@ TEST(ThreadTurns, GoByTheSeatsAndNotByWhoIsFirst) {
   turns->give();
   EXPECT_EQ(said, (Said{"a0", "b0"}));
   turns->give();
-  EXPECT_EQ(said.size(), 2U) << "nobody had anything to go on with";
+  EXPECT_EQ(said.size(), 2U) << "no thread had anything to go on with";
   b.speak();
   a.speak();
-  EXPECT_EQ(said.size(), 2U) << "nobody had a turn";
+  EXPECT_EQ(said.size(), 2U) << "no thread had a turn";
   turns->give();
   EXPECT_EQ(said, (Said{"a0", "b0", "a1", "b1"}));
 }
@@ -115,7 +115,7 @@ TEST(ThreadTurns, WhoEndsAnotherLetsItHaveItsTurn) {
   thread.join();
 }
 
-TEST(ThreadTurns, AMutexHeldWhileWaitingHoldsNobodyUp) {
+TEST(ThreadTurns, AMutexHeldWhileWaitingHoldsNoOtherThreadUp) {
   const auto turns = std::make_shared<ThreadTurns>();
   Said said;
   TurnMutex mutex;
@@ -170,7 +170,7 @@ TEST(ThreadTurns, FreedThreadsWaitAsAnyOther) {
   changed.notifyAll();
   thread.join();
   EXPECT_EQ(passed, 1);
-  turns->give();  // of nobody
+  turns->give();  // there is no thread left
 }
 
 TEST(ThreadTurns, WithoutTurnsASeatDoesNothing) {
