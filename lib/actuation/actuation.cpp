@@ -74,9 +74,11 @@ ControlPathHooks Actuation::pathHooks() {
   hooks.release_surfaces = [this](const std::string& why) { surfaces_.release(why); };
   hooks.end_surface_commands = [this] { surfaces_.endCommands(); };
   hooks.event = [this](ControlPathHooks::Kind kind, const std::string& text, const std::string& who) {
-    const bool of_overrides = kind == ControlPathHooks::Kind::kOverride;
-    hooks_.event({of_overrides ? EventKind::kOverride : EventKind::kMode, text, who, true,
-                  kind == ControlPathHooks::Kind::kFailsafe, 0, sim_time_});
+    using Kind = ControlPathHooks::Kind;
+    const EventKind shown = kind == Kind::kOverride  ? EventKind::kOverride
+                            : kind == Kind::kMissing ? EventKind::kAircraft
+                                                     : EventKind::kMode;
+    hooks_.event({shown, text, who, kind != Kind::kMissing, kind == Kind::kFailsafe, 0, sim_time_});
   };
   hooks.warn = hooks_.warn;
   return hooks;

@@ -128,6 +128,7 @@ void ControlPath::onAircraft(const core::AircraftIdentity& aircraft) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   aircraft_ = aircraft;
   overrides_->forgetShown();
+  askMissing();
   settle();
 }
 
@@ -343,7 +344,7 @@ void ControlPath::sendCommand(double time) {
 void ControlPath::send(double time) {
   command_waits_ = false;
   const core::ChannelExcitation excitation = hooks_.excitation();
-  const core::ArbitratedControls& controls = arbiter_.step(time, excitation);
+  const core::ArbitratedControls controls = withoutMissing(arbiter_.step(time, excitation));
   watchSurfaces();
   watchFailsafe();
   excited_ = controls.excited != 0u;
@@ -472,7 +473,7 @@ core::SourceStatistics ControlPath::statistics(core::FlightMode source) const {
 
 core::ChannelSet ControlPath::commanded() const {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  return standing_ == Standing::kFlying ? arbiter_.commanded() : core::ChannelSet{};
+  return standing_ == Standing::kFlying ? arbiter_.commanded() & ~missingChannels() : core::ChannelSet{};
 }
 
 }  // namespace xplane_bridge

@@ -121,10 +121,10 @@ def flights(new_world, tmp_path_factory):
             "--no-beacon", "--aircraft", aircraft, "--start", "ground" if where == "parked" else "air"
         )
         world.applied = world.watch("control/applied", AppliedCommand)
-        events = world.watch("events", EventList)
+        world.events = world.watch("events", EventList)
         world.set_param("aircraft", aircraft)
         world.start("tx_node", tx_params(aircraft))
-        events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events), 60.0)
+        world.events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events), 60.0)
         world.manual = CommandSource(world, "control/manual")
         return world
 
@@ -165,3 +165,15 @@ def test_channel_moves_what_it_is_for(flights, channel):
         watched.wait(path, value if isinstance(value, float) else value[0], WAIT_S, tolerance=2e-3)
     finally:
         watched.close()
+
+
+def test_a_trim_that_the_aircraft_has_not_is_refused_in_words(flights):
+    world = flights("multirotor parked")
+    world.manual.fly(fields=F.ROLL | F.TRIM_YAW, roll=0.1, trim_yaw=0.5)
+    told = world.events.wait_for(lambda e: any("trim_yaw is not sent" in event.text for event in e.events), WAIT_S)
+    event = next(event for event in told.events if "trim_yaw is not sent" in event.text)
+    assert not event.success
+    assert "this aircraft has no rudder trim (acf_max_trim_rudd, acf_min_trim_rudd of" in event.text
+    assert world.applied.wait_for_next(lambda a: a.read_back, WAIT_S).fields == F.ROLL
+    assert world.wire(world.xplane.port).read(COCKPIT + "rudder_trim") == 0.0
+    world.manual.fly(roll=0.0, trim_yaw=0.0)

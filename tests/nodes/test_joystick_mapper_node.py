@@ -120,6 +120,12 @@ def test_wrong_key_stops_the_node_in_words(world):
     assert "direct/roll/dead_zon" in node.output()
 
 
+def test_slats_are_refused_in_words(world):
+    node = world.start("joystick_mapper_node", {"device": "x", "direct": {"slats": {"axis": 0}}})
+    assert node.wait(15) == 1
+    assert "X-Plane has no handle for slats, they follow that of the flaps" in node.output()
+
+
 def test_wrong_target_stops_the_node_in_words(world):
     node = world.start("joystick_mapper_node", {"device": "x", "direct": {"ailerons": {"axis": 0}}})
     assert node.wait(15) == 1

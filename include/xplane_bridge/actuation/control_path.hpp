@@ -13,6 +13,7 @@
 #include "xplane_bridge/actuation/override_manager.hpp"
 #include "xplane_bridge/core/control/control_arbiter.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
+#include "xplane_bridge/core/control/missing_channels.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 #include "xplane_bridge/core/state/flight_watch.hpp"
@@ -68,8 +69,9 @@ struct ControlPathHooks {
   std::function<void(const std::string& why)> release_surfaces;
   /// The commands of control/surfaces must end; stick or mixing takes those surfaces on from where they are.
   std::function<void()> end_surface_commands;
-  /// The mode has changed, a failsafe begins or ends, overrides were released by another client: for events.
-  enum class Kind : std::uint8_t { kMode, kFailsafe, kOverride };
+  /// The mode has changed, a failsafe begins or ends, overrides were released by another client, the aircraft has
+  /// nothing for a channel that is commanded: for events.
+  enum class Kind : std::uint8_t { kMode, kFailsafe, kOverride, kMissing };
   std::function<void(Kind kind, const std::string& text, const std::string& who)> event;
   /// For the log: why commands are not sent.
   std::function<void(const std::string& text)> warn;
@@ -156,6 +158,9 @@ class ControlPath {
   void publishApplied(const core::ArbitratedControls& controls);
   void watchReadBack(const core::ChannelSet& channels);
   void onReadBack(const core::RrefView& view);
+  void askMissing();
+  core::ChannelSet missingChannels() const;
+  core::ArbitratedControls withoutMissing(core::ArbitratedControls controls);
   void watchReleases();
   void watchSurfaces();
 
@@ -173,6 +178,8 @@ class ControlPath {
   std::string suspension_;    // why; empty: not suspended
   std::string halted_;        // why a mode must be asked for; empty: it need not
   core::AircraftIdentity aircraft_;
+  std::vector<core::MissingChannel> missing_;  // of it
+  core::ChannelSet missing_told_;
 
   core::ControlArbiter arbiter_;
   core::ControlEncoder encoder_;

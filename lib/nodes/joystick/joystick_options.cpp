@@ -14,6 +14,10 @@ core::JoyTarget targetOf(const ParamLoader& in, const std::string& name) {
   const std::string text = in.text("target", name);
   const auto target = core::joyTargetFrom(text);
   if (!target) {
+    if (text == "slats") {
+      throw ParamError("parameter " + in.fullKey("target") +
+                       ": X-Plane has no handle for slats, they follow that of the flaps; target flaps instead");
+    }
     std::string known;
     for (const core::JoyTargetRow& row : core::kJoyTargets)
       known += (known.empty() ? "" : ", ") + std::string(row.name);

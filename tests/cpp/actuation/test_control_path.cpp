@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "flown_path.hpp"
 
 namespace xplane_bridge {
@@ -21,6 +23,7 @@ class ControlPathTest : public testing::Test, protected FlownPath {
     return false;
   }
   static constexpr const char* kRunningTime = "sim/time/total_running_time_sec";
+  static constexpr const char* kRudderTrim = "sim/cockpit2/controls/rudder_trim";
   static constexpr const char* kFlightTime = "sim/time/total_flight_time_sec";
 
   /// Asks for the mode and flies in it, a quarter to the right.
@@ -926,6 +929,50 @@ TEST_F(ControlPathTest, SuspendedDuringALossItGivesBackAfterwards) {
   runWith(rollCommand(0.3), 0.1);
   EXPECT_EQ(path->standing(), Standing::kSuspended);
   EXPECT_FLOAT_EQ(sim.value(kStickOverride), 0.0F);
+}
+
+core::ControlCommand trimmedRoll() {
+  core::ControlCommand command = rollCommand(0.3);
+  command.fields |= core::kFieldTrimYaw;
+  command.trim_yaw = 0.5;
+  return command;
+}
+
+TEST_F(ControlPathTest, ATrimThatTheAircraftHasNotIsRefusedInWordsAndTheRestFlown) {
+  sim.setAll(core::trimDatarefs(), 0.0F);
+  sim.set(kRudderTrim, 0.0F);
+  start();
+  run(0.5);
+  for (int i = 0; i < 3; ++i) {
+    path->command(FlightMode::kManual, trimmedRoll());
+    frame();
+  }
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.3F);
+  EXPECT_FLOAT_EQ(sim.value(kRudderTrim), 0.0F);
+  ASSERT_FALSE(applied.empty());
+  EXPECT_EQ(applied.back().controls.fields, core::kFieldRoll);
+  EXPECT_EQ(path->commanded().count(), 1U);
+  const auto told = std::count_if(events.begin(), events.end(), [](const std::string& text) {
+    return text.find("trim_yaw is not sent: this aircraft has no rudder trim") == 0;
+  });
+  EXPECT_EQ(told, 1) << "once for an aircraft";
+
+  // Another one, that has it.
+  sim.set("sim/aircraft/controls/acf_max_trim_rudd", 0.4F);
+  path->onAircraft({"DA62", "another"});
+  run(0.5);
+  path->command(FlightMode::kManual, trimmedRoll());
+  frame();
+  EXPECT_FLOAT_EQ(sim.value(kRudderTrim), 0.5F);
+}
+
+TEST_F(ControlPathTest, TrimsAreSentWhereXPlaneDoesNotTellOfThem) {
+  sim.set(kRudderTrim, 0.0F);
+  start();
+  run(0.5);
+  path->command(FlightMode::kManual, trimmedRoll());
+  frame();
+  EXPECT_FLOAT_EQ(sim.value(kRudderTrim), 0.5F);
 }
 
 TEST_F(ControlPathTest, ASecondBridgeIsNoCrash) {

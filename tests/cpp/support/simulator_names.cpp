@@ -8,6 +8,7 @@
 
 #include "xplane_bridge/core/camera/view_stream.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
+#include "xplane_bridge/core/control/missing_channels.hpp"
 #include "xplane_bridge/core/control/simulator_stick.hpp"
 #include "xplane_bridge/core/failures/failure_names.hpp"
 #include "xplane_bridge/core/failures/failures.hpp"
@@ -100,6 +101,7 @@ class Uses {
       for (const std::string& name : requiredOverrides(every, options)) set({{name, 1.0F}});
     }
     set({{kThrottleOverride, 0.0F}});
+    readAll(trimDatarefs());
     const SimulatorStick stick({kMaxStickAxes, 0, kMaxStickButtons, 50});
     readAll(stick.settingRequests());
     readAll(stick.valueRequests());

@@ -250,10 +250,12 @@ def _limits(t: Table, sim: Sources) -> None:
     t.value("sim/aircraft/vtolcontrols/acf_vectEQ", lambda f: f.info.hover_thrust_vector is not None)
     t.value("sim/aircraft2/metadata/is_vtol", lambda f: f.info.hover_thrust_vector is not None)
     t.value("sim/aircraft2/metadata/is_helicopter", lambda _: False)
-    trims = {"elev": ("elevator", "elv1"), "rudd": ("rudder", "rud1")}
+    trims = {"ailn": ("aileron", "ail1"), "elev": ("elevator", "elv1"), "rudd": ("rudder", "rud1")}
     for name, (kind, leaf) in trims.items():
         t.value(f"{limits}max_trim_{name}", partial(lambda trim, part, _: _trim_part(sim, trim, part), kind, leaf))
         t.value(f"{limits}min_trim_{name}", partial(lambda trim, part, _: _trim_part(sim, trim, part), kind, leaf))
+    for end in ("up", "dn"):
+        t.setting(f"{limits}hstb_trim_{end}")  # no aircraft here has a stabiliser that trims
 
 
 def _spec(sim: Sources, leaf: str) -> Optional[SurfaceSpec]:
