@@ -68,8 +68,8 @@ def groups():
     return {f"mission/{group}": f"xplane_bridge/{message}" for message, group in sections if group != "flight"}
 
 
-#: Of the bridge's namespace, advertised by others than its nodes: joy, controllers, the scenario's player.
-FROM_OUTSIDE = {"joy", "control/auto", "traffic/command", "scenario/label"}
+#: Of the bridge's namespace, advertised by others than its nodes: controllers, the scenario's player.
+FROM_OUTSIDE = {"control/auto", "traffic/command", "scenario/label"}
 
 
 def test_the_nodes_advertise_the_topics_of_the_list_with_their_types():
