@@ -39,10 +39,10 @@ _USELESS = ImageQuality.DISPLAY_UNKNOWN | ImageQuality.FROZEN | ImageQuality.BLA
 _MOVING_S = 0.06
 #: For which a recording may take longer than it is long: its start, and the writing at its end [s].
 _PATIENCE_S = 30.0
-#: Command and the surface that follows it.
 #: What --live records, below the bridge's namespace.
 _PICTURES = "camera/image_raw/compressed"
 _LIVE_TOPICS = ("flight_state", _PICTURES, "camera/frame_state", "control/applied", "mission/surfaces")
+#: Command and the surface that follows it.
 _RESPONSES = (("roll", "delta_aileron"), ("pitch", "delta_elevator"), ("yaw", "delta_rudder"))
 
 
