@@ -18,6 +18,8 @@ from xplane_bridge.resources import share_dir
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from xplane_bridge.bags import Recorded
+
 PACKAGE = "xplane_bridge"
 SPEED = 60.0  #: [m/s] over ground, horizontal
 CLIMB = 2.0  #: [m/s]
@@ -150,6 +152,15 @@ class FlightBag:
             md5sum = self.definitions.store.generate_msgdef(name)[1]
             self._connections[key] = self._writer.add_connection(
                 topic, name, msgdef=self.definitions.text(name), md5sum=md5sum
+            )
+        self._writer.write(self._connections[key], time_ns, raw)
+
+    def add_recorded(self, topic: Recorded, time_ns: int, raw: bytes) -> None:
+        """Write one serialised message of a topic of another bag."""
+        key = (topic.topic, topic.msgtype)
+        if key not in self._connections:
+            self._connections[key] = self._writer.add_connection(
+                topic.topic, topic.msgtype.replace("/", "/msg/"), msgdef=topic.definition, md5sum=topic.md5sum
             )
         self._writer.write(self._connections[key], time_ns, raw)
 
