@@ -77,7 +77,7 @@ void ControlPath::onReadBack(const core::RrefView& view) {
 /// Once for each aircraft, whose file does not change while it is loaded.
 void ControlPath::askMissing() {
   missing_.clear();
-  missing_told_.reset();
+  missing_reported_.reset();
   link_->read(core::trimDatarefs(), kMissingTimeout, [this](const std::vector<core::DatarefValue>& values) {
     const std::lock_guard<core::HandlerMutex> lock(*mutex_);
     missing_ = core::missingTrims(values);
@@ -101,8 +101,8 @@ core::ArbitratedControls ControlPath::withoutMissing(core::ArbitratedControls co
     controls.fields &= ~field;
     controls.limited &= ~field;
     controls.excited &= ~field;
-    if (missing_told_.test(channel)) continue;
-    missing_told_.set(channel);
+    if (missing_reported_.test(channel)) continue;
+    missing_reported_.set(channel);
     hooks_.event(ControlPathHooks::Kind::kMissing, core::channelName(missing.channel) + " is not sent: " + missing.why,
                  "");
   }

@@ -170,8 +170,8 @@ def test_channel_moves_what_it_is_for(flights, channel):
 def test_a_trim_that_the_aircraft_has_not_is_refused_in_words(flights):
     world = flights("multirotor parked")
     world.manual.fly(fields=F.ROLL | F.TRIM_YAW, roll=0.1, trim_yaw=0.5)
-    told = world.events.wait_for(lambda e: any("trim_yaw is not sent" in event.text for event in e.events), WAIT_S)
-    event = next(event for event in told.events if "trim_yaw is not sent" in event.text)
+    said = world.events.wait_for(lambda e: any("trim_yaw is not sent" in event.text for event in e.events), WAIT_S)
+    event = next(event for event in said.events if "trim_yaw is not sent" in event.text)
     assert not event.success
     assert "this aircraft has no rudder trim (acf_max_trim_rudd, acf_min_trim_rudd of" in event.text
     assert world.applied.wait_for_next(lambda a: a.read_back, WAIT_S).fields == F.ROLL

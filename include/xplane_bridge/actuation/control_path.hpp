@@ -179,7 +179,7 @@ class ControlPath {
   std::string halted_;        // why a mode must be asked for; empty: it need not
   core::AircraftIdentity aircraft_;
   std::vector<core::MissingChannel> missing_;  // of it
-  core::ChannelSet missing_told_;
+  core::ChannelSet missing_reported_;
 
   core::ControlArbiter arbiter_;
   core::ControlEncoder encoder_;

@@ -952,10 +952,10 @@ TEST_F(ControlPathTest, ATrimThatTheAircraftHasNotIsRefusedInWordsAndTheRestFlow
   ASSERT_FALSE(applied.empty());
   EXPECT_EQ(applied.back().controls.fields, core::kFieldRoll);
   EXPECT_EQ(path->commanded().count(), 1U);
-  const auto told = std::count_if(events.begin(), events.end(), [](const std::string& text) {
+  const auto reports = std::count_if(events.begin(), events.end(), [](const std::string& text) {
     return text.find("trim_yaw is not sent: this aircraft has no rudder trim") == 0;
   });
-  EXPECT_EQ(told, 1) << "once for an aircraft";
+  EXPECT_EQ(reports, 1) << "once for an aircraft";
 
   // Another one, that has it.
   sim.set("sim/aircraft/controls/acf_max_trim_rudd", 0.4F);
@@ -966,7 +966,7 @@ TEST_F(ControlPathTest, ATrimThatTheAircraftHasNotIsRefusedInWordsAndTheRestFlow
   EXPECT_FLOAT_EQ(sim.value(kRudderTrim), 0.5F);
 }
 
-TEST_F(ControlPathTest, TrimsAreSentWhereXPlaneDoesNotTellOfThem) {
+TEST_F(ControlPathTest, TrimsAreSentWhereXPlaneDoesNotReportThem) {
   sim.set(kRudderTrim, 0.0F);
   start();
   run(0.5);

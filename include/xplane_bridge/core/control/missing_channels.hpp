@@ -15,12 +15,12 @@ struct MissingChannel {
   std::string why;  ///< "this aircraft has no rudder trim (acf_max_trim_rudd and acf_min_trim_rudd are 0)"
 };
 
-/// What tells it, of the loaded aircraft: how far trims move their surfaces. Names after Laminar's lists of 11.40 to
+/// What shows it, of the loaded aircraft: how far trims move their surfaces. Names after Laminar's lists of 11.40 to
 /// 12.10, which have all of them.
 std::vector<std::string> trimDatarefs();
 
 /// Trims that move nothing.
-/// @param values of trimDatarefs(); one that did not answer tells nothing
+/// @param values of trimDatarefs(); one that did not answer shows nothing
 std::vector<MissingChannel> missingTrims(const std::vector<DatarefValue>& values);
 
 }  // namespace xplane_bridge::core

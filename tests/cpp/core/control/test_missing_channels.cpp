@@ -33,7 +33,7 @@ TEST(MissingChannels, AnElevatorTrimMayMoveTheStabiliser) {
   EXPECT_EQ(found[1].channel, Channel::kTrimYaw);
 }
 
-TEST(MissingChannels, ASilentDatarefTellsNothing) {
+TEST(MissingChannels, ASilentDatarefShowsNothing) {
   const auto found = missing({{"acf_max_trim_rudd", std::nullopt}});
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[1].channel, Channel::kTrimPitch);
