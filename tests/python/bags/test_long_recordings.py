@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 MEGABYTES = 500.0  #: that an hour may take
 EXPORT = "from xplane_bridge.cli.bag_export import main; import sys; main(sys.argv[1:]) and sys.exit(1)\n"
-# Of the process itself: what wait4() tells of a child begins with the size of its parent.
+# Of the process itself: what wait4() shows of a child begins with the size of its parent.
 PEAK = 'print("PEAK", next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))'
 
 
