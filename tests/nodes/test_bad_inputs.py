@@ -19,7 +19,7 @@ from xplane_bridge.resources import program
 ROOT = Path(__file__).resolve().parents[2]
 NO_BAG = "not a ROS 1 bag (it does not start with '#ROSBAG V')"
 AIRCRAFT = "rv10, tiltrotor; or a file of your own with aircraft_file:=PATH"
-JOYSTICKS = "there is logitech_extreme_3d_pro, logitech_f710, playstation, xbox; or a file of your own"
+JOYSTICKS = "there is logitech_extreme_3d_pro, logitech_f710, playstation, xbox, xplane; or a file of your own"
 SCENARIOS = "has: approach.yaml, blocked_pitot.yaml, bus_failure.yaml, conflict.yaml, demo.yaml, demo_flight.yaml"
 UNPARSED = "broken.yaml: does not parse as YAML: line 3, column 1: expected the node content"
 
@@ -107,12 +107,16 @@ LAUNCHES = [
     ("joystick.launch joy_config:=wheel", 1, ["(joy_config:=wheel)", JOYSTICKS]),
     ("bridge.launch joystick:=mapper joy_config:=wheel", 1, ["(joy_config:=wheel)", JOYSTICKS]),
     ("joystick.launch stick_mode:=left", 1, ["stick_mode:=left: expected a whole number"]),
-    ("joystick.launch driver:=bluetooth", 1, ["driver:=bluetooth is unknown: expected joy, sdl, virtual or none"]),
+    (
+        "joystick.launch driver:=bluetooth",
+        1,
+        ["driver:=bluetooth is unknown: expected joy, sdl, virtual, xplane or none"],
+    ),
     ("failure.launch scenario:=nothing", 1, ["scenario:=nothing: ", SCENARIOS]),
     ("failure.launch scenario:={}/typo.yaml", 1, ["typo.yaml: scenario.evnts: unknown key; expected one of"]),
     ("record.launch split_size:=big", 1, ["split_size:=big: expected a whole number"]),
     ("record.launch compression:=zip", 1, ["compression:=zip: expected one of none, lz4, bz2"]),
-    ("bridge.launch joystick:=wheel", 1, ["joystick:=wheel: expected one of none, mapper, joy, sdl, virtual"]),
+    ("bridge.launch joystick:=wheel", 1, ["joystick:=wheel: expected one of none, mapper, joy, sdl, virtual, xplane"]),
     ("failure.launch scenario:=left_aileron_stuck joystick:=yes", 1, ["joystick:=yes: expected true or false"]),
     (
         "failure.launch scenario:=left_aileron_stuck joystick:=true joy_config:=wheel",

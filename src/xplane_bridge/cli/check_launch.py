@@ -55,7 +55,7 @@ def _one_of(*choices: str) -> Check:
 
 def _joystick(name: str, value: str, given: Given) -> str:
     """Who publishes joy; for failure.launch, which has no joy_config_file: whether the player plays a joystick."""
-    check = _one_of("none", "mapper", "joy", "sdl", "virtual") if "joy_config_file" in given else _flag
+    check = _one_of("none", "mapper", "joy", "sdl", "virtual", "xplane") if "joy_config_file" in given else _flag
     return check(name, value, given)
 
 
