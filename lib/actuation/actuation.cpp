@@ -47,13 +47,17 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
       views_(link, [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
       traffic_(link, &overrides_, options.traffic,
                [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
+      disturbance_(link, kOverridePurpose, hooks_.disturbance,
+                   [this](const std::string& text, const std::string& who, bool success) {
+                     say(EventKind::kSetting, text, who, success);
+                   }),
       jobs_(
           link, options.flight, changeHooks(),
           [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
             hooks_.event({outcome.kind, outcome.text, who, outcome.success, false, number, sim_time_});
           },
           options.turns),
-      releases_(link, &overrides_, hooks_.journal_problem, options.turns) {
+      releases_(link, &overrides_, hooks_.journal_problem, options.turns, [this] { disturbance_.watchJournal(); }) {
   const Lock lock(*mutex_);
   subscribe();
 }
@@ -143,6 +147,7 @@ void Actuation::onLink(const core::LinkStatus& status) {
     link_status_ = status;
     failures_.onLink(status);
     path_.onLink(status);
+    disturbance_.onLink(status);
   }
   releases_.wake();
   if (!text.empty()) say(EventKind::kLink, text);
@@ -160,10 +165,12 @@ void Actuation::onWatch(const core::RrefView& view) {
   if (watch_.sim_time > before) ++frames_flown_;
   failures_.onFrame(watch_);
   excitation_.onFrame(watch_);
+  disturbance_.onFrame(watch_);
   if (identification_.running()) identification_.onFrame(watch_, conditions());
   path_.onFrame(watch_);
   if (watch_.crashed && !crashed) {
     endSignals("the aircraft has crashed");
+    disturbance_.abort("the aircraft has crashed");
     say(EventKind::kCrash, "the aircraft has crashed");
   }
 }
@@ -197,6 +204,7 @@ void Actuation::askIdentity() {
 void Actuation::onReset(const std::string& how) {
   ++resets_;
   endSignals("the flight was reset");
+  disturbance_.abort("the flight was reset");
   path_.onNewFlight(how);
   // Perhaps with another aircraft, which must not be flown until the subscription shows which.
   askIdentity();
@@ -219,6 +227,7 @@ void Actuation::onHang() {
   overrides_.giveBackAll();
   failures_.repaired();
   traffic_.forget();
+  disturbance_.forget("tx_node hung");
   path_.onGivenBack("tx_node hung, and its guardian has given back what it had set");
 }
 
@@ -234,6 +243,7 @@ void Actuation::stop() {
     endSignals("tx_node ends");
   }
   traffic_.release("tx_node ends");
+  disturbance_.abort("tx_node ends");
   jobs_.stop();
   releases_.stop();
   surfaces_.stop();
@@ -253,6 +263,7 @@ void Actuation::publish() {
   hooks_.mode(path_.mode(), sim_time_);
   failures_.publish();
   excitation_.publish();
+  disturbance_.publish();
 }
 
 // --- requests ---
@@ -291,6 +302,36 @@ Actuation::Injected Actuation::inject(const ExcitationRequest& request, const st
 void Actuation::endSignals(const std::string& why) {
   identification_.abort(why);
   excitation_.abort(why);
+}
+
+Actuation::Disturbed Actuation::disturb(const std::string& kind, core::DisturbanceSpec spec, const std::string& who) {
+  const auto answer = [this](core::ResultCode code, std::string text) {
+    return Disturbed{{code, std::move(text)}, disturbance_.label().id};
+  };
+  if (kind == "stop") {
+    if (disturbance_.windRefusal().empty()) return answer(core::ResultCode::kRefused, "no disturbance runs");
+    disturbance_.abort("stopped by " + who);
+    return answer(core::ResultCode::kAccepted, "it is stopped, and the wind of before is put back");
+  }
+  const auto known = core::disturbanceKindFrom(kind);
+  if (!known) {
+    return answer(core::ResultCode::kRefused,
+                  "kind is \"" + kind + "\"; expected " + core::kDisturbanceKindWords + " or stop");
+  }
+  spec.kind = *known;
+  if (const auto wrong = core::check(spec)) return answer(core::ResultCode::kRefused, *wrong);
+  if (const auto refusal = core::refusalBy(spec)) return answer(core::ResultCode::kNotSupported, *refusal);
+  if (const auto refusal = jobs_.refusal()) return answer(refusal->code, refusal->text);
+  const std::string refusal = disturbance_.begin(spec, who);
+  if (!refusal.empty()) return answer(core::ResultCode::kRefused, refusal);
+  return answer(core::ResultCode::kAccepted,
+                "it begins when X-Plane has shown its weather; disturbance/state reports it");
+}
+
+std::optional<RequestResult> Actuation::windRefusal() const {
+  const std::string why = disturbance_.windRefusal();
+  if (why.empty()) return std::nullopt;
+  return RequestResult{core::ResultCode::kRefused, why};
 }
 
 IdentificationConditions Actuation::conditions() const {

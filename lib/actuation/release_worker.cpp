@@ -15,8 +15,13 @@ constexpr double kReleaseWait = 1.0;  // [s] of one attempt
 }  // namespace
 
 ReleaseWorker::ReleaseWorker(core::SimulatorPort* link, OverrideManager* overrides,
-                             std::function<void(const std::string&)> problem, std::shared_ptr<core::ThreadTurns> turns)
-    : link_(link), overrides_(overrides), problem_(std::move(problem)), turns_(std::move(turns)) {}
+                             std::function<void(const std::string&)> problem, std::shared_ptr<core::ThreadTurns> turns,
+                             std::function<void()> watch)
+    : link_(link),
+      overrides_(overrides),
+      problem_(std::move(problem)),
+      watch_(std::move(watch)),
+      turns_(std::move(turns)) {}
 
 ReleaseWorker::~ReleaseWorker() { stop(); }
 
@@ -66,6 +71,7 @@ void ReleaseWorker::work() {
       leftovers_of_epoch_ = status.epoch;
     }
     overrides_->recordPreparations();
+    if (watch_) watch_();
     if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseWait);
   } catch (const core::JournalError& error) {
     problem_(error.what());

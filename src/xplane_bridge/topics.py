@@ -39,6 +39,7 @@ TOPICS = {
     "traffic/command": "xplane_bridge/TrafficCommand",
     "failures/state": "xplane_bridge/FailureState",
     "excitation/state": "xplane_bridge/ExcitationState",
+    "disturbance/state": "xplane_bridge/DisturbanceState",
     "events": "xplane_bridge/EventList",
     "scenario/label": "std_msgs/String",
     "camera/image_raw": "sensor_msgs/Image",

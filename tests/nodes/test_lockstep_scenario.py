@@ -28,6 +28,7 @@ events:
   - {at: 0, hold: {roll: 0, climb: 0, speed: 65}, mode: auto}
   - {at: 0.5, mode: manual}
   - {at: 1, hold: {roll: 25}, label: turn}
+  - {at: 1.5, disturb: {kind: turbulence, speed: 10, from_deg: 250, duration: 3, seed: 7, horizontal_only: true}}
   - {at: 2, excitation: {kind: doublet, target: pitch, amplitude: 0.05, duration: 1}}
   - {at: 3, failure: {name: engine_1}, label: broken}
   - {at: 4, clear_failures: true, mode: auto}

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "xplane_bridge/actuation/control_path.hpp"
+#include "xplane_bridge/actuation/disturbance/disturbance_manager.hpp"
 #include "xplane_bridge/actuation/excitation_manager.hpp"
 #include "xplane_bridge/actuation/failure_manager.hpp"
 #include "xplane_bridge/actuation/flight_jobs.hpp"
@@ -63,6 +65,7 @@ struct ActuationHooks {
       surfaces_applied;
   std::function<void(const FailureSnapshot& snapshot)> failures;
   std::function<void(const ExcitationLabel& label)> excitation;
+  std::function<void(const DisturbanceLabel& label)> disturbance;
   std::function<void(const ActuationEvent& event)> event;
   /// For the log.
   std::function<void(const std::string& text)> warn;
@@ -115,7 +118,7 @@ class Actuation {
   /// Gives everything back and waits until X-Plane shows it, up to `timeout` [s]. Returns whether it does; what it does
   /// not stays in the journal.
   bool undo(double timeout);
-  /// Publishes mode, failures and excitation once more.
+  /// Publishes mode, failures, excitation and disturbance once more.
   void publish();
 
   // Requests. `who` asks.
@@ -128,6 +131,12 @@ class Actuation {
     std::uint32_t id = 0;  ///< of the excitation that runs, or ran last
   };
   Injected inject(const ExcitationRequest& request, const std::string& who);
+  struct Disturbed {
+    RequestResult result;
+    std::uint32_t id = 0;  ///< of the disturbance that begins, or ran last
+  };
+  /// @param kind of SetDisturbance.srv: which replaces the one of `spec`, or "stop"
+  Disturbed disturb(const std::string& kind, core::DisturbanceSpec spec, const std::string& who);
   struct Identifying {
     RequestResult result;
     std::uint32_t event_number = 0;  ///< of the event with the outcome; 0: refused
@@ -143,6 +152,8 @@ class Actuation {
   SettingRequests& settings() { return settings_; }
   ViewRequests& views() { return views_; }
   TrafficControl& traffic() { return traffic_; }
+  /// Why set_wind and set_weather cannot set the wind now; nullopt: they can.
+  std::optional<RequestResult> windRefusal() const;
 
   // What is.
 
@@ -193,6 +204,7 @@ class Actuation {
   SettingRequests settings_;
   ViewRequests views_;
   TrafficControl traffic_;
+  DisturbanceManager disturbance_;
   FlightJobs jobs_;
   ReleaseWorker releases_;
 

@@ -18,11 +18,12 @@ namespace xplane_bridge {
 /// each X-Plane the link finds, so that nothing else has to wait for that.
 class ReleaseWorker {
  public:
-  /// `problem(text)`: the journal cannot be used; called again and again while that lasts.
+  /// `problem(text)`: the journal cannot be used; called again and again while that lasts. `watch()`: looks into the
+  /// journal for another part of the node, each time X-Plane is up; may throw core::JournalError; null: no other part.
   /// @param turns of the thread; null: it runs as it likes
   ReleaseWorker(core::SimulatorPort* link, OverrideManager* overrides,
                 std::function<void(const std::string& text)> problem,
-                std::shared_ptr<core::ThreadTurns> turns = nullptr);
+                std::shared_ptr<core::ThreadTurns> turns = nullptr, std::function<void()> watch = nullptr);
   /// stop()
   ~ReleaseWorker();
   ReleaseWorker(const ReleaseWorker&) = delete;
@@ -43,6 +44,7 @@ class ReleaseWorker {
   core::SimulatorPort* link_;
   OverrideManager* overrides_;
   std::function<void(const std::string&)> problem_;
+  std::function<void()> watch_;
   std::uint32_t leftovers_of_epoch_ = 0;  // link epoch whose leftovers were released
   std::mutex mutex_;
   core::ClockCondition wanted_;

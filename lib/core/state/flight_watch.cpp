@@ -27,6 +27,7 @@ constexpr Row kRows[] = {
     {"sim/flightmodel/position/Prad", &FlightWatch::roll_rate_deg_s, 1.0 / kRadiansPerDegree},
     {"sim/flightmodel/position/Qrad", &FlightWatch::pitch_rate_deg_s, 1.0 / kRadiansPerDegree},
     {"sim/flightmodel/position/Rrad", &FlightWatch::yaw_rate_deg_s, 1.0 / kRadiansPerDegree},
+    {"sim/flightmodel/position/true_airspeed", &FlightWatch::true_airspeed, 1.0},
 };
 constexpr std::size_t kRowCount = sizeof kRows / sizeof kRows[0];
 // Behind them.

@@ -2,6 +2,7 @@
 
 #include "xplane_bridge/nodes/base/ros_time.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
+#include "xplane_bridge/nodes/messages/field_copy.hpp"
 
 namespace xplane_bridge {
 core::FailureRequest toCore(const SetFailure::Request& request) {
@@ -99,6 +100,54 @@ void toMessage(const ExcitationLabel& label, ExcitationState* message) {
   message->start_sim_time = static_cast<float>(label.start_sim_time);
   message->end_sim_time = static_cast<float>(label.end_sim_time);
   message->result = label.result;
+}
+
+core::DisturbanceSpec toCore(const SetDisturbance::Request& request) {
+  core::DisturbanceSpec out;
+  out.horizontal_only = request.horizontal_only != 0;
+  out.duration = static_cast<double>(request.duration);
+  out.from_deg = static_cast<double>(request.from_deg);
+  out.speed = static_cast<double>(request.speed);
+  out.vertical_speed = static_cast<double>(request.vertical_speed);
+  out.length = static_cast<double>(request.length);
+  out.gradient = static_cast<double>(request.gradient);
+  out.roughness = static_cast<double>(request.roughness);
+  out.seed = request.seed;
+  out.latitude_deg = request.latitude;
+  out.longitude_deg = request.longitude;
+  out.radius = static_cast<double>(request.radius);
+  out.height = static_cast<double>(request.height);
+  return out;
+}
+
+void toMessage(const DisturbanceLabel& label, DisturbanceState* message) {
+  message->sim_time = static_cast<float>(label.sim_time);
+  message->active = label.active;
+  message->id = label.id;
+  putField(label.steady, &message->steady_ned);
+  putField(label.model, &message->model_ned);
+  putField(label.commanded, &message->commanded_ned);
+  message->wind_speed = static_cast<float>(label.wind_speed);
+  message->wind_from_deg = static_cast<float>(label.wind_from_deg);
+  message->start_sim_time = static_cast<float>(label.start_sim_time);
+  message->end_sim_time = static_cast<float>(label.end_sim_time);
+  message->result = label.result;
+  if (!label.spec) return;
+  const core::DisturbanceSpec& spec = *label.spec;
+  message->kind = core::toString(spec.kind);
+  message->horizontal_only = spec.horizontal_only;
+  message->duration = static_cast<float>(spec.duration);
+  message->from_deg = static_cast<float>(spec.from_deg);
+  message->speed = static_cast<float>(spec.speed);
+  message->vertical_speed = static_cast<float>(spec.vertical_speed);
+  message->length = static_cast<float>(spec.length);
+  message->gradient = static_cast<float>(spec.gradient);
+  message->roughness = static_cast<float>(spec.roughness);
+  message->seed = spec.seed;
+  message->latitude = spec.latitude_deg;
+  message->longitude = spec.longitude_deg;
+  message->radius = static_cast<float>(spec.radius);
+  message->height = static_cast<float>(spec.height);
 }
 
 }  // namespace xplane_bridge

@@ -8,21 +8,19 @@
 #include "xplane_bridge/AppliedCommand.h"
 #include "xplane_bridge/ClearFailures.h"
 #include "xplane_bridge/ControlMode.h"
+#include "xplane_bridge/DisturbanceState.h"
 #include "xplane_bridge/ExcitationState.h"
 #include "xplane_bridge/FailureState.h"
 #include "xplane_bridge/IdentifySurfaces.h"
 #include "xplane_bridge/InjectExcitation.h"
-#include "xplane_bridge/LoadAircraft.h"
 #include "xplane_bridge/RunCommand.h"
 #include "xplane_bridge/ServiceResult.h"
 #include "xplane_bridge/SetDataref.h"
 #include "xplane_bridge/SetFailure.h"
 #include "xplane_bridge/SetView.h"
-#include "xplane_bridge/Situation.h"
 #include "xplane_bridge/nodes/base/service_result.hpp"
 #include "xplane_bridge/nodes/messages/actuation_conversions.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
-#include "xplane_bridge/nodes/messages/flight_conversions.hpp"
 #include "xplane_bridge/nodes/tx/actuation_diagnostics.hpp"
 
 namespace xplane_bridge {
@@ -46,6 +44,7 @@ void TxNode::advertise() {
   applied_publisher_ = advertiseTopic<AppliedCommand>("control/applied", 100);
   failure_publisher_ = advertiseTopic<FailureState>("failures/state", 10, true);
   excitation_publisher_ = advertiseTopic<ExcitationState>("excitation/state", 10, true);
+  disturbance_publisher_ = advertiseTopic<DisturbanceState>("disturbance/state", 100, true);
   if (lockstep()) makeLockstep();
   advertiseLockstep();
   advertiseServices();
@@ -118,6 +117,7 @@ ActuationHooks TxNode::hooks() {
   hooks.surfaces_applied = [this](const auto&... echo) { publishAs<AppliedCommand>(applied_publisher_, echo...); };
   hooks.failures = [this](const auto& snapshot) { publishAs<FailureState>(failure_publisher_, snapshot); };
   hooks.excitation = [this](const auto& label) { publishAs<ExcitationState>(excitation_publisher_, label); };
+  hooks.disturbance = [this](const auto& label) { publishAs<DisturbanceState>(disturbance_publisher_, label); };
   hooks.event = [this](const ActuationEvent& event) { onEvent(event); };
   hooks.warn = [](const std::string& text) { ROS_WARN("%s", text.c_str()); };
   hooks.journal_problem = [](const std::string& text) { ROS_ERROR_THROTTLE(5.0, "%s", text.c_str()); };
@@ -158,17 +158,6 @@ void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
 }
 
 // --- services: they run on the service thread and may wait for X-Plane; the control path never waits for them ---
-
-template <class Service, class Serve>
-void TxNode::advertiseOwn(const std::string& service, Serve serve) {
-  using Request = typename Service::Request;
-  using Response = typename Service::Response;
-  advertiseService<Request, Response>(name() + "/" + service,
-                                      [this, serve](const Request& request, Response& response) {
-                                        if (lockstep_) lockstep_->waitUntilOpen();
-                                        serve(request, &response);
-                                      });
-}
 
 void TxNode::advertiseServices() {
   advertiseOwn<SetMode>("set_mode", [this](const auto& request, auto* response) { serveSetMode(request, response); });
@@ -225,50 +214,6 @@ void TxNode::advertiseFailureServices() {
                                                     [this] { return events_.reserve(); });
     answer(begun.result, response);
     response->event_number = begun.event_number;
-  });
-}
-
-/// A flight service: refused for what the request itself says or as X-Plane is now, or accepted, with an event
-/// promised, and begun.
-template <class Service, class Begin>
-void TxNode::advertiseJob(const std::string& service, Begin begin) {
-  advertiseOwn<Service>(service, [this, service, begin](const auto& request, auto* response) {
-    if (const auto wrong = wrongWith(request)) {
-      response->result = result(ServiceResult::REFUSED, *wrong);
-    } else if (const auto refusal = actuation_->jobs().refusal()) {
-      response->result = toMessage(*refusal);
-    } else {
-      response->success = true;
-      response->event_number = events_.reserve();
-      response->result = result(ServiceResult::ACCEPTED,
-                                "event " + std::to_string(response->event_number) + " will report the outcome");
-      begin(actuation_->jobs(), request, response->event_number, name() + "/" + service);
-    }
-  });
-}
-
-void TxNode::advertiseFlightServices() {
-  const auto by = [](auto job) {
-    return [job](auto& jobs, const auto& request, auto number, const auto& who) {
-      (jobs.*job)(toCore(request), number, who);
-    };
-  };
-  advertiseJob<ResetFlight>("reset_flight", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    beginReset(&jobs, request, number, who);
-  });
-  advertiseJob<SetWind>("set_wind", by(&FlightJobs::setWind));
-  advertiseJob<SetTime>("set_time", by(&FlightJobs::setTime));
-  advertiseJob<SetWeather>("set_weather", by(&FlightJobs::setWeather));
-  advertiseJob<SetAutopilot>("set_autopilot", by(&FlightJobs::setAutopilot));
-  advertiseJob<SetLoading>("set_loading", by(&FlightJobs::setLoading));
-  advertiseJob<LoadAircraft>("load_aircraft", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.loadAircraft(request.path, request.livery, number, who);
-  });
-  advertiseJob<Situation>("save_state", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.saveSituation(request.path, number, who);
-  });
-  advertiseJob<Situation>("load_state", [](auto& jobs, const auto& request, auto number, const auto& who) {
-    jobs.loadSituation(request.path, number, who);
   });
 }
 

@@ -515,6 +515,7 @@ class Simulator:
             names = (region + "wind_direction_degt", region + "wind_speed_msc", region + "turbulence")
             factor = _MPS_PER_KT if "wind-names" in self.otherwise else 1.0
         direction, speed, turbulence = names
+        self._wind_settings = (*names, factor)
 
         def set_wind(_index: int, _value: float) -> None:
             strength = _clip(store.get(speed) * factor, 0.0, _MAX_WIND_MPS)
@@ -533,6 +534,11 @@ class Simulator:
         """Wind and turbulence of the command line."""
         self.weather.set_wind(self.model, wind_from_deg, wind_mps)
         self.weather.set_turbulence(self.model, turbulence_mps, seed)
+        # as clients read it, who put it back
+        direction, speed, turbulence, factor = self._wind_settings
+        self.store.set(direction, wind_from_deg)
+        self.store.set(speed, wind_mps / factor)
+        self.store.set(turbulence, turbulence_mps / TURBULENCE_MPS_PER_UNIT)
 
     def _set_fuel(self, _index: int, _value: float) -> None:
         tanks = self.model.info.tank_count

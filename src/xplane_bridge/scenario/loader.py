@@ -28,7 +28,7 @@ from xplane_bridge.scenario.schema import (
     ScenarioError,
 )
 from xplane_bridge.scenario.traffic import MOST, RANGES
-from xplane_bridge.scenario.world import LAYERS, TIME, WEATHER, WIND
+from xplane_bridge.scenario.world import DISTURBANCE_NEEDS, DISTURBANCES, LAYERS, TIME, WEATHER, WIND
 
 _TOP = (
     *("name", "description", "aircraft", "controller", "repeat_every", "start", "aerodrome", "gains", "criteria"),
@@ -325,6 +325,36 @@ def _wind(item: Any, path: str) -> Dict[str, float]:
     return _ranged(item, path, WIND, some=True)
 
 
+def _disturb(item: Any, path: str) -> Dict[str, Any]:
+    if not isinstance(item, Mapping) or "kind" not in item:
+        raise ScenarioError(f"{path}: {_short(item)}; expected a mapping with kind: {', '.join(DISTURBANCES)}")
+    kind = _one_of(item["kind"], f"{path}.kind", DISTURBANCES)
+    ranges = DISTURBANCES[kind]
+    given = _mapping(item, path, ("kind", "horizontal_only", *ranges))
+    out: Dict[str, Any] = {"kind": kind}
+    if "horizontal_only" in given:
+        if not isinstance(given["horizontal_only"], bool):
+            raise ScenarioError(f"{path}.horizontal_only: {_short(given['horizontal_only'])}; expected true or false")
+        out["horizontal_only"] = given["horizontal_only"]
+    out.update(_ranged({key: value for key, value in given.items() if key in ranges}, path, ranges))
+    for key in DISTURBANCE_NEEDS[kind]:
+        if key not in out:
+            low, high = ranges[key]
+            raise ScenarioError(f"{path}.{key}: missing; expected a number from {low:g} to {high:g}")
+    pair = {"gust": ("length", "duration"), "shear": ("gradient", "roughness")}.get(kind)
+    if pair and bool(out.get(pair[0])) == bool(out.get(pair[1])):
+        raise ScenarioError(f"{path}: expected either {pair[0]} or {pair[1]}")
+    if kind == "gust" and not (out.get("speed") or out.get("vertical_speed")):
+        raise ScenarioError(f"{path}.speed: missing; expected the peak of the gust, up to 50 m/s")
+    if out.get("seed", 0) != int(out.get("seed", 0)):
+        raise ScenarioError(f"{path}.seed: {out['seed']}; expected a whole number")
+    if not out.get("horizontal_only") and (kind in ("turbulence", "microburst") or out.get("vertical_speed")):
+        raise ScenarioError(
+            f"{path}.horizontal_only: missing; expected true: no X-Plane can be sent the vertical wind of a {kind}"
+        )
+    return out
+
+
 def _time(item: Any, path: str) -> Dict[str, float]:
     return _ranged(item, path, TIME, some=True)
 
@@ -385,6 +415,7 @@ _ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
     "excitation": _excitation,
     "reset": _reset,
     "wind": _wind,
+    "disturb": _disturb,
     "weather": _weather,
     "time": _time,
     "traffic": _traffic,

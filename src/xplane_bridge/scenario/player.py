@@ -41,8 +41,8 @@ class FlightSample:
 class Action:
     """For the caller to do once.
 
-    `mode`, `failure`, `clear_failures`, `excitation`, `reset`, `wind`, `weather`, `time`, `traffic`, `dataref`,
-    `command`, `label`.
+    `mode`, `failure`, `clear_failures`, `excitation`, `reset`, `wind`, `disturb`, `weather`, `time`, `traffic`,
+    `dataref`, `command`, `label`.
     """
 
     kind: str

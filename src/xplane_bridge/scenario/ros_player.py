@@ -19,7 +19,7 @@ from xplane_bridge.scenario.resets import reset_request
 from xplane_bridge.scenario.schema import HANDLE_FIELDS, Scenario, ScenarioError
 from xplane_bridge.scenario.traffic import ScenarioTraffic
 from xplane_bridge.scenario.virtual_stick import VirtualStick
-from xplane_bridge.scenario.world import time_request, weather_request, wind_request
+from xplane_bridge.scenario.world import disturbance_request, time_request, weather_request, wind_request
 
 #: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
 STICK_RATE = 50.0
@@ -293,6 +293,7 @@ class RosPlayer:
             "excitation": self._excitation,
             "reset": self._reset,
             "wind": self._wind,
+            "disturb": self._disturb,
             "weather": self._weather,
             "time": self._time,
             "dataref": self._datarefs,
@@ -390,6 +391,11 @@ class RosPlayer:
         from xplane_bridge.srv import SetWind
 
         self._call("set_wind", SetWind, "wind", **wind_request(value))
+
+    def _disturb(self, value: Dict[str, Any]) -> None:
+        from xplane_bridge.srv import SetDisturbance
+
+        self._call("disturb", SetDisturbance, f"disturbance {value['kind']}", **disturbance_request(value))
 
     def _weather(self, value: Dict[str, Any]) -> None:
         from xplane_bridge.srv import SetWeather, SetWeatherRequest

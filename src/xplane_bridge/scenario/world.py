@@ -1,4 +1,4 @@
-"""Wind, weather and time of a scenario: their ranges, and the requests to tx_node's services they become."""
+"""Wind and its disturbances, weather and time of a scenario: their ranges, and the requests they become."""
 
 from __future__ import annotations
 
@@ -8,6 +8,45 @@ Ranges = Mapping[str, Tuple[float, float]]
 
 #: Of set_wind; what is not given is calm air from north.
 WIND: Ranges = {"speed": (0.0, 100.0), "from_deg": (0.0, 360.0), "turbulence": (0.0, 1.0)}
+#: Of disturb, by kind; what a scenario must give stands in `DISTURBANCE_NEEDS`.
+DISTURBANCES: Mapping[str, Ranges] = {
+    "gust": {
+        "duration": (0.0, 36000.0),
+        "from_deg": (0.0, 360.0),
+        "speed": (0.0, 50.0),
+        "vertical_speed": (-50.0, 50.0),
+        "length": (0.0, 20000.0),
+    },
+    "turbulence": {
+        "duration": (0.0, 36000.0),
+        "from_deg": (0.0, 360.0),
+        "speed": (0.001, 50.0),
+        "seed": (0.0, 4294967295.0),
+    },
+    "shear": {
+        "duration": (0.0, 36000.0),
+        "from_deg": (0.0, 360.0),
+        "speed": (0.0, 50.0),
+        "gradient": (-1.0, 1.0),
+        "roughness": (0.0, 2.0),
+    },
+    "microburst": {
+        "duration": (0.0, 36000.0),
+        "speed": (0.001, 50.0),
+        "latitude": (-90.0, 90.0),
+        "longitude": (-180.0, 180.0),
+        "radius": (100.0, 10000.0),
+        "height": (10.0, 1000.0),
+    },
+    "stop": {},
+}
+DISTURBANCE_NEEDS: Mapping[str, Tuple[str, ...]] = {
+    "gust": (),
+    "turbulence": ("speed",),
+    "shear": (),
+    "microburst": ("speed", "latitude", "longitude", "radius", "height"),
+    "stop": (),
+}
 #: Of set_time, each with its bit of `fields`.
 TIME: Ranges = {"date_days": (0.0, 365.0), "zulu_time": (0.0, 86400.0), "time_ratio": (1.0, 16.0)}
 _TIME_BITS = {"date_days": "DATE", "zulu_time": "ZULU_TIME", "time_ratio": "TIME_RATIO"}
@@ -42,12 +81,17 @@ _WEATHER_BITS = {
     "sea_level_pressure": "PRESSURE",
 }
 #: Kinds of actions that take tx_node's services, or an X-Plane: nothing that flies in process has them.
-KINDS = ("reset", "wind", "weather", "time", "traffic")
+KINDS = ("reset", "wind", "disturb", "weather", "time", "traffic")
 
 
 def wind_request(value: Mapping[str, float]) -> Dict[str, float]:
     """Fields of SetWind. Calm air is asked for from 360 deg: the service takes three zeros for nothing."""
     return {"speed": 0.0, "from_deg": 360.0, "turbulence": 0.0, **value}
+
+
+def disturbance_request(value: Mapping[str, Any]) -> Dict[str, Any]:
+    """Fields of SetDisturbance."""
+    return {key: int(given) if key == "seed" else given for key, given in value.items()}
 
 
 def time_request(value: Mapping[str, float], bits: Any) -> Dict[str, Any]:

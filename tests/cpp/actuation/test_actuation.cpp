@@ -36,6 +36,7 @@ class ActuationTest : public testing::Test {
     hooks.surfaces_applied = [](const SurfaceControl::Echo&, core::FlightMode, const auto&) {};
     hooks.failures = [this](const FailureSnapshot& snapshot) { broken_.push_back(snapshot); };
     hooks.excitation = [this](const ExcitationLabel& label) { labels_.push_back(label); };
+    hooks.disturbance = [](const DisturbanceLabel&) {};
     hooks.event = [this](const ActuationEvent& event) { events_.push_back(event); };
     hooks.warn = [](const std::string&) {};
     hooks.journal_problem = [](const std::string&) {};

@@ -23,6 +23,7 @@ LATER = {
     "experiment",
     "traffic/state",
     "traffic/command",
+    "disturbance/state",
 }
 OLD_TOPICS = {name: msgtype for name, msgtype in TOPICS.items() if name not in LATER}
 

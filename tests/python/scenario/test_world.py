@@ -9,10 +9,11 @@ from types import SimpleNamespace
 import pytest
 
 from xplane_bridge.campaign.definition import CampaignError, _refuse_unflyable
+from xplane_bridge.constants import DISTURBANCE_KINDS
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import ScenarioError, parse_scenario
 from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS, reset_request
-from xplane_bridge.scenario.world import time_request, weather_request, wind_request
+from xplane_bridge.scenario.world import DISTURBANCES, disturbance_request, time_request, weather_request, wind_request
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -28,6 +29,42 @@ def service(name):
 def read(**actions):
     scenario = parse_scenario({"name": "t", "events": [{"at": 0, **actions}]})
     return dict(scenario.events[0].actions)
+
+
+def test_a_disturbance_becomes_its_request():
+    _, fields = service("SetDisturbance")
+    assert set().union(*DISTURBANCES.values()) | {"kind", "horizontal_only"} == set(fields)
+    assert set(DISTURBANCES) == {*DISTURBANCE_KINDS, "stop"}
+    given = {"kind": "turbulence", "speed": 12, "from_deg": 250, "seed": 3, "horizontal_only": True}
+    request = disturbance_request(read(disturb=given)["disturb"])
+    assert request == given
+    assert isinstance(request["seed"], int)
+    gust = {"kind": "gust", "speed": 8, "from_deg": 270, "length": 200}
+    assert read(disturb=gust)["disturb"] == gust
+    assert read(disturb={"kind": "stop"})["disturb"] == {"kind": "stop"}
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ("gust", "expected a mapping with kind: gust, turbulence, shear, microburst, stop"),
+        ({"kind": "storm"}, "disturb.kind: 'storm'; expected one of gust,"),
+        ({"kind": "gust", "speed": 8}, "disturb: expected either length or duration"),
+        ({"kind": "gust", "speed": 8, "length": 100, "duration": 2}, "expected either length or duration"),
+        ({"kind": "gust", "duration": 2}, "disturb.speed: missing"),
+        ({"kind": "gust", "speed": 80, "duration": 2}, "disturb.speed: 80; expected a number from 0 to 50"),
+        ({"kind": "gust", "vertical_speed": 5, "duration": 2}, "disturb.horizontal_only: missing; expected true"),
+        ({"kind": "shear", "speed": 8}, "expected either gradient or roughness"),
+        ({"kind": "shear", "speed": 8, "length": 9}, "disturb.length: unknown key"),
+        ({"kind": "turbulence", "speed": 8}, "disturb.horizontal_only: missing; expected true"),
+        ({"kind": "turbulence", "speed": 8, "horizontal_only": True, "seed": 0.5}, "expected a whole number"),
+        ({"kind": "microburst", "speed": 8, "horizontal_only": True}, "disturb.latitude: missing"),
+        ({"kind": "microburst", "speed": 8, "horizontal_only": 1}, "disturb.horizontal_only: 1; expected true or"),
+    ],
+)
+def test_a_wrong_disturbance_is_refused_with_what_was_expected(given, complaint):
+    with pytest.raises(ScenarioError, match=re.escape(complaint)):
+        read(disturb=given)
 
 
 def test_weather_becomes_the_request_with_its_bits():

@@ -25,6 +25,7 @@ struct FlightWatch {
   double longitude_deg = std::nan("");
   double elevation = std::nan("");         ///< [m] MSL
   double ground_speed = std::nan("");      ///< [m/s]
+  double true_airspeed = std::nan("");     ///< [m/s]
   double roll_rate_deg_s = std::nan("");   ///< about the body's axes: right +
   double pitch_rate_deg_s = std::nan("");  ///< nose up +
   double yaw_rate_deg_s = std::nan("");    ///< nose right +

@@ -93,7 +93,19 @@ class TxNode : public BaseNode {
   ros::Publisher mode_publisher_;
   ros::Publisher failure_publisher_;
   ros::Publisher excitation_publisher_;
+  ros::Publisher disturbance_publisher_;
   std::unique_ptr<Actuation> actuation_;  // from start() on
 };
+
+template <class Service, class Serve>
+void TxNode::advertiseOwn(const std::string& service, Serve serve) {
+  using Request = typename Service::Request;
+  using Response = typename Service::Response;
+  advertiseService<Request, Response>(name() + "/" + service,
+                                      [this, serve](const Request& request, Response& response) {
+                                        if (lockstep_) lockstep_->waitUntilOpen();
+                                        serve(request, &response);
+                                      });
+}
 
 }  // namespace xplane_bridge

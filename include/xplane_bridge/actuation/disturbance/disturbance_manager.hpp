@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "xplane_bridge/core/control/control_channels.hpp"
+#include "xplane_bridge/core/link/simulator_port.hpp"
+#include "xplane_bridge/core/simulator/disturbance.hpp"
+#include "xplane_bridge/core/state/flight_watch.hpp"
+
+namespace xplane_bridge {
+
+/// As DisturbanceState.msg.
+struct DisturbanceLabel {
+  double sim_time = std::nan("");  ///< [s] of the last frame
+  bool active = false;
+  std::uint32_t id = 0;
+  std::optional<core::DisturbanceSpec> spec;  ///< none before the first
+  // Velocity of the air, NED [m/s].
+  Eigen::Vector3d steady = Eigen::Vector3d::Zero();     ///< that it found and adds to
+  Eigen::Vector3d model = Eigen::Vector3d::Zero();      ///< that its model adds
+  Eigen::Vector3d commanded = Eigen::Vector3d::Zero();  ///< of that, what X-Plane is sent
+  double wind_speed = 0.0;                              ///< [m/s] sent: steady and commanded
+  double wind_from_deg = 0.0;                           ///< true, where it comes from
+  double start_sim_time = std::nan("");                 ///< [s]
+  double end_sim_time = std::nan("");                   ///< [s]
+  std::string result;
+};
+
+/// One disturbance at a time: asks X-Plane for its weather, notes that in the journal, writes the wind in each frame of
+/// flight, and puts the weather back when it ends, by whatever way. Thread-safe; waits for nothing but the journal's
+/// disk.
+class DisturbanceManager {
+ public:
+  using Publish = std::function<void(const DisturbanceLabel& label)>;
+  /// `report(text, who, success)`: what happened, for events and the log; `who` asked for the disturbance.
+  using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
+
+  /// @param purpose of the entry in the journal, see core::JournalEntry
+  DisturbanceManager(core::SimulatorPort* link, std::string purpose, Publish publish, Report report);
+
+  /// For what core::check() and core::refusalBy() let pass, while X-Plane is up. Returns why it is refused; empty: it
+  /// begins once X-Plane has shown its weather, or is reported as failed.
+  std::string begin(const core::DisturbanceSpec& spec, const std::string& who);
+  /// In each frame.
+  void onFrame(const core::FlightWatch& watch);
+  void onLink(const core::LinkStatus& status);
+  /// Ends the one that runs, as aborted, and puts the weather back.
+  void abort(const std::string& why);
+  /// Another process has put everything back: the one that runs ends.
+  void forget(const std::string& why);
+  /// Sees once a second whether another process has put the weather back. Reads the journal.
+  void watchJournal();
+
+  /// Why the wind cannot be set now; empty: it can.
+  std::string windRefusal() const;
+  DisturbanceLabel label() const;
+  void publish() const;
+
+ private:
+  enum class State : std::uint8_t { kIdle, kAsking, kRunning };
+
+  // All with mutex_ held.
+  void onWeather(std::uint32_t id, const std::vector<std::string>& names,
+                 const std::vector<core::DatarefValue>& values);
+  void send(const Eigen::Vector3d& wind_ned);
+  void putBack();
+  void end(const std::string& result, bool success);
+
+  core::SimulatorPort* link_;
+  const std::string purpose_;
+  const Publish publish_;
+  const Report report_;
+  mutable core::HandlerMutex mutex_;
+  State state_ = State::kIdle;
+  bool up_ = false;
+  std::uint32_t epoch_ = 0;
+  core::SimulatorVersion version_;
+  std::string who_;
+  DisturbanceLabel label_;
+  std::optional<core::Disturbance> disturbance_;
+  std::vector<core::UndoOperation> restores_;  // what is still to be put back
+  std::vector<core::DatarefWrite> sent_;
+  double send_all_at_ = 0.0;  // [s] steady
+  double looked_at_ = 0.0;    // [s] steady, at the journal
+};
+
+}  // namespace xplane_bridge
