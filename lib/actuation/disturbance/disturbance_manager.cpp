@@ -56,7 +56,7 @@ std::string DisturbanceManager::begin(const core::DisturbanceSpec& spec, const s
   state_ = State::kAsking;
   publish();
   link_->read(names, kAskWait, [this, id, names](const std::vector<core::DatarefValue>& values) {
-    const Lock told(mutex_);
+    const Lock answered(mutex_);
     onWeather(id, names, values);
   });
   return "";
