@@ -1,4 +1,4 @@
-"""Gusts and their like through tx_node: what the emulator's air does, against what disturbance/state tells."""
+"""Gusts and their like through tx_node: what the emulator's air does, against what disturbance/state reports."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def flight(request, new_world, tmp_path_factory):
     world.close()
 
 
-def test_a_gust_is_flown_told_and_ended(flight):
+def test_a_gust_is_flown_reported_and_ended(flight):
     steady = -flight.calm[0]
     assert steady == pytest.approx(-6.0, abs=0.01)
     number = disturb(flight, **GUST)
@@ -148,7 +148,7 @@ def test_the_wind_of_before_comes_back_when_the_node_ends(world, end):
 
 
 def test_without_x_plane_nothing_is_accepted(world):
-    world.point_to(9)  # nobody there
+    world.point_to(9)  # no X-Plane there
     world.set_param("aircraft", "fixed_wing")
     world.start("tx_node", tx_params())
     response = call(world, "disturb", "SetDisturbance", **GUST)
