@@ -26,7 +26,7 @@ constexpr double kWriteAgain = 0.3;             // [s] until datarefs that are n
 constexpr double kStationsWait = 0.5;           // [s] until a payload that the stations do not take is written as a sum
 constexpr double kWindAgain = 1.0;              // [s] the same of the weather
 constexpr double kPauseWait = 1.0;              // [s] until a pause must be shown
-constexpr double kIdentityWait = 3.0;           // [s] until X-Plane must have shown its aircraft
+constexpr double kIdentityChangeWait = 3.0;     // [s] until X-Plane must have shown its aircraft
 constexpr const char* kSettingsEntry = "override:settings of the flight";
 constexpr const char* kLoading = "another aircraft is being loaded";
 
@@ -445,7 +445,7 @@ std::string FlightChanges::waitForAircraft(const std::string& path, std::int32_t
     loaded = isShown() && (hasBegun() || !same) && isUp();
   }
   const unsigned identities = hooks_.identities();
-  const bool shown = waitFor(kIdentityWait, [&] { return hooks_.identities() != identities; });
+  const bool shown = waitFor(kIdentityChangeWait, [&] { return hooks_.identities() != identities; });
   return shown ? "" : "X-Plane has loaded it, but does not report which aircraft it is";
 }
 

@@ -7,7 +7,7 @@
 namespace xplane_bridge {
 namespace {
 
-using Lock = std::lock_guard<std::mutex>;
+using BarrierLock = std::lock_guard<std::mutex>;
 
 constexpr std::size_t kReader = 0;
 
@@ -30,7 +30,7 @@ std::size_t LockstepBarrier::find(const std::string& who) const {
 std::size_t LockstepBarrier::rank(const std::string& who) const { return find(who); }
 
 void LockstepBarrier::open(std::uint32_t number, std::int64_t stamp_ns) {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   open_ = true;
   number_ = number;
   stamp_ns_ = stamp_ns;
@@ -53,12 +53,12 @@ void LockstepBarrier::take(std::size_t participant, std::int64_t stamp_ns, bool 
 }
 
 void LockstepBarrier::answer(const std::string& who, std::int64_t stamp_ns) {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   take(find(who), stamp_ns, false);
 }
 
 void LockstepBarrier::answerForAll(const std::string& reader, std::int64_t stamp_ns) {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   take(find(reader), stamp_ns, true);
 }
 
@@ -76,7 +76,7 @@ bool LockstepBarrier::answeredLocked() const {
 }
 
 std::vector<std::string> LockstepBarrier::missing() const {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   std::vector<std::string> out;
   for (std::size_t i = 0; i < names_.size(); ++i) {
     if (isMissing(i)) out.push_back(names_[i]);
@@ -85,38 +85,38 @@ std::vector<std::string> LockstepBarrier::missing() const {
 }
 
 bool LockstepBarrier::complete() const {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   return granted_ > 0 && answeredLocked();
 }
 
 bool LockstepBarrier::holds() const {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   return granted_ == 0 && answeredLocked();
 }
 
 bool LockstepBarrier::answered() const {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   return answeredLocked();
 }
 
 void LockstepBarrier::close() {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   open_ = false;
   if (granted_ != kEndless && granted_ > 0) --granted_;
 }
 
 void LockstepBarrier::step(std::uint64_t frames) {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   granted_ = frames;
 }
 
 void LockstepBarrier::run() {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   granted_ = kEndless;
 }
 
 std::uint32_t LockstepBarrier::number() const {
-  const Lock lock(mutex_);
+  const BarrierLock lock(mutex_);
   return number_;
 }
 

@@ -9,8 +9,8 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kPeriod = 0.2;       // [s]
-constexpr double kReleaseWait = 1.0;  // [s] of one attempt
+constexpr double kPeriod = 0.2;          // [s]
+constexpr double kReleaseAttempt = 1.0;  // [s] of one attempt
 
 }  // namespace
 
@@ -66,13 +66,13 @@ void ReleaseWorker::work() {
   const core::LinkStatus status = link_->status();
   if (!isUp(status)) return;
   try {
-    if (leftovers_of_epoch_ != status.epoch && overrides_->releaseLeftovers(kReleaseWait) &&
-        resumeLeftovers(link_, kReleaseWait)) {
+    if (leftovers_of_epoch_ != status.epoch && overrides_->releaseLeftovers(kReleaseAttempt) &&
+        resumeLeftovers(link_, kReleaseAttempt)) {
       leftovers_of_epoch_ = status.epoch;
     }
     overrides_->recordPreparations();
     if (watch_) watch_();
-    if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseWait);
+    if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseAttempt);
   } catch (const core::JournalError& error) {
     problem_(error.what());
   }

@@ -12,16 +12,16 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kSolvePeriod = 1.0;   // [s] of simulator time
-constexpr double kTakeOverWait = 1.0;  // [s] until the override must be shown
-constexpr double kReleaseWait = 2.0;   // [s] until it must be shown released
-constexpr double kRetry = 5.0;         // [s] after an attempt that failed
-constexpr double kLongestFrame = 0.1;  // [s] X-Plane slows its time beyond 1/20 s
-constexpr double kMovementDeg = 0.05;  // [deg] of a step by which the lag is measured
-constexpr double kSettleWait = 2.0;    // [s] of frames in which surfaces must have gone back to the law
-constexpr double kSettledDeg = 0.5;    // [deg] off the law that is no jump
-constexpr double kFollowsAgain = 0.5;  // [s] after the release until X-Plane must move the surfaces
-constexpr double kOffLawDeg = 2.0;     // [deg] off the law that shows a surface left standing
+constexpr double kSolvePeriod = 1.0;        // [s] of simulator time
+constexpr double kTakeOverWait = 1.0;       // [s] until the override must be shown
+constexpr double kShownReleasedWait = 2.0;  // [s] until it must be shown released
+constexpr double kRetry = 5.0;              // [s] after an attempt that failed
+constexpr double kLongestFrame = 0.1;       // [s] X-Plane slows its time beyond 1/20 s
+constexpr double kMovementDeg = 0.05;       // [deg] of a step by which the lag is measured
+constexpr double kSettleWait = 2.0;         // [s] of frames in which surfaces must have gone back to the law
+constexpr double kSettledDeg = 0.5;         // [deg] off the law that is no jump
+constexpr double kFollowsAgain = 0.5;       // [s] after the release until X-Plane must move the surfaces
+constexpr double kOffLawDeg = 2.0;          // [deg] off the law that shows a surface left standing
 constexpr double kLagSmoothing = 0.1;
 constexpr std::size_t kMaxAwaitingReadBack = 64;
 
@@ -151,7 +151,7 @@ void SurfaceControl::onSample() {
         left_time_ = time;
         enter(State::kIdle);
         report_("X-Plane drives the surfaces again", true);
-      } else if (now() - state_since_ > kReleaseWait) {
+      } else if (now() - state_since_ > kShownReleasedWait) {
         enter(State::kIdle);
         report_("X-Plane still shows the surface override", false);
       }

@@ -339,7 +339,7 @@ std::optional<core::MixingModel> readMixingFile(const std::string& folder, const
 }
 
 std::string writeMixingFile(const std::string& folder, const core::MixingModel& model) {
-  const std::string path = core::mixingPath(folder, model.aircraft);
+  std::string path = core::mixingPath(folder, model.aircraft);
   const std::string fresh = path + ".new";
   std::error_code error;
   std::filesystem::create_directories(folder, error);

@@ -14,6 +14,7 @@ using Lock = std::lock_guard<core::HandlerMutex>;
 
 std::string listed(const std::vector<int>& numbers) {
   std::vector<std::string> texts;
+  texts.reserve(numbers.size());
   for (const int number : numbers) texts.push_back(std::to_string(number));
   return core::join(texts, ", ");
 }

@@ -19,7 +19,7 @@ namespace {
 using core::ResultCode;
 
 constexpr const char* kEntry = "view:camera";
-constexpr double kReadWait = 0.6;      // [s] for what X-Plane shows now
+constexpr double kViewReadWait = 0.6;  // [s] for what X-Plane shows now
 constexpr double kAttemptWait = 0.5;   // [s] until the writes are sent once more: the view's command may undo them
 constexpr int kAttempts = 2;           // a second in all
 constexpr double kToleranceDeg = 2.0;  // of the measured pose; a frame of a roll at 60 deg/s is 1 deg
@@ -88,7 +88,7 @@ RequestResult ViewRequests::setViewLocked(const core::ViewWish& wish) {
     bool there = false;
     std::tie(there, shown) = tryWay(way, wanted);
     if (!there) continue;
-    const RequestResult field = setFieldOfView(wish.field_of_view_deg);
+    RequestResult field = setFieldOfView(wish.field_of_view_deg);
     if (!field.success()) return field;
     return {ResultCode::kOk, "the camera is at " + described(shown->pose, shown->view_type)};
   }
@@ -101,7 +101,7 @@ RequestResult ViewRequests::setViewLocked(const core::ViewWish& wish) {
 std::string ViewRequests::remember() {
   if (!link_->journal()) return "there is no journal yet, so that nothing is changed: try again in a second";
   const std::vector<std::string>& camera = core::cameraDatarefs();
-  const auto now = link_->read(camera, kReadWait);
+  const auto now = link_->read(camera, kViewReadWait);
   answered_.clear();
   for (std::size_t i = 0; i < camera.size(); ++i) {
     if (now[i]) answered_.push_back(camera[i]);
@@ -111,7 +111,7 @@ std::string ViewRequests::remember() {
   if (!before_.empty()) return "";
   std::vector<std::string> changed = core::viewDatarefs();
   changed.emplace_back(core::kFieldOfViewDataref);
-  const auto values = link_->read(changed, kReadWait);
+  const auto values = link_->read(changed, kViewReadWait);
   for (std::size_t i = 0; i < changed.size(); ++i) {
     if (values[i]) before_[changed[i]] = *values[i];
   }

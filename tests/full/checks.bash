@@ -56,7 +56,7 @@ check_tsan() {
     sanitized tsan thread "${names[@]}"
 }
 
-check_tidy_all() { tidy_of lib; }
+check_tidy_all() { python tests/tidy.py lib; }
 
 # Ten minutes each with libFuzzer and sanitizers, and as long for what reads files and packets in Python.
 check_long_fuzz() {
