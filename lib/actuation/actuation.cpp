@@ -286,7 +286,7 @@ Actuation::Injected Actuation::inject(const ExcitationRequest& request, const st
   const ExcitationManager::Plan plan = excitation_.plan(request);
   const Lock lock(*mutex_);
   if (identification_.running() && plan.wrong.empty()) {
-    if (plan.signal) {
+    if (!plan.signals.empty()) {
       return {{core::ResultCode::kRefused,
                "identify_surfaces runs: wait for event " + std::to_string(identification_.number()) + ", or stop it"},
               excitation_.label().id};

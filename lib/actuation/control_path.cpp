@@ -16,6 +16,21 @@ constexpr double kHandleRepeat = 0.3;     // [s] in which a changed handle is se
 constexpr double kSameFlight = 1.0;       // [s] by which a flight may seem to have run on too far in a gap
 constexpr double kGap = 0.4;              // [s] without a frame in which X-Plane may have been restarted
 
+/// Whether each axis of a test signal is excited. Of the levers one is enough: not every engine's is commanded.
+bool everyAxisExcited(const core::ChannelSet& channels, std::uint32_t excited) {
+  bool levers = false;
+  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+    if (!channels.test(i)) continue;
+    const auto channel = static_cast<core::Channel>(i);
+    if (core::isLever(channel)) {
+      levers = true;
+    } else if ((excited & core::fieldOf(channel)) == 0u) {
+      return false;
+    }
+  }
+  return !levers || (excited & (core::kFieldThrottle | core::kFieldEngineThrottles)) != 0u;
+}
+
 }  // namespace
 
 const char* toString(Standing standing) {
@@ -348,7 +363,9 @@ void ControlPath::send(double time) {
   watchSurfaces();
   watchFailsafe();
   excited_ = controls.excited != 0u;
-  if (excitation.channels.any() && !excited_) hooks_.end_excitation("the commands of the axis have ended");
+  if (!everyAxisExcited(excitation.channels, controls.excited)) {
+    hooks_.end_excitation("the commands of the axis have ended");
+  }
   publishMode();
   std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
   if (fly(controls, time)) {

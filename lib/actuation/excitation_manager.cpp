@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/surfaces/surfaces.hpp"
 
 namespace xplane_bridge {
@@ -25,6 +26,36 @@ core::ChannelSet channelsOf(const std::string& target) {
   return out;
 }
 
+/// The axes of "roll,pitch"; spaces do not count.
+std::vector<std::string> axesOf(const std::string& target) {
+  std::vector<std::string> out(1);
+  for (const char c : target) {
+    if (c == ',') {
+      out.emplace_back();
+    } else if (c != ' ') {
+      out.back() += c;
+    }
+  }
+  return out;
+}
+
+/// The channels of each axis of `target`; returns what is wrong with it, or nothing.
+std::string planAxes(const std::string& target, std::vector<core::ChannelSet>* channels) {
+  core::ChannelSet all;
+  for (const std::string& axis : axesOf(target)) {
+    const core::ChannelSet own = channelsOf(axis);
+    if (own.none()) {
+      return "target is \"" + target +
+             "\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md), of a " +
+             "multisine also several axes, for example \"roll,pitch\"";
+    }
+    if ((all & own).any()) return "target is \"" + target + "\"; expected each axis once";
+    all |= own;
+    channels->push_back(own);
+  }
+  return {};
+}
+
 }  // namespace
 
 ExcitationManager::ExcitationManager(SurfaceControl* surfaces, double max_roll_deg, double max_pitch_deg,
@@ -45,11 +76,13 @@ ExcitationManager::Plan ExcitationManager::plan(const ExcitationRequest& request
     out.wrong = "kind is \"" + request.kind + "\"; expected " + core::kExcitationShapeWords + " or stop";
     return out;
   }
-  out.channels = channelsOf(request.target);
   out.surface = core::surfaceNumber(request.target);
-  if (out.channels.none() && !out.surface) {
+  if (!out.surface) out.wrong = planAxes(request.target, &out.channels);
+  if (!out.wrong.empty()) return out;
+  const std::size_t targets = out.surface ? 1 : out.channels.size();
+  if (targets > 1 && *shape != core::ExcitationShape::kMultisine) {
     out.wrong =
-        "target is \"" + request.target + "\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md)";
+        "target is \"" + request.target + "\"; several axes at once take a multisine, " + request.kind + " takes one";
     return out;
   }
   core::ExcitationSpec spec;
@@ -63,12 +96,19 @@ ExcitationManager::Plan ExcitationManager::plan(const ExcitationRequest& request
   spec.seed = request.seed;
   spec.roll_limit_deg = request.max_roll_deg == 0.0 ? max_roll_deg_ : request.max_roll_deg;
   spec.pitch_limit_deg = request.max_pitch_deg == 0.0 ? max_pitch_deg_ : request.max_pitch_deg;
-  if (const auto problem = core::validate(spec)) {
-    out.wrong = *problem;
-  } else if (out.channels.any() && spec.amplitude > 1.0) {
+  spec.interleave = static_cast<int>(targets);
+  if (out.channels.size() > 0 && spec.amplitude > 1.0) {
     out.wrong = "amplitude of an axis must be at most 1 (full travel)";
-  } else {
-    out.signal.emplace(spec);
+    return out;
+  }
+  for (std::size_t i = 0; i < targets; ++i) {
+    spec.interleave_offset = static_cast<int>(i);
+    if (const auto problem = core::validate(spec)) {
+      out.wrong = *problem;
+      out.signals.clear();
+      return out;
+    }
+    out.signals.emplace_back(spec);
   }
   return out;
 }
@@ -77,20 +117,21 @@ RequestResult ExcitationManager::inject(const ExcitationRequest& request, const 
                                         const core::FlightWatch& watch, const std::string& blocked_reason,
                                         const core::ChannelSet& commanded) {
   if (!plan.wrong.empty()) return {core::ResultCode::kRefused, plan.wrong};
-  if (!plan.signal) {
+  if (plan.signals.empty()) {
     if (!running()) return {core::ResultCode::kRefused, "no excitation runs"};
     abort("stopped by " + who);
     return {core::ResultCode::kAccepted, "excitation " + std::to_string(label_.id) + " is stopped"};
   }
-  const core::ExcitationSpec& spec = plan.signal->spec();
+  const core::ExcitationSpec& spec = plan.signals.front().spec();
   if (!blocked_reason.empty()) return {core::ResultCode::kNoLink, blocked_reason};
   if (running()) {
     return {core::ResultCode::kRefused, "excitation " + std::to_string(label_.id) + " runs on " + label_.target +
                                             "; one at a time: wait for it, or stop it"};
   }
-  if (plan.channels.any() && (plan.channels & commanded).none() && !request.rest) {
-    return {core::ResultCode::kRefused,
-            "no source commands " + request.target + ": an excitation is added to a command (control/manual or auto)"};
+  for (std::size_t i = 0; i < plan.channels.size(); ++i) {
+    if ((plan.channels[i] & commanded).any() || request.rest) continue;
+    return {core::ResultCode::kRefused, "no source commands " + axesOf(request.target)[i] +
+                                            ": an excitation is added to a command (control/manual or auto)"};
   }
   if (!std::isfinite(watch.sim_time) || !std::isfinite(watch.roll_deg) || !std::isfinite(watch.pitch_deg)) {
     return {core::ResultCode::kNoLink, "X-Plane has not shown the attitude yet"};
@@ -102,7 +143,7 @@ RequestResult ExcitationManager::inject(const ExcitationRequest& request, const 
     const std::string why = surfaces_->beginOffset(*plan.surface, spec.amplitude);
     if (!why.empty()) return {core::ResultCode::kRefused, why};
   }
-  runner_.start(*plan.signal, watch.sim_time);
+  runner_.start(plan.signals, watch.sim_time);
   channels_ = plan.channels;
   rest_ = request.rest;
   surface_ = plan.surface;
@@ -132,17 +173,17 @@ void ExcitationManager::begin(const ExcitationRequest& request, const core::Exci
 
 bool ExcitationManager::onFrame(const core::FlightWatch& watch) {
   if (!running()) return false;
-  const double value = runner_.step(watch.sim_time, watch.roll_deg, watch.pitch_deg);
+  const double value = runner_.step(watch.sim_time, watch.roll_deg, watch.pitch_deg).front();
   last_sim_time_ = watch.sim_time;
   if (!running()) {
     end();
-    return channels_.any();
+    return !channels_.empty();
   }
   if (surface_) {
     const std::string ended = surfaces_->setOffset(value);
     if (!ended.empty()) abort(ended);
   }
-  return channels_.any();
+  return !channels_.empty();
 }
 
 void ExcitationManager::abort(const std::string& reason) {
@@ -151,9 +192,24 @@ void ExcitationManager::abort(const std::string& reason) {
   end();
 }
 
+core::ChannelSet ExcitationManager::channels() const {
+  core::ChannelSet out;
+  if (!running()) return out;
+  for (const core::ChannelSet& axis : channels_) out |= axis;
+  return out;
+}
+
 core::ChannelExcitation ExcitationManager::excitation() const {
-  if (!running()) return {};
-  return {channels_, runner_.value(), rest_};
+  core::ChannelExcitation out;
+  if (!running()) return out;
+  out.channels = channels();
+  out.rest = rest_;
+  for (std::size_t axis = 0; axis < channels_.size(); ++axis) {
+    for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+      if (channels_[axis].test(i)) out.values[i] = runner_.values()[axis];
+    }
+  }
+  return out;
 }
 
 void ExcitationManager::end() {

@@ -210,7 +210,7 @@ PyObject* step(PyObject* object, PyObject* arguments) {
         if (lever || core::channelName(channel) == wanted) excitation.channels.set(i);
       }
       if (excitation.channels.none()) throw std::invalid_argument("\"" + wanted + "\" is no channel");
-      excitation.value = value;
+      excitation.values.fill(value);
     }
     const core::ArbitratedControls& controls = self(object)->arbiter->step(now, excitation);
     Object out(PyDict_New());

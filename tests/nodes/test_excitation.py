@@ -88,6 +88,26 @@ def test_a_doublet_is_added_to_the_stick(flown):
     assert any(f"excitation {began.id}" in event.text for event in flown.events.last.events)
 
 
+def test_a_multisine_moves_several_axes_each_by_its_own_signal(flown):
+    from xplane_bridge.msg import ControlCommand
+
+    refused = inject(flown, target="roll,pitch", duration=20.0)
+    assert "several axes at once take a multisine" in refused.result.message
+    refused = inject(flown, kind="multisine", target="roll,pitch", duration=20.0)
+    assert "commands pitch" in refused.result.message, "each axis needs a command to be added to"
+    flown.manual.fly(fields=ControlCommand.ROLL | ControlCommand.PITCH, roll=0.0, pitch=0.0)
+    flown.applied.wait_for_next(lambda a: a.fields & ControlCommand.PITCH)
+    began = inject(flown, kind="multisine", target="roll,pitch", duration=20.0, amplitude=0.05)
+    assert began.success, began.result.message
+    state = flown.state.wait_for(lambda s: s.id == began.id and s.active)
+    assert state.target == "roll,pitch"
+    both = ControlCommand.ROLL | ControlCommand.PITCH
+    flown.applied.wait_for_next(lambda a: a.excited == both and abs(a.roll) > 0.01 and abs(a.roll - a.pitch) > 0.01)
+    flown.applied.wait_for_next(lambda a: a.excited == both and abs(a.pitch) > 0.01)
+    assert inject(flown, kind="stop").success
+    flown.manual.fly(fields=ControlCommand.ROLL, roll=0.0)
+
+
 def test_it_ends_where_the_attitude_leaves_its_limits(flown):
     began = inject(flown, amplitude=0.8, duration=20.0, max_roll_deg=15.0)
     assert began.success

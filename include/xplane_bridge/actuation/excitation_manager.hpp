@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "xplane_bridge/actuation/request_result.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
@@ -17,7 +18,7 @@ namespace xplane_bridge {
 /// As InjectExcitation.srv.
 struct ExcitationRequest {
   std::string kind;    ///< of ExcitationShape, or "stop"
-  std::string target;  ///< roll, pitch, yaw, throttle or a surface
+  std::string target;  ///< roll, pitch, yaw, throttle or a surface; several axes of a multisine: "roll,pitch"
   double amplitude = 0.0;
   double duration = 0.0;       ///< [s]
   double frequency_min = 0.0;  ///< [Hz]
@@ -45,8 +46,9 @@ struct ExcitationLabel {
   std::string result;                    ///< running, done, aborted: <why>
 };
 
-/// The one test signal that runs, on an axis (added to what is commanded) or on a surface (which is driven for as
-/// long), and its label. X-Plane's frames drive it. Not thread-safe: its owner's mutex guards it, but for plan().
+/// The one test signal that runs, on an axis or several (added to what is commanded) or on a surface (which is driven
+/// for as long), and its label. X-Plane's frames drive it. Not thread-safe: its owner's mutex guards it, but for
+/// plan().
 class ExcitationManager {
  public:
   /// `report(text, who, success)`: what happened, for events and the log.
@@ -59,10 +61,10 @@ class ExcitationManager {
 
   /// What a request asks for, as far as it says by itself.
   struct Plan {
-    std::string wrong;  ///< with the request, in words; empty: nothing
-    core::ChannelSet channels;
+    std::string wrong;                       ///< with the request, in words; empty: nothing
+    std::vector<core::ChannelSet> channels;  ///< of each axis; none for a surface
     std::optional<std::size_t> surface;
-    std::optional<core::ExcitationSignal> signal;  ///< none to stop the one that runs
+    std::vector<core::ExcitationSignal> signals;  ///< of each axis, or of the surface; none to stop the one that runs
   };
   /// Takes up to half a second. May be called without the owner's mutex.
   Plan plan(const ExcitationRequest& request) const;
@@ -82,7 +84,7 @@ class ExcitationManager {
   core::ChannelExcitation excitation() const;
   bool running() const { return runner_.phase() == core::ExcitationPhase::kRunning; }
   /// The channels it is added to; none for a surface, or while none runs.
-  core::ChannelSet channels() const { return running() ? channels_ : core::ChannelSet{}; }
+  core::ChannelSet channels() const;
   /// The one that runs, or ran last; without id before the first.
   const ExcitationLabel& label() const { return label_; }
   /// Publishes the label once more.
@@ -99,7 +101,7 @@ class ExcitationManager {
   Report report_;
 
   core::ExcitationRunner runner_;
-  core::ChannelSet channels_;
+  std::vector<core::ChannelSet> channels_;  // of each axis
   std::optional<double> rest_;
   std::optional<std::size_t> surface_;
   std::string who_;

@@ -342,7 +342,7 @@ const ArbitratedControls& ControlArbiter::step(double now, const ChannelExcitati
       commanded = true;
     }
     const bool excited = takesSignal(i, target.has_value(), excitation);
-    if (excited) excite(i, target ? output_[i] : *excitation.rest, excitation.value);
+    if (excited) excite(i, target ? output_[i] : *excitation.rest, excitation.values[i]);
     if (!target && !excited) continue;
     out_.active.set(i);
     out_.fields |= fieldOf(channel);

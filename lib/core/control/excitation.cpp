@@ -14,10 +14,10 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kMaxDuration = 600.0;     // [s] longer ones are a mistake in the unit
-constexpr int kMaxComponents = 2000;       // bounds the work of one sample
-constexpr double kMaxHarmonic = 60000.0;   // 100 Hz for the longest duration; bounds the work of finding the peak
-constexpr int kPeakSamplesPerPeriod = 32;  // of the highest component; leaves the true peak within 0.5 %
+constexpr double kMaxDuration = 600.0;        // [s] longer ones are a mistake in the unit
+constexpr std::size_t kMaxComponents = 2000;  // bounds the work of one sample
+constexpr double kMaxHarmonic = 60000.0;      // 100 Hz for the longest duration; bounds the work of finding the peak
+constexpr int kPeakSamplesPerPeriod = 32;     // of the highest component; leaves the true peak within 0.5 %
 
 std::string complaint(const char* field, double given, const char* expected) {
   char text[160];
@@ -27,11 +27,14 @@ std::string complaint(const char* field, double given, const char* expected) {
 
 bool isPulse(ExcitationShape shape) { return shape == ExcitationShape::kDoublet || shape == ExcitationShape::k3211; }
 
-// Harmonics of 1/duration within [low, high], both ends included despite rounding.
-int firstHarmonic(const ExcitationSpec& s) {
-  return std::max(1, static_cast<int>(std::ceil(s.frequency_min * s.duration - 1e-9)));
+// The multisine's harmonics of 1/duration within [low, high], both ends included despite rounding.
+std::vector<int> harmonicsOf(const ExcitationSpec& s) {
+  const int first = std::max(1, static_cast<int>(std::ceil(s.frequency_min * s.duration - 1e-9)));
+  const int last = static_cast<int>(std::floor(s.frequency_max * s.duration + 1e-9));
+  std::vector<int> out;
+  for (int k = first + s.interleave_offset; k <= last; k += s.interleave) out.push_back(k);
+  return out;
 }
-int lastHarmonic(const ExcitationSpec& s) { return static_cast<int>(std::floor(s.frequency_max * s.duration + 1e-9)); }
 
 // Uniform in [0, 1) from a seed (SplitMix32's finaliser): the standard library's distributions differ between vendors.
 double unitFromSeed(std::uint32_t seed) {
@@ -43,14 +46,14 @@ double unitFromSeed(std::uint32_t seed) {
   return static_cast<double>(z) / 4294967296.0;
 }
 
-// Greatest magnitude of the sum of cosines of harmonics first, first + 1, ... with these phases.
-double peakOf(int first, const std::vector<double>& phases) {
-  const int wanted = kPeakSamplesPerPeriod * (first + static_cast<int>(phases.size()));
+// Greatest magnitude of the sum of cosines of these ascending harmonics with these phases.
+double peakOf(const std::vector<int>& harmonics, const std::vector<double>& phases) {
+  const int wanted = kPeakSamplesPerPeriod * (harmonics.back() + 1);
   std::size_t samples = 1;
   while (samples < static_cast<std::size_t>(wanted)) samples *= 2;
   std::vector<std::complex<double>> lines(samples), sum;
   for (std::size_t n = 0; n < phases.size(); ++n)
-    lines[static_cast<std::size_t>(first) + n] = std::polar(1.0, phases[n]);
+    lines[static_cast<std::size_t>(harmonics[n])] = std::polar(1.0, phases[n]);
   Eigen::FFT<double> fft;
   fft.SetFlag(Eigen::FFT<double>::Unscaled);
   fft.inv(sum, lines);
@@ -95,9 +98,13 @@ std::optional<std::string> validate(const ExcitationSpec& s) {
     if (s.frequency_max * s.duration > kMaxHarmonic) {
       return complaint("frequency_max", s.frequency_max, "at most 60000 / duration");
     }
-    const int count = lastHarmonic(s) - firstHarmonic(s) + 1;
+    if (s.interleave < 1) return complaint("interleave", s.interleave, "1 or more");
+    if (s.interleave_offset < 0 || s.interleave_offset >= s.interleave) {
+      return complaint("interleave_offset", s.interleave_offset, "0 or more, below interleave");
+    }
+    const std::size_t count = harmonicsOf(s).size();
     if (count < 1) {
-      return complaint("frequency_max", s.frequency_max, "a band that holds a multiple of 1/duration");
+      return complaint("frequency_max", s.frequency_max, "a band that holds a multiple of 1/duration for each target");
     }
     if (count > kMaxComponents) return complaint("duration", s.duration, "at most 2000 harmonics in the band");
   }
@@ -108,14 +115,16 @@ ExcitationSignal::ExcitationSignal(const ExcitationSpec& spec) : spec_(spec) {
   if (const auto wrong = validate(spec)) throw std::invalid_argument(*wrong);
   scale_ = spec.amplitude;
   if (spec.shape != ExcitationShape::kMultisine) return;
-  const int first = firstHarmonic(spec), last = lastHarmonic(spec), count = last - first + 1;
+  const std::vector<int> harmonics = harmonicsOf(spec);
+  const auto count = static_cast<int>(harmonics.size());
   const double shift = 2.0 * kPi * unitFromSeed(spec.seed);
   for (int n = 0; n < count; ++n) {
-    frequencies_.push_back((first + n) / spec.duration);
+    const int harmonic = harmonics[static_cast<std::size_t>(n)];
+    frequencies_.push_back(harmonic / spec.duration);
     // Schroeder (1970) for a flat spectrum; the seed's time shift turns harmonic k by k times its angle.
-    phases_.push_back(std::fmod(-kPi * n * (n + 1.0) / count + shift * (first + n), 2.0 * kPi));
+    phases_.push_back(std::fmod(-kPi * n * (n + 1.0) / count + shift * harmonic, 2.0 * kPi));
   }
-  scale_ = spec.amplitude / peakOf(first, phases_);
+  scale_ = spec.amplitude / peakOf(harmonics, phases_);
 }
 
 double ExcitationSignal::multisine(double t) const {
@@ -155,22 +164,23 @@ double ExcitationSignal::value(double t) const {
   return 0.0;
 }
 
-void ExcitationRunner::start(const ExcitationSignal& signal, double sim_time) {
+void ExcitationRunner::start(const std::vector<ExcitationSignal>& signals, double sim_time) {
   if (phase_ == ExcitationPhase::kRunning) {
-    throw std::logic_error(std::string("an excitation is running (") + toString(signal_->spec().shape) +
+    throw std::logic_error(std::string("an excitation is running (") + toString(signals_.front().spec().shape) +
                            "): wait for its end or abort it first");
   }
   if (!std::isfinite(sim_time)) throw std::invalid_argument("excitation needs simulator time, which is not known");
-  signal_ = signal;
+  if (signals.empty()) throw std::invalid_argument("an excitation needs a signal");
+  signals_ = signals;
   phase_ = ExcitationPhase::kRunning;
   reason_.clear();
   start_time_ = last_time_ = sim_time;
-  value_ = 0.0;
+  values_.assign(signals_.size(), 0.0);
 }
 
-double ExcitationRunner::step(double sim_time, double roll_deg, double pitch_deg) {
-  if (phase_ != ExcitationPhase::kRunning) return value_ = 0.0;
-  const ExcitationSpec& spec = signal_->spec();
+const std::vector<double>& ExcitationRunner::step(double sim_time, double roll_deg, double pitch_deg) {
+  if (phase_ != ExcitationPhase::kRunning) return values_;
+  const ExcitationSpec& spec = signals_.front().spec();
   char text[120];
   if (!std::isfinite(sim_time) || sim_time < last_time_ - kOvertaking) {
     abort("simulator time ran backwards or is unknown");
@@ -182,21 +192,21 @@ double ExcitationRunner::step(double sim_time, double roll_deg, double pitch_deg
   } else if (std::abs(pitch_deg) > spec.pitch_limit_deg) {
     std::snprintf(text, sizeof text, "pitch %.1f deg is beyond the limit of %.1f deg", pitch_deg, spec.pitch_limit_deg);
     abort(text);
-  } else if (sim_time - start_time_ >= signal_->duration()) {
+  } else if (sim_time - start_time_ >= spec.duration) {
     phase_ = ExcitationPhase::kDone;
-    value_ = 0.0;
+    values_.assign(signals_.size(), 0.0);
   } else if (sim_time >= last_time_) {
-    value_ = signal_->value(sim_time - start_time_);
+    for (std::size_t i = 0; i < signals_.size(); ++i) values_[i] = signals_[i].value(sim_time - start_time_);
     last_time_ = sim_time;
   }
-  return value_;
+  return values_;
 }
 
 void ExcitationRunner::abort(const std::string& reason) {
   if (phase_ != ExcitationPhase::kRunning) return;
   phase_ = ExcitationPhase::kAborted;
   reason_ = reason;
-  value_ = 0.0;
+  values_.assign(signals_.size(), 0.0);
 }
 
 }  // namespace xplane_bridge::core

@@ -35,6 +35,10 @@ class ScenarioPilot:
             for kind, value in event.actions:
                 if kind == "failure":
                     failure_dataref(value["name"])
+                if kind == "excitation" and "," in value["target"]:
+                    raise ScenarioError(
+                        "excitation: the emulator's pilot moves one axis; tx_node moves several at once"
+                    )
                 if kind in WORLD_KINDS:
                     way = {"reset": "reset_flight", "traffic": "traffic/command"}.get(kind, f"set_{kind}")
                     raise ScenarioError(f"{kind}: the emulator's pilot only flies; tx_node sets {kind} ({way})")

@@ -284,6 +284,10 @@ def _excitation(item: Any, path: str) -> Dict[str, Any]:
     _one_of(kind, f"{path}.kind", EXCITATION_KINDS)
     if not target:
         raise ScenarioError(f"{path}.target: missing; expected roll, pitch, yaw, throttle or a surface's name")
+    if "," in target and kind != "multisine":
+        raise ScenarioError(
+            f"{path}.target: {target!r}; expected one target: only a multisine moves several axes at once"
+        )
     out: Dict[str, Any] = {"kind": kind, "target": target, "seed": given.get("seed", 0)}
     for key, default, low, high in (
         ("amplitude", None, 0.0, 45.0),

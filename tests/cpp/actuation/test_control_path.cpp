@@ -505,7 +505,7 @@ TEST_F(ControlPathTest, AnExcitationGoesOutWithEveryFrameAndItsEndToo) {
   sim.frame(0.001);
   sim.clearMessages();
   excitation.channels.set(core::index(core::Channel::kRoll));
-  excitation.value = 0.3;
+  excitation.values.fill(0.3);
   sim.frame(0.001);
   sim.frame(0.001);
   EXPECT_EQ(writesTo(kStickRoll), (Floats{0.4F, 0.4F}));
@@ -518,7 +518,7 @@ TEST_F(ControlPathTest, AnExcitationGoesOutWithEveryFrameAndItsEndToo) {
 TEST_F(ControlPathTest, AnAxisWithoutCommandsIsTakenForASignalAndGivenBack) {
   start();
   excitation.channels.set(core::index(core::Channel::kRoll));
-  excitation.value = 0.3;
+  excitation.values.fill(0.3);
   excitation.rest = 0.1;
   sim.frame(0.001);
   EXPECT_EQ(sim.value(kStickOverride), 1.0F);
@@ -531,11 +531,22 @@ TEST_F(ControlPathTest, AnAxisWithoutCommandsIsTakenForASignalAndGivenBack) {
   EXPECT_EQ(writesTo(kStickRoll), Floats{0.4F});
 }
 
+TEST_F(ControlPathTest, AnExcitationOfSeveralAxesEndsWithTheFirstThatIsNotCommanded) {
+  start();
+  path->command(FlightMode::kManual, rollCommand(0.1));
+  excitation.channels.set(core::index(core::Channel::kRoll));
+  sim.frame(0.001);
+  EXPECT_TRUE(excitation_ends.empty());
+  excitation.channels.set(core::index(core::Channel::kPitch));
+  sim.frame(0.001);
+  EXPECT_EQ(excitation_ends, Texts{"the commands of the axis have ended"});
+}
+
 TEST_F(ControlPathTest, AnExcitationEndsWithTheSourceAndIsNotSentOnTheFailsafe) {
   start();
   path->command(FlightMode::kManual, rollCommand(0.1));
   excitation.channels.set(core::index(core::Channel::kRoll));
-  excitation.value = 0.3;
+  excitation.values.fill(0.3);
   run(0.4);
   EXPECT_TRUE(excitation_ends.empty());
   run(0.2);

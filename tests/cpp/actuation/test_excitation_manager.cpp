@@ -16,6 +16,8 @@ using core::Channel;
 using core::FakeAirframe;
 using core::ResultCode;
 
+using Axes = std::vector<core::ChannelSet>;
+
 const std::string kLeft = FakeAirframe::dataref(FakeAirframe::kLeft);
 const std::size_t kLeftNumber = core::surfaceNumber(FakeAirframe::kLeft).value();
 
@@ -74,8 +76,10 @@ TEST_F(ExcitationManagerTest, PlanSaysWhatIsWrongWithARequest) {
   ExcitationRequest request = doubletOn("roll");
   request.kind = "square";
   EXPECT_NE(wrongWith(request).find("kind is \"square\""), std::string::npos) << wrongWith(request);
-  EXPECT_EQ(wrongWith(doubletOn("gear")),
-            "target is \"gear\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md)");
+  EXPECT_EQ(
+      wrongWith(doubletOn("gear")),
+      "target is \"gear\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md), of a multisine also "
+      "several axes, for example \"roll,pitch\"");
   EXPECT_EQ(wrongWith(doubletOn("roll", 1.1)), "amplitude of an axis must be at most 1 (full travel)");
   EXPECT_EQ(wrongWith(doubletOn(FakeAirframe::kLeft, 1.1)), "") << "degrees";
   request = doubletOn("roll");
@@ -86,23 +90,77 @@ TEST_F(ExcitationManagerTest, PlanSaysWhatIsWrongWithARequest) {
 }
 
 TEST_F(ExcitationManagerTest, PlanKnowsItsTarget) {
-  EXPECT_EQ(manager_.plan(doubletOn("roll")).channels, only(Channel::kRoll));
-  EXPECT_EQ(manager_.plan(doubletOn("pitch")).channels, only(Channel::kPitch));
-  EXPECT_EQ(manager_.plan(doubletOn("yaw")).channels, only(Channel::kYaw));
-  const core::ChannelSet levers = manager_.plan(doubletOn("throttle")).channels;
+  EXPECT_EQ(manager_.plan(doubletOn("roll")).channels, Axes{only(Channel::kRoll)});
+  EXPECT_EQ(manager_.plan(doubletOn("pitch")).channels, Axes{only(Channel::kPitch)});
+  EXPECT_EQ(manager_.plan(doubletOn("yaw")).channels, Axes{only(Channel::kYaw)});
+  const core::ChannelSet levers = manager_.plan(doubletOn("throttle")).channels.front();
   EXPECT_EQ(levers.count(), 8U) << "one lever for each engine";
   EXPECT_EQ(manager_.plan(doubletOn(FakeAirframe::kLeft)).surface, kLeftNumber);
-  EXPECT_TRUE(manager_.plan(doubletOn(FakeAirframe::kLeft)).channels.none());
+  EXPECT_TRUE(manager_.plan(doubletOn(FakeAirframe::kLeft)).channels.empty());
+}
+
+TEST_F(ExcitationManagerTest, MultisineTakesSeveralAxesWithHarmonicsOfTheirOwn) {
+  ExcitationRequest request = doubletOn("roll, pitch,yaw");
+  EXPECT_EQ(wrongWith(request),
+            "target is \"roll, pitch,yaw\"; several axes at once take a multisine, doublet takes one");
+  request.kind = "multisine";
+  request.duration = 20.0;
+  request.frequency_min = 0.1;
+  request.frequency_max = 0.6;  // harmonics 2 to 12
+  const ExcitationManager::Plan plan = manager_.plan(request);
+  EXPECT_EQ(plan.wrong, "");
+  EXPECT_EQ(plan.channels, (Axes{only(Channel::kRoll), only(Channel::kPitch), only(Channel::kYaw)}));
+  ASSERT_EQ(plan.signals.size(), 3U);
+  const std::vector<double> expected[] = {{2, 5, 8, 11}, {3, 6, 9, 12}, {4, 7, 10}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::vector<double> harmonics;
+    for (const double frequency : plan.signals[i].frequencies()) harmonics.push_back(std::round(frequency * 20.0));
+    EXPECT_EQ(harmonics, expected[i]) << i;
+  }
+  request.target = "roll,roll";
+  EXPECT_EQ(wrongWith(request), "target is \"roll,roll\"; expected each axis once");
+  request.target = std::string("roll,") + FakeAirframe::kLeft;
+  EXPECT_NE(wrongWith(request).find("expected roll, pitch"), std::string::npos) << wrongWith(request);
+  request.target = "roll,";
+  EXPECT_NE(wrongWith(request).find("expected roll, pitch"), std::string::npos) << wrongWith(request);
+  request.target = "roll,pitch,yaw";
+  request.frequency_max = 0.15;
+  EXPECT_NE(wrongWith(request).find("for each target"), std::string::npos) << wrongWith(request);
+}
+
+TEST_F(ExcitationManagerTest, SeveralAxesRunTogetherEachWithItsOwnSignal) {
+  ExcitationRequest request = doubletOn("roll,pitch");
+  request.kind = "multisine";
+  request.duration = 20.0;
+  request.frequency_min = 0.1;
+  request.frequency_max = 2.0;
+  EXPECT_EQ(inject(request).text,
+            "no source commands pitch: an excitation is added to a command (control/manual or auto)");
+  commanded_ |= only(Channel::kPitch);
+  const ExcitationManager::Plan plan = manager_.plan(request);
+  ASSERT_EQ(inject(request).code, ResultCode::kAccepted);
+  EXPECT_EQ(labels_.back().target, "roll,pitch");
+  sim_.frame();
+  sim_.frame();
+  EXPECT_TRUE(excited_);
+  const core::ChannelExcitation now = manager_.excitation();
+  EXPECT_EQ(now.channels, only(Channel::kRoll) | only(Channel::kPitch));
+  const double t = watch_.sim_time - labels_.back().start_sim_time;
+  ASSERT_GT(t, 0.0);
+  EXPECT_EQ(now.values[core::index(Channel::kRoll)], plan.signals[0].value(t));
+  EXPECT_EQ(now.values[core::index(Channel::kPitch)], plan.signals[1].value(t));
+  EXPECT_NE(now.values[core::index(Channel::kRoll)], now.values[core::index(Channel::kPitch)]);
+  EXPECT_EQ(now.values[core::index(Channel::kYaw)], 0.0);
 }
 
 TEST_F(ExcitationManagerTest, LimitsAreThoseOfTheAircraftUnlessGiven) {
   ExcitationRequest request = doubletOn("roll");
-  EXPECT_EQ(manager_.plan(request).signal->spec().roll_limit_deg, 45.0);
-  EXPECT_EQ(manager_.plan(request).signal->spec().pitch_limit_deg, 20.0);
+  EXPECT_EQ(manager_.plan(request).signals.front().spec().roll_limit_deg, 45.0);
+  EXPECT_EQ(manager_.plan(request).signals.front().spec().pitch_limit_deg, 20.0);
   request.max_roll_deg = 10.0;
   request.max_pitch_deg = 5.0;
-  EXPECT_EQ(manager_.plan(request).signal->spec().roll_limit_deg, 10.0);
-  EXPECT_EQ(manager_.plan(request).signal->spec().pitch_limit_deg, 5.0);
+  EXPECT_EQ(manager_.plan(request).signals.front().spec().roll_limit_deg, 10.0);
+  EXPECT_EQ(manager_.plan(request).signals.front().spec().pitch_limit_deg, 5.0);
 }
 
 TEST_F(ExcitationManagerTest, PlanTakesBandAndSeed) {
@@ -113,7 +171,7 @@ TEST_F(ExcitationManagerTest, PlanTakesBandAndSeed) {
   for (const char* kind : {"multisine", "chirp"}) {
     request.kind = kind;
     request.duration = 20.0;
-    const core::ExcitationSpec spec = manager_.plan(request).signal->spec();
+    const core::ExcitationSpec spec = manager_.plan(request).signals.front().spec();
     EXPECT_EQ(spec.frequency_min, 0.5) << kind;
     EXPECT_EQ(spec.frequency_max, 3.0) << kind;
     EXPECT_EQ(spec.seed, 7U) << kind;
@@ -166,9 +224,9 @@ TEST_F(ExcitationManagerTest, SignalOnAnAxisRunsToItsEnd) {
   sim_.run(0.5);
   EXPECT_TRUE(excited_);
   EXPECT_EQ(manager_.excitation().channels, only(Channel::kRoll));
-  EXPECT_EQ(manager_.excitation().value, 0.2);
+  EXPECT_EQ(manager_.excitation().values[core::index(Channel::kRoll)], 0.2);
   sim_.run(1.0);
-  EXPECT_EQ(manager_.excitation().value, -0.2);
+  EXPECT_EQ(manager_.excitation().values[core::index(Channel::kRoll)], -0.2);
   sim_.run(0.6);
   EXPECT_FALSE(manager_.running());
   EXPECT_TRUE(manager_.excitation().channels.none());

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -64,6 +65,18 @@ def test_modes_in_calm_air_are_within_their_budgets(
 ) -> None:
     assert error(found[axis], truth, mode) < budget
     assert not found[axis].refusals
+
+
+def test_three_axes_moved_at_once_give_both_models(twin: FlightModel, truth: LinearModel) -> None:
+    together = Manoeuvre("roll,pitch,yaw", amplitude=0.06, kind="multisine", duration=12.0, frequency=0.2, seed=1)
+    others = [replace(together, seed=seed) for seed in (11, 21)]
+    results = identify(flown([together, *others], model=twin).flight(), geometry=GEOMETRY).results
+    assert error(results["longitudinal"], truth, "short_period") < 0.04
+    assert error(results["lateral"], truth, "roll") < 0.04
+    assert error(results["lateral"], truth, "dutch_roll") < 0.02
+    for name, axis in (("Cm_de", "longitudinal"), ("Cl_da", "lateral"), ("Cn_dr", "lateral")):
+        expected = truth.axes[axis].derivatives[name].value
+        assert results[axis].model.derivatives[name].value == pytest.approx(expected, rel=0.05), name
 
 
 def test_derivatives_are_those_of_the_aircraft(found: dict[str, AxisResult], truth: LinearModel) -> None:

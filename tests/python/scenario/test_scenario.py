@@ -88,6 +88,10 @@ def test_the_example_of_the_manual_is_a_scenario():
         ({"name": "x", "events": [{"at": 0, "failure": {"kind": "stuck"}}]}, "failure.name: missing"),
         ({"name": "x", "events": [{"at": 0, "failure": {"name": "a", "kind": "bent"}}]}, "failure.kind: 'bent'"),
         ({"name": "x", "events": [{"at": 0, "excitation": {"kind": "chirp", "target": "roll"}}]}, "amplitude: missing"),
+        (
+            {"name": "x", "events": [{"at": 0, "excitation": {"kind": "chirp", "target": "roll,pitch"}}]},
+            "only a multisine moves several axes",
+        ),
         ({"name": "x", "events": [{"at": 0, "when": {"speed": {"over": 3}}}]}, "when.speed.over: unknown key"),
         ({"name": "x", "events": [{"at": 0, "when": {"speed": [1]}}]}, r"expected two bounds"),
         ({"name": "x", "events": [{"at": 0, "timeout": 3}]}, "timeout: without 'when'"),

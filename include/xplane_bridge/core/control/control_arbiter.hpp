@@ -93,8 +93,8 @@ struct SourceStatistics {
 
 /// A test signal added to what was arbitrated.
 struct ChannelExcitation {
-  ChannelSet channels;  ///< only those that the active source commands are excited, unless `rest` is set
-  double value = 0.0;
+  ChannelSet channels;     ///< only those that the active source commands are excited, unless `rest` is set
+  ChannelValues values{};  ///< added to each of them
   /// Where the channels without a command are meanwhile; they are X-Plane's again afterwards.
   std::optional<double> rest;
 };

@@ -17,7 +17,9 @@ namespace xplane_bridge::core {
 
 // The shapes (ExcitationShape), A the amplitude. Doublet: +A for the first half of `duration`, then -A. 3-2-1-1: +A for
 // 3/7 of `duration`, -A for 2/7, +A for 1/7, -A for 1/7. Multisine: equal-power harmonics of 1/`duration` within the
-// band, Schroeder phases (low crest factor). Chirp: logarithmic sweep from `frequency_min` to `frequency_max`.
+// band, Schroeder phases (low crest factor); with `interleave` only every so many-th of them, so that multisines of
+// different `interleave_offset` are orthogonal over `duration`. Chirp: logarithmic sweep from `frequency_min` to
+// `frequency_max`.
 
 /// What to play. Defaults are a usable roll multisine.
 struct ExcitationSpec {
@@ -27,6 +29,8 @@ struct ExcitationSpec {
   double frequency_min = 0.1;     ///< [Hz] lower end of the band
   double frequency_max = 2.0;     ///< [Hz] upper end of the band
   std::uint32_t seed = 0;         ///< shifts the multisine in time: another realisation, the same spectrum and peak
+  int interleave = 1;             ///< multisine: every so many-th harmonic of the band; >= 1
+  int interleave_offset = 0;      ///< multisine: harmonics left out at its lower end; 0 to interleave - 1
   double fade = 0.5;              ///< [s] raised-cosine fade in and out of multisine and chirp; not used by the pulses
   double roll_limit_deg = 45.0;   ///< |roll| beyond which the excitation is aborted; > 0
   double pitch_limit_deg = 20.0;  ///< |pitch| beyond which the excitation is aborted; > 0
@@ -65,31 +69,33 @@ enum class ExcitationPhase : std::uint8_t { kIdle, kRunning, kDone, kAborted };
 
 const char* toString(ExcitationPhase phase);
 
-/// Plays one signal at a time against simulator time and stops it where the aircraft leaves the allowed attitude.
+/// Plays signals, which begin and end together, against simulator time and stops them where the aircraft leaves the
+/// allowed attitude. Duration and limits are the first signal's.
 class ExcitationRunner {
  public:
-  /// Starts at simulator time `sim_time` [s]. Throws std::invalid_argument (time unknown) or std::logic_error (one is
-  /// running already).
-  void start(const ExcitationSignal& signal, double sim_time);
+  /// Starts at simulator time `sim_time` [s]. Throws std::invalid_argument (time unknown, no signal) or
+  /// std::logic_error (some run already).
+  void start(const std::vector<ExcitationSignal>& signals, double sim_time);
 
-  /// Advances to `sim_time` [s] with the present attitude [deg] and returns the value to add to the target's command.
+  /// Advances to `sim_time` [s] with the present attitude [deg] and returns what to add to each target's command, in
+  /// the order of the signals.
   /// A non-finite attitude, or simulator time running backwards (reset, replay) by more than kOvertaking, aborts.
-  double step(double sim_time, double roll_deg, double pitch_deg);
+  const std::vector<double>& step(double sim_time, double roll_deg, double pitch_deg);
 
   /// Ends a running excitation; the reason is kept for the label. Without one running, nothing happens.
   void abort(const std::string& reason);
 
   ExcitationPhase phase() const { return phase_; }
-  const std::string& reason() const { return reason_; }  ///< why it was aborted; else empty
-  double value() const { return value_; }                ///< as returned by the last step
+  const std::string& reason() const { return reason_; }          ///< why it was aborted; else empty
+  const std::vector<double>& values() const { return values_; }  ///< as returned by the last step
 
  private:
-  std::optional<ExcitationSignal> signal_;
+  std::vector<ExcitationSignal> signals_;
   ExcitationPhase phase_ = ExcitationPhase::kIdle;
   std::string reason_;
   double start_time_ = 0.0;
   double last_time_ = 0.0;
-  double value_ = 0.0;
+  std::vector<double> values_;
 };
 
 }  // namespace xplane_bridge::core

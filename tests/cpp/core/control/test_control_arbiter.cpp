@@ -367,13 +367,13 @@ TEST(ControlArbiter, ExcitationIsAddedAfterSlewAndKeptWithinLimits) {
   ChannelExcitation excitation;
   excitation.channels.set(index(Channel::kRoll));
   excitation.channels.set(index(Channel::kYaw));  // not in use
-  excitation.value = -0.3;
+  excitation.values.fill(-0.3);
   const auto down = arbiter.step(0.01, excitation);
   EXPECT_DOUBLE_EQ(roll(down), 0.4 - 0.3);
   EXPECT_EQ(down.excited, static_cast<std::uint32_t>(kFieldRoll));
   EXPECT_EQ(down.limited, 0u);
   EXPECT_FALSE(down.active.test(index(Channel::kYaw)));
-  excitation.value = 0.3;
+  excitation.values.fill(0.3);
   const auto up = arbiter.step(0.02, excitation);
   EXPECT_DOUBLE_EQ(roll(up), 0.5);
   EXPECT_EQ(up.limited, static_cast<std::uint32_t>(kFieldRoll));
@@ -386,7 +386,7 @@ TEST(ControlArbiter, ExcitationIsAddedOnlyToWhatALivingSourceCommands) {
   arbiter.step(0.0);
   ChannelExcitation excitation;
   excitation.channels.set(index(Channel::kRoll));
-  excitation.value = 0.25;
+  excitation.values.fill(0.25);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(0.25, excitation)), 0.65);
   EXPECT_EQ(arbiter.commanded().count(), 2u);
   const auto& late = arbiter.step(0.75, excitation);
@@ -400,7 +400,7 @@ TEST(ControlArbiter, ExcitationWithItsOwnRestMovesChannelsWithoutCommandsForAsLo
   ChannelExcitation excitation;
   excitation.channels.set(index(Channel::kRoll));
   excitation.rest = 0.1;
-  excitation.value = 0.25;
+  excitation.values.fill(0.25);
   const auto taken = arbiter.step(0.0, excitation);
   EXPECT_DOUBLE_EQ(roll(taken), 0.35);
   EXPECT_EQ(taken.active.count(), 1u);
@@ -423,7 +423,7 @@ TEST(ControlArbiter, ExcitationWithItsOwnRestMovesWhatALivingSourceHasLeft) {
   ChannelExcitation excitation;
   excitation.channels.set(index(Channel::kRoll));
   excitation.rest = 0.9;
-  excitation.value = 0.25;
+  excitation.values.fill(0.25);
   EXPECT_DOUBLE_EQ(roll(arbiter.step(0.75, excitation)), 0.25) << "added to the neutral of its failsafe";
   EXPECT_EQ(arbiter.step(1.5, excitation).excited, 0u) << "the failsafe flies all";
   EXPECT_DOUBLE_EQ(roll(arbiter.step(1.5, excitation)), 0.0);

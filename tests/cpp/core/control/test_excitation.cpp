@@ -67,6 +67,34 @@ TEST(Excitation, MultisineHasEqualLinesInTheBandAndNoneOutside) {
   }
 }
 
+TEST(Excitation, InterleavedMultisinesShareNoHarmonicAndFillTheBand) {
+  // Harmonics 4 to 20 over three signals: 4, 7, ...; 5, 8, ...; 6, 9, ...
+  std::vector<ExcitationSignal> signals;
+  for (int offset = 0; offset < 3; ++offset) {
+    ExcitationSpec spec = specOf(ExcitationShape::kMultisine);
+    spec.frequency_min = 0.2;
+    spec.frequency_max = 1.0;
+    spec.interleave = 3;
+    spec.interleave_offset = offset;
+    signals.emplace_back(spec);
+  }
+  for (int offset = 0; offset < 3; ++offset) {
+    const ExcitationSignal& signal = signals[static_cast<std::size_t>(offset)];
+    const double line = lineAmplitude(signal, (4 + offset) / 20.0);
+    EXPECT_GT(line, 0.01);
+    for (int k = 1; k <= 40; ++k) {
+      const bool own = k >= 4 && k <= 20 && (k - 4) % 3 == offset;
+      EXPECT_NEAR(lineAmplitude(signal, k / 20.0), own ? line : 0.0, 1e-9) << "signal " << offset << ", harmonic " << k;
+    }
+    for (int other = 0; other < offset; ++other) {
+      double product = 0.0;
+      for (int i = 0; i < 4000; ++i)
+        product += signal.value(i / 200.0) * signals[static_cast<std::size_t>(other)].value(i / 200.0);
+      EXPECT_NEAR(product, 0.0, 1e-9) << "signals " << offset << " and " << other << " are orthogonal";
+    }
+  }
+}
+
 TEST(Excitation, MultisinePeaksAtTheAmplitudeWithALowCrestFactor) {
   ExcitationSpec spec = specOf(ExcitationShape::kMultisine);
   for (const std::uint32_t seed : {0u, 1u, 77u}) {
@@ -150,6 +178,16 @@ TEST(Excitation, RefusesWhatCannotBePlayedAndNamesTheField) {
               s.fade = 0.0;
             }).find("1/duration"),
             std::string::npos);
+  EXPECT_NE(wrong([](auto& s) { s.interleave = 0; }).find("interleave is 0"), std::string::npos);
+  EXPECT_NE(wrong([](auto& s) { s.interleave_offset = 1; }).find("interleave_offset is 1"), std::string::npos);
+  EXPECT_NE(wrong([](auto& s) {  // harmonics 2 and 3: none is left for a third signal
+              s.frequency_min = 0.1;
+              s.frequency_max = 0.15;
+              s.interleave = 3;
+              s.interleave_offset = 2;
+            })
+                .find("for each target"),
+            std::string::npos);
   EXPECT_NE(wrong([](auto& s) {
               s.shape = ExcitationShape::kDoublet;
               s.duration = 0.0;
@@ -173,23 +211,35 @@ TEST(Excitation, RefusesWhatCannotBePlayedAndNamesTheField) {
 TEST(ExcitationRunner, PlaysAgainstSimulatorTimeAndEnds) {
   ExcitationRunner runner;
   EXPECT_EQ(runner.phase(), ExcitationPhase::kIdle);
-  runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 100.0);
-  EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0), 0.2);
-  EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0), 0.2);  // paused: simulator time stands still
-  EXPECT_DOUBLE_EQ(runner.step(100.7, 0.0, 0.0), -0.2);
-  EXPECT_THROW(runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 100.8), std::logic_error);
-  EXPECT_DOUBLE_EQ(runner.step(101.0, 0.0, 0.0), 0.0);
+  runner.start({ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0))}, 100.0);
+  EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0).front(), 0.2);
+  EXPECT_DOUBLE_EQ(runner.step(100.2, 0.0, 0.0).front(), 0.2);  // paused: simulator time stands still
+  EXPECT_DOUBLE_EQ(runner.step(100.7, 0.0, 0.0).front(), -0.2);
+  EXPECT_THROW(runner.start({ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0))}, 100.8), std::logic_error);
+  EXPECT_DOUBLE_EQ(runner.step(101.0, 0.0, 0.0).front(), 0.0);
   EXPECT_EQ(runner.phase(), ExcitationPhase::kDone);
-  runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 102.0);
+  runner.start({ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0))}, 102.0);
   EXPECT_EQ(runner.phase(), ExcitationPhase::kRunning);
+}
+
+TEST(ExcitationRunner, PlaysSeveralSignalsTogether) {
+  ExcitationSpec small = specOf(ExcitationShape::kDoublet, 1.0);
+  small.amplitude = 0.05;
+  ExcitationRunner runner;
+  runner.start({ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), ExcitationSignal(small)}, 100.0);
+  EXPECT_EQ(runner.step(100.2, 0.0, 0.0), (std::vector<double>{0.2, 0.05}));
+  EXPECT_EQ(runner.step(100.7, 0.0, 0.0), (std::vector<double>{-0.2, -0.05}));
+  EXPECT_EQ(runner.values(), (std::vector<double>{-0.2, -0.05}));
+  EXPECT_EQ(runner.step(101.0, 0.0, 0.0), (std::vector<double>{0.0, 0.0}));
+  EXPECT_THROW(runner.start({}, 102.0), std::invalid_argument);
 }
 
 TEST(ExcitationRunner, GoesOnWhereDatagramsOvertakeEachOther) {
   ExcitationRunner runner;
-  runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 10.0);
-  EXPECT_DOUBLE_EQ(runner.step(10.52, 0.0, 0.0), -0.2);
-  EXPECT_DOUBLE_EQ(runner.step(10.48, 0.0, 0.0), -0.2) << "the older one says nothing";
-  EXPECT_DOUBLE_EQ(runner.step(10.56, 0.0, 0.0), -0.2);
+  runner.start({ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0))}, 10.0);
+  EXPECT_DOUBLE_EQ(runner.step(10.52, 0.0, 0.0).front(), -0.2);
+  EXPECT_DOUBLE_EQ(runner.step(10.48, 0.0, 0.0).front(), -0.2) << "the older one says nothing";
+  EXPECT_DOUBLE_EQ(runner.step(10.56, 0.0, 0.0).front(), -0.2);
   EXPECT_EQ(runner.phase(), ExcitationPhase::kRunning);
 }
 
@@ -205,12 +255,12 @@ TEST(ExcitationRunner, AbortsOutsideTheAttitudeLimitsAndSaysWhy) {
                {9.5, 0.0, 0.0, "backwards"}};
   for (const auto& c : cases) {
     ExcitationRunner runner;
-    runner.start(ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0)), 10.0);
-    EXPECT_DOUBLE_EQ(runner.step(10.1, 44.9, 19.9), 0.2);
-    EXPECT_DOUBLE_EQ(runner.step(c.t, c.roll, c.pitch), 0.0);
+    runner.start({ExcitationSignal(specOf(ExcitationShape::kDoublet, 1.0))}, 10.0);
+    EXPECT_DOUBLE_EQ(runner.step(10.1, 44.9, 19.9).front(), 0.2);
+    EXPECT_DOUBLE_EQ(runner.step(c.t, c.roll, c.pitch).front(), 0.0);
     EXPECT_EQ(runner.phase(), ExcitationPhase::kAborted);
     EXPECT_NE(runner.reason().find(c.reason), std::string::npos) << runner.reason();
-    EXPECT_DOUBLE_EQ(runner.step(10.3, 0.0, 0.0), 0.0) << "stays aborted";
+    EXPECT_DOUBLE_EQ(runner.step(10.3, 0.0, 0.0).front(), 0.0) << "stays aborted";
   }
 }
 
