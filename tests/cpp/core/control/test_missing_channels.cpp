@@ -21,7 +21,8 @@ TEST(MissingChannels, AreTheTrimsThatMoveNothing) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].channel, Channel::kTrimYaw);
   EXPECT_EQ(found[0].why,
-            "this aircraft has no rudder trim (acf_max_trim_rudd, acf_min_trim_rudd of sim/aircraft/controls are 0)");
+            "this aircraft has no rudder trim (sim/aircraft/controls/acf_max_trim_rudd, "
+            "sim/aircraft/controls/acf_min_trim_rudd are 0)");
 }
 
 TEST(MissingChannels, AreAllWhereNothingTrims) { EXPECT_EQ(missing({}).size(), 3U); }
