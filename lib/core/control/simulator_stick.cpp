@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 namespace xplane_bridge::core {
 namespace {
 
 const std::string kFolder = "sim/joystick/";
-constexpr std::size_t kRoll = 0, kPitch = 1;  // of kStickFunctions
+constexpr std::size_t kRoll = 0, kPitch = 1, kYaw = 2;  // of kStickFunctions
 constexpr float kPressed = 0.5F;
 // X-Plane may answer the datarefs of one rate in different frames of a period.
 constexpr double kJoinPeriods = 1.5;
@@ -88,10 +89,11 @@ bool SimulatorStick::addValues(const RrefView& datagram, std::int64_t receive_ns
   std::size_t next = 1 + buttons_.size();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const Source& source = (*sources_)[i];
-    axes_[i] = 0.0F;
-    if (source.axis < 0) continue;
-    const float value = values[next++];
-    if (!std::isfinite(value)) continue;
+    const float value = source.axis < 0 ? std::numeric_limits<float>::quiet_NaN() : values[next++];
+    if (!std::isfinite(value)) {
+      if (i <= kYaw) axes_[i] = 0.0F;  // a lever that is gone stays where it was: 0 would be half of its travel
+      continue;
+    }
     const float shown = 2.0F * std::clamp(value, 0.0F, 1.0F) - 1.0F;
     axes_[i] = kStickFunctions[i].sign * (source.reversed ? -shown : shown);
   }

@@ -60,7 +60,8 @@ class SimulatorStick {
   /// rolls or pitches, and all of a sample has come.
   bool addValues(const RrefView& datagram, std::int64_t receive_ns);
 
-  /// [-1..1] as kStickFunctions; 0 where no axis has the function.
+  /// [-1..1] as kStickFunctions; 0 where no axis has had the function. A stick whose axis is gone is centred, a lever
+  /// stays where it was.
   const std::vector<float>& axes() const { return axes_; }
   const std::vector<std::int32_t>& buttons() const { return buttons_; }
 

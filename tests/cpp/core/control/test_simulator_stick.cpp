@@ -83,6 +83,23 @@ TEST(SimulatorStick, FollowsWhoAssignsItsAxesAnew) {
   EXPECT_EQ(stick.axes().front(), 1.0F);
 }
 
+TEST(SimulatorStick, LeavesALeverWhereItWasWhenItsAxisIsGone) {
+  SimulatorStick stick({4, 0, 0, 50});
+  Values assigned = {{"joystick_axis_assignments[0]", 2.0F},
+                     {"joystick_axis_assignments[1]", 1.0F},
+                     {"joystick_axis_assignments[2]", 4.0F}};
+  settings(&stick, assigned);
+  ASSERT_TRUE(move(&stick, {{"joystick_axis_values[1]", 1.0F}, {"joystick_axis_values[2]", 0.1F}}));
+  EXPECT_EQ(stick.axes()[1], -1.0F);
+  EXPECT_FLOAT_EQ(stick.axes()[3], -0.8F);
+  assigned.erase("joystick_axis_assignments[1]");
+  assigned.erase("joystick_axis_assignments[2]");
+  EXPECT_TRUE(settings(&stick, assigned, kLater));
+  ASSERT_TRUE(move(&stick, {{"joystick_axis_values[0]", 0.5F}}, kLater));
+  EXPECT_EQ(stick.axes()[1], 0.0F) << "the stick is centred";
+  EXPECT_FLOAT_EQ(stick.axes()[3], -0.8F) << "0 would be half throttle";
+}
+
 TEST(SimulatorStick, SaysWhyNothingIsPublished) {
   SimulatorStick stick({2, 0, 0, 50});
   EXPECT_EQ(stick.problem(), "X-Plane has not shown its joystick yet");
