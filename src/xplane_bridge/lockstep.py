@@ -44,7 +44,7 @@ def node_options(namespace: str = NAMESPACE) -> Dict[str, Any]:
     """
     try:
         return {"disable_rostime": is_on(namespace)}
-    except OSError:  # no master yet, for which init_node waits
+    except (OSError, ImportError):  # no master yet, for which init_node waits; no ROS, which start_node reports
         return {}
 
 
