@@ -133,14 +133,15 @@ class WireReplay:
 
         def published() -> List[Tuple[str, str]]:
             node.check_running()
+            # The node has advertised everything when its diagnostics' timer runs: looked at before the topics are.
+            if self._param(master, "wire_replay") is None or not self._has_begun(node):
+                return []
             with xmlrpc.client.ServerProxy(master.uri) as api:
                 state: Any = api.getSystemState(_CALLER)
                 types: Any = api.getTopicTypes(_CALLER)
             kinds = dict(types[2])
             ours = [topic for topic, nodes in state[2][0] if self._start.node in nodes]
-            # The node has advertised everything when its diagnostics' timer runs.
-            ready = self._param(master, "wire_replay") is not None and self._has_begun(node)
-            return [(topic, kinds[topic]) for topic in ours if not _left_out(topic)] if ready else []
+            return [(topic, kinds[topic]) for topic in ours if not _left_out(topic)]
 
         topics = wait_until(published, _READY_S, f"topic of {self._start.node}")
         subscribers = []
