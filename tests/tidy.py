@@ -44,7 +44,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         parser.error(f"not built, so clang-tidy does not know their include folders: {', '.join(missing)}")
     cache = _ROOT / given.cache
     cache.mkdir(parents=True, exist_ok=True)
-    rules = _rules()
+    rules = _rules(_ROOT / given.build)
     units = [Unit(files, flags[room], cache, rules) for room in rooms for files in _apart(sorted(room.glob("*.cpp")))]
     failed = False
     with ThreadPoolExecutor(os.cpu_count()) as workers:
@@ -122,10 +122,11 @@ def _flags(database: Path) -> Dict[Path, Tuple[str, ...]]:
     return {folder: tuple(words) for folder, words in found.items()}
 
 
-def _rules() -> bytes:
-    """What a room's outcome depends on besides its own files."""
+def _rules(build: Path) -> bytes:
+    """What a room's outcome depends on besides its own files, generated headers included."""
     version = subprocess.run(["clang-tidy", "--version"], check=True, stdout=subprocess.PIPE).stdout
-    headers = sorted((_ROOT / "include").rglob("*.hpp"))
+    folders = (_ROOT / "include", _ROOT / "lib", build.parent / "devel" / "include")
+    headers = sorted(file for folder in folders for file in folder.rglob("*.hpp"))
     return b"".join([version, (_ROOT / ".clang-tidy").read_bytes(), *(file.read_bytes() for file in headers)])
 
 
