@@ -35,7 +35,7 @@ class ThreadTurns {
     bool entered = false;
     bool has_turn = false;
     bool left = false;
-    bool own_way = false;                       // it takes no turns any more
+    std::atomic<bool> own_way{false};           // it takes no turns any more
     std::atomic<bool> notified{false};          // the condition was
     const ClockCondition* condition = nullptr;  // that it waits with
     std::function<bool()> ready;                // empty: it has waited for nothing yet
