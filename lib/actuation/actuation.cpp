@@ -57,7 +57,7 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
             hooks_.event({outcome.kind, outcome.text, who, outcome.success, false, number, sim_time_});
           },
           options.turns),
-      releases_(link, &overrides_, hooks_.journal_problem, options.turns, [this] { disturbance_.watchJournal(); }) {
+      releases_(link, &overrides_, hooks_.journal_problem, options.turns, [this] { disturbance_.watch(); }) {
   const Lock lock(*mutex_);
   subscribe();
 }
@@ -227,7 +227,7 @@ void Actuation::onHang() {
   overrides_.giveBackAll();
   failures_.repaired();
   traffic_.forget();
-  disturbance_.forget("tx_node hung");
+  disturbance_.abort("tx_node hung");
   path_.onGivenBack("tx_node hung, and its guardian has given back what it had set");
 }
 
@@ -243,7 +243,7 @@ void Actuation::stop() {
     endSignals("tx_node ends");
   }
   traffic_.release("tx_node ends");
-  disturbance_.abort("tx_node ends");
+  disturbance_.stop("tx_node ends");
   jobs_.stop();
   releases_.stop();
   surfaces_.stop();
@@ -322,13 +322,16 @@ Actuation::Disturbed Actuation::disturb(const std::string& kind, core::Disturban
   if (const auto wrong = core::check(spec)) return answer(core::ResultCode::kRefused, *wrong);
   if (const auto refusal = core::refusalBy(spec)) return answer(core::ResultCode::kNotSupported, *refusal);
   if (const auto refusal = jobs_.refusal()) return answer(refusal->code, refusal->text);
+  if (jobs_.busy()) {
+    return answer(core::ResultCode::kRefused, "a change of the flight or its weather is under way: wait for its event");
+  }
   const std::string refusal = disturbance_.begin(spec, who);
   if (!refusal.empty()) return answer(core::ResultCode::kRefused, refusal);
   return answer(core::ResultCode::kAccepted,
                 "it begins when X-Plane has shown its weather; disturbance/state reports it");
 }
 
-std::optional<RequestResult> Actuation::windRefusal() const {
+std::optional<RequestResult> Actuation::windRefusal() {
   const std::string why = disturbance_.windRefusal();
   if (why.empty()) return std::nullopt;
   return RequestResult{core::ResultCode::kRefused, why};

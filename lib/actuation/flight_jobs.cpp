@@ -34,6 +34,11 @@ void FlightJobs::stop() {
   thread_.join();
 }
 
+bool FlightJobs::busy() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return running_ || !jobs_.empty();
+}
+
 bool FlightJobs::full() const {
   std::lock_guard<std::mutex> lock(mutex_);
   return changes_.stopping() || jobs_.size() >= kMostWaiting;
@@ -78,6 +83,7 @@ void FlightJobs::loop() {
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
     if (job.moves) moving_caller_ = job.who;
+    running_ = true;
     lock.unlock();
     FlightChangeOutcome outcome;
     try {
@@ -89,6 +95,7 @@ void FlightJobs::loop() {
     report_(job.number, outcome, job.who);
     lock.lock();
     moving_caller_.clear();
+    running_ = false;
   }
 }
 

@@ -152,8 +152,8 @@ class Actuation {
   SettingRequests& settings() { return settings_; }
   ViewRequests& views() { return views_; }
   TrafficControl& traffic() { return traffic_; }
-  /// Why set_wind and set_weather cannot set the wind now; nullopt: they can.
-  std::optional<RequestResult> windRefusal() const;
+  /// Why set_wind and set_weather must not change the weather now; nullopt: they may.
+  std::optional<RequestResult> windRefusal();
 
   // What is.
 

@@ -47,6 +47,8 @@ class FlightJobs {
   void saveSituation(const std::string& path, std::uint32_t number, const std::string& who);
   void loadSituation(const std::string& path, std::uint32_t number, const std::string& who);
 
+  /// One runs or waits.
+  bool busy() const;
   /// Too many wait already.
   bool full() const;
   /// Why X-Plane could not be asked for anything now; nullopt: it could.
@@ -74,6 +76,7 @@ class FlightJobs {
   core::ClockCondition wanted_;
   std::deque<Job> jobs_;
   std::string moving_caller_;
+  bool running_ = false;
   core::ThreadSeat seat_;
   std::thread thread_;  // last: it uses all of the others
 };

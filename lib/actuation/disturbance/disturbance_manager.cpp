@@ -15,8 +15,9 @@ namespace {
 
 using Lock = std::lock_guard<core::HandlerMutex>;
 
-constexpr double kAskWait = 3.0;     // [s] for X-Plane to show its weather
-constexpr double kRepeat = 1.0;      // [s] after which also what has not changed is sent: datagrams get lost
+constexpr double kAskWait = 3.0;  // [s] for X-Plane to show its weather
+constexpr double kRepeat = 1.0;   // [s] after which also what has not changed is sent: datagrams get lost
+constexpr int kTimesPutBack = 2;
 constexpr double kMostWind = 100.0;  // [m/s] as set_wind
 constexpr const char* kEntry = "override:the wind before a disturbance";
 
@@ -39,6 +40,7 @@ DisturbanceManager::DisturbanceManager(core::SimulatorPort* link, std::string pu
 
 std::string DisturbanceManager::begin(const core::DisturbanceSpec& spec, const std::string& who) {
   const Lock lock(mutex_);
+  if (ended_) return "tx_node ends";
   if (state_ != State::kIdle) return described(label_) + ", runs; one at a time: wait for its end, or stop it";
   if (!link_->journal()) return "there is no journal to note the wind of before in";
   putBack();
@@ -83,6 +85,7 @@ void DisturbanceManager::onWeather(std::uint32_t id, const std::vector<std::stri
     return end("refused: " + core::whyNotChanged(error), false);
   }
   restores_ = std::move(all);
+  times_put_back_ = 0;
   const auto speed = static_cast<double>(*values[weather]);
   label_.steady =
       core::windNedFromDirection(static_cast<double>(*values[weather + 1]) * core::kRadiansPerDegree, speed);
@@ -134,10 +137,19 @@ void DisturbanceManager::putBack() {
   const auto journal = link_->journal();
   if (restores_.empty() || !journal) return;
   try {
-    if (!up_) return journal->leave({kEntry}, "X-Plane went first");
-    for (const core::UndoOperation& operation : restores_) link_->sendUndo(operation);
-    restores_.clear();
+    if (!up_) {
+      times_put_back_ = 0;
+      return journal->leave({kEntry}, "X-Plane went first");
+    }
+    bool all_sent = true;
+    for (const core::UndoOperation& operation : restores_) {
+      if (link_->sendUndo(operation) != core::SendStatus::kSent) all_sent = false;
+    }
+    put_back_again_at_ = link_->clock().steadySeconds() + kRepeat;
+    if (all_sent) ++times_put_back_;
+    if (times_put_back_ < kTimesPutBack) return;
     journal->remove({kEntry});
+    restores_.clear();
   } catch (const core::JournalError& error) {
     report_(error.what(), who_, false);
   }
@@ -163,10 +175,11 @@ void DisturbanceManager::abort(const std::string& why) {
   if (state_ != State::kIdle) end("aborted: " + why, false);
 }
 
-void DisturbanceManager::forget(const std::string& why) {
+void DisturbanceManager::stop(const std::string& why) {
   const Lock lock(mutex_);
-  restores_.clear();
+  ended_ = true;
   abort(why);
+  if (up_) putBack();
 }
 
 void DisturbanceManager::onLink(const core::LinkStatus& status) {
@@ -180,21 +193,30 @@ void DisturbanceManager::onLink(const core::LinkStatus& status) {
   if (!was_up && state_ == State::kIdle) putBack();
 }
 
-void DisturbanceManager::watchJournal() {
-  const Lock lock(mutex_);
+void DisturbanceManager::watch() {
+  std::unique_lock<core::HandlerMutex> lock(mutex_);
   const double now = link_->clock().steadySeconds();
+  if (state_ == State::kIdle && up_ && now >= put_back_again_at_) putBack();
   const auto journal = link_->journal();
   if (state_ != State::kRunning || !journal || now < looked_at_ + kRepeat) return;
   looked_at_ = now;
+  const std::uint32_t id = label_.id;
+  lock.unlock();  // another process may hold the journal
   const std::vector<core::JournalEntry> own = journal->own();
+  lock.lock();
   const bool noted =
       std::any_of(own.begin(), own.end(), [](const core::JournalEntry& entry) { return entry.id == kEntry; });
-  if (!noted) forget("another client has put the wind back");
+  // Put back once more: frames may have been sent since.
+  if (!noted && state_ == State::kRunning && id == label_.id)
+    end("aborted: another client has put the wind back", false);
 }
 
-std::string DisturbanceManager::windRefusal() const {
+std::string DisturbanceManager::windRefusal() {
   const Lock lock(mutex_);
-  if (state_ == State::kIdle) return "";
+  if (state_ == State::kIdle) {
+    if (up_) putBack();
+    return "";
+  }
   return described(label_) + ", sets the wind: wait for its end, or call disturb with kind stop";
 }
 

@@ -35,8 +35,8 @@ struct DisturbanceLabel {
 };
 
 /// One disturbance at a time: asks X-Plane for its weather, notes that in the journal, writes the wind in each frame of
-/// flight, and puts the weather back when it ends, by whatever way. Thread-safe; waits for nothing but the journal's
-/// disk.
+/// flight, and puts the weather back when it ends, by whatever way: twice, a second apart, as X-Plane confirms nothing.
+/// Thread-safe; waits for nothing but the journal's disk.
 class DisturbanceManager {
  public:
   using Publish = std::function<void(const DisturbanceLabel& label)>;
@@ -54,13 +54,14 @@ class DisturbanceManager {
   void onLink(const core::LinkStatus& status);
   /// Ends the one that runs, as aborted, and puts the weather back.
   void abort(const std::string& why);
-  /// Another process has put everything back: the one that runs ends.
-  void forget(const std::string& why);
-  /// Sees once a second whether another process has put the weather back. Reads the journal.
-  void watchJournal();
+  /// The same for good: none begins any more, and the weather is put back at once.
+  void stop(const std::string& why);
+  /// Called now and then, without a lock held: ends the one that runs when another process has put the weather back,
+  /// which the journal shows; puts the weather back a second time.
+  void watch();
 
-  /// Why the wind cannot be set now; empty: it can.
-  std::string windRefusal() const;
+  /// Why the weather cannot be set now; empty: it can, and nothing is put back over it any more.
+  std::string windRefusal();
   DisturbanceLabel label() const;
   void publish() const;
 
@@ -87,6 +88,9 @@ class DisturbanceManager {
   DisturbanceLabel label_;
   std::optional<core::Disturbance> disturbance_;
   std::vector<core::UndoOperation> restores_;  // what is still to be put back
+  int times_put_back_ = 0;
+  double put_back_again_at_ = 0.0;  // [s] steady
+  bool ended_ = false;
   std::vector<core::DatarefWrite> sent_;
   double send_all_at_ = 0.0;  // [s] steady
   double looked_at_ = 0.0;    // [s] steady, at the journal
