@@ -79,7 +79,8 @@ class Unit:
         command += [f"--header-filter={room}/|{_HEADERS}", str(source), "--", "-std=c++17", *self._flags]
         done = subprocess.run(command, check=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         source.unlink()
-        if "[clang-diagnostic-error" in done.stdout and len(self.files) > 1:  # names that _apart() does not see
+        # Names that _apart() does not see; or clang-tidy itself has crashed, which it does on some large units.
+        if ("[clang-diagnostic-error" in done.stdout or done.returncode < 0) and len(self.files) > 1:
             half = len(self.files) // 2
             parts = (self.files[:half], self.files[half:])
             return "".join(Unit(part, self._flags, self._cache, self._rules).findings() for part in parts)

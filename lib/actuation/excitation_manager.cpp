@@ -97,7 +97,7 @@ ExcitationManager::Plan ExcitationManager::plan(const ExcitationRequest& request
   spec.roll_limit_deg = request.max_roll_deg == 0.0 ? max_roll_deg_ : request.max_roll_deg;
   spec.pitch_limit_deg = request.max_pitch_deg == 0.0 ? max_pitch_deg_ : request.max_pitch_deg;
   spec.interleave = static_cast<int>(targets);
-  if (out.channels.size() > 0 && spec.amplitude > 1.0) {
+  if (!out.channels.empty() && spec.amplitude > 1.0) {
     out.wrong = "amplitude of an axis must be at most 1 (full travel)";
     return out;
   }

@@ -82,7 +82,11 @@ SimLink::SimLink(SimLinkOptions options, SimLinkCallbacks callbacks, Clock clock
 }
 
 SimLink::~SimLink() {
-  stop(kDestructorTimeout);
+  try {
+    stop(kDestructorTimeout);
+  } catch (const std::exception& error) {  // of the journal's disk, or of who handles what the link reports
+    log_(LogLevel::kError, std::string("the link did not end in order: ") + error.what());
+  }
   const std::lock_guard<std::mutex> lock(self_->mutex);
   self_->link = nullptr;
 }
