@@ -88,7 +88,7 @@ def test_a_gust_is_flown_reported_and_ended(flight):
     assert (end.kind, end.active, end.speed, end.duration) == ("gust", False, 8.0, 3.0)
     assert end.end_sim_time - end.start_sim_time == pytest.approx(3.0, abs=0.2)
     wait_for_wind_of_before(flight)
-    assert journal_entries(flight) == []
+    wait_until(lambda: journal_entries(flight) == [], 15.0, "an empty journal")
     texts = [(e.kind, e.text, e.success) for e in flight.events.last.events if e.requested_by.endswith("/disturb")]
     assert (SETTING, f"disturbance {number}, gust: begins", True) in texts
     assert (SETTING, f"disturbance {number}, gust: done", True) in texts
