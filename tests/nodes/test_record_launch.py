@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.ros import roslaunch
 
 
@@ -18,6 +19,25 @@ def test_it_warns_while_no_states_come_and_takes_it_back(world):
         launch.wait_for_line("flight states are recorded now", 60)
         launch.wait_for_line(rf"nothing on {world.namespace}/flight_state .*, though /tests\w+ would publish it", 60)
         publisher.unregister()
+
+
+def test_further_cameras_are_recorded_by_their_names(world):
+    import rosgraph
+
+    namespace = world.namespace.strip("/")
+    bag = world.folder / "cameras.bag"
+    arguments = {"ns": namespace, "bag": bag, "topics": "control/mode", "cameras": "belly tail"}
+    wanted = {f"{world.namespace}/control/mode"}
+    for camera in ("belly", "tail"):
+        topics = ("image_raw/compressed", "camera_info", "frame_state")
+        wanted |= {f"{world.namespace}/{camera}/camera/{topic}" for topic in topics}
+
+    def recorded() -> set:
+        _, subscribers, _ = rosgraph.Master("/test_record").getSystemState()
+        return {topic for topic, nodes in subscribers if f"{world.namespace}/record" in nodes}
+
+    with roslaunch(world.master, world.folder, "record.launch", **arguments):
+        wait_until(lambda: wanted <= recorded(), 60.0, "subscriptions of the recorder")
 
 
 def test_a_recording_that_does_not_want_states_has_no_watch(world):

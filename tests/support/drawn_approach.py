@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Callable, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Mapping, NamedTuple, Sequence
 
 import cv2
 import numpy as np
@@ -30,6 +30,40 @@ SUN = (31.101993, 41.576129)  #: elevation, heading [deg]
 RADIUS_M = 6378145.0
 #: States of other aircraft a second; their times are those of no picture.
 TRAFFIC_HZ = 4.0
+
+
+class View(NamedTuple):
+    """A camera of the aircraft."""
+
+    topics: str = "/xplane/camera"
+    size: tuple[int, int] = SIZE
+    fov_deg: float = FOV_DEG
+    pitch_deg: float = 0.0
+    rotation: tuple[float, float, float, float] = (-0.5, 0.5, -0.5, 0.5)  #: of body_to_camera
+
+    @property
+    def matrix(self) -> list[float]:
+        """CameraInfo's K."""
+        focal = 0.5 * self.size[0] / math.tan(math.radians(0.5 * self.fov_deg))
+        return [focal, 0.0, 0.5 * (self.size[0] - 1), 0.0, focal, 0.5 * (self.size[1] - 1), 0.0, 0.0, 1.0]
+
+
+FORWARD = View()
+_HALF = math.radians(-12.5)
+#: As `camera.launch camera:=belly pitch:=-25 field_of_view:=80` publishes it. Forward, turned about the camera's right
+#: by -25 degrees: the product of the two quaternions, by hand.
+BELLY = View(
+    "/xplane/belly/camera",
+    (640, 360),
+    80.0,
+    -25.0,
+    (
+        0.5 * (math.sin(_HALF) - math.cos(_HALF)),
+        0.5 * (math.cos(_HALF) - math.sin(_HALF)),
+        -0.5 * (math.cos(_HALF) + math.sin(_HALF)),
+        0.5 * (math.cos(_HALF) + math.sin(_HALF)),
+    ),
+)
 
 
 def scene(t: float, far: float = 900.0) -> Scene:
@@ -84,6 +118,24 @@ def frame_state(bag: FlightBag, shown: Scene, ns: int, **changes: Any) -> dict[s
     }
 
 
+def seen(shown: Scene, view: View) -> Scene:
+    """A scene as a camera has it."""
+    return replace(shown, head_pitch_deg=view.pitch_deg, field_of_view_deg=view.fov_deg)
+
+
+def add_picture(bag: FlightBag, view: View, pixels: np.ndarray, frame: Mapping[str, Any]) -> None:
+    """Write a picture of a camera, its CameraInfo and its FrameState."""
+    header = frame["header"]
+    ns = header["stamp"]["sec"] * 1_000_000_000 + header["stamp"]["nanosec"]
+    pose = {**frame["body_to_camera"], "rotation": dict(zip("xyzw", view.rotation))}
+    bag.add(f"{view.topics}/frame_state", "xplane_bridge/FrameState", ns, {**frame, "body_to_camera": pose})
+    info = {"header": header, "width": view.size[0], "height": view.size[1], "K": view.matrix}
+    bag.add(f"{view.topics}/camera_info", "sensor_msgs/CameraInfo", ns, info)
+    jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 90])[1]
+    picture = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.reshape(-1)}
+    bag.add(f"{view.topics}/image_raw/compressed", "sensor_msgs/CompressedImage", ns, picture)
+
+
 def geodetic(along: float, across: float) -> tuple[float, float]:
     """Latitude, longitude [deg] so far along the runway's heading from its middle, and right of that [m]."""
     turn = math.radians(HEADING_DEG)
@@ -113,6 +165,7 @@ def write_approach(
     far: float = 900.0,
     every: int = 15,
     traffic: Callable[[float], Sequence[Pose]] = lambda _: (),
+    views: Sequence[View] = (FORWARD,),
     **turned: float,
 ) -> Path:
     """Write a bag of pictures.
@@ -124,11 +177,10 @@ def write_approach(
         far: [m] before the threshold where it begins.
         every: Frames of 1/30 s from one picture to the next.
         traffic: Where other aircraft are at a time [s]; recorded between the pictures.
+        views: The cameras; pictures of one frame have the same stamp.
         **turned: Of every scene, in place of the approach's.
     """
-    focal = 0.5 * SIZE[0] / math.tan(math.radians(0.5 * FOV_DEG))
-    matrix = [focal, 0.0, 0.5 * (SIZE[0] - 1), 0.0, focal, 0.5 * (SIZE[1] - 1), 0.0, 0.0, 1.0]
-    painter = Painter(*SIZE, ANCHOR, HEADING_DEG)
+    painters = [Painter(*view.size, ANCHOR, HEADING_DEG) for view in views]
     with FlightBag(path) as bag:
         for k in range(0, frames * every, every):
             t = k * PERIOD
@@ -137,13 +189,8 @@ def write_approach(
                 replace(scene(at, far), others=tuple(traffic(at)), **turned) for at in (t, t + late * PERIOD)
             )
             frame = frame_state(bag, known, ns)
-            jpeg = cv2.imencode(".jpg", painter.paint(shown), [cv2.IMWRITE_JPEG_QUALITY, 90])[1]
-            header = frame["header"]
-            bag.add("/xplane/camera/frame_state", "xplane_bridge/FrameState", ns, frame)
-            info = {"header": header, "width": SIZE[0], "height": SIZE[1], "K": matrix}
-            bag.add("/xplane/camera/camera_info", "sensor_msgs/CameraInfo", ns, info)
-            picture = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.reshape(-1)}
-            bag.add("/xplane/camera/image_raw/compressed", "sensor_msgs/CompressedImage", ns, picture)
+            for view, painter in zip(views, painters):
+                add_picture(bag, view, painter.paint(seen(shown, view)), frame)
             bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, frame["state"])
             if k % (30 * every) == 0:
                 names = [f"sim/graphics/scenery/sun_{name}_degrees" for name in ("pitch", "heading")]

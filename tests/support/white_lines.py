@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import cv2
 import numpy as np
 
-from xplane_bridge.bags.pictures import COMPRESSED, grey_pictures, image_topic
+from xplane_bridge.bags.cameras import FIRST, chosen_cameras
+from xplane_bridge.bags.pictures import grey_pictures
 from xplane_bridge.labels.apt import read_airport
 from xplane_bridge.labels.flight import Flight, Options
 from xplane_bridge.resources import config_file
@@ -75,7 +76,7 @@ def measure(grey: np.ndarray, camera: Camera, labeller: Labeller) -> np.ndarray:
     return np.array(errors)
 
 
-def measure_flight(bags: Bags, flight: Flight, every: int = 1, late: int = 0) -> Lines:
+def measure_flight(bags: Bags, flight: Flight, every: int = 1, late: int = 0, camera: str = FIRST) -> Lines:
     """Measure the lines in each n-th picture of a flight, but for those whose flags say they may be paired wrong.
 
     Args:
@@ -83,8 +84,9 @@ def measure_flight(bags: Bags, flight: Flight, every: int = 1, late: int = 0) ->
         flight: Of them.
         every: n.
         late: With the camera of so many frames later: of another picture, which shows that frame.
+        camera: Whose pictures.
     """
-    frames = {frame.stamp: frame for frame in flight.frames()}
+    frames = {frame.stamp: frame for frame in flight.frames() if frame.name == camera}
     cameras = {stamp: frame.camera for stamp, frame in frames.items()}
     sure = {stamp: camera for stamp, camera in cameras.items() if not camera.pose.may_be_neighbour}
     unsure = len(cameras) - len(sure)
@@ -93,8 +95,8 @@ def measure_flight(bags: Bags, flight: Flight, every: int = 1, late: int = 0) ->
         numbers = {stamp: round(frames[stamp].sim_time / frames[stamp].camera.pose.period) + late for stamp in sure}
         sure = {stamp: at[number] for stamp, number in numbers.items() if number in at}
     found = []
-    topic = image_topic(bags, (COMPRESSED, "sensor_msgs/Image"))
-    for number, (stamp, grey) in enumerate(grey_pictures(bags, topic)):
+    (recorded,) = chosen_cameras(bags, [camera])
+    for number, (stamp, grey) in enumerate(grey_pictures(bags, recorded.images)):
         if number % every == 0 and stamp in sure:
             found.append(measure(grey, sure[stamp], flight.labeller))
     errors = np.concatenate(found) if found else np.empty(0)

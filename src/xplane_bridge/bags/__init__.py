@@ -187,8 +187,11 @@ class Bags:
         return np.sort(np.concatenate([file.times(c.id) for file, c in self._connections(topic)]))
 
     def topic_of_type(self, msgtype: str, suffix: str = "") -> Optional[str]:
-        """Find the topic of a message type (``package/Name``); of several, the first whose name ends in `suffix`."""
-        for info in sorted(self.topics.values(), key=lambda info: info.topic):
+        """Find the topic of a message type (``package/Name``) whose name ends in `suffix`.
+
+        Of several, the one in the fewest name spaces: the bridge's own camera before a further one's; then by name.
+        """
+        for info in sorted(self.topics.values(), key=lambda info: (info.topic.count("/"), info.topic)):
             if info.msgtype == msgtype and info.topic.endswith(suffix):
                 return info.topic
         return None

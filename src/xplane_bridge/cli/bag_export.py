@@ -59,6 +59,13 @@ def parser() -> argparse.ArgumentParser:
         help="labels of the pictures, made by label_images; for several flights the folder with their "
         "NAME.labels.jsonl (default: none are exported)",
     )
+    data.add_argument(
+        "--camera",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="export these cameras' pictures, as camera.launch names them; camera is the bridge's own (default: all)",
+    )
     data.add_argument("--keep-bad-frames", action="store_true", help="keep frames whose quality bits say they are bad")
     run = p.add_argument_group("how to run")
     run.add_argument(
@@ -83,9 +90,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         p.error("no BAG given")
     if args.jobs < 1:
         p.error(f"--jobs {args.jobs}: at least 1 process is needed")
-    for option in ("rate", "topics", "labels"):
-        if getattr(args, option) and option not in FORMATS[args.format].options:
-            having = ", ".join(name for name, form in FORMATS.items() if option in form.options)
+    for option, needed in (("rate", "rate"), ("topics", "topics"), ("labels", "labels"), ("camera", "dataset")):
+        if getattr(args, option) and needed not in FORMATS[args.format].options:
+            having = ", ".join(name for name, form in FORMATS.items() if needed in form.options)
             p.error(f"--{option} is not for {args.format}; it is for {having}")
     jobs = _jobs(args, output)
     campaign.make_folder(output)
@@ -110,7 +117,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 
 def _jobs(args: argparse.Namespace, output: Path) -> list[Job]:
-    dataset = Options(args.keep_bad_frames, args.train_share, args.split_by, args.seed)
+    cameras = tuple(sorted(set(args.camera)))
+    dataset = Options(args.keep_bad_frames, args.train_share, args.split_by, args.seed, cameras)
     named = campaign.flights(args.bags)
     training = campaign.choose_training(named, dataset)
     jobs = []

@@ -36,7 +36,7 @@ _LARD = (
     *("weather", "night", "time", "slant_distance", "along_track_distance", "height_above_runway"),
     *("lateral_path_angle", "vertical_path_angle", "yaw", "pitch", "roll", "watermark_height"),
     *("x_TR", "y_TR", "x_TL", "y_TL", "x_BL", "y_BL", "x_BR", "y_BR"),
-    *("sigma_TR_px", "sigma_TL_px", "sigma_BL_px", "sigma_BR_px", "height_source", "stamp_ns"),
+    *("sigma_TR_px", "sigma_TL_px", "sigma_BL_px", "sigma_BR_px", "height_source", "stamp_ns", "camera"),
 )
 _MILE_M, _FOOT_M = 1852.0, 0.3048
 
@@ -53,8 +53,7 @@ def export_annotated(
         ExportError: The labels are of other pictures.
     """
     pictures = write_pictures(bags, folder, options, train_flight)
-    stamps = [picture.stamp for picture in pictures.kept]
-    counts = labels.counts(stamps) if labels else {"labelled": 0}
+    counts = labels.counts([picture.key for picture in pictures.kept]) if labels else {"labelled": 0}
     write_frames(folder / "frames.csv", pictures, pictures.columns)
     write(folder, pictures, labels)
     return {**pictures.counts._asdict(), **counts}
@@ -73,7 +72,7 @@ def coco(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
             if picture.split != split:
                 continue
             images.append({"id": image_id, **_image(picture, pictures.columns, labels)})
-            for thing in labels.things(picture.stamp) if labels else ():
+            for thing in labels.things(picture.key) if labels else ():
                 number += 1
                 annotations.append({"id": number, "image_id": image_id, **_annotation(thing)})
         content = {
@@ -93,11 +92,12 @@ def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: Optional
     def vector(prefix: str, axes: Sequence[object]) -> list[Any]:
         return [value(f"{prefix}_{axis}") for axis in axes]
 
-    frame = labels.frame(picture.stamp) if labels else None
+    frame = labels.frame(picture.key) if labels else None
     return {
         "file_name": Path(picture.file).name,
         "width": picture.size[0],
         "height": picture.size[1],
+        "camera": picture.camera,
         "stamp_ns": picture.stamp,
         "camera_matrix": vector("camera_matrix", range(9)),
         "body_to_camera": {
@@ -111,7 +111,7 @@ def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: Optional
         "quality": value("quality_words"),
         "labelled": frame is not None,
         "others_known": bool(frame and frame.get("others_known")),
-        "horizon": labels.horizon(picture.stamp) if labels else None,
+        "horizon": labels.horizon(picture.key) if labels else None,
     }
 
 
@@ -139,12 +139,12 @@ def yolo(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
     """Write YOLO's text: a line an object, its class and its outline as shares of the picture; boxes follow from it."""
     rows: list[list[Any]] = []
     for picture in pictures.kept:
-        if labels is None or labels.frame(picture.stamp) is None:
+        if labels is None or labels.frame(picture.key) is None:
             continue
         path = folder / "labels" / picture.split / f"{Path(picture.file).stem}.txt"
         path.parent.mkdir(parents=True, exist_ok=True)
         lines = []
-        for number, thing in enumerate(labels.things(picture.stamp)):
+        for number, thing in enumerate(labels.things(picture.key)):
             shares = [min(max(part / side, 0.0), 1.0) for at in thing.outline for part, side in zip(at, picture.size)]
             lines.append(" ".join([str(CATEGORIES.index(thing.category)), *(f"{share:.6f}" for share in shares)]))
             label = thing.label
@@ -163,7 +163,7 @@ def lard(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
         rows = []
         for picture in pictures.kept:
             if picture.split == split:
-                things = list(labels.things(picture.stamp)) if labels else []
+                things = list(labels.things(picture.key)) if labels else []
                 rows += [
                     _lard_row(picture, thing, pictures.columns, labels) for thing in things if "points" in thing.label
                 ]
@@ -193,6 +193,7 @@ def _lard_row(
         "roll": roll,
         "watermark_height": 0,
         "height_source": label["height"]["source"],
+        "camera": picture.camera,
         "stamp_ns": picture.stamp,
     }
     for corner in ("TR", "TL", "BL", "BR"):

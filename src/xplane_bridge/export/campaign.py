@@ -115,7 +115,7 @@ def _export(job: Job, output: Path) -> dict[str, Any]:
             counts = form.write(bags, folder / final.name, job)
             about = {"topics": {t: [info.msgtype, info.count] for t, info in bags.topics.items() if info.count}}
             if form.frames:
-                about["quality"] = frame_quality(bags)
+                about["quality"] = frame_quality(bags, job.dataset.cameras if "dataset" in form.options else ())
         _remove(final)
         os.replace(folder / final.name, final)
     finally:

@@ -2,8 +2,9 @@
 
 Folder of one flight::
 
-    labels.csv                    one row an image: file, split, stamp, then the columns below
+    labels.csv                    one row an image: file, split, stamp, camera, then the columns below
     images/train/000000.jpg       numbered in time order; JPEG bytes as recorded, raw images as PNG (lossless)
+                                  (camera_000000.jpg, belly_000100.jpg: where there are several cameras)
     images/train/metadata.parquet the same rows for Hugging Face datasets, with `file_name` relative to this file
     images/validation/...         likewise
 
@@ -26,13 +27,15 @@ import pandas as pd
 
 from xplane_bridge.analysis.quality import BAD_QUALITY
 from xplane_bridge.bags import BagError, Bags, Table
+from xplane_bridge.bags.cameras import Camera, cameras, chosen_cameras
 from xplane_bridge.bags.pictures import COMPRESSED, RAW, image_topic
 from xplane_bridge.export.columns import named
-from xplane_bridge.export.flight import FRAME_STATE, quality_bits, topic_of
 from xplane_bridge.export.flight import labels as flight_labels
+from xplane_bridge.export.flight import quality_bits
 
 if TYPE_CHECKING:
     from xplane_bridge.export.image_labels import ImageLabels
+    from xplane_bridge.labels.table import Key
 
 
 class Options(NamedTuple):
@@ -42,6 +45,7 @@ class Options(NamedTuple):
     train_share: float = 0.8  #: of the time of each flight, or of the flights
     split_by: str = "time"  #: time: the first part of each flight trains; flight: whole flights
     seed: int = 0  #: of the choice of flights
+    cameras: tuple[str, ...] = ()  #: names of those to export; all when empty
 
 
 class Counts(NamedTuple):
@@ -62,6 +66,12 @@ class Picture(NamedTuple):
     row: int  #: of what is known of the frames
     stamp: int  #: [ns]
     size: tuple[int, int]  #: width, height [px]
+    camera: str  #: its name
+
+    @property
+    def key(self) -> Key:
+        """By which its labels are found."""
+        return self.camera, self.stamp
 
 
 class Pictures(NamedTuple):
@@ -93,8 +103,9 @@ def export_images(
     columns = dict(pictures.columns)
     counts = pictures.counts._asdict()
     if labels is not None:
-        counts.update(labels.counts([picture.stamp for picture in pictures.kept]))
-        columns["labels_json"] = np.array([labels.text(int(stamp)) for stamp in pictures.stamp], dtype=object)
+        counts.update(labels.counts([picture.key for picture in pictures.kept]))
+        keys = zip(columns["camera"], pictures.stamp.tolist())
+        columns["labels_json"] = np.array([labels.text(key) for key in keys], dtype=object)
     write_frames(folder / "labels.csv", pictures, columns)
     for split in sorted({picture.split for picture in pictures.kept}):
         part = [picture for picture in pictures.kept if picture.split == split]
@@ -112,21 +123,70 @@ def write_pictures(bags: Bags, folder: Path, options: Options, train_flight: boo
         train_flight: With ``split_by="flight"``: whether this flight trains.
 
     Raises:
-        BagError: No images or no frame states in the bag, or an image encoding that cannot be written.
+        BagError: No such camera, no images or no frame states in the bag, or an image encoding that cannot be written.
     """
-    topic = image_topic(bags, (COMPRESSED, RAW))
-    frame_topic = topic_of(bags, FRAME_STATE)
-    table, constants = bags.read(frame_topic), bags.constants(frame_topic)
+    image_topic(bags, (COMPRESSED, RAW))  # says what to record where there is none at all
+    chosen = chosen_cameras(bags, options.cameras)
+    for camera in chosen:
+        if not camera.images:
+            topic = f"{camera.info.rsplit('/', 1)[0]}/image_raw/compressed"
+            names = ", ".join(map(str, bags.paths))
+            others = ", or leave this camera out with --camera" if len(chosen) > 1 else ""
+            msg = f"{names}: no images of camera {camera.name}; record {topic} (launch/record.launch does){others}"
+            raise BagError(msg)
+    # One instant for all cameras, also for those that are not exported: no frame is in both splits.
+    stamps = np.concatenate([bags.read(camera.frames, ["header.stamp"]).stamp for camera in cameras(bags)])
+    cut = _split_stamp(stamps, options)
+    folder.mkdir(parents=True)
+    parts = []
+    for camera in chosen:
+        prefix = f"{camera.name}_" if len(chosen) > 1 else ""
+        parts.append(_write_camera(bags, camera, folder, options, train_flight, cut, prefix))
+    return _joined(parts)
+
+
+def _joined(parts: list[Pictures]) -> Pictures:
+    """Put the pictures of several cameras behind each other."""
+    kept: list[Picture] = []
+    left_out: Counter[str] = Counter()
+    first = 0
+    for part in parts:
+        kept += [picture._replace(row=first + picture.row) for picture in part.kept]
+        left_out.update(part.counts.left_out)
+        first += len(part.stamp)
+    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
+    counts = Counts(
+        sum(part.counts.images for part in parts),
+        sum(part.counts.exported for part in parts),
+        sum(part.counts.train for part in parts),
+        sum(part.counts.validation for part in parts),
+        dict(sorted(left_out.items())),
+    )
+    return Pictures(kept, np.concatenate([part.stamp for part in parts]), columns, counts)
+
+
+def _write_camera(
+    bags: Bags, camera: Camera, folder: Path, options: Options, train_flight: bool, cut: int, prefix: str
+) -> Pictures:
+    """Write the images of one camera.
+
+    Args:
+        bags: Open bags of the flight.
+        camera: Whose.
+        folder: Of the flight; exists.
+        options: What to keep and how to split.
+        train_flight: With ``split_by="flight"``: whether this flight trains.
+        cut: [ns] with ``split_by="time"``: images before it train.
+        prefix: Of the files' names.
+    """
+    table, constants = bags.read(camera.frames), bags.constants(camera.frames)
     bad = {name: int(constants[name]) for name in BAD_QUALITY if name in constants}
     stamp = table.stamp
     row_of = {int(s): k for k, s in enumerate(stamp)}
-    cut = _split_stamp(stamp, options)
-
-    folder.mkdir(parents=True)
     left_out: Counter[str] = Counter()
     kept: list[Picture] = []
     images = 0
-    for image_stamp, suffix, content in _images(bags, topic):
+    for image_stamp, suffix, content in _images(bags, camera.images):
         images += 1
         row = row_of.get(image_stamp)
         if row is None:
@@ -138,11 +198,11 @@ def write_pictures(bags: Bags, folder: Path, options: Options, train_flight: boo
             continue
         trains = train_flight if options.split_by == "flight" else image_stamp < cut
         split = "train" if trains else "validation"
-        name = f"images/{split}/{len(kept):06d}{suffix}"
+        name = f"images/{split}/{prefix}{len(kept):06d}{suffix}"
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
-        kept.append(Picture(name, split, row, image_stamp, (0, 0)))
-    columns = _columns(bags, frame_topic, table, constants)
+        kept.append(Picture(name, split, row, image_stamp, (0, 0), camera.name))
+    columns = _columns(bags, camera, table, constants)
     kept = [picture._replace(size=_size(folder / picture.file, columns, picture.row)) for picture in kept]
     splits = Counter(picture.split for picture in kept)
     counts = Counts(images, len(kept), splits["train"], splits["validation"], dict(sorted(left_out.items())))
@@ -160,13 +220,14 @@ def _size(path: Path, columns: Mapping[str, np.ndarray], row: int) -> tuple[int,
     return (0, 0) if picture is None else (int(picture.shape[1]), int(picture.shape[0]))
 
 
-def _columns(bags: Bags, topic: str, table: Table, constants: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _columns(bags: Bags, camera: Camera, table: Table, constants: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Give what is known of each frame, by column; shape (frames,)."""
-    columns = named(table.columns, bags.units(topic))
-    columns = {k: v for k, v in columns.items() if not k.startswith("state_header")}
+    columns = {"camera": np.full(len(table), camera.name, dtype=object)}
+    named_columns = named(table.columns, bags.units(camera.frames))
+    columns.update({k: v for k, v in named_columns.items() if not k.startswith("state_header")})
     columns.update(flight_labels(bags, table.stamp))
     columns.update(_quality(table["quality"], constants))
-    columns.update(_camera(bags, f"{topic.rsplit('/', 1)[0]}/camera_info", table.stamp))
+    columns.update(_camera(bags, camera.info, table.stamp))
     return columns
 
 
@@ -247,7 +308,7 @@ def _write_metadata(
             "coarse": pyarrow.bool_(),
         }
         kind = pyarrow.struct({name: pyarrow.list_(item) for name, item in lists.items()})
-        table = table.append_column("objects", pyarrow.array([labels.boxes(p.stamp) for p in kept], type=kind))
+        table = table.append_column("objects", pyarrow.array([labels.boxes(p.key) for p in kept], type=kind))
     parquet.write_table(table, path)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any, Mapping, Sequence
 
 import numpy as np
 
 from xplane_bridge.analysis.resampling import held
 from xplane_bridge.bags import BagError, Bags, Table
+from xplane_bridge.bags.cameras import cameras
 from xplane_bridge.errors import XplaneBridgeError
 
 STATE = "xplane_bridge/FlightState"
@@ -53,14 +55,23 @@ def quality_bits(constants: Mapping[str, Any]) -> dict[str, int]:
     return {k[len(prefix) :].lower().replace("_", " "): int(v) for k, v in constants.items() if k.startswith(prefix)}
 
 
-def frame_quality(bags: Bags) -> dict[str, Any]:
-    """Count the frames in the bags, the perfect ones, and those with each quality bit; empty without frames."""
-    topic = bags.topic_of_type(FRAME_STATE)
-    if topic is None or not bags.topics[topic].count:
-        return {}
-    quality = bags.read(topic, ["quality"])["quality"]
-    counts = {word: int(((quality & bit) != 0).sum()) for word, bit in quality_bits(bags.constants(topic)).items()}
-    return {"frames": len(quality), "perfect": int((quality == 0).sum()), "bits": counts}
+def frame_quality(bags: Bags, names: Sequence[str] = ()) -> dict[str, Any]:
+    """Count the frames of cameras, the perfect ones, and those with each quality bit; empty without frames.
+
+    Args:
+        bags: Open bags of one flight.
+        names: Of the cameras; all when empty.
+    """
+    frames, perfect = 0, 0
+    counts: Counter[str] = Counter()
+    for camera in cameras(bags):
+        if names and camera.name not in names:
+            continue
+        quality = bags.read(camera.frames, ["quality"])["quality"]
+        bits = quality_bits(bags.constants(camera.frames))
+        counts.update({word: int(((quality & bit) != 0).sum()) for word, bit in bits.items()})
+        frames, perfect = frames + len(quality), perfect + int((quality == 0).sum())
+    return {"frames": frames, "perfect": perfect, "bits": dict(counts)} if frames else {}
 
 
 def labels(bags: Bags, base: np.ndarray) -> dict[str, np.ndarray]:

@@ -36,7 +36,8 @@ class Job(NamedTuple):
         if "topics" in options:
             out["topics"] = list(self.topics)
         if "dataset" in options:
-            out.update(self.dataset._asdict(), train_flight=self.train_flight)
+            cameras = list(self.dataset.cameras)
+            out.update({**self.dataset._asdict(), "cameras": cameras}, train_flight=self.train_flight)
         if self.labels_sha256:
             out["labels_sha256"] = self.labels_sha256
         return out

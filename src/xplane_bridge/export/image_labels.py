@@ -9,10 +9,13 @@ from __future__ import annotations
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Any, Iterator, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.labels import table
+
+if TYPE_CHECKING:
+    from xplane_bridge.labels.table import Key
 
 #: Classes of objects, in the order of their numbers.
 CATEGORIES = ("runway", "sun", "aircraft")
@@ -48,31 +51,31 @@ class ImageLabels:
         self._path = path
         self.about, self._frames = table.read(path)
 
-    def counts(self, stamps: Sequence[int]) -> dict[str, Any]:
+    def counts(self, keys: Sequence[Key]) -> dict[str, Any]:
         """Count for the manifest what is labelled of these pictures.
 
         Raises:
             ExportError: Nothing is: they are labels of other pictures.
         """
-        labelled = [stamp for stamp in stamps if stamp in self._frames]
-        if stamps and not labelled:
+        labelled = [key for key in keys if key in self._frames]
+        if keys and not labelled:
             msg = f"{self._path} labels none of these pictures: it is of {', '.join(self.about['bags'])}"
             raise ExportError(msg)
-        kinds = Counter(thing["kind"] for stamp in labelled for thing in self._frames[stamp]["objects"])
+        kinds = Counter(thing["kind"] for key in labelled for thing in self._frames[key]["objects"])
         return {"labelled": len(labelled), "objects": dict(sorted(kinds.items()))}
 
-    def frame(self, stamp: int) -> Optional[dict[str, Any]]:
+    def frame(self, key: Key) -> Optional[dict[str, Any]]:
         """Give everything about a picture; None where it has no labels."""
-        return self._frames.get(stamp)
+        return self._frames.get(key)
 
-    def text(self, stamp: int) -> Optional[str]:
+    def text(self, key: Key) -> Optional[str]:
         """Give the objects of a picture as JSON."""
-        frame = self._frames.get(stamp)
+        frame = self._frames.get(key)
         return None if frame is None else json.dumps(frame["objects"], separators=(",", ":"))
 
-    def things(self, stamp: int) -> Iterator[Thing]:
+    def things(self, key: Key) -> Iterator[Thing]:
         """Give the objects of a picture that have a box."""
-        frame = self._frames.get(stamp)
+        frame = self._frames.get(key)
         for label in frame["objects"] if frame else ():
             if label["kind"] not in CATEGORIES:
                 continue
@@ -81,18 +84,18 @@ class ImageLabels:
             outline = [(u + _HALF, v + _HALF) for u, v in label["polygon"]] if "polygon" in label else corners
             yield Thing(label["kind"], (left, top, right - left, bottom - top), outline, label)
 
-    def horizon(self, stamp: int) -> Optional[dict[str, Any]]:
+    def horizon(self, key: Key) -> Optional[dict[str, Any]]:
         """Give the horizon of a picture, its lines in pixels from the corner."""
-        frame = self._frames.get(stamp)
+        frame = self._frames.get(key)
         for label in frame["objects"] if frame else ():
             if label["kind"] == "horizon":
                 lines = {name: [_moved(part) for part in label[name]] for name in ("level", "dipped")}
                 return {**lines, "dip_deg": label["dip_deg"], "sigma_px": label["sigma_px"]}
         return None
 
-    def boxes(self, stamp: int) -> dict[str, list[Any]]:
+    def boxes(self, key: Key) -> dict[str, list[Any]]:
         """Give boxes, categories and sigmas of a picture as lists side by side."""
-        things = list(self.things(stamp))
+        things = list(self.things(key))
         return {
             "bbox": [list(thing.box) for thing in things],
             "category": [thing.category for thing in things],

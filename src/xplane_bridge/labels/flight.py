@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections import Counter
 from pathlib import Path
-from typing import Any, Iterator, Mapping, NamedTuple, Optional
+from typing import Any, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import Bags, Table
+from xplane_bridge.bags.cameras import Camera as Recorded
+from xplane_bridge.bags.cameras import chosen_cameras
 from xplane_bridge.labels import table as label_table
 from xplane_bridge.labels.apt import Airport
 from xplane_bridge.labels.camera import Camera, Optics, Pose
@@ -20,7 +22,7 @@ from xplane_bridge.labels.things import MAP_SIGMA_M, SPAN_M, Labeller, Sun
 from xplane_bridge.labels.traffic import RecordedTraffic
 from xplane_bridge.labels.world import Flat, Sphere, World
 
-_FRAME, _STATE, _DATAREFS = "xplane_bridge/FrameState", "xplane_bridge/FlightState", "xplane_bridge/DatarefValues"
+_STATE, _DATAREFS = "xplane_bridge/FlightState", "xplane_bridge/DatarefValues"
 #: Where the sun stands, and the origin whose axes that is in.
 _SUN = ("sim/graphics/scenery/sun_pitch_degrees", "sim/graphics/scenery/sun_heading_degrees")
 _ORIGIN = ("sim/flightmodel/position/lat_ref", "sim/flightmodel/position/lon_ref")
@@ -47,10 +49,33 @@ class Options(NamedTuple):
 class Frame(NamedTuple):
     """One picture that can be labelled."""
 
+    name: str  #: of its camera
     stamp: int  #: [ns]
     camera: Camera
     epoch: int  #: of its state
     sim_time: float  #: [s] of its state
+
+
+class _Seen:
+    """What one camera's pictures are known by."""
+
+    def __init__(self, bags: Bags, camera: Recorded) -> None:
+        self.name = camera.name
+        self.frames = bags.read(camera.frames)
+        self.infos = _optics(bags, camera.info)
+        self.suns = _suns(bags, self.frames.stamp)
+
+    def why_not(self, row: int) -> str:
+        """Give why a picture cannot be labelled; empty where it can."""
+        if int(self.frames["quality"][row]) & _STATE_MISSING:
+            return "no state, or its position or attitude is not known"
+        if int(self.frames["state.valid"][row]) & _NEEDED != _NEEDED:
+            return "no state, or its position or attitude is not known"
+        if int(self.frames["camera_pose_source"][row]) != _MEASURED:
+            return "the camera's pose was not measured"
+        if int(self.frames.stamp[row]) not in self.infos:
+            return "no camera_info of the same stamp"
+        return ""
 
 
 class Flight:
@@ -61,19 +86,25 @@ class Flight:
         airport: What to label.
         heights: Of runway ends [m MSL], from a user.
         options: How.
+        cameras: Names of those to label; all when empty.
 
     Raises:
-        LabelError: The bags have no pictures with a measured camera.
-        BagError: The bags cannot be read.
+        LabelError: What is known of a camera was not recorded.
+        BagError: The bags have no such camera, or cannot be read.
     """
 
-    def __init__(self, bags: Bags, airport: Airport, heights: Mapping[str, float], options: Options) -> None:
+    def __init__(
+        self,
+        bags: Bags,
+        airport: Airport,
+        heights: Mapping[str, float],
+        options: Options,
+        cameras: Sequence[str] = (),
+    ) -> None:
         self.left_out: Counter[str] = Counter()  #: pictures without labels, by reason
+        self.labelled: Counter[str] = Counter()  #: pictures with labels, by camera
         self._bags, self.airport, self._options = bags, airport, options
-        self._topic = _filled(bags, _FRAME)
-        self._frames = bags.read(self._topic)
-        self._infos = _optics(bags, f"{self._topic.rsplit('/', 1)[0]}/camera_info")
-        self._sun = _suns(bags, self._frames.stamp)
+        self._seen = [_Seen(bags, camera) for camera in chosen_cameras(bags, cameras)]
         middle = airport.runways[0].ends
         self._world: World = (
             Flat(*(0.5 * (getattr(middle[0], name) + getattr(middle[1], name)) for name in ("latitude", "longitude")))
@@ -87,30 +118,36 @@ class Flight:
         self.others_unknown = 0  #: labelled pictures of which it is not known where other aircraft were
 
     def frames(self) -> Iterator[Frame]:
-        """Give the pictures that can be labelled, in the order of the bag; the others are counted."""
+        """Give the pictures that can be labelled, by camera, in the order of the bag; the others are counted."""
         self.left_out.clear()
-        for row, stamp in enumerate(self._frames.stamp.tolist()):
-            reason = self._why_not(row, stamp)
-            if reason:
-                self.left_out[reason] += 1
-            else:
-                camera = Camera(self._world, _pose(self._frames, row), self._infos[stamp])
-                epoch, time = (self._frames[f"state.{name}"][row] for name in ("epoch", "sim_time"))
-                yield Frame(stamp, camera, int(epoch), float(time))
+        for seen in self._seen:
+            of = f" (camera {seen.name})" if len(self._seen) > 1 else ""
+            for row, stamp in enumerate(seen.frames.stamp.tolist()):
+                reason = seen.why_not(row)
+                if reason:
+                    self.left_out[reason + of] += 1
+                else:
+                    camera = Camera(self._world, _pose(seen.frames, row), seen.infos[stamp])
+                    epoch, time = (seen.frames[f"state.{name}"][row] for name in ("epoch", "sim_time"))
+                    yield Frame(seen.name, stamp, camera, int(epoch), float(time))
 
     def labels(self) -> Iterator[dict[str, Any]]:
         """Label all pictures: what each line of the file is."""
         self.others_unknown = 0
+        self.labelled.clear()
+        suns = {seen.name: seen.suns for seen in self._seen}
         for frame in self.frames():
+            self.labelled[frame.name] += 1
             optics = frame.camera.optics
             others = self.traffic.at(frame.epoch, frame.sim_time)
             self.others_unknown += others is None
             yield {
+                "camera": frame.name,
                 "stamp_ns": frame.stamp,
                 "width": optics.width,
                 "height": optics.height,
                 "others_known": others is not None,
-                "objects": self.labeller.label(frame.camera, self._sun.get(frame.stamp), others or ()),
+                "objects": self.labeller.label(frame.camera, suns[frame.name].get(frame.stamp), others or ()),
             }
 
     def about(self) -> dict[str, Any]:
@@ -121,6 +158,7 @@ class Flight:
         return {
             "xplane_bridge": __version__,
             "bags": [path.name for path in self._bags.paths],
+            "cameras": [seen.name for seen in self._seen],
             "airport": self.airport.ident,
             "apt": {
                 "file": Path(self.airport.file).name,
@@ -128,32 +166,27 @@ class Flight:
                 "version": self.airport.version,
             },
             "heights": runways,
-            "sun": bool(self._sun),
+            "sun": any(seen.suns for seen in self._seen),
             "other_aircraft": self.traffic.recorded,
             "others_unknown": self.others_unknown,
             **self._options._asdict(),
         }
 
-    def _why_not(self, row: int, stamp: int) -> str:
-        frames = self._frames
-        if int(frames["quality"][row]) & _STATE_MISSING or int(frames["state.valid"][row]) & _NEEDED != _NEEDED:
-            return "no state, or its position or attitude is not known"
-        if int(frames["camera_pose_source"][row]) != _MEASURED:
-            return "the camera's pose was not measured"
-        if stamp not in self._infos:
-            return "no camera_info of the same stamp"
-        return ""
-
 
 def label_flight(
-    bags: Bags, path: Path, airport: Airport, heights: Mapping[str, float], options: Options
+    bags: Bags,
+    path: Path,
+    airport: Airport,
+    heights: Mapping[str, float],
+    options: Options,
+    cameras: Sequence[str] = (),
 ) -> tuple[int, Flight]:
-    """Label a flight's pictures into a file; gives how many, and the flight with what was left out.
+    """Label the pictures of a flight's cameras into a file; gives how many, and the flight with what was left out.
 
     Raises:
         LabelError: Nothing can be labelled, or the file cannot be written.
     """
-    flight = Flight(bags, airport, heights, options)
+    flight = Flight(bags, airport, heights, options, cameras)
     lines = list(flight.labels())
     if not lines:
         reasons = ", ".join(f"{count}: {reason}" for reason, count in flight.left_out.items())
@@ -164,19 +197,10 @@ def label_flight(
     return label_table.write(path, about, lines), flight
 
 
-def _filled(bags: Bags, msgtype: str) -> str:
-    topic = bags.topic_of_type(msgtype)
-    if topic is None or not bags.topics[topic].count:
-        names = ", ".join(map(str, bags.paths))
-        msg = f"{names}: no message of type {msgtype}; record camera/frame_state (launch/record.launch does)"
-        raise LabelError(msg)
-    return topic
-
-
 def _optics(bags: Bags, topic: str) -> dict[int, Optics]:
     if topic not in bags.topics or not bags.topics[topic].count:
         names = ", ".join(map(str, bags.paths))
-        msg = f"{names}: no {topic}; record it (launch/record.launch does)"
+        msg = f"{names}: no {topic}; record it (launch/record.launch does), or choose other cameras with --camera"
         raise LabelError(msg)
     infos = bags.read(topic, ["header.stamp", "width", "height", "K"])
     out = {}

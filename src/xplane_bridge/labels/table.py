@@ -1,7 +1,7 @@
 """The file of labels, beside its bag: JSON lines, the first about how they were made, then one a picture.
 
-A picture's line has the stamp of its header, ``stamp_ns``, which is the key, its size, and ``objects``; pixels as in
-`xplane_bridge.labels`.
+A picture's line has the name of its ``camera`` and the stamp of its header, ``stamp_ns``, which are the key, its size,
+and ``objects``; pixels as in `xplane_bridge.labels`.
 """
 
 from __future__ import annotations
@@ -9,12 +9,16 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Any, Iterable, Mapping, NamedTuple
+from typing import Any, Iterable, Mapping, NamedTuple, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
 
-SCHEMA = 1
+SCHEMA = 2  #: 1 knew one camera
 ENDING = ".labels.jsonl"
+
+
+#: Of a picture: its camera's name and its stamp [ns].
+Key = Tuple[str, int]
 
 
 class LabelError(XplaneBridgeError):
@@ -25,7 +29,12 @@ class Labels(NamedTuple):
     """A file of labels."""
 
     about: dict[str, Any]  #: the first line
-    frames: dict[int, dict[str, Any]]  #: the other ones by stamp [ns]
+    frames: dict[Key, dict[str, Any]]  #: the other ones
+
+    @property
+    def cameras(self) -> list[str]:
+        """Names of the cameras that have labels, in the order of the file."""
+        return list(dict.fromkeys(camera for camera, _ in self.frames))
 
 
 def beside(bag: Path) -> Path:
@@ -74,7 +83,7 @@ def read(path: Path) -> Labels:
     if not lines or not isinstance(lines[0], dict) or lines[0].get("labels") != SCHEMA:
         msg = f"{path}: no labels of this version; label_images writes them anew"
         raise LabelError(msg)
-    return Labels(lines[0], {int(line["stamp_ns"]): line for line in lines[1:]})
+    return Labels(lines[0], {(str(line["camera"]), int(line["stamp_ns"])): line for line in lines[1:]})
 
 
 def digest(path: Path) -> str:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import base64
 import html
-from typing import TYPE_CHECKING, Any, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, Sequence
 
 import cv2
 import numpy as np
 
+from xplane_bridge.bags.cameras import cameras
+from xplane_bridge.bags.pictures import COMPRESSED
 from xplane_bridge.plotting.page import missing
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
+    from xplane_bridge.bags.cameras import Camera
     from xplane_bridge.labels.table import Labels
 
-#: Pictures on the page, evenly spread over those with a runway.
+#: Pictures of a camera on the page, evenly spread over those with a runway.
 PICTURES = 10
 #: Width that pictures are drawn at, so that thin lines stand out [px].
 _WIDTH = 960
@@ -30,35 +33,46 @@ _SHIFT = 4  # sub-pixel bits of OpenCV's coordinates
 
 
 def section(bags: Bags, labels: Labels, start: int) -> str:
-    """Make the section: ten pictures with what is labelled in them.
+    """Make the section: ten pictures of each camera with what is labelled in them.
 
     Args:
         bags: Open; pictures are streamed from them.
         labels: Of these pictures.
         start: [ns] zero of the times shown.
     """
-    topic = bags.topic_of_type("sensor_msgs/CompressedImage")
-    if topic is None or not bags.topics[topic].count:
+    seen = cameras(bags)
+    compressed = [c for c in seen if c.images and bags.topics[c.images].msgtype == COMPRESSED]
+    if not compressed:
         return missing("the bag has no compressed camera images")
-    chosen = _chosen(labels.frames)
-    if not chosen:
+    if not labels.frames:
         return missing("no picture has labels")
-    figures = []
-    for _, message in bags.messages(topic):
+    parts = []
+    for camera in compressed:
+        figures = "".join(_figures(bags, camera, labels, start))
+        if figures:
+            head = f"<h3>Camera {html.escape(camera.name)}</h3>" if len(seen) > 1 else ""
+            parts.append(f'{head}<div class="overlay">{figures}</div>')
+    if not parts:
+        return missing("the labels are of other pictures")
+    return f"<p>{html.escape(_about(labels))}</p>{''.join(parts)}"
+
+
+def _figures(bags: Bags, camera: Camera, labels: Labels, start: int) -> Iterator[str]:
+    """Ten pictures of a camera with what is labelled in them."""
+    frames = {stamp: frame for (name, stamp), frame in labels.frames.items() if name == camera.name}
+    chosen = _chosen(frames)
+    for _, message in bags.messages(camera.images) if chosen else ():
         stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
         if stamp not in chosen:
             continue
         picture = cv2.imdecode(np.frombuffer(message.data.tobytes(), dtype=np.uint8), cv2.IMREAD_COLOR)
         if picture is None:
             continue
-        jpeg = cv2.imencode(".jpg", draw(picture, labels.frames[stamp]), [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
-        figures.append(
+        jpeg = cv2.imencode(".jpg", draw(picture, frames[stamp]), [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
+        yield (
             f'<figure><img alt="picture with labels" src="data:image/jpeg;base64,{_text(jpeg)}">'
-            f"<figcaption>{(stamp - start) / 1e9:.1f} s &middot; {_caption(labels.frames[stamp])}</figcaption></figure>"
+            f"<figcaption>{(stamp - start) / 1e9:.1f} s &middot; {_caption(frames[stamp])}</figcaption></figure>"
         )
-    if not figures:
-        return missing("the labels are of other pictures")
-    return f'<p>{html.escape(_about(labels))}</p><div class="overlay">{"".join(figures)}</div>'
 
 
 def draw(picture: np.ndarray, frame: Mapping[str, Any]) -> np.ndarray:

@@ -34,11 +34,12 @@ def test_the_file_lies_beside_the_bag_and_says_how_it_was_made(
     assert out[1] == "height of runway 15/33: apt.dat"
     assert out[2:] == ["no other aircraft: record traffic/state (launch/record.launch does)"], "nothing was left out"
     labels = table.read(path)
-    assert list(labels.frames) == [stamp_ns(k * 0.5) for k in range(3)]
+    assert list(labels.frames) == [("camera", stamp_ns(k * 0.5)) for k in range(3)]
+    assert labels.about["cameras"] == ["camera"]
     assert labels.about["bags"] == ["flight.bag"]
     assert labels.about["apt"]["file"] == "apt.dat"
     assert labels.about["flat_world"] is True
-    first = labels.frames[stamp_ns(0.0)]
+    first = labels.frames["camera", stamp_ns(0.0)]
     assert (first["width"], first["height"]) == (640, 480)
     runway = first["objects"][0]
     assert (runway["kind"], runway["name"]) == ("runway", "15")

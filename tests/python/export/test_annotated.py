@@ -222,4 +222,5 @@ def test_labels_that_do_not_fit_are_refused(flight: Path, tmp_path: Path, capsys
 
 
 def test_the_stamp_is_the_key(flight: Path) -> None:
-    assert list(table.read(table.beside(flight)).frames) == [stamp_ns(0.5 * k) for k in range(FRAMES)]
+    expected = [("camera", stamp_ns(0.5 * k)) for k in range(FRAMES)]
+    assert list(table.read(table.beside(flight)).frames) == expected

@@ -59,6 +59,13 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="for the emulator, whose ground is drawn flat around the middle of the first runway",
     )
+    p.add_argument(
+        "--camera",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="label these cameras' pictures, as camera.launch names them; camera is the bridge's own (default: all)",
+    )
     p.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: beside the (first) bag")
     return p
 
@@ -72,9 +79,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     with Bags(args.bags) as bags:
         path = args.output or beside(bags.paths[0])
         options = Options(args.flat_world, args.map_sigma, args.standing_height, args.span)
-        count, flight = label_flight(bags, path, airport, heights, options)
+        count, flight = label_flight(bags, path, airport, heights, options, args.camera)
     about = flight.about()
     print(f"{path}: {count} pictures labelled; {airport.ident} of {airport.file}")
+    if len(about["cameras"]) > 1:
+        print("of cameras: " + ", ".join(f"{name} {flight.labelled[name]}" for name in about["cameras"]))
     for line in about["heights"]:
         print(f"height of runway {line}")
     if not about["sun"]:

@@ -1,0 +1,74 @@
+"""The cameras of a recording: the topics of each capture_node, by the camera's name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Sequence
+
+from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags.pictures import COMPRESSED, RAW
+
+#: Name of the bridge's own camera, whose topics have no further name space.
+FIRST = "camera"
+_FRAMES, _STATES = "xplane_bridge/FrameState", "xplane_bridge/FlightState"
+
+
+class Camera(NamedTuple):
+    """One camera's topics, by full name."""
+
+    name: str  #: as `camera.launch` gave it: the name space below the bridge's; `FIRST` of the bridge's own
+    frames: str  #: FrameState of each picture, at least one message
+    info: str  #: CameraInfo, recorded or not
+    images: str  #: compressed pictures, else raw ones; empty where none were recorded
+
+
+def cameras(bags: Bags) -> list[Camera]:
+    """Give the cameras with at least one FrameState, the bridge's own first, the others by name.
+
+    Of several bridges in a recording, those of the first.
+    """
+    topics = bags.topics
+    filled = [name for name, info in sorted(topics.items()) if info.count and info.msgtype == _FRAMES]
+    state = bags.topic_of_type(_STATES)
+    space = state.rsplit("/", 1)[0] if state else ""
+    own = [name for name in filled if name.startswith(f"{space}/")] if state else []
+    places = {name: _place(name) for name in own or filled}
+    short = {name: place[len(space.strip("/")) :] if own else place.partition("/")[2] for name, place in places.items()}
+    names = short if len(set(short.values())) == len(short) else places
+    found = []
+    for name in places:
+        folder = name.rsplit("/", 1)[0]
+        images = [
+            topic
+            for kind in (COMPRESSED, RAW)
+            for topic, info in sorted(topics.items(), key=lambda item: (not item[0].startswith(f"{folder}/"), item[0]))
+            # Pictures of an only camera may have any name; those of several have places of their own.
+            if info.count and info.msgtype == kind and (len(filled) == 1 or topic.startswith(f"{folder}/"))
+        ]
+        called = names[name].strip("/").replace("/", "_") or FIRST
+        found.append(Camera(called, name, f"{folder}/camera_info", images[0] if images else ""))
+    return sorted(found, key=lambda camera: (camera.name != FIRST, camera.name))
+
+
+def chosen_cameras(bags: Bags, names: Sequence[str] = ()) -> list[Camera]:
+    """Give the cameras of these names, all when empty.
+
+    Raises:
+        BagError: The bags have no camera, or none of a name; the text says which there are.
+    """
+    found = cameras(bags)
+    paths = ", ".join(map(str, bags.paths))
+    if not found:
+        msg = f"{paths}: no message of type {_FRAMES}; record camera/frame_state (launch/record.launch does)"
+        raise BagError(msg)
+    have = [camera.name for camera in found]
+    missing = sorted(set(names) - set(have))
+    if missing:
+        msg = f"{paths}: no camera {', '.join(missing)}; expected some of: {', '.join(have)}"
+        raise BagError(msg)
+    return [camera for camera in found if not names or camera.name in names]
+
+
+def _place(topic: str) -> str:
+    """The name space of a camera, without the first slash."""
+    ending = "/camera/frame_state"
+    return (topic[: -len(ending)] if topic.endswith(ending) else topic).strip("/")
