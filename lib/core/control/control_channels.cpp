@@ -26,7 +26,7 @@ struct Row {
   ChannelWire wire;
 };
 
-// docs/protocol.md 8.1.
+// docs/protocol.md 5.1.
 constexpr Row kRows[] = {
     {Channel::kRoll,
      Channel::kRoll,

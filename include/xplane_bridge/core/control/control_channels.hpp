@@ -1,6 +1,6 @@
 #pragma once
 
-/// Channels to X-Plane's datarefs: the one place that knows their names (docs/protocol.md 8.1).
+/// Channels to X-Plane's datarefs: the one place that knows their names (docs/protocol.md 5.1).
 
 #include <string>
 #include <vector>
@@ -52,7 +52,7 @@ std::string readBackDataref(Channel channel, const EncoderOptions& options);
 /// Overrides the commanded channels need, each once, in a fixed order; behind them the DATA rows that hold them.
 std::vector<std::string> requiredOverrides(const ChannelSet& channels, const EncoderOptions& options);
 
-/// Overrides whose effect is on all surfaces (docs/protocol.md 8.2).
+/// Overrides whose effect is on all surfaces (docs/protocol.md 5.2).
 extern const char* const kSurfaceOverride;
 
 /// A throttle for all engines in place of their levers'; -2 gives it back.

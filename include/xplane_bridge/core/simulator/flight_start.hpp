@@ -1,6 +1,6 @@
 #pragma once
 
-/// Placing the aircraft in the air (docs/protocol.md 8.4): what is sent, and whether X-Plane shows it.
+/// Placing the aircraft in the air (docs/protocol.md 5.4): what is sent, and whether X-Plane shows it.
 
 #include <optional>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Drives every surface from an identified mixing, some of them broken (docs/protocol.md 8.3, steps 2 and 3).
+/// Drives every surface from an identified mixing, some of them broken (docs/protocol.md 5.3, steps 2 and 3).
 
 #include <optional>
 #include <string>
@@ -52,8 +52,8 @@ class SurfaceDriver {
   void engage(const std::vector<double>& shown_deg, const std::vector<double>& bias_deg = {});
   bool engaged() const { return !driven_.empty(); }
 
-  /// The broken surfaces, all of them; one failure a surface. A surface that stops being broken goes back to the law.
-  /// Surfaces not driven before start from 0 deg.
+  /// The broken surfaces, all of them; at most one failure for each surface. A surface that stops being broken goes
+  /// back to the law. Surfaces not driven before start from 0 deg.
   void setFailures(const std::vector<SurfaceFailure>& failures);
   /// Surfaces flown one by one (SurfaceCommand.msg), all of them. A failure of the same surface is stronger.
   void setCommands(const std::vector<SurfaceDeflection>& commands);

@@ -1,6 +1,6 @@
 #pragma once
 
-/// How X-Plane moves each surface with stick, trims and flaps: identified from normal flight (docs/protocol.md 8.3).
+/// How X-Plane moves each surface with stick, trims and flaps: identified from normal flight (docs/protocol.md 5.3).
 ///
 /// For each surface a linear law with separate slopes for positive and negative stick:
 ///   deflection = bias + k_roll+ max(roll, 0) + k_roll- min(roll, 0) + ... + k_trim trim + k_flap flap + ...

@@ -1,7 +1,7 @@
 #pragma once
 
 /// What tx_node watches of the control surfaces every frame: deflections, what moves them, and whether a client has
-/// taken them from X-Plane (docs/protocol.md 8.3, step 1).
+/// taken them from X-Plane (docs/protocol.md 5.3, step 1).
 
 #include <array>
 #include <cmath>

@@ -17,7 +17,7 @@ ChannelSet setOf(std::initializer_list<Channel> channels) {
 }
 
 TEST(ControlChannels, WritesTheDatarefsOfTheReference) {
-  // docs/protocol.md 8.1, X-Plane 11 column.
+  // docs/protocol.md 5.1, X-Plane 11 column.
   const std::map<Channel, std::string> expected = {
       {Channel::kRoll, "sim/joystick/yoke_roll_ratio"},
       {Channel::kPitch, "sim/joystick/yoke_pitch_ratio"},
