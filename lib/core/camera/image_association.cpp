@@ -26,7 +26,8 @@ constexpr double kBorder = 0.1;
 // that were late for a while would leave all later ones one frame off.
 constexpr double kLargestOffset = 0.3;
 
-double median(std::vector<double>& values) {
+// The upper of the two in the middle where there are two.
+double upperMedian(std::vector<double>& values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -125,7 +126,7 @@ double ImageAssociator::framePeriod() const {
       spacings.push_back(frames_[i].frame.sim_time - frames_[i - 1].frame.sim_time);
     }
   }
-  return reported.empty() ? median(spacings) : median(reported);
+  return reported.empty() ? upperMedian(spacings) : upperMedian(reported);
 }
 
 double ImageAssociator::statePeriod() const {
@@ -136,7 +137,7 @@ double ImageAssociator::statePeriod() const {
     spacings.push_back(static_cast<double>(states_[i].key.sim_time_raw) -
                        static_cast<double>(states_[i - 1].key.sim_time_raw));
   }
-  return median(spacings);
+  return upperMedian(spacings);
 }
 
 double ImageAssociator::stateToFrameRatio() const {
@@ -148,7 +149,7 @@ double ImageAssociator::runningOffset() const {
   if (offsets_.size() < kMinimumOffsets) return 0.0;
   std::vector<double> values(offsets_.begin(), offsets_.end());
   const double largest = kLargestOffset * framePeriod();
-  return std::clamp(median(values), -largest, largest);
+  return std::clamp(upperMedian(values), -largest, largest);
 }
 
 std::optional<ImageAssociator::FrameChoice> ImageAssociator::chooseFrame(const ImageMoment& moment) const {

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "xplane_bridge/core/base/text.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -28,12 +30,6 @@ void command(JoyTarget target, double value, ControlCommand& out) {
   }
 }
 
-std::string wrong(const std::string& key, double given, const std::string& expected) {
-  char number[32];
-  std::snprintf(number, sizeof number, "%g", given);
-  return key + " is " + number + ": expected " + expected;
-}
-
 std::string rangeText(ChannelRange range) {
   char text[48];
   std::snprintf(text, sizeof text, "%g..%g", range.low, range.high);
@@ -46,19 +42,21 @@ std::optional<std::string> checkIntegrated(const IntegratedInput& in, StickMode 
   const bool has_axis = in.axis.of(mode) >= 0;
   const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
   if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
-  if (!std::isfinite(in.rate) || in.rate == 0.0) return wrong(in.key + ".rate", in.rate, "a rate other than 0 [1/s]");
-  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0)) return wrong(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
+  if (!std::isfinite(in.rate) || in.rate == 0.0)
+    return wrongNumber(in.key + ".rate", in.rate, "a rate other than 0 [1/s]");
+  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0))
+    return wrongNumber(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
   const ChannelRange range = commandRange(in.target);
-  if (!inRange(in.low, range)) return wrong(in.key + ".low", in.low, rangeText(range));
+  if (!inRange(in.low, range)) return wrongNumber(in.key + ".low", in.low, rangeText(range));
   if (!inRange(in.high, range) || in.high <= in.low) {
-    return wrong(in.key + ".high", in.high, rangeText(range) + ", above low");
+    return wrongNumber(in.key + ".high", in.high, rangeText(range) + ", above low");
   }
   if (!inRange(in.initial, {in.low, in.high})) {
-    return wrong(in.key + ".initial", in.initial, rangeText({in.low, in.high}));
+    return wrongNumber(in.key + ".initial", in.initial, rangeText({in.low, in.high}));
   }
   for (std::size_t i = 0; i < in.detents.size(); ++i) {
     if (!inRange(in.detents[i], {in.low, in.high}) || (i > 0 && in.detents[i] <= in.detents[i - 1])) {
-      return wrong(in.key + ".detents", in.detents[i], "rising values within " + rangeText({in.low, in.high}));
+      return wrongNumber(in.key + ".detents", in.detents[i], "rising values within " + rangeText({in.low, in.high}));
     }
   }
   return std::nullopt;
@@ -69,17 +67,21 @@ std::optional<std::string> checkSurface(const SurfaceInput& in, StickMode mode) 
   const bool has_axis = in.axis.of(mode) >= 0;
   const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
   if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
-  if (!std::isfinite(in.rate)) return wrong(in.key + ".rate", in.rate, "a finite number [1/s]");
-  if (has_buttons && in.rate == 0.0) return wrong(in.key + ".rate", in.rate, "a rate other than 0 [1/s], for buttons");
-  if (!std::isfinite(in.scale) || in.scale == 0.0) return wrong(in.key + ".scale", in.scale, "a number other than 0");
-  if (in.select_button < 0) return wrong(in.key + ".select_button", in.select_button, "the button that chooses it");
-  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0)) return wrong(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
-  if (!inRange(in.low, kTravel)) return wrong(in.key + ".low", in.low, rangeText(kTravel) + " [deg]");
+  if (!std::isfinite(in.rate)) return wrongNumber(in.key + ".rate", in.rate, "a finite number [1/s]");
+  if (has_buttons && in.rate == 0.0)
+    return wrongNumber(in.key + ".rate", in.rate, "a rate other than 0 [1/s], for buttons");
+  if (!std::isfinite(in.scale) || in.scale == 0.0)
+    return wrongNumber(in.key + ".scale", in.scale, "a number other than 0");
+  if (in.select_button < 0)
+    return wrongNumber(in.key + ".select_button", in.select_button, "the button that chooses it");
+  if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0))
+    return wrongNumber(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
+  if (!inRange(in.low, kTravel)) return wrongNumber(in.key + ".low", in.low, rangeText(kTravel) + " [deg]");
   if (!inRange(in.high, kTravel) || in.high <= in.low) {
-    return wrong(in.key + ".high", in.high, rangeText(kTravel) + " [deg], above low");
+    return wrongNumber(in.key + ".high", in.high, rangeText(kTravel) + " [deg], above low");
   }
   if (inRange(in.initial, {in.low, in.high})) return std::nullopt;
-  return wrong(in.key + ".initial", in.initial, rangeText({in.low, in.high}) + " [deg]");
+  return wrongNumber(in.key + ".initial", in.initial, rangeText({in.low, in.high}) + " [deg]");
 }
 
 bool sameSource(const IntegratedInput& a, const IntegratedInput& b, StickMode mode) {
@@ -101,41 +103,43 @@ const char* toString(JoyTarget target) { return rowOf(target).name; }
 ChannelRange commandRange(JoyTarget target) { return commandRange(rowOf(target).range); }
 
 std::optional<std::string> validate(const JoystickOptions& o) {
-  if (!(o.joy_timeout > 0.0)) return wrong("joy_timeout", o.joy_timeout, "above 0 s");
-  if (!(o.debounce >= 0.0)) return wrong("debounce", o.debounce, "0 s or more");
+  if (!(o.joy_timeout > 0.0)) return wrongNumber("joy_timeout", o.joy_timeout, "above 0 s");
+  if (!(o.debounce >= 0.0)) return wrongNumber("debounce", o.debounce, "0 s or more");
   for (const DirectInput& in : o.direct) {
-    if (in.axis.of(o.stick_mode) < 0) return wrong(in.key + ".axis", in.axis.of(o.stick_mode), "an index from 0");
-    if (!std::isfinite(in.scale) || in.scale == 0.0) return wrong(in.key + ".scale", in.scale, "a number other than 0");
-    if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0)) return wrong(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
-    if (!(in.expo >= 0.0 && in.expo <= 1.0)) return wrong(in.key + ".expo", in.expo, "0..1");
+    if (in.axis.of(o.stick_mode) < 0) return wrongNumber(in.key + ".axis", in.axis.of(o.stick_mode), "an index from 0");
+    if (!std::isfinite(in.scale) || in.scale == 0.0)
+      return wrongNumber(in.key + ".scale", in.scale, "a number other than 0");
+    if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0))
+      return wrongNumber(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
+    if (!(in.expo >= 0.0 && in.expo <= 1.0)) return wrongNumber(in.key + ".expo", in.expo, "0..1");
   }
   for (std::size_t i = 0; i < o.integrated.size(); ++i) {
     if (auto text = checkIntegrated(o.integrated[i], o.stick_mode)) return text;
     for (std::size_t k = 0; k < o.integrated.size(); ++k) {
       if (k == i || !sameSource(o.integrated[i], o.integrated[k], o.stick_mode)) continue;
       if (o.integrated[i].select_button < 0) {
-        return wrong(o.integrated[i].key + ".select_button", o.integrated[i].select_button,
-                     "a button, because " + o.integrated[k].key + " has the same axis or buttons");
+        return wrongNumber(o.integrated[i].key + ".select_button", o.integrated[i].select_button,
+                           "a button, because " + o.integrated[k].key + " has the same axis or buttons");
       }
     }
   }
   for (const ButtonInput& in : o.buttons) {
-    if (in.button < 0) return wrong(in.key + ".button", in.button, "an index from 0");
+    if (in.button < 0) return wrongNumber(in.key + ".button", in.button, "an index from 0");
     const ChannelRange range = commandRange(in.target);
-    if (!inRange(in.value, range)) return wrong(in.key + ".value", in.value, rangeText(range));
+    if (!inRange(in.value, range)) return wrongNumber(in.key + ".value", in.value, rangeText(range));
     if (in.released && !inRange(*in.released, range))
-      return wrong(in.key + ".released", *in.released, rangeText(range));
+      return wrongNumber(in.key + ".released", *in.released, rangeText(range));
   }
   for (std::size_t i = 0; i < o.surfaces.size(); ++i) {
     if (auto text = checkSurface(o.surfaces[i], o.stick_mode)) return text;
     for (std::size_t k = 0; k < i; ++k) {
       if (o.surfaces[k].select_button != o.surfaces[i].select_button) continue;
-      return wrong(o.surfaces[i].key + ".select_button", o.surfaces[i].select_button,
-                   "another button than that of " + o.surfaces[k].key);
+      return wrongNumber(o.surfaces[i].key + ".select_button", o.surfaces[i].select_button,
+                         "another button than that of " + o.surfaces[k].key);
     }
   }
   for (const ActionButton& in : o.actions) {
-    if (in.button < 0) return wrong(in.key + ".button", in.button, "an index from 0");
+    if (in.button < 0) return wrongNumber(in.key + ".button", in.button, "an index from 0");
   }
   return std::nullopt;
 }

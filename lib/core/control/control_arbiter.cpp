@@ -6,6 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
 
 namespace xplane_bridge::core {
@@ -14,12 +15,6 @@ namespace {
 constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kRequestersKept = 100;  // whose sequence numbers are remembered
 constexpr std::array<Channel, 3> kStick = {Channel::kRoll, Channel::kPitch, Channel::kYaw};
-
-std::string wrong(const std::string& key, double given, const std::string& expected) {
-  char number[32];
-  std::snprintf(number, sizeof number, "%g", given);
-  return key + " is " + number + ": expected " + expected;
-}
 
 const char* topicOf(FlightMode mode) { return mode == FlightMode::kManual ? "control/manual" : "control/auto"; }
 
@@ -50,11 +45,11 @@ ArbiterOptions::ArbiterOptions() {
 }
 
 std::optional<std::string> validate(const ArbiterOptions& o) {
-  if (o.engines < 1 || o.engines > kMaxEngines) return wrong("engines", o.engines, "1..8");
-  if (!(o.command_timeout > 0.0)) return wrong("command_timeout", o.command_timeout, "above 0 s");
-  if (!(o.resume_grace >= 0.0)) return wrong("resume_grace", o.resume_grace, "0 s or more");
-  if (!(o.transition_rate > 0.0)) return wrong("transition_rate", o.transition_rate, "above 0 1/s");
-  if (!(o.takeover_threshold >= 0.0)) return wrong("takeover_threshold", o.takeover_threshold, "0 or more");
+  if (o.engines < 1 || o.engines > kMaxEngines) return wrongNumber("engines", o.engines, "1..8");
+  if (!(o.command_timeout > 0.0)) return wrongNumber("command_timeout", o.command_timeout, "above 0 s");
+  if (!(o.resume_grace >= 0.0)) return wrongNumber("resume_grace", o.resume_grace, "0 s or more");
+  if (!(o.transition_rate > 0.0)) return wrongNumber("transition_rate", o.transition_rate, "above 0 1/s");
+  if (!(o.takeover_threshold >= 0.0)) return wrongNumber("takeover_threshold", o.takeover_threshold, "0 or more");
   for (std::size_t i = 0; i < kChannelCount; ++i) {
     const auto channel = static_cast<Channel>(i);
     const ChannelRange range = commandRange(channel);
@@ -62,12 +57,12 @@ std::optional<std::string> validate(const ArbiterOptions& o) {
     const std::string key = "channels." + channelName(channel) + ".";
     char limits[64];
     std::snprintf(limits, sizeof limits, "%g..%g", range.low, range.high);
-    if (!(c.low >= range.low && c.low <= range.high)) return wrong(key + "low", c.low, limits);
+    if (!(c.low >= range.low && c.low <= range.high)) return wrongNumber(key + "low", c.low, limits);
     if (!(c.high >= c.low && c.high <= range.high)) {
-      return wrong(key + "high", c.high, std::string(limits) + ", not below low");
+      return wrongNumber(key + "high", c.high, std::string(limits) + ", not below low");
     }
-    if (!(c.slew > 0.0)) return wrong(key + "slew", c.slew, "above 0 1/s");
-    if (!(c.neutral >= c.low && c.neutral <= c.high)) return wrong(key + "neutral", c.neutral, "low..high");
+    if (!(c.slew > 0.0)) return wrongNumber(key + "slew", c.slew, "above 0 1/s");
+    if (!(c.neutral >= c.low && c.neutral <= c.high)) return wrongNumber(key + "neutral", c.neutral, "low..high");
   }
   return std::nullopt;
 }

@@ -12,12 +12,6 @@ constexpr std::size_t kDescriptionLength = 64;
 // X-Plane may answer the characters in different frames of a period.
 constexpr double kJoinWindow = 1.5 / AircraftIdentityReader::kRateHz;
 
-RrefFrameAssembler::Options frameOptions() {
-  RrefFrameAssembler::Options options;
-  options.join_window = kJoinWindow;
-  return options;
-}
-
 std::string textFrom(const std::vector<float>& values, std::size_t first, std::size_t length) {
   std::string text;
   for (std::size_t i = first; i < first + length; ++i) {
@@ -39,7 +33,8 @@ std::string textFrom(const std::vector<float>& values, std::size_t first, std::s
 
 std::string described(const AircraftIdentity& aircraft) { return aircraft.icao + " (" + aircraft.description + ")"; }
 
-AircraftIdentityReader::AircraftIdentityReader() : frames_(datarefs().size(), 0, frameOptions()) {}
+AircraftIdentityReader::AircraftIdentityReader()
+    : frames_(datarefs().size(), 0, RrefFrameAssembler::Options::joinedWithin(kJoinWindow)) {}
 
 const std::vector<std::string>& AircraftIdentityReader::datarefs() {
   static const std::vector<std::string> kDatarefs = [] {

@@ -13,12 +13,6 @@ constexpr double kFloat32Tolerance = 3.0;
 /// How long values that no row carries wait for each other [s].
 constexpr double kSupplementJoinWindow = 0.1;
 
-RrefFrameAssembler::Options frameOptions(double join_window) {
-  RrefFrameAssembler::Options options;
-  options.join_window = join_window;
-  return options;
-}
-
 /// Slower groups: X-Plane may answer their indices in different frames of a period.
 double missionJoinWindow(int rate) {
   constexpr double kPeriods = 1.5;
@@ -67,7 +61,8 @@ FlightStateAssembler::FlightStateAssembler(const Options& options)
 
 std::unique_ptr<RrefFrameAssembler> FlightStateAssembler::makeFrames() const {
   const double window = options_.transport == Transport::kRref ? options_.join_window : kSupplementJoinWindow;
-  return std::make_unique<RrefFrameAssembler>(decoder_.requests().size(), 0, frameOptions(window));
+  return std::make_unique<RrefFrameAssembler>(decoder_.requests().size(), 0,
+                                              RrefFrameAssembler::Options::joinedWithin(window));
 }
 
 bool FlightStateAssembler::wantsRpos() const {
@@ -253,7 +248,8 @@ template <typename State>
 MissionAssembler<State>::MissionAssembler(const Options& options)
     : options_(options),
       decoder_(options.transport, options.version, options.engines),
-      frames_(decoder_.requests().size(), 0, frameOptions(missionJoinWindow(options.rate))),
+      frames_(decoder_.requests().size(), 0,
+              RrefFrameAssembler::Options::joinedWithin(missionJoinWindow(options.rate))),
       unknown_(decoder_.requests().size(), kNaNf) {}
 
 template <typename State>

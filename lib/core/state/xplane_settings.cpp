@@ -10,12 +10,6 @@ namespace {
 // X-Plane may answer them in different frames of a period.
 constexpr double kJoinWindow = 1.5 / XPlaneSettings::kRateHz;
 
-RrefFrameAssembler::Options frameOptions() {
-  RrefFrameAssembler::Options options;
-  options.join_window = kJoinWindow;
-  return options;
-}
-
 }  // namespace
 
 bool sameValues(const std::vector<float>& a, const std::vector<float>& b) {
@@ -24,7 +18,8 @@ bool sameValues(const std::vector<float>& a, const std::vector<float>& b) {
   });
 }
 
-XPlaneSettings::XPlaneSettings() : frames_(datarefs().size(), 0, frameOptions()) {}
+XPlaneSettings::XPlaneSettings()
+    : frames_(datarefs().size(), 0, RrefFrameAssembler::Options::joinedWithin(kJoinWindow)) {}
 
 const std::vector<std::string>& XPlaneSettings::datarefs() {
   static const std::vector<std::string> kDatarefs = {

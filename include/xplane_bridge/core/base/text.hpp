@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdio>
 #include <string>
 #include <string_view>
 
@@ -27,5 +28,12 @@ std::string join(const Texts& texts, std::string_view separator = ", ") {
 
 /// "override_joystick" of "sim/operation/override/override_joystick"; a text without a slash as it is.
 inline std::string afterLastSlash(const std::string& path) { return path.substr(path.rfind('/') + 1); }
+
+/// A refusal of a number: "low is 1.5: expected 0..1".
+inline std::string wrongNumber(const std::string& key, double given, const std::string& expected) {
+  char number[32];
+  std::snprintf(number, sizeof number, "%g", given);
+  return key + " is " + number + ": expected " + expected;
+}
 
 }  // namespace xplane_bridge::core

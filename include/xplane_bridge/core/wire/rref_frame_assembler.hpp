@@ -24,6 +24,13 @@ class RrefFrameAssembler {
     double join_window = 0.005;
     /// Frames in a row without an index before it is taken as silent.
     int frames_until_silent = 3;
+
+    /// For pieces that belong together within so many seconds.
+    static Options joinedWithin(double seconds) {
+      Options options;
+      options.join_window = seconds;
+      return options;
+    }
   };
 
   struct Counters {
