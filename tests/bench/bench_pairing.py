@@ -6,8 +6,9 @@ import csv
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
-from typing import Dict, List, NamedTuple
+from typing import Dict, List, NamedTuple, Optional
 
 import numpy as np
 from pairing_run import COLUMNS
@@ -23,6 +24,8 @@ _JITTERS_S = {"regular": 0.0, "irregular": 0.015}
 _DELAY_ASSUMED = 8192  #: FrameState.QUALITY_DELAY_ASSUMED
 #: Each flight is this many measurements long: the minute that the budget is for, by default.
 _LENGTHS = 3.0
+#: The same of a flight for its display times alone, which drawing makes later than the delay.
+_REHEARSAL = 0.25
 #: A picture that appeared, or was noticed, this much off its time is a cause of its own [share of a frame].
 _OFF_TIME = 0.3
 
@@ -43,12 +46,12 @@ class Run(NamedTuple):
     cpu_percent: float  #: of a core, of all cameras
 
 
-def read_run(folder: Path, delay: float, camera: str = "") -> Run:
+def read_run(folder: Path, delay: Optional[float], camera: str = "") -> Run:
     """Puts together what `pairing_run.py` and the emulator have written.
 
     Args:
         folder: Where.
-        delay: The emulator's [s].
+        delay: The emulator's [s]; None: the median of what it has shown.
         camera: "" or, of a second window, "_2".
     """
     with np.load(folder / f"pictures{camera}.npz") as arrays:
@@ -67,6 +70,7 @@ def read_run(folder: Path, delay: float, camera: str = "") -> Run:
         }
     frame = columns["shown_frame"]
     began, swapped = np.array([swaps[number] for number in frame]).T
+    shown_after = 1e-9 * (swapped - began)
     paired = np.array([frame_at.get(np.float32(sim_time), np.nan) for sim_time in columns["state_sim_time"]])
     return Run(
         pictures,
@@ -74,7 +78,7 @@ def read_run(folder: Path, delay: float, camera: str = "") -> Run:
         frame,
         columns["state_sim_time"] - columns["shown_sim_time"],
         paired - frame,
-        1e-9 * (swapped - began) - delay,
+        shown_after - (float(np.median(shown_after)) if delay is None else delay),
         1e-9 * (columns["display_ns"] - swapped),
         1e-9 * (columns["grab_ns"] - columns["display_ns"]),
         columns["quality"],
@@ -113,11 +117,13 @@ def measures(run: Run, fps: float, seconds: float) -> List[Measure]:
     ]
 
 
-def _flown(context: Context, fps: float, delay: float, *options: object, name: str = "") -> Path:
-    """Flies once in a process of its own; returns the folder of what it has written."""
+def _flown(
+    context: Context, fps: float, delay: float, *options: object, name: str = "", lengths: float = _LENGTHS
+) -> Path:
+    """Flies once, so many measurements long, in a process of its own; returns the folder of what it has written."""
     folder = context.folder / f"{name}{fps:g}"
     command = [sys.executable, Path(__file__).with_name("pairing_run.py"), folder, "--fps", fps]
-    command += ["--seconds", _LENGTHS * context.seconds, "--pipeline-delay", delay, *options]
+    command += ["--seconds", lengths * context.seconds, "--pipeline-delay", delay, *options]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise HarnessError(f"the flight at {fps:g} frames/s failed:\n{done.stderr.strip()}")
@@ -193,18 +199,38 @@ def pairing_windows(context: Context) -> List[Measure]:
     ]
 
 
+def _shown_after(folder: Path) -> List[float]:
+    """From a frame to its picture in each of two windows [s], median."""
+    result = []
+    for camera in ("", "_2"):
+        with (folder / f"swaps{camera}.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        to_host = time.time_ns() - time.monotonic_ns()
+        shown = [int(row["swap_end_ns"]) - int(row["frame_monotonic_ns"]) - to_host for row in rows]
+        result.append(1e-9 * float(np.median(shown)))
+    return result
+
+
 @benchmark
 def pairing_delays(context: Context) -> List[Measure]:
-    """Window, sender and two windows at 30 frames/s, at four delays of the display, frames regular and irregular."""
+    """Window, sender and two windows at 30 frames/s, at four delays of the display, frames regular and irregular.
+
+    capture_node and sender measure the delay; those of two windows, of which none can be measured where a window has a
+    field of view of its own, are given from a short flight before.
+    """
     fps = 30.0
     result: List[Measure] = []
-    for source, options in (("x11", ()), ("sender", ("--sender",)), ("two windows", ("--windows", 2))):
+    for source, options in (("x11", ("--calibrate",)), ("sender", ("--sender",)), ("two windows", ("--windows", 2))):
         for delay in _DELAYS_S:
             for frames, jitter in _JITTERS_S.items():
                 name = f"{source}, {1e3 * delay:g} ms, {frames}: "
                 place = f"{source}_{delay:g}_{frames}_".replace(" ", "_")
-                folder = _flown(context, fps, delay, "--frame-jitter", jitter, *options, name=place)
-                result += _sure(read_run(folder, delay), name, fps)
+                flown = partial(_flown, context, fps, delay, "--frame-jitter", jitter, *options)
                 if source == "two windows":
-                    result += _sure(read_run(folder, delay, "_2"), name + "second: ", fps)
+                    delays = _shown_after(flown(name=f"rehearsal_{place}", lengths=_REHEARSAL))
+                    folder = flown("--display-delays", *delays, name=place)
+                    result += _sure(read_run(folder, None, "_2"), name + "second: ", fps)
+                else:
+                    folder = flown(name=place)
+                result += _sure(read_run(folder, None), name, fps)
     return result

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import os
 import sys
 import time
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Sequence
 
 import numpy as np
 from measuring import Use
 
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
-from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
+from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ros import free_port
 from xplane_bridge.resources import config_file, node_program, program
@@ -34,6 +35,7 @@ COLUMNS = (
 )
 _NAMESPACE = "/bench"
 _WARM_UP_S = 30.0
+_ATTEMPTS = 6
 
 
 class Recorder:
@@ -64,6 +66,11 @@ class Recorder:
         """Whether pictures are paired as well as they will be: a delay of 0 counts as not measured."""
         return self.perfect or (delay == 0.0 and self.paired)
 
+    def clear(self) -> None:
+        """Forgets all pictures."""
+        self.edges.clear()
+        self.paired = self.perfect = False
+
     def row(self, stamp: int) -> tuple:
         """Values of `COLUMNS`."""
         try:
@@ -87,20 +94,42 @@ class Flight(NamedTuple):
     fps: float
     seconds: float
     delay: float  #: of the emulator, from a frame to its display [s]
+    display_delays: Sequence[float]  #: what the capture_nodes are to take it for [s]
+    calibrate: bool  #: the first capture_node measures it
     jitter: float  #: by which frames come later, at most [s]
     sender: bool  #: pictures by xplane_eye
     windows: int  #: a capture_node for each
 
 
-def second_window(shared: dict) -> dict:
+def second_window(shared: dict, delay: float) -> dict:
     """Parameters of a further camera's namespace."""
     own = {"own_field_of_view": True, "field_of_view_deg": 90.0, "mount": {"pitch_deg": -90.0}}
-    return {**shared, "capture_node": {"max_rate": 0.0, "window": {"index": 1}, "frame_measured": "down", **own}}
+    return {
+        **shared,
+        "display_delay": delay,
+        "capture_node": {"max_rate": 0.0, "window": {"index": 1}, "frame_measured": "down", **own},
+    }
+
+
+def calibrated() -> None:
+    """Has the capture_node measure the delay of its display; a busy machine draws too late at times."""
+    import rospy
+    from std_srvs.srv import Trigger
+
+    service = f"{_NAMESPACE}/capture_node/calibrate_display_delay"
+    rospy.wait_for_service(service, _WARM_UP_S)
+    measure = rospy.ServiceProxy(service, Trigger)
+    answers = []
+    while len(answers) < _ATTEMPTS:
+        answers.append(measure())
+        if answers[-1].success:
+            return
+    raise HarnessError("the delay was not measured: " + "; ".join(answer.message for answer in answers))
 
 
 def fly(folder: Path, flight: Flight) -> None:
     """Flies and writes the files; the pictures come from the window, or from `xplane_eye`."""
-    fps, delay, sender = flight.fps, flight.delay, flight.sender
+    fps, delay, delays, sender = flight.fps, flight.delay, flight.display_delays, flight.sender
     with VirtualDisplay(folder) as display, RosMaster(folder) as master:
         os.environ["DISPLAY"] = display.display
         master.use_here()
@@ -114,7 +143,12 @@ def fly(folder: Path, flight: Flight) -> None:
         options += ["--swap-log", folder / "swaps.csv", "--pilot", config_file("scenarios", "demo.yaml")]
         options += ["--frame-jitter", f"{flight.jitter}s", *(["--window2", "down@90"] if flight.windows > 1 else [])]
         with EmulatorProcess(folder, list(map(str, options))) as emulator:
-            shared = {"host": "127.0.0.1", "port": emulator.port, "listen_for_beacon": False, "display_delay": delay}
+            shared = {
+                "host": "127.0.0.1",
+                "port": emulator.port,
+                "listen_for_beacon": False,
+                "display_delay": delays[0],
+            }
             receiver = free_port()
             source = {"source": "sender", "sender": {"listen": f"127.0.0.1:{receiver}"}} if sender else {}
             window = {"window": {"index": 0}} if flight.windows > 1 else {}
@@ -126,7 +160,7 @@ def fly(folder: Path, flight: Flight) -> None:
             ]
             if flight.windows > 1:
                 places.append(f"{_NAMESPACE}/down")
-                rospy.set_param(places[1], second_window(shared))
+                rospy.set_param(places[1], second_window(shared, delays[-1]))
                 command = [node_program("capture_node", env), f"__ns:={places[1]}"]
                 command += [f"{topic}:={_NAMESPACE}/{topic}" for topic in ("flight_state", "mission/warnings")]
                 nodes.append(ManagedProcess("capture_node_2", command, folder, env=env))
@@ -141,9 +175,17 @@ def fly(folder: Path, flight: Flight) -> None:
             with contextlib.ExitStack() as running:
                 for node in [*nodes, *([eye(folder, emulator.port, receiver)] if sender else [])]:
                     running.enter_context(node)
-                wait_until(lambda: all(recorder.ready(delay) for recorder in recorders), _WARM_UP_S, "paired pictures")
+                if flight.calibrate:
+                    calibrated()
+                    recorders[0].clear()
+                    delays = (math.inf, *delays[1:])  # measured, whatever it is
+                wait_until(
+                    lambda: all(recorder.ready(given) for recorder, given in zip(recorders, delays)),
+                    _WARM_UP_S,
+                    "paired pictures",
+                )
                 for recorder in recorders:
-                    recorder.edges.clear()
+                    recorder.clear()
                 cameras = [Use(node.pid) for node in nodes[1:]]
                 time.sleep(flight.seconds)
                 cpu = sum(camera.cpu_percent(flight.seconds) for camera in cameras)
@@ -171,10 +213,26 @@ def main() -> int:
     parser.add_argument("--frame-jitter", type=float, default=0.0, metavar="S")
     parser.add_argument("--windows", type=int, choices=(1, 2), default=1, help="of the emulator, a camera for each")
     parser.add_argument("--sender", action="store_true", help="pictures by xplane_eye")
+    parser.add_argument("--calibrate", action="store_true", help="the capture_node measures the delay")
+    parser.add_argument(
+        "--display-delays", type=float, nargs="+", metavar="S", help="given to the capture_nodes (--pipeline-delay)"
+    )
     parser.add_argument("--pipeline-delay", type=float, required=True, metavar="S")
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
-    flight = Flight(args.fps, args.seconds, args.pipeline_delay, args.frame_jitter, args.sender, args.windows)
+    delays = args.display_delays or [args.pipeline_delay] * args.windows
+    if len(delays) != args.windows:
+        parser.error(f"--display-delays: {len(delays)} for {args.windows} windows")
+    flight = Flight(
+        args.fps,
+        args.seconds,
+        args.pipeline_delay,
+        delays,
+        args.calibrate,
+        args.frame_jitter,
+        args.sender,
+        args.windows,
+    )
     fly(args.folder.resolve(), flight)
     return 0
 

@@ -22,7 +22,7 @@ class Measure:
         """Whether the budget is kept; None without one."""
         if self.budget is None:
             return None
-        return self.value >= self.budget if self.at_least else self.value <= self.budget
+        return bool(self.value >= self.budget if self.at_least else self.value <= self.budget)
 
 
 @dataclass

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
 from typing import Dict, List
+
+import pytest
 
 _RUN = Path(__file__).parents[1] / "bench" / "run.py"
 
@@ -19,7 +22,7 @@ def measured(tmp_path: Path, names: List[str]) -> Dict[str, float]:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         check=False,
-        timeout=500,
+        timeout=1500,
     )
     assert result.is_file(), done.stdout.decode()
     report = json.loads(result.read_text(encoding="utf-8"))
@@ -61,3 +64,36 @@ def test_the_benchmark_of_lockstep_measures(tmp_path: Path) -> None:
     assert measures["lockstep: rx, tx, mapper, rospy controller, player, record"] > 0.01
     assert measures["lockstep: the nodes' part of a frame, mean"] > 10.0
     assert measures["lockstep: three bare roscpp nodes, mean"] > 10.0
+
+
+def test_benchmarks_of_wire_and_files_measure(tmp_path: Path) -> None:
+    names = ["decode", "packet_rate", "emulator_period", "command_to_surface", "steps"]
+    measures = measured(tmp_path, names)
+    assert {name.split(":")[0] for name in measures} == set(names)
+    assert all(math.isfinite(value) for value in measures.values())
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "name",
+    [
+        "bags",
+        "capture_1080p",
+        "failsafes",
+        "labels",
+        "latency",
+        "pairing",
+        "pairing_sender",
+        "pairing_windows",
+        "pairing_delays",
+    ],
+)
+def test_the_long_benchmarks_measure(tmp_path: Path, name: str) -> None:
+    assert all(math.isfinite(value) for value in measured(tmp_path, [name]).values())
+
+
+def test_every_benchmark_is_run_by_a_test() -> None:
+    listing = subprocess.run([sys.executable, str(_RUN), "--list"], stdout=subprocess.PIPE, check=True, timeout=100)
+    text = Path(__file__).read_text(encoding="utf-8")
+    for line in listing.stdout.decode().splitlines():
+        assert f'"{line.split()[0]}"' in text, f"no test runs {line}"
