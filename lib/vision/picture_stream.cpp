@@ -13,13 +13,17 @@ constexpr std::size_t kLeastHeader = 2;   // kind and window
 constexpr std::size_t kMostHeader = 512;  // later releases may append to it
 constexpr std::size_t kMostText = 1024;   // body of all messages but pictures
 constexpr std::size_t kHelloHeader = 6;
+constexpr std::size_t kHelloHeaderWithAbilities = 8;
+constexpr std::size_t kCalibrationHeader = 12;
 constexpr std::size_t kPictureHeader = 64;
 constexpr std::uint8_t kHello = 1;
 constexpr std::uint8_t kPicture = 2;
 constexpr std::uint8_t kStatus = 3;
+constexpr std::uint8_t kCalibration = 4;
 constexpr std::uint8_t kJpeg = 0;
 constexpr std::uint32_t kBorderline = 1;
 constexpr std::uint32_t kDelayAssumed = 2;
+constexpr std::uint16_t kCalibrates = 1;  // of a hello's abilities
 constexpr int kSmallestSide = 16;
 constexpr int kLargestSide = 8192;
 constexpr double kLongestDelay = 1.0;  // [s]
@@ -138,12 +142,22 @@ std::optional<SentMessage> PictureStreamReader::read(const Lengths& lengths) {
         refuse(StreamFault::kMalformed, "the sender's first message is not as long as it says");
         return std::nullopt;
       }
-      return SentHello{header[1], text(0, token), text(token, name)};
+      const bool able = lengths.header >= kHelloHeaderWithAbilities;
+      const bool calibrates = able && (get<std::uint16_t>(header + 6) & kCalibrates) != 0;
+      return SentHello{header[1], text(0, token), text(token, name), calibrates};
     }
     case kPicture:
       return readPicture(header, body, lengths);
     case kStatus:
       return SentStatus{header[1], text(0, lengths.body)};
+    case kCalibration:
+      if (lengths.header < kCalibrationHeader) {
+        refuse(StreamFault::kMalformed, "the sender's answer has a header of " + std::to_string(lengths.header) +
+                                            " bytes; expected at least 12");
+        return std::nullopt;
+      }
+      return SentCalibration{header[1], get<std::uint16_t>(header + 2) != 0, get<std::uint64_t>(header + 4),
+                             text(0, lengths.body)};
     default:
       return std::nullopt;
   }

@@ -94,6 +94,7 @@ class SenderSource::Impl {
         peer_(peerFrom(options.peer.empty() ? kThisComputer : options.peer)) {}
 
   WaitResult waitChange(std::chrono::milliseconds timeout, Change& change) {
+    passRequestOn();
     if (!listener_.open() && !listen()) {
       (void)::poll(nullptr, 0, static_cast<int>(timeout.count()));
       return WaitResult::kLost;
@@ -185,7 +186,25 @@ class SenderSource::Impl {
     }
   }
 
+  void passRequestOn() {
+    const std::uint64_t number = options_.calibration ? options_.calibration->take() : 0;
+    if (number == 0) return;
+    if (!greeted_) {
+      options_.calibration->settle(number, {false, problem()});
+    } else if (!calibrates_) {
+      options_.calibration->settle(
+          number, {false,
+                   "the xplane_eye that sends the pictures is of an earlier release, which measures at its start only: "
+                   "start it anew, or install this release on X-Plane's computer"});
+    } else {
+      reply(client_, ReplyCode::kCalibrate, number);
+      asked_ = number;
+    }
+  }
+
   void endClient(const std::string& why) {
+    if (asked_ != 0) options_.calibration->settle(asked_, {false, "xplane_eye is gone meanwhile: " + why});
+    asked_ = 0;
     client_ = Socket();
     greeted_ = false;
     status_.clear();
@@ -213,6 +232,11 @@ class SenderSource::Impl {
         refuseClient(Refusal::kMalformed, "it did not introduce itself");
       } else if (auto* status = std::get_if<SentStatus>(&*message)) {
         status_ = status->problem;
+      } else if (auto* found = std::get_if<SentCalibration>(&*message)) {
+        if (found->number == asked_ && asked_ != 0) {
+          asked_ = 0;
+          options_.calibration->settle(found->number, {found->measured, found->text});
+        }
       } else if (auto* picture = std::get_if<SentPicture>(&*message)) {
         status_.clear();
         reply(client_, ReplyCode::kTaken, picture->index);
@@ -229,6 +253,7 @@ class SenderSource::Impl {
       return;
     }
     greeted_ = true;
+    calibrates_ = hello.calibrates;
     xplane_ = hello.xplane;
     last_end_.clear();
     reply(client_, ReplyCode::kWelcome, options_.recorded && options_.recorded() ? kWelcomeRecorded : 0);
@@ -252,6 +277,8 @@ class SenderSource::Impl {
   PictureStreamReader reader_;
   ServerClock sender_clock_;
   bool greeted_ = false;
+  bool calibrates_ = false;
+  std::uint64_t asked_ = 0;  // number of the request that the sender has not answered; 0: none
   std::string xplane_;
   std::string status_;
   std::string last_end_;

@@ -58,6 +58,16 @@ def test_the_benchmark_of_the_environments_measures(tmp_path: Path) -> None:
     assert measures["gym: pictures of 84x84"] > 1.0
 
 
+def test_the_benchmark_of_the_eye_measures(tmp_path: Path) -> None:
+    """Pictures come, take time to make, and are older at the receiver than when sent."""
+    measures = measured(tmp_path, ["eye"])
+    for size in ("640x480 at 30/s", "640x480 at 60/s", "1280x720 at 30/s", "1920x1080 at 20/s"):
+        assert measures[f"eye: {size}: pictures"] > 0.5
+        assert measures[f"eye: {size}: CPU a picture"] > 0.1
+        sent, came = (measures[f"eye: {size}: change to {where}, p50"] for where in ("sent", "receiver"))
+        assert 0.0 < sent < came
+
+
 def test_the_benchmark_of_lockstep_measures(tmp_path: Path) -> None:
     """Flights come about, and their frames take time."""
     measures = measured(tmp_path, ["lockstep"])

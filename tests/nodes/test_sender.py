@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import os
 import random
+import re
 import signal
 import socket
 import threading
@@ -15,6 +17,7 @@ from typing import Iterator
 import numpy as np
 import pytest
 
+from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.eye import program as eye_program
 from xplane_bridge.eye.grab import TITLES
@@ -29,6 +32,8 @@ FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
 TIMES_ON_SCREEN = "sim/network/dataout/data_to_screen[1]"
 LONGEST_S = 150.0
 FPS = 20
+USERS_DEG = 72.0
+ATTEMPTS = 6  # on a busy machine pictures come late, and then it says that it has found nothing
 #: Three periods of perfectly regular frames: timing alone cannot show them. Longer than any drawing takes.
 PIPELINE_DELAY_S = 0.15
 #: A picture that appeared this much off its time, as the machine was busy, says nothing about the pairing.
@@ -224,6 +229,60 @@ def test_the_next_start_gives_the_field_of_view_back_after_a_kill(scene: Scene) 
     with scene.eye("--no-calibrate"):
         wire.wait_until_reads(FIELD_OF_VIEW, own)
         wait_until(lambda: not (scene.folder / "undo.json").exists(), 15.0, "the end of the note")
+
+
+def calibrate(scene: Scene):
+    from std_srvs.srv import Trigger
+
+    return scene.world.call("capture_node/calibrate_display_delay", Trigger)
+
+
+def test_the_delay_is_measured_on_request_without_a_restart_but_not_in_a_recording(scene: Scene) -> None:
+    from xplane_bridge.msg import FrameState
+
+    answer = calibrate(scene)
+    assert not answer.success
+    assert f"no xplane_eye on 127.0.0.1 has connected to 127.0.0.1:{scene.port}" in answer.message
+    wire = scene.world.wire(scene.emulator.port)
+    wire.send(protocol.DrefWrite(FIELD_OF_VIEW, USERS_DEG))
+    wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
+    topic = f"{scene.world.namespace}/camera/frame_state"
+    bag = ["rosbag", "record", "-O", str(scene.folder / "pictures.bag"), topic]
+    with contextlib.ExitStack() as recording:
+        recording.enter_context(ManagedProcess("rosbag", bag, scene.folder, env=scene.world.env))
+        wait_until(
+            lambda: "records the pictures" in calibrate(scene).message, 60.0, "a refusal for the recorder's sake"
+        )
+        with scene.eye() as eye:
+            eye.wait_for_line("delay: not measured, as capture_node's pictures are being recorded", 60.0)
+            state = scene.states.wait_for(lambda _: True, 60.0, "a picture")
+            assert state.quality & FrameState.QUALITY_DELAY_ASSUMED
+            assert "records the pictures" in calibrate(scene).message
+            assert wire.read(FIELD_OF_VIEW) == USERS_DEG
+            recording.close()
+            wait_until(lambda: "records the pictures" not in calibrate(scene).message, 60.0, "the recorder's end")
+            answers = [calibrate(scene)]
+            while not answers[-1].success and len(answers) < ATTEMPTS:
+                answers.append(calibrate(scene))
+            assert answers[-1].success, [answer.message for answer in answers]
+            assert re.match(r"\d+\.\d ms, from \d+ steps that lie", answers[-1].message)
+            delay = float(answers[-1].message.split()[0]) * 1e-3
+            assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.025)
+            sure = scene.states.wait_for_next(lambda s: not s.quality & FrameState.QUALITY_DELAY_ASSUMED, timeout=30.0)
+            assert sure.display_delay == pytest.approx(delay, abs=LATE_S)
+            wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
+            assert not (scene.folder / "undo.json").exists()
+            assert not any(s.quality & FrameState.QUALITY_FROZEN for s in scene.states.messages)
+
+
+def test_an_eye_that_leaves_the_field_of_view_alone_refuses_in_words(scene: Scene) -> None:
+    wire = scene.world.wire(scene.emulator.port)
+    with scene.eye("--delay", "0.1"):
+        scene.states.wait_for(lambda _: True, 60.0, "a picture")
+        answer = calibrate(scene)
+        assert not answer.success
+        assert "--delay or --no-calibrate" in answer.message
+    assert wire.read(FIELD_OF_VIEW) == pytest.approx(60.0)
 
 
 def test_nothing_is_measured_while_the_pictures_are_recorded_but_on_request(scene: Scene) -> None:

@@ -12,7 +12,8 @@
 namespace xplane_bridge::vision {
 
 /// The bytes that `xplane_eye` sends, little-endian: a prefix of 16 bytes (XEY1, version u16, bytes of the header u16,
-/// bytes of the body u32, CRC-32 of the header u32), header, body. src/xplane_bridge/eye/wire.py is the other end.
+/// bytes of the body u32, CRC-32 of the header u32), header, body. src/xplane_bridge/eye/wire.py is the other end. A
+/// header may be longer than known here, and kinds of messages that are not known here are passed over.
 
 constexpr std::uint16_t kPictureStreamVersion = 1;
 constexpr std::size_t kMostPictureBytes = 16U * 1024U * 1024U;
@@ -21,7 +22,8 @@ constexpr std::size_t kMostPictureBytes = 16U * 1024U * 1024U;
 struct SentHello {
   std::uint8_t window = 0;
   std::string token;
-  std::string xplane;  ///< which X-Plane, for people
+  std::string xplane;       ///< which X-Plane, for people
+  bool calibrates = false;  ///< it measures its delay on request; earlier releases end the connection at a request
 };
 
 /// A picture, and the frame it shows. Times are the sender's own, of a clock that runs evenly.
@@ -45,7 +47,15 @@ struct SentStatus {
   std::string problem;  ///< why there are no pictures; empty: nothing is wrong
 };
 
-using SentMessage = std::variant<SentHello, SentPicture, SentStatus>;
+/// The answer to ReplyCode::kCalibrate.
+struct SentCalibration {
+  std::uint8_t window = 0;
+  bool measured = false;
+  std::uint64_t number = 0;  ///< of the request
+  std::string text;          ///< for people: what was measured, or why nothing was
+};
+
+using SentMessage = std::variant<SentHello, SentPicture, SentStatus, SentCalibration>;
 
 enum class StreamFault {
   kNone,
@@ -86,9 +96,10 @@ class PictureStreamReader {
 
 /// What the receiver says; it says nothing else.
 enum class ReplyCode : std::uint16_t {
-  kWelcome = 0,  ///< with kWelcomeRecorded or 0
-  kTaken = 1,    ///< with the index of the picture
-  kRefused = 2,  ///< with a Refusal
+  kWelcome = 0,    ///< with kWelcomeRecorded or 0
+  kTaken = 1,      ///< with the index of the picture
+  kRefused = 2,    ///< with a Refusal
+  kCalibrate = 3,  ///< with the number of the request; only to a sender that `calibrates`
 };
 
 /// Of a welcome: the pictures are being recorded, so the view is not to be changed.

@@ -108,6 +108,7 @@ void CaptureNode::start() {
   encoder_ = std::make_unique<LatestWorker<sensor_msgs::ImageConstPtr>>(
       kPicturesWaiting, [this](sensor_msgs::ImageConstPtr& image) { encodeJpeg(*image); });
   options_.sender.recorded = [this] { return !recorder().empty(); };
+  options_.sender.calibration = sender_calibration_;
   capture_thread_ = std::thread([this] { captureLoop(); });
 }
 
@@ -148,7 +149,7 @@ void CaptureNode::captureLoop() {
         source_description_ = source->describe();
       }
     }
-    repeatFrozen(clock().system_ns());
+    if (!calibrating_) repeatFrozen(clock().system_ns());
   }
 }
 

@@ -21,6 +21,7 @@ constexpr double kSettle = 0.7;
 constexpr double kShortestStep = 0.15;
 constexpr double kLongestStep = 0.3;
 constexpr double kUndoTimeout = 2.0;
+constexpr double kSenderAnswers = 30.0;  // with what it may have to wait for X-Plane to take its field of view back
 
 /// Of a node that records one of these topics, its name; empty: none does.
 std::string recorderOf(const std::vector<std::string>& topics) {
@@ -52,6 +53,12 @@ std::string CaptureNode::recorder() const {
 
 void CaptureNode::serveCalibration(std_srvs::TriggerResponse* response) {
   try {
+    if (options_.source == CaptureOptions::Source::kSender) {
+      response->message = calibrateSender();
+      response->success = 1;
+      ROS_INFO("display delay measured by xplane_eye: %s", response->message.c_str());
+      return;
+    }
     const core::MeasuredDelay found = calibrate();
     pairing_->setDisplayDelay(found.delay);
     char text[160];
@@ -73,20 +80,15 @@ void CaptureNode::serveCalibration(std_srvs::TriggerResponse* response) {
 core::MeasuredDelay CaptureNode::calibrate() {
   if (options_.source != CaptureOptions::Source::kX11) {
     throw std::runtime_error(
-        "the pictures come from no window of this computer: expected source x11 (xplane_eye "
-        "measures its delay itself; estimate_latency measures it of a video)");
+        "the pictures come from a video: expected source x11 or sender (estimate_latency measures the "
+        "delay of a video)");
   }
   if (options_.own_field_of_view) {
     throw std::runtime_error(
         "this window has a field of view of its own, which does not follow X-Plane's: measure it "
         "with estimate_latency, or set own_field_of_view to false");
   }
-  const std::string recording = recorder();
-  if (!recording.empty()) {
-    throw std::runtime_error(recording +
-                             " records the pictures, and the field of view would change in them: call it "
-                             "before or after a recording");
-  }
+  refuseWhileRecorded();
   double own = std::numeric_limits<double>::quiet_NaN();
   {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
@@ -118,6 +120,40 @@ core::MeasuredDelay CaptureNode::calibrate() {
   const auto found = calibration_.settle(&why);
   if (!found.has_value()) throw std::runtime_error(why);
   return *found;
+}
+
+std::string CaptureNode::calibrateSender() {
+  refuseWhileRecorded();
+  calibrating_ = true;  // pictures of the steps are not published, and none for seconds is no frozen view
+  const std::uint64_t number = sender_calibration_->ask();
+  std::optional<vision::CalibrationAnswer> answer;
+  const auto answered = [this, number, &answer] {
+    answer = sender_calibration_->answer(number);
+    return answer.has_value() || stopping();
+  };
+  link().waitUntil(answered, kSenderAnswers);
+  {
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    frozen_check_.pictureChanged(clock().system_ns());
+    calibrating_ = false;
+  }
+  if (!answer.has_value()) {
+    if (stopping()) throw std::runtime_error("the node is stopping");
+    const std::lock_guard<std::mutex> lock(capture_mutex_);
+    throw std::runtime_error("xplane_eye has not answered in 30 s; " +
+                             (source_problem_.empty() ? "it sends pictures: call again" : source_problem_));
+  }
+  if (!answer->measured) throw std::runtime_error(answer->text);
+  return answer->text;
+}
+
+void CaptureNode::refuseWhileRecorded() const {
+  const std::string recording = recorder();
+  if (!recording.empty()) {
+    throw std::runtime_error(recording +
+                             " records the pictures, and the field of view would change in them: call it "
+                             "before or after a recording");
+  }
 }
 
 std::string CaptureNode::stepFieldOfView(double own, double other) {

@@ -42,7 +42,7 @@ class EyeOptions:
         token: Shared with `capture_node`; empty: none.
         quality: Of the JPEG, 1..100.
         delay_s: From a frame to its picture [s]; None: to be measured.
-        calibrate: Whether it may be measured.
+        calibrate: Whether it may be measured, at the start and on request.
         while_recorded: Whether also while the pictures are being recorded.
         local_port: UDP port that X-Plane answers to.
         undo_file: Where X-Plane's field of view is kept while it is changed.
@@ -169,6 +169,7 @@ class Eye:
             self._send_decided()
             self._watch_delay()
             self._report_remark()
+            self._calibrate_on_request()
             each_time()
             time.sleep(_LOOK_S)
 
@@ -236,25 +237,63 @@ class Eye:
             return
         while True:
             self._wait_for(lambda: not self._grabber.problem, "waiting for X-Plane's window")
-            self._sender.report_problem("the eye is calibrating")
-            self._say("calibrating: X-Plane's field of view changes for about three seconds")
             try:
-                found = self._new_calibration().run()
+                self._measure()
             except CalibrationError as error:
-                self._say(f"not calibrated: {error}")
                 self._sender.report_problem(f"not calibrated: {error}")
                 time.sleep(_CALIBRATE_AGAIN_S)
                 continue
-            finally:
-                with self._lock:
-                    self._calibration = None
-            with self._lock:
-                self._pairing.set_delay(found.delay_s)
-            self._say(
-                f"delay: {1e3 * found.delay_s:.1f} ms, from {found.steps} steps that lie "
-                f"{1e3 * found.spread_s:.1f} ms from it"
-            )
             return
+
+    def _measure(self) -> str:
+        """Measures the delay, which is used from then on; gives what there is to say of it.
+
+        Raises:
+            CalibrationError: It could not be measured; the one before stays.
+        """
+        self._sender.report_problem("the eye is calibrating")
+        self._say("calibrating: X-Plane's field of view changes for about three seconds")
+        try:
+            found = self._new_calibration().run()
+        except CalibrationError as error:
+            self._say(f"not calibrated: {error}")
+            raise
+        finally:
+            with self._lock:
+                self._calibration = None
+        with self._lock:
+            self._pairing.set_delay(found.delay_s)
+        text = f"{1e3 * found.delay_s:.1f} ms, from {found.steps} steps that lie {1e3 * found.spread_s:.1f} ms from it"
+        self._say(f"delay: {text}")
+        return text
+
+    def _calibrate_on_request(self) -> None:
+        """Measures the delay anew where capture_node asks for it, which it does not while it is recorded."""
+        if not isinstance(self._sender, Sender):
+            return
+        number = self._sender.take_request()
+        if number == 0:
+            return
+        reason = self._why_not_on_request()
+        if reason:
+            self._sender.answer(number, False, reason)
+            return
+        with self._lock:
+            self._publishing = False
+        try:
+            self._sender.answer(number, True, self._measure())
+        except CalibrationError as error:
+            self._sender.answer(number, False, str(error))
+        with self._lock:
+            self._publishing = True
+
+    def _why_not_on_request(self) -> str:
+        if self._options.delay_s is not None or not self._options.calibrate:
+            return (
+                "xplane_eye was started with --delay or --no-calibrate, by which it leaves X-Plane's field of view "
+                "alone: start it without"
+            )
+        return self._problem()
 
     def _why_not_measured(self) -> str:
         """What is said of the delay where it is not to be measured; else empty."""
@@ -293,7 +332,7 @@ class Eye:
         if self._delay_was_sure and not sure and self._options.calibrate:
             self._say(
                 "the delay has changed (the window's size, vertical sync?): pictures are flagged DELAY_ASSUMED; "
-                "start xplane_eye anew to calibrate"
+                "call capture_node's service calibrate_display_delay, or start xplane_eye anew"
             )
         self._delay_was_sure = sure
 

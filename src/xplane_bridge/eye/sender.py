@@ -11,7 +11,7 @@ import select
 import socket
 import threading
 import time
-from typing import Any, Callable, Optional, Tuple
+from typing import Any, Callable, List, Optional, Tuple
 
 from xplane_bridge.eye import wire
 from xplane_bridge.eye.jpeg import Encode
@@ -64,6 +64,8 @@ class Sender:
         self._waker.setblocking(False)
         self._awake.setblocking(False)
         self._thread = threading.Thread(target=self._run, name="sender", daemon=True)
+        self._request = 0
+        self._answers: List[bytes] = []
         #: Pictures that newer ones have replaced, and pictures sent.
         #: Whether `capture_node` has answered, or does not; and whether its pictures were being recorded then.
         self.tried = threading.Event()
@@ -92,6 +94,18 @@ class Sender:
     def report_problem(self, problem: str) -> None:
         """Reports to `capture_node` why there are no pictures; empty when there are."""
         self._problem = problem
+
+    def take_request(self) -> int:
+        """The number of a request to measure the delay that waits for an answer, once; 0: there is none."""
+        with self._lock:
+            number, self._request = self._request, 0
+        return number
+
+    def answer(self, number: int, measured: bool, text: str) -> None:
+        """Answers a request; nothing where its connection has ended."""
+        with self._lock:
+            self._answers.append(wire.encode_calibration(self._window, number, measured, text))
+        self._wake()
 
     def _wake(self) -> None:
         with contextlib.suppress(BlockingIOError):
@@ -135,6 +149,8 @@ class _Session:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
         connection.settimeout(_SEND_TIMEOUT_S)
+        with sender._lock:  # what an earlier connection was asked is not answered to this one
+            sender._request, sender._answers = 0, []
         self._replies = wire.ReplyReader()
         self._credit = 0
         self._welcome = False
@@ -150,6 +166,7 @@ class _Session:
                     self._sender._awake.recv(4096)
                 if self._connection in readable:
                     self._take_replies(self._connection.recv(4096))
+                self._send_answers()
                 self._send_newest()
                 if time.monotonic() - last_status_s >= _STATUS_S and self._welcome:
                     last_status_s = time.monotonic()
@@ -171,8 +188,17 @@ class _Session:
                 self._sender.tried.set()
                 self._credit = CREDIT
                 self._sender._report("capture_node at {}:{} takes pictures".format(*self._sender._receiver))
+            elif reply.code == wire.CALIBRATE:
+                with self._sender._lock:
+                    self._sender._request = reply.number
             else:
                 self._credit = min(self._credit + 1, CREDIT)
+
+    def _send_answers(self) -> None:
+        with self._sender._lock:
+            answers, self._sender._answers = self._sender._answers, []
+        for answer in answers:
+            self._connection.sendall(answer)
 
     def _send_newest(self) -> None:
         if self._credit == 0:

@@ -2,8 +2,10 @@
 
 The eye sends messages: a prefix of 16 bytes, a header, a body. The prefix is the letters XEY1, the version (u16), the
 sizes of header (u16) and body (u32), and the CRC-32 of the header (u32). The header begins with the kind and the
-number of the window (u8 each); a receiver passes over what it is longer than expected. `capture_node` answers with
-replies of 16 bytes and sends nothing else: no command travels from ROS to X-Plane's computer.
+number of the window (u8 each); a receiver passes over what it is longer than expected, and over kinds it does not know.
+`capture_node` answers with replies of 16 bytes and sends nothing else. One of them is a request: to measure the delay,
+sent only to an eye whose hello says that it does so, and answered by a message. No other command travels from ROS to
+X-Plane's computer.
 """
 
 from __future__ import annotations
@@ -23,16 +25,19 @@ DELAY_ASSUMED = 2
 
 _MAGIC = b"XEY1"
 _PREFIX = struct.Struct("<4sHHII")
-_HELLO, _PICTURE, _STATUS = 1, 2, 3
+_HELLO, _PICTURE, _STATUS, _CALIBRATION = 1, 2, 3, 4
 _JPEG = 0
-_HELLO_HEADER = struct.Struct("<BBHH")
+#: Bit of a hello's abilities, which releases before them end without.
+_CALIBRATES = 1
+_HELLO_HEADER = struct.Struct("<BBHHH")
+_CALIBRATION_HEADER = struct.Struct("<BBHQ")
 _STATUS_HEADER = struct.Struct("<BBH")
 _PICTURE_HEADER = struct.Struct("<BBBBHHfIQqqqdd")
 _REPLY = struct.Struct("<4sHHQ")
 _REPLY_MAGIC = b"XEYA"
 
-#: Codes of replies: the eye may send; a picture was taken over; the connection is refused.
-WELCOME, TAKEN, REFUSED = 0, 1, 2
+#: Codes of replies: the eye may send; a picture was taken over; the connection is refused; the delay is to be measured.
+WELCOME, TAKEN, REFUSED, CALIBRATE = 0, 1, 2, 3
 #: The number of a welcome while the pictures are being recorded: the view is not to be changed.
 RECORDED = 1
 #: Why, by the number of a refusal.
@@ -79,7 +84,10 @@ class PictureHeader:
 
 @dataclass(frozen=True)
 class Reply:
-    """An answer of `capture_node`: WELCOME and RECORDED or 0, TAKEN and the picture's index, REFUSED and the reason."""
+    """A reply of `capture_node`.
+
+    WELCOME with RECORDED or 0, TAKEN with the picture's index, REFUSED with the reason, CALIBRATE with its own number.
+    """
 
     code: int
     number: int
@@ -92,7 +100,7 @@ def encode_hello(window: int, token: str, xplane: str) -> bytes:
         WireError: A text is longer than MOST_TEXT.
     """
     secret, name = _text(token, "the token"), _text(xplane, "X-Plane's name")
-    return _message(_HELLO_HEADER.pack(_HELLO, window, len(secret), len(name)), secret + name)
+    return _message(_HELLO_HEADER.pack(_HELLO, window, len(secret), len(name), _CALIBRATES), secret + name)
 
 
 def encode_picture(window: int, header: PictureHeader, jpeg: bytes) -> bytes:
@@ -124,8 +132,16 @@ def encode_picture(window: int, header: PictureHeader, jpeg: bytes) -> bytes:
 
 def encode_status(window: int, problem: str) -> bytes:
     """What keeps the eye from sending pictures; empty: nothing. Sent every now and then, also as a sign of life."""
-    raw = problem.encode("utf-8")[:MOST_TEXT].decode("utf-8", "ignore").encode("utf-8")
-    return _message(_STATUS_HEADER.pack(_STATUS, window, 0), raw)
+    return _message(_STATUS_HEADER.pack(_STATUS, window, 0), _cut(problem))
+
+
+def encode_calibration(window: int, number: int, measured: bool, text: str) -> bytes:
+    """The answer to a CALIBRATE of this number: whether the delay was measured, and what is to be said of it."""
+    return _message(_CALIBRATION_HEADER.pack(_CALIBRATION, window, int(measured), number), _cut(text))
+
+
+def _cut(text: str) -> bytes:
+    return text.encode("utf-8")[:MOST_TEXT].decode("utf-8", "ignore").encode("utf-8")
 
 
 def _text(text: str, what: str) -> bytes:
@@ -162,6 +178,6 @@ class ReplyReader:
     @staticmethod
     def _reply(fields: Tuple[bytes, int, int, int]) -> Reply:
         magic, _version, code, number = fields
-        if magic != _REPLY_MAGIC or code > REFUSED:
+        if magic != _REPLY_MAGIC or code > CALIBRATE:
             raise WireError(f"an answer that begins with {magic!r}, code {code}: this is no capture_node")
         return Reply(code, number)

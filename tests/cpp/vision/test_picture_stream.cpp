@@ -59,6 +59,18 @@ TEST(PictureStream, ReadsTheGoldenMessages) {
   EXPECT_EQ(std::get<vision::SentHello>(*hello).window, 2);
   EXPECT_EQ(std::get<vision::SentHello>(*hello).token, "secret");
   EXPECT_EQ(std::get<vision::SentHello>(*hello).xplane, "127.0.0.1:49000");
+  EXPECT_FALSE(std::get<vision::SentHello>(*hello).calibrates) << "an earlier release, which does not say";
+  reader = fed(golden("hello_that_calibrates"));
+  const auto able = reader.next();
+  ASSERT_TRUE(able.has_value()) << reader.problem();
+  EXPECT_EQ(std::get<vision::SentHello>(*able).xplane, "127.0.0.1:49000");
+  EXPECT_TRUE(std::get<vision::SentHello>(*able).calibrates);
+  reader = fed(golden("calibration"));
+  const auto answer = reader.next();
+  ASSERT_TRUE(answer.has_value()) << reader.problem();
+  EXPECT_TRUE(std::get<vision::SentCalibration>(*answer).measured);
+  EXPECT_EQ(std::get<vision::SentCalibration>(*answer).number, 7U);
+  EXPECT_EQ(std::get<vision::SentCalibration>(*answer).text, "42.5 ms, from 10 steps");
   reader = fed(golden("status"));
   EXPECT_EQ(std::get<vision::SentStatus>(*reader.next()).problem, "no window");
   reader = fed(pictureWith(jpegOf640x480()));

@@ -63,6 +63,7 @@ class SenderSourceTest : public ::testing::Test {
     port_ = freePort();
     vision::SenderSourceOptions options{"127.0.0.1:" + std::to_string(port_), peer, token};
     options.recorded = [this] { return recorded_; };
+    options.calibration = calibration_;
     source_ = std::make_unique<vision::SenderSource>(options, [this] { return now_ns_; });
     wait(std::chrono::milliseconds(1));  // listens
   }
@@ -118,6 +119,7 @@ class SenderSourceTest : public ::testing::Test {
   vision::Change change_;
   std::vector<int> sockets_;
   bool recorded_ = false;
+  std::shared_ptr<vision::SenderCalibration> calibration_ = std::make_shared<vision::SenderCalibration>();
 };
 
 }  // namespace
@@ -128,6 +130,65 @@ TEST_F(SenderSourceTest, ASenderHearsWhetherItsPicturesAreRecorded) {
   const int fd = connectFrom("127.0.0.1");
   send(fd, golden("hello"));
   EXPECT_EQ(answer(fd), reply(ReplyCode::kWelcome, vision::kWelcomeRecorded));
+}
+
+TEST_F(SenderSourceTest, ARequestIsPassedOnAndItsAnswerComesBack) {
+  start();
+  const int fd = connectFrom("127.0.0.1");
+  send(fd, golden("hello_that_calibrates"));
+  EXPECT_EQ(answer(fd), reply(ReplyCode::kWelcome, 0));
+  std::uint64_t number = 0;
+  while (number < 7) number = calibration_->ask();  // the golden answer's
+  EXPECT_EQ(answer(fd), reply(ReplyCode::kCalibrate, 7));
+  EXPECT_FALSE(calibration_->answer(7).has_value());
+  send(fd, golden("calibration"));
+  for (int tries = 0; tries < 200 && !calibration_->answer(7).has_value(); ++tries) wait(std::chrono::milliseconds(10));
+  const auto found = calibration_->answer(7);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_TRUE(found->measured);
+  EXPECT_EQ(found->text, "42.5 ms, from 10 steps");
+  EXPECT_FALSE(calibration_->answer(6).has_value());
+}
+
+TEST_F(SenderSourceTest, ARequestWithoutASenderIsRefusedInWords) {
+  start();
+  const std::uint64_t number = calibration_->ask();
+  wait(std::chrono::milliseconds(1));
+  const auto found = calibration_->answer(number);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_FALSE(found->measured);
+  EXPECT_NE(found->text.find("no xplane_eye on 127.0.0.1 has connected"), std::string::npos) << found->text;
+}
+
+TEST_F(SenderSourceTest, ASenderOfAnEarlierReleaseIsNotAsked) {
+  start();
+  const int fd = connectFrom("127.0.0.1");
+  send(fd, golden("hello"));
+  EXPECT_EQ(answer(fd), reply(ReplyCode::kWelcome, 0));
+  const std::uint64_t number = calibration_->ask();
+  wait(std::chrono::milliseconds(1));
+  const auto found = calibration_->answer(number);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_FALSE(found->measured);
+  EXPECT_NE(found->text.find("of an earlier release"), std::string::npos) << found->text;
+  send(fd, picture());
+  EXPECT_EQ(answer(fd), reply(ReplyCode::kTaken, 7)) << "the connection lives, and nothing else was said";
+}
+
+TEST_F(SenderSourceTest, ASenderThatEndsAnswersWhatItWasAsked) {
+  start();
+  const int fd = connectFrom("127.0.0.1");
+  send(fd, golden("hello_that_calibrates"));
+  EXPECT_EQ(answer(fd), reply(ReplyCode::kWelcome, 0));
+  const std::uint64_t number = calibration_->ask();
+  EXPECT_EQ(answer(fd), reply(ReplyCode::kCalibrate, number));
+  ::shutdown(fd, SHUT_RDWR);
+  for (int tries = 0; tries < 200 && !calibration_->answer(number).has_value(); ++tries)
+    wait(std::chrono::milliseconds(10));
+  const auto found = calibration_->answer(number);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_FALSE(found->measured);
+  EXPECT_NE(found->text.find("gone meanwhile"), std::string::npos) << found->text;
 }
 
 TEST_F(SenderSourceTest, APictureComesWithItsFrameAndIsAcknowledged) {

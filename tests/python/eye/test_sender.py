@@ -17,8 +17,8 @@ from xplane_bridge.eye.sender import CREDIT, Sender
 from xplane_bridge.harness import wait_until
 
 PREFIX = struct.Struct("<4sHHII")
-HELLO, PICTURE, STATUS = 1, 2, 3
-WELCOME, TAKEN, REFUSED = 0, 1, 2
+HELLO, PICTURE, STATUS, CALIBRATION = 1, 2, 3, 4
+WELCOME, TAKEN, REFUSED, CALIBRATE = 0, 1, 2, 3
 
 
 class Receiver:
@@ -152,6 +152,34 @@ def test_a_status_reports_why_there_are_no_pictures(receiver: Receiver):
         receiver.accept()
         receiver.reply(WELCOME)
         assert receiver.message(STATUS)[1] == b"no window"
+
+
+def test_a_request_is_handed_over_once_and_answered_by_its_number(receiver: Receiver):
+    with start(receiver) as eye:
+        receiver.accept()
+        receiver.reply(WELCOME)
+        assert eye.take_request() == 0
+        receiver.reply(CALIBRATE, 7)
+        taken: list = []
+        wait_until(lambda: taken.append(eye.take_request()) or taken[-1], 10.0, "the request")
+        assert (taken[-1], eye.take_request()) == (7, 0)
+        eye.answer(7, True, "42.5 ms")
+        header, body = receiver.message(CALIBRATION)
+        assert struct.unpack("<BBHQ", header) == (CALIBRATION, 0, 1, 7)
+        assert body == b"42.5 ms"
+
+
+def test_what_an_ended_connection_was_asked_is_not_answered_to_the_next(receiver: Receiver):
+    with start(receiver) as eye:
+        receiver.accept()
+        receiver.reply(WELCOME)
+        receiver.reply(CALIBRATE, 7)
+        wait_until(lambda: eye._request == 7, 10.0, "the request")
+        receiver.connection.close()
+        receiver.accept()
+        receiver.reply(WELCOME)
+        receiver.message(STATUS)
+        assert eye.take_request() == 0
 
 
 def test_it_ends_while_no_receiver_answers(monkeypatch: pytest.MonkeyPatch):

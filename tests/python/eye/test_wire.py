@@ -31,9 +31,10 @@ HEADER = wire.PictureHeader(
 
 
 def test_messages_have_the_golden_bytes():
-    assert wire.encode_hello(2, "secret", "127.0.0.1:49000") == golden("hello")
+    assert wire.encode_hello(2, "secret", "127.0.0.1:49000") == golden("hello_that_calibrates")
     assert wire.encode_picture(2, HEADER, b"JPEG") == golden("picture")
     assert wire.encode_status(2, "no window") == golden("status")
+    assert wire.encode_calibration(2, 7, True, "42.5 ms, from 10 steps") == golden("calibration")
 
 
 def test_what_no_receiver_would_take_is_not_sent():
@@ -51,9 +52,9 @@ def test_a_long_status_is_cut_between_two_characters():
 
 def test_replies_are_read_from_pieces():
     reader = wire.ReplyReader()
-    stream = struct.pack("<4sHHQ", b"XEYA", 1, 0, 0) + struct.pack("<4sHHQ", b"XEYA", 1, 1, 42)
+    stream = b"".join(struct.pack("<4sHHQ", b"XEYA", 1, *reply) for reply in ((0, 0), (1, 42), (3, 9)))
     replies = [reply for at in range(0, len(stream), 5) for reply in reader.feed(stream[at : at + 5])]
-    assert replies == [wire.Reply(wire.WELCOME, 0), wire.Reply(wire.TAKEN, 42)]
+    assert replies == [wire.Reply(wire.WELCOME, 0), wire.Reply(wire.TAKEN, 42), wire.Reply(wire.CALIBRATE, 9)]
 
 
 def test_another_server_is_no_capture_node():

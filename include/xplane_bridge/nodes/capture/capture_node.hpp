@@ -106,6 +106,11 @@ class CaptureNode : public BaseNode {
   void serveCalibration(std_srvs::TriggerResponse* response);
   /// @throws std::runtime_error with a sentence for people
   core::MeasuredDelay calibrate();
+  /// The same by xplane_eye, which sends the delay with its pictures. @return what it says of it
+  /// @throws std::runtime_error with a sentence for people
+  std::string calibrateSender();
+  /// @throws std::runtime_error with a sentence for people
+  void refuseWhileRecorded() const;
   /// @return why it did not come to its end; empty: it did
   std::string stepFieldOfView(double own, double other);
   /// @return whether a new entry was made
@@ -171,6 +176,7 @@ class CaptureNode : public BaseNode {
   core::DelayCalibration calibration_;  // while `calibrating_`
   cv::Mat step_before_;                 // the picture before, small and grey
   std::atomic<bool> calibrating_{false};
+  std::shared_ptr<vision::SenderCalibration> sender_calibration_ = std::make_shared<vision::SenderCalibration>();
   std::atomic<bool> field_of_view_left_{false};  // a killed node's may have to be given back
 
   Grabbed last_;  // capture thread only: for repeating a frozen picture
