@@ -35,7 +35,7 @@ def _model(in_cpp: bool) -> Callable[[], Any]:
 
 def _simulator(everything: bool) -> Callable[[], Any]:
     sim = Simulator(create_model, "fixed_wing", initial=InitialState(airspeed_mps=70.0))
-    sim.set_weather(0.0, 0.0, 1.0, 1)
+    sim.settings.set_weather(0.0, 0.0, 1.0, 1)
     if everything:
         sim.store.watch_all()
     return lambda: sim.step(1.0 / 60.0)

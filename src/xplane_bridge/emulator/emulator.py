@@ -124,7 +124,7 @@ class Emulator:
             otherwise=o.otherwise,
             traffic=o.traffic,
         )
-        sim.set_weather(*o.wind, o.turbulence, o.seed)
+        sim.settings.set_weather(*o.wind, o.turbulence, o.seed)
         sim.on_rows(protocol.RowSelection("DSEL", o.data_rows))
         return sim
 

@@ -12,10 +12,19 @@ from typing import FrozenSet, List, Optional, Sequence, Tuple
 
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.aircraft import model_names
-from xplane_bridge.emulator.datarefs import otherwise
 from xplane_bridge.emulator.datarefs.traffic import MOST as MOST_OTHERS
 from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_half_turn
 from xplane_bridge.emulator.flight.flight_model import InitialState
+from xplane_bridge.emulator.option_values import (
+    OptionError,
+    address,
+    aerodrome,
+    endpoint,
+    otherwise_ids,
+    require,
+    rows,
+    wind_from,
+)
 from xplane_bridge.emulator.windows import WindowView, window_view
 from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, parse_faults
 from xplane_bridge.emulator.wire.server import RREF_REQUESTS_PER_FRAME
@@ -23,10 +32,6 @@ from xplane_bridge.emulator.wire.server import RREF_REQUESTS_PER_FRAME
 KINEMATIC = "kinematic"
 #: What `--otherwise` makes of values a datagram and of requests a frame.
 _SMALL_SPLIT, _FEW_REQUESTS = 20, 50
-
-
-class OptionError(ValueError):
-    """An option that makes no sense; the message names it, what was given, and what is expected."""
 
 
 @dataclass
@@ -223,7 +228,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     window.add_argument(
         "--aerodrome",
-        type=_aerodrome,
+        type=aerodrome,
         metavar="LAT,LON,HEADING",
         help="middle of the runway that is drawn, and its true heading (default: where and as the flight starts)",
     )
@@ -253,12 +258,12 @@ def _parser() -> argparse.ArgumentParser:
     wire.add_argument("--no-beacon", dest="beacon", action="store_false", help="do not announce on multicast")
     wire.add_argument(
         "--second-beacon",
-        type=_address,
+        type=address,
         metavar="IP",
         help="announce from this address of the machine as well, as a computer with two networks does",
     )
     wire.add_argument(
-        "--answer-from", type=_address, metavar="IP", help="RREF and RPOS come from this address of the machine"
+        "--answer-from", type=address, metavar="IP", help="RREF and RPOS come from this address of the machine"
     )
     wire.add_argument(
         "--beacon-target",
@@ -301,7 +306,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     wire.add_argument(
         "--otherwise",
-        type=_ids,
+        type=otherwise_ids,
         default=frozenset(),
         metavar="ID,...",
         help="where X-Plane is not as the bridge assumes: questions of docs/doctor.md, or 'all'",
@@ -332,30 +337,30 @@ def _parser() -> argparse.ArgumentParser:
 def _options(given: argparse.Namespace) -> Options:
     finite = ("lat", "lon", "alt", "heading", "terrain", "turbulence", "fps")
     for name in (*finite, "sim_time_start", "load_time", "loading_time"):
-        _require(
+        require(
             math.isfinite(getattr(given, name)), f"--{name.replace('_', '-')}", getattr(given, name), "a finite number"
         )
-    _require(-90.0 <= given.lat <= 90.0, "--lat", given.lat, "-90..90")
-    _require(-180.0 <= given.lon <= 360.0, "--lon", given.lon, "-180..180")
-    _require(1.0 <= given.fps <= 500.0, "--fps", given.fps, "1..500")
-    _require(0 <= given.port <= 65535, "--port", given.port, "0..65535")
-    _require(0 <= given.traffic <= MOST_OTHERS, "--traffic", given.traffic, f"0..{MOST_OTHERS}")
-    _require(1 <= given.rref_split <= protocol.RREF_MAX_PAIRS, "--rref-split", given.rref_split, "1..183")
-    _require(given.request_limit >= 1, "--request-limit", given.request_limit, "1 or more")
-    _require(0 <= given.rate <= 99, "--rate", given.rate, "0..99")
-    _require(0.0 <= given.turbulence <= 20.0, "--turbulence", given.turbulence, "0..20")
-    _require(given.load_time >= 0.0, "--load-time", given.load_time, "0 or more")
-    _require(given.loading_time >= 0.0, "--loading-time", given.loading_time, "0 or more")
-    _require(given.duration is None or given.duration > 0.0, "--duration", given.duration, "more than 0")
-    _require(given.speed is None or 0.0 <= given.speed <= 300.0, "--speed", given.speed, "0..300")
-    _require(given.stepped != "fast" or given.duration is not None, "--stepped", "fast", "--duration with it")
+    require(-90.0 <= given.lat <= 90.0, "--lat", given.lat, "-90..90")
+    require(-180.0 <= given.lon <= 360.0, "--lon", given.lon, "-180..180")
+    require(1.0 <= given.fps <= 500.0, "--fps", given.fps, "1..500")
+    require(0 <= given.port <= 65535, "--port", given.port, "0..65535")
+    require(0 <= given.traffic <= MOST_OTHERS, "--traffic", given.traffic, f"0..{MOST_OTHERS}")
+    require(1 <= given.rref_split <= protocol.RREF_MAX_PAIRS, "--rref-split", given.rref_split, "1..183")
+    require(given.request_limit >= 1, "--request-limit", given.request_limit, "1 or more")
+    require(0 <= given.rate <= 99, "--rate", given.rate, "0..99")
+    require(0.0 <= given.turbulence <= 20.0, "--turbulence", given.turbulence, "0..20")
+    require(given.load_time >= 0.0, "--load-time", given.load_time, "0 or more")
+    require(given.loading_time >= 0.0, "--loading-time", given.loading_time, "0 or more")
+    require(given.duration is None or given.duration > 0.0, "--duration", given.duration, "more than 0")
+    require(given.speed is None or 0.0 <= given.speed <= 300.0, "--speed", given.speed, "0..300")
+    require(given.stepped != "fast" or given.duration is not None, "--stepped", "fast", "--duration with it")
     lockstep = given.stepped == "lockstep"
-    _require(0.0 <= given.pace <= 1000.0, "--pace", given.pace, "0..1000")
-    _require(lockstep or given.pace == 0.0, "--pace", given.pace, "--stepped lockstep with it")
-    _require(
+    require(0.0 <= given.pace <= 1000.0, "--pace", given.pace, "0..1000")
+    require(lockstep or given.pace == 0.0, "--pace", given.pace, "--stepped lockstep with it")
+    require(
         not (lockstep and given.fault), "--fault", given.fault, "none with --stepped lockstep, whose frames all arrive"
     )
-    _require(given.pilot is None or given.pilot.is_file(), "--pilot", given.pilot, "an existing file")
+    require(given.pilot is None or given.pilot.is_file(), "--pilot", given.pilot, "an existing file")
     try:
         ipaddress.IPv4Address(given.bind)
     except ValueError:
@@ -367,7 +372,7 @@ def _options(given: argparse.Namespace) -> Options:
     else:
         aircraft = given.aircraft
         known = (*model_names(), KINEMATIC)
-        _require(aircraft in known, "--aircraft", aircraft, "one of " + ", ".join(known))
+        require(aircraft in known, "--aircraft", aircraft, "one of " + ", ".join(known))
     try:
         fault = parse_faults(given.fault)
         delay = parse_faults(f"delay={given.pipeline_delay}").delay_s
@@ -376,10 +381,10 @@ def _options(given: argparse.Namespace) -> Options:
         raise OptionError(str(error)) from None
     size = re.fullmatch(r"(\d{3,4})x(\d{3,4})", given.window or "640x480")
     xpc_port = given.xpc_port
-    _require(xpc_port is None or 0 <= xpc_port <= 65535, "--xpc-port", xpc_port, "0 to 65535")
+    require(xpc_port is None or 0 <= xpc_port <= 65535, "--xpc-port", xpc_port, "0 to 65535")
     if size is None:
         raise OptionError(f"--window {given.window}: expected WIDTHxHEIGHT, e.g. 640x480")
-    _require(not given.window2 or given.window is not None, "--window2", given.window2, "--window with it")
+    require(not given.window2 or given.window is not None, "--window2", given.window2, "--window with it")
     group, _, beacon_port = given.beacon_target.partition(":")
     initial = InitialState(
         latitude_deg=given.lat,
@@ -419,7 +424,7 @@ def _options(given: argparse.Namespace) -> Options:
         overridden_totals=given.overridden_totals,
         send_while_paused=given.paused_output == "on",
         otherwise=given.otherwise,
-        wind=_wind(given.wind),
+        wind=wind_from(given.wind),
         turbulence=given.turbulence,
         traffic=given.traffic,
         pipeline_delay=delay,
@@ -435,77 +440,11 @@ def _options(given: argparse.Namespace) -> Options:
         auto_coordination=given.auto_coordination,
         loading_time=given.loading_time,
         answer_from=given.answer_from,
-        data_target=_endpoint("--data-target", given.data_target),
-        data_rows=_rows(given.data_rows),
+        data_target=endpoint("--data-target", given.data_target),
+        data_rows=rows(given.data_rows),
         deaf=given.deaf,
         second_beacon=given.second_beacon,
         fault=fault,
         realtime=given.priority == "realtime",
         verbose=given.verbose,
     )
-
-
-def _aerodrome(text: str) -> Tuple[float, float, float]:
-    try:
-        latitude, longitude, heading = (float(part) for part in text.split(","))
-    except ValueError:
-        latitude = longitude = heading = math.nan
-    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0 and math.isfinite(heading)):
-        raise argparse.ArgumentTypeError(
-            f"{text!r}: expected latitude,longitude,heading in degrees, e.g. 37.46,126.44,40"
-        )
-    return latitude, longitude, heading
-
-
-def _ids(text: str) -> FrozenSet[str]:
-    given = frozenset(otherwise.IDS if text == "all" else filter(None, text.split(",")))
-    unknown = sorted(given - set(otherwise.IDS))
-    if unknown:
-        raise argparse.ArgumentTypeError(f"{', '.join(unknown)}: expected some of {', '.join(otherwise.IDS)}")
-    return given
-
-
-def _address(text: str) -> str:
-    try:
-        return str(ipaddress.IPv4Address(text))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text}: expected an IPv4 address of this machine") from None
-
-
-def _endpoint(option: str, text: Optional[str]) -> Optional[Tuple[str, int]]:
-    if text is None:
-        return None
-    address, _, port = text.partition(":")
-    try:
-        good = 1 <= int(port) <= 65535 and bool(ipaddress.IPv4Address(address))
-    except ValueError:
-        good = False
-    _require(good, option, text, "IP:PORT, e.g. 192.168.1.20:49003")
-    return address, int(port)
-
-
-def _rows(text: str) -> Tuple[int, ...]:
-    rows: List[int] = []
-    for part in filter(None, (item.strip() for item in text.split(","))):
-        match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
-        first, last = (int(match.group(1)), int(match.group(2) or match.group(1))) if match else (1, 0)
-        good = first <= last < protocol.ROW_COUNT
-        _require(good, "--data-rows", text, f"numbers from 0 to {protocol.ROW_COUNT - 1} and ranges, e.g. 1,3,16-21")
-        rows += range(first, last + 1)
-    return tuple(rows)
-
-
-def _wind(text: str) -> Tuple[float, float]:
-    direction, slash, speed = text.partition("/")
-    try:
-        wind = float(direction), float(speed)
-    except ValueError:
-        wind = (math.nan, math.nan)
-    if not slash or not all(map(math.isfinite, wind)) or not 0.0 <= wind[1] <= 60.0:
-        raise OptionError(f"--wind {text}: expected FROM/SPEED in degrees true and m/s (0..60), e.g. 270/8")
-    return wrap_degrees(wind[0]), wind[1]
-
-
-def _require(good: bool, option: str, given: object, expected: str) -> None:
-    if not good:
-        raise OptionError(f"{option} {given}: expected {expected}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
-from functools import partial
 from typing import Callable, Dict, FrozenSet, List, Mapping, Optional, Set, Tuple
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.beam import Beam
 from xplane_bridge.emulator.datarefs import airport_starts, commands, data_rows, tables
-from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments
 from xplane_bridge.emulator.datarefs.autopilot import Autopilot
 from xplane_bridge.emulator.datarefs.camera import Cameras
 from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, InputOptions, Pilot
@@ -22,6 +21,7 @@ from xplane_bridge.emulator.datarefs.placement import Placements
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.controls import surface_dataref
 from xplane_bridge.emulator.datarefs.traffic import Traffic
+from xplane_bridge.emulator.datarefs.world_settings import PRESSURE_INHG, WorldSettings, clip
 from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
 from xplane_bridge.emulator.flight.frame import Clocks, Frame
@@ -33,27 +33,13 @@ _LOG = logging.getLogger(__name__)
 INTERNAL_VERSIONS = {"11.40": 114012, "11.55": 115501, "12.00": 120012, "12.08": 120815, "12.10": 122015}
 #: Below this frame rate X-Plane slows simulated time instead of taking larger steps [1/s].
 MIN_FRAME_RATE = 19.9
-#: Vertical gust per unit of X-Plane's turbulence, which goes from 0 to 10 [m/s].
-TURBULENCE_MPS_PER_UNIT = 0.5
 
 #: Fastest simulated time; `sim_speed` beyond it counts as this.
 MAX_SIM_SPEED = 16.0
-#: What clients may make of the air and the loading; values beyond are cut to these.
-_TEMPERATURE_C = (-45.0, 75.0)
-_PRESSURE_INHG = (25.5, 32.0)
-_MAX_WIND_MPS = 100.0
-_MAX_TURBULENCE_MPS = 10.0
-_MAX_LOAD_KG = 5000.0
-_STATIONS = 9
 _BAR_PER_PSI = 0.0689476
-_MPS_PER_KT = 1852.0 / 3600.0
 
-#: Where the centre of gravity is set: by the first of these that the version has.
-CG_OFFSETS = ("sim/flightmodel2/misc/cg_offset_z", "sim/flightmodel/misc/cgz_ref_to_default")
 _SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_pilot"
 _COPILOT_SETTING = "sim/cockpit2/gauges/actuators/barometer_setting_in_hg_copilot"
-_SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
-_SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
 _IDENTITY = "sim/aircraft/view/"
 _ELECTRICAL = "sim/cockpit2/electrical/"
 
@@ -112,10 +98,9 @@ class Simulator:
         self.model = make_model(aircraft)
         self.store = DatarefStore(version, bracket_names and not (not self.is_12 and "wind-names" in otherwise))
         self.clocks = Clocks(running=sim_time_start)
-        self.stations_kg = [0.0] * _STATIONS
         self.frame = Frame(self.model.info, self.clocks, from_wheels="parked-height" not in otherwise)
         self.controls = Controls()
-        self.electrics, self.weather = Electrics(), Weather()
+        self.electrics = Electrics()
         self.instruments, self.copilot_instruments = Instruments(), Instruments(COPILOT)
         self.flying = False
         self.loads = 0  #: how often a flight or a situation was loaded
@@ -138,7 +123,7 @@ class Simulator:
         self._failures = FailureDatarefs(self.store)
         self._effects = FailureEffects(surface_failures)
         self.inputs.connect(self)
-        self._connect_settings()
+        self.settings = WorldSettings(self.store, self.clocks, lambda: self.model, otherwise)
         self._bind_aircraft()
         self.traffic = Traffic(self.store, otherwise)
         self.traffic.start(traffic, self.initial)
@@ -157,7 +142,7 @@ class Simulator:
         dt = (
             0.0
             if clocks.paused
-            else clocks.simulated_period * _clip(self.store.get("sim/time/sim_speed"), 0.0, MAX_SIM_SPEED)
+            else clocks.simulated_period * clip(self.store.get("sim/time/sim_speed"), 0.0, MAX_SIM_SPEED)
         )
         clocks.advance(dt, self.flying)
         if self.flying:
@@ -202,7 +187,7 @@ class Simulator:
         self.copilot_instruments.update(self.frame, self._altimeter_inhg(_COPILOT_SETTING), self.failed)
 
     def _altimeter_inhg(self, setting: str = _SETTING) -> float:
-        return _clip(self.store.get(setting), *_PRESSURE_INHG)
+        return clip(self.store.get(setting), *PRESSURE_INHG)
 
     def _publish_surfaces(self) -> None:
         deflections = self.model.state.surfaces_deg
@@ -484,100 +469,12 @@ class Simulator:
             m.r_rad_s,
         )
 
-    # --- settings that reach the model --------------------------------------------------------------------------------
-
-    def _connect_settings(self) -> None:
-        store = self.store
-
-        def set_clock(attribute: str) -> Callable[[int, float], None]:
-            return lambda _index, value: setattr(self.clocks, attribute, value)
-
-        store.on_write("sim/time/total_flight_time_sec", set_clock("flight"))
-        store.on_write("sim/time/zulu_time_sec", lambda _i, value: setattr(self.clocks, "zulu", value % 86400.0))
-        store.on_write("sim/flightmodel/weight/m_fixed", self._set_payload)
-        store.on_write("sim/flightmodel/weight/m_stations", self._set_station)
-        store.on_write("sim/flightmodel/weight/m_fuel", self._set_fuel)
-        store.on_write(next(name for name in CG_OFFSETS if store.dataref(name).visible), self._set_balance)
-        store.on_write("sim/time/local_date_days", lambda _i, value: setattr(self.clocks, "date_days", int(value)))
-        # 12 has the sea level's air by two names, one of them in another unit
-        for name, region, factor in (
-            (_SEA_LEVEL, "sim/weather/region/sealevel_pressure_pas", INHG_PA),
-            (_SEA_LEVEL_TEMPERATURE, "sim/weather/region/sealevel_temperature_c", 1.0),
-        ):
-            store.on_write(name, partial(lambda to, k, _, value: self._set_atmosphere(to, value * k), region, factor))
-            store.on_write(region, partial(lambda to, k, _, value: self._set_atmosphere(to, value / k), name, factor))
-        if not store.dataref("sim/weather/region/wind_speed_msc").visible:
-            layer = "sim/weather/{}[0]"
-            names = (layer.format("wind_direction_degt"), layer.format("wind_speed_kt"), layer.format("turbulence"))
-            factor = _MPS_PER_KT  # the layers' speed is in knots, unlike the present wind's
-        else:
-            region = "sim/weather/region/"
-            names = (region + "wind_direction_degt", region + "wind_speed_msc", region + "turbulence")
-            factor = _MPS_PER_KT if "wind-names" in self.otherwise else 1.0
-        direction, speed, turbulence = names
-        self._wind_settings = (*names, factor)
-
-        def set_wind(_index: int, _value: float) -> None:
-            strength = _clip(store.get(speed) * factor, 0.0, _MAX_WIND_MPS)
-            self.weather.set_wind(self.model, math.fmod(store.get(direction), 360.0), strength)
-
-        store.on_write(direction, set_wind)
-        store.on_write(speed, set_wind)
-
-        def set_turbulence(_index: int, _value: float) -> None:
-            gust = _clip(store.get(turbulence) * TURBULENCE_MPS_PER_UNIT, 0.0, _MAX_TURBULENCE_MPS)
-            self.weather.set_turbulence(self.model, gust)
-
-        store.on_write(turbulence, set_turbulence)
-
-    def set_weather(self, wind_from_deg: float, wind_mps: float, turbulence_mps: float, seed: int) -> None:
-        """Wind and turbulence of the command line."""
-        self.weather.set_wind(self.model, wind_from_deg, wind_mps)
-        self.weather.set_turbulence(self.model, turbulence_mps, seed)
-        # as clients read it, who put it back
-        direction, speed, turbulence, factor = self._wind_settings
-        self.store.set(direction, wind_from_deg)
-        self.store.set(speed, wind_mps / factor)
-        self.store.set(turbulence, turbulence_mps / TURBULENCE_MPS_PER_UNIT)
-
-    def _set_fuel(self, _index: int, _value: float) -> None:
-        tanks = self.model.info.tank_count
-        slots = self.store.dataref("sim/flightmodel/weight/m_fuel").slots
-        self.store.values[slots[tanks:]] = 0.0  # no such tanks
-        fuel = self.store.values[slots[:tanks]]
-        self.model.set_loading(fuel_kg=[_clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in fuel])
-
-    def _set_payload(self, _index: int, value: float) -> None:
-        if "stations" in self.otherwise:  # the payload is their sum, whatever is written
-            return
-        self.model.set_loading(payload_kg=_clip(value, 0.0, _MAX_LOAD_KG))
-
-    def _set_station(self, _index: int, _value: float) -> None:
-        written = self.store.array("sim/flightmodel/weight/m_stations")
-        self.stations_kg = [_clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in written]
-        self.model.set_loading(payload_kg=sum(self.stations_kg))
-
-    def _set_balance(self, _index: int, value: float) -> None:
-        self.model.set_loading(cg_aft_m=value)
-
-    def _set_atmosphere(self, other: str, value: float) -> None:
-        """Takes what was written; `other` is its second name, with the value there."""
-        self.store.set(other, value)
-        self.model.set_atmosphere(
-            temperature_offset_k=_clip(self.store.get(_SEA_LEVEL_TEMPERATURE), *_TEMPERATURE_C) - 15.0,
-            sea_level_pressure_pa=_clip(self.store.get(_SEA_LEVEL), *_PRESSURE_INHG) * INHG_PA,
-        )
-
 
 def _is_sane(state: ModelState) -> bool:
     total = state.latitude_deg + state.longitude_deg + state.altitude_m + sum(state.quaternion)
     return math.isfinite(
         total + state.u_mps + state.v_mps + state.w_mps + state.p_rad_s + state.q_rad_s + state.r_rad_s
     )
-
-
-def _clip(value: float, low: float, high: float) -> float:
-    return min(max(value, low), high)
 
 
 def aircraft_path(name: str) -> str:

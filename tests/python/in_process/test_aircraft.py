@@ -47,7 +47,7 @@ def test_surfaces_have_the_names_of_the_core() -> None:
 def test_the_view_is_what_the_emulator_sends() -> None:
     """Every field that X-Plane has a dataref for, by lib/core/state/sources.txt, against the emulator's own tables."""
     simulator = Simulator(create_model, "fixed_wing", initial=InitialState(heading_deg=30.0, airspeed_mps=70.0))
-    simulator.set_weather(200.0, 7.0, 1.0, 3)
+    simulator.settings.set_weather(200.0, 7.0, 1.0, 3)
     simulator.inputs._pilot = None
     for _ in range(60):
         simulator.step(1 / 60)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Callable, FrozenSet, List, Mapping, Protocol, Tuple
+from typing import Callable, FrozenSet, Mapping, Protocol, Tuple
 
-from xplane_bridge.emulator.datarefs.aircraft_systems import Electrics, Instruments, Weather
+from xplane_bridge.emulator.datarefs.aircraft_systems import Electrics, Instruments
 from xplane_bridge.emulator.datarefs.camera import Cameras
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.traffic import Traffic
+from xplane_bridge.emulator.datarefs.world_settings import WorldSettings
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, InitialState
 from xplane_bridge.emulator.flight.frame import Clocks
 
@@ -25,7 +26,6 @@ class Sources(LoadedAircraft, Protocol):
     initial_data_rate: int  #: DATA datagrams a second
     window_size: Tuple[int, int]  #: width and height [px]
     otherwise: FrozenSet[str]  #: of `otherwise.IDS`: in what X-Plane is not as the bridge assumes
-    stations_kg: List[float]  #: the payload by station, as a client has set it last (12)
     totals_move: bool  #: whether `total_*_ratio` follow the stick under `override_control_surfaces`
     store: DatarefStore
     clocks: Clocks  #: the same object for ever
@@ -34,7 +34,7 @@ class Sources(LoadedAircraft, Protocol):
     instruments: Instruments
     copilot_instruments: Instruments
     initial: InitialState  #: where flights start
-    weather: Weather
+    settings: WorldSettings
     cameras: Cameras
     traffic: Traffic
 

@@ -18,7 +18,7 @@ def simulator(version: str, everything: bool, load_time: float = 0.0) -> Simulat
     sim = Simulator(
         create_model, "fixed_wing", version, initial=InitialState(airspeed_mps=70.0), load_time=load_time, data_rate=60
     )
-    sim.set_weather(200.0, 7.0, 2.0, 3)
+    sim.settings.set_weather(200.0, 7.0, 2.0, 3)
     if everything:
         sim.store.watch_all()
     return sim

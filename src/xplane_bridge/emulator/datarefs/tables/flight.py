@@ -162,7 +162,7 @@ def _weights(t: Table, sim: Sources) -> None:
     t.array("_emulator/fuel_kg", lambda f: f.m.fuel_kg, size=9)
     t.value(weight + "m_fuel_total", lambda f: sum(f.m.fuel_kg))
     t.value(weight + "m_fixed", lambda f: f.m.payload_kg)
-    t.array(weight + "m_stations", lambda f: _stations(sim.stations_kg, f.m.payload_kg))
+    t.array(weight + "m_stations", lambda f: _stations(sim.settings.stations_kg, f.m.payload_kg))
     t.value(weight + "m_total", lambda f: f.m.mass_kg)
     t.setting(weight + "m_jettison")
     per_kg = 1.0 / 0.45359237 if "mass-unit" in sim.otherwise else 1.0

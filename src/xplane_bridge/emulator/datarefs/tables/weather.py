@@ -18,7 +18,7 @@ def define(t: Table, sim: Sources) -> None:
     # wind_speed_kt is in m/s in spite of its name
     t.value("_emulator/wind_speed_mps", lambda f: f.wind_speed)
     t.value("_emulator/wind_from_deg", lambda f: f.wind_from)
-    t.value("_emulator/turbulence", lambda _: sim.weather.turbulence_mps / 10.0)
+    t.value("_emulator/turbulence", lambda _: sim.settings.weather.turbulence_mps / 10.0)
     t.value("sim/weather/wind_direction_degt", lambda f: f.wind_from)
     t.value("sim/weather/wind_speed_kt", lambda f: f.wind_speed)
     goes = -1.0 if "wind-direction" in sim.otherwise else 1.0
