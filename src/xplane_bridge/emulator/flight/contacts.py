@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 
-from xplane_bridge.emulator.flight.flight_model import GearState, ModelState
+from xplane_bridge.emulator.flight.flight_model import Controls, GearState, ModelState
 from xplane_bridge.emulator.flight.jsbsim_state import FOOT_M, Properties
 
 #: A structural part that meets the ground faster than this, or gear faster than the second, is a crash [m/s].
 CRASH_STRUCTURE_MPS = 2.0
 CRASH_GEAR_MPS = 6.0
+#: Cosine of the tilt beyond which the wheels no longer carry.
+STRUTS_WORK_COSINE = 0.5
 
 
 class Contact:
@@ -77,3 +79,44 @@ class Contacts:
             gear.steer_deg = contact.max_steer_deg * steer
             standing += gear.on_ground
         s.on_ground_any, s.on_ground_all = standing > 0, standing == len(self._gear)
+
+
+class LandingGear:
+    """Legs, brakes and the nose wheel's steering.
+
+    Args:
+        properties: JSBSim's.
+        travel_s: How long the legs travel; 0: they are fixed.
+
+    Attributes:
+        position: 1 extended, 0 retracted.
+        steering: Of the nose wheel, -1 to 1 (right).
+    """
+
+    def __init__(self, properties: Properties, travel_s: float) -> None:
+        self._travel_s = travel_s
+        self._set_extension = properties.setter("gear/gear-pos-norm")
+        self._set_brakes = [properties.setter(f"fcs/{side}-brake-cmd-norm") for side in ("left", "right")]
+        self._set_steering = properties.setter("fcs/steer-cmd-norm")
+        self.position, self.steering = 1.0, 0.0
+
+    def put(self, position: float) -> None:
+        """Sets the legs at once."""
+        self.position = position
+        self._set_extension(position)
+
+    def move(self, dt: float, controls: Controls, ground_speed: float) -> None:
+        """Flies on: legs travel, brakes and wheel follow at once. Speed in m/s."""
+        if self._travel_s > 0.0:
+            wanted, reach = (1.0 if controls.gear_down else 0.0), dt / self._travel_s
+            self.position += min(max(wanted - self.position, -reach), reach)
+        for setter, brake in zip(self._set_brakes, (controls.brake_left, controls.brake_right)):
+            setter(min(max(brake, controls.parking_brake, 0.0), 1.0))
+        # Nose wheel and rudder share the pedals; the wheel's share fades with speed as its tyre would skid.
+        self.steering = min(max(controls.yaw, -1.0), 1.0) / (1.0 + (ground_speed / 12.0) ** 2)
+        self._set_steering(self.steering)
+
+    def set_struts(self, roll_rad: float, pitch_rad: float, near_ground: bool) -> None:
+        """JSBSim measures compression along the strut: on its side an aircraft would stand on metres of it."""
+        tilted = math.cos(roll_rad) * math.cos(pitch_rad) < STRUTS_WORK_COSINE
+        self._set_extension(0.0 if tilted and near_ground else self.position)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import copy
 import enum
+import math
 from dataclasses import dataclass, field
 from typing import Optional, Protocol, Sequence
 
@@ -262,6 +263,20 @@ class InitialState:
     terrain_elevation_m: float = 0.0
     engines_running: bool = True
     sim_time_s: float = 0.0
+
+    def check(self) -> None:
+        """Raises a `FlightModelError` for a start that no aircraft can have."""
+        speed = 0.0 if self.airspeed_mps is None else self.airspeed_mps
+        numbers = (self.latitude_deg, self.longitude_deg, self.heading_deg, self.altitude_m, speed)
+        if not all(math.isfinite(number) for number in numbers) or abs(self.latitude_deg) > 89.9:
+            raise FlightModelError(
+                f"cannot start at {self}: numbers must be finite, the latitude within -89.9..89.9 deg"
+            )
+        if not self.on_ground and self.altitude_m < self.terrain_elevation_m + 1.0:
+            raise FlightModelError(
+                f"cannot start in the air at {self.altitude_m} m: the ground is at {self.terrain_elevation_m} m; "
+                "give a greater altitude or start on the ground"
+            )
 
 
 @dataclass(frozen=True)

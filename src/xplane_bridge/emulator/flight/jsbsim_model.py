@@ -16,8 +16,7 @@ from typing import Any, Optional, Sequence, TypeVar
 import jsbsim
 
 from xplane_bridge.emulator.flight.actuators import SurfaceSet
-from xplane_bridge.emulator.flight.contacts import Contacts
-from xplane_bridge.emulator.flight.earth import EARTH_RADIUS_M, GRAVITY_MPS2
+from xplane_bridge.emulator.flight.contacts import Contacts, LandingGear
 from xplane_bridge.emulator.flight.flight_model import (
     MAX_STEP_S,
     MAX_SUBSTEP_S,
@@ -30,18 +29,27 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceSpec,
 )
 from xplane_bridge.emulator.flight.jsbsim_state import (
+    AIR_PROPERTIES,
     FOOT_M,
     INCH_M,
-    POUND_FOOT_NM,
-    POUND_FORCE_N,
+    LOADS,
     POUND_KG,
     PSF_PA,
     RANKINE_K,
     SLUG_FT3_KG_M3,
-    SLUG_KG,
     Properties,
     StateReader,
+    missing_gravity,
     new_jsbsim,
+    start_motion,
+)
+from xplane_bridge.emulator.flight.limits import (
+    check_atmosphere,
+    check_fuel,
+    check_payload,
+    check_turbulence,
+    opened_situation,
+    payload_place,
 )
 from xplane_bridge.emulator.flight.rotors import Rotor, sum_loads
 from xplane_bridge.emulator.flight.turbulence import DrydenTurbulence
@@ -51,30 +59,9 @@ SITUATION_VERSION = 2
 CRASH_WATCH_M = 20.0
 #: How deep in the ground the lowest point of a placed aircraft may be: the travel of its springs.
 DEEPEST_PLACE_M = 0.25
-#: Cosine of the tilt beyond which the wheels no longer carry.
-STRUTS_WORK_COSINE = 0.5
 
 _ROOT = Path(__file__).resolve().parents[1]  # holds aircraft/
 _T = TypeVar("_T")
-
-_AIR_PROPERTIES = (
-    "velocities/u-aero-fps",
-    "velocities/v-aero-fps",
-    "velocities/w-aero-fps",
-    "velocities/p-rad_sec",
-    "velocities/q-rad_sec",
-    "velocities/r-rad_sec",
-    "atmosphere/rho-slugs_ft3",
-)
-
-_LOADS = (
-    ("external_reactions/thrusters_x/magnitude", POUND_FORCE_N),
-    ("external_reactions/thrusters_y/magnitude", POUND_FORCE_N),
-    ("external_reactions/thrusters_z/magnitude", POUND_FORCE_N),
-    ("external_reactions/thrusters_l/magnitude-lbsft", POUND_FOOT_NM),
-    ("external_reactions/thrusters_m/magnitude-lbsft", POUND_FOOT_NM),
-    ("external_reactions/thrusters_n/magnitude-lbsft", POUND_FOOT_NM),
-)
 
 
 class JsbsimModel:
@@ -123,8 +110,6 @@ class JsbsimModel:
         self._find_properties(Properties(fdm.get_property_manager()))
         self._surface_set = SurfaceSet(self.surfaces)
         self._time = 0.0
-        self._gear_position = 1.0
-        self._steer = 0.0
         self._crashed = False
         self._gravity_force = (0.0, 0.0, 0.0)
         self._rotors: list[Rotor] = []
@@ -151,14 +136,12 @@ class JsbsimModel:
         self._mass = getter("inertia/mass-slugs")
         self._pressure = getter("atmosphere/P-psf")
         self._temperature = getter("atmosphere/T-R")
-        self._air_getters = [getter(path) for path in _AIR_PROPERTIES]
-        self._load_setters = [(setter(path), 1.0 / unit) for path, unit in _LOADS]
+        self._air_getters = [getter(path) for path in AIR_PROPERTIES]
+        self._load_setters = [(setter(path), 1.0 / unit) for path, unit in LOADS]
         self._surface_setters = [setter(f"surface/{spec.name}") for spec in self.surfaces]
         # As JSBSim's gust, because starting a motion takes its wind away.
         self._wind_setters = [setter(f"atmosphere/gust-{axis}-fps") for axis in ("north", "east", "down")]
-        self._gear_setter = setter("gear/gear-pos-norm")
-        self._brake_setters = [setter(f"fcs/{side}-brake-cmd-norm") for side in ("left", "right")]
-        self._steer_setter = setter("fcs/steer-cmd-norm")
+        self._gear = LandingGear(properties, self.gear_time_s if self.info.retractable_gear else 0.0)
         masses = len(self.fuel_capacity_kg) + 1
         self._mass_setters = [setter(f"inertia/pointmass-weight-lbs[{i}]") for i in range(masses)]
         self._payload_aft_setter = setter(f"inertia/pointmass-location-X-inches[{masses - 1}]")
@@ -209,7 +192,7 @@ class JsbsimModel:
 
     def reset(self, initial: InitialState) -> Controls:
         """Starts a flight."""
-        self._check_initial(initial)
+        initial.check()
         self._terrain_m = initial.terrain_elevation_m
         self._gusts = [0.0, 0.0, 0.0]
         self._fuel_kg = list(self._loaded_fuel_kg)
@@ -256,7 +239,7 @@ class JsbsimModel:
     def _fly(self, dt: float, controls: Controls) -> None:
         count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-6))
         substep = dt / count
-        self._move_gear(dt, controls)
+        self._gear.move(dt, controls, math.hypot(self.state.v_north_mps, self.state.v_east_mps))
         self._correct_gravity()
         self._run_steps(count, substep, controls)
 
@@ -271,7 +254,7 @@ class JsbsimModel:
             if abs(substep / runs - self._fdm_step) > 1e-12:
                 self._fdm_step = substep / runs
                 self._fdm.set_dt(self._fdm_step)
-            self._set_struts()
+            self._gear.set_struts(self._roll(), self._pitch(), self._agl() * FOOT_M < CRASH_WATCH_M)
             for _ in range(runs):
                 run()
             if self._agl() * FOOT_M < CRASH_WATCH_M:
@@ -284,39 +267,13 @@ class JsbsimModel:
         )
         self._apply_loads()
 
-    def _set_struts(self) -> None:
-        """JSBSim measures compression along the strut: on its side an aircraft would stand on metres of it."""
-        tilted = math.cos(self._roll()) * math.cos(self._pitch()) < STRUTS_WORK_COSINE
-        self._gear_setter(0.0 if tilted and self._agl() * FOOT_M < CRASH_WATCH_M else self._gear_position)
-
     def _outside_air(self) -> tuple[float, float]:
         """Pressure [Pa] and temperature [K]."""
         return self._pressure() * PSF_PA, self._temperature() * RANKINE_K
 
-    def _move_gear(self, dt: float, controls: Controls) -> None:
-        if self.info.retractable_gear:
-            wanted, reach = (1.0 if controls.gear_down else 0.0), dt / self.gear_time_s
-            self._gear_position += min(max(wanted - self._gear_position, -reach), reach)
-        parking = controls.parking_brake
-        for setter, brake in zip(self._brake_setters, (controls.brake_left, controls.brake_right)):
-            setter(min(max(brake, parking, 0.0), 1.0))
-        # Nose wheel and rudder share the pedals; the wheel's share fades with speed as its tyre would skid.
-        speed = math.hypot(self.state.v_north_mps, self.state.v_east_mps)
-        self._steer = min(max(controls.yaw, -1.0), 1.0) / (1.0 + (speed / 12.0) ** 2)
-        self._steer_setter(self._steer)
-
     def _correct_gravity(self) -> None:
         """X-Plane's gravity is constant, JSBSim's falls off with height: the difference, as a force."""
-        height = self._height() * FOOT_M
-        missing = GRAVITY_MPS2 * (1.0 - (EARTH_RADIUS_M / (EARTH_RADIUS_M + height)) ** 2)
-        force = missing * self._mass() * SLUG_KG
-        roll, pitch = self._roll(), self._pitch()
-        cosine = math.cos(pitch)
-        self._gravity_force = (
-            -force * math.sin(pitch),
-            force * math.sin(roll) * cosine,
-            force * math.cos(roll) * cosine,
-        )
+        self._gravity_force = missing_gravity(self._height() * FOOT_M, self._mass(), self._roll(), self._pitch())
 
     def _blow(self, dt: float) -> None:
         heading = self._heading()
@@ -334,7 +291,7 @@ class JsbsimModel:
             s.surfaces_deg[actuator.spec.name] = actuator.position_deg
         s.fuel_kg = list(self._fuel_kg)
         s.payload_kg, s.empty_mass_kg = self._payload_kg, self._empty_mass_kg
-        self._contacts.read(s, self._gear_position, self._steer)
+        self._contacts.read(s, self._gear.position, self._gear.steering)
         s.crashed = self._crashed
         self._fill_state(s, controls)
         return s
@@ -383,27 +340,8 @@ class JsbsimModel:
         v_ned_mps: Sequence[float],
         pqr_rad_s: Sequence[float],
     ) -> None:
-        values = [latitude_deg, longitude_deg, altitude_m, *euler_rad, *v_ned_mps, *pqr_rad_s]
-        if not all(math.isfinite(value) for value in values):
-            raise FlightModelError(f"cannot place the aircraft at {values}: every number must be finite")
-        if abs(latitude_deg) > 89.9:
-            raise FlightModelError(
-                f"latitude {latitude_deg} deg: expected -89.9..89.9 (the local level has no north at a pole)"
-            )
-        fdm = self._fdm
-        fdm["ic/terrain-elevation-ft"] = self._terrain_m / FOOT_M
-        fdm["ic/lat-geod-deg"] = latitude_deg
-        fdm["ic/long-gc-deg"] = longitude_deg
-        fdm["ic/h-sl-ft"] = altitude_m / FOOT_M
-        fdm["ic/psi-true-rad"] = euler_rad[2]
-        fdm["ic/theta-rad"] = euler_rad[1]
-        fdm["ic/phi-rad"] = euler_rad[0]
-        fdm["ic/vn-fps"] = v_ned_mps[0] / FOOT_M
-        fdm["ic/ve-fps"] = v_ned_mps[1] / FOOT_M
-        fdm["ic/vd-fps"] = v_ned_mps[2] / FOOT_M
-        for axis, rate in zip("pqr", pqr_rad_s):
-            fdm[f"ic/{axis}-rad_sec"] = rate
-        fdm.run_ic()
+        position = (latitude_deg, longitude_deg, altitude_m)
+        start_motion(self._fdm, position, euler_rad, v_ned_mps, pqr_rad_s, self._terrain_m)
 
     def _settle_on_ground(self, controls: Controls, seconds: float) -> None:
         """Lets the aircraft come to rest on its gear, without gusts."""
@@ -432,7 +370,7 @@ class JsbsimModel:
                 "fuel": self._fuel_kg,
                 "payload": self._payload_kg,
                 "payload_aft": self._payload_aft_m,
-                "gear": self._gear_position,
+                "gear": self._gear.position,
                 "crashed": self._crashed,
                 "surfaces": [actuator.save() for actuator in self._surface_set.actuators],
                 "rotors": [rotor.save() for rotor in self._rotors],
@@ -442,22 +380,13 @@ class JsbsimModel:
 
     def restore(self, situation: bytes) -> ModelState:
         """Goes on from a saved situation."""
-        try:
-            saved = json.loads(situation.decode())
-            model, version = saved["model"], saved["version"]
-        except (ValueError, KeyError, TypeError) as error:
-            raise FlightModelError(f"not a saved situation of the emulator: {error}") from error
-        if (model, version) != (self.info.name, SITUATION_VERSION):
-            raise FlightModelError(
-                f"situation of '{model}', version {version}: '{self.info.name}', version {SITUATION_VERSION} is loaded"
-            )
+        saved = opened_situation(situation, self.info.name, SITUATION_VERSION)
         self._start_jsbsim()
         self._terrain_m, self._wind, self._gusts = saved["terrain"], list(saved["wind"]), list(saved["gusts"])
         self._turbulence.restore(saved["turbulence"])
         self._atmosphere = tuple(saved["atmosphere"])
         self._fuel_kg, self._payload_kg = list(saved["fuel"]), saved["payload"]
         self._payload_aft_m = saved["payload_aft"]
-        self._gear_position = saved["gear"]
         for actuator, values in zip(self._surface_set.actuators, saved["surfaces"]):
             actuator.restore(values)
         for rotor, values in zip(self._rotors, saved["rotors"]):
@@ -466,7 +395,7 @@ class JsbsimModel:
         self._apply_loading()
         self._apply_atmosphere()
         self._apply_wind()
-        self._gear_setter(self._gear_position)
+        self._gear.put(saved["gear"])
         self._put(saved["position"], saved["euler"], saved["v_ned"], saved["pqr"])
         self._time, self._crashed = saved["time"], saved["crashed"]
         return self._read_state(self._trimmed)
@@ -507,8 +436,7 @@ class JsbsimModel:
 
     def set_turbulence(self, intensity_mps: float, seed: Optional[int] = None) -> None:
         """Dryden turbulence."""
-        if not 0.0 <= intensity_mps <= 20.0:
-            raise FlightModelError(f"turbulence of {intensity_mps} m/s: expected 0..20 (light 1, moderate 2, severe 4)")
+        check_turbulence(intensity_mps)
         self._turbulence.start(intensity_mps, seed)
         if intensity_mps == 0.0:
             self._gusts = [0.0, 0.0, 0.0]
@@ -516,11 +444,7 @@ class JsbsimModel:
 
     def set_atmosphere(self, temperature_offset_k: float = 0.0, sea_level_pressure_pa: float = 101325.0) -> None:
         """The day."""
-        if not (abs(temperature_offset_k) <= 60.0 and 85000.0 <= sea_level_pressure_pa <= 110000.0):
-            raise FlightModelError(
-                f"atmosphere {temperature_offset_k} K off standard, {sea_level_pressure_pa} Pa at sea level: "
-                "expected -60..60 K, 85000..110000 Pa"
-            )
+        check_atmosphere(temperature_offset_k, sea_level_pressure_pa)
         self._atmosphere = (temperature_offset_k, sea_level_pressure_pa)
         self._apply_atmosphere()
 
@@ -542,23 +466,14 @@ class JsbsimModel:
     ) -> None:
         """Fuel, payload, balance."""
         if fuel_kg is not None:
-            capacity = self.fuel_capacity_kg
-            if len(fuel_kg) != len(capacity) or not all(0.0 <= f <= c for f, c in zip(fuel_kg, capacity)):
-                raise FlightModelError(f"fuel {list(fuel_kg)} kg: expected one value per tank, 0..{list(capacity)}")
-        if payload_kg is not None and not 0.0 <= payload_kg <= self.max_payload_kg:
-            raise FlightModelError(f"payload {payload_kg} kg: expected 0..{self.max_payload_kg}")
+            check_fuel(fuel_kg, self.fuel_capacity_kg)
+        if payload_kg is not None:
+            check_payload(payload_kg, self.max_payload_kg)
         payload = self._payload_kg if payload_kg is None else payload_kg
         fuel = self._fuel_kg if fuel_kg is None else list(fuel_kg)
         aft = self._payload_aft_m
         if cg_aft_m is not None:
-            # Everything else has its centre of gravity at the reference point.
-            moment = cg_aft_m * (self._empty_mass_kg + sum(fuel) + payload)
-            if abs(moment) > self.payload_reach_m * payload:
-                raise FlightModelError(
-                    f"centre of gravity {cg_aft_m} m aft: the payload of {payload} kg can be moved by "
-                    f"{self.payload_reach_m} m only; load more, or ask for less"
-                )
-            aft = moment / payload if payload > 0.0 else 0.0
+            aft = payload_place(cg_aft_m, self._empty_mass_kg + sum(fuel) + payload, payload, self.payload_reach_m)
         if fuel_kg is not None:
             self._loaded_fuel_kg = list(fuel)
         self._fuel_kg, self._payload_kg, self._payload_aft_m = fuel, payload, aft
@@ -572,16 +487,3 @@ class JsbsimModel:
         for setter, mass in zip(self._mass_setters, [*self._fuel_kg, self._payload_kg]):
             setter(mass / POUND_KG)
         self._payload_aft_setter(self._payload_aft_m / INCH_M)
-
-    def _check_initial(self, initial: InitialState) -> None:
-        speed = 0.0 if initial.airspeed_mps is None else initial.airspeed_mps
-        numbers = (initial.latitude_deg, initial.longitude_deg, initial.heading_deg, initial.altitude_m, speed)
-        if not all(math.isfinite(number) for number in numbers) or abs(initial.latitude_deg) > 89.9:
-            raise FlightModelError(
-                f"cannot start at {initial}: numbers must be finite, the latitude within -89.9..89.9 deg"
-            )
-        if not initial.on_ground and initial.altitude_m < initial.terrain_elevation_m + 1.0:
-            raise FlightModelError(
-                f"cannot start in the air at {initial.altitude_m} m: the ground is at {initial.terrain_elevation_m} m; "
-                "give a greater altitude or start on the ground"
-            )

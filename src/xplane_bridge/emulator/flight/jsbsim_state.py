@@ -74,6 +74,26 @@ _STATE_PROPERTIES = (
     "moments/n-aero-lbsft",
 )
 
+#: What rotors and surfaces meet: velocity through the air, turn rates, density.
+AIR_PROPERTIES = (
+    "velocities/u-aero-fps",
+    "velocities/v-aero-fps",
+    "velocities/w-aero-fps",
+    "velocities/p-rad_sec",
+    "velocities/q-rad_sec",
+    "velocities/r-rad_sec",
+    "atmosphere/rho-slugs_ft3",
+)
+#: Force and moment of rotors and gravity, and their unit in SI.
+LOADS = (
+    ("external_reactions/thrusters_x/magnitude", POUND_FORCE_N),
+    ("external_reactions/thrusters_y/magnitude", POUND_FORCE_N),
+    ("external_reactions/thrusters_z/magnitude", POUND_FORCE_N),
+    ("external_reactions/thrusters_l/magnitude-lbsft", POUND_FOOT_NM),
+    ("external_reactions/thrusters_m/magnitude-lbsft", POUND_FOOT_NM),
+    ("external_reactions/thrusters_n/magnitude-lbsft", POUND_FOOT_NM),
+)
+
 
 def quaternion_from_euler(roll: float, pitch: float, heading: float) -> tuple[float, float, float, float]:
     """w, x, y, z of the rotation of FRD vectors into NED (heading, then pitch, then roll)."""
@@ -111,6 +131,46 @@ def new_jsbsim(root: Path, aircraft: str) -> jsbsim.FGFDMExec:
         )
     fdm["simulation/gravity-model"] = 0
     return fdm
+
+
+def missing_gravity(height_m: float, mass_slugs: float, roll: float, pitch: float) -> tuple[float, float, float]:
+    """What JSBSim's gravity lacks of X-Plane's at a height: a force in body axes, FRD [N]. Angles in rad."""
+    missing = GRAVITY_MPS2 * (1.0 - (EARTH_RADIUS_M / (EARTH_RADIUS_M + height_m)) ** 2)
+    force = missing * mass_slugs * SLUG_KG
+    cosine = math.cos(pitch)
+    return -force * math.sin(pitch), force * math.sin(roll) * cosine, force * math.cos(roll) * cosine
+
+
+def start_motion(
+    fdm: jsbsim.FGFDMExec,
+    position: Sequence[float],
+    euler_rad: Sequence[float],
+    v_ned_mps: Sequence[float],
+    pqr_rad_s: Sequence[float],
+    terrain_m: float,
+) -> None:
+    """Starts JSBSim's motion anew at latitude, longitude [deg] and altitude [m], with roll, pitch, heading."""
+    latitude_deg, longitude_deg, altitude_m = position
+    values = [latitude_deg, longitude_deg, altitude_m, *euler_rad, *v_ned_mps, *pqr_rad_s]
+    if not all(math.isfinite(value) for value in values):
+        raise FlightModelError(f"cannot place the aircraft at {values}: every number must be finite")
+    if abs(latitude_deg) > 89.9:
+        raise FlightModelError(
+            f"latitude {latitude_deg} deg: expected -89.9..89.9 (the local level has no north at a pole)"
+        )
+    fdm["ic/terrain-elevation-ft"] = terrain_m / FOOT_M
+    fdm["ic/lat-geod-deg"] = latitude_deg
+    fdm["ic/long-gc-deg"] = longitude_deg
+    fdm["ic/h-sl-ft"] = altitude_m / FOOT_M
+    fdm["ic/psi-true-rad"] = euler_rad[2]
+    fdm["ic/theta-rad"] = euler_rad[1]
+    fdm["ic/phi-rad"] = euler_rad[0]
+    fdm["ic/vn-fps"] = v_ned_mps[0] / FOOT_M
+    fdm["ic/ve-fps"] = v_ned_mps[1] / FOOT_M
+    fdm["ic/vd-fps"] = v_ned_mps[2] / FOOT_M
+    for axis, rate in zip("pqr", pqr_rad_s):
+        fdm[f"ic/{axis}-rad_sec"] = rate
+    fdm.run_ic()
 
 
 class Properties:

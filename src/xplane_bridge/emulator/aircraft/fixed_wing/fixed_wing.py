@@ -250,8 +250,7 @@ class FixedWing(JsbsimModel):
         if not 30.0 <= speed <= 110.0:
             raise FlightModelError(f"airspeed {speed} m/s: the twin starts in the air at 30..110 m/s")
         controls = Controls(gear_down=False)
-        self._gear_position = 0.0
-        self._gear_setter(0.0)
+        self._gear.put(0.0)
         heading = math.radians(initial.heading_deg)
         course = (math.cos(heading), math.sin(heading))
         for i, engine in enumerate(self._engines):

@@ -305,8 +305,7 @@ class Tiltrotor(JsbsimModel):
         on_wing = min(max((speed - 15.0) / (AIRPLANE_SPEED_MPS - 15.0), 0.0), 1.0)
         ratio = HOVER_RATIO * (1.0 - on_wing * on_wing)  # the wing carries with the square of the speed
         controls = Controls(gear_down=on_wing == 0.0, thrust_vector=ratio)
-        self._gear_position = 1.0 if controls.gear_down else 0.0
-        self._gear_setter(self._gear_position)
+        self._gear.put(1.0 if controls.gear_down else 0.0)
         self._nacelle_deg = NACELLE_DEG_PER_RATIO * ratio
         self._running = [True] * 2
         upright = self._upright()
