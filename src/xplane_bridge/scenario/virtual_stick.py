@@ -5,6 +5,7 @@ The joystick mapper turns them back, so that a scripted flight passes through th
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Tuple
 
@@ -119,13 +120,18 @@ def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:
     return VirtualStick(device, stick_mode)
 
 
+@functools.lru_cache(maxsize=None)
+def _curve(expo: float) -> np.ndarray:
+    curve: np.ndarray = (1.0 - expo) * _GRID + expo * _GRID**3
+    return curve
+
+
 def _inverse(value: float, entry: Dict[str, Any]) -> float:
     """The axis that equation (1) turns into `value`."""
     dead_zone, expo = float(entry.get("dead_zone", 0.0)), float(entry.get("expo", 0.0))
     # `full`: the whole travel becomes 0..1
     delta = 2.0 * value - 1.0 if entry.get("travel") == "full" else value
     shaped = delta / float(entry.get("scale", 1.0))
-    curve = (1.0 - expo) * _GRID + expo * _GRID**3
-    beyond = float(np.interp(min(abs(shaped), 1.0), curve, _GRID))
+    beyond = float(np.interp(min(abs(shaped), 1.0), _curve(expo), _GRID))
     magnitude = 0.0 if beyond == 0.0 else dead_zone + beyond * (1.0 - dead_zone)
     return float(np.copysign(magnitude, shaped))
