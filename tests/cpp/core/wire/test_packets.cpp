@@ -4,74 +4,20 @@
 
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "golden_packets.hpp"
+#include "packet_bytes.hpp"
 
 namespace xplane_bridge::core {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 constexpr double kNanDouble = std::numeric_limits<double>::quiet_NaN();
-
-Bytes operator+(Bytes a, const Bytes& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
-
-Bytes text(const char* chars, std::size_t size) {
-  Bytes bytes(size, 0);
-  std::memcpy(bytes.data(), chars, std::strlen(chars));
-  return bytes;
-}
-
-/// Little-endian bytes of the bits given: the tests' own way, not the library's.
-Bytes word(std::uint32_t bits) {
-  return {static_cast<std::uint8_t>(bits & 0xFFU), static_cast<std::uint8_t>((bits >> 8) & 0xFFU),
-          static_cast<std::uint8_t>((bits >> 16) & 0xFFU), static_cast<std::uint8_t>(bits >> 24)};
-}
-
-Bytes number(float value) {
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, &value, sizeof(bits));
-  return word(bits);
-}
-
-Bytes number(double value) {
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &value, sizeof(bits));
-  return word(static_cast<std::uint32_t>(bits & 0xFFFFFFFFU)) + word(static_cast<std::uint32_t>(bits >> 32));
-}
-
-Bytes dataRow(std::int32_t index, const std::array<float, 8>& values) {
-  Bytes row = word(static_cast<std::uint32_t>(index));
-  for (const float value : values) {
-    row = row + number(value);
-  }
-  return row;
-}
-
-Bytes rpos(double longitude, double latitude, float roll_rate) {
-  Bytes packet = text("RPOS4", 5) + number(longitude) + number(latitude) + number(100.0);
-  for (int i = 0; i < 7; ++i) {
-    packet = packet + number(0.5F);
-  }
-  return packet + number(roll_rate) + number(0.0F) + number(0.0F);
-}
-
-/// A vector with exactly its bytes on the heap, so that the address sanitizer sees a read one past the end.
-Bytes tight(const Bytes& bytes) {
-  Bytes copy(bytes);
-  copy.shrink_to_fit();
-  return copy;
-}
 
 // ------------------------------------------------------------------------------------------------ hand-worked bytes
 
@@ -473,81 +419,6 @@ TEST(Names, AreDistinctAndComplete) {
     EXPECT_EQ(std::string(toString(static_cast<EncodeError>(i))).find("invalid"), std::string::npos);
   }
   EXPECT_STREQ(toString(static_cast<EncodeError>(kEncodeErrorCount)), "invalid_encode_error");
-}
-
-// ------------------------------------------------------------------------------------------------ mutations
-
-/// Reads everything the decoders hand out, so that sanitizers see every byte that is touched. Returns how many decoders
-/// accepted the datagram, and adds the NaN and infinite values met to `odd_values`.
-int decodeEverything(ByteView datagram, std::size_t* odd_values) {
-  int accepted = 0;
-  if (const auto data = decodeData(datagram)) {
-    ++accepted;
-    *odd_values += inspect(*data).non_finite_values;
-  }
-  if (const auto rref = decodeRref(datagram)) {
-    ++accepted;
-    for (std::size_t i = 0; i < rref->size(); ++i) {
-      *odd_values += std::isfinite((*rref)[i].value) ? 0U : 1U;
-    }
-  }
-  if (const auto position = decodeRpos(datagram)) {
-    ++accepted;
-    EXPECT_LE(std::abs(position->latitude_deg), 90.0);
-    EXPECT_TRUE(std::isfinite(position->yaw_rate_radps));
-  }
-  if (const auto becn = decodeBeacon(datagram)) {
-    ++accepted;
-    EXPECT_LE(becn->computer_name.size() + 22, datagram.size());
-    EXPECT_NE(becn->port, 0);
-    EXPECT_EQ(std::string(becn->computer_name).find('\0'), std::string::npos);
-  }
-  if (const auto dref = decodeDref(datagram)) {
-    ++accepted;
-    EXPECT_EQ(std::string(dref->path).find('\0'), std::string::npos);
-  }
-  if (const auto terrain = decodeTerr(datagram)) {
-    ++accepted;
-    EXPECT_TRUE(std::isfinite(terrain->terrain_elevation_m));
-  }
-  if (const auto posi = decodePosi(datagram)) {
-    ++accepted;
-    EXPECT_TRUE(std::isfinite(posi->elevation_m));
-  }
-  EXPECT_LE(accepted, 1) << "one datagram, two messages";
-  return accepted;
-}
-
-TEST(Mutation, NoMutilatedPacketIsReadPastItsEnd) {
-  std::minstd_rand random(20110601);
-  const auto below = [&random](std::size_t limit) { return static_cast<std::size_t>(random()) % limit; };
-  const std::vector<GoldenPacket> packets = loadGoldenPackets();
-  int accepted = 0;
-  std::size_t odd_values = 0;
-  for (int round = 0; round < 20000; ++round) {
-    Bytes packet = packets[below(packets.size())].bytes;
-    if (packet.size() > 600) {
-      packet.resize(5 + below(600));
-    }
-    for (std::size_t edits = below(6); edits > 0; --edits) {
-      packet[below(packet.size())] = static_cast<std::uint8_t>(below(256));
-    }
-    switch (below(4)) {
-      case 0:
-        packet.resize(below(packet.size() + 1));
-        break;
-      case 1:
-        packet.resize(packet.size() + below(80), static_cast<std::uint8_t>(below(256)));
-        break;
-      default:
-        break;
-    }
-    accepted += decodeEverything(tight(packet), &odd_values);
-  }
-  // Both sides of the decoders' checks must have been walked often.
-  EXPECT_GT(accepted, 1000);
-  EXPECT_LT(accepted, 19000);
-  EXPECT_GT(odd_values, 0U);
 }
 
 }  // namespace
