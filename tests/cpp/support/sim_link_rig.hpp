@@ -155,4 +155,9 @@ class SimLinkRig : public testing::Test {
   std::vector<std::string> log_;
 };
 
+class SimLinkTest : public SimLinkRig {
+ protected:
+  static RrefGroup group(std::vector<std::string> datarefs) { return {"test", std::move(datarefs), 50, 0}; }
+};
+
 }  // namespace xplane_bridge::core
