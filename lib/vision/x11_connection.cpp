@@ -186,6 +186,13 @@ std::pair<int, int> X11Connection::corner(xcb_window_t window) const {
   return corner == nullptr ? std::make_pair(0, 0) : std::make_pair(int{corner->dst_x}, int{corner->dst_y});
 }
 
+bool X11Connection::covers(xcb_window_t window, cv::Point point) const {
+  const XcbPointer<xcb_get_geometry_reply_t> geometry(
+      xcb_get_geometry_reply(connection_, xcb_get_geometry(connection_, window), nullptr));
+  const auto [x, y] = corner(window);
+  return geometry != nullptr && cv::Rect(x, y, geometry->width, geometry->height).contains(point);
+}
+
 X11Connection::Found X11Connection::findWindow(const X11SourceOptions& options) const {
   Found found;
   if (options.window_id != 0) {
@@ -208,6 +215,10 @@ X11Connection::Found X11Connection::findWindow(const X11SourceOptions& options) 
     best.push_back(window);
   }
   found.alike = best.size();
+  if (options.point.has_value()) {
+    const auto elsewhere = [&](xcb_window_t window) { return !covers(window, *options.point); };
+    best.erase(std::remove_if(best.begin(), best.end(), elsewhere), best.end());
+  }
   if (options.index < 0) {
     const auto smaller = [this](xcb_window_t a, xcb_window_t b) { return area(a) < area(b); };
     const auto largest = std::max_element(best.begin(), best.end(), smaller);

@@ -70,6 +70,8 @@ class X11Connection {
   [[nodiscard]] std::uint32_t area(xcb_window_t window) const;
   /// [px] of its upper left corner on the screen: x, y
   [[nodiscard]] std::pair<int, int> corner(xcb_window_t window) const;
+  /// Whether a point [px] of the screen lies in it.
+  [[nodiscard]] bool covers(xcb_window_t window, cv::Point point) const;
 
   xcb_connection_t* connection_;
   xcb_screen_t* screen_ = nullptr;

@@ -55,6 +55,12 @@ std::string selection(const X11SourceOptions& options) {
     any.index = -1;
     return selection(any) + ", number " + std::to_string(options.index) + " from the left";
   }
+  if (options.point.has_value()) {
+    X11SourceOptions any = options;
+    any.point.reset();
+    return selection(any) + ", at the point " + std::to_string(options.point->x) + ", " +
+           std::to_string(options.point->y) + " of the screen";
+  }
   if (options.window_id != 0) return "window " + hex(options.window_id);
   if (!options.class_name.empty()) return "window of class \"" + options.class_name + "\"";
   if (!options.title.empty()) {
@@ -79,6 +85,10 @@ void validate(const X11SourceOptions& options) {
   if (options.index >= 0 && (options.window_id != 0 || !options.region.empty())) {
     throw std::invalid_argument("window index " + std::to_string(options.index) +
                                 " is given with a window id or a region, which name one already");
+  }
+  if (options.point.has_value() && (options.index >= 0 || options.window_id != 0 || !options.region.empty())) {
+    throw std::invalid_argument(
+        "a window's point is given with an index, an id or a region, which name a window already");
   }
   if (options.region.x < 0 || options.region.y < 0) {
     throw std::invalid_argument(selection(options) + ": expected its corner on the screen (x, y >= 0)");

@@ -84,8 +84,8 @@ class X11WindowSource::Impl {
     std::ostringstream text;
     text << wanted_ << ": " << hex(target_.window);
     if (options_.region.empty()) text << " \"" << connection_->title(target_.window) << "\"";
-    if (alike_ > 1 && options_.index < 0) {
-      text << ", the largest of " << alike_ << " that are alike (the window's index chooses one)";
+    if (alike_ > 1 && options_.index < 0 && !options_.point.has_value()) {
+      text << ", the largest of " << alike_ << " that are alike (the window's index or point chooses one)";
     }
     text << " on display " << connection_->displayName() << ", " << grabber_->area().width << "x"
          << grabber_->area().height << ", depth " << target_.format.depth
@@ -201,7 +201,8 @@ class X11WindowSource::Impl {
     if (!found.window.has_value()) {
       problem_ = "no visible " + wanted_ + " on display " + connection_->displayName();
       if (alike_ > 0) {
-        problem_ += "; there are " + std::to_string(alike_) + ", counted from 0";
+        problem_ += "; there are " + std::to_string(alike_) +
+                    (options_.point.has_value() ? ", none of them there" : ", counted from 0");
       } else if (options_.window_id == 0) {
         problem_ += thereAre(std::move(found.titles));
       }

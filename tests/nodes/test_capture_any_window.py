@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Iterator
@@ -32,6 +33,20 @@ paint()
 root.mainloop()
 """
 ORANGE, BLUE = (0x00, 0x80, 0xFF), (0xC0, 0x40, 0x00)  # BGR
+
+
+LARGE = """
+import tkinter
+root = tkinter.Tk()
+root.title("large")
+canvas = tkinter.Canvas(root, width=4000, height=3000, highlightthickness=0)
+canvas.pack()
+def paint(number):
+    canvas.configure(background=("#ff8000", "#0040c0")[number % 2])
+    root.after(100, paint, number + 1)
+paint(0)
+root.mainloop()
+"""
 
 
 @pytest.fixture
@@ -73,6 +88,23 @@ def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, 
         assert np.isnan(known.state.latitude)
         assert known.header.stamp in {image.header.stamp for image in images.messages}
         launch.check_running()
+
+
+def test_pictures_that_take_long_to_read_are_a_warning(world, tmp_path: Path) -> None:
+    from sensor_msgs.msg import CameraInfo
+
+    world.point_to(9)  # nothing answers there
+    with VirtualDisplay(tmp_path, 4000, 3000) as server:
+        program = ["env", f"DISPLAY={server.display}", sys.executable, "-c", LARGE]
+        with ManagedProcess("window", program, tmp_path):
+            # 48 MB a picture, through a socket.
+            window = {"display": server.display, "title": "large", "shared_memory": False}
+            world.start("capture_node", {"window": window})
+            world.watch("camera/camera_info", CameraInfo)
+            slow = re.compile(r"reading a picture takes (\d+\.\d) ms")
+            status = world.wait_for_diagnostics("capture", lambda s: slow.fullmatch(s.message), timeout=60.0)
+    assert status.level == 1
+    assert float(slow.fullmatch(status.message).group(1)) > 5.0
 
 
 def halves(image) -> tuple:

@@ -360,6 +360,8 @@ def test_states_below_the_frame_rate_are_interpolated(world, display) -> None:
 @pytest.mark.parametrize(
     ("params", "text"),
     [
+        ({"window": {"point": [1920]}}, "[x, y] in pixels of the screen"),
+        ({"window": {"point": [1920, 0], "index": 1}}, "name a window already"),
         ({"max_rate": -1.0}, "max_rate"),
         ({"fit": "zoom"}, "crop"),
         ({"window": {"title": "a", "class": "b"}}, "at most one"),

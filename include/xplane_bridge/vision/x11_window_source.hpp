@@ -27,7 +27,8 @@ const std::vector<std::string>& xplaneWindowTitles();
 
 /// Which part of which screen. At most one of title, class_name, window_id and region is given; none: X-Plane's own
 /// window, which has exactly one of xplaneWindowTitles(). Of several windows that fit, the one whose process is X-Plane
-/// is preferred, then one with exactly the title, then the largest, or, of such that are alike in both, number `index`.
+/// is preferred, then one with exactly the title, then the largest, or, of such that are alike in both, number `index`
+/// or the one at `point`.
 struct X11SourceOptions {
   std::string display;          ///< X display, e.g. ":0"; empty = $DISPLAY
   std::string title;            ///< part of the window's title
@@ -36,6 +37,7 @@ struct X11SourceOptions {
   std::uint32_t window_id = 0;  ///< as xwininfo prints it
   cv::Rect region;              ///< [px] part of the screen, top left corner first
   int index = -1;               ///< of windows alike, counted from 0, the leftmost, then the topmost; -1: the largest
+  std::optional<cv::Point> point;  ///< [px] of windows alike, those that cover this point of the screen; not with index
 
   ChangeDetection change_detection = ChangeDetection::kAuto;
   bool use_composite = true;      ///< read the window also when covered or off the screen

@@ -43,6 +43,9 @@ vision::X11SourceOptions loadWindow(const ParamLoader& window) {
   x11.region = region(window);
   x11.title = window.text("title", "");
   x11.index = window.integer("index", {-1, 99}, x11.index);
+  const std::vector<double> point = window.numbers("point", {-65535.0, 65535.0});
+  if (point.size() == 2) x11.point = cv::Point(static_cast<int>(point[0]), static_cast<int>(point[1]));
+  if (point.size() != 2 && !point.empty()) window.refuse("point", "[x, y] in pixels of the screen, or []");
   x11.title_is_regex = window.boolean("title_is_regex", false);
   x11.change_detection = vision::changeDetectionFromName(
       window.choice("change_detection", {"auto", "damage", "checksum", "none"}, "auto"));

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Any, Callable, Optional, Sequence, Tuple, TypeVar
+from typing import Any, Callable, Optional, Sequence, Tuple, TypeVar, Union
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -16,6 +16,8 @@ Take = Callable[[Any, int], None]
 
 #: Of a window on the screen: x, y, width, height [px].
 Rect = Tuple[int, int, int, int]
+#: Which of several windows alike: its number, or a point [px] of the screen that it covers; None: the largest.
+Which = Union[int, Tuple[int, int], None]
 W = TypeVar("W")
 
 
@@ -28,7 +30,8 @@ class Grabber:
 
     Args:
         titles: Of the window, exactly.
-        index: Of several such windows, counted from 0, the leftmost, then the topmost; None: the largest.
+        which: Of several such windows: its number, counted from 0, the leftmost, then the topmost; or a point of the
+            screen that it covers, x, y; None: the largest.
         take: Takes the pictures.
 
     Attributes:
@@ -36,11 +39,11 @@ class Grabber:
         remark: What is to be known of the window that is taken; empty: nothing.
     """
 
-    def __init__(self, titles: Tuple[str, ...], index: Optional[int], take: Take) -> None:
+    def __init__(self, titles: Tuple[str, ...], which: Which, take: Take) -> None:
         self.remark = ""
         self.problem = "the window was not looked for yet"
         self._titles = titles
-        self._index = index
+        self._which = which
         self._take = take
         self._stop = threading.Event()
         self._thread: Optional[threading.Thread] = None
@@ -62,13 +65,21 @@ class Grabber:
 
     def _chosen(self, windows: Sequence[Tuple[Rect, W]]) -> Optional[W]:
         """The window that is asked for, of those that fit; says why there is none, and that there are several."""
-        if self._index is None:
+        if self._which is None:
             count = len(windows)
             self.remark = f"{count} windows are alike: the largest is taken, --window chooses" if count > 1 else ""
             return max(windows, key=lambda window: window[0][2] * window[0][3])[1]
-        if self._index < len(windows):
-            return sorted(windows, key=lambda window: window[0][:2])[self._index][1]
-        self.problem = f"there is no window number {self._index}: {len(windows)} are alike, counted from 0"
+        ordered = sorted(windows, key=lambda window: window[0][:2])
+        if isinstance(self._which, tuple):
+            x, y = self._which
+            there = [name for (left, top, w, h), name in ordered if left <= x < left + w and top <= y < top + h]
+            if there:
+                return there[0]
+            self.problem = f"there is no window at {x},{y} of the screen: {len(windows)} are alike, none of them there"
+            return None
+        if self._which < len(windows):
+            return ordered[self._which][1]
+        self.problem = f"there is no window number {self._which}: {len(windows)} are alike, counted from 0"
         return None
 
     def _no_window(self, others: Tuple[str, ...]) -> str:

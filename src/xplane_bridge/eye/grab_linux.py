@@ -14,7 +14,7 @@ from typing import Any, Optional, Tuple
 import numpy as np
 
 from xplane_bridge.doctor.observe import windows
-from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take
+from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take, Which
 
 _SEARCH_S = 0.5
 _POLL_S = 0.002
@@ -101,8 +101,8 @@ class LinuxGrabber(Grabber):
         GrabError: There is no display, or Xlib is not there.
     """
 
-    def __init__(self, titles: Tuple[str, ...], index: Optional[int], take: Take) -> None:
-        super().__init__(titles, index, take)
+    def __init__(self, titles: Tuple[str, ...], which: Which, take: Take) -> None:
+        super().__init__(titles, which, take)
         self._name = os.environ.get("DISPLAY", "")
         try:
             self._x11 = windows.declared(ctypes.CDLL("libX11.so.6"))

@@ -13,7 +13,7 @@ from typing import Any, List, Optional, Tuple
 
 import numpy as np
 
-from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take
+from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take, Which
 
 _SEARCH_S = 0.5
 _ANSWER_S = 5.0
@@ -31,8 +31,8 @@ class MacGrabber(Grabber):
         GrabError: pyobjc's ScreenCaptureKit is not installed.
     """
 
-    def __init__(self, titles: Tuple[str, ...], index: Optional[int], take: Take) -> None:
-        super().__init__(titles, index, take)
+    def __init__(self, titles: Tuple[str, ...], which: Which, take: Take) -> None:
+        super().__init__(titles, which, take)
         try:
             self._kit = importlib.import_module("ScreenCaptureKit")
             self._media = importlib.import_module("CoreMedia")

@@ -14,7 +14,7 @@ from typing import Any, List, Optional, Tuple
 
 import numpy as np
 
-from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take
+from xplane_bridge.eye.grab import Grabber, GrabError, Rect, Take, Which
 
 _SEARCH_S = 0.5
 _CHECK_S = 0.25
@@ -138,8 +138,8 @@ class WindowsGrabber(Grabber):
         GrabError: windows-capture is not installed.
     """
 
-    def __init__(self, titles: Tuple[str, ...], index: Optional[int], take: Take) -> None:
-        super().__init__(titles, index, take)
+    def __init__(self, titles: Tuple[str, ...], which: Which, take: Take) -> None:
+        super().__init__(titles, which, take)
         try:
             self._library = importlib.import_module("windows_capture")
         except ImportError as error:

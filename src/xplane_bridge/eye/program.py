@@ -14,7 +14,7 @@ from typing import Any, Callable, Optional, Tuple, Union
 
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.eye.calibrate import Calibration, CalibrationError, UndoFile
-from xplane_bridge.eye.grab import Grabber, GrabError, Take
+from xplane_bridge.eye.grab import Grabber, GrabError, Take, Which
 from xplane_bridge.eye.jpeg import encoder
 from xplane_bridge.eye.pairing import Pairing
 from xplane_bridge.eye.rref import Address, FrameStream, Heard
@@ -38,7 +38,8 @@ class EyeOptions:
         receiver: Where `capture_node` listens, HOST, PORT; None: nothing is sent, the pairing is verified.
         xplane: Where X-Plane listens, HOST, PORT.
         titles: Of the window, exactly.
-        window: Of several such windows, counted from 0, the leftmost, then the topmost; None: the largest.
+        window: Of several such windows: its number, counted from 0, the leftmost, then the topmost; or a point of the
+            screen that it covers; None: the largest.
         token: Shared with `capture_node`; empty: none.
         quality: Of the JPEG, 1..100.
         delay_s: From a frame to its picture [s]; None: to be measured.
@@ -51,7 +52,7 @@ class EyeOptions:
     receiver: Optional[Address]
     xplane: Address
     titles: Tuple[str, ...]
-    window: Optional[int]
+    window: Which
     token: str
     quality: int
     delay_s: Optional[float]
@@ -65,7 +66,7 @@ class EyeError(XplaneBridgeError):
     """The eye cannot work as asked."""
 
 
-def grabber_class() -> Callable[[Tuple[str, ...], Optional[int], Take], Grabber]:
+def grabber_class() -> Callable[[Tuple[str, ...], Which, Take], Grabber]:
     """The grabber of this system; others' modules are not imported.
 
     Raises:
@@ -132,7 +133,8 @@ class Eye:
             self._sender: Union[Sender, Verification] = self._verification
         else:
             receiver = resolved(options.receiver, "capture_node's computer")
-            self._sender = Sender(receiver, options.window or 0, options.token, name, encoder(options.quality), say)
+            number = options.window if isinstance(options.window, int) else 0
+            self._sender = Sender(receiver, number, options.token, name, encoder(options.quality), say)
 
     @property
     def findings(self) -> Optional[Findings]:

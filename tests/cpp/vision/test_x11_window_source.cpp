@@ -365,6 +365,28 @@ TEST_F(X11WindowSourceTest, OfWindowsAlikeTheIndexChoosesFromTheLeft) {
   EXPECT_NE(none.problem().find("there are 3, counted from 0"), std::string::npos) << none.problem();
 }
 
+TEST_F(X11WindowSourceTest, OfWindowsAlikeThePointChoosesTheOneThatCoversIt) {
+  TestWindow right(server_.display(), "X-System", 320, 240, 400, 0);
+  TestWindow left(server_.display(), "X-System", 100, 80, 10, 20);
+  X11SourceOptions options = titled(server_, "");
+  for (const auto& [point, window] :
+       {std::make_pair(cv::Point(10, 20), &left), std::make_pair(cv::Point(109, 99), &left),
+        std::make_pair(cv::Point(719, 239), &right)}) {
+    options.point = point;
+    X11WindowSource source(options, steadyNow);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+    EXPECT_EQ(source.window(), window->id()) << point;
+    EXPECT_EQ(source.describe().find("alike"), std::string::npos);
+  }
+  options.point = cv::Point(110, 99);
+  X11WindowSource none(options, steadyNow);
+  EXPECT_TRUE(becomesLost(none));
+  EXPECT_NE(none.problem().find("at the point 110, 99 of the screen"), std::string::npos) << none.problem();
+  EXPECT_NE(none.problem().find("there are 2, none of them there"), std::string::npos) << none.problem();
+  options.index = 1;
+  EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
+}
+
 TEST_F(X11WindowSourceTest, FindsXPlanesOwnWindowByExactlyItsTitle) {
   TestWindow browser(server_.display(), "X-Plane 12 manual - browser", 600, 500);
   X11WindowSource source(titled(server_, ""), steadyNow);

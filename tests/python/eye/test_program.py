@@ -60,6 +60,8 @@ def test_it_starts_without_ros_and_without_what_only_linux_has():
         (["127.0.0.1:9", "--delay", "2"], "expected seconds from 0 to 0.5"),
         (["127.0.0.1:9", "--delay", "0.1", "--no-calibrate"], "not allowed with"),
         (["127.0.0.1:9", "--quality", "0"], "a whole number from 1 to 100"),
+        (["127.0.0.1:9", "--window", "left"], "expected a number from 0 to 255, or a point of the screen X,Y"),
+        (["127.0.0.1:9", "--window", "1920,"], "expected a number from 0 to 255, or a point of the screen X,Y"),
     ],
 )
 def test_wrong_arguments_are_refused_in_words(arguments: list, text: str):
@@ -123,3 +125,13 @@ def test_of_windows_alike_the_number_chooses_from_the_left():
     beyond = Windows((), 3, lambda *_: None)
     assert beyond.choose(LEFT, RIGHT, BELOW) is None
     assert beyond.problem == "there is no window number 3: 3 are alike, counted from 0"
+
+
+def test_of_windows_alike_a_point_of_the_screen_chooses_the_one_there():
+    for point, name in (((10, 20), "left"), ((109, 99), "left"), ((209, 459), "below"), ((719, 0), "right")):
+        windows = Windows((), point, lambda *_: None)
+        assert windows.choose(RIGHT, BELOW, LEFT) == name
+        assert windows.remark == ""
+    beside = Windows((), (110, 99), lambda *_: None)
+    assert beside.choose(LEFT, RIGHT, BELOW) is None
+    assert beside.problem == "there is no window at 110,99 of the screen: 3 are alike, none of them there"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import time
 from pathlib import Path
 from typing import Callable, Optional, Sequence, Tuple
 
 from xplane_bridge.cli.entry import guarded, number
 from xplane_bridge.eye.calibrate import default_undo_file
-from xplane_bridge.eye.grab import TITLES
+from xplane_bridge.eye.grab import TITLES, Which
 from xplane_bridge.eye.program import Eye, EyeOptions
 from xplane_bridge.eye.rref import THIS_COMPUTER
 
@@ -77,9 +78,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--window",
-        type=_within(0, 255),
-        metavar="N",
-        help="of several windows with that title, counted from 0, leftmost first, then topmost (default: the largest)",
+        type=_window,
+        metavar="N|X,Y",
+        help="of several windows with that title: its number, counted from 0, leftmost first, then topmost; or a point "
+        "of the screen that it covers, e.g. one on its monitor (default: the largest)",
     )
     parser.add_argument("--token-file", type=Path, metavar="FILE", help="holds the text of capture_node's sender/token")
     parser.add_argument("--quality", type=_within(1, 100), default=90, help="of the JPEG, 1..100 (default: 90)")
@@ -122,6 +124,18 @@ def _address(text: str) -> Tuple[str, int]:
     if not (host and colon and port.isdecimal() and 0 < int(port) < 65536):
         raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, e.g. 192.168.1.10:49790")
     return host, int(port)
+
+
+def _window(text: str) -> Which:
+    x, comma, y = text.partition(",")
+    with contextlib.suppress(ValueError):
+        if comma:
+            return int(x), int(y)
+        if 0 <= int(x) <= 255:
+            return int(x)
+    raise argparse.ArgumentTypeError(
+        f"{text!r}: expected a number from 0 to 255, or a point of the screen X,Y in pixels, e.g. 1920,0"
+    )
 
 
 def _within(low: int, high: int) -> Callable[[str], int]:
