@@ -1,8 +1,9 @@
-"""Benchmark of reading bags: an hour at 100 Hz into arrays, against the rosbag API and against plain rosbags."""
+"""Benchmarks of reading bags: arrays of an hour against the rosbag API and plain rosbags, and memory."""
 
 from __future__ import annotations
 
 import importlib.util
+import shutil
 import time
 from pathlib import Path
 from typing import List
@@ -11,6 +12,7 @@ import numpy as np
 from registry import Context, Measure, benchmark
 from rosbags.highlevel import AnyReader
 
+from support.long_recording import READERS, peak_mb, write_long_recording
 from support.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import HarnessError
@@ -42,6 +44,25 @@ def bags(context: Context) -> List[Measure]:
         Measure("ours / rosbag Python API", ours / rosbag_api, "times", budget=10.0, at_least=True),
         Measure("ours / plain rosbags deserialisation", ours / rosbags, "times", budget=2.5, at_least=True),
     ]
+
+
+@benchmark
+def bag_memory(context: Context) -> List[Measure]:
+    """Largest memory of what reads an hour of all topics and pictures (20 GB; 3 minutes a second of --seconds)."""
+    context.folder.mkdir(parents=True, exist_ok=True)
+    minutes = min(60.0, 3.0 * context.seconds)
+    short, long = context.folder / "short.bag", context.folder / "long.bag"
+    write_long_recording(short, 1.0)
+    write_long_recording(long, 60.0 * minutes)
+    measures = []
+    for name in READERS:
+        alone = peak_mb(name, short, context.folder / "out")
+        peak = peak_mb(name, long, context.folder / "out")
+        shutil.rmtree(context.folder / "out")
+        measures.append(Measure(f"{name}: {minutes:g} minutes", peak, "MB", budget=500.0))
+        measures.append(Measure(f"{name}: a second, imports and code", alone, "MB"))
+    long.unlink()
+    return measures
 
 
 def _write(path: Path, count: int) -> None:

@@ -1,8 +1,13 @@
-"""A recording of any length with all topics and pictures, made of the recorded bag's messages at the bridge's rates."""
+"""A recording of any length with all topics and pictures, and the memory that what reads it takes.
+
+It is made of the recorded bag's messages at the bridge's rates.
+"""
 
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,10 +47,54 @@ RATES = {
     "/xplane/link_state": 1.0,
     "/diagnostics": 5.0,
 }
+#: What reads a recording, by name: programs of Python whose arguments are the bag and a folder to write to.
+READERS = {
+    "read": """
+import sys
+from xplane_bridge.bags import Bags
+with Bags(sys.argv[1]) as bags:
+    for topic in bags.topics:  # one after the other; pictures one at a time, as they are meant to be
+        if "image_raw" in topic:
+            assert all(message.format for _, message in bags.messages(topic))
+        else:
+            assert len(bags.read(topic).columns)
+""",
+    "report": """
+import sys
+from xplane_bridge.cli.flight_report import main
+main([sys.argv[1], "-o", sys.argv[2] + "/report.html", "--png", sys.argv[2]]) and sys.exit(1)
+""",
+    "compare": """
+import sys
+from xplane_bridge.cli.flights.compare_flights import main
+main([sys.argv[1], sys.argv[1], "-o", sys.argv[2] + "/comparison.html"]) and sys.exit(1)
+""",
+}
+_EXPORT = """
+import sys
+from xplane_bridge.cli.bag_export import main
+main([sys.argv[1], "-o", sys.argv[2], "--jobs", "1", "--format", *"FORMAT".split()]) and sys.exit(1)
+"""
+_FORMATS = ("csv", "csv --rate 100", "parquet", "npz", "mat", "tum", "euroc", "imagefolder", "coco", "mcap", "ros2")
+READERS.update({name: _EXPORT.replace("FORMAT", name) for name in _FORMATS})
+# Of the process itself: what wait4() shows of a child begins with the size of its parent.
+_PEAK = """
+print("PEAK", next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))
+"""
+
 _STATE, _PICTURE = "/xplane/flight_state", "/xplane/camera/image_raw/compressed"
 _PICTURES = 30  #: different ones
 _STAMP = struct.Struct("<II")
 _BEFORE_STAMP = 4  #: [bytes] header.seq
+
+
+def peak_mb(name: str, bag: Path, folder: Path) -> float:
+    """Runs one of `READERS`; the largest memory [MB] that it had at once."""
+    folder.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-c", READERS[name] + _PEAK, str(bag), str(folder)]
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-2000:]
+    return int(done.stdout.split("PEAK")[-1]) / 1024
 
 
 def write_long_recording(path: Path, seconds: float) -> int:

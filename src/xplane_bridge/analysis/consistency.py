@@ -5,11 +5,12 @@ The same four relations that the bridge's live monitor watches, over a whole rec
 
 from __future__ import annotations
 
-from typing import Mapping, NamedTuple
+from typing import Iterator, Mapping, NamedTuple
 
 import numpy as np
 
 GRAVITY = 9.80665  #: [m/s^2]
+_PIECE = 16384  # samples
 
 
 class Check(NamedTuple):
@@ -90,13 +91,22 @@ def _sim_steps(columns: Mapping[str, np.ndarray], use: np.ndarray) -> np.ndarray
     return steps
 
 
+def _pieces(use: np.ndarray) -> Iterator[np.ndarray]:
+    """Cut indices into pieces: a matrix a sample, of a long flight, does not fit into memory several times."""
+    return (use[first : first + _PIECE] for first in range(0, len(use), _PIECE))
+
+
+def _quaternions(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    return np.stack([columns[f"orientation.{axis}"] for axis in "xyzw"], axis=1)
+
+
 def _vector(columns: Mapping[str, np.ndarray], name: str) -> np.ndarray:
     return np.stack([columns[f"{name}.{axis}"] for axis in "xyz"], axis=1)
 
 
-def _matrix(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Give R_ned_frd of every sample, shape (n, 3, 3), from the recorded quaternion."""
-    x, y, z, w = (columns[f"orientation.{axis}"] for axis in "xyzw")
+def _matrix(quaternions: np.ndarray) -> np.ndarray:
+    """Give R_ned_frd of every sample, shape (n, 3, 3), from the recorded quaternions (x, y, z, w)."""
+    x, y, z, w = quaternions.T
     return np.stack(
         [
             np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
@@ -108,12 +118,13 @@ def _matrix(columns: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def _rates(columns: Mapping[str, np.ndarray], use: np.ndarray, dt: np.ndarray) -> Check:
-    turn = _matrix(columns)
-    step = np.einsum("nji,njk->nik", turn[use], turn[use + 1])
-    skew = np.stack(
-        [step[:, 2, 1] - step[:, 1, 2], step[:, 0, 2] - step[:, 2, 0], step[:, 1, 0] - step[:, 0, 1]], axis=1
-    )
-    seen = skew / 2 / dt[:, None]
+    quaternions = _quaternions(columns)
+    turned = [np.empty((0, 3))]
+    for k in _pieces(use):
+        step = np.einsum("nji,njk->nik", _matrix(quaternions[k]), _matrix(quaternions[k + 1]))
+        skew = [step[:, 2, 1] - step[:, 1, 2], step[:, 0, 2] - step[:, 2, 0], step[:, 1, 0] - step[:, 0, 1]]
+        turned.append(np.stack(skew, axis=1))
+    seen = np.concatenate(turned) / 2 / dt[:, None]
     said = _vector(columns, "angular_velocity")
     mean = (said[use] + said[use + 1]) / 2
     return _check("attitude against p, q, r", "rad/s", [seen - mean], seen, 0.02, share=0.05)
@@ -122,8 +133,9 @@ def _rates(columns: Mapping[str, np.ndarray], use: np.ndarray, dt: np.ndarray) -
 def _force(columns: Mapping[str, np.ndarray], use: np.ndarray, dt: np.ndarray) -> Check:
     velocity = _vector(columns, "velocity_ned")
     acceleration = (velocity[use + 1] - velocity[use]) / dt[:, None]
-    turn = _matrix(columns)
-    felt = np.einsum("nij,nj->ni", turn, _vector(columns, "specific_force"))
+    quaternions, force = _quaternions(columns), _vector(columns, "specific_force")
+    turned = [np.einsum("nij,nj->ni", _matrix(quaternions[k]), force[k]) for k in _pieces(np.arange(len(force)))]
+    felt = np.concatenate([np.empty((0, 3)), *turned])
     mean = (felt[use] + felt[use + 1]) / 2 + np.array([0.0, 0.0, GRAVITY])
     return _check("specific force against dv/dt", "m/s^2", [acceleration - mean], acceleration, 0.3, share=0.1)
 

@@ -7,9 +7,11 @@ messages read as they were; fields that came later are there too: NaN, 0, false 
 layout (all lengths inside equal) are decoded together by numpy; a topic whose lengths vary is split into its layouts,
 and only messages that hold lists of messages or of strings are decoded one by one.
 
+A long recording needs little memory in pieces (`Bags.pieces`), or with its columns in a temporary file (`ColumnFile`).
+
 Columns are named by path: ``header.stamp``, ``angular_velocity.x``, ``gear_deploy_ratio``. Times and durations are
 int64 nanoseconds. A fixed array is a column of shape (n, k); strings, lists of varying length and lists of messages
-are object columns. Units are those of the message definition.
+(`MessageList`) are object columns. Units are those of the message definition.
 """
 
 from __future__ import annotations
@@ -21,13 +23,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
-from typing import Any, Iterator, NamedTuple, Optional, Sequence, Union
+from typing import Any, Iterator, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from xplane_bridge.bags.chunks import BagFile, Connection, DamagedError
+from xplane_bridge.bags.columns import ColumnFile, Filling, StoredColumns
 from xplane_bridge.bags.decoding import (
     NeedsObjectsError,
     Types,
@@ -41,8 +44,9 @@ from xplane_bridge.errors import XplaneBridgeError
 
 PathLike = Union[str, Path]
 _LOG = logging.getLogger(__name__)
-#: Messages are decoded so many bytes at a time.
-_PIECE_BYTES = 16 << 20
+#: Messages are decoded so many at a time: bytes, and number of them.
+_PIECE_BYTES = 4 << 20
+_PIECE_MESSAGES = 8192
 
 
 class BagError(XplaneBridgeError):
@@ -78,7 +82,7 @@ class Table:
     topic: str
     msgtype: str
     time: np.ndarray  #: int64 [ns] when the recorder received the message
-    columns: dict[str, np.ndarray]
+    columns: Mapping[str, np.ndarray]  #: a dict; of a table in a `ColumnFile`, loaded each time one is asked for
 
     def __len__(self) -> int:
         """Give the number of messages."""
@@ -105,6 +109,16 @@ class Table:
     def stamp(self) -> np.ndarray:
         """int64 [ns]: header.stamp where the message has one, else the receive time."""
         return self.columns.get("header.stamp", self.time)
+
+    def by_stamp(self) -> Table:
+        """Give the table in the order of its stamps; messages of one stamp stay in receive order."""
+        stamp = self.stamp
+        if (np.diff(stamp) >= 0).all():
+            return self
+        order = np.argsort(stamp, kind="stable")
+        if isinstance(self.columns, StoredColumns):
+            return Table(self.topic, self.msgtype, self.time[order], self.columns.in_order(order))
+        return Table(self.topic, self.msgtype, self.time[order], {k: v[order] for k, v in self.columns.items()})
 
 
 class Bags:
@@ -207,22 +221,39 @@ class Bags:
         connection = self._connections(topic)[0][1]
         return {**later_units(connection.msgtype), **parse_units(connection.definition, connection.msgtype)}
 
-    def read(self, topic: str, columns: Optional[Sequence[str]] = None) -> Table:
+    def read(self, topic: str, columns: Optional[Sequence[str]] = None, store: Optional[ColumnFile] = None) -> Table:
         """Read one topic into arrays.
 
         Args:
             topic: Name as in `topics`.
             columns: Column names, or the name of a group of them (``angular_velocity``); all when omitted.
+            store: Where the columns of numbers are kept, to be loaded one at a time; in memory when omitted.
 
         Raises:
             BagError: No such topic or column, or damaged data.
         """
-        parts: list[tuple[np.ndarray, dict[str, np.ndarray]]] = []
-        msgtype = ""
+        connections = self._connections(topic)
+        filling = Filling(sum(len(file.times(c.id)) for file, c in connections), store)
+        for file, connection in connections:
+            for time, found in self._pieces(file, connection, columns):
+                filling.add(time, found)
+        return _table(topic, connections[-1][1].msgtype, filling, columns)
+
+    def pieces(self, topic: str, columns: Optional[Sequence[str]] = None) -> Iterator[Table]:
+        """Read one topic some thousand messages at a time, in the order of the files: for what needs each value once.
+
+        Args:
+            topic: Name as in `topics`.
+            columns: As for `read`.
+
+        Raises:
+            BagError: No such topic or column, or damaged data.
+        """
         for file, connection in self._connections(topic):
-            msgtype = connection.msgtype
-            parts += self._pieces(file, connection, columns)
-        return _joined(topic, msgtype, parts, columns)
+            for time, found in self._pieces(file, connection, columns):
+                filling = Filling(len(time), None)
+                filling.add(time, found)
+                yield _table(topic, connection.msgtype, filling, columns)
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Yield (receive time [ns], message) of one topic one at a time, in time order: for images and lists."""
@@ -249,7 +280,7 @@ class Bags:
     def _pieces(
         self, file: BagFile, connection: Connection, columns: Optional[Sequence[str]]
     ) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
-        """Receive times and columns, so many messages at a time that their bytes need little memory."""
+        """Receive times and columns, so many messages at a time that they need little memory."""
         times: list[np.ndarray] = []
         raws: list[bytes] = []
         size = 0
@@ -258,7 +289,7 @@ class Bags:
                 times.append(time)
                 raws += messages
                 size += sum(map(len, messages))
-                if size > _PIECE_BYTES:
+                if size > _PIECE_BYTES or len(raws) > _PIECE_MESSAGES:
                     yield np.concatenate(times), self._decode(connection, raws, columns)
                     times, raws, size = [], [], 0
         except (DamagedError, OSError) as error:
@@ -361,58 +392,18 @@ def _damaged(file: BagFile, err: Exception) -> BagError:
     return BagError(f"{file.path}: damaged data ({err}); `rosbag reindex {file.path}` saves what can be saved")
 
 
-def _joined(
-    topic: str,
-    msgtype: str,
-    parts: list[tuple[np.ndarray, dict[str, np.ndarray]]],
-    columns: Optional[Sequence[str]],
-) -> Table:
-    """Put the parts of several files in receive order; a column that a part lacks is NaN or None there."""
-    filled = [part for part in parts if len(part[0])]
-    names: list[str] = []
-    seen: set[str] = set()
-    for _, part in filled:
-        for name in part:
-            if name not in seen:
-                seen.add(name)
-                names.append(name)
+def _table(topic: str, msgtype: str, filling: Filling, columns: Optional[Sequence[str]]) -> Table:
+    """What was read, in receive order.
+
+    Raises:
+        BagError: A column that was asked for is not there.
+    """
+    if not len(filling):
+        return Table(topic, msgtype, filling.time, {})
     for column in columns or ():
-        if filled and not any(wanted(name, [column]) for name in names):
-            have = sorted({n for _, part in filled for n in part}) if columns is None else []
-            msg = f"{topic} ({msgtype}) has no column {column!r}" + (f"; it has: {', '.join(have)}" if have else "")
+        if not any(wanted(name, [column]) for name in filling.names):
+            msg = f"{topic} ({msgtype}) has no column {column!r}"
             raise BagError(msg)
-    if not filled:
-        return Table(topic, msgtype, np.empty(0, dtype=np.int64), {})
-    time = np.concatenate([part[0] for part in filled])
+    time = filling.time
     order = None if np.all(time[1:] >= time[:-1]) else np.argsort(time, kind="stable")
-    out: dict[str, np.ndarray] = {}
-    for name in names:  # one column at a time, and its parts let go: there is never a second copy of all
-        stacked = _stacked(name, filled)
-        for _, columns_of_part in filled:
-            columns_of_part.pop(name, None)
-        out[name] = stacked if order is None else stacked[order]
-    return Table(topic, msgtype, time if order is None else time[order], out)
-
-
-def _stacked(name: str, parts: list[tuple[np.ndarray, dict[str, np.ndarray]]]) -> np.ndarray:
-    have = [part[name] for _, part in parts if name in part]
-    if len(parts) == 1:
-        return have[0]
-    shapes = {column.shape[1:] for column in have}
-    if len(have) == len(parts) and len(shapes) == 1:
-        return np.concatenate(have)
-    if len(shapes) == 1 and all(np.issubdtype(c.dtype, np.number) or c.dtype == bool for c in have):
-        shape = next(iter(shapes))
-        return np.concatenate(
-            [
-                part[name].astype(np.float64) if name in part else np.full((len(time), *shape), np.nan)
-                for time, part in parts
-            ]
-        )
-    out = np.empty(sum(len(time) for time, _ in parts), dtype=object)
-    at = 0
-    for time, part in parts:
-        for k in range(len(time)):
-            out[at + k] = part[name][k] if name in part else None
-        at += len(time)
-    return out
+    return Table(topic, msgtype, time if order is None else time[order], filling.columns(order))

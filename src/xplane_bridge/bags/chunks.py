@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bz2
 import struct
+from array import array
 from pathlib import Path
 from typing import BinaryIO, Callable, Collection, Dict, Iterator, List, NamedTuple, Optional, Tuple
 
@@ -60,6 +61,30 @@ class _Index(NamedTuple):
     offset: np.ndarray  #: of the record in it
 
 
+class _Entries:
+    """The index of one connection while it is read: in one piece, an object for each chunk takes twice its memory."""
+
+    def __init__(self) -> None:
+        self._data = bytearray()
+        self._chunks = array("I")
+        self._counts = array("I")
+
+    def add(self, chunk: int, data: bytes) -> None:
+        """Adds the index of a chunk."""
+        self._data += data
+        self._chunks.append(chunk)
+        self._counts.append(len(data) // _ENTRY.itemsize)
+
+    def joined(self) -> _Index:
+        """All of it."""
+        every = np.frombuffer(self._data, dtype=_ENTRY)
+        chunk = np.repeat(np.array(self._chunks, dtype=np.uint32), self._counts)
+        time = every["sec"].astype(np.int64)
+        time *= 1_000_000_000
+        time += every["nsec"]
+        return _Index(time, chunk, every["offset"].copy())
+
+
 class BagFile:
     """One bag file, open for reading.
 
@@ -80,7 +105,7 @@ class BagFile:
         self.connections: Dict[int, Connection] = {}
         self.lost: Optional[int] = None
         self._chunks: List[Chunk] = []
-        self._entries: Dict[int, List[Tuple[int, np.ndarray]]] = {}
+        self._entries: Dict[int, _Entries] = {}
         self._kept: Dict[int, bytes] = {}
         self._file: BinaryIO = path.open("rb")
         try:
@@ -88,7 +113,7 @@ class BagFile:
         except BaseException:
             self._file.close()
             raise
-        self._index = {id_: self._joined(self._entries.get(id_, [])) for id_ in self.connections}
+        self._index = {id_: self._entries.pop(id_, _Entries()).joined() for id_ in self.connections}
         self._entries.clear()
 
     def close(self) -> None:
@@ -164,7 +189,7 @@ class BagFile:
                 id_ = _number(entries, b"conn")
                 if len(data) != _number(entries, b"count") * _ENTRY.itemsize or id_ not in self.connections:
                     raise DamagedError("an index does not fit its chunk")
-                self._entries.setdefault(id_, []).append((len(self._chunks) - 1, np.frombuffer(data, dtype=_ENTRY)))
+                self._entries.setdefault(id_, _Entries()).add(len(self._chunks) - 1, data)
 
     def _open_by_scan(self, position: int) -> None:
         """What the chunks themselves hold, up to the first that is not whole."""
@@ -200,7 +225,9 @@ class BagFile:
                 entry = (time & 0xFFFFFFFF, time >> 32, begin)
                 found.setdefault(_number(header, b"conn"), []).append(entry)
         for id_, entries in found.items():
-            self._entries.setdefault(id_, []).append((len(self._chunks) - 1, np.array(entries, dtype=_ENTRY)))
+            self._entries.setdefault(id_, _Entries()).add(
+                len(self._chunks) - 1, np.array(entries, dtype=_ENTRY).tobytes()
+            )
 
     def _add_connection(self, header: Fields, record: bytes) -> None:
         fields = _all_fields(record)
@@ -220,15 +247,6 @@ class BagFile:
             )
         except (KeyError, UnicodeDecodeError) as error:
             raise DamagedError(f"a connection does not say its {error}") from None
-
-    @staticmethod
-    def _joined(entries: List[Tuple[int, np.ndarray]]) -> _Index:
-        if not entries:
-            return _Index(*(np.empty(0, dtype=np.int64) for _ in range(3)))
-        every = np.concatenate([array for _, array in entries])
-        chunk = np.repeat([number for number, _ in entries], [len(array) for _, array in entries])
-        time = every["sec"].astype(np.int64) * 1_000_000_000 + every["nsec"]
-        return _Index(time, chunk.astype(np.uint32), every["offset"].copy())
 
     # ---------------------------------------------------------------------------------------------------- reading
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from xplane_bridge.bags import BagError, Bags, Table, TopicInfo
 from xplane_bridge.bags.segments import segments
 
 if TYPE_CHECKING:
+    from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.units import Unit
 
 #: Role in a flight to message type.
@@ -59,8 +60,12 @@ class Flight:
         return max(int(t[-1]) for t in self.times.values())
 
 
-def read_flight(bags: Bags) -> Flight:
+def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
     """Read everything but images.
+
+    Args:
+        bags: Open bags of one flight.
+        store: Where the columns are kept (`Bags.read`); in memory when omitted.
 
     Raises:
         BagError: The bags hold no message at all, or are damaged.
@@ -76,18 +81,10 @@ def read_flight(bags: Bags) -> Flight:
         topic = bags.topic_of_type(msgtype)
         if topic is None or not topics[topic].count:
             continue
-        flight.tables[role] = _sorted(bags.read(topic))
+        flight.tables[role] = bags.read(topic, store=store).by_stamp()
         flight.units[role] = bags.units(topic)
         flight.constants[role] = bags.constants(topic)
     if "state" in flight.tables:
         state = flight.tables["state"]
         flight.parts = segments(state.stamp, state["epoch"])
     return flight
-
-
-def _sorted(table: Table) -> Table:
-    stamp = table.stamp
-    if (np.diff(stamp) >= 0).all():
-        return table
-    order = np.argsort(stamp, kind="stable")
-    return Table(table.topic, table.msgtype, table.time[order], {k: v[order] for k, v in table.columns.items()})

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Optional, Sequence
+from typing import TYPE_CHECKING, Optional, Sequence, Union
 
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.entry import guarded
 from xplane_bridge.errors import XplaneBridgeError
+
+if TYPE_CHECKING:
+    from xplane_bridge.plotting.spec import PathFigure, TimeFigure
 
 
 class ReportError(XplaneBridgeError):
@@ -55,24 +58,27 @@ def write_report(
         LabelError: The labels cannot be read.
         ReportError: The file cannot be written; or it is, and shows no flight, because no flight state was recorded.
     """
+    from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.flight import read_flight
     from xplane_bridge.labels import table
     from xplane_bridge.plotting import report, static
 
     known = table.read(labels) if labels else None
-    with Bags(list(bag_paths)) as bags:
-        flight = read_flight(bags)
-        page, figures = report.build(bags, flight, known)
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        output.write_text(page, encoding="utf-8")
+
+    def save(figure: Union[TimeFigure, PathFigure]) -> None:
         if png is not None:
-            png.mkdir(parents=True, exist_ok=True)
-            for figure in figures:
-                static.save(figure, flight.start, png / f"{figure.key}.png")
-    except OSError as error:
-        msg = f"{error.filename or output}: {error.strerror}"
-        raise ReportError(msg) from None
+            static.save(figure, flight.start, png / f"{figure.key}.png")
+
+    with Bags(list(bag_paths)) as bags:
+        try:
+            for folder in (output.parent, png):
+                if folder is not None:
+                    folder.mkdir(parents=True, exist_ok=True)
+            flight = read_flight(bags, ColumnFile(output.parent))
+            output.write_text(report.build(bags, flight, known, save), encoding="utf-8")
+        except OSError as error:
+            msg = f"{error.filename or output}: {error.strerror}"
+            raise ReportError(msg) from None
     if "state" not in flight.tables:
         names = ", ".join(str(path) for path in bag_paths)
         msg = (

@@ -17,7 +17,25 @@ import dataclasses
 import json
 import math
 import re
-from typing import TYPE_CHECKING, Any, Iterable, Iterator, NamedTuple, Optional, Sequence
+import struct
+import tempfile
+import zlib
+from array import array
+from functools import partial
+from itertools import islice
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    BinaryIO,
+    Callable,
+    Iterable,
+    Iterator,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Union,
+)
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
@@ -25,6 +43,8 @@ import numpy as np
 from xplane_bridge import __version__
 from xplane_bridge.analysis.resampling import interpolated
 from xplane_bridge.bags import BagError
+from xplane_bridge.bags.columns import ColumnFile
+from xplane_bridge.bags.decoding import MessageList
 from xplane_bridge.bags.pictures import COMPRESSED, RAW
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.columns import name_of
@@ -41,6 +61,74 @@ SIM_TIME = "sim_time_unwrapped_s"
 _LONGEST_NAME = 63
 #: A variable of MATLAB's file format 5 holds less than this.
 _MAT_LIMIT = 2**31
+_MAT_HEADER = 128  #: [bytes] before the first variable
+_MAT_TAG = struct.Struct("=II")  #: of an element: its type, its size
+_MAT_COMPRESSED = 15
+_PIECE_BYTES = 1 << 20
+
+
+class Texts:
+    """A column of texts, kept in a file: in memory NumPy gives each the room of the longest.
+
+    Args:
+        texts: Each is taken once.
+        folder: Where the temporary file lies; Python's choice when omitted.
+    """
+
+    def __init__(self, texts: Iterable[str], folder: Optional[Path]) -> None:
+        self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115, closed with the last reference to it
+        sizes: array[int] = array("q")
+        longest = 1
+        for text in texts:
+            sizes.append(self._file.write(text.encode("utf-8", "surrogatepass")))
+            longest = max(longest, len(text))
+        self.dtype = np.dtype(f"U{longest}")
+        self.shape = (len(sizes),)
+        self._sizes = sizes
+
+    def __iter__(self) -> Iterator[str]:
+        """The texts."""
+        self._file.seek(0)
+        for size in self._sizes:
+            yield self._file.read(size).decode("utf-8", "surrogatepass")
+
+    def pieces(self) -> Iterator[np.ndarray]:
+        """The texts as arrays of the column's type, so many in each that it is small."""
+        texts = iter(self)
+        step = max(1, _PIECE_BYTES // self.dtype.itemsize)
+        for first in range(0, self.shape[0], step):
+            yield np.array(list(islice(texts, min(step, self.shape[0] - first))), dtype=self.dtype)
+
+
+Source = Union[np.ndarray, Texts]
+
+
+class Columns(Mapping[str, np.ndarray]):
+    """Columns by name, made when they are asked for."""
+
+    def __init__(self) -> None:
+        self._sources: dict[str, Callable[[], Source]] = {}
+
+    def add(self, name: str, source: Callable[[], Source]) -> None:
+        """Adds a column by what gives it."""
+        self._sources[name] = source
+
+    def source(self, name: str) -> Source:
+        """Give a column to be written; texts in pieces."""
+        return self._sources[name]()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Give a column as an array."""
+        source = self.source(name)
+        return np.concatenate([np.empty(0, source.dtype), *source.pieces()]) if isinstance(source, Texts) else source
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self._sources)
+
+    def __len__(self) -> int:
+        """Give the number of columns."""
+        return len(self._sources)
 
 
 class TopicArrays(NamedTuple):
@@ -49,7 +137,8 @@ class TopicArrays(NamedTuple):
     name: str  #: a name that MATLAB takes too, e.g. ``mission_engines``
     topic: str
     msgtype: str
-    columns: dict[str, np.ndarray]  #: numbers, booleans or texts; the first axis counts messages
+    messages: int
+    columns: Columns  #: numbers, booleans or texts; the first axis counts messages
     units: dict[str, str]  #: of the columns that have one, as written in the message, e.g. ``rad/s``
 
 
@@ -68,12 +157,13 @@ class _SimClock(NamedTuple):
         return interpolated(stamp, self.stamp, self.sim_time, self.parts)
 
 
-def topic_arrays(bags: Bags, only: Sequence[str] = ()) -> Iterator[TopicArrays]:
-    """Read the topics of a flight, one after the other: only one needs to be in memory.
+def topic_arrays(bags: Bags, only: Sequence[str] = (), folder: Optional[Path] = None) -> Iterator[TopicArrays]:
+    """Read the topics of a flight, one after the other and into temporary files: one column needs to be in memory.
 
     Args:
         bags: Open bags of one flight.
         only: The topics to read, by full name or by name below the bridge's name space; all when empty.
+        folder: Where the temporary files lie; Python's choice when omitted.
 
     Raises:
         BagError: No such topic, a topic of pictures, or nothing in the bags.
@@ -95,7 +185,7 @@ def topic_arrays(bags: Bags, only: Sequence[str] = ()) -> Iterator[TopicArrays]:
     for topic in chosen:
         name = topic[len(space) :] if topic.startswith(space + "/") else topic
         taken.append(_valid_name(name.strip("/"), taken))
-        yield _arrays(taken[-1], bags.read(topic), bags.units(topic), clock)
+        yield _arrays(taken[-1], bags.read(topic, store=ColumnFile(folder)), bags.units(topic), clock, folder)
 
 
 class _Written:
@@ -110,7 +200,7 @@ class _Written:
     def add(self, topic: TopicArrays) -> None:
         self.names.append(topic[:3])
         self.units[topic.name] = topic.units
-        self.messages += len(topic.columns["stamp_ns"])
+        self.messages += topic.messages
         self.columns += len(topic.columns)
 
     @property
@@ -128,14 +218,21 @@ def write_npz(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
     written = _Written()
     with ZipFile(path, "w", ZIP_DEFLATED) as archive:
 
-        def add(name: str, values: np.ndarray) -> None:
+        def add(name: str, values: Source) -> None:
             with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
-                np.lib.format.write_array(file, values, allow_pickle=False)
+                if isinstance(values, Texts):
+                    about = {"descr": values.dtype.str, "fortran_order": False, "shape": values.shape}
+                    np.lib.format.write_array_header_1_0(file, about)
+                    for piece in values.pieces():
+                        file.write(piece.tobytes())
+                else:
+                    np.lib.format.write_array(file, values, allow_pickle=False)
 
         for topic in topics:
             written.add(topic)
-            for name, values in topic.columns.items():
-                add(f"{topic.name}/{name}", values)
+            for name in topic.columns:
+                add(f"{topic.name}/{name}", topic.columns.source(name))
+            del topic  # before the next is read
         units = [
             (f"{topic}/{name}", unit) for topic, of_topic in written.units.items() for name, unit in of_topic.items()
         ]
@@ -159,16 +256,23 @@ def write_mat(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
     written = _Written()
     with path.open("w+b") as file:
 
-        def add(name: str, value: Any) -> None:  # SciPy begins a file only at its start
-            savemat(file, {name: value}, long_field_names=True, oned_as="column", do_compression=True)
+        def add(name: str, value: Any) -> None:
+            with tempfile.TemporaryFile(dir=path.parent) as plain:  # SciPy would compress in memory
+                savemat(plain, {name: value}, long_field_names=True, oned_as="column")
+                plain.seek(0)
+                header = plain.read(_MAT_HEADER)
+                if not file.tell():
+                    file.write(header)
+                _compress(plain, file)
 
         for topic in topics:
             written.add(topic)
-            size = sum(_mat_bytes(values) for values in topic.columns.values())
+            size = sum(_mat_bytes(topic.columns.source(name)) for name in topic.columns)
             if size >= _MAT_LIMIT:
                 msg = f"{topic.topic}: {size} bytes are too many for a .mat file (limit {_MAT_LIMIT}); use --format npz"
                 raise BagError(msg)
-            add(topic.name, {name: _cells(values) for name, values in topic.columns.items()})
+            add(topic.name, {name: _MatColumn(topic.columns, name) for name in topic.columns})
+            del topic  # before the next is read
         add("units", written.units)
         add("topics", _cells(_texts(written.names)))
         add("about", _about())
@@ -176,6 +280,33 @@ def write_mat(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
         file.seek(0)
         file.write(f"MATLAB 5.0 MAT-file, {_about()}".ljust(116).encode("ascii"))
     return written.counts
+
+
+class _MatColumn:
+    """A column that SciPy asks for when it writes it."""
+
+    __slots__ = ("_columns", "_name")  # SciPy takes what has a __dict__ for a struct
+
+    def __init__(self, columns: Columns, name: str) -> None:
+        self._columns = columns
+        self._name = name
+
+    def __array__(self, dtype: Any = None, copy: Optional[bool] = None) -> np.ndarray:
+        return _cells(self._columns.source(self._name))
+
+
+def _compress(plain: BinaryIO, file: BinaryIO) -> None:
+    """Adds the rest of an uncompressed MAT-file as one compressed element."""
+    tag = file.tell()
+    file.write(_MAT_TAG.pack(_MAT_COMPRESSED, 0))
+    packer = zlib.compressobj()
+    for block in iter(lambda: plain.read(_PIECE_BYTES), b""):
+        file.write(packer.compress(block))
+    file.write(packer.flush())
+    end = file.tell()
+    file.seek(tag)
+    file.write(_MAT_TAG.pack(_MAT_COMPRESSED, end - tag - _MAT_TAG.size))
+    file.seek(end)
 
 
 def _about() -> str:
@@ -193,21 +324,32 @@ def _sim_clock(bags: Bags, state: Optional[str]) -> _SimClock:
     return _SimClock(int(stamp[0]), stamp, table["sim_time_unwrapped"][order], parts)
 
 
-def _arrays(key: str, table: Table, units: dict[str, Unit], clock: _SimClock) -> TopicArrays:
+def _arrays(key: str, table: Table, units: dict[str, Unit], clock: _SimClock, folder: Optional[Path]) -> TopicArrays:
     stamp = table.stamp
-    columns = {"stamp_ns": stamp, "receive_ns": table.time, "time_s": (stamp - clock.zero) / 1e9}
+    columns = Columns()
+    columns.add("stamp_ns", lambda: stamp)
+    columns.add("receive_ns", lambda: table.time)
+    columns.add("time_s", lambda: (stamp - clock.zero) / 1e9)
     symbols = {"stamp_ns": "ns", "receive_ns": "ns", "time_s": "s"}
     if "sim_time_unwrapped" not in table:
-        columns[SIM_TIME], symbols[SIM_TIME] = clock.at(stamp), "s"
+        columns.add(SIM_TIME, lambda: clock.at(stamp))
+        symbols[SIM_TIME] = "s"
     for path, values in table.columns.items():
         if path.split(".")[0] == "header":
             continue
         name = _valid_name(name_of(path, units), columns)
-        for ending, flat in _without_objects(values).items():
-            columns[name + ending] = flat
+        if values.dtype != object:
+            columns.add(name, partial(table.__getitem__, path))
+        else:
+            for ending, flat in _without_objects(values, folder).items():
+                columns.add(name + ending, partial(_given, flat))
         if path in units and units[path].symbol:
             symbols[name] = units[path].symbol
-    return TopicArrays(key, table.topic, table.msgtype, columns, symbols)
+    return TopicArrays(key, table.topic, table.msgtype, len(table), columns, symbols)
+
+
+def _given(source: Source) -> Source:
+    return source
 
 
 def _valid_name(text: str, taken: Iterable[str]) -> str:
@@ -222,22 +364,20 @@ def _valid_name(text: str, taken: Iterable[str]) -> str:
     return name
 
 
-def _without_objects(values: np.ndarray) -> dict[str, np.ndarray]:
-    """Give a column as arrays that need no pickle, by the ending of their names."""
-    if values.dtype != object:
-        return {"": values}
+def _without_objects(values: np.ndarray, folder: Optional[Path]) -> dict[str, Source]:
+    """Give a column of objects as what needs no pickle, by the ending of the names."""
     filled = [value for value in values if value is not None]
     if all(isinstance(value, str) for value in filled):
-        return {"": _texts(["" if value is None else value for value in values])}
+        return {"": Texts(("" if value is None else value for value in values), folder)}
     if all(isinstance(value, np.ndarray) for value in filled):
         return _padded(values, np.result_type(*filled))
-    if all(isinstance(value, list) and all(isinstance(text, str) for text in value) for value in filled):
+    if all(isinstance(value, (list, MessageList)) and all(isinstance(text, str) for text in value) for value in filled):
         longest = max((len(text) for value in filled for text in value), default=1)
         return _padded(values, np.dtype(f"U{max(longest, 1)}"))
-    return {"": _texts(["" if value is None else json.dumps(_plain(value)) for value in values])}
+    return {"": Texts(("" if value is None else json.dumps(_plain(value)) for value in values), folder)}
 
 
-def _padded(values: np.ndarray, dtype: np.dtype) -> dict[str, np.ndarray]:
+def _padded(values: np.ndarray, dtype: np.dtype) -> dict[str, Source]:
     lengths = np.array([0 if value is None else len(value) for value in values], dtype=np.int64)
     width = int(lengths.max()) if len(lengths) else 0
     filler: Any = np.nan if np.issubdtype(dtype, np.floating) else "" if dtype.kind == "U" else 0
@@ -256,7 +396,7 @@ def _plain(value: Any) -> Any:
         return {name: _plain(getattr(value, name)) for name in fields}
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple, MessageList)):
         return [_plain(item) for item in value]
     if isinstance(value, np.generic):
         return _plain(value.item())
@@ -267,12 +407,23 @@ def _texts(values: Sequence[Any]) -> np.ndarray:
     return np.array(values, dtype=str) if len(values) else np.empty(0, dtype="U1")
 
 
-def _mat_bytes(values: np.ndarray) -> int:
-    return values.nbytes if values.dtype.kind != "U" else sum(64 + 2 * len(text) for text in values.flat)
+def _mat_bytes(values: Source) -> int:
+    texts: Iterable[str] = ()
+    if isinstance(values, Texts):
+        texts = values
+    elif values.dtype.kind == "U":
+        texts = values.flat
+    else:
+        return values.nbytes
+    return sum(64 + 2 * len(text) for text in texts)
 
 
-def _cells(values: np.ndarray) -> np.ndarray:
+def _cells(values: Source) -> np.ndarray:
     """Give texts as objects, of which SciPy makes cells; a padded matrix of characters would lose their lengths."""
+    if isinstance(values, Texts):
+        cells = np.empty((values.shape[0], 1), dtype=object)
+        cells[:, 0] = [text.rstrip("\0") for text in values]
+        return cells
     if values.dtype.kind != "U":
         return values
     return (values[:, None] if values.ndim == 1 else values).astype(object)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Mapping
+from typing import TYPE_CHECKING, Iterator, Mapping
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def on_base(
     columns: Mapping[str, np.ndarray],
     units: Mapping[str, Unit],
     parts: list[slice],
-) -> dict[str, np.ndarray]:
+) -> Iterator[tuple[str, np.ndarray]]:
     """Bring columns onto a time base: numbers linearly, angles and quaternions the short way round, others held.
 
     Args:
@@ -67,24 +67,23 @@ def on_base(
         units: From `Bags.units`; say which angles wrap.
         parts: Segments of `time` (`segments`).
 
-    Returns:
-        The same names, m rows. NaN where there is nothing to interpolate.
+    Yields:
+        The same names, m rows each, one after the other. NaN where there is nothing to interpolate.
     """
-    out: dict[str, np.ndarray] = {}
     done: set[str] = set()
-    for path, values in columns.items():
+    for path in columns:
         if path in done:
             continue
+        values = columns[path]
         quaternion = [f"{path[:-2]}.{axis}" for axis in "xyzw"]
         if path.endswith(".x") and all(q in columns for q in quaternion):
             turned = rotated(base, time, np.stack([columns[q] for q in quaternion], axis=1), parts)
             for k, name in enumerate(quaternion):
-                out[name] = turned[:, k]
+                yield name, turned[:, k]
             done.update(quaternion)
         elif np.issubdtype(values.dtype, np.floating):
             unit = units.get(path)
             wrap, low = (unit.wrap, unit.low) if unit else (0.0, 0.0)
-            out[path] = interpolated(base, time, values, parts, wrap, low)
+            yield path, interpolated(base, time, values, parts, wrap, low)
         else:
-            out[path] = held(base, time, values)
-    return out
+            yield path, held(base, time, values)

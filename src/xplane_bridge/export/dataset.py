@@ -20,7 +20,7 @@ from __future__ import annotations
 import csv
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterator, Mapping, NamedTuple, Optional
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 import pandas as pd
@@ -29,6 +29,7 @@ from xplane_bridge.analysis.quality import BAD_QUALITY
 from xplane_bridge.bags import BagError, Bags, Table
 from xplane_bridge.bags.cameras import Camera, cameras, chosen_cameras
 from xplane_bridge.bags.pictures import COMPRESSED, RAW, image_topic
+from xplane_bridge.export import tables
 from xplane_bridge.export.columns import named
 from xplane_bridge.export.flight import labels as flight_labels
 from xplane_bridge.export.flight import quality_bits
@@ -154,7 +155,9 @@ def _joined(parts: list[Pictures]) -> Pictures:
         kept += [picture._replace(row=first + picture.row) for picture in part.kept]
         left_out.update(part.counts.left_out)
         first += len(part.stamp)
-    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
+    columns = parts[0].columns
+    if len(parts) > 1:
+        columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in columns}
     counts = Counts(
         sum(part.counts.images for part in parts),
         sum(part.counts.exported for part in parts),
@@ -260,6 +263,8 @@ def _camera(bags: Bags, topic: str, stamp: np.ndarray) -> dict[str, np.ndarray]:
     return out
 
 
+#: Rows of metadata that are written at a time.
+_PIECE_ROWS = 8192
 #: Types of the columns that may lack values: the same in every flight, whatever it lacks.
 _NULLABLE = {
     "mode": "UInt8",
@@ -290,26 +295,34 @@ def _write_metadata(
     labels: Optional[ImageLabels],
 ) -> None:
     import pyarrow
-    from pyarrow import parquet
+
+    number = pyarrow.float64()
+    lists = {
+        "bbox": pyarrow.list_(number),
+        "category": pyarrow.string(),
+        "sigma_px": number,
+        "coarse": pyarrow.bool_(),
+    }
+    kind = pyarrow.struct({name: pyarrow.list_(item) for name, item in lists.items()})
+
+    def frame(part: Sequence[Picture]) -> pd.DataFrame:
+        rows = np.array([picture.row for picture in part], dtype=int)
+        data: dict[str, Any] = {"file_name": [Path(picture.file).name for picture in part]}
+        data.update(split=kept[0].split, stamp_ns=stamp[rows])
+        for name, values in columns.items():
+            chosen = values[rows]
+            data[name] = pd.array(chosen, dtype=_NULLABLE[name]) if name in _NULLABLE else chosen
+        if labels is not None:
+            data["objects"] = [labels.boxes(picture.key) for picture in part]
+        return pd.DataFrame(data)
 
     rows = np.array([picture.row for picture in kept])
-    data: dict[str, Any] = {"file_name": [Path(picture.file).name for picture in kept]}
-    data.update(split=kept[0].split, stamp_ns=stamp[rows])
-    for name, values in columns.items():
-        chosen = values[rows]
-        data[name] = pd.array(chosen, dtype=_NULLABLE[name]) if name in _NULLABLE else chosen
-    table = pyarrow.Table.from_pandas(pd.DataFrame(data), preserve_index=False)
+    objects = {name: v[rows] for name, v in columns.items() if v.dtype.hasobject and name not in _NULLABLE}
+    schema = tables.schema_of(frame(kept[:1]), objects)
     if labels is not None:
-        number = pyarrow.float64()
-        lists = {
-            "bbox": pyarrow.list_(number),
-            "category": pyarrow.string(),
-            "sigma_px": number,
-            "coarse": pyarrow.bool_(),
-        }
-        kind = pyarrow.struct({name: pyarrow.list_(item) for name, item in lists.items()})
-        table = table.append_column("objects", pyarrow.array([labels.boxes(p.key) for p in kept], type=kind))
-    parquet.write_table(table, path)
+        schema = schema.set(schema.get_field_index("objects"), pyarrow.field("objects", kind))
+    pieces = (frame(kept[first : first + _PIECE_ROWS]) for first in range(0, len(kept), _PIECE_ROWS))
+    tables.write_frames(path, pieces, schema)
 
 
 def _split_stamp(stamp: np.ndarray, options: Options) -> int:

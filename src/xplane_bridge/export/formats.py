@@ -56,17 +56,17 @@ class Format(NamedTuple):
 def _csv(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import tables
 
-    frame = tables.flight_table(bags, job.rate, job.topics)
-    tables.write_csv(frame, path)
-    return {"rows": len(frame), "columns": len(frame.columns)}
+    table = tables.flight_table(bags, job.rate, job.topics, path.parent)
+    tables.write_csv(table, path)
+    return table.counts
 
 
 def _parquet(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import tables
 
-    frame = tables.flight_table(bags, job.rate, job.topics)
-    tables.write_parquet(frame, path)
-    return {"rows": len(frame), "columns": len(frame.columns)}
+    table = tables.flight_table(bags, job.rate, job.topics, path.parent)
+    tables.write_parquet(table, path)
+    return table.counts
 
 
 def _tum(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
@@ -116,13 +116,13 @@ def _lard(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 def _npz(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import arrays
 
-    return arrays.write_npz(arrays.topic_arrays(bags, job.topics), path)
+    return arrays.write_npz(arrays.topic_arrays(bags, job.topics, path.parent), path)
 
 
 def _mat(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import arrays
 
-    return arrays.write_mat(arrays.topic_arrays(bags, job.topics), path)
+    return arrays.write_mat(arrays.topic_arrays(bags, job.topics, path.parent), path)
 
 
 def _mcap(bags: Bags, path: Path, job: Job) -> dict[str, Any]:

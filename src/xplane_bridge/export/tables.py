@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Iterable, Iterator, Mapping, Optional, Sequence, Union
 
 import numpy as np
 import pandas as pd
 
 from xplane_bridge.analysis.resampling import held, time_base
+from xplane_bridge.bags.columns import ColumnFile, StoredColumn
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.columns import named, on_base
 from xplane_bridge.export.flight import STATE, labels, topic_of
@@ -17,14 +18,64 @@ if TYPE_CHECKING:
 
     from xplane_bridge.bags import Bags
 
+#: Rows that are written at a time.
+_PIECE_ROWS = 8192
 
-def flight_table(bags: Bags, rate: Optional[float] = None, topics: Sequence[str] = ()) -> pd.DataFrame:
+
+class FlightTable:
+    """A table whose numbers lie in a temporary file and which is taken some thousand rows at a time.
+
+    Args:
+        rows: How many it has.
+        store: Where the numbers lie; texts and lists are in memory.
+    """
+
+    def __init__(self, rows: int, store: ColumnFile) -> None:
+        self.rows = rows
+        self.store = store
+        self._columns: dict[str, Union[np.ndarray, StoredColumn]] = {}
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """For the manifest."""
+        return {"rows": self.rows, "columns": len(self._columns)}
+
+    def add(self, columns: Mapping[str, np.ndarray]) -> None:
+        """Adds columns; one of the name of an earlier one takes its place."""
+        for name, values in columns.items():
+            if values.dtype.hasobject:
+                self._columns[name] = values
+            else:
+                kept = self.store.column(self.rows, values.dtype, values.shape[1:])
+                kept[:] = values
+                self._columns[name] = kept
+
+    def objects(self) -> dict[str, np.ndarray]:
+        """The columns of texts and lists."""
+        return {name: values for name, values in self._columns.items() if isinstance(values, np.ndarray)}
+
+    def frame(self, rows: Union[slice, Sequence[int]]) -> pd.DataFrame:
+        """Give some rows: neighbours, or a few by their numbers."""
+        if isinstance(rows, slice):
+            return pd.DataFrame({name: values[rows] for name, values in self._columns.items()})
+        return pd.concat([self.frame(slice(k, k + 1)) for k in rows], ignore_index=True)
+
+    def frames(self) -> Iterator[pd.DataFrame]:
+        """Give all rows in pieces; a table without any is one piece without any."""
+        for first in range(0, max(self.rows, 1), _PIECE_ROWS):
+            yield self.frame(slice(first, first + _PIECE_ROWS))
+
+
+def flight_table(
+    bags: Bags, rate: Optional[float] = None, topics: Sequence[str] = (), folder: Optional[Path] = None
+) -> FlightTable:
     """Make the table of a flight.
 
     Args:
         bags: Open bags of one flight.
         rate: [1/s] of a uniform time base; None: one row per flight state, nothing interpolated.
         topics: Further topics whose newest values at each row are added, prefixed by their name below the name space.
+        folder: Where its temporary file lies; Python's choice when omitted.
 
     Returns:
         ``stamp_ns`` (int64), ``time_s`` since the first row, every field of FlightState with its unit in the name, the
@@ -33,38 +84,71 @@ def flight_table(bags: Bags, rate: Optional[float] = None, topics: Sequence[str]
     Raises:
         BagError: No flight state in the bag, or no such further topic.
     """
+    store = ColumnFile(folder)
     topic = topic_of(bags, STATE)
-    table, units = bags.read(topic), bags.units(topic)
-    order = np.argsort(table.stamp, kind="stable")
-    stamp = table.stamp[order]
-    columns = {name: values[order] for name, values in table.columns.items()}
-    base = stamp
+    units = bags.units(topic)
+    state = bags.read(topic, store=store).by_stamp()
+    base, columns = state.stamp, iter(state.columns.items())
     if rate is not None:
-        parts = segments(stamp, columns["epoch"], DEFAULT_MAX_GAP)
-        base = time_base(stamp, parts, rate)
-        columns = on_base(base, stamp, columns, units, parts)
-    data: dict[str, Any] = {"stamp_ns": base, "time_s": (base - base[0]) / 1e9 if len(base) else np.empty(0)}
-    data.update(named(columns, units))
-    data.update(labels(bags, base))
+        parts = segments(state.stamp, state["epoch"], DEFAULT_MAX_GAP)
+        base = time_base(state.stamp, parts, rate)
+        columns = on_base(base, state.stamp, state.columns, units, parts)
+    table = FlightTable(len(base), store)
+    table.add({"stamp_ns": base, "time_s": (base - base[0]) / 1e9 if len(base) else np.empty(0)})
+    for path, values in columns:
+        table.add(named({path: values}, units))
+    table.add(labels(bags, base))
     for other in topics:
-        data.update(_newest(bags, other, base, topic.rsplit("/", 1)[0]))
-    return pd.DataFrame(data)
+        _add_newest(table, bags, other, base, topic.rsplit("/", 1)[0])
+    return table
 
 
-def _newest(bags: Bags, topic: str, base: np.ndarray, space: str) -> dict[str, np.ndarray]:
+def _add_newest(table: FlightTable, bags: Bags, topic: str, base: np.ndarray, space: str) -> None:
     full = topic if topic.startswith("/") else f"{space}/{topic}"
-    table, units = bags.read(full), bags.units(full)
-    order = np.argsort(table.stamp, kind="stable")
-    columns = {name: held(base, table.stamp[order], values[order]) for name, values in table.columns.items()}
+    units = bags.units(full)
+    other = bags.read(full, store=table.store).by_stamp()
     prefix = full[len(space) :].strip("/") if full.startswith(space + "/") else full.strip("/")
-    return named(columns, units, prefix.replace("/", "_"))
+    for path, values in other.columns.items():
+        table.add(named({path: held(base, other.stamp, values)}, units, prefix.replace("/", "_")))
 
 
-def write_csv(frame: pd.DataFrame, path: Path) -> None:
+def write_csv(table: FlightTable, path: Path) -> None:
     """Write a table as CSV; numbers read back to the very same values."""
-    frame.to_csv(path, index=False, lineterminator="\n")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for k, frame in enumerate(table.frames()):
+            frame.to_csv(file, index=False, header=k == 0, lineterminator="\n")
 
 
-def write_parquet(frame: pd.DataFrame, path: Path) -> None:
+def write_parquet(table: FlightTable, path: Path) -> None:
     """Write a table as Parquet with its types."""
-    frame.to_parquet(path, index=False)
+    objects = table.objects()
+    # Rows that show what each column of objects holds.
+    filled = (np.flatnonzero([value is not None for value in values])[:1].tolist() for values in objects.values())
+    rows = sorted({row for of_column in filled for row in of_column}) or [0]
+    write_frames(path, table.frames(), schema_of(table.frame(rows[: table.rows]), objects))
+
+
+def schema_of(sample: pd.DataFrame, objects: Mapping[str, np.ndarray]) -> Any:
+    """Give Arrow's schema of a table.
+
+    Args:
+        sample: Some of its rows.
+        objects: Whole columns, those whose type follows from all of their values.
+    """
+    import pyarrow as pa
+
+    schema = pa.Schema.from_pandas(sample, preserve_index=False)
+    for name, values in objects.items():
+        whole = pa.Schema.from_pandas(pd.DataFrame({name: values}), preserve_index=False).field(name)
+        schema = schema.set(schema.get_field_index(name), whole)
+    return schema
+
+
+def write_frames(path: Path, frames: Iterable[pd.DataFrame], schema: Any) -> None:
+    """Write pieces of a table as one Parquet file."""
+    import pyarrow as pa
+    from pyarrow.parquet import ParquetWriter
+
+    with ParquetWriter(path, schema) as writer:
+        for frame in frames:
+            writer.write_table(pa.Table.from_pandas(frame, schema=schema, preserve_index=False))

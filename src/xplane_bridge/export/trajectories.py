@@ -32,7 +32,7 @@ def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np
     Raises:
         BagError: No odometry in the bag.
     """
-    table = bags.read(topic_of(bags, ODOMETRY), ["header.stamp", "pose.pose"])
+    table = bags.read(topic_of(bags, ODOMETRY), ["header.stamp", *_POSITION, *_ORIENTATION])
     order = np.argsort(table.stamp, kind="stable")
     stamp = table.stamp[order]
     position = np.stack([table[name][order] for name in _POSITION], axis=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
-from typing import TYPE_CHECKING, Any, Mapping, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
@@ -31,18 +31,23 @@ _THUMBNAIL_WIDTH = 320
 _LINK_STATES = words(LinkState)
 
 
-def build(bags: Bags, flight: Flight, labels: Optional[Labels] = None) -> tuple[str, list[TimeFigure | PathFigure]]:
+def build(
+    bags: Bags,
+    flight: Flight,
+    labels: Optional[Labels] = None,
+    made: Callable[[Union[TimeFigure, PathFigure]], None] = lambda _: None,
+) -> str:
     """Make the report.
 
     Args:
         bags: Open; images are streamed from them.
         flight: Read from `bags`.
         labels: Of its pictures, to be drawn into some.
+        made: Takes each figure as it is made (for PNG files); none is kept, they hold the whole flight.
 
     Returns:
-        The page, and the figures on it (for PNG files).
+        The page.
     """
-    made: list[TimeFigure | PathFigure] = []
     sections: list[Section] = [("summary", "Summary", _summary(flight))]
     for key, title, make in all_figures():
         try:
@@ -50,15 +55,16 @@ def build(bags: Bags, flight: Flight, labels: Optional[Labels] = None) -> tuple[
         except MissingError as error:
             sections.append((key, title, missing(str(error))))
             continue
-        made.append(figure)
+        made(figure)
         linked = " data-time" if hasattr(figure, "panels") else ""
         sections.append((key, title, f"<div{linked}>{interactive.draw(figure, flight.start)}</div>"))
+        del figure
     sections.append(("images", "Images and their state", _strip(bags, flight)))
     if labels is not None:
         sections.append(("labels", "Labels in the images", overlay.section(bags, labels, flight.start)))
     sections.append(("quality", "Data quality", _quality(flight)))
     sections.append(("experiment", "How it was made", passport_section(read_passports(bags))))
-    return _page(flight, bags, sections), made
+    return _page(flight, bags, sections)
 
 
 def _page(flight: Flight, bags: Bags, sections: Sequence[Section]) -> str:

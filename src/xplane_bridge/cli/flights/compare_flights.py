@@ -13,6 +13,7 @@ import yaml
 
 from xplane_bridge.analysis.comparison import SIGNALS, Matched
 from xplane_bridge.bags import Bags
+from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.flight import Flight, read_flight
 from xplane_bridge.bags.passport import Passport, read_passports
 from xplane_bridge.cli.entry import guarded
@@ -74,7 +75,13 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(argv)
     if args.match and args.event is not None:
         raise CompareError("--match and --event: give one of them")
-    found = [read(path, variant) for path, variant in paths_of(args.flights)]
+    paths = paths_of(args.flights)
+    try:
+        args.output.parent.mkdir(parents=True, exist_ok=True)
+        store = ColumnFile(args.output.parent)
+        found = [read(path, variant, store) for path, variant in paths]
+    except OSError as error:
+        raise CompareError(f"{error.filename or args.output}: {error.strerror}") from None
     if len(found) < 2:
         raise CompareError(f"{found[0].path}: one flight alone; give two or more")
     by = args.match or ("event" if args.event is not None else usual(found))
@@ -85,7 +92,6 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     flights = [matched(each, name, by, args.event) for each, name in zip(found, names)]
     text = comparison.build(flights, [each.passport for each in found], zero)
     try:
-        args.output.parent.mkdir(parents=True, exist_ok=True)
         args.output.write_text(text, encoding="utf-8")
     except OSError as error:
         raise CompareError(f"{args.output}: {error.strerror}") from None
@@ -120,8 +126,8 @@ def short_names(paths: Sequence[Path]) -> List[str]:
     return ["/".join(each[common:]) for each in parts]
 
 
-def read(path: Path, variant: str) -> Read:
-    """Read one flight.
+def read(path: Path, variant: str, store: Optional[ColumnFile] = None) -> Read:
+    """Read one flight; its columns into `store`, into memory when omitted.
 
     Raises:
         BagError: The bag cannot be read.
@@ -129,7 +135,7 @@ def read(path: Path, variant: str) -> Read:
     """
     labels: Dict[str, int] = {}
     with Bags(path) as bags:
-        flight = read_flight(bags)
+        flight = read_flight(bags, store)
         passports = read_passports(bags)
         for topic, info in bags.topics.items():
             if topic.endswith("scenario/label") and info.count:
