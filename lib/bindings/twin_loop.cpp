@@ -41,7 +41,7 @@ class Loop {
     pitch_ = attribute(model, "_pitch");
     heading_ = attribute(model, "_heading");
     airspeed_ = attribute(model, "_airspeed");
-    gear_ = attribute(model, "_gear_setter");
+    gear_ = attribute(attribute(model, "_gear").get(), "_set_extension");
     wind_ = getters("_wind_setters");
     const Object fdm = attribute(model, "_fdm");
     run_ = attribute(fdm.get(), "run");
@@ -136,7 +136,7 @@ class Loop {
       steady_wind_[axis] = number(wind.at(axis).get());
       gravity_[axis] = number(gravity.at(axis).get());
     }
-    gear_position_ = number(attribute(model, "_gear_position").get());
+    gear_position_ = number(attribute(attribute(model, "_gear").get(), "position").get());
     fdm_step_ = number(attribute(model, "_fdm_step").get());
     crashed_ = PyObject_IsTrue(attribute(model, "_crashed").get()) == 1;
     blown_ = false;

@@ -12,9 +12,12 @@ import cv2
 import numpy as np
 import pytest
 
+from support.export_flight import write_flight
 from support.synthetic_flight import FlightBag, stamp_ns, write_states
+from xplane_bridge.analysis.quality import QUALITY_WORDS
 from xplane_bridge.cli import flight_report
 from xplane_bridge.plotting.spec import SHADES, Panel, Series
+from xplane_bridge.resources import share_dir
 
 RATE = 50.0
 
@@ -144,6 +147,23 @@ def test_the_quality_section_finds_the_gap_and_judges_physics(page: Path) -> Non
     force = re.search(r"<tr><td>specific force against dv/dt</td>.*?</tr>", text).group(0)
     assert "violated" in force
     assert "40 images, 100.0 % with a state, 100.0 % without" in text
+
+
+def test_quality_bits_of_the_pictures_are_said_in_words(tmp_path: Path) -> None:
+    bag = write_flight(tmp_path / "flight.bag")  # one of 19 is frozen, one interpolated with a delay that is assumed
+    assert flight_report.main([str(bag), "-o", str(tmp_path / "report.html")]) == 0
+    text = section(tmp_path / "report.html", "quality")
+    rows = re.findall(r"<tr><td>([a-z ]+)</td><td>([^<]+)</td><td[^>]*>([\d.]+) %</td></tr>", text)
+    assert rows == [
+        ("interpolated", "its state lies between two received ones, which come more slowly than frames", "5.3"),
+        ("frozen", "the window stood still while the aircraft moved", "5.3"),
+        ("delay assumed", "the delay of the display was not measured: the state may be frames off", "5.3"),
+    ]
+
+
+def test_each_quality_bit_has_words() -> None:
+    text = (share_dir() / "msg" / "FrameState.msg").read_text(encoding="utf-8")
+    assert set(re.findall(r"^uint32 QUALITY_(\w+) *=", text, re.MULTILINE)) == set(QUALITY_WORDS)
 
 
 def test_commanded_achieved_and_failures_are_drawn(page: Path) -> None:
