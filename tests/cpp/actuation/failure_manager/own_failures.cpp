@@ -1,0 +1,134 @@
+#include "fixture.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+// ------------------------------------------------------------------------------- X-Plane 12's own failures of surfaces
+
+TEST_F(FailureManagerTest12, XPlanesOwnFailureOfASurfaceIsUsedWhereItActs) {
+  airframe_.setStick(0.25);
+  sim_.run(0.1);
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.path == kLock && message.value == 6.0F) airframe_.hold(FakeAirframe::kLeft, 5.5);
+  };
+  after(0.2, [this] { airframe_.setStick(0.5); });
+  require(broken(FakeAirframe::kLeft, "stuck"));
+  EXPECT_EQ(sim_.value(kLock), 6.0F);
+  EXPECT_EQ(state(), SurfaceControlState::kIdle);
+  EXPECT_NEAR(label(FakeAirframe::kLeft).value, 5.5, 1e-4) << "where it got stuck";
+  requireClear();
+  EXPECT_EQ(sim_.value(kLock), 0.0F);
+}
+
+TEST_F(FailureManagerTest12, DriverTakesOverWhereXPlanesOwnFailureDoesNotAct) {
+  airframe_.setStick(0.25);
+  sim_.run(0.1);
+  after(0.3, [this] { airframe_.setStick(0.5); });
+  const double begin = sim_.time();
+  require(broken(FakeAirframe::kLeft, "stuck"));
+  EXPECT_TRUE(
+      reported("aileron1_wing2_left: X-Plane's own failure does not act as it says, so that tx_node drives the "
+               "surfaces",
+               kWho, true));
+  EXPECT_GE(sim_.time() - begin, 1.0) << "it is given a second";
+  EXPECT_EQ(sim_.value(kLock), 0.0F) << "it is repaired";
+  EXPECT_EQ(state(), SurfaceControlState::kDriving);
+  sim_.run(0.5);
+  EXPECT_NEAR(sim_.value(kLeft), 5.0, 1e-4) << "where it was when it was to get stuck";
+  EXPECT_NEAR(sim_.value(kRight), -10.0, 1e-4);
+  EXPECT_TRUE(label(FakeAirframe::kLeft).confirmed);
+}
+
+TEST_F(FailureManagerTest12, DriverTakesOverWhereXPlaneDoesNotShowItsFailure) {
+  sim_.setReadOnly(kLock);
+  const double begin = sim_.time();
+  require(broken(FakeAirframe::kLeft, "stuck"));
+  EXPECT_NEAR(sim_.time() - begin, 2.1, 0.15);
+  EXPECT_EQ(state(), SurfaceControlState::kDriving);
+  requireClear();
+  EXPECT_EQ(state(), SurfaceControlState::kIdle);
+}
+
+TEST_F(FailureManagerTest12, DriverThatCannotTakeOverGivesTheFailureUp) {
+  airframe_.setStick(0.25);
+  sim_.run(0.1);
+  after(0.2, [this] { airframe_.setStick(0.5); });
+  after(0.3, [this] { blocked_ = "the aircraft is another one"; });
+  const RequestResult result = set(broken(FakeAirframe::kLeft, "stuck"));
+  EXPECT_EQ(result.code, ResultCode::kTimeout);
+  EXPECT_EQ(result.text, "the aircraft is another one");
+  EXPECT_TRUE(labelNames().empty());
+}
+
+TEST_F(FailureManagerTest12, HardOverOfXPlanesMustReachTheEndOfTheTravel) {
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.path.find("ailn_1_lft_mxup") != std::string::npos && message.value == 6.0F) {
+      airframe_.hold(FakeAirframe::kLeft, -19.0);
+    }
+  };
+  require(broken(FakeAirframe::kLeft, "hard_over_up"));
+  EXPECT_EQ(state(), SurfaceControlState::kIdle) << "within 2 deg";
+}
+
+struct OwnCase {
+  std::string kind;
+  std::string event;  // the end of X-Plane's own name
+  double shown;       // [deg] where X-Plane brings the left aileron, from 5
+};
+const std::vector<OwnCase> kOwnCases{{"stuck", "lock", 5.0},
+                                     {"hard_over_up", "mxup", -20.0},
+                                     {"hard_over_down", "mxdn", 20.0},
+                                     {"centred", "cntr", 0.0}};
+
+TEST_F(FailureManagerTest12, EachOwnFailureIsBelievedWhereTheSurfaceGoesAsItSays) {
+  for (const OwnCase& each : kOwnCases) {
+    SCOPED_TRACE(each.kind);
+    airframe_.letGo(FakeAirframe::kLeft);
+    airframe_.setStick(0.25);
+    sim_.run(1.2);
+    const std::string own = "sim/operation/failures/rel_fcon_ailn_1_lft_" + each.event;
+    sim_.on_message = [&](const core::FakeSimulator::Message& message) {
+      if (message.path == own && message.value == 6.0F) airframe_.hold(FakeAirframe::kLeft, each.shown);
+    };
+    after(0.2, [this] { airframe_.setStick(-0.25); });
+    require(broken(FakeAirframe::kLeft, each.kind));
+    EXPECT_EQ(sim_.value(own), 6.0F);
+    EXPECT_EQ(state(), SurfaceControlState::kIdle);
+    requireClear();
+    EXPECT_EQ(sim_.value(own), 0.0F);
+  }
+}
+
+TEST_F(FailureManagerTest12, EachOwnFailureGivesWayToTheDriverWhereTheSurfaceDoesNotGoThere) {
+  for (const OwnCase& each : kOwnCases) {
+    SCOPED_TRACE(each.kind);
+    airframe_.setStick(0.25);
+    sim_.run(1.2);
+    after(0.2, [this] { airframe_.setStick(-0.25); });
+    require(broken(FakeAirframe::kLeft, each.kind));
+    EXPECT_EQ(sim_.value("sim/operation/failures/rel_fcon_ailn_1_lft_" + each.event), 0.0F);
+    EXPECT_EQ(state(), SurfaceControlState::kDriving);
+    sim_.run(1.0);
+    EXPECT_NEAR(sim_.value(kLeft), each.shown, 1e-4);
+    EXPECT_NEAR(sim_.value(kRight), 5.0, 1e-4);
+    requireClear();
+  }
+}
+
+TEST_F(FailureManagerTest12, LostSurfaceIsXPlanesAlone) {
+  require(broken(FakeAirframe::kLeft, "gone"));
+  EXPECT_EQ(sim_.value("sim/operation/failures/rel_fcon_ailn_1_lft_gone"), 6.0F);
+  requireClear();
+  sim_.setReadOnly("sim/operation/failures/rel_fcon_ailn_1_lft_gone");
+  const RequestResult result = set(broken(FakeAirframe::kLeft, "gone"));
+  EXPECT_EQ(result.code, ResultCode::kTimeout);
+  EXPECT_EQ(result.text, "X-Plane does not show it");
+}
+
+TEST_F(FailureManagerTest12, WhatXPlaneCannotExpressIsDrivenAtOnce) {
+  require(broken(FakeAirframe::kLeft, "reduced", 0.5));
+  EXPECT_EQ(state(), SurfaceControlState::kDriving);
+}
+
+}  // namespace
+}  // namespace xplane_bridge

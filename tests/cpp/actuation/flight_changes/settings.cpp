@@ -1,0 +1,148 @@
+#include "fixture.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+TEST_F(FlightChangesTest, WindIsWrittenUntilTheAirShowsIt) {
+  const auto shown = core::shownWindDatarefs(core::kXPlane11);
+  after(1.5, [&] {
+    sim_.set(shown[0], 12.0F);
+    sim_.set(shown[1], 250.0F);
+  });
+  expect(changes_.applyWind({12.0, 250.0, 0.0}), EventKind::kSetting, "the wind blows as asked for");
+  const std::size_t once = core::windWrites({12.0, 250.0, 0.0}, core::kXPlane11).size();
+  EXPECT_EQ(sim_.writes().size(), 2 * once) << "again after a second";
+}
+
+TEST_F(FlightChangesTest, WindThatDoesNotBlowIsReported) {
+  const auto shown = core::shownWindDatarefs(core::kXPlane11);
+  sim_.set(shown[0], 3.0F);
+  sim_.set(shown[1], 90.0F);
+  flight_.setPaused(true);
+  const double begin = sim_.time();
+  expectFailure(changes_.applyWind({12.0, 250.0, 0.0}), EventKind::kSetting,
+                "set_wind: the air at the aircraft does not show it, but 3.000000 m/s from 90.000000 deg (it is "
+                "paused)");
+  EXPECT_NEAR(sim_.time() - begin, 2.0, 0.3);
+}
+
+// ------------------------------------------------------------------------------------------------ loading
+
+TEST_F(FlightChangesTest, LoadingIsShown) {
+  sim_.setAll({"sim/flightmodel/weight/m_fuel[0]", "sim/flightmodel/weight/m_fixed"}, 0.0F);
+  sim_.loseMessages(1);
+  expect(changes_.applyLoading({{80.0}, 100.0, {}}), EventKind::kSetting, "the aircraft is loaded as asked for");
+  EXPECT_EQ(sim_.value("sim/flightmodel/weight/m_fuel[0]"), 80.0F);
+  EXPECT_EQ(sim_.value("sim/flightmodel/weight/m_fixed"), 100.0F);
+}
+
+TEST_F(FlightChangesTest12, PayloadGoesByTheStations) {
+  const auto stations = core::stationDatarefs(sim_.status().version);
+  sim_.setAll(stations, 0.0F);
+  sim_.set(stations[2], 40.0F);
+  sim_.set(stations[3], 10.0F);
+  sim_.set("sim/flightmodel/weight/m_fixed", 50.0F);
+  sim_.setReadOnly("sim/flightmodel/weight/m_fixed");  // it is their sum, whatever is written
+  const auto before = sim_.on_frame;
+  sim_.on_frame = [this, before, stations] {
+    if (before) before();
+    float sum = 0.0F;
+    for (const std::string& name : stations) sum += sim_.value(name);
+    sim_.set("sim/flightmodel/weight/m_fixed", sum);
+  };
+  expect(changes_.applyLoading({{}, 100.0, {}}), EventKind::kSetting, "the aircraft is loaded as asked for");
+  EXPECT_EQ(sim_.value(stations[2]), 80.0F);
+  EXPECT_EQ(sim_.value(stations[3]), 20.0F);
+}
+
+TEST_F(FlightChangesTest12, PayloadOfAnAircraftWithoutStationsGoesAsASum) {
+  sim_.set("sim/flightmodel/weight/m_fixed", 0.0F);
+  expect(changes_.applyLoading({{}, 100.0, {}}), EventKind::kSetting, "the aircraft is loaded as asked for");
+  // The same where there are stations that do nothing.
+  sim_.setAll(core::stationDatarefs(sim_.status().version), 0.0F);
+  expect(changes_.applyLoading({{}, 120.0, {}}), EventKind::kSetting, "the aircraft is loaded as asked for");
+  EXPECT_EQ(sim_.value("sim/flightmodel/weight/m_fixed"), 120.0F);
+}
+
+TEST_F(FlightChangesTest, LoadingThatIsNotTakenIsReported) {
+  sim_.set("sim/flightmodel/weight/m_fuel[0]", 5.0F);
+  sim_.setReadOnly("sim/flightmodel/weight/m_fuel[0]");
+  expectFailure(changes_.applyLoading({{80.0}, 100.0, {}}), EventKind::kSetting,
+                "set_loading: sim/flightmodel/weight/m_fuel[0] is 5.000000, not 80.000000, "
+                "sim/flightmodel/weight/m_fixed does not answer");
+}
+
+// ------------------------------------------------------------------------------------------------ time and weather
+
+TEST_F(FlightChangesTest, TimeIsShown) {
+  sim_.setAll({"sim/time/use_system_time", "sim/time/zulu_time_sec"}, 1.0F);
+  sim_.loseMessages(2);
+  core::TimeSetting time;
+  time.zulu_time = 43200.0;
+  expect(changes_.applyTime(time), EventKind::kSetting, "it is the time that was asked for");
+  EXPECT_EQ(sim_.value("sim/time/use_system_time"), 0.0F);
+  EXPECT_EQ(sim_.value("sim/time/zulu_time_sec"), 43200.0F);
+}
+
+TEST_F(FlightChangesTest, SettingsThatEndWithTheNodeAreInTheJournalAndComeBack) {
+  const std::string name = "sim/weather/temperature_sealevel_c", real = "sim/weather/use_real_weather_bool";
+  sim_.set(name, 15.0F);
+  sim_.set(real, 1.0F);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  weather.sea_level_temperature = 35.0;  // what was there before the first of them counts
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  EXPECT_EQ(sim_.value(name), 35.0F);
+  ASSERT_EQ(sim_.journal()->entries().size(), 1U);
+  EXPECT_EQ(sim_.journal()->entries()[0].undo.size(), 2U);
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  EXPECT_EQ(sim_.value(name), 15.0F);
+  EXPECT_EQ(sim_.value(real), 1.0F);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+TEST_F(FlightChangesTest, SettingsStayWithoutRestoreOnExit) {
+  const std::string name = "sim/weather/temperature_sealevel_c";
+  sim_.set(name, 15.0F);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  EXPECT_EQ(sim_.value(name), 30.0F);
+}
+
+TEST_F(FlightChangesTest, WhatCouldNotBePutBackIsNotChanged) {
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  expectFailure(changes_.applyWeather(weather), EventKind::kSetting,
+                "set_weather: X-Plane does not report sim/weather/temperature_sealevel_c, which could not be put back "
+                "on exit");
+  EXPECT_TRUE(sim_.writes().empty());
+}
+
+TEST_F(FlightChangesTest, WeatherThatIsNotTakenIsReported) {
+  const std::string name = "sim/weather/temperature_sealevel_c";
+  sim_.set(name, 15.0F);
+  sim_.setReadOnly(name);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  expectFailure(changes_.applyWeather(weather), EventKind::kSetting, "set_weather: " + name + " is 15, not 30");
+}
+
+TEST_F(FlightChangesTest, WeatherThatXPlaneDoesNotHaveIsRefused) {
+  core::Weather weather;
+  weather.clouds.emplace(4);
+  expectFailure(changes_.applyWeather(weather), EventKind::kSetting,
+                "set_weather: X-Plane before 12.08 has 3 layers of clouds: 4 are given");
+  EXPECT_TRUE(sim_.writes().empty());
+}
+
+// ------------------------------------------------------------------------------------------------ aircraft
+
+}  // namespace
+}  // namespace xplane_bridge
