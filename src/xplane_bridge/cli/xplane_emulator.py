@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import json
 import logging
 import signal
@@ -53,6 +54,7 @@ def main(arguments: Optional[Sequence[str]] = None, make: Callable[[Options], Em
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, stop)
         print("READY " + json.dumps(emulator.describe()), flush=True)
+        gc.freeze()  # what there is now stays: looking through it again would take milliseconds of a frame
         emulator.run()
     except KeyboardInterrupt:
         pass

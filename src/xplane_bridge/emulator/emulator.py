@@ -86,6 +86,7 @@ class Emulator:
         self._beacon = self._new_beacon()
         self._truth = TruthFile(options.truth, self.sim.model) if options.truth is not None else None
         self._frames = 0
+        self._truth_frame = -1
         self._loading_until = -math.inf
         self._sent_at: List[float] = []
         self._jitter = np.random.default_rng(options.seed)
@@ -163,6 +164,8 @@ class Emulator:
         limit = o.request_limit if self._fences is None else sys.maxsize
         server = Server(o.bind, port, handlers, subscriptions, self._channel, limit, o.answer_from)
         server.data_target = o.data_target
+        if self._fences is not None:
+            server.hold()
         return server
 
     def _new_beacon(self) -> Optional[Beacon]:
@@ -241,8 +244,8 @@ class Emulator:
         server.flush_delayed(now)
         if self._xplane_connect is not None:
             self._xplane_connect.answer()
-        if self._truth is not None and sim.flying:
-            self._truth.write(sim.frame, host_time)
+        if self._fences is None:
+            self._write_truth(host_time)
         if self.view is not None and not (self._frames % 2 and "window-changes" in self.options.otherwise):
             self.view.show(sim)
             self._wait_for_picture(self.view)
@@ -259,6 +262,13 @@ class Emulator:
             self._rpos_packet,
             sim.table.plan,
         )
+
+    def _write_truth(self, host_time: float = math.nan) -> None:
+        sim = self.sim
+        # In lock-step also asked for after frames that have not happened: files are read, X-Plane is away.
+        if self._truth is not None and sim.flying and sim.clocks.frame != self._truth_frame:
+            self._truth_frame = sim.clocks.frame
+            self._truth.write(sim.frame, host_time)
 
     def _reads_a_load(self, server: Server) -> bool:
         """Takes what clients sent, up to a request that has files loaded; returns whether there was one."""
@@ -404,6 +414,7 @@ class Emulator:
             lambda: self.server,
             fences,
             lambda: self.step_frames(1),
+            self._write_truth,
             self._send,
             lambda: self.sim.clocks.running,
             self.period,

@@ -2,7 +2,9 @@
 
 The fence is a dataref that no X-Plane has, `FENCE`: its elements are the frame's number, whole seconds and microseconds
 of simulated time, each exact in float32. Who subscribes to it, at whatever rate, gets it after everything else that is
-sent in a frame. A DREF that writes a frame's number to it lets the simulator fly on from that frame.
+sent in a frame. A program with many sockets names the port of one of them by `GROUP`: that one gets every fence, as the
+last of them; the others get it in frames that send them something, at the end of that datagram. A DREF that writes a
+frame's number to the fence lets the simulator fly on from that frame.
 
 Frame 0 does not fly: it is sent again and again, in real time, until it is answered, so that clients can subscribe.
 """
@@ -13,17 +15,24 @@ import math
 import re
 import select
 import time
-from typing import Callable, Dict, Optional, Tuple
+from collections import Counter
+from typing import Callable, Dict, List, Optional, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.emulator.wire.server import Server
-from xplane_bridge.emulator.wire.subscriptions import Address
+from xplane_bridge.emulator.wire.subscriptions import Address, Datagram
 
 FENCE = "xplane_bridge/lockstep"
-#: Of a client: its index and the element.
+#: Its element is the port of the group's first socket; its value, how many sockets of the group get this fence.
+GROUP = "xplane_bridge/lockstep_group"
+#: Of a client: its index and the element; that of the group is negative.
 Pairs = Tuple[Tuple[int, int], ...]
+_GROUP = re.compile(re.escape(GROUP) + r"\[(\d{1,5})\]")
+_SOCKETS = -1
 _ELEMENT = re.compile(re.escape(FENCE) + r"(?:\[([0-2])\])?")
 _MICROSECONDS = 1_000_000
+#: RREF datagram [bytes].
+_LONGEST = protocol.HEADER_SIZE + protocol.RREF_MAX_PAIRS * protocol.RREF_PAIR_SIZE
 #: Longest wait without looking whether to stop [s].
 _PATIENCE_S = 0.25
 
@@ -34,31 +43,41 @@ class Fences:
     def __init__(self) -> None:
         self.answered = -1  #: number of the newest frame that may be left; -1: none
         self._clients: Dict[Address, Dict[int, int]] = {}  # of a client: its index to the element
+        self._groups: Dict[Address, Address] = {}  # of a client: the first socket of its group
+        self._always: List[Tuple[Address, Pairs]] = []  # who gets every fence
+        self._pairs: Dict[Address, Pairs] = {}
 
     def request(self, request: protocol.RrefRequest, client: Address) -> bool:
         """Takes a subscription or its end; returns whether it is one of the fence."""
-        match = _ELEMENT.fullmatch(request.path)
-        if match is None:
+        match, group = _ELEMENT.fullmatch(request.path), _GROUP.fullmatch(request.path)
+        if match is None and group is None:
             return False
         indices = self._clients.setdefault(client, {})
         if request.rate_hz > 0:
-            indices[request.index] = int(match.group(1) or 0)
+            indices[request.index] = _SOCKETS if match is None else int(match.group(1) or 0)
+            if group is not None:
+                self._groups[client] = (client[0], int(group.group(1)))
         else:
             indices.pop(request.index, None)
         if not indices:
             del self._clients[client]
+            self._groups.pop(client, None)
+        self._pairs = {each: tuple(elements.items()) for each, elements in self._clients.items()}
+        firsts = [each for each in self._clients if self._groups.get(each) == each]
+        others = [each for each in self._clients if each not in self._groups]
+        self._always = [(each, self._pairs[each]) for each in others + firsts]
         return True
 
     def write(self, request: protocol.DrefWrite) -> bool:
         """Takes the answer to a frame; returns whether it is one."""
-        if _ELEMENT.fullmatch(request.path) is None:
+        if not request.path.startswith(FENCE) or _ELEMENT.fullmatch(request.path) is None:
             return False
         if math.isfinite(request.value):
             self.answered = max(self.answered, int(request.value))
         return True
 
     def send(self, server: Server, now: float, frame: int, sim_time: float) -> None:
-        """Ends a frame.
+        """Ends a frame: sends what the server has held of it, with the fences.
 
         Args:
             server: The sockets.
@@ -68,14 +87,40 @@ class Fences:
         """
         microseconds = round(sim_time * _MICROSECONDS)
         values = (float(frame), float(microseconds // _MICROSECONDS), float(microseconds % _MICROSECONDS))
-        packets: Dict[Pairs, bytes] = {}  # mostly one: clients ask for the elements alike
-        datagrams = []
-        for client, indices in self._clients.items():
-            key = tuple(indices.items())
-            if key not in packets:
-                packets[key] = protocol.encode_rref_response([(index, values[element]) for index, element in key])
-            datagrams.append((packets[key], client))
-        server.send_all(now, datagrams)
+        server.send_all(now, self._ended(server.take_held(), values))
+
+    def _ended(self, datagrams: List[Datagram], values: Tuple[float, ...]) -> List[Datagram]:
+        """A frame's datagrams with the fences behind them."""
+        due: Dict[Address, int] = {}  # clients of groups that are sent something: place of the last datagram
+        out: List[Datagram] = []
+        last: List[Datagram] = []  # to first sockets of groups
+        for packet, client in datagrams:
+            group = self._groups.get(client)
+            if group == client:
+                last.append((packet, client))
+                continue
+            if group is not None:
+                due[client] = len(out)
+            out.append((packet, client))
+        sockets = Counter(self._groups[client] for client in due)
+        sockets.update(client for client, _ in self._always)
+        packets: Dict[Tuple[Pairs, int], bytes] = {}  # few: clients ask for the elements alike
+
+        def fence(pairs: Pairs, count: int) -> bytes:
+            if (pairs, count) not in packets:
+                elements = (*values, float(count))  # its last is that of _SOCKETS
+                packets[pairs, count] = protocol.encode_rref_response([(i, elements[element]) for i, element in pairs])
+            return packets[pairs, count]
+
+        for client, place in due.items():
+            packet, ending = out[place][0], fence(self._pairs[client], sockets[self._groups[client]])
+            if packet[:4] == ending[:4] and len(packet) + len(ending) <= _LONGEST:
+                out[place] = (packet + ending[protocol.HEADER_SIZE :], client)
+            else:
+                out.append((ending, client))
+        out += last
+        out += [(fence(pairs, sockets[client]), client) for client, pairs in self._always]
+        return out
 
 
 class LockstepLoop:
@@ -85,6 +130,7 @@ class LockstepLoop:
         server: Gives the sockets.
         fences: Of these.
         fly: Flies a frame and sends what is due in it.
+        after_fence: Does what remains of a frame, while clients answer it.
         hold: Sends what is due without flying; gets the time on the loop's clock [s].
         sim_time: Gives the simulated time [s].
         period: Time of one frame [s].
@@ -96,6 +142,7 @@ class LockstepLoop:
         server: Callable[[], Server],
         fences: Fences,
         fly: Callable[[], None],
+        after_fence: Callable[[], None],
         hold: Callable[[float], None],
         sim_time: Callable[[], float],
         period: float,
@@ -104,6 +151,7 @@ class LockstepLoop:
         self._server = server
         self._fences = fences
         self._fly = fly
+        self._after_fence = after_fence
         self._hold = hold
         self._sim_time = sim_time
         self._period = period
@@ -127,6 +175,7 @@ class LockstepLoop:
             self._fly()
             self._fences.send(self._server(), frame * self._period, frame, self._sim_time())
             sent = time.monotonic()
+            self._after_fence()
             while self._fences.answered < frame and not stopping():
                 self._await(frame, _PATIENCE_S, stopping)
             self.waited += time.monotonic() - sent

@@ -13,6 +13,7 @@ from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.options import KINEMATIC, Options, parse
 
 FENCE = "xplane_bridge/lockstep"
+GROUP = "xplane_bridge/lockstep_group"
 TIME = "sim/time/total_running_time_sec"
 FENCE_INDEX = 900
 
@@ -122,6 +123,41 @@ def test_fences_come_last_on_every_socket_and_slow_groups_start_with_the_flight(
         fence, pairs = fast.frame()
         assert (fence[0], len(pairs)) == (number + 1, 2)
     assert counts == [1, 0, 0, 0, 0] * 2  # 10 a second at 50 frames a second, wherever the hold ended
+
+
+def test_sockets_of_a_group_get_a_fence_with_what_else_they_get_and_the_first_says_how_many(fly):
+    port = fly().port
+    first, slow, fast = Client(port), Client(port), Client(port)
+    group = f"{GROUP}[{first.socket.getsockname()[1]}]"
+    for client in (first, slow, fast):
+        client.subscribe([group], first_index=FENCE_INDEX + 8)
+    slow.ask([TIME], rate_hz=10)
+    fast.ask([TIME, "sim/time/paused"])
+    first.ask([])
+    frame_0 = {FENCE_INDEX: 0.0, FENCE_INDEX + 8: 3.0}
+    while not frame_0.items() <= dict(protocol.decode_rref_response(first.wait())).items():
+        pass  # all requests have been read, and all three get something
+    first.answer(0)
+    while dict(protocol.decode_rref_response(fast.wait())).get(FENCE_INDEX) != 1.0:
+        pass
+    while first.frame()[0][0] != 1:
+        pass
+    while dict(protocol.decode_rref_response(slow.wait())).get(FENCE_INDEX) != 1.0:
+        pass
+    for number in range(2, 12):
+        first.answer(number - 1)
+        fence = dict(protocol.decode_rref_response(first.wait()))
+        with_slow = number in (6, 11)  # 10 a second at 50 frames a second
+        assert (fence[FENCE_INDEX], fence[FENCE_INDEX + 8]) == (number, 3.0 if with_slow else 2.0)
+        pairs = protocol.decode_rref_response(fast.wait())
+        assert [index for index, _ in pairs[:2]] == [0, 1]
+        assert dict(pairs[2:]) == fence
+        if with_slow:
+            assert dict(protocol.decode_rref_response(slow.wait())).items() >= fence.items()
+        slow.socket.settimeout(0.0)
+        with pytest.raises(BlockingIOError):
+            slow.socket.recv(2000)
+        slow.socket.settimeout(10.0)
 
 
 def test_a_write_before_the_answer_acts_in_the_next_frame(fly):

@@ -80,7 +80,8 @@ class DatarefStore:
         self._by_name: Dict[str, Dataref] = {}
         self._first: Dict[str, int] = {}  # slot of the first element by name: what is read most
         self._hooks: Dict[str, List[WriteHook]] = {}
-        self._watched: Set[str] = set()  # names that `dataref` has been asked for
+        self._watched: Set[str] = set()  # names that `dataref` has been asked for, or that were written
+        self._found: Dict[str, Tuple[Dataref, int]] = {}  # clients' paths
         self._idle: Dict[int, Callable[[], None]] = {}  # slot to what begins to compute it
 
     # --- definition ---------------------------------------------------------------------------------------------------
@@ -225,7 +226,9 @@ class DatarefStore:
         if not dataref.visible or not dataref.writable or dataref.kind is Kind.BYTE:
             return False
         stored = float(int(value)) if dataref.kind is Kind.INT else value
-        self.watch(dataref.slots)  # or who reads it first would find what is computed in place of what was written
+        if dataref.name not in self._watched:  # or who reads it first would find what is computed, not what was written
+            self._watched.add(dataref.name)
+            self.watch(dataref.slots)
         self.values[dataref.slots[index]] = stored
         for hook in self._hooks.get(dataref.name, ()):
             hook(index, stored)
@@ -245,6 +248,7 @@ class DatarefStore:
             writable = bool(fact.writable) and not read_only
             dataref = Dataref(name, Kind(fact.kind), slots, fact.is_array, writable, visible)
         self._by_name[name], self._first[name] = dataref, int(slots[0])
+        self._found.clear()
         return dataref
 
     def _fact(self, name: str) -> Tuple[xplane_names.Dataref, bool]:
@@ -257,6 +261,14 @@ class DatarefStore:
 
     def _resolve(self, path: str) -> Optional[Tuple[Dataref, int]]:
         """The dataref that a path means, and the element."""
+        found = self._found.get(path)
+        if found is None:
+            found = self._parse(path)
+            if found is not None:
+                self._found[path] = found
+        return found
+
+    def _parse(self, path: str) -> Optional[Tuple[Dataref, int]]:
         dataref = self._by_name.get(path)
         match = _INDEXED.fullmatch(path)
         if match is None or (dataref is not None and self._brackets):

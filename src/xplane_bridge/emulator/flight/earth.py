@@ -161,9 +161,7 @@ class LocalFrame:
 
     def to_local(self, latitude_deg: float, longitude_deg: float, elevation_m: float) -> Tuple[float, float, float]:
         """X east, Y up, Z south [m] of a place."""
-        radial = -level_axes(latitude_deg, longitude_deg)[2] * (EARTH_RADIUS_M + elevation_m)
-        north, east, down = self.origin_axes @ radial
-        return float(east), float(-down - EARTH_RADIUS_M), float(-north)
+        return self._place(level_axes(latitude_deg, longitude_deg), elevation_m)
 
     def to_geodetic(self, x: float, y: float, z: float) -> Tuple[float, float, float]:
         """Latitude, longitude [deg] and elevation [m MSL] of a local position."""
@@ -176,6 +174,18 @@ class LocalFrame:
         """Rotation from the local level (NED) at a place to the origin's north, east, down axes."""
         axes: np.ndarray = self.origin_axes @ level_axes(latitude_deg, longitude_deg).T
         return axes
+
+    def level_and_place(
+        self, latitude_deg: float, longitude_deg: float, elevation_m: float
+    ) -> Tuple[np.ndarray, Tuple[float, float, float]]:
+        """`from_level` and `to_local` of a place."""
+        axes = level_axes(latitude_deg, longitude_deg)
+        return self.origin_axes @ axes.T, self._place(axes, elevation_m)
+
+    def _place(self, axes: np.ndarray, elevation_m: float) -> Tuple[float, float, float]:
+        radial = -axes[2] * (EARTH_RADIUS_M + elevation_m)
+        north, east, down = self.origin_axes @ radial
+        return float(east), float(-down - EARTH_RADIUS_M), float(-north)
 
     def _move_to(self, lat_ref: float, lon_ref: float) -> None:
         self.lat_ref, self.lon_ref = lat_ref, lon_ref

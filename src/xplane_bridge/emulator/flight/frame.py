@@ -120,8 +120,7 @@ class Frame:
         """Takes over a state of the flight model."""
         self.m = state
         self.origin_jumped = self.local.follow(state.latitude_deg, state.longitude_deg)
-        turn = self.local.from_level(state.latitude_deg, state.longitude_deg)
-        self.position = self.local.to_local(state.latitude_deg, state.longitude_deg, state.altitude_m)
+        turn, self.position = self.local.level_and_place(state.latitude_deg, state.longitude_deg, state.altitude_m)
         velocity = (state.v_north_mps, state.v_east_mps, state.v_down_mps)
         self.velocity = _opengl(turn @ velocity)
         self.acceleration = _opengl(

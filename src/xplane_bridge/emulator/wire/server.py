@@ -12,7 +12,7 @@ import logging
 import socket
 import struct
 from collections import Counter
-from typing import Any, Callable, Dict, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -69,6 +69,7 @@ class Server:
         self.data_target: Optional[Address] = None
         self._data_pacer: Optional[Pacer] = None
         self._data_rate = 0
+        self._held: Optional[List[Datagram]] = None
 
     def close(self) -> None:
         """Closes it."""
@@ -162,7 +163,19 @@ class Server:
         if due:
             packet = position()
             datagrams += [(packet, client) for client in due]
-        self.send_all(now, datagrams)
+        if self._held is None:
+            self.send_all(now, datagrams)
+        else:
+            self._held += datagrams
+
+    def hold(self) -> None:
+        """Keeps from now on what `send_frame` would send, for `take_held`; but for DATA."""
+        self._held = []
+
+    def take_held(self) -> List[Datagram]:
+        """What it has kept since the last call."""
+        held, self._held = self._held or [], []
+        return held
 
     def send_all(self, now: float, datagrams: Sequence[Datagram]) -> None:
         """Sends datagrams in their order, through the faults if there are any."""

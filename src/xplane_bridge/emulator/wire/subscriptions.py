@@ -112,8 +112,7 @@ class RrefClient:
             gather = self._gather(due)
             self._gathers[due] = gather
         slots, pairs = gather
-        with np.errstate(over="ignore"):
-            pairs["value"] = values[slots]
+        pairs["value"] = values[slots]
         header = b"RREF" + bytes([FIFTH_BYTE[b"RREF"]])
         for start in range(0, len(pairs), split):
             yield header + pairs[start : start + split].tobytes()
@@ -176,11 +175,12 @@ class Subscriptions:
             slots = itertools.chain.from_iterable(self.rref[client].slots(rates) for client, rates in due)
             compute = self._plans[due] = plan(slots)
         compute()
-        return [
-            (packet, client)
-            for client, rates in due
-            for packet in self.rref[client].datagrams(rates, values, self.split)
-        ]
+        with np.errstate(over="ignore"):
+            return [
+                (packet, client)
+                for client, rates in due
+                for packet in self.rref[client].datagrams(rates, values, self.split)
+            ]
 
     def restart_pacers(self) -> None:
         """Everything is due in the next frame, and from then on at its rate."""
