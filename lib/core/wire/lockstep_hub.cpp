@@ -16,11 +16,13 @@ namespace {
 
 constexpr std::int32_t kFenceIndex = 0x4C530000;  // far from all indices that are used here
 constexpr std::int32_t kFenceElements = 3;
+constexpr std::int32_t kSocketsIndex = kFenceIndex + 8;
 constexpr std::int32_t kFenceRate = 1000;
 constexpr std::size_t kRateAt = 5;    // of a request: after the label
 constexpr int kLongestWaitMs = 5;     // while the clock goes at the host's pace
 constexpr int kPassesAfterClose = 2;  // of the link: calls posted by the first are carried out in the second
 constexpr std::int64_t kAskAgainNs = 300 * kNanosecondsPerMillisecond;
+constexpr int kFramesUntilForgotten = 2;  // by then X-Plane has read that a source wants no more
 
 /// Whether a datagram to X-Plane asks for a stream.
 bool asks(ByteView bytes) {
@@ -31,22 +33,39 @@ bool asks(ByteView bytes) {
   return std::memcmp(bytes.data(), "RREF", 4) == 0 && rate > 0;
 }
 
-/// The frame that a datagram ends; nullopt: it is no fence.
-std::optional<LockstepFrame> fenceIn(ByteView bytes) {
-  const DecodeResult<RrefView> rref = decodeRref(bytes);
-  if (!rref.ok() || rref->size() != kFenceElements) return std::nullopt;
-  std::array<float, kFenceElements> elements{};
-  for (std::size_t i = 0; i < rref->size(); ++i) {
-    const RrefPair pair = (*rref)[i];
-    const std::int32_t element = pair.index - kFenceIndex;
-    if (element < 0 || element >= kFenceElements || !(pair.value >= 0.0F)) return std::nullopt;
-    elements[static_cast<std::size_t>(element)] = pair.value;
-  }
+/// What a datagram ends with.
+struct Fence {
+  std::size_t begin = 0;  ///< [bytes] of the datagram before it
   LockstepFrame frame;
+  std::uint32_t sockets = 0;  ///< of this node to which the frame's fence is sent; 0: to all
+};
+
+/// The fence at the end of a datagram; nullopt: there is none.
+std::optional<Fence> fenceIn(ByteView bytes) {
+  const DecodeResult<RrefView> rref = decodeRref(bytes);
+  if (!rref.ok()) return std::nullopt;
+  std::array<float, kFenceElements> elements{};
+  std::size_t at = rref->size();
+  int found = 0;
+  Fence fence;
+  for (; at > 0; --at) {
+    const RrefPair pair = (*rref)[at - 1];
+    const std::int32_t element = pair.index - kFenceIndex;
+    if (pair.index == kSocketsIndex && pair.value >= 0.0F) {
+      fence.sockets = static_cast<std::uint32_t>(pair.value);
+      continue;
+    }
+    if (element < 0 || element >= kFenceElements || !(pair.value >= 0.0F)) break;
+    elements[static_cast<std::size_t>(element)] = pair.value;
+    ++found;
+  }
+  if (found != kFenceElements) return std::nullopt;
+  fence.begin = at == 0 ? 0 : kHeaderSize + at * kRrefPairSize;
+  LockstepFrame& frame = fence.frame;
   frame.number = static_cast<std::uint32_t>(elements[0]);
   frame.sim_ns = static_cast<std::int64_t>(elements[1]) * kNanosecondsPerSecond +
                  static_cast<std::int64_t>(elements[2]) * kNanosecondsPerMillisecond / 1000;
-  return frame;
+  return fence;
 }
 
 }  // namespace
@@ -90,17 +109,23 @@ class LockstepHub::Source : public DatagramSource {
   int receiveBuffer() const override { return inner->receiveBuffer(); }
   UdpCounters counters() const override { return inner->counters(); }
 
-  void request(std::int32_t rate_hz) {
+  /// `group`: port of the source that gets every fence; this one does with what else it gets.
+  void request(std::int32_t rate_hz, std::uint16_t group) {
     for (std::int32_t element = 0; element < kFenceElements; ++element) {
-      std::array<std::uint8_t, kRrefRequestSize> message;
-      const std::string path = std::string(kFenceDataref) + "[" + std::to_string(element) + "]";
-      if (const EncodeResult size = encodeRref(message, path, rate_hz, kFenceIndex + element)) {
-        inner->sendTo({message.data(), *size}, peer);
-      }
+      request(kFenceDataref, element, rate_hz, kFenceIndex + element);
     }
+    request(kFenceGroupDataref, group, rate_hz, kSocketsIndex);
   }
 
  private:
+  void request(const char* dataref, std::int32_t element, std::int32_t rate_hz, std::int32_t index) {
+    std::array<std::uint8_t, kRrefRequestSize> message;
+    const std::string path = std::string(dataref) + "[" + std::to_string(element) + "]";
+    if (const EncodeResult size = encodeRref(message, path, rate_hz, index)) {
+      inner->sendTo({message.data(), *size}, peer);
+    }
+  }
+
   LockstepHub* hub_;
 
  public:
@@ -115,6 +140,7 @@ class LockstepHub::Source : public DatagramSource {
   std::size_t ended = 0;            ///< of `waiting`: up to the newest fence
   bool seen = false;                ///< a fence has come
   LockstepFrame newest;
+  std::uint32_t sockets = 0;  ///< as the newest fence says
 };
 
 LockstepHub::LockstepHub(std::unique_ptr<DatagramHub> inner, LockstepClock clock, Clock host, LockstepHooks hooks)
@@ -136,10 +162,14 @@ std::shared_ptr<DatagramSource> LockstepHub::open(const std::string& name, const
 void LockstepHub::ignore(const DatagramSource& source) {
   for (const std::shared_ptr<Source>& each : sources()) {
     if (each.get() != &source) continue;
-    inner_->ignore(*each->inner);
     const std::lock_guard<std::mutex> lock(mutex_);
     each->ignored = true;
-    if (std::exchange(each->fenced, false)) each->request(0);
+    if (std::exchange(each->fenced, false)) each->request(0, group_);
+    if (clock_.phase() == LockstepClock::Phase::kReleased) {
+      inner_->ignore(*each->inner);
+    } else {
+      retired_.push_back({each, 0});  // a frame that is under way counts it
+    }
   }
 }
 
@@ -157,7 +187,8 @@ std::vector<std::shared_ptr<LockstepHub::Source>> LockstepHub::sources() const {
 }
 
 void LockstepHub::askForFence(Source* source) {
-  source->request(kFenceRate);
+  if (group_ == 0) group_ = source->inner->localPort();
+  source->request(kFenceRate, group_);
   asked_ns_ = host_.steady_ns();
 }
 
@@ -175,19 +206,23 @@ void LockstepHub::askAgain() {
 void LockstepHub::take(Source* source) {
   Received received;
   while (source->inner->receive(buffer_, &received) == ReceiveStatus::kReceived) {
-    const ByteView bytes(buffer_.data(), std::min(received.size, buffer_.size()));
-    if (const auto frame = fenceIn(bytes)) {
-      if (source->newest.number != frame->number) {
+    ByteView bytes(buffer_.data(), std::min(received.size, buffer_.size()));
+    const std::optional<Fence> fence = fenceIn(bytes);
+    if (fence) {
+      bytes = {buffer_.data(), fence->begin};
+      if (source->newest.number != fence->frame.number) {
         // Of frame 0, which was not handed out in time; the first frame that flies brings all of it again.
         source->waiting.erase(source->waiting.begin(),
                               source->waiting.begin() + static_cast<std::ptrdiff_t>(source->ended));
       }
-      source->seen = true;
-      source->newest = *frame;
-      source->ended = source->waiting.size();
-      continue;
     }
-    source->waiting.push_back({{bytes.data(), bytes.data() + bytes.size()}, received});
+    if (bytes.size() > 0) source->waiting.push_back({{bytes.data(), bytes.data() + bytes.size()}, received});
+    if (fence) {
+      source->seen = true;
+      source->newest = fence->frame;
+      source->sockets = fence->sockets;
+      source->ended = source->waiting.size();
+    }
   }
 }
 
@@ -196,16 +231,18 @@ void LockstepHub::collect(int timeout_ms) {
   takeAll();
 }
 
-/// Waits for one source whose fence is missing: the same each time while that is the last to come, so that a frame
-/// wakes the thread once and not with each of its datagrams.
+/// Waits for one source whose fence is missing, so that a frame wakes the thread once and not with each of its
+/// datagrams: the one that gets every fence, as the last, else the same each time while that is the last to come.
 void LockstepHub::collectFrame(int timeout_ms) {
   const std::vector<std::shared_ptr<Source>> all = sources();
   std::shared_ptr<Source> awaited;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
+    const bool counted = std::any_of(all.begin(), all.end(), [](const auto& source) { return source->sockets > 0; });
     for (const std::shared_ptr<Source>& source : all) {
       const bool missing = source->fenced && (!source->seen || source->newest.number != frame_.number + 1);
-      if (missing && (!awaited || source.get() == awaited_)) awaited = source;
+      const bool last = counted ? source->inner->localPort() == group_ : source.get() == awaited_;
+      if (missing && (!awaited || last)) awaited = source;
     }
   }
   awaited_ = awaited.get();
@@ -223,17 +260,35 @@ void LockstepHub::takeAll() {
   }
 }
 
-/// Whether all sources show a frame beyond the last one, the same.
+/// Whether all sources show a frame beyond the last one, the same; of a simulator that counts them, so many.
 bool LockstepHub::frameIsComplete() const {
   const std::vector<std::shared_ptr<Source>> all = sources();
   const std::lock_guard<std::mutex> lock(mutex_);
-  bool any = false;
+  std::uint32_t shown = 0;
+  std::uint32_t counted = 0;
+  bool missing = false;
   for (const std::shared_ptr<Source>& source : all) {
-    if (!source->fenced) continue;
-    if (!source->seen || source->newest.number != frame_.number + 1) return false;
-    any = true;
+    if (source->seen && source->newest.number == frame_.number + 1) {
+      ++shown;
+      counted = std::max(counted, source->sockets);
+    } else if (source->fenced) {
+      missing = true;
+    }
   }
-  return any;
+  return counted > 0 ? shown >= counted : shown > 0 && !missing;
+}
+
+/// What was ignored a few frames ago: X-Plane sends nothing there any more.
+void LockstepHub::forgetRetired() {
+  std::vector<Retired> kept;
+  for (Retired& each : retired_) {
+    if (++each.frames < kFramesUntilForgotten) {
+      kept.push_back(std::move(each));
+    } else {
+      inner_->ignore(*each.source->inner);
+    }
+  }
+  retired_ = std::move(kept);
 }
 
 void LockstepHub::handOut(bool whole_frame) {
@@ -242,9 +297,10 @@ void LockstepHub::handOut(bool whole_frame) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       fenced = source->fenced && source->seen;
+      if (source->ignored) source->waiting.clear();
     }
     // In flight, what no fence stands behind belongs to no frame.
-    std::size_t count = fenced ? source->ended : source->waiting.size();
+    std::size_t count = fenced ? std::min(source->ended, source->waiting.size()) : source->waiting.size();
     if (whole_frame && !fenced) {
       source->waiting.clear();
       count = 0;
@@ -352,6 +408,7 @@ bool LockstepHub::advance(int timeout_ms) {
   for (const std::shared_ptr<Source>& source : sources()) {
     if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
   }
+  forgetRetired();
   clock_.move(frame_.sim_ns);
   hooks_.begin(frame_);
   handOut(true);

@@ -15,6 +15,9 @@ namespace xplane_bridge::core {
 /// The dataref by which a simulator in lock-step ends its frames; written with a frame's number, it flies on. Its
 /// elements are that number, whole seconds and microseconds of simulated time.
 constexpr const char* kFenceDataref = "xplane_bridge/lockstep";
+/// Its element is the port of the socket that gets every fence of a node. The others that ask for it get a fence in the
+/// frames in which they get something else, at the end of that datagram; its value says how many sockets do.
+constexpr const char* kFenceGroupDataref = "xplane_bridge/lockstep_group";
 
 /// One frame of a simulator in lock-step. Number 0 stands: it comes again and again until it is answered.
 struct LockstepFrame {
@@ -52,6 +55,10 @@ class LockstepHub : public DatagramHub {
 
  private:
   class Source;
+  struct Retired {
+    std::shared_ptr<Source> source;
+    int frames;
+  };
   enum class Stage : std::uint8_t { kCollecting, kHandling, kAnswering, kClosing };
 
   void askForFence(Source* source);
@@ -61,6 +68,7 @@ class LockstepHub : public DatagramHub {
   void takeAll();
   void take(Source* source);
   bool frameIsComplete() const;
+  void forgetRetired();
   void handOut(bool whole_frame);
   bool anythingHandedOut() const;
   void waitHeld(int timeout_ms);
@@ -75,6 +83,7 @@ class LockstepHub : public DatagramHub {
 
   mutable std::mutex mutex_;  // guards the list, and what of a source is asked for
   std::vector<std::weak_ptr<Source>> sources_;
+  std::uint16_t group_ = 0;  // port of the source that asked first
 
   // Of the thread that receives.
   Stage stage_ = Stage::kCollecting;
@@ -82,6 +91,7 @@ class LockstepHub : public DatagramHub {
   LockstepFrame frame_;
   std::uint32_t released_frame_ = 0;  // newest one let go after release()
   std::int64_t asked_ns_ = 0;         // [ns] of the host's steady clock
+  std::vector<Retired> retired_;      // ignored, perhaps while a frame is under way that counts them
   const Source* awaited_ = nullptr;   // whose fence was missing last; compared only
   std::vector<std::uint8_t> buffer_;
 };

@@ -32,12 +32,17 @@ class LockstepHubTest : public testing::Test {
       if (frame.number > 0) said_ += " end" + std::to_string(frame.number);
     };
     hub_ = std::make_unique<LockstepHub>(std::move(inner), clock_, wire_->clock(), hooks);
-    a_ = hub_->open("a", {});
-    b_ = hub_->open("b", {});
+    a_ = hub_->open("a", port(7001));
+    b_ = hub_->open("b", port(7002));
     ask(a_.get());
     ask(b_.get());
   }
 
+  static UdpSocketOptions port(std::uint16_t number) {
+    UdpSocketOptions options;
+    options.bind_port = number;
+    return options;
+  }
   static void ask(DatagramSource* source) {
     std::array<std::uint8_t, kRrefRequestSize> message;
     const EncodeResult size = encodeRref(message, "sim/time/paused", 20, 0);
@@ -57,6 +62,10 @@ class LockstepHubTest : public testing::Test {
   void value(const std::string& source, float value) { arrive(source, {{0, value}}); }
   void fence(const std::string& source, float frame, float seconds = 0.0F, float microseconds = 0.0F) {
     arrive(source, {{kFence, frame}, {kFence + 1, seconds}, {kFence + 2, microseconds}});
+  }
+  /// Of a simulator that sends it to so many sockets, behind a value.
+  void countedFence(const std::string& source, float frame, float sockets) {
+    arrive(source, {{0, frame}, {kFence, frame}, {kFence + 1, 0.0F}, {kFence + 2, 0.0F}, {kFence + 8, sockets}});
   }
 
   /// As SimLink's step: waits, then takes what there is, of a first.
@@ -102,9 +111,14 @@ TEST_F(LockstepHubTest, AsksForTheFenceOnEverySourceThatAsksForSomething) {
   for (const auto& sent : wire_->sent) {
     const std::string text(sent.bytes.begin(), sent.bytes.end());
     const auto at = text.find(kFenceDataref);
-    if (at != std::string::npos) asked.push_back(sent.source + text.substr(at + std::strlen(kFenceDataref), 3));
+    if (at != std::string::npos) asked.push_back(sent.source + " " + text.substr(at, text.find(']', at) + 1 - at));
   }
-  EXPECT_EQ(asked, (std::vector<std::string>{"a[0]", "a[1]", "a[2]", "b[0]", "b[1]", "b[2]"}));
+  std::vector<std::string> expected;
+  for (const std::string source : {"a ", "b "}) {
+    for (const char* element : {"[0]", "[1]", "[2]"}) expected.push_back(source + kFenceDataref + element);
+    expected.push_back(source + kFenceGroupDataref + "[7001]");  // the port of the one that asked first
+  }
+  EXPECT_EQ(asked, expected);
 }
 
 TEST_F(LockstepHubTest, HandsOutFrame0AsItComesAndNoFences) {
@@ -144,6 +158,37 @@ TEST_F(LockstepHubTest, WaitsForTheSourceWhoseFenceCameLast) {
   }
   ASSERT_FALSE(wire_->awaited.empty());
   for (const std::string& source : wire_->awaited) EXPECT_EQ(source, "b");
+}
+
+TEST_F(LockstepHubTest, WaitsForAsManySourcesAsTheFenceSaysAndForTheFirstOfThem) {
+  takeOff();
+  countedFence("a", 2.0F, 1.0F);
+  EXPECT_EQ(steps(1), " begin2 a2") << "b gets nothing in this frame";
+  EXPECT_EQ(steps(6), " close2 end2");
+  wire_->awaited.clear();
+  countedFence("b", 3.0F, 2.0F);
+  EXPECT_EQ(steps(3), "");
+  countedFence("a", 3.0F, 2.0F);
+  EXPECT_EQ(steps(1), " begin3 a3 b3");
+  ASSERT_FALSE(wire_->awaited.empty());
+  for (const std::string& source : wire_->awaited) EXPECT_EQ(source, "a");
+}
+
+TEST_F(LockstepHubTest, ASourceThatIsIgnoredStillCountsInTheFramesThatAreUnderWay) {
+  takeOff();
+  hub_->ignore(*b_);
+  countedFence("a", 2.0F, 2.0F);
+  EXPECT_EQ(steps(2), "");
+  countedFence("b", 2.0F, 2.0F);
+  EXPECT_EQ(steps(1), " begin2 a2");
+  EXPECT_EQ(steps(6), " close2 end2");
+  for (const float frame : {3.0F, 4.0F}) {
+    countedFence("a", frame, 1.0F);
+    steps(6);
+  }
+  wire_->arrivals.clear();
+  countedFence("b", 5.0F, 1.0F);
+  EXPECT_EQ(steps(3), "") << "long after, it is not looked at any more";
 }
 
 TEST_F(LockstepHubTest, WaitsForTheAnswersAfterTheFrameWasHandled) {
