@@ -71,9 +71,10 @@ def test_the_delay_is_measured_and_used(world, display: str) -> None:
     node.check_running()
 
 
-def test_not_in_a_recording(world, display: str) -> None:
+@pytest.mark.parametrize("camera", ["", "belly/"])
+def test_not_in_a_recording_of_this_or_another_camera(world, display: str, camera: str) -> None:
     emulator, _, _ = start(world, display)
-    bag = ["rosbag", "record", "-O", world.folder / "pictures.bag", f"{world.namespace}/camera/frame_state"]
+    bag = ["rosbag", "record", "-O", world.folder / "pictures.bag", f"{world.namespace}/{camera}camera/frame_state"]
     with ManagedProcess("rosbag", [str(word) for word in bag], world.folder, env=world.env):
         wait_until(
             lambda: "records the pictures" in calibrate(world).message, 90.0, "a refusal for the recorder's sake"

@@ -23,7 +23,19 @@ constexpr double kLongestStep = 0.3;
 constexpr double kUndoTimeout = 2.0;
 constexpr double kSenderAnswers = 30.0;  // with what it may have to wait for X-Plane to take its field of view back
 
-/// Of a node that records one of these topics, its name; empty: none does.
+/// Whether a topic is one of these, or the same of another camera of the bridge, which shows the same X-Plane.
+bool sameBridges(const std::string& topic, const std::vector<std::string>& topics) {
+  return std::any_of(topics.begin(), topics.end(), [&topic](const std::string& own) {
+    const std::size_t camera = own.rfind("/camera/");
+    if (camera == std::string::npos || camera == 0) return topic == own;
+    const std::string space = own.substr(0, own.find('/', 1) + 1);  // "/xplane/"
+    const std::string tail = own.substr(camera);
+    return topic.compare(0, space.size(), space) == 0 && topic.size() >= tail.size() &&
+           topic.compare(topic.size() - tail.size(), tail.size(), tail) == 0;
+  });
+}
+
+/// Of a node that records one of these topics, or of another camera's, its name; empty: none does.
 std::string recorderOf(const std::vector<std::string>& topics) {
   XmlRpc::XmlRpcValue request, response, state;
   request[0] = ros::this_node::getName();
@@ -31,7 +43,7 @@ std::string recorderOf(const std::vector<std::string>& topics) {
   XmlRpc::XmlRpcValue& subscribers = state[1];
   for (int i = 0; i < subscribers.size(); ++i) {
     const std::string topic = subscribers[i][0];
-    if (std::find(topics.begin(), topics.end(), topic) == topics.end()) continue;
+    if (!sameBridges(topic, topics)) continue;
     XmlRpc::XmlRpcValue& nodes = subscribers[i][1];
     for (int k = 0; k < nodes.size(); ++k) {
       const std::string node = nodes[k];
