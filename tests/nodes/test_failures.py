@@ -1,134 +1,55 @@
-"""Failures and single surfaces through tx_node, each seen in the emulator's own deflections and motion."""
+"""Failures through tx_node: of surfaces and systems, triggers, the simulator's menu."""
 
 from __future__ import annotations
 
-import itertools
-import json
 import math
 import signal
 import threading
-import time
 
 import pytest
 
+from support.failing_twin import (  # noqa: F401
+    ACCEPTED,
+    ALPHA,
+    BANK,
+    BATTERY,
+    BUS,
+    ELEVATOR,
+    ENGINE,
+    FAILURES,
+    GENERATOR,
+    LEFT,
+    NOT_SUPPORTED,
+    OK,
+    REFUSED,
+    RIGHT,
+    RUDDER,
+    STICK,
+    SURFACES,
+    TIME,
+    TOTAL,
+    close,
+    fail,
+    fixture_healthy,
+    fixture_twin,
+    fly,
+    follows,
+    said,
+)
 from support.tx_fixtures import (
-    AUTO,
-    MANUAL,
     PITCH,
     ROLL,
     YAW,
-    CommandSource,
     WatchedDatarefs,
     call,
     journal_entries,
-    tx_params,
-    write_mixing,
 )
 from xplane_bridge import protocol
 from xplane_bridge.emulator.simulator import aircraft_path
 from xplane_bridge.harness import wait_until
 
-OK, ACCEPTED, REFUSED, NOT_SUPPORTED, NO_LINK, TIMEOUT = range(6)
 AT_SIM_TIME, AT_ALTITUDE_ABOVE, AT_SPEED_BELOW = 1, 2, 5
-CONTROLS = "sim/flightmodel/controls/"
-LEFT, RIGHT = CONTROLS + "wing2l_ail1def", CONTROLS + "wing2r_ail1def"
-ELEVATOR, RUDDER = CONTROLS + "hstab1_elv1def", CONTROLS + "vstab1_rud1def"
-SURFACES = "sim/operation/override/override_control_surfaces"
-BANK = "sim/flightmodel/position/true_phi"
-ALPHA = "sim/flightmodel/position/alpha"
-STICK = "sim/joystick/yoke_roll_ratio"
-PEDALS = "sim/joystick/yoke_heading_ratio"
-TOTAL = "sim/cockpit2/controls/total_roll_ratio"
-TIME = "sim/time/total_running_time_sec"
-FAILURES = "sim/operation/failures/"
-ELECTRICAL = "sim/cockpit2/electrical/"
 GAUGES = "sim/cockpit2/gauges/indicators/"
-#: Where each system's failure shows.
-ENGINE, BUS = "sim/flightmodel/engine/ENGN_running[0]", ELECTRICAL + "bus_volts[0]"
-GENERATOR, BATTERY = ELECTRICAL + "generator_amps[1]", ELECTRICAL + "battery_voltage_actual_volts[0]"
-WATCHED = (
-    SURFACES,
-    LEFT,
-    RIGHT,
-    ELEVATOR,
-    RUDDER,
-    BANK,
-    ALPHA,
-    STICK,
-    PEDALS,
-    TOTAL,
-    TIME,
-    ENGINE,
-    BUS,
-    GENERATOR,
-    BATTERY,
-)
-
-
-def fly(world, *emulator_options, known=True, **params):
-    """Starts emulator (its own pilot flies level) and tx_node; with a mixing file by default."""
-    from xplane_bridge.msg import AppliedCommand, EventList, FailureState
-
-    if known:
-        write_mixing(world)
-    pilot = world.folder / "pilot.yaml"
-    pilot.write_text("name: level\nevents: [{at: 0, hold: {roll: 0, altitude: 1000, speed: 72}}]\n", encoding="utf-8")
-    world.xplane = world.emulator("--no-beacon", "--start", "air", "--pilot", pilot, *emulator_options)
-    world.wire = WatchedDatarefs(world.xplane.port, *WATCHED)
-    world.state = world.watch("failures/state", FailureState)
-    world.events = world.watch("events", EventList)
-    world.applied = world.watch("control/applied", AppliedCommand)
-    world.params = tx_params(**params)
-    world.set_param("aircraft", "fixed_wing")
-    world.node = world.start("tx_node", world.params)
-    world.manual = CommandSource(world, "control/manual")
-    world.events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events))
-    if known:
-        wait_ready(world)
-    return world
-
-
-def wait_ready(world):
-    """Surfaces have been seen to follow the mixing."""
-    world.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
-
-
-def close(world):
-    world.manual.stop()
-    world.wire.close()
-    world.close()
-
-
-@pytest.fixture(scope="module")
-def twin(new_world, tmp_path_factory):
-    """One flight that many tests share; each leaves it repaired."""
-    world = fly(new_world(tmp_path_factory.mktemp("twin")))
-    yield world
-    close(world)
-
-
-@pytest.fixture
-def healthy(twin):
-    """The shared flight, repaired and with X-Plane driving its surfaces, before and after."""
-    yield twin
-    twin.manual.stop()
-    done = call(twin, "clear_failures", "ClearFailures", include_simulator=True)
-    assert done.success, done.result.message
-    twin.wire.wait(SURFACES, 0.0)
-    wait_until(lambda: not twin.state.last.names, 5, "an empty failures/state")
-
-
-def fail(world, name, kind="failed", value=None, **trigger):
-    return call(
-        world,
-        "set_failure",
-        "SetFailure",
-        name=name,
-        kind=kind,
-        has_value=value is not None,
-        value=value or 0.0,
-        **trigger,
-    )
 
 
 def label_of(world, name):
@@ -147,17 +68,6 @@ def wait_for_label(world, name, **expected):
         10,
         f"label of {name} {expected}, last {label_of(world, name)}",
     )
-
-
-def follows(wire, aileron):
-    """An aileron is where X-Plane's total stick wants it: 15 degrees down, 25 up."""
-    down = wire.value(TOTAL) if aileron == LEFT else -wire.value(TOTAL)
-    return wire.value(aileron) == pytest.approx(15.0 * down if down > 0.0 else 25.0 * down, abs=0.02)
-
-
-def said(world, text):
-    """An event with this text has come since the node started."""
-    return world.events.wait_for(lambda e: any(text in event.text for event in e.events), what=f"event '{text}'")
 
 
 def test_left_aileron_stuck_rolls_the_aircraft_and_the_others_keep_flying(healthy):
@@ -347,195 +257,6 @@ def test_the_simulators_menu(healthy):
     other.send(protocol.DrefWrite(FAILURES + "rel_genera0", 0.0))
     said(world, "generator_1 was repaired in the simulator")
     wait_until(lambda: not label_of(world, "generator_1"), 5, "the label to go")
-
-
-def test_override_that_another_client_releases_is_not_taken_again(healthy):
-    world, name = healthy, "rudder1_fin1"
-    assert fail(world, name, "stuck", 4.0).success
-    world.wire.wait(RUDDER, 4.0)
-    type(world).wire(world.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
-    said(world, f"failure of {name} has ended: another client has released the surface override")
-    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
-    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), 5, "the journal's entry to go")
-    assert world.wire.value(SURFACES) == 0.0
-
-
-def test_who_takes_the_stick_from_the_bridge_gets_the_surfaces_too(healthy):
-    world, name = healthy, "rudder1_fin1"
-    wait_ready(world)
-    world.manual.fly(fields=ROLL, roll=0.0)
-    assert fail(world, name, "stuck", 4.0).success
-    world.wire.wait(RUDDER, 4.0)
-    both = {"override_control_surfaces", "override_joystick_roll"}
-    world.wait_for_diagnostics("control", lambda s: both <= set(world.values_of(s)["Overrides set"].split(", ")))
-    type(world).wire(world.xplane.port).send(protocol.DrefWrite("sim/operation/override/override_joystick_roll", 0.0))
-    said(world, f"failure of {name} has ended: another client has released")
-    world.wire.wait(SURFACES, 0.0)
-    wait_until(lambda: not journal_entries(world), 5, "an empty journal")
-    assert call(world, "set_mode", "SetMode", mode=1).success  # flies on
-
-
-class Surfaces:
-    """Publishes a SurfaceCommand."""
-
-    def __init__(self, world):
-        import rospy
-        from xplane_bridge.msg import SurfaceCommand
-
-        self._type = SurfaceCommand
-        self._publisher = rospy.Publisher(f"{world.namespace}/control/surfaces", SurfaceCommand, queue_size=1)
-        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "tx_node's subscription")
-
-    def send(self, sequence=0, **deflections):
-        self._publisher.publish(
-            self._type(sequence=sequence, names=list(deflections), deflections_deg=list(deflections.values()))
-        )
-
-
-def test_single_surfaces_by_command(healthy):
-    world, wire = healthy, healthy.wire
-    surfaces = Surfaces(world)
-    surfaces.send(aileron1_wing2_left=3.0)
-    world.wait_for_diagnostics(
-        "surfaces", lambda s: "flies in AUTO" in world.values_of(s).get("control/surfaces last refusal", "")
-    )
-    assert call(world, "set_mode", "SetMode", mode=AUTO).success
-    refusals = (
-        ({"aileron1_wing2_left": 3.0, "wing": 1.0}, "no surface"),
-        ({"aileron1_wing2_left": 3.0, "rudder1_fin1": math.nan}, "rudder1_fin1 is nan"),
-        ({"aileron1_wing2_left": 3.0, "aileron1_wing1_left": 0.0}, "has not been seen to move"),
-        ({"aileron1_wing2_left": 3.0, "elevator1_left": 40.0}, "its travel, -19.0..14.0"),
-    )
-    for deflections, text in refusals:
-        surfaces.send(**deflections)
-        world.wait_for_diagnostics(
-            "surfaces", lambda s, text=text: text in world.values_of(s).get("control/surfaces last refusal", "")
-        )
-    assert wire.value(SURFACES) == 0.0
-    assert all("aileron1_wing2_left" not in a.surface_names for a in world.applied.messages[-3:])
-
-    def shown():
-        surfaces.send(70007, aileron1_wing2_left=4.0, aileron1_wing2_right=4.0)
-        return abs(wire.value(LEFT) - 4.0) < 1e-4 and abs(wire.value(RIGHT) - 4.0) < 1e-4
-
-    count = len(world.applied.messages)
-    wait_until(shown, 5, "both ailerons down")
-    seen = world.applied.wait_for(lambda a: a.sequence == 70007 and a.read_back)
-    assert list(seen.surface_names) == ["aileron1_wing2_left", "aileron1_wing2_right"]
-    assert seen.read_back_frames > 0.9
-    assert len(world.applied.messages) > count
-    # One of a stream faster than X-Plane's frames is seen to be shown, too.
-    numbers = itertools.count(80000)
-
-    def streamed():
-        for _ in range(10):
-            surfaces.send(next(numbers), aileron1_wing2_left=3.0)
-            time.sleep(0.002)
-        return any(a.sequence >= 80000 and a.read_back for a in world.applied.messages)
-
-    wait_until(streamed, 5, "a command of the stream")
-    # Not repeated, the command ends after command_timeout, and the mixing flies again.
-    wire.wait(SURFACES, 0.0)
-    wait_until(lambda: follows(wire, LEFT) and follows(wire, RIGHT), 5, "the ailerons to follow again")
-    assert call(world, "set_mode", "SetMode", mode=MANUAL).success
-
-
-def test_a_stick_that_takes_over_ends_single_surfaces(healthy):
-    from xplane_bridge.msg import ControlMode
-
-    world, wire = healthy, healthy.wire
-    modes = world.watch("control/mode", ControlMode)
-    surfaces = Surfaces(world)
-    world.manual.fly(fields=ROLL, roll=0.0)
-    assert call(world, "set_mode", "SetMode", mode=AUTO).success
-
-    def shown():
-        surfaces.send(aileron1_wing2_left=4.0, aileron1_wing2_right=4.0)
-        return abs(wire.value(LEFT) - 4.0) < 1e-4 and abs(wire.value(RIGHT) - 4.0) < 1e-4
-
-    wait_until(shown, 5, "both ailerons down")
-    modes.skip_to_now()
-    world.manual.fly(roll=0.5)
-
-    def over():
-        surfaces.send(aileron1_wing2_left=4.0, aileron1_wing2_right=4.0)  # it goes on commanding
-        return wire.value(SURFACES) == 0.0 and follows(wire, LEFT) and follows(wire, RIGHT)
-
-    wait_until(over, 5, "the ailerons to follow the stick")
-    taken = modes.then_wait_for(lambda m: m.mode == MANUAL)
-    assert taken.reason.startswith("stick take-over")
-    assert taken.reason.endswith("control/surfaces ends")
-    said(world, taken.reason)
-
-
-def test_overrides_and_failures_are_given_back_however_it_ends(new_world, tmp_path):
-    world = fly(new_world(tmp_path))
-    engine = WatchedDatarefs(world.xplane.port, FAILURES + "rel_engfai1")
-    for end in (signal.SIGINT, signal.SIGKILL):
-        assert fail(world, "elevator1_left", "stuck", -2.0).success
-        assert fail(world, "engine_2").success
-        world.wire.wait(SURFACES, 1.0)
-        engine.wait(FAILURES + "rel_engfai1", 6.0)
-        world.node.send_signal(end)
-        world.wire.wait(SURFACES, 0.0)
-        engine.wait(FAILURES + "rel_engfai1", 0.0)
-        world.node.wait(10)
-        if end == signal.SIGINT:  # its last word must not label what comes after
-            wait_until(
-                lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "nothing broken"
-            )
-        wait_until(lambda: not journal_entries(world), 10, "an empty journal")
-        if end == signal.SIGINT:
-            world.node = world.start("tx_node", world.params)
-            wait_ready(world)
-    engine.close()
-    close(world)
-
-
-def test_mixing_is_identified_from_flight_and_kept(new_world, tmp_path):
-    mixing = {"excursion": 0.2, "independence": 0.03, "residual_deg": 0.5, "slope_error_deg": 1.0, "samples": 60}
-    world = fly(new_world(tmp_path), known=False, mixing=mixing)
-    world.wait_for_diagnostics("surfaces", lambda s: "roll right" in s.message)
-    refused = fail(world, "aileron1_wing2_left", "stuck", 5.0)
-    assert (refused.success, refused.result.code) == (False, REFUSED)
-    assert "roll right: seen up to" in refused.result.message
-    assert "need 0.20 of full stick" in refused.result.message
-    assert world.wire.value(SURFACES) == 0.0
-
-    file = world.folder / "ros_home" / "xplane_bridge" / "mixing" / "DA62.yaml"
-    start = world.wire.value(TIME)
-
-    def flying():
-        t = world.wire.value(TIME) - start
-        world.manual.fly(
-            fields=ROLL | PITCH | YAW,
-            roll=0.3 * math.sin(2.5 * t),
-            pitch=0.3 * math.sin(1.9 * t),
-            yaw=0.3 * math.sin(3.1 * t + 1.0),
-        )
-        return file.is_file()
-
-    wait_until(flying, 40, "a mixing file")
-    world.manual.stop()
-    found = json.loads(file.read_text(encoding="utf-8"))
-    assert found["aircraft"] == "DA62"
-    for name, slopes in (("aileron1_wing2_left", (15.0, 25.0)), ("aileron1_wing2_right", (-25.0, -15.0))):
-        law = found["surfaces"][name]["slopes_deg"]
-        assert (law["roll+"], law["roll-"]) == pytest.approx(slopes, abs=0.5)
-    assert found["surfaces"]["elevator1_right"]["slopes_deg"]["pitch+"] == pytest.approx(-18.0, abs=0.5)
-    assert found["surfaces"]["rudder1_fin1"]["slopes_deg"]["yaw-"] == pytest.approx(27.0, abs=0.5)
-    said(world, "the mixing of the surfaces is identified")
-    wait_ready(world)
-    assert fail(world, "aileron1_wing2_left", "stuck", 5.0).success
-    world.wire.wait(LEFT, 5.0)
-
-    world.node.send_signal(signal.SIGINT)
-    world.node.wait(10)
-    world.node = world.start("tx_node", world.params)
-    wait_ready(world)  # by the file, without any flying
-    assert fail(world, "aileron1_wing2_left", "stuck", -3.0).success
-    world.wire.wait(LEFT, -3.0)
-    close(world)
 
 
 def test_xplane_12_breaks_its_surfaces_itself(new_world, tmp_path):
