@@ -1,95 +1,14 @@
 #include "xplane_bridge/vision/x11_window_source.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/prctl.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include "xvfb.hpp"
-
-namespace vision = xplane_bridge::vision;
-using std::chrono::milliseconds;
-using vision::Change;
-using vision::ChangeDetection;
-using vision::GrabResult;
-using vision::Picture;
-using vision::WaitResult;
-using vision::X11SourceOptions;
-using vision::X11WindowSource;
-using xplane_bridge::test::TestWindow;
-using xplane_bridge::test::Xvfb;
-
-namespace {
-
-std::int64_t steadyNow() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
-constexpr milliseconds kDeadline{10000};
-constexpr milliseconds kShort{50};
-
-cv::Vec3b pixelAt(const cv::Mat& picture, int x, int y) {
-  const std::uint8_t* pixel = picture.ptr<std::uint8_t>(y) + static_cast<std::ptrdiff_t>(x) * picture.channels();
-  return {pixel[0], pixel[1], pixel[2]};
-}
-
-/// Takes pictures until one is new; false at the deadline.
-bool nextPicture(X11WindowSource& source, Picture& picture) {
-  const auto deadline = std::chrono::steady_clock::now() + kDeadline;
-  while (std::chrono::steady_clock::now() < deadline) {
-    Change change;
-    if (source.waitChange(kShort, change) != WaitResult::kChange) continue;
-    if (source.grab(change, picture) == GrabResult::kNew) return true;
-  }
-  return false;
-}
-
-/// Waits until the source reports that there is nothing to capture.
-bool becomesLost(X11WindowSource& source) {
-  const auto deadline = std::chrono::steady_clock::now() + kDeadline;
-  while (std::chrono::steady_clock::now() < deadline) {
-    Change change;
-    Picture picture;
-    const WaitResult result = source.waitChange(kShort, change);
-    if (result == WaitResult::kLost) return true;
-    if (result == WaitResult::kChange && source.grab(change, picture) == GrabResult::kLost) return true;
-  }
-  return false;
-}
-
-/// True when no new picture comes within a while.
-bool staysQuiet(X11WindowSource& source) {
-  Change change;
-  Picture picture;
-  const auto until = std::chrono::steady_clock::now() + milliseconds(100);
-  while (std::chrono::steady_clock::now() < until) {
-    if (source.waitChange(milliseconds(20), change) != WaitResult::kChange) continue;
-    if (source.grab(change, picture) == GrabResult::kNew) return false;
-  }
-  return true;
-}
-
-X11SourceOptions titled(const Xvfb& server, const std::string& title = "X-System") {
-  X11SourceOptions options;
-  options.display = server.display();
-  options.title = title;
-  options.search_period = 0.02;
-  return options;
-}
-
-const cv::Vec3b kRed(0, 0, 255);
-const cv::Vec3b kGreen(0, 255, 0);
-const cv::Vec3b kBlue(255, 0, 0);
-
-}  // namespace
+#include "x11_window_source_test.hpp"
 
 TEST(X11SourceOptions, RefusesContradictions) {
   X11SourceOptions options;
@@ -115,12 +34,6 @@ TEST(X11SourceOptions, RefusesContradictions) {
   EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
   EXPECT_THROW((void)vision::changeDetectionFromName("xdamage"), std::invalid_argument);
 }
-
-class X11WindowSourceTest : public ::testing::Test {
- protected:
-  Xvfb server_;
-  Picture picture_;
-};
 
 TEST_F(X11WindowSourceTest, ReadsAWindowByTitleAndSeesEveryChangeOnce) {
   TestWindow other(server_.display(), "something else", 300, 300, 400, 100);
@@ -306,118 +219,6 @@ TEST_F(X11WindowSourceTest, AWindowThatVanishesBetweenChangeAndGrabIsLostAndNoMo
   window->destroy();
   EXPECT_EQ(source.grab(change, picture_), GrabResult::kLost);
   EXPECT_TRUE(becomesLost(source));
-}
-
-TEST_F(X11WindowSourceTest, FindsByClassIdExpressionAndRegion) {
-  TestWindow window(server_.display(), "X-Plane 11.55 X-System", 320, 240, 30, 40);
-  window.fill(0xff0000);
-  X11SourceOptions by_class = titled(server_, "");
-  by_class.class_name = "XpClass";
-  X11SourceOptions by_id = titled(server_, "");
-  by_id.window_id = window.id();
-  X11SourceOptions by_expression = titled(server_, "^X-Plane 1[12].*X-System$");
-  by_expression.title_is_regex = true;
-  X11SourceOptions by_region = titled(server_, "");
-  by_region.region = cv::Rect(30, 40, 64, 48);
-  for (const auto& options : {by_class, by_id, by_expression, by_region}) {
-    X11WindowSource source(options, steadyNow);
-    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
-    EXPECT_EQ(pixelAt(picture_.bgr, 5, 5), kRed) << source.describe();
-  }
-  EXPECT_EQ(picture_.bgr.size(), cv::Size(64, 48));
-  by_region.region = cv::Rect(700, 500, 640, 480);
-  X11WindowSource beyond(by_region, steadyNow);
-  EXPECT_TRUE(becomesLost(beyond));
-  EXPECT_NE(beyond.problem().find("800x600"), std::string::npos) << beyond.problem();
-}
-
-TEST_F(X11WindowSourceTest, PrefersTheExactTitleThenTheLargest) {
-  TestWindow editor(server_.display(), "notes on X-System - editor", 600, 500);
-  TestWindow small(server_.display(), "X-System", 100, 80);
-  TestWindow large(server_.display(), "X-System", 320, 240);
-  X11WindowSource source(titled(server_), steadyNow);
-  ASSERT_TRUE(nextPicture(source, picture_));
-  EXPECT_EQ(source.window(), large.id());
-}
-
-TEST_F(X11WindowSourceTest, OfWindowsAlikeTheIndexChoosesFromTheLeft) {
-  TestWindow right(server_.display(), "X-System", 320, 240, 400, 0);
-  TestWindow left(server_.display(), "X-System", 100, 80, 10, 20);
-  TestWindow below(server_.display(), "X-System", 200, 160, 10, 300);
-  X11WindowSource largest(titled(server_, ""), steadyNow);
-  ASSERT_TRUE(nextPicture(largest, picture_));
-  EXPECT_EQ(largest.window(), right.id());
-  EXPECT_NE(largest.describe().find("the largest of 3 that are alike"), std::string::npos) << largest.describe();
-  int index = 0;
-  for (const TestWindow* window : {&left, &below, &right}) {
-    X11SourceOptions options = titled(server_, "");
-    options.index = index++;
-    X11WindowSource source(options, steadyNow);
-    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
-    EXPECT_EQ(source.window(), window->id()) << "index " << options.index;
-    EXPECT_EQ(source.describe().find("alike"), std::string::npos);
-  }
-  X11SourceOptions options = titled(server_, "");
-  options.index = 3;
-  X11WindowSource none(options, steadyNow);
-  EXPECT_TRUE(becomesLost(none));
-  EXPECT_NE(none.problem().find("number 3 from the left"), std::string::npos) << none.problem();
-  EXPECT_NE(none.problem().find("there are 3, counted from 0"), std::string::npos) << none.problem();
-}
-
-TEST_F(X11WindowSourceTest, OfWindowsAlikeThePointChoosesTheOneThatCoversIt) {
-  TestWindow right(server_.display(), "X-System", 320, 240, 400, 0);
-  TestWindow left(server_.display(), "X-System", 100, 80, 10, 20);
-  X11SourceOptions options = titled(server_, "");
-  for (const auto& [point, window] :
-       {std::make_pair(cv::Point(10, 20), &left), std::make_pair(cv::Point(109, 99), &left),
-        std::make_pair(cv::Point(719, 239), &right)}) {
-    options.point = point;
-    X11WindowSource source(options, steadyNow);
-    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
-    EXPECT_EQ(source.window(), window->id()) << point;
-    EXPECT_EQ(source.describe().find("alike"), std::string::npos);
-  }
-  options.point = cv::Point(110, 99);
-  X11WindowSource none(options, steadyNow);
-  EXPECT_TRUE(becomesLost(none));
-  EXPECT_NE(none.problem().find("at the point 110, 99 of the screen"), std::string::npos) << none.problem();
-  EXPECT_NE(none.problem().find("there are 2, none of them there"), std::string::npos) << none.problem();
-  options.index = 1;
-  EXPECT_THROW(X11WindowSource(options, steadyNow), std::invalid_argument);
-}
-
-TEST_F(X11WindowSourceTest, FindsXPlanesOwnWindowByExactlyItsTitle) {
-  TestWindow browser(server_.display(), "X-Plane 12 manual - browser", 600, 500);
-  X11WindowSource source(titled(server_, ""), steadyNow);
-  EXPECT_TRUE(becomesLost(source));
-  EXPECT_NE(source.problem().find("\"X-System\" or \"X-Plane\""), std::string::npos) << source.problem();
-  EXPECT_NE(source.problem().find("\"X-Plane 12 manual - browser\""), std::string::npos) << source.problem();
-  for (const char* title : {"X-System", "X-Plane"}) {
-    TestWindow window(server_.display(), title, 320, 240);
-    X11WindowSource finds(titled(server_, ""), steadyNow);
-    ASSERT_TRUE(nextPicture(finds, picture_)) << finds.describe();
-    EXPECT_EQ(finds.window(), window.id());
-  }
-}
-
-TEST_F(X11WindowSourceTest, PrefersTheWindowWhoseProcessIsXPlane) {
-  TestWindow folder(server_.display(), "X-Plane", 600, 500);  // a file manager, say
-  TestWindow elsewhere(server_.display(), "X-Plane", 500, 400);
-  TestWindow window(server_.display(), "X-Plane", 320, 240);
-  char host[256] = {};
-  ASSERT_EQ(gethostname(host, sizeof host - 1), 0);
-  char before[16] = {};
-  ASSERT_EQ(prctl(PR_GET_NAME, before), 0);
-  ASSERT_EQ(prctl(PR_SET_NAME, "X-Plane-x86_64"), 0);  // of the process too, as this is its main thread
-  folder.ownedBy(1, host);
-  elsewhere.ownedBy(static_cast<std::uint32_t>(getpid()), "another-computer");
-  window.ownedBy(static_cast<std::uint32_t>(getpid()), host);
-  X11WindowSource source(titled(server_, ""), steadyNow);
-  const bool found = nextPicture(source, picture_);
-  prctl(PR_SET_NAME, before);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(source.window(), window.id());
 }
 
 TEST_F(X11WindowSourceTest, WorksThroughTheSocketWithoutSharedMemory) {
