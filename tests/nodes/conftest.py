@@ -11,11 +11,11 @@ from typing import Any, Callable, Iterator
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.resources import node_program
 
-_ANSWER_S = 15.0  # a machine busy with other work is slow, a node that hangs is silent for ever
 _numbers = itertools.count(1)
 
 # Shells ignore SIGINT for what they run in the background, and programs would inherit that from here.
@@ -54,19 +54,19 @@ class TopicLog:
         return self.messages[-1] if self.messages else None
 
     def wait_for(
-        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S, what: str = ""
+        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = WAIT_S, what: str = ""
     ) -> Any:
         """Waits for a message, from the first one on, that fulfils `condition`, and returns it."""
         return self._find(0, condition, timeout, what)
 
     def wait_for_next(
-        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S, what: str = ""
+        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = WAIT_S, what: str = ""
     ) -> Any:
         """The same, among the messages that come from now on: for topics that stream."""
         return self._find(len(self.messages), condition, timeout, what)
 
     def then_wait_for(
-        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S, what: str = ""
+        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = WAIT_S, what: str = ""
     ) -> Any:
         """The same, among the messages after the one found last (or the ones before skip_to_now()).
 
@@ -78,7 +78,7 @@ class TopicLog:
         """What has come until now is not what then_wait_for() looks for."""
         self._after_found = len(self.messages)
 
-    def wait_for_count(self, count: int, timeout: float = _ANSWER_S) -> list[Any]:
+    def wait_for_count(self, count: int, timeout: float = WAIT_S) -> list[Any]:
         """Waits until `count` more messages have come, and returns those."""
         first = len(self.messages)
         wait_until(lambda: len(self.messages) >= first + count, timeout, f"{count} messages on {self.topic}")
@@ -140,7 +140,7 @@ class Wire:
 
     def wait_until_reads(self, path: str, value: float) -> None:
         """Waits until a dataref has a value."""
-        wait_until(lambda: self.read(path) == value, _ANSWER_S, f"{path} = {value:g}")
+        wait_until(lambda: self.read(path) == value, WAIT_S, f"{path} = {value:g}")
 
 
 class World:
@@ -215,7 +215,7 @@ class World:
         import rospy
 
         name = f"{self.namespace}/{service}"
-        rospy.wait_for_service(name, _ANSWER_S)
+        rospy.wait_for_service(name, WAIT_S)
         return rospy.ServiceProxy(name, service_type)(*args, **kwargs)
 
     def point_to(self, port: int) -> None:
@@ -231,7 +231,7 @@ class World:
         return log
 
     def wait_for_diagnostics(
-        self, name: str, condition: Callable[[Any], bool] = lambda _: True, timeout: float = _ANSWER_S
+        self, name: str, condition: Callable[[Any], bool] = lambda _: True, timeout: float = WAIT_S
     ) -> Any:
         """Waits for a status of one of this namespace's nodes whose name ends in `name`; returns it."""
         from diagnostic_msgs.msg import DiagnosticArray

@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import AUTO, MANUAL, tx_params
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.ros import roslaunch
@@ -52,23 +53,23 @@ def test_a_controller_and_x_plane_die_and_the_recording_says_so(world) -> None:
     wait_until(lambda: abs(state.last.roll_deg - 15.0) < 3.0, 60, "the turn")
 
     controller.send_signal(signal.SIGKILL)
-    controller.wait(10)
+    controller.wait(WAIT_S)
     dead = mode.wait_for(lambda m: m.failsafe)
     assert (dead.mode, dead.reason) == (AUTO, "timeout of control/auto")
     events.wait_for(lambda e: any(event.text == "AUTO: failsafe: timeout of control/auto" for event in e.events))
-    wait_until(lambda: "AUTO: failsafe: timeout of control/auto" in bridge.output(), 10, "the warning")
+    wait_until(lambda: "AUTO: failsafe: timeout of control/auto" in bridge.output(), WAIT_S, "the warning")
     height = state.last.altitude_msl
     drifted = flies_for(state, 10.0)
     assert max(abs(later.altitude_msl - height) for later in drifted) < 60.0
 
     xplane.restart()
-    off = mode.wait_for_next(lambda m: m.mode == MANUAL, 30)
+    off = mode.wait_for_next(lambda m: m.mode == MANUAL, WAIT_S)
     assert off.reason.startswith("X-Plane was restarted")
-    state.wait_for_next(timeout=30)
+    state.wait_for_next(timeout=WAIT_S)
     flies_for(state, 5.0)
     assert mode.last.mode == MANUAL, "AUTO came back by itself"
     recorder.stop()
-    wait_until(bag.exists, 30, "the end of the recording")
+    wait_until(bag.exists, WAIT_S, "the end of the recording")
 
     page = world.folder / "flight.html"
     run("flight_report", bag, "-o", page)

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import call, journal_entries, tx_params
 from xplane_bridge.harness import wait_until
 
@@ -49,7 +50,7 @@ def flight(request, new_world, tmp_path_factory):
 def ask(world, **request):
     """Calls the service, which accepts; returns the event with the outcome."""
     flies = "sim/time/total_flight_time_sec"
-    wait_until(lambda: world.other.read(flies) > 1.0, 30.0, "a flight that has begun")
+    wait_until(lambda: world.other.read(flies) > 1.0, WAIT_S, "a flight that has begun")
     response = call(world, "reset_flight", "ResetFlight", **request)
     assert (response.success, response.result.code) == (True, ACCEPTED), response.result.message
     number = response.event_number

@@ -7,6 +7,7 @@ import signal
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import ROLL, CommandSource, call, journal_entries, tx_params
 from xplane_bridge.harness import wait_until
 
@@ -106,7 +107,7 @@ def test_what_cannot_be_is_refused(world):
         try:
             manual.fly(fields=ROLL, roll=0.0)
             wait_until(
-                lambda: world.other.read("sim/operation/override/override_joystick_roll") == 1.0, 30.0, "the override"
+                lambda: world.other.read("sim/operation/override/override_joystick_roll") == 1.0, WAIT_S, "the override"
             )
             event = done(world, fields=bits("MASTER"), master=2)
             assert "tx_node holds override_joystick_roll, and there the autopilot moves nothing" in event.text

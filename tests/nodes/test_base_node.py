@@ -9,6 +9,7 @@ import xmlrpc.client
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.ros import free_port
 
@@ -41,7 +42,7 @@ def trace(world):
 def test_signal_ends_it_in_order(world, tiny, number):
     node = tiny()
     node.send_signal(number)
-    assert node.wait(10) == 0
+    assert node.wait(WAIT_S) == 0
     assert trace(world) == STOP_ORDER
     assert world.last_word.wait_for(lambda word: word.data == "undone")
     assert f"stopping: {number.name}" in node.output()
@@ -51,7 +52,7 @@ def test_first_line_comes_at_once_and_reports_what_the_node_was_given(world, tin
     """Its output goes into a file here, as roslaunch's does where that is redirected."""
     world.set_param("port", 49010)
     node = tiny(gain=2.5, mode="calm", limits={"upper": 100.0})
-    started = node.wait_for_line(r"^.*tiny_node starts with (.*?)(\x1b\[0m)?$", 10)
+    started = node.wait_for_line(r"^.*tiny_node starts with (.*?)(\x1b\[0m)?$", WAIT_S)
     assert started.group(1) == f'port: 49010, ~gain: 2.5, ~trace_file: "{world.trace}"'
 
 
@@ -62,7 +63,7 @@ def test_master_shutdown_request_ends_it_in_order(world, tiny):
         uri = master.lookupNode("/tests", f"{world.namespace}/tiny_node")[2]
     with xmlrpc.client.ServerProxy(uri) as slave:
         assert slave.shutdown("/tests", "user request")[0] == 1
-    assert node.wait(10) == 0
+    assert node.wait(WAIT_S) == 0
     assert trace(world) == STOP_ORDER
     assert "shutdown request: user request" in node.output()
 
@@ -71,10 +72,10 @@ def test_second_node_of_the_same_name_replaces_the_first_in_order(world, tiny):
     first = tiny()
     world.trace.rename(world.folder / "first")
     second = tiny(wait=False)
-    assert first.wait(10) == 0
+    assert first.wait(WAIT_S) == 0
     assert (world.folder / "first").read_text(encoding="utf-8").split() == STOP_ORDER
     words = world.last_word.messages
-    wait_until(lambda: [word.data for word in words].count("running") == 2, 15, "the second node's first word")
+    wait_until(lambda: [word.data for word in words].count("running") == 2, WAIT_S, "the second node's first word")
     for _ in range(2):
         world.wait_for_diagnostics("tiny")
     assert second.running
@@ -91,30 +92,30 @@ def test_ending_needs_no_master(world, tmp_path):
         )
         node.start()
         other_trace = tmp_path / "trace"
-        wait_until(lambda: other_trace.exists() and "start" in other_trace.read_text(), 15, "start of the node")
+        wait_until(lambda: other_trace.exists() and "start" in other_trace.read_text(), WAIT_S, "start of the node")
     node.send_signal(signal.SIGINT)
-    assert node.wait(10) == 0
+    assert node.wait(WAIT_S) == 0
     assert other_trace.read_text(encoding="utf-8").split() == STOP_ORDER
 
 
 def test_ctrl_c_while_waiting_for_a_master(world, tmp_path):
     env = {**world.env, "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}"}
     with ManagedProcess("tiny", [world.program("tiny_node")], tmp_path, env=env) as node:
-        node.wait_for_line("no ROS master at .* waiting", 10)
+        node.wait_for_line("no ROS master at .* waiting", WAIT_S)
         node.send_signal(signal.SIGINT)
-        assert node.wait(5) == 0
+        assert node.wait(WAIT_S) == 0
 
 
 def test_hanging_end_is_cut_off_and_named(tiny):
     node = tiny(mode="hang_in_undo")
     node.send_signal(signal.SIGTERM)
-    assert node.wait(15) == 3
+    assert node.wait(WAIT_S) == 3
     assert "hangs in: undo in X-Plane" in node.output()
 
 
 def test_failing_start_ends_it_in_order_with_its_own_status(world, tiny):
     node = tiny(wait=False, mode="fail_at_start")
-    assert node.wait(10) == 1
+    assert node.wait(WAIT_S) == 1
     assert "port 49003 is in use" in node.output()
     assert trace(world) == STOP_ORDER[1:]
 
@@ -125,7 +126,7 @@ def test_failure_later_has_its_own_status(world, tiny):
 
     node = tiny(mode="fail_later")
     rospy.Publisher(f"{world.namespace}/ping", Float64, queue_size=1, latch=True).publish(1.0)
-    assert node.wait(10) == 2
+    assert node.wait(WAIT_S) == 2
     assert "the test wanted it" in node.output()
     assert trace(world) == STOP_ORDER
 
@@ -143,7 +144,7 @@ def test_failure_later_has_its_own_status(world, tiny):
 )
 def test_wrong_parameters_are_refused_in_words(tiny, params, parts):
     node = tiny(wait=False, **params)
-    assert node.wait(10) == 1
+    assert node.wait(WAIT_S) == 1
     for part in parts:
         assert part in node.output()
 
@@ -151,13 +152,13 @@ def test_wrong_parameters_are_refused_in_words(tiny, params, parts):
 def test_wrong_shared_parameter_is_refused(world, tiny):
     world.set_param("hots", "192.168.1.2")
     node = tiny(wait=False)
-    assert node.wait(10) == 1
+    assert node.wait(WAIT_S) == 1
     assert f"{world.namespace}/hots (did you mean host?)" in node.output()
 
 
 def test_missing_required_parameter_is_named(world):
     node = world.start("tiny_node")
-    assert node.wait(10) == 1
+    assert node.wait(WAIT_S) == 1
     assert f"{world.namespace}/tiny_node/trace_file is required" in node.output()
 
 
@@ -186,7 +187,7 @@ def test_waiting_service_does_not_delay_callbacks_nor_the_end(world, tiny):
     from xplane_bridge.srv import GetDataref
 
     node = tiny()
-    rospy.wait_for_service(f"{world.namespace}/slow_echo", 10)
+    rospy.wait_for_service(f"{world.namespace}/slow_echo", WAIT_S)
     call = rospy.ServiceProxy(f"{world.namespace}/slow_echo", GetDataref)
     answers = []
 
@@ -205,7 +206,7 @@ def test_waiting_service_does_not_delay_callbacks_nor_the_end(world, tiny):
     assert not answers, "the callback ran only after the service"
     begin = time.monotonic()
     node.send_signal(signal.SIGINT)
-    assert node.wait(10) == 0
+    assert node.wait(WAIT_S) == 0
     assert trace(world) == STOP_ORDER
     waiting.join(10)
     assert time.monotonic() - begin < 5.0

@@ -9,6 +9,7 @@ from typing import Iterator
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import journal_entries
 from xplane_bridge import protocol
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -60,7 +61,7 @@ def test_the_delay_is_measured_and_used(world, display: str) -> None:
     assert answers[-1].success, [answer.message for answer in answers]
     delay = float(re.match(r"([0-9.]+) s, from \d+ steps", answers[-1].message).group(1))
     assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.025)
-    state = states.wait_for_next(lambda s: not s.quality & FrameState.QUALITY_DELAY_ASSUMED, timeout=30.0)
+    state = states.wait_for_next(lambda s: not s.quality & FrameState.QUALITY_DELAY_ASSUMED, timeout=WAIT_S)
     assert state.display_delay == pytest.approx(delay, abs=1e-4)
     world.wire(emulator.port).wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
     assert not journal_entries(world)
@@ -112,5 +113,5 @@ def test_the_field_of_view_is_given_back_by_the_end_or_by_the_next_start(world, 
     else:
         node.stop()
     wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
-    wait_until(lambda: not journal_entries(world), 30.0, "an empty journal")
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     asking.join(30.0)

@@ -11,6 +11,7 @@ from typing import Iterator
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.harness import wait_until
@@ -90,7 +91,7 @@ def test_pose_is_that_of_the_drawn_camera_in_every_view(
     states = world.watch("camera/frame_state", FrameState)
     transforms = world.watch("/tf", TFMessage)
     unsure = FrameState.QUALITY_POSE_UNSURE | FrameState.QUALITY_STATE_MISSING
-    states.wait_for(lambda state: not state.quality & unsure, timeout=30.0, what="a sure pose")
+    states.wait_for(lambda state: not state.quality & unsure, timeout=WAIT_S, what="a sure pose")
 
     seen: dict[str, range] = {}
     for view in (*VIEWS, "turned"):
@@ -101,7 +102,7 @@ def test_pose_is_that_of_the_drawn_camera_in_every_view(
         else:
             send(emulator.port, protocol.CommandRequest(f"sim/view/{view}"))
         begin = len(states.messages)
-        wait_until(lambda begin=begin: len(states.messages) > begin + 3 * FPS, 30.0, f"pictures of {view}")
+        wait_until(lambda begin=begin: len(states.messages) > begin + 3 * FPS, WAIT_S, f"pictures of {view}")
         seen[view] = range(begin + FPS // 2, len(states.messages))  # the view's first pictures are on their way still
     emulator.stop()
 

@@ -10,6 +10,7 @@ from typing import Iterator
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import ManagedProcess, RosMaster, roslaunch
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ros import free_port
@@ -68,7 +69,7 @@ def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, 
         images = world.watch("desktop/camera/image_raw", Image)
         infos = world.watch("desktop/camera/camera_info", CameraInfo)
         states = world.watch("desktop/camera/frame_state", FrameState)
-        images.wait_for(what="a picture", timeout=40.0)
+        images.wait_for(what="a picture", timeout=WAIT_S)
         status = world.wait_for_diagnostics("capture", lambda s: s.level == 0 and s.message == "capturing")
         assert f'"{TITLE}"' in world.values_of(status)["Source"]
         seen = {halves(image) for image in images.wait_for_count(10)}

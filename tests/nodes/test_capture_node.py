@@ -14,6 +14,7 @@ from typing import Iterator
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess, wait_until
@@ -93,7 +94,7 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
     states.wait_for(lambda state: state.quality == 0, what="a perfectly paired picture")
     first = len(images.messages)
     images.wait_for_count(100, timeout=60.0)
-    wait_until(lambda: len(states.messages) > first + 100, 10.0, "states of the pictures")
+    wait_until(lambda: len(states.messages) > first + 100, WAIT_S, "states of the pictures")
     emulator.stop()
 
     by_stamp = {state.header.stamp: state for state in states.messages}
@@ -230,11 +231,11 @@ def test_lost_window_is_said_and_found_again(world, display) -> None:
     images, states = watch(world, "image", "state")
     images.wait_for()
     emulator.kill()
-    status = world.wait_for_diagnostics("capture", lambda status: status.level == 2, timeout=30.0)
+    status = world.wait_for_diagnostics("capture", lambda status: status.level == 2, timeout=WAIT_S)
     assert "X-System" in status.message
     emulator.restart()
-    images.wait_for_next(timeout=30.0)
-    states.wait_for_next(timeout=30.0)
+    images.wait_for_next(timeout=WAIT_S)
+    states.wait_for_next(timeout=WAIT_S)
     node.check_running()
 
 
@@ -250,7 +251,7 @@ def test_a_picture_that_stands_is_an_error_unless_the_aircraft_has_crashed(world
     (images,) = watch(world, "image")
     state = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1)
     warnings = rospy.Publisher(f"{world.namespace}/mission/warnings", WarningState, queue_size=1, latch=True)
-    wait_until(lambda: state.get_num_connections() and warnings.get_num_connections(), 15.0, "capture_node's ear")
+    wait_until(lambda: state.get_num_connections() and warnings.get_num_connections(), WAIT_S, "capture_node's ear")
     ended = threading.Event()
 
     def move() -> None:
@@ -263,14 +264,14 @@ def test_a_picture_that_stands_is_an_error_unless_the_aircraft_has_crashed(world
     mover.start()
     try:
         still.start()
-        images.wait_for(timeout=30.0)
-        frozen = world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=30.0)
+        images.wait_for(timeout=WAIT_S)
+        frozen = world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=WAIT_S)
         assert frozen.message == "frozen: the aircraft moves, the picture does not"
         warnings.publish(WarningState(crashed=1.0))
-        crashed = world.wait_for_diagnostics("capture", lambda s: s.level < 2, timeout=30.0)
+        crashed = world.wait_for_diagnostics("capture", lambda s: s.level < 2, timeout=WAIT_S)
         assert (crashed.level, crashed.message) == (1, "the picture stands still: the aircraft has crashed")
         warnings.publish(WarningState(crashed=0.0))
-        world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=30.0)
+        world.wait_for_diagnostics("capture", lambda s: s.level == 2, timeout=WAIT_S)
     finally:
         ended.set()
         mover.join()
@@ -298,9 +299,9 @@ root.mainloop()
     images, states = watch(world, "image", "state")
     try:
         black.start()
-        images.wait_for(timeout=30.0)
-        assert states.wait_for(timeout=30.0).quality & FrameState.QUALITY_BLACK
-        reported = world.wait_for_diagnostics("capture", lambda s: s.level == 1, timeout=30.0)
+        images.wait_for(timeout=WAIT_S)
+        assert states.wait_for(timeout=WAIT_S).quality & FrameState.QUALITY_BLACK
+        reported = world.wait_for_diagnostics("capture", lambda s: s.level == 1, timeout=WAIT_S)
         assert reported.message == "the picture is black"
     finally:
         black.stop()
@@ -338,10 +339,10 @@ def test_field_of_view_is_set_and_given_back(world, display) -> None:
     write_dataref(emulator.port, FIELD_OF_VIEW, 72.0)
     node = capture(world, display, field_of_view_deg=40.0, set_field_of_view=True)
     (states,) = watch(world, "state")
-    states.wait_for(lambda state: abs(state.field_of_view_deg - 40.0) < 1e-3, timeout=30.0)
+    states.wait_for(lambda state: abs(state.field_of_view_deg - 40.0) < 1e-3, timeout=WAIT_S)
     node.stop()
     capture(world, display, field_of_view_deg=40.0, set_field_of_view=False)
-    states.wait_for_next(lambda state: abs(state.field_of_view_deg - 72.0) < 1e-3, timeout=30.0)
+    states.wait_for_next(lambda state: abs(state.field_of_view_deg - 72.0) < 1e-3, timeout=WAIT_S)
 
 
 def test_states_below_the_frame_rate_are_interpolated(world, display) -> None:
@@ -352,7 +353,7 @@ def test_states_below_the_frame_rate_are_interpolated(world, display) -> None:
     world.start("rx_node", {"max_publish_rate": 5.0})
     capture(world, display)
     (states,) = watch(world, "state")
-    state = states.wait_for(lambda state: state.quality & FrameState.QUALITY_INTERPOLATED, timeout=30.0)
+    state = states.wait_for(lambda state: state.quality & FrameState.QUALITY_INTERPOLATED, timeout=WAIT_S)
     assert state.state.sim_time == pytest.approx(state.frame_sim_time, abs=2e-3)
     assert state.sim_time_error == 0.0
 
@@ -372,7 +373,7 @@ def test_states_below_the_frame_rate_are_interpolated(world, display) -> None:
 )
 def test_wrong_parameters_are_refused_in_words(world, params: dict, text: str) -> None:
     node = world.start("capture_node", params)
-    assert node.wait(20.0) == 1
+    assert node.wait(WAIT_S) == 1
     assert text in node.output()
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import call, tx_params
 from xplane_bridge import protocol
 from xplane_bridge.harness.display import VirtualDisplay
@@ -65,7 +66,7 @@ def test_rows_that_are_otherwise_are_not_used(world):
     states, status = world.watch("flight_state", FlightState), world.watch("mission/sim", SimStatus)
     world.start("rx_node", {"configure_xplane": True})
     wanted = FlightState.VALID_RATES | FlightState.VALID_POSITION
-    turn = states.wait_for(lambda s: s.valid & wanted == wanted and 24.0 < s.roll_deg < 26.0, 40)
+    turn = states.wait_for(lambda s: s.valid & wanted == wanted and 24.0 < s.roll_deg < 26.0, WAIT_S)
     # A level turn: the heading turns with g tan(bank) / V, of which pitch and yaw get their parts.
     bank = math.radians(turn.roll_deg)
     turning = 9.80665 * math.tan(bank) / turn.ground_speed
@@ -92,7 +93,7 @@ def test_without_the_file_those_rows_mislead(world):
     world.set_param("data_port", 0)
     states = world.watch("flight_state", FlightState)
     world.start("rx_node", {"configure_xplane": True})
-    turn = states.wait_for(lambda s: s.valid & FlightState.VALID_RATES and s.roll_deg > 20.0, 40)
+    turn = states.wait_for(lambda s: s.valid & FlightState.VALID_RATES and s.roll_deg > 20.0, WAIT_S)
     assert turn.angular_velocity.z < 0.01, "radians a second taken for degrees"
 
 
@@ -116,9 +117,9 @@ def test_systems_whose_rows_are_otherwise_are_right_by_the_file_and_wrong_withou
     engines, warnings = world.watch("mission/engines", EngineStates), world.watch("mission/warnings", WarningState)
     autopilot = world.watch("mission/autopilot", AutopilotState)
     world.start("rx_node", {"configure_xplane": True})
-    propellers = engines.wait_for(lambda e: e.count == 2 and e.valid & PROPELLER_COMMAND, 40).propeller_command[:2]
-    lights = warnings.wait_for(lambda w: w.valid & WarningState.VALID_ENGINES, 40).generator_off[:2]
-    held = autopilot.wait_for(lambda a: a.valid & AutopilotState.VALID_MODES, 40).altitude_hold_status
+    propellers = engines.wait_for(lambda e: e.count == 2 and e.valid & PROPELLER_COMMAND, WAIT_S).propeller_command[:2]
+    lights = warnings.wait_for(lambda w: w.valid & WarningState.VALID_ENGINES, WAIT_S).generator_off[:2]
+    held = autopilot.wait_for(lambda a: a.valid & AutopilotState.VALID_MODES, WAIT_S).altitude_hold_status
     governed = [wire.read(f"sim/flightmodel/engine/ENGN_prop[{engine}]") for engine in range(2)]
     assert min(governed) > 100.0, "rad/s of governors in flight"
     if has_file:
@@ -143,7 +144,7 @@ def test_a_vehs_that_moves_nothing_is_not_sent(world):
     there = {"latitude": 47.2, "longitude": 8.3, "altitude_msl": 1500.0, "heading_true_deg": 250.0}
     answer = call(world, "reset_flight", "ResetFlight", true_airspeed=75.0, **there)
     assert answer.result.code == ACCEPTED, answer.result.message
-    reported = events.wait_for(lambda e: any(event.number == answer.event_number for event in e.events), 30)
+    reported = events.wait_for(lambda e: any(event.number == answer.event_number for event in e.events), WAIT_S)
     assert next(event for event in reported.events if event.number == answer.event_number).success
     assert "vehs is refuted: flights are placed by PREL, not by VEHS" in log_of(world)
     world.xplane.stop()

@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.bags import Bags
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
@@ -178,7 +179,7 @@ def test_ctrl_c_ends_the_demo_and_all_it_has_started(tmp_path: Path) -> None:
         assert len(children) >= 4, "emulator, master, roslaunch and nodes"
         run.send_signal(signal.SIGINT)
         assert run.wait(60.0) == 130, run.output()
-        wait_until(lambda: not [pid for pid in children if alive(pid)], 10.0, "end of all children")
+        wait_until(lambda: not [pid for pid in children if alive(pid)], WAIT_S, "end of all children")
 
 
 #: Flies in a process of its own: rospy knows one master a process, and the tests' process has its own already.

@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import call, journal_entries, tx_params
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import wait_until
@@ -60,7 +61,7 @@ def wait_for_wind_of_before(world):
     def is_back():
         return np.allclose([world.other.read(name) for name in world.air], world.calm, atol=0.01)
 
-    wait_until(is_back, 15.0, "the wind of before")
+    wait_until(is_back, WAIT_S, "the wind of before")
 
 
 @pytest.fixture(scope="module", params=["11.40", "12"])
@@ -74,7 +75,7 @@ def test_a_gust_is_flown_reported_and_ended(flight):
     steady = -flight.calm[0]
     assert steady == pytest.approx(-6.0, abs=0.01)
     number = disturb(flight, **GUST)
-    end = flight.truth.wait_for(lambda s: s.id == number and s.result == "done", 30.0)
+    end = flight.truth.wait_for(lambda s: s.id == number and s.result == "done", WAIT_S)
     states = [s for s in flight.truth.messages if s.id == number and s.active]
     assert len(states) > 50
     for state in states:
@@ -88,7 +89,7 @@ def test_a_gust_is_flown_reported_and_ended(flight):
     assert (end.kind, end.active, end.speed, end.duration) == ("gust", False, 8.0, 3.0)
     assert end.end_sim_time - end.start_sim_time == pytest.approx(3.0, abs=0.2)
     wait_for_wind_of_before(flight)
-    wait_until(lambda: journal_entries(flight) == [], 15.0, "an empty journal")
+    wait_until(lambda: journal_entries(flight) == [], WAIT_S, "an empty journal")
     texts = [(e.kind, e.text, e.success) for e in flight.events.last.events if e.requested_by.endswith("/disturb")]
     assert (SETTING, f"disturbance {number}, gust: begins", True) in texts
     assert (SETTING, f"disturbance {number}, gust: done", True) in texts
@@ -96,9 +97,9 @@ def test_a_gust_is_flown_reported_and_ended(flight):
 
 def test_the_air_of_the_simulator_is_what_was_commanded(flight):
     number = disturb(flight, **LASTING)
-    flight.truth.wait_for(lambda s: s.id == number and s.active, 30.0)
+    flight.truth.wait_for(lambda s: s.id == number and s.active, WAIT_S)
     # 5 m/s from the south, on a wind of 6 m/s from the north.
-    wait_until(lambda: abs(air_now(flight)[0] + 1.0) < 0.02, 15.0, "the wind")
+    wait_until(lambda: abs(air_now(flight)[0] + 1.0) < 0.02, WAIT_S, "the wind")
     assert flight.truth.last.wind_speed == pytest.approx(1.0, abs=0.01)
     assert len(journal_entries(flight)) == 1
     # One at a time, and no other wind meanwhile.
@@ -139,10 +140,10 @@ def test_the_wind_of_before_comes_back_when_the_node_ends(world, end):
     fly(world)
     try:
         disturb(world, **LASTING)
-        wait_until(lambda: abs(air_now(world)[0] + 1.0) < 0.02, 15.0, "the wind")
+        wait_until(lambda: abs(air_now(world)[0] + 1.0) < 0.02, WAIT_S, "the wind")
         world.node.send_signal(end)
         wait_for_wind_of_before(world)
-        wait_until(lambda: journal_entries(world) == [], 15.0, "an empty journal")
+        wait_until(lambda: journal_entries(world) == [], WAIT_S, "an empty journal")
     finally:
         world.close()
 

@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.failing_twin import (  # noqa: F401
     FAILURES,
     LEFT,
@@ -47,8 +48,8 @@ def test_override_that_another_client_releases_is_not_taken_again(healthy):
     world.wire.wait(RUDDER, 4.0)
     type(world).wire(world.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
     said(world, f"failure of {name} has ended: another client has released the surface override")
-    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
-    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), 5, "the journal's entry to go")
+    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, WAIT_S, "an empty state")
+    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), WAIT_S, "the journal's entry to go")
     assert world.wire.value(SURFACES) == 0.0
 
 
@@ -63,7 +64,7 @@ def test_who_takes_the_stick_from_the_bridge_gets_the_surfaces_too(healthy):
     type(world).wire(world.xplane.port).send(protocol.DrefWrite("sim/operation/override/override_joystick_roll", 0.0))
     said(world, f"failure of {name} has ended: another client has released")
     world.wire.wait(SURFACES, 0.0)
-    wait_until(lambda: not journal_entries(world), 5, "an empty journal")
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     assert call(world, "set_mode", "SetMode", mode=1).success  # flies on
 
 
@@ -76,7 +77,7 @@ class Surfaces:
 
         self._type = SurfaceCommand
         self._publisher = rospy.Publisher(f"{world.namespace}/control/surfaces", SurfaceCommand, queue_size=1)
-        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+        wait_until(lambda: self._publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
 
     def send(self, sequence=0, **deflections):
         self._publisher.publish(
@@ -111,7 +112,7 @@ def test_single_surfaces_by_command(healthy):
         return abs(wire.value(LEFT) - 4.0) < 1e-4 and abs(wire.value(RIGHT) - 4.0) < 1e-4
 
     count = len(world.applied.messages)
-    wait_until(shown, 5, "both ailerons down")
+    wait_until(shown, WAIT_S, "both ailerons down")
     seen = world.applied.wait_for(lambda a: a.sequence == 70007 and a.read_back)
     assert list(seen.surface_names) == ["aileron1_wing2_left", "aileron1_wing2_right"]
     assert seen.read_back_frames > 0.9
@@ -125,10 +126,10 @@ def test_single_surfaces_by_command(healthy):
             time.sleep(0.002)
         return any(a.sequence >= 80000 and a.read_back for a in world.applied.messages)
 
-    wait_until(streamed, 5, "a command of the stream")
+    wait_until(streamed, WAIT_S, "a command of the stream")
     # Not repeated, the command ends after command_timeout, and the mixing flies again.
     wire.wait(SURFACES, 0.0)
-    wait_until(lambda: follows(wire, LEFT) and follows(wire, RIGHT), 5, "the ailerons to follow again")
+    wait_until(lambda: follows(wire, LEFT) and follows(wire, RIGHT), WAIT_S, "the ailerons to follow again")
     assert call(world, "set_mode", "SetMode", mode=MANUAL).success
 
 
@@ -145,7 +146,7 @@ def test_a_stick_that_takes_over_ends_single_surfaces(healthy):
         surfaces.send(aileron1_wing2_left=4.0, aileron1_wing2_right=4.0)
         return abs(wire.value(LEFT) - 4.0) < 1e-4 and abs(wire.value(RIGHT) - 4.0) < 1e-4
 
-    wait_until(shown, 5, "both ailerons down")
+    wait_until(shown, WAIT_S, "both ailerons down")
     modes.skip_to_now()
     world.manual.fly(roll=0.5)
 
@@ -153,7 +154,7 @@ def test_a_stick_that_takes_over_ends_single_surfaces(healthy):
         surfaces.send(aileron1_wing2_left=4.0, aileron1_wing2_right=4.0)  # it goes on commanding
         return wire.value(SURFACES) == 0.0 and follows(wire, LEFT) and follows(wire, RIGHT)
 
-    wait_until(over, 5, "the ailerons to follow the stick")
+    wait_until(over, WAIT_S, "the ailerons to follow the stick")
     taken = modes.then_wait_for(lambda m: m.mode == MANUAL)
     assert taken.reason.startswith("stick take-over")
     assert taken.reason.endswith("control/surfaces ends")
@@ -171,12 +172,12 @@ def test_overrides_and_failures_are_given_back_however_it_ends(new_world, tmp_pa
         world.node.send_signal(end)
         world.wire.wait(SURFACES, 0.0)
         engine.wait(FAILURES + "rel_engfai1", 0.0)
-        world.node.wait(10)
+        world.node.wait(WAIT_S)
         if end == signal.SIGINT:  # its last word must not label what comes after
             wait_until(
-                lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "nothing broken"
+                lambda: not world.state.last.names and not world.state.last.surrogate_mixing, WAIT_S, "nothing broken"
             )
-        wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+        wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
         if end == signal.SIGINT:
             world.node = world.start("tx_node", world.params)
             wait_ready(world)
@@ -207,7 +208,7 @@ def test_mixing_is_identified_from_flight_and_kept(new_world, tmp_path):
         )
         return file.is_file()
 
-    wait_until(flying, 40, "a mixing file")
+    wait_until(flying, WAIT_S, "a mixing file")
     world.manual.stop()
     found = json.loads(file.read_text(encoding="utf-8"))
     assert found["aircraft"] == "DA62"
@@ -222,7 +223,7 @@ def test_mixing_is_identified_from_flight_and_kept(new_world, tmp_path):
     world.wire.wait(LEFT, 5.0)
 
     world.node.send_signal(signal.SIGINT)
-    world.node.wait(10)
+    world.node.wait(WAIT_S)
     world.node = world.start("tx_node", world.params)
     wait_ready(world)  # by the file, without any flying
     assert fail(world, "aileron1_wing2_left", "stuck", -3.0).success

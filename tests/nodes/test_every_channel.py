@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import CommandSource, WatchedDatarefs, tx_params
 from xplane_bridge.constants import ControlField
 
@@ -20,7 +21,6 @@ LEVERS = "sim/cockpit2/engine/actuators/throttle_ratio"
 USED = "sim/flightmodel2/engines/throttle_used_ratio"
 OVERRIDE = "sim/operation/override/override_"
 #: Nacelles go 8 deg/s, flaps 7 deg/s, and the machine may be busy.
-WAIT_S = 60.0
 
 
 def engines(dataref, *values):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import AUTO, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
 from xplane_bridge import protocol
 from xplane_bridge.harness import wait_until
@@ -51,14 +52,14 @@ def flown(twin):
         twin.manual.fly(fields=ROLL, roll=max(-0.5, min(0.5, -0.02 * bank)))
         return abs(bank) < 3.0
 
-    wait_until(levelled, 30, "level flight")
+    wait_until(levelled, WAIT_S, "level flight")
     twin.manual.fly(roll=0.0)
     twin.wire.wait(STICK, 0.0)
     yield twin
     inject(twin, kind="stop")
-    wait_until(lambda: not twin.state.last.active, 10, "the end of the excitation")
+    wait_until(lambda: not twin.state.last.active, WAIT_S, "the end of the excitation")
     twin.manual.stop()
-    wait_until(lambda: call(twin, "set_mode", "SetMode", mode=1).success, 10, "MANUAL")
+    wait_until(lambda: call(twin, "set_mode", "SetMode", mode=1).success, WAIT_S, "MANUAL")
 
 
 def inject(world, **request):
@@ -165,7 +166,7 @@ def test_a_surface_that_another_client_releases_is_not_taken_again(flown):
     began = inject(flown, kind="chirp", target="aileron1_wing2_left", amplitude=1.0, duration=60.0)
     assert began.success, began.result.message
     flown.wire.wait(SURFACES, 1.0)
-    wait_until(lambda: abs(flown.wire.value(LEFT)) > 0.3, 10, "the left aileron to move")
+    wait_until(lambda: abs(flown.wire.value(LEFT)) > 0.3, WAIT_S, "the left aileron to move")
     type(flown).wire(flown.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
     ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
     assert ended.result == "aborted: another client has released the surface override"
@@ -190,10 +191,10 @@ def test_a_surface_that_breaks_ends_it(flown):
 def test_one_surface_is_excited_while_the_others_fly(flown):
     began = inject(flown, target="aileron1_wing2_left", amplitude=4.0, duration=3.0)
     assert began.success, began.result.message
-    wait_until(lambda: flown.wire.value(LEFT) == pytest.approx(4.0, abs=0.3), 10, "the left aileron down")
+    wait_until(lambda: flown.wire.value(LEFT) == pytest.approx(4.0, abs=0.3), WAIT_S, "the left aileron down")
     assert flown.wire.value(SURFACES) == 1.0
     assert flown.wire.value(RIGHT) == pytest.approx(0.0, abs=0.3)
-    wait_until(lambda: flown.wire.value(LEFT) == pytest.approx(-4.0, abs=0.3), 10, "the left aileron up")
+    wait_until(lambda: flown.wire.value(LEFT) == pytest.approx(-4.0, abs=0.3), WAIT_S, "the left aileron up")
     assert flown.state.wait_for(lambda s: s.id == began.id and not s.active).result == "done"
     flown.wire.wait(SURFACES, 0.0)
 

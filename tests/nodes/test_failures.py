@@ -8,6 +8,7 @@ import threading
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.failing_twin import (  # noqa: F401
     ACCEPTED,
     ALPHA,
@@ -65,7 +66,7 @@ def label_of(world, name):
 def wait_for_label(world, name, **expected):
     wait_until(
         lambda: all(label_of(world, name).get(key) == value for key, value in expected.items()),
-        10,
+        WAIT_S,
         f"label of {name} {expected}, last {label_of(world, name)}",
     )
 
@@ -86,18 +87,18 @@ def test_left_aileron_stuck_rolls_the_aircraft_and_the_others_keep_flying(health
     assert 0.0 < label_of(world, "aileron1_wing2_left")["since_sim_time"] <= began
     assert abs(wire.value(RIGHT)) < 2.0, "only one aileron is stuck"
     # The figure: hands off, 30 degrees in about 5 s.
-    wait_until(lambda: wire.value(BANK) >= 30.0, 15, "30 degrees of bank")
+    wait_until(lambda: wire.value(BANK) >= 30.0, WAIT_S, "30 degrees of bank")
     assert 2.5 < wire.value(TIME) - began < 8.0
     # The stick still moves all others: right aileron by its own travel, elevator, rudder.
     world.manual.fly(roll=-0.8, pitch=0.25, yaw=-0.25)
-    wait_until(lambda: wire.value(RIGHT) > 4.0 and follows(wire, RIGHT), 5, "the right aileron")
-    wait_until(lambda: wire.value(RUDDER) < -5.0 and wire.value(ELEVATOR) < -2.0, 5, "rudder and elevator")
+    wait_until(lambda: wire.value(RIGHT) > 4.0 and follows(wire, RIGHT), WAIT_S, "the right aileron")
+    wait_until(lambda: wire.value(RUDDER) < -5.0 and wire.value(ELEVATOR) < -2.0, WAIT_S, "rudder and elevator")
     assert wire.value(LEFT) == pytest.approx(5.0, abs=1e-4)
-    wait_until(lambda: wire.value(BANK) < 20.0, 10, "the stick rolls back")
+    wait_until(lambda: wire.value(BANK) < 20.0, WAIT_S, "the stick rolls back")
     applied = world.applied.wait_for_next()
     assert list(applied.surface_names) == ["aileron1_wing2_left"]
     assert list(applied.surface_deflections_deg) == [5.0]
-    wait_until(lambda: 0.9 < world.state.last.surrogate_lag_frames < 4.0, 5, "a measured lag")
+    wait_until(lambda: 0.9 < world.state.last.surrogate_lag_frames < 4.0, WAIT_S, "a measured lag")
     assert world.state.last.surrogate_mixing
 
 
@@ -109,10 +110,10 @@ def test_cleared_surface_follows_the_stick_again(healthy):
     assert done.success, done.result.message
     assert list(done.cleared) == ["rudder1_fin1"]
     wire.wait(SURFACES, 0.0)
-    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), 5, "the journal's entry to go")
+    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), WAIT_S, "the journal's entry to go")
     world.manual.fly(fields=ROLL | PITCH | YAW, yaw=0.25)
     wire.wait(RUDDER, 27.0 * 0.25, tolerance=1.5)
-    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
+    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, WAIT_S, "an empty state")
     assert math.isnan(world.state.last.surrogate_lag_frames)
 
 
@@ -121,7 +122,7 @@ def test_every_kind_of_a_surface(healthy):
     name = "aileron1_wing2_left"
     world.manual.fly(fields=ROLL, roll=0.4)
     wire.wait(STICK, 0.4)
-    wait_until(lambda: follows(wire, LEFT), 5, "the stick")
+    wait_until(lambda: follows(wire, LEFT), WAIT_S, "the stick")
     healthy_deg = wire.value(LEFT)
 
     assert fail(world, name, "stuck").success  # where it is
@@ -140,10 +141,10 @@ def test_every_kind_of_a_surface(healthy):
 
     world.manual.fly(roll=0.3)
     assert fail(world, name, "reduced", 0.5).success
-    wait_until(lambda: wire.value(LEFT) == pytest.approx(7.5 * wire.value(TOTAL), abs=0.05), 5, "half of it")
+    wait_until(lambda: wire.value(LEFT) == pytest.approx(7.5 * wire.value(TOTAL), abs=0.05), WAIT_S, "half of it")
 
     assert fail(world, name, "floating").success
-    wait_until(lambda: wire.value(LEFT) == pytest.approx(-0.3 * wire.value(ALPHA), abs=0.1), 5, "trailing")
+    wait_until(lambda: wire.value(LEFT) == pytest.approx(-0.3 * wire.value(ALPHA), abs=0.1), WAIT_S, "trailing")
 
     assert fail(world, name, "slow", 5.0).success
     world.manual.fly(roll=-0.3)
@@ -154,7 +155,7 @@ def test_every_kind_of_a_surface(healthy):
         angles.append(wire.value(LEFT))
         return angles[-1] < -3.0 and follows(wire, LEFT)
 
-    wait_until(arrived, 10, "the slow surface")
+    wait_until(arrived, WAIT_S, "the slow surface")
     moving = [(t, a) for t, a in zip(times, angles) if a < angles[0] - 0.5]
     assert (moving[0][1] - moving[-1][1]) / (moving[-1][0] - moving[0][0]) == pytest.approx(5.0, rel=0.2)
     assert wire.value(SURFACES) == 1.0
@@ -177,11 +178,11 @@ def test_every_kind_of_a_surface(healthy):
 def test_systems_fail_and_are_repaired(healthy, name, leaf, where, shows):
     world = healthy
     wire = WatchedDatarefs(world.xplane.port, where, FAILURES + leaf)
-    wait_until(lambda: not math.isnan(wire.value(where)) and not shows(wire.value(where)), 5, f"{where} before")
+    wait_until(lambda: not math.isnan(wire.value(where)) and not shows(wire.value(where)), WAIT_S, f"{where} before")
     done = fail(world, name)
     assert done.result.code == OK, done.result.message
     wire.wait(FAILURES + leaf, 6.0)
-    wait_until(lambda: shows(wire.value(where)), 5, f"{where} to show it")
+    wait_until(lambda: shows(wire.value(where)), WAIT_S, f"{where} to show it")
     wait_for_label(world, name, set_by="bridge", active=True, confirmed=True, kinds="failed")
     assert world.wire.value(SURFACES) == 0.0, "no surface is concerned"
     assert call(world, "clear_failures", "ClearFailures", names=[name]).success
@@ -256,7 +257,7 @@ def test_the_simulators_menu(healthy):
     assert fail(world, "generator_1").success
     other.send(protocol.DrefWrite(FAILURES + "rel_genera0", 0.0))
     said(world, "generator_1 was repaired in the simulator")
-    wait_until(lambda: not label_of(world, "generator_1"), 5, "the label to go")
+    wait_until(lambda: not label_of(world, "generator_1"), WAIT_S, "the label to go")
 
 
 def test_xplane_12_breaks_its_surfaces_itself(new_world, tmp_path):
@@ -266,7 +267,7 @@ def test_xplane_12_breaks_its_surfaces_itself(new_world, tmp_path):
     fcon = WatchedDatarefs(world.xplane.port, locked, up, FAILURES + "rel_fcon_ailn_1_lft_gone")
     world.manual.fly(fields=ROLL, roll=0.3)
     wire.wait(STICK, 0.3)
-    wait_until(lambda: follows(wire, LEFT), 5, "the stick")
+    wait_until(lambda: follows(wire, LEFT), WAIT_S, "the stick")
     angle = wire.value(LEFT)
     done = fail(world, name, "stuck")
     assert done.result.code == OK, done.result.message
@@ -274,7 +275,7 @@ def test_xplane_12_breaks_its_surfaces_itself(new_world, tmp_path):
     assert wire.value(SURFACES) == 0.0
     assert not world.state.last.surrogate_mixing
     world.manual.fly(roll=-0.2)
-    wait_until(lambda: wire.value(RIGHT) > 2.0 and follows(wire, RIGHT), 5, "the right aileron")
+    wait_until(lambda: wire.value(RIGHT) > 2.0 and follows(wire, RIGHT), WAIT_S, "the right aileron")
     assert wire.value(LEFT) == pytest.approx(angle, abs=0.2)
     wait_for_label(world, name, active=True, confirmed=True, kinds="stuck")
     # Another failure of the same surface takes the place of the first.
@@ -327,7 +328,9 @@ def test_pause_restart_and_a_total_that_stands_still(new_world, tmp_path):
     assert fail(world, name, "stuck", 3.0).success
     wire.wait(LEFT, 3.0)
     world.manual.fly(fields=ROLL, roll=-0.4)
-    wait_until(lambda: wire.value(RIGHT) == pytest.approx(15.0 * 0.4, abs=1.0), 5, "the stick instead of the total")
+    wait_until(
+        lambda: wire.value(RIGHT) == pytest.approx(15.0 * 0.4, abs=1.0), WAIT_S, "the stick instead of the total"
+    )
 
     assert world.call("tx_node/pause", SetBool, True).success
     world.state.wait_for_next()
@@ -335,7 +338,7 @@ def test_pause_restart_and_a_total_that_stands_still(new_world, tmp_path):
     assert (wire.value(SURFACES), wire.value(LEFT)) == (1.0, 3.0)
     assert world.call("tx_node/pause", SetBool, False).success
     world.manual.fly(roll=-0.2)
-    wait_until(lambda: wire.value(RIGHT) == pytest.approx(15.0 * 0.2, abs=1.0), 5, "the right aileron to go on")
+    wait_until(lambda: wire.value(RIGHT) == pytest.approx(15.0 * 0.2, abs=1.0), WAIT_S, "the right aileron to go on")
     wait_for_label(world, name, active=True, confirmed=True)
 
     # Another X-Plane has no failure; nothing is broken in it without being asked for, nor later.
@@ -346,8 +349,8 @@ def test_pause_restart_and_a_total_that_stands_still(new_world, tmp_path):
     said(world, f"failure of {name} has ended: X-Plane was restarted")
     again = WatchedDatarefs(world.xplane.port, SURFACES)
     again.wait(SURFACES, 0.0)
-    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
-    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), 5, "the journal's entry to go")
+    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, WAIT_S, "an empty state")
+    wait_until(lambda: "override:" + SURFACES not in journal_entries(world), WAIT_S, "the journal's entry to go")
     again.close()
     close(world)
 
@@ -370,7 +373,7 @@ def test_surfaces_of_another_aircraft_are_left_alone(new_world, tmp_path):
     ended = excitation.wait_for(lambda s: s.id == 1 and not s.active)
     assert ended.result in ("aborted: another aircraft was loaded", "aborted: the flight was reset")
     world.wire.wait(SURFACES, 0.0)
-    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, 5, "an empty state")
+    wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, WAIT_S, "an empty state")
     done = fail(world, name, "stuck", 5.0)
     assert (done.success, done.result.code) == (False, REFUSED)
     assert "config/aircraft/fixed_wing.yaml is for DA62" in done.result.message

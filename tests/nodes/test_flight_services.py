@@ -12,6 +12,7 @@ import time
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import ROLL, CommandSource, WatchedDatarefs, call, journal_entries, tx_params
 from xplane_bridge import protocol
 from xplane_bridge.emulator.simulator import aircraft_path
@@ -78,7 +79,7 @@ def ask(world, service, kind, **request):
     assert (response.success, response.result.code) == (True, ACCEPTED), response.result.message
     number = response.event_number
     assert str(number) in response.result.message
-    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 30)
+    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), WAIT_S)
     return next(event for event in reported.events if event.number == number)
 
 
@@ -328,7 +329,7 @@ def test_weather_that_was_to_end_with_the_node_does(world, end):
         done(world, "set_weather", "SetWeather", fields=16, sea_level_temperature=30.0, restore_on_exit=True)
         assert world.other.read(temperature) == pytest.approx(30.0)
         world.node.send_signal(end)
-        wait_until(lambda: abs(world.other.read(temperature) - 15.0) < 1e-3, 15.0, "the temperature of before")
+        wait_until(lambda: abs(world.other.read(temperature) - 15.0) < 1e-3, WAIT_S, "the temperature of before")
     finally:
         close(world)
 
@@ -388,7 +389,7 @@ def test_x_plane_10_is_not_supported_and_why(world):
         assert not response.success
         return response.result.message if response.result.code == NOT_SUPPORTED else ""
 
-    message = wait_until(not_supported, 15, "the version to be known")
+    message = wait_until(not_supported, WAIT_S, "the version to be known")
     assert "this is X-Plane 105105" in message
     assert "before 11.00" in message
     old.close()

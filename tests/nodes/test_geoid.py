@@ -6,9 +6,9 @@ import struct
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import wait_until
 
-WAIT_S = 40.0
 #: What a build says that has no GeographicLib.
 WITHOUT = "this build has no GeographicLib"
 

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import AUTO, LAW, WatchedDatarefs, call, tx_params
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.resources import program
@@ -30,7 +31,7 @@ def fly(world, *options):
     world.set_param("aircraft", "fixed_wing")
     world.start("tx_node", tx_params())
     world.events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events))
-    wait_until(lambda: world.wire.value(HEIGHT) == world.wire.value(HEIGHT), 10, "X-Plane's answers")
+    wait_until(lambda: world.wire.value(HEIGHT) == world.wire.value(HEIGHT), WAIT_S, "X-Plane's answers")
     return world
 
 
@@ -42,7 +43,7 @@ def identify(world, **request):
         answers.append(call(world, "identify_surfaces", "IdentifySurfaces", **request))
         return answers[-1].success
 
-    wait_until(accepted, 30, "a steady flight")
+    wait_until(accepted, WAIT_S, "a steady flight")
     number = answers[-1].event_number
     found = world.events.wait_for(lambda e: any(event.number == number for event in e.events), timeout=90)
     return next(event for event in found.events if event.number == number)

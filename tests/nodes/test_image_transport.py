@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -71,7 +72,7 @@ def test_compressed_has_one_advertiser(world, display, package: Path, tmp_path: 
         assert advertisers(f"{world.namespace}/{TOPIC}") == [f"{world.namespace}/capture_node"]
         stamps = [jpeg.header.stamp for jpeg in jpegs.messages]
         assert len(set(stamps)) == len(stamps), "a picture came twice"
-        wait_until(lambda: images.last.header.stamp > stamps[PICTURES - 1], 15.0, "later images")
+        wait_until(lambda: images.last.header.stamp > stamps[PICTURES - 1], WAIT_S, "later images")
         assert set(stamps[1:PICTURES]) <= {image.header.stamp for image in images.messages}
         for jpeg in jpegs.messages[:PICTURES]:
             assert jpeg.format == "bgr8; jpeg compressed bgr8"

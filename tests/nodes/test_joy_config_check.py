@@ -11,6 +11,7 @@ import sys
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import wait_until
 from xplane_bridge.resources import program
 
@@ -110,19 +111,19 @@ def test_on_a_terminal_it_follows_the_stick_and_the_file(world, stick):
         return re.search(pattern, text.rpartition("\x1b[H")[2].replace("\x1b[K", "").replace("\r", ""), re.MULTILINE)
 
     try:
-        wait_until(lambda: shows(r"roll \+0\.250 "), 30, "command of the stick on the screen")
+        wait_until(lambda: shows(r"roll \+0\.250 "), WAIT_S, "command of the stick on the screen")
         stick.axes[0] = 1.0
         stick.axes[1] = 1.0
         stick.buttons[1] = 1
-        wait_until(lambda: shows(r"roll -1\.000 "), 15, "new command on the screen")
-        wait_until(lambda: shows(r"flaps \+1\.000 "), 15, "integrated flaps on the screen")
-        wait_until(lambda: shows(r"mode requests: AUTO"), 15, "request for AUTO on the screen")
+        wait_until(lambda: shows(r"roll -1\.000 "), WAIT_S, "new command on the screen")
+        wait_until(lambda: shows(r"flaps \+1\.000 "), WAIT_S, "integrated flaps on the screen")
+        wait_until(lambda: shows(r"mode requests: AUTO"), WAIT_S, "request for AUTO on the screen")
         file.write_text(FILE.replace("scale: -1.0", "scale: 0.5"), encoding="utf-8")
-        wait_until(lambda: shows(r"roll \+0\.500 "), 15, "command by the file saved anew")
+        wait_until(lambda: shows(r"roll \+0\.500 "), WAIT_S, "command by the file saved anew")
         file.write_text(FILE.replace("scale", "scal"), encoding="utf-8")
-        wait_until(lambda: shows(r"ERROR: .*direct\.roll\.scal "), 15, "error of the file saved anew")
+        wait_until(lambda: shows(r"ERROR: .*direct\.roll\.scal "), WAIT_S, "error of the file saved anew")
         run.send_signal(signal.SIGINT)
-        wait_until(lambda: (shows(""), run.poll())[1] is not None, 15, "end on Ctrl-C")
+        wait_until(lambda: (shows(""), run.poll())[1] is not None, WAIT_S, "end on Ctrl-C")
         assert run.returncode == 130
         shows("")
         assert "\x1b[?25h" in text, "the cursor is given back"

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import ManagedProcess
 from xplane_bridge.resources import config_file, program
 
@@ -65,9 +66,9 @@ def reader(world):
 def test_without_a_joystick_it_says_so_and_ends_on_ctrl_c(world):
     process = start(world, program("joy_reader"), "--device", "Extreme", "--namespace", world.namespace)
     try:
-        process.wait_for_line("no joystick is there; looking for one", 30)
+        process.wait_for_line("no joystick is there; looking for one", WAIT_S)
         process.send_signal(signal.SIGINT)
-        assert process.wait(15) == 0, process.output()
+        assert process.wait(WAIT_S) == 0, process.output()
     finally:
         process.stop()
 
@@ -80,7 +81,7 @@ def test_stick_to_command_through_unplugging_and_plugging_in(world, reader):
     joy, commands = world.watch("joy", Joy), world.watch("control/manual", ControlCommand)
     options = yaml.safe_load(config_file("joysticks", "logitech_extreme_3d_pro.yaml").read_text(encoding="utf-8"))
     world.start("joystick_mapper_node", {**options, "joy_timeout": 0.3})
-    process.wait_for_line("no joystick is there", 30)
+    process.wait_for_line("no joystick is there", WAIT_S)
     do("plug")
     first = joy.wait_for()
     assert first.header.frame_id == "Virtual Flight Stick"
@@ -93,7 +94,7 @@ def test_stick_to_command_through_unplugging_and_plugging_in(world, reader):
     assert all(c.roll == 1.0 for c in commands.wait_for_count(50)), "the stick is held"
 
     do("pull_out")
-    process.wait_for_line("'Virtual Flight Stick' was pulled out; no joystick is there", 15)
+    process.wait_for_line("'Virtual Flight Stick' was pulled out; no joystick is there", WAIT_S)
     world.wait_for_diagnostics("joystick", lambda status: status.level == 1 and "silent" in status.message)
     assert commands.last.roll == 1.0, "not let go by the unplugging"
     world.wait_for_diagnostics("joy_reader: device", lambda status: status.level == 1)

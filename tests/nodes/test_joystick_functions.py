@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import RepeatedJoy, WatchedDatarefs, tx_params, write_mixing
 from xplane_bridge.harness import wait_until
 
@@ -27,7 +28,6 @@ STICK = {
         "nonsense": {"button": 6, "does": "failure", "name": "wing", "kind": "failed"},
     },
 }
-WAIT_S = 30.0
 
 
 @pytest.fixture

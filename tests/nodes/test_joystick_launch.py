@@ -6,6 +6,7 @@ import shlex
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.resources import config_file
 
@@ -135,4 +136,4 @@ def test_a_scenario_flies_the_whole_bridge_as_a_joystick(world):
             applied.wait_for(lambda a: a.roll == pytest.approx(0.5, abs=0.01))
         except Exception:
             pytest.fail(launch.describe("no flight"))
-    wait_until(lambda: not launch.running, 15, "end of the launch")
+    wait_until(lambda: not launch.running, WAIT_S, "end of the launch")

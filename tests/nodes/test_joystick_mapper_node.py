@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import RepeatedJoy
 from xplane_bridge.harness import wait_until
 
@@ -87,7 +88,7 @@ def test_trigger_asks_for_the_other_mode_once_a_press(world, mapper):
     # Another node went back to MANUAL: the next press asks for AUTO again.
     publisher = rospy.Publisher(f"{world.namespace}/control/mode", ControlMode, queue_size=1, latch=True)
     publisher.publish(ControlMode(mode=1))
-    wait_until(lambda: publisher.get_num_connections() > 0, 15, "the mapper's subscription")
+    wait_until(lambda: publisher.get_num_connections() > 0, WAIT_S, "the mapper's subscription")
     stick.buttons[0] = 0
     world.commands.wait_for_count(20)
     stick.buttons[0] = 1
@@ -116,17 +117,17 @@ def test_device_with_too_few_axes_is_named(world, mapper):
 
 def test_wrong_key_stops_the_node_in_words(world):
     node = world.start("joystick_mapper_node", {"device": "x", "direct": {"roll": {"axis": 0, "dead_zon": 0.1}}})
-    assert node.wait(15) == 1
+    assert node.wait(WAIT_S) == 1
     assert "direct/roll/dead_zon" in node.output()
 
 
 def test_slats_are_refused_in_words(world):
     node = world.start("joystick_mapper_node", {"device": "x", "direct": {"slats": {"axis": 0}}})
-    assert node.wait(15) == 1
+    assert node.wait(WAIT_S) == 1
     assert "X-Plane has no handle for slats, they follow that of the flaps" in node.output()
 
 
 def test_wrong_target_stops_the_node_in_words(world):
     node = world.start("joystick_mapper_node", {"device": "x", "direct": {"ailerons": {"axis": 0}}})
-    assert node.wait(15) == 1
+    assert node.wait(WAIT_S) == 1
     assert "trim_pitch" in node.output()

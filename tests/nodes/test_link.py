@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import wait_until
 from xplane_bridge.resources import config_file
 
@@ -34,7 +35,7 @@ def killed_node(world):
     states = world.watch("flight_state", FlightState)
     node = world.start("rx_node")
     states.wait_for()
-    wait_until(lambda: sum(subscribed(xplane).values()) > 300, 15, "all groups to be asked for")
+    wait_until(lambda: sum(subscribed(xplane).values()) > 300, WAIT_S, "all groups to be asked for")
     node.kill()
     left = subscribed(xplane)
     assert sum(left.values()) > 300, "X-Plane does not know that the node is gone"
@@ -48,12 +49,12 @@ def test_next_start_ends_what_a_killed_node_has_subscribed(world, killed_node):
     states = world.watch("flight_state", FlightState)
     node = world.start("rx_node")
     states.wait_for()
-    wait_until(lambda: not set(left) & set(subscribed(xplane)), 15, "the dead node's subscriptions to end")
+    wait_until(lambda: not set(left) & set(subscribed(xplane)), WAIT_S, "the dead node's subscriptions to end")
     journal = next((world.folder / "ros_home" / "xplane_bridge").glob("*.json"))
-    wait_until(lambda: len(json.loads(journal.read_text())["entries"]) == 1, 15, "the dead node's entry to go")
+    wait_until(lambda: len(json.loads(journal.read_text())["entries"]) == 1, WAIT_S, "the dead node's entry to go")
     node.send_signal(signal.SIGINT)
-    assert node.wait(15) == 0
-    wait_until(lambda: not subscribed(xplane), 5, "the living node's subscriptions to end with it")
+    assert node.wait(WAIT_S) == 0
+    wait_until(lambda: not subscribed(xplane), WAIT_S, "the living node's subscriptions to end with it")
     assert not journal.exists()
     assert xplane.status()["ignored"].get("flood", 0) == 0
 
@@ -64,7 +65,7 @@ def test_release_overrides_ends_what_a_killed_node_has_subscribed(world, killed_
     assert done.returncode == 0, done.stderr
     assert "/rx_node" in done.stdout
     assert done.stdout.strip().endswith(": ended"), done.stdout
-    wait_until(lambda: not subscribed(xplane), 5, "the dead node's subscriptions to end")
+    wait_until(lambda: not subscribed(xplane), WAIT_S, "the dead node's subscriptions to end")
     assert not list((world.folder / "ros_home" / "xplane_bridge").glob("*.json"))
 
 
@@ -149,5 +150,5 @@ def test_one_way_with_its_version_given_publishes_rates(world, version, paramete
 
 def test_one_way_with_its_version_given_to_the_launch_file_publishes_rates(world):
     one_way(world, "11", "xplane_version:=115501")
-    world.states.wait_for(lambda state: state.valid & RATES, 40.0)
+    world.states.wait_for(lambda state: state.valid & RATES, WAIT_S)
     assert world.links.last.xplane_version == 115501

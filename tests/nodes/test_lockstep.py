@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import tx_params
 from xplane_bridge.harness.processes import ManagedProcess, wait_until
 
@@ -41,7 +42,7 @@ class Recording:
         return all(subscriber.get_num_connections() > 0 for subscriber in self._subscribers)
 
     def wait_for(self, topic, count):
-        wait_until(lambda: len(self.payloads[topic]) >= count, 30, f"{count} messages on {topic}")
+        wait_until(lambda: len(self.payloads[topic]) >= count, WAIT_S, f"{count} messages on {topic}")
 
     def wait_until_quiet(self):
         """Waits until nothing has come for a second: the simulator stands."""
@@ -98,12 +99,12 @@ def fly(world, shaken):
     controller = start_controller(world)
     processes.append(controller)
     for service in ("get_dataref", "tx_node/load_state"):  # advertised after all topics
-        rospy.wait_for_service(f"{world.namespace}/{service}", 30)
+        rospy.wait_for_service(f"{world.namespace}/{service}", WAIT_S)
     recording = Recording(world.namespace)
     ended = threading.Event()
     shaker = threading.Thread(target=shake, args=(processes, ended, 5))
     try:
-        wait_until(recording.connected, 30, "all topics")
+        wait_until(recording.connected, WAIT_S, "all topics")
         if shaken:
             shaker.start()
         began = time.monotonic()
@@ -203,7 +204,7 @@ def test_the_controllers_of_the_page_answer_every_frame(new_world, tmp_path, lan
             states, commands = world.watch("flight_state", FlightState), world.watch("control/auto", ControlCommand)
             assert step(world, 60).flown == 60
             states.wait_for(lambda state: state.frame_count == 60)
-            wait_until(lambda: len(commands.messages) == 60, 30, "60 commands")
+            wait_until(lambda: len(commands.messages) == 60, WAIT_S, "60 commands")
     finally:
         world.close()
     law = [min(max(-0.03 * state.roll_deg, -1.0), 1.0) for state in states.messages]
@@ -226,6 +227,6 @@ def test_what_lockstep_cannot_work_with_is_refused(world, key, value, message):
     world.set_param("listen_for_beacon", True)
     world.set_param(key, value)
     node = world.start("rx_node")
-    wait_until(lambda: not node.running, 30, "end of rx_node")
+    wait_until(lambda: not node.running, WAIT_S, "end of rx_node")
     assert node.returncode == 1
     assert message in node.describe("")

@@ -8,9 +8,9 @@ from typing import Any, Iterator
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.harness import roslaunch, wait_until
 
-WAIT_S = 60.0
 #: So far the quadrotor is to go, from where it was first seen [m]: east, north, up.
 AWAY = (6.0, 3.0, 4.0)
 

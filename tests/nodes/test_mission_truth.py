@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 
 EARTH_RADIUS_M = 6378145.0
@@ -23,7 +24,7 @@ def slant_range_m(state):
 
 def state_of(states, message):
     """The flight state of a mission message's frame."""
-    return states.wait_for(lambda s: s.sim_time == message.sim_time, 10.0, f"the state of {message.sim_time}")
+    return states.wait_for(lambda s: s.sim_time == message.sim_time, WAIT_S, f"the state of {message.sim_time}")
 
 
 @pytest.fixture(name="logs")
@@ -42,11 +43,11 @@ def test_needles_gauges_and_air_agree_with_the_flight(world, logs, version):
 
     world.emulator("--version", version, *START)
     world.start("rx_node", {})
-    begins = logs["flight"].wait_for(lambda _: True, 30.0, "a flight").sim_time
+    begins = logs["flight"].wait_for(lambda _: True, WAIT_S, "a flight").sim_time
 
     def first(group, everything):
         """The first whole message of a frame that has a flight state."""
-        return logs[group].wait_for(lambda m: m.valid == everything and m.sim_time > begins, 10.0, f"all of {group}")
+        return logs[group].wait_for(lambda m: m.valid == everything and m.sim_time > begins, WAIT_S, f"all of {group}")
 
     navigation = first("navigation", NavigationState.VALID_ALL)
     state = state_of(logs["flight"], navigation)
@@ -80,7 +81,7 @@ def test_a_blocked_pitot_is_seen_against_the_truth(world, logs):
     emulator = world.emulator("--model", "kinematic")
     other = world.wire(emulator.port)
     world.start("rx_node", {})
-    logs["instruments"].wait_for(lambda m: math.isfinite(m.airspeed[0]), 30.0, "an airspeed")
+    logs["instruments"].wait_for(lambda m: math.isfinite(m.airspeed[0]), WAIT_S, "an airspeed")
     other.send(protocol.DrefWrite("sim/operation/failures/rel_pitot", 6.0))
     other.send(protocol.DrefWrite("sim/operation/override/override_joystick", 1.0))
     other.send(protocol.DrefWrite("sim/joystick/yoke_pitch_ratio", 0.4))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import tx_params
 from xplane_bridge.harness.processes import wait_until
 
@@ -24,13 +25,13 @@ def test_stamps_and_clock_are_simulator_time(world):
     states, clocks = world.watch("flight_state", FlightState), world.watch("/clock", Clock)
     surfaces, applied = world.watch("mission/surfaces", SurfaceStates), world.watch("control/applied", AppliedCommand)
     stick = rospy.Publisher(f"{world.namespace}/control/manual", ControlCommand, queue_size=1)
-    wait_until(lambda: stick.get_num_connections() == 1, 15, "tx_node")
+    wait_until(lambda: stick.get_num_connections() == 1, WAIT_S, "tx_node")
 
     def applied_now():
         stick.publish(ControlCommand(fields=ControlCommand.ROLL, roll=0.1))
         return len(applied.messages) >= 20
 
-    wait_until(applied_now, 15, "commands applied")
+    wait_until(applied_now, WAIT_S, "commands applied")
     surfaces.wait_for_count(20)
     for state in states.wait_for_count(60):
         assert state.header.stamp.to_sec() == pytest.approx(START + state.sim_time_unwrapped, abs=1e-6)
@@ -63,7 +64,7 @@ def test_capture_node_says_that_it_cannot(world):
     world.point_to(49000)
     world.set_param("publish_clock", True)
     node = world.start("capture_node")
-    wait_until(lambda: not node.running, 30, "end of capture_node")
+    wait_until(lambda: not node.running, WAIT_S, "end of capture_node")
     assert node.returncode == 1
     assert "capture:=false" in node.describe("")
 
@@ -74,7 +75,7 @@ def test_a_simulator_that_does_not_wait_is_stepped_by_its_pause(world):
 
     wire = world.wire(world.emulator("--fps", 60).port)
     world.start("tx_node", tx_params())
-    wait_until(lambda: world.call("lockstep/hold", Trigger).success, 15, "pause")
+    wait_until(lambda: world.call("lockstep/hold", Trigger).success, WAIT_S, "pause")
     assert wire.read(PAUSED) == 1.0
     before = wire.read(RUNNING_TIME)
     answer = world.call("lockstep/step", LockstepStep, frames=30)

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import tx_params
 from xplane_bridge.bags import Bags
 from xplane_bridge.resources import program
@@ -105,7 +106,7 @@ def test_recorded_poses_move_the_aircraft_and_the_flight_model_is_given_back(wor
         assert np.median([abs(getattr(state, name) - recorded[name][row]) for state, row in shown]) < 1.0, name
     assert max(state.roll_deg for state, _ in shown) > 10.0
     last = flights.last.sim_time
-    flights.wait_for_next(lambda state: state.sim_time > last + 1.0, 30.0)
+    flights.wait_for_next(lambda state: state.sim_time > last + 1.0, WAIT_S)
     assert distance(flights.last, recorded, -1) > 20.0  # it flies on
 
 

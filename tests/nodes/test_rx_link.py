@@ -10,6 +10,7 @@ import xmlrpc.client
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from support.rx_fixtures import (
     ALL_VALID,
     KINEMATIC,
@@ -25,7 +26,7 @@ from xplane_bridge.resources import program
 
 def wait_for_link(world, name):
     """Waits for a state of the link, by name, after the one waited for last; returns the message."""
-    return world.links.then_wait_for(lambda link: link.state_name == name, 20.0, f"link state {name}")
+    return world.links.then_wait_for(lambda link: link.state_name == name, WAIT_S, f"link state {name}")
 
 
 # --- whatever X-Plane does --------------------------------------------------------------------------------------------
@@ -48,11 +49,11 @@ def test_search_in_vain_is_said_on_the_console_in_link_state_and_in_diagnostics(
     port = free_udp_port()
     world.point_to(port)
     node = rx()
-    node.wait_for_line(rf"looking for X-Plane at 127\.0\.0\.1:{port}", 15)
+    node.wait_for_line(rf"looking for X-Plane at 127\.0\.0\.1:{port}", WAIT_S)
     # Nothing listens there, and this computer's kernel says so.
     sentence = f"no answer from 127.0.0.1:{port}: that computer is there, but nothing listens on the port"
     world.links.wait_for(lambda link: link.state_name == "SEARCHING" and link.reason.startswith(sentence))
-    node.wait_for_line(rf"WARN.*{sentence}", 15)
+    node.wait_for_line(rf"WARN.*{sentence}", WAIT_S)
     status = world.wait_for_diagnostics("link to X-Plane", lambda status: sentence in status.message)
     assert status.message.count(sentence) == 1, status.message
     assert node.output().count(sentence) == 1
@@ -64,7 +65,7 @@ def test_no_flight_loaded_yet(world, rx):
     rx()
     world.wait_for_diagnostics("flight state", lambda s: "no flight is loaded" in s.message)
     assert not world.states.messages
-    state = world.states.wait_for(timeout=30.0)
+    state = world.states.wait_for(timeout=WAIT_S)
     assert state.valid == ALL_VALID
     assert state.altitude_msl > 100.0
 
@@ -74,12 +75,12 @@ def test_x_plane_killed_and_restarted(world, rx):
     emulator = world.emulator(*KINEMATIC)
     rx()
     # A restart differs from a gap by simulator time that runs anew.
-    before = world.states.wait_for(lambda state: state.sim_time > 5.0, 30.0)
+    before = world.states.wait_for(lambda state: state.sim_time > 5.0, WAIT_S)
     epoch = wait_for_link(world, "CONNECTED").link_epoch
     emulator.kill()
     wait_for_link(world, "STALE")
     emulator.start()
-    world.links.then_wait_for(lambda link: link.state_name == "CONNECTED" and link.link_epoch > epoch, 20.0)
+    world.links.then_wait_for(lambda link: link.state_name == "CONNECTED" and link.link_epoch > epoch, WAIT_S)
     after = world.states.wait_for_next(lambda state: state.valid == ALL_VALID and state.sim_time < before.sim_time)
     assert after.epoch > before.epoch
     world.states.wait_for_count(20)
@@ -119,9 +120,9 @@ def test_found_by_beacon_and_again_on_another_port(world, rx):
         first.stop()
     second, second_port = x_plane("second")
     try:
-        link = world.links.then_wait_for(lambda m: m.state_name == "CONNECTED" and m.port == second_port, 30.0)
+        link = world.links.then_wait_for(lambda m: m.state_name == "CONNECTED" and m.port == second_port, WAIT_S)
         assert link.host == "127.0.0.1"
-        world.states.wait_for_next(timeout=30.0)
+        world.states.wait_for_next(timeout=WAIT_S)
     finally:
         second.stop()
 
@@ -148,9 +149,9 @@ def test_another_aircraft_is_reported_and_starts_an_epoch(world, rx):
     link = world.links.wait_for(lambda m: m.aircraft_icao)
     before = world.states.wait_for()
     world.wire(emulator.port).send(protocol.AircraftLoad(0, "Aircraft/xplane_bridge/multirotor/multirotor.acf"))
-    other = world.links.then_wait_for(lambda m: m.aircraft_icao not in ("", link.aircraft_icao), 30.0)
+    other = world.links.then_wait_for(lambda m: m.aircraft_icao not in ("", link.aircraft_icao), WAIT_S)
     assert other.aircraft_description != link.aircraft_description
-    world.states.wait_for_next(lambda state: state.epoch > before.epoch, 30.0)
+    world.states.wait_for_next(lambda state: state.epoch > before.epoch, WAIT_S)
 
 
 @both_transports
@@ -211,7 +212,7 @@ def test_data_output_is_restored_at_the_end(world, rx, users_data_output, how):
             slave.shutdown("/tests", "user request")
     else:
         node.send_signal(getattr(signal, how))
-    assert node.wait(15) == 0
+    assert node.wait(WAIT_S) == 0
     # At once, not in the end: it was read back before the process ended.
     assert users_data_output.read(RATE) == 33.0
     assert users_data_output.read(ROW_3) == 1.0
@@ -242,7 +243,7 @@ def test_nothing_is_touched_with_rref(world, rx, users_data_output):
     assert users_data_output.read(ROW_21) == 0.0
     assert users_data_output.read(RATE) == 33.0
     node.send_signal(signal.SIGINT)
-    assert node.wait(15) == 0
+    assert node.wait(WAIT_S) == 0
 
 
 def test_nothing_is_configured_when_the_user_has_done_it(world, rx, users_data_output):
@@ -259,5 +260,5 @@ def test_nothing_is_configured_when_the_user_has_done_it(world, rx, users_data_o
     assert state.latitude == pytest.approx(37.46, abs=0.5)
     assert users_data_output.read(RATE) == 33.0
     node.send_signal(signal.SIGINT)
-    assert node.wait(15) == 0
+    assert node.wait(WAIT_S) == 0
     assert users_data_output.read(ROW_21) == 1.0

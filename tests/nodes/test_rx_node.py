@@ -12,6 +12,7 @@ import socket
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from support.rx_fixtures import (  # noqa: F401
     ALL_VALID,
     EARTH_RADIUS_M,
@@ -169,7 +170,7 @@ def test_mission_state_arrives_complete(world, rx):
     rx()
     for group, log in logs.items():
         everything = getattr(xplane_bridge.msg, MISSION[group]).VALID_ALL
-        message = log.wait_for(lambda m, bits=everything: m.valid == bits, 20.0, "complete state")
+        message = log.wait_for(lambda m, bits=everything: m.valid == bits, WAIT_S, "complete state")
         assert math.isfinite(message.sim_time)
         assert message.header.stamp.to_sec() > 1e9
     engines = logs["engines"].wait_for_next()
@@ -183,7 +184,7 @@ def test_mission_state_arrives_complete(world, rx):
 def test_a_frame_split_over_datagrams_is_joined(world, rx):
     world.emulator(*KINEMATIC, "--rref-split", 40)
     rx()
-    states = world.states.wait_for_count(100, 30.0)
+    states = world.states.wait_for_count(100, WAIT_S)
     assert {state.valid for state in states} == {ALL_VALID}
     counts = [state.frame_count for state in states]
     assert counts == list(range(counts[0], counts[0] + 100))
@@ -203,7 +204,7 @@ def test_groups_at_rate_zero_have_no_topic(world, rx):
 def test_max_publish_rate_thins_evenly(world, rx):
     world.emulator(*KINEMATIC, "--fps", 60)
     rx(max_publish_rate=20)
-    states = world.states.wait_for_count(40, 30.0)
+    states = world.states.wait_for_count(40, WAIT_S)
     counts = np.diff([state.frame_count for state in states])
     assert counts.mean() == pytest.approx(3.0, abs=0.2)
     assert counts.min() >= 2
@@ -303,7 +304,7 @@ def test_an_unknown_dataref_is_named(world, rx, unknown):
     rx(datarefs=[{"name": "sim/no/such_dataref"}, {"name": "sim/time/paused"}])
     if unknown == "omit":
         assert math.isnan(values.wait_for().values[0])
-        world.wait_for_diagnostics("link to X-Plane", lambda s: "sim/no/such_dataref" in s.message, 40.0)
+        world.wait_for_diagnostics("link to X-Plane", lambda s: "sim/no/such_dataref" in s.message, WAIT_S)
     else:  # X-Plane then gives no way to distinguish it from a real zero
         assert values.wait_for().values[0] == 0.0
     world.states.wait_for_count(10)
@@ -337,7 +338,7 @@ def test_the_passport_says_how_the_flight_is_made_and_changes_with_it(world, rx)
     world.set_param("experiment", {"aircraft_file": text, "pilot": "Kim"})
     passports = world.watch("experiment", Experiment)
     rx(publish_tf=False)
-    first = passports.wait_for(timeout=30.0)
+    first = passports.wait_for(timeout=WAIT_S)
     parameters = json.loads(first.parameters)
     assert parameters["experiment"]["pilot"] == "Kim"
     assert parameters["rx_node"] == {"publish_tf": False}
@@ -354,8 +355,8 @@ def test_the_passport_says_how_the_flight_is_made_and_changes_with_it(world, rx)
     assert not first.lockstep
     world.wire(emulator.port).send(protocol.DrefWrite("sim/time/sim_speed", 2.0))
     world.set_param("experiment/pilot", "Lee")
-    passports.wait_for(lambda p: dict(zip(p.settings, p.setting_values))["sim/time/sim_speed"] == 2.0, 30.0)
-    last = passports.wait_for(lambda p: "Lee" in p.parameters, 30.0)
+    passports.wait_for(lambda p: dict(zip(p.settings, p.setting_values))["sim/time/sim_speed"] == 2.0, WAIT_S)
+    last = passports.wait_for(lambda p: "Lee" in p.parameters, WAIT_S)
     assert last.header.stamp > first.header.stamp
     assert len(passports.messages) <= 4
 
@@ -381,7 +382,7 @@ def test_the_passport_says_how_the_flight_is_made_and_changes_with_it(world, rx)
 def test_wrong_parameters_are_refused_in_words(world, rx, params, parts):
     world.point_to(free_udp_port())
     node = rx(**params)
-    assert node.wait(15) == 1
+    assert node.wait(WAIT_S) == 1
     for part in parts:
         assert part in node.output()
 
@@ -393,7 +394,7 @@ def test_a_port_in_use_is_said(world, rx):
         world.set_param("transport", "data")
         world.set_param("data_port", other.getsockname()[1])
         node = rx()
-        assert node.wait(15) == 1
+        assert node.wait(WAIT_S) == 1
     assert "in use" in node.output()
 
 
@@ -402,12 +403,12 @@ def test_diagnostics_cover_every_concern(world, rx):
     rx()
     world.states.wait_for_count(60)
     for name in ("link to X-Plane", "flight state", "clock", "position", "physics", "mission state"):
-        status = world.wait_for_diagnostics(name, lambda s: s.level == 0, 30.0)
+        status = world.wait_for_diagnostics(name, lambda s: s.level == 0, WAIT_S)
         assert status.values
     wait_until(
         lambda: world.values_of(world.wait_for_diagnostics("position"))["Source"].startswith(
             "scenery coordinates, agree"
         ),
-        30.0,
+        WAIT_S,
         "comparison with RPOS",
     )

@@ -17,6 +17,7 @@ from typing import Iterator
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.eye import program as eye_program
@@ -228,7 +229,7 @@ def test_the_next_start_gives_the_field_of_view_back_after_a_kill(scene: Scene) 
         eye.kill()
     with scene.eye("--no-calibrate"):
         wire.wait_until_reads(FIELD_OF_VIEW, own)
-        wait_until(lambda: not (scene.folder / "undo.json").exists(), 15.0, "the end of the note")
+        wait_until(lambda: not (scene.folder / "undo.json").exists(), WAIT_S, "the end of the note")
 
 
 def calibrate(scene: Scene):
@@ -268,7 +269,9 @@ def test_the_delay_is_measured_on_request_without_a_restart_but_not_in_a_recordi
             assert re.match(r"\d+\.\d ms, from \d+ steps that lie", answers[-1].message)
             delay = float(answers[-1].message.split()[0]) * 1e-3
             assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.025)
-            sure = scene.states.wait_for_next(lambda s: not s.quality & FrameState.QUALITY_DELAY_ASSUMED, timeout=30.0)
+            sure = scene.states.wait_for_next(
+                lambda s: not s.quality & FrameState.QUALITY_DELAY_ASSUMED, timeout=WAIT_S
+            )
             assert sure.display_delay == pytest.approx(delay, abs=LATE_S)
             wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
             assert not (scene.folder / "undo.json").exists()
@@ -309,13 +312,13 @@ def test_nothing_is_measured_while_the_pictures_are_recorded_but_on_request(scen
 
 
 def test_a_wrong_token_and_a_missing_sender_are_said(scene: Scene) -> None:
-    missing = scene.world.wait_for_diagnostics("capture", lambda status: status.level == 2, timeout=30.0)
+    missing = scene.world.wait_for_diagnostics("capture", lambda status: status.level == 2, timeout=WAIT_S)
     assert f"no xplane_eye on 127.0.0.1 has connected to 127.0.0.1:{scene.port}" in missing.message
     eye = scene.eye("--no-calibrate")
     (scene.folder / "token").write_text("aisle seat", encoding="utf-8")
     with eye:
-        eye.wait_for_line("the token is not the one in capture_node's sender/token", 30.0)
-        scene.world.wait_for_diagnostics("capture", lambda status: "sender/token" in status.message, timeout=30.0)
+        eye.wait_for_line("the token is not the one in capture_node's sender/token", WAIT_S)
+        scene.world.wait_for_diagnostics("capture", lambda status: "sender/token" in status.message, timeout=WAIT_S)
 
 
 @pytest.mark.parametrize(
@@ -328,7 +331,7 @@ def test_a_wrong_token_and_a_missing_sender_are_said(scene: Scene) -> None:
 )
 def test_wrong_addresses_are_refused_in_words(world, sender: dict, text: str) -> None:
     node = world.start("capture_node", {"source": "sender", **({"sender": sender} if sender else {})})
-    assert node.wait(20.0) == 1
+    assert node.wait(WAIT_S) == 1
     assert text in node.output()
 
 
@@ -345,7 +348,7 @@ def test_the_pairing_is_verified_by_the_time_that_x_plane_prints(world, tmp_path
         assert wire.read(TIMES_ON_SCREEN) == 1.0
         said = eye.wait_for_line(r"(\d+) of (\d+) stills show the frame that they are paired with", 180.0)
         assert int(said.group(2)) > 100
-        eye.wait(20.0)
+        eye.wait(WAIT_S)
     assert wire.read(TIMES_ON_SCREEN) == 0.0
     assert wire.read(FIELD_OF_VIEW) == pytest.approx(60.0)
     assert list(tmp_path.glob("undo*")) == []

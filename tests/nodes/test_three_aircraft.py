@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from support.deadlines import WAIT_S
 from support.position_loop import Motion, PositionLoop
 from support.tx_fixtures import AUTO, PITCH, ROLL, THROTTLE, YAW, RepeatedJoy, WatchedDatarefs, tx_params
 from xplane_bridge.harness import wait_until
@@ -44,16 +45,16 @@ def test_one_joystick_flies_it(world, aircraft, engines):
     try:
         stick.plug_in()
         stick.axes[0] = -0.6  # stick right
-        wait_until(lambda: wire.value(BANK) > 8.0, 15, "right bank")
+        wait_until(lambda: wire.value(BANK) > 8.0, WAIT_S, "right bank")
         stick.axes[0] = 0.6
-        wait_until(lambda: wire.value(BANK) < 0.0, 15, "left bank")
+        wait_until(lambda: wire.value(BANK) < 0.0, WAIT_S, "left bank")
         stick.axes[0] = 0.0
         before = wire.value(ELEVATION)
         stick.axes[1] = -0.6  # stick back
-        wait_until(lambda: wire.value(ELEVATION) > before + 3.0, 15, "nose up")
+        wait_until(lambda: wire.value(ELEVATION) > before + 3.0, WAIT_S, "nose up")
         stick.axes[1] = 0.0
         stick.axes[2] = -0.8  # twisted right
-        wait_until(lambda: wire.value(TURN) > 1.0, 15, "turn to the right")
+        wait_until(lambda: wire.value(TURN) > 1.0, WAIT_S, "turn to the right")
         stick.axes[2] = 0.0
         stick.axes[3] = 0.5  # knob: three quarters
         for path in levers:
@@ -62,7 +63,7 @@ def test_one_joystick_flies_it(world, aircraft, engines):
             before = wire.value(NACELLES)
             stick.buttons[5] = 1  # the hat moves the nacelles from now on
             stick.axes[5] = 1.0 if before < 0.5 else -1.0
-            wait_until(lambda: abs(wire.value(NACELLES) - before) > 0.2, 15, "nacelles on their way")
+            wait_until(lambda: abs(wire.value(NACELLES) - before) > 0.2, WAIT_S, "nacelles on their way")
     finally:
         stick.pull_out()
         wire.close()
@@ -90,14 +91,14 @@ def test_position_loop_on_control_auto_hovers_the_quadrotor_60_s_within_a_metre(
     start_tx(world, "multirotor", "--alt", "120", "--heading", "70", "--turbulence", "0.5", "--seed", "4")
     world.start("rx_node")
     wire = WatchedDatarefs(world.xplane.port, lever(0))
-    wait_until(lambda: wire.value(lever(0)) > 0.0, 15, "the throttle of the hover")
+    wait_until(lambda: wire.value(lever(0)) > 0.0, WAIT_S, "the throttle of the hover")
     hover = wire.value(lever(0))
     wire.close()
 
     commands = rospy.Publisher(f"{world.namespace}/control/auto", ControlCommand, queue_size=1)
     requests = rospy.Publisher(f"{world.namespace}/control/mode_request", ModeRequest, queue_size=1)
     for publisher in (commands, requests):
-        wait_until(lambda publisher=publisher: publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+        wait_until(lambda publisher=publisher: publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
     loop = None
     distances = []  # simulator time, metres
 
@@ -115,7 +116,7 @@ def test_position_loop_on_control_auto_hovers_the_quadrotor_60_s_within_a_metre(
 
     states = rospy.Subscriber(f"{world.namespace}/flight_state", FlightState, control, queue_size=1, tcp_nodelay=True)
     try:
-        wait_until(lambda: loop is not None, 30, "flight state")
+        wait_until(lambda: loop is not None, WAIT_S, "flight state")
         requests.publish(ModeRequest(mode=AUTO, sequence=1, requester="test"))
         world.mode.wait_for(lambda mode: mode.mode == AUTO)
         settled = distances[-1][0] + 5.0

@@ -10,6 +10,7 @@ import threading
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import tx_params
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import wait_until
@@ -28,8 +29,8 @@ def test_other_aircraft_are_published_where_they_are_at_their_time(world, versio
     emulator = world.emulator(*KINEMATIC, "--version", version, "--traffic", 2)
     world.start("rx_node", {"rates": {"traffic": 50}})
     traffic = world.watch("traffic/state", TrafficState)
-    first = traffic.wait_for(lambda state: len(state.number) == 2, 30.0, "two aircraft")
-    last = traffic.wait_for(lambda state: state.sim_time > first.sim_time + 2.0, 30.0, "two seconds more")
+    first = traffic.wait_for(lambda state: len(state.number) == 2, WAIT_S, "two aircraft")
+    last = traffic.wait_for(lambda state: state.sim_time > first.sim_time + 2.0, WAIT_S, "two seconds more")
     assert emulator.port
     assert list(last.number) == [1, 2]
     for state in (first, last):
@@ -63,13 +64,13 @@ def test_nothing_is_asked_for_without_a_subscriber(world):
     emulator = world.emulator(*KINEMATIC, "--traffic", 1)
     world.start("rx_node")
     states = world.watch("flight_state", FlightState)
-    states.wait_for_count(30, 30.0)
+    states.wait_for_count(30, WAIT_S)
     quiet = subscriptions(emulator)
     log = world.watch("traffic/state", TrafficState)
-    log.wait_for(lambda state: list(state.number) == [1], 30.0, "the other aircraft")
+    log.wait_for(lambda state: list(state.number) == [1], WAIT_S, "the other aircraft")
     assert subscriptions(emulator) >= quiet + 19 * 12
     log.close()
-    wait_until(lambda: subscriptions(emulator) == quiet, 30.0, "the subscription's end")
+    wait_until(lambda: subscriptions(emulator) == quiet, WAIT_S, "the subscription's end")
 
 
 def command_of(number, now, **more):
@@ -107,9 +108,9 @@ def fixture_placed(world):
         tx = world.start("tx_node", tx_params(**params))
         world.traffic = world.watch("traffic/state", TrafficState)
         states = world.watch("flight_state", FlightState)
-        first = states.wait_for_count(1, 30.0)[0]
+        first = states.wait_for_count(1, WAIT_S)[0]
         publisher = rospy.Publisher(f"{world.namespace}/traffic/command", TrafficCommand, queue_size=1)
-        wait_until(lambda: publisher.get_num_connections() > 0, 30.0, "tx_node's subscription")
+        wait_until(lambda: publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
 
         def fly():
             while not ended.wait(0.2):
@@ -129,7 +130,7 @@ def fixture_placed(world):
 @pytest.mark.parametrize("way", ["written", "vehx"])
 def test_a_commanded_aircraft_flies_smoothly_and_is_given_back(world, placed, way):
     emulator, _ = placed(traffic_way=way)
-    first = world.traffic.wait_for(lambda state: 3 in list(state.number), 30.0, "aircraft 3")
+    first = world.traffic.wait_for(lambda state: 3 in list(state.number), WAIT_S, "aircraft 3")
     world.traffic.wait_for(lambda state: state.sim_time > first.sim_time + 4.0, 60.0, "four seconds of flight")
     seen = [state for state in world.traffic.messages if 3 in list(state.number)]
     for state in seen:
@@ -161,10 +162,10 @@ def test_it_is_given_back_when_tx_node_ends_and_when_it_is_killed(world, placed)
 
 def test_a_wrong_list_is_refused_in_words(world, placed):
     _, tx = placed()
-    world.traffic.wait_for(lambda state: 3 in list(state.number), 30.0, "aircraft 3")
+    world.traffic.wait_for(lambda state: 3 in list(state.number), WAIT_S, "aircraft 3")
     placed.stop()
     world.publisher.publish(command_of(3, 0.0, latitude=[]))
-    tx.wait_for_line("traffic/command is refused: latitude has 0 elements: expected 1, as `number`", 30.0)
+    tx.wait_for_line("traffic/command is refused: latitude has 0 elements: expected 1, as `number`", WAIT_S)
 
 
 def test_the_conflict_scenario_is_recorded_with_the_truth_of_both(tmp_path):

@@ -12,13 +12,13 @@ from typing import Iterator
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.network_namespaces import TwoMachines, why_no_machines
 from support.recorded_topics import RecordedTopics
 from xplane_bridge.harness import ManagedProcess
 from xplane_bridge.resources import program
 
 FIRST, SECOND = "10.77.0.1", "10.77.0.3"
-WAIT_S = 40.0
 _NOT_PERMITTED = why_no_machines()
 
 pytestmark = pytest.mark.skipif(bool(_NOT_PERMITTED), reason=_NOT_PERMITTED)

@@ -13,13 +13,13 @@ from typing import Any, Iterator
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import ROLL, CommandSource, WatchedDatarefs
 from xplane_bridge.harness import ManagedProcess, roslaunch, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ros import free_port
 from xplane_bridge.resources import program
 
-WAIT_S = 60.0
 LONGITUDES = {"first": 20.0, "second": 40.0}
 STICK = "sim/joystick/yoke_roll_ratio"
 OVERRIDE = "sim/operation/override/override_joystick_roll"

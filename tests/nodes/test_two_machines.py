@@ -15,6 +15,7 @@ from typing import Any, Iterator, Sequence
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from support.network_namespaces import Machine, TwoMachines, why_no_machines
 from support.recorded_topics import RecordedTopics
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -30,7 +31,6 @@ STATE_MISSING = 1
 STATES = 4 * FPS
 #: So many pictures with nothing to say against are waited for.
 PERFECT = 90
-WAIT_S = 40.0
 #: What both machines are given: the namespace's parameters are shared.
 _SHARED = f"display_delay:={PIPELINE_DELAY_S}"
 _NOT_PERMITTED = why_no_machines()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import (
     AUTO,
     FLAPS,
@@ -45,14 +46,14 @@ def test_overrides_are_released_however_it_ends(tx, world, end):
     if end == "rosnode kill":
         kill = ManagedProcess("kill", ["rosnode", "kill", f"{world.namespace}/tx_node"], world.folder, env=world.env)
         kill.start()
-        assert kill.wait(20) == 0, kill.output()
+        assert kill.wait(WAIT_S) == 0, kill.output()
     else:
         node.send_signal(end)
     world.wire.wait(OVERRIDE, 0.0)
-    code = node.wait(10)
+    code = node.wait(WAIT_S)
     if end != signal.SIGKILL:
         assert code == 0
-    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
 
 
 def test_overrides_are_released_on_ctrl_c_of_roslaunch(world):
@@ -65,10 +66,10 @@ def test_overrides_are_released_on_ctrl_c_of_roslaunch(world):
     launch.start()
     manual = CommandSource(world, "control/manual")
     manual.fly(fields=ROLL, roll=0.5)
-    wire.wait(OVERRIDE, 1.0, timeout=30.0)
+    wire.wait(OVERRIDE, 1.0, timeout=WAIT_S)
     launch.send_signal(signal.SIGINT)
     wire.wait(OVERRIDE, 0.0)
-    assert launch.wait(20) == 0, launch.output()
+    assert launch.wait(WAIT_S) == 0, launch.output()
     assert not journal_entries(world)
     manual.stop()
     wire.close()
@@ -82,12 +83,12 @@ def test_killed_together_with_its_guardian_the_next_start_releases(tx, world):
     (guardian,) = guardians_of(node)
     os.kill(guardian, signal.SIGKILL)
     node.send_signal(signal.SIGKILL)
-    node.wait(10)
+    node.wait(WAIT_S)
     assert world.wire.value(OVERRIDE) == 1.0
     assert journal_entries(world)
     world.start("tx_node", world.params)
     world.wire.wait(OVERRIDE, 0.0)
-    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     world.events.wait_for(lambda e: has(e, "released override_joystick_roll left by a run that crashed"))
 
 
@@ -101,7 +102,9 @@ def test_a_second_bridge_learns_whose_the_stick_is(tx, world, new_world):
     node = second.start("tx_node", tx_params())
     stick = CommandSource(second, "control/manual")
     stick.fly(fields=ROLL, roll=-0.5)
-    wait_until(lambda: "commands are not sent: another bridge is at this X-Plane" in node.output(), 15, "the warning")
+    wait_until(
+        lambda: "commands are not sent: another bridge is at this X-Plane" in node.output(), WAIT_S, "the warning"
+    )
     assert f"belongs to {world.namespace}/tx_node" in node.output()
     stick.stop()
     second.close()
@@ -117,13 +120,13 @@ def test_xplane_that_went_first_is_no_crash(tx, world):
     world.xplane.kill()
     world.events.wait_for(lambda e: has(e, "STALE"))
     node.send_signal(signal.SIGINT)
-    assert node.wait(20) == 0
+    assert node.wait(WAIT_S) == 0
     assert "override_joystick_roll could not be released, because X-Plane went first, or is silent" in node.output()
-    wait_until(lambda: not guardians_of(node), 15, "the end of its guardian")
+    wait_until(lambda: not guardians_of(node), WAIT_S, "the end of its guardian")
     assert journal_entries(world), "it may only have been silent"
     world.xplane.restart()
     again = world.start("tx_node", world.params)
-    wait_until(lambda: not journal_entries(world), 15, "an empty journal")
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     world.events.wait_for(lambda e: has(e, "released override_joystick_roll left because X-Plane went first"))
     again.stop()
     assert "crash" not in node.output() + again.output()
@@ -142,7 +145,7 @@ def test_a_node_that_hangs_is_relieved_and_flies_again_only_on_request(tx, world
     world.wire.wait(OVERRIDE, 1.0)
     node.send_signal(signal.SIGSTOP)
     world.wire.wait(OVERRIDE, 0.0)
-    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     assert "has not run for 1.0 s: giving back what it has set" in node.output()
     world.mode.skip_to_now()
     node.send_signal(signal.SIGCONT)
@@ -181,7 +184,7 @@ def test_killed_in_the_middle_of_a_reset_it_leaves_xplane_running(tx, world):
     wire.wait(paused, 1.0)
     node.send_signal(signal.SIGKILL)
     wire.wait(paused, 0.0)
-    wait_until(lambda: not journal_entries(world), 10, "an empty journal")
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     wire.close()
 
 
@@ -237,7 +240,7 @@ def release_overrides(world):
         "release", ["/usr/bin/python3", ROOT / "scripts" / "release_overrides"], world.folder, env=world.env
     )
     panic.start()
-    assert panic.wait(20) == 0, panic.output()
+    assert panic.wait(WAIT_S) == 0, panic.output()
 
 
 def test_release_overrides_frees_what_a_crash_left(tx, world):

@@ -7,6 +7,7 @@ import threading
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import (
     AUTO,
     ROLL,
@@ -125,4 +126,4 @@ def test_lost_gives_back_what_is_not_commanded_any_more(flight):
     go_on(flight)
     flight.seen.wait(SURFACES, 0.0)
     flight.seen.wait(OVERRIDE, 0.0)
-    wait_until(lambda: not journal_entries(flight), 10, "an empty journal")
+    wait_until(lambda: not journal_entries(flight), WAIT_S, "an empty journal")

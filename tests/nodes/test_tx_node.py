@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import (
     AUTO,
     FLAPS,
@@ -43,7 +44,7 @@ def request_mode(world, mode, sequence=1, requester="test"):
     from xplane_bridge.msg import ModeRequest
 
     publisher = rospy.Publisher(f"{world.namespace}/control/mode_request", ModeRequest, queue_size=10)
-    wait_until(lambda: publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+    wait_until(lambda: publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
     publisher.publish(ModeRequest(mode=mode, sequence=sequence, requester=requester))
 
 
@@ -186,7 +187,7 @@ def test_motors_take_the_throttle_override_and_give_it_back(tx, world):
     world.wire.wait(THROTTLES, 1.0)
     request_mode(world, MANUAL, sequence=2)
     world.wire.wait(THROTTLES, 0.0)
-    wait_until(lambda: "override:" + THROTTLES not in journal_entries(world), 10, "the journal entry's end")
+    wait_until(lambda: "override:" + THROTTLES not in journal_entries(world), WAIT_S, "the journal entry's end")
 
 
 def test_axes_without_commands_stay_with_xplane(tx, world):
@@ -196,7 +197,7 @@ def test_axes_without_commands_stay_with_xplane(tx, world):
     wire = WatchedDatarefs(world.xplane.port, whole, heading, pedals)
     world.manual.fly(fields=ROLL | PITCH, roll=0.3, pitch=0.1)
     world.wire.wait(STICK, 0.3)
-    wait_until(lambda: abs(wire.value(pedals)) > 1e-3, 10, "a rudder that follows the sideslip")
+    wait_until(lambda: abs(wire.value(pedals)) > 1e-3, WAIT_S, "a rudder that follows the sideslip")
     assert wire.value(whole) == wire.value(heading) == 0.0
     assert set(journal_entries(world)) == {"override:" + path for path in AXES - {heading}}
     world.manual.fly(fields=ROLL | PITCH | YAW, yaw=-0.5)
@@ -209,7 +210,7 @@ def test_levers_are_where_the_motors_were_also_after_a_crash(tx, world):
     node = tx("--aircraft", "multirotor", aircraft="multirotor")
     world.manual.fly(fields=32, engine_count=4, motors=[0.55] * 4 + [0.0] * 4)
     world.wire.wait(THROTTLES, 1.0)
-    wait_until(lambda: '"confirm": false' in journal_text(world), 10, "the levers in the journal")
+    wait_until(lambda: '"confirm": false' in journal_text(world), WAIT_S, "the levers in the journal")
     assert world.wire.value(LEVER) != pytest.approx(0.55, abs=1e-3), "theirs is the cockpit"
     node.send_signal(signal.SIGKILL)
     world.wire.wait(THROTTLES, 0.0)
@@ -238,7 +239,7 @@ def restart_and_see_flown_on(world):
     """The new X-Plane is commanded as the one before: roll 0.3, flaps 0.5."""
     world.xplane.restart()
     wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK, FLAP_HANDLE)
-    wire.wait(OVERRIDE, 1.0, timeout=20)
+    wire.wait(OVERRIDE, 1.0, timeout=WAIT_S)
     wire.wait(STICK, 0.3)
     wire.wait(FLAP_HANDLE, 0.5, tolerance=0.02)
     wire.close()
@@ -259,9 +260,11 @@ def test_restarted_xplane_is_not_flown_by_auto_until_it_is_asked_for(tx, world):
     world.wire.wait(STICK, 0.3)
     world.events.skip_to_now()
     world.xplane.restart()
-    reported = world.events.then_wait_for(lambda e: any("AUTO is off until" in event.text for event in e.events), 20)
+    reported = world.events.then_wait_for(
+        lambda e: any("AUTO is off until" in event.text for event in e.events), WAIT_S
+    )
     assert any(e.kind == MODE and e.text.startswith("MANUAL: X-Plane was restarted") for e in reported.events)
-    wait_until(lambda: world.mode.last.mode == MANUAL, 10, "the mode that the event names")
+    wait_until(lambda: world.mode.last.mode == MANUAL, WAIT_S, "the mode that the event names")
     wire = WatchedDatarefs(world.xplane.port, OVERRIDE, STICK)
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
     wire.wait(OVERRIDE, 0.0)
@@ -303,7 +306,7 @@ def test_restarted_xplane_is_left_alone_without_commands(tx, world):
     world.mode.wait_for(lambda m: m.failsafe)  # X-Plane may be back before the last command has timed out
     world.events.skip_to_now()
     world.xplane.restart()
-    world.events.then_wait_for(lambda e: "CONNECTED" in e.events[-1].text, timeout=20)
+    world.events.then_wait_for(lambda e: "CONNECTED" in e.events[-1].text, timeout=WAIT_S)
     wire = WatchedDatarefs(world.xplane.port, OVERRIDE)
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
     wire.wait(OVERRIDE, 0.0)
@@ -348,7 +351,7 @@ def test_view_is_given_back(tx, world):
     node.send_signal(signal.SIGINT)
     for path, value in zip(paths, (0.0, 1000.0, 60.0)):
         wire.wait(path, value)
-    node.wait(10)
+    node.wait(WAIT_S)
     assert journal_entries(world) == []
     wire.close()
 
@@ -388,5 +391,5 @@ def test_services_say_what_is_wrong(tx, world):
 
 def test_aircraft_file_is_required(world):
     node = world.start("tx_node", {"rate": 50.0})
-    assert node.wait(15) == 1
+    assert node.wait(WAIT_S) == 1
     assert "tx_node/aircraft is missing" in node.output()

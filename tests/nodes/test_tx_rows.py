@@ -6,6 +6,7 @@ import signal
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import (
     AUTO,
     FLAPS,
@@ -61,7 +62,7 @@ def fly(world):
 def test_it_flies_by_the_same_arbiter(rows):
     fly(rows)
     assert rows.applied.wait_for(lambda a: a.read_back and a.roll == 0.25).read_back_frames > 0
-    wait_until(lambda: rows.wire.value(BANK) > 10.0, 20, "a bank to the right")
+    wait_until(lambda: rows.wire.value(BANK) > 10.0, WAIT_S, "a bank to the right")
     rows.auto.fly(fields=ROLL, roll=-0.25)
     assert call(rows, "set_mode", "SetMode", mode=AUTO).success
     rows.wire.wait(ROLL_STICK, -0.25)
@@ -78,6 +79,6 @@ def test_what_rows_hold_is_given_back(rows, end):
     assert set(journal_entries(rows)) >= ROWS
     rows.node.send_signal(end)
     rows.wire.wait(OVERRIDE, 0.0)
-    wait_until(lambda: abs(rows.wire.value(LEVER) - 0.7) > 0.01, 20, "the pilot's throttle")
-    wait_until(lambda: abs(rows.wire.value(ROLL_STICK) - 0.25) > 0.02, 20, "the pilot's stick")
-    wait_until(lambda: not journal_entries(rows), 20, "an empty journal")
+    wait_until(lambda: abs(rows.wire.value(LEVER) - 0.7) > 0.01, WAIT_S, "the pilot's throttle")
+    wait_until(lambda: abs(rows.wire.value(ROLL_STICK) - 0.25) > 0.02, WAIT_S, "the pilot's stick")
+    wait_until(lambda: not journal_entries(rows), WAIT_S, "an empty journal")

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import PITCH, ROLL, CommandSource, WatchedDatarefs, call, tx_params
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.simulator import aircraft_path
@@ -63,7 +64,7 @@ def done(world, service, kind, **request):
     response = call(world, service, kind, **request)
     assert response.result.code == ACCEPTED, response.result.message
     number = response.event_number
-    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), 30)
+    reported = world.events.wait_for(lambda e: any(event.number == number for event in e.events), WAIT_S)
     event = next(event for event in reported.events if event.number == number)
     assert event.success, event.text
 
@@ -93,7 +94,7 @@ def test_reset_places_the_flight_and_leaves_it_running_or_paused(flight):
 def test_another_aircraft_is_loaded_and_flown(flight):
     for name in ("multirotor", "fixed_wing"):
         # Version 11 shows only that the flight's time begins anew; this one loads in no time.
-        wait_until(lambda: flight.other.read(FLIGHT_TIME) > 1.0, 20.0, "flight")
+        wait_until(lambda: flight.other.read(FLIGHT_TIME) > 1.0, WAIT_S, "flight")
         done(flight, "load_aircraft", "LoadAircraft", path=aircraft_path(name))
     flight.manual.fly(fields=ROLL, roll=0.125)
     flight.seen.wait(STICK, 0.125)
@@ -107,7 +108,7 @@ def test_two_axes_leave_the_pedals_alone(flight):
     flight.seen.wait(STICK, 0.125)
     # The pilot's, who wants no yaw rate; an override would let them stand.
     before = flight.seen.value(PEDALS)
-    wait_until(lambda: abs(flight.seen.value(PEDALS) - before) > 1e-3, 30.0, "pedals that move")
+    wait_until(lambda: abs(flight.seen.value(PEDALS) - before) > 1e-3, WAIT_S, "pedals that move")
     flight.manual.stop()
 
 
@@ -148,7 +149,7 @@ def test_diagnostics_are_without_a_warning(flight):
 
     flight.manual.fly(fields=ROLL, roll=0.0)  # a stick that is silent is a warning of its own
     try:
-        wait_until(all_well, 40.0, "diagnostics without a warning")
+        wait_until(all_well, WAIT_S, "diagnostics without a warning")
     except HarnessError:
         pytest.fail("\n".join(f"{s.name}: {s.level} {s.message}" for s in newest().values()))
     finally:

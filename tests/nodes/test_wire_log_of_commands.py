@@ -6,6 +6,7 @@ import hashlib
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import AUTO, PITCH, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
 from support.wire_replays import RawTopics, by_number, payloads_in, replay
 from xplane_bridge.harness.processes import wait_until
@@ -26,7 +27,7 @@ class Surfaces:
 
         self._type = SurfaceCommand
         self._publisher = rospy.Publisher(f"{world.namespace}/control/surfaces", SurfaceCommand, queue_size=1)
-        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+        wait_until(lambda: self._publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
 
     def send(self, **deflections_deg) -> None:
         self._publisher.publish(
@@ -39,7 +40,7 @@ def request_mode(world, mode):
     from xplane_bridge.msg import ModeRequest
 
     publisher = rospy.Publisher(f"{world.namespace}/control/mode_request", ModeRequest, queue_size=10)
-    wait_until(lambda: publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+    wait_until(lambda: publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
     publisher.publish(ModeRequest(mode=mode, sequence=7, requester="test"))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import pytest
 import yaml
 
+from support.deadlines import WAIT_S
 from support.tx_fixtures import THROTTLE, WatchedDatarefs, tx_params
 from xplane_bridge import protocol
 from xplane_bridge.harness import wait_until
@@ -27,7 +28,6 @@ events:
 """
 #: After the device file's dead zone of 0.05.
 SHAPED = 0.2
-WAIT_S = 30.0
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from support.deadlines import WAIT_S
 from xplane_bridge.constants import ControlField, FlightMode
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.harness.xplane_client import XPlaneClient
@@ -41,7 +42,7 @@ class WatchedDatarefs:
         self._known.update(self._client.values())
         return self._known.get(self.paths.index(path), math.nan)
 
-    def wait(self, path: str, expected: float, timeout: float = 10.0, tolerance: float = 1e-4) -> None:
+    def wait(self, path: str, expected: float, timeout: float = WAIT_S, tolerance: float = 1e-4) -> None:
         """Waits until a dataref has a value."""
         wait_until(lambda: abs(self.value(path) - expected) <= tolerance, timeout, f"{path} = {expected}")
 
@@ -71,7 +72,7 @@ class CommandSource:
         """Changes fields of the command and publishes it."""
         for key, value in values.items():
             setattr(self.command, key, value)
-        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "tx_node's subscription")
+        wait_until(lambda: self._publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
         self._publisher.publish(self.command)
 
     def fly(self, **values: Any) -> None:
@@ -121,7 +122,7 @@ class RepeatedJoy:
         """Repeats it from now on."""
         import rospy
 
-        wait_until(lambda: self._publisher.get_num_connections() > 0, 15, "the mapper's subscription")
+        wait_until(lambda: self._publisher.get_num_connections() > 0, WAIT_S, "the mapper's subscription")
         self._timer = rospy.Timer(rospy.Duration(0.02), lambda _: self.send())
 
     def pull_out(self) -> None:

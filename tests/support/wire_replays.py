@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 from typing import Any, Callable, Sequence
 
+from support.deadlines import WAIT_S
 from xplane_bridge.bags.chunks import BagFile
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.resources import program
@@ -34,7 +35,7 @@ class RawTopics:
     def _take(self, message: Any, topic: str) -> None:
         self.payloads.setdefault(topic, []).append(message._buff)
 
-    def wait_for(self, topic: str, message_type: Any, condition: Callable[[Any], bool], timeout: float = 20.0) -> Any:
+    def wait_for(self, topic: str, message_type: Any, condition: Callable[[Any], bool], timeout: float = WAIT_S) -> Any:
         """Waits for a message, from the first one on, that fulfils `condition`, and returns it."""
         seen = 0
 
