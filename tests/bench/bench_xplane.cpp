@@ -8,7 +8,6 @@
 //     rate=HZ             frames per second
 //     seconds=S           how long states are timed, after every topic has begun to flow
 //     topics=A,B          flight_state topics that clients publish
-//     bare=TOPIC          flight_state topic of bench_bare_publisher, whose stamps show when it published (or empty)
 //     extra=N             datagrams of a single value sent to each client with every frame, besides the frame's own
 //     outages=N           how often it falls silent for a second afterwards, forgetting its subscriptions
 //     link_state=TOPIC    for outages
@@ -91,7 +90,7 @@ class Meter {
   explicit Meter(const bench::Settings& settings)
       : settings_(settings), period_(1.0 / number("rate")), topic_names_(split(text("topics"))) {
     loadValues(text("values"));
-    topics_.resize(topic_names_.size() + 1);
+    topics_.resize(topic_names_.size());
   }
 
   std::string run() {
@@ -101,10 +100,6 @@ class Meter {
     for (std::size_t i = 0; i < topic_names_.size(); ++i) {
       subscribers.push_back(handle.subscribe<FlightState>(
           topic_names_[i], 10000, [this, i](const FlightStateConstPtr& state) { onState(i, *state); }, nullptr, hints));
-    }
-    if (!text("bare").empty()) {
-      subscribers.push_back(handle.subscribe<FlightState>(
-          text("bare"), 10000, [this](const FlightStateConstPtr& state) { onBare(*state); }, nullptr, hints));
     }
     if (!text("link_state").empty()) {
       subscribers.push_back(handle.subscribe<LinkState>(
@@ -237,7 +232,7 @@ class Meter {
 
   void frames(const std::function<bool()>& done) {
     const auto period_ns = static_cast<std::int64_t>(period_ * 1e9);
-    // Clients take the first and the last third of a period, the bare publisher the middle one.
+    // Each client has a part of the period for itself.
     std::int64_t next = (now_ns() / period_ns + 1) * period_ns;
     while (!done()) {
       serve();
@@ -253,7 +248,7 @@ class Meter {
       for (std::size_t turn = 0; turn < flying.size(); ++turn) {
         // They change places with every frame: the one that comes after a busy one finds the machine awake.
         const std::size_t which = (turn + frame_) % flying.size();
-        sleepUntil(next + static_cast<std::int64_t>(turn) * 2 * period_ns / 3);
+        sleepUntil(next + static_cast<std::int64_t>(turn) * period_ns / static_cast<std::int64_t>(flying.size()));
         sendFrame(frame_, which, flying[which]);
       }
       ++frame_;
@@ -264,11 +259,7 @@ class Meter {
 
   bool allFlow() {
     const std::lock_guard<std::mutex> lock(mutex_);
-    for (std::size_t i = 0; i < topics_.size(); ++i) {
-      const bool wanted = i < topic_names_.size() || !text("bare").empty();
-      if (wanted && topics_[i].received < 20) return false;
-    }
-    return true;
+    return std::all_of(topics_.begin(), topics_.end(), [](const Topic& topic) { return topic.received >= 20; });
   }
 
   void measure() {
@@ -340,14 +331,6 @@ class Meter {
     }
   }
 
-  void onBare(const FlightState& state) {
-    const double latency =
-        (ros::WallTime::now() - ros::WallTime(state.header.stamp.sec, state.header.stamp.nsec)).toSec();
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++topics_.back().received;
-    if (measuring_) topics_.back().latencies_us.push_back(latency * 1e6);
-  }
-
   void onLink(const LinkState& link) {
     if (waiting_for_silence_ && silence_noticed_ns_ == 0 && link.state != LinkState::CONNECTED) {
       silence_noticed_ns_ = now_ns();
@@ -362,10 +345,9 @@ class Meter {
                   static_cast<unsigned long long>(datagrams_measured_), elapsed_);
     std::string out = line;
     for (std::size_t i = 0; i < topics_.size(); ++i) {
-      const std::string name = i < topic_names_.size() ? topic_names_[i] : "bare";
       const std::vector<double>& latencies = topics_[i].latencies_us;
       std::snprintf(line, sizeof line, ", \"%s\": {\"received\": %zu, \"p50_us\": %.2f, \"p99_us\": %.2f}",
-                    name.c_str(), latencies.size(), percentile(latencies, 0.5), percentile(latencies, 0.99));
+                    topic_names_[i].c_str(), latencies.size(), percentile(latencies, 0.5), percentile(latencies, 0.99));
       out += line;
     }
     return out;
@@ -388,7 +370,7 @@ class Meter {
 
   std::mutex mutex_;
   std::deque<std::pair<float, std::int64_t>> sent_;  // simulator time, steady time of sending
-  std::vector<Topic> topics_;                        // the last one: bare
+  std::vector<Topic> topics_;                        // as in topic_names_
   bool measuring_ = false;
   std::atomic<bool> waiting_for_silence_{false}, waiting_for_state_{false};
   std::atomic<std::int64_t> silence_noticed_ns_{0}, state_back_ns_{0};
