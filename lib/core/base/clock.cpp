@@ -53,17 +53,22 @@ void ClockCondition::notifyAll() {
   pthread_cond_broadcast(&changed_);
 }
 
-void ClockCondition::beginWait(const Deadline* deadline) {
-  if (ThreadTurns::taken()) return;  // who gives turns looks at the time
+bool ClockCondition::beginWait(const Deadline* deadline) {
+  if (ThreadTurns::taken()) return true;
   if (ClockWaiters* const waiters = waitersOf(deadline)) {
     const std::lock_guard<std::mutex> lock(waiters->mutex_);
     waiters->waiting_.push_back(this);
   }
+  return false;
 }
 
-void ClockCondition::sleep(std::unique_lock<std::mutex>* sleeping, const Deadline* deadline) {
+void ClockCondition::sleep(std::unique_lock<std::mutex>* sleeping, const Deadline* deadline, bool in_turn) {
   constexpr double kLongest = 3600.0;  // [s] of one sleep: far below what a time holds
-  if (ThreadTurns::sleep(*this, sleeping, deadline)) return;
+  if (in_turn) {
+    // Not at all where turns have ended since: then the next wait is no turn's.
+    ThreadTurns::sleep(*this, sleeping, deadline);
+    return;
+  }
   pthread_mutex_t* const mutex = sleeping->mutex()->native_handle();
   if (deadline == nullptr || waitersOf(deadline) != nullptr) {
     if (deadline == nullptr || !deadline->over()) {

@@ -57,9 +57,9 @@ void ThreadTurns::pass(std::function<bool()> ready) {
   turns.changed_.wait(lock, [&] { return place.has_turn || turns.runsFreely(place); });
 }
 
-bool ThreadTurns::sleep(const ClockCondition& condition, std::unique_lock<std::mutex>* sleeping,
+void ThreadTurns::sleep(const ClockCondition& condition, std::unique_lock<std::mutex>* sleeping,
                         const Deadline* deadline) {
-  if (!taken()) return false;
+  if (!taken()) return;
   Place* const place = static_cast<Place*>(place_of_thread);
   place->notified = false;
   place->condition = &condition;
@@ -76,7 +76,6 @@ bool ThreadTurns::sleep(const ClockCondition& condition, std::unique_lock<std::m
     parked_count = parked.size();
   }
   sleeping->lock();
-  return true;
 }
 
 void ThreadTurns::notify(const ClockCondition& condition) {

@@ -102,17 +102,19 @@ class ClockCondition {
   /// Returns when notified, when the deadline is over, and sometimes without a cause.
   template <class Lock>
   void waitOnce(Lock* lock, const Deadline* deadline) {
-    beginWait(deadline);
+    const bool in_turn = beginWait(deadline);
     {
       std::unique_lock<std::mutex> sleeping(mutex_);
       lock->unlock();
-      sleep(&sleeping, deadline);
+      sleep(&sleeping, deadline, in_turn);
     }
-    endWait(deadline);
+    if (!in_turn) endWait(deadline);
     lock->lock();
   }
-  void beginWait(const Deadline* deadline);
-  void sleep(std::unique_lock<std::mutex>* sleeping, const Deadline* deadline);
+  /// @return whether the thread waits in a turn: then who gives turns looks at the time, and it is not among the
+  ///         clock's waiters. So it stays for this wait, also where turns end meanwhile.
+  bool beginWait(const Deadline* deadline);
+  void sleep(std::unique_lock<std::mutex>* sleeping, const Deadline* deadline, bool in_turn);
   void endWait(const Deadline* deadline);
 
   // Held when a waiting thread goes to sleep and when one is woken, so that no waking gets lost in between. Nothing

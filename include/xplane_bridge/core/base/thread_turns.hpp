@@ -41,8 +41,8 @@ class ThreadTurns {
     std::function<bool()> ready;                // empty: it has waited for nothing yet
   };
 
-  /// Waits with a condition whose mutex `sleeping` holds. False: the calling thread takes no turns.
-  static bool sleep(const ClockCondition& condition, std::unique_lock<std::mutex>* sleeping, const Deadline* deadline);
+  /// Waits with a condition whose mutex `sleeping` holds. Returns at once where the calling thread takes no turns.
+  static void sleep(const ClockCondition& condition, std::unique_lock<std::mutex>* sleeping, const Deadline* deadline);
   static void notify(const ClockCondition& condition);
   bool runsFreely(const Place& place) const { return free_ || place.own_way; }
 

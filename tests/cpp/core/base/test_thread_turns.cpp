@@ -1,10 +1,14 @@
 #include "xplane_bridge/core/base/thread_turns.hpp"
 
 #include <atomic>
+#include <chrono>
+#include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -171,6 +175,95 @@ TEST(ThreadTurns, FreedThreadsWaitAsAnyOther) {
   thread.join();
   EXPECT_EQ(passed, 1);
   turns->give();  // there is no thread left
+}
+
+constexpr std::int64_t kSecond = 1'000'000'000;             // [ns]
+constexpr auto kLongestFailure = std::chrono::seconds(30);  // of a thread that is not woken
+
+/// A lock that does something when it is first unlocked: between the beginning of a wait and its sleep.
+struct HookedLock {
+  void lock() { mutex.lock(); }
+  void unlock() {
+    mutex.unlock();
+    if (const std::function<void()> act = std::exchange(hook, nullptr)) act();
+  }
+  std::function<void()> hook;
+  std::mutex mutex{};
+};
+
+TEST(ThreadTurns, AWaitThatBeganInATurnFollowsTheClockWhereTurnsEndBeforeItSleeps) {
+  const auto turns = std::make_shared<ThreadTurns>();
+  std::atomic<std::int64_t> now{0};
+  std::atomic<bool> freed{false}, moved{false};
+  const auto read = [&] {
+    const std::int64_t before = now;
+    if (freed && !moved) {  // right behind the reading by which the thread goes to sleep
+      now = 2 * kSecond;
+      moved = true;
+    }
+    return before;
+  };
+  const Clock clock{read, read, std::make_shared<ClockWaiters>()};
+  ThreadSeat seat(turns);
+  ClockCondition changed;
+  std::promise<void> ended;
+  std::thread thread([&] {
+    const ThreadSeat::Taken taken(&seat);
+    HookedLock lock{[&] {
+      turns->free();
+      freed = true;
+    }};
+    lock.lock();
+    changed.waitUntil(&lock, Deadline(clock, 1.0), [] { return false; });
+    lock.unlock();
+    ended.set_value();
+  });
+  turns->give();
+  while (!moved) std::this_thread::yield();
+  clock.waiters->wakeAll();
+  EXPECT_EQ(ended.get_future().wait_for(kLongestFailure), std::future_status::ready) << "it sleeps for ever";
+  changed.notifyAll();
+  thread.join();
+}
+
+TEST(ThreadTurns, AWaitInATurnLeavesOthersAmongTheClocksWaiters) {
+  const auto turns = std::make_shared<ThreadTurns>();
+  const auto waiters = std::make_shared<ClockWaiters>();
+  std::atomic<std::int64_t> now{0};
+  std::atomic<bool> unlocked{false}, asleep{false};
+  const auto read = [&] { return now.load(); };
+  const auto read_by_other = [&] {
+    const std::int64_t before = now;
+    asleep = unlocked.load();  // or certain to sleep: it holds the condition's mutex
+    return before;
+  };
+  const Clock clock{read, read, waiters}, of_other{read_by_other, read_by_other, waiters};
+  ClockCondition changed;
+  std::promise<void> ended;
+  std::thread other([&] {
+    HookedLock lock{[&] { unlocked = true; }};
+    lock.lock();
+    changed.waitUntil(&lock, Deadline(of_other, 2.0), [] { return false; });
+    lock.unlock();
+    ended.set_value();
+  });
+  while (!asleep) std::this_thread::yield();
+  ThreadSeat seat(turns);
+  std::thread thread([&] {
+    const ThreadSeat::Taken taken(&seat);
+    std::mutex mutex;
+    std::unique_lock<std::mutex> lock(mutex);
+    changed.waitUntil(&lock, Deadline(clock, 1.0), [] { return false; });
+  });
+  turns->give();
+  now = kSecond;
+  turns->give();
+  thread.join();
+  now = 2 * kSecond;
+  waiters->wakeAll();
+  EXPECT_EQ(ended.get_future().wait_for(kLongestFailure), std::future_status::ready) << "it sleeps for ever";
+  changed.notifyAll();
+  other.join();
 }
 
 TEST(ThreadTurns, WithoutTurnsASeatDoesNothing) {
