@@ -49,6 +49,11 @@ class TopicLog:
         )
 
     @property
+    def connected(self) -> bool:
+        """Whether there is a publisher whose messages come from now on."""
+        return bool(self._subscriber.get_num_connections())
+
+    @property
     def last(self) -> Any:
         """The newest message; None before the first."""
         return self.messages[-1] if self.messages else None

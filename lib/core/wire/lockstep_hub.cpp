@@ -15,7 +15,7 @@ namespace xplane_bridge::core {
 namespace {
 
 constexpr std::int32_t kFenceIndex = 0x4C530000;  // far from all indices that are used here
-constexpr std::int32_t kFenceElements = 3;
+constexpr std::int32_t kFenceElements = 4;
 constexpr std::int32_t kSocketsIndex = kFenceIndex + 8;
 constexpr std::int32_t kFenceRate = 1000;
 constexpr std::size_t kRateAt = 5;    // of a request: after the label
@@ -65,6 +65,7 @@ std::optional<Fence> fenceIn(ByteView bytes) {
   frame.number = static_cast<std::uint32_t>(elements[0]);
   frame.sim_ns = static_cast<std::int64_t>(elements[1]) * kNanosecondsPerSecond +
                  static_cast<std::int64_t>(elements[2]) * kNanosecondsPerMillisecond / 1000;
+  frame.picture = static_cast<std::uint32_t>(elements[3]);
   return fence;
 }
 
@@ -346,7 +347,9 @@ void LockstepHub::waitHeld(int timeout_ms) {
   askAgain();
   if (frameIsComplete() && frame_.number == 0) {
     // The simulator flies: this frame is the first.
-    for (const std::shared_ptr<Source>& source : sources()) frame_ = source->seen ? source->newest : frame_;
+    for (const std::shared_ptr<Source>& source : sources()) {
+      if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
+    }
     clock_.move(frame_.sim_ns);
     hooks_.begin(frame_);
     handOut(true);

@@ -86,6 +86,7 @@ void BaseNode::initialize() {
   common_ = loadCommonOptions(shared);
   if (common_.lockstep.enabled) {
     lockstep_clock_.emplace(host_clock_, core::toNanoseconds(common_.lockstep.start_time));
+    topics_.keepAll();
   }
   clock_ = lockstep() ? lockstep_clock_->clock() : host_clock_;
   const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());

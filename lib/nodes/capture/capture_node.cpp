@@ -51,11 +51,12 @@ CaptureNode::~CaptureNode() = default;
 void CaptureNode::loadParameters(const ParamLoader& own) {
   options_ = loadCaptureOptions(own);
   options_.prefixFrames(common().frames.prefix);
-  if (lockstep() || stampsBySimulator()) {
+  if (stampsBySimulator()) {
     throw ParamError(
-        "capture_node pairs pictures by the host's time: expected neither publish_clock nor "
-        "lockstep/enabled; start the bridge with capture:=false");
+        "capture_node pairs pictures by the host's time: expected publish_clock to be false; start the bridge with "
+        "capture:=false");
   }
+  if (lockstep()) requireLockstep(own);
   scaler_ = std::make_unique<vision::PictureScaler>(options_.width, options_.height, options_.fit);
   limiter_ = core::RateLimiter(options_.max_rate);
   frozen_check_ = vision::FrozenCheck(core::toNanoseconds(options_.frozen_after));
@@ -68,8 +69,9 @@ void CaptureNode::advertise() {
   info_publisher_ = advertiseTopic<sensor_msgs::CameraInfo>("camera/camera_info", kImageQueue);
   frame_state_publisher_ = advertiseTopic<FrameState>("camera/frame_state", kStateQueue);
   measured_frame_ = std::make_unique<tf2_ros::TransformBroadcaster>();
-  pairing_ = std::make_unique<ImagePairing>(common().display_delay, options_.max_wait,
-                                            [this](const FrameState& state) { publishFrameState(state); });
+  pairing_ = std::make_unique<ImagePairing>(
+      common().display_delay, options_.max_wait, [this](const FrameState& state) { publishFrameState(state); },
+      lockstep());
   broadcastFrames();
   advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
       name() + "/calibrate_display_delay",
@@ -81,6 +83,10 @@ void CaptureNode::advertise() {
 }
 
 void CaptureNode::subscribe() {
+  if (lockstep()) {
+    subscribeInLockstep();
+    return;
+  }
   subscribeTopic<FlightState>("flight_state", kStateQueue,
                               [this](const FlightState::ConstPtr& state) { onState(state); });
   subscribeTopic<WarningState>("mission/warnings", kStateQueue, [this](const WarningState::ConstPtr& warnings) {
@@ -103,8 +109,14 @@ void CaptureNode::start() {
   view_subscription_ = link().subscribe(
       view_stream_.group(),
       [this](const core::RrefView& datagram, const core::ReceiveInfo& info) { onView(datagram, info); });
-  publisher_ =
-      std::make_unique<LatestWorker<Grabbed>>(kPicturesWaiting, [this](Grabbed& grabbed) { publishPicture(&grabbed); });
+  if (lockstep()) {
+    capture_thread_ = std::thread([this] { captureInLockstep(); });
+    return;
+  }
+  publisher_ = std::make_unique<LatestWorker<Grabbed>>(kPicturesWaiting, [this](Grabbed& grabbed) {
+    publishPicture(&grabbed);
+    if (!grabbed.frozen) giveBuffer(std::move(grabbed.pixels));
+  });
   encoder_ = std::make_unique<LatestWorker<sensor_msgs::ImageConstPtr>>(
       kPicturesWaiting, [this](sensor_msgs::ImageConstPtr& image) { encodeJpeg(*image); });
   options_.sender.recorded = [this] { return !recorder().empty(); };
@@ -126,31 +138,30 @@ void CaptureNode::joinThreads() {
 void CaptureNode::captureLoop() {
   prctl(PR_SET_NAME, "capture");
   const std::unique_ptr<vision::FrameSource> source = makeSource(options_, clock().system_ns);
-  std::string logged_problem;
   while (!stop_) {
     vision::Change change;
     const vision::WaitResult result = source->waitChange(kSourceWait, change);
     if (result == vision::WaitResult::kChange) takePicture(source.get(), change);
-    const std::string problem = source->problem();
-    if (problem != logged_problem) {
-      if (problem.empty()) {
-        ROS_INFO_STREAM("capturing " << source->describe());
-      } else {
-        ROS_WARN_STREAM("no picture: " << problem);
-      }
-      logged_problem = problem;
-    }
-    {
-      const std::lock_guard<std::mutex> lock(capture_mutex_);
-      source_problem_ = problem;
-      if (!problem.empty()) periods_.interrupt();
-      // Asking the window for its title costs a round trip; only where it may have changed.
-      if (result != vision::WaitResult::kChange || source_description_.empty()) {
-        source_description_ = source->describe();
-      }
-    }
+    noteSource(*source, result != vision::WaitResult::kChange);
     if (!calibrating_) repeatFrozen(clock().system_ns());
   }
+}
+
+void CaptureNode::noteSource(const vision::FrameSource& source, bool described) {
+  const std::string problem = source.problem();
+  if (problem != logged_problem_) {
+    if (problem.empty()) {
+      ROS_INFO_STREAM("capturing " << source.describe());
+    } else {
+      ROS_WARN_STREAM("no picture: " << problem);
+    }
+    logged_problem_ = problem;
+  }
+  const std::lock_guard<std::mutex> lock(capture_mutex_);
+  source_problem_ = problem;
+  if (!problem.empty()) periods_.interrupt();
+  // Asking the window for its title costs a round trip; only where it may have changed.
+  if (described || source_description_.empty()) source_description_ = source.describe();
 }
 
 void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change& change) {
@@ -288,13 +299,18 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
     cv::Mat pixels(options_.height, options_.width, CV_8UC3, image->data.data());
     scaler_->scale(grabbed->pixels, pixels);
     if (raw) image_publisher_.publish(image);
-    if (jpeg && !verbatim) encoder_->pushDroppingOldest(image);
+    if (jpeg && !verbatim) {
+      if (encoder_) {
+        encoder_->pushDroppingOldest(image);
+      } else {
+        encodeJpeg(*image);
+      }
+    }
   }
   info_publisher_.publish(info);
   pairing_->addPicture(
       state, clock().system_ns(),
       grabbed->frame.has_value() ? std::optional<float>(grabbed->frame->sim_time) : std::optional<float>());
-  if (!grabbed->frozen) giveBuffer(std::move(grabbed->pixels));
 }
 
 sensor_msgs::ImagePtr CaptureNode::takeMessage() {

@@ -90,6 +90,7 @@ void CaptureNode::serveCalibration(std_srvs::TriggerResponse* response) {
 }
 
 core::MeasuredDelay CaptureNode::calibrate() {
+  if (lockstep()) throw std::runtime_error("there is no delay to measure in lock-step: a frame ends with its picture");
   if (options_.source != CaptureOptions::Source::kX11) {
     throw std::runtime_error(
         "the pictures come from a video: expected source x11 or sender (estimate_latency measures the "

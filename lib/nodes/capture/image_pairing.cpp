@@ -23,13 +23,21 @@ FlightState unknownState() {
   return message;
 }
 
+core::ClockFilter::Options clockOptions(bool exact) {
+  core::ClockFilter::Options options;
+  options.exact = exact;
+  return options;
+}
+
 }  // namespace
 
-ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish)
+ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish, bool exact)
     : display_delay_(display_delay),
       delay_measured_(display_delay != 0.0),
       max_wait_ns_(core::toNanoseconds(max_wait)),
-      publish_(std::move(publish)) {}
+      publish_(std::move(publish)),
+      exact_(exact),
+      clock_(clockOptions(exact)) {}
 
 void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -119,7 +127,7 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns, st
     if (!delay_measured_) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
   }
   if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
-  waiting.answer.clock_uncertainty = clock_.fitted() ? clock_.uncertainty() : kNaN;
+  waiting.answer.clock_uncertainty = clock_.fitted() || exact_ ? clock_.uncertainty() : kNaN;
   waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : std::numeric_limits<float>::quiet_NaN();
   waiting.moment.host_time_ns =
       static_cast<std::int64_t>(picture.header.stamp.toNSec()) - core::toNanoseconds(waiting.answer.display_delay);

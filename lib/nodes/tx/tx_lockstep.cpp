@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "xplane_bridge/core/base/node_name.hpp"
 #include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/base/units.hpp"
 
@@ -14,7 +15,6 @@ namespace {
 
 using Lock = std::lock_guard<std::mutex>;
 
-constexpr const char* kReader = "rx_node";
 constexpr double kWatchPeriod = 0.2;  // [s]
 constexpr int kRequestWaits = 2;      // [frames]
 
@@ -28,7 +28,7 @@ TxLockstep::TxLockstep(const LockstepOptions& options, core::Clock host, const r
       host_(std::move(host)),
       wake_(std::move(wake)),
       give_up_(std::move(give_up)),
-      barrier_(options.participants, kReader),
+      barrier_(options.participants, kLockstepReader),
       stamp_ns_(nanoseconds(start)),
       previous_ns_(stamp_ns_) {
   if (options.hold) barrier_.step(0);
@@ -65,6 +65,16 @@ void TxLockstep::takeRequest(const ros::Time& stamp, Action carry_out) {
 }
 
 void TxLockstep::takeDone(const std::string& who, const ros::Time& stamp, const std::string& said) {
+  const bool waits = said.rfind(kLockstepWaits, 0) == 0;
+  {
+    const Lock lock(mutex_);
+    if (waits) {
+      reasons_[who] = said;
+    } else {
+      reasons_.erase(who);
+    }
+  }
+  if (waits) return;
   if (said == kLockstepNoState) {
     barrier_.answerForAll(who, nanoseconds(stamp));
   } else {
@@ -163,9 +173,17 @@ void TxLockstep::progress() {
 
 std::string TxLockstep::whatIsMissing() const {
   const std::string frame = "frame " + std::to_string(barrier_.number());
-  const std::vector<std::string> missing = barrier_.missing();
+  std::vector<std::string> missing = barrier_.missing();
   if (closed_ || missing.empty()) return "the simulator has not gone on from " + frame;
+  for (std::string& each : missing) each += reasonOf(each);
   return frame + " was not answered by " + core::join(missing);
+}
+
+std::string TxLockstep::reasonOf(const std::string& participant) const {
+  for (const auto& [who, said] : reasons_) {
+    if (core::isNamed(who, participant)) return ", which " + said;
+  }
+  return "";
 }
 
 void TxLockstep::watch() {

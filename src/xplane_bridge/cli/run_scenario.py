@@ -23,6 +23,7 @@ from xplane_bridge.scenario import Scenario, ScenarioError
 from xplane_bridge.scenario.judging import judge
 
 _FPS = 60.0
+_PICTURES_HZ = 30.0  # in lock-step, as nearly as frames allow; otherwise capture_node's max_rate says it
 #: Options that make a flight what it is.
 _KEPT = ("aircraft", "transport", "joystick", "controller", "camera", "duration", "emulator", "seed")
 _KEPT_LOCKSTEP = ("lockstep", "speed", "controller_node")
@@ -80,6 +81,8 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
         raise ScenarioError(f"{scenario.name} repeats for ever (repeat_every): give --duration")
     lockstep = lockstep_of(args)
     options = ["--fps", f"{_FPS:g}", "--seed", str(args.seed), *(["--window"] if args.camera else [])]
+    if lockstep is not None and args.camera:
+        options += ["--picture-every", str(max(1, round(lockstep.fps / _PICTURES_HZ)))]
     return scenario_plan(
         scenario,
         args.scenario,
@@ -106,9 +109,11 @@ def lockstep_of(args: argparse.Namespace) -> Optional[Lockstep]:
             if getattr(args, option) is not None:
                 raise ScenarioError(f"--{option.replace('_', '-')} {getattr(args, option)}: needs --lockstep")
         return None
-    if args.camera or args.transport != "rref":
-        raise ScenarioError("--lockstep flies without --camera and with --transport rref")
+    if args.transport != "rref":
+        raise ScenarioError("--lockstep flies with --transport rref")
     lockstep = Lockstep(speed=args.speed or 0.0, fps=_fps_of(args.emulator))
+    if args.camera:
+        lockstep.participants.append("capture_node")
     if args.controller:
         lockstep.participants.append(args.controller_node or Path(shlex.split(args.controller)[0]).name)
     return lockstep

@@ -58,7 +58,7 @@ def main(arguments: Optional[Sequence[str]] = None, make: Callable[[Options], Em
         emulator.run()
     except KeyboardInterrupt:
         pass
-    except OSError as error:  # the port was taken while a restart was played
+    except OSError as error:  # the port was taken while a restart was played, or the window is gone
         print(f"xplane_emulator: {error.strerror or error}", file=sys.stderr)
         failed = 1
     emulator.close()

@@ -14,7 +14,7 @@ import os
 import socket
 import sys
 import time
-from typing import Any, Callable, Dict, List, Optional, Protocol, TextIO
+from typing import Any, Callable, Dict, List, Optional, TextIO
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from xplane_bridge.emulator.datarefs.control_inputs import InputOptions
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.lockstep import Fences, LockstepLoop
 from xplane_bridge.emulator.options import KINEMATIC, Options
+from xplane_bridge.emulator.pictures import View, wait_until_shown
 from xplane_bridge.emulator.priority import take_realtime_priority
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.emulator.simulator import INTERNAL_VERSIONS, Simulator
@@ -48,16 +49,6 @@ _SCHEDULER_JITTER_S = 0.001
 _HIGHEST_RATE_HZ = 99
 #: Longest wait without looking whether to stop [s].
 _PATIENCE_S = 0.25
-
-
-class View(Protocol):
-    """Where the pictures go."""
-
-    def show(self, sim: Simulator) -> None:
-        """Has the frame drawn whose packets were just sent."""
-
-    def drawn(self, timeout_s: float) -> bool:
-        """Whether that is done; waits for it so long."""
 
 
 class Emulator:
@@ -87,6 +78,7 @@ class Emulator:
         self._truth = TruthFile(options.truth, self.sim.model) if options.truth is not None else None
         self._frames = 0
         self._truth_frame = -1
+        self._picture = 0  # number of the frame that the window shows
         self._loading_until = -math.inf
         self._sent_at: List[float] = []
         self._jitter = np.random.default_rng(options.seed)
@@ -246,9 +238,18 @@ class Emulator:
             self._xplane_connect.answer()
         if self._fences is None:
             self._write_truth(host_time)
-        if self.view is not None and not (self._frames % 2 and "window-changes" in self.options.otherwise):
+        if self.view is not None and self._picture_is_due():
             self.view.show(sim)
-            self._wait_for_picture(self.view)
+            if self._fences is None:
+                self._wait_for_picture(self.view)
+            else:
+                wait_until_shown(self.view, self._frames, lambda: self.stopping)
+            self._picture = self._frames
+
+    def _picture_is_due(self) -> bool:
+        if self._frames % 2 and "window-changes" in self.options.otherwise:
+            return False
+        return self._picture == 0 or (self._frames - 1) % self.options.picture_every == 0
 
     def _send(self, now: float) -> None:
         sim = self.sim
@@ -293,7 +294,11 @@ class Emulator:
     # --- loops --------------------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Flies until `stopping` is set or the duration is over."""
+        """Flies until `stopping` is set or the duration is over.
+
+        Raises:
+            OSError: The port was taken while a restart was played, or in lock-step the window is gone.
+        """
         try:
             if self.options.stepped == "fast":
                 self._run_fast()
@@ -417,6 +422,7 @@ class Emulator:
             self._write_truth,
             self._send,
             lambda: self.sim.clocks.running,
+            lambda: self._picture,
             self.period,
             o.pace,
         )

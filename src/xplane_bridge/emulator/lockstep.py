@@ -1,10 +1,11 @@
 """Lock-step on the wire: every frame ends with a fence on every client's socket, and waits for one that comes back.
 
 The fence is a dataref that no X-Plane has, `FENCE`: its elements are the frame's number, whole seconds and microseconds
-of simulated time, each exact in float32. Who subscribes to it, at whatever rate, gets it after everything else that is
-sent in a frame. A program with many sockets names the port of one of them by `GROUP`: that one gets every fence, as the
-last of them; the others get it in frames that send them something, at the end of that datagram. A DREF that writes a
-frame's number to the fence lets the simulator fly on from that frame.
+of simulated time, and the number of the frame that the window shows, each exact in float32. Who subscribes to it, at
+whatever rate, gets it after everything else that is sent in a frame, when its picture is drawn. A program with many
+sockets names the port of one of them by `GROUP`: that one gets every fence, as the last of them; the others get it in
+frames that send them something, at the end of that datagram. A DREF that writes a frame's number to the fence lets the
+simulator fly on from that frame.
 
 Frame 0 does not fly: it is sent again and again, in real time, until it is answered, so that clients can subscribe.
 """
@@ -29,7 +30,7 @@ GROUP = "xplane_bridge/lockstep_group"
 Pairs = Tuple[Tuple[int, int], ...]
 _GROUP = re.compile(re.escape(GROUP) + r"\[(\d{1,5})\]")
 _SOCKETS = -1
-_ELEMENT = re.compile(re.escape(FENCE) + r"(?:\[([0-2])\])?")
+_ELEMENT = re.compile(re.escape(FENCE) + r"(?:\[([0-3])\])?")
 _MICROSECONDS = 1_000_000
 #: RREF datagram [bytes].
 _LONGEST = protocol.HEADER_SIZE + protocol.RREF_MAX_PAIRS * protocol.RREF_PAIR_SIZE
@@ -76,7 +77,7 @@ class Fences:
             self.answered = max(self.answered, int(request.value))
         return True
 
-    def send(self, server: Server, now: float, frame: int, sim_time: float) -> None:
+    def send(self, server: Server, now: float, frame: int, sim_time: float, picture: int = 0) -> None:
         """Ends a frame: sends what the server has held of it, with the fences.
 
         Args:
@@ -84,9 +85,11 @@ class Fences:
             now: Time of the frame on the loop's clock [s].
             frame: Its number.
             sim_time: Simulated time [s].
+            picture: Number of the frame that the window shows; 0: none.
         """
         microseconds = round(sim_time * _MICROSECONDS)
-        values = (float(frame), float(microseconds // _MICROSECONDS), float(microseconds % _MICROSECONDS))
+        seconds, rest = divmod(microseconds, _MICROSECONDS)
+        values = (float(frame), float(seconds), float(rest), float(picture))
         server.send_all(now, self._ended(server.take_held(), values))
 
     def _ended(self, datagrams: List[Datagram], values: Tuple[float, ...]) -> List[Datagram]:
@@ -133,6 +136,7 @@ class LockstepLoop:
         after_fence: Does what remains of a frame, while clients answer it.
         hold: Sends what is due without flying; gets the time on the loop's clock [s].
         sim_time: Gives the simulated time [s].
+        picture: Gives the number of the frame that the window shows; 0: none.
         period: Time of one frame [s].
         pace: Simulated time may go by so many times faster than real time; 0: as fast as it goes.
     """
@@ -145,6 +149,7 @@ class LockstepLoop:
         after_fence: Callable[[], None],
         hold: Callable[[float], None],
         sim_time: Callable[[], float],
+        picture: Callable[[], int],
         period: float,
         pace: float = 0.0,
     ) -> None:
@@ -154,6 +159,7 @@ class LockstepLoop:
         self._after_fence = after_fence
         self._hold = hold
         self._sim_time = sim_time
+        self._picture = picture
         self._period = period
         self._pace = pace
         self.waited = 0.0  #: [s] of wall time for answers to frames that were flown
@@ -173,7 +179,7 @@ class LockstepLoop:
             if self._pace > 0.0:
                 time.sleep(max(0.0, began + frame * self._period / self._pace - time.monotonic()))
             self._fly()
-            self._fences.send(self._server(), frame * self._period, frame, self._sim_time())
+            self._fences.send(self._server(), frame * self._period, frame, self._sim_time(), self._picture())
             sent = time.monotonic()
             self._after_fence()
             while self._fences.answered < frame and not stopping():

@@ -77,6 +77,7 @@ class Options:
     hud: bool = False
     strip: bool = True
     swap_log: Optional[Path] = None
+    picture_every: int = 1  #: of lock-step: frames from one picture to the next
     joystick: str = "attached"
     auto_coordination: bool = False
     loading_time: float = 0.0  #: of a flight, an aircraft, a situation that a client asks for [s]
@@ -242,6 +243,13 @@ def _parser() -> argparse.ArgumentParser:
     window.add_argument("--hud", action="store_true", help="with a head-up display")
     window.add_argument("--no-strip", dest="strip", action="store_false", help="without the machine-readable strip")
     window.add_argument("--swap-log", type=Path, metavar="FILE", help="CSV of when each picture was shown")
+    window.add_argument(
+        "--picture-every",
+        type=int,
+        default=1,
+        metavar="N",
+        help="of --stepped lockstep: draw the first frame and every Nth one after it (default 1)",
+    )
 
     wire = p.add_argument_group("wire")
     wire.add_argument("--bind", default="0.0.0.0", metavar="IP", help="address to listen on (default all)")
@@ -385,6 +393,16 @@ def _options(given: argparse.Namespace) -> Options:
     if size is None:
         raise OptionError(f"--window {given.window}: expected WIDTHxHEIGHT, e.g. 640x480")
     require(not given.window2 or given.window is not None, "--window2", given.window2, "--window with it")
+    every = given.picture_every
+    require(1 <= every <= 1000, "--picture-every", every, "1..1000")
+    drawn = lockstep and given.window is not None
+    require(drawn or every == 1, "--picture-every", every, "--window and --stepped lockstep with it")
+    require(
+        not drawn or delay == 0.0,
+        "--pipeline-delay",
+        given.pipeline_delay,
+        "0 with --stepped lockstep, where a frame ends when its picture is on display",
+    )
     group, _, beacon_port = given.beacon_target.partition(":")
     initial = InitialState(
         latitude_deg=given.lat,
@@ -436,6 +454,7 @@ def _options(given: argparse.Namespace) -> Options:
         hud=given.hud,
         strip=given.strip,
         swap_log=given.swap_log,
+        picture_every=every,
         joystick=given.joystick,
         auto_coordination=given.auto_coordination,
         loading_time=given.loading_time,

@@ -22,6 +22,7 @@ from xplane_bridge.topics import NAMESPACE
 _CONNECTED_TIMEOUT_S = 60.0
 _PLAYER_ENDS_S = 30.0
 _RECORDED_S = 60.0
+_RECORDED_TOO = ("/tf", "/tf_static")  # outside the namespace
 _QUIET_S = 1.0  # without a flight state, while the simulator stands: all that was sent has come
 
 
@@ -117,7 +118,7 @@ class LockstepRun:
             program.check_running()
 
     def _missing(self) -> str:
-        graph = self._flight.master.graph(NAMESPACE)
+        graph = self._flight.master.graph(NAMESPACE, *_RECORDED_TOO)
         answering = graph.publishers.get(f"{NAMESPACE}/lockstep/done", set())
         nodes = {*self._lockstep.participants, "rx_node"}
         absent = sorted(name for name in nodes if not any(("/" + node).endswith("/" + name) for node in answering))

@@ -156,12 +156,18 @@ class RosMaster(ManagedProcess):
         with xmlrpc.client.ServerProxy(answer[2]) as api:
             api.shutdown(_CALLER, "the flight is over")
 
-    def graph(self, namespace: str) -> Graph:
-        """Who publishes and who subscribes below a namespace, and who is connected, as all nodes say themselves."""
+    def graph(self, namespace: str, *more: str) -> Graph:
+        """Who publishes and who subscribes below a namespace, and who is connected, as all nodes say themselves.
+
+        Args:
+            namespace: full name.
+            more: full names of further topics.
+        """
+        below = namespace.rstrip("/") + "/"
         with xmlrpc.client.ServerProxy(self.uri) as master:
             state: Any = master.getSystemState(_CALLER)
             publishers, subscribers = (
-                {topic: set(nodes) for topic, nodes in each if topic.startswith(namespace.rstrip("/") + "/")}
+                {topic: set(nodes) for topic, nodes in each if topic.startswith(below) or topic in more}
                 for each in state[2][:2]
             )
             found: Dict[str, Any] = {

@@ -29,7 +29,7 @@ def test_frames_a_second_that_are_none_are_refused(capsys):
     [
         (["--speed", "2"], "--speed 2.0: needs --lockstep"),
         (["--controller-node", "law"], "--controller-node law: needs --lockstep"),
-        (["--lockstep", "--camera"], "--lockstep flies without --camera and with --transport rref"),
+        (["--lockstep", "--transport", "data"], "--lockstep flies with --transport rref"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(arguments, said):

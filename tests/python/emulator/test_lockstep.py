@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 import threading
 import time
 
@@ -21,9 +23,11 @@ FENCE_INDEX = 900
 class Client(XPlaneClient):
     """Asks for fences too, last, and reads what comes up to one."""
 
+    picture = 0  #: the frame on display, by the newest fence
+
     def ask(self, paths, rate_hz=1000):
         self.subscribe(paths, rate_hz)
-        self.subscribe([f"{FENCE}[{element}]" for element in range(3)], first_index=FENCE_INDEX)
+        self.subscribe([f"{FENCE}[{element}]" for element in range(4)], first_index=FENCE_INDEX)
 
     def answer(self, frame):
         self.send(protocol.DrefWrite(FENCE, float(frame)))
@@ -36,8 +40,20 @@ class Client(XPlaneClient):
             assert packet is not None, "no fence in 10 s"
             found = dict(protocol.decode_rref_response(packet))
             if FENCE_INDEX in found:
+                self.picture = int(found[FENCE_INDEX + 3])
                 return [int(found[FENCE_INDEX + element]) for element in range(3)], pairs
             pairs += protocol.decode_rref_response(packet)
+
+    def fences_until_quiet(self):
+        """The frames whose fences come until nothing does for a while."""
+        found = set()
+        self.socket.settimeout(0.3)
+        with contextlib.suppress(socket.timeout):
+            while True:
+                pairs = dict(protocol.decode_rref_response(self.socket.recv(2000)))
+                found.update(int(value) for index, value in pairs.items() if index == FENCE_INDEX)
+        self.socket.settimeout(10.0)
+        return found
 
     def leave_hold(self):
         """Answers frame 0; gives the first frame that flies."""
@@ -72,6 +88,19 @@ def fixture_fly():
         emulator.stopping = True
         thread.join(10.0)
         assert not thread.is_alive()
+
+
+class Renderer:
+    """Draws as soon as the test says so."""
+
+    def __init__(self):
+        self.frames, self.alive, self.ready = [], True, threading.Event()
+
+    def show(self, sim):
+        self.frames.append(sim.clocks.frame)
+
+    def drawn(self, timeout_s):
+        return self.ready.wait(timeout_s)
 
 
 @pytest.fixture(name="bench")
@@ -183,6 +212,55 @@ def test_a_flight_ends_after_its_duration(fly):
     assert emulator.sim.clocks.running == pytest.approx(0.1)
 
 
+def test_the_fence_says_which_frame_is_on_display(fly):
+    emulator = fly(picture_every=2)
+    emulator.view = renderer = Renderer()
+    renderer.ready.set()
+    client = Client(emulator.port)
+    client.ask([TIME])
+    pictures = []
+    client.leave_hold()
+    for number in range(1, 7):
+        pictures.append(client.picture)
+        client.answer(number)
+        client.frame()
+    assert pictures == [1, 1, 3, 3, 5, 5]
+    assert renderer.frames[:3] == [1, 3, 5]
+
+
+def test_the_fence_says_where_nothing_is_drawn(fly):
+    client = Client(fly().port)
+    client.ask([TIME])
+    client.leave_hold()
+    assert client.picture == 0
+
+
+def test_a_frame_does_not_end_before_its_picture_is_shown(fly):
+    emulator = fly()
+    emulator.view = renderer = Renderer()
+    client = Client(emulator.port)
+    client.ask([TIME])
+    while client.frame()[0][0] != 0:
+        pass
+    client.answer(0)
+    while not renderer.frames:
+        time.sleep(0.01)
+    assert client.fences_until_quiet() <= {0}
+    renderer.ready.set()
+    assert client.first_frame()[0][0] == 1
+    assert client.picture == 1
+
+
+def test_a_frame_whose_window_is_gone_ends_the_emulator():
+    emulator = Emulator(Options(bind="127.0.0.1", port=0, beacon=False, stepped="lockstep", aircraft=KINEMATIC))
+    emulator.view = renderer = Renderer()
+    renderer.ready.set()
+    renderer.alive = False
+    with pytest.raises(BrokenPipeError, match="the window was closed"):
+        emulator.step_frames(1)
+    emulator.close()
+
+
 def test_pace_bounds_the_speed_from_above_only(fly):
     client = Client(fly(pace=2.0).port)
     client.ask([TIME])
@@ -210,6 +288,13 @@ def test_other_modes_do_not_know_the_fence(bench):
         ("--pace 2", "--pace 2.0: expected --stepped lockstep with it"),
         ("--stepped lockstep --pace -1", "--pace -1.0: expected 0..1000"),
         ("--stepped lockstep --fault drop=0.1", "expected none with --stepped lockstep"),
+        ("--picture-every 2", "--picture-every 2: expected --window and --stepped lockstep with it"),
+        ("--stepped lockstep --picture-every 2", "--picture-every 2: expected --window and --stepped lockstep with it"),
+        ("--stepped lockstep --window --picture-every 0", "--picture-every 0: expected 1..1000"),
+        (
+            "--stepped lockstep --window --pipeline-delay 50ms",
+            "--pipeline-delay 50ms: expected 0 with --stepped lockstep",
+        ),
     ],
 )
 def test_options_that_make_no_sense(given, message, capsys):

@@ -13,7 +13,8 @@
 namespace xplane_bridge::core {
 
 /// The dataref by which a simulator in lock-step ends its frames; written with a frame's number, it flies on. Its
-/// elements are that number, whole seconds and microseconds of simulated time.
+/// elements are that number, whole seconds and microseconds of simulated time, and the number of the frame that the
+/// simulator's window shows.
 constexpr const char* kFenceDataref = "xplane_bridge/lockstep";
 /// Its element is the port of the socket that gets every fence of a node. The others that ask for it get a fence in the
 /// frames in which they get something else, at the end of that datagram; its value says how many sockets do.
@@ -22,7 +23,8 @@ constexpr const char* kFenceGroupDataref = "xplane_bridge/lockstep_group";
 /// One frame of a simulator in lock-step. Number 0 stands: it comes again and again until it is answered.
 struct LockstepFrame {
   std::uint32_t number = 0;
-  std::int64_t sim_ns = 0;  ///< [ns] simulated time
+  std::int64_t sim_ns = 0;    ///< [ns] simulated time
+  std::uint32_t picture = 0;  ///< number of the frame whose picture the window shows, drawn by now; 0: there is none
 };
 
 /// What a node does in each frame; called from the thread that receives, in this order. All must be set.

@@ -7,7 +7,8 @@
 
 namespace xplane_bridge {
 
-/// Advertises a node's topics. In a replay, which is faster than a flight, no message may fall out of a queue.
+/// Advertises a node's topics. In a replay and in lock-step, which are faster than a flight, no message may fall out of
+/// a queue.
 class Advertiser {
  public:
   explicit Advertiser(ros::NodeHandle* handle) : handle_(handle) {}

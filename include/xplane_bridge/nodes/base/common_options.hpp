@@ -33,11 +33,15 @@ struct LockstepOptions {
 constexpr std::uint32_t kLockstepQueue = 100;
 /// std_msgs/Header of a node that has done all it does in the frame of that stamp.
 constexpr const char* kLockstepDoneTopic = "lockstep/done";
+/// The node whose answer says that a frame's flight_state is published, or that there is none.
+constexpr const char* kLockstepReader = "rx_node";
 /// ControlMode as of the end of every frame, so that participants know that they have missed none.
 constexpr const char* kLockstepModeTopic = "lockstep/mode";
 /// Of lockstep/done: its frame_id where rx_node has published no flight_state in that frame: no participant can answer
 /// it.
 constexpr const char* kLockstepNoState = "no flight_state";
+/// Of lockstep/done: its frame_id begins so where a participant has not answered and says what it waits for.
+constexpr const char* kLockstepWaits = "waits for ";
 
 /// What all nodes of one namespace must agree on: read from that namespace (config/common.yaml), never from a node's
 /// private one.

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -13,6 +14,7 @@
 #include <ros/publisher.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
+#include <std_msgs/Header.h>
 #include <std_srvs/Trigger.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
@@ -42,6 +44,9 @@ namespace xplane_bridge {
 ///
 /// Threads besides BaseNode's: one reads pictures and does nothing else; one scales, checks and publishes; one encodes
 /// JPEG. Each drops, and counts, what it has no time for. Nothing is scaled or encoded without a subscriber.
+///
+/// In lock-step it is a participant: the simulator draws a frame's picture before it ends the frame, one thread reads,
+/// scales and publishes it, and then the frame is answered. Nothing is dropped, and no time of the host's counts.
 class CaptureNode : public BaseNode {
  public:
   CaptureNode();
@@ -56,6 +61,8 @@ class CaptureNode : public BaseNode {
   void stopInputs() override;
   void undo(const Deadline& deadline) override;
   void joinThreads() override;
+  bool frameReady(const core::LockstepFrame& frame) override;
+  void endFrame(const core::LockstepFrame& frame) override;
 
  private:
   static constexpr const char* kFieldOfViewPurpose = "field_of_view";  ///< of the journal's entry, and its id
@@ -80,7 +87,27 @@ class CaptureNode : public BaseNode {
     std::optional<core::CheckedPose> pose;  // of the newest frame
   };
 
+  /// What is done for a frame of lock-step.
+  enum class FrameStage {
+    kReading,     ///< its flight_state has not come
+    kDue,         ///< its picture is to be taken
+    kNoRenderer,  ///< the simulator draws no pictures
+    kSkipped,     ///< it has no flight_state: tx_node waits for no answer
+    kDone,        ///< it may be answered
+  };
+
   void captureLoop();
+  /// Remembers what a source says of itself; logs a new problem. @param described asking for that costs a round trip
+  void noteSource(const vision::FrameSource& source, bool described);
+  // Lock-step.
+  void requireLockstep(const ParamLoader& own) const;
+  void subscribeInLockstep();
+  void captureInLockstep();
+  /// @return whether the picture that is due was taken and published
+  bool takeFramePicture(vision::FrameSource* source, cv::Mat* pixels);
+  /// Reads off what has come whether the frame has a state, and a picture.
+  FrameStage beginPicture(const core::LockstepFrame& frame);
+  void sayWhatIsMissing(const std::string& what);
   void takePicture(vision::FrameSource* source, const vision::Change& change);
   void repeatFrozen(std::int64_t now_ns);
   void publishPicture(Grabbed* grabbed);
@@ -179,7 +206,8 @@ class CaptureNode : public BaseNode {
   std::shared_ptr<vision::SenderCalibration> sender_calibration_ = std::make_shared<vision::SenderCalibration>();
   std::atomic<bool> field_of_view_left_{false};  // a killed node's may have to be given back
 
-  Grabbed last_;  // capture thread only: for repeating a frozen picture
+  std::string logged_problem_;  // capture thread only
+  Grabbed last_;                // capture thread only: for repeating a frozen picture
   std::int64_t frozen_sent_ns_ = 0;
   core::RateLimiter limiter_;
 
@@ -191,6 +219,16 @@ class CaptureNode : public BaseNode {
       messages_;  // used again once no publisher holds them: memory once touched is cheap
   std::uint32_t image_count_ = 0;
   std::uint32_t frozen_count_ = 0;
+
+  // Lock-step.
+  ros::Publisher done_publisher_;
+  std::mutex frame_mutex_;  // guards the following
+  core::ClockCondition frame_changed_;
+  std::deque<FlightState::ConstPtr> states_;     // of frames that were not begun
+  std::deque<std_msgs::HeaderConstPtr> reader_;  // rx_node's answers to them
+  std::uint32_t frame_ = 0;
+  FrameStage frame_stage_ = FrameStage::kDone;
+  float frame_key_ = 0.0F;  // [s] the frame's raw simulator time
 
   core::AssociationCounters reported_;  // diagnostics only: as of the last report
 

@@ -29,7 +29,8 @@ class ImagePairing {
   /// @param max_wait [s] after a picture at which it is paired with what is there; the first pictures wait up to
   ///        kFirstPictures as long as there is no state, or no clock, yet
   /// @param publish called under the lock, in order; must not call back
-  ImagePairing(double display_delay, double max_wait, Publish publish);
+  /// @param exact receive times are the frames' own, as in lock-step: the clock has no uncertainty
+  ImagePairing(double display_delay, double max_wait, Publish publish, bool exact = false);
 
   /// A frame heard on the capture host. @param receive_ns [ns] host time, running evenly
   void addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns);
@@ -84,6 +85,7 @@ class ImagePairing {
   bool delay_measured_;
   const std::int64_t max_wait_ns_;
   const Publish publish_;
+  const bool exact_;
 
   mutable std::mutex mutex_;
   core::ClockFilter clock_;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -86,6 +87,8 @@ class TxLockstep {
   void progress();
   void watch();
   std::string whatIsMissing() const;
+  /// What a participant that has not answered has said it waits for, in words; empty: nothing.
+  std::string reasonOf(const std::string& participant) const;
 
   const LockstepOptions options_;
   const core::Clock host_;
@@ -100,6 +103,7 @@ class TxLockstep {
   core::ClockCondition ended_;
   std::vector<Command> commands_;
   std::vector<Request> requests_;
+  std::map<std::string, std::string> reasons_;  // full name of a node to what it waits for, until it answers
   std::int64_t stamp_ns_;
   std::int64_t previous_ns_;  // stamp of the frame before
   bool closed_ = false;       // the present frame

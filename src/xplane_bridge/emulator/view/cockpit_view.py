@@ -19,7 +19,7 @@ from xplane_bridge.protocol import ROW_COUNT
 
 
 class CockpitView:
-    """What the pilot sees, in a window, and further windows with views of their own; see `emulator.View`.
+    """What the pilot sees, in a window, and further windows with views of their own; see `pictures.View`.
 
     The aerodrome lies where the options say, else where the flight starts, its runway along the first heading. Further
     windows lie right of the first.
@@ -72,9 +72,17 @@ class CockpitView:
             renderer.show(_seen(scene, view, camera.turn))
 
     def drawn(self, timeout_s: float) -> bool:
-        """Whether that is done (or the window gone) in all windows; waits for it so long."""
+        """Whether that is done (or the window gone) in all windows; waits for it so long.
+
+        In lock-step it is done when the pictures are on display.
+        """
         end = time.monotonic() + timeout_s
         return all(renderer.drawn(max(end - time.monotonic(), 0.0)) for renderer in self._renderers)
+
+    @property
+    def alive(self) -> bool:
+        """Whether all windows are still there."""
+        return all(renderer.alive for renderer in self._renderers)
 
     def close(self) -> None:
         """Closes the windows."""
@@ -99,6 +107,7 @@ def _renderer_options(options: Options, number: int) -> RendererOptions:
         strip=options.strip,
         swap_log=swap_log,
         realtime=options.realtime,
+        answers_shown=options.stepped == "lockstep",
         place=(number * width, 0) if options.more_windows else None,
     )
 

@@ -23,7 +23,10 @@ class LockstepHubTest : public testing::Test {
   void SetUp() override {
     auto inner = std::make_unique<ScriptedHub>(wire_);
     LockstepHooks hooks;
-    hooks.begin = [this](const LockstepFrame& frame) { said_ += " begin" + std::to_string(frame.number); };
+    hooks.begin = [this](const LockstepFrame& frame) {
+      said_ += " begin" + std::to_string(frame.number);
+      pictures_.push_back(frame.picture);
+    };
     hooks.ready = [this](const LockstepFrame&) { return ready_; };
     hooks.close = [this](const LockstepFrame& frame) {
       if (frame.number > 0) said_ += " close" + std::to_string(frame.number);
@@ -60,12 +63,18 @@ class LockstepHubTest : public testing::Test {
     wire_->arrivals.push_back({wire_->now_ns, source, bytes, kXPlane, 12345});
   }
   void value(const std::string& source, float value) { arrive(source, {{0, value}}); }
-  void fence(const std::string& source, float frame, float seconds = 0.0F, float microseconds = 0.0F) {
-    arrive(source, {{kFence, frame}, {kFence + 1, seconds}, {kFence + 2, microseconds}});
+  void fence(const std::string& source, float frame, float seconds = 0.0F, float microseconds = 0.0F,
+             float picture = 0.0F) {
+    arrive(source, {{kFence, frame}, {kFence + 1, seconds}, {kFence + 2, microseconds}, {kFence + 3, picture}});
   }
   /// Of a simulator that sends it to so many sockets, behind a value.
   void countedFence(const std::string& source, float frame, float sockets) {
-    arrive(source, {{0, frame}, {kFence, frame}, {kFence + 1, 0.0F}, {kFence + 2, 0.0F}, {kFence + 8, sockets}});
+    arrive(source, {{0, frame},
+                    {kFence, frame},
+                    {kFence + 1, 0.0F},
+                    {kFence + 2, 0.0F},
+                    {kFence + 3, 0.0F},
+                    {kFence + 8, sockets}});
   }
 
   /// As SimLink's step: waits, then takes what there is, of a first.
@@ -102,6 +111,7 @@ class LockstepHubTest : public testing::Test {
   LockstepClock clock_{wire_->clock(), 0};
   bool ready_ = true;
   std::string said_;
+  std::vector<std::uint32_t> pictures_;  // of the frames begun
   std::unique_ptr<LockstepHub> hub_;
   std::shared_ptr<DatagramSource> a_, b_;
 };
@@ -115,7 +125,7 @@ TEST_F(LockstepHubTest, AsksForTheFenceOnEverySourceThatAsksForSomething) {
   }
   std::vector<std::string> expected;
   for (const std::string source : {"a ", "b "}) {
-    for (const char* element : {"[0]", "[1]", "[2]"}) expected.push_back(source + kFenceDataref + element);
+    for (const char* element : {"[0]", "[1]", "[2]", "[3]"}) expected.push_back(source + kFenceDataref + element);
     expected.push_back(source + kFenceGroupDataref + "[7001]");  // the port of the one that asked first
   }
   EXPECT_EQ(asked, expected);
@@ -142,6 +152,17 @@ TEST_F(LockstepHubTest, HandsOutAFrameWhenAllSourcesShowItsFenceAndGoesThroughIt
   EXPECT_EQ(steps(1), " begin2 a2 b2");
   EXPECT_EQ(clock_.clock().system_ns(), 3'500'000'000);
   EXPECT_EQ(steps(6), " close2 end2");
+}
+
+TEST_F(LockstepHubTest, SaysWhichFrameIsOnDisplay) {
+  takeOff();
+  fence("a", 2.0F, 0.0F, 0.0F, 2.0F);
+  fence("b", 2.0F, 0.0F, 0.0F, 2.0F);
+  steps(3);
+  fence("a", 3.0F, 0.0F, 0.0F, 2.0F);
+  fence("b", 3.0F, 0.0F, 0.0F, 2.0F);
+  steps(3);
+  EXPECT_EQ(pictures_, (std::vector<std::uint32_t>{0, 2, 2}));
 }
 
 TEST_F(LockstepHubTest, WaitsForTheSourceWhoseFenceCameLast) {

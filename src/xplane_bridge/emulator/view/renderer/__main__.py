@@ -1,7 +1,8 @@
 """`python -m xplane_bridge.emulator.view.renderer`: the window.
 
-Scenes come as records on standard input; a byte on standard output answers each one when it is drawn. Pictures wait for
-their time in a swap chain: one that is not shown before the next one is due is left out.
+Scenes come as records on standard input; a byte on standard output answers each one when it is drawn, or with
+`--answer-shown` when the server has it. Pictures wait for their time in a swap chain: one that is not shown before the
+next one is due is left out.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import NamedTuple, Optional, Sequence
+from typing import Callable, NamedTuple, Optional, Sequence
 
 import cv2
 import numpy as np
@@ -135,9 +136,14 @@ class SwapChain:
             self._spare.append(pixels)
 
 
-def _draw(painter: Painter, chain: SwapChain, delay_ns: int) -> None:
+def _answer() -> None:
+    with contextlib.suppress(BrokenPipeError):
+        os.write(sys.stdout.fileno(), b".")
+
+
+def _draw(painter: Painter, chain: SwapChain, delay_ns: int, drawn: Callable[[], None]) -> None:
     """Draws scenes as they come, until the pipe is closed."""
-    scenes, answers = sys.stdin.fileno(), sys.stdout.fileno()
+    scenes = sys.stdin.fileno()
     record = b""
     while True:
         data = os.read(scenes, RECORD_BYTES - len(record))
@@ -152,8 +158,7 @@ def _draw(painter: Painter, chain: SwapChain, delay_ns: int) -> None:
         pixels = chain.buffer((*picture.shape[:2], 4))
         cv2.cvtColor(picture, cv2.COLOR_BGR2BGRA, dst=pixels)
         chain.put(Picture(scene, pixels, scene.time_ns + delay_ns))
-        with contextlib.suppress(BrokenPipeError):
-            os.write(answers, b".")
+        drawn()
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
@@ -174,7 +179,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         take_realtime_priority()
     print("READY", flush=True)
     chain = SwapChain()
-    threading.Thread(target=_draw, args=(painter, chain, int(args.pipeline_delay * 1e9)), daemon=True).start()
+    drawn, shown = ((lambda: None), _answer) if args.answer_shown else (_answer, (lambda: None))
+    threading.Thread(target=_draw, args=(painter, chain, int(args.pipeline_delay * 1e9), drawn), daemon=True).start()
     while not window.closed() and not chain.ended:
         picture = chain.next(_POLL_S)
         if picture is None:
@@ -184,6 +190,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         time.sleep(max(0.0, (picture.due_ns - time.monotonic_ns()) * 1e-9))
         begin = time.time_ns()
         window.swap()
+        shown()
         if writer:
             scene = picture.scene
             camera = (repr(getattr(scene, name)) for name in CAMERA_COLUMNS)
@@ -203,6 +210,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-strip", action="store_true")
     parser.add_argument("--swap-log", type=Path, metavar="CSV")
     parser.add_argument("--realtime", action="store_true")
+    parser.add_argument("--answer-shown", action="store_true")
     return parser
 
 

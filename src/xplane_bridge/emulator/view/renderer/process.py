@@ -36,6 +36,7 @@ class RendererOptions:
         hud, strip: Whether the head-up display and the machine-readable strip are drawn.
         swap_log: CSV file for frame, simulator time, frame time and swap time of each picture shown, and its camera.
         realtime: Whether the thread that swaps asks for real-time priority.
+        answers_shown: Whether a frame counts as drawn when it is on display only.
         place: Of the window's upper left corner on the screen [px]; None: where the system puts it.
         display: X display; None: `DISPLAY`.
     """
@@ -49,6 +50,7 @@ class RendererOptions:
     strip: bool = True
     swap_log: Optional[Path] = None
     realtime: bool = False
+    answers_shown: bool = False
     place: Optional[tuple[int, int]] = None
     display: Optional[str] = None
 
@@ -68,6 +70,7 @@ class RendererOptions:
         words += [] if self.strip else ["--no-strip"]
         words += ["--swap-log", self.swap_log] if self.swap_log else []
         words += ["--realtime"] if self.realtime else []
+        words += ["--answer-shown"] if self.answers_shown else []
         return [str(word) for word in words]
 
 
@@ -104,11 +107,12 @@ class RendererProcess:
             raise RendererError(msg)
         self._scenes, self._answers = self._child.stdin.fileno(), self._child.stdout.fileno()
         self._in_work = 0
+        self._silent = False  # the pipes are closed, which comes before the process has ended
 
     @property
     def alive(self) -> bool:
         """Whether the window is still there."""
-        return self._child.poll() is None
+        return not self._silent and self._child.poll() is None
 
     def show(self, scene: Scene) -> None:
         """Hands a frame over; not before the last one is drawn."""
@@ -118,12 +122,13 @@ class RendererProcess:
             os.write(self._scenes, record)  # all or nothing: shorter than PIPE_BUF
             self._in_work += 1
         except BrokenPipeError:
-            self._in_work = 0  # the window was closed; X-Plane's packets go on
+            self._in_work, self._silent = 0, True  # the window was closed; X-Plane's packets go on
 
     def drawn(self, timeout_s: float) -> bool:
         """Whether all frames handed over are drawn (or the window gone); waits for it so long."""
         if self._in_work and select.select((self._answers,), (), (), timeout_s)[0]:
             answers = os.read(self._answers, 4096)
+            self._silent = not answers
             self._in_work = self._in_work - len(answers) if answers else 0
         return self._in_work == 0
 
