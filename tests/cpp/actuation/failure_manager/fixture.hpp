@@ -34,7 +34,8 @@ const std::string kLock = "sim/operation/failures/rel_fcon_ailn_1_lft_lock";
 constexpr const char* kWho = "node/set_failure";
 
 inline core::FailureRequest failed(const std::string& name) { return {name, "failed", {}, 0, 0.0}; }
-core::FailureRequest broken(const std::string& surface, const std::string& kind, std::optional<double> value = {}) {
+inline core::FailureRequest broken(const std::string& surface, const std::string& kind,
+                                   std::optional<double> value = {}) {
   return {surface, kind, value, 0, 0.0};
 }
 inline core::FailureRequest triggered(const std::string& name, FailureTrigger trigger, double value) {
