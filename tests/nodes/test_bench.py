@@ -87,6 +87,7 @@ def test_benchmarks_of_wire_and_files_measure(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     [
+        "bag_memory",
         "bags",
         "capture_1080p",
         "failsafes",
