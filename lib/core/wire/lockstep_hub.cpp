@@ -36,6 +36,7 @@ bool asks(ByteView bytes) {
 /// What a datagram ends with.
 struct Fence {
   std::size_t begin = 0;  ///< [bytes] of the datagram before it
+  bool whole = false;     ///< else X-Plane has read a part of what asks for it, or ends it
   LockstepFrame frame;
   std::uint32_t sockets = 0;  ///< of this node to which the frame's fence is sent; 0: to all
 };
@@ -59,8 +60,9 @@ std::optional<Fence> fenceIn(ByteView bytes) {
     elements[static_cast<std::size_t>(element)] = pair.value;
     ++found;
   }
-  if (found != kFenceElements) return std::nullopt;
+  if (at == rref->size()) return std::nullopt;
   fence.begin = at == 0 ? 0 : kHeaderSize + at * kRrefPairSize;
+  fence.whole = found == kFenceElements;
   LockstepFrame& frame = fence.frame;
   frame.number = static_cast<std::uint32_t>(elements[0]);
   frame.sim_ns = static_cast<std::int64_t>(elements[1]) * kNanosecondsPerSecond +
@@ -110,15 +112,24 @@ class LockstepHub::Source : public DatagramSource {
   int receiveBuffer() const override { return inner->receiveBuffer(); }
   UdpCounters counters() const override { return inner->counters(); }
 
+  // X-Plane may fly a frame between any two of these requests: whom it counts in the group has the whole fence.
+
   /// `group`: port of the source that gets every fence; this one does with what else it gets.
-  void request(std::int32_t rate_hz, std::uint16_t group) {
-    for (std::int32_t element = 0; element < kFenceElements; ++element) {
-      request(kFenceDataref, element, rate_hz, kFenceIndex + element);
-    }
-    request(kFenceGroupDataref, group, rate_hz, kSocketsIndex);
+  void join(std::uint16_t group) {
+    requestElements(kFenceRate);
+    request(kFenceGroupDataref, group, kFenceRate, kSocketsIndex);
+  }
+  void leave(std::uint16_t group) {
+    request(kFenceGroupDataref, group, 0, kSocketsIndex);
+    requestElements(0);
   }
 
  private:
+  void requestElements(std::int32_t rate_hz) {
+    for (std::int32_t element = 0; element < kFenceElements; ++element) {
+      request(kFenceDataref, element, rate_hz, kFenceIndex + element);
+    }
+  }
   void request(const char* dataref, std::int32_t element, std::int32_t rate_hz, std::int32_t index) {
     std::array<std::uint8_t, kRrefRequestSize> message;
     const std::string path = std::string(dataref) + "[" + std::to_string(element) + "]";
@@ -161,11 +172,16 @@ std::shared_ptr<DatagramSource> LockstepHub::open(const std::string& name, const
 }
 
 void LockstepHub::ignore(const DatagramSource& source) {
-  for (const std::shared_ptr<Source>& each : sources()) {
+  const std::vector<std::shared_ptr<Source>> all = sources();
+  for (const std::shared_ptr<Source>& each : all) {
     if (each.get() != &source) continue;
     const std::lock_guard<std::mutex> lock(mutex_);
     each->ignored = true;
-    if (std::exchange(each->fenced, false)) each->request(0, group_);
+    if (std::exchange(each->fenced, false)) {
+      const std::uint16_t left = group_;
+      if (each->inner->localPort() == group_) gatherBehindAnother(all);
+      each->leave(left);
+    }
     if (clock_.phase() == LockstepClock::Phase::kReleased) {
       inner_->ignore(*each->inner);
     } else {
@@ -187,9 +203,17 @@ std::vector<std::shared_ptr<LockstepHub::Source>> LockstepHub::sources() const {
   return out;
 }
 
+/// The one that got every fence ends: another does from now on.
+void LockstepHub::gatherBehindAnother(const std::vector<std::shared_ptr<Source>>& all) {
+  group_ = 0;
+  for (const std::shared_ptr<Source>& each : all) {
+    if (each->fenced) askForFence(each.get());
+  }
+}
+
 void LockstepHub::askForFence(Source* source) {
   if (group_ == 0) group_ = source->inner->localPort();
-  source->request(kFenceRate, group_);
+  source->join(group_);
   asked_ns_ = host_.steady_ns();
 }
 
@@ -211,14 +235,14 @@ void LockstepHub::take(Source* source) {
     const std::optional<Fence> fence = fenceIn(bytes);
     if (fence) {
       bytes = {buffer_.data(), fence->begin};
-      if (source->newest.number != fence->frame.number) {
+      if (fence->whole && source->newest.number != fence->frame.number) {
         // Of frame 0, which was not handed out in time; the first frame that flies brings all of it again.
         source->waiting.erase(source->waiting.begin(),
                               source->waiting.begin() + static_cast<std::ptrdiff_t>(source->ended));
       }
     }
     if (bytes.size() > 0) source->waiting.push_back({{bytes.data(), bytes.data() + bytes.size()}, received});
-    if (fence) {
+    if (fence && fence->whole) {
       source->seen = true;
       source->newest = fence->frame;
       source->sockets = fence->sockets;
@@ -266,17 +290,19 @@ bool LockstepHub::frameIsComplete() const {
   const std::vector<std::shared_ptr<Source>> all = sources();
   const std::lock_guard<std::mutex> lock(mutex_);
   std::uint32_t shown = 0;
+  std::uint32_t shown_of_group = 0;
   std::uint32_t counted = 0;
   bool missing = false;
   for (const std::shared_ptr<Source>& source : all) {
     if (source->seen && source->newest.number == frame_.number + 1) {
       ++shown;
+      if (source->sockets > 0) ++shown_of_group;
       counted = std::max(counted, source->sockets);
     } else if (source->fenced) {
       missing = true;
     }
   }
-  return counted > 0 ? shown >= counted : shown > 0 && !missing;
+  return counted > 0 ? shown_of_group >= counted : shown > 0 && !missing;
 }
 
 /// What was ignored a few frames ago: X-Plane sends nothing there any more.

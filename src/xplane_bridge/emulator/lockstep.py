@@ -58,11 +58,10 @@ class Fences:
             indices[request.index] = _SOCKETS if match is None else int(match.group(1) or 0)
             if group is not None:
                 self._groups[client] = (client[0], int(group.group(1)))
-        else:
-            indices.pop(request.index, None)
+        elif indices.pop(request.index, None) == _SOCKETS:
+            self._groups.pop(client, None)
         if not indices:
             del self._clients[client]
-            self._groups.pop(client, None)
         self._pairs = {each: tuple(elements.items()) for each, elements in self._clients.items()}
         firsts = [each for each in self._clients if self._groups.get(each) == each]
         others = [each for each in self._clients if each not in self._groups]

@@ -12,6 +12,7 @@ import pytest
 from support.emulator_fixture import EmulatorFixture, XPlaneClient
 from xplane_bridge import protocol
 from xplane_bridge.emulator.emulator import Emulator
+from xplane_bridge.emulator.lockstep import Fences
 from xplane_bridge.emulator.options import KINEMATIC, Options, parse
 
 FENCE = "xplane_bridge/lockstep"
@@ -188,6 +189,43 @@ def test_sockets_of_a_group_get_a_fence_with_what_else_they_get_and_the_first_sa
         with pytest.raises(BlockingIOError):
             slow.socket.recv(2000)
         slow.socket.settimeout(10.0)
+
+
+class HeldServer:
+    """Of a frame that sends something to the second socket of a group."""
+
+    def __init__(self, first, second):
+        self._held = [(protocol.encode_rref_response([(0, 1.0)]), each) for each in (second, first)]
+        self.sent = {}  #: by client, its pairs
+
+    def take_held(self):
+        return self._held
+
+    def send_all(self, _, datagrams):
+        for packet, client in datagrams:
+            self.sent.setdefault(client, {}).update(dict(protocol.decode_rref_response(packet)))
+
+
+@pytest.mark.parametrize("requests", range(6))
+@pytest.mark.parametrize("leaves", [False, True])
+def test_who_joins_or_leaves_a_group_in_five_requests_is_counted_where_its_fence_is_whole(requests, leaves):
+    # As bridge nodes do: the group is joined last and left first, and a frame may be flown between any two.
+    first, second = ("127.0.0.1", 7001), ("127.0.0.1", 7002)
+    elements = [(f"{FENCE}[{element}]", FENCE_INDEX + element) for element in range(4)]
+    group = (f"{GROUP}[{first[1]}]", FENCE_INDEX + 8)
+    fences = Fences()
+    for path, index in [*elements, group]:
+        assert fences.request(protocol.RrefRequest(1000, index, path), first)
+        assert not leaves or fences.request(protocol.RrefRequest(1000, index, path), second)
+    changes = [(0, group), *((0, each) for each in elements)] if leaves else [(20, each) for each in [*elements, group]]
+    for rate_hz, (path, index) in changes[:requests]:
+        assert fences.request(protocol.RrefRequest(rate_hz, index, path), second)
+    server = HeldServer(first, second)
+    fences.send(server, 0.0, 1, 0.02)
+    whole = {FENCE_INDEX, FENCE_INDEX + 1, FENCE_INDEX + 2, FENCE_INDEX + 3, FENCE_INDEX + 8}
+    assert whole < server.sent[first].keys()
+    assert server.sent[first][FENCE_INDEX + 8] == (2.0 if whole < server.sent[second].keys() else 1.0)
+    assert (FENCE_INDEX + 8 in server.sent[second]) == (server.sent[first][FENCE_INDEX + 8] == 2.0)
 
 
 def test_a_write_before_the_answer_acts_in_the_next_frame(fly):

@@ -63,6 +63,7 @@ class LockstepHub : public DatagramHub {
   };
   enum class Stage : std::uint8_t { kCollecting, kHandling, kAnswering, kClosing };
 
+  void gatherBehindAnother(const std::vector<std::shared_ptr<Source>>& all);
   void askForFence(Source* source);
   void askAgain();
   void collect(int timeout_ms);
@@ -85,7 +86,7 @@ class LockstepHub : public DatagramHub {
 
   mutable std::mutex mutex_;  // guards the list, and what of a source is asked for
   std::vector<std::weak_ptr<Source>> sources_;
-  std::uint16_t group_ = 0;  // port of the source that asked first
+  std::uint16_t group_ = 0;  // port of the source that gets every fence
 
   // Of the thread that receives.
   Stage stage_ = Stage::kCollecting;

@@ -77,6 +77,20 @@ class LockstepHubTest : public testing::Test {
                     {kFence + 8, sockets}});
   }
 
+  /// Requests for fences ("+") and their ends ("-"): by which source, and of what.
+  std::vector<std::string> fencesAskedFor() const {
+    std::vector<std::string> asked;
+    for (const auto& sent : wire_->sent) {
+      const std::string text(sent.bytes.begin(), sent.bytes.end());
+      const auto at = text.find(kFenceDataref);
+      if (at == std::string::npos) continue;
+      std::int32_t rate = 0;
+      std::memcpy(&rate, sent.bytes.data() + 5, sizeof rate);
+      asked.push_back((rate > 0 ? "+" : "-") + sent.source + " " + text.substr(at, text.find(']', at) + 1 - at));
+    }
+    return asked;
+  }
+
   /// As SimLink's step: waits, then takes what there is, of a first.
   void step() {
     hub_->wait(1);
@@ -117,18 +131,34 @@ class LockstepHubTest : public testing::Test {
 };
 
 TEST_F(LockstepHubTest, AsksForTheFenceOnEverySourceThatAsksForSomething) {
-  std::vector<std::string> asked;
-  for (const auto& sent : wire_->sent) {
-    const std::string text(sent.bytes.begin(), sent.bytes.end());
-    const auto at = text.find(kFenceDataref);
-    if (at != std::string::npos) asked.push_back(sent.source + " " + text.substr(at, text.find(']', at) + 1 - at));
-  }
   std::vector<std::string> expected;
-  for (const std::string source : {"a ", "b "}) {
+  for (const std::string source : {"+a ", "+b "}) {
     for (const char* element : {"[0]", "[1]", "[2]", "[3]"}) expected.push_back(source + kFenceDataref + element);
     expected.push_back(source + kFenceGroupDataref + "[7001]");  // the port of the one that asked first
   }
-  EXPECT_EQ(asked, expected);
+  EXPECT_EQ(fencesAskedFor(), expected);
+}
+
+TEST_F(LockstepHubTest, LeavesTheGroupBeforeItEndsItsFence) {
+  wire_->sent.clear();
+  hub_->ignore(*b_);
+  std::vector<std::string> expected = {std::string("-b ") + kFenceGroupDataref + "[7001]"};
+  for (const char* element : {"[0]", "[1]", "[2]", "[3]"})
+    expected.push_back(std::string("-b ") + kFenceDataref + element);
+  EXPECT_EQ(fencesAskedFor(), expected);
+}
+
+TEST_F(LockstepHubTest, AnotherGetsEveryFenceBeforeTheOneThatDidEnds) {
+  wire_->sent.clear();
+  hub_->ignore(*a_);
+  std::vector<std::string> expected;
+  for (const char* element : {"[0]", "[1]", "[2]", "[3]"})
+    expected.push_back(std::string("+b ") + kFenceDataref + element);
+  expected.push_back(std::string("+b ") + kFenceGroupDataref + "[7002]");
+  expected.push_back(std::string("-a ") + kFenceGroupDataref + "[7001]");
+  for (const char* element : {"[0]", "[1]", "[2]", "[3]"})
+    expected.push_back(std::string("-a ") + kFenceDataref + element);
+  EXPECT_EQ(fencesAskedFor(), expected);
 }
 
 TEST_F(LockstepHubTest, HandsOutFrame0AsItComesAndNoFences) {
@@ -193,6 +223,34 @@ TEST_F(LockstepHubTest, WaitsForAsManySourcesAsTheFenceSaysAndForTheFirstOfThem)
   EXPECT_EQ(steps(1), " begin3 a3 b3");
   ASSERT_FALSE(wire_->awaited.empty());
   for (const std::string& source : wire_->awaited) EXPECT_EQ(source, "a");
+}
+
+TEST_F(LockstepHubTest, WhatHasAFenceAndIsNotOfTheGroupStandsForNothingOfTheGroup) {
+  takeOff();
+  countedFence("a", 2.0F, 2.0F);
+  const auto c = hub_->open("c", port(7003));
+  fence("c", 2.0F);
+  EXPECT_EQ(steps(3), "");
+  countedFence("b", 2.0F, 2.0F);
+  EXPECT_EQ(steps(1), " begin2 a2 b2");
+}
+
+TEST_F(LockstepHubTest, APartOfAFenceIsNeitherAFenceNorData) {
+  takeOff();
+  const auto c = hub_->open("c", port(7003));
+  ask(c.get());
+  arrive("c", {{0, 9.0F}, {kFence + 2, 0.0F}, {kFence + 3, 0.0F}});
+  countedFence("a", 2.0F, 1.0F);
+  EXPECT_EQ(steps(6), " begin2 a2 close2 end2");
+  EXPECT_FALSE(hub_->hasInput(*c)) << "what no fence stands behind belongs to no frame";
+  countedFence("c", 3.0F, 2.0F);
+  countedFence("a", 3.0F, 2.0F);
+  steps(1);
+  std::array<std::uint8_t, 100> buffer{};
+  Received received;
+  ASSERT_EQ(c->receive({buffer.data(), buffer.size()}, &received), ReceiveStatus::kReceived);
+  EXPECT_EQ(decodeRref({buffer.data(), received.size})->size(), 1U);
+  EXPECT_FALSE(hub_->hasInput(*c));
 }
 
 TEST_F(LockstepHubTest, ASourceThatIsIgnoredStillCountsInTheFramesThatAreUnderWay) {
