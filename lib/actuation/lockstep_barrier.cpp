@@ -44,12 +44,18 @@ void LockstepBarrier::open(std::uint32_t number, std::int64_t stamp_ns) {
 
 void LockstepBarrier::take(std::size_t participant, std::int64_t stamp_ns, bool for_all) {
   if (participant == names_.size()) return;
-  if (open_ && stamp_ns == stamp_ns_) {
+  const bool now = open_ && number_ > 0;
+  if (now && stamp_ns == stamp_ns_) {
     answered_.insert(participant);
     for_all_ = for_all_ || for_all;
-  } else if (stamp_ns > stamp_ns_ || (!open_ && stamp_ns == stamp_ns_)) {
+  } else if (stamp_ns > stamp_ns_ || (!now && stamp_ns == stamp_ns_)) {
     early_.insert({stamp_ns, participant, for_all});
   }
+}
+
+void LockstepBarrier::answerFrame0(const std::string& reader) {
+  const BarrierLock lock(mutex_);
+  if (number_ == 0 && find(reader) == kReader) answered_.insert(kReader);
 }
 
 void LockstepBarrier::answer(const std::string& who, std::int64_t stamp_ns) {

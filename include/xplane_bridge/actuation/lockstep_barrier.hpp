@@ -15,7 +15,8 @@ namespace xplane_bridge {
 ///
 /// An answer to another frame than the present one does not count for it; one that comes before its frame waits for it,
 /// because the network may bring the answer first. While the simulator is paused, frames share a stamp: then an answer
-/// counts for the frame that is open when it comes.
+/// counts for the frame that is open when it comes. Frame 0 may share that of the first frame that flies: it has an
+/// answer of its own, and all others are of that frame.
 class LockstepBarrier {
  public:
   /// @param participants names of nodes: "/a/b" is that one, "b" is /b and any /.../b
@@ -24,6 +25,8 @@ class LockstepBarrier {
 
   /// The next frame is here. Number 0 is answered by the reader alone: the others have seen nothing of it.
   void open(std::uint32_t number, std::int64_t stamp_ns);
+  /// The reader, by its full name, has answered frame 0.
+  void answerFrame0(const std::string& reader);
   /// `who`, the full name of a node, has answered the frame of this stamp.
   void answer(const std::string& who, std::int64_t stamp_ns);
   /// The reader has answered, and has nothing in this frame that others could answer.

@@ -229,10 +229,16 @@ void LockstepHub::askAgain() {
 }
 
 void LockstepHub::take(Source* source) {
+  std::uint16_t peer_port = 0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    peer_port = source->peer.port;
+  }
   Received received;
   while (source->inner->receive(buffer_, &received) == ReceiveStatus::kReceived) {
     ByteView bytes(buffer_.data(), std::min(received.size, buffer_.size()));
-    const std::optional<Fence> fence = fenceIn(bytes);
+    // Another program's is data, which the link drops. (A computer of many addresses may answer from any of them.)
+    const std::optional<Fence> fence = received.from.port == peer_port ? fenceIn(bytes) : std::nullopt;
     if (fence) {
       bytes = {buffer_.data(), fence->begin};
       if (fence->whole && source->newest.number != fence->frame.number) {

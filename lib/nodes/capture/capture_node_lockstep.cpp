@@ -50,10 +50,12 @@ void CaptureNode::subscribeInLockstep() {
   });
   subscribeEvents<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue,
                                     [this](const ros::MessageEvent<const std_msgs::Header>& event) {
+                                      const auto done = event.getConstMessage();
                                       if (!core::isNamed(event.getPublisherName(), kLockstepReader)) return;
+                                      if (done->frame_id == kLockstepFrame0) return;
                                       {
                                         const FrameLock lock(frame_mutex_);
-                                        reader_.push_back(event.getConstMessage());
+                                        reader_.push_back(done);
                                       }
                                       askFrameReady();
                                     });

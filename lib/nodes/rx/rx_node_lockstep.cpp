@@ -60,7 +60,7 @@ void RxNode::endFrame(const core::LockstepFrame& frame) {
   std_msgs::Header done;
   done.stamp = stampNow();
   // No participant can answer a state that has not come.
-  done.frame_id = frame.number > 0 && !state_is_new_ ? kLockstepNoState : "";
+  done.frame_id = frame.number == 0 ? kLockstepFrame0 : state_is_new_ ? "" : kLockstepNoState;
   done_publisher_.publish(done);
 }
 

@@ -75,7 +75,9 @@ void TxLockstep::takeDone(const std::string& who, const ros::Time& stamp, const 
     }
   }
   if (waits) return;
-  if (said == kLockstepNoState) {
+  if (said == kLockstepFrame0) {
+    barrier_.answerFrame0(who);
+  } else if (said == kLockstepNoState) {
     barrier_.answerForAll(who, nanoseconds(stamp));
   } else {
     barrier_.answer(who, nanoseconds(stamp));

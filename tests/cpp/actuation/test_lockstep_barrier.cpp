@@ -92,15 +92,34 @@ TEST_F(LockstepBarrierTest, NoParticipantIsAwaitedInAFrameThatHasNothingToAnswer
 TEST_F(LockstepBarrierTest, Frame0IsTheReadersAlone) {
   barrier_.open(0, 0);
   EXPECT_FALSE(barrier_.complete());
-  barrier_.answer("/xplane/rx_node", 0);
+  barrier_.answerFrame0("/xplane/controller");
+  EXPECT_FALSE(barrier_.complete());
+  barrier_.answerFrame0("/xplane/rx_node");
   EXPECT_TRUE(barrier_.complete());
+}
+
+TEST_F(LockstepBarrierTest, AnAnswerWithFrame0sStampIsOfTheFirstFrameThatFlies) {
+  barrier_.open(0, 0);
+  barrier_.answerFrame0("/xplane/rx_node");
+  for (const char* who : {"/rx_node", "/controller"}) barrier_.answer(who, 0);  // the network is faster to tx_node
+  barrier_.open(1, 0);
+  EXPECT_EQ(barrier_.missing(), Names{"/other/player"});
+  barrier_.answerFrame0("/xplane/rx_node");
+  EXPECT_FALSE(barrier_.complete());
+  barrier_.answer("/other/player", 0);
+  EXPECT_TRUE(barrier_.complete());
+}
+
+TEST_F(LockstepBarrierTest, Frame0sAnswerIsOfNoOtherFrame) {
+  barrier_.answerFrame0("/xplane/rx_node");
+  EXPECT_EQ(barrier_.missing(), (Names{"rx_node", "controller", "/other/player"}));
 }
 
 TEST(LockstepBarrierSteps, FliesAsManyFramesAsAreGrantedAndHoldsWithTheLastOneAnswered) {
   LockstepBarrier barrier({}, "rx_node");
   barrier.step(0);
   barrier.open(0, 0);
-  barrier.answer("/rx_node", 0);
+  barrier.answerFrame0("/rx_node");
   EXPECT_FALSE(barrier.complete());
   EXPECT_TRUE(barrier.holds());
   barrier.step(3);

@@ -40,6 +40,8 @@ constexpr const char* kLockstepModeTopic = "lockstep/mode";
 /// Of lockstep/done: its frame_id where rx_node has published no flight_state in that frame: no participant can answer
 /// it.
 constexpr const char* kLockstepNoState = "no flight_state";
+/// The same of frame 0, whose stamp the first frame that flies may have as well.
+constexpr const char* kLockstepFrame0 = "frame 0";
 /// Of lockstep/done: its frame_id begins so where a participant has not answered and says what it waits for.
 constexpr const char* kLockstepWaits = "waits for ";
 

@@ -235,6 +235,15 @@ TEST_F(LockstepHubTest, WhatHasAFenceAndIsNotOfTheGroupStandsForNothingOfTheGrou
   EXPECT_EQ(steps(1), " begin2 a2 b2");
 }
 
+TEST_F(LockstepHubTest, AnotherProgramsFenceIsData) {
+  takeOff();
+  countedFence("a", 2.0F, 1.0F);
+  wire_->arrivals.back().from.port = 49001;
+  EXPECT_EQ(steps(3), "");
+  countedFence("a", 2.0F, 1.0F);
+  EXPECT_EQ(steps(1), " begin2 a2 a2") << "the link looks at where they come from";
+}
+
 TEST_F(LockstepHubTest, APartOfAFenceIsNeitherAFenceNorData) {
   takeOff();
   const auto c = hub_->open("c", port(7003));
