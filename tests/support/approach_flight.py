@@ -7,6 +7,7 @@ from typing import Optional
 
 from xplane_bridge.harness.display import screen
 from xplane_bridge.harness.flight import fly
+from xplane_bridge.harness.lockstep_flight import Lockstep
 from xplane_bridge.harness.scenario_flight import scenario_plan
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import load_scenario
@@ -18,21 +19,25 @@ DELAY_S = 0.1
 LONGEST_S = 150.0
 
 
-def fly_approach(folder: Path, scenario: Optional[Path] = None) -> Path:
+def fly_approach(folder: Path, scenario: Optional[Path] = None, lockstep: bool = False) -> Path:
     """Flies an approach in wind and records it. Returns the bag.
 
     Args:
         folder: Of everything that is written.
         scenario: Flown instead of the one that is shipped.
+        lockstep: With a picture of every frame, however busy the machine is; otherwise in real time, where pictures are
+            paired with frames by when they are shown, and dropped where there is no time for them.
     """
     file = scenario or config_file("scenarios", "approach.yaml")
+    late = [] if lockstep else ["--pipeline-delay", f"{DELAY_S}s"]
     plan = scenario_plan(
         load_scenario(file),
         str(file),
         folder,
         LONGEST_S,
-        emulator_options=["--window", "--fps", str(FPS), "--pipeline-delay", f"{DELAY_S}s"],
-        launch_args={"display_delay": DELAY_S},
+        emulator_options=["--window", "--fps", str(FPS), *late],
+        launch_args={} if lockstep else {"display_delay": DELAY_S},
+        lockstep=Lockstep(["capture_node"], fps=FPS) if lockstep else None,
     )
     plan.make_folders()
     with screen(plan.logs, headless=True):
