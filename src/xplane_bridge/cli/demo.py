@@ -46,7 +46,7 @@ def parser() -> argparse.ArgumentParser:
         type=number(f"seconds, {_SHORTEST_S:g} or more", low=_SHORTEST_S),
         default=60.0,
         metavar="S",
-        help="length of the recording [s] (%(default)g)",
+        help="length of the recording, of simulated time [s] (%(default)g)",
     )
     p.add_argument("--output", type=Path, default=Path("out"), metavar="DIR", help="where to write (%(default)s)")
     p.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help="aircraft to fly (%(default)s)")

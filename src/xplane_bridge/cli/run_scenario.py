@@ -52,7 +52,12 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--camera", action="store_true", help="draw and record the cockpit view")
     p.add_argument("--headless", action="store_true", help="draw it, but not on this screen")
-    p.add_argument("--duration", type=positive, metavar="S", help="end after so long; needed where a scenario repeats")
+    p.add_argument(
+        "--duration",
+        type=positive,
+        metavar="S",
+        help="end after so much simulated time; needed where a scenario repeats",
+    )
     p.add_argument(
         "--emulator",
         default="",

@@ -29,7 +29,7 @@ class FlightPlan:
     """What is to be flown and recorded, and how."""
 
     output: Path  #: folder of everything that is written
-    duration: float  #: [s] of flight to record
+    duration: float  #: [s] of flight to record, of the simulator's time
     aircraft: str = "fixed_wing"
     transport: str = "rref"
     emulator_options: List[str] = field(default_factory=list)
@@ -44,7 +44,7 @@ class FlightPlan:
     controller: str = ""
     #: Silences that belong to the plan, e.g. a restart of the emulator, are not failures.
     silence_allowed: float = _SILENCE_S  #: [s]
-    #: In lock-step; `duration` is simulated time then, and the player ends the flight by holding it.
+    #: In lock-step; the player ends the flight by holding it then.
     lockstep: Optional[Lockstep] = None
     #: How it was asked for, by which it can be flown again: experiment/flight of the passport.
     experiment: Dict[str, Any] = field(default_factory=dict)
@@ -200,14 +200,15 @@ def _wait_for_controller(flight: RunningFlight, controller: ManagedProcess) -> N
 
 
 def _record(plan: FlightPlan, flight: RunningFlight, observer: Observer) -> None:
-    began = last_new = time.monotonic()
+    last_new = time.monotonic()
     seen = 0
+    flight.count_time()
     while flight.elapsed < plan.duration:
         flight.bridge.check_running()
         if _is_over(plan, flight):
             return
         now = time.monotonic()
-        flight.elapsed = now - began
+        flight.count_time()
         if flight.states != seen:
             seen, last_new = flight.states, now
         elif now - last_new > plan.silence_allowed:
@@ -224,7 +225,7 @@ def _fly_in_lockstep(plan: FlightPlan, lockstep: Lockstep, flight: RunningFlight
     run.begin()
     while not run.over and not _is_over(plan, flight):
         flight.bridge.check_running()
-        flight.elapsed = flight.last.sim_time if flight.last is not None else 0.0
+        flight.count_time()
         observer(flight)
         time.sleep(0.1)
     return run.end(plan.player)
