@@ -113,6 +113,13 @@ def test_hanging_end_is_cut_off_and_named(tiny):
     assert "hangs in: undo in X-Plane" in node.output()
 
 
+def test_none_of_its_threads_works_while_it_waits_for_x_plane_in_the_end(world, tiny):
+    node = tiny(mode="rest_in_undo")
+    node.send_signal(signal.SIGINT)
+    assert node.wait(WAIT_S) == 0
+    assert trace(world) == [*STOP_ORDER[:3], "rested", *STOP_ORDER[3:]]
+
+
 def test_failing_start_ends_it_in_order_with_its_own_status(world, tiny):
     node = tiny(wait=False, mode="fail_at_start")
     assert node.wait(WAIT_S) == 1

@@ -1,6 +1,8 @@
 // The smallest node that uses everything BaseNode offers; it has nothing to do with X-Plane's state, which shows that
 // the base class is reusable. Driven by test_base_node.py.
 
+#include <time.h>
+
 #include <fstream>
 #include <string>
 #include <thread>
@@ -20,7 +22,7 @@ class TinyNode : public BaseNode {
 
   void loadParameters(const ParamLoader& own) override {
     gain_ = own.number("gain", {0.0, 10.0}, 1.0);
-    mode_ = own.choice("mode", {"calm", "fail_at_start", "hang_in_undo", "fail_later"}, "calm");
+    mode_ = own.choice("mode", {"calm", "fail_at_start", "hang_in_undo", "rest_in_undo", "fail_later"}, "calm");
     trace_.open(own.text("trace_file"));
     const ParamLoader limits = own.section("limits");
     limit_ = limits.number("upper", {}, 100.0);
@@ -67,6 +69,11 @@ class TinyNode : public BaseNode {
     if (mode_ == "hang_in_undo") {
       std::this_thread::sleep_for(std::chrono::hours(1));
     }
+    if (mode_ == "rest_in_undo") {
+      const double before = processorTime();
+      std::this_thread::sleep_for(std::chrono::duration<double>(kRest));
+      trace(processorTime() - before < 0.2 * kRest ? "rested" : "worked");
+    }
   }
 
   void publishFinalState() override {
@@ -82,8 +89,15 @@ class TinyNode : public BaseNode {
     message.data = word;
     last_word_.publish(message);
   }
+  /// [s] of all threads.
+  static double processorTime() {
+    timespec now{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
   void trace(const std::string& step) { trace_ << step << std::endl; }
 
+  static constexpr double kRest = 0.5;  // [s]
   double gain_ = 1.0;
   double limit_ = 0.0;
   std::string mode_;

@@ -230,17 +230,17 @@ void BaseNode::endInputs() {
   spinner_->stop();
   service_queue_.disable();
   stopInputs();
-  std::unique_lock<std::mutex> lock(service_mutex_, std::defer_lock);
-  bool idle = true;
-  if (wire_) {
-    idle = wire_->waitForWorkers(kServiceGrace);
-  } else {
-    lock.lock();
-    idle = service_idle_.waitUntil(&lock, Deadline(host_clock_, kServiceGrace), [this] { return !service_busy_; });
-  }
-  if (!idle) {
+  const bool workers_idle = !wire_ || wire_->waitForWorkers(kServiceGrace);
+  std::unique_lock<std::mutex> lock(service_mutex_);
+  const auto idle = [this] { return !service_busy_; };
+  if (!wire_) service_idle_.waitUntil(&lock, Deadline(host_clock_, kServiceGrace), idle);
+  const bool services_idle = idle();
+  lock.unlock();
+  if (!workers_idle || (!wire_ && !services_idle)) {
     ROS_WARN("a service call is still waiting for X-Plane; stopping without it");
   }
+  // roscpp's thread does not sleep at a queue that is disabled: it would take a whole processor until the end.
+  if (services_idle) service_spinner_->stop();
 }
 
 void BaseNode::flushPublishers() {
