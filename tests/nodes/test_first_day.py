@@ -91,8 +91,8 @@ def shells(tmp_path: Path) -> Iterator[Shells]:
 
 
 def watch(shells: Shells) -> RecordedTopics:
-    """What the bridge publishes from now on."""
-    recorded = RecordedTopics(shells.home / "topics.jsonl", WAIT_S)
+    """What flies, and where, from now on."""
+    recorded = RecordedTopics(shells.home / "topics.jsonl", WAIT_S, ["flight_state", "control/mode"])
     shells.start("recorder", " ".join(recorded.command))
     recorded.wait_for("flight_state", lambda _: True, "a state")
     return recorded

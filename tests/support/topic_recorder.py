@@ -1,6 +1,6 @@
 """Writes down what arrives on the bridge's topics on its machine, a JSON object a line: for tests on two machines.
 
-usage: topic_recorder.py FILE
+usage: topic_recorder.py FILE [TOPIC...]
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ def main() -> None:
 
             return on_message
 
-        for topic, (message_type, take) in _TOPICS.items():
+        for topic in sys.argv[2:] or _TOPICS:
+            message_type, take = _TOPICS[topic]
             rospy.Subscriber(topic, message_type, write(topic, take), queue_size=1000, buff_size=_BUFFER)
         rospy.spin()
 
