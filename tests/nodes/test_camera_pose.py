@@ -83,7 +83,7 @@ def test_pose_is_that_of_the_drawn_camera_in_every_view(
     monkeypatch.setenv("DISPLAY", display)
     swaps = tmp_path / "swaps.csv"
     (tmp_path / "rolling.yaml").write_text(ROLLING, encoding="utf-8")
-    options = ["--window", "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", "--swap-log", swaps]
+    options = ["--window", "320x240", "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", "--swap-log", swaps]
     emulator = world.emulator(*options, "--pilot", tmp_path / "rolling.yaml", "--start", "air")
     world.set_param("display_delay", PIPELINE_DELAY_S)
     world.start("rx_node")

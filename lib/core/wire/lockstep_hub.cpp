@@ -112,7 +112,7 @@ class LockstepHub::Source : public DatagramSource {
   int receiveBuffer() const override { return inner->receiveBuffer(); }
   UdpCounters counters() const override { return inner->counters(); }
 
-  // X-Plane may fly a frame between any two of these requests: whom it counts in the group has the whole fence.
+  // X-Plane may fly a frame between any two of these requests: a source it counts in the group has the whole fence.
 
   /// `group`: port of the source that gets every fence; this one does with what else it gets.
   void join(std::uint16_t group) {
