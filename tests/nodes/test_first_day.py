@@ -1,7 +1,8 @@
 """What README, tutorial and examples give a new user to type does what they say.
 
 Their blocks run as they stand there, on a machine of their own: a network namespace, where no port is taken. Only
-folders are the test's. Where this computer permits no namespaces, the tests say so and are skipped.
+folders, and for most the emulator's frame rate, are the test's. Where this computer permits no namespaces, the tests
+say so and are skipped.
 """
 
 from __future__ import annotations
@@ -104,10 +105,14 @@ def section(file: Path, heading: str) -> list[Block]:
     return found
 
 
-def by_hand(shells: Shells) -> tuple[RecordedTopics, str]:
-    """Emulator and bridge as README starts them; what comes third there."""
+#: For tests that look at no picture: drawing those of README takes two thirds of the processor time of all that runs.
+FEW_FRAMES = "--fps 20"
+
+
+def by_hand(shells: Shells, options: str = FEW_FRAMES) -> tuple[RecordedTopics, str]:
+    """Emulator, with further options, and bridge as README starts them; what comes third there."""
     emulator, bridge, hold = section(ROOT / "README.md", "By hand, without X-Plane")[0].text.splitlines()
-    shells.start("emulator", emulator).wait_for_line(r"^READY\b", WAIT_S)
+    shells.start("emulator", f"{emulator} {options}").wait_for_line(r"^READY\b", WAIT_S)
     shells.start("bridge", bridge)
     return watch(shells), hold
 
@@ -123,7 +128,7 @@ def settled(recorded: RecordedTopics, name: str, wanted: float, within: float, s
 
 
 def test_the_three_lines_of_readme_fly(shells: Shells) -> None:
-    recorded, hold = by_hand(shells)
+    recorded, hold = by_hand(shells, options="")
     shells.start("hold", hold)
     recorded.wait_for("control/mode", lambda m: m["mode"] == AUTO and not m["failsafe"], "automatic flight")
     settled(recorded, "heading", 40.0, 3.0)
