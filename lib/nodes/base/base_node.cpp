@@ -232,7 +232,7 @@ void BaseNode::endInputs() {
   stopInputs();
   const bool workers_idle = !wire_ || wire_->waitForWorkers(kServiceGrace);
   std::unique_lock<std::mutex> lock(service_mutex_);
-  const auto idle = [this] { return !service_busy_; };
+  const auto idle = [this] { return service_calls_ == 0; };
   if (!wire_) service_idle_.waitUntil(&lock, Deadline(host_clock_, kServiceGrace), idle);
   const bool services_idle = idle();
   lock.unlock();
@@ -259,7 +259,7 @@ bool BaseNode::guardedService(const std::string& service, const std::function<vo
       ROS_WARN("%s refused: the node is stopping", service.c_str());
       return false;
     }
-    service_busy_ = true;
+    ++service_calls_;
   }
   bool served = false;
   try {
@@ -270,7 +270,7 @@ bool BaseNode::guardedService(const std::string& service, const std::function<vo
   }
   {
     std::lock_guard<std::mutex> lock(service_mutex_);
-    service_busy_ = false;
+    --service_calls_;
   }
   service_idle_.notifyAll();
   return served;

@@ -368,7 +368,7 @@ class BaseNode {
 
   std::mutex service_mutex_;
   core::ClockCondition service_idle_;
-  bool service_busy_ = false;
+  int service_calls_ = 0;  // under way, of any queue
 
   std::mutex diagnostics_mutex_;
   std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
