@@ -21,7 +21,6 @@ _PIPELINE_DELAY_S = 0.05
 #: Delays of the display [s], and of frames at random, at most [s], of `pairing_delays`.
 _DELAYS_S = (0.0, 0.025, 0.06, 0.2)
 _JITTERS_S = {"regular": 0.0, "irregular": 0.015}
-_DELAY_ASSUMED = 8192  #: FrameState.QUALITY_DELAY_ASSUMED
 #: Each flight is this many measurements long: the minute that the budget is for, by default.
 _LENGTHS = 3.0
 #: The same of a flight for its display times alone, which drawing makes later than the delay.
@@ -131,12 +130,12 @@ def _flown(
 
 
 def _sure(run: Run, name: str, fps: float) -> List[Measure]:
-    """What is wanted of pictures without a flag, or with that of the delay alone, which a delay of 0 does not clear.
+    """What is wanted of pictures without a flag.
 
     Those that the emulator itself has shown late are left out: no pairing can know that.
     """
     on_time = np.abs(run.display_late) <= _OFF_TIME / fps
-    sure = on_time & (run.quality & ~_DELAY_ASSUMED == 0) & np.isfinite(run.error)
+    sure = on_time & (run.quality == 0) & np.isfinite(run.error)
     right = 100.0 * float(np.mean(run.error[sure] == 0.0)) if sure.any() else 0.0
     worst = float(np.abs(run.frame_error[sure]).max(initial=0.0))
     return [
