@@ -14,6 +14,8 @@ sanitized() {
     >"$build/configure.log" 2>&1 || { tail -n 20 "$build/configure.log"; return 1; }
   make -C "$build" -j"${XPLANE_BRIDGE_JOBS:-$(nproc)}" "$@" >"$build/build.log" 2>&1 ||
     { grep -E -m 20 'error|\*\*\*' "$build/build.log"; return 1; }
+  # Its own libraries: those of the ordinary build come first on the path, and are not sanitized.
+  local -x LD_LIBRARY_PATH=$build/devel/lib:${LD_LIBRARY_PATH:-}
   # A program's memory must lie where the sanitizer expects it, which randomised addresses do not everywhere.
   for program; do
     printf '%s: ' "${program#xplane_bridge_}"
