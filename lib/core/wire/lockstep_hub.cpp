@@ -368,6 +368,12 @@ void LockstepHub::wait(int timeout_ms) {
   }
 }
 
+void LockstepHub::goToNewestFrame() {
+  for (const std::shared_ptr<Source>& source : sources()) {
+    if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
+  }
+}
+
 void LockstepHub::waitHeld(int timeout_ms) {
   clock_.tick();
   if (stage_ == Stage::kClosing) {
@@ -379,9 +385,7 @@ void LockstepHub::waitHeld(int timeout_ms) {
   askAgain();
   if (frameIsComplete() && frame_.number == 0) {
     // The simulator flies: this frame is the first.
-    for (const std::shared_ptr<Source>& source : sources()) {
-      if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
-    }
+    goToNewestFrame();
     clock_.move(frame_.sim_ns);
     hooks_.begin(frame_);
     handOut(true);
@@ -406,9 +410,7 @@ void LockstepHub::waitReleased(int timeout_ms) {
     hooks_.end(frame_);
   }
   collect(std::min(timeout_ms, kLongestWaitMs));
-  for (const std::shared_ptr<Source>& source : sources()) {
-    if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
-  }
+  goToNewestFrame();
   handOut(false);
 }
 
@@ -440,9 +442,7 @@ bool LockstepHub::advance(int timeout_ms) {
     askAgain();
     return false;
   }
-  for (const std::shared_ptr<Source>& source : sources()) {
-    if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
-  }
+  goToNewestFrame();
   forgetRetired();
   clock_.move(frame_.sim_ns);
   hooks_.begin(frame_);

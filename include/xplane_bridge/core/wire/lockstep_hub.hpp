@@ -71,6 +71,7 @@ class LockstepHub : public DatagramHub {
   void takeAll();
   void take(Source* source);
   bool frameIsComplete() const;
+  void goToNewestFrame();
   void forgetRetired();
   void handOut(bool whole_frame);
   bool anythingHandedOut() const;
