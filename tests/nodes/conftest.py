@@ -14,6 +14,7 @@ import pytest
 from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
+from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import node_program
 
 _numbers = itertools.count(1)
@@ -33,6 +34,19 @@ def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RosMaster]:
         rospy.init_node("tests", anonymous=True, disable_signals=True)
         yield running
         rospy.signal_shutdown("tests are over")
+
+
+@pytest.fixture(scope="module")
+def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Name of an X display for the tests of a file."""
+    with VirtualDisplay(tmp_path_factory.mktemp("display")) as server:
+        yield server.display
+
+
+@pytest.fixture
+def screen(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Has the programs of a test show their windows there."""
+    monkeypatch.setenv("DISPLAY", display)
 
 
 class TopicLog:

@@ -6,7 +6,6 @@ import csv
 import math
 import socket
 from pathlib import Path
-from typing import Iterator
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.harness import wait_until
-from xplane_bridge.harness.display import VirtualDisplay
 
 PIPELINE_DELAY_S = 0.1
 FPS = 20
@@ -44,12 +42,6 @@ events:
 #: Optical axes right, down, forward of a camera that looks ahead, in forward, right, down.
 _OPTICAL = np.array(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
 _FLU = np.diag((1.0, -1.0, -1.0))
-
-
-@pytest.fixture(scope="module")
-def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with VirtualDisplay(tmp_path_factory.mktemp("display")) as server:
-        yield server.display
 
 
 def send(port: int, message) -> None:

@@ -9,7 +9,6 @@ import socket
 import sys
 import threading
 from pathlib import Path
-from typing import Iterator
 
 import numpy as np
 import pytest
@@ -18,10 +17,11 @@ from support.deadlines import WAIT_S
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess, wait_until
-from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import program
 
 FOCAL_60_DEG = 554.256  # 320 / tan(30 deg)
+pytestmark = pytest.mark.usefixtures("screen")
+
 HEAD_PSI = "sim/graphics/view/pilots_head_psi"
 HEAD_THE = "sim/graphics/view/pilots_head_the"
 FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
@@ -29,17 +29,6 @@ FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
 PIPELINE_DELAY_S = 0.15
 FPS = 20
 STILL = "Still life"
-
-
-@pytest.fixture(scope="module")
-def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with VirtualDisplay(tmp_path_factory.mktemp("display")) as server:
-        yield server.display
-
-
-@pytest.fixture(autouse=True)
-def _screen(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DISPLAY", display)
 
 
 def window(world, *options: str):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 from pathlib import Path
-from typing import Iterator
 
 import numpy as np
 import pytest
@@ -14,24 +13,14 @@ import yaml
 from support.tx_fixtures import tx_params
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import roslaunch, wait_until
-from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import config_file
+
+pytestmark = pytest.mark.usefixtures("screen")
 
 FPS = 60
 EVERY = 2
 FRAMES = 60
 WATCHDOG_S = 15.0  # longer than nodes take to start on a busy machine
-
-
-@pytest.fixture(scope="module")
-def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with VirtualDisplay(tmp_path_factory.mktemp("display")) as server:
-        yield server.display
-
-
-@pytest.fixture(autouse=True)
-def _screen(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DISPLAY", display)
 
 
 def start(world, *options, participants=("capture_node",), **lockstep):

@@ -12,7 +12,6 @@ import socket
 import threading
 import time
 from pathlib import Path
-from typing import Iterator
 
 import numpy as np
 import pytest
@@ -25,9 +24,10 @@ from xplane_bridge.eye.grab import TITLES
 from xplane_bridge.eye.pairing import Decision
 from xplane_bridge.eye.verify import Verification
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, wait_until
-from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ros import free_port
 from xplane_bridge.resources import program
+
+pytestmark = pytest.mark.usefixtures("screen")
 
 FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
 TIMES_ON_SCREEN = "sim/network/dataout/data_to_screen[1]"
@@ -40,17 +40,6 @@ ATTEMPTS = 6  # on a busy machine pictures come late, and then it says that it h
 PIPELINE_DELAY_S = 0.15
 #: A picture that appeared this much off its time, as the machine was busy, says nothing about the pairing.
 LATE_S = 0.2 / FPS
-
-
-@pytest.fixture(scope="module")
-def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with VirtualDisplay(tmp_path_factory.mktemp("display")) as server:
-        yield server.display
-
-
-@pytest.fixture(autouse=True)
-def _screen(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("DISPLAY", display)
 
 
 class Relay:
