@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
+from support.second_camera import NAME, WINDOW, second_camera
 from support.tx_fixtures import tx_params
 from xplane_bridge.emulator.view.renderer import read_strip
-from xplane_bridge.harness import roslaunch, wait_until
+from xplane_bridge.harness import wait_until
 from xplane_bridge.resources import config_file
 
 pytestmark = pytest.mark.usefixtures("screen")
@@ -85,30 +86,17 @@ def test_every_picture_is_of_its_own_frame_and_says_nothing_of_wall_time(world, 
     assert [pair.image_count for pair in pairs.messages] == list(range(1, len(due) + 1))
 
 
-def test_two_cameras_answer_with_pictures_of_the_same_frames(world, master, display, tmp_path):
+def test_two_cameras_answer_with_pictures_of_the_same_frames(world, display, tmp_path):
     from xplane_bridge.msg import FrameState
 
-    names = [f"{world.namespace}/capture_node", f"{world.namespace}/belly/capture_node"]
-    emulator, _, _ = start(world, "--window", "320x240", "--window2", "down@90", participants=names)
+    names = [f"{world.namespace}/capture_node", f"{world.namespace}/{NAME}/capture_node"]
+    emulator, _, _ = start(world, "--window", "320x240", *WINDOW, participants=names)
     capture(world, display, window={"display": display, "index": 0})
     common = yaml.safe_load(config_file("common.yaml").read_text(encoding="utf-8"))
     common["lockstep"].update(enabled=True, participants=names)
     (tmp_path / "common.yaml").write_text(yaml.safe_dump(common), encoding="utf-8")
-    arguments = {
-        "ns": world.namespace.lstrip("/"),
-        "camera": "belly",
-        "window_index": 1,
-        "pitch": -90,
-        "field_of_view": 90,
-        "assumed_view": "down",
-        "x_display": display,
-        "host": "127.0.0.1",
-        "port": emulator.port,
-        "listen_for_beacon": False,
-        "common_config": tmp_path / "common.yaml",
-    }
-    with roslaunch(master, tmp_path, "camera.launch", **arguments):
-        logs = [world.watch(f"{camera}camera/frame_state", FrameState) for camera in ("", "belly/")]
+    with second_camera(world, emulator.port, display, common_config=tmp_path / "common.yaml"):
+        logs = [world.watch(f"{camera}camera/frame_state", FrameState) for camera in ("", f"{NAME}/")]
         wait_until(lambda: all(log.connected for log in logs), 60, "both cameras")
         assert step(world, 20).flown == 20
         for log in logs:

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from support.second_camera import NAME, WINDOW, second_camera
 from xplane_bridge.emulator.view.renderer import read_strip
-from xplane_bridge.harness import roslaunch, wait_until
+from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 
 FPS = 20
@@ -32,39 +33,26 @@ def on_time(swaps: Path) -> set:
     return {frame for frame, delay in late.items() if abs(delay - PIPELINE_DELAY_S) < LATE_S}
 
 
-def test_forward_and_down_join_by_the_frame(world, master, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from sensor_msgs.msg import CameraInfo, Image
     from xplane_bridge.msg import FrameState
 
     with VirtualDisplay(tmp_path) as display:
         monkeypatch.setenv("DISPLAY", display.display)
         swaps = tmp_path / "swaps.csv"
-        views = ["--window", "--window2", "down@90", "--swap-log", swaps]
+        views = ["--window", *WINDOW, "--swap-log", swaps]
         emulator = world.emulator(*views, "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", "--start", "air")
         world.set_param("display_delay", PIPELINE_DELAY_S)
         world.start("rx_node")
         world.start("capture_node", {"window": {"display": display.display, "index": 0}})
-        arguments = {
-            "ns": world.namespace.lstrip("/"),
-            "camera": "belly",
-            "window_index": 1,
-            "pitch": -90,
-            "field_of_view": 90,
-            "assumed_view": "down",
-            "display_delay": PIPELINE_DELAY_S,
-            "x_display": display.display,
-            "host": "127.0.0.1",
-            "port": emulator.port,
-            "listen_for_beacon": False,
-        }
-        with roslaunch(master, tmp_path, "camera.launch", **arguments) as launch:
+        with second_camera(world, emulator.port, display.display, display_delay=PIPELINE_DELAY_S) as launch:
             cameras = [
                 (
                     world.watch(f"{place}camera/image_raw", Image),
                     world.watch(f"{place}camera/camera_info", CameraInfo),
                     world.watch(f"{place}camera/frame_state", FrameState),
                 )
-                for place in ("", "belly/")
+                for place in ("", f"{NAME}/")
             ]
 
             def shared() -> set:
