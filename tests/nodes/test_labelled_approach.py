@@ -15,7 +15,8 @@ from support.approach_flight import FPS
 from support.drawn_approach import geodetic
 from support.white_lines import MEDIAN_PX, P95_PX, flight_of, measure_flight
 from xplane_bridge.bags import Bags
-from xplane_bridge.bags.pictures import COMPRESSED, grey_pictures, image_topic
+from xplane_bridge.bags.cameras import COMPRESSED
+from xplane_bridge.bags.pictures import grey_pictures, image_topic
 from xplane_bridge.harness import ManagedProcess
 from xplane_bridge.harness.ros import ros_environment
 from xplane_bridge.resources import config_file

@@ -12,6 +12,7 @@ import yaml
 
 from support.second_camera import NAME, WINDOW, second_camera
 from support.tx_fixtures import tx_params
+from xplane_bridge.cli.flight_report import write_report
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import wait_until
 from xplane_bridge.resources import config_file
@@ -86,8 +87,20 @@ def test_every_picture_is_of_its_own_frame_and_says_nothing_of_wall_time(world, 
     assert [pair.image_count for pair in pairs.messages] == list(range(1, len(due) + 1))
 
 
+def kept_in_a_bag(path: Path, logs) -> Path:
+    """What came on topics, as a recording."""
+    import rosbag
+
+    with rosbag.Bag(str(path), "w") as bag:
+        for log in logs:
+            for message in log.messages:
+                bag.write(log.topic, message, message.header.stamp)
+    return path
+
+
 def test_two_cameras_answer_with_pictures_of_the_same_frames(world, display, tmp_path):
-    from xplane_bridge.msg import FrameState
+    from sensor_msgs.msg import CompressedImage
+    from xplane_bridge.msg import FlightState, FrameState
 
     names = [f"{world.namespace}/capture_node", f"{world.namespace}/{NAME}/capture_node"]
     emulator, _, _ = start(world, "--window", "320x240", *WINDOW, participants=names)
@@ -96,16 +109,23 @@ def test_two_cameras_answer_with_pictures_of_the_same_frames(world, display, tmp
     common["lockstep"].update(enabled=True, participants=names)
     (tmp_path / "common.yaml").write_text(yaml.safe_dump(common), encoding="utf-8")
     with second_camera(world, emulator.port, display, common_config=tmp_path / "common.yaml"):
-        logs = [world.watch(f"{camera}camera/frame_state", FrameState) for camera in ("", f"{NAME}/")]
+        places = [f"{camera}camera" for camera in ("", f"{NAME}/")]
+        logs = [world.watch(f"{place}/frame_state", FrameState) for place in places]
+        logs += [world.watch(f"{place}/image_raw/compressed", CompressedImage) for place in places]
+        logs.append(world.watch("flight_state", FlightState))
         wait_until(lambda: all(log.connected for log in logs), 60, "both cameras")
         assert step(world, 20).flown == 20
         for log in logs:
             have(log, 20)
-        ahead, down = (log.messages for log in logs)
+        ahead, down = (log.messages for log in logs[:2])
     assert [pair.state for pair in ahead] == [pair.state for pair in down]
     assert [pair.header.stamp for pair in ahead] == [pair.header.stamp for pair in down]
     assert ahead[-1].view == FrameState.VIEW_FORWARD
     assert down[-1].view == FrameState.VIEW_DOWN
+    page = write_report([kept_in_a_bag(tmp_path / "two.bag", logs)], tmp_path / "report.html").read_text("utf-8")
+    assert "100.0 % of the frames with a picture have one of every camera: 20 of 20" in page
+    strips = page.split('<section id="images">')[1].split("</section>")[0].split("<h3>Camera ")[1:]
+    assert [(strip.split("<")[0], strip.count("<img")) for strip in strips] == [("camera", 12), (NAME, 12)]
 
 
 def test_a_picture_that_looks_like_the_one_before_comes_too(world, display):

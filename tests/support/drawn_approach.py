@@ -105,6 +105,7 @@ def frame_state(bag: FlightBag, shown: Scene, ns: int, **changes: Any) -> dict[s
     return {
         "header": bag.header(ns, "camera_optical"),
         "state": state,
+        "frame_sim_time": shown.sim_time,
         "frame_period": np.float32(PERIOD),
         "display_delay": 0.058,
         "camera_pose_source": 2,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Mapping, NamedTuple
+from typing import Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -135,6 +135,44 @@ def pairing(frames: Mapping[str, np.ndarray], constants: Mapping[str, int]) -> P
         _counted(frames["frozen"], int(frozen[0])),
         _counted(frames["unpaired"], int(missing[0])),
     )
+
+
+class Joined(NamedTuple):
+    """How the pictures of several cameras join by the simulator's frame that they show."""
+
+    frames: tuple[int, ...]  #: of each camera: frames that it has a picture of
+    of_any: int  #: frames that at least one camera has a picture of
+    of_all: int  #: frames that every camera has one of
+    perfect: int  #: of these, those with quality 0 on every picture
+    rows: tuple[np.ndarray, ...]  #: of each camera: its pictures of the frames that all have, frame by frame
+
+
+_FRAME_KEY = np.dtype([("epoch", np.int64), ("sim_time", np.float64)])
+
+
+def joined(cameras: Sequence[Mapping[str, np.ndarray]], constants: Mapping[str, int]) -> Joined:
+    """Join pictures of one frame: X-Plane draws all its windows of one frame's state, so their keys are equal.
+
+    A picture without a state, or of a paused simulator, is of no frame that is known.
+
+    Args:
+        cameras: Columns of FrameState of each, in time order; each of shape (n,).
+        constants: Of FrameState.
+    """
+    keys, rows = [], []
+    for columns in cameras:
+        missing = (columns["quality"].astype(np.int64) & int(constants["QUALITY_STATE_MISSING"])) != 0
+        known = np.flatnonzero(np.isfinite(columns["frame_sim_time"]) & ~missing)
+        key = np.empty(len(known), dtype=_FRAME_KEY)
+        key["epoch"], key["sim_time"] = columns["state.epoch"][known], columns["frame_sim_time"][known]
+        distinct, first = np.unique(key, return_index=True)
+        keys.append(distinct)
+        rows.append(known[first])
+    _, frame, count = np.unique(np.concatenate(keys), return_inverse=True, return_counts=True)
+    of_all = np.split(count[frame] == len(cameras), np.cumsum([len(key) for key in keys])[:-1])
+    shared = tuple(row[inside] for row, inside in zip(rows, of_all))
+    perfect = np.all([columns["quality"][row] == 0 for columns, row in zip(cameras, shared)], axis=0)
+    return Joined(tuple(map(len, keys)), len(count), len(shared[0]), int(np.sum(perfect)), shared)
 
 
 def _counted(counter: np.ndarray, first: int) -> int:

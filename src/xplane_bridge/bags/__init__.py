@@ -255,9 +255,14 @@ class Bags:
                 filling.add(time, found)
                 yield _table(topic, connection.msgtype, filling, columns)
 
-    def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """Yield (receive time [ns], message) of one topic one at a time, in time order: for images and lists."""
-        streams = [self._stream(file, connection) for file, connection in self._connections(topic)]
+    def messages(self, topic: str, spans: Optional[Sequence[tuple[int, int]]] = None) -> Iterator[tuple[int, Any]]:
+        """Yield (receive time [ns], message) of one topic one at a time, in time order: for images and lists.
+
+        Args:
+            topic: Name as in `topics`.
+            spans: First and last receive time [ns] of those wanted: the rest of the file is not read; all when omitted.
+        """
+        streams = [self._stream(file, connection, spans) for file, connection in self._connections(topic)]
         yield from merge(*streams, key=lambda pair: pair[0])
 
     def recorded(self, topics: Sequence[str] = ()) -> Iterator[tuple[Recorded, int, bytes]]:
@@ -305,11 +310,13 @@ class Bags:
         except (DamagedError, OSError) as error:
             raise _damaged(file, error) from None
 
-    def _stream(self, file: BagFile, connection: Connection) -> Iterator[tuple[int, Any]]:
+    def _stream(
+        self, file: BagFile, connection: Connection, spans: Optional[Sequence[tuple[int, int]]]
+    ) -> Iterator[tuple[int, Any]]:
         _, store = self._definition(connection)
         name = _type_name(connection.msgtype)
         try:
-            for _, time, raw in file.by_time([connection.id]):
+            for _, time, raw in file.by_time([connection.id], spans):
                 yield time, store.deserialize_ros1(raw, name)
         except (DamagedError, OSError, SerdeError, struct.error, AssertionError) as error:
             raise _damaged(file, error) from None

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple, Sequence
 
 from xplane_bridge.bags import BagError, Bags
-from xplane_bridge.bags.pictures import COMPRESSED, RAW
 
+COMPRESSED = "sensor_msgs/CompressedImage"
+RAW = "sensor_msgs/Image"
 #: Name of the bridge's own camera, whose topics have no further name space.
 FIRST = "camera"
 _FRAMES, _STATES = "xplane_bridge/FrameState", "xplane_bridge/FlightState"
@@ -66,6 +67,11 @@ def chosen_cameras(bags: Bags, names: Sequence[str] = ()) -> list[Camera]:
         msg = f"{paths}: no camera {', '.join(missing)}; expected some of: {', '.join(have)}"
         raise BagError(msg)
     return [camera for camera in found if not names or camera.name in names]
+
+
+def has_jpegs(bags: Bags, camera: Camera) -> bool:
+    """Returns whether a camera's pictures were recorded, and compressed."""
+    return bool(camera.images) and bags.topics[camera.images].msgtype == COMPRESSED
 
 
 def _place(topic: str) -> str:

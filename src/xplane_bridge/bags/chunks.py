@@ -10,7 +10,7 @@ import bz2
 import struct
 from array import array
 from pathlib import Path
-from typing import BinaryIO, Callable, Collection, Dict, Iterator, List, NamedTuple, Optional, Tuple
+from typing import BinaryIO, Callable, Collection, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import lz4.frame
 import numpy as np
@@ -136,8 +136,14 @@ class BagFile:
             data = self._data(int(chunk[first]))
             yield time[first:end], [_message(data, at) for at in offset[first:end].tolist()]
 
-    def by_time(self, ids: Collection[int]) -> Iterator[Tuple[int, int, bytes]]:
+    def by_time(
+        self, ids: Collection[int], spans: Optional[Sequence[Tuple[int, int]]] = None
+    ) -> Iterator[Tuple[int, int, bytes]]:
         """Messages of several connections in order of time: connection, receive time [ns], serialised message.
+
+        Args:
+            ids: The connections.
+            spans: First and last receive time [ns] of what is wanted; chunks that have none of it are not read.
 
         Raises:
             DamagedError: A chunk cannot be read.
@@ -147,6 +153,11 @@ class BagFile:
             return
         time, chunk, offset = (np.concatenate([index[k] for _, index in chosen]) for k in range(3))
         owner = np.repeat([id_ for id_, _ in chosen], [len(index.time) for _, index in chosen])
+        if spans is not None:
+            inside = np.zeros(len(time), dtype=bool)
+            for first, last in spans:
+                inside |= (time >= first) & (time <= last)
+            time, chunk, offset, owner = (values[inside] for values in (time, chunk, offset, owner))
         for k in np.lexsort((offset, chunk, time)):
             yield int(owner[k]), int(time[k]), _message(self._data(int(chunk[k])), int(offset[k]))
 

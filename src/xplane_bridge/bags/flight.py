@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
 import numpy as np
 
 from xplane_bridge.bags import BagError, Bags, Table, TopicInfo
+from xplane_bridge.bags.cameras import Camera, cameras
 from xplane_bridge.bags.segments import segments
 
 if TYPE_CHECKING:
@@ -28,9 +29,16 @@ ROLES = {
     "excitation": "xplane_bridge/ExcitationState",
     "link": "xplane_bridge/LinkState",
     "events": "xplane_bridge/EventList",
-    "frames": "xplane_bridge/FrameState",
     "odom": "nav_msgs/Odometry",
 }
+
+
+class CameraFrames(NamedTuple):
+    """What was recorded of a camera, but for its pictures."""
+
+    camera: Camera
+    table: Table  #: its FrameStates
+    constants: dict[str, Any]  #: of FrameState
 
 
 @dataclass
@@ -44,6 +52,7 @@ class Flight:
     units: dict[str, dict[str, Unit]] = field(default_factory=dict)
     constants: dict[str, dict[str, Any]] = field(default_factory=dict)
     parts: list[slice] = field(default_factory=list)  #: segments of the state: not to be bridged
+    cameras: list[CameraFrames] = field(default_factory=list)  #: the bridge's own first
 
     @property
     def start(self) -> int:
@@ -84,6 +93,9 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
         flight.tables[role] = bags.read(topic, store=store).by_stamp()
         flight.units[role] = bags.units(topic)
         flight.constants[role] = bags.constants(topic)
+    for camera in cameras(bags):
+        table = bags.read(camera.frames, store=store).by_stamp()
+        flight.cameras.append(CameraFrames(camera, table, bags.constants(camera.frames)))
     if "state" in flight.tables:
         state = flight.tables["state"]
         flight.parts = segments(state.stamp, state["epoch"])

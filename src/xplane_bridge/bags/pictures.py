@@ -7,10 +7,11 @@ from typing import Any, Iterator, Sequence
 import cv2
 import numpy as np
 
-from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags import BagError, Bags, Table
+from xplane_bridge.bags.cameras import COMPRESSED, RAW, Camera
 
-COMPRESSED = "sensor_msgs/CompressedImage"
-RAW = "sensor_msgs/Image"
+#: A picture is received before or after its FrameState, at most so many pictures off.
+_NEIGHBOURS = 8
 _CHANNELS = {"bgr8": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4, "mono8": 1}
 _TO_GREY = {
     "bgr8": cv2.COLOR_BGR2GRAY,
@@ -47,8 +48,39 @@ def grey_pictures(bags: Bags, topic: str) -> Iterator[tuple[int, np.ndarray]]:
     """
     compressed = bags.topics[topic].msgtype == COMPRESSED
     for _, message in bags.messages(topic):
-        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-        yield stamp, (_decoded(message, topic) if compressed else _grey(message))
+        yield _stamp(message), (_decoded(message, topic) if compressed else _grey(message))
+
+
+def pictures_near(bags: Bags, camera: Camera, frames: Table, rows: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield stamp [ns] and picture (blue, green, red) of some of a camera's frames.
+
+    Of a frame whose picture was not recorded it is that of a neighbour; none comes twice, and one that cannot be
+    decoded is left out. The pictures between are not read.
+
+    Args:
+        bags: Open.
+        camera: One with compressed pictures (`has_jpegs`).
+        frames: Its FrameStates.
+        rows: Of those wanted.
+    """
+    received, stamps = bags.times(camera.images), frames.stamp
+    seen = set()
+    for row in rows:
+        wanted = int(stamps[row])
+        middle = int(np.searchsorted(received, frames.time[row]))
+        near = received[max(middle - _NEIGHBOURS, 0) : middle + _NEIGHBOURS]
+        span = (int(near[0]), int(near[-1]))
+        candidates = (message for _, message in bags.messages(camera.images, [span]))
+        message = min(candidates, key=lambda candidate: abs(_stamp(candidate) - wanted))
+        stamp = _stamp(message)
+        picture = cv2.imdecode(np.asarray(message.data), cv2.IMREAD_COLOR)
+        if stamp not in seen and picture is not None:
+            seen.add(stamp)
+            yield stamp, picture
+
+
+def _stamp(message: Any) -> int:
+    return int(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
 
 
 def _decoded(message: Any, topic: str) -> np.ndarray:

@@ -43,9 +43,9 @@ import numpy as np
 from xplane_bridge import __version__
 from xplane_bridge.analysis.resampling import interpolated
 from xplane_bridge.bags import BagError
+from xplane_bridge.bags.cameras import COMPRESSED, RAW
 from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.decoding import MessageList
-from xplane_bridge.bags.pictures import COMPRESSED, RAW
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.columns import name_of
 from xplane_bridge.export.flight import STATE, full_names, name_space

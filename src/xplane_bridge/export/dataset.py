@@ -27,8 +27,8 @@ import pandas as pd
 
 from xplane_bridge.analysis.quality import BAD_QUALITY
 from xplane_bridge.bags import BagError, Bags, Table
-from xplane_bridge.bags.cameras import Camera, cameras, chosen_cameras
-from xplane_bridge.bags.pictures import COMPRESSED, RAW, image_topic
+from xplane_bridge.bags.cameras import COMPRESSED, RAW, Camera, cameras, chosen_cameras
+from xplane_bridge.bags.pictures import image_topic
 from xplane_bridge.export import tables
 from xplane_bridge.export.columns import named
 from xplane_bridge.export.flight import labels as flight_labels

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Iterator, Mapping, Sequence
 import cv2
 import numpy as np
 
-from xplane_bridge.bags.cameras import cameras
-from xplane_bridge.bags.pictures import COMPRESSED
+from xplane_bridge.bags.cameras import cameras, has_jpegs
 from xplane_bridge.plotting.page import missing
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def section(bags: Bags, labels: Labels, start: int) -> str:
         start: [ns] zero of the times shown.
     """
     seen = cameras(bags)
-    compressed = [c for c in seen if c.images and bags.topics[c.images].msgtype == COMPRESSED]
+    compressed = [camera for camera in seen if has_jpegs(bags, camera)]
     if not compressed:
         return missing("the bag has no compressed camera images")
     if not labels.frames:

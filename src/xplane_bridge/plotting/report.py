@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import base64
 import html
-from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Any, Callable, Optional, Sequence, Union
 
 import numpy as np
 
 from xplane_bridge.analysis.consistency import check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values, who_flew
-from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, pairing, timing
+from xplane_bridge.analysis.quality import bit_shares, timing
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.bags.passport import read_passports
 from xplane_bridge.constants import LinkState, words
-from xplane_bridge.plotting import interactive, overlay
+from xplane_bridge.plotting import cameras, interactive, overlay
 from xplane_bridge.plotting.flight_figures import MissingError, all_figures
 from xplane_bridge.plotting.page import Section, day_of, missing, number, page, rows_table
 from xplane_bridge.plotting.passports import passport_section
@@ -25,9 +24,6 @@ if TYPE_CHECKING:
     from xplane_bridge.labels.table import Labels
     from xplane_bridge.plotting.spec import PathFigure, TimeFigure
 
-#: Images on the strip, evenly spread over the flight.
-STRIP_IMAGES = 12
-_THUMBNAIL_WIDTH = 320
 _LINK_STATES = words(LinkState)
 
 
@@ -59,7 +55,7 @@ def build(
         linked = " data-time" if hasattr(figure, "panels") else ""
         sections.append((key, title, f"<div{linked}>{interactive.draw(figure, flight.start)}</div>"))
         del figure
-    sections.append(("images", "Images and their state", _strip(bags, flight)))
+    sections.append(("images", "Images and their state", cameras.strips(bags, flight)))
     if labels is not None:
         sections.append(("labels", "Labels in the images", overlay.section(bags, labels, flight.start)))
     sections.append(("quality", "Data quality", _quality(flight)))
@@ -133,66 +129,6 @@ def _seconds(stamp: int, flight: Flight) -> str:
     return f"{(stamp - flight.start) / 1e9:.1f}"
 
 
-def _strip(bags: Bags, flight: Flight) -> str:
-    topic = bags.topic_of_type("sensor_msgs/CompressedImage")
-    if topic is None or not bags.topics[topic].count:
-        return missing("the bag has no compressed camera images")
-    if "frames" not in flight.tables:
-        return missing("the bag has no camera/frame_state")
-    frames = flight.tables["frames"]
-    row_of = {int(stamp): k for k, stamp in enumerate(frames.stamp)}
-    count = bags.topics[topic].count
-    wanted = set(np.unique(np.linspace(0, count - 1, min(STRIP_IMAGES, count)).astype(int)).tolist())
-    figures = []
-    for k, (_, message) in enumerate(bags.messages(topic)):
-        if k not in wanted:
-            continue
-        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-        picture = _thumbnail(message.data)
-        if picture is None:
-            continue
-        caption = _caption(frames, row_of.get(stamp), _seconds(stamp, flight), flight.constants["frames"])
-        figures.append(
-            f'<figure><img alt="cockpit view" src="data:image/jpeg;base64,{picture}">'
-            f"<figcaption>{caption}</figcaption></figure>"
-        )
-    return f'<div class="strip">{"".join(figures)}</div>' if figures else missing("no image could be decoded")
-
-
-def _thumbnail(data: np.ndarray) -> Optional[str]:
-    import cv2
-
-    image = cv2.imdecode(np.frombuffer(data.tobytes(), dtype=np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
-        return None
-    height = max(1, round(image.shape[0] * _THUMBNAIL_WIDTH / image.shape[1]))
-    small = cv2.resize(image, (_THUMBNAIL_WIDTH, height), interpolation=cv2.INTER_AREA)
-    return base64.b64encode(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()).decode("ascii")
-
-
-def _remarks(quality: int, constants: Mapping[str, Any]) -> str:
-    """Name the quality bits that are set; those that make an image unfit in red."""
-    names = [name for name, bit in constants.items() if name.startswith("QUALITY_") and quality & int(bit)]
-    return "".join(
-        f' &middot; <span class="{"bad" if name in BAD_QUALITY else "note"}">'
-        f"{name[len('QUALITY_') :].lower().replace('_', ' ')}</span>"
-        for name in names
-    )
-
-
-def _caption(frames: Any, row: Optional[int], at: str, constants: Mapping[str, Any]) -> str:
-    if row is None:
-        return f"{at} s &middot; no state"
-    names = ("roll_deg", "pitch_deg", "heading_true_deg", "altitude_msl", "indicated_airspeed")
-    value = {name: frames[f"state.{name}"][row] for name in names}
-    return (
-        f"{at} s &middot; roll {value['roll_deg']:.1f}&deg; &middot; pitch {value['pitch_deg']:.1f}&deg; &middot; "
-        f"true heading {value['heading_true_deg']:.1f}&deg;<br>{value['altitude_msl']:.0f} m MSL &middot; "
-        f"IAS {value['indicated_airspeed']:.1f} m/s &middot; time error {frames['sim_time_error'][row] * 1e3:.1f} ms"
-        + _remarks(int(frames["quality"][row]), constants)
-    )
-
-
 def _quality(flight: Flight) -> str:
     rows = []
     for topic in sorted(flight.times):
@@ -204,7 +140,7 @@ def _quality(flight: Flight) -> str:
     text = "<h3>Rates, as received</h3>" + rows_table(head, rows, (1, 2, 3, 4, 5))
     if "state" in flight.tables:
         text += _clock(flight) + _validity(flight) + _physics(flight)
-    return text + _images_quality(flight)
+    return text + cameras.quality(flight)
 
 
 def _clock(flight: Flight) -> str:
@@ -262,24 +198,3 @@ def _odometry(flight: Flight) -> Any:
     cuts = [0, *np.searchsorted(t.stamp, edges).tolist(), len(t)]
     parts = [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:]) if b > a]
     return check_odometry(t.stamp, position, velocity, parts)
-
-
-def _images_quality(flight: Flight) -> str:
-    if "frames" not in flight.tables:
-        return ""
-    t, constants = flight.tables["frames"], flight.constants["frames"]
-    p = pairing(t.columns, constants)
-    shares = bit_shares(t["quality"], constants, "QUALITY_")
-    rows = [
-        (html.escape(name.lower().replace("_", " ")), QUALITY_WORDS.get(name, ""), f"{share * 100:.1f} %")
-        for name, share in shares.items()
-        if share
-    ]
-    text = (
-        f"<h3>Images</h3><p>{p.images} images, {p.with_state * 100:.1f} % with a state, {p.perfect * 100:.1f} % "
-        f"without any remark; time error {number(p.error_p50 * 1e3, 3)} ms (median), "
-        f"{number(p.error_p95 * 1e3, 3)} ms (95 %), {number(p.error_max * 1e3, 3)} ms (worst); "
-        f"{p.dropped} pictures not published, {p.frozen} frozen, {p.unpaired} without a state, "
-        "counted from the first image recorded.</p>"
-    )
-    return text + (rows_table(("remark", "that is", "images"), rows, (2,)) if rows else "")

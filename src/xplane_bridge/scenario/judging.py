@@ -56,8 +56,8 @@ def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any]) -> List
 
 
 def _camera(flight: Flight) -> Dict[str, float]:
-    if "frames" not in flight.tables:
+    if not flight.cameras:
         return {}
-    quality = flight.tables["frames"]["quality"]
-    missing = quality & flight.constants["frames"]["QUALITY_STATE_MISSING"]
+    quality = np.concatenate([camera.table["quality"] for camera in flight.cameras])
+    missing = quality & flight.cameras[0].constants["QUALITY_STATE_MISSING"]
     return {"paired": float(np.mean(missing == 0)), "perfect": float(np.mean(quality == 0))}

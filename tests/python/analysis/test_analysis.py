@@ -11,7 +11,7 @@ import pytest
 from xplane_bridge.analysis.consistency import GRAVITY, check_flight, check_odometry
 from xplane_bridge.analysis.decimation import min_max
 from xplane_bridge.analysis.episodes import Episode, from_sets, from_values
-from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, pairing, timing
+from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, joined, pairing, timing
 from xplane_bridge.analysis.summary import distance, summary
 
 S = 10**9
@@ -202,3 +202,22 @@ def test_decimation_keeps_every_peak() -> None:
     gap = values.copy()
     gap[40_000:60_000] = np.nan
     assert np.isnan(min_max(time, gap, 1000)[1]).any()
+
+
+def keyed(*pictures: tuple) -> dict:
+    """FrameStates of pictures: epoch, simulator time of the frame, quality."""
+    epoch, time, quality = zip(*pictures)
+    columns = {"state.epoch": np.array(epoch, dtype=np.uint32), "frame_sim_time": np.array(time)}
+    return {**columns, "quality": np.array(quality, dtype=np.uint32)}
+
+
+def test_pictures_of_several_cameras_join_by_the_frame_they_show() -> None:
+    # After a reset of the simulator (epoch 2) its time comes again; the paused picture has no frame, one has no state.
+    ahead = keyed((1, 0.1, 0), (1, 0.2, 32), (1, 0.3, 0), (1, np.nan, 128), (2, 0.1, 0), (2, 0.2, 1), (2, 0.3, 0))
+    down = keyed((1, 0.2, 0), (1, 0.3, 0), (1, 0.3, 0), (1, np.nan, 128), (2, 0.2, 1), (2, 0.3, 0), (2, 0.4, 0))
+    got = joined([ahead, down], BITS)
+    assert got[:4] == ((5, 4), 6, 3, 2)
+    assert [rows.tolist() for rows in got.rows] == [[1, 2, 6], [0, 1, 5]]
+    tail = keyed((1, 0.3, 0))
+    assert [rows.tolist() for rows in joined([ahead, down, tail], BITS).rows] == [[2], [1], [0]]
+    assert joined([ahead, keyed((1, np.nan, 1))], BITS)[:4] == ((5, 0), 5, 0, 0)

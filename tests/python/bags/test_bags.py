@@ -135,6 +135,19 @@ def test_split_bags_are_one_flight_in_receive_order(tmp_path: Path) -> None:
             assert [time for time, _ in bags.messages("/s")] == [10, 20, 30, 40, 50, 60, 70]
 
 
+def test_messages_of_some_spans_come_alone_and_the_rest_is_not_read(tmp_path: Path) -> None:
+    path = flight(tmp_path / "a.bag", 200, compression=Writer.CompressionFormat.BZ2)
+    flight(tmp_path / "b.bag", 3, 200)
+    with Bags([path, tmp_path / "b.bag"]) as bags:
+        spans = [(40, 59), (50, 70), (2000, 2010)]
+        assert [time for time, _ in bags.messages("/s", spans)] == [40, 50, 60, 70, 2000, 2010]
+        assert list(bags.messages("/s", [(41, 49)])) == []
+        assert list(bags.messages("/s", [])) == []
+    damage(path, lambda raw: raw.replace(b"BZh", b"BZx"))
+    with Bags([path, tmp_path / "b.bag"]) as bags:
+        assert [message.x for _, message in bags.messages("/s", [(2020, 2030)])] == [201.5, 202.5]
+
+
 def test_mixed_versions_read_each_by_its_own_definition(tmp_path: Path) -> None:
     write(tmp_path / "old.bag", [("/v", "pkg/msg/V", "float64 a\n", [(1, struct.pack("<d", 1.25))])])
     write(tmp_path / "new.bag", [("/v", "pkg/msg/V", "float64 a\nuint8 b\n", [(2, struct.pack("<dB", 2.5, 9))])])
