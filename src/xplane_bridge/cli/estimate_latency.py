@@ -21,6 +21,7 @@ from xplane_bridge.analysis.latency import (
     value_motion,
 )
 from xplane_bridge.bags import Bags
+from xplane_bridge.bags.cameras import FIRST, cameras, chosen_cameras
 from xplane_bridge.cli.bridge.waiting import Listener, print_waiting, wait_for_state, wait_until
 from xplane_bridge.cli.entry import guarded, number, start_node
 from xplane_bridge.constants import CameraView, ImageQuality, words
@@ -33,15 +34,18 @@ if TYPE_CHECKING:
 #: Line of sight in body axes (forward, right, down), by FrameState.view.
 _AXES = {1: (1.0, 0.0, 0.0), 2: (-1.0, 0.0, 0.0), 3: (0.0, 0.0, 1.0)}
 _VIEWS = {name: number for number, name in words(CameraView).items() if number != CameraView.UNKNOWN}
+#: FrameState.POSE_NONE.
+_POSE_NONE = 0
 #: Pictures that say nothing about the delay.
 _USELESS = ImageQuality.DISPLAY_UNKNOWN | ImageQuality.FROZEN | ImageQuality.BLACK | ImageQuality.EXTERNAL_VIEW
 #: A command that stays the same for longer rests; until then it may be on its way from one value to the next [s].
 _MOVING_S = 0.06
 #: For which a recording may take longer than it is long: its start, and the writing at its end [s].
 _PATIENCE_S = 30.0
-#: What --live records, below the bridge's namespace.
+#: What --live records, below the bridge's namespace, and of the camera below its own.
 _PICTURES = "camera/image_raw/compressed"
-_LIVE_TOPICS = ("flight_state", _PICTURES, "camera/frame_state", "control/applied", "mission/surfaces")
+_CAMERA_TOPICS = (_PICTURES, "camera/frame_state")
+_LIVE_TOPICS = ("flight_state", "control/applied", "mission/surfaces")
 #: Command and the surface that follows it.
 _RESPONSES = (("roll", "delta_aileron"), ("pitch", "delta_elevator"), ("yaw", "delta_rudder"))
 
@@ -62,6 +66,12 @@ def parser() -> argparse.ArgumentParser:
         help="instead of a BAG: record the running bridge for so long, while the aircraft rolls",
     )
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge, for --live (%(default)s)")
+    p.add_argument(
+        "--camera",
+        default="",
+        metavar="NAME",
+        help="of several cameras, the one to measure, as camera.launch names it (default: the bridge's own, camera)",
+    )
     p.add_argument("--view", choices=sorted(_VIEWS), help="where camera/frame_state does not say it")
     p.add_argument(
         "--ignore-bottom",
@@ -93,9 +103,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     if bool(args.bags) == bool(args.live):
         p.error("give a BAG, or --live SECONDS")
     with contextlib.ExitStack() as stack:
-        paths = [stack.enter_context(_recorded(args.namespace.rstrip("/"), args.live))] if args.live else args.bags
+        space = args.namespace.rstrip("/")
+        paths = [stack.enter_context(_recorded(space, args.camera, args.live))] if args.live else args.bags
         bags = stack.enter_context(Bags(paths))
-        display = display_delay(bags, _VIEWS[args.view] if args.view else None, args.ignore_bottom)
+        display = display_delay(bags, _VIEWS[args.view] if args.view else None, args.ignore_bottom, args.camera)
         responses = command_responses(bags)
     require_usable(display, "pictures")
     print(f"display delay       {_text(display)}   gain {display.gain:.3f}, {display.samples} pairs of pictures")
@@ -122,19 +133,20 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 
 @contextlib.contextmanager
-def _recorded(namespace: str, seconds: float) -> Iterator[Path]:
+def _recorded(namespace: str, camera: str, seconds: float) -> Iterator[Path]:
     """A bag of the bridge that runs, recorded now."""
     start_node("estimate_latency", anonymous=True)
     from sensor_msgs.msg import CompressedImage
 
     wait_for_state(namespace, "estimate_latency")
-    pictures = Listener(f"{namespace}/{_PICTURES}", CompressedImage)
+    place = namespace if camera in ("", FIRST) else f"{namespace}/{camera}"
+    pictures = Listener(f"{place}/{_PICTURES}", CompressedImage)
     wait_until(pictures.came.is_set, pictures.why_none, print_waiting("estimate_latency"))
     pictures.close()
     print(f"estimate_latency: recording {seconds:g} s; let the aircraft roll to and fro", file=sys.stderr, flush=True)
     with tempfile.TemporaryDirectory(prefix="estimate_latency_") as folder:
         bag = Path(folder) / "live.bag"
-        topics = [f"{namespace}/{topic}" for topic in _LIVE_TOPICS]
+        topics = [f"{namespace}/{topic}" for topic in _LIVE_TOPICS] + [f"{place}/{topic}" for topic in _CAMERA_TOPICS]
         command: List[Union[str, Path]] = ["rosbag", "record", "-O", bag, f"--duration={round(seconds)}", *topics]
         with ManagedProcess("record", command, bag.parent) as run:
             if run.wait(seconds + _PATIENCE_S) != 0 or not bag.is_file():
@@ -143,28 +155,28 @@ def _recorded(namespace: str, seconds: float) -> Iterator[Path]:
         yield bag
 
 
-def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float = 0.05) -> Delay:
+def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float = 0.05, camera: str = "") -> Delay:
     """Delay from a simulator frame to its display: mean of picture stamp minus host time of the frame shown.
 
     Args:
         bags: Open bags with camera pictures and flight_state.
-        view: FrameState.view; None: as recorded.
+        view: FrameState.view; None: the line of sight is that of the recorded pose, else of the recorded view.
         ignore_bottom: Share of the picture at its lower edge that does not show the scene.
+        camera: Its name; the first of the recording when empty.
 
     Raises:
         BagError: No pictures or states.
         LatencyError: The recording does not show it.
     """
     from xplane_bridge.analysis.image_rotation import rotation_motion
-    from xplane_bridge.bags.pictures import grey_pictures, image_topic
+    from xplane_bridge.bags.pictures import grey_pictures
 
     time, rates = _rates(bags)
-    topic = image_topic(bags)
-    useful, recorded_view = _frame_states(bags)
-    if view is None:
-        view = recorded_view
-    if view not in _AXES:
-        msg = "the recorded view is none of forward, rear and down: give --view"
+    topic, frames = _pictures(bags, camera)
+    useful, recorded = (None, None) if frames is None else _useful(frames)
+    axis = recorded if view is None else np.array(_AXES[view])
+    if axis is None:
+        msg = "the recording does not say where the camera looks, forward, rear or down: give --view"
         raise LatencyError(msg)
     zero = time[0]
 
@@ -175,7 +187,7 @@ def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float =
 
     motion = rotation_motion(chosen(), ignore_bottom)
     seconds = 1e-9 * (time - zero)
-    return fit_delay(motion, seconds, accumulated_rotation(seconds, rates, np.array(_AXES[view])))
+    return fit_delay(motion, seconds, accumulated_rotation(seconds, rates, axis))
 
 
 def command_responses(bags: Bags) -> dict[str, Delay]:
@@ -231,15 +243,38 @@ def _rates(bags: Bags) -> tuple[np.ndarray, np.ndarray]:
     return time[order], rates[use][order]
 
 
-def _frame_states(bags: Bags) -> tuple[Optional[set[int]], int]:
-    """Stamps [ns] of the pictures to use (None: all), and the view of most of them."""
-    table = _first_of_type(bags, "xplane_bridge/FrameState")
-    if table is None:
-        return None, 0
-    views, counts = np.unique(table["view"], return_counts=True)
+def _pictures(bags: Bags, name: str) -> tuple[str, Optional[Table]]:
+    """The topic of a camera's pictures, and its FrameStates where they were recorded.
+
+    Raises:
+        BagError: The bags have no such camera, or no pictures of it.
+    """
+    from xplane_bridge.bags.pictures import image_topic
+
+    if not cameras(bags) and not name:
+        return image_topic(bags), None
+    camera = chosen_cameras(bags, [name] if name else [])[0]
+    if not camera.images:
+        image_topic(bags)  # says what to record where there is none at all
+        other = "record them (launch/record.launch does), or choose another with --camera"
+        msg = f"no images of camera {camera.name}: {other}"
+        raise LatencyError(msg)
+    return camera.images, bags.read(camera.frames)
+
+
+def _useful(frames: Table) -> tuple[set[int], Optional[np.ndarray]]:
+    """Stamps [ns] of the pictures to use: those of the view that most have; and their line of sight in body axes."""
+    views, counts = np.unique(frames["view"], return_counts=True)
     view = int(views[np.argmax(counts)])
-    use = ((table["quality"] & _USELESS.value) == 0) & (table["view"] == view)
-    return {int(stamp) for stamp in table.stamp[use]}, view
+    use = ((frames["quality"] & _USELESS.value) == 0) & (frames["view"] == view)
+    posed = use & (frames["camera_pose_source"] != _POSE_NONE)
+    if posed.any():
+        x, y, z, w = (frames[f"body_to_camera.rotation.{axis}"][posed] for axis in "xyzw")
+        sight = np.median([2.0 * (x * z + w * y), 2.0 * (w * x - y * z), 2.0 * (x * x + y * y) - 1.0], axis=1)
+        axis = sight / np.linalg.norm(sight)
+    else:
+        axis = np.array(_AXES[view]) if view in _AXES else None
+    return {int(stamp) for stamp in frames.stamp[use]}, axis
 
 
 def _first_of_type(bags: Bags, msgtype: str) -> Optional[Table]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import NamedTuple, Optional
 
 import cv2
 import pytest
@@ -15,6 +16,24 @@ from xplane_bridge.emulator.view.renderer import Scene
 from xplane_bridge.emulator.view.renderer.painter import Painter
 
 DURATION_S = 25.0
+_HALF = math.radians(-15.0)
+
+
+class Window(NamedTuple):
+    """A camera whose pictures are recorded."""
+
+    delay: float  #: [s]
+    topics: str = "/xplane/camera"
+    pitch_deg: float = 0.0
+    view: int = 1
+    rotation: Optional[tuple[float, float, float, float]] = None  #: of body_to_camera, where it is measured
+
+
+def belly(delay: float) -> Window:
+    """Forward and 30 degrees down, which is none of the views with a name; a product of two quaternions, by hand."""
+    sine, cosine = math.sin(_HALF), math.cos(_HALF)
+    rotation = (0.5 * (sine - cosine), 0.5 * (cosine - sine), -0.5 * (cosine + sine), 0.5 * (cosine + sine))
+    return Window(delay, "/xplane/belly/camera", -30.0, 0, rotation)
 
 
 def roll_and_rate(t: float, scale: float) -> tuple[float, float]:
@@ -25,7 +44,30 @@ def roll_and_rate(t: float, scale: float) -> tuple[float, float]:
     return scale * roll, scale * rate
 
 
-def write_bag(path: Path, delay: float, scale: float = 1.0, pictures: bool = True, refresh: bool = False) -> None:
+def add_picture(bag: FlightBag, painter: Painter, window: Window, k: int, scale: float) -> None:
+    """Write the picture that appears with frame `k` of 60 a second, and its FrameState."""
+    t = k / 60
+    shown = t - window.delay
+    scene = Scene(
+        frame=k,
+        latitude_deg=47.0 + 60.0 * shown / 111000.0,
+        longitude_deg=8.0,
+        altitude_m=600.0,
+        pitch_deg=-5.0,
+        roll_deg=math.degrees(roll_and_rate(shown, scale)[0]),
+        head_pitch_deg=window.pitch_deg,
+    )
+    _, jpeg = cv2.imencode(".jpg", painter.paint(scene))
+    header = bag.header(stamp_ns(t), "camera_forward_optical")
+    image = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.ravel()}
+    bag.add(f"{window.topics}/image_raw/compressed", "sensor_msgs/CompressedImage", stamp_ns(t), image)
+    frame = {"header": header, "view": window.view}
+    if window.rotation is not None:
+        frame.update(camera_pose_source=2, body_to_camera={"rotation": dict(zip("xyzw", window.rotation))})
+    bag.add(f"{window.topics}/frame_state", "xplane_bridge/FrameState", stamp_ns(t), frame)
+
+
+def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False) -> None:
     painter = Painter(320, 240, (47.02, 8.0))
     with FlightBag(path) as bag:
         for k in range(round(DURATION_S * 60)):
@@ -40,28 +82,14 @@ def write_bag(path: Path, delay: float, scale: float = 1.0, pictures: bool = Tru
             if k % 3 == 0:  # the aileron follows the stick by 45 ms
                 surface = {"header": bag.header(stamp_ns(t), ""), "delta_aileron": 15.0 * math.sin(2.1 * (t - 0.045))}
                 bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", stamp_ns(t), surface)
-            if pictures and k % 2 == 0 and t > 0.5:
-                shown = t - delay
-                scene = Scene(
-                    frame=k,
-                    latitude_deg=47.0 + 60.0 * shown / 111000.0,
-                    longitude_deg=8.0,
-                    altitude_m=600.0,
-                    pitch_deg=-5.0,
-                    roll_deg=math.degrees(roll_and_rate(shown, scale)[0]),
-                )
-                _, jpeg = cv2.imencode(".jpg", painter.paint(scene))
-                header = bag.header(stamp_ns(t), "camera_forward_optical")
-                image = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.ravel()}
-                bag.add("/xplane/camera/image_raw/compressed", "sensor_msgs/CompressedImage", stamp_ns(t), image)
-                bag.add(
-                    "/xplane/camera/frame_state", "xplane_bridge/FrameState", stamp_ns(t), {"header": header, "view": 1}
-                )
+            if k % 2 == 0 and t > 0.5:
+                for window in windows:
+                    add_picture(bag, painter, window, k, scale)
 
 
 def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag, plot, numbers = tmp_path / "flight.bag", tmp_path / "delay.png", tmp_path / "delay.json"
-    write_bag(bag, delay=0.085)
+    write_bag(bag, Window(0.085))
     assert main([str(bag), "--plot", str(plot), "--json", str(numbers)]) == 0
     text = capsys.readouterr().out
     assert "display delay" in text
@@ -76,14 +104,29 @@ def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.C
 
 def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Path) -> None:
     bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
-    write_bag(bag, delay=0.05, refresh=True)
+    write_bag(bag, Window(0.05), refresh=True)
     assert main([str(bag), "--json", str(numbers)]) == 0
     assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
 
 
+def test_of_several_cameras_one_is_measured_about_its_own_line_of_sight(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag, numbers = tmp_path / "two.bag", tmp_path / "delay.json"
+    write_bag(bag, Window(0.085), belly(0.04))
+    for arguments, delay in (([], 0.085), (["--camera", "belly"], 0.04)):
+        assert main([str(bag), "--json", str(numbers), *arguments]) == 0
+        found = json.loads(numbers.read_text())["display_delay"]
+        assert found["delay"] == pytest.approx(delay, abs=0.005)
+        # Against the rate about the aircraft's own axis, that of the second were 0.87: cos(30 deg).
+        assert found["gain"] == pytest.approx(1.0, abs=0.05)
+    assert main([str(bag), "--camera", "tail"]) == 1
+    assert "no camera tail; expected some of: camera, belly" in capsys.readouterr().err
+
+
 def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = tmp_path / "calm.bag"
-    write_bag(bag, delay=0.05, scale=0.01)
+    write_bag(bag, Window(0.05), scale=0.01)
     assert main([str(bag)]) == 1
     error = capsys.readouterr().err.strip()
     assert "\n" not in error
@@ -92,6 +135,6 @@ def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest
 
 def test_bag_without_pictures_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = tmp_path / "blind.bag"
-    write_bag(bag, delay=0.0, pictures=False)
+    write_bag(bag)
     assert main([str(bag)]) == 1
     assert "no camera images" in capsys.readouterr().err
