@@ -1,7 +1,11 @@
-"""Two windows of one X-Plane, a capture_node for each: forward and down, joined by the frame they show."""
+"""Two windows of one X-Plane, a capture_node for each: forward and down, joined by the frame they show.
+
+The nodes read the windows, or two `xplane_eye` do and send them.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import math
 import time
@@ -9,11 +13,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from support.second_camera import NAME, WINDOW, second_camera
 from xplane_bridge.emulator.view.renderer import read_strip
-from xplane_bridge.harness import wait_until
+from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
+from xplane_bridge.harness.ros import free_port
+from xplane_bridge.resources import config_file, program
 
 FPS = 20
 PIPELINE_DELAY_S = 0.15
@@ -33,7 +40,36 @@ def on_time(swaps: Path) -> set:
     return {frame for frame, delay in late.items() if abs(delay - PIPELINE_DELAY_S) < LATE_S}
 
 
-def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@contextlib.contextmanager
+def reading_windows(world, port: int, display: str):
+    """Two capture_node that read the windows."""
+    world.set_param("display_delay", PIPELINE_DELAY_S)
+    world.start("capture_node", {"window": {"display": display, "index": 0}})
+    with second_camera(world, port, display, display_delay=PIPELINE_DELAY_S) as launch:
+        yield launch
+
+
+@contextlib.contextmanager
+def taking_what_is_sent(world, port: int, display: str):
+    """Two capture_node with an xplane_eye for each."""
+    listen = [f"127.0.0.1:{free_port()}" for _ in range(2)]
+    world.start("capture_node", {"source": "sender", "sender": {"listen": listen[0]}})
+    second = yaml.safe_load(config_file("capture.yaml").read_text(encoding="utf-8"))
+    second["source"], second["sender"]["listen"] = "sender", listen[1]
+    config = world.folder / "second.yaml"
+    config.write_text(yaml.safe_dump(second), encoding="utf-8")
+    with contextlib.ExitStack() as running:
+        launch = running.enter_context(second_camera(world, port, display, capture_config=config))
+        for window, receiver in enumerate(listen):
+            which = [receiver, "--window", window, "--xplane", f"127.0.0.1:{port}", "--local-port", 0]
+            own = ["--undo-file", world.folder / f"undo_{window}.json", "--delay", PIPELINE_DELAY_S]
+            command = [str(word) for word in (program("xplane_eye"), *which, *own)]
+            running.enter_context(ManagedProcess(f"xplane_eye_{window}", command, world.folder))
+        yield launch
+
+
+@pytest.mark.parametrize("cameras_of", [reading_windows, taking_what_is_sent])
+def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cameras_of) -> None:
     from sensor_msgs.msg import CameraInfo, Image
     from xplane_bridge.msg import FrameState
 
@@ -42,10 +78,8 @@ def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: 
         swaps = tmp_path / "swaps.csv"
         views = ["--window", *WINDOW, "--swap-log", swaps]
         emulator = world.emulator(*views, "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", "--start", "air")
-        world.set_param("display_delay", PIPELINE_DELAY_S)
         world.start("rx_node")
-        world.start("capture_node", {"window": {"display": display.display, "index": 0}})
-        with second_camera(world, emulator.port, display.display, display_delay=PIPELINE_DELAY_S) as launch:
+        with cameras_of(world, emulator.port, display.display) as launch:
             cameras = [
                 (
                     world.watch(f"{place}camera/image_raw", Image),

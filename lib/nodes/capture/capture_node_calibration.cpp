@@ -98,8 +98,8 @@ core::MeasuredDelay CaptureNode::calibrate() {
   }
   if (options_.own_field_of_view) {
     throw std::runtime_error(
-        "this window has a field of view of its own, which does not follow X-Plane's: measure it "
-        "with estimate_latency, or set own_field_of_view to false");
+        "this window has a field of view of its own, which does not follow X-Plane's: measure the delay "
+        "with estimate_latency --camera, or set own_field_of_view to false");
   }
   refuseWhileRecorded();
   double own = std::numeric_limits<double>::quiet_NaN();

@@ -189,7 +189,8 @@ def settle(frames: Sequence[Tuple[int, float]], pictures: Sequence[Tuple[int, fl
     if len(best) < _ENOUGH:
         raise CalibrationError(
             f"only {len(best)} of {len(asked)} steps of the field of view were seen in the pictures; at least "
-            f"{_ENOUGH} are needed. Does the window show X-Plane's own view, and does it change with it?"
+            f"{_ENOUGH} are needed. Does the window show X-Plane's own view, and does it change with it? A further "
+            "window with a field of view of its own does not: give --delay, which estimate_latency --camera measures"
         )
     middle_ns = statistics.median(best)
     rivals = [len(matches(delay_ns)) for delay_ns in candidates if abs(delay_ns - middle_ns) > 1.5 * period_ns]
