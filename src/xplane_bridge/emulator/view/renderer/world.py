@@ -82,42 +82,54 @@ def _noise(random: np.random.Generator, size: int, cells: int) -> np.ndarray:
 def _ground_tile(random: np.random.Generator) -> np.ndarray:
     """Fields, woods, water, roads and villages seen from above; 8 m a texel."""
     size = _TILE_PX
-    y, x = np.mgrid[0:size, 0:size].astype(np.float32)
+    x = np.arange(size, dtype=np.float32)
     bend = (_noise(random, size, 16) - 0.5) * 90.0
-    column, row = ((x + bend) // 56).astype(int), ((y + 0.7 * bend) // 40).astype(int)
+    across, down = x + bend, x[:, np.newaxis] + 0.7 * bend
+    column, row = np.floor(across / 56.0), np.floor(down / 40.0)
     kinds = random.integers(0, len(_FIELDS), (64, 64))
-    tile = _FIELDS[kinds[row % 64, column % 64]]
+    across -= column * 56.0
+    down -= row * 40.0
+    column, row = column.astype(np.int32), row.astype(np.int32)
     # Furrows and hedges: what gives a field its grain.
-    along = np.where((row + column) % 2 == 0, x, y)
-    tile *= (0.94 + 0.08 * np.sin(along * 1.9))[..., np.newaxis]
-    hedge = ((x + bend) % 56 < 2) | ((y + 0.7 * bend) % 40 < 2)
-    tile[hedge] *= 0.7
-    wood = _noise(random, size, 24) * 0.7 + _noise(random, size, 96) * 0.3 > 0.6
-    tile[wood] = np.array(_FOREST, np.float32)
-    tile[wood] *= (0.75 + 0.6 * random.random(int(wood.sum()), np.float32))[:, np.newaxis]
-    tile[_noise(random, size, 9) > 0.86] = _WATER
+    furrows = 0.94 + 0.08 * np.sin(x * 1.9)
+    shade = np.where((row + column) & 1, furrows[:, np.newaxis], furrows)
+    hedge = np.where((across < 2.0) | (down < 2.0), np.float32(0.7), np.float32(1.0))
+    wood = np.flatnonzero(_noise(random, size, 24) * 0.7 + _noise(random, size, 96) * 0.3 > 0.6)
+    trees = 0.75 + 0.6 * random.random(len(wood), np.float32)
+    water = _noise(random, size, 9) > 0.86
+    field = ((row & 63) << 6) + (column & 63)
+    # Each colour by itself: several times faster than three values at each place.
+    tile = np.empty((3, size, size), np.float32)
+    for plane, fields, forest, wet in zip(tile, _FIELDS[kinds].reshape(-1, 3).T, _FOREST, _WATER):
+        np.take(fields, field, out=plane, mode="wrap")
+        plane *= shade
+        plane *= hedge
+        plane.reshape(-1)[wood] = np.float32(forest) * trees
+        np.copyto(plane, wet, where=water)
     for _ in range(14):
         here = random.integers(0, size, 2)
-        cv2.circle(tile, tuple(int(v) for v in here), int(random.integers(10, 26)), _TOWN, -1)
+        radius = int(random.integers(10, 26))
+        for plane, town in zip(tile, _TOWN):
+            cv2.circle(plane, tuple(int(v) for v in here), radius, town, -1)
         for _ in range(60):
             corner = here + random.normal(0.0, 14.0, 2)
-            shade = float(random.uniform(0.5, 1.3))
-            colour = tuple(float(c * shade) for c in (120, 120, 190))
-            cv2.rectangle(
-                tile,
-                tuple(int(v) for v in corner),
-                tuple(int(v) for v in corner + random.integers(2, 5, 2)),
-                colour,
-                -1,
-            )
+            lit = float(random.uniform(0.5, 1.3))
+            ends = (corner, corner + random.integers(2, 5, 2))
+            first, last = (tuple(int(v) for v in end) for end in ends)
+            for plane, roof in zip(tile, (120, 120, 190)):
+                cv2.rectangle(plane, first, last, float(roof * lit), -1)
     for at in random.integers(0, size, 5):
         wave = (at + 60.0 * np.sin(np.arange(size) * (2.0 * math.pi * int(random.integers(1, 4)) / size))) % size
         line = np.column_stack((np.arange(size), wave)).astype(np.int32)
         line = line if random.random() < 0.5 else line[:, ::-1]
-        cv2.polylines(tile, [np.ascontiguousarray(line)], False, _ROAD, 2, cv2.LINE_AA)
-    tile *= (0.85 + 0.3 * _noise(random, size, 128))[..., np.newaxis]
+        for plane, road in zip(tile, _ROAD):
+            cv2.polylines(plane, [np.ascontiguousarray(line)], False, road, 2, cv2.LINE_AA)
+    light = 0.85 + 0.3 * _noise(random, size, 128)
+    for plane in tile:
+        plane *= light
+        np.clip(plane, 0, 255, out=plane)
     blurred: np.ndarray = cv2.GaussianBlur(
-        np.clip(tile, 0, 255).astype(np.uint8), (3, 3), 0.7, borderType=cv2.BORDER_REFLECT
+        cv2.merge([plane.astype(np.uint8) for plane in tile]), (3, 3), 0.7, borderType=cv2.BORDER_REFLECT
     )
     return blurred
 
