@@ -116,10 +116,8 @@ class Painter:
                 if abs(x) < _FAR_PIXELS and abs(y) < _FAR_PIXELS:
                     self._disc(x, y, radius * scale, colour)
         quads = camera.directions_to_camera(self._skyline) * 100.0
-        for quad in quads[quads[..., 2].max(axis=1) > 0.1]:
-            corners = camera.polygon(quad)
-            if corners is not None:
-                self._fill(corners, _MOUNTAIN)
+        quads = quads[quads[..., 2].max(axis=1) > 0.1]
+        self._fill_quads(camera, quads, np.broadcast_to(_MOUNTAIN, (len(quads), 3)))
 
     def _disc(self, x: float, y: float, radius: float, colour: tuple[int, int, int]) -> None:
         one = 1 << _SHIFT
@@ -281,6 +279,35 @@ class Painter:
         points = np.round(corners * (1 << _SHIFT)).astype(np.int32)
         cv2.fillConvexPoly(self._picture, points, tuple(float(c) for c in colour), cv2.LINE_AA, _SHIFT)
 
+    def _fill_quads(self, camera: Camera, quads: np.ndarray, colours: np.ndarray, smallest: float = 0.0) -> None:
+        """Fills convex quadrangles (n, 4, 3) in camera axes, in their order.
+
+        What can be done for all of them at once is: by far the most time went into single ones, most of them unseen.
+
+        Args:
+            camera: That sees them.
+            quads: Their corners.
+            colours: (n, 3)
+            smallest: Smaller ones are not drawn, unless they reach behind the near plane [px].
+        """
+        depth = quads[..., 2]
+        in_front = depth.min(axis=1) >= NEAR_M
+        pixels = np.zeros((len(quads), 4, 2))
+        pixels[in_front] = camera.project(quads[in_front].reshape(-1, 3)).reshape(-1, 4, 2)
+        low, high = pixels.min(axis=1), pixels.max(axis=1)
+        seen = in_front & (high >= 0.0).all(axis=1) & (low <= self._size).all(axis=1)
+        seen &= (high - low).max(axis=1) >= smallest
+        plain = seen & (low >= -_FAR_PIXELS).all(axis=1) & (high <= _FAR_PIXELS).all(axis=1)
+        points = np.round(np.where(plain[:, np.newaxis, np.newaxis], pixels, 0.0) * (1 << _SHIFT)).astype(np.int32)
+        tuples = colours.tolist()
+        for i in np.nonzero(seen | (~in_front & (depth.max(axis=1) >= NEAR_M)))[0]:
+            if plain[i]:
+                cv2.fillConvexPoly(self._picture, points[i], tuples[i], cv2.LINE_AA, _SHIFT)
+                continue
+            corners = camera.polygon(quads[i])
+            if corners is not None:
+                self._fill(corners, tuples[i])
+
     def _hazed(self, colours: np.ndarray, distances: np.ndarray) -> np.ndarray:
         clear = np.exp(-distances / _HAZE_M)[:, np.newaxis]
         return colours * clear + _HAZE * (1.0 - clear)
@@ -288,19 +315,7 @@ class Painter:
     def _paint_markings(self, camera: Camera) -> None:
         in_camera = camera.to_camera(self._world.markings)
         distance = np.linalg.norm(in_camera.mean(axis=1), axis=1)
-        depth = in_camera[..., 2]
-        colours = self._hazed(self._world.marking_colours, distance)
-        in_front = depth.min(axis=1) >= NEAR_M
-        pixels = np.zeros((*in_camera.shape[:2], 2))
-        pixels[in_front] = camera.project(in_camera[in_front].reshape(-1, 3)).reshape(-1, 4, 2)
-        large = np.ptp(pixels, axis=1).max(axis=1) > _SMALLEST
-        for i in np.nonzero(depth.max(axis=1) > NEAR_M)[0]:
-            if not in_front[i]:
-                corners = camera.polygon(in_camera[i])
-                if corners is not None:
-                    self._fill(corners, colours[i])
-            elif large[i]:
-                self._fill(pixels[i], colours[i])
+        self._fill_quads(camera, in_camera, self._hazed(self._world.marking_colours, distance), _SMALLEST)
 
     def _paint_boxes(self, camera: Camera) -> None:
         in_camera = camera.to_camera(self._world.boxes)
@@ -309,12 +324,11 @@ class Painter:
         seen = np.nonzero((depth > 0.0) & (depth < _BOX_DEPTH_M) & (size > _SMALLEST * depth))[0]
         colours = self._hazed(self._world.box_colours[seen], depth[seen])
         facing = ((camera.eye - self._face_centres[seen]) * self._face_normals[seen]).sum(axis=2) > 0.0
-        for n in np.argsort(-depth[seen]):
-            i = seen[n]
-            for face in np.nonzero(facing[n])[0]:
-                polygon = camera.polygon(in_camera[i, _BOX_FACES[face]])
-                if polygon is not None:
-                    self._fill(polygon, colours[n] * self._face_light[i, face])
+        order = np.argsort(-depth[seen])
+        facing, seen, colours = facing[order], seen[order], colours[order]
+        quads = in_camera[seen][:, _BOX_FACES]
+        shaded = colours[:, np.newaxis] * self._face_light[seen][..., np.newaxis]
+        self._fill_quads(camera, quads[facing], shaded[facing])
 
     def _paint_floor(self, scene: Scene, camera: Camera) -> None:
         """The cockpit's floor, which hides the ground from who looks down in it."""
