@@ -1,8 +1,8 @@
 """What README, tutorial and examples give a new user to type does what they say.
 
 Their blocks run as they stand there, on a machine of their own: a network namespace, where no port is taken. Only
-folders, and for most the emulator's frame rate, are the test's. Where this computer permits no namespaces, the tests
-say so and are skipped.
+folders, and for most the emulator's frame rate and the size of its window, are the test's. Where this computer permits
+no namespaces, the tests say so and are skipped.
 """
 
 from __future__ import annotations
@@ -105,11 +105,12 @@ def section(file: Path, heading: str) -> list[Block]:
     return found
 
 
-#: For tests that look at no picture: drawing those of README takes two thirds of the processor time of all that runs.
-FEW_FRAMES = "--fps 20"
+#: For tests that look at no picture: drawing those of README, encoding and recording them takes most of the processor
+#: time of all that runs.
+CHEAP_PICTURES = "--fps 20 --window 320x240"
 
 
-def by_hand(shells: Shells, options: str = FEW_FRAMES) -> tuple[RecordedTopics, str]:
+def by_hand(shells: Shells, options: str = CHEAP_PICTURES) -> tuple[RecordedTopics, str]:
     """Emulator, with further options, and bridge as README starts them; what comes third there."""
     emulator, bridge, hold = section(ROOT / "README.md", "By hand, without X-Plane")[0].text.splitlines()
     shells.start("emulator", f"{emulator} {options}").wait_for_line(r"^READY\b", WAIT_S)
@@ -216,7 +217,11 @@ def test_the_afternoon_of_the_tutorial(shells: Shells) -> None:
             (shells.home / f"{name}.py").write_text(text, encoding="utf-8")
             said = shells.run(name, f"python3 {shells.home}/{name}.py")
         elif shell:
-            shells.start(shell.group(1), "\n".join(lines[1:])).wait_for_line(ready[shell.group(1)], WAIT_S)
+            command = "\n".join(lines[1:])
+            if shell.group(1) == "shell 1":
+                assert "--window" in command
+                command += f" {CHEAP_PICTURES}"
+            shells.start(shell.group(1), command).wait_for_line(ready[shell.group(1)], WAIT_S)
             if shell.group(1) == "shell 2":
                 recorded = watch(shells)
             elif shell.group(1) == "shell 3":
