@@ -245,6 +245,11 @@ void ImageAssociator::pairWithFrame(const FrameChoice& frame, bool final, Associ
   };
   if (nearest != nullptr && std::abs(distance(*nearest)) <= kSameFrame * frame.period) {
     use(PairingMethod::kFrame, *nearest);
+    if (frame.inferred) {  // put in evenly between its neighbours; its state knows its time, which other cameras heard
+      answer.frame_sim_time = static_cast<double>(nearest->key.sim_time_raw);
+      answer.frame_offset -= answer.state_offset;
+      answer.state_offset = 0.0;
+    }
     return;
   }
   if (after == nullptr && !final) {

@@ -72,11 +72,10 @@ struct Association {
       0.0;                    ///< [s] simulator time of the frame shown, in the raw float32's numbers (kept in double)
   double frame_offset = 0.0;  ///< [s] moment - frame: jitter of the display plus the error of the display delay
   double state_offset = 0.0;  ///< [s] simulator time of the state - simulator time of the frame; 0 when interpolated
-  bool frame_inferred =
-      false;                  ///< the frame itself was not heard (datagram lost): put in evenly between its neighbours
-  bool at_edge = false;       ///< the frame lies at a pause, reset, epoch or gap
-  double frame_period = 0.0;  ///< [s] simulator time of one frame, 0 = unknown
-  bool ambiguous = false;     ///< the moment lies nearer to the border between two frames than its uncertainty
+  bool frame_inferred = false;  ///< the frame itself was not heard (datagram lost): its state's time, or put in evenly
+  bool at_edge = false;         ///< the frame lies at a pause, reset, epoch or gap
+  double frame_period = 0.0;    ///< [s] simulator time of one frame, 0 = unknown
+  bool ambiguous = false;       ///< the moment lies nearer to the border between two frames than its uncertainty
 };
 
 /// Running totals since construction.

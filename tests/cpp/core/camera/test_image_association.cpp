@@ -105,6 +105,21 @@ TEST(ImageAssociator, InfersAFrameWhoseDatagramWasLost) {
   EXPECT_TRUE(answer.frame_inferred);
 }
 
+TEST(ImageAssociator, KnowsTheTimeOfAFrameThatWasNotHeardByItsState) {
+  core::ImageAssociator associator;
+  const auto at = [](int k) { return 100.0 + k / 60.0 + (k == 30 ? 0.003 : 0.0); };
+  for (int k = 0; k < 60; ++k) {
+    if (k != 30) associator.addFrame(frameAt(at(k)));
+    associator.addState(stateAt(static_cast<std::uint64_t>(k), at(k)));
+  }
+  const auto answer = associator.associate(momentAt(at(30) + 0.002), false);
+  EXPECT_TRUE(answer.frame_inferred);
+  EXPECT_EQ(answer.method, PairingMethod::kFrame);
+  EXPECT_EQ(answer.frame_sim_time, static_cast<double>(static_cast<float>(at(30)))) << "the key that others have";
+  EXPECT_EQ(answer.state_offset, 0.0);
+  EXPECT_NEAR(answer.frame_offset, 0.002, 1e-5);
+}
+
 TEST(ImageAssociator, TakesALongFrameForOneFrame) {
   core::ImageAssociator associator;
   // The 31st frame took 30 ms: nearly two of the others, but none was lost.
