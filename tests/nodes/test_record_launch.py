@@ -1,4 +1,4 @@
-"""record.launch: a recording that gets no flight says so while it can still be put right."""
+"""record.launch: a recording that gets no flight, or not all cameras, says so while it can still be put right."""
 
 from __future__ import annotations
 
@@ -38,6 +38,17 @@ def test_further_cameras_are_recorded_by_their_names(world):
 
     with roslaunch(world.master, world.folder, "record.launch", **arguments):
         wait_until(lambda: wanted <= recorded(), 60.0, "subscriptions of the recorder")
+
+
+def test_a_camera_that_is_not_recorded_is_named(world):
+    import rospy
+    from xplane_bridge.msg import FrameState
+
+    rospy.Publisher(f"{world.namespace}/belly/camera/frame_state", FrameState, queue_size=1)
+    arguments = {"ns": world.namespace.strip("/"), "bag": world.folder / "one.bag"}
+    topics = "flight_state camera/frame_state"
+    with roslaunch(world.master, world.folder, "record.launch", topics=topics, **arguments) as launch:
+        launch.wait_for_line("camera belly is not recorded: record.launch takes it with cameras:=belly", 60)
 
 
 def test_a_recording_that_does_not_want_states_has_no_watch(world):

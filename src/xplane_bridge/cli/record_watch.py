@@ -1,17 +1,19 @@
-"""record_watch: warns while a recording gets no flight states; launch/record.launch starts it beside the recorder."""
+"""record_watch: warns of what a recording lacks, states or a camera; record.launch starts it beside the recorder."""
 
 from __future__ import annotations
 
 import argparse
 import time
-from typing import Any, Optional, Sequence
+from typing import Any, Callable, Optional, Sequence
 
 from xplane_bridge import lockstep
-from xplane_bridge.cli.bridge.waiting import Listener, Patience, link_text
+from xplane_bridge.cli.bridge.waiting import Listener, Patience, Surroundings, link_text, surroundings
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.topics import NAMESPACE
 
 _POLL_S = 0.1
+_LOOK_S = 2.0  # between two looks at the master
+_FRAMES = "camera/frame_state"
 
 
 class StateWatch:
@@ -39,11 +41,43 @@ class StateWatch:
             self._say("flight states are recorded now")
 
 
+class CameraWatch:
+    """Warns of cameras that are not recorded while the bridge's own is: their pictures would be missed only later.
+
+    Args:
+        namespace: Of the bridge, without a slash at its end.
+        say: Called once for each.
+    """
+
+    def __init__(self, namespace: str, say: Callable[[str], None]) -> None:
+        self._namespace = namespace
+        self._say = say
+        self._said: set[str] = set()
+
+    def look(self, there: Optional[Surroundings]) -> None:
+        """Takes what the master knows, or None."""
+        if there is None:
+            return
+        recorder, place = f"{self._namespace}/record", f"{self._namespace}/"
+        recorded = {topic for topic, nodes in there.subscribers.items() if recorder in nodes}
+        if place + _FRAMES not in recorded:
+            return
+        for topic in sorted(topic for topic, nodes in there.publishers.items() if nodes and topic not in recorded):
+            name = topic[len(place) : -len(_FRAMES) - 1]
+            of_camera = name and topic.startswith(place) and topic.endswith(f"/{_FRAMES}")
+            another_bridge = f"{place}{name}/flight_state" in there.publishers
+            if of_camera and not another_bridge and name not in self._said:
+                self._said.add(name)
+                self._say(f"camera {name} is not recorded: record.launch takes it with cameras:={name}")
+
+
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
     p = argparse.ArgumentParser(
-        prog="record_watch", description="Warns while no flight states come, because a recording has no flight then."
+        prog="record_watch",
+        description="Warns while no flight states come, because a recording has no flight then, and of cameras that "
+        "are not recorded.",
     )
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     args = p.parse_args(ros_arguments(argv))
@@ -60,7 +94,12 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         lambda text: rospy.logwarn("%s", text),
     )
     watch = StateWatch(patience, lambda text: rospy.loginfo("%s", text))
+    cameras = CameraWatch(namespace, lambda text: rospy.logwarn("%s", text))
+    next_look = 0.0
     while not rospy.is_shutdown():
         watch.look(states.last)
+        if time.monotonic() >= next_look:
+            cameras.look(surroundings())
+            next_look = time.monotonic() + _LOOK_S
         time.sleep(_POLL_S)
     return 0

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from xplane_bridge.cli import record_watch
-from xplane_bridge.cli.record_watch import StateWatch
+from xplane_bridge.cli.bridge.waiting import Surroundings
+from xplane_bridge.cli.record_watch import CameraWatch, StateWatch
 
 
 class Reporter:
@@ -44,3 +45,28 @@ def test_in_lockstep_it_leaves_the_watching_to_tx_node(monkeypatch) -> None:
     monkeypatch.setattr(record_watch, "start_node", lambda *_args, **_options: None)
     monkeypatch.setattr(record_watch.lockstep, "is_on", lambda namespace: namespace == "/there")
     assert record_watch.main(["--namespace", "/there/"]) == 0
+
+
+def seen(publishers: list[str], recorded: list[str]) -> Surroundings:
+    return Surroundings(
+        {topic: ["/node"] for topic in publishers}, {}, [], {topic: ["/x/rviz", "/x/record"] for topic in recorded}
+    )
+
+
+def test_cameras_that_run_and_are_not_recorded_are_named_once() -> None:
+    said: list[str] = []
+    watch = CameraWatch("/x", said.append)
+    own, belly, tail = (f"/x/{name}camera/frame_state" for name in ("", "belly/", "tail/"))
+    watch.look(None)
+    watch.look(seen([own, belly, tail], [own, belly, tail]))
+    watch.look(seen([own, belly], []))  # a recording without pictures, or one that has not begun
+    assert said == []
+    others = [
+        "/y/belly/camera/frame_state",
+        "/x/second/camera/frame_state",
+        "/x/second/flight_state",
+        "/x/camera/other",
+    ]
+    for _ in range(2):
+        watch.look(seen([own, belly, tail, *others], [own, tail]))
+    assert said == ["camera belly is not recorded: record.launch takes it with cameras:=belly"]

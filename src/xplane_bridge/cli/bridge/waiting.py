@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from types import MappingProxyType
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
 
 from xplane_bridge.errors import XplaneBridgeError
@@ -25,6 +26,7 @@ class Surroundings(NamedTuple):
     publishers: Mapping[str, Sequence[str]]  #: topic to the nodes that publish it
     types: Mapping[str, str]  #: topic to the type of its messages
     services: Sequence[str]
+    subscribers: Mapping[str, Sequence[str]] = MappingProxyType({})  #: topic to the nodes that take it
 
 
 def surroundings() -> Optional[Surroundings]:
@@ -33,11 +35,11 @@ def surroundings() -> Optional[Surroundings]:
 
     try:
         master = rosgraph.Master("/xplane_bridge_waiting")
-        publishers, _, services = master.getSystemState()
+        publishers, subscribers, services = master.getSystemState()
         types = dict(master.getTopicTypes())
     except (OSError, rosgraph.MasterException):
         return None
-    return Surroundings(dict(publishers), types, [name for name, _ in services])
+    return Surroundings(dict(publishers), types, [name for name, _ in services], dict(subscribers))
 
 
 def about_topic(topic: str, msgtype: str, there: Optional[Surroundings], link: str = "") -> str:
