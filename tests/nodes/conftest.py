@@ -12,16 +12,39 @@ from typing import Any, Callable, Iterator
 import pytest
 
 from support.deadlines import WAIT_S
+from support.scheduling import long_ones_first, rank
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import node_program
 
 _numbers = itertools.count(1)
+#: Tests that take half a minute and more, the longest first, none of which shares what its file has made with others.
+LONG = (
+    "test_first_day.py::",
+    "test_flights.py::",
+    "test_lockstep_scenario.py::test_runs_with",
+    "test_three_aircraft.py::test_position_loop",
+    "test_demo.py::test_the_demo_flies",
+    "test_bench.py::",
+    "test_labelled_approach.py::test_the_other_aircraft",
+    "test_sender.py::",
+)
 
 # Shells ignore SIGINT for what they run in the background, and programs would inherit that from here.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Replaces pytest-xdist's own order of tests."""
+    return long_ones_first(config, log, LONG)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts long tests first."""
+    items.sort(key=lambda item: rank(item.nodeid, LONG))
 
 
 @pytest.fixture(scope="session")
