@@ -38,13 +38,17 @@ OLDEST, NEWEST = xplane_names.VERSIONS[0], xplane_names.VERSIONS[-1]
 #: Until the left aileron has been stuck and repaired; until the stick has taken over and the wing has stalled. Of the
 #: simulator's time, which passes slowly on a busy machine.
 LONG, SHORT = 47, 16
-#: Transport, seconds, X-Plane's version: oldest and newest; those between, and all by rows, in full tests.
+#: The demo's own frame rate, and one for half the processor time: most of it goes into frames and their pictures.
+FULL, HALF = 60, 30
+#: Transport, seconds, X-Plane's version, frames a second: oldest and newest; those between, all by rows, and the long
+#: one at the demo's own rate in full tests.
 DEMOS = [
-    ("rref", LONG, NEWEST),
-    ("rref", SHORT, OLDEST),
-    ("data", SHORT, NEWEST),
-    *(pytest.param("rref", SHORT, version, marks=pytest.mark.nightly) for version in xplane_names.VERSIONS[1:-1]),
-    *(pytest.param("data", SHORT, version, marks=pytest.mark.nightly) for version in xplane_names.VERSIONS[:-1]),
+    ("rref", LONG, NEWEST, HALF),
+    ("rref", SHORT, OLDEST, FULL),
+    ("data", SHORT, NEWEST, HALF),
+    pytest.param("rref", LONG, NEWEST, FULL, marks=pytest.mark.nightly),
+    *(pytest.param("rref", SHORT, version, FULL, marks=pytest.mark.nightly) for version in xplane_names.VERSIONS[1:-1]),
+    *(pytest.param("data", SHORT, version, FULL, marks=pytest.mark.nightly) for version in xplane_names.VERSIONS),
 ]
 
 
@@ -58,9 +62,12 @@ NOT_IN_THE_DEMO = {
 }
 
 
-@pytest.mark.parametrize(("transport", "seconds", "version"), DEMOS)
-def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: str, seconds: int, version: str) -> None:
-    with demo(tmp_path, "--duration", str(seconds), "--version", version, f"transport:={transport}") as run:
+@pytest.mark.parametrize(("transport", "seconds", "version", "fps"), DEMOS)
+def test_the_demo_flies_records_judges_and_reports(
+    tmp_path: Path, transport: str, seconds: int, version: str, fps: int
+) -> None:
+    rate = () if fps == FULL else ("--fps", str(fps))
+    with demo(tmp_path, "--duration", str(seconds), "--version", version, *rate, f"transport:={transport}") as run:
         assert run.wait(DEMO_TIMEOUT_S) == 0, run.output()
     out = tmp_path / "out"
     verdicts = {v.name: v for v in flight_check.judge(out / "flight.bag", out / "truth.csv")}
@@ -94,7 +101,7 @@ def test_the_demo_flies_records_judges_and_reports(tmp_path: Path, transport: st
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A demo's bag, for tests that read it."""
     folder = tmp_path_factory.mktemp("recording")
-    with demo(folder, "--duration", "6") as run:
+    with demo(folder, "--duration", "6", "--fps", str(HALF)) as run:
         assert run.wait(DEMO_TIMEOUT_S) == 0, run.output()
     return folder / "out" / "flight.bag"
 
@@ -190,7 +197,9 @@ def test_images_of_the_demo_read_back_with_opencv_and_carry_their_states(picture
 def test_an_override_that_is_left_on_fails_the_demo(tmp_path: Path) -> None:
     # Another client takes the stick again and again: also after the bridge has given it back.
     taking = protocol.DrefWrite("sim/operation/override/override_joystick_roll", 1.0).encode()
-    with demo(tmp_path, "--duration", "5") as run, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+    with demo(tmp_path, "--duration", "5", "--fps", str(HALF)) as run, socket.socket(
+        socket.AF_INET, socket.SOCK_DGRAM
+    ) as client:
         port = int(run.wait_for_line(r"X-Plane's port: (\d+)", DEMO_TIMEOUT_S).group(1))
         deadline = time.monotonic() + DEMO_TIMEOUT_S
         while run.running and time.monotonic() < deadline:
@@ -203,7 +212,7 @@ def test_an_override_that_is_left_on_fails_the_demo(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_ends_the_demo_and_all_it_has_started(tmp_path: Path) -> None:
-    with demo(tmp_path, "--duration", "60") as run:
+    with demo(tmp_path, "--duration", "60", "--fps", str(HALF)) as run:
         run.wait_for_line(r"demo: +[1-9]\d*/60 s", DEMO_TIMEOUT_S)
         children = descendants(run.pid)
         assert len(children) >= 4, "emulator, master, roslaunch and nodes"
