@@ -88,8 +88,10 @@ def _quality(exports: _Records) -> list[str]:
     ]
     lines += ["", "| flight | frames | perfect | said |", "|---|---|---|---|"]
     for name, quality in sorted(found.items()):
-        said = ", ".join(f"{count} {word}" for word, count in sorted(quality["bits"].items()) if count)
-        lines.append(f"| {_cell(name)} | {quality['frames']} | {quality['perfect']} | {said or 'nothing'} |")
+        for camera, part in quality.get("cameras", {"": quality}).items():
+            said = ", ".join(f"{count} {word}" for word, count in sorted(part["bits"].items()) if count)
+            whose = f"{name}, camera {camera}" if camera else name
+            lines.append(f"| {_cell(whose)} | {part['frames']} | {part['perfect']} | {said or 'nothing'} |")
     return lines
 
 

@@ -58,20 +58,26 @@ def quality_bits(constants: Mapping[str, Any]) -> dict[str, int]:
 def frame_quality(bags: Bags, names: Sequence[str] = ()) -> dict[str, Any]:
     """Count the frames of cameras, the perfect ones, and those with each quality bit; empty without frames.
 
+    Of several cameras also those of each, as `cameras`.
+
     Args:
         bags: Open bags of one flight.
         names: Of the cameras; all when empty.
     """
-    frames, perfect = 0, 0
+    found: dict[str, dict[str, Any]] = {}
     counts: Counter[str] = Counter()
     for camera in cameras(bags):
         if names and camera.name not in names:
             continue
         quality = bags.read(camera.frames, ["quality"])["quality"]
         bits = quality_bits(bags.constants(camera.frames))
-        counts.update({word: int(((quality & bit) != 0).sum()) for word, bit in bits.items()})
-        frames, perfect = frames + len(quality), perfect + int((quality == 0).sum())
-    return {"frames": frames, "perfect": perfect, "bits": dict(counts)} if frames else {}
+        own = {word: int(((quality & bit) != 0).sum()) for word, bit in bits.items()}
+        found[camera.name] = {"frames": len(quality), "perfect": int((quality == 0).sum()), "bits": own}
+        counts.update(own)
+    if not found:
+        return {}
+    total = {name: sum(part[name] for part in found.values()) for name in ("frames", "perfect")}
+    return {**total, "bits": dict(counts), **({"cameras": found} if len(found) > 1 else {})}
 
 
 def labels(bags: Bags, base: np.ndarray) -> dict[str, np.ndarray]:

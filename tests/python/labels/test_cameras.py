@@ -100,6 +100,9 @@ def test_coco_has_each_cameras_pictures_with_its_own_matrix_pose_and_runway(flig
 
 def test_one_instant_splits_all_cameras_also_when_one_is_exported(flight: Path, tmp_path: Path) -> None:
     rows = pd.read_csv(exported(flight, "yolo", tmp_path / "both") / "frames.csv")
+    card = (tmp_path / "both" / "README.md").read_text(encoding="utf-8")
+    for camera in ("camera", "belly"):
+        assert f"| flight, camera {camera} | {FRAMES} | {FRAMES} | nothing |" in card
     splits = rows.groupby("stamp_ns")["split"].nunique()
     assert len(rows) == 2 * FRAMES
     assert (splits == 1).all()
