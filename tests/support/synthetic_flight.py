@@ -6,6 +6,7 @@ climb 2 m/s, 60 m/s over ground, no wind. Every number in the bag follows from `
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import TYPE_CHECKING, Any, Mapping
 
@@ -31,14 +32,7 @@ class Definitions:
     """The package's messages and ROS's, as rosbags types, with the full text of each definition."""
 
     def __init__(self) -> None:
-        self.store = get_typestore(Stores.ROS1_NOETIC)
-        self._texts: dict[str, str] = {}
-        types: dict[str, Any] = {}
-        for file in sorted((share_dir() / "msg").glob("*.msg")):
-            name = f"{PACKAGE}/msg/{file.stem}"
-            self._texts[name] = file.read_text(encoding="utf-8")
-            types.update(get_types_from_msg(self._texts[name], name))
-        self.store.register(types)
+        self.store, self._texts = _parsed()
 
     def text(self, msgtype: str) -> str:
         """Give the definition as a recorder stores it: own text with comments, then all it depends on."""
@@ -94,6 +88,18 @@ class Definitions:
         if given is None:
             return np.zeros(size if kind == 3 else 0, dtype=dtype)
         return np.asarray(given, dtype=dtype)
+
+
+@functools.lru_cache(maxsize=None)
+def _parsed() -> tuple[Any, dict[str, str]]:
+    """All messages, and the texts of the package's own; once, because that takes longer than writing a bag."""
+    store, texts, types = get_typestore(Stores.ROS1_NOETIC), {}, {}
+    for file in sorted((share_dir() / "msg").glob("*.msg")):
+        name = f"{PACKAGE}/msg/{file.stem}"
+        texts[name] = file.read_text(encoding="utf-8")
+        types.update(get_types_from_msg(texts[name], name))
+    store.register(types)
+    return store, texts
 
 
 def _fields(store: Any) -> Any:

@@ -149,7 +149,6 @@ class Bags:
             raise BagError(msg)
         self._stack: Optional[ExitStack] = None
         self._files: list[BagFile] = []
-        self._definitions: dict[tuple[str, str], tuple[Types, Any]] = {}
 
     def __enter__(self) -> Bags:
         """Open all files."""
@@ -333,17 +332,11 @@ class Bags:
         return self._parsed(connection.topic, connection.msgtype, connection.definition)
 
     def _parsed(self, topic: str, msgtype: str, definition: str) -> tuple[Types, Any]:
-        key = (msgtype, definition)
-        if key not in self._definitions:
-            store = get_typestore(Stores.EMPTY)
-            try:
-                types = get_types_from_msg(definition, _type_name(msgtype))
-                store.register(types)
-            except (TypesysError, SyntaxError) as error:
-                msg = f"{topic}: the bag's definition of {msgtype} does not parse: {error}"
-                raise BagError(msg) from None
-            self._definitions[key] = (types, store)
-        return self._definitions[key]
+        try:
+            return _types_of(msgtype, definition)
+        except (TypesysError, SyntaxError) as error:
+            msg = f"{topic}: the bag's definition of {msgtype} does not parse: {error}"
+            raise BagError(msg) from None
 
     def _decode(
         self, connection: Connection, raws: list[bytes], columns: Optional[Sequence[str]]
@@ -359,6 +352,15 @@ class Bags:
             msg = f"{connection.topic}: a message does not fit its definition {connection.msgtype}: {error}"
             raise BagError(msg) from None
         return add_later_fields(connection.msgtype, len(raws), columns, found)
+
+
+@functools.lru_cache(maxsize=256)
+def _types_of(msgtype: str, definition: str) -> tuple[Types, Any]:
+    """A definition parsed, and the store that decodes it; kept, because programs open a flight's bag several times."""
+    store = get_typestore(Stores.EMPTY)
+    types = get_types_from_msg(definition, _type_name(msgtype))
+    store.register(types)
+    return types, store
 
 
 def _type_name(msgtype: str) -> str:
