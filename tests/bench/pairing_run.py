@@ -173,9 +173,11 @@ def fly(folder: Path, flight: Flight) -> None:
                     rospy.Subscriber(f"{place}/camera/frame_state", FrameState, recorder.on_state, queue_size=1000),
                 ]
             with contextlib.ExitStack() as running:
-                for node in [*nodes, *([eye(folder, emulator.port, receiver)] if sender else [])]:
+                eyes = [eye(folder, emulator.port, receiver)] if sender else []
+                for node in [*nodes, *eyes]:
                     running.enter_context(node)
-                if flight.calibrate:
+                given_up = [one.wait_for_line("delay: (not measured)?", _WARM_UP_S).group(1) for one in eyes]
+                if flight.calibrate or any(given_up):
                     calibrated()
                     recorders[0].clear()
                     delays = (math.inf, *delays[1:])  # measured, whatever it is

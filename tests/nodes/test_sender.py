@@ -161,11 +161,27 @@ def check_exact(pairs: list, at_least: int) -> None:
     assert len(perfect) >= at_least
 
 
+def calibrate(scene: Scene):
+    from std_srvs.srv import Trigger
+
+    return scene.world.call("capture_node/calibrate_display_delay", Trigger)
+
+
+def measure(scene: Scene) -> str:
+    """Has the delay measured, again where a busy machine has drawn too late; what is said of it."""
+    answers = [calibrate(scene)]
+    while not answers[-1].success and len(answers) < ATTEMPTS:
+        answers.append(calibrate(scene))
+    assert answers[-1].success, [answer.message for answer in answers]
+    return answers[-1].message
+
+
 def test_regular_frames_and_a_delay_of_three_periods_are_paired_exactly(scene: Scene) -> None:
     import cv2
 
     with scene.eye() as eye:
-        eye.wait_for_line(r"delay: (\d+\.\d) ms, from", 90.0)
+        if eye.wait_for_line(r"delay: (\d+\.\d ms, from|not measured)", 90.0).group(1) == "not measured":
+            measure(scene)
         scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
         scene.images.wait_for_count(80, timeout=60.0)
         jpegs, images = scene.jpegs.messages[-20:], {image.header.stamp: image for image in scene.images.messages}
@@ -223,12 +239,6 @@ def test_the_next_start_gives_the_field_of_view_back_after_a_kill(scene: Scene) 
         wait_until(lambda: not (scene.folder / "undo.json").exists(), WAIT_S, "the end of the note")
 
 
-def calibrate(scene: Scene):
-    from std_srvs.srv import Trigger
-
-    return scene.world.call("capture_node/calibrate_display_delay", Trigger)
-
-
 def test_the_delay_is_measured_on_request_without_a_restart_but_not_in_a_recording(scene: Scene) -> None:
     from xplane_bridge.msg import FrameState
 
@@ -253,12 +263,9 @@ def test_the_delay_is_measured_on_request_without_a_restart_but_not_in_a_recordi
             assert wire.read(FIELD_OF_VIEW) == USERS_DEG
             recording.close()
             wait_until(lambda: "records the pictures" not in calibrate(scene).message, 60.0, "the recorder's end")
-            answers = [calibrate(scene)]
-            while not answers[-1].success and len(answers) < ATTEMPTS:
-                answers.append(calibrate(scene))
-            assert answers[-1].success, [answer.message for answer in answers]
-            assert re.match(r"\d+\.\d ms, from \d+ steps that lie", answers[-1].message)
-            delay = float(answers[-1].message.split()[0]) * 1e-3
+            message = measure(scene)
+            assert re.match(r"\d+\.\d ms, from \d+ steps that lie", message)
+            delay = float(message.split()[0]) * 1e-3
             assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.025)
             sure = scene.states.wait_for_next(
                 lambda s: not s.quality & FrameState.QUALITY_DELAY_ASSUMED, timeout=WAIT_S

@@ -1,4 +1,4 @@
-"""An X-Plane of a few lines, whose ways of going wrong a test chooses: answers RREF on the loopback interface."""
+"""An X-Plane of a few lines, whose ways of going wrong a test chooses: answers RREF on loopback, and takes DREF."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class FakeXPlane:
     """Answers requests for datarefs while within ``with``.
 
     Args:
-        values: Datarefs it has; others are not answered.
+        values: Datarefs it has, which can be written; others are not answered.
         reply_from: IPv4 address its answers come from; empty: the one that was asked.
         time_step: Added to `sim/time/total_running_time_sec` with each datagram; 0: it stands still.
 
     Attributes:
         port: The UDP port it listens on, on 127.0.0.1.
         subscriptions: Datarefs of each client, by the client's index.
-        others: Datagrams that ask for anything else.
+        others: Datagrams that ask for anything else, those that write included.
     """
 
     TIME = "sim/time/total_running_time_sec"
@@ -68,6 +68,8 @@ class FakeXPlane:
         request = protocol.decode_request(datagram)
         if not isinstance(request, protocol.RrefRequest):
             self.others.append(datagram)
+            if isinstance(request, protocol.DrefWrite) and request.path in self._values:
+                self._values[request.path] = request.value
             return
         mine = self.subscriptions.setdefault(client, {})
         if request.rate_hz:

@@ -24,6 +24,8 @@ from xplane_bridge.eye.verify import Findings, Verification
 
 _LOOK_S = 0.02
 _CALIBRATE_AGAIN_S = 2.0
+#: Measurements of the delay that fail at the start, before pictures go out without it.
+_MEASUREMENTS = 3
 #: capture_node answers within so long, or is not there.
 _ANSWER_S = 3.0
 #: From here on neighbouring float32 numbers of simulator time are 8 ms apart: frames above 60/s share them.
@@ -228,7 +230,7 @@ class Eye:
             time.sleep(_LOOK_S)
 
     def _prepare(self) -> None:
-        """Measures the delay, where that is wanted; always gives back what a killed eye has left."""
+        """Measures the delay, where that is wanted and can be; always gives back what a killed eye has left."""
         self._screen.restore()
         reason = self._why_not_measured()
         if reason:
@@ -237,15 +239,24 @@ class Eye:
             self._delay_was_sure = self._options.delay_s is not None
             self._say(reason)
             return
-        while True:
+        failed = 0
+        while failed < _MEASUREMENTS:
+            self._wait_for(lambda: self._stream.alive, "waiting for X-Plane")
             self._wait_for(lambda: not self._grabber.problem, "waiting for X-Plane's window")
             try:
                 self._measure()
             except CalibrationError as error:
+                failed += not self._problem()  # one that the end of X-Plane or its window cut short says nothing
                 self._sender.report_problem(f"not calibrated: {error}")
                 time.sleep(_CALIBRATE_AGAIN_S)
                 continue
             return
+        self._delay_was_sure = False
+        self._say(
+            f"delay: not measured, as {failed} measurements have failed; X-Plane's field of view is left alone now. "
+            "Pictures are flagged DELAY_ASSUMED; --delay gives what is known, and capture_node's service "
+            "calibrate_display_delay measures anew"
+        )
 
     def _measure(self) -> str:
         """Measures the delay, which is used from then on; gives what there is to say of it.

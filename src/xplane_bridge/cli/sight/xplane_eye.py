@@ -54,7 +54,8 @@ def _parser() -> argparse.ArgumentParser:
         prog="xplane_eye",
         description="Sends the pictures of X-Plane's window, each with the frame it shows, to capture_node (source: "
         "sender) on another computer. Runs beside X-Plane; needs no ROS. At its start it measures the delay from a "
-        "frame to its picture by steps of X-Plane's field of view, which it gives back; start it before recording.",
+        "frame to its picture by steps of X-Plane's field of view, which it gives back; start it before recording. "
+        "After three measurements in vain it sends without, and flags each picture.",
     )
     parser.add_argument("receiver", nargs="?", type=_address, metavar="HOST:PORT", help="capture_node's sender/listen")
     parser.add_argument(

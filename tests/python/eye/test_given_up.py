@@ -1,0 +1,177 @@
+"""The eye at a window whose delay cannot be measured: it goes on without, and leaves X-Plane alone."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import threading
+from pathlib import Path
+from typing import Any, Callable, Iterator, List
+
+import numpy as np
+import pytest
+
+from support.fake_xplane import FakeXPlane
+from xplane_bridge import protocol
+from xplane_bridge.eye import calibrate, names, program
+from xplane_bridge.eye.calibrate import CalibrationError, Delay
+from xplane_bridge.eye.grab import Grabber
+from xplane_bridge.eye.pairing import Decision
+from xplane_bridge.eye.wire import DELAY_ASSUMED
+from xplane_bridge.harness import wait_until
+
+OWN_DEG = 71.0
+ENOUGH = 5  #: pictures
+LONGEST_S = 60.0
+
+
+class OwnView(Grabber):
+    """A window whose view stands still, whatever X-Plane's field of view."""
+
+    def run(self) -> None:
+        self.problem = ""
+        pixels = np.zeros((48, 64, 4), np.uint8)
+        while not self._stop.wait(0.05):
+            self._take(pixels, program.time.perf_counter_ns())
+
+
+class Receiver:
+    """Instead of a connection to `capture_node`; ends the program by Ctrl-C after some pictures."""
+
+    recorded = False
+    decisions: List[Decision]
+    problems: List[str]
+
+    def __init__(self, *_: object) -> None:
+        self.tried = threading.Event()
+        self.tried.set()
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def offer(self, decision: Decision) -> None:
+        self.decisions.append(decision)
+
+    def report_problem(self, problem: str) -> None:
+        self.problems.append(problem)
+
+    def take_request(self) -> int:
+        if len(self.decisions) >= ENOUGH:
+            raise KeyboardInterrupt
+        return 0
+
+
+class Run:
+    """The eye, with its parts played by the test."""
+
+    def __init__(self, xplane: FakeXPlane, folder: Path) -> None:
+        self.xplane = xplane
+        self.undo = folder / "undo.json"
+        self.said: List[str] = []
+        self.eye = program.Eye(
+            program.EyeOptions(
+                receiver=("127.0.0.1", 9),
+                xplane=("127.0.0.1", xplane.port),
+                titles=("X-Plane",),
+                window=None,
+                token="",
+                quality=90,
+                delay_s=None,
+                calibrate=True,
+                while_recorded=False,
+                local_port=0,
+                undo_file=self.undo,
+            ),
+            self.said.append,
+        )
+
+    def __call__(self) -> None:
+        limit = threading.Timer(LONGEST_S, os.kill, (os.getpid(), signal.SIGTERM))  # its run ends by that, too
+        limit.start()
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                self.eye.run()
+        finally:
+            limit.cancel()
+        assert len(Receiver.decisions) >= ENOUGH, self.said
+
+    def written(self) -> List[float]:
+        """Values of the field of view that X-Plane was sent."""
+        requests = map(protocol.decode_request, list(self.xplane.others))
+        return [request.value for request in requests if getattr(request, "path", "") == names.FIELD_OF_VIEW]
+
+
+@pytest.fixture
+def start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[Any], Run]]:
+    monkeypatch.setattr(calibrate, "_BETWEEN_S", (0.1, 0.12))
+    monkeypatch.setattr(calibrate, "_SETTLE_S", 0.1)
+    monkeypatch.setattr(program, "_CALIBRATE_AGAIN_S", 0.05)
+    monkeypatch.setattr(program, "Sender", Receiver)
+    monkeypatch.setattr(Receiver, "decisions", [], raising=False)
+    monkeypatch.setattr(Receiver, "problems", [], raising=False)
+    before = signal.getsignal(signal.SIGTERM)
+    with FakeXPlane({FakeXPlane.TIME: 100.0, names.FIELD_OF_VIEW: OWN_DEG}) as xplane:
+
+        def make(grabber: Any) -> Run:
+            monkeypatch.setattr(program, "grabber_class", lambda: grabber)
+            return Run(xplane, tmp_path)
+
+        yield make
+    signal.signal(signal.SIGTERM, before)
+
+
+def test_after_three_measurements_that_failed_flagged_pictures_go_out(start: Callable[[Any], Run]):
+    run = start(OwnView)
+    run()
+    assert sum(line.startswith("calibrating") for line in run.said) == 3
+    reasons = [line for line in run.said if line.startswith("not calibrated")]
+    assert len(reasons) == 3
+    assert re.search(r"only 0 of \d+ steps .* field of view of its own does not: give --delay", reasons[-1])
+    assert "delay: not measured, as 3 measurements have failed" in run.said[-1]
+    assert "--delay gives what is known" in run.said[-1]
+    assert all(decision.flags & DELAY_ASSUMED for decision in Receiver.decisions)
+    assert all(decision.delay_s == 0.0 for decision in Receiver.decisions)
+    wait_until(lambda: run.written()[-1:] == [OWN_DEG], 10.0, "the user's field of view")
+    assert OWN_DEG + 8.0 in run.written()
+    assert not run.undo.exists()
+    assert Receiver.problems[-1] == ""
+
+
+class Vanishing(OwnView):
+    """A window that is found to be gone once after each time that `gone` is set."""
+
+    gone = False
+
+    @property
+    def problem(self) -> str:
+        was, Vanishing.gone = Vanishing.gone, False
+        return "the window is minimised" if was else ""
+
+    @problem.setter
+    def problem(self, _: str) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("cut_short", "own_faults", "measured"), [(5, 2, True), (2, 3, False)])
+def test_measurements_that_a_lost_window_cuts_short_do_not_count(
+    start: Callable[[Any], Run], monkeypatch: pytest.MonkeyPatch, cut_short: int, own_faults: int, measured: bool
+):
+    left = [True] * cut_short + [False] * own_faults
+
+    def measure(_: calibrate.Calibration) -> Delay:
+        if not left:
+            return Delay(0.02, 10, 0.0)
+        Vanishing.gone = left.pop(0)
+        raise CalibrationError("nothing was seen")
+
+    monkeypatch.setattr(calibrate.Calibration, "run", measure)
+    run = start(Vanishing)
+    run()
+    assert left == []
+    outcome = next(line for line in run.said if line.startswith("delay"))
+    assert outcome.startswith("delay: 20.0 ms" if measured else "delay: not measured")
+    assert bool(Receiver.decisions[-1].flags & DELAY_ASSUMED) != measured
