@@ -1,6 +1,7 @@
 // The steps of the light twin between two frames, for FixedWing (emulator/aircraft/fixed_wing): reads surfaces,
 // engines, propellers and gusts from the Python objects, steps them with JSBSim through its own getters, setters and
-// `run`, and writes them back. The order of every reading, writing and operation is the Python code's.
+// `run`, and writes them back. The order of every writing and operation is the Python code's; of the readings, a height
+// is kept until the next `run`, because it costs JSBSim ten times another value.
 #include "xplane_bridge/bindings/twin_mirrors.hpp"
 
 #include <algorithm>
@@ -139,6 +140,7 @@ class Loop {
     gear_position_ = number(attribute(attribute(model, "_gear").get(), "position").get());
     fdm_step_ = number(attribute(model, "_fdm_step").get());
     crashed_ = PyObject_IsTrue(attribute(model, "_crashed").get()) == 1;
+    height_m_ = call(agl_) * kFoot;
     blown_ = false;
   }
 
@@ -173,8 +175,8 @@ class Loop {
 
   void updateGusts(double dt) {
     const double heading = call(heading_);
-    const double speed = call(airspeed_) * kFoot, agl = call(agl_) * kFoot;
-    const Dryden::Gusts g = turbulence_.dryden.step(dt, speed, agl, [this] { return turbulence_.gauss(); });
+    const double speed = call(airspeed_) * kFoot;
+    const Dryden::Gusts g = turbulence_.dryden.step(dt, speed, height_m_, [this] { return turbulence_.gauss(); });
     const double sine = std::sin(heading), cosine = std::cos(heading);
     gusts_ = {g.along * cosine - g.across * sine, g.along * sine + g.across * cosine, g.down};
     blown_ = true;
@@ -218,15 +220,17 @@ class Loop {
     if (turbulence_.dryden.intensity_mps > 0.0) updateGusts(dt);
     advance(dt, orders, throttles);
     applyLoads();
-    const int runs = call(agl_) * kFoot > contact_height_ ? 1 : contact_runs_;
+    const int runs = height_m_ > contact_height_ ? 1 : contact_runs_;
     if (std::fabs(dt / runs - fdm_step_) > 1e-12) {
       fdm_step_ = dt / runs;
       call(set_dt_, fdm_step_);
     }
-    const bool tilted = std::cos(call(roll_)) * std::cos(call(pitch_)) < kStrutsWorkCosine;
-    call(gear_, tilted && call(agl_) * kFoot < kCrashWatch ? 0.0 : gear_position_);
+    const bool tilted_near_ground =
+        height_m_ < kCrashWatch && std::cos(call(roll_)) * std::cos(call(pitch_)) < kStrutsWorkCosine;
+    call(gear_, tilted_near_ground ? 0.0 : gear_position_);
     for (int i = 0; i < runs; ++i) Object(PyObject_CallObject(run_.get(), nullptr));
-    if (call(agl_) * kFoot < kCrashWatch && !crashed_) {
+    height_m_ = call(agl_) * kFoot;
+    if (height_m_ < kCrashWatch && !crashed_) {
       const Object hit(PyObject_CallObject(hit_.get(), nullptr));
       crashed_ = PyObject_IsTrue(hit.get()) == 1;
     }
@@ -248,7 +252,7 @@ class Loop {
   TurbulenceMirror turbulence_;
   std::vector<double> fuel_;
   std::array<double, 3> steady_wind_{}, gusts_{}, gravity_{};
-  double gear_position_ = 0.0, fdm_step_ = 0.0;
+  double gear_position_ = 0.0, fdm_step_ = 0.0, height_m_ = 0.0;
   bool crashed_ = false, blown_ = false;
 };
 

@@ -5,6 +5,7 @@
 #include "xplane_bridge/bindings/python_object.hpp"
 
 #include <cmath>
+#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -23,6 +24,7 @@ inline void call(const Object& setter, double value) {
 struct Field {
   Object name;
   double* value;
+  double read = 0.0;  // what Python's object has
 };
 
 /// A Python object and the numbers that it shares with a C++ one.
@@ -31,11 +33,16 @@ struct Mirror {
   std::vector<Field> fields;
 
   void add(const char* name, double& value) { fields.push_back({Object(PyUnicode_InternFromString(name)), &value}); }
-  void read() const {
-    for (const Field& field : fields) *field.value = number(attribute(object.get(), field.name.get()).get());
+  void read() {
+    for (Field& field : fields) {
+      field.read = number(attribute(object.get(), field.name.get()).get());
+      *field.value = field.read;
+    }
   }
+  /// To be called after `read`: writes what has changed since.
   void write() const {
     for (const Field& field : fields) {
+      if (std::memcmp(&field.read, field.value, sizeof field.read) == 0) continue;
       check(PyObject_SetAttr(object.get(), field.name.get(), makeNumber(*field.value).get()));
     }
   }
