@@ -24,10 +24,12 @@ NOT_COMPARED = {"/diagnostics"}
 RUNS = int(os.environ.get("LOCKSTEP_RUNS", "2"))
 #: Latched, and of several publishers, whose order is not promised.
 OF_SEVERAL = {"/tf_static"}
-#: In the last of the shaken flights one of these stands still for so long [s]; not the recorder: its queues are short.
+#: In the last of the shaken flights one of these stands still for so long [s], and then the recorder.
 STALL_S = 12.0
+RECORDER_STALL_S = 3.0  # far more than rosbag's queue of 100 messages, where the flight does not wait
 FLIES_BYTES = 20_000  # of the truth file, which grows by some hundred a frame
 STALLED = ("rx_node", "tx_node", "capture_node", "joystick_mapper")
+RECORDER = "lockstep_record"  # as long as /proc gives names
 LAST_SHAKEN = RUNS - 1 if RUNS % 2 == 0 else RUNS - 2
 SCENARIO = """
 name: lockstep
@@ -93,10 +95,10 @@ def shake(flying: subprocess.Popen, seed: int, truth: Path) -> None:
             pids = children_of(flying.pid)
             if stalls and truth.is_file() and truth.stat().st_size > FLIES_BYTES:
                 stalls = False
-                name = dice.choice(STALLED)
-                named = [pid for pid in pids if Path(f"/proc/{pid}/comm").read_text().startswith(name)]
-                print(f"{name} stands still")
-                stop_for(min(named), STALL_S)  # tx_node's guardian is its child
+                for name, time_s in ((dice.choice(STALLED), STALL_S), (RECORDER, RECORDER_STALL_S)):
+                    named = [pid for pid in pids if Path(f"/proc/{pid}/comm").read_text().startswith(name)]
+                    print(f"{name} stands still")
+                    stop_for(min(named), time_s)  # tx_node's guardian is its child
             elif pids:
                 stop_for(dice.choice(pids), dice.uniform(0.0, 0.1))
             time.sleep(dice.uniform(0.0, 0.1))

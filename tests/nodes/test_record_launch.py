@@ -58,3 +58,31 @@ def test_a_recording_that_does_not_want_states_has_no_watch(world):
     with launch:
         launch.wait_for_line(r"process\[.*record-\d+\]: started", 60)
     assert "record_watch" not in launch.output()
+
+
+def test_the_recorder_of_lockstep_takes_the_arguments_of_the_other_and_answers(world):
+    import rosbag
+    import rospy
+    from std_msgs.msg import Header
+    from xplane_bridge.msg import FlightState
+
+    answers = []
+    listening = rospy.Subscriber(
+        f"{world.namespace}/lockstep/done", Header, lambda header: answers.append(header.stamp)
+    )
+    publisher = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1, latch=True)
+    state = FlightState(frame_count=7)
+    state.header.stamp = rospy.Time(12, 345)
+    publisher.publish(state)
+    arguments = {"ns": world.namespace.strip("/"), "prefix": world.folder / "steps", "compression": "lz4"}
+    launch = roslaunch(world.master, world.folder, "record.launch", lockstep=True, topics="flight_state", **arguments)
+    with launch:
+        wait_until(lambda: answers, 60.0, "answer of the recorder to a frame")
+    publisher.unregister()
+    listening.unregister()
+    assert answers == [state.header.stamp]
+    (file,) = world.folder.glob("steps_20??-??-??-??-??-??.bag")
+    with rosbag.Bag(str(file)) as bag:
+        assert bag.get_compression_info().compression == "lz4"
+        ((topic, message, _),) = bag.read_messages()
+    assert (topic, message.frame_count) == (f"{world.namespace}/flight_state", 7)

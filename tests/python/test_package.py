@@ -159,6 +159,7 @@ MAY_USE_HOST_TIME = {
         "waits for the master before there is a node, and for roscpp to send the last words",
         {"sleep_for"},
     ),
+    "lib/nodes/recorder/lockstep_recorder.cpp": ("names a file by the date, as rosbag does", {"time(nullptr)"}),
     "include/xplane_bridge/nodes/tx/tx_node.hpp": ("shows its guardian that it runs", {"SteadyTimer"}),
     "lib/nodes/tx/tx_guard.cpp": ("the same, also while the node's clock stands", {"createSteadyTimer"}),
     "lib/actuation/guardian.cpp": ("a process of its own: releases whatever clock the node had", {"hostClock("}),

@@ -124,7 +124,7 @@ CHECKS: Dict[str, Check] = {
     **dict.fromkeys(("display_delay", "max_publish_rate", "image_rate", "heading", "pitch", "roll"), _number),
     "field_of_view": _field_of_view,
     **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
-    **dict.fromkeys(("set_points", "engage"), _flag),
+    **dict.fromkeys(("set_points", "engage", "lockstep"), _flag),
     "compression": _one_of("none", "lz4", "bz2"),
     "joystick": _joystick,
     "joy_config": _joy_config,

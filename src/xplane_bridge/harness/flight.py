@@ -112,15 +112,17 @@ def fly(
         say("starting the emulator")
         options = ["--aircraft", plan.aircraft, "--truth", str(plan.truth.resolve()), *plan.emulator_options]
         launch_args = dict(plan.launch_args)
-        if plan.lockstep is not None:
-            options += plan.lockstep.emulator_options()
-            launch_args["common_config"] = stack.enter_context(plan.lockstep.common_config())
+        lockstep = None if plan.lockstep is None else plan.lockstep.recorded()
+        if lockstep is not None:
+            options += lockstep.emulator_options()
+            launch_args["common_config"] = stack.enter_context(lockstep.common_config())
+            launch_args["lockstep"] = True
         emulator = EmulatorProcess(plan.logs, options, command=plan.emulator_command)
         stack.enter_context(emulator)
         say(f"starting ROS and the bridge (X-Plane's port: {emulator.port})")
         master = RosMaster(plan.logs)
         stack.enter_context(master)
-        if plan.lockstep is not None:
+        if lockstep is not None:
             master.set_param("/use_sim_time", True)
         if plan.experiment:
             master.set_param(f"{NAMESPACE}/experiment/flight", plan.experiment)
@@ -140,8 +142,8 @@ def fly(
         )
         stack.enter_context(bridge)
         flight = RunningFlight(emulator, master, bridge)
-        stack.enter_context(_StateListener(flight, plan.lockstep is not None))
-        if plan.lockstep is None:
+        stack.enter_context(_StateListener(flight, lockstep is not None))
+        if lockstep is None:
             _wait_for_state(flight)
         else:
             wait_for_bridge(flight)
@@ -150,13 +152,13 @@ def fly(
             stack.enter_context(flight.programs[name])
             if name in plan.ready:
                 flight.programs[name].wait_for_line(plan.ready[name], _READY_TIMEOUT_S)
-            elif name == plan.controller and plan.lockstep is None:
+            elif name == plan.controller and lockstep is None:
                 _wait_for_controller(flight, flight.programs[name])
         say(f"flying; to watch, in a second shell: export ROS_MASTER_URI={master.uri}")
-        if plan.lockstep is None:
+        if lockstep is None:
             _record(plan, flight, observer)
         else:
-            say(_fly_in_lockstep(plan, plan.lockstep, flight, observer))
+            say(_fly_in_lockstep(plan, lockstep, flight, observer))
         say("ending the recording")
         bridge.stop()  # first: the recording is not to show a stick that has fallen silent
         if bridge.returncode != 0:

@@ -8,7 +8,7 @@ import tempfile
 import threading
 import time
 import xmlrpc.client
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Dict, Iterator, List
 
@@ -18,6 +18,9 @@ from xplane_bridge.harness.processes import HarnessError, wait_until
 from xplane_bridge.harness.running_flight import RunningFlight
 from xplane_bridge.resources import config_file
 from xplane_bridge.topics import NAMESPACE
+
+#: Name of the recorder's node, which answers every frame of a recorded flight.
+RECORDER = "record"
 
 _CONNECTED_TIMEOUT_S = 60.0
 _PLAYER_ENDS_S = 30.0
@@ -35,6 +38,10 @@ class Lockstep:
     speed: float = 0.0  #: times real time at most; 0: as fast as it goes
     fps: float = 60.0  #: frames per simulated second
     options: Dict[str, Any] = field(default_factory=dict)  #: further ones of the section `lockstep`
+
+    def recorded(self) -> Lockstep:
+        """The same with a recorder that the flight waits for (record.launch, `lockstep:=true`)."""
+        return replace(self, participants=[*self.participants, RECORDER])
 
     def emulator_options(self) -> List[str]:
         """Options of xplane_emulator."""
@@ -126,7 +133,7 @@ class LockstepRun:
         if absent:
             return f"lockstep/done of {', '.join(absent)}"
         writing = self._flight.master.ros_home / f"{self._recording}.active"
-        if not (any(node.endswith("/record") for node in listening) and writing.is_file()):
+        if not (any(node.endswith(f"/{RECORDER}") for node in listening) and writing.is_file()):
             return "the recorder"
         return ", ".join(f"{topic} from {a} to {b}" for topic, a, b in sorted(graph.unconnected()))
 
@@ -171,7 +178,7 @@ class LockstepRun:
             states = self._flight.states
             time.sleep(_QUIET_S)
         # Before the bridge, which lets the simulator go when it ends.
-        self._flight.master.end_node(f"{NAMESPACE}/record")
+        self._flight.master.end_node(f"{NAMESPACE}/{RECORDER}")
         recording = self._flight.master.ros_home / self._recording
         wait_until(recording.is_file, _RECORDED_S, f"end of the recording {recording}")
         sim = self._answer.sim_time

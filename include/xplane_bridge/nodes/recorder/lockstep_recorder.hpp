@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <ros/ros.h>
+#include <rosbag/bag.h>
+#include <topic_tools/shape_shifter.h>
+
+#include "xplane_bridge/FlightState.h"
+
+namespace xplane_bridge {
+
+/// What `lockstep_recorder` is to do.
+struct LockstepRecording {
+  std::string bag;  ///< file to write; `<file>.active` until it is complete
+  rosbag::CompressionType compression = rosbag::compression::Uncompressed;
+  std::uint32_t chunk_size = 768 * 1024;  ///< [bytes] of messages until they are compressed and written
+  std::vector<std::string> topics;        ///< absolute names
+  std::string bridge = "/xplane";         ///< namespace of the bridge
+
+  /// Reads `--output-name=FILE` or `--output-prefix=START` (and the date), `--lz4`, `--bz2`, `--chunksize=KB` and
+  /// topics, as `rosbag record` takes them, and `--bridge=NAMESPACE`.
+  /// @throws std::invalid_argument an option that it does not know, no file, no topic
+  static LockstepRecording parse(const std::vector<std::string>& arguments);
+};
+
+/// Records topics of a flight in lock-step and answers each frame, so that the flight waits for a recorder that is slow
+/// or stands: `rosbag record`, which the flight does not wait for, drops what exceeds 100 waiting messages of a topic.
+/// Times of receipt are the simulator's (`use_sim_time`).
+class LockstepRecorder {
+ public:
+  /// Opens the file and subscribes. @throws rosbag::BagException the file cannot be written
+  LockstepRecorder(const LockstepRecording& recording, const ros::NodeHandle& handle);
+  LockstepRecorder(const LockstepRecorder&) = delete;
+  LockstepRecorder& operator=(const LockstepRecorder&) = delete;
+
+  /// Completes the file. To be called when no callback runs any more. @throws rosbag::BagException it cannot be written
+  void finish();
+
+ private:
+  using Event = ros::MessageEvent<const topic_tools::ShapeShifter>;
+
+  void write(const std::string& topic, const Event& event);
+  void answer(const FlightState& state) const;
+
+  const std::string file_;
+  rosbag::Bag bag_;
+  ros::Publisher done_;
+  std::vector<ros::Subscriber> subscribers_;
+};
+
+}  // namespace xplane_bridge
