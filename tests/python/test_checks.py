@@ -54,3 +54,19 @@ def test_the_workflow_runs_the_command_of_the_readme_on_both_systems():
         assert commands[-1] == "scripts/test ${{ github.event_name == 'schedule' && '--full' || '' }}", name
         assert re.search(r"^scripts/test +# every check", readme, re.MULTILINE)
         assert job["runs-on"] == "ubuntu-latest", f"{name}: a public runner"
+
+
+def test_what_runs_side_by_side_is_shown_in_order_and_a_failure_among_it_counts():
+    function = re.search(r"^side_by_side\(\) \{$.*?^\}$", TEST, re.MULTILINE | re.DOTALL).group(0)
+    script = f"""set -uo pipefail
+root=here results= programs= expression=
+roslaunch_check() {{ :; }}
+{function}
+say() {{ [ "$1" != a/slow ] || sleep 0.3; echo "$1 of $root"; [ "$1" != a/bad ]; }}
+end() {{ kill -ABRT "$BASHPID"; }}
+side_by_side say a/slow "a/with space" a/3 && echo good
+side_by_side say a/slow a/bad a/3 || echo failed
+side_by_side end a/1 a/2 || echo failed"""
+    done = subprocess.run(["bash", "-c", script], stdout=subprocess.PIPE, text=True, check=True)
+    said = ["a/slow of here", "a/with space of here", "a/3 of here", "good"]
+    assert done.stdout.splitlines() == [*said, "a/slow of here", "a/bad of here", "a/3 of here", "failed", "failed"]
