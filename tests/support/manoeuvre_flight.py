@@ -12,7 +12,7 @@ from support.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Table
 from xplane_bridge.bags.flight import Flight
 from xplane_bridge.emulator.aircraft import create_model
-from xplane_bridge.emulator.flight.flight_model import FlightModel, InitialState, ModelState
+from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, InitialState, ModelState
 from xplane_bridge.scenario import excitations
 
 if TYPE_CHECKING:
@@ -77,6 +77,53 @@ class Recording:
         return path
 
 
+class Film:
+    """A flight model that flies a flight once and then shows it: for flights that differ by the sensors' noise alone.
+
+    Args:
+        model: That flies; in calm air and without a controller in the loop, so that each flight is the same.
+    """
+
+    def __init__(self, model: FlightModel) -> None:
+        self._model = model
+        self._trims: list[Controls] = []
+        self._states: list[ModelState] = []
+        self._resets = self._shown = 0
+
+    def again(self) -> Film:
+        """From the start."""
+        self._resets = self._shown = 0
+        return self
+
+    @property
+    def state(self) -> ModelState:
+        """As the model has it."""
+        return self._states[self._shown - 1]
+
+    def set_turbulence(self, strength: float) -> None:
+        """Takes calm air."""
+        assert strength == 0.0
+
+    def reset(self, initial: InitialState) -> Controls:
+        """As the model does it."""
+        self._resets += 1
+        if self._resets > len(self._trims):
+            self._trims.append(self._model.reset(initial).copy())
+        self._show()
+        return self._trims[self._resets - 1].copy()
+
+    def step(self, dt: float, controls: Controls) -> None:
+        """As the model does it."""
+        if self._shown == len(self._states):
+            self._model.step(dt, controls)
+        self._show()
+
+    def _show(self) -> None:
+        self._shown += 1
+        if self._shown > len(self._states):
+            self._states.append(self._model.state.copy())
+
+
 class Pilot:
     """Flies manoeuvres one after the other, each from the same trimmed flight, in one recording.
 
@@ -92,7 +139,7 @@ class Pilot:
 
     def __init__(
         self,
-        model: FlightModel | None = None,
+        model: FlightModel | Film | None = None,
         turbulence: float = 0.0,
         noise: float = 0.0,
         seed: int = 0,

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from support.manoeuvre_flight import LATERAL, PITCH, Manoeuvre, Recording, flown
+from support.manoeuvre_flight import LATERAL, PITCH, Film, Manoeuvre, Recording, flown
 from xplane_bridge.bags.flight import Flight
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight import jsbsim_model
@@ -136,8 +136,17 @@ def test_an_elevator_of_20_percent_less_is_found(
 
 def coverage(twin: FlightModel, truth: LinearModel, seeds: range) -> np.ndarray:
     """Share of the flights in which the intervals of Cm_alpha and of Cm_q hold the true values."""
-    results = (longitudinal(flown(SMALL, model=twin, noise=1.0, seed=seed)) for seed in seeds)
+    film = Film(twin)
+    results = (longitudinal(flown(SMALL, model=film.again(), noise=1.0, seed=seed)) for seed in seeds)
     return np.mean([covers(result, truth) for result in results], axis=0)
+
+
+def test_a_film_shows_what_the_model_flies(twin: FlightModel) -> None:
+    film = Film(twin)
+    for seed in (1, 2):
+        shown, flew = (flown(SMALL, model=model, noise=1.0, seed=seed) for model in (film.again(), twin))
+        assert shown.state == flew.state
+        assert shown.surfaces == flew.surfaces
 
 
 def test_intervals_cover_the_truth(twin: FlightModel, truth: LinearModel) -> None:
