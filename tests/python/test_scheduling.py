@@ -1,4 +1,4 @@
-"""Node tests side by side: the long ones begin, each by itself, and the others stay with their file."""
+"""Tests side by side: the long ones begin, each by itself or with its file, and the others stay with their file."""
 
 from __future__ import annotations
 
@@ -6,28 +6,33 @@ import ast
 import re
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
 
 from support.room_table import ROOT
 
-NODES = ROOT / "tests" / "nodes"
+FOLDERS = [ROOT / "tests" / name for name in ("nodes", "python")]
 
 
-def names() -> list[str]:
-    """LONG of the node tests' conftest, which only a run of them can import."""
-    text = (NODES / "conftest.py").read_text(encoding="utf-8")
+def names(folder: Path) -> list[str]:
+    """LONG of a folder's conftest, which only a run of its tests can import."""
+    text = (folder / "conftest.py").read_text(encoding="utf-8")
     return list(ast.literal_eval(re.search(r"^LONG = (\(.*?^\))", text, re.MULTILINE | re.DOTALL).group(1)))
 
 
-def test_every_long_test_is_there():
-    for name in names():
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_every_long_test_is_there(folder):
+    for name in names(folder):
         file, _, test = name.partition("::")
-        assert re.search(rf"^def {test or 'test_'}", (NODES / file).read_text(encoding="utf-8"), re.MULTILINE), name
+        assert re.search(rf"^def {test or 'test_'}", (folder / file).read_text(encoding="utf-8"), re.MULTILINE), name
 
 
-def test_no_long_test_shares_what_its_file_makes_once():
-    for name in names():
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_no_test_by_itself_shares_what_its_file_makes_for_several(folder):
+    for name in (name for name in names(folder) if "::" in name):
         file, _, test = name.partition("::")
-        text = (NODES / file).read_text(encoding="utf-8")
+        text = (folder / file).read_text(encoding="utf-8")
         made = re.findall(r'^@pytest\.fixture\(scope="module".*\)\ndef (?:fixture_)?(\w+)', text, re.MULTILINE)
         for arguments in re.findall(rf"^def {test or 'test_'}\w*\((.*?)\)", text, re.MULTILINE | re.DOTALL):
             assert not set(made) & set(re.findall(r"\w+", arguments)), name
@@ -37,7 +42,7 @@ CONFTEST = """
 import pathlib, sys
 sys.path.insert(0, {tests!r})
 from support.scheduling import long_ones_first, rank
-LONG = ("test_b.py::test_slow", "test_a.py::test_slow")
+LONG = ("test_b.py::test_slow", "test_a.py::test_slow", "test_d.py")
 
 def pytest_xdist_make_scheduler(config, log):
     return long_ones_first(config, log, LONG)
@@ -65,16 +70,17 @@ def test_long_ones_begin_and_the_others_stay_with_their_file(tmp_path):
     folder.mkdir()
     log = tmp_path / "log"
     (folder / "conftest.py").write_text(CONFTEST.format(tests=str(ROOT / "tests"), log=str(log)), encoding="utf-8")
-    for name in "abc":
-        text = FILE if name != "c" else FILE[: FILE.index("def test_slow_1")]
+    for name in "abcd":
+        text = FILE if name in "ab" else FILE[: FILE.index("def test_slow_1")]
         (folder / f"test_{name}.py").write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "pytest", "-q", "--numprocesses", "2", "--dist", "loadfile", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     begun = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
-    assert len(begun) == 13
+    assert len(begun) == 16
     assert sorted(test for test, _ in begun[:2]) == [f"side_by_side/test_b.py::test_slow_{k}" for k in (1, 2)]
     assert len({process for _, process in begun[:2]}) == 2, "both at once"
-    for name in "abc":
+    assert max(k for k, (test, _) in enumerate(begun) if "test_d" in test) < len(begun) - 3
+    for name in "abcd":
         others = {process for test, process in begun if f"test_{name}.py" in test and "slow" not in test}
         assert len(others) == 1, begun

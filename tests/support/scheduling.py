@@ -14,13 +14,13 @@ def rank(nodeid: str, long: Sequence[str]) -> int:
 
     Args:
         nodeid: The test's.
-        long: Files and beginnings of tests' names, e.g. "test_flights.py::" for all tests of that file.
+        long: Files, which stay whole, and tests by file and beginning, e.g. "test_flights.py::" for all of that file.
     """
     return next((number for number, name in enumerate(long) if f"/{name}" in nodeid), len(long))
 
 
 def long_ones_first(config: Any, log: Any, long: Sequence[str]) -> Any:
-    """A scheduler that gives each test with one of these names to a process by itself, and the others by file.
+    """A scheduler that gives each test whose name is among these to a process by itself, and the others by file.
 
     Args:
         config: pytest's.
@@ -31,7 +31,7 @@ def long_ones_first(config: Any, log: Any, long: Sequence[str]) -> Any:
 
     class LongOnesFirst(LoadFileScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            scope: str = nodeid if rank(nodeid, long) < len(long) else super()._split_scope(nodeid)
+            scope: str = nodeid if "::" in [*long, ""][rank(nodeid, long)] else super()._split_scope(nodeid)
             return scope
 
     config.option.loadscopereorder = False  # before pytest-xdist 3.7, files of many tests still come first
