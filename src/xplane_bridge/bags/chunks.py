@@ -149,17 +149,38 @@ class BagFile:
             DamagedError: A chunk cannot be read.
         """
         chosen = [(id_, self._index[id_]) for id_ in ids]
-        if not chosen:
-            return
-        time, chunk, offset = (np.concatenate([index[k] for _, index in chosen]) for k in range(3))
-        owner = np.repeat([id_ for id_, _ in chosen], [len(index.time) for _, index in chosen])
         if spans is not None:
-            inside = np.zeros(len(time), dtype=bool)
-            for first, last in spans:
-                inside |= (time >= first) & (time <= last)
-            time, chunk, offset, owner = (values[inside] for values in (time, chunk, offset, owner))
-        for k in np.lexsort((offset, chunk, time)):
-            yield int(owner[k]), int(time[k]), _message(self._data(int(chunk[k])), int(offset[k]))
+            chosen = [(id_, _within(index, spans)) for id_, index in chosen]
+        for time, chunk, offset, owner in self._in_order(chosen):
+            for k in np.lexsort((offset, chunk, time)):
+                yield int(owner[k]), int(time[k]), _message(self._data(int(chunk[k])), int(offset[k]))
+
+    def _in_order(self, chosen: List[Tuple[int, _Index]]) -> Iterator[Tuple[np.ndarray, ...]]:
+        """Entries of several connections, some at a time: none is earlier than those that were given before.
+
+        Yields:
+            Receive times [ns], numbers of chunks, offsets, connections; in any order.
+        """
+        never = np.iinfo(np.int64).max
+        earliest = np.full(len(self._chunks), never)
+        edges = []  # of each: where the entries of each chunk begin
+        for _, index in chosen:
+            edges.append(np.searchsorted(index.chunk, np.arange(len(self._chunks) + 1)).astype(np.uint32))
+            np.minimum.at(earliest, index.chunk, index.time)
+        order = np.argsort(earliest, kind="stable")
+        order = order[earliest[order] < never]
+        waiting: Tuple[np.ndarray, ...] = tuple(np.empty(0, kind) for kind in (np.int64, np.uint32, np.uint32, int))
+        for place, number in enumerate(order):
+            parts = [waiting]
+            for (id_, index), edge in zip(chosen, edges):
+                first, end = int(edge[number]), int(edge[number + 1])
+                if end > first:
+                    parts.append((*(column[first:end] for column in index), np.full(end - first, id_)))
+            waiting = tuple(np.concatenate(columns) for columns in zip(*parts))
+            following = earliest[order[place + 1]] if place + 1 < len(order) else never
+            due = waiting[0] < following
+            yield tuple(column[due] for column in waiting)
+            waiting = tuple(column[~due] for column in waiting)
 
     # ---------------------------------------------------------------------------------------------------- opening
 
@@ -313,6 +334,14 @@ class BagFile:
         if len(data) != count:
             raise DamagedError("it ends in the middle of a record")
         return data
+
+
+def _within(index: _Index, spans: Sequence[Tuple[int, int]]) -> _Index:
+    """The messages received in one of these spans [ns], both ends included."""
+    inside = np.zeros(len(index.time), dtype=bool)
+    for first, last in spans:
+        inside |= (index.time >= first) & (index.time <= last)
+    return _Index(*(column[inside] for column in index))
 
 
 def _message(data: bytes, at: int) -> bytes:

@@ -148,6 +148,22 @@ def test_messages_of_some_spans_come_alone_and_the_rest_is_not_read(tmp_path: Pa
         assert [message.x for _, message in bags.messages("/s", [(2020, 2030)])] == [201.5, 202.5]
 
 
+def test_messages_of_all_topics_come_in_order_of_time_whatever_chunk_they_are_in(tmp_path: Path) -> None:
+    times = [9, 30, 31, 32, 1, 9, 40, 5, 3, 9, 3, 2, 8, 50, 41]
+    path = tmp_path / "a.bag"
+    writer = Writer(path)
+    writer.chunk_threshold = 100  # bytes: few messages
+    with writer:
+        to = [writer.add_connection(f"/{name}", "pkg/msg/N", msgdef="uint32 n\n", md5sum=MD5) for name in "ab"]
+        for k, time in enumerate(times):
+            writer.write(to[k % 2], time, struct.pack("<I", k))
+    for topics in ((), ("/a",), ("/b",)):
+        with Bags(path) as bags:
+            seen = [(time, struct.unpack("<I", raw)[0]) for _, time, raw in bags.recorded(topics)]
+        wanted = [(time, k) for k, time in enumerate(times) if not topics or topics == (f"/{'ab'[k % 2]}",)]
+        assert seen == sorted(wanted)
+
+
 def test_mixed_versions_read_each_by_its_own_definition(tmp_path: Path) -> None:
     write(tmp_path / "old.bag", [("/v", "pkg/msg/V", "float64 a\n", [(1, struct.pack("<d", 1.25))])])
     write(tmp_path / "new.bag", [("/v", "pkg/msg/V", "float64 a\nuint8 b\n", [(2, struct.pack("<dB", 2.5, 9))])])
