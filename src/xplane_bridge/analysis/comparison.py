@@ -134,8 +134,9 @@ def mean_interval(samples: np.ndarray) -> Interval:
     if count < _FEWEST_BLOCKS:
         return _UNKNOWN
     means = samples[: count * block].reshape(count, block).mean(axis=1)
-    drawn = np.random.default_rng(0).integers(0, count, size=(_RESAMPLES, count))  # the same page each time
-    low, high = np.quantile(means[drawn].mean(axis=1), (0.025, 0.975))
+    random = np.random.default_rng(0)  # the same page each time
+    drawn = np.array([means[random.integers(0, count, size=count)].mean() for _ in range(_RESAMPLES)])
+    low, high = np.quantile(drawn, (0.025, 0.975))
     return Interval(float(low), float(high))
 
 

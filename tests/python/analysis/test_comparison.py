@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -73,6 +74,16 @@ def test_a_flight_too_short_for_its_memory_has_no_interval():
     assert math.isnan(mean_interval(np.linspace(0.0, 1.0, 100)).low)
     assert math.isnan(mean_interval(np.empty(0)).low)
     assert mean_interval(np.full(10, 2.0)) == (2.0, 2.0)
+
+
+def test_the_interval_of_an_hour_of_noise_needs_little_memory():
+    noise = np.random.default_rng(2).normal(size=216_000)
+    tracemalloc.start()
+    interval = mean_interval(noise)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert interval.high - interval.low == pytest.approx(2.0 * 1.96 / math.sqrt(len(noise)), rel=0.1)
+    assert peak < 12 * noise.nbytes
 
 
 def test_welchs_interval_is_that_of_scipy():
