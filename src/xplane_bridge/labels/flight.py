@@ -29,6 +29,13 @@ _ORIGIN = ("sim/flightmodel/position/lat_ref", "sim/flightmodel/position/lon_ref
 #: What a picture needs of its state: position and attitude.
 _NEEDED = 2 | 16
 _HAS_AGL = 2 | 4
+#: What of FrameState labelling goes by.
+_COLUMNS = (
+    *("header.stamp", "quality", "frame_period"),
+    *("camera_pose_source", "body_to_camera", "camera_pose_uncertainty", "camera_pose_uncertainty_deg"),
+    *("state.valid", "state.epoch", "state.sim_time", "state.latitude", "state.longitude", "state.altitude_msl"),
+    *("state.orientation", "state.angular_velocity", "state.velocity_ned"),
+)
 _STATE_MISSING = 1
 #: QUALITY_* by which a picture may be of the neighbouring frame: off frame, clock unsure, delay assumed, borderline.
 _UNSURE = 4 | 16 | 8192 | 16384
@@ -61,7 +68,7 @@ class _Seen:
 
     def __init__(self, bags: Bags, camera: Recorded) -> None:
         self.name = camera.name
-        self.frames = bags.read(camera.frames)
+        self.frames = bags.read(camera.frames, _COLUMNS)
         self.infos = _optics(bags, camera.info)
         self.suns = _suns(bags, self.frames.stamp)
 
@@ -187,14 +194,16 @@ def label_flight(
         LabelError: Nothing can be labelled, or the file cannot be written.
     """
     flight = Flight(bags, airport, heights, options, cameras)
-    lines = list(flight.labels())
-    if not lines:
-        reasons = ", ".join(f"{count}: {reason}" for reason, count in flight.left_out.items())
-        remedy = "record with this version, from X-Plane's own window"
-        msg = f"{bags.paths[0]}: no picture can be labelled ({reasons}); {remedy}"
-        raise LabelError(msg)
-    about = {**flight.about(), "left_out": dict(sorted(flight.left_out.items()))}
-    return label_table.write(path, about, lines), flight
+
+    def about() -> dict[str, Any]:
+        if not flight.labelled:
+            reasons = ", ".join(f"{count}: {reason}" for reason, count in flight.left_out.items())
+            remedy = "record with this version, from X-Plane's own window"
+            msg = f"{bags.paths[0]}: no picture can be labelled ({reasons}); {remedy}"
+            raise LabelError(msg)
+        return {**flight.about(), "left_out": dict(sorted(flight.left_out.items()))}
+
+    return label_table.write(path, about, flight.labels()), flight
 
 
 def _optics(bags: Bags, topic: str) -> dict[int, Optics]:
@@ -203,10 +212,12 @@ def _optics(bags: Bags, topic: str) -> dict[int, Optics]:
         msg = f"{names}: no {topic}; record it (launch/record.launch does), or choose other cameras with --camera"
         raise LabelError(msg)
     infos = bags.read(topic, ["header.stamp", "width", "height", "K"])
-    out = {}
+    out: dict[int, Optics] = {}
+    alike: dict[Optics, Optics] = {}
     for stamp, width, height, k in zip(infos.stamp.tolist(), infos["width"], infos["height"], infos["K"]):
         if k[0] > 0.0 and k[4] > 0.0:
-            out[stamp] = Optics(int(width), int(height), float(k[0]), float(k[4]), float(k[2]), float(k[5]))
+            optics = Optics(int(width), int(height), float(k[0]), float(k[4]), float(k[2]), float(k[5]))
+            out[stamp] = alike.setdefault(optics, optics)
     return out
 
 
@@ -225,12 +236,12 @@ def _suns(bags: Bags, stamps: np.ndarray) -> dict[int, Sun]:
         return {}
     at = np.array([row[0] for row in rows])
     newest = np.searchsorted(at, stamps, side="right") - 1
-    out = {}
-    for stamp, k in zip(stamps.tolist(), newest.tolist()):
-        _, elevation, heading, latitude, longitude = rows[max(k, 0)]  # it hardly moves: the first one holds before, too
+    suns = []
+    for _, elevation, heading, latitude, longitude in rows:
         known = math.isfinite(latitude) and math.isfinite(longitude)
-        out[stamp] = Sun(elevation, heading, (latitude, longitude) if known else None)
-    return out
+        suns.append(Sun(elevation, heading, (latitude, longitude) if known else None))
+    # It hardly moves: the first one holds before, too.
+    return {stamp: suns[max(k, 0)] for stamp, k in zip(stamps.tolist(), newest.tolist())}
 
 
 def _ground(bags: Bags, standing: Optional[float]) -> Optional[Ground]:

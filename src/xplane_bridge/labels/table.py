@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
+import tempfile
+import weakref
 from pathlib import Path
-from typing import Any, Iterable, Mapping, NamedTuple, Tuple
+from typing import Any, BinaryIO, Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -25,11 +28,49 @@ class LabelError(XplaneBridgeError):
     """A file of labels that cannot be used, or a bag that cannot be labelled; the text is one line with the remedy."""
 
 
+class Frames(Mapping[Key, Dict[str, Any]]):
+    """The lines of pictures, each read from the file when it is asked for: those of an hour do not fit into memory.
+
+    Args:
+        file: Open; it is closed with this.
+        places: Where the line of each begins, by camera and stamp.
+    """
+
+    def __init__(self, file: BinaryIO, places: Mapping[str, Mapping[int, int]]) -> None:
+        self._file = file
+        self._places = places
+        self._last: Optional[Tuple[Key, Dict[str, Any]]] = None
+        weakref.finalize(self, file.close)
+
+    def __getitem__(self, key: Key) -> Dict[str, Any]:
+        """Reads a picture's line."""
+        camera, stamp = key
+        place = self._places.get(camera, {}).get(stamp)
+        if place is None:
+            raise KeyError(key)
+        if self._last is None or self._last[0] != key:
+            self._file.seek(place)
+            self._last = key, json.loads(self._file.readline())
+        return self._last[1]
+
+    def __contains__(self, key: object) -> bool:
+        """Returns whether a picture has labels, without reading them."""
+        return isinstance(key, tuple) and key[1] in self._places.get(key[0], {})
+
+    def __iter__(self) -> Iterator[Key]:
+        """The keys, by camera, in the order of the file."""
+        return ((camera, stamp) for camera, stamps in self._places.items() for stamp in stamps)
+
+    def __len__(self) -> int:
+        """Give the number of pictures."""
+        return sum(map(len, self._places.values()))
+
+
 class Labels(NamedTuple):
     """A file of labels."""
 
     about: dict[str, Any]  #: the first line
-    frames: dict[Key, dict[str, Any]]  #: the other ones
+    frames: Mapping[Key, dict[str, Any]]  #: the other ones
 
     @property
     def cameras(self) -> list[str]:
@@ -42,8 +83,13 @@ def beside(bag: Path) -> Path:
     return bag.with_name(bag.stem + ENDING)
 
 
-def write(path: Path, about: Mapping[str, Any], frames: Iterable[Mapping[str, Any]]) -> int:
+def write(path: Path, about: Callable[[], Mapping[str, Any]], frames: Iterable[Mapping[str, Any]]) -> int:
     """Write a file of labels, under its name only when it is whole; gives the number of pictures.
+
+    Args:
+        path: The file.
+        about: Gives its first line, once all pictures are written; its error ends it without a file.
+        frames: The pictures' lines; not held in memory.
 
     Raises:
         LabelError: It cannot be written.
@@ -51,11 +97,14 @@ def write(path: Path, about: Mapping[str, Any], frames: Iterable[Mapping[str, An
     part = path.with_name(path.name + ".part")
     count = 0
     try:
-        with part.open("w", encoding="utf-8") as file:
-            file.write(_line({"labels": SCHEMA, **about}))
+        with tempfile.TemporaryFile("w+", encoding="utf-8", dir=path.parent) as lines:
             for frame in frames:
-                file.write(_line(frame))
+                lines.write(_line(frame))
                 count += 1
+            lines.seek(0)
+            with part.open("w", encoding="utf-8") as file:
+                file.write(_line({"labels": SCHEMA, **about()}))
+                shutil.copyfileobj(lines, file)
         part.replace(path)
     except OSError as error:
         msg = f"{path}: {error.strerror}; --output takes another file"
@@ -72,18 +121,31 @@ def read(path: Path) -> Labels:
     Raises:
         LabelError: It is missing, or not one of this version.
     """
+    about: Any = None
+    places: Dict[str, Dict[int, int]] = {}
     try:
-        with path.open(encoding="utf-8") as file:
-            lines = [json.loads(line) for line in file]
+        file = path.open("rb")
     except OSError as error:
         msg = f"{path}: {error.strerror}; label_images writes it"
         raise LabelError(msg) from None
+    try:
+        at = 0
+        for line in file:
+            content = json.loads(line)
+            if not at:
+                about = content
+                if not isinstance(about, dict) or about.get("labels") != SCHEMA:
+                    break
+            else:
+                places.setdefault(str(content["camera"]), {})[int(content["stamp_ns"])] = at
+            at += len(line)
     except ValueError:
-        lines = []
-    if not lines or not isinstance(lines[0], dict) or lines[0].get("labels") != SCHEMA:
+        about = None
+    if not isinstance(about, dict) or about.get("labels") != SCHEMA:
+        file.close()
         msg = f"{path}: no labels of this version; label_images writes them anew"
         raise LabelError(msg)
-    return Labels(lines[0], {(str(line["camera"]), int(line["stamp_ns"])): line for line in lines[1:]})
+    return Labels(about, Frames(file, places))
 
 
 def digest(path: Path) -> str:
@@ -93,7 +155,11 @@ def digest(path: Path) -> str:
         LabelError: It cannot be read.
     """
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        found = hashlib.sha256()
+        with path.open("rb") as file:
+            for block in iter(lambda: file.read(1 << 20), b""):
+                found.update(block)
+        return found.hexdigest()
     except OSError as error:
         msg = f"{path}: {error.strerror}; label_images writes it"
         raise LabelError(msg) from None

@@ -58,8 +58,7 @@ def section(bags: Bags, labels: Labels, start: int) -> str:
 
 def _figures(bags: Bags, camera: Camera, labels: Labels, start: int) -> Iterator[str]:
     """Ten pictures of a camera with what is labelled in them."""
-    frames = {stamp: frame for (name, stamp), frame in labels.frames.items() if name == camera.name}
-    chosen = _chosen(frames)
+    chosen = _chosen(labels, camera)
     for _, message in bags.messages(camera.images) if chosen else ():
         stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
         if stamp not in chosen:
@@ -67,10 +66,11 @@ def _figures(bags: Bags, camera: Camera, labels: Labels, start: int) -> Iterator
         picture = cv2.imdecode(np.frombuffer(message.data.tobytes(), dtype=np.uint8), cv2.IMREAD_COLOR)
         if picture is None:
             continue
-        jpeg = cv2.imencode(".jpg", draw(picture, frames[stamp]), [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
+        frame = labels.frames[camera.name, stamp]
+        jpeg = cv2.imencode(".jpg", draw(picture, frame), [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
         yield (
             f'<figure><img alt="picture with labels" src="data:image/jpeg;base64,{_text(jpeg)}">'
-            f"<figcaption>{(stamp - start) / 1e9:.1f} s &middot; {_caption(frames[stamp])}</figcaption></figure>"
+            f"<figcaption>{(stamp - start) / 1e9:.1f} s &middot; {_caption(frame)}</figcaption></figure>"
         )
 
 
@@ -143,10 +143,15 @@ class _Pen:
         return turned
 
 
-def _chosen(frames: Mapping[int, Mapping[str, Any]]) -> set[int]:
+def _chosen(labels: Labels, camera: Camera) -> set[int]:
     """Stamps of the pictures to show: those with a runway, where there are any."""
-    stamps = [s for s, frame in sorted(frames.items()) if any(thing["kind"] == "runway" for thing in frame["objects"])]
-    stamps = stamps or sorted(frames)
+    every, with_runway = [], []
+    for (name, stamp), frame in labels.frames.items():
+        if name == camera.name:
+            every.append(stamp)
+            if any(thing["kind"] == "runway" for thing in frame["objects"]):
+                with_runway.append(stamp)
+    stamps = sorted(with_runway or every)
     places = np.linspace(0, max(len(stamps) - 1, 0), min(PICTURES, len(stamps))).astype(int)
     return {stamps[k] for k in places}
 
