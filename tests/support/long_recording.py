@@ -16,6 +16,7 @@ import numpy as np
 
 from support.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
+from xplane_bridge.export.formats import FORMATS
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Recorded
@@ -75,8 +76,7 @@ import sys
 from xplane_bridge.cli.bag_export import main
 main([sys.argv[1], "-o", sys.argv[2], "--jobs", "1", "--format", *"FORMAT".split()]) and sys.exit(1)
 """
-_FORMATS = ("csv", "csv --rate 100", "parquet", "npz", "mat", "tum", "euroc", "imagefolder", "coco", "mcap", "ros2")
-READERS.update({name: _EXPORT.replace("FORMAT", name) for name in _FORMATS})
+READERS.update({name: _EXPORT.replace("FORMAT", name) for name in ("csv --rate 100", *FORMATS)})
 # Of the process itself: what wait4() shows of a child begins with the size of its parent.
 _PEAK = """
 print("PEAK", next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM")))

@@ -13,9 +13,9 @@ from tqdm import tqdm
 
 from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.export import campaign
-from xplane_bridge.export.dataset import Options
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.export.formats import ALIASES, FORMATS, Job
+from xplane_bridge.export.pictures import Options
 from xplane_bridge.labels import table
 
 

@@ -11,17 +11,21 @@ Without labels there are the pictures, and annotations of nothing.
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import math
+import shutil
+import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Optional, Sequence, TextIO
 
 import numpy as np
 
 from xplane_bridge import __version__
-from xplane_bridge.export.dataset import Options, Picture, Pictures, write_frames, write_pictures
+from xplane_bridge.export.dataset import write_frames
 from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels, Thing, keypoints
+from xplane_bridge.export.pictures import Options, Picture, Pictures, write_pictures
 from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
 
 if TYPE_CHECKING:
@@ -53,8 +57,8 @@ def export_annotated(
         ExportError: The labels are of other pictures.
     """
     pictures = write_pictures(bags, folder, options, train_flight)
-    counts = labels.counts([picture.key for picture in pictures.kept]) if labels else {"labelled": 0}
-    write_frames(folder / "frames.csv", pictures, pictures.columns)
+    counts = labels.counts(pictures.keys()) if labels else {"labelled": 0}
+    write_frames(folder / "frames.csv", pictures.names, pictures.pieces())
     write(folder, pictures, labels)
     return {**pictures.counts._asdict(), **counts}
 
@@ -64,39 +68,54 @@ def coco(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
     categories: list[dict[str, Any]] = [{"id": k, "name": name} for k, name in enumerate(CATEGORIES, 1)]
     categories[0].update(keypoints=list(KEYPOINTS), skeleton=_SKELETON)
     about = {"description": f"xplane_bridge {__version__}", "version": __version__, "labels": _about(labels)}
+    head = {"info": about, "licenses": [], "categories": categories}
     (folder / "annotations").mkdir()
     number = 0
     for split in _SPLITS:
-        images, annotations = [], []
-        for image_id, picture in enumerate(pictures.kept, 1):
-            if picture.split != split:
-                continue
-            images.append({"id": image_id, **_image(picture, pictures.columns, labels)})
-            for thing in labels.things(picture.key) if labels else ():
-                number += 1
-                annotations.append({"id": number, "image_id": image_id, **_annotation(thing)})
-        content = {
-            "info": about,
-            "licenses": [],
-            "categories": categories,
-            "images": images,
-            "annotations": annotations,
-        }
-        _write_text(folder / "annotations" / f"{split}.json", json.dumps(content, allow_nan=False) + "\n")
+        path = folder / "annotations" / f"{split}.json"
+        # Annotations come behind all images: an hour of them is not held in memory.
+        spool = tempfile.TemporaryFile("w+", encoding="utf-8", dir=folder)  # noqa: SIM115, closed below
+        with spool as notes, path.open("w", encoding="utf-8") as file:
+            file.write(json.dumps(head, allow_nan=False)[:-1] + ', "images": [')
+            images, annotations = _JsonList(file), _JsonList(notes)
+            for picture in pictures.of(split):
+                image_id = picture.number + 1
+                images.add({"id": image_id, **_image(picture, pictures, labels)})
+                for thing in labels.things(picture.key) if labels else ():
+                    number += 1
+                    annotations.add({"id": number, "image_id": image_id, **_annotation(thing)})
+            file.write('], "annotations": [')
+            notes.seek(0)
+            shutil.copyfileobj(notes, file)
+            file.write("]}\n")
 
 
-def _image(picture: Picture, columns: Mapping[str, np.ndarray], labels: Optional[ImageLabels]) -> dict[str, Any]:
+class _JsonList:
+    """The elements of a list, written as they come."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+        self._begun = False
+
+    def add(self, item: Any) -> None:
+        """Writes an element."""
+        self._file.write((", " if self._begun else "") + json.dumps(item, allow_nan=False))
+        self._begun = True
+
+
+def _image(picture: Picture, pictures: Pictures, labels: Optional[ImageLabels]) -> dict[str, Any]:
     def value(name: str) -> Any:
-        return _plain(columns[name][picture.row]) if name in columns else None
+        return _plain(picture.known(name))
 
     def vector(prefix: str, axes: Sequence[object]) -> list[Any]:
         return [value(f"{prefix}_{axis}") for axis in axes]
 
     frame = labels.frame(picture.key) if labels else None
+    width, height = pictures.size(picture)
     return {
         "file_name": Path(picture.file).name,
-        "width": picture.size[0],
-        "height": picture.size[1],
+        "width": width,
+        "height": height,
         "camera": picture.camera,
         "stamp_ns": picture.stamp,
         "camera_matrix": vector("camera_matrix", range(9)),
@@ -137,20 +156,19 @@ def _annotation(thing: Thing) -> dict[str, Any]:
 
 def yolo(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> None:
     """Write YOLO's text: a line an object, its class and its outline as shares of the picture; boxes follow from it."""
-    rows: list[list[Any]] = []
-    for picture in pictures.kept:
-        if labels is None or labels.frame(picture.key) is None:
-            continue
-        path = folder / "labels" / picture.split / f"{Path(picture.file).stem}.txt"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lines = []
-        for number, thing in enumerate(labels.things(picture.key)):
-            shares = [min(max(part / side, 0.0), 1.0) for at in thing.outline for part, side in zip(at, picture.size)]
-            lines.append(" ".join([str(CATEGORIES.index(thing.category)), *(f"{share:.6f}" for share in shares)]))
-            label = thing.label
-            rows.append([picture.file, number, thing.category, label["sigma_px"], int(label["coarse"])])
-        _write_text(path, "".join(line + "\n" for line in lines))
-    _write_csv(folder / "sigmas.csv", ("file", "line", "class", "sigma_px", "coarse"), rows, ",")
+    with _csv(folder / "sigmas.csv", ("file", "line", "class", "sigma_px", "coarse"), ",") as write:
+        for picture in pictures:
+            if labels is None or labels.frame(picture.key) is None:
+                continue
+            path = folder / "labels" / picture.split / f"{Path(picture.file).stem}.txt"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            size, lines = pictures.size(picture), []
+            for number, thing in enumerate(labels.things(picture.key)):
+                shares = [min(max(part / side, 0.0), 1.0) for at in thing.outline for part, side in zip(at, size)]
+                lines.append(" ".join([str(CATEGORIES.index(thing.category)), *(f"{share:.6f}" for share in shares)]))
+                label = thing.label
+                write([picture.file, number, thing.category, label["sigma_px"], int(label["coarse"])])
+            _write_text(path, "".join(line + "\n" for line in lines))
     names = "".join(f"  {k}: {name}\n" for k, name in enumerate(CATEGORIES))
     said = json.dumps(_about(labels))
     head = f"# xplane_bridge {__version__}; labels: {said}\n"
@@ -160,28 +178,25 @@ def yolo(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
 def lard(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> None:
     """Write LARD's table, one file a split: a row a runway, distances in nautical miles, the height in feet."""
     for split in _SPLITS:
-        rows = []
-        for picture in pictures.kept:
-            if picture.split == split:
-                things = list(labels.things(picture.key)) if labels else []
-                rows += [
-                    _lard_row(picture, thing, pictures.columns, labels) for thing in things if "points" in thing.label
-                ]
-        _write_csv(folder / f"{split}.csv", _LARD, rows, ";")
+        with _csv(folder / f"{split}.csv", _LARD, ";") as write:
+            if labels is None:
+                continue
+            for picture in pictures.of(split):
+                for thing in labels.things(picture.key):
+                    if "points" in thing.label:
+                        write(_lard_row(picture, thing, pictures.size(picture), labels))
 
 
-def _lard_row(
-    picture: Picture, thing: Thing, columns: Mapping[str, np.ndarray], labels: Optional[ImageLabels]
-) -> list[Any]:
+def _lard_row(picture: Picture, thing: Thing, size: tuple[int, int], labels: ImageLabels) -> list[Any]:
     label = thing.label
-    heading, pitch, roll = _attitude(columns, picture.row)
+    heading, pitch, roll = _attitude(picture)
     values: dict[str, Any] = {
         "image": picture.file,
-        "width": picture.size[0],
-        "height": picture.size[1],
+        "width": size[0],
+        "height": size[1],
         "type": "xplane_bridge",
         "original_dataset": "xplane_bridge",
-        "airport": labels.about["airport"] if labels else "",
+        "airport": labels.about["airport"],
         "runway": label["name"],
         "slant_distance": label["slant_distance_m"] / _MILE_M,
         "along_track_distance": label["along_track_distance_m"] / _MILE_M,
@@ -204,11 +219,11 @@ def _lard_row(
     return [values.get(name, "") for name in _LARD]
 
 
-def _attitude(columns: Mapping[str, np.ndarray], row: int) -> tuple[float, float, float]:
+def _attitude(picture: Picture) -> tuple[float, float, float]:
     """Heading, pitch, roll [deg] of the camera against the local level."""
 
     def rotation(prefix: str) -> np.ndarray:
-        return rotation_of(np.array([float(columns[f"{prefix}_{axis}"][row]) for axis in "xyzw"]))
+        return rotation_of(np.array([float(picture.known(f"{prefix}_{axis}")) for axis in "xyzw"]))
 
     optical = rotation("state_orientation") @ FRD_OF_FLU @ rotation("body_to_camera_rotation")
     right, down, forward = optical[:, 0], optical[:, 1], optical[:, 2]
@@ -239,8 +254,10 @@ def _write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def _write_csv(path: Path, head: Sequence[str], rows: Sequence[Sequence[Any]], separator: str) -> None:
+@contextlib.contextmanager
+def _csv(path: Path, head: Sequence[str], separator: str) -> Iterator[Callable[[Sequence[Any]], object]]:
+    """Begin a table; gives what writes a row."""
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, delimiter=separator, lineterminator="\n")
         writer.writerow(head)
-        writer.writerows(rows)
+        yield writer.writerow

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, NamedTuple, Optional
 
-from xplane_bridge.export.dataset import Options, export_images
+from xplane_bridge.export.dataset import export_images
+from xplane_bridge.export.pictures import Options
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterator, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Iterable, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.labels import table
@@ -51,18 +51,24 @@ class ImageLabels:
         self._path = path
         self.about, self._frames = table.read(path)
 
-    def counts(self, keys: Sequence[Key]) -> dict[str, Any]:
+    def counts(self, keys: Iterable[Key]) -> dict[str, Any]:
         """Count for the manifest what is labelled of these pictures.
 
         Raises:
             ExportError: Nothing is: they are labels of other pictures.
         """
-        labelled = [key for key in keys if key in self._frames]
-        if keys and not labelled:
+        kinds: Counter[str] = Counter()
+        seen = labelled = 0
+        for key in keys:
+            frame = self._frames.get(key)
+            seen += 1
+            if frame is not None:
+                labelled += 1
+                kinds.update(thing["kind"] for thing in frame["objects"])
+        if seen and not labelled:
             msg = f"{self._path} labels none of these pictures: it is of {', '.join(self.about['bags'])}"
             raise ExportError(msg)
-        kinds = Counter(thing["kind"] for key in labelled for thing in self._frames[key]["objects"])
-        return {"labelled": len(labelled), "objects": dict(sorted(kinds.items()))}
+        return {"labelled": labelled, "objects": dict(sorted(kinds.items()))}
 
     def frame(self, key: Key) -> Optional[dict[str, Any]]:
         """Give everything about a picture; None where it has no labels."""

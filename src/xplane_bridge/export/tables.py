@@ -40,6 +40,11 @@ class FlightTable:
         """For the manifest."""
         return {"rows": self.rows, "columns": len(self._columns)}
 
+    @property
+    def names(self) -> list[str]:
+        """Of its columns."""
+        return list(self._columns)
+
     def add(self, columns: Mapping[str, np.ndarray]) -> None:
         """Adds columns; one of the name of an earlier one takes its place."""
         for name, values in columns.items():
@@ -54,10 +59,14 @@ class FlightTable:
         """The columns of texts and lists."""
         return {name: values for name, values in self._columns.items() if isinstance(values, np.ndarray)}
 
+    def piece(self, rows: slice) -> dict[str, np.ndarray]:
+        """Give some rows, by column."""
+        return {name: values[rows] for name, values in self._columns.items()}
+
     def frame(self, rows: Union[slice, Sequence[int]]) -> pd.DataFrame:
         """Give some rows: neighbours, or a few by their numbers."""
         if isinstance(rows, slice):
-            return pd.DataFrame({name: values[rows] for name, values in self._columns.items()})
+            return pd.DataFrame(self.piece(rows))
         return pd.concat([self.frame(slice(k, k + 1)) for k in rows], ignore_index=True)
 
     def frames(self) -> Iterator[pd.DataFrame]:

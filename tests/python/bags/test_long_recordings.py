@@ -17,20 +17,22 @@ from xplane_bridge.cli import bag_export, flight_report
 
 MEGABYTES = 500.0  #: that an hour may take
 SECONDS = (5.0, 12.0)
-#: The report reads several chunks of a recording at a time, each of about a megabyte: both flights have more of them.
-SECONDS_OF_REPORT = (30.0, 60.0)
+#: What hides growth in short flights: several chunks of a recording at a time, each of about a megabyte, or pictures.
+LONGER_SECONDS = (30.0, 60.0)
 WARMING_UP = 0.5  #: [s] a flight that has everything loaded before it is counted
 #: [kB] a second of flight adds at most: index, stamps, a column or two; all columns of flight_state alone are 31.
 MOST_GROWTH = 40.0
 #: [kB] likewise, where lists of messages are written, too: /diagnostics as it was recorded is 25.
 MOST_GROWTH_WITH_LISTS = 65.0
+#: [kB] likewise, of what copies pictures or messages: the index, and names and checksums of files; 11 and 14.
+MOST_GROWTH_OF_COPIES = 20.0
 
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Dict[float, Path]:
     """The same flight, in all lengths."""
     folder = tmp_path_factory.mktemp("recordings")
-    paths = {seconds: folder / f"{seconds:g}.bag" for seconds in (WARMING_UP, *SECONDS, *SECONDS_OF_REPORT)}
+    paths = {seconds: folder / f"{seconds:g}.bag" for seconds in (WARMING_UP, *SECONDS, *LONGER_SECONDS)}
     for seconds, path in paths.items():
         write_long_recording(path, seconds)
     return paths
@@ -54,7 +56,9 @@ def pieces(bag: Path, _: Path) -> None:
                 assert sum(len(piece) for piece in bags.pieces(topic)) == bags.topics[topic].count
 
 
-PROGRAMS = {form: export(form) for form in ("csv", "csv --rate 100", "parquet", "npz", "mat", "tum", "euroc")}
+COPIES = ("coco", "mcap")
+_FORMATS = ("csv", "csv --rate 100", "parquet", "npz", "mat", "tum", "euroc", *COPIES)
+PROGRAMS = {form: export(form) for form in _FORMATS}
 PROGRAMS.update(report=report, pieces=pieces)
 
 
@@ -65,11 +69,12 @@ def test_a_longer_flight_takes_hardly_more_memory(
     """Pieces are made so small that the short flight already has several; what Python and NumPy allocate is counted."""
     monkeypatch.setattr("xplane_bridge.bags._PIECE_MESSAGES", 100)
     monkeypatch.setattr("xplane_bridge.export.tables._PIECE_ROWS", 100)
+    monkeypatch.setattr("xplane_bridge.export.pictures._PIECE_ROWS", 20)
     monkeypatch.setattr("xplane_bridge.export.arrays._PIECE_BYTES", 10000)
     monkeypatch.setattr("xplane_bridge.plotting.interactive.MAX_POINTS", 200)
     PROGRAMS[name](recordings[WARMING_UP], tmp_path / "first")
     peaks = []
-    lengths = SECONDS_OF_REPORT if name == "report" else SECONDS
+    lengths = LONGER_SECONDS if name in ("report", *COPIES) else SECONDS
     for seconds in lengths:
         gc.collect()
         tracemalloc.start()
@@ -77,6 +82,7 @@ def test_a_longer_flight_takes_hardly_more_memory(
         peaks.append(tracemalloc.get_traced_memory()[1] / 1e3)
         tracemalloc.stop()
     most = MOST_GROWTH_WITH_LISTS if name in ("npz", "mat", "pieces") else MOST_GROWTH
+    most = MOST_GROWTH_OF_COPIES if name in COPIES else most
     assert peaks[1] - peaks[0] < most * (lengths[1] - lengths[0]), peaks
 
 
