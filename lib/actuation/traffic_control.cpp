@@ -82,7 +82,8 @@ void TrafficControl::tick(double sim_time) {
   if (flown_.empty()) return;
   if (sim_time - commanded_at_ > options_.timeout) return release("no command came for a while");
   const double now = link_->clock().steadySeconds();
-  if (now < due_ || (!options_.vehx && !knows_scenery_)) return;
+  const bool due = now >= due_ || link_->inLockstep();
+  if (!due || (!options_.vehx && !knows_scenery_)) return;
   due_ = std::max(due_ + 1.0 / options_.rate, now - 1.0 / options_.rate);
   const std::vector<std::string> active = overrides_->active();
   for (auto it = flown_.begin(); it != flown_.end();) {

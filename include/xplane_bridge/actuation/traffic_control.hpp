@@ -14,7 +14,7 @@
 namespace xplane_bridge {
 
 struct TrafficOptions {
-  double rate = 30.0;    ///< [1/s] of poses sent for each aircraft
+  double rate = 30.0;    ///< [1/s] of poses sent for each aircraft; in lock-step each frame
   double timeout = 2.0;  ///< [s] of simulator time without a command, after which all are given back
   bool vehx = false;     ///< by VEHX [? other-aircraft], else by writing their positions [? other-written]
 };

@@ -33,7 +33,8 @@ std::vector<std::string> TrafficPublisher::requests() const {
 
 bool TrafficPublisher::wantedChanges() {
   const bool before = wanted_;
-  wanted_ = publisher_.getNumSubscribers() > 0;
+  // In lock-step who wants it may come until the flight begins; from then on every run asks in the same frame.
+  wanted_ = !muted_ && publisher_.getNumSubscribers() > 0;
   if (wanted_ && !before) traffic_.reset();
   return wanted_ != before;
 }

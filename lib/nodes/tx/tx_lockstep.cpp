@@ -59,9 +59,9 @@ void TxLockstep::takeCommand(const std::string& who, const ros::Time& stamp, int
   wakeIfAnswered();
 }
 
-void TxLockstep::takeRequest(const ros::Time& stamp, Action carry_out) {
+void TxLockstep::takeRequest(const std::string& who, const ros::Time& stamp, int topic, Action carry_out) {
   const Lock lock(mutex_);
-  requests_.push_back({nanoseconds(stamp), 0, std::move(carry_out)});
+  requests_.push_back({{barrier_.rank(who), topic, nanoseconds(stamp), std::move(carry_out)}, 0});
 }
 
 void TxLockstep::takeDone(const std::string& who, const ros::Time& stamp, const std::string& said) {
@@ -115,8 +115,7 @@ bool TxLockstep::ready() {
 }
 
 void TxLockstep::close() {
-  std::vector<Command> commands;
-  std::vector<Request> requests;
+  std::vector<Command> commands, requests;
   {
     const Lock lock(mutex_);
     const auto due = [this](const Command& command) {
@@ -128,9 +127,11 @@ void TxLockstep::close() {
     commands_.erase(commands_.begin(), later);
     std::vector<Request> kept;
     for (Request& request : requests_) {
-      const bool due_now = request.frames_waited == kRequestWaits || request.stamp_ns < previous_ns_;
-      ++request.frames_waited;
-      (due_now ? requests : kept).push_back(std::move(request));
+      if (request.frames_waited++ == kRequestWaits || request.what.stamp_ns < previous_ns_) {
+        requests.push_back(std::move(request.what));
+      } else {
+        kept.push_back(std::move(request));
+      }
     }
     requests_ = std::move(kept);
     closed_ = true;
@@ -139,7 +140,10 @@ void TxLockstep::close() {
   std::stable_sort(commands.begin(), commands.end(), [](const Command& a, const Command& b) {
     return std::tie(a.rank, a.topic) < std::tie(b.rank, b.topic);
   });
-  for (const Request& request : requests) request.carry_out();
+  std::stable_sort(requests.begin(), requests.end(), [](const Command& a, const Command& b) {
+    return std::tie(a.stamp_ns, a.rank, a.topic) < std::tie(b.stamp_ns, b.rank, b.topic);
+  });
+  for (const Command& request : requests) request.carry_out();
   for (const Command& command : commands) command.carry_out();
   barrier_.close();
   progress();

@@ -73,6 +73,19 @@ void TxNode::subscribeCommands(const std::string& topic, int rank, std::function
   });
 }
 
+template <class Message>
+void TxNode::subscribeRequests(const std::string& topic, std::uint32_t queue_size, int rank,
+                               std::function<void(const Message&)> take) {
+  if (!lockstep_) {
+    subscribeTopic<Message>(topic, queue_size, [take = std::move(take)](const auto& message) { take(*message); });
+    return;
+  }
+  subscribeEvents<Message>(topic, kLockstepQueue, [this, rank, take](const ros::MessageEvent<const Message>& event) {
+    const boost::shared_ptr<const Message> message = event.getConstMessage();
+    lockstep_->takeRequest(event.getPublisherName(), message->header.stamp, rank, [take, message] { take(*message); });
+  });
+}
+
 void TxNode::subscribe() {
   subscribeCommands<ControlCommand>(
       "control/manual", 0, [this](const ControlCommand& command) { onCommand(core::FlightMode::kManual, command); });
@@ -80,16 +93,12 @@ void TxNode::subscribe() {
       "control/auto", 1, [this](const ControlCommand& command) { onCommand(core::FlightMode::kAuto, command); });
   subscribeCommands<SurfaceCommand>("control/surfaces", 2,
                                     [this](const SurfaceCommand& command) { onSurfaceCommand(command); });
-  subscribeCommands<TrafficCommand>("traffic/command", 3,
+  // These are few and none may be lost.
+  subscribeRequests<ModeRequest>("control/mode_request", 20, 0,
+                                 [this](const ModeRequest& request) { onModeRequest(request); });
+  // Of traffic the newest list counts.
+  subscribeRequests<TrafficCommand>("traffic/command", 1, 1,
                                     [this](const TrafficCommand& command) { onTraffic(command); });
-  // Requests are few and none may be lost.
-  subscribeTopic<ModeRequest>("control/mode_request", 20, [this](const ModeRequestConstPtr& request) {
-    if (!lockstep_) {
-      onModeRequest(*request);
-    } else {
-      lockstep_->takeRequest(request->header.stamp, [this, request] { onModeRequest(*request); });
-    }
-  });
   if (lockstep_) {
     subscribeEvents<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue,
                                       [this](const ros::MessageEvent<const std_msgs::Header>& event) {

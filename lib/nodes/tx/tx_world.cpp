@@ -17,6 +17,8 @@
 namespace xplane_bridge {
 namespace {
 
+constexpr double kOldestPoses = 1.0;  // [s] in lock-step; what is older has no stamp of the flight
+
 template <class Request>
 bool setsWind(const Request&) {
   return false;
@@ -80,9 +82,14 @@ void TxNode::advertiseFlightServices() {
 
 void TxNode::onTraffic(const TrafficCommand& message) {
   const auto poses = toCore(message);
+  double sim_time = actuation_->simTime();
+  if (lockstep_) {  // carried out some frames after its own, whose time its stamp is
+    const double age = (stampNow() - message.header.stamp).toSec();
+    if (age > 0.0 && age < kOldestPoses) sim_time -= age;
+  }
   const std::string refusal = std::holds_alternative<std::string>(poses)
                                   ? std::get<std::string>(poses)
-                                  : actuation_->traffic().command(std::get<0>(poses), actuation_->simTime());
+                                  : actuation_->traffic().command(std::get<0>(poses), sim_time);
   if (!refusal.empty()) ROS_WARN_THROTTLE(1.0, "traffic/command is refused: %s", refusal.c_str());
 }
 

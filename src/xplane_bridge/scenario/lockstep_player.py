@@ -27,10 +27,6 @@ class LockstepPlayer(RosPlayer):
 
     def __init__(self, *args: Any, check: Callable[[], None], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        if any(kind == "traffic" for event in self._player.scenario.events for kind, _ in event.actions):
-            raise ScenarioError(
-                "traffic: not in lock-step, where it could come a frame later than the stick; fly it freely"
-            )
         self._check: Optional[Callable[[], None]] = check
         self._failure_of_check: Optional[BaseException] = None
         self._due: Deque[Action] = deque()

@@ -156,13 +156,13 @@ class RosPlayer:
         self._label_publisher = rospy.Publisher(topic + "scenario/label", String, queue_size=10, latch=True)
         self._mode_publisher = rospy.Publisher(topic + "control/mode_request", ModeRequest, queue_size=10)
         if any(kind == "traffic" for event in self._player.scenario.events for kind, _ in event.actions):
-            self._traffic_publisher = rospy.Publisher(topic + "traffic/command", TrafficCommand, queue_size=1)
+            self._traffic_publisher = self._publisher(topic + "traffic/command", TrafficCommand)
         if self._stick is None:
             return self._publisher(topic + "control/manual", ControlCommand)
         return self._publisher(topic + "joy", Joy)
 
     def _publisher(self, topic: str, message_type: Any) -> Any:
-        """A publisher of stick or commands."""
+        """A publisher of stick, commands or other aircraft."""
         import rospy
 
         return rospy.Publisher(topic, message_type, queue_size=1, tcp_nodelay=True)

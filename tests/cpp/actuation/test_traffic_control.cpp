@@ -25,6 +25,12 @@ core::TrafficPose poseOf(int number, double north_mps = 60.0) {
   return pose;
 }
 
+class Simulator : public core::FakeSimulator {
+ public:
+  bool inLockstep() const override { return lockstep; }
+  bool lockstep = false;
+};
+
 /// X-Plane with the scenery's origin below the aircraft; frames of 0.02 s, poses at 25 Hz: every second frame.
 class TrafficControlTest : public testing::Test {
  protected:
@@ -53,7 +59,7 @@ class TrafficControlTest : public testing::Test {
   }
   std::size_t inJournal() { return sim_.journal()->entries().size(); }
 
-  core::FakeSimulator sim_;
+  Simulator sim_;
   OverrideManager overrides_{&sim_, [](const std::string&, bool) {}};
   std::unique_ptr<TrafficControl> control_;
   std::vector<std::string> reports_;
@@ -76,6 +82,18 @@ TEST_F(TrafficControlTest, PlacesAnAircraftAndMovesItOnBetweenCommands) {
   std::size_t poses = 0;
   for (const auto& each : sim_.writes()) poses += each.first == kPlane3 + "x" ? 1U : 0U;
   EXPECT_EQ(poses, 10U) << "25 a second";
+}
+
+TEST_F(TrafficControlTest, InLockstepEveryFrameHasAPoseOfItsTime) {
+  sim_.lockstep = true;
+  TrafficControl& traffic = control();
+  EXPECT_EQ(traffic.command({poseOf(3)}, now()), "");
+  fly(0.1);
+  for (int frame = 0; frame < 5; ++frame) {
+    const float before = sim_.value(kPlane3 + "z");
+    fly(core::FakeSimulator::kFrame);
+    EXPECT_NEAR(sim_.value(kPlane3 + "z"), before - 60.0F * 0.02F, 1e-3F);
+  }
 }
 
 TEST_F(TrafficControlTest, GivesBackWhatAListDoesNotHaveAnyMore) {

@@ -33,7 +33,7 @@ class TrafficPublisher {
   void onRref(const core::RrefView& datagram, std::int64_t receive_ns, const core::ClockFilter& clock);
   /// The link came up anew.
   void reset() { traffic_.reset(); }
-  /// Nothing is published while muted.
+  /// Nothing is asked for or published while muted, as before a flight in lock-step begins.
   void mute(bool muted) { muted_ = muted; }
 
  private:

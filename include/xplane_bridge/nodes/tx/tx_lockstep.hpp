@@ -40,8 +40,9 @@ class TxLockstep {
   /// A command, which answers the frame of its stamp. `topic` orders those of one node.
   void takeCommand(const std::string& who, const ros::Time& stamp, int topic, Action carry_out);
   /// A request, which answers nothing. It is carried out in the second frame after that of its stamp: it comes over a
-  /// connection of its own, perhaps after the command that answers its frame, or together with the next one.
-  void takeRequest(const ros::Time& stamp, Action carry_out);
+  /// connection of its own, perhaps after the command that answers its frame, or together with the next one. Those that
+  /// are due together are carried out by stamp, node and `topic`.
+  void takeRequest(const std::string& who, const ros::Time& stamp, int topic, Action carry_out);
   /// lockstep/done. `said`: its frame_id.
   void takeDone(const std::string& who, const ros::Time& stamp, const std::string& said);
 
@@ -77,9 +78,8 @@ class TxLockstep {
     Action carry_out;
   };
   struct Request {
-    std::int64_t stamp_ns;
+    Command what;
     int frames_waited;
-    Action carry_out;
   };
 
   /// Lets the link's thread look, if there is something to see: an answer that is not the last one does not wake it.

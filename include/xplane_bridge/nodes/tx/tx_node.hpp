@@ -59,6 +59,10 @@ class TxNode : public BaseNode {
   /// Commands on a topic; in lock-step they wait for their frame's end, and `rank` orders the topics.
   template <class Message>
   void subscribeCommands(const std::string& topic, int rank, std::function<void(const Message&)> take);
+  /// Requests on a topic, which answer no frame; in lock-step they are carried out some frames later.
+  template <class Message>
+  void subscribeRequests(const std::string& topic, std::uint32_t queue_size, int rank,
+                         std::function<void(const Message&)> take);
   void advertiseLockstep();
   void serveStep(const LockstepStep::Request& request, LockstepStep::Response* response);
   /// The same of a simulator that does not wait for participants.
