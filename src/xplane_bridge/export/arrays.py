@@ -9,6 +9,8 @@ Of every topic but the pictures there is, with one row per message:
   an epoch (NaN there);
 * every field with its unit in the name, as in the other tables. Fixed arrays are two-dimensional. Lists of varying
   length are filled up (NaN, 0, false or empty text) beside their lengths, ``<name>_count``; lists of messages are JSON.
+
+Beside the topics there is ``cameras``, with one row per camera (`CameraRow`).
 """
 
 from __future__ import annotations
@@ -47,6 +49,8 @@ from xplane_bridge.bags.cameras import COMPRESSED, RAW
 from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.decoding import MessageList
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
+from xplane_bridge.export.cameras import UNITS as CAMERA_UNITS
+from xplane_bridge.export.cameras import CameraRow, one_column_each
 from xplane_bridge.export.columns import name_of
 from xplane_bridge.export.flight import STATE, full_names, name_space
 
@@ -65,6 +69,8 @@ _MAT_HEADER = 128  #: [bytes] before the first variable
 _MAT_TAG = struct.Struct("=II")  #: of an element: its type, its size
 _MAT_COMPRESSED = 15
 _PIECE_BYTES = 1 << 20
+#: Name of the table of the cameras.
+_CAMERAS = "cameras"
 
 
 class Texts:
@@ -177,7 +183,7 @@ def topic_arrays(bags: Bags, only: Sequence[str] = (), folder: Optional[Path] = 
         msg = f"{', '.join(map(str, bags.paths))}: no message that a table can hold; nothing was recorded but pictures"
         raise BagError(msg)
     clock = _sim_clock(bags, bags.topic_of_type(STATE))
-    taken = ["units", "topics", "about"]
+    taken = ["units", "topics", "about", _CAMERAS]
     for topic in chosen:
         if topic in infos and infos[topic].msgtype in (RAW, COMPRESSED):
             msg = f"{topic}: pictures do not go into a table; use --format imagefolder, mcap or ros2"
@@ -209,8 +215,10 @@ class _Written:
         return {"topics": len(self.names), "messages": self.messages, "columns": self.columns}
 
 
-def write_npz(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
+def write_npz(topics: Iterable[TopicArrays], path: Path, cameras: Iterable[CameraRow] = ()) -> dict[str, int]:
     """Write ``<topic>/<column>`` arrays, then ``topics`` (name, topic, type), ``units`` (key, unit) and ``about``.
+
+    Where there are cameras, also ``cameras/<column>``.
 
     Returns:
         What the manifest says of it.
@@ -233,6 +241,11 @@ def write_npz(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
             for name in topic.columns:
                 add(f"{topic.name}/{name}", topic.columns.source(name))
             del topic  # before the next is read
+        rows = list(cameras)  # after the topics: to read them leaves things in memory
+        if rows:
+            written.units[_CAMERAS] = CAMERA_UNITS
+            for name, values in one_column_each(rows).items():
+                add(f"{_CAMERAS}/{name}", values)
         units = [
             (f"{topic}/{name}", unit) for topic, of_topic in written.units.items() for name, unit in of_topic.items()
         ]
@@ -242,8 +255,10 @@ def write_npz(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
     return written.counts
 
 
-def write_mat(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
+def write_mat(topics: Iterable[TopicArrays], path: Path, cameras: Iterable[CameraRow] = ()) -> dict[str, int]:
     """Write a struct for each topic, a struct ``units`` of the same shape, ``topics`` and ``about``.
+
+    Where there are cameras, also a struct ``cameras``.
 
     Returns:
         What the manifest says of it.
@@ -273,6 +288,10 @@ def write_mat(topics: Iterable[TopicArrays], path: Path) -> dict[str, int]:
                 raise BagError(msg)
             add(topic.name, {name: _MatColumn(topic.columns, name) for name in topic.columns})
             del topic  # before the next is read
+        rows = list(cameras)
+        if rows:
+            written.units[_CAMERAS] = CAMERA_UNITS
+            add(_CAMERAS, {name: _cells(values) for name, values in one_column_each(rows).items()})
         add("units", written.units)
         add("topics", _cells(_texts(written.names)))
         add("about", _about())

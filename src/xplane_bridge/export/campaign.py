@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple,
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.export.cameras import camera_rows
 from xplane_bridge.export.card import CARD, card
 from xplane_bridge.export.flight import ExportError, frame_quality
 from xplane_bridge.export.formats import ALIASES, FORMATS, Job
@@ -113,9 +114,13 @@ def _export(job: Job, output: Path) -> dict[str, Any]:
         with Bags(job.bags) as bags:
             folder.mkdir(parents=True)
             counts = form.write(bags, folder / final.name, job)
-            about = {"topics": {t: [info.msgtype, info.count] for t, info in bags.topics.items() if info.count}}
+            about: dict[str, Any] = {
+                "topics": {t: [info.msgtype, info.count] for t, info in bags.topics.items() if info.count}
+            }
             if form.frames:
-                about["quality"] = frame_quality(bags, job.dataset.cameras if "dataset" in form.options else ())
+                names = job.dataset.cameras if "dataset" in form.options else ()
+                about["quality"] = frame_quality(bags, names)
+                about["cameras"] = [row.plain() for row in camera_rows(bags, names)]
         _remove(final)
         os.replace(folder / final.name, final)
     finally:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Mapping
+from typing import Any, Mapping, Optional, Sequence
 
 #: Name of the card's file.
 CARD = "README.md"
@@ -31,6 +31,7 @@ def card(version: str, exports: _Records) -> str:
             cells = [name, ", ".join(record["bags"]), _pairs(record["parameters"]), _pairs(record["counts"])]
             lines.append("| " + " | ".join(_cell(text) for text in cells) + " |")
     lines += _topics(exports)
+    lines += _cameras(exports)
     lines += _quality(exports)
     lines += _labels(exports)
     return "\n".join(lines) + "\n"
@@ -68,6 +69,44 @@ def _topics(exports: _Records) -> list[str]:
             f"| {_cell(topic)} | {msgtype} | {sum(counts.values())} in {len(counts)} of {len(names)} flights |"
         )
     return lines
+
+
+def _cameras(exports: _Records) -> list[str]:
+    """Say what each camera was: size, K, where it is in the aircraft, and the delay of its display."""
+    found = {
+        (name, row["name"]): row
+        for records in exports.values()
+        for name, record in records.items()
+        for row in record.get("cameras", [])
+    }
+    if not found:
+        return []
+    lines = [
+        *("", "## Cameras", ""),
+        "K and place of the picture nearest to the median; place and quaternion x, y, z, w as in `body_to_camera` (in",
+        "base_link: forward, left, up), with the farthest of the flight's pictures from it.",
+        "",
+        "| flight | camera | size | fx, fy, cx, cy [px] | place [m] | quaternion | farthest | display delay |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for (name, camera), row in sorted(found.items()):
+        (fx, _, cx), (_, fy, cy) = row["camera_matrix"][:2]
+        delay = row["display_delay_s"]
+        cells = [
+            *(name, camera, f"{row['width_px']}x{row['height_px']}" if row["width_px"] else "not recorded"),
+            _numbers((fx, fy, cx, cy), ".2f"),
+            _numbers(row["body_to_camera_translation_m"], ".3f"),
+            _numbers(row["body_to_camera_rotation_xyzw"], ".5f"),
+            f"{_numbers([row['body_to_camera_spread_m']], '.3f')} m, "
+            f"{_numbers([row['body_to_camera_spread_deg']], '.2f')} deg",
+            f"{_numbers([None if delay is None else 1e3 * delay], '.1f')} ms, {row['display_delay_source']}",
+        ]
+        lines.append("| " + " | ".join(map(_cell, cells)) + " |")
+    return lines
+
+
+def _numbers(values: Sequence[Optional[float]], form: str) -> str:
+    return ", ".join("-" if value is None else format(value, form) for value in values)
 
 
 def _quality(exports: _Records) -> list[str]:

@@ -116,14 +116,18 @@ def _lard(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 
 def _npz(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import arrays
+    from xplane_bridge.export.cameras import camera_rows
 
-    return arrays.write_npz(arrays.topic_arrays(bags, job.topics, path.parent), path)
+    rows = camera_rows(bags, topics=job.topics)
+    return arrays.write_npz(arrays.topic_arrays(bags, job.topics, path.parent), path, rows)
 
 
 def _mat(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import arrays
+    from xplane_bridge.export.cameras import camera_rows
 
-    return arrays.write_mat(arrays.topic_arrays(bags, job.topics, path.parent), path)
+    rows = camera_rows(bags, topics=job.topics)
+    return arrays.write_mat(arrays.topic_arrays(bags, job.topics, path.parent), path, rows)
 
 
 def _mcap(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
