@@ -312,7 +312,8 @@ def _known(bags: Bags, camera: Camera, table: Table, constants: Mapping[str, Any
             known.add(named({path: table[path]}, units))
     known.add(flight_labels(bags, table.stamp))
     known.add(_quality(table["quality"], constants))
-    known.add(_camera(bags, camera.info, table.stamp, store))
+    for column, values in _camera(bags, camera.info, table.stamp, store):
+        known.add({column: values})
     return known
 
 
@@ -329,20 +330,20 @@ def _quality(quality: np.ndarray, constants: Mapping[str, Any]) -> dict[str, np.
     return columns
 
 
-def _camera(bags: Bags, topic: str, stamp: np.ndarray, store: ColumnFile) -> dict[str, np.ndarray]:
-    """Give CameraInfo's size and matrix K (row by row) of each frame; NaN where none has the frame's stamp."""
-    size = {name: np.full(len(stamp), np.nan) for name in ("width", "height")}
-    matrix = np.full((len(stamp), 9), np.nan)
-    if topic in bags.topics and bags.topics[topic].count:
-        infos = bags.read(topic, ["header.stamp", "width", "height", "K"], store)
-        rows = _Rows(infos.stamp).of_each(stamp)
-        there = rows >= 0
-        matrix[there] = infos["K"][rows[there]]
-        for name, values in size.items():
-            values[there] = infos[name][rows[there]]
-    out = {f"camera_{name}_px": values for name, values in size.items()}
-    out.update({f"camera_matrix_{k}": matrix[:, k] for k in range(9)})
-    return out
+def _camera(bags: Bags, topic: str, stamp: np.ndarray, store: ColumnFile) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield CameraInfo's size and matrix K (row by row), by column; NaN where none has a frame's stamp."""
+    size = {name: f"camera_{name}_px" for name in ("width", "height")}
+    matrix = {k: f"camera_matrix_{k}" for k in range(9)}
+    if topic not in bags.topics or not bags.topics[topic].count:
+        for column in (*size.values(), *matrix.values()):
+            yield column, np.full(len(stamp), np.nan)
+        return
+    infos = bags.read(topic, ["header.stamp", "width", "height", "K"], store)
+    rows = _Rows(infos.stamp).of_each(stamp)
+    for name, column in size.items():
+        yield column, np.where(rows >= 0, infos[name][rows], np.nan)
+    for k, column in matrix.items():
+        yield column, np.where(rows >= 0, infos["K"][rows, k], np.nan)
 
 
 def _images(bags: Bags, topic: str) -> Iterator[tuple[int, str, bytes]]:
