@@ -13,9 +13,11 @@ int main(int argc, char** argv) {
     ros::init(argc, argv, "record");  // takes its own arguments away
     const LockstepRecording recording = LockstepRecording::parse({argv + 1, argv + argc});
     ros::NodeHandle handle;
-    ros::Time::waitForValid();  // no message can be recorded at time 0
+    if (!ros::Time::isValid()) ROS_WARN("no time on /clock yet: nothing can be recorded before rx_node gives it");
+    ros::Time::waitForValid();
     if (!ros::ok()) return 0;
     LockstepRecorder recorder(recording, handle);
+    ROS_INFO("recording %zu topics to %s", recording.topics.size(), recording.bag.c_str());
     ros::spin();
     recorder.finish();
     return 0;
