@@ -6,7 +6,6 @@ next frame does not begin before the picture is drawn.
 
 from __future__ import annotations
 
-import gc
 import json
 import logging
 import math
@@ -26,7 +25,7 @@ from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.lockstep import Fences, LockstepLoop
 from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.pictures import View, wait_until_shown
-from xplane_bridge.emulator.priority import take_realtime_priority
+from xplane_bridge.emulator.priority import collect_seldom, collected_by_hand, take_realtime_priority
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.emulator.simulator import INTERNAL_VERSIONS, Simulator
 from xplane_bridge.emulator.truth import TruthFile
@@ -40,9 +39,6 @@ _LOG = logging.getLogger(__name__)
 
 #: Periods of the newest frames are kept for the closing statistics.
 _KEPT_PERIODS = 100_000
-#: Frames between two collections of cyclic garbage, which nothing in a frame should make.
-_COLLECT_EVERY = 3600
-
 #: Frames that begin later than this last as long as they really do [s].
 _SCHEDULER_JITTER_S = 0.001
 #: Of X-Plane's own dialogues; whether requests may ask for more is a question [1/s].
@@ -304,10 +300,12 @@ class Emulator:
                 self._run_fast()
             elif self.options.stepped == "lines":
                 self._run_lines(sys.stdin, sys.stdout)
-            elif self._fences is not None:
-                self._run_lockstep(self._fences)
             else:
-                self._run_real_time()
+                with collected_by_hand():
+                    if self._fences is not None:
+                        self._run_lockstep(self._fences)
+                    else:
+                        self._run_real_time()
         finally:
             self.close()
 
@@ -315,9 +313,6 @@ class Emulator:
         clock, o = time.monotonic, self.options
         if o.realtime:
             take_realtime_priority()
-        gc.collect()
-        gc.freeze()
-        gc.disable()
         start = deadline = clock()
         last = start - self.period
         while not self.stopping:
@@ -342,8 +337,7 @@ class Emulator:
             self.sim.clocks.work = end - begin
             if len(self._sent_at) < _KEPT_PERIODS:
                 self._sent_at.append(begin)
-            if self._frames % _COLLECT_EVERY == 0:
-                gc.collect()
+            collect_seldom(self._frames)
             # A frame that takes too long (its picture, mostly) makes the next one late, and the frame rate fall.
             deadline = max(deadline + self.period + self._jitter.uniform(0.0, o.frame_jitter), end)
 
@@ -413,13 +407,17 @@ class Emulator:
         while self._frames < frames and not self.stopping:
             self.step_frames(1)
 
+    def _after_fence(self) -> None:
+        self._write_truth()
+        collect_seldom(self._frames)
+
     def _run_lockstep(self, fences: Fences) -> None:
         o = self.options
         self._lockstep = LockstepLoop(
             lambda: self.server,
             fences,
             lambda: self.step_frames(1),
-            self._write_truth,
+            self._after_fence,
             self._send,
             lambda: self.sim.clocks.running,
             lambda: self._picture,
