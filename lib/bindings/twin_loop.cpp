@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -32,28 +33,33 @@ class Loop {
  public:
   explicit Loop(PyObject* model) {
     const auto getters = [model](const char* name) { return items(attribute(model, name).get()); };
-    air_ = getters("_air_getters");
+    const auto properties = [&getters](const char* name) {
+      const std::vector<Object> methods = getters(name);
+      return std::vector<Property>(methods.begin(), methods.end());
+    };
+    const auto property = [](PyObject* owner, const char* name) { return Property(attribute(owner, name)); };
+    air_ = properties("_air_getters");
     if (air_.size() != 7) throw std::invalid_argument("_air_getters: expected 7 of them");
-    alpha_ = attribute(model, "_alpha");
-    pressure_ = attribute(model, "_pressure");
-    temperature_ = attribute(model, "_temperature");
-    agl_ = attribute(model, "_agl");
-    roll_ = attribute(model, "_roll");
-    pitch_ = attribute(model, "_pitch");
-    heading_ = attribute(model, "_heading");
-    airspeed_ = attribute(model, "_airspeed");
-    gear_ = attribute(attribute(model, "_gear").get(), "_set_extension");
-    wind_ = getters("_wind_setters");
+    alpha_ = property(model, "_alpha");
+    pressure_ = property(model, "_pressure");
+    temperature_ = property(model, "_temperature");
+    agl_ = property(model, "_agl");
+    roll_ = property(model, "_roll");
+    pitch_ = property(model, "_pitch");
+    heading_ = property(model, "_heading");
+    airspeed_ = property(model, "_airspeed");
+    gear_ = property(attribute(model, "_gear").get(), "_set_extension");
+    wind_ = properties("_wind_setters");
     const Object fdm = attribute(model, "_fdm");
     run_ = attribute(fdm.get(), "run");
-    set_dt_ = attribute(fdm.get(), "set_dt");
+    set_dt_ = property(fdm.get(), "set_dt");
     hit_ = attribute(attribute(model, "_contacts").get(), "hit");
     contact_height_ = number(attribute(model, "contact_height_m").get());
     contact_runs_ = static_cast<int>(number(attribute(model, "contact_runs").get()));
-    surface_setters_ = getters("_surface_setters");
+    surface_setters_ = properties("_surface_setters");
     for (const Object& pair : getters("_load_setters")) {
       const std::vector<Object> both = items(pair.get());
-      load_setters_.push_back({both.at(0), number(both.at(1).get())});
+      load_setters_.push_back({Property(both.at(0)), number(both.at(1).get())});
     }
     const Object surface_set = attribute(model, "_surface_set");
     for (const Object& o : items(attribute(surface_set.get(), "actuators").get())) {
@@ -140,7 +146,8 @@ class Loop {
     gear_position_ = number(attribute(attribute(model, "_gear").get(), "position").get());
     fdm_step_ = number(attribute(model, "_fdm_step").get());
     crashed_ = PyObject_IsTrue(attribute(model, "_crashed").get()) == 1;
-    height_m_ = call(agl_) * kFoot;
+    height_m_ = agl_.get() * kFoot;
+    applied_deg_.assign(surfaces_.size(), std::numeric_limits<double>::quiet_NaN());  // others set them between frames
     blown_ = false;
   }
 
@@ -162,30 +169,30 @@ class Loop {
 
   Air readAir(bool floor) const {
     std::array<double, 7> values{};
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = call(air_[i]);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = air_[i].get();
     Air air;
     air.velocity = {values[0] * kFoot, values[1] * kFoot, values[2] * kFoot};
     air.rates = {values[3], values[4], values[5]};
     const double density = values[6] * density_unit_;
     air.density = floor ? pythonMax(density, kThinnestAir) : density;
-    air.pressure = call(pressure_) * pressure_unit_;
-    air.temperature = call(temperature_) * temperature_unit_;
+    air.pressure = pressure_.get() * pressure_unit_;
+    air.temperature = temperature_.get() * temperature_unit_;
     return air;
   }
 
   void updateGusts(double dt) {
-    const double heading = call(heading_);
-    const double speed = call(airspeed_) * kFoot;
+    const double heading = heading_.get();
+    const double speed = airspeed_.get() * kFoot;
     const Dryden::Gusts g = turbulence_.dryden.step(dt, speed, height_m_, [this] { return turbulence_.gauss(); });
     const double sine = std::sin(heading), cosine = std::cos(heading);
     gusts_ = {g.along * cosine - g.across * sine, g.along * sine + g.across * cosine, g.down};
     blown_ = true;
-    for (std::size_t axis = 0; axis < 3; ++axis) call(wind_[axis], (steady_wind_[axis] + gusts_[axis]) / kFoot);
+    for (std::size_t axis = 0; axis < 3; ++axis) wind_[axis].set((steady_wind_[axis] + gusts_[axis]) / kFoot);
   }
 
   void advance(double dt, const std::vector<SurfaceOrder>& orders, const std::vector<Throttle>& throttles) {
     const Air air = readAir(true);
-    const double alpha_deg = degrees(call(alpha_));
+    const double alpha_deg = degrees(alpha_.get());
     for (std::size_t i = 0; i < surfaces_.size(); ++i) surfaces_[i]->actuator.step(orders[i], dt, alpha_deg);
     for (std::size_t i = 0; i < engines_.size(); ++i) {
       Rotor& rotor = rotors_[i]->rotor;
@@ -200,8 +207,13 @@ class Loop {
     }
   }
 
-  void applyLoads() const {
-    for (std::size_t i = 0; i < surfaces_.size(); ++i) call(surface_setters_[i], surfaces_[i]->actuator.effective_deg);
+  void applyLoads() {
+    for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+      const double angle = surfaces_[i]->actuator.effective_deg;
+      if (sameBits(angle, applied_deg_[i])) continue;
+      surface_setters_[i].set(angle);
+      applied_deg_[i] = angle;
+    }
     std::array<double, 6> loads{};
     for (const auto& mirror : rotors_) {
       const Rotor& rotor = mirror->rotor;
@@ -213,7 +225,7 @@ class Loop {
       loads[5] += rotor.moment.z;
     }
     for (std::size_t axis = 0; axis < 3; ++axis) loads[axis] += gravity_[axis];
-    for (std::size_t i = 0; i < loads.size(); ++i) call(load_setters_[i].setter, loads[i] * load_setters_[i].factor);
+    for (std::size_t i = 0; i < loads.size(); ++i) load_setters_[i].setter.set(loads[i] * load_setters_[i].factor);
   }
 
   void step(double dt, const std::vector<SurfaceOrder>& orders, const std::vector<Throttle>& throttles) {
@@ -223,13 +235,13 @@ class Loop {
     const int runs = height_m_ > contact_height_ ? 1 : contact_runs_;
     if (std::fabs(dt / runs - fdm_step_) > 1e-12) {
       fdm_step_ = dt / runs;
-      call(set_dt_, fdm_step_);
+      set_dt_.set(fdm_step_);
     }
     const bool tilted_near_ground =
-        height_m_ < kCrashWatch && std::cos(call(roll_)) * std::cos(call(pitch_)) < kStrutsWorkCosine;
-    call(gear_, tilted_near_ground ? 0.0 : gear_position_);
+        height_m_ < kCrashWatch && std::cos(roll_.get()) * std::cos(pitch_.get()) < kStrutsWorkCosine;
+    gear_.set(tilted_near_ground ? 0.0 : gear_position_);
     for (int i = 0; i < runs; ++i) Object(PyObject_CallObject(run_.get(), nullptr));
-    height_m_ = call(agl_) * kFoot;
+    height_m_ = agl_.get() * kFoot;
     if (height_m_ < kCrashWatch && !crashed_) {
       const Object hit(PyObject_CallObject(hit_.get(), nullptr));
       crashed_ = PyObject_IsTrue(hit.get()) == 1;
@@ -237,12 +249,13 @@ class Loop {
   }
 
   struct LoadSetter {
-    Object setter;
+    Property setter;
     double factor;
   };
-  std::vector<Object> air_, wind_, surface_setters_;
+  std::vector<Property> air_, wind_, surface_setters_;
   std::vector<LoadSetter> load_setters_;
-  Object alpha_, pressure_, temperature_, agl_, roll_, pitch_, heading_, airspeed_, gear_, run_, set_dt_, hit_;
+  Property alpha_, pressure_, temperature_, agl_, roll_, pitch_, heading_, airspeed_, gear_, set_dt_;
+  Object run_, hit_;
   double contact_height_ = 0.0, density_unit_ = 1.0, pressure_unit_ = 1.0, temperature_unit_ = 1.0;
   int contact_runs_ = 1;
   std::vector<std::unique_ptr<SurfaceMirror>> surfaces_;  // pointers: the mirrors point into what they mirror
@@ -250,7 +263,7 @@ class Loop {
   std::vector<std::unique_ptr<GovernorMirror>> governors_;
   std::vector<std::unique_ptr<EngineMirror>> engines_;
   TurbulenceMirror turbulence_;
-  std::vector<double> fuel_;
+  std::vector<double> fuel_, applied_deg_;
   std::array<double, 3> steady_wind_{}, gusts_{}, gravity_{};
   double gear_position_ = 0.0, fdm_step_ = 0.0, height_m_ = 0.0;
   bool crashed_ = false, blown_ = false;

@@ -13,11 +13,42 @@
 
 namespace xplane_bridge::bindings {
 
-inline double call(const Object& getter) { return number(Object(PyObject_CallObject(getter.get(), nullptr)).get()); }
+/// Also tells the two zeros apart.
+inline bool sameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-inline void call(const Object& setter, double value) {
-  const Object argument = makeNumber(value);
-  Object(PyObject_CallFunctionObjArgs(setter.get(), argument.get(), nullptr));
+/// A getter or setter of JSBSim's; a bound method is called without the step that binds it.
+class Property {
+ public:
+  Property() = default;
+  explicit Property(const Object& callable) : function_(callable) {
+    if (PyMethod_Check(callable.get())) {
+      function_ = Object::borrowed(PyMethod_Function(callable.get()));
+      self_ = Object::borrowed(PyMethod_Self(callable.get()));
+    }
+  }
+
+  double get() const { return number(call(nullptr).get()); }
+  void set(double value) const { (void)call(makeNumber(value).get()); }
+
+ private:
+  Object call(PyObject* argument) const {
+    PyObject* const arguments[] = {self_.get(), argument};
+    const std::size_t first = self_.get() ? 0 : 1, end = argument ? 2 : 1;
+    return Object(vectorcall(function_.get(), arguments + first, end - first));
+  }
+  static PyObject* vectorcall(PyObject* function, PyObject* const* arguments, std::size_t count) {
+#if PY_VERSION_HEX >= 0x03090000
+    return PyObject_Vectorcall(function, arguments, count, nullptr);
+#else
+    return _PyObject_Vectorcall(function, arguments, count, nullptr);
+#endif
+  }
+
+  Object function_, self_;
+};
+
+inline double call(const Object& function) {
+  return number(Object(PyObject_CallObject(function.get(), nullptr)).get());
 }
 
 /// A double that lives in an attribute of a Python object while no frame is flown.
@@ -42,7 +73,7 @@ struct Mirror {
   /// To be called after `read`: writes what has changed since.
   void write() const {
     for (const Field& field : fields) {
-      if (std::memcmp(&field.read, field.value, sizeof field.read) == 0) continue;
+      if (sameBits(field.read, *field.value)) continue;
       check(PyObject_SetAttr(object.get(), field.name.get(), makeNumber(*field.value).get()));
     }
   }
