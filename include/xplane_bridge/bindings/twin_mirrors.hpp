@@ -13,7 +13,7 @@
 
 namespace xplane_bridge::bindings {
 
-/// Also tells the two zeros apart.
+/// Unlike ==, false for zeros of two signs.
 inline bool sameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 /// A getter or setter of JSBSim's; a bound method is called without the step that binds it.

@@ -5,8 +5,11 @@
 #include <ctime>
 #include <stdexcept>
 
+#include <rosbag/bag.h>
 #include <std_msgs/Header.h>
+#include <topic_tools/shape_shifter.h>
 
+#include "xplane_bridge/FlightState.h"
 #include "xplane_bridge/nodes/base/common_options.hpp"
 
 namespace xplane_bridge {
@@ -47,6 +50,17 @@ std::uint32_t kilobytes(const std::string& text) {
   return static_cast<std::uint32_t>(value) * kBytes;
 }
 
+rosbag::CompressionType rosbagsName(LockstepRecording::Compression compression) {
+  switch (compression) {
+    case LockstepRecording::Compression::kLz4:
+      return rosbag::compression::LZ4;
+    case LockstepRecording::Compression::kBz2:
+      return rosbag::compression::BZ2;
+    default:
+      return rosbag::compression::Uncompressed;
+  }
+}
+
 }  // namespace
 
 LockstepRecording LockstepRecording::parse(const std::vector<std::string>& arguments) {
@@ -61,9 +75,9 @@ LockstepRecording LockstepRecording::parse(const std::vector<std::string>& argum
     } else if (takesValue(argument, "--chunksize", &value)) {
       out.chunk_size = kilobytes(value);
     } else if (argument == "--lz4") {
-      out.compression = rosbag::compression::LZ4;
+      out.compression = Compression::kLz4;
     } else if (argument == "--bz2") {
-      out.compression = rosbag::compression::BZ2;
+      out.compression = Compression::kBz2;
     } else if (!argument.empty() && argument[0] == '/') {
       out.topics.push_back(argument);
     } else {
@@ -78,45 +92,61 @@ LockstepRecording LockstepRecording::parse(const std::vector<std::string>& argum
   return out;
 }
 
+class LockstepRecorder::Impl {
+ public:
+  Impl(const LockstepRecording& recording, const ros::NodeHandle& handle) : file_(recording.bag) {
+    bag_.setCompression(rosbagsName(recording.compression));
+    bag_.setChunkThreshold(recording.chunk_size);
+    bag_.open(file_ + kUnfinished, rosbag::bagmode::Write);
+    ros::NodeHandle bridge(handle, recording.bridge);
+    done_ = bridge.advertise<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue, true);
+    const ros::TransportHints at_once = ros::TransportHints().tcpNoDelay();
+    for (const std::string& topic : recording.topics) {
+      ros::SubscribeOptions options;
+      options.topic = topic;
+      options.queue_size = kUnlimited;
+      options.md5sum = ros::message_traits::md5sum<topic_tools::ShapeShifter>();
+      options.datatype = ros::message_traits::datatype<topic_tools::ShapeShifter>();
+      options.helper = boost::make_shared<ros::SubscriptionCallbackHelperT<const Event&>>(
+          [this, topic](const Event& event) { write(topic, event); });
+      options.transport_hints = at_once;
+      subscribers_.push_back(bridge.subscribe(options));
+    }
+    subscribers_.push_back(bridge.subscribe<FlightState>(
+        "flight_state", kUnlimited, [this](const FlightStateConstPtr& state) { answer(*state); }, nullptr, at_once));
+  }
+
+  void finish() {
+    for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
+    bag_.close();
+    if (std::rename((file_ + kUnfinished).c_str(), file_.c_str()) != 0) {
+      throw rosbag::BagIOException("cannot rename " + file_ + kUnfinished);
+    }
+  }
+
+ private:
+  using Event = ros::MessageEvent<const topic_tools::ShapeShifter>;
+
+  void write(const std::string& topic, const Event& event) {
+    bag_.write(topic, event.getReceiptTime(), *event.getMessage(), event.getConnectionHeaderPtr());
+  }
+
+  void answer(const FlightState& state) const {
+    std_msgs::Header done;
+    done.stamp = state.header.stamp;
+    done_.publish(done);
+  }
+
+  const std::string file_;
+  rosbag::Bag bag_;
+  ros::Publisher done_;
+  std::vector<ros::Subscriber> subscribers_;
+};
+
 LockstepRecorder::LockstepRecorder(const LockstepRecording& recording, const ros::NodeHandle& handle)
-    : file_(recording.bag) {
-  bag_.setCompression(recording.compression);
-  bag_.setChunkThreshold(recording.chunk_size);
-  bag_.open(file_ + kUnfinished, rosbag::bagmode::Write);
-  ros::NodeHandle bridge(handle, recording.bridge);
-  done_ = bridge.advertise<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue, true);
-  const ros::TransportHints at_once = ros::TransportHints().tcpNoDelay();
-  for (const std::string& topic : recording.topics) {
-    ros::SubscribeOptions options;
-    options.topic = topic;
-    options.queue_size = kUnlimited;
-    options.md5sum = ros::message_traits::md5sum<topic_tools::ShapeShifter>();
-    options.datatype = ros::message_traits::datatype<topic_tools::ShapeShifter>();
-    options.helper = boost::make_shared<ros::SubscriptionCallbackHelperT<const Event&>>(
-        [this, topic](const Event& event) { write(topic, event); });
-    options.transport_hints = at_once;
-    subscribers_.push_back(bridge.subscribe(options));
-  }
-  subscribers_.push_back(bridge.subscribe<FlightState>(
-      "flight_state", kUnlimited, [this](const FlightStateConstPtr& state) { answer(*state); }, nullptr, at_once));
-}
+    : impl_(std::make_unique<Impl>(recording, handle)) {}
+LockstepRecorder::~LockstepRecorder() = default;
 
-void LockstepRecorder::write(const std::string& topic, const Event& event) {
-  bag_.write(topic, event.getReceiptTime(), *event.getMessage(), event.getConnectionHeaderPtr());
-}
-
-void LockstepRecorder::answer(const FlightState& state) const {
-  std_msgs::Header done;
-  done.stamp = state.header.stamp;
-  done_.publish(done);
-}
-
-void LockstepRecorder::finish() {
-  for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
-  bag_.close();
-  if (std::rename((file_ + kUnfinished).c_str(), file_.c_str()) != 0) {
-    throw rosbag::BagIOException("cannot rename " + file_ + kUnfinished);
-  }
-}
+void LockstepRecorder::finish() { impl_->finish(); }
 
 }  // namespace xplane_bridge

@@ -1,21 +1,20 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <ros/ros.h>
-#include <rosbag/bag.h>
-#include <topic_tools/shape_shifter.h>
-
-#include "xplane_bridge/FlightState.h"
 
 namespace xplane_bridge {
 
 /// What `lockstep_recorder` is to do.
 struct LockstepRecording {
+  enum class Compression { kNone, kLz4, kBz2 };
+
   std::string bag;  ///< file to write; `<file>.active` until it is complete
-  rosbag::CompressionType compression = rosbag::compression::Uncompressed;
+  Compression compression = Compression::kNone;
   std::uint32_t chunk_size = 768 * 1024;  ///< [bytes] of messages until they are compressed and written
   std::vector<std::string> topics;        ///< absolute names
   std::string bridge = "/xplane";         ///< namespace of the bridge
@@ -33,6 +32,7 @@ class LockstepRecorder {
  public:
   /// Opens the file and subscribes. @throws rosbag::BagException the file cannot be written
   LockstepRecorder(const LockstepRecording& recording, const ros::NodeHandle& handle);
+  ~LockstepRecorder();
   LockstepRecorder(const LockstepRecorder&) = delete;
   LockstepRecorder& operator=(const LockstepRecorder&) = delete;
 
@@ -40,15 +40,8 @@ class LockstepRecorder {
   void finish();
 
  private:
-  using Event = ros::MessageEvent<const topic_tools::ShapeShifter>;
-
-  void write(const std::string& topic, const Event& event);
-  void answer(const FlightState& state) const;
-
-  const std::string file_;
-  rosbag::Bag bag_;
-  ros::Publisher done_;
-  std::vector<ros::Subscriber> subscribers_;
+  class Impl;  // rosbag's headers need more than users of this package's library have
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace xplane_bridge

@@ -15,16 +15,17 @@ TEST(LockstepRecorder, TakesTheArgumentsThatRosbagTakes) {
   const LockstepRecording plain = LockstepRecording::parse({"--output-name=/a/flight.bag", "/xplane/odom", "/tf"});
   EXPECT_EQ(plain.bag, "/a/flight.bag");
   EXPECT_EQ(plain.topics, (Words{"/xplane/odom", "/tf"}));
-  EXPECT_EQ(plain.compression, rosbag::compression::Uncompressed);
+  EXPECT_EQ(plain.compression, LockstepRecording::Compression::kNone);
   EXPECT_EQ(plain.chunk_size, 768U * 1024U);
   EXPECT_EQ(plain.bridge, "/xplane");
 
   const LockstepRecording small =
       LockstepRecording::parse({"--lz4", "--chunksize=64", "--bridge=/north/", "--output-name=b", "/north/odom"});
-  EXPECT_EQ(small.compression, rosbag::compression::LZ4);
+  EXPECT_EQ(small.compression, LockstepRecording::Compression::kLz4);
   EXPECT_EQ(small.chunk_size, 64U * 1024U);
   EXPECT_EQ(small.bridge, "/north/");
-  EXPECT_EQ(LockstepRecording::parse({"--bz2", "--output-name=b", "/tf"}).compression, rosbag::compression::BZ2);
+  EXPECT_EQ(LockstepRecording::parse({"--bz2", "--output-name=b", "/tf"}).compression,
+            LockstepRecording::Compression::kBz2);
 }
 
 TEST(LockstepRecorder, PutsTheDateBehindAPrefix) {
