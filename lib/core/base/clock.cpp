@@ -27,10 +27,10 @@ Clock hostClock() {
   return {[] { return readClock(CLOCK_MONOTONIC); }, [] { return readClock(CLOCK_REALTIME); }};
 }
 
-void ClockWaiters::wakeAll() {
+void ClockWaiters::wake(std::int64_t steady_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (ClockCondition* condition : waiting_) {
-    condition->notifyAll();
+  for (const Waiting& each : waiting_) {
+    if (each.end_ns <= steady_ns) each.condition->notifyAll();
   }
 }
 
@@ -57,7 +57,7 @@ bool ClockCondition::beginWait(const Deadline* deadline) {
   if (ThreadTurns::taken()) return true;
   if (ClockWaiters* const waiters = waitersOf(deadline)) {
     const std::lock_guard<std::mutex> lock(waiters->mutex_);
-    waiters->waiting_.push_back(this);
+    waiters->waiting_.push_back({this, deadline->end_ns()});
   }
   return false;
 }
@@ -85,7 +85,9 @@ void ClockCondition::endWait(const Deadline* deadline) {
   if (ClockWaiters* const waiters = waitersOf(deadline)) {
     const std::lock_guard<std::mutex> lock(waiters->mutex_);
     auto& waiting = waiters->waiting_;
-    const auto found = std::find(waiting.begin(), waiting.end(), this);
+    const auto found = std::find_if(waiting.begin(), waiting.end(), [&](const ClockWaiters::Waiting& each) {
+      return each.condition == this && each.end_ns == deadline->end_ns();
+    });
     if (found != waiting.end()) waiting.erase(found);
   }
 }

@@ -76,6 +76,6 @@ void LockstepClock::release() {
   tick();
 }
 
-void LockstepClock::tick() { state_->waiters->wakeAll(); }
+void LockstepClock::tick() { state_->waiters->wake(state_->steady()); }
 
 }  // namespace xplane_bridge::core

@@ -92,7 +92,7 @@ class FakeSimulator : public SimulatorPort {
   /// One frame. While X-Plane does not answer (SEARCHING, STALE, LOST), time passes and nothing is delivered.
   void frame(double dt = kFrame) {
     now_ns_ += static_cast<std::int64_t>(std::llround(dt * 1e9));
-    clock_.waiters->wakeAll();
+    clock_.waiters->wake(now_ns_);
     if (answers()) {
       if (status_.state == LinkState::kConnected) {
         datarefs_[kSimTime] += static_cast<float>(dt);

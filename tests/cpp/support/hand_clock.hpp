@@ -21,7 +21,7 @@ class HandClock {
   std::int64_t steadyNs() const { return *now_; }
   void move(std::int64_t nanoseconds) {
     *now_ += nanoseconds;
-    waiters_->wakeAll();
+    waiters_->wake(*now_);
   }
 
  private:

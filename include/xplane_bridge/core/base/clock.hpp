@@ -21,13 +21,19 @@ class ClockCondition;
 /// Who waits for a time of a clock that does not run by itself. Thread-safe.
 class ClockWaiters {
  public:
-  /// Lets each of them look at the time: to be called whenever the clock was moved. The caller may hold any lock.
-  void wakeAll();
+  /// Lets those look at the time whose deadline is over: to be called whenever the clock was moved. The caller may hold
+  /// any lock.
+  /// @param steady_ns [ns] the clock's steady time
+  void wake(std::int64_t steady_ns);
 
  private:
   friend class ClockCondition;
+  struct Waiting {
+    ClockCondition* condition;
+    std::int64_t end_ns;  // steady time
+  };
   std::mutex mutex_;
-  std::vector<ClockCondition*> waiting_;
+  std::vector<Waiting> waiting_;
 };
 
 /// Time source handed to all code that needs the time; a copy is the same clock. The functions may be called from any
@@ -59,6 +65,8 @@ class Deadline {
   }
 
   const Clock& clock() const { return clock_; }
+  /// [ns] of the clock's steady time
+  std::int64_t end_ns() const { return end_ns_; }
   bool over() const { return clock_.steady_ns() >= end_ns_; }
   /// [s] until then; 0 or less once it is over
   double left() const { return toSeconds(end_ns_ - clock_.steady_ns()); }

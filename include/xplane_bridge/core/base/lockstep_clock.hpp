@@ -29,7 +29,7 @@ class LockstepClock {
   void move(std::int64_t sim_ns);
   /// The flight is over: the node ends, and must not wait for frames that never come.
   void release();
-  /// Lets those who wait look at the time. To be called every few milliseconds while it does not fly.
+  /// Lets those go on whose time has come. To be called every few milliseconds while it does not fly.
   void tick();
 
  private:

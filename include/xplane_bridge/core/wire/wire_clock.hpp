@@ -26,7 +26,7 @@ class WireClock {
   void move(std::int64_t steady_ns, std::int64_t wall_ns) const {
     state_->steady_ns = steady_ns;
     state_->wall_ns = wall_ns;
-    state_->waiters->wakeAll();
+    state_->waiters->wake(steady_ns);
   }
 
  private:

@@ -72,6 +72,30 @@ TEST_F(AConditionOfAClock, IsWaitedForUntilTheHandReachesTheDeadline) {
   EXPECT_EQ(outcome.steady_ns, deadline);
 }
 
+TEST_F(AConditionOfAClock, SleepsWhileOthersAreWoken) {
+  constexpr int kOthers = 200;
+  HandClock hand;
+  std::atomic<int> looks{0};
+  const Deadline deadline(hand.clock(), 1e-3 * (kOthers + 1));
+  std::future<void> last = std::async(std::launch::async, [&] {
+    std::mutex mutex;
+    std::unique_lock<std::mutex> lock(mutex);
+    ClockCondition condition;
+    condition.waitUntil(&lock, deadline, [&] {
+      ++looks;
+      return false;
+    });
+  });
+  for (int i = 0; i < kOthers; ++i) {
+    std::future<Outcome> other = waitUntil(Deadline(hand.clock(), 1e-3));
+    hand.move(kMs);
+    other.get();
+  }
+  hand.move(kMs);
+  last.get();
+  EXPECT_LT(looks, kOthers / 10);  // some may come without a cause
+}
+
 TEST_F(AConditionOfAClock, EndsWithTheNotificationWhileTheClockStands) {
   HandClock hand;
   std::future<Outcome> waiting = waitUntil(Deadline(hand.clock(), 0.1));
@@ -119,7 +143,7 @@ TEST_F(AConditionOfAClock, IsNotWaitedForWhereTheClockIsMovedJustBefore) {
                       const std::int64_t seen = now;
                       if (++looks == 2) {  // the wait has seen that the deadline is not over, and does not sleep yet
                         now = kMs;
-                        waiters->wakeAll();
+                        waiters->wake(now);
                       }
                       return seen;
                     },

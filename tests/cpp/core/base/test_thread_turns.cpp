@@ -93,7 +93,7 @@ TEST(ThreadTurns, AThreadGoesOnOnceItsDeadlineIsOver) {
   });
   turns->give();
   now = 999'999'999;
-  clock.waiters->wakeAll();
+  clock.waiters->wake(now);
   turns->give();
   EXPECT_EQ(passed, 0);
   now = 1'000'000'000;
@@ -220,7 +220,7 @@ TEST(ThreadTurns, AWaitThatBeganInATurnFollowsTheClockWhereTurnsEndBeforeItSleep
   });
   turns->give();
   while (!moved) std::this_thread::yield();
-  clock.waiters->wakeAll();
+  clock.waiters->wake(now);
   EXPECT_EQ(ended.get_future().wait_for(kLongestFailure), std::future_status::ready) << "it sleeps for ever";
   changed.notifyAll();
   thread.join();
@@ -260,7 +260,7 @@ TEST(ThreadTurns, AWaitInATurnLeavesOthersAmongTheClocksWaiters) {
   turns->give();
   thread.join();
   now = 2 * kSecond;
-  waiters->wakeAll();
+  waiters->wake(now);
   EXPECT_EQ(ended.get_future().wait_for(kLongestFailure), std::future_status::ready) << "it sleeps for ever";
   changed.notifyAll();
   other.join();
