@@ -192,6 +192,7 @@ UdpSocket& UdpSocket::operator=(UdpSocket&& other) noexcept {
     sent_bytes_.store(other.sent_bytes_.load());
     send_failures_.store(other.send_failures_.load());
     refused_.store(other.refused_.load());
+    errors_queued_.store(other.errors_queued_.load());
     joined_ = std::move(other.joined_);
   }
   return *this;
@@ -238,6 +239,7 @@ bool UdpSocket::sendTo(ByteView bytes, const Endpoint& to, int* error_number) {
       sent_bytes_.fetch_add(bytes.size(), std::memory_order_relaxed);
       return true;
     }
+    errors_queued_ = true;
     if (errno != ECONNREFUSED) {
       break;
     }
@@ -281,7 +283,8 @@ ReceiveStatus UdpSocket::receive(ByteSpan buffer, Received* received) {
     if (size < 0) {
       const int error_number = errno;
       if (error_number == EAGAIN || error_number == EWOULDBLOCK) {
-        drainErrorQueue();
+        // An error is reported by one call, of sending or of receiving, and stays queued.
+        if (errors_queued_.exchange(false)) drainErrorQueue();
         return ReceiveStatus::kNothing;
       }
       if (error_number == EINTR) {
@@ -292,6 +295,7 @@ ReceiveStatus UdpSocket::receive(ByteSpan buffer, Received* received) {
         drainErrorQueue();
         continue;
       }
+      errors_queued_ = true;
       return ReceiveStatus::kFailed;
     }
     received->size = static_cast<std::size_t>(size);

@@ -58,6 +58,7 @@ class UdpSocket : public DatagramSource {
   std::atomic<std::uint64_t> sent_bytes_{0};
   std::atomic<std::uint64_t> send_failures_{0};
   std::atomic<std::uint64_t> refused_{0};
+  std::atomic<bool> errors_queued_{false};  ///< some may be, which no call reports any more
   std::vector<std::string> joined_;
 };
 

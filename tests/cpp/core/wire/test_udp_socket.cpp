@@ -143,6 +143,25 @@ TEST(UdpSocket, RefusalIsCountedAndHarmless) {
   EXPECT_EQ(socket.counters().send_failures, 0U);
 }
 
+TEST(UdpSocket, ARefusalThatSendingMetDoesNotKeepPollAwake) {
+  UdpSocket socket(onLoopback());
+  Endpoint closed_port;
+  {
+    UdpSocket gone(onLoopback());
+    closed_port = endpointOf(gone);
+  }
+  pollfd end{socket.fd(), POLLIN, 0};
+  ASSERT_TRUE(socket.sendTo(kPayload, closed_port));
+  ASSERT_EQ(poll(&end, 1, kPatienceMs), 1);
+  ASSERT_TRUE(socket.sendTo(kPayload, endpointOf(socket)));
+  ASSERT_EQ(socket.counters().refused, 1U);
+  std::array<std::uint8_t, 8> buffer{};
+  Received received;
+  ASSERT_EQ(receiveWithin(kPatienceMs, &socket, buffer, &received), ReceiveStatus::kReceived);
+  EXPECT_EQ(socket.receive(buffer, &received), ReceiveStatus::kNothing);
+  EXPECT_EQ(poll(&end, 1, 0), 0);
+}
+
 TEST(UdpSocket, DropsOfTheKernelAreCounted) {
   UdpSocketOptions options = onLoopback();
   options.receive_buffer = 4096;
