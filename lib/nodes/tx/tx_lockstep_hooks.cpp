@@ -132,14 +132,16 @@ void TxNode::closeFrame(const core::LockstepFrame& frame) {
   if (frame.number > 0) lockstep_->close();
   actuation_->tick();
   if (held()) return;
-  ControlMode mode;
-  mode.header.stamp = stampNow();
-  toMessage(actuation_->path().mode(), actuation_->simTime(), &mode);
-  frame_mode_publisher_.publish(mode);
+  frame_mode_.emplace();
+  frame_mode_->header.stamp = stampNow();
+  toMessage(actuation_->path().mode(), actuation_->simTime(), &*frame_mode_);
 }
 
 void TxNode::endFrame(const core::LockstepFrame& frame) {
   link().write(core::kFenceDataref, static_cast<float>(frame.number));
+  // While the simulator is at its next frame.
+  if (frame_mode_) frame_mode_publisher_.publish(*frame_mode_);
+  frame_mode_.reset();
 }
 
 void TxNode::serveStep(const LockstepStep::Request& request, LockstepStep::Response* response) {

@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <ros/publisher.h>
 #include <ros/steady_timer.h>
 
 #include "xplane_bridge/ControlCommand.h"
+#include "xplane_bridge/ControlMode.h"
 #include "xplane_bridge/LockstepStep.h"
 #include "xplane_bridge/ModeRequest.h"
 #include "xplane_bridge/SetMode.h"
@@ -86,8 +88,9 @@ class TxNode : public BaseNode {
 
   TxOptions options_;
   std::unique_ptr<TxLockstep> lockstep_;
-  ros::Publisher frame_mode_publisher_;  // in lock-step
-  ros::CallbackQueue lockstep_queue_;    // lockstep/step waits for frames, which wait for other services
+  ros::Publisher frame_mode_publisher_;    // in lock-step
+  std::optional<ControlMode> frame_mode_;  // to be published at the frame's end
+  ros::CallbackQueue lockstep_queue_;      // lockstep/step waits for frames, which wait for other services
   std::unique_ptr<ros::AsyncSpinner> lockstep_spinner_;
   EventLog events_;
   Guardian guardian_;
