@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xplane_bridge.harness import wait_until
+from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.ros import roslaunch
 
 
@@ -86,3 +86,30 @@ def test_the_recorder_of_lockstep_takes_the_arguments_of_the_other_and_answers(w
         assert bag.get_compression_info().compression == "lz4"
         ((topic, message, _),) = bag.read_messages()
     assert (topic, message.frame_count) == (f"{world.namespace}/flight_state", 7)
+
+
+def test_the_recorder_of_lockstep_ends_where_nothing_can_be_written(world):
+    import rospy
+    from xplane_bridge.msg import FlightState
+
+    publisher = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1)
+    recorder = [
+        "rosrun",
+        "xplane_bridge",
+        "lockstep_recorder",
+        f"--output-name={world.folder / 'full.bag'}",
+        "--chunksize=1",
+    ]
+    recorder += [f"--bridge={world.namespace}", f"{world.namespace}/flight_state"]
+    with_little_room = ["bash", "-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "bash", *recorder]  # [KiB] of a file
+    with ManagedProcess("recorder", with_little_room, world.folder, env=world.master.env) as process:
+
+        def ends() -> bool:
+            publisher.publish(FlightState())
+            return not process.running
+
+        wait_until(ends, 60.0, "end of a recorder that cannot write")
+        assert process.returncode == 1
+        assert f"lockstep_recorder: cannot write {world.folder / 'full.bag.active'}: " in process.output()
+    publisher.unregister()
+    assert not (world.folder / "full.bag").exists()

@@ -116,6 +116,12 @@ void BaseNode::stampBySimulator() {
   });
 }
 
+void BaseNode::subscribeWith(ros::SubscribeOptions* options) {
+  options->transport_hints = ros::TransportHints().tcpNoDelay();
+  if (lockstep()) options->callback_queue = &immediate_;
+  subscribers_.push_back(handle_.subscribe(*options));
+}
+
 void BaseNode::takeOverShutdownRequest() {
   // roscpp's own handler would call ros::shutdown() before anything is undone.
   const ros::XMLRPCManagerPtr& manager = ros::XMLRPCManager::instance();
@@ -150,6 +156,7 @@ ExitCode BaseNode::run() {
   if (!stopping()) {
     spinner_->start();
     service_spinner_->start();
+    immediate_.open();
     if (!lockstep() && !wire_) timers_->start();
   }
   diagnostics_thread_ = std::thread([this] { diagnosticsLoop(); });

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdio>
 #include <ctime>
+#include <memory>
 #include <stdexcept>
 
 #include <rosbag/bag.h>
@@ -11,6 +12,7 @@
 
 #include "xplane_bridge/FlightState.h"
 #include "xplane_bridge/nodes/base/common_options.hpp"
+#include "xplane_bridge/nodes/base/immediate_queue.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -95,10 +97,11 @@ LockstepRecording LockstepRecording::parse(const std::vector<std::string>& argum
 class LockstepRecorder::Impl {
  public:
   Impl(const LockstepRecording& recording, const ros::NodeHandle& handle) : file_(recording.bag) {
-    bag_.setCompression(rosbagsName(recording.compression));
-    bag_.setChunkThreshold(recording.chunk_size);
-    bag_.open(file_ + kUnfinished, rosbag::bagmode::Write);
+    bag_->setCompression(rosbagsName(recording.compression));
+    bag_->setChunkThreshold(recording.chunk_size);
+    bag_->open(file_ + kUnfinished, rosbag::bagmode::Write);
     ros::NodeHandle bridge(handle, recording.bridge);
+    bridge.setCallbackQueue(&queue_);
     done_ = bridge.advertise<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue, true);
     const ros::TransportHints at_once = ros::TransportHints().tcpNoDelay();
     for (const std::string& topic : recording.topics) {
@@ -114,11 +117,18 @@ class LockstepRecorder::Impl {
     }
     subscribers_.push_back(bridge.subscribe<FlightState>(
         "flight_state", kUnlimited, [this](const FlightStateConstPtr& state) { answer(*state); }, nullptr, at_once));
+    queue_.open();
   }
 
   void finish() {
     for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
-    bag_.close();
+    try {
+      if (!failure_.empty()) throw rosbag::BagIOException(failure_);
+      bag_->close();
+    } catch (const std::exception& error) {
+      (void)bag_.release();  // its destructor tries again to complete the file, and what that throws ends the process
+      throw rosbag::BagIOException("cannot write " + file_ + kUnfinished + ": " + error.what() + "; is the disk full?");
+    }
     if (std::rename((file_ + kUnfinished).c_str(), file_.c_str()) != 0) {
       throw rosbag::BagIOException("cannot rename " + file_ + kUnfinished);
     }
@@ -127,19 +137,29 @@ class LockstepRecorder::Impl {
  private:
   using Event = ros::MessageEvent<const topic_tools::ShapeShifter>;
 
+  /// On roscpp's network thread, which no exception may leave.
   void write(const std::string& topic, const Event& event) {
-    bag_.write(topic, event.getReceiptTime(), *event.getMessage(), event.getConnectionHeaderPtr());
+    if (!failure_.empty()) return;
+    try {
+      bag_->write(topic, event.getReceiptTime(), *event.getMessage(), event.getConnectionHeaderPtr());
+    } catch (const std::exception& error) {
+      failure_ = error.what();
+      ros::requestShutdown();
+    }
   }
 
   void answer(const FlightState& state) const {
+    if (!failure_.empty()) return;
     std_msgs::Header done;
     done.stamp = state.header.stamp;
     done_.publish(done);
   }
 
   const std::string file_;
-  rosbag::Bag bag_;
+  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
+  std::string failure_;  // of the first message that could not be written
   ros::Publisher done_;
+  ImmediateQueue queue_;
   std::vector<ros::Subscriber> subscribers_;
 };
 

@@ -27,6 +27,7 @@
 #include "xplane_bridge/nodes/base/advertiser.hpp"
 #include "xplane_bridge/nodes/base/clock_timers.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
+#include "xplane_bridge/nodes/base/immediate_queue.hpp"
 #include "xplane_bridge/nodes/base/node_wire.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
@@ -65,6 +66,8 @@ enum class ExitCode {
 ///
 /// Lock-step (the shared section `lockstep`): clock() is the simulator's, and all that the node does in a frame is done
 /// on the link's thread, in the order of the hooks below; timers too. A node without a link moves its clock itself.
+/// Subscriptions are served by roscpp's network thread (ImmediateQueue): each other thread to wake is a part of a
+/// frame.
 ///
 /// With `publish_clock` and without lock-step, only clock()'s system time is the simulator's: stamps. rx_node moves it,
 /// and the others follow /clock. Receive times of datagrams stay wallClock()'s.
@@ -208,9 +211,9 @@ class BaseNode {
                       std::function<void(const boost::shared_ptr<const Message>&)> callback) {
     if (wire_) callback = throughWire<Message>("topic " + topic, std::move(callback));
     if (wire_ && wire_->replays()) return;
-    subscribers_.push_back(handle_.subscribe<Message>(
-        topic, queue_size, boost::function<void(const boost::shared_ptr<const Message>&)>(std::move(callback)),
-        ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+    ros::SubscribeOptions options;
+    options.init<Message>(topic, queue_size, std::move(callback));
+    subscribeWith(&options);
   }
 
   /// The same for a callback that needs to know the publisher.
@@ -219,8 +222,7 @@ class BaseNode {
                        std::function<void(const ros::MessageEvent<const Message>&)> callback) {
     ros::SubscribeOptions options;
     options.initByFullCallbackType<const ros::MessageEvent<const Message>&>(topic, queue_size, std::move(callback));
-    options.transport_hints = ros::TransportHints().tcpNoDelay();
-    subscribers_.push_back(handle_.subscribe(options));
+    subscribeWith(&options);
   }
 
   /// Advertises a service on the service thread, or on that of another `queue`. While stopping, calls fail at once. An
@@ -286,6 +288,7 @@ class BaseNode {
   enum class State { kCreated, kInitialized, kRunning, kStopped };
 
   void stampBySimulator();
+  void subscribeWith(ros::SubscribeOptions* options);
   void openWire(const ParamLoader& shared, const ParamLoader& own);
   void startWire();
   void logUserFiles();
@@ -351,6 +354,7 @@ class BaseNode {
   std::optional<core::LockstepClock> lockstep_clock_;
   std::shared_ptr<std::atomic<std::int64_t>> stamp_ns_;  // with stampsBySimulator()
 
+  ImmediateQueue immediate_;  // of the subscriptions, in lock-step
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
   ros::CallbackQueue service_queue_;

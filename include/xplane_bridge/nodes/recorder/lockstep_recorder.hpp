@@ -36,7 +36,8 @@ class LockstepRecorder {
   LockstepRecorder(const LockstepRecorder&) = delete;
   LockstepRecorder& operator=(const LockstepRecorder&) = delete;
 
-  /// Completes the file. To be called when no callback runs any more. @throws rosbag::BagException it cannot be written
+  /// Ends the subscriptions and completes the file. @throws rosbag::BagException it cannot be written, or a message
+  /// could not, for which ROS has been shut down
   void finish();
 
  private:
