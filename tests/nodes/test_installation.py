@@ -50,7 +50,8 @@ def install_space():
     shutil.rmtree(prefix, ignore_errors=True)
     env = {key: value for key, value in os.environ.items() if key not in ("MAKEFLAGS", "MAKELEVEL", "DESTDIR")}
     run(["make", "-C", WORKSPACE / "build", "install"], env=env)
-    return prefix
+    yield prefix
+    shutil.rmtree(prefix)  # where it lies, rosrun finds two programs of each name in a clone
 
 
 def test_ros_finds_the_installed_package_and_its_messages(install_space, tmp_path):

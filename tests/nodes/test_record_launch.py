@@ -93,13 +93,7 @@ def test_the_recorder_of_lockstep_ends_where_nothing_can_be_written(world):
     from xplane_bridge.msg import FlightState
 
     publisher = rospy.Publisher(f"{world.namespace}/flight_state", FlightState, queue_size=1)
-    recorder = [
-        "rosrun",
-        "xplane_bridge",
-        "lockstep_recorder",
-        f"--output-name={world.folder / 'full.bag'}",
-        "--chunksize=1",
-    ]
+    recorder = [world.program("lockstep_recorder"), f"--output-name={world.folder / 'full.bag'}", "--chunksize=1"]
     recorder += [f"--bridge={world.namespace}", f"{world.namespace}/flight_state"]
     with_little_room = ["bash", "-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "bash", *recorder]  # [KiB] of a file
     with ManagedProcess("recorder", with_little_room, world.folder, env=world.master.env) as process:
