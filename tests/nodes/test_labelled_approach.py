@@ -29,7 +29,7 @@ import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from support.approach_flight import fly_approach
-fly_approach(Path(sys.argv[2]), Path(sys.argv[3]), lockstep=sys.argv[4] == "lockstep")
+fly_approach(Path(sys.argv[2]), Path(sys.argv[3]), lockstep=True)
 """
 #: The last seconds of the approach: from 800 m before the threshold.
 START_ALONG, END_S = -900.0 - 800.0, 13
@@ -43,26 +43,23 @@ OWN_MEDIAN_PX, OWN_P95_PX = 0.15, 0.45
 AHEAD = {"number": 1, "ahead": 300, "right": 60, "turned": 0, "speed": 40}
 
 
-def scenario(file: Path, others: bool) -> Path:
-    """Shortens the scenario that is shipped; livelier, so that frames differ, or with another aircraft."""
+def scenario(file: Path) -> Path:
+    """Shortens the scenario that is shipped; livelier, so that frames differ, and with another aircraft."""
     content = yaml.safe_load(config_file("scenarios", "approach.yaml").read_text(encoding="utf-8"))
     latitude, longitude = geodetic(START_ALONG, 0.0)
     content["start"].update(latitude=latitude, longitude=longitude, altitude=60)
     wind, final, roll, *_ = content["events"]
     roll["at"] = 1
-    if not others:
-        roll["excitation"]["amplitude"] = 0.25
-    traffic = [{"at": 1, "traffic": [AHEAD]}] if others else []
-    content["events"] = [wind, final, roll, *traffic, {"at": END_S, "end": True}]
+    roll["excitation"]["amplitude"] = 0.25
+    content["events"] = [wind, final, roll, {"at": 1, "traffic": [AHEAD]}, {"at": END_S, "end": True}]
     del content["criteria"]
     file.write_text(yaml.safe_dump(content), encoding="utf-8")
     return file
 
 
-def flown(folder: Path, how: str) -> Path:
-    """The recording of it, in lock-step or, with the other aircraft, which it does not have there, free."""
-    file = scenario(folder / "short.yaml", others=how == "free")
-    arguments = [str(TESTS), folder / "out", file, how]
+def flown(folder: Path) -> Path:
+    """The recording of it."""
+    arguments = [str(TESTS), folder / "out", scenario(folder / "short.yaml")]
     with ManagedProcess("flight", [sys.executable, "-c", FLY, *arguments], folder, env=ros_environment()) as flight:
         assert flight.wait(TIMEOUT_S) == 0, flight.output()
     return folder / "out" / "flight.bag"
@@ -70,7 +67,7 @@ def flown(folder: Path, how: str) -> Path:
 
 @pytest.fixture(scope="module", name="bags")
 def fixture_bags(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bags]:
-    with Bags(flown(tmp_path_factory.mktemp("approach"), "lockstep")) as bags:
+    with Bags(flown(tmp_path_factory.mktemp("approach"))) as bags:
         yield bags
 
 
@@ -103,18 +100,17 @@ def contrast(grey: np.ndarray, centre: Tuple[float, float], size: float) -> floa
     return float(near.max()) - float(np.median(wide))
 
 
-def test_the_other_aircraft_is_where_its_label_says(tmp_path: Path) -> None:
+def test_the_other_aircraft_is_where_its_label_says(bags: Bags) -> None:
     there: List[float] = []
     beside: List[float] = []
-    with Bags(flown(tmp_path, "free")) as bags:
-        lines = {line["stamp_ns"]: line for line in flight_of(bags).labels()}
-        known = [line["others_known"] for line in lines.values()]
-        assert sum(known) > 0.8 * len(known)
-        for stamp, grey in grey_pictures(bags, image_topic(bags, (COMPRESSED, "sensor_msgs/Image"))):
-            for thing in lines[stamp]["objects"] if stamp in lines else ():
-                if thing["kind"] == "aircraft" and thing["state"] == "visible" and 15.0 < thing["size_px"] < 80.0:
-                    u, v = thing["centre"]
-                    there.append(contrast(grey, (u, v), thing["size_px"]))
-                    beside.append(contrast(grey, (u, v - thing["size_px"]), thing["size_px"]))
+    lines = {line["stamp_ns"]: line for line in flight_of(bags).labels()}
+    known = [line["others_known"] for line in lines.values()]
+    assert sum(known) > 0.8 * len(known)
+    for stamp, grey in grey_pictures(bags, image_topic(bags, (COMPRESSED, "sensor_msgs/Image"))):
+        for thing in lines[stamp]["objects"]:
+            if thing["kind"] == "aircraft" and thing["state"] == "visible" and 15.0 < thing["size_px"] < 80.0:
+                u, v = thing["centre"]
+                there.append(contrast(grey, (u, v), thing["size_px"]))
+                beside.append(contrast(grey, (u, v - thing["size_px"]), thing["size_px"]))
     assert len(there) > 50
     assert np.median(there) > np.median(beside) + 20.0
