@@ -33,16 +33,19 @@ def test_stamps_and_clock_are_simulator_time(world):
 
     wait_until(applied_now, WAIT_S, "commands applied")
     surfaces.wait_for_count(20)
-    for state in states.wait_for_count(60):
+    states.wait_for_count(60)
+    recent, commanded = states.messages[-60:], applied.messages[-10:]
+    clocks.wait_for(lambda clock: clock.clock >= max(m.header.stamp for m in recent + commanded))
+    for state in states.messages:
         assert state.header.stamp.to_sec() == pytest.approx(START + state.sim_time_unwrapped, abs=1e-6)
         assert state.stamp_uncertainty == 0.0
     shown = {clock.clock for clock in clocks.messages}
-    assert {state.header.stamp for state in states.messages[-60:]} <= shown
+    assert {state.header.stamp for state in recent} <= shown
     # The frame's own time, not that of the frame it was published in.
     for message in surfaces.messages[-20:]:
         assert message.header.stamp.to_sec() == pytest.approx(START + message.sim_time, abs=1e-3)
     # tx_node knows the time from /clock: that of the frame before.
-    for message in applied.messages[-10:]:
+    for message in commanded:
         assert message.header.stamp in shown or message.header.stamp.to_sec() == START
     link = world.watch("link_state", LinkState).wait_for(lambda m: m.state == m.CONNECTED)
     assert START <= link.header.stamp.to_sec() < START + 1e5
