@@ -4,15 +4,21 @@
 
 #include <ros/ros.h>
 
+#include "xplane_bridge/nodes/base/immediate_queue.hpp"
+#include "xplane_bridge/nodes/base/ros_time.hpp"
 #include "xplane_bridge/nodes/recorder/lockstep_recorder.hpp"
 
 int main(int argc, char** argv) {
   using xplane_bridge::LockstepRecorder;
   using xplane_bridge::LockstepRecording;
   try {
-    ros::init(argc, argv, "record");  // takes its own arguments away
+    xplane_bridge::initWithOwnTime(&argc, argv, "record");
     const LockstepRecording recording = LockstepRecording::parse({argv + 1, argv + argc});
     ros::NodeHandle handle;
+    xplane_bridge::ImmediateQueue at_once;
+    at_once.open();
+    const ros::Subscriber clock =
+        xplane_bridge::movesRosTime() ? xplane_bridge::followClock(&at_once) : ros::Subscriber();
     if (!ros::Time::isValid()) ROS_WARN("no time on /clock yet: nothing can be recorded before rx_node gives it");
     ros::Time::waitForValid();
     if (!ros::ok()) return 0;

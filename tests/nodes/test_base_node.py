@@ -188,6 +188,24 @@ def test_diagnostics_tick_at_one_hertz(world, tiny):
     world.wait_for_diagnostics("tiny")
 
 
+def test_with_use_sim_time_its_time_is_that_of_the_clock(world, tiny):
+    import rospy
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rosgraph_msgs.msg import Clock
+
+    publisher = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
+    diagnostics = world.watch("/diagnostics", DiagnosticArray)
+    world.master.set_param("/use_sim_time", True)
+    try:
+        tiny()
+        for time_s in (1234, 1300):
+            publisher.publish(Clock(clock=rospy.Time(time_s)))
+            diagnostics.wait_for(lambda message, now=time_s: message.header.stamp.to_sec() == now)
+    finally:
+        world.master.set_param("/use_sim_time", False)
+        publisher.unregister()
+
+
 def test_waiting_service_does_not_delay_callbacks_nor_the_end(world, tiny):
     import rospy
     from std_msgs.msg import Float64

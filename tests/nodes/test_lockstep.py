@@ -178,6 +178,27 @@ def test_it_holds_and_flies_on_as_asked(world):
     assert world.call("lockstep/hold", Trigger).success
 
 
+def test_ros_time_of_a_node_is_that_of_the_frame(world):
+    from diagnostic_msgs.msg import DiagnosticArray
+    from xplane_bridge.msg import FlightState
+
+    world.master.set_param("/use_sim_time", True)
+    try:
+        start(world, participants=[])
+        states, diagnostics = world.watch("flight_state", FlightState), world.watch("/diagnostics", DiagnosticArray)
+        for number in (1, 2):
+            step(world, 50)
+            last = states.wait_for(lambda state, count=50 * number: state.frame_count == count)
+            for node in ("rx_node", "tx_node"):
+                diagnostics.wait_for(
+                    lambda message, node=node, stamp=last.header.stamp: (
+                        message.header.stamp == stamp and node in message.status[0].name
+                    )
+                )
+    finally:
+        world.master.set_param("/use_sim_time", False)
+
+
 def example(world, language):
     """The controller of docs/lockstep.md, started as it stands there."""
     page = (Path(__file__).resolve().parents[2] / "docs/lockstep.md").read_text(encoding="utf-8")

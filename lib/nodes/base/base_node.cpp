@@ -9,6 +9,7 @@
 #include <rosgraph_msgs/Clock.h>
 
 #include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/nodes/base/ros_time.hpp"
 #include "xplane_bridge/nodes/base/stop_signals.hpp"
 
 namespace xplane_bridge {
@@ -89,6 +90,8 @@ void BaseNode::initialize() {
     topics_.keepAll();
   }
   clock_ = lockstep() ? lockstep_clock_->clock() : host_clock_;
+  moves_ros_time_ = movesRosTime();
+  showRosTime();
   const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());
   openWire(shared, own);
   if (stampsBySimulator()) stampBySimulator();
@@ -102,6 +105,7 @@ void BaseNode::initialize() {
   ROS_INFO("%s starts with %s", ros::this_node::getName().c_str(), givenText(shared, own).c_str());
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(handle_, private_handle_);
   diagnostics_->setHardwareID("none");
+  if (moves_ros_time_ && !lockstep()) subscribers_.push_back(followClock(&immediate_));
   advertise();
   subscribe();
   state_ = State::kInitialized;
@@ -114,6 +118,11 @@ void BaseNode::stampBySimulator() {
   subscribeTopic<rosgraph_msgs::Clock>(kClockTopic, 1, [this](const rosgraph_msgs::ClockConstPtr& clock) {
     *stamp_ns_ = static_cast<std::int64_t>(clock->clock.toNSec());
   });
+}
+
+/// In lock-step, ROS's time is that of the node.
+void BaseNode::showRosTime() const {
+  if (moves_ros_time_ && lockstep()) ros::Time::setNow(stampNow());
 }
 
 void BaseNode::subscribeWith(ros::SubscribeOptions* options) {
@@ -334,7 +343,7 @@ int runNode(int argc, char** argv, const std::string& default_name,
         ros::shutdown();  // initialize() may be waiting for a master that has gone
       }
     });
-    ros::init(argc, argv, default_name, ros::init_options::NoSigintHandler);
+    initWithOwnTime(&argc, argv, default_name, ros::init_options::NoSigintHandler);
     for (bool logged = false; !ros::master::check(); logged = true) {
       if (!logged) {
         ROS_WARN("no ROS master at %s yet; waiting (start one with roslaunch or roscore)",

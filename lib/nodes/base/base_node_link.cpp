@@ -70,6 +70,7 @@ void BaseNode::makeLink() {
 core::LockstepHooks BaseNode::lockstepHooks() {
   core::LockstepHooks hooks;
   hooks.begin = [this, flying = false](const core::LockstepFrame& frame) mutable {
+    showRosTime();
     if (!std::exchange(flying, true)) {
       timers_->restart();
       beginFlight();
@@ -90,6 +91,7 @@ core::LockstepHooks BaseNode::lockstepHooks() {
 void BaseNode::moveClock(const ros::Time& stamp) {
   const std::int64_t start_ns = core::toNanoseconds(common_.lockstep.start_time);
   lockstep_clock_->move(static_cast<std::int64_t>(stamp.toNSec()) - start_ns);
+  showRosTime();
   timers_->runDue();
 }
 

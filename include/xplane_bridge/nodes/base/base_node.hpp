@@ -289,6 +289,7 @@ class BaseNode {
 
   void stampBySimulator();
   void subscribeWith(ros::SubscribeOptions* options);
+  void showRosTime() const;
   void openWire(const ParamLoader& shared, const ParamLoader& own);
   void startWire();
   void logUserFiles();
@@ -353,6 +354,7 @@ class BaseNode {
   core::Clock receive_clock_ = host_clock_;
   std::optional<core::LockstepClock> lockstep_clock_;
   std::shared_ptr<std::atomic<std::int64_t>> stamp_ns_;  // with stampsBySimulator()
+  bool moves_ros_time_ = false;                          // `use_sim_time` is set
 
   ImmediateQueue immediate_;  // of the subscriptions, in lock-step
   std::vector<ros::Subscriber> subscribers_;

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
+#include <ros/callback_queue_interface.h>
+#include <ros/subscriber.h>
 #include <ros/time.h>
 
 namespace xplane_bridge {
@@ -17,5 +20,18 @@ inline ros::Time toRosTime(std::int64_t system_ns) {
   if (system_ns > 0) out.fromNSec(static_cast<std::uint64_t>(system_ns));
   return out;
 }
+
+// ROS's time with `use_sim_time`. roscpp gives every message of /clock to a thread of its own; a node that has the time
+// anyway, or serves messages where they are read, spares itself that.
+
+/// ros::init() for a node that moves ROS's time itself. Takes ROS's arguments out of `argv`, as ros::init() does.
+void initWithOwnTime(int* argc, char** argv, const std::string& name, std::uint32_t options = 0);
+
+/// Whether the node is to move ROS's time by ros::Time::setNow(): whether `use_sim_time` is set. Its time stands at 0
+/// from then on. Needs a master, and initWithOwnTime().
+bool movesRosTime();
+
+/// Moves ROS's time with /clock. @param queue serves its messages, and outlives the subscription
+ros::Subscriber followClock(ros::CallbackQueueInterface* queue);
 
 }  // namespace xplane_bridge
