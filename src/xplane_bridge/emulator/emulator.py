@@ -165,8 +165,8 @@ class Emulator:
 
     # --- requests that concern the wire -------------------------------------------------------------------------------
 
-    def _on_dref(self, request: protocol.DrefWrite, _sender: Address) -> Optional[str]:
-        if self._fences is not None and self._fences.write(request):
+    def _on_dref(self, request: protocol.DrefWrite, sender: Address) -> Optional[str]:
+        if self._fences is not None and self._fences.write(request, sender):
             return None
         return self.sim.on_dref(request)
 

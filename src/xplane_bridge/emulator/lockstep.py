@@ -5,7 +5,7 @@ of simulated time, and the number of the frame that the window shows, each exact
 whatever rate, gets it after everything else that is sent in a frame, when its picture is drawn. A program with many
 sockets names the port of one of them by `GROUP`: that one gets every fence, as the last of them; the others get it in
 frames that send them something, at the end of that datagram. A DREF that writes a frame's number to the fence lets the
-simulator fly on from that frame.
+simulator fly on from that frame; the program that writes it gets its frames last, because it waits for the others.
 
 Frame 0 does not fly: it is sent again and again, in real time, until it is answered, so that clients can subscribe.
 """
@@ -16,8 +16,7 @@ import math
 import re
 import select
 import time
-from collections import Counter
-from typing import Callable, Dict, List, Optional, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.emulator.wire.server import Server
@@ -28,12 +27,19 @@ FENCE = "xplane_bridge/lockstep"
 GROUP = "xplane_bridge/lockstep_group"
 #: Of a client: its index and the element; that of the group is negative.
 Pairs = Tuple[Tuple[int, int], ...]
+#: Of a datagram: to whom, its label, how long.
+Shape = Tuple[Address, bytes, int]
+#: To whom, which datagram of the frame (None: none), and the fence at its end: pairs, and how many sockets get it.
+_Place = Tuple[Address, Optional[int], Optional[Tuple[Pairs, int]]]
 _GROUP = re.compile(re.escape(GROUP) + r"\[(\d{1,5})\]")
 _SOCKETS = -1
 _ELEMENT = re.compile(re.escape(FENCE) + r"(?:\[([0-3])\])?")
 _MICROSECONDS = 1_000_000
 #: RREF datagram [bytes].
-_LONGEST = protocol.HEADER_SIZE + protocol.RREF_MAX_PAIRS * protocol.RREF_PAIR_SIZE
+_PAIR_SIZE = protocol.RREF_PAIR_SIZE
+_LONGEST = protocol.HEADER_SIZE + protocol.RREF_MAX_PAIRS * _PAIR_SIZE
+#: Of frames whose datagrams are alike, so many layouts are kept.
+_MOST_LAYOUTS = 256
 #: Longest wait without looking whether to stop [s].
 _PATIENCE_S = 0.25
 
@@ -45,8 +51,10 @@ class Fences:
         self.answered = -1  #: number of the newest frame that may be left; -1: none
         self._clients: Dict[Address, Dict[int, int]] = {}  # of a client: its index to the element
         self._groups: Dict[Address, Address] = {}  # of a client: the first socket of its group
-        self._always: List[Tuple[Address, Pairs]] = []  # who gets every fence
+        self._always: List[Address] = []  # who gets every fence: first sockets of groups, and those of no group
+        self._answers: Optional[Address] = None  # who wrote the newest answer
         self._pairs: Dict[Address, Pairs] = {}
+        self._layouts: Dict[Tuple[Shape, ...], List[_Place]] = {}
 
     def request(self, request: protocol.RrefRequest, client: Address) -> bool:
         """Takes a subscription or its end; returns whether it is one of the fence."""
@@ -63,17 +71,19 @@ class Fences:
         if not indices:
             del self._clients[client]
         self._pairs = {each: tuple(elements.items()) for each, elements in self._clients.items()}
-        firsts = [each for each in self._clients if self._groups.get(each) == each]
-        others = [each for each in self._clients if each not in self._groups]
-        self._always = [(each, self._pairs[each]) for each in others + firsts]
+        self._always = [each for each in self._clients if self._groups.get(each, each) == each]
+        self._layouts.clear()
         return True
 
-    def write(self, request: protocol.DrefWrite) -> bool:
+    def write(self, request: protocol.DrefWrite, client: Address) -> bool:
         """Takes the answer to a frame; returns whether it is one."""
         if not request.path.startswith(FENCE) or _ELEMENT.fullmatch(request.path) is None:
             return False
         if math.isfinite(request.value):
             self.answered = max(self.answered, int(request.value))
+            if client != self._answers:
+                self._answers = client
+                self._layouts.clear()
         return True
 
     def send(self, server: Server, now: float, frame: int, sim_time: float, picture: int = 0) -> None:
@@ -93,35 +103,48 @@ class Fences:
 
     def _ended(self, datagrams: List[Datagram], values: Tuple[float, ...]) -> List[Datagram]:
         """A frame's datagrams with the fences behind them."""
-        due: Dict[Address, int] = {}  # clients of groups that are sent something: place of the last datagram
+        shapes = tuple((client, packet[:4], len(packet)) for packet, client in datagrams)
+        layout = self._layouts.get(shapes)
+        if layout is None:
+            if len(self._layouts) >= _MOST_LAYOUTS:
+                self._layouts.clear()
+            layout = self._layouts[shapes] = self._lay_out(shapes)
+        fences: Dict[Tuple[Pairs, int], bytes] = {}  # few: clients ask for the elements alike
         out: List[Datagram] = []
-        last: List[Datagram] = []  # to first sockets of groups
-        for packet, client in datagrams:
-            group = self._groups.get(client)
-            if group == client:
-                last.append((packet, client))
-                continue
-            if group is not None:
-                due[client] = len(out)
+        for client, place, ending in layout:
+            packet = b"" if place is None else datagrams[place][0]
+            if ending is not None:
+                if ending not in fences:
+                    pairs, count = ending
+                    elements = (*values, float(count))  # its last is that of _SOCKETS
+                    fences[ending] = protocol.encode_rref_response([(i, elements[element]) for i, element in pairs])
+                packet = packet + fences[ending][protocol.HEADER_SIZE :] if packet else fences[ending]
             out.append((packet, client))
-        sockets = Counter(self._groups[client] for client in due)
-        sockets.update(client for client, _ in self._always)
-        packets: Dict[Tuple[Pairs, int], bytes] = {}  # few: clients ask for the elements alike
+        return out
 
-        def fence(pairs: Pairs, count: int) -> bytes:
-            if (pairs, count) not in packets:
-                elements = (*values, float(count))  # its last is that of _SOCKETS
-                packets[pairs, count] = protocol.encode_rref_response([(i, elements[element]) for i, element in pairs])
-            return packets[pairs, count]
-
-        for client, place in due.items():
-            packet, ending = out[place][0], fence(self._pairs[client], sockets[self._groups[client]])
-            if packet[:4] == ending[:4] and len(packet) + len(ending) <= _LONGEST:
-                out[place] = (packet + ending[protocol.HEADER_SIZE :], client)
-            else:
-                out.append((ending, client))
-        out += last
-        out += [(fence(pairs, sockets[client]), client) for client, pairs in self._always]
+    def _lay_out(self, shapes: Sequence[Shape]) -> List[_Place]:
+        """What is sent in which order: program by program, that which answers last."""
+        programs: Dict[Address, List[int]] = {first: [] for first in self._always}  # places of its datagrams
+        for place, (client, _, _) in enumerate(shapes):
+            programs.setdefault(self._groups.get(client, client), []).append(place)
+        answering = None if self._answers is None else self._groups.get(self._answers, self._answers)
+        out: List[_Place] = []
+        for first in sorted(programs, key=lambda each: each == answering):
+            places = sorted(programs[first], key=lambda place: shapes[place][0] == first)
+            endings = {shapes[place][0]: place for place in places if shapes[place][0] in self._groups}
+            endings.pop(first, None)
+            count = len(endings) + (first in self._always)
+            alone: List[_Place] = []
+            for place in places:
+                client, label, size = shapes[place]
+                ending = (self._pairs[client], count) if endings.get(client) == place else None
+                if ending is not None and (label != b"RREF" or size + _PAIR_SIZE * len(ending[0]) > _LONGEST):
+                    alone.append((client, None, ending))
+                    ending = None
+                out.append((client, place, ending))
+            out += alone
+            if first in self._always:
+                out.append((first, None, (self._pairs[first], count)))
         return out
 
 

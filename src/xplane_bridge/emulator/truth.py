@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Callable, List, Sequence, Tuple
+from typing import Callable, List, Tuple
 
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.flight.frame import Frame
@@ -65,6 +65,7 @@ COLUMNS: Tuple[Tuple[str, _Source], ...] = (
     ("on_ground", lambda f: int(f.m.on_ground_any)),
     ("thrust_n", lambda f: sum(engine.thrust_n for engine in f.m.engines)),
 )
+_SOURCES = tuple(source for _, source in COLUMNS)
 
 
 class TruthFile:
@@ -87,9 +88,10 @@ class TruthFile:
 
     def write(self, frame: Frame, host_time: float) -> None:
         """Writes one line."""
-        values: Sequence[float] = [source(frame) for _, source in COLUMNS]
-        surfaces = [frame.m.surfaces_deg.get(name, math.nan) for name in self._surfaces]
-        self._file.write(",".join(map(repr, map(_plain, [*values, *surfaces, host_time]))) + "\n")
+        values: List[float] = [source(frame) for source in _SOURCES]
+        values += [frame.m.surfaces_deg.get(name, math.nan) for name in self._surfaces]
+        values.append(host_time)
+        self._file.write(",".join([repr(v) if type(v) is float else _text(v) for v in values]) + "\n")
         self._lines += 1
         if self._lines % _FLUSH_EVERY == 0:
             self._file.flush()
@@ -99,6 +101,6 @@ class TruthFile:
         self._file.close()
 
 
-def _plain(value: float) -> float:
-    """A Python number (numpy's would print their type's name)."""
-    return value if isinstance(value, int) else float(value)
+def _text(value: float) -> str:
+    """A number as Python writes it (numpy's would have their type's name)."""
+    return repr(value if isinstance(value, int) else float(value))

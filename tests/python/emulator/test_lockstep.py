@@ -197,12 +197,14 @@ class HeldServer:
     def __init__(self, first, second):
         self._held = [(protocol.encode_rref_response([(0, 1.0)]), each) for each in (second, first)]
         self.sent = {}  #: by client, its pairs
+        self.order = []  #: the clients
 
     def take_held(self):
         return self._held
 
     def send_all(self, _, datagrams):
         for packet, client in datagrams:
+            self.order.append(client)
             self.sent.setdefault(client, {}).update(dict(protocol.decode_rref_response(packet)))
 
 
@@ -226,6 +228,27 @@ def test_who_joins_or_leaves_a_group_in_five_requests_is_counted_where_its_fence
     assert whole < server.sent[first].keys()
     assert server.sent[first][FENCE_INDEX + 8] == (2.0 if whole < server.sent[second].keys() else 1.0)
     assert (FENCE_INDEX + 8 in server.sent[second]) == (server.sent[first][FENCE_INDEX + 8] == 2.0)
+
+
+def test_a_frame_goes_program_by_program_and_to_the_one_that_answers_last():
+    barrier, second = ("127.0.0.1", 7001), ("127.0.0.1", 7002)
+    other, alone = ("127.0.0.1", 7003), ("127.0.0.1", 7004)
+    fences = Fences()
+    for client, first in ((barrier, barrier), (second, barrier), (other, other), (alone, None)):
+        for element in range(4):
+            fences.request(protocol.RrefRequest(1000, FENCE_INDEX + element, f"{FENCE}[{element}]"), client)
+        if first is not None:
+            fences.request(protocol.RrefRequest(1000, FENCE_INDEX + 8, f"{GROUP}[{first[1]}]"), client)
+    before = HeldServer(barrier, second)
+    fences.send(before, 0.0, 1, 0.02)
+    assert before.order == [second, barrier, barrier, other, alone]
+    for answering in (barrier, second):
+        fences.write(protocol.DrefWrite(FENCE, 1.0), answering)
+        after = HeldServer(barrier, second)
+        fences.send(after, 0.0, 2, 0.04)
+        assert after.order == [other, alone, second, barrier, barrier]
+        assert after.sent[barrier][FENCE_INDEX + 8] == 2.0
+        assert after.sent[second][FENCE_INDEX] == 2.0
 
 
 def test_a_write_before_the_answer_acts_in_the_next_frame(fly):

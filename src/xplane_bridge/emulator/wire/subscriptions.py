@@ -6,24 +6,23 @@ of up to 183 pairs, or fewer with `split`.
 
 from __future__ import annotations
 
-import itertools
-from typing import Callable, Dict, Iterable, Iterator, List, Tuple
+import struct
+from typing import Callable, Dict, Iterable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from xplane_bridge.protocol import FIFTH_BYTE, RREF_MAX_PAIRS
+from xplane_bridge import protocol
 
 Address = Tuple[str, int]
-Rates = Tuple[int, ...]
-
 Datagram = Tuple[bytes, Address]
 Planner = Callable[[Iterable[int]], Callable[[], None]]
 
 #: A due time may lie this part of a frame ahead and still belong to this frame.
 _EARLY = 0.01
-#: Of plans that are kept: combinations of rates that are due together.
+#: Of plans that are kept: combinations of streams that are due together.
 _MOST_PLANS = 256
-_PAIR = np.dtype([("index", "<i4"), ("value", "<f4")])
+_INDEX = struct.Struct("<i")
+_VALUE = np.dtype("<f4")
 
 
 class Pacer:
@@ -65,9 +64,8 @@ class RrefClient:
 
     def __init__(self, replaces: bool = True) -> None:
         self._replaces = replaces
-        self._groups: Dict[int, _Group] = {}
+        self.groups: Dict[int, _Group] = {}  #: by rate
         self._rates: Dict[int, int] = {}  # client's index -> rate
-        self._gathers: Dict[Rates, Tuple[np.ndarray, np.ndarray]] = {}
 
     def __len__(self) -> int:
         return len(self._rates)
@@ -77,76 +75,84 @@ class RrefClient:
         if index in self._rates and not self._replaces:
             return
         self.unsubscribe(index)
-        self._groups.setdefault(rate_hz, _Group(rate_hz)).slots[index] = slot
+        self.groups.setdefault(rate_hz, _Group(rate_hz)).slots[index] = slot
         self._rates[index] = rate_hz
-        self._gathers.clear()
 
     def unsubscribe(self, index: int) -> None:
         """Ends the subscription with this index."""
         rate = self._rates.pop(index, None)
         if rate is None:
             return
-        group = self._groups[rate]
+        group = self.groups[rate]
         del group.slots[index]
         if not group.slots:
-            del self._groups[rate]
-        self._gathers.clear()
+            del self.groups[rate]
 
-    def restart_pacers(self) -> None:
-        """Everything is due in the next frame, and from then on at its rate."""
-        for group in self._groups.values():
-            group.pacer.restart()
 
-    def due(self, now: float, frame_period: float) -> Rates:
-        """The rates that are due in this frame; to be asked once a frame."""
-        return tuple(rate for rate, group in self._groups.items() if group.pacer.due(now, frame_period))
+class _Plan:
+    """All datagrams of frames in which the same is due: laid out once, filled in every such frame.
 
-    def slots(self, due: Rates) -> Iterable[int]:
-        """What is sent at these rates."""
-        return itertools.chain.from_iterable(self._groups[rate].slots.values() for rate in due)
+    Args:
+        due: Clients and their groups.
+        split: Pairs in a datagram at most.
+        plan: Gives what computes slots.
+    """
 
-    def datagrams(self, due: Rates, values: np.ndarray, split: int) -> Iterator[bytes]:
-        """What is sent at these rates."""
-        gather = self._gathers.get(due)
-        if gather is None:
-            gather = self._gather(due)
-            self._gathers[due] = gather
-        slots, pairs = gather
-        pairs["value"] = values[slots]
-        header = b"RREF" + bytes([FIFTH_BYTE[b"RREF"]])
-        for start in range(0, len(pairs), split):
-            yield header + pairs[start : start + split].tobytes()
+    def __init__(self, due: Sequence[Tuple[Address, _Group]], split: int, plan: Planner) -> None:
+        items: Dict[Address, List[Tuple[int, int]]] = {}
+        for client, group in due:
+            items.setdefault(client, []).extend(group.slots.items())
+        header = b"RREF" + bytes([protocol.FIFTH_BYTE[b"RREF"]])
+        slots: List[int] = []
+        floats: List[int] = []  # their places among the floats of the layout
+        layout = bytearray()
+        self._cuts: List[Tuple[int, int, Address]] = []
+        for client, pairs in items.items():
+            for first in range(0, len(pairs), split):
+                layout += bytes(protocol.RREF_PAIR_SIZE - protocol.HEADER_SIZE)  # pairs lie where floats may lie
+                start = len(layout)
+                layout += header
+                for index, slot in pairs[first : first + split]:
+                    layout += _INDEX.pack(index)
+                    floats.append(len(layout) // _VALUE.itemsize)
+                    slots.append(slot)
+                    layout += bytes(_VALUE.itemsize)
+                self._cuts.append((start, len(layout), client))
+        self._layout = np.frombuffer(layout, dtype=_VALUE)
+        self._floats, self._slots = np.array(floats, dtype=int), np.array(slots, dtype=int)
+        self._compute = plan(slots)
 
-    def _gather(self, rates: Rates) -> Tuple[np.ndarray, np.ndarray]:
-        items: List[Tuple[int, int]] = []
-        for rate in rates:
-            items += self._groups[rate].slots.items()
-        pairs = np.zeros(len(items), dtype=_PAIR)
-        pairs["index"] = [index for index, _ in items]
-        return np.array([slot for _, slot in items]), pairs
+    def datagrams(self, values: np.ndarray) -> List[Datagram]:
+        """Those of a frame."""
+        self._compute()
+        with np.errstate(over="ignore"):
+            self._layout[self._floats] = values[self._slots]
+        filled = self._layout.tobytes()
+        return [(filled[start:end], client) for start, end, client in self._cuts]
 
 
 class Subscriptions:
     """All clients of RREF and RPOS."""
 
-    def __init__(self, split: int = RREF_MAX_PAIRS, replaces: bool = True) -> None:
+    def __init__(self, split: int = protocol.RREF_MAX_PAIRS, replaces: bool = True) -> None:
         self.split = split
         self._replaces = replaces
         self.rref: Dict[Address, RrefClient] = {}
         self.rpos: Dict[Address, Pacer] = {}
-        self._plans: Dict[Tuple[Tuple[Address, Rates], ...], Callable[[], None]] = {}
+        self._streams: Optional[List[Tuple[Pacer, Address, _Group]]] = None  # of all clients; None: to be listed anew
+        self._plans: Dict[Tuple[int, ...], _Plan] = {}  # by which of the streams are due
 
     def request_rref(self, client: Address, index: int, rate_hz: int, slot: int) -> None:
         """A client subscribes to a slot."""
         self.rref.setdefault(client, RrefClient(self._replaces)).subscribe(index, rate_hz, slot)
-        self._plans.clear()
+        self._streams = None
 
     def stop_rref(self, client: Address, index: int) -> None:
         """A client ends a subscription."""
         subscriptions = self.rref.get(client)
         if subscriptions is not None:
             subscriptions.unsubscribe(index)
-            self._plans.clear()
+            self._streams = None
             if not len(subscriptions):
                 del self.rref[client]
 
@@ -166,26 +172,25 @@ class Subscriptions:
             values: The store's values.
             plan: Gives what computes slots, where they are not computed in each frame.
         """
-        asked = ((client, each.due(now, frame_period)) for client, each in self.rref.items())
-        due = tuple((client, rates) for client, rates in asked if rates)
-        compute = self._plans.get(due)
-        if compute is None:
+        if self._streams is None:
+            groups = ((client, group) for client, each in self.rref.items() for group in each.groups.values())
+            self._streams = [(group.pacer, client, group) for client, group in groups]
+            self._plans.clear()
+        due = tuple(i for i, (pacer, _, _) in enumerate(self._streams) if pacer.due(now, frame_period))
+        if not due:
+            return []
+        found = self._plans.get(due)
+        if found is None:
             if len(self._plans) >= _MOST_PLANS:
                 self._plans.clear()
-            slots = itertools.chain.from_iterable(self.rref[client].slots(rates) for client, rates in due)
-            compute = self._plans[due] = plan(slots)
-        compute()
-        with np.errstate(over="ignore"):
-            return [
-                (packet, client)
-                for client, rates in due
-                for packet in self.rref[client].datagrams(rates, values, self.split)
-            ]
+            found = self._plans[due] = _Plan([self._streams[i][1:] for i in due], self.split, plan)
+        return found.datagrams(values)
 
     def restart_pacers(self) -> None:
         """Everything is due in the next frame, and from then on at its rate."""
         for client in self.rref.values():
-            client.restart_pacers()
+            for group in client.groups.values():
+                group.pacer.restart()
         for pacer in self.rpos.values():
             pacer.restart()
 
@@ -200,4 +205,4 @@ class Subscriptions:
         """What a restart of X-Plane does."""
         self.rref.clear()
         self.rpos.clear()
-        self._plans.clear()
+        self._streams = None
