@@ -27,7 +27,7 @@ LONG = (
     "test_three_aircraft.py::test_position_loop",
     "test_demo.py::test_the_demo_flies",
     "test_bench.py::",
-    "test_labelled_approach.py::test_the_other_aircraft",
+    "test_labelled_approach.py",
     "test_sender.py::",
 )
 

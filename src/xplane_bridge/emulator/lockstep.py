@@ -27,9 +27,9 @@ FENCE = "xplane_bridge/lockstep"
 GROUP = "xplane_bridge/lockstep_group"
 #: Of a client: its index and the element; that of the group is negative.
 Pairs = Tuple[Tuple[int, int], ...]
-#: Of a datagram: to whom, its label, how long.
+#: Of a datagram: its receiver, its label, its length.
 Shape = Tuple[Address, bytes, int]
-#: To whom, which datagram of the frame (None: none), and the fence at its end: pairs, and how many sockets get it.
+#: Receiver, which datagram of the frame (None: none), and the fence at its end: pairs, and how many sockets get it.
 _Place = Tuple[Address, Optional[int], Optional[Tuple[Pairs, int]]]
 _GROUP = re.compile(re.escape(GROUP) + r"\[(\d{1,5})\]")
 _SOCKETS = -1
