@@ -29,6 +29,13 @@ struct Throttle {
   int fault;  // 0 none, 1 stopped, 2 seized
 };
 
+/// Attributes of the model itself, which the loop must not keep: the model has the loop.
+struct Names {
+  static Object name(const char* text) { return Object(PyUnicode_InternFromString(text)); }
+  Object fuel = name("_fuel_kg"), wind = name("_wind"), gravity = name("_gravity_force"), step = name("_fdm_step"),
+         crashed = name("_crashed"), gusts = name("_gusts");
+};
+
 class Loop {
  public:
   explicit Loop(PyObject* model) {
@@ -48,12 +55,14 @@ class Loop {
     pitch_ = property(model, "_pitch");
     heading_ = property(model, "_heading");
     airspeed_ = property(model, "_airspeed");
-    gear_ = property(attribute(model, "_gear").get(), "_set_extension");
+    gear_ = attribute(model, "_gear");
+    gear_position_now_ = Attribute(gear_.get(), "position");
+    extend_gear_ = property(gear_.get(), "_set_extension");
     wind_ = properties("_wind_setters");
     const Object fdm = attribute(model, "_fdm");
-    run_ = attribute(fdm.get(), "run");
+    run_ = property(fdm.get(), "run");
     set_dt_ = property(fdm.get(), "set_dt");
-    hit_ = attribute(attribute(model, "_contacts").get(), "hit");
+    hit_ = property(attribute(model, "_contacts").get(), "hit");
     contact_height_ = number(attribute(model, "contact_height_m").get());
     contact_runs_ = static_cast<int>(number(attribute(model, "contact_runs").get()));
     surface_setters_ = properties("_surface_setters");
@@ -68,7 +77,7 @@ class Loop {
     for (const Object& o : getters("_rotors")) rotors_.push_back(std::make_unique<RotorMirror>(o));
     for (const Object& o : getters("_governors")) governors_.push_back(std::make_unique<GovernorMirror>(o));
     for (const Object& o : getters("_engines")) engines_.push_back(std::make_unique<EngineMirror>(o));
-    turbulence_.object = attribute(model, "_turbulence");
+    turbulence_ = TurbulenceMirror(attribute(model, "_turbulence"));
     // Not worked out anew: Python's ** rounds otherwise than a product.
     const Object units(PyImport_ImportModule("xplane_bridge.emulator.flight.jsbsim_state"));
     density_unit_ = constant(units, "SLUG_FT3_KG_M3");
@@ -117,37 +126,32 @@ class Loop {
     for (auto& rotor : rotors_) rotor->mirror.read();
     for (auto& governor : governors_) governor->mirror.read();
     for (auto& engine : engines_) engine->read();
-    const std::vector<Object> fuel = items(attribute(model, "_fuel_kg").get());
-    fuel_.clear();
-    for (const Object& tank : fuel) fuel_.push_back(number(tank.get()));
+    const Object fuel = attribute(model, names_.fuel.get());
+    fuel_.resize(static_cast<std::size_t>(std::max<Py_ssize_t>(PySequence_Size(fuel.get()), 0)));
     if (fuel_.size() < engines_.size()) throw std::invalid_argument("_fuel_kg: expected a tank for each engine");
+    readNumbers(fuel.get(), fuel_.data(), fuel_.size());
   }
 
   void writeEngines(PyObject* model) const {
     for (const auto& rotor : rotors_) rotor->mirror.write();
     for (const auto& governor : governors_) governor->mirror.write();
     for (const auto& engine : engines_) engine->write();
-    const Object fuel = attribute(model, "_fuel_kg");
-    for (std::size_t i = 0; i < fuel_.size(); ++i) {
-      check(PySequence_SetItem(fuel.get(), static_cast<Py_ssize_t>(i), makeNumber(fuel_[i]).get()));
-    }
+    writeNumbers(attribute(model, names_.fuel.get()).get(), fuel_.data(), fuel_.size());
   }
 
   void read(PyObject* model) {
     readEngines(model);
     for (auto& surface : surfaces_) surface->read();
     turbulence_.read();
-    const std::vector<Object> wind = items(attribute(model, "_wind").get());
-    const std::vector<Object> gravity = items(attribute(model, "_gravity_force").get());
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      steady_wind_[axis] = number(wind.at(axis).get());
-      gravity_[axis] = number(gravity.at(axis).get());
-    }
-    gear_position_ = number(attribute(attribute(model, "_gear").get(), "position").get());
-    fdm_step_ = number(attribute(model, "_fdm_step").get());
-    crashed_ = PyObject_IsTrue(attribute(model, "_crashed").get()) == 1;
+    readNumbers(attribute(model, names_.wind.get()).get(), steady_wind_.data(), steady_wind_.size());
+    readNumbers(attribute(model, names_.gravity.get()).get(), gravity_.data(), gravity_.size());
+    gear_position_ = gear_position_now_.getNumber();
+    fdm_step_ = number(attribute(model, names_.step.get()).get());
+    crashed_ = PyObject_IsTrue(attribute(model, names_.crashed.get()).get()) == 1;
     height_m_ = agl_.get() * kFoot;
-    applied_deg_.assign(surfaces_.size(), std::numeric_limits<double>::quiet_NaN());  // others set them between frames
+    // Others set them between frames.
+    applied_deg_.assign(surfaces_.size(), std::numeric_limits<double>::quiet_NaN());
+    extended_ = std::numeric_limits<double>::quiet_NaN();
     blown_ = false;
   }
 
@@ -155,8 +159,8 @@ class Loop {
     writeEngines(model);
     for (const auto& surface : surfaces_) surface->write();
     turbulence_.write();
-    check(PyObject_SetAttrString(model, "_fdm_step", makeNumber(fdm_step_).get()));
-    check(PyObject_SetAttrString(model, "_crashed", crashed_ ? Py_True : Py_False));
+    check(PyObject_SetAttr(model, names_.step.get(), makeNumber(fdm_step_).get()));
+    check(PyObject_SetAttr(model, names_.crashed.get(), crashed_ ? Py_True : Py_False));
     if (!blown_) return;
     const Object gusts(PyList_New(3));
     for (Py_ssize_t axis = 0; axis < 3; ++axis) {
@@ -164,7 +168,7 @@ class Loop {
       if (!gust) throw PythonError{};
       PyList_SetItem(gusts.get(), axis, gust);
     }
-    check(PyObject_SetAttrString(model, "_gusts", gusts.get()));
+    check(PyObject_SetAttr(model, names_.gusts.get(), gusts.get()));
   }
 
   Air readAir(bool floor) const {
@@ -239,11 +243,12 @@ class Loop {
     }
     const bool tilted_near_ground =
         height_m_ < kCrashWatch && std::cos(roll_.get()) * std::cos(pitch_.get()) < kStrutsWorkCosine;
-    gear_.set(tilted_near_ground ? 0.0 : gear_position_);
-    for (int i = 0; i < runs; ++i) Object(PyObject_CallObject(run_.get(), nullptr));
+    const double extended = tilted_near_ground ? 0.0 : gear_position_;
+    if (!sameBits(extended, extended_)) extend_gear_.set(extended_ = extended);
+    for (int i = 0; i < runs; ++i) run_.call();
     height_m_ = agl_.get() * kFoot;
     if (height_m_ < kCrashWatch && !crashed_) {
-      const Object hit(PyObject_CallObject(hit_.get(), nullptr));
+      const Object hit = hit_.call();
       crashed_ = PyObject_IsTrue(hit.get()) == 1;
     }
   }
@@ -254,8 +259,10 @@ class Loop {
   };
   std::vector<Property> air_, wind_, surface_setters_;
   std::vector<LoadSetter> load_setters_;
-  Property alpha_, pressure_, temperature_, agl_, roll_, pitch_, heading_, airspeed_, gear_, set_dt_;
-  Object run_, hit_;
+  Property alpha_, pressure_, temperature_, agl_, roll_, pitch_, heading_, airspeed_, extend_gear_, set_dt_, run_, hit_;
+  Object gear_;
+  Attribute gear_position_now_;
+  const Names names_;
   double contact_height_ = 0.0, density_unit_ = 1.0, pressure_unit_ = 1.0, temperature_unit_ = 1.0;
   int contact_runs_ = 1;
   std::vector<std::unique_ptr<SurfaceMirror>> surfaces_;  // pointers: the mirrors point into what they mirror
@@ -265,7 +272,7 @@ class Loop {
   TurbulenceMirror turbulence_;
   std::vector<double> fuel_, applied_deg_;
   std::array<double, 3> steady_wind_{}, gusts_{}, gravity_{};
-  double gear_position_ = 0.0, fdm_step_ = 0.0, height_m_ = 0.0;
+  double gear_position_ = 0.0, extended_ = 0.0, fdm_step_ = 0.0, height_m_ = 0.0;
   bool crashed_ = false, blown_ = false;
 };
 

@@ -82,6 +82,23 @@ inline void check(int result) {
   if (result < 0) throw PythonError{};
 }
 
+/// Reads as many numbers from a list or tuple, which may be longer.
+inline void readNumbers(PyObject* sequence, double* out, std::size_t count) {
+  const Object fast(PySequence_Fast(sequence, "expected a list or a tuple"));
+  if (static_cast<std::size_t>(PySequence_Fast_GET_SIZE(fast.get())) < count)
+    raise(PyExc_ValueError, "too few numbers");
+  for (std::size_t i = 0; i < count; ++i) {
+    out[i] = number(PySequence_Fast_GET_ITEM(fast.get(), static_cast<Py_ssize_t>(i)));
+  }
+}
+
+/// Puts them into a list.
+inline void writeNumbers(PyObject* list, const double* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    check(PySequence_SetItem(list, static_cast<Py_ssize_t>(i), makeNumber(values[i]).get()));
+  }
+}
+
 /// Runs `body` at the border to Python: its PythonError becomes the null that says "an exception is set".
 template <typename Body>
 PyObject* guarded(Body&& body) {

@@ -2,13 +2,14 @@
 
 /// The parts of the light twin that live in Python objects, and in C++ while a frame is flown.
 
-#include "xplane_bridge/bindings/python_object.hpp"
+#include "xplane_bridge/bindings/python_attribute.hpp"
 
 #include <cmath>
 #include <cstring>
 #include <optional>
 #include <vector>
 
+#include "xplane_bridge/bindings/python_object.hpp"
 #include "xplane_bridge/bindings/twin_physics.hpp"
 
 namespace xplane_bridge::bindings {
@@ -16,7 +17,8 @@ namespace xplane_bridge::bindings {
 /// Unlike ==, false for zeros of two signs.
 inline bool sameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-/// A getter or setter of JSBSim's; a bound method is called without the step that binds it.
+/// A function that is called again and again, such as JSBSim's getters and setters; a bound method is called without
+/// the step that binds it.
 class Property {
  public:
   Property() = default;
@@ -27,15 +29,15 @@ class Property {
     }
   }
 
-  double get() const { return number(call(nullptr).get()); }
+  double get() const { return number(call().get()); }
   void set(double value) const { (void)call(makeNumber(value).get()); }
-
- private:
-  Object call(PyObject* argument) const {
+  Object call(PyObject* argument = nullptr) const {
     PyObject* const arguments[] = {self_.get(), argument};
     const std::size_t first = self_.get() ? 0 : 1, end = argument ? 2 : 1;
     return Object(vectorcall(function_.get(), arguments + first, end - first));
   }
+
+ private:
   static PyObject* vectorcall(PyObject* function, PyObject* const* arguments, std::size_t count) {
 #if PY_VERSION_HEX >= 0x03090000
     return PyObject_Vectorcall(function, arguments, count, nullptr);
@@ -47,13 +49,9 @@ class Property {
   Object function_, self_;
 };
 
-inline double call(const Object& function) {
-  return number(Object(PyObject_CallObject(function.get(), nullptr)).get());
-}
-
 /// A double that lives in an attribute of a Python object while no frame is flown.
 struct Field {
-  Object name;
+  Attribute attribute;
   double* value;
   double read = 0.0;  // what Python's object has
 };
@@ -63,18 +61,15 @@ struct Mirror {
   Object object;
   std::vector<Field> fields;
 
-  void add(const char* name, double& value) { fields.push_back({Object(PyUnicode_InternFromString(name)), &value}); }
+  explicit Mirror(Object owner) : object(std::move(owner)) {}
+  void add(const char* name, double& value) { fields.push_back({Attribute(object.get(), name), &value}); }
   void read() {
-    for (Field& field : fields) {
-      field.read = number(attribute(object.get(), field.name.get()).get());
-      *field.value = field.read;
-    }
+    for (Field& field : fields) *field.value = field.read = field.attribute.getNumber();
   }
   /// To be called after `read`: writes what has changed since.
   void write() const {
     for (const Field& field : fields) {
-      if (sameBits(field.read, *field.value)) continue;
-      check(PyObject_SetAttr(object.get(), field.name.get(), makeNumber(*field.value).get()));
+      if (!sameBits(field.read, *field.value)) field.attribute.set(makeNumber(*field.value));
     }
   }
 };
@@ -87,7 +82,7 @@ struct RotorMirror {
   Rotor rotor;
   Mirror mirror;
 
-  explicit RotorMirror(const Object& object) {
+  explicit RotorMirror(const Object& object) : mirror(object) {
     const Object spec = attribute(object.get(), "spec");
     rotor.direction = constant(spec, "direction") > 0.0 ? 1 : -1;
     rotor.radius_m = constant(spec, "radius_m");
@@ -98,7 +93,6 @@ struct RotorMirror {
     rotor.profile_drag = constant(spec, "profile_drag");
     rotor.zero_lift_deg = constant(spec, "zero_lift_deg");
     rotor.edgewise_drag = constant(spec, "edgewise_drag");
-    mirror.object = object;
     mirror.add("omega", rotor.omega);
     mirror.add("blade_rad", rotor.blade_rad);
     mirror.add("inflow", rotor.inflow);
@@ -123,7 +117,7 @@ struct GovernorMirror {
   Governor governor;
   Mirror mirror;
 
-  explicit GovernorMirror(const Object& object) {
+  explicit GovernorMirror(const Object& object) : mirror(object) {
     const Object spec = attribute(object.get(), "spec");
     governor.minimum_rpm = constant(spec, "minimum_rpm");
     governor.maximum_rpm = constant(spec, "maximum_rpm");
@@ -132,7 +126,6 @@ struct GovernorMirror {
     governor.rate_deg_s = constant(spec, "rate_deg_s");
     governor.proportional = constant(spec, "proportional");
     governor.integral = constant(spec, "integral");
-    mirror.object = object;
     mirror.add("integral_deg", governor.integral_deg);
   }
 };
@@ -140,8 +133,9 @@ struct GovernorMirror {
 struct EngineMirror {
   PistonEngine engine;
   Mirror mirror;
+  Attribute running;
 
-  explicit EngineMirror(const Object& object) {
+  explicit EngineMirror(const Object& object) : mirror(object), running(object.get(), "running") {
     const Object spec = attribute(object.get(), "spec");
     engine.rated_power_w = constant(spec, "rated_power_w");
     engine.rated_rpm = constant(spec, "rated_rpm");
@@ -149,7 +143,6 @@ struct EngineMirror {
     engine.closed_throttle = constant(spec, "closed_throttle");
     engine.open_throttle = constant(spec, "open_throttle");
     engine.friction = constant(spec, "friction");
-    mirror.object = object;
     mirror.add("manifold_pa", engine.manifold_pa);
     mirror.add("egt_k", engine.egt_k);
     mirror.add("cht_k", engine.cht_k);
@@ -160,68 +153,72 @@ struct EngineMirror {
   }
   void read() {
     mirror.read();
-    const Object running = attribute(mirror.object.get(), "running");
-    engine.running = PyObject_IsTrue(running.get()) == 1;
+    engine.running = PyObject_IsTrue(running.get().get()) == 1;
   }
   void write() const {
     mirror.write();
-    check(PyObject_SetAttrString(mirror.object.get(), "running", engine.running ? Py_True : Py_False));
+    running.set(Object::borrowed(engine.running ? Py_True : Py_False));
   }
 };
 
 struct SurfaceMirror {
   SurfaceActuator actuator;
   Mirror mirror;
+  Attribute stuck;
 
-  explicit SurfaceMirror(const Object& object) {
+  explicit SurfaceMirror(const Object& object) : mirror(object), stuck(object.get(), "_stuck_deg") {
     const Object spec = attribute(object.get(), "spec");
     actuator.minimum_deg = constant(spec, "minimum_deg");
     actuator.maximum_deg = constant(spec, "maximum_deg");
     actuator.rate_deg_s = constant(spec, "rate_deg_s");
     const Object kind = attribute(spec.get(), "kind");
     actuator.rudder = text(attribute(kind.get(), "value").get()) == "rudder";
-    mirror.object = object;
     mirror.add("position_deg", actuator.position_deg);
     mirror.add("effective_deg", actuator.effective_deg);
   }
   void read() {
     mirror.read();
-    const Object stuck = attribute(mirror.object.get(), "_stuck_deg");
+    const Object angle = stuck.get();
     actuator.stuck_deg.reset();
-    if (stuck.get() != Py_None) actuator.stuck_deg = number(stuck.get());
+    if (angle.get() != Py_None) actuator.stuck_deg = number(angle.get());
   }
   void write() const {
     mirror.write();
-    const Object stuck = actuator.stuck_deg ? makeNumber(*actuator.stuck_deg) : Object::borrowed(Py_None);
-    check(PyObject_SetAttrString(mirror.object.get(), "_stuck_deg", stuck.get()));
+    stuck.set(actuator.stuck_deg ? makeNumber(*actuator.stuck_deg) : Object::borrowed(Py_None));
   }
 };
 
 /// DrydenTurbulence, with Python's own generator: random.Random.gauss() on its random().
 struct TurbulenceMirror {
   Dryden dryden;
-  Object object, generator, random;
+  Object object;
+  Attribute intensity, states, source;
+  Object generator;
+  Property random;
   std::optional<double> next;
 
+  TurbulenceMirror() = default;
+  explicit TurbulenceMirror(const Object& owner)
+      : object(owner),
+        intensity(owner.get(), "intensity_mps"),
+        states(owner.get(), "_state"),
+        source(owner.get(), "_random"),
+        generator(source.get()),
+        random(attribute(generator.get(), "random")),
+        kept_(generator.get(), "gauss_next") {}
+
   void read() {
-    dryden.intensity_mps = number(attribute(object.get(), "intensity_mps").get());
+    dryden.intensity_mps = intensity.getNumber();
     if (!(dryden.intensity_mps > 0.0)) return;
-    generator = attribute(object.get(), "_random");
-    random = attribute(generator.get(), "random");
-    const std::vector<Object> state = items(attribute(object.get(), "_state").get());
-    for (std::size_t i = 0; i < dryden.state.size(); ++i) dryden.state[i] = number(state.at(i).get());
-    const Object kept = attribute(generator.get(), "gauss_next");
+    readNumbers(states.get().get(), dryden.state.data(), dryden.state.size());
+    const Object kept = kept_.get();
     next.reset();
     if (kept.get() != Py_None) next = number(kept.get());
   }
   void write() const {
     if (!(dryden.intensity_mps > 0.0)) return;
-    const Object state = attribute(object.get(), "_state");
-    for (std::size_t i = 0; i < dryden.state.size(); ++i) {
-      check(PySequence_SetItem(state.get(), static_cast<Py_ssize_t>(i), makeNumber(dryden.state[i]).get()));
-    }
-    const Object kept = next ? makeNumber(*next) : Object::borrowed(Py_None);
-    check(PyObject_SetAttrString(generator.get(), "gauss_next", kept.get()));
+    writeNumbers(states.get().get(), dryden.state.data(), dryden.state.size());
+    kept_.set(next ? makeNumber(*next) : Object::borrowed(Py_None));
   }
   double gauss() {
     double z = 0.0;
@@ -229,13 +226,16 @@ struct TurbulenceMirror {
       z = *next;
       next.reset();
     } else {
-      const double angle = call(random) * (2.0 * kPi);
-      const double radius = std::sqrt(-2.0 * std::log(1.0 - call(random)));
+      const double angle = random.get() * (2.0 * kPi);
+      const double radius = std::sqrt(-2.0 * std::log(1.0 - random.get()));
       z = std::cos(angle) * radius;
       next = std::sin(angle) * radius;
     }
     return 0.0 + z * 1.0;
   }
+
+ private:
+  Attribute kept_;
 };
 
 }  // namespace xplane_bridge::bindings
