@@ -57,7 +57,7 @@ bool ClockCondition::beginWait(const Deadline* deadline) {
   if (ThreadTurns::taken()) return true;
   if (ClockWaiters* const waiters = waitersOf(deadline)) {
     const std::lock_guard<std::mutex> lock(waiters->mutex_);
-    waiters->waiting_.push_back({this, deadline->end_ns()});
+    waiters->waiting_.push_back({this, deadline->endNs()});
   }
   return false;
 }
@@ -86,7 +86,7 @@ void ClockCondition::endWait(const Deadline* deadline) {
     const std::lock_guard<std::mutex> lock(waiters->mutex_);
     auto& waiting = waiters->waiting_;
     const auto found = std::find_if(waiting.begin(), waiting.end(), [&](const ClockWaiters::Waiting& each) {
-      return each.condition == this && each.end_ns == deadline->end_ns();
+      return each.condition == this && each.end_ns == deadline->endNs();
     });
     if (found != waiting.end()) waiting.erase(found);
   }

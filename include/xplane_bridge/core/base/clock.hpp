@@ -66,7 +66,7 @@ class Deadline {
 
   const Clock& clock() const { return clock_; }
   /// [ns] of the clock's steady time
-  std::int64_t end_ns() const { return end_ns_; }
+  std::int64_t endNs() const { return end_ns_; }
   bool over() const { return clock_.steady_ns() >= end_ns_; }
   /// [s] until then; 0 or less once it is over
   double left() const { return toSeconds(end_ns_ - clock_.steady_ns()); }
