@@ -8,6 +8,7 @@ constexpr double kInflowLag = 0.04;  // [s]
 constexpr double kFloatPerAlpha = -0.5;
 constexpr double kFloatRate = 90.0;  // [deg/s]
 constexpr double kStandardPa = 101325.0;
+constexpr double kFiresAbove = 0.1;  // of the rated speed
 
 double lagged(double value, double target, double dt, double time_constant) {
   return value + (target - value) * pythonMin(dt / time_constant, 1.0);
@@ -76,7 +77,11 @@ double PistonEngine::torque(double dt, double omega, double throttle, double mix
   const double rated_omega = rated_rpm * (kPi / 30.0);
   const double rated_torque = rated_power_w / rated_omega;
   const double speed = omega / rated_omega;
-  if (!fuel || mixture < 0.05) running = false;
+  if (!fuel || mixture < 0.05 || !ignition) {
+    running = false;
+  } else if (speed > kFiresAbove) {
+    running = true;
+  }
   const double ratio = closed_throttle + (open_throttle - closed_throttle) * opening;
   manifold_pa = air.pressure * (1.0 - (1.0 - ratio) * pythonMin(speed / 0.2, 1.0));
   const double rubbing = friction * (0.6 + 0.4 * speed);

@@ -133,9 +133,10 @@ struct GovernorMirror {
 struct EngineMirror {
   PistonEngine engine;
   Mirror mirror;
-  Attribute running;
+  Attribute running, ignition;
 
-  explicit EngineMirror(const Object& object) : mirror(object), running(object.get(), "running") {
+  explicit EngineMirror(const Object& object)
+      : mirror(object), running(object.get(), "running"), ignition(object.get(), "ignition") {
     const Object spec = attribute(object.get(), "spec");
     engine.rated_power_w = constant(spec, "rated_power_w");
     engine.rated_rpm = constant(spec, "rated_rpm");
@@ -154,6 +155,7 @@ struct EngineMirror {
   void read() {
     mirror.read();
     engine.running = PyObject_IsTrue(running.get().get()) == 1;
+    engine.ignition = PyObject_IsTrue(ignition.get().get()) == 1;
   }
   void write() const {
     mirror.write();

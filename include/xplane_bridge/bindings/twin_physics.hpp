@@ -61,7 +61,7 @@ struct Governor {
 struct PistonEngine {
   double rated_power_w = 0.0, rated_rpm = 0.0, fuel_kg_per_joule = 0.0, closed_throttle = 0.0, open_throttle = 0.0,
          friction = 0.0;
-  bool running = false;
+  bool ignition = false, running = false;
   double manifold_pa = 0.0, egt_k = 0.0, cht_k = 0.0, oil_k = 0.0, oil_pa = 0.0, fuel_flow = 0.0, power = 0.0;
 
   double torque(double dt, double omega, double throttle, double mixture, const Air& air, bool fuel);

@@ -205,16 +205,23 @@ class PistonSpec:
 
 
 class PistonEngine:
-    """Shaft torque, fuel and instruments of one piston engine."""
+    """Shaft torque, fuel and instruments of one piston engine.
 
-    __slots__ = ("cht_k", "egt_k", "fuel_flow", "manifold_pa", "oil_k", "oil_pa", "power", "running", "spec")
+    With its ignition on and fuel it fires as soon as the shaft turns fast enough, so that a repaired engine whose
+    propeller windmills runs again.
+    """
 
-    _SAVED = ("running", "manifold_pa", "egt_k", "cht_k", "oil_k", "oil_pa", "fuel_flow", "power")
+    __slots__ = (
+        "cht_k", "egt_k", "fuel_flow", "ignition", "manifold_pa", "oil_k", "oil_pa", "power", "running", "spec",
+    )  # fmt: skip
+
+    _SAVED = ("running", "manifold_pa", "egt_k", "cht_k", "oil_k", "oil_pa", "fuel_flow", "power", "ignition")
     STANDARD_PA = 101325.0
+    FIRES_ABOVE = 0.1  #: of the rated speed
 
     def __init__(self, spec: PistonSpec) -> None:
         self.spec = spec
-        self.running = False
+        self.running = self.ignition = False
         self.manifold_pa = self.STANDARD_PA
         self.egt_k = self.cht_k = self.oil_k = 288.15
         self.oil_pa = self.fuel_flow = self.power = 0.0
@@ -235,8 +242,10 @@ class PistonEngine:
         rated_omega = spec.rated_rpm * (math.pi / 30.0)
         rated_torque = spec.rated_power_w / rated_omega
         speed = omega / rated_omega
-        if not fuel or mixture < 0.05:
+        if not fuel or mixture < 0.05 or not self.ignition:
             self.running = False
+        elif speed > self.FIRES_ABOVE:
+            self.running = True
         # The intake cannot be pumped down while the shaft stands still.
         ratio = spec.closed_throttle + (spec.open_throttle - spec.closed_throttle) * opening
         self.manifold_pa = pressure_pa * (1.0 - (1.0 - ratio) * min(speed / 0.2, 1.0))
@@ -265,6 +274,10 @@ class PistonEngine:
         value = getattr(self, name)
         setattr(self, name, value + (target - value) * min(dt / time_constant, 1.0))
 
+    def switch(self, on: bool) -> None:
+        """Ignition on or off; on, the engine counts as running at once."""
+        self.running = self.ignition = on
+
     def warm_up(self, temperature_k: float, load: float) -> None:
         """Instruments of an engine that has run at ``load`` (0..1 of rated power) for long."""
         self.egt_k = temperature_k + 560.0 + 340.0 * load
@@ -276,8 +289,8 @@ class PistonEngine:
         return [getattr(self, name) for name in self._SAVED]
 
     def restore(self, saved: Sequence[float]) -> None:
-        """Puts the engine back into the state of ``save``."""
-        for name, value in zip(self._SAVED, saved):
+        """Puts the engine back into the state of ``save``, also one without ignition, as they were saved before."""
+        for name, value in zip(self._SAVED, [*saved, saved[0]]):
             setattr(self, name, value)
 
 

@@ -212,6 +212,34 @@ def test_engine_failure_yaws_and_rolls_towards_it(twin):
     assert state.engines[1].rpm == 0.0
 
 
+def test_a_repaired_engine_that_windmills_fires_again(twin):
+    controls = twin.reset(InitialState())
+    thrust = twin.state.engines[0].thrust_n
+    controls.engine_faults[0] = EngineFault.STOPPED
+    assert not fly(twin, controls, 2.0).engines[0].running
+    controls.engine_faults[0] = EngineFault.NONE
+    state = fly(twin, controls, 5.0)
+    assert state.engines[0].running
+    assert state.engines[0].thrust_n == pytest.approx(thrust, rel=0.2)
+
+
+def test_an_engine_that_is_switched_off_only_windmills(twin):
+    controls = twin.reset(InitialState())
+    twin.set_engine_running(1, False)
+    state = fly(twin, controls, 2.0)
+    assert state.engines[1].rpm > 500.0
+    assert [engine.running for engine in state.engines] == [True, False]
+
+
+def test_a_repaired_engine_that_stands_still_stays_off(twin):
+    controls = twin.reset(InitialState(on_ground=True))
+    controls.engine_faults[0] = EngineFault.SEIZED
+    assert fly(twin, controls, 1.0).engines[0].rpm == 0.0
+    controls.engine_faults[0] = EngineFault.NONE
+    state = fly(twin, controls, 2.0)
+    assert [engine.running for engine in state.engines] == [False, True]
+
+
 def test_propeller_governor_holds_speed(twin):
     controls = twin.reset(InitialState())
     for lever, rpm in ((0.75, 2375.0), (1.0, 2700.0), (0.6, 2180.0)):

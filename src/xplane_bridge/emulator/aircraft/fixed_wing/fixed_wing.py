@@ -201,7 +201,7 @@ class FixedWing(JsbsimModel):
         """Starts (at once) or stops an engine."""
         if engine not in (0, 1):
             raise FlightModelError(f"engine {engine}: this aircraft has engines 0 and 1")
-        self._engines[engine].running = running
+        self._engines[engine].switch(running)
         if running:
             self._rotors[engine].omega = max(self._rotors[engine].omega, 100.0)
 
@@ -254,7 +254,7 @@ class FixedWing(JsbsimModel):
         heading = math.radians(initial.heading_deg)
         course = (math.cos(heading), math.sin(heading))
         for i, engine in enumerate(self._engines):
-            engine.running = True
+            engine.switch(True)
             self._rotors[i].omega = ENGINE.rated_rpm * math.pi / 30.0
 
         def fly(x: np.ndarray) -> Sequence[float]:
@@ -293,7 +293,7 @@ class FixedWing(JsbsimModel):
     def _start_on_ground(self, initial: InitialState) -> Controls:
         controls = Controls(parking_brake=1.0)
         for i, engine in enumerate(self._engines):
-            engine.running = initial.engines_running
+            engine.switch(initial.engines_running)
             self._rotors[i].omega = 100.0 if initial.engines_running else 0.0
         altitude = initial.terrain_elevation_m + STANDING_HEIGHT_M
         euler = (0.0, STANDING_PITCH_RAD, math.radians(initial.heading_deg))
