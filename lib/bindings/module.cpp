@@ -5,7 +5,7 @@ namespace {
 PyModuleDef definition = {
     PyModuleDef_HEAD_INIT,
     "_core",
-    "Parts of xplane_bridge in C++: tx_node's arbiter, and of the emulator the twin's step and the sending.",
+    "Parts of xplane_bridge in C++: tx_node's arbiter, and of the emulator the state, the twin's step and the sending.",
     -1,
     nullptr,
     nullptr,
@@ -21,6 +21,7 @@ PyMODINIT_FUNC PyInit__core() {
     xplane_bridge::bindings::Object module(PyModule_Create(&definition));
     xplane_bridge::bindings::addArbiter(module.get());
     xplane_bridge::bindings::addDatagrams(module.get());
+    xplane_bridge::bindings::addStateReader(module.get());
     xplane_bridge::bindings::addTwinLoop(module.get());
     PyObject* out = module.get();
     Py_INCREF(out);

@@ -10,44 +10,13 @@
 #include <vector>
 
 #include "xplane_bridge/bindings/python_object.hpp"
+#include "xplane_bridge/bindings/python_property.hpp"
 #include "xplane_bridge/bindings/twin_physics.hpp"
 
 namespace xplane_bridge::bindings {
 
 /// Unlike ==, false for zeros of two signs.
 inline bool sameBits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
-
-/// A function that is called again and again, such as JSBSim's getters and setters; a bound method is called without
-/// the step that binds it.
-class Property {
- public:
-  Property() = default;
-  explicit Property(const Object& callable) : function_(callable) {
-    if (PyMethod_Check(callable.get())) {
-      function_ = Object::borrowed(PyMethod_Function(callable.get()));
-      self_ = Object::borrowed(PyMethod_Self(callable.get()));
-    }
-  }
-
-  double get() const { return number(call().get()); }
-  void set(double value) const { (void)call(makeNumber(value).get()); }
-  Object call(PyObject* argument = nullptr) const {
-    PyObject* const arguments[] = {self_.get(), argument};
-    const std::size_t first = self_.get() ? 0 : 1, end = argument ? 2 : 1;
-    return Object(vectorcall(function_.get(), arguments + first, end - first));
-  }
-
- private:
-  static PyObject* vectorcall(PyObject* function, PyObject* const* arguments, std::size_t count) {
-#if PY_VERSION_HEX >= 0x03090000
-    return PyObject_Vectorcall(function, arguments, count, nullptr);
-#else
-    return _PyObject_Vectorcall(function, arguments, count, nullptr);
-#endif
-  }
-
-  Object function_, self_;
-};
 
 /// A double that lives in an attribute of a Python object while no frame is flown.
 struct Field {
@@ -73,10 +42,6 @@ struct Mirror {
     }
   }
 };
-
-inline double constant(const Object& specification, const char* name) {
-  return number(attribute(specification.get(), name).get());
-}
 
 struct RotorMirror {
   Rotor rotor;

@@ -9,6 +9,7 @@ from typing import Any, Callable, Sequence
 
 import jsbsim
 
+from xplane_bridge import compiled
 from xplane_bridge.emulator.flight.earth import EARTH_RADIUS_M, GRAVITY_MPS2
 from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
 
@@ -201,9 +202,14 @@ class StateReader:
 
     def __init__(self, properties: Properties) -> None:
         self._getters = [properties.getter(path) for path in _STATE_PROPERTIES]
+        # The same in C++, where it has been built: the same bits.
+        self._compiled = None if compiled.core is None else compiled.core.StateReader(self._getters)
 
     def read(self, s: ModelState, gravity_force: Sequence[float]) -> None:
         """``gravity_force``: what stands among JSBSim's forces although it is gravity, FRD [N]."""
+        if self._compiled is not None:
+            self._compiled.read(s, gravity_force)
+            return
         (
             s.latitude_deg, s.longitude_deg, altitude, agl, s.roll_rad, s.pitch_rad, heading, s.p_rad_s, s.q_rad_s,
             s.r_rad_s, s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2, north, east, down, u, v, w, fx, fy, fz, mass,

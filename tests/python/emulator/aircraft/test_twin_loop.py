@@ -59,7 +59,7 @@ def history(initial: InitialState, frames: int, period: float, turbulence: float
         except FlightModelError as error:
             return [*out, str(error).encode()]
         if frame % 5 == 0:
-            out.append(model.save() + repr((state.engines, state.surfaces_deg, state.gear)).encode())
+            out.append(model.save() + repr(state).encode())
         if frame == frames // 2:
             model.restore(model.save())
     return out
