@@ -56,7 +56,8 @@ class AttitudeHold:
             wanted_roll = t.get("roll") or 0.0
         else:
             wanted_roll = clip(1.2 * math.remainder(t["heading"] - state.heading_true_deg, 360.0), -25.0, 25.0)
-        roll_rate = math.degrees(state.angular_velocity.x)
+        rates = state.angular_velocity
+        roll_rate, pitch_rate = math.degrees(rates.x), math.degrees(rates.y)
         roll = clip(0.035 * (wanted_roll - state.roll_deg) - 0.012 * roll_rate, -1.0, 1.0)
 
         if t.get("pitch") is None:
@@ -69,7 +70,7 @@ class AttitudeHold:
             wanted_pitch = t["pitch"]
         error = wanted_pitch - state.pitch_deg
         self._elevator = clip(self._elevator + 0.015 * error * dt, -0.6, 0.6)
-        pitch = clip(0.03 * error - 0.015 * math.degrees(state.angular_velocity.y) + self._elevator, -1.0, 1.0)
+        pitch = clip(0.03 * error - 0.015 * pitch_rate + self._elevator, -1.0, 1.0)
 
         error = t["speed"] - state.calibrated_airspeed
         self._throttle = clip(self._throttle + 0.006 * error * dt, 0.0, 1.0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Mapping
+from functools import lru_cache
+from typing import Mapping, Tuple
 
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel
 
@@ -24,9 +25,16 @@ def apply_channels(sent: Mapping[str, float], controls: Controls, model: FlightM
         elif name == "gear":
             controls.gear_down = value != 0.0
         else:
-            kind, engine = name[:-1].split("[")
+            kind, engine = _of_engine(name)
             if kind == "motors":
                 controls.override_throttles = True
-                controls.throttle_use[int(engine)] = value
+                controls.throttle_use[engine] = value
             else:
-                controls.throttle[int(engine)] = min(max(value, info.min_throttle), info.max_throttle)
+                controls.throttle[engine] = min(max(value, info.min_throttle), info.max_throttle)
+
+
+@lru_cache(maxsize=None)
+def _of_engine(channel: str) -> Tuple[str, int]:
+    """What an engine's channel moves, and the engine's number."""
+    kind, engine = channel[:-1].split("[")
+    return kind, int(engine)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Optional, Set, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from xplane_bridge.scenario import excitations
 from xplane_bridge.scenario.holds import HoldAutopilot, HoldGains, Targets
@@ -15,8 +15,7 @@ from xplane_bridge.scenario.schema import STICK_AXES, Event, Scenario
 _MAX_STEP_S = 0.1
 
 
-@dataclass(frozen=True)
-class FlightSample:
+class FlightSample(NamedTuple):
     """What the player looks at: degrees, degrees/s, metres, m/s (`speed` is calibrated airspeed)."""
 
     roll: float = 0.0
@@ -160,7 +159,7 @@ class Player:
     def _ready(self, event: Event, now: float, due: float, sample: FlightSample) -> bool:
         if not event.when:
             return True
-        values = {**dataclasses.asdict(sample), "time": now - self._round_start, "on_ground": float(sample.on_ground)}
+        values = {**sample._asdict(), "time": now - self._round_start, "on_ground": float(sample.on_ground)}
         if all(condition.holds(values) for condition in event.when):
             return True
         if self._waiting_since is None:

@@ -32,6 +32,7 @@ MODE_NAMES = words(FlightMode)
 
 def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
     """The player's view of a FlightState; what is unknown there is NaN here, and no condition on it holds."""
+    rates = state.angular_velocity
     return FlightSample(
         roll=state.roll_deg,
         pitch=state.pitch_deg,
@@ -42,9 +43,9 @@ def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
         speed=state.calibrated_airspeed,
         alpha=state.alpha_deg,
         beta=state.beta_deg,
-        roll_rate=math.degrees(state.angular_velocity.x),
-        pitch_rate=math.degrees(state.angular_velocity.y),
-        yaw_rate=math.degrees(state.angular_velocity.z),
+        roll_rate=math.degrees(rates.x),
+        pitch_rate=math.degrees(rates.y),
+        yaw_rate=math.degrees(rates.z),
         load_factor=state.load_factor_normal,
         on_ground=state.on_ground,
         stall_warning=stall_warning,
