@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::int64_t kMaintenanceNs = 20 * kNanosecondsPerMillisecond;
 constexpr int kThreadStepMs = 20;
+constexpr int kRequestStepMs = 5;           // while requests wait for their turn
 constexpr double kDestructorTimeout = 1.0;  // [s]
 constexpr std::size_t kMaxCalls = 1024;     // waiting: hundreds come at once when a node subscribes
 
@@ -118,10 +119,14 @@ void SimLink::listenForBeacon() {
 
 // --- life cycle ---
 
-void SimLink::start() {
+void SimLink::startDriven() {
   if (running_.exchange(true)) {
     throw std::logic_error("SimLink::start() was called twice");
   }
+}
+
+void SimLink::start() {
+  startDriven();
   thread_ = std::thread([this] {
     while (!quit_) {
       step(kThreadStepMs);
@@ -155,8 +160,6 @@ bool SimLink::stop(double timeout_s) {
   hub_->wake();
   if (thread_.joinable()) {
     thread_.join();
-    running_ = false;
-    wakeWaiting();
   } else {
     // Driven by the caller: the injected clock may stand still, so the number of steps is bounded, too.
     const int max_steps = static_cast<int>(timeout_s * 1000.0) + 100;
@@ -165,6 +168,8 @@ bool SimLink::stop(double timeout_s) {
     }
     stop_phase_ = StopPhase::kDone;
   }
+  running_ = false;
+  wakeWaiting();
   return released_;
 }
 
@@ -381,11 +386,13 @@ void SimLink::wakeWaiting() {
   }
 }
 
+int SimLink::patienceMs() const { return requests_.empty() ? kThreadStepMs : kRequestStepMs; }
+
 void SimLink::step(int timeout_ms) {
   link_thread_id_ = std::this_thread::get_id();
   now_ns_ = clock_.steady_ns();
   runCalls();
-  hub_->wait(requests_.empty() ? timeout_ms : std::min(timeout_ms, 5));
+  hub_->wait(std::min(timeout_ms, patienceMs()));
   now_ns_ = clock_.steady_ns();
   runCalls();
   receiveControl();

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <utility>
 
+#include <ros/poll_manager.h>
+
 #include "xplane_bridge/core/wire/udp_hub.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/base/conformance_file.hpp"
@@ -96,15 +98,23 @@ void BaseNode::moveClock(const ros::Time& stamp) {
 }
 
 void BaseNode::startLink() {
-  if (link_) {
-    link_->start();
+  if (!link_) {
+    return;
   }
+  if (!receivesOnNetworkThread() || link_->fd() < 0) {
+    link_->start();
+    return;
+  }
+  link_->startDriven();
+  const DrivenByNetwork driven{link_->fd(), [this] { link_->step(0); }, [this] { return link_->patienceMs(); }};
+  driver_ = std::make_unique<NetworkThreadDriver>(driven, &ros::PollManager::instance()->getPollSet());
 }
 
 void BaseNode::stopLink(const Deadline& deadline) {
   if (!link_) {
     return;
   }
+  driver_.reset();
   if (wire_) wire_->leaveOnWake();
   const bool undone = link_->stop(std::max(deadline.left(), kShortestLinkStop));
   if (wire_) wire_->free();

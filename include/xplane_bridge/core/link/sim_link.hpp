@@ -60,10 +60,10 @@ struct SimLinkCallbacks {
 /// The link to one X-Plane: finds it, keeps subscriptions alive whatever happens to it, says in which state it is,
 /// reads and writes datarefs.
 ///
-/// One thread (start()) or the caller (step()) does all receiving and calls all handlers and callbacks. Every other
-/// public function may be called from any thread; those that wait say so and must not be called from a callback.
-/// Subscriptions may outlive the link; then they do nothing. Members that are not said to be shared belong to the
-/// thread that receives.
+/// One thread (start()), or one of the caller's at a time (step()), does all receiving and calls all handlers and
+/// callbacks. Every other public function may be called from any thread; those that wait say so and must not be called
+/// from a callback. Subscriptions may outlive the link; then they do nothing. Members that are not said to be shared
+/// belong to the thread that receives.
 class SimLink : public SimulatorPort {
  public:
   /// `journals` may be empty when neither Data Output is configured nor leftovers are to be restored.
@@ -78,6 +78,12 @@ class SimLink : public SimulatorPort {
 
   /// Runs the link in a thread of its own.
   void start();
+  /// Instead: the caller's threads call step(0), one at a time, when fd() is readable, and patienceMs() after the last
+  /// one at the latest. They have ended before stop().
+  void startDriven();
+  /// -1: it has to be start().
+  int fd() const { return hub_->fd(); }
+  int patienceMs() const;
   /// Undoes what was changed in X-Plane (read back, at most `timeout_s`), stops subscriptions, joins the thread.
   /// Waits. Returns whether everything was undone; what was not stays in the journal.
   bool stop(double timeout_s = 1.5);

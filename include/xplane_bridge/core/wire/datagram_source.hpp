@@ -116,6 +116,8 @@ class DatagramHub {
   }
   /// Whether the last wait() found a datagram there.
   virtual bool hasInput(const DatagramSource& source) const = 0;
+  /// Readable while wait() would find something; -1 where wait() does more than look for that.
+  virtual int fd() const { return -1; }
 };
 
 }  // namespace xplane_bridge::core

@@ -25,6 +25,7 @@ class UdpHub : public DatagramHub {
   void wait(int timeout_ms) override;
   void waitFor(const DatagramSource& source, int timeout_ms) override;
   bool hasInput(const DatagramSource& source) const override;
+  int fd() const override { return epoll_fd_; }
 
  private:
   void watch(int fd, const void* tag);

@@ -28,6 +28,7 @@
 #include "xplane_bridge/nodes/base/clock_timers.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
 #include "xplane_bridge/nodes/base/immediate_queue.hpp"
+#include "xplane_bridge/nodes/base/network_thread_driver.hpp"
 #include "xplane_bridge/nodes/base/node_wire.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
@@ -119,6 +120,9 @@ class BaseNode {
   virtual void configureLink(core::SimLinkOptions* options) { static_cast<void>(options); }
   /// Called from the link's thread; must return quickly.
   virtual core::SimLinkCallbacks linkCallbacks() { return {}; }
+  /// Whether roscpp's network thread receives, because what comes is published at once: what its callbacks do must be
+  /// short. Not in lock-step and not where the wire is logged.
+  virtual bool receivesOnNetworkThread() const { return false; }
   /// Whether all that the node does follows from datagrams, messages, timers and inputs, so that it can be replayed.
   virtual bool wireIsOrdered() const { return false; }
   /// Subscribe datarefs with link(), open sockets, start threads. Callbacks come once this returns.
@@ -370,7 +374,8 @@ class BaseNode {
   std::unique_ptr<core::DatagramHub> hub_of_link_;  // until there is a link
   core::DatagramHub* waking_ = nullptr;             // the link's
   std::unique_ptr<core::SimLink> link_;
-  core::LockstepHub* hub_ = nullptr;  // of the link, in lock-step
+  core::LockstepHub* hub_ = nullptr;             // of the link, in lock-step
+  std::unique_ptr<NetworkThreadDriver> driver_;  // of the link, where it has no thread of its own
 
   std::mutex service_mutex_;
   core::ClockCondition service_idle_;

@@ -1,6 +1,7 @@
 #include "xplane_bridge/core/link/sim_link.hpp"
 
 #include <gtest/gtest.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <atomic>
@@ -323,6 +324,25 @@ TEST_F(ThreadedSimLink, WritesAreReadBack) {
   EXPECT_FALSE(link_->read({"no/such"}, 0.1)[0].has_value());
   EXPECT_TRUE(link_->stop(2.0));
   EXPECT_TRUE(link_->stop(2.0)) << "again is harmless";
+}
+
+TEST_F(ThreadedSimLink, IsSteppedByOthersWhenItsDescriptorIsReadable) {
+  ASSERT_GE(link_->fd(), 0);
+  link_->startDriven();
+  EXPECT_THROW(link_->start(), std::logic_error);
+  std::atomic<bool> over{false};
+  std::thread stepping([&] {
+    while (!over) {
+      pollfd readable{link_->fd(), POLLIN, 0};
+      poll(&readable, 1, link_->patienceMs());
+      link_->step(0);
+    }
+  });
+  EXPECT_EQ(link_->read({"sim/version/xplane_internal_version"}, 5.0)[0], 115501.0F);
+  over = true;
+  stepping.join();
+  EXPECT_TRUE(link_->stop(2.0));
+  EXPECT_THROW(link_->read({"a/b"}, 0.1), std::logic_error) << "nothing would ever come";
 }
 
 TEST_F(ThreadedSimLink, WaitsForACondition) {

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include <ros/poll_set.h>
+
+namespace xplane_bridge {
+
+/// What is done whenever a descriptor is readable, and now and then without.
+struct DrivenByNetwork {
+  int fd = -1;
+  std::function<void()> step;  ///< reads what there is; must not wait for a message
+  /// [ms] until the next step() at the latest. Called behind each step().
+  std::function<int()> patience_ms;
+};
+
+/// Has a link receive on roscpp's network thread: what the link publishes is then sent by the thread that has received
+/// it, and no other has to be woken. What is due without a datagram is done by a thread of the driver's own, so that a
+/// name server that does not answer keeps no subscriber waiting. One of the two at a time.
+class NetworkThreadDriver {
+ public:
+  /// Begins at once. @param poll_set of roscpp; outlives the driver
+  NetworkThreadDriver(DrivenByNetwork driven, ros::PollSet* poll_set);
+  /// Ends it; then no step() is under way.
+  ~NetworkThreadDriver();
+  NetworkThreadDriver(const NetworkThreadDriver&) = delete;
+  NetworkThreadDriver& operator=(const NetworkThreadDriver&) = delete;
+
+ private:
+  class Impl;
+  const std::shared_ptr<Impl> impl_;  // the network thread may still hold it
+};
+
+}  // namespace xplane_bridge

@@ -1,0 +1,82 @@
+#include "xplane_bridge/nodes/base/network_thread_driver.hpp"
+
+#include <poll.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace xplane_bridge {
+
+class NetworkThreadDriver::Impl {
+ public:
+  Impl(DrivenByNetwork driven, ros::PollSet* poll_set) : driven_(std::move(driven)), poll_set_(poll_set) {}
+
+  /// @param self holds this for the network thread
+  void begin(const std::shared_ptr<Impl>& self) {
+    poll_set_->addSocket(driven_.fd, [self](int) { self->onReadable(); });
+    poll_set_->addEvents(driven_.fd, POLLIN);
+    thread_ = std::thread([this] { stepWhenDue(); });
+  }
+
+  void end() {
+    poll_set_->delSocket(driven_.fd);
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ended_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+
+ private:
+  /// On the network thread, which must not wait for the other one: that listens again when it is through.
+  void onReadable() {
+    std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+    if (!lock) {
+      poll_set_->delEvents(driven_.fd, POLLIN);
+      passed_over_ = true;
+      if (!lock.try_lock()) return;
+    }
+    if (ended_) return;
+    driven_.step();
+    listenAgain();
+  }
+
+  void stepWhenDue() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!ended_) {
+      driven_.step();
+      const std::chrono::milliseconds patience(driven_.patience_ms());
+      lock.unlock();
+      listenAgain();
+      lock.lock();
+      changed_.wait_for(lock, patience, [this] { return ended_; });
+    }
+  }
+
+  /// Where the network thread has not been served.
+  void listenAgain() {
+    if (passed_over_.exchange(false)) poll_set_->addEvents(driven_.fd, POLLIN);
+  }
+
+  const DrivenByNetwork driven_;
+  ros::PollSet* const poll_set_;
+  std::atomic<bool> passed_over_{false};
+  std::mutex mutex_;  // guards the following, and is held during a step
+  std::condition_variable changed_;
+  bool ended_ = false;
+  std::thread thread_;
+};
+
+NetworkThreadDriver::NetworkThreadDriver(DrivenByNetwork driven, ros::PollSet* poll_set)
+    : impl_(std::make_shared<Impl>(std::move(driven), poll_set)) {
+  impl_->begin(impl_);
+}
+
+NetworkThreadDriver::~NetworkThreadDriver() { impl_->end(); }
+
+}  // namespace xplane_bridge
