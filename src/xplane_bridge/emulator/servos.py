@@ -18,6 +18,13 @@ _THROTTLE = "sim/cockpit2/engine/actuators/throttle_ratio"
 _OVERRIDE = "sim/operation/override/override_"
 #: An axis: attribute of `Controls`, name in `servo_*_ratio` and in the override that takes it.
 _AXES = (("roll", "roll"), ("pitch", "pitch"), ("yaw", "heading"))
+#: In the order in which `Servos.move` takes them.
+_SWITCHES = (
+    ap.MASTER,
+    ap.YAW_DAMPER,
+    *(_OVERRIDE + name for name in ("joystick", "flightcontrol", "autopilot")),
+    *(f"{_OVERRIDE}joystick_{name}" for _, name in _AXES),
+)
 #: Climb for speed that is too high, by pitch [m/s of climb per m/s], and at most [m/s].
 _CLIMB_PER_SPEED, _MOST_CLIMB = 1.2, 6.0
 #: Pedals against yaw that no coordinated turn has [per deg/s].
@@ -37,6 +44,7 @@ class Servos:
 
     def __init__(self, store: DatarefStore) -> None:
         self._store = store
+        self._switches = store.gather(_SWITCHES)
         self._holds: Optional[HoldAutopilot] = None
         self._throttle: Optional[HoldAutopilot] = None
 
@@ -61,9 +69,9 @@ class Servos:
         """
         if not info.autopilot:
             return
-        get = self._store.get
         m = frame.m
-        flies = get(ap.MASTER) == ap.SERVOS
+        master, damper, joystick, flight_control, autopilot, *taken_axes = self._switches()
+        flies = master == ap.SERVOS
         deflections = {"roll": 0.0, "pitch": 0.0, "yaw": 0.0}
         if flies:
             self._holds = self._holds or HoldAutopilot(HoldGains())
@@ -76,13 +84,12 @@ class Servos:
             )
         else:
             self._holds = None
-        if get(ap.YAW_DAMPER) and m.true_airspeed_mps > _SLOW_MPS:
+        if damper and m.true_airspeed_mps > _SLOW_MPS:
             turn = _GRAVITY_MPS2 / m.true_airspeed_mps * math.sin(m.roll_rad) * math.cos(m.pitch_rad)
             deflections["yaw"] = min(max(-_DAMPING * math.degrees(m.r_rad_s - turn), -0.3), 0.3)
-        everything = get(_OVERRIDE + "joystick") or get(_OVERRIDE + "flightcontrol") or get(_OVERRIDE + "autopilot")
-        for axis, name in _AXES:
-            taken = everything or get(f"{_OVERRIDE}joystick_{name}")
-            deflection = 0.0 if taken else deflections[axis]
+        everything = joystick or flight_control or autopilot
+        for (axis, name), taken in zip(_AXES, taken_axes):
+            deflection = 0.0 if everything or taken else deflections[axis]
             self._store.set(f"sim/joystick/servo_{name}_ratio", deflection)
             setattr(controls, axis, min(max(getattr(controls, axis) + deflection, -1.0), 1.0))
         self._move_levers(dt, frame, info, controls)

@@ -114,8 +114,9 @@ class Simulator:
         self._surface_names: List[str] = []
         self.inputs = ControlInputs(self.store, pilot, inputs or InputOptions())
         self.cameras = Cameras(self)
-        self._autopilot, self._servos = Autopilot(self.store, self), Servos(self.store)
+        self._autopilot = Autopilot(self.store, self)
         self.table = tables.build(self)
+        self._servos = Servos(self.store)
         self.rows = data_rows.DataRows(self.store, self.is_12, otherwise)
         #: What unknown datarefs are sent from where they are sent as 0.
         self.unknown_slot = int(self.store.add("_emulator/unknown").slots[0])

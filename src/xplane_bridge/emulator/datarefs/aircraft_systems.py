@@ -46,10 +46,14 @@ class Electrics:
     generator_amps: List[float] = field(default_factory=lambda: [0.0] * 8)
     generator_off: List[bool] = field(default_factory=lambda: [False] * 8)
     charge_ah: float = _FULL_CHARGE_AH
+    _switches: Optional[Callable[[], List[float]]] = None
 
     def update(self, dt: float, store: DatarefStore, frame: Frame, failed: Failed) -> None:
         """Takes a new frame."""
-        load = _BASE_LOAD_A + sum(amps for name, amps in _LOADS.items() if store.get(name) != 0.0)
+        if self._switches is None:
+            self._switches = store.gather((*_LOADS, "sim/cockpit2/electrical/battery_on"))
+        *switched, battery_on = self._switches()
+        load = _BASE_LOAD_A + sum(amps for amps, on in zip(_LOADS.values(), switched) if on != 0.0)
         switches = store.array("sim/cockpit2/electrical/generator_on")
         working = []
         for i, engine in enumerate(frame.m.engines[:8]):
@@ -57,7 +61,7 @@ class Electrics:
             self.generator_off[i] = not good
             if good:
                 working.append(i)
-        battery = store.get("sim/cockpit2/electrical/battery_on") != 0.0 and not failed("rel_batter0")
+        battery = battery_on != 0.0 and not failed("rel_batter0")
         self.generator_amps = [0.0] * 8
         for i in working:
             self.generator_amps[i] = load / len(working)

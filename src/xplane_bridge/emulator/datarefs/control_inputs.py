@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import Callable, Dict, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -42,6 +42,23 @@ _HANDLES = {
 _THROTTLE_ROW = 25
 #: Rudder that auto-coordination gives for sideslip (wind from the right positive: the nose goes right).
 _COORDINATION_PER_DEG = 0.1
+_LEFT_BRAKE, _RIGHT_BRAKE = _COCKPIT + "left_brake_ratio", _COCKPIT + "right_brake_ratio"
+#: In the order in which `_read_handles` takes them.
+_READ_HANDLES = (
+    _COCKPIT + "elevator_trim",
+    _COCKPIT + "aileron_trim",
+    _COCKPIT + "rudder_trim",
+    _COCKPIT + "flap_ratio",
+    _COCKPIT + "speedbrake_ratio",
+    _COCKPIT + "gear_handle_down",
+    _COCKPIT + "parking_brake_ratio",
+    _COCKPIT + "thrust_vector_ratio",
+    "sim/cockpit2/switches/artificial_stability_on",
+    _LEFT_BRAKE,
+    _RIGHT_BRAKE,
+    _OVERRIDE + "toe_brakes",
+    _OVERRIDE + "artstab",
+)
 #: Levers and handles that a saved situation brings back and a new flight sets.
 _LEVERS = (
     _ACTUATORS + "throttle_ratio",
@@ -107,6 +124,7 @@ class ControlInputs:
         self._throttle_commands: Dict[int, float] = {}
         self._surface_slots: Dict[str, int] = {}
         self._joystick_slots = np.zeros(0, dtype=int)
+        self._handles: Callable[[], List[float]] = list  # as connect() makes it
 
     # --- definition ---------------------------------------------------------------------------------------------------
 
@@ -137,6 +155,7 @@ class ControlInputs:
             for axis, (assignment, reverse, _attribute) in enumerate(_JOYSTICK_AXES):
                 store.values[store.locate(_JOYSTICK + "axis_assignments", axis)] = assignment
                 store.values[store.locate(_JOYSTICK + "axis_reverse", axis)] = reverse
+        self._handles = store.gather(_READ_HANDLES)
         self._joystick_slots = store.dataref(_JOYSTICK + "axis_values").slots[: len(_JOYSTICK_AXES)]
 
     # --- flights ------------------------------------------------------------------------------------------------------
@@ -268,23 +287,30 @@ class ControlInputs:
                 store.set(_COCKPIT + name, float(value))
 
     def _read_handles(self, controls: Controls) -> None:
-        store = self._store
-        controls.trim_pitch = _clip(store.get(_COCKPIT + "elevator_trim"), -1.0, 1.0)
-        controls.trim_roll = _clip(store.get(_COCKPIT + "aileron_trim"), -1.0, 1.0)
-        controls.trim_yaw = _clip(store.get(_COCKPIT + "rudder_trim"), -1.0, 1.0)
-        controls.flap_request = _clip(store.get(_COCKPIT + "flap_ratio"), 0.0, 1.0)
-        controls.speedbrake = _clip(store.get(_COCKPIT + "speedbrake_ratio"), -0.5, 1.0)
-        controls.gear_down = store.get(_COCKPIT + "gear_handle_down") != 0.0
-        controls.parking_brake = _clip(store.get(_COCKPIT + "parking_brake_ratio"), 0.0, 1.0)
-        for side, slot in (("left", 2), ("right", 3)):
-            name = f"{_COCKPIT}{side}_brake_ratio"
-            if not self._overrides("toe_brakes") and (14, slot) not in self._held:
-                store.set(name, 0.0)  # pedals that are not pressed
-            setattr(controls, f"brake_{side}", _clip(store.get(name), 0.0, 1.0))
-        controls.thrust_vector = max(store.get(_COCKPIT + "thrust_vector_ratio"), 0.0)
-        controls.artificial_stability = store.get(
-            "sim/cockpit2/switches/artificial_stability_on"
-        ) != 0.0 and not self._overrides("artstab")
+        (
+            trim_pitch, trim_roll, trim_yaw, flaps, speedbrake, gear, parking_brake, vector, stability, left, right,
+            toe_brakes_overridden, stability_overridden,
+        ) = self._handles()  # fmt: skip
+        controls.trim_pitch = _clip(trim_pitch, -1.0, 1.0)
+        controls.trim_roll = _clip(trim_roll, -1.0, 1.0)
+        controls.trim_yaw = _clip(trim_yaw, -1.0, 1.0)
+        controls.flap_request = _clip(flaps, 0.0, 1.0)
+        controls.speedbrake = _clip(speedbrake, -0.5, 1.0)
+        controls.gear_down = gear != 0.0
+        controls.parking_brake = _clip(parking_brake, 0.0, 1.0)
+        if not toe_brakes_overridden:  # pedals that are not pressed
+            if (14, 2) not in self._held:
+                left = self._released(_LEFT_BRAKE, left)
+            if (14, 3) not in self._held:
+                right = self._released(_RIGHT_BRAKE, right)
+        controls.brake_left, controls.brake_right = _clip(left, 0.0, 1.0), _clip(right, 0.0, 1.0)
+        controls.thrust_vector = max(vector, 0.0)
+        controls.artificial_stability = stability != 0.0 and not stability_overridden
+
+    def _released(self, name: str, value: float) -> float:
+        if value != 0.0:
+            self._store.set(name, 0.0)
+        return 0.0
 
     def _read_engines(self, controls: Controls, model: FlightModel) -> None:
         store, info = self._store, model.info

@@ -155,6 +155,11 @@ class DatarefStore:
             self._idle[slot]()
         return self.values.item(slot)
 
+    def gather(self, names: Sequence[str]) -> Callable[[], List[float]]:
+        """What reads the first elements of all these datarefs at once, again and again."""
+        slots = np.array([self.dataref(name).slots[0] for name in names])
+        return lambda: self.values[slots].tolist()
+
     def array(self, name: str) -> np.ndarray:
         """A copy of all elements."""
         elements: np.ndarray = self.values[self.dataref(name).slots]

@@ -8,9 +8,13 @@ angles (`theta` and `true_theta`) and why its local velocities are not north/eas
 from __future__ import annotations
 
 import math
-from typing import Tuple
+from typing import Tuple, Union
 
 import numpy as np
+
+Vector = Tuple[float, float, float]
+#: A rotation, for what is worked out in each frame: of 3 x 3 numbers, arrays take longer, and round by their library.
+Rows = Tuple[Vector, Vector, Vector]
 
 #: Radius of X-Plane's earth, solved from a captured pair of rows 20 and 21 (`sim/physics/earth_radius_m`).
 EARTH_RADIUS_M = 6378145.0
@@ -53,58 +57,76 @@ def nominal_origin(latitude_deg: float, longitude_deg: float) -> Tuple[float, fl
     return latitude, wrap_half_turn(math.floor(longitude_deg + 0.5))
 
 
-def level_axes(latitude_deg: float, longitude_deg: float) -> np.ndarray:
-    """Rows: unit vectors north, east, down at a place, in earth-centred axes (x to 0 N 0 E, z to the north pole)."""
+def _level_rows(latitude_deg: float, longitude_deg: float) -> Rows:
     lat, lon = math.radians(latitude_deg), math.radians(longitude_deg)
     sin_lat, cos_lat, sin_lon, cos_lon = math.sin(lat), math.cos(lat), math.sin(lon), math.cos(lon)
-    return np.array(
-        (
-            (-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat),
-            (-sin_lon, cos_lon, 0.0),
-            (-cos_lat * cos_lon, -cos_lat * sin_lon, -sin_lat),
-        )
+    return (
+        (-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat),
+        (-sin_lon, cos_lon, 0.0),
+        (-cos_lat * cos_lon, -cos_lat * sin_lon, -sin_lat),
+    )
+
+
+def level_axes(latitude_deg: float, longitude_deg: float) -> np.ndarray:
+    """Rows: unit vectors north, east, down at a place, in earth-centred axes (x to 0 N 0 E, z to the north pole)."""
+    return np.array(_level_rows(latitude_deg, longitude_deg))
+
+
+def body_rows(roll_deg: float, pitch_deg: float, heading_deg: float) -> Rows:
+    """`body_to_level` as rows."""
+    phi, theta, psi = math.radians(roll_deg), math.radians(pitch_deg), math.radians(heading_deg)
+    s_phi, c_phi, s_theta, c_theta = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
+    s_psi, c_psi = math.sin(psi), math.cos(psi)
+    return (
+        (c_theta * c_psi, s_phi * s_theta * c_psi - c_phi * s_psi, c_phi * s_theta * c_psi + s_phi * s_psi),
+        (c_theta * s_psi, s_phi * s_theta * s_psi + c_phi * c_psi, c_phi * s_theta * s_psi - s_phi * c_psi),
+        (-s_theta, s_phi * c_theta, c_phi * c_theta),
     )
 
 
 def body_to_level(roll_deg: float, pitch_deg: float, heading_deg: float) -> np.ndarray:
     """Rotation from body (FRD) to level (NED) axes for roll, pitch and true heading in the usual order."""
-    phi, theta, psi = math.radians(roll_deg), math.radians(pitch_deg), math.radians(heading_deg)
-    s_phi, c_phi, s_theta, c_theta = math.sin(phi), math.cos(phi), math.sin(theta), math.cos(theta)
-    s_psi, c_psi = math.sin(psi), math.cos(psi)
-    return np.array(
-        (
-            (c_theta * c_psi, s_phi * s_theta * c_psi - c_phi * s_psi, c_phi * s_theta * c_psi + s_phi * s_psi),
-            (c_theta * s_psi, s_phi * s_theta * s_psi + c_phi * c_psi, c_phi * s_theta * s_psi - s_phi * c_psi),
-            (-s_theta, s_phi * c_theta, c_phi * c_theta),
-        )
-    )
+    return np.array(body_rows(roll_deg, pitch_deg, heading_deg))
 
 
-def euler_degrees(rotation: np.ndarray) -> Tuple[float, float, float]:
+def turned(rows: Rows, vector: Vector) -> Vector:
+    """A vector in the axes into which a rotation turns."""
+    x, y, z = vector
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+
+def product(left: Rows, right: Rows) -> Rows:
+    """The rotation `right`, and then `left`."""
+    columns = [turned(left, column) for column in zip(*right)]
+    return tuple(zip(*columns))  # type: ignore[return-value]
+
+
+def euler_degrees(rotation: Union[np.ndarray, Rows]) -> Tuple[float, float, float]:
     """Roll, pitch, heading (0..360) of a body-to-level rotation, in degrees; straight up or down, roll is 0."""
-    if math.hypot(rotation[0, 0], rotation[1, 0]) < _VERTICAL:
-        heading = wrap_degrees(math.degrees(math.atan2(-rotation[0, 1], rotation[1, 1])))
-        return 0.0, math.copysign(90.0, -rotation[2, 0]), heading
-    roll = math.degrees(math.atan2(rotation[2, 1], rotation[2, 2]))
-    pitch = math.degrees(math.asin(min(max(-rotation[2, 0], -1.0), 1.0)))
-    heading = wrap_degrees(math.degrees(math.atan2(rotation[1, 0], rotation[0, 0])))
+    if math.hypot(rotation[0][0], rotation[1][0]) < _VERTICAL:
+        heading = wrap_degrees(math.degrees(math.atan2(-rotation[0][1], rotation[1][1])))
+        return 0.0, math.copysign(90.0, -rotation[2][0]), heading
+    roll = math.degrees(math.atan2(rotation[2][1], rotation[2][2]))
+    pitch = math.degrees(math.asin(min(max(-rotation[2][0], -1.0), 1.0)))
+    heading = wrap_degrees(math.degrees(math.atan2(rotation[1][0], rotation[0][0])))
     return roll, pitch, heading
 
 
-def quaternion(rotation: np.ndarray) -> Tuple[float, float, float, float]:
+def quaternion(rotation: Union[np.ndarray, Rows]) -> Tuple[float, float, float, float]:
     """Unit quaternion (w, x, y, z), w >= 0, of a rotation matrix (Shepperd's method: no loss near 180 degrees)."""
     m = rotation
-    trace = m[0, 0] + m[1, 1] + m[2, 2]
-    diagonal = (trace, m[0, 0], m[1, 1], m[2, 2])
+    trace = m[0][0] + m[1][1] + m[2][2]
+    diagonal = (trace, m[0][0], m[1][1], m[2][2])
     largest = max(range(4), key=diagonal.__getitem__)
     if largest == 0:
-        q = [1.0 + trace, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]
+        q = [1.0 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]]
     elif largest == 1:
-        q = [m[2, 1] - m[1, 2], 1.0 + 2.0 * m[0, 0] - trace, m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]]
+        q = [m[2][1] - m[1][2], 1.0 + 2.0 * m[0][0] - trace, m[0][1] + m[1][0], m[0][2] + m[2][0]]
     elif largest == 2:
-        q = [m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], 1.0 + 2.0 * m[1, 1] - trace, m[1, 2] + m[2, 1]]
+        q = [m[0][2] - m[2][0], m[0][1] + m[1][0], 1.0 + 2.0 * m[1][1] - trace, m[1][2] + m[2][1]]
     else:
-        q = [m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], 1.0 + 2.0 * m[2, 2] - trace]
+        q = [m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1.0 + 2.0 * m[2][2] - trace]
     scale = math.copysign(1.0 / math.sqrt(sum(x * x for x in q)), q[0])
     return tuple(float(x * scale) for x in q)  # type: ignore[return-value]
 
@@ -139,7 +161,6 @@ class LocalFrame:
     def __init__(self, latitude_deg: float, longitude_deg: float) -> None:
         self.lat_ref = 0.0
         self.lon_ref = 0.0
-        self.origin_axes = level_axes(0.0, 0.0)
         self._move_to(*nominal_origin(latitude_deg, longitude_deg))
 
     def follow(self, latitude_deg: float, longitude_deg: float) -> bool:
@@ -161,7 +182,7 @@ class LocalFrame:
 
     def to_local(self, latitude_deg: float, longitude_deg: float, elevation_m: float) -> Tuple[float, float, float]:
         """X east, Y up, Z south [m] of a place."""
-        return self._place(level_axes(latitude_deg, longitude_deg), elevation_m)
+        return self._place(_level_rows(latitude_deg, longitude_deg)[2], elevation_m)
 
     def to_geodetic(self, x: float, y: float, z: float) -> Tuple[float, float, float]:
         """Latitude, longitude [deg] and elevation [m MSL] of a local position."""
@@ -175,18 +196,19 @@ class LocalFrame:
         axes: np.ndarray = self.origin_axes @ level_axes(latitude_deg, longitude_deg).T
         return axes
 
-    def level_and_place(
-        self, latitude_deg: float, longitude_deg: float, elevation_m: float
-    ) -> Tuple[np.ndarray, Tuple[float, float, float]]:
+    def level_and_place(self, latitude_deg: float, longitude_deg: float, elevation_m: float) -> Tuple[Rows, Vector]:
         """`from_level` and `to_local` of a place."""
-        axes = level_axes(latitude_deg, longitude_deg)
-        return self.origin_axes @ axes.T, self._place(axes, elevation_m)
+        rows = _level_rows(latitude_deg, longitude_deg)
+        columns: Rows = tuple(turned(self._origin_rows, row) for row in rows)  # type: ignore[assignment]
+        return tuple(zip(*columns)), self._place(rows[2], elevation_m)  # type: ignore[return-value]
 
-    def _place(self, axes: np.ndarray, elevation_m: float) -> Tuple[float, float, float]:
-        radial = -axes[2] * (EARTH_RADIUS_M + elevation_m)
-        north, east, down = self.origin_axes @ radial
-        return float(east), float(-down - EARTH_RADIUS_M), float(-north)
+    def _place(self, down: Vector, elevation_m: float) -> Vector:
+        distance = -(EARTH_RADIUS_M + elevation_m)
+        x, y, z = down
+        north, east, below = turned(self._origin_rows, (x * distance, y * distance, z * distance))
+        return east, -below - EARTH_RADIUS_M, -north
 
     def _move_to(self, lat_ref: float, lon_ref: float) -> None:
         self.lat_ref, self.lon_ref = lat_ref, lon_ref
-        self.origin_axes = level_axes(lat_ref, lon_ref)
+        self._origin_rows = _level_rows(lat_ref, lon_ref)
+        self.origin_axes = np.array(self._origin_rows)

@@ -47,14 +47,16 @@ class FailureEffects:
             model: Whose surfaces and engines they are.
             dt: Of the frame [s].
         """
+        if not failed:
+            controls.surface_faults, controls.stability_fault = {}, False
+            controls.engine_faults = [EngineFault.NONE] * len(controls.engine_faults)
+            self._frozen.clear()
+            return
         acting = failed if self._surfaces_break else {leaf for leaf in failed if not leaf.startswith("rel_fcon_")}
         controls.surface_faults = self._surface_faults(acting, model)
         engines = model.info.engine_count
         controls.engine_faults = [self._engine_fault(i, failed) for i in range(len(controls.engine_faults))]
         controls.stability_fault = "rel_stbaug" in failed
-        if not failed:
-            self._frozen.clear()
-            return
         self._limit_stick(controls, failed)
         lock = "rel_conlock" in failed
         self._freeze(controls, "roll", lock or bool(failed & {"rel_ail_L_jam", "rel_ail_R_jam"}))

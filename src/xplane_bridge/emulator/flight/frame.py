@@ -9,8 +9,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Tuple
 
-import numpy as np
-
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.flight_model import ModelInfo, ModelState
 
@@ -122,14 +120,14 @@ class Frame:
         self.origin_jumped = self.local.follow(state.latitude_deg, state.longitude_deg)
         turn, self.position = self.local.level_and_place(state.latitude_deg, state.longitude_deg, state.altitude_m)
         velocity = (state.v_north_mps, state.v_east_mps, state.v_down_mps)
-        self.velocity = _opengl(turn @ velocity)
-        self.acceleration = _opengl(
-            turn @ (state.acceleration_north_mps2, state.acceleration_east_mps2, state.acceleration_down_mps2)
-        )
-        self.wind = _opengl(turn @ (state.wind_north_mps, state.wind_east_mps, state.wind_down_mps))
+        acceleration = (state.acceleration_north_mps2, state.acceleration_east_mps2, state.acceleration_down_mps2)
+        wind = (state.wind_north_mps, state.wind_east_mps, state.wind_down_mps)
+        self.velocity = _opengl(earth.turned(turn, velocity))
+        self.acceleration = _opengl(earth.turned(turn, acceleration))
+        self.wind = _opengl(earth.turned(turn, wind))
         self.true_phi, self.true_theta = math.degrees(state.roll_rad), math.degrees(state.pitch_rad)
         self.true_psi = earth.wrap_degrees(math.degrees(state.heading_rad))
-        in_origin = turn @ earth.body_to_level(self.true_phi, self.true_theta, self.true_psi)
+        in_origin = earth.product(turn, earth.body_rows(self.true_phi, self.true_theta, self.true_psi))
         self.phi, self.theta, self.psi = earth.euler_degrees(in_origin)
         self.q = earth.quaternion(in_origin)
         self.declination = magnetic_declination(state.latitude_deg, state.longitude_deg)
@@ -160,6 +158,7 @@ class Frame:
         return earth.wrap_degrees(self.true_psi - self.declination)
 
 
-def _opengl(ned: np.ndarray) -> Tuple[float, float, float]:
+def _opengl(ned: earth.Vector) -> earth.Vector:
     """North, east, down to X east, Y up, Z south."""
-    return float(ned[1]), float(-ned[2]), float(-ned[0])
+    north, east, down = ned
+    return east, -down, -north
