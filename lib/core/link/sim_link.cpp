@@ -191,7 +191,8 @@ void SimLink::post(std::function<void()> call) {
   hub_->wake();
 }
 
-void SimLink::runCalls() {
+/// @return whether there were any
+bool SimLink::runCalls() {
   std::vector<std::function<void()>> calls;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -201,6 +202,7 @@ void SimLink::runCalls() {
   for (const std::function<void()>& call : calls) {
     call();
   }
+  return !calls.empty();
 }
 
 Subscription SimLink::subscribe(RrefGroup group, RrefHandler handler, std::shared_ptr<HandlerMutex> mutex) {
@@ -388,13 +390,19 @@ void SimLink::wakeWaiting() {
 
 int SimLink::patienceMs() const { return requests_.empty() ? kThreadStepMs : kRequestStepMs; }
 
-void SimLink::step(int timeout_ms) {
+bool SimLink::receive() {
+  const bool called = receive(0);
+  wakeWaiting();
+  return called || monitor_.alive() != was_alive_ || monitor_.epoch() != seen_epoch_;
+}
+
+bool SimLink::receive(int timeout_ms) {
   link_thread_id_ = std::this_thread::get_id();
   now_ns_ = clock_.steady_ns();
-  runCalls();
+  bool called = runCalls();
   hub_->wait(std::min(timeout_ms, patienceMs()));
   now_ns_ = clock_.steady_ns();
-  runCalls();
+  called = runCalls() || called;
   receiveControl();
   for (Group& group : groups_) {
     receiveGroup(&group);
@@ -405,6 +413,11 @@ void SimLink::step(int timeout_ms) {
   receiveLeftovers();
   askXpc(now_ns_);
   receiveBeacons();
+  return called;
+}
+
+void SimLink::step(int timeout_ms) {
+  receive(timeout_ms);
   refreshLink(now_ns_);
   if (!reader_.idle()) {
     reader_.update(now_ns_);

@@ -106,7 +106,8 @@ void BaseNode::startLink() {
     return;
   }
   link_->startDriven();
-  const DrivenByNetwork driven{link_->fd(), [this] { link_->step(0); }, [this] { return link_->patienceMs(); }};
+  const DrivenByNetwork driven{link_->fd(), [this] { return link_->receive(); }, [this] { link_->step(0); },
+                               [this] { return link_->patienceMs(); }};
   driver_ = std::make_unique<NetworkThreadDriver>(driven, &ros::PollManager::instance()->getPollSet());
 }
 

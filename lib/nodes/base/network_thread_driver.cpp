@@ -42,19 +42,23 @@ class NetworkThreadDriver::Impl {
       if (!lock.try_lock()) return;
     }
     if (ended_) return;
-    driven_.step();
+    if (driven_.receive()) {
+      due_ = true;
+      changed_.notify_all();
+    }
     listenAgain();
   }
 
   void stepWhenDue() {
     std::unique_lock<std::mutex> lock(mutex_);
     while (!ended_) {
+      due_ = false;
       driven_.step();
       const std::chrono::milliseconds patience(driven_.patience_ms());
       lock.unlock();
       listenAgain();
       lock.lock();
-      changed_.wait_for(lock, patience, [this] { return ended_; });
+      changed_.wait_for(lock, patience, [this] { return ended_ || due_; });
     }
   }
 
@@ -66,9 +70,9 @@ class NetworkThreadDriver::Impl {
   const DrivenByNetwork driven_;
   ros::PollSet* const poll_set_;
   std::atomic<bool> passed_over_{false};
-  std::mutex mutex_;  // guards the following, and is held during a step
+  std::mutex mutex_;  // guards the following, and is held while one of the two is at it
   std::condition_variable changed_;
-  bool ended_ = false;
+  bool ended_ = false, due_ = false;
   std::thread thread_;
 };
 

@@ -60,10 +60,10 @@ struct SimLinkCallbacks {
 /// The link to one X-Plane: finds it, keeps subscriptions alive whatever happens to it, says in which state it is,
 /// reads and writes datarefs.
 ///
-/// One thread (start()), or one of the caller's at a time (step()), does all receiving and calls all handlers and
-/// callbacks. Every other public function may be called from any thread; those that wait say so and must not be called
-/// from a callback. Subscriptions may outlive the link; then they do nothing. Members that are not said to be shared
-/// belong to the thread that receives.
+/// One thread (start()), or one of the caller's at a time (receive(), step()), does all receiving and calls all
+/// handlers and callbacks. Every other public function may be called from any thread; those that wait say so and must
+/// not be called from a callback. Subscriptions may outlive the link; then they do nothing. Members that are not said
+/// to be shared belong to the thread that receives.
 class SimLink : public SimulatorPort {
  public:
   /// `journals` may be empty when neither Data Output is configured nor leftovers are to be restored.
@@ -78,9 +78,11 @@ class SimLink : public SimulatorPort {
 
   /// Runs the link in a thread of its own.
   void start();
-  /// Instead: the caller's threads call step(0), one at a time, when fd() is readable, and patienceMs() after the last
-  /// one at the latest. They have ended before stop().
+  /// Instead: the caller's threads call, one at a time, receive() when fd() is readable, and step(0) patienceMs() after
+  /// the last one at the latest. They have ended before stop().
   void startDriven();
+  /// Handles the datagrams that have come, and no more. @return whether step() is due at once
+  bool receive();
   /// -1: it has to be start().
   int fd() const { return hub_->fd(); }
   int patienceMs() const;
@@ -158,7 +160,8 @@ class SimLink : public SimulatorPort {
 
   // Calls of any thread, carried out on the link's (sim_link.cpp).
   void post(std::function<void()> call);
-  void runCalls();
+  bool runCalls();
+  bool receive(int timeout_ms);
   void changeGroup(const std::shared_ptr<RrefDelivery>& delivery, std::uint32_t list, std::optional<RrefGroup> group);
   void startRead(std::vector<std::string> paths, double timeout_s, DatarefReader::Accept accept,
                  DatarefReader::Done done);

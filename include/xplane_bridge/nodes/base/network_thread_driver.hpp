@@ -7,22 +7,23 @@
 
 namespace xplane_bridge {
 
-/// What is done whenever a descriptor is readable, and now and then without.
+/// What is done whenever a descriptor is readable, and now and then.
 struct DrivenByNetwork {
   int fd = -1;
-  std::function<void()> step;  ///< reads what there is; must not wait for a message
+  std::function<bool()> receive;  ///< reads what there is, and returns at once whether step() is due
+  std::function<void()> step;
   /// [ms] until the next step() at the latest. Called behind each step().
   std::function<int()> patience_ms;
 };
 
 /// Has a link receive on roscpp's network thread: what the link publishes is then sent by the thread that has received
-/// it, and no other has to be woken. What is due without a datagram is done by a thread of the driver's own, so that a
-/// name server that does not answer keeps no subscriber waiting. One of the two at a time.
+/// it, and no other has to be woken. What else is due is done by a thread of the driver's own, so that no subscriber
+/// waits for that, or for a name server that does not answer. One of the two at a time.
 class NetworkThreadDriver {
  public:
   /// Begins at once. @param poll_set of roscpp; outlives the driver
   NetworkThreadDriver(DrivenByNetwork driven, ros::PollSet* poll_set);
-  /// Ends it; then no step() is under way.
+  /// Ends it; then neither is under way.
   ~NetworkThreadDriver();
   NetworkThreadDriver(const NetworkThreadDriver&) = delete;
   NetworkThreadDriver& operator=(const NetworkThreadDriver&) = delete;

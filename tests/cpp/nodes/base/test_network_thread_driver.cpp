@@ -28,19 +28,30 @@ class NetworkThreadDriverTest : public testing::Test {
   }
 
   void drive(int patience_ms) {
-    driver_ = std::make_unique<NetworkThreadDriver>(
-        DrivenByNetwork{fd_, [this] { step(); }, [patience_ms] { return patience_ms; }}, &poll_set_);
+    const DrivenByNetwork driven{fd_, [this] { return receive(); }, [this] { step(); },
+                                 [patience_ms] { return patience_ms; }};
+    driver_ = std::make_unique<NetworkThreadDriver>(driven, &poll_set_);
+  }
+
+  bool receive() {
+    EXPECT_EQ(std::this_thread::get_id(), network_);
+    ++by_network_;
+    take();
+    return due_;
   }
 
   void step() {
-    if (std::this_thread::get_id() == network_) {
-      ++by_network_;
-    } else {
+    EXPECT_NE(std::this_thread::get_id(), network_);
+    {
       std::unique_lock<std::mutex> lock(mutex_);
       ++by_own_;
       changed_.notify_all();
       changed_.wait(lock, [this] { return !held_; });
     }
+    take();
+  }
+
+  void take() {
     std::uint64_t count = 0;
     if (read(fd_, &count, sizeof count) == sizeof count) got_ += static_cast<int>(count);
   }
@@ -76,6 +87,7 @@ class NetworkThreadDriverTest : public testing::Test {
   std::condition_variable changed_;
   int by_own_ = 0;
   bool held_ = false;
+  bool due_ = false;  // of the network thread
   std::unique_ptr<NetworkThreadDriver> driver_;
 };
 
@@ -97,6 +109,19 @@ TEST_F(NetworkThreadDriverTest, DoesByItselfWhatIsDue) {
   waitForOwn(3);
   EXPECT_EQ(got_, 1);
   EXPECT_EQ(by_network_, 0) << "nothing polls";
+}
+
+TEST_F(NetworkThreadDriverTest, DoesAtOnceWhatADatagramMakesDue) {
+  drive(kForever);
+  waitForOwn(1);
+  due_ = true;
+  arrive();
+  pollUntilGot(1);
+  if (by_network_ == 0) {  // read by the first step
+    arrive();
+    pollUntilGot(2);
+  }
+  waitForOwn(2);
 }
 
 TEST_F(NetworkThreadDriverTest, KeepsTheNetworkThreadFromWaiting) {
