@@ -4,8 +4,8 @@
 
 #include <ros/ros.h>
 
-#include "xplane_bridge/nodes/base/immediate_queue.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
+#include "xplane_bridge/nodes/network/immediate_queue.hpp"
 #include "xplane_bridge/nodes/recorder/lockstep_recorder.hpp"
 
 int main(int argc, char** argv) {

@@ -108,7 +108,7 @@ void BaseNode::startLink() {
   link_->startDriven();
   const DrivenByNetwork driven{link_->fd(), [this] { return link_->receive(); }, [this] { link_->step(0); },
                                [this] { return link_->patienceMs(); }};
-  driver_ = std::make_unique<NetworkThreadDriver>(driven, &ros::PollManager::instance()->getPollSet());
+  driver_ = std::make_unique<NetworkThreadDriver>(driven, host_clock_, &ros::PollManager::instance()->getPollSet());
 }
 
 void BaseNode::stopLink(const Deadline& deadline) {

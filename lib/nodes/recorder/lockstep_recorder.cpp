@@ -12,7 +12,7 @@
 
 #include "xplane_bridge/FlightState.h"
 #include "xplane_bridge/nodes/base/common_options.hpp"
-#include "xplane_bridge/nodes/base/immediate_queue.hpp"
+#include "xplane_bridge/nodes/network/immediate_queue.hpp"
 
 namespace xplane_bridge {
 namespace {

@@ -27,11 +27,11 @@
 #include "xplane_bridge/nodes/base/advertiser.hpp"
 #include "xplane_bridge/nodes/base/clock_timers.hpp"
 #include "xplane_bridge/nodes/base/common_options.hpp"
-#include "xplane_bridge/nodes/base/immediate_queue.hpp"
-#include "xplane_bridge/nodes/base/network_thread_driver.hpp"
 #include "xplane_bridge/nodes/base/node_wire.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
+#include "xplane_bridge/nodes/network/immediate_queue.hpp"
+#include "xplane_bridge/nodes/network/network_thread_driver.hpp"
 
 namespace xplane_bridge {
 

@@ -5,6 +5,8 @@
 
 #include <ros/poll_set.h>
 
+#include "xplane_bridge/core/base/clock.hpp"
+
 namespace xplane_bridge {
 
 /// What is done whenever a descriptor is readable, and now and then.
@@ -21,8 +23,8 @@ struct DrivenByNetwork {
 /// waits for that, or for a name server that does not answer. One of the two at a time.
 class NetworkThreadDriver {
  public:
-  /// Begins at once. @param poll_set of roscpp; outlives the driver
-  NetworkThreadDriver(DrivenByNetwork driven, ros::PollSet* poll_set);
+  /// Begins at once. @param clock that runs by itself @param poll_set of roscpp; outlives the driver
+  NetworkThreadDriver(DrivenByNetwork driven, core::Clock clock, ros::PollSet* poll_set);
   /// Ends it; then neither is under way.
   ~NetworkThreadDriver();
   NetworkThreadDriver(const NetworkThreadDriver&) = delete;

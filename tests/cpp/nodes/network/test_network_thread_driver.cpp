@@ -1,4 +1,4 @@
-#include "xplane_bridge/nodes/base/network_thread_driver.hpp"
+#include "xplane_bridge/nodes/network/network_thread_driver.hpp"
 
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -30,7 +30,7 @@ class NetworkThreadDriverTest : public testing::Test {
   void drive(int patience_ms) {
     const DrivenByNetwork driven{fd_, [this] { return receive(); }, [this] { step(); },
                                  [patience_ms] { return patience_ms; }};
-    driver_ = std::make_unique<NetworkThreadDriver>(driven, &poll_set_);
+    driver_ = std::make_unique<NetworkThreadDriver>(driven, core::hostClock(), &poll_set_);
   }
 
   bool receive() {

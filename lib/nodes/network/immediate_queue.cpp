@@ -1,4 +1,4 @@
-#include "xplane_bridge/nodes/base/immediate_queue.hpp"
+#include "xplane_bridge/nodes/network/immediate_queue.hpp"
 
 #include <algorithm>
 #include <thread>

@@ -1,19 +1,23 @@
-#include "xplane_bridge/nodes/base/network_thread_driver.hpp"
+#include "xplane_bridge/nodes/network/network_thread_driver.hpp"
 
 #include <poll.h>
 
 #include <atomic>
-#include <chrono>
-#include <condition_variable>
 #include <mutex>
 #include <thread>
 #include <utility>
 
 namespace xplane_bridge {
+namespace {
+
+constexpr double kMillisecond = 1e-3;  // [s]
+
+}  // namespace
 
 class NetworkThreadDriver::Impl {
  public:
-  Impl(DrivenByNetwork driven, ros::PollSet* poll_set) : driven_(std::move(driven)), poll_set_(poll_set) {}
+  Impl(DrivenByNetwork driven, core::Clock clock, ros::PollSet* poll_set)
+      : driven_(std::move(driven)), clock_(std::move(clock)), poll_set_(poll_set) {}
 
   /// @param self holds this for the network thread
   void begin(const std::shared_ptr<Impl>& self) {
@@ -28,7 +32,7 @@ class NetworkThreadDriver::Impl {
       const std::lock_guard<std::mutex> lock(mutex_);
       ended_ = true;
     }
-    changed_.notify_all();
+    changed_.notifyAll();
     thread_.join();
   }
 
@@ -44,7 +48,7 @@ class NetworkThreadDriver::Impl {
     if (ended_) return;
     if (driven_.receive()) {
       due_ = true;
-      changed_.notify_all();
+      changed_.notifyAll();
     }
     listenAgain();
   }
@@ -54,11 +58,11 @@ class NetworkThreadDriver::Impl {
     while (!ended_) {
       due_ = false;
       driven_.step();
-      const std::chrono::milliseconds patience(driven_.patience_ms());
+      const core::Deadline next(clock_, driven_.patience_ms() * kMillisecond);
       lock.unlock();
       listenAgain();
       lock.lock();
-      changed_.wait_for(lock, patience, [this] { return ended_ || due_; });
+      changed_.waitUntil(&lock, next, [this] { return ended_ || due_; });
     }
   }
 
@@ -68,16 +72,17 @@ class NetworkThreadDriver::Impl {
   }
 
   const DrivenByNetwork driven_;
+  const core::Clock clock_;
   ros::PollSet* const poll_set_;
   std::atomic<bool> passed_over_{false};
   std::mutex mutex_;  // guards the following, and is held while one of the two is at it
-  std::condition_variable changed_;
+  core::ClockCondition changed_;
   bool ended_ = false, due_ = false;
   std::thread thread_;
 };
 
-NetworkThreadDriver::NetworkThreadDriver(DrivenByNetwork driven, ros::PollSet* poll_set)
-    : impl_(std::make_shared<Impl>(std::move(driven), poll_set)) {
+NetworkThreadDriver::NetworkThreadDriver(DrivenByNetwork driven, core::Clock clock, ros::PollSet* poll_set)
+    : impl_(std::make_shared<Impl>(std::move(driven), std::move(clock), poll_set)) {
   impl_->begin(impl_);
 }
 
