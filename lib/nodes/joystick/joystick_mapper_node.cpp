@@ -10,6 +10,7 @@
 namespace xplane_bridge {
 void JoystickMapperNode::loadParameters(const ParamLoader& own) {
   period_ = 1.0 / own.number("rate", {1.0, 1000.0}, 50.0);
+  repeat_ = core::CommandRepeat(period_);
   mapper_ = std::make_unique<core::JoystickMapper>(loadJoystickOptions(own));
   if (!lockstep() && !mapper_->options().actions.empty()) {
     functions_ = std::make_unique<JoyFunctions>(loadJoyFunctions(own), [](const std::string& text, bool success) {
@@ -66,6 +67,7 @@ void JoystickMapperNode::onJoy(const sensor_msgs::Joy& joy) {
   ++joy_count_;
   if (mapper_->onJoy(joy.axes, joy.buttons, time)) {
     last_joy_ = time;
+    repeat_.heard(time);
     publish(time);
   }
   reportProblems();
@@ -80,9 +82,7 @@ void JoystickMapperNode::onTimer() {
              mapper_->options().device.c_str());
   }
   was_alive_ = alive;
-  // A message has just done it.
-  if (time - last_publication_ < 0.5 * period_) return;
-  publish(time);
+  if (repeat_.due(time)) publish(time);
 }
 
 bool JoystickMapperNode::publish(double time) {
@@ -106,7 +106,7 @@ bool JoystickMapperNode::publish(double time) {
   message.header.stamp = stamp;
   toMessage(command.command, &message);
   command_publisher_.publish(message);
-  last_publication_ = time;
+  repeat_.sent(time);
   reportSelection();
   return true;
 }

@@ -10,6 +10,7 @@
 
 #include "xplane_bridge/ControlMode.h"
 #include "xplane_bridge/core/control/axis_map.hpp"
+#include "xplane_bridge/core/control/command_repeat.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/joystick/joy_functions.hpp"
 
@@ -64,8 +65,8 @@ class JoystickMapperNode : public BaseNode {
   std::uint32_t command_sequence_ = 0;
   std::uint32_t request_sequence_ = 0;
   std::uint64_t joy_count_ = 0;
-  double last_publication_ = 0.0;  // [s] steady
-  double last_joy_ = 0.0;
+  core::CommandRepeat repeat_{period_};
+  double last_joy_ = 0.0;  // [s] steady
   bool was_alive_ = false;
   std::string reported_problems_;
   std::vector<std::string> reported_selection_;
