@@ -52,8 +52,16 @@ def test_the_workflow_runs_the_command_of_the_readme_on_both_systems():
     for name, job in workflow["jobs"].items():
         commands = [step["run"] for step in job["steps"] if "run" in step]
         assert commands[-1] == "scripts/test ${{ github.event_name == 'schedule' && '--full' || '' }}", name
-        assert re.search(r"^scripts/test +# every check", readme, re.MULTILINE)
+        assert re.search(r"^scripts/test +# all checks but those of a night \(--full\)$", readme, re.MULTILINE)
         assert job["runs-on"] == "ubuntu-latest", f"{name}: a public runner"
+
+
+def test_without_options_all_checks_run_but_those_of_a_night():
+    """As README and CONTRIBUTING say."""
+    assert re.search(r'^checks=\("\$\{all_checks\[@\]\}"\)$', TEST, re.MULTILINE)
+    assert re.search(r'^leave_out=\(-m "not nightly"\)$', TEST, re.MULTILINE)
+    assert not set(names("all_checks")) & set(names("full_checks"))
+    assert "\nscripts/test           # all checks but those of a night" in (ROOT / "CONTRIBUTING.md").read_text()
 
 
 def test_what_runs_side_by_side_is_shown_in_order_and_a_failure_among_it_counts():

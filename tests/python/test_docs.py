@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from xplane_bridge.topics import TOPICS
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted(
     path
@@ -18,6 +20,7 @@ PAGES = sorted(
     if ".workspace" not in path.parts and ".venv" not in path.parts
 )
 INDEX = ROOT / "docs/README.md"
+ARCHITECTURE = ROOT / "docs/architecture.md"
 
 
 def links(page):
@@ -52,6 +55,86 @@ def test_every_page_is_found_from_the_index():
                 reached.add(target)
                 waiting.append(target)
     assert {page for page in PAGES if page.parent == ROOT / "docs"} - reached == set()
+
+
+# ---------------------------------------------------------------------------------------------------- what pages name
+
+
+def section(page, heading):
+    """The text below a heading of a page, to the next of its rank."""
+    return page.read_text(encoding="utf-8").split(f"\n## {heading}\n")[1].split("\n## ")[0]
+
+
+def stops():
+    """The stops of the walks of architecture.md: their files, and their functions, each with the file it is in."""
+    text = section(ARCHITECTURE, "Four walks")
+    for stop in re.findall(r"^\d+\. (.*?)(?=\n\S|\n\n|\Z)", text, re.MULTILINE | re.DOTALL):
+        files, functions = [], []
+        for word in re.findall(r"`([^`]+)`", stop):
+            if word.endswith("()"):
+                functions.append((files[-1], word[:-2]))
+            elif "/" in word and word not in TOPICS and not word.startswith("/"):
+                files.append(word)
+        yield pytest.param(stop, files, functions, id=f"{files[0]}-{functions[0][1] if functions else ''}")
+
+
+@pytest.mark.parametrize(("stop", "files", "functions"), list(stops()))
+def test_a_stop_of_a_walk_begins_with_its_file_and_all_that_it_names_is_there(stop, files, functions):
+    assert stop.startswith(f"`{files[0]}`")
+    assert [file for file in files if not (ROOT / file).is_file()] == []
+    for file, function in functions:
+        beginning = rf"\bdef {function}\(" if file.startswith(("src/", "scripts/")) else rf"(?<![.>]){function}\("
+        assert re.search(beginning, (ROOT / file).read_text(encoding="utf-8")), f"{file} has no {function}()"
+
+
+def test_there_are_four_walks():
+    walks = section(ARCHITECTURE, "Four walks").split("\n### ")[1:]
+    assert len(walks) == 4
+    assert min(len(re.findall(r"^\d+\. ", walk, re.MULTILINE)) for walk in walks) >= 5
+
+
+def described(text):
+    """The topics between backticks; one without its folder is in that of the one before."""
+    folder = ""
+    for word in re.findall(r"`([^`]+)`", text):
+        for topic in (word, f"{folder}/{word}"):
+            if topic in TOPICS:
+                folder = topic.rpartition("/")[0]
+                yield topic
+
+
+def test_every_topic_has_its_line():
+    rows = [line.split("|")[1] for line in section(ROOT / "docs/topics.md", "Topics").splitlines() if line[:1] == "|"]
+    named = [topic for row in rows for topic in described(row)]
+    assert sorted(set(TOPICS) - set(named)) == []
+    assert len(named) == len(set(named)), "a topic with two lines"
+
+
+#: Of the nodes, and those that a user may type.
+NODES = sorted(path.stem for path in (ROOT / "src").glob("*.cpp"))
+SCRIPTS = sorted(path.name for path in (ROOT / "scripts").iterdir() if path.is_file() and not path.suffix)
+
+
+def test_the_index_says_where_every_node_is_described():
+    index = INDEX.read_text(encoding="utf-8")
+    assert [node for node in NODES if not re.search(rf"\[[^]]*\b{node}\b[^]]*\]\(", index)] == []
+
+
+def test_every_program_is_named_in_a_page():
+    pages = "".join(page.read_text(encoding="utf-8") for page in PAGES if page.parent == ROOT / "docs")
+    pages += (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(SCRIPTS) > 20
+    assert [name for name in (*NODES, *SCRIPTS) if not re.search(rf"(?:scripts/|`|\[){name}\b", pages)] == []
+
+
+def test_words_are_in_alphabetical_order():
+    rows = (ROOT / "docs/glossary.md").read_text(encoding="utf-8").splitlines()
+    words = [row.split("|")[1].strip().lower() for row in rows if row.startswith("| ")][1:]
+    assert len(words) > 20
+    assert words == sorted(words)
+
+
+# ----------------------------------------------------------------------------------------------------------- the site
 
 
 def site(source, output):

@@ -13,10 +13,15 @@ from support.room_table import ROOT
 from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
 from xplane_bridge.topics import TOPICS
 
-#: Written apart, made, X-Plane's own names, or rooms that fly single aircraft: a new channel needs nothing there.
-NOT_COUNTED = tuple(
-    f":!src/xplane_bridge/{name}"
-    for name in ("emulator", "constants.py", "xplane_names", "aircraft_file", "controllers", "gym")
+PRODUCT = ("msg", "srv", "lib", "include", "launch", "src", "cmake", "config")
+#: Written apart, made, X-Plane's own names, rooms that fly single aircraft, or configuration: a new channel needs
+#: nothing there. Counted in a row that names a file of it.
+NOT_COUNTED = (
+    "config",
+    *(
+        f"src/xplane_bridge/{name}"
+        for name in ("emulator", "constants.py", "xplane_names", "aircraft_file", "controllers", "gym")
+    ),
 )
 
 
@@ -34,9 +39,18 @@ def changes():
 def test_the_files_of_a_change_are_those_that_have_its_example(words, files):
     patterns = [part for word in words for part in ("-e", word)]
     command = ["git", "-c", f"safe.directory={ROOT}", "-C", str(ROOT), "grep", "-lwF", *patterns, "--"]
-    where = ("msg", "srv", "lib", "include", "launch", "src", "cmake", *NOT_COUNTED)
+    tests = {file for file in files if file.startswith("tests/")}
+    left_out = [f":!{place}" for place in NOT_COUNTED if not any(file.startswith(f"{place}/") for file in files)]
+    where = (*PRODUCT, *tests, ":!*.md", *left_out)
     found = subprocess.run([*command, *where], stdout=subprocess.PIPE, text=True, check=True).stdout.split()
     assert set(found) == files
+    texts = [(ROOT / file).read_text(encoding="utf-8") for file in files]
+    assert [word for word in words if not any(word in text for text in texts)] == []
+
+
+def test_the_table_has_the_changes_that_are_asked_for_most():
+    named = {row.id for row in changes()}
+    assert named >= {"a topic", "a launch argument", "an aircraft of the emulator", "an export format"}
 
 
 def test_documents_explain_every_kind():

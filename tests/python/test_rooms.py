@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,6 @@ from support.room_table import MOST_FILES, ROOT, not_needed, require_floors, roo
 
 PACKAGE = ROOT / "src" / "xplane_bridge"
 TABLE = room_table("Python rooms")
-#: Rooms of the table that need not exist yet.
-TO_COME = set(
-    re.findall(r"^\| `([^`]+)` \| to come:", (ROOT / "docs/architecture.md").read_text(encoding="utf-8"), re.MULTILINE)
-)
 ROS = re.compile(
     r"^(ros(py|lib|bag|graph|launch|node|topic|service|param|msg)|tf2?|tf2_\w+|actionlib|message_filters|cv_bridge|"
     r"genpy|(\w+_)?msgs|std_srvs|xplane_bridge\.(msg|srv))(\.|$)"
@@ -91,9 +88,17 @@ def test_every_import_is_allowed_by_the_room_table():
 
 def test_the_room_table_names_the_rooms_there_are_and_they_form_floors():
     rooms = {room_of(module) for module in MODULES} - {None}
-    assert rooms >= set(TABLE) - TO_COME, "rooms of the table that do not exist"
-    assert not rooms & TO_COME, "these exist: take 'to come:' out of their rows and allow them what they import"
+    assert rooms == set(TABLE), "rooms of the table that do not exist"
     require_floors(TABLE)
+
+
+@pytest.mark.parametrize("heading", ["C++ rooms", "Python rooms"])
+def test_the_picture_of_the_floors_has_each_room_above_all_that_it_may_use(heading):
+    texts = ElementTree.parse(ROOT / "docs/images/rooms.svg").getroot().iter("{http://www.w3.org/2000/svg}text")
+    drawn = {text.text: float(text.get("y")) for text in texts if text.get("class") == "room"}
+    table = room_table(heading)
+    assert set(drawn) == set(TABLE) | set(room_table("C++ rooms"))
+    assert [(room, other) for room, below in table.items() for other in below if drawn[other] <= drawn[room]] == []
 
 
 def test_the_room_table_allows_nothing_that_no_file_needs():
@@ -104,7 +109,7 @@ def test_the_room_table_allows_nothing_that_no_file_needs():
                 name for name in imports_of(module) if name.split(".")[0] == "xplane_bridge" and not ROS.match(name)
             }
             used[room_of(module)] |= {room_of(name) for name in ours}
-    assert not_needed({room: below for room, below in TABLE.items() if room not in TO_COME}, used) == {}
+    assert not_needed(TABLE, used) == {}
 
 
 @pytest.mark.parametrize("room", sorted(WITHOUT_ROS_AND_EMULATOR))
