@@ -3,12 +3,16 @@
 // sends is passed on, and so are the answers, so that the nodes meet a simulator that obeys. Beside it, the floor: two
 // bare hops (bench_bare_hops) that end in a sendto to this program.
 //
+// joystick_mapper_node and tx_node have timers of the same 50 Hz, and what a message meets depends on how long ago they
+// fired: on an exact grid a whole run would measure one such phase. So the messages drift evenly through a period of
+// the timers and back, and besides all latencies each eighth of the period has its own median.
+//
 //   bench_control key=value ...
 //     listen=N    UDP port for tx_node      xplane=N   UDP port of the simulator
 //     joy=TOPIC   of joystick_mapper_node   bare_joy=TOPIC, bare_port=N   of the bare hops
 //     axis=I      index of the roll axis    seconds=S
 //
-// Prints one JSON object.
+// Prints one JSON object; phase_p50_us lists the eighths, -1 where nothing arrived.
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -17,8 +21,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
@@ -39,7 +45,11 @@ namespace xplane_bridge {
 namespace {
 
 constexpr const char* kRollPath = "sim/joystick/yoke_roll_ratio";
-constexpr std::int64_t kPeriod = 20'000'000;  // [ns]
+constexpr std::int64_t kPeriod = 20'000'000;  // [ns] of the timers of joystick_mapper_node and tx_node
+constexpr int kPhases = 8;
+constexpr int kNotMeasured = -1;
+/// A turn's share of a sweep to and fro: a tenth of the golden section, whose multiples lie evenly and never repeat.
+constexpr double kDrift = 0.061803398874989485;
 constexpr std::size_t kAxes = 8;
 constexpr std::size_t kButtons = 12;
 constexpr float kDeflection = 0.5F;
@@ -56,19 +66,29 @@ int openSocket(std::uint16_t port) {
   return made;
 }
 
+/// [0, 1] of a period that a turn's messages come behind its place on the 50 Hz grid. It goes up and down, so that the
+/// time between messages differs from the period by less than an eighth of it.
+double phaseOf(std::uint64_t turn) {
+  const double sweep = kDrift * static_cast<double>(turn);
+  return 1.0 - std::abs(2.0 * (sweep - std::floor(sweep)) - 1.0);
+}
+
 /// Arrivals of a changed side, for one chain.
 struct Chain {
   std::atomic<int> expected{0};  // sign of the roll that is waited for
+  std::atomic<int> phase{kNotMeasured};
   std::atomic<std::int64_t> sent_ns{0};
-  std::vector<double> latencies_us;
+  std::array<std::vector<double>, kPhases> latencies_us;
   std::atomic<std::uint64_t> arrived{0};
 
   void arrive(float roll) {
     const int side = roll > 0.0F ? 1 : -1;
     if (roll == 0.0F || side != expected.load()) return;
     expected = 0;
-    latencies_us.push_back(static_cast<double>(bench::now_ns() - sent_ns.load()) * 1e-3);
     ++arrived;
+    const int at = phase.load();
+    if (at == kNotMeasured) return;
+    latencies_us[static_cast<std::size_t>(at)].push_back(static_cast<double>(bench::now_ns() - sent_ns.load()) * 1e-3);
   }
 };
 
@@ -152,11 +172,19 @@ class Relay {
 };
 
 std::string report(const char* name, const Chain& chain, std::uint64_t sent) {
+  std::vector<double> all;
+  std::string phases;
+  for (const std::vector<double>& of_phase : chain.latencies_us) {
+    all.insert(all.end(), of_phase.begin(), of_phase.end());
+    char number[40];
+    std::snprintf(number, sizeof number, "%s%.2f", phases.empty() ? "" : ", ", bench::percentile(of_phase, 0.5));
+    phases += number;
+  }
   char line[200];
-  std::snprintf(line, sizeof line, "\"%s\": {\"sent\": %llu, \"arrived\": %llu, \"p50_us\": %.2f, \"p99_us\": %.2f}",
-                name, static_cast<unsigned long long>(sent), static_cast<unsigned long long>(chain.latencies_us.size()),
-                bench::percentile(chain.latencies_us, 0.5), bench::percentile(chain.latencies_us, 0.99));
-  return line;
+  std::snprintf(line, sizeof line, "\"%s\": {\"sent\": %llu, \"arrived\": %llu, \"p50_us\": %.2f, \"p99_us\": %.2f, ",
+                name, static_cast<unsigned long long>(sent), static_cast<unsigned long long>(all.size()),
+                bench::percentile(all, 0.5), bench::percentile(all, 0.99));
+  return line + ("\"phase_p50_us\": [" + phases + "]}");
 }
 
 void run(const bench::Settings& settings) {
@@ -172,12 +200,13 @@ void run(const bench::Settings& settings) {
   std::uint64_t sent = 0;
   {
     Relay relay(settings.port("listen"), settings.port("xplane"), settings.port("bare_port"), &ours, &floor);
-    const auto publish = [&](const ros::Publisher& publisher, Chain* chain, std::uint64_t turn) {
+    const auto publish = [&](const ros::Publisher& publisher, Chain* chain, std::uint64_t turn, int phase) {
       // A stick to the left is positive on ROS's axes and negative in X-Plane: the sides are learnt below.
       message.axes[axis] = turn % 2 == 0 ? kDeflection : -kDeflection;
       const ros::WallTime stamp = ros::WallTime::now();
       message.header.stamp = ros::Time(stamp.sec, stamp.nsec);
       const bool inverted = publisher == joy;
+      chain->phase = phase;
       chain->expected = (message.axes[axis] > 0.0F) != inverted ? 1 : -1;
       chain->sent_ns = bench::now_ns();
       publisher.publish(message);
@@ -187,16 +216,16 @@ void run(const bench::Settings& settings) {
     bool measuring = false;
     for (std::uint64_t turn = 0; bench::now_ns() < end; ++turn) {
       next += kPeriod;
-      bench::sleepUntil(next);
-      publish(joy, &ours, turn);
-      bench::sleepUntil(next + kPeriod / 2);
-      publish(bare_joy, &floor, turn);
+      const double behind = phaseOf(turn);
+      const int phase = measuring ? std::min(static_cast<int>(behind * kPhases), kPhases - 1) : kNotMeasured;
+      const std::int64_t at = next + static_cast<std::int64_t>(behind * kPeriod);
+      bench::sleepUntil(at);
+      publish(joy, &ours, turn, phase);
+      bench::sleepUntil(at + kPeriod / 2);
+      publish(bare_joy, &floor, turn, phase);
       sent += measuring ? 1 : 0;
       if (!measuring && ours.arrived > 50 && floor.arrived > 50) {
-        bench::sleepUntil(next + kPeriod - 2'000'000);
         measuring = true;
-        ours.latencies_us.clear();
-        floor.latencies_us.clear();
         end = bench::now_ns() + static_cast<std::int64_t>(settings.number("seconds") * 1e9);
       }
     }

@@ -9,16 +9,25 @@ import os
 import platform
 import sys
 import tempfile
+import textwrap
+import traceback
 from dataclasses import asdict
 from pathlib import Path
-from typing import Dict, List, Optional, Sequence
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from registry import BENCHMARKS, Context, Measure
 
 from xplane_bridge.cli.entry import guarded
-from xplane_bridge.harness import HarnessError
 
 _MARKS = {True: "ok", False: "MISSED", None: ""}
+
+
+def _json_file(text: str) -> Path:
+    """The type of --json: a file that can be replaced, which a device, such as /dev/stdout, must not be."""
+    file = Path(text).resolve()
+    if file.exists() and not file.is_file():
+        raise argparse.ArgumentTypeError(f"{text} is no regular file; name one, or a new one")
+    return file
 
 
 def parser() -> argparse.ArgumentParser:
@@ -26,14 +35,14 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="bench",
         description=(
-            "Measures against the budgets of the design. Absolute figures are for a quiet machine of two cores; "
-            "ratios hold anywhere. Exit code 1: a budget was missed or a benchmark failed."
+            "Measures against the budgets of docs/benchmarks.md. Absolute figures are for a quiet machine of two "
+            "cores; ratios hold anywhere. Exit code 1: a budget was missed or a benchmark failed."
         ),
     )
     p.add_argument("names", nargs="*", metavar="NAME", help="benchmarks to run (default: all)")
     p.add_argument("--list", action="store_true", help="list them and end")
     p.add_argument("--seconds", type=float, default=20.0, metavar="S", help="length of each measurement (%(default)g)")
-    p.add_argument("--json", type=Path, metavar="FILE", help="write the results there too")
+    p.add_argument("--json", type=_json_file, metavar="FILE", help="write the results there too, after each benchmark")
     return p
 
 
@@ -59,6 +68,25 @@ def _machine() -> Dict[str, object]:
     }
 
 
+def _entry(measure: Measure) -> Dict[str, Any]:
+    return {**asdict(measure), "value": float(measure.value), "passed": measure.passed}
+
+
+def _measured(name: str, context: Context) -> Tuple[List[str], List[Dict[str, Any]]]:
+    """Runs a benchmark. Returns its rows for the table and for the JSON file."""
+    measures = BENCHMARKS[name](context)
+    return [_row(measure) for measure in measures], [_entry(measure) for measure in measures]
+
+
+def _write(report: Dict[str, Any], file: Optional[Path]) -> None:
+    """Puts the whole report in the file's place at once, so that it is complete whenever the run ends."""
+    if file is None:
+        return
+    part = file.with_name(f"{file.name}.part")
+    part.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    part.replace(file)
+
+
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs the program."""
@@ -74,24 +102,24 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         p.error(f"no benchmark {', '.join(unknown)}; there are: {', '.join(BENCHMARKS)}")
     machine = _machine()
     print(f"{machine['cores']} cores, load {machine['load']:.1f}")
-    results: Dict[str, List[Measure]] = {}
+    results: Dict[str, List[Dict[str, Any]]] = {}
     failed: List[str] = []
+    report = {"machine": machine, "failed": failed, "results": results}
+    try:
+        _write(report, args.json)  # an earlier run's results are not taken for this one's
+    except OSError as error:
+        p.error(f"argument --json: {error}; name a file that can be written")
     with tempfile.TemporaryDirectory(prefix="xplane_bridge_bench_") as folder:
         for name in args.names or list(BENCHMARKS):
             print(f"{name}", flush=True)
             try:
-                results[name] = BENCHMARKS[name](Context(Path(folder) / name, args.seconds))
-            except HarnessError as error:
+                rows, results[name] = _measured(name, Context(Path(folder) / name, args.seconds))
+            except Exception:  # whatever it is: the other benchmarks have nothing to do with it
                 failed.append(name)
-                print(f"  failed: {error}")
-                continue
-            for measure in results[name]:
-                print(_row(measure), flush=True)
-    missed = [f"{name}: {m.name}" for name, measures in results.items() for m in measures if m.passed is False]
-    if args.json:
-        listing = {name: [{**asdict(m), "passed": m.passed} for m in measures] for name, measures in results.items()}
-        report = {"machine": machine, "failed": failed, "results": listing}
-        args.json.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+                rows = ["  failed:", textwrap.indent(traceback.format_exc().rstrip(), "    ")]
+            _write(report, args.json)
+            print("\n".join(rows), flush=True)
+    missed = [f"{name}: {m['name']}" for name, listed in results.items() for m in listed if m["passed"] is False]
     print(f"{len(results)} benchmarks run, {len(failed)} failed, {len(missed)} budgets missed")
     return 1 if failed or missed else 0
 

@@ -37,6 +37,10 @@ def test_benchmarks_of_the_nodes_measure(tmp_path: Path) -> None:
     assert measures["flight_state: datagram to callback, p50"] > 1.0
     assert measures["flight_state: datagram to bare publish to callback, p50"] > 1.0
     assert measures["control: joy to datagram, p50"] > 1.0
+    # The median of all phases together is never above that of the worst.
+    assert measures["control: eighths of the period that were measured"] == 8.0
+    for way, worst in (("joy to datagram", "joy to datagram"), ("two bare hops and sendto", "two bare hops")):
+        assert measures[f"control: {way}, p50"] <= measures[f"control: {worst}, p50 of the worst phase"]
     assert measures["link_return: states flow again, median"] < 10.0
     for grabber in ("capture_node", "ffmpeg", "mss", "GetImage"):
         assert measures[f"capture: 640x480 {grabber}: distinct pictures"] > 1.0
@@ -77,8 +81,9 @@ def test_the_benchmark_of_lockstep_measures(tmp_path: Path) -> None:
 
 
 def test_benchmarks_of_wire_and_files_measure(tmp_path: Path) -> None:
-    names = ["decode", "packet_rate", "emulator_period", "command_to_surface", "steps"]
+    names = ["decode", "packet_rate", "emulator_period", "command_to_surface", "steps", "bags"]
     measures = measured(tmp_path, names)
+    assert measures["bags: messages read / written"] == 1.0
     assert {name.split(":")[0] for name in measures} == set(names)
     assert all(math.isfinite(value) for value in measures.values())
 
@@ -88,7 +93,6 @@ def test_benchmarks_of_wire_and_files_measure(tmp_path: Path) -> None:
     "name",
     [
         "bag_memory",
-        "bags",
         "capture_1080p",
         "failsafes",
         "labels",
