@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 
@@ -49,11 +50,25 @@ def test_the_workflow_runs_the_command_of_the_readme_on_both_systems():
     workflow = yaml.safe_load((ROOT / ".github/workflows/checks.yaml").read_text(encoding="utf-8"))
     assert set(workflow["jobs"]) == {"debian_12", "ubuntu_20_04"}
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert re.search(r"^scripts/test +# all checks but those of a night \(--full\)$", readme, re.MULTILINE)
     for name, job in workflow["jobs"].items():
         commands = [step["run"] for step in job["steps"] if "run" in step]
-        assert commands[-1] == "scripts/test ${{ github.event_name == 'schedule' && '--full' || '' }}", name
-        assert re.search(r"^scripts/test +# all checks but those of a night \(--full\)$", readme, re.MULTILINE)
+        assert commands[-1] == "scripts/test ${{ matrix.arguments }}", name
         assert job["runs-on"] == "ubuntu-latest", f"{name}: a public runner"
+
+
+def test_a_night_of_the_workflow_runs_every_check_part_by_part():
+    workflow = yaml.safe_load((ROOT / ".github/workflows/checks.yaml").read_text(encoding="utf-8"))
+    for name, job in workflow["jobs"].items():
+        chosen = re.fullmatch(
+            r"\$\{\{ fromJSON\(github.event_name == 'schedule' && '(.*)' \|\| '(.*)'\) \}\}",
+            job["strategy"]["matrix"]["arguments"],
+        )
+        assert chosen, name
+        ordinary, *of_a_night = json.loads(chosen.group(1))
+        assert ordinary == "--full --only " + ",".join(names("all_checks")), name
+        assert of_a_night == [f"--only {check}" for check in names("full_checks")], name
+        assert json.loads(chosen.group(2)) == [""], name
 
 
 def test_without_options_all_checks_run_but_those_of_a_night():
