@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import signal
 import subprocess
 import sys
 
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.tx_fixtures import tx_params
+from support.synthetic_flight import FlightBag, stamp_ns
+from support.tx_fixtures import AUTO, MANUAL, tx_params
 from xplane_bridge.bags import Bags
+from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.resources import program
 
 OVERRIDE = "sim/operation/override/override_planepath[0]"
@@ -122,6 +125,106 @@ def distance(state, recorded, row):
     return np.sqrt(north**2 + east**2 + (state.altitude_msl - recorded["altitude_msl"][row]) ** 2)
 
 
+@pytest.fixture(scope="module")
+def steered(tmp_path_factory):
+    """A flight of ten minutes, flown in AUTO from its third second on."""
+    bag = tmp_path_factory.mktemp("steered") / "flight.bag"
+    with FlightBag(bag) as writing:
+        for k in range(600):
+            writing.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k), writing.state(float(k), k))
+            writing.add("/xplane/control/auto", "xplane_bridge/ControlCommand", stamp_ns(k + 0.5), {"fields": 1})
+            if k == 2:
+                writing.add("/xplane/control/mode", "xplane_bridge/ControlMode", stamp_ns(k), {"mode": int(AUTO)})
+    return bag
+
+
+@pytest.fixture(scope="module")
+def bridge(new_world, tmp_path_factory):
+    """A bridge for the tests of how it ends."""
+    world = new_world(tmp_path_factory.mktemp("bridge"))
+    world.xplane = world.emulator("--alt", 1500, "--lat", 37.5, "--lon", 127.0)
+    world.nodes = [world.start("rx_node"), world.start("tx_node", tx_params())]
+    yield world
+    world.close()
+
+
+@pytest.fixture
+def rerun(bridge, steered):
+    """Starts rerun_flight on that bridge."""
+    started = []
+
+    def start(option):
+        command = [sys.executable, program("rerun_flight"), steered, option, "--namespace", bridge.namespace]
+        started.append(ManagedProcess("rerun_flight", command, bridge.folder, env=bridge.env))
+        started[-1].start()
+        started[-1].wait_for_line("^playing", WAIT_S)
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.stop()
+
+
+def end(world, process, how):
+    """Ends a rerun_flight; returns its exit status."""
+    if isinstance(how, signal.Signals):
+        process.send_signal(how)
+        return process.wait(WAIT_S)
+    listed = subprocess.run(
+        ["rosnode", "list"], capture_output=True, text=True, timeout=WAIT_S, check=True, env=world.env
+    )
+    (name,) = (line for line in listed.stdout.splitlines() if line.startswith(f"/rerun_flight_{process.pid}_"))
+    subprocess.run(["rosnode", "kill", name], capture_output=True, timeout=WAIT_S, check=True, env=world.env)
+    return process.wait(WAIT_S)
+
+
+ENDS = pytest.mark.parametrize(
+    ("how", "status"),
+    [
+        (signal.SIGINT, 130),
+        (signal.SIGTERM, 130),
+        pytest.param(signal.SIGHUP, 130, marks=pytest.mark.nightly),
+        pytest.param("rosnode kill", 1, marks=pytest.mark.nightly),
+    ],
+)
+
+
+@ENDS
+def test_poses_that_are_broken_off_give_the_flight_model_back(bridge, rerun, how, status):
+    process = rerun("--pose")
+    wire = bridge.wire(bridge.xplane.port)
+    wire.wait_until_reads(OVERRIDE, 1.0)
+    assert end(bridge, process, how) == status
+    assert wire.read(OVERRIDE) == 0.0
+    assert "the flight model flies again" in process.output()
+    assert "Traceback" not in process.output()
+
+
+@ENDS
+def test_commands_that_are_broken_off_leave_mode_manual(bridge, rerun, how, status):
+    from xplane_bridge.msg import ControlMode
+
+    process = rerun("--commands")
+    modes = bridge.watch("control/mode", ControlMode)
+    modes.wait_for(lambda mode: mode.mode == AUTO)
+    assert end(bridge, process, how) == status
+    wait_until(lambda: modes.last.mode == MANUAL, WAIT_S, "mode MANUAL")
+    modes.close()
+    assert "Traceback" not in process.output()
+
+
+def test_where_the_bridge_is_gone_it_says_what_to_do(bridge, rerun):
+    """The last test of this bridge."""
+    process = rerun("--pose")
+    for node in bridge.nodes:
+        node.stop()
+    assert end(bridge, process, signal.SIGINT) == 130
+    assert "is not seen given back" in process.output()
+    assert "scripts/release_overrides" in process.output()
+    assert "Traceback" not in process.output()
+    bridge.wire(bridge.xplane.port).wait_until_reads(OVERRIDE, 0.0)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -133,8 +236,6 @@ def distance(state, recorded, row):
     ],
 )
 def test_what_cannot_be_flown_again_is_said(tmp_path, arguments, message):
-    from support.synthetic_flight import FlightBag, stamp_ns
-
     bag = tmp_path / "bare.bag"
     with FlightBag(bag) as writing:
         for k in range(3):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import threading
 from dataclasses import dataclass
 from typing import Dict, Mapping
 
@@ -58,15 +59,23 @@ class PoseSender:
         self._to = (host, port)
         self._scenery = scenery
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._closed = False
+        self._lock = threading.Lock()
 
     def send(self, pose: Mapping[str, float]) -> None:
-        """Writes one pose."""
-        for path, value in self._scenery.datarefs(pose).items():
-            self._socket.sendto(protocol.DrefWrite(path, value).encode(), self._to)
+        """Writes one pose, from any thread; none once it is closed."""
+        messages = [protocol.DrefWrite(path, value).encode() for path, value in self._scenery.datarefs(pose).items()]
+        with self._lock:
+            if self._closed:
+                return
+            for message in messages:
+                self._socket.sendto(message, self._to)
 
     def close(self) -> None:
-        """Closes its socket."""
-        self._socket.close()
+        """Closes its socket: from now on nothing moves the aircraft."""
+        with self._lock:
+            self._closed = True
+            self._socket.close()
 
 
 def _level(latitude_deg: float, longitude_deg: float) -> np.ndarray:

@@ -12,7 +12,7 @@ from xplane_bridge import lockstep
 from xplane_bridge.bags import Bags, Table
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
 from xplane_bridge.cli.entry import start_node
-from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
 
 _NODE = "rerun_flight"
 #: Topics that are played, with their types.
@@ -23,12 +23,9 @@ _PLAYED = {
     "control/mode": "ControlMode",
 }
 PLACED_S = 60.0  #: a flight may take so long to load
+_MODE_S = 0.1  # between two looks whether another mode is recorded
 NEAR_M = 100.0  #: [m] within which an aircraft is where it was placed
 _EARTH_RADIUS_M = 6378145.0
-
-
-class ReplayError(XplaneBridgeError):
-    """What was recorded cannot be played."""
 
 
 class Played(NamedTuple):
@@ -85,12 +82,14 @@ def elapsed_of(state: Table) -> np.ndarray:
 
 
 def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None:
-    """Places the aircraft, plays, and gives the stick back: mode MANUAL, from which its commands time out.
+    """Places the aircraft, plays, and gives the stick back, whatever ends it.
+
+    That is mode MANUAL, from which its commands time out.
 
     Raises:
         ReplayError: The bridge refuses, or its messages are others than the recorded ones.
     """
-    rospy = start_node(_NODE, anonymous=True)
+    rospy = start_node(_NODE, anonymous=True, disable_signals=True)
     from xplane_bridge import msg
     from xplane_bridge.srv import SetMode
 
@@ -107,23 +106,52 @@ def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None
     }
     wait_for_state(namespace, _NODE)
     wait_for_service(f"{namespace}/tx_node/reset_flight", _NODE)
-    set_mode = rospy.ServiceProxy(f"{namespace}/tx_node/set_mode", SetMode)
+    service = f"{namespace}/tx_node/set_mode"
+    proxy = rospy.ServiceProxy(service, SetMode)
+
+    def set_mode(mode: int) -> Any:
+        return answered(service, lambda: proxy(mode=mode))
+
+    def give_back() -> None:
+        give_stick_back(lambda: set_mode(SetMode._request_class.MANUAL), service)
+
     player = _Player(commands, publishers, types, set_mode)
     place(commands.start, namespace)
-    states = rospy.Subscriber(f"{namespace}/flight_state", msg.FlightState, player.on_state, tcp_nodelay=True)
-    try:
-        if not player.placed.wait(PLACED_S):
-            raise ReplayError(f"the aircraft is not where the recording begins {PLACED_S:g} s after reset_flight")
-        say(f"playing {len(commands.messages)} messages, {commands.duration:.1f} s")
-        while not player.over.wait(0.1):
-            player.change_mode()
-            if rospy.is_shutdown():
-                raise ReplayError("ended by ROS")
-    finally:
-        states.unregister()
-        if not rospy.is_shutdown():
-            set_mode(mode=SetMode._request_class.MANUAL)
+    with Borrowed(_NODE, rospy, give_back) as borrowed:
+        states = rospy.Subscriber(f"{namespace}/flight_state", msg.FlightState, player.on_state, tcp_nodelay=True)
+        try:
+            if not borrowed.wait(player.placed, PLACED_S):
+                raise ReplayError(f"the aircraft is not where the recording begins {PLACED_S:g} s after reset_flight")
+            say(f"playing {len(commands.messages)} messages, {commands.duration:.1f} s")
+            while not borrowed.wait(player.over, _MODE_S):
+                player.change_mode()
+        finally:
+            player.over.set()
+            states.unregister()
     say("played")
+
+
+def give_stick_back(set_manual: Callable[[], Any], service: str) -> None:
+    """Asks for mode MANUAL.
+
+    Args:
+        set_manual: asks for it; gives the answer of set_mode.
+        service: its name.
+
+    Raises:
+        ReplayError: It is not seen set; says what stays, and what to do.
+    """
+    try:
+        answer = set_manual()
+        problem = "" if answer.success else f"{service}: {answer.result.message}"
+    except ReplayError as error:
+        problem = str(error)
+    if problem:
+        raise ReplayError(
+            f"mode MANUAL is not set: {problem}. If tx_node runs, it keeps its mode, and in AUTO the failsafe flies: "
+            f'rosservice call {service} "mode: 1". If it has ended, and X-Plane does not get its controls back: '
+            "scripts/release_overrides"
+        )
 
 
 def place(start: Any, namespace: str) -> None:
@@ -179,6 +207,7 @@ class _Player:
             self.placed.set()
         if state.epoch != self._epoch:  # placed in two steps: the second one is the begin
             self._begin, self._epoch, self._next = state.sim_time_unwrapped, state.epoch, 0
+            self._wanted = self._mode = 0  # tx_node goes to MANUAL with it
         now = state.sim_time_unwrapped - self._begin
         messages = self._commands.messages
         while self._next < len(messages) and messages[self._next].time <= now:
@@ -196,4 +225,4 @@ class _Player:
         """Asks for the recorded mode, where it is another; not from the thread of the states, as it waits."""
         if self._wanted != self._mode:
             self._mode = self._wanted
-            self._set_mode(mode=self._mode)
+            self._set_mode(self._mode)

@@ -12,7 +12,8 @@ from xplane_bridge import lockstep
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
 from xplane_bridge.cli.entry import start_node
-from xplane_bridge.cli.flights.recorded_commands import NEAR_M, PLACED_S, ReplayError, elapsed_of, far, first_of, place
+from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
+from xplane_bridge.cli.flights.recorded_commands import NEAR_M, PLACED_S, elapsed_of, far, first_of, place
 from xplane_bridge.harness.pose_sender import PATH_OVERRIDE, SCENERY, PoseSender, Scenery
 
 _NODE = "rerun_flight"
@@ -65,12 +66,12 @@ def read_poses(bag: Path) -> Poses:
 
 
 def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None:
-    """Plays them, and gives the flight model back: also tx_node does, on its exit, however it ends.
+    """Plays them, and gives the flight model back, whatever ends it; where it is killed, tx_node does on its exit.
 
     Raises:
         ReplayError: The bridge refuses, or does not know its simulator.
     """
-    rospy = start_node(_NODE, anonymous=True)
+    rospy = start_node(_NODE, anonymous=True, disable_signals=True)
     from xplane_bridge.msg import FlightState, LinkState
     from xplane_bridge.srv import GetDataref, SetDataref
 
@@ -91,10 +92,19 @@ def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None
         link = rospy.wait_for_message(f"{namespace}/link_state", LinkState, _LINK_S)
     except rospy.ROSException as error:
         raise ReplayError(f"{namespace}/link_state: {error}") from None
-    write = rospy.ServiceProxy(f"{namespace}/tx_node/set_dataref", SetDataref)
-    taken = write(name=PATH_OVERRIDE, values=[1.0])
-    if not taken.success:
-        raise ReplayError(f"{PATH_OVERRIDE}: {taken.result.message}")
+    service = f"{namespace}/tx_node/set_dataref"
+    proxy = rospy.ServiceProxy(service, SetDataref)
+
+    def write(value: float) -> Any:
+        return answered(service, lambda: proxy(name=PATH_OVERRIDE, values=[value]))
+
+    def shown() -> Any:  # X-Plane may be slow to show it
+        return answered(f"{namespace}/get_dataref", lambda: read(name=PATH_OVERRIDE, timeout=_GIVEN_BACK_S))
+
+    def give_back() -> None:
+        give_flight_model_back(lambda: write(0.0), shown)
+        say("the flight model flies again")
+
     sender = PoseSender(link.host, link.port, Scenery(*(answer.values[0] for answer in answers)))
     over = threading.Event()
     begin: List[float] = []
@@ -113,24 +123,49 @@ def play_poses(poses: Poses, namespace: str, say: Callable[[str], None]) -> None
         sent[:] = [poses.at(time)]
         sender.send(sent[-1])
 
-    states = rospy.Subscriber(f"{namespace}/flight_state", FlightState, on_state, queue_size=1, tcp_nodelay=True)
-    say(f"playing {len(poses.time)} poses, {poses.time[-1]:.1f} s")
-    try:
-        while not over.wait(0.1):
-            if rospy.is_shutdown():
-                raise ReplayError("ended by ROS; tx_node gives the flight model back when it ends")
-    finally:
-        states.unregister()
-        sender.close()
-        if not rospy.is_shutdown():
-            write(name=PATH_OVERRIDE, values=[0.0])
-            shown = read(name=PATH_OVERRIDE, timeout=_GIVEN_BACK_S)  # X-Plane may be slow to show it
-            if not shown.success or shown.values[0] != 0.0:
-                raise ReplayError(f"{PATH_OVERRIDE} is not shown as given back: scripts/release_overrides does it")
-            say("the flight model flies again")
+    with Borrowed(_NODE, rospy, give_back) as borrowed:
+        taken = write(1.0)
+        if not taken.success:
+            raise ReplayError(f"{PATH_OVERRIDE}: {taken.result.message}")
+        states = rospy.Subscriber(f"{namespace}/flight_state", FlightState, on_state, queue_size=1, tcp_nodelay=True)
+        try:
+            say(f"playing {len(poses.time)} poses, {poses.time[-1]:.1f} s")
+            borrowed.wait(over)
+        finally:
+            states.unregister()
+            sender.close()
     if lost:
         raise ReplayError("the aircraft is not shown where it was put: the simulator has moved its scenery's origin")
     say("played")
+
+
+def give_flight_model_back(write: Callable[[], Any], shown: Callable[[], Any]) -> None:
+    """Releases the flight model.
+
+    Args:
+        write: writes 0; gives the answer of set_dataref, which reads back.
+        shown: gives the answer of get_dataref, which is asked where that has not seen it, or tx_node is gone.
+
+    Raises:
+        ReplayError: It is not seen given back; says what stays, and what to do.
+    """
+    try:
+        written = write()
+        if written.success:
+            return
+        problem = str(written.result.message)
+    except ReplayError as error:
+        problem = str(error)
+    try:
+        answer = shown()
+        if answer.success and answer.values[0] == 0.0:
+            return
+    except ReplayError as error:
+        problem = f"{problem}; {error}"
+    raise ReplayError(
+        f"{PATH_OVERRIDE} is not seen given back, and the flight model may stand still: {problem}. tx_node gives "
+        "it back when it ends; if it has ended already, or is to go on: scripts/release_overrides"
+    )
 
 
 def _wait_until_near(start: Any, namespace: str) -> None:

@@ -13,6 +13,7 @@ from xplane_bridge.cli.entry import guarded, ros_arguments
 from xplane_bridge.cli.flights.recorded_commands import play, read_commands
 from xplane_bridge.cli.flights.recorded_poses import play_poses, read_poses
 from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.harness.processes import interrupted_by_signals
 from xplane_bridge.topics import NAMESPACE
 
 _BAG = "flight.bag"
@@ -55,11 +56,12 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     namespace = args.namespace.rstrip("/")
     if (args.commands or args.pose) and args.output is not None:
         raise RerunError(f"--output {args.output}: not with --commands or --pose, which play into a running bridge")
-    if args.commands:
-        play(read_commands(args.bag), namespace, _say)
-        return 0
-    if args.pose:
-        play_poses(read_poses(args.bag), namespace, _say)
+    if args.commands or args.pose:
+        with interrupted_by_signals("rerun_flight"):
+            if args.commands:
+                play(read_commands(args.bag), namespace, _say)
+            else:
+                play_poses(read_poses(args.bag), namespace, _say)
         return 0
     passport = passport_of(args.bag)
     flight = passport.flight
