@@ -150,13 +150,14 @@ def test_a_recording_becomes_a_regression_test(flight):
     kept = folder / "kept"
     done = replay(path, "--regression", kept)
     assert done.returncode == 0, done.stdout + done.stderr
-    expected = json.loads((kept / "wire.json").read_text(encoding="utf-8"))
-    assert expected
-    done = replay(kept / "wire.pcapng", "--expect", kept / "wire.json")
+    recording, file = kept / "wire.rx_node.pcapng", kept / "wire.rx_node.json"
+    expected = json.loads(file.read_text(encoding="utf-8"))
+    assert expected["options"] == {"xplane": None, "set": {}}
+    done = replay(recording, "--expect", file)
     assert done.returncode == 0, done.stdout + done.stderr
-    topic = next(name for name in expected if name.endswith("/odom"))
-    expected[topic]["sha256"] = "0" * 64
-    (kept / "wire.json").write_text(json.dumps(expected), encoding="utf-8")
-    done = replay(kept / "wire.pcapng", "--expect", kept / "wire.json")
+    topic = next(name for name in expected["topics"] if name.endswith("/odom"))
+    expected["topics"][topic]["sha256"] = "0" * 64
+    file.write_text(json.dumps(expected), encoding="utf-8")
+    done = replay(recording, "--expect", file)
     assert done.returncode == 1, done.stdout + done.stderr
     assert f"DIFFERS {topic}" in done.stdout

@@ -27,6 +27,18 @@ class Datagram(NamedTuple):
     payload: bytes
 
 
+class UdpPacket(NamedTuple):
+    """What an IPv4 packet holds of a UDP datagram: all of it, or one fragment."""
+
+    source: str
+    destination: str
+    number: int  #: the same in all fragments of a datagram
+    offset: int  #: [bytes] in the datagram's body
+    more: bool  #: fragments follow
+    body: bytes  #: the header of UDP and the payload, or a part of them
+    whole: bool  #: the capture has all of the packet
+
+
 def datagram_in(link_type: int, data: bytes) -> Optional[Datagram]:
     """The datagram in a captured packet; None when it holds another protocol, or only a fragment.
 
@@ -37,18 +49,43 @@ def datagram_in(link_type: int, data: bytes) -> Optional[Datagram]:
     Raises:
         CaptureError: The link type is not understood.
     """
+    packet = udp_packet_in(link_type, data)
+    return None if packet is None or packet.offset or packet.more else datagram_of(packet, packet.body)
+
+
+def udp_packet_in(link_type: int, data: bytes) -> Optional[UdpPacket]:
+    """The packet of UDP over IPv4 in a captured packet; None when it holds another protocol.
+
+    Raises:
+        CaptureError: The link type is not understood.
+    """
     ip = _ip_in(link_type, data)
     if ip is None or len(ip) < 20 or ip[0] >> 4 != 4 or ip[9] != _UDP:
         return None
     head = (ip[0] & 15) * 4
-    total, fragment = struct.unpack_from(">H", ip, 2)[0], struct.unpack_from(">H", ip, 6)[0]
-    if fragment & 0x3FFF or len(ip) < head + 8:
+    total, number, fragment = struct.unpack_from(">HHH", ip, 2)
+    if head < 20:
         return None
     # Where the network card divides datagrams, the length says 0.
-    end = min(len(ip), total or len(ip))
-    from_port, to_port, size = struct.unpack_from(">HHH", ip, head)
-    payload = ip[head + 8 : min(end, head + size) if size else end]
-    return Datagram((socket.inet_ntoa(ip[12:16]), from_port), (socket.inet_ntoa(ip[16:20]), to_port), bytes(payload))
+    body = ip[head : min(len(ip), total or len(ip))]
+    return UdpPacket(
+        socket.inet_ntoa(ip[12:16]),
+        socket.inet_ntoa(ip[16:20]),
+        number,
+        (fragment & 0x1FFF) * 8,
+        bool(fragment & 0x2000),
+        bytes(body),
+        len(ip) >= total,
+    )
+
+
+def datagram_of(packet: UdpPacket, body: bytes) -> Optional[Datagram]:
+    """The datagram of a packet and its body; None when that is too short for one."""
+    if len(body) < 8:
+        return None
+    from_port, to_port, size = struct.unpack_from(">HHH", body)
+    payload = body[8:size] if size else body[8:]
+    return Datagram((packet.source, from_port), (packet.destination, to_port), payload)
 
 
 def _ip_in(link_type: int, data: bytes) -> Optional[bytes]:

@@ -63,16 +63,10 @@ class OwnLog:
 
     def parts(self) -> List[Path]:
         """The files of the log, from the one given on."""
-        match = _PART.search(self.path.stem)
-        number = int(match.group(1)) if match else 1
-        stem = self.path.stem[: match.start()] if match else self.path.stem
         out = [self.path]
-        while True:
-            number += 1
-            following = self.path.with_name(f"{stem}_part{number}{self.path.suffix}")
-            if not following.is_file():
-                return out
+        while (following := part_after(self.path, len(out))).is_file():
             out.append(following)
+        return out
 
     def events(self) -> Iterator[Event]:
         """The records, up to the first gap.
@@ -148,6 +142,14 @@ class OwnLog:
         return Event(
             records.RECEIVED, number, source, wall, steady, kernel, datagram.source, dropped[source], datagram.payload
         )
+
+
+def part_after(path: Path, count: int) -> Path:
+    """Where the part of a wire log lies that comes so many parts after this one."""
+    match = _PART.search(path.stem)
+    number = int(match.group(1)) if match else 1
+    stem = path.stem[: match.start()] if match else path.stem
+    return path.with_name(f"{stem}_part{number + count}{path.suffix}")
 
 
 def about_of(capture: Capture) -> Optional[Dict[str, Any]]:

@@ -9,14 +9,15 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from pathlib import Path
-from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Optional, Set, Tuple
 
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import Capture, CaptureError
-from xplane_bridge.wire_log.datagrams import Address, Datagram, datagram_in
+from xplane_bridge.wire_log.datagrams import Address, Datagram
+from xplane_bridge.wire_log.fragments import DatagramReader
 
 MAGIC = b"xplane_bridge wire capture 1\n"
-_REQUEST, _ANSWER = b"RREF\0", b"RREF,"
+_REQUEST, _ANSWER, _ROWS = b"RREF\0", b"RREF,", b"DATA"
 _PAIR = struct.Struct("<if")
 _ROW_BYTES = 36
 #: Steady time of the first packet [ns]: clocks of a computer do not begin at 0.
@@ -45,12 +46,19 @@ class StrangersCapture:
         capture = Capture.open(path)
         self.path = path
         seen = []
+        self._reader = DatagramReader()
         for packet in capture.packets():
-            datagram = datagram_in(capture.interfaces[packet.interface].link_type, packet.data)
-            if datagram is not None and packet.whole:
+            datagram = self._reader.read(capture.interfaces[packet.interface].link_type, packet)
+            if datagram is not None:
                 seen.append(Sighting(packet.time_ns, datagram))
+        self._reader.finish()
+        self._ends_early = capture.cut
         seen.sort(key=lambda each: each.time_ns)
-        self.xplane = xplane or self._find(seen)
+        self._others: Counter[Address] = Counter()  # of no use, by where they came from
+        self._senders: Set[Address] = set()  # from which X-Plane sends
+        self.xplane = xplane or ""
+        if not xplane:
+            self.xplane = self._find(seen)
         #: Where it was asked.
         self.port = next(
             (to[1] for _, (_, to, data) in seen if data.startswith(_REQUEST) and to[0] == self.xplane), 49000
@@ -67,7 +75,27 @@ class StrangersCapture:
                 else ("expected answers (RREF), Data Output (DATA) or positions (RPOS)")
             )
             msg = f"{path} has no values of X-Plane at {self.xplane} that can be used; {lacking}"
-            raise CaptureError(msg)
+            raise CaptureError("; ".join([msg, *self.left_out()]))
+
+    def left_out(self) -> List[str]:
+        """What X-Plane has sent and no node gets, in words; of all senders as long as it is not found."""
+        reader, out = self._reader, []
+        incomplete, cut = (
+            counts[self.xplane] if self.xplane else sum(counts.values()) for counts in (reader.incomplete, reader.cut)
+        )
+        if incomplete:
+            out.append(
+                f"{incomplete} datagrams are not replayed because the capture does not have all fragments of them; "
+                "capture with the filter of docs/wire_log.md, which takes fragments too"
+            )
+        if cut:
+            out.append(f"{cut} datagrams are not replayed because they were cut short; capture whole packets (-s 0)")
+        others = sum(count for sender, count in self._others.items() if sender in self._senders)
+        if others:
+            out.append(f"{others} datagrams of X-Plane are not replayed: they are neither RREF, DATA, RPOS nor BECN")
+        if self._ends_early:
+            out.append(f"{self.path} is cut off; the replay ends there")
+        return out
 
     def _find(self, seen: List[Sighting]) -> str:
         votes: Counter[str] = Counter()
@@ -78,7 +106,7 @@ class StrangersCapture:
                 votes[source[0]] += 1
         if not votes:
             msg = f"{self.path} has no datagrams of X-Plane; expected RREF, DATA, RPOS or BECN over UDP"
-            raise CaptureError(msg)
+            raise CaptureError("; ".join([msg, *self.left_out()]))
         return votes.most_common(1)[0][0]
 
     def _read(self, seen: List[Sighting]) -> Iterator[bytes]:
@@ -98,10 +126,15 @@ class StrangersCapture:
                     names[client, index] = number
                     yield records.encode(records.NAMED, path.encode(), client, counted=number)
                 continue
-            if source[0] != self.xplane:
+            # Where X-Plane runs on the same computer, commands to it come from its own address too.
+            if source[0] != self.xplane or to == (self.xplane, self.port):
                 continue
             first = time_ns if first is None else first
             kind, client, payload = self._useful(data, clients.get(to, -1), names)
+            if kind or data.startswith(_ROWS):
+                self._senders.add(source)
+            if not kind and not data.startswith(_ANSWER):
+                self._others[source] += 1
             if kind:
                 steady_ns = _START_NS + time_ns - first
                 yield records.encode(kind, payload, max(client, 0), time_ns, steady_ns, time_ns, source)
@@ -134,4 +167,4 @@ class StrangersCapture:
 
 
 def _is_rows(data: bytes) -> bool:
-    return data.startswith(b"DATA") and len(data) > 5 and (len(data) - 5) % _ROW_BYTES == 0
+    return data.startswith(_ROWS) and len(data) > 5 and (len(data) - 5) % _ROW_BYTES == 0

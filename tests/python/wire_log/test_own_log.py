@@ -10,7 +10,7 @@ import pytest
 
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import CaptureError, Packet, write_pcapng
-from xplane_bridge.wire_log.own_log import OwnLog, replayable
+from xplane_bridge.wire_log.own_log import OwnLog, part_after, replayable
 
 INTERFACES = [(147, "rx_node/notes", ""), (101, "rx_node/control", "port 50001"), (101, "rx_node/flight", "port 50002")]
 
@@ -75,6 +75,7 @@ def test_parts_follow_each_other(tmp_path):
     assert log.parts() == [first, second]
     assert [e.kind for e in log.events()] == [1, 1, 4, 4, 2, 3, 4, 5, 6, 4]
     assert OwnLog(second).parts() == [second]
+    assert part_after(second, 1) == part_after(first, 2) == tmp_path / "w.rx_node_part3.pcapng"
 
 
 def test_it_ends_where_something_is_missing(tmp_path):

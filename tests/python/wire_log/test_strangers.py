@@ -73,6 +73,68 @@ def test_data_output_and_beacons_go_by_their_sockets(tmp_path):
     assert b"data\0" + row in b"".join(strange.playable())
 
 
+def test_data_output_in_fragments_is_played_and_what_is_missing_is_said(tmp_path):
+    rows = b"DATA*" + b"".join(struct.pack("<i8f", k, *range(8)) for k in range(60))
+    whole = frame(XPLANE, CLIENT, rows)
+    head, body = whole[14:34], whole[34:]
+
+    def piece(number: int, at: int, more: int) -> bytes:
+        part = body[at : at + 1480]
+        return whole[:14] + head[:2] + struct.pack(">HHH", 20 + len(part), number, at // 8 | more) + head[8:] + part
+
+    first, last = piece(9, 0, 0x2000), piece(9, 1480, 0)
+    strange = StrangersCapture(capture(tmp_path / "x.pcapng", last, first))
+    assert strange.left_out() == []
+    event = records.encode(
+        records.RECEIVED, b"data\0" + rows, 0, 10**18 + 20_000_000, 1000 * 10**9, 10**18 + 20_000_000, XPLANE
+    )
+    assert b"".join(strange.playable()) == MAGIC + event
+    # As a filter by port gives it: the first fragment only; and another computer's, of which nothing is asked.
+    others = piece(3, 0, 0x2000).replace(bytes([192, 168, 1, 5]), bytes([192, 168, 1, 6]))
+    unknown_kind = frame(XPLANE, CLIENT, b"XGPS")
+    file = capture(tmp_path / "y.pcapng", last, first, piece(10, 0, 0x2000), others, unknown_kind)
+    file.write_bytes(file.read_bytes() + b"\x06\0\0\0")
+    strange = StrangersCapture(file)
+    assert strange.rows == 1
+    assert strange.left_out() == [
+        "1 datagrams are not replayed because the capture does not have all fragments of them; capture with the filter "
+        "of docs/wire_log.md, which takes fragments too",
+        "1 datagrams of X-Plane are not replayed: they are neither RREF, DATA, RPOS nor BECN",
+        f"{file} is cut off; the replay ends there",
+    ]
+    with pytest.raises(CaptureError, match=r"no datagrams of X-Plane; .*; 1 datagrams are not replayed because"):
+        StrangersCapture(capture(tmp_path / "z.pcapng", first))
+
+
+def test_packets_cut_short_are_counted(tmp_path):
+    row = frame(XPLANE, CLIENT, b"DATA*" + bytes(36))
+    file = capture(tmp_path / "x.pcapng", row, row)
+    data = bytearray(file.read_bytes())
+    # The second is longer than what was captured of it.
+    at = data.rindex(struct.pack("<II", len(row), len(row)))
+    struct.pack_into("<I", data, at + 4, len(row) + 36)
+    file.write_bytes(data)
+    strange = StrangersCapture(file)
+    assert strange.rows == 1
+    assert strange.left_out() == [
+        "1 datagrams are not replayed because they were cut short; capture whole packets (-s 0)"
+    ]
+
+
+def test_commands_to_x_plane_on_the_same_computer_are_not_its_data_output(tmp_path):
+    xplane, client = ("127.0.0.1", 49000), ("127.0.0.1", 60001)
+    row = b"DATA*" + bytes(36)
+    strange = StrangersCapture(
+        capture(
+            tmp_path / "x.pcapng",
+            frame(client, xplane, b"DATA\0" + bytes(36)),
+            frame(xplane, client, row),
+            frame(client, xplane, b"CMND\0sim/none/none"),
+        )
+    )
+    assert (strange.rows, strange.left_out()) == (1, [])
+
+
 def test_what_cannot_be_used_is_refused_in_words(tmp_path):
     with pytest.raises(CaptureError, match="has no datagrams of X-Plane; expected RREF, DATA"):
         StrangersCapture(capture(tmp_path / "a.pcapng", frame(CLIENT, OTHER, b"hello")))

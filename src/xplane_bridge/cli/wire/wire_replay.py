@@ -7,7 +7,7 @@ import hashlib
 import json
 import tempfile
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import yaml
 
@@ -18,7 +18,7 @@ from xplane_bridge.harness.processes import interrupted_by_signals
 from xplane_bridge.harness.wire_replay import Start, WireReplay
 from xplane_bridge.topics import NAMESPACE
 from xplane_bridge.wire_log import own_log, records
-from xplane_bridge.wire_log.anonymous import anonymised
+from xplane_bridge.wire_log.anonymous import Anonymiser, is_address
 from xplane_bridge.wire_log.capture import Capture
 from xplane_bridge.wire_log.own_log import OwnLog
 from xplane_bridge.wire_log.strangers import StrangersCapture
@@ -29,10 +29,30 @@ _NOT_REPLAYED = ("wire_log", "wire_log_size", "wire_log_parts", "listen_for_beac
 
 #: Says how a node was started, and so another thing of a replay.
 _OF_THE_START = "/experiment"
+#: Of the names of captures.
+_ENDINGS = (".pcapng", ".pcap", ".cap")
 
 
 class ReplayError(XplaneBridgeError):
     """A recording cannot be replayed; the text says why."""
+
+
+class Options(NamedTuple):
+    """What a replay goes by beside the recording."""
+
+    xplane: Optional[str]  #: address of X-Plane in another program's capture; None: found
+    given: Mapping[str, Any]  #: shared parameters, in the place of those recorded
+
+    def over(self, kept: Options) -> Options:
+        """These, and of those kept what is not given anew."""
+        return Options(self.xplane or kept.xplane, {**kept.given, **self.given})
+
+
+class Expected(NamedTuple):
+    """What --regression has written."""
+
+    options: Options
+    topics: Mapping[str, Any]
 
 
 def hashes(messages: Mapping[str, Sequence[bytes]]) -> Dict[str, str]:
@@ -72,7 +92,11 @@ def compare(live: Mapping[str, Sequence[bytes]], replayed: Mapping[str, Sequence
 
 def payloads_of(bag: Path, node: str) -> Dict[str, List[bytes]]:
     """The payloads of all topics of a node in a bag."""
-    file = BagFile(bag)
+    try:
+        file = BagFile(bag)
+    except OSError as error:
+        msg = f"{bag} cannot be read: {error.strerror}; expected the bag of the flight"
+        raise ReplayError(msg) from None
     try:
         out: Dict[str, List[bytes]] = {}
         for connection in file.connections.values():
@@ -118,7 +142,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     p.add_argument("-o", "--output", type=Path, metavar="BAG", help="bag of what the node publishes")
     p.add_argument("--against", type=Path, metavar="BAG", help="the bag of the flight: are its messages the same?")
     p.add_argument("--sent", type=Path, metavar="FILE", help="wire log of the replay itself: what the node sends")
-    p.add_argument("--xplane", metavar="ADDRESS", help="of X-Plane, in a capture of another program with several")
+    p.add_argument(
+        "--xplane", type=_address, metavar="ADDRESS", help="of X-Plane, in a capture of another program with several"
+    )
     p.add_argument(
         "--set",
         type=_parameter,
@@ -166,16 +192,18 @@ def prepare(path: Path, file: Path, xplane: Optional[str], given: Mapping[str, A
     strange = StrangersCapture(path, xplane)
     with file.open("wb") as out:
         out.writelines(strange.playable())
-    transport = "rref" if strange.answers else "data"
-    shared = {"host": strange.xplane, "port": strange.port, "transport": transport, "listen_for_beacon": False}
-    if transport == "data":
-        shared["listen_for_beacon"] = True
+    transport = given.get("transport", "rref" if strange.answers else "data")
+    shared = {"host": strange.xplane, "port": strange.port, "transport": transport}
+    shared["listen_for_beacon"] = transport == "data"
     word = (
         f"X-Plane at {strange.xplane}: {strange.answers} answers with {len(strange.paths)} datarefs, {strange.rows} "
         f"datagrams of Data Output"
     )
+    if strange.rows and transport != "data":
+        word += ", which are not replayed beside answers (--set transport=data takes them instead)"
     if strange.nameless:
         word += f"; {strange.nameless} values have no name, their requests were not captured"
+    word = "; ".join([word, *strange.left_out()])
     return Start("rx_node", f"{NAMESPACE}/rx_node", NAMESPACE, {**shared, **given}, {}), word
 
 
@@ -187,13 +215,85 @@ def _parameter(text: str) -> Tuple[str, Any]:
     return key, yaml.safe_load(value)
 
 
-def _write_anonymised(path: Path, to: Path) -> None:
-    parts = OwnLog(path).parts() if own_log.about_of(Capture.open(path)) is not None else [path]
-    if len(parts) > 1:
-        msg = f"{path} has {len(parts)} parts: expected a recording of one; anonymise them one by one"
+def _address(text: str) -> str:
+    if not is_address(text):
+        msg = f"{text!r}: expected an IPv4 address, such as 192.168.1.5"
+        raise argparse.ArgumentTypeError(msg)
+    return text
+
+
+def _write_anonymised(path: Path, to: Path, written: List[Path]) -> Anonymiser:
+    """Writes a recording's parts in one disguise.
+
+    Args:
+        path: the first part.
+        to: where it goes; the others go beside it, named as parts are.
+        written: gets the files as they are begun.
+
+    Raises:
+        CaptureError, ReplayError: It cannot be read, or something is there already.
+    """
+    is_own = own_log.about_of(Capture.open(path)) is not None
+    parts = OwnLog(path).parts() if is_own else [path]
+    outputs = [to, *(own_log.part_after(to, count) for count in range(1, len(parts)))]
+    # Of a wire log a reader would take one more for the next part.
+    for there in (*outputs, own_log.part_after(to, len(parts)) if is_own else to):
+        if there.exists():
+            msg = f"{there} is there already and is kept: delete it, or write {path} elsewhere than to {to}"
+            raise ReplayError(msg)
+    anonymiser = Anonymiser(parts)
+    for part, output in zip(parts, outputs):
+        try:
+            with output.open("xb") as out:
+                written.append(output)
+                out.writelines(anonymiser.blocks(part))
+        except OSError as error:
+            msg = f"{output} cannot be written: {error.strerror}; give a folder that is there and can be written"
+            raise ReplayError(msg) from None
+    for word in anonymiser.left_out():
+        print(f"wire_replay: {word}")
+    return anonymiser
+
+
+def _keep(path: Path, to: Path, options: Options, written: List[Path]) -> Options:
+    """Writes a recording as a regression test's; returns the options that mean the same there.
+
+    Raises:
+        CaptureError, ReplayError: It cannot be read, something is there already, or X-Plane is not in it.
+    """
+    if to.resolve() == path.resolve():
+        if not to.with_suffix(".json").is_file():
+            msg = f"{path} lies in {to.parent} itself, where it would stay with all addresses: give another folder"
+            raise ReplayError(msg)
+        return options.over(_expectation(to.with_suffix(".json")).options)
+    if to.with_suffix(".json").exists():
+        msg = (
+            f"{path} would be kept as {to}, and {to.with_suffix('.json')} is there already: give another folder, "
+            f"delete both, or replay {to} itself with --regression to make its JSON file anew"
+        )
         raise ReplayError(msg)
-    with to.open("wb") as out:
-        out.writelines(anonymised(path))
+    disguise = _write_anonymised(path, to, written).disguise
+    if options.xplane and not disguise.knows(options.xplane):
+        msg = f"--xplane {options.xplane}: {path} has no datagram from or to it; expected the address of X-Plane there"
+        raise ReplayError(msg)
+    xplane = disguise.address(options.xplane) if options.xplane else None
+    return Options(xplane, {key: disguise.word(value) for key, value in options.given.items()})
+
+
+def _kept_name(path: Path) -> str:
+    """Of a recording in a folder of regression tests: node, run and part stay in it."""
+    ending = next((each for each in _ENDINGS if path.name.lower().endswith(each)), "")
+    return path.name[: len(path.name) - len(ending)] + _ENDINGS[0]
+
+
+def _expectation(path: Path) -> Expected:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        options = content["options"]
+        return Expected(Options(options["xplane"], dict(options["set"])), dict(content["topics"]))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        msg = f"{path} cannot be read: {error!r}; expected what --regression has written"
+        raise ReplayError(msg) from None
 
 
 def _judge(expected: Mapping[str, Mapping[str, Any]], found: Mapping[str, Mapping[str, Any]]) -> List[Tuple[str, str]]:
@@ -211,21 +311,35 @@ def _judge(expected: Mapping[str, Mapping[str, Any]], found: Mapping[str, Mappin
 
 
 def _replay(args: argparse.Namespace, folder: Path) -> int:
-    if args.anonymise:
-        _write_anonymised(args.file, args.anonymise)
-        return 0
+    written: List[Path] = []  # and of no use, unless all goes well
+    try:
+        if args.anonymise:
+            _write_anonymised(args.file, args.anonymise, written)
+            return 0
+        return _play(args, folder, written)
+    except BaseException:
+        for path in written:
+            path.unlink(missing_ok=True)
+        raise
+
+
+def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
+    path, options = args.file, Options(args.xplane, dict(args.set))
     if args.regression:
         args.regression.mkdir(parents=True, exist_ok=True)
-        kept = args.regression / f"{args.file.name.split('.')[0]}.pcapng"
-        if kept.resolve() != args.file.resolve():
-            _write_anonymised(args.file, kept)
-        args.file = kept
+        path = args.regression / _kept_name(args.file)
+        options = _keep(args.file, path, options, written)
+    expected = _expectation(args.expect) if args.expect else None
+    if expected is not None:
+        options = options.over(expected.options)
     file = folder / "records"
-    start, word = prepare(args.file, file, args.xplane, dict(args.set))
-    if word:
-        print(f"wire_replay: {word}")
+    start, word = prepare(path, file, options.xplane, options.given)
     replay = WireReplay(start, file, args.logs or folder, wire_log=args.sent)
-    print(replay.run(args.timeout))
+    try:
+        print(replay.run(args.timeout))
+    finally:
+        if word:
+            print(f"wire_replay: {word}")
     messages: Dict[str, List[bytes]] = {}
     for message in replay.messages:
         if message.topic.endswith(_OF_THE_START):
@@ -235,15 +349,12 @@ def _replay(args: argparse.Namespace, folder: Path) -> int:
         print(f"{topic}  {len(messages[topic])}  {digest[:16]}")
     found = {topic: {"messages": len(messages[topic]), "sha256": digest} for topic, digest in hashes(messages).items()}
     if args.regression:
-        text = json.dumps(found, indent=2, sort_keys=True) + "\n"
-        args.file.with_suffix(".json").write_text(text, encoding="utf-8")
-    if args.expect:
-        try:
-            expected = json.loads(args.expect.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            msg = f"{args.expect} cannot be read: {error}; expected what --regression has written"
-            raise ReplayError(msg) from None
-        return _say(_judge(expected, found))
+        kept = {"options": {"xplane": options.xplane, "set": dict(options.given)}, "topics": found}
+        text = json.dumps(kept, indent=2, sort_keys=True) + "\n"
+        path.with_suffix(".json").write_text(text, encoding="utf-8")
+        written.clear()
+    if expected is not None:
+        return _say(_judge(expected.topics, found))
     if args.output:
         replay.write_bag(args.output)
     if not args.against:
