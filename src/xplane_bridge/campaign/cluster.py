@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import tempfile
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
-from typing import Any, Iterator, List, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
-from xplane_bridge.campaign.definition import Campaign
+from xplane_bridge.campaign.definition import Campaign, parse_campaign
 from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.campaign.fingerprint import CPU, Fingerprint, differences, fingerprint
 from xplane_bridge.campaign.rows import Row, dead_row, fly_rows
 
 #: How often a task may lose its worker and be flown again.
 _SECOND_CHANCES = 1
+_FIRST_WORKER_S = 30.0
 
 
 def available() -> bool:
@@ -30,13 +34,52 @@ class Cluster:
 
     def __init__(self, client: Any) -> None:
         self._client = client
+        self._address = str(client.scheduler.address)
+        self._flies: Optional[Campaign] = None
+        self._flies_with: Fingerprint = {}
+
+    def fingerprint(self, campaign: Campaign) -> Fingerprint:
+        """What all workers fly with: what is here, but for the kind of CPU, which is the workers'.
+
+        Raises:
+            CampaignError: There is no worker, or one that flies with something else; or the scheduler has gone.
+        """
+        with self._scheduler_watched():
+            try:
+                self._client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
+            except asyncio.TimeoutError:
+                raise CampaignError(
+                    f"the Dask scheduler at {self._address} has no workers; start some with `dask worker "
+                    f"{self._address} --nthreads 1`, then start the same command again"
+                ) from None
+            found = self._client.run(_own_fingerprint, campaign.document, on_error="return")
+        wanted = fingerprint(campaign)
+        for worker, has in sorted(found.items()):
+            if isinstance(has, Exception):
+                raise CampaignError(
+                    f"worker {worker} cannot fly this campaign ({type(has).__name__}: {has}); install there the "
+                    "xplane_bridge, and the controller, that are here, or end it; then start the same command again"
+                )
+            wanted = {**wanted, CPU: found[min(found)][CPU]}
+            _refuse_another(worker, has, wanted)
+        self._flies, self._flies_with = campaign, wanted
+        return wanted
 
     def __call__(self, campaign: Campaign, chunks: Sequence[Tuple[int, int]]) -> Iterator[List[Row]]:
         """Flies the chunks in any order.
 
         A chunk that loses its worker twice is flown once more, alone and flight by flight, so that it is certain which
         flight ends its worker: that one becomes a row too.
+
+        Raises:
+            CampaignError: A worker, perhaps one that came later, flies with something else; or the scheduler has gone.
         """
+        if self._flies != campaign:
+            self.fingerprint(campaign)
+        with self._scheduler_watched():
+            yield from self._fly(campaign, chunks)
+
+    def _fly(self, campaign: Campaign, chunks: Sequence[Tuple[int, int]]) -> Iterator[List[Row]]:
         from distributed import KilledWorker
         from distributed import as_completed as completed
 
@@ -62,7 +105,45 @@ class Cluster:
         return sorted(self._client.run(os.getpid).values())
 
     def _submit(self, campaign: Campaign, first: int, count: int) -> Any:
-        return self._client.submit(fly_rows, campaign.document, first, count, pure=False)
+        return self._client.submit(_fly_chunk, campaign.document, self._flies_with, first, count, pure=False)
+
+    @contextmanager
+    def _scheduler_watched(self) -> Iterator[None]:
+        """Says in a line that the scheduler has gone: all that was asked of it is cancelled then."""
+        try:
+            yield
+        except (CancelledError, OSError):
+            raise CampaignError(
+                f"the Dask scheduler at {self._address} ended, or cannot be reached any more; what is flown is kept: "
+                "start scheduler and workers, then start the same command again"
+            ) from None
+
+
+def _own_fingerprint(document: Dict[str, Any]) -> Fingerprint:
+    """Of a worker, in it."""
+    return fingerprint(parse_campaign(document))
+
+
+def _fly_chunk(document: Dict[str, Any], flies_with: Fingerprint, first: int, count: int) -> List[Row]:
+    """What a worker runs; it may have come after all were asked what they fly with."""
+    from distributed import get_worker
+
+    worker = str(get_worker().address)
+    try:
+        _refuse_another(worker, _own_fingerprint(document), flies_with)
+        return fly_rows(document, first, count)
+    except OSError as error:  # of a file: one that came through would be taken for the scheduler's
+        raise CampaignError(f"worker {worker}: {error}; give it that file, or end it") from None
+
+
+def _refuse_another(worker: str, has: Fingerprint, wanted: Fingerprint) -> None:
+    """Raises CampaignError where a worker's flights might be other bits than those of the others."""
+    other = differences(has, wanted)
+    if other:
+        raise CampaignError(
+            f"worker {worker} has another {other}, with which the same seed may give other bits; install there what "
+            "is here and start it again, or end it; then start the same command again"
+        )
 
 
 @contextmanager
@@ -94,6 +175,9 @@ def running_cluster(address: str) -> Iterator[Cluster]:
     """
     from distributed import Client
 
+    # Of a scheduler that ends, tracebacks: what the user needs to know is the error's line.
+    for logger in ("distributed", "distributed.client", "asyncio"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout="10s")
     except (OSError, ValueError) as error:

@@ -11,6 +11,7 @@ from typing import Any, Dict, List
 from xplane_bridge.campaign.definition import Campaign, FlightPlan, parse_campaign
 from xplane_bridge.campaign.distributions import CampaignError, Design
 from xplane_bridge.campaign.flight import Flight, FlightResult
+from xplane_bridge.campaign.threads import one_thread
 from xplane_bridge.in_process.failures import NotFlownError
 from xplane_bridge.scenario import ScenarioError
 
@@ -23,7 +24,8 @@ Row = Dict[str, Any]
 
 
 def fly_rows(document: Dict[str, Any], first: int, count: int) -> List[Row]:
-    """Flies the flights `first` to `first + count - 1` of a campaign; the one function that workers run."""
+    """Flies the flights `first` to `first + count - 1` of a campaign; what every worker does."""
+    one_thread()
     campaign = parse_campaign(document)
     design = campaign.design
     return [_fly_row(campaign, design, flight) for flight in range(first, first + count)]

@@ -8,31 +8,28 @@ is remembered: what has no part is flown, whatever was killed when.
 from __future__ import annotations
 
 import fcntl
-import hashlib
-import importlib
 import json
 import os
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Sequence, Tuple
+from typing import Any, Callable, Iterator, List, Sequence, Tuple
 
-import numpy as np
 import pandas as pd
 
-from xplane_bridge import __version__
 from xplane_bridge.analysis.intervals import wilson
 from xplane_bridge.campaign.definition import Campaign, parse_campaign
 from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.campaign.fingerprint import Fingerprint, differences, fingerprint
 from xplane_bridge.campaign.rows import Row, fly_rows
 from xplane_bridge.compiled import require
-from xplane_bridge.resources import config_file
 
 #: Flights of one task and one part: long enough to hide what a task costs, short enough to lose little.
 CHUNK = 10
 CAMPAIGN, PARTS, TABLE = "campaign.json", "parts", "table.parquet"
 
 Chunk = Tuple[int, int]  #: first flight, count
-#: Flies chunks of a campaign in any order and gives the rows of each.
+#: Flies chunks of a campaign in any order and gives the rows of each. One that flies elsewhere has a `fingerprint` too:
+#: of what it flies with there.
 Executor = Callable[[Campaign, Sequence[Chunk]], Iterator[List[Row]]]
 
 
@@ -79,7 +76,7 @@ class CampaignFolder:
         try:
             (self.folder / PARTS).mkdir(parents=True, exist_ok=True)
             with self._locked():
-                self._claim(campaign)
+                self._claim(campaign, getattr(executor, "fingerprint", fingerprint)(campaign))
                 for left in (self.folder / PARTS).glob("*.tmp"):
                     left.unlink()
                 table = self._fly_rounds(campaign, executor, progress)
@@ -107,18 +104,18 @@ class CampaignFolder:
                 raise CampaignError(f"{self.folder}: another run_campaign is flying into it") from None
             yield
 
-    def _claim(self, campaign: Campaign) -> None:
+    def _claim(self, campaign: Campaign, flies_with: Fingerprint) -> None:
         path = self.folder / CAMPAIGN
-        wanted = {"campaign": campaign.document, "flown_with": fingerprint(campaign)}
+        wanted = {"campaign": campaign.document, "flown_with": flies_with}
         if path.is_file():
             saved = json.loads(path.read_text(encoding="utf-8"))
             if saved.get("campaign") != json.loads(json.dumps(campaign.document)):
                 raise CampaignError(f"{self.folder}: holds flights of another campaign; give another folder with -o")
-            changed = [key for key, value in wanted["flown_with"].items() if saved["flown_with"].get(key) != value]
+            changed = differences(saved["flown_with"], flies_with)
             if changed:
                 raise CampaignError(
-                    f"{self.folder}: its flights were flown with another {', '.join(changed)}; "
-                    "give another folder with -o"
+                    f"{self.folder}: its flights were flown with another {changed}, with which the same seed may give "
+                    "other bits; fly on with what they were flown with, or give another folder with -o"
                 )
             return
         _replace(path, lambda new: new.write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8"))
@@ -163,31 +160,3 @@ def _replace(path: Path, write: Callable[[Path], Any]) -> None:
     with new.open("rb") as file:
         os.fsync(file.fileno())
     os.replace(new, path)
-
-
-def fingerprint(campaign: Campaign) -> Dict[str, str]:
-    """What the same bits depend on, beside the campaign and the processor, by its name in messages."""
-    package = Path(__file__).resolve().parents[1]
-    code = [p for room in ("analysis", "campaign", "emulator/flight", "emulator/aircraft", "in_process", "scenario")
-            for p in sorted((package / room).rglob("*")) if p.suffix in (".py", ".xml")]  # fmt: skip
-    code.append(Path(require("a campaign").__file__))
-    plan = campaign.plan(0)
-    files = [config_file("tx.yaml"), config_file("aircraft", f"{plan.aircraft}.yaml")]
-    if plan.controller:
-        module = importlib.import_module(plan.controller.split(":")[0])
-        file = getattr(module, "__file__", None)
-        code += [Path(file)] if file else []
-    return {
-        "version of xplane_bridge": __version__,
-        "code": _digest(code),
-        "configuration (config/tx.yaml, config/aircraft)": _digest(files),
-        "jsbsim": importlib.import_module("jsbsim").__version__,
-        "numpy": np.__version__,
-    }
-
-
-def _digest(files: Sequence[Path]) -> str:
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]

@@ -18,6 +18,7 @@ from xplane_bridge.campaign.definition import Campaign, load_campaign
 from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.campaign.flight import Flight
 from xplane_bridge.campaign.runner import TABLE, CampaignFolder, in_process
+from xplane_bridge.campaign.threads import one_thread
 from xplane_bridge.cli.entry import guarded
 from xplane_bridge.cli.flights import through_nodes
 from xplane_bridge.in_process.view import FlightView
@@ -54,9 +55,7 @@ def parser() -> argparse.ArgumentParser:
 @contextmanager
 def executor_of(args: argparse.Namespace) -> Iterator[Any]:
     """Who flies."""
-    # One thread for numpy's linear algebra, in the workers too: flights are the parallel part.
-    for library in ("OPENBLAS", "OMP", "MKL"):
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    one_thread()
     missing = "dask.distributed is not installed (pip install 'dask[distributed]')"
     if args.scheduler:
         if not cluster.available():

@@ -1,22 +1,27 @@
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
 import subprocess
 import time
 from pathlib import Path
-from typing import Any, List
+from typing import Any, Iterator, List
 
+import jsbsim
 import pandas as pd
 import pytest
 
 from xplane_bridge.analysis.intervals import wilson
-from xplane_bridge.campaign.cluster import local_cluster
+from xplane_bridge.campaign.cluster import Cluster, local_cluster, running_cluster
 from xplane_bridge.campaign.definition import Campaign, CampaignError, parse_campaign
+from xplane_bridge.campaign.fingerprint import fingerprint
 from xplane_bridge.campaign.flight import Flight
-from xplane_bridge.campaign.rows import VARYING, fly_rows
-from xplane_bridge.campaign.runner import TABLE, CampaignFolder, in_process
-from xplane_bridge.resources import program
+from xplane_bridge.campaign.rows import VARYING, cpu_kind, fly_rows
+from xplane_bridge.campaign.runner import CHUNK, TABLE, CampaignFolder, in_process
+from xplane_bridge.cli import run_campaign
+from xplane_bridge.resources import config_file, program
 
 
 def document(**more: Any) -> dict:
@@ -168,8 +173,146 @@ def test_other_code_under_the_same_campaign_is_noticed(tmp_path: Path, monkeypat
     campaign = parse_campaign(document(flights=1))
     CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
     monkeypatch.setattr("jsbsim.__version__", "0.0")
-    with pytest.raises(CampaignError, match="flown with another jsbsim"):
+    with pytest.raises(CampaignError, match=r"flown with another jsbsim \(\d\S+ instead of 0\.0\), with which .* -o$"):
         CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+
+
+def test_a_folder_of_another_kind_of_cpu_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign = parse_campaign(document(flights=1))
+    table = CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+    assert list(table["host_cpu"]) == [cpu_kind()]
+    monkeypatch.setattr("xplane_bridge.campaign.fingerprint.cpu_kind", lambda: "Other 9000")
+    with pytest.raises(CampaignError) as raised:
+        CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+    assert f"flown with another kind of CPU ({cpu_kind()} instead of Other 9000), with which" in str(raised.value)
+    assert "fly on with what they were flown with, or give another folder with -o" in str(raised.value)
+
+
+@pytest.fixture(scope="module")
+def elsewhere() -> Iterator[Any]:
+    """A client of a scheduler with one worker, a process."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0", host="127.0.0.1"
+    ) as cluster, distributed.Client(cluster, set_as_default=False) as client:
+        yield client
+
+
+def program_of(campaign: dict, folder: Path, *options: str) -> int:
+    """Exit status of run_campaign in this process."""
+    path = folder.with_suffix(".yaml")
+    path.write_text(str(campaign), encoding="utf-8")  # JSON-like text is YAML
+    return run_campaign.main([str(path), "-o", str(folder), *options])
+
+
+def test_a_scheduler_elsewhere_gives_the_same_table(tmp_path: Path, elsewhere: Any) -> None:
+    address = elsewhere.scheduler.address
+    assert program_of(document(), tmp_path / "elsewhere", "--scheduler", address) == 0
+    there = pd.read_parquet(tmp_path / "elsewhere" / TABLE)
+    here = CampaignFolder(tmp_path / "here").fly(parse_campaign(document()), in_process, quiet)
+    pd.testing.assert_frame_equal(same(there), same(here))
+    assert set(there["host_pid"]) == set(elsewhere.run(os.getpid).values())
+    assert set(here["host_pid"]) == {os.getpid()}
+
+
+def test_a_worker_that_flies_with_something_else_is_refused(
+    tmp_path: Path, elsewhere: Any, capsys: pytest.CaptureFixture
+) -> None:
+    (worker,) = elsewhere.scheduler_info()["workers"]
+    elsewhere.run(setattr, jsbsim, "__version__", "0.0")
+    try:
+        assert program_of(document(), tmp_path / "c", "--scheduler", elsewhere.scheduler.address) == 1
+    finally:
+        elsewhere.run(setattr, jsbsim, "__version__", jsbsim.__version__)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f": worker {worker} has another jsbsim (0.0 instead of {jsbsim.__version__}), with which the same" in line
+    assert line.endswith("or end it; then start the same command again")
+    assert not list((tmp_path / "c/parts").iterdir())
+
+
+def test_a_worker_that_cannot_fly_it_is_named(tmp_path: Path, elsewhere: Any, capsys: pytest.CaptureFixture) -> None:
+    (tmp_path / "only_here.py").write_text("fly = dict\n", encoding="utf-8")
+    campaign = document(controller="only_here:fly")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(tmp_path))
+        assert program_of(campaign, tmp_path / "c", "--scheduler", elsewhere.scheduler.address) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.search(r": worker tcp://\S+ cannot fly this campaign \(CampaignError: .*'only_here:fly'", line)
+
+
+def test_a_worker_that_comes_later_with_something_else_flies_nothing(elsewhere: Any) -> None:
+    campaign = parse_campaign(document())
+    (worker,) = elsewhere.scheduler_info()["workers"]
+    with running_cluster(elsewhere.scheduler.address) as cluster:
+        cluster.fingerprint(campaign)  # as of all that are there
+        elsewhere.run(setattr, jsbsim, "__version__", "0.0")
+        try:
+            with pytest.raises(CampaignError, match=rf"worker {worker} has another jsbsim \(0\.0 instead of"):
+                list(cluster(campaign, [(0, 1)]))
+        finally:
+            elsewhere.run(setattr, jsbsim, "__version__", jsbsim.__version__)
+        assert [row["outcome"] for rows in cluster(campaign, [(0, 1)]) for row in rows] == ["flown"]
+
+
+def test_workers_of_another_kind_of_cpu_than_this_one_fly_and_the_folder_is_theirs(
+    tmp_path: Path, elsewhere: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("xplane_bridge.campaign.fingerprint.cpu_kind", lambda: "Other 9000")
+    campaign = parse_campaign(document(flights=1))
+    with running_cluster(elsewhere.scheduler.address) as cluster:
+        assert set(CampaignFolder(tmp_path).fly(campaign, cluster, quiet)["host_cpu"]) == {cpu_kind()}
+    assert json.loads((tmp_path / "campaign.json").read_text())["flown_with"]["kind of CPU"] == cpu_kind()
+    with pytest.raises(CampaignError, match="another kind of CPU"):
+        CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
+
+
+def test_workers_of_two_kinds_of_cpu_do_not_fly_together(elsewhere: Any) -> None:
+    campaign = parse_campaign(document())
+    own = fingerprint(campaign)
+
+    class Two:
+        scheduler = elsewhere.scheduler
+        wait_for_workers = elsewhere.wait_for_workers
+
+        def run(self, *_: Any, **__: Any) -> dict:
+            return {"tcp://b:1": {**own, "kind of CPU": "B"}, "tcp://a:1": {**own, "kind of CPU": "A"}}
+
+    with pytest.raises(CampaignError, match=r"worker tcp://b:1 has another kind of CPU \(B instead of A\)"):
+        Cluster(Two()).fingerprint(campaign)
+
+
+def test_a_scheduler_without_workers_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("xplane_bridge.campaign.cluster._FIRST_WORKER_S", 0.1)
+    with distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp", dashboard_address=":0") as empty:
+        assert program_of(document(), tmp_path / "c", "--scheduler", empty.scheduler_address) == 1
+        assert f"at {empty.scheduler_address} has no workers; start some with" in capsys.readouterr().err
+
+
+def test_a_scheduler_that_ends_midway_is_a_line_and_the_same_command_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    cluster = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=":0"
+    )
+
+    class Bar(run_campaign.tqdm):
+        def update(self, count: int) -> None:
+            if count:
+                cluster.close()
+
+    with cluster, monkeypatch.context() as patch:
+        patch.setattr(run_campaign, "tqdm", Bar)
+        address = cluster.scheduler_address
+        assert program_of(document(), tmp_path / "c", "--scheduler", address) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f": the Dask scheduler at {address} ended, or cannot be reached any more; what is flown is kept" in line
+    assert line.endswith("then start the same command again")
+    assert len(list((tmp_path / "c/parts").glob("*.parquet"))) == 1
+    campaign = parse_campaign(document())
+    tables = [same(CampaignFolder(tmp_path / name).fly(campaign, in_process, quiet)) for name in ("c", "whole")]
+    pd.testing.assert_frame_equal(*tables)
 
 
 def test_the_program_killed_at_any_moment_goes_on(tmp_path: Path) -> None:
@@ -193,3 +336,42 @@ def test_the_program_killed_at_any_moment_goes_on(tmp_path: Path) -> None:
     broken.loc[7, "sha256"] = "0" * 64
     broken.to_parquet(tmp_path / "killed/parts/flights-00000000-0010.parquet")
     assert subprocess.run(again, check=False, stdout=subprocess.DEVNULL).returncode == 1
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("flights", [200])
+def test_the_shipped_example_is_one_table_with_one_worker_with_two_and_after_a_kill(
+    tmp_path: Path, flights: int, record_property: Any
+) -> None:
+    """Whole, as a user flies it; wall times are printed, and noted in the results."""
+    pytest.importorskip("distributed")
+    example = str(config_file("campaigns", "stuck_aileron.yaml"))
+    command = [str(program("run_campaign")), example, "--flights", str(flights)]
+
+    def fly(name: str, workers: int) -> subprocess.Popen[bytes]:
+        options = ["--workers", str(workers), "-o", str(tmp_path / name)]
+        return subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL)
+
+    def note(name: str, began: float) -> None:
+        record_property(f"{name}_wall_s", round(time.monotonic() - began, 1))
+        print(f"stuck_aileron, {flights} flights, {name}: {time.monotonic() - began:.1f} s")
+
+    for name, workers in (("one_worker", 1), ("two_workers", 2)):
+        began = time.monotonic()
+        assert fly(name, workers).wait() == 0
+        note(name, began)
+    began = time.monotonic()
+    first = fly("killed", 2)
+    while len(list((tmp_path / "killed/parts").glob("*.parquet"))) < flights // CHUNK // 2:
+        assert first.poll() is None
+        time.sleep(0.02)
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    assert not (tmp_path / "killed" / TABLE).exists()
+    assert fly("killed", 2).wait() == 0
+    note("killed_and_resumed", began)
+    one, *others = (same(pd.read_parquet(tmp_path / n / TABLE)) for n in ("one_worker", "two_workers", "killed"))
+    assert len(one) == flights
+    assert one["sha256"].nunique() == flights
+    for other in others:
+        pd.testing.assert_frame_equal(other, one)

@@ -42,9 +42,9 @@ def test_what_is_learned_follows_from_the_seed_alone(example: ModuleType) -> Non
     assert not np.array_equal(example.train(generations=2, seed=4, workers=2, say=False), first)
 
 
-@pytest.mark.full
+@pytest.mark.nightly
 def test_stable_baselines_checker_is_content_and_ppo_learns() -> None:
-    pytest.importorskip("stable_baselines3", reason="pip install stable-baselines3 to have it checked")
+    pytest.importorskip("stable_baselines3", reason="pip install -r requirements-full.txt to have it checked")
     import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.env_checker import check_env
