@@ -15,6 +15,7 @@ from typing import Any, Dict, Mapping, Optional
 import yaml
 
 from xplane_bridge.compiled import require
+from xplane_bridge.constants import FlightMode
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.command_channels import apply_channels
 from xplane_bridge.emulator.flight.flight_model import FlightModel, InitialState, ModelState
@@ -22,7 +23,8 @@ from xplane_bridge.in_process.failures import Failures
 from xplane_bridge.in_process.view import FlightView
 from xplane_bridge.resources import config_file
 
-MANUAL, AUTO = 1, 2
+#: As plain numbers, which results and files hold.
+MANUAL, AUTO = int(FlightMode.MANUAL), int(FlightMode.AUTO)
 #: Keys of a start, of the weather and of the loading, as scenarios and campaigns have them.
 START = {
     "latitude": "latitude_deg", "longitude": "longitude_deg", "heading": "heading_deg", "altitude": "altitude_m",

@@ -40,7 +40,7 @@ class Failures:
 
     def __init__(self, model: FlightModel) -> None:
         self._model = model
-        self._surfaces = {spec.name for spec in model.surfaces}
+        self._surfaces = {spec.name: spec for spec in model.surfaces}
         self._faults: Dict[str, SurfaceFault] = {}
         self._systems: Set[str] = set()
         self._effects = FailureEffects()
@@ -50,7 +50,8 @@ class Failures:
         """A `failure` of a scenario happens, or is cleared.
 
         Raises:
-            NotFlownError: This aircraft has no such part, or a flight in process cannot show that it is broken.
+            NotFlownError: This aircraft has no such part, the value is none of that kind, or a flight in process cannot
+                show that it is broken.
             ScenarioError: No such system.
         """
         name, kind = failure["name"], failure["kind"]
@@ -65,7 +66,7 @@ class Failures:
             elif kind == "failed":
                 raise NotFlownError(f"failure {name!r}: kind is missing; expected what the surface does")
             else:
-                self._faults[surface] = SurfaceFault(SurfaceFaultKind(kind), failure["value"])
+                self._faults[surface] = self._fault(surface, failure)
             return
         leaf = failure_dataref(name)
         if _NOT_FLOWN.match(leaf):
@@ -73,6 +74,17 @@ class Failures:
                 f"failure {name!r}: instruments and busses are not flown in process; it takes the bridge"
             )
         (self._systems.discard if failure["clear"] else self._systems.add)(leaf)
+
+    def _fault(self, surface: str, failure: Mapping[str, Any]) -> SurfaceFault:
+        """A surface's failure as the flight model has it, which takes the rate of a slow one as a share of its own."""
+        kind, value = SurfaceFaultKind(failure["kind"]), failure["value"]
+        if kind is SurfaceFaultKind.SLOW:
+            if value is None or not value > 0.0:
+                raise NotFlownError(f"failure {failure['name']!r}: value is {value}; expected a rate above 0 deg/s")
+            value = min(value / self._surfaces[surface].rate_deg_s, 1.0)
+        elif kind is SurfaceFaultKind.REDUCED and (value is None or not 0.0 <= value <= 1.0):
+            raise NotFlownError(f"failure {failure['name']!r}: value is {value}; expected 0..1 of the effectiveness")
+        return SurfaceFault(kind, value)
 
     def clear(self) -> None:
         """Everything is repaired."""

@@ -6,6 +6,8 @@ import math
 import random
 from typing import Any, Mapping
 
+from xplane_bridge.scenario.schema import ScenarioError
+
 #: Sines of a multisine.
 _SINES = 8
 
@@ -16,6 +18,9 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
     Args:
         parameters: A checked `excitation`: kind, amplitude, duration [s], frequency, frequency_end [Hz], seed.
         time_s: Time since the start [s].
+
+    Raises:
+        ScenarioError: No input of this kind is made here.
     """
     duration: float = parameters["duration"]
     amplitude: float = parameters["amplitude"]
@@ -27,6 +32,8 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
         return amplitude if part < 0.5 else -amplitude
     if kind == "3-2-1-1":
         return amplitude if part < 3 / 7 or 5 / 7 <= part < 6 / 7 else -amplitude
+    if kind not in ("chirp", "multisine"):
+        raise ScenarioError(f"excitation.kind: {kind!r}; expected doublet, 3-2-1-1, multisine or chirp")
     low: float = parameters["frequency"]
     high: float = parameters["frequency_end"]
     if kind == "chirp":

@@ -22,7 +22,7 @@ const std::string kLeft = FakeAirframe::dataref(FakeAirframe::kLeft);
 /// Frames of 0.02 s and the driver's 60 deg/s: a driven surface moves by 1.2 deg a frame.
 class SurfaceAuthorityTest : public DrivenSurfacesTest {
  protected:
-  SurfaceAuthorityTest() {
+  explicit SurfaceAuthorityTest(FlightMode surfaces_source = FlightMode::kAuto) {
     ControlPathHooks hooks;
     hooks.mode = [this](const core::ModeStatus& status, double) { mode_ = status; };
     hooks.applied = [](const AppliedControls&) {};
@@ -37,6 +37,7 @@ class SurfaceAuthorityTest : public DrivenSurfacesTest {
     hooks.warn = [](const std::string&) {};
     ControlPathOptions options;
     options.arbiter.transition_rate = std::numeric_limits<double>::infinity();
+    options.arbiter.surfaces_source = surfaces_source;
     path_ = std::make_unique<ControlPath>(&sim_, &overrides_, options, std::move(hooks), mutex_);
     path_->onLink(sim_.status());
     sim_.set("sim/operation/override/override_joystick_roll", 0.0F);
@@ -65,16 +66,27 @@ class SurfaceAuthorityTest : public DrivenSurfacesTest {
     return refusal;
   }
   void ask(FlightMode mode) { path_->requestMode({0, static_cast<int>(mode), "test", 0.0}); }
-  /// In AUTO, the left aileron commanded to 6 deg and there, the stick in the middle.
-  void flySurface() {
+  /// In their mode, the left aileron commanded to 6 deg and there, the stick in the middle.
+  void flySurface(FlightMode mode = FlightMode::kAuto) {
     stick_ = 0.0;
-    ask(FlightMode::kAuto);
+    ask(mode);
     commanded_ = 6.0F;
     sim_.run(0.3);
     ASSERT_FLOAT_EQ(sim_.value(kLeft), 6.0F);
     ASSERT_EQ(state(), State::kDriving);
     sim_.clearMessages();
   }
+  /// Frames pass until the failsafe acts; what was written in that frame alone stays.
+  void runUntilFailsafe() {
+    for (int frame = 0; frame < 50 && !mode_.failsafe; ++frame) {
+      EXPECT_FLOAT_EQ(sim_.value(kLeft), 6.0F) << "before the failsafe";
+      sim_.clearMessages();
+      sim_.frame();
+    }
+    ASSERT_TRUE(mode_.failsafe);
+  }
+  /// In the one frame since: as far as the driver moves it.
+  void expectOnItsWay() const { EXPECT_EQ(written(kLeft), std::vector<float>{4.8F}) << "on its way in the same frame"; }
   /// From one frame to the next, no further than the driver moves it.
   void expectNoJump() const {
     float before = 6.0F;
@@ -106,28 +118,30 @@ TEST_F(SurfaceAuthorityTest, AStickThatTakesOverEndsItInTheSameFrameWithoutAJump
   EXPECT_EQ(mode_.mode, FlightMode::kManual);
   EXPECT_EQ(mode_.reason, "stick take-over: roll moved by -0.50 since AUTO was engaged; control/surfaces ends");
   EXPECT_EQ(events_.back(), "MANUAL: " + mode_.reason);
-  EXPECT_EQ(written(kLeft), std::vector<float>{4.8F}) << "on its way in the same frame";
+  expectOnItsWay();
   sim_.run(0.3);
   expectNoJump();
   EXPECT_NEAR(written(kLeft).back(), -10.0, 0.5) << "where the stick wants it";
   EXPECT_EQ(state(), State::kIdle) << "given back";
 }
 
-TEST_F(SurfaceAuthorityTest, ARequestForManualEndsIt) {
+TEST_F(SurfaceAuthorityTest, ARequestForManualEndsItInTheSameFrame) {
   flySurface();
   ask(FlightMode::kManual);
   EXPECT_EQ(mode_.reason, "request; control/surfaces ends");
+  sim_.frame();
+  expectOnItsWay();
   sim_.run(0.3);
   expectNoJump();
   EXPECT_EQ(state(), State::kIdle);
 }
 
-TEST_F(SurfaceAuthorityTest, AFailsafeEndsIt) {
-  controller_ = 0.25;
+TEST_F(SurfaceAuthorityTest, AFailsafeEndsItInTheSameFrame) {
+  controller_ = -0.25;
   flySurface();
   controller_.reset();
-  sim_.run(0.6);
-  EXPECT_TRUE(mode_.failsafe);
+  runUntilFailsafe();
+  expectOnItsWay();
   EXPECT_EQ(mode_.reason, "timeout of control/auto; control/surfaces ends");
   sim_.run(0.3);
   expectNoJump();
@@ -168,6 +182,42 @@ TEST_F(SurfaceAuthorityTest, ThePanicToolEndsItUntilAModeIsAskedFor) {
   ask(FlightMode::kAuto);
   sim_.run(0.3);
   EXPECT_EQ(state(), State::kDriving);
+}
+
+/// As with tx_node's `surfaces_source: manual`.
+class ManualSurfaceAuthorityTest : public SurfaceAuthorityTest {
+ protected:
+  ManualSurfaceAuthorityTest() : SurfaceAuthorityTest(FlightMode::kManual) {}
+};
+
+TEST_F(ManualSurfaceAuthorityTest, ARequestForAutoEndsItInTheSameFrame) {
+  controller_ = 0.0;
+  flySurface(FlightMode::kManual);
+  ask(FlightMode::kAuto);
+  EXPECT_EQ(mode_.reason, "request; control/surfaces ends");
+  EXPECT_EQ(commandSurface(6.0F), "control/surfaces flies in MANUAL, and the mode is AUTO");
+  sim_.frame();
+  expectOnItsWay();
+  sim_.run(0.3);
+  expectNoJump();
+  EXPECT_EQ(state(), State::kIdle) << "though commands keep coming";
+  ask(FlightMode::kManual);
+  sim_.run(0.3);
+  EXPECT_EQ(state(), State::kDriving);
+}
+
+TEST_F(ManualSurfaceAuthorityTest, ASilentStickEndsItInTheSameFrameAndAMovedOneDoesNot) {
+  flySurface(FlightMode::kManual);
+  stick_ = -0.5;
+  sim_.run(0.3);
+  EXPECT_FLOAT_EQ(sim_.value(kLeft), 6.0F) << "there is nothing to take over";
+  stick_.reset();
+  runUntilFailsafe();
+  EXPECT_EQ(mode_.reason, "timeout of control/manual; control/surfaces ends");
+  expectOnItsWay();
+  sim_.run(0.3);
+  expectNoJump();
+  EXPECT_EQ(state(), State::kIdle);
 }
 
 }  // namespace

@@ -21,11 +21,19 @@ namespace xplane_bridge {
 struct MessageLeaf {
   std::string field;  ///< of the top message; the parts of a vector have the same
   std::string type;
-  std::string comment;  ///< of the field's line
+  std::string comment;   ///< of the field's line
+  bool is_list = false;  ///< as many of them as the message says
 };
 
 /// Values of the fields by name; a time is one value in seconds, an array or vector several.
 using MessageValues = std::map<std::string, std::vector<double>>;
+/// Strings of the fields by name; a list has several.
+using MessageTexts = std::map<std::string, std::vector<std::string>>;
+
+struct MessageContent {
+  MessageValues values;
+  MessageTexts texts;
+};
 
 class MessageLayout {
  public:
@@ -64,34 +72,56 @@ class MessageLayout {
   }
 
   template <class Message>
-  MessageValues read(const Message& message) const {
+  MessageContent content(const Message& message) const {
     std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(message));
     ros::serialization::OStream out(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
     ros::serialization::serialize(out, message);
-    MessageValues values;
+    MessageContent content;
     std::size_t at = 0;
     for (const MessageLeaf& leaf : leaves_) {
-      if (leaf.type == "string") {
-        at += sizeof(std::uint32_t) + take<std::uint32_t>(bytes, at);
-      } else {
-        values[leaf.field].push_back(takeNumber(leaf.type, bytes, at));
-        at += sizeOf(leaf.type);
+      const bool is_text = leaf.type == "string";
+      is_text ? static_cast<void>(content.texts[leaf.field]) : static_cast<void>(content.values[leaf.field]);
+      const std::size_t count = leaf.is_list ? takeCount(bytes, &at) : 1;
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t size = is_text ? takeCount(bytes, &at) : sizeOf(leaf.type);
+        if (at + size > bytes.size()) throw std::logic_error("the serialised message is shorter than its definition");
+        if (is_text) {
+          content.texts[leaf.field].emplace_back(bytes.data() + at, bytes.data() + at + size);
+        } else {
+          content.values[leaf.field].push_back(takeNumber(leaf.type, bytes, at));
+        }
+        at += size;
       }
     }
     if (at != bytes.size()) throw std::logic_error("the definition and the serialised message differ in length");
-    return values;
+    return content;
+  }
+  template <class Message>
+  MessageValues read(const Message& message) const {
+    return content(message).values;
   }
 
-  /// A message with these values; strings are empty. Every field must be given.
+  /// A message with these values and texts. Every number must be given; a string that is not given is empty.
   template <class Message>
-  Message make(const MessageValues& values) const {
+  Message make(const MessageValues& values, const MessageTexts& texts = {}) const {
     std::vector<std::uint8_t> bytes;
     std::map<std::string, std::size_t> next;
     for (const MessageLeaf& leaf : leaves_) {
-      if (leaf.type == "string") {
-        put<std::uint32_t>(0, bytes);
-      } else {
-        putNumber(leaf.type, values.at(leaf.field).at(next[leaf.field]++), bytes);
+      const bool is_text = leaf.type == "string";
+      const auto text = texts.find(leaf.field);
+      const std::size_t texts_given = text == texts.end() ? 0 : text->second.size();
+      std::size_t count = 1;
+      if (leaf.is_list) {
+        count = is_text ? texts_given : values.at(leaf.field).size();
+        put(static_cast<std::uint32_t>(count), bytes);
+      }
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t part = next[leaf.field]++;
+        if (is_text) {
+          putText(part < texts_given ? text->second[part] : "", bytes);
+        } else {
+          putNumber(leaf.type, values.at(leaf.field).at(part), bytes);
+        }
       }
     }
     Message message;
@@ -110,9 +140,11 @@ class MessageLayout {
       const std::size_t hash = line.find('#');
       const std::string own = hash == std::string::npos ? "" : line.substr(std::min(hash + 2, line.size()));
       std::size_t count = 1;
+      bool is_list = false;
       const std::size_t bracket = type.find('[');
       if (bracket != std::string::npos) {
-        count = std::stoul(type.substr(bracket + 1));
+        is_list = type.substr(bracket) == "[]";
+        if (!is_list) count = std::stoul(type.substr(bracket + 1));
         type = type.substr(0, bracket);
       }
       // The parts of a header are fields of their own, those of a vector belong to the vector.
@@ -121,17 +153,20 @@ class MessageLayout {
       for (std::size_t i = 0; i < count; ++i) {
         const std::string nested = type.substr(type.rfind('/') + 1);
         if (sections_.count(nested) != 0) {
+          if (is_list)
+            throw std::logic_error(full + " is a list of messages, which MessageLayout does not walk through");
           flatten(nested, full, field.empty() ? own : comment);
         } else {
-          leaves_.push_back({full, type, field.empty() ? own : comment});
+          leaves_.push_back({full, type, field.empty() ? own : comment, is_list});
         }
       }
     }
   }
 
   static std::size_t sizeOf(const std::string& type) {
-    static const std::map<std::string, std::size_t> sizes = {{"bool", 1},    {"uint8", 1},   {"uint32", 4},
-                                                             {"float32", 4}, {"float64", 8}, {"time", 8}};
+    static const std::map<std::string, std::size_t> sizes = {{"bool", 1},    {"uint8", 1}, {"uint16", 2},
+                                                             {"uint32", 4},  {"int32", 4}, {"float32", 4},
+                                                             {"float64", 8}, {"time", 8},  {"duration", 8}};
     return sizes.at(type);
   }
 
@@ -141,10 +176,18 @@ class MessageLayout {
     std::memcpy(&value, &bytes.at(at), sizeof value);
     return value;
   }
+  static std::size_t takeCount(const std::vector<std::uint8_t>& bytes, std::size_t* at) {
+    const auto count = take<std::uint32_t>(bytes, *at);
+    *at += sizeof count;
+    return count;
+  }
   static double takeNumber(const std::string& type, const std::vector<std::uint8_t>& bytes, std::size_t at) {
     if (type == "float32") return static_cast<double>(take<float>(bytes, at));
     if (type == "float64") return take<double>(bytes, at);
+    if (type == "uint16") return take<std::uint16_t>(bytes, at);
     if (type == "uint32") return take<std::uint32_t>(bytes, at);
+    if (type == "int32") return take<std::int32_t>(bytes, at);
+    if (type == "duration") return take<std::int32_t>(bytes, at) + 1e-9 * take<std::int32_t>(bytes, at + 4);
     if (type == "time") return take<std::uint32_t>(bytes, at) + 1e-9 * take<std::uint32_t>(bytes, at + 4);
     return bytes.at(at);
   }
@@ -159,15 +202,25 @@ class MessageLayout {
       put(static_cast<float>(value), bytes);
     } else if (type == "float64") {
       put(value, bytes);
+    } else if (type == "uint16") {
+      put(static_cast<std::uint16_t>(value), bytes);
     } else if (type == "uint32") {
       put(static_cast<std::uint32_t>(value), bytes);
+    } else if (type == "int32") {
+      put(static_cast<std::int32_t>(value), bytes);
     } else if (type == "time") {
       const double whole = std::floor(value);
       put(static_cast<std::uint32_t>(whole), bytes);
       put(static_cast<std::uint32_t>(std::lround((value - whole) * 1e9)), bytes);
-    } else {
+    } else if (type == "bool" || type == "uint8") {
       put(static_cast<std::uint8_t>(value), bytes);
+    } else {
+      throw std::logic_error("MessageLayout::make does not know the type " + type);
     }
+  }
+  static void putText(const std::string& text, std::vector<std::uint8_t>& bytes) {
+    put(static_cast<std::uint32_t>(text.size()), bytes);
+    bytes.insert(bytes.end(), text.begin(), text.end());
   }
 
   std::map<std::string, std::vector<std::string>> sections_;

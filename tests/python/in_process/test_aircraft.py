@@ -6,10 +6,11 @@ import pytest
 
 from support.room_table import ROOT
 from xplane_bridge.compiled import core
+from xplane_bridge.constants import FAILURE_KINDS, SURFACE_FAILURE_KINDS, FlightMode
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
 from xplane_bridge.emulator.simulator import Simulator
-from xplane_bridge.in_process.aircraft import arbiter_options
+from xplane_bridge.in_process.aircraft import AUTO, MANUAL, arbiter_options
 from xplane_bridge.in_process.failures import Failures, NotFlownError, model_surface
 from xplane_bridge.in_process.view import FlightView
 
@@ -33,6 +34,40 @@ def test_a_surface_fails_in_the_model_and_an_engine_by_its_dataref() -> None:
         failures.act({"name": "pitot_1", "kind": "failed", "value": None, "clear": False})
     with pytest.raises(NotFlownError, match="wing2l_ail1"):
         failures.act({"name": "aileron2_wing1_left", "kind": "stuck", "value": None, "clear": False})
+
+
+def test_every_kind_of_the_service_breaks_a_surface_in_the_model() -> None:
+    assert {kind.value for kind in SurfaceFaultKind} == set(SURFACE_FAILURE_KINDS)
+    failures, controls = Failures(create_model("fixed_wing")), Controls()
+    for kind in SURFACE_FAILURE_KINDS:
+        failures.act({"name": "aileron1_wing2_left", "kind": kind, "value": 0.5, "clear": False})
+        failures.apply(controls, 1 / 60)
+        assert controls.surface_faults["wing2l_ail1"].kind.value == kind
+    with pytest.raises(NotFlownError, match="kind is missing"):  # of FAILURE_KINDS the one that is for other parts
+        failures.act({"name": "aileron1_wing2_left", "kind": FAILURE_KINDS[-1], "value": None, "clear": False})
+
+
+@pytest.mark.parametrize(("rate_deg_s", "moved_deg"), [(3.0, 0.3), (150.0, 7.0)])
+def test_a_slow_surface_moves_at_the_rate_of_the_request(rate_deg_s: float, moved_deg: float) -> None:
+    """In 0.1 s by a tenth of `value` [deg/s], as in SetFailure, and no faster than a healthy one: 70 deg/s."""
+    model = create_model("fixed_wing")
+    failures, controls = Failures(model), model.reset(InitialState())
+    name = "wing2l_ail1"
+    before = model.step(1 / 60, controls).surfaces_deg[name]
+    failures.act({"name": "aileron1_wing2_left", "kind": "slow", "value": rate_deg_s, "clear": False})
+    controls.roll = 1.0
+    for _ in range(6):
+        failures.apply(controls, 1 / 60)
+        after = model.step(1 / 60, controls).surfaces_deg[name]
+    assert abs(after - before) == pytest.approx(moved_deg)
+
+
+@pytest.mark.parametrize(("kind", "value"), [("slow", None), ("slow", 0.0), ("reduced", None), ("reduced", 1.5)])
+def test_a_value_that_tx_node_refuses_is_refused_in_process(kind: str, value: object) -> None:
+    with pytest.raises(NotFlownError, match=f"value is {value}; expected"):
+        Failures(create_model("fixed_wing")).act(
+            {"name": "aileron1_wing2_left", "kind": kind, "value": value, "clear": False}
+        )
 
 
 def test_surfaces_have_the_names_of_the_core() -> None:
@@ -84,3 +119,8 @@ def test_the_options_of_the_arbiter_are_those_of_the_files() -> None:
     assert options["channels"]["flaps"] == {"slew": 0.5}
     assert options["command_timeout"] == 0.5
     assert core.ControlArbiter(options, 0.0).mode == 1
+
+
+def test_modes_are_plain_numbers_of_the_message() -> None:
+    assert (MANUAL, AUTO) == (FlightMode.MANUAL, FlightMode.AUTO)
+    assert (type(MANUAL), type(AUTO)) == (int, int)

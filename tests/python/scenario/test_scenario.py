@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from support.emulator_fixture import EmulatorFixture
+from xplane_bridge.constants import EXCITATION_KINDS
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import (
     FlightSample,
@@ -313,6 +314,27 @@ def test_sines_stay_in_bounds_and_repeat_by_seed(kind):
     assert max(values) - min(values) > 0.3
     assert values == [excitations.value(dict(parameters), i * 0.01) for i in range(1000)]
     assert excitations.value(parameters, 10.0) == excitations.value(parameters, -0.1) == 0.0
+
+
+def test_every_kind_of_the_service_is_played_and_each_as_itself():
+    given = {"amplitude": 1.0, "duration": 2.0, "frequency": 0.1, "frequency_end": 2.0, "seed": 0}
+    played = {
+        kind: tuple(excitations.value({"kind": kind, **given}, i * 0.1) for i in range(20)) for kind in EXCITATION_KINDS
+    }
+    assert len(set(played.values())) == len(EXCITATION_KINDS) == 4
+
+
+def test_an_unknown_kind_is_refused_and_not_played_as_a_multisine():
+    parameters = {
+        "kind": "square",
+        "amplitude": 1.0,
+        "duration": 2.0,
+        "frequency": 0.1,
+        "frequency_end": 2.0,
+        "seed": 0,
+    }
+    with pytest.raises(ScenarioError, match="'square'; expected doublet, 3-2-1-1, multisine or chirp"):
+        excitations.value(parameters, 0.5)
 
 
 # --- the emulator's pilot ---

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 namespace xplane_bridge {
 namespace {
@@ -53,6 +55,15 @@ void expectVector(const Vector& v, double x, double y, double z, double toleranc
   EXPECT_NEAR(v.x, x, tolerance);
   EXPECT_NEAR(v.y, y, tolerance);
   EXPECT_NEAR(v.z, z, tolerance);
+}
+
+template <class Covariance>
+void expectDiagonal(const Covariance& covariance, const std::vector<double>& diagonal) {
+  const std::size_t size = diagonal.size();
+  ASSERT_EQ(covariance.size(), size * size);
+  for (std::size_t i = 0; i < covariance.size(); ++i) {
+    EXPECT_EQ(covariance[i], i % (size + 1) == 0 ? diagonal[i / (size + 1)] : 0.0) << "[" << i << "]";
+  }
 }
 
 TEST(Conversions, StampKeepsNanoseconds) {
@@ -237,6 +248,87 @@ TEST(Conversions, NothingIsFilledWhileAnInputIsInvalid) {
   EXPECT_FALSE(toNavSatFix(without(core::FlightState::kValidPosition), 0.0, FrameNames(), &fix));
   geometry_msgs::TwistWithCovarianceStamped wind;
   EXPECT_FALSE(toWind(without(core::FlightState::kValidWind), kMap, FrameNames(), &wind));
+}
+
+TEST(Conversions, EachIsStampedWithTheTimeOfItsState) {
+  const core::FlightState state = sampleState();
+  const ros::Time stamp = toRosTime(state.stamp_ns);
+  nav_msgs::Odometry odometry;
+  ASSERT_TRUE(toOdometry(state, kMap, FrameNames(), &odometry));
+  EXPECT_EQ(odometry.header.stamp, stamp);
+  geometry_msgs::TransformStamped transform;
+  ASSERT_TRUE(toTransform(state, kMap, FrameNames(), &transform));
+  EXPECT_EQ(transform.header.stamp, stamp);
+  sensor_msgs::Imu imu;
+  ASSERT_TRUE(toImu(state, FrameNames(), &imu));
+  EXPECT_EQ(imu.header.stamp, stamp);
+  sensor_msgs::NavSatFix fix;
+  ASSERT_TRUE(toNavSatFix(state, 0.0, FrameNames(), &fix));
+  EXPECT_EQ(fix.header.stamp, stamp);
+  geometry_msgs::TwistWithCovarianceStamped wind;
+  ASSERT_TRUE(toWind(state, kMap, FrameNames(), &wind));
+  EXPECT_EQ(wind.header.stamp, stamp);
+  sensor_msgs::NavSatFix origin;
+  toOrigin(kMap.origin(), state.stamp_ns, 0.0, FrameNames(), &origin);
+  EXPECT_EQ(origin.header.stamp, stamp);
+  EXPECT_EQ(baseLinkFrdTransform(FrameNames(), stamp).header.stamp, stamp);
+  EXPECT_EQ(mapNedTransform(FrameNames(), stamp).header.stamp, stamp);
+}
+
+TEST(Conversions, VariancesAreTheResolutionOfEachQuantity) {
+  const core::FlightState state = sampleState();
+  nav_msgs::Odometry odometry;
+  ASSERT_TRUE(toOdometry(state, kMap, FrameNames(), &odometry));
+  expectDiagonal(odometry.pose.covariance, {1e-5, 1e-5, 1e-5, 1e-10, 1e-10, 1e-10});
+  expectDiagonal(odometry.twist.covariance, {1e-8, 1e-8, 1e-8, 1e-10, 1e-10, 1e-10});
+  sensor_msgs::Imu imu;
+  ASSERT_TRUE(toImu(state, FrameNames(), &imu));
+  expectDiagonal(imu.orientation_covariance, {1e-10, 1e-10, 1e-10});
+  expectDiagonal(imu.angular_velocity_covariance, {1e-10, 1e-10, 1e-10});
+  expectDiagonal(imu.linear_acceleration_covariance, {1e-8, 1e-8, 1e-8});
+  geometry_msgs::TwistWithCovarianceStamped wind;
+  ASSERT_TRUE(toWind(state, kMap, FrameNames(), &wind));
+  expectDiagonal(wind.twist.covariance, {1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0});
+}
+
+TEST(Conversions, VarianceOfThePositionGoesByItsSource) {
+  using Source = core::PositionSource;
+  for (const auto& [source, variance] : std::vector<std::pair<Source, double>>{{Source::kLocal, 1e-5},
+                                                                               {Source::kLocalUnchecked, 1e-5},
+                                                                               {Source::kRpos, 1e-4},
+                                                                               {Source::kXpc, 1e-4},
+                                                                               {Source::kFloat32, 0.25}}) {
+    SCOPED_TRACE(static_cast<int>(source));
+    core::FlightState state = sampleState();
+    state.position_source = source;
+    sensor_msgs::NavSatFix fix;
+    ASSERT_TRUE(toNavSatFix(state, 0.0, FrameNames(), &fix));
+    expectDiagonal(fix.position_covariance, {variance, variance, variance});
+    EXPECT_EQ(fix.position_covariance_type, sensor_msgs::NavSatFix::COVARIANCE_TYPE_DIAGONAL_KNOWN);
+    nav_msgs::Odometry odometry;
+    ASSERT_TRUE(toOdometry(state, kMap, FrameNames(), &odometry));
+    EXPECT_EQ(odometry.pose.covariance[0], variance);
+  }
+}
+
+TEST(Conversions, FixAndOriginSayThatTheyAreAFixOfGps) {
+  sensor_msgs::NavSatFix fix, origin;
+  fix.status.status = origin.status.status = sensor_msgs::NavSatStatus::STATUS_NO_FIX;
+  ASSERT_TRUE(toNavSatFix(sampleState(), 0.0, FrameNames(), &fix));
+  toOrigin(kMap.origin(), 0, 0.0, FrameNames(), &origin);
+  for (const sensor_msgs::NavSatFix& each : {fix, origin}) {
+    EXPECT_EQ(each.status.status, sensor_msgs::NavSatStatus::STATUS_FIX);
+    EXPECT_EQ(each.status.service, sensor_msgs::NavSatStatus::SERVICE_GPS);
+    EXPECT_EQ(each.position_covariance_type, sensor_msgs::NavSatFix::COVARIANCE_TYPE_DIAGONAL_KNOWN);
+  }
+  EXPECT_EQ(origin.longitude, 127.0);
+  expectDiagonal(origin.position_covariance, {0.0, 0.0, 0.0});
+}
+
+TEST(Conversions, ATransformHasTheRotationAndTranslationItIsMadeOf) {
+  const geometry_msgs::Transform transform = toTransform(Eigen::Quaterniond(0.5, 0.1, -0.7, 0.5), {1.0, 2.0, 3.0});
+  expectVector(transform.translation, 1.0, 2.0, 3.0);
+  expectQuaternion(transform.rotation, 0.5, 0.1, -0.7, 0.5);
 }
 
 TEST(Conversions, StaticFramesSwapTheAxes) {

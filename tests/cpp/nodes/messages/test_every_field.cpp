@@ -9,7 +9,7 @@
 #include <set>
 
 #include "datagram.hpp"
-#include "message_fields.hpp"
+#include "expected_fields.hpp"
 #include "xplane_bridge/core/state/air_data.hpp"
 #include "xplane_bridge/core/state/state_assembler.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
@@ -36,10 +36,6 @@ const Case kCases[] = {{core::kXPlane11, Transport::kRref},
 std::string described(const Case& c) {
   return std::to_string(c.version.number) + (c.transport == Transport::kRref ? " rref" : " data");
 }
-
-// Flags cannot differ in one message; over kPasses messages each has a pattern of its own.
-constexpr unsigned kPasses = 3;
-bool flag(std::size_t number, unsigned pass) { return ((number + 1) >> pass & 1U) != 0; }
 
 /// What X-Plane sends for one group: a number for each dataref and slot, and what it is in the table's fields.
 class Wire {
@@ -125,35 +121,6 @@ class Wire {
   MessageValues sent_;
   int last_ = 3000;  // no bits of `valid` are as large and as odd
 };
-
-/// Every field of the message against its expected value, and every one of these against all others.
-void expectFields(const MessageLayout& layout, const MessageValues& actual, const MessageValues& expected,
-                  const std::set<std::string>& not_distinct = {}) {
-  std::map<std::vector<double>, std::string> seen;
-  for (const std::string& name : layout.fields()) {
-    if (layout.leaf(name).type == "string" || name == "header.seq") continue;
-    SCOPED_TRACE(name);
-    const auto want = expected.find(name);
-    if (want == expected.end()) {
-      ADD_FAILURE() << "nothing was expected of it: a field that is computed is to be expected here";
-      continue;
-    }
-    const std::vector<double>& values = actual.at(name);
-    ASSERT_LE(want->second.size(), values.size());
-    const bool single = layout.leaf(name).type == "float32";
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const double value = i < want->second.size() ? want->second[i] : std::nan("");
-      if (std::isnan(value)) {
-        EXPECT_TRUE(std::isnan(values[i])) << "[" << i << "] is " << values[i] << ", expected nothing there";
-      } else {
-        EXPECT_NEAR(values[i], value, std::abs(value) * (single ? 1e-7 : 1e-12) + 1e-9) << "[" << i << "]";
-      }
-    }
-    if (layout.leaf(name).type == "bool" || not_distinct.count(name) != 0) continue;
-    const auto [other, is_new] = seen.try_emplace(want->second, name);
-    EXPECT_TRUE(is_new) << "has the same number as " << other->second << ": swapping them would not be noticed";
-  }
-}
 
 // --- mission messages ---
 
