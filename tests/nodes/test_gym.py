@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any, Tuple
 
 import numpy as np
 import pytest
 
+from support.room_table import ROOT
 from xplane_bridge.emulator.flight.flight_model import ModelState
 from xplane_bridge.gym import FlyEnv
 from xplane_bridge.gym.spaces import FIELDS
@@ -53,3 +59,21 @@ def test_an_episode_over_the_nodes_is_the_one_in_process(arguments: dict) -> Non
             assert bridged[:, i] == pytest.approx(alone[:, i], rel=0.0, abs=WORKED_OUT[field]), name
         else:
             assert np.array_equal(bridged[:, i], alone[:, i]), name
+
+
+@pytest.mark.nightly
+def test_what_the_worked_example_has_trained_flies_over_the_bridge_as_in_process(tmp_path: Path) -> None:
+    policy = str(tmp_path / "policy.npy")
+
+    def run(*arguments: str) -> str:
+        command = [sys.executable, str(ROOT / "docs/examples/wings_level/wings_level"), *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    run("train", policy, "--generations", "1", "--workers", str(os.cpu_count() or 1))
+    alone, bridged = run("fly", policy).splitlines(), run("fly", policy, "--bridge", "ros").splitlines()
+    assert len(alone) == 10
+    assert bridged == alone[:1]
+    trained, free = map(float, re.findall(r"([\d.]+) deg", bridged[0]))
+    assert trained != free
