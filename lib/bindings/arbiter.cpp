@@ -1,11 +1,12 @@
 // ControlArbiter for Python: the class that tx_node flies with, fed with numbers as they are after their way through
 // ControlCommand.msg (float32) and giving them as they go to X-Plane (float32).
-#include "xplane_bridge/bindings/python_object.hpp"
+#include "xplane_bridge/bindings/python_type.hpp"
 
 #include <algorithm>
 #include <array>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "xplane_bridge/core/control/control_arbiter.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
@@ -14,12 +15,17 @@ namespace xplane_bridge::bindings {
 namespace {
 
 struct Arbiter {
-  PyObject base;
-  core::ControlArbiter* arbiter;
-  std::array<PyObject*, core::kChannelCount>* names;  // owned strings
+  core::ControlArbiter arbiter;
+  std::array<Object, core::kChannelCount> names;  // of its channels
+
+  Arbiter(core::ArbiterOptions options, double now) : arbiter(std::move(options), now) {
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      names[i] = Object(PyUnicode_FromString(core::channelName(static_cast<core::Channel>(i)).c_str()));
+    }
+  }
 };
 
-Arbiter* self(PyObject* object) { return reinterpret_cast<Arbiter*>(object); }
+Arbiter& self(PyObject* object) { return ownedBy<Arbiter>(object); }
 
 double rounded(double value) { return static_cast<double>(static_cast<float>(value)); }
 
@@ -143,34 +149,12 @@ core::ControlCommand readCommand(PyObject* dictionary) {
   return out;
 }
 
-void destroy(PyObject* object) {
-  delete self(object)->arbiter;
-  if (self(object)->names) {
-    for (PyObject* name : *self(object)->names) Py_XDECREF(name);
-    delete self(object)->names;
-  }
-  PyTypeObject* type = Py_TYPE(object);
-  type->tp_free(object);
-  Py_DECREF(type);
-}
-
 PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* /*keywords*/) {
   return guarded([&]() -> PyObject* {
     PyObject* options = nullptr;
     double now = 0.0;
     if (!PyArg_ParseTuple(arguments, "Od", &options, &now)) throw PythonError{};
-    auto arbiter = std::make_unique<core::ControlArbiter>(readOptions(options), now);
-    Object object(type->tp_alloc(type, 0));
-    self(object.get())->arbiter = arbiter.release();
-    auto* names = new std::array<PyObject*, core::kChannelCount>();
-    self(object.get())->names = names;
-    for (std::size_t i = 0; i < core::kChannelCount; ++i) {
-      (*names)[i] = PyUnicode_FromString(core::channelName(static_cast<core::Channel>(i)).c_str());
-      if (!(*names)[i]) throw PythonError{};
-    }
-    PyObject* out = object.get();
-    Py_INCREF(out);
-    return out;
+    return makeOwner(type, std::make_unique<Arbiter>(readOptions(options), now));
   });
 }
 
@@ -180,7 +164,7 @@ PyObject* command(PyObject* object, PyObject* arguments) {
     PyObject* values = nullptr;
     double now = 0.0;
     if (!PyArg_ParseTuple(arguments, "lOd", &mode, &values, &now)) throw PythonError{};
-    const auto refusal = self(object)->arbiter->onCommand(modeOf(mode), readCommand(values), now);
+    const auto refusal = self(object).arbiter.onCommand(modeOf(mode), readCommand(values), now);
     return refusal ? PyUnicode_FromString(refusal->text.c_str()) : none();
   });
 }
@@ -191,7 +175,7 @@ PyObject* setMode(PyObject* object, PyObject* arguments) {
     const char *who = nullptr, *reason = nullptr;
     double now = 0.0;
     if (!PyArg_ParseTuple(arguments, "lssd", &mode, &who, &reason, &now)) throw PythonError{};
-    self(object)->arbiter->setMode(modeOf(mode), who, reason, now);
+    self(object).arbiter.setMode(modeOf(mode), who, reason, now);
     return none();
   });
 }
@@ -212,29 +196,27 @@ PyObject* step(PyObject* object, PyObject* arguments) {
       if (excitation.channels.none()) throw std::invalid_argument("\"" + wanted + "\" is no channel");
       excitation.values.fill(value);
     }
-    const core::ArbitratedControls& controls = self(object)->arbiter->step(now, excitation);
+    const core::ArbitratedControls& controls = self(object).arbiter.step(now, excitation);
     Object out(PyDict_New());
     for (std::size_t i = 0; i < core::kChannelCount; ++i) {
       if (!controls.active.test(i)) continue;
       const Object sent = makeNumber(core::wireValue(static_cast<core::Channel>(i), controls.values[i]));
-      check(PyDict_SetItem(out.get(), (*self(object)->names)[i], sent.get()));
+      check(PyDict_SetItem(out.get(), self(object).names[i].get(), sent.get()));
     }
-    PyObject* result = out.get();
-    Py_INCREF(result);
-    return result;
+    return out.release();
   });
 }
 
 PyObject* getMode(PyObject* object, void* /*closure*/) {
-  return PyLong_FromLong(static_cast<long>(self(object)->arbiter->status().mode));
+  return PyLong_FromLong(static_cast<long>(self(object).arbiter.status().mode));
 }
 
 PyObject* getFailsafe(PyObject* object, void* /*closure*/) {
-  return PyBool_FromLong(self(object)->arbiter->status().failsafe ? 1 : 0);
+  return PyBool_FromLong(self(object).arbiter.status().failsafe ? 1 : 0);
 }
 
 PyObject* getReason(PyObject* object, void* /*closure*/) {
-  return PyUnicode_FromString(self(object)->arbiter->status().reason.c_str());
+  return PyUnicode_FromString(self(object).arbiter.status().reason.c_str());
 }
 
 PyMethodDef methods[] = {
@@ -259,22 +241,18 @@ char description[] =
 
 PyType_Slot slots[] = {
     {Py_tp_new, reinterpret_cast<void*>(create)},
-    {Py_tp_dealloc, reinterpret_cast<void*>(destroy)},
+    {Py_tp_dealloc, reinterpret_cast<void*>(destroyOwner<Arbiter>)},
     {Py_tp_methods, methods},
     {Py_tp_getset, properties},
     {Py_tp_doc, description},
     {0, nullptr},
 };
 
-PyType_Spec specification = {"xplane_bridge._core.ControlArbiter", sizeof(Arbiter), 0, Py_TPFLAGS_DEFAULT, slots};
+PyType_Spec specification = {"xplane_bridge._core.ControlArbiter", sizeof(Owner<Arbiter>), 0, Py_TPFLAGS_DEFAULT,
+                             slots};
 
 }  // namespace
 
-void addArbiter(PyObject* module) {
-  Object type(PyType_FromSpec(&specification));
-  PyObject* owned = type.get();
-  Py_INCREF(owned);
-  check(PyModule_AddObject(module, "ControlArbiter", owned));
-}
+void addArbiter(PyObject* module) { addType(module, "ControlArbiter", &specification); }
 
 }  // namespace xplane_bridge::bindings

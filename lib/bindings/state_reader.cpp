@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "xplane_bridge/bindings/python_property.hpp"
+#include "xplane_bridge/bindings/python_type.hpp"
 #include "xplane_bridge/bindings/twin_physics.hpp"
 
 namespace xplane_bridge::bindings {
@@ -203,34 +204,19 @@ class Reader {
          inch_ = 0.0, rankine_ = 0.0, earth_radius_ = 0.0, gravity_ = 0.0;
 };
 
-struct StateReader {
-  PyObject base;
-  Reader* reader;
-};
-
 PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* /*keywords*/) {
   return guarded([&]() -> PyObject* {
     PyObject* getters = nullptr;
     if (!PyArg_ParseTuple(arguments, "O", &getters)) throw PythonError{};
-    auto reader = std::make_unique<Reader>(getters);
-    Object object(type->tp_alloc(type, 0));
-    reinterpret_cast<StateReader*>(object.get())->reader = reader.release();
-    return object.release();
+    return makeOwner(type, std::make_unique<Reader>(getters));
   });
-}
-
-void destroy(PyObject* object) {
-  delete reinterpret_cast<StateReader*>(object)->reader;
-  PyTypeObject* type = Py_TYPE(object);
-  type->tp_free(object);
-  Py_DECREF(type);
 }
 
 PyObject* read(PyObject* object, PyObject* arguments) {
   return guarded([&]() -> PyObject* {
     PyObject *state = nullptr, *gravity_force = nullptr;
     if (!PyArg_ParseTuple(arguments, "OO", &state, &gravity_force)) throw PythonError{};
-    reinterpret_cast<StateReader*>(object)->reader->read(state, gravity_force);
+    ownedBy<Reader>(object).read(state, gravity_force);
     return none();
   });
 }
@@ -245,21 +231,16 @@ char description[] =
 
 PyType_Slot slots[] = {
     {Py_tp_new, reinterpret_cast<void*>(create)},
-    {Py_tp_dealloc, reinterpret_cast<void*>(destroy)},
+    {Py_tp_dealloc, reinterpret_cast<void*>(destroyOwner<Reader>)},
     {Py_tp_methods, methods},
     {Py_tp_doc, description},
     {0, nullptr},
 };
 
-PyType_Spec specification = {"xplane_bridge._core.StateReader", sizeof(StateReader), 0, Py_TPFLAGS_DEFAULT, slots};
+PyType_Spec specification = {"xplane_bridge._core.StateReader", sizeof(Owner<Reader>), 0, Py_TPFLAGS_DEFAULT, slots};
 
 }  // namespace
 
-void addStateReader(PyObject* module) {
-  Object type(PyType_FromSpec(&specification));
-  PyObject* owned = type.get();
-  Py_INCREF(owned);
-  check(PyModule_AddObject(module, "StateReader", owned));
-}
+void addStateReader(PyObject* module) { addType(module, "StateReader", &specification); }
 
 }  // namespace xplane_bridge::bindings

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "xplane_bridge/bindings/python_object.hpp"
+#include "xplane_bridge/bindings/python_type.hpp"
 #include "xplane_bridge/bindings/twin_physics.hpp"
 
 namespace xplane_bridge::bindings {
@@ -276,31 +276,12 @@ class Loop {
   bool crashed_ = false, blown_ = false;
 };
 
-struct TwinLoop {
-  PyObject base;
-  Loop* loop;
-};
-
-Loop& loopOf(PyObject* object) { return *reinterpret_cast<TwinLoop*>(object)->loop; }
-
 PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* /*keywords*/) {
   return guarded([&]() -> PyObject* {
     PyObject* model = nullptr;
     if (!PyArg_ParseTuple(arguments, "O", &model)) throw PythonError{};
-    auto loop = std::make_unique<Loop>(model);
-    Object object(type->tp_alloc(type, 0));
-    reinterpret_cast<TwinLoop*>(object.get())->loop = loop.release();
-    PyObject* out = object.get();
-    Py_INCREF(out);
-    return out;
+    return makeOwner(type, std::make_unique<Loop>(model));
   });
-}
-
-void destroy(PyObject* object) {
-  delete reinterpret_cast<TwinLoop*>(object)->loop;
-  PyTypeObject* type = Py_TYPE(object);
-  type->tp_free(object);
-  Py_DECREF(type);
 }
 
 // (fault or -1, value or None, target or None, overridden) for each surface, or just the targets.
@@ -341,7 +322,7 @@ PyObject* fly(PyObject* object, PyObject* arguments) {
     int count = 0;
     double dt = 0.0;
     if (!PyArg_ParseTuple(arguments, "OidOO", &model, &count, &dt, &orders, &throttles)) throw PythonError{};
-    Loop& loop = loopOf(object);
+    Loop& loop = ownedBy<Loop>(object);
     loop.fly(model, count, dt, readOrders(orders, loop.surfaces()), readThrottles(throttles, loop.engines()));
     return none();
   });
@@ -353,7 +334,7 @@ PyObject* settle(PyObject* object, PyObject* arguments) {
     int count = 0;
     double dt = 0.0;
     if (!PyArg_ParseTuple(arguments, "OidO", &model, &count, &dt, &throttles)) throw PythonError{};
-    Loop& loop = loopOf(object);
+    Loop& loop = ownedBy<Loop>(object);
     loop.settle(model, count, dt, readThrottles(throttles, loop.engines()));
     return none();
   });
@@ -372,21 +353,16 @@ char description[] = "TwinLoop(model): the steps of a FixedWing between two fram
 
 PyType_Slot slots[] = {
     {Py_tp_new, reinterpret_cast<void*>(create)},
-    {Py_tp_dealloc, reinterpret_cast<void*>(destroy)},
+    {Py_tp_dealloc, reinterpret_cast<void*>(destroyOwner<Loop>)},
     {Py_tp_methods, methods},
     {Py_tp_doc, description},
     {0, nullptr},
 };
 
-PyType_Spec specification = {"xplane_bridge._core.TwinLoop", sizeof(TwinLoop), 0, Py_TPFLAGS_DEFAULT, slots};
+PyType_Spec specification = {"xplane_bridge._core.TwinLoop", sizeof(Owner<Loop>), 0, Py_TPFLAGS_DEFAULT, slots};
 
 }  // namespace
 
-void addTwinLoop(PyObject* module) {
-  Object type(PyType_FromSpec(&specification));
-  PyObject* owned = type.get();
-  Py_INCREF(owned);
-  check(PyModule_AddObject(module, "TwinLoop", owned));
-}
+void addTwinLoop(PyObject* module) { addType(module, "TwinLoop", &specification); }
 
 }  // namespace xplane_bridge::bindings

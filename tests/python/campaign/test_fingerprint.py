@@ -7,7 +7,6 @@ from typing import Any, Dict, Iterator, Set
 
 import pytest
 
-import xplane_bridge
 from xplane_bridge.campaign import fingerprint as module
 from xplane_bridge.campaign.definition import Campaign, parse_campaign
 from xplane_bridge.campaign.fingerprint import CPU, differences, fingerprint
@@ -46,8 +45,7 @@ def _forgets() -> Iterator[None]:
 
 def test_every_source_of_the_package_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "xplane_bridge"
-    source = Path(xplane_bridge.__file__).parent
-    shutil.copytree(source, package, ignore=shutil.ignore_patterns("__pycache__", "*.so", "*.txt"))
+    shutil.copytree(module._PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "*.so", "*.txt"))
     before = fresh(campaign())
     monkeypatch.setattr(module, "_PACKAGE", package)
     now = fresh(campaign())

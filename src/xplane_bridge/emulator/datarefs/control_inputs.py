@@ -42,9 +42,7 @@ _HANDLES = {
 _THROTTLE_ROW = 25
 #: Rudder that auto-coordination gives for sideslip (wind from the right positive: the nose goes right).
 _COORDINATION_PER_DEG = 0.1
-_LEFT_BRAKE, _RIGHT_BRAKE = _COCKPIT + "left_brake_ratio", _COCKPIT + "right_brake_ratio"
-#: In the order in which `_read_handles` takes them.
-_READ_HANDLES = (
+_HANDLE_NAMES = (
     _COCKPIT + "elevator_trim",
     _COCKPIT + "aileron_trim",
     _COCKPIT + "rudder_trim",
@@ -52,6 +50,11 @@ _READ_HANDLES = (
     _COCKPIT + "speedbrake_ratio",
     _COCKPIT + "gear_handle_down",
     _COCKPIT + "parking_brake_ratio",
+)
+_LEFT_BRAKE, _RIGHT_BRAKE = _COCKPIT + "left_brake_ratio", _COCKPIT + "right_brake_ratio"
+#: In the order in which `_read_handles` takes them.
+_READ_HANDLES = (
+    *_HANDLE_NAMES,
     _COCKPIT + "thrust_vector_ratio",
     "sim/cockpit2/switches/artificial_stability_on",
     _LEFT_BRAKE,
@@ -64,13 +67,7 @@ _LEVERS = (
     _ACTUATORS + "throttle_ratio",
     _ACTUATORS + "prop_ratio",
     _ACTUATORS + "mixture_ratio",
-    _COCKPIT + "elevator_trim",
-    _COCKPIT + "aileron_trim",
-    _COCKPIT + "rudder_trim",
-    _COCKPIT + "flap_ratio",
-    _COCKPIT + "speedbrake_ratio",
-    _COCKPIT + "gear_handle_down",
-    _COCKPIT + "parking_brake_ratio",
+    *_HANDLE_NAMES,
     _COCKPIT + "left_brake_ratio",
     _COCKPIT + "right_brake_ratio",
     _COCKPIT + "thrust_vector_ratio",
