@@ -162,7 +162,10 @@ MAY_USE_HOST_TIME = {
     "lib/nodes/recorder/lockstep_recorder.cpp": ("names a file by the date, as rosbag does", {"time(nullptr)"}),
     "include/xplane_bridge/nodes/tx/tx_node.hpp": ("shows its guardian that it runs", {"SteadyTimer"}),
     "lib/nodes/tx/tx_guard.cpp": ("the same, also while the node's clock stands", {"createSteadyTimer"}),
-    "lib/actuation/guardian.cpp": ("a process of its own: releases whatever clock the node had", {"hostClock("}),
+    "lib/actuation/guardian.cpp": (
+        "a process of its own, which releases whatever clock the node had, and the beat that it compares with that",
+        {"hostClock("},
+    ),
     "lib/vision/video_source.cpp": ("devices and files play in the host's time", {"steady_clock", "sleep_until"}),
     "lib/vision/x11_window_source.cpp": ("windows are drawn in the host's time", {"steady_clock"}),
 }
