@@ -6,6 +6,7 @@ import struct
 import xmlrpc.client
 from pathlib import Path
 
+from support.udp_packets import udp
 from xplane_bridge.wire_log.anonymous import Anonymiser, Disguise
 from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
 from xplane_bridge.wire_log.datagrams import datagram_in
@@ -16,15 +17,6 @@ BEACON = b"BECN\0\x01\x02" + struct.pack("<iiIH", 1, 115501, 1, 49000) + b"peter
 TARGET = b"ISE4\0" + struct.pack("<i", 64) + b"172.16.20.30\0".ljust(16, b"\0") + b"49003\0\0\0" + struct.pack("<i", 1)
 # A text in a field of its own, whose stand-in is longer.
 SHORT = b"x" + b"1.2.3.4".ljust(16, b"\0")
-
-
-def udp(source: tuple[str, int], to: tuple[str, int], payload: bytes) -> bytes:
-    def octets(address: str) -> bytes:
-        return bytes(int(part) for part in address.split("."))
-
-    body = struct.pack(">HHHH", source[1], to[1], 8 + len(payload), 0) + payload
-    head = bytes([0x45, 0]) + struct.pack(">HHHBBH", 20 + len(body), 0, 0, 64, 17, 0)
-    return head + octets(source[0]) + octets(to[0]) + body
 
 
 def about(shared: dict[str, object], own: dict[str, object]) -> str:

@@ -8,20 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from support.udp_packets import udp
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import CaptureError, Packet, write_pcapng
 from xplane_bridge.wire_log.own_log import OwnLog, part_after, replayable
 
 INTERFACES = [(147, "rx_node/notes", ""), (101, "rx_node/control", "port 50001"), (101, "rx_node/flight", "port 50002")]
-
-
-def udp(source: tuple[str, int], to: tuple[str, int], payload: bytes) -> bytes:
-    def octets(address: str) -> bytes:
-        return bytes(int(part) for part in address.split("."))
-
-    body = struct.pack(">HHHH", source[1], to[1], 8 + len(payload), 0) + payload
-    head = bytes([0x45, 0]) + struct.pack(">HHHBBH", 20 + len(body), 0, 0, 64, 17, 0)
-    return head + octets(source[0]) + octets(to[0]) + body
 
 
 XPLANE, OURS = ("10.0.0.1", 49000), ("10.0.0.2", 50002)

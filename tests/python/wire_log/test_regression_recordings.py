@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from support.udp_packets import udp
 from xplane_bridge.cli.wire import wire_replay
 from xplane_bridge.cli.wire.wire_replay import main
 from xplane_bridge.harness.processes import HarnessError
@@ -17,15 +18,6 @@ from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
 from xplane_bridge.wire_log.own_log import OwnLog
 
 XPLANE, OTHER, OURS = ("192.168.1.5", 49000), ("192.168.1.6", 49000), ("192.168.1.9", 50002)
-
-
-def udp(source: tuple[str, int], to: tuple[str, int], payload: bytes) -> bytes:
-    def octets(address: str) -> bytes:
-        return bytes(int(part) for part in address.split("."))
-
-    body = struct.pack(">HHHH", source[1], to[1], 8 + len(payload), 0) + payload
-    head = bytes([0x45, 0]) + struct.pack(">HHHBBH", 20 + len(body), 0, 0, 64, 17, 0)
-    return head + octets(source[0]) + octets(to[0]) + body
 
 
 def log(path: Path, first: int = 0, source: tuple[str, int] = XPLANE) -> Path:

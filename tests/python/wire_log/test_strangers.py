@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from support.udp_packets import udp
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import CaptureError, Packet, write_pcapng
 from xplane_bridge.wire_log.strangers import MAGIC, StrangersCapture
@@ -15,12 +16,7 @@ XPLANE, CLIENT, OTHER = ("192.168.1.5", 49000), ("192.168.1.9", 60001), ("192.16
 
 
 def frame(source: tuple[str, int], to: tuple[str, int], payload: bytes) -> bytes:
-    def octets(address: str) -> bytes:
-        return bytes(int(part) for part in address.split("."))
-
-    body = struct.pack(">HHHH", source[1], to[1], 8 + len(payload), 0) + payload
-    head = bytes([0x45, 0]) + struct.pack(">HHHBBH", 20 + len(body), 0, 0, 64, 17, 0)
-    return bytes(12) + b"\x08\x00" + head + octets(source[0]) + octets(to[0]) + body
+    return bytes(12) + b"\x08\x00" + udp(source, to, payload)
 
 
 def request(client: tuple[str, int], rate: int, index: int, path: str) -> bytes:
