@@ -57,7 +57,7 @@ class BuildWithMessageCode(build_ext):
 def compiled_module():
     """xplane_bridge._core, of the same files as lib/bindings/CMakeLists.txt makes it; left out without a compiler."""
     control = ("control_arbiter", "control_channels", "control_command", "control_rows")
-    bindings = ("arbiter", "datagrams", "module", "state_reader", "twin_loop", "twin_physics")
+    bindings = ("arbiter", "datagrams", "module", "state_reader", "twin_frame", "twin_loop", "twin_physics")
     sources = [f"lib/core/control/{name}.cpp" for name in control] + [f"lib/bindings/{name}.cpp" for name in bindings]
     # The same bits as Python's own arithmetic: nothing fused, and every function the C library's.
     exact = ["-ffp-contract=off", "-fno-builtin"]

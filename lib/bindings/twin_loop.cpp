@@ -1,4 +1,4 @@
-// The steps of the light twin between two frames, for FixedWing (emulator/aircraft/fixed_wing): reads surfaces,
+// A frame of the light twin, for FixedWing (emulator/aircraft/fixed_wing): reads surfaces,
 // engines, propellers and gusts from the Python objects, steps them with JSBSim through its own getters, setters and
 // `run`, and writes them back. The order of every writing and operation is the Python code's; of the readings, a height
 // is kept until the next `run`, because it costs JSBSim ten times another value.
@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "xplane_bridge/bindings/python_type.hpp"
+#include "xplane_bridge/bindings/twin_frame.hpp"
 #include "xplane_bridge/bindings/twin_physics.hpp"
 
 namespace xplane_bridge::bindings {
@@ -24,11 +25,6 @@ constexpr double kCrashWatch = 20.0;  // [m]
 constexpr double kStrutsWorkCosine = 0.5;
 constexpr double kThinnestAir = 1e-3;  // [kg/m3]
 
-struct Throttle {
-  double lever, propeller, mixture;
-  int fault;  // 0 none, 1 stopped, 2 seized
-};
-
 /// Attributes of the model itself, which the loop must not keep: the model has the loop.
 struct Names {
   static Object name(const char* text) { return Object(PyUnicode_InternFromString(text)); }
@@ -38,7 +34,7 @@ struct Names {
 
 class Loop {
  public:
-  explicit Loop(PyObject* model) {
+  explicit Loop(PyObject* model) : frame_(model) {
     const auto getters = [model](const char* name) { return items(attribute(model, name).get()); };
     const auto properties = [&getters](const char* name) {
       const std::vector<Object> methods = getters(name);
@@ -85,15 +81,15 @@ class Loop {
     temperature_unit_ = constant(units, "RANKINE_K");
   }
 
-  std::size_t engines() const { return engines_.size(); }
-  std::size_t surfaces() const { return surfaces_.size(); }
-
-  /// Flies `count` steps of `dt` [s]. What had been flown is written back also where JSBSim gives up.
-  void fly(PyObject* model, int count, double dt, const std::vector<SurfaceOrder>& orders,
-           const std::vector<Throttle>& throttles) {
+  /// Flies `count` steps of `substep` [s], in all `dt` [s]. What had been flown is written back also where JSBSim gives
+  /// up.
+  void fly(PyObject* model, int count, double substep, double dt, PyObject* controls) {
+    frame_.begin(model, dt, controls);
+    const std::vector<SurfaceOrder> orders = frame_.orders(model, controls);
+    const std::vector<Throttle> throttles = frame_.throttles(controls);
     read(model);
     try {
-      for (int i = 0; i < count; ++i) step(dt, orders, throttles);
+      for (int i = 0; i < count; ++i) step(substep, orders, throttles);
     } catch (const PythonError&) {
       PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
       PyErr_Fetch(&type, &value, &trace);
@@ -102,10 +98,14 @@ class Loop {
       throw;
     }
     write(model);
+    frame_.load(model);
   }
 
+  void fill(PyObject* model, PyObject* state, PyObject* controls) const { frame_.fill(model, state, controls); }
+
   /// FixedWing._settle_engines but for its end: the engines alone in the air as it passes now.
-  void settle(PyObject* model, int count, double dt, const std::vector<Throttle>& throttles) {
+  void settle(PyObject* model, int count, double dt, PyObject* controls) {
+    const std::vector<Throttle> throttles = frame_.throttles(controls);
     readEngines(model);
     const Air air = readAir(false);
     for (std::size_t i = 0; i < engines_.size(); ++i) {
@@ -253,6 +253,7 @@ class Loop {
     }
   }
 
+  const TwinFrame frame_;
   struct LoadSetter {
     Property setter;
     double factor;
@@ -284,72 +285,47 @@ PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* /*keywords*/
   });
 }
 
-// (fault or -1, value or None, target or None, overridden) for each surface, or just the targets.
-std::vector<SurfaceOrder> readOrders(PyObject* sequence, std::size_t count) {
-  std::vector<SurfaceOrder> out;
-  for (const Object& item : items(sequence)) {
-    SurfaceOrder order;
-    if (PyTuple_Check(item.get())) {
-      const std::vector<Object> parts = items(item.get());
-      order.fault = static_cast<SurfaceFault>(static_cast<int>(number(parts.at(0).get())));
-      if (parts.at(1).get() != Py_None) order.value = number(parts.at(1).get());
-      if (parts.at(2).get() != Py_None) order.target_deg = number(parts.at(2).get());
-      order.overridden = PyObject_IsTrue(parts.at(3).get()) == 1;
-    } else {
-      order.target_deg = number(item.get());
-    }
-    out.push_back(order);
-  }
-  if (out.size() != count) throw std::invalid_argument("expected an order for each surface");
-  return out;
-}
-
-// (lever, propeller, mixture, fault) for each engine.
-std::vector<Throttle> readThrottles(PyObject* sequence, std::size_t count) {
-  std::vector<Throttle> out;
-  for (const Object& item : items(sequence)) {
-    const std::vector<Object> parts = items(item.get());
-    out.push_back({number(parts.at(0).get()), number(parts.at(1).get()), number(parts.at(2).get()),
-                   static_cast<int>(number(parts.at(3).get()))});
-  }
-  if (out.size() != count) throw std::invalid_argument("expected levers for each engine");
-  return out;
-}
-
 PyObject* fly(PyObject* object, PyObject* arguments) {
   return guarded([&]() -> PyObject* {
-    PyObject *model = nullptr, *orders = nullptr, *throttles = nullptr;
+    PyObject *model = nullptr, *controls = nullptr;
     int count = 0;
-    double dt = 0.0;
-    if (!PyArg_ParseTuple(arguments, "OidOO", &model, &count, &dt, &orders, &throttles)) throw PythonError{};
-    Loop& loop = ownedBy<Loop>(object);
-    loop.fly(model, count, dt, readOrders(orders, loop.surfaces()), readThrottles(throttles, loop.engines()));
+    double substep = 0.0, dt = 0.0;
+    if (!PyArg_ParseTuple(arguments, "OiddO", &model, &count, &substep, &dt, &controls)) throw PythonError{};
+    ownedBy<Loop>(object).fly(model, count, substep, dt, controls);
     return none();
   });
 }
 
 PyObject* settle(PyObject* object, PyObject* arguments) {
   return guarded([&]() -> PyObject* {
-    PyObject *model = nullptr, *throttles = nullptr;
+    PyObject *model = nullptr, *controls = nullptr;
     int count = 0;
     double dt = 0.0;
-    if (!PyArg_ParseTuple(arguments, "OidO", &model, &count, &dt, &throttles)) throw PythonError{};
-    Loop& loop = ownedBy<Loop>(object);
-    loop.settle(model, count, dt, readThrottles(throttles, loop.engines()));
+    if (!PyArg_ParseTuple(arguments, "OidO", &model, &count, &dt, &controls)) throw PythonError{};
+    ownedBy<Loop>(object).settle(model, count, dt, controls);
+    return none();
+  });
+}
+
+PyObject* fill(PyObject* object, PyObject* arguments) {
+  return guarded([&]() -> PyObject* {
+    PyObject *model = nullptr, *state = nullptr, *controls = nullptr;
+    if (!PyArg_ParseTuple(arguments, "OOO", &model, &state, &controls)) throw PythonError{};
+    ownedBy<Loop>(object).fill(model, state, controls);
     return none();
   });
 }
 
 PyMethodDef methods[] = {
     {"fly", method(fly), METH_VARARGS,
-     "fly(model, count, dt, orders, levers): `count` JSBSim steps of `dt` [s]. `orders`: an angle [deg] for each "
-     "surface, "
-     "or (fault, value, target, overridden). `levers`: (throttle, propeller, mixture, fault) for each engine."},
-    {"settle", method(settle), METH_VARARGS, "settle(model, count, dt, levers): the engines alone, in the air of now."},
+     "fly(model, count, substep, dt, controls): a frame of `dt` [s] in `count` JSBSim steps of `substep` [s]."},
+    {"settle", method(settle), METH_VARARGS,
+     "settle(model, count, dt, controls): the engines alone, in the air of now."},
+    {"fill", method(fill), METH_VARARGS, "fill(model, state, controls): what the twin itself adds to a ModelState."},
     {nullptr, nullptr, 0, nullptr},
 };
 
-char description[] = "TwinLoop(model): the steps of a FixedWing between two frames, the same bits as in Python.";
+char description[] = "TwinLoop(model): the frames of a FixedWing, the same bits as in Python.";
 
 PyType_Slot slots[] = {
     {Py_tp_new, reinterpret_cast<void*>(create)},

@@ -22,9 +22,9 @@ class Property {
 
   double get() const { return number(call().get()); }
   void set(double value) const { (void)call(makeNumber(value).get()); }
-  Object call(PyObject* argument = nullptr) const {
-    PyObject* const arguments[] = {self_.get(), argument};
-    const std::size_t first = self_.get() ? 0 : 1, end = argument ? 2 : 1;
+  Object call(PyObject* argument = nullptr, PyObject* second = nullptr) const {
+    PyObject* const arguments[] = {self_.get(), argument, second};
+    const std::size_t first = self_.get() ? 0 : 1, end = second ? 3 : argument ? 2 : 1;
     return Object(vectorcall(function_.get(), arguments + first, end - first));
   }
 

@@ -11,7 +11,7 @@ import json
 import math
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Any, Optional, Sequence, TypeVar
+from typing import Any, Optional, Sequence, Tuple, TypeVar
 
 import jsbsim
 
@@ -62,6 +62,12 @@ DEEPEST_PLACE_M = 0.25
 
 _ROOT = Path(__file__).resolve().parents[1]  # holds aircraft/
 _T = TypeVar("_T")
+
+
+def substeps(dt: float) -> Tuple[int, float]:
+    """Number and length [s] of the JSBSim steps that fly `dt`."""
+    count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-6))
+    return count, dt / count
 
 
 class JsbsimModel:
@@ -237,8 +243,7 @@ class JsbsimModel:
         return self._read_state(controls)
 
     def _fly(self, dt: float, controls: Controls) -> None:
-        count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-6))
-        substep = dt / count
+        count, substep = substeps(dt)
         self._gear.move(dt, controls, math.hypot(self.state.v_north_mps, self.state.v_east_mps))
         self._correct_gravity()
         self._run_steps(count, substep, controls)
@@ -287,14 +292,18 @@ class JsbsimModel:
         s = self.state
         s.sim_time_s, s.terrain_elevation_m = self._time, self._terrain_m
         self._reader.read(s, self._gravity_force)
+        s.payload_kg, s.empty_mass_kg = self._payload_kg, self._empty_mass_kg
+        s.crashed = self._crashed
+        self._fill_parts(s, controls)
+        return s
+
+    def _fill_parts(self, s: ModelState, controls: Controls) -> None:
+        """What JSBSim does not know of the aircraft's parts: surfaces, tanks, wheels, and the subclass's own."""
         for actuator in self._surface_set.actuators:
             s.surfaces_deg[actuator.spec.name] = actuator.position_deg
         s.fuel_kg = list(self._fuel_kg)
-        s.payload_kg, s.empty_mass_kg = self._payload_kg, self._empty_mass_kg
         self._contacts.read(s, self._gear.position, self._gear.steering)
-        s.crashed = self._crashed
         self._fill_state(s, controls)
-        return s
 
     # ---- placing, saving
 

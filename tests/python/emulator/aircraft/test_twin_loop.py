@@ -86,9 +86,12 @@ def test_the_same_bits_as_in_python(
 def test_what_a_wrong_call_says() -> None:
     model = create_model("fixed_wing")
     loop = compiled.core.TwinLoop(model)
-    with pytest.raises(ValueError, match="an order for each surface"):
-        loop.fly(model, 1, 1 / 240, [0.0], [(0.5, 0.5, 1.0, 0)] * 2)
-    with pytest.raises(ValueError, match="levers for each engine"):
-        loop.fly(model, 1, 1 / 240, [0.0] * 9, [(0.5, 0.5, 1.0, 0)])
+    frame = (1, 1 / 240, 1 / 240)
+    with pytest.raises(ValueError, match="a member of EngineFault"):
+        loop.fly(model, *frame, Controls(engine_faults=[EngineFault.NONE, None]))
+    with pytest.raises(IndexError):
+        loop.fly(model, *frame, Controls(throttle=[0.5]))
+    with pytest.raises(AttributeError):
+        loop.fly(model, *frame, object())
     with pytest.raises(AttributeError):
         compiled.core.TwinLoop(object())

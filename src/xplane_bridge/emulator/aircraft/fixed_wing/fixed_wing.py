@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Sequence, Tuple
+from typing import Any, Sequence
 
 import numpy as np
 
@@ -19,10 +19,9 @@ from xplane_bridge.emulator.flight.flight_model import (
     ModelInfo,
     ModelState,
     Side,
-    SurfaceFaultKind,
     SurfaceKind,
 )
-from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel
+from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel, substeps
 from xplane_bridge.emulator.flight.jsbsim_state import FOOT_M, SLUG_FT3_KG_M3
 from xplane_bridge.emulator.flight.rotors import Governor, GovernorSpec, PistonEngine, PistonSpec, Rotor, RotorSpec
 
@@ -51,9 +50,6 @@ PROPELLER = {
 GOVERNOR = GovernorSpec(minimum_rpm=1400.0, maximum_rpm=2700.0, fine_deg=13.0, coarse_deg=38.0)
 ENGINE = PistonSpec(rated_power_w=134.2e3, rated_rpm=2700.0)
 ENGINE_ARM_M = 1.7
-
-_FAULT_NUMBERS = {kind: number for number, kind in enumerate(SurfaceFaultKind)}
-_ENGINE_FAULT_NUMBERS = {kind: number for number, kind in enumerate(EngineFault)}
 
 
 class FixedWing(JsbsimModel):
@@ -106,7 +102,7 @@ class FixedWing(JsbsimModel):
         self._governors = [Governor(GOVERNOR) for _ in self._rotors]
         self._engines = [PistonEngine(ENGINE) for _ in self._rotors]
         self._commands = (0.0, 0.0, 0.0)
-        # The same steps in C++, where they have been built: the same bits, some times as fast.
+        # The same frames in C++, where they have been built: the same bits, some times as fast.
         self._loop = None if compiled.core is None else compiled.core.TwinLoop(self)
 
     # ---- one step
@@ -130,34 +126,17 @@ class FixedWing(JsbsimModel):
             self._fuel_kg[i] = max(self._fuel_kg[i] - engine.fuel_flow * dt, 0.0)
 
     def _fly(self, dt: float, controls: Controls) -> None:
-        super()._fly(dt, controls)
-        self._apply_loading()
-
-    def _run_steps(self, count: int, substep: float, controls: Controls) -> None:
         if self._loop is None:
-            super()._run_steps(count, substep, controls)
+            super()._fly(dt, controls)
+            self._apply_loading()
         else:
-            self._loop.fly(self, count, substep, self._orders(controls), self._levers(controls))
+            self._loop.fly(self, *substeps(dt), dt, controls)
 
-    def _orders(self, controls: Controls) -> Sequence[Any]:
-        """What the surfaces are to do in this frame, as `TwinLoop.fly` takes it."""
-        targets = self._mix(controls)
-        faults, overridden = controls.surface_faults, controls.override_surfaces
-        if not faults and not overridden:
-            return targets
-        orders = []
-        for spec, target in zip(self.surfaces, targets):
-            fault = faults.get(spec.name)
-            number, value = (-1, None) if fault is None else (_FAULT_NUMBERS[fault.kind], fault.value)
-            orders.append((number, value, controls.surface_deg.get(spec.name) if overridden else target, overridden))
-        return orders
-
-    def _levers(self, controls: Controls) -> Sequence[Tuple[float, float, float, int]]:
-        throttles = controls.throttle_use if controls.override_throttles else controls.throttle
-        return [
-            (throttles[i], controls.propeller[i], controls.mixture[i], _ENGINE_FAULT_NUMBERS[controls.engine_faults[i]])
-            for i in range(self.info.engine_count)
-        ]
+    def _fill_parts(self, s: ModelState, controls: Controls) -> None:
+        if self._loop is None:
+            super()._fill_parts(s, controls)
+        else:
+            self._loop.fill(self, s, controls)
 
     def _mix(self, controls: Controls) -> Sequence[float]:
         """Where the controls want the surfaces, in the order of ``surfaces`` [deg]."""
@@ -222,7 +201,7 @@ class FixedWing(JsbsimModel):
         if self._loop is None:
             self._settle_in_python(controls, int(seconds / dt), dt)
         else:
-            self._loop.settle(self, int(seconds / dt), dt, self._levers(controls))
+            self._loop.settle(self, int(seconds / dt), dt, controls)
         _, temperature = self._outside_air()
         for engine in self._engines:
             engine.warm_up(temperature, max(engine.power / ENGINE.rated_power_w, 0.0))
