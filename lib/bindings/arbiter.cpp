@@ -18,7 +18,7 @@ struct Arbiter {
   core::ControlArbiter arbiter;
   std::array<Object, core::kChannelCount> names;  // of its channels
 
-  Arbiter(core::ArbiterOptions options, double now) : arbiter(std::move(options), now) {
+  Arbiter(const core::ArbiterOptions& options, double now) : arbiter(options, now) {
     for (std::size_t i = 0; i < names.size(); ++i) {
       names[i] = Object(PyUnicode_FromString(core::channelName(static_cast<core::Channel>(i)).c_str()));
     }

@@ -16,7 +16,7 @@ PyModuleDef definition = {
 
 }  // namespace
 
-PyMODINIT_FUNC PyInit__core() {
+PyMODINIT_FUNC PyInit__core() {  // NOLINT(bugprone-reserved-identifier,readability-identifier-naming): Python's
   return xplane_bridge::bindings::guarded([] {
     xplane_bridge::bindings::Object module(PyModule_Create(&definition));
     xplane_bridge::bindings::addArbiter(module.get());

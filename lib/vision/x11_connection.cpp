@@ -143,7 +143,7 @@ std::vector<xcb_window_t> X11Connection::allWindows() const {
 bool X11Connection::fits(xcb_window_t window, const X11SourceOptions& options, const std::string& title) const {
   if (!options.class_name.empty()) {
     const std::string both = textProperty(window, XCB_ATOM_WM_CLASS);  // two strings, each ended by a zero
-    const std::string instance = both.c_str();
+    const std::string instance = both.substr(0, both.find('\0'));
     const std::string name = instance.size() < both.size() ? both.c_str() + instance.size() + 1 : "";
     return instance == options.class_name || name == options.class_name;
   }

@@ -42,7 +42,7 @@ void X11Grabber::attach(std::size_t bytes) {
   const int handle = shmget(IPC_PRIVATE, bytes, IPC_CREAT | 0600);
   if (handle < 0) return;
   void* memory = shmat(handle, nullptr, 0);
-  if (memory != reinterpret_cast<void*>(-1)) {
+  if (memory != reinterpret_cast<void*>(-1)) {  // NOLINT(performance-no-int-to-ptr): as shmat() has it
     const std::uint32_t id = xcb_generate_id(connection_.get());
     if (connection_.succeeded(xcb_shm_attach_checked(connection_.get(), id, static_cast<std::uint32_t>(handle), 0))) {
       segment_ = {id, static_cast<std::uint8_t*>(memory)};

@@ -14,7 +14,12 @@ constexpr std::size_t kMostTitles = 8;
 // Each in quotation marks.
 std::string quoted(const std::vector<std::string>& texts, const std::string& separator) {
   std::string out;
-  for (const std::string& text : texts) out += (out.empty() ? "\"" : separator + "\"") + text + "\"";
+  for (const std::string& text : texts) {
+    if (!out.empty()) out += separator;
+    out += '"';
+    out += text;
+    out += '"';
+  }
   return out;
 }
 

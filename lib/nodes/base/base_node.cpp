@@ -301,7 +301,7 @@ void BaseNode::setAlarm(Alarm alarm, std::int64_t due_ns) { timers_->setAlarm(al
 void BaseNode::addDiagnostics(const std::string& status_name,
                               std::function<void(diagnostic_updater::DiagnosticStatusWrapper&)> fill) {
   std::lock_guard<std::mutex> lock(diagnostics_mutex_);
-  diagnostics_->add(status_name, fill);
+  diagnostics_->add(status_name, std::move(fill));
 }
 
 void BaseNode::setHardwareId(const std::string& id) {

@@ -210,7 +210,7 @@ T ParamLoader::readOr(const std::string& key, const T& fallback, const Read& rea
   if (value == nullptr) {
     return fallback;
   }
-  const T result = read(*value);
+  T result = read(*value);
   if (result != fallback) {
     record_->given.push_back(key);
   }

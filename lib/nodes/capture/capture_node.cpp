@@ -317,7 +317,7 @@ sensor_msgs::ImagePtr CaptureNode::takeMessage() {
   for (const sensor_msgs::ImagePtr& message : messages_) {
     if (message.unique()) return message;  // written, and encoded
   }
-  const auto message = boost::make_shared<sensor_msgs::Image>();
+  auto message = boost::make_shared<sensor_msgs::Image>();
   message->width = static_cast<std::uint32_t>(options_.width);
   message->height = static_cast<std::uint32_t>(options_.height);
   message->encoding = sensor_msgs::image_encodings::BGR8;

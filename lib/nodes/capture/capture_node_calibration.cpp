@@ -46,7 +46,7 @@ std::string recorderOf(const std::vector<std::string>& topics) {
     if (!sameBridges(topic, topics)) continue;
     XmlRpc::XmlRpcValue& nodes = subscribers[i][1];
     for (int k = 0; k < nodes.size(); ++k) {
-      const std::string node = nodes[k];
+      std::string node = nodes[k];
       // rosbag record's own name, alone and in record.launch, begins so.
       if (node.compare(node.rfind('/') + 1, 6, "record") == 0 && node.find("record_watch") == std::string::npos) {
         return node;

@@ -50,7 +50,7 @@ void CaptureNode::subscribeInLockstep() {
   });
   subscribeEvents<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue,
                                     [this](const ros::MessageEvent<const std_msgs::Header>& event) {
-                                      const auto done = event.getConstMessage();
+                                      const auto& done = event.getConstMessage();
                                       if (!core::isNamed(event.getPublisherName(), kLockstepReader)) return;
                                       if (done->frame_id == kLockstepFrame0) return;
                                       {

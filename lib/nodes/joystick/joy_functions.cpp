@@ -86,7 +86,7 @@ std::string JoyFunctions::call(const std::string& service, Service* message) {
 std::string JoyFunctions::pause() {
   std_srvs::SetBool message;
   message.request.data = static_cast<std::uint8_t>(!paused_);
-  const std::string problem = call("pause", &message);
+  std::string problem = call("pause", &message);
   if (!problem.empty()) return problem;
   if (!message.response.success) return message.response.message;
   paused_ = message.request.data != 0;
@@ -96,7 +96,7 @@ std::string JoyFunctions::pause() {
 std::string JoyFunctions::runCommand(const JoyFunction& function) {
   RunCommand message;
   message.request.name = function.name;
-  const std::string problem = call("run_command", &message);
+  std::string problem = call("run_command", &message);
   if (!problem.empty()) return problem;
   return message.response.success ? "" : message.response.result.message;
 }
@@ -104,7 +104,7 @@ std::string JoyFunctions::runCommand(const JoyFunction& function) {
 std::string JoyFunctions::setView(const JoyFunction& function) {
   SetView message;
   message.request.view = function.view;
-  const std::string problem = call("set_view", &message);
+  std::string problem = call("set_view", &message);
   if (!problem.empty()) return problem;
   return message.response.success ? "" : message.response.result.message;
 }
@@ -113,7 +113,7 @@ std::string JoyFunctions::toggleFailure(const JoyFunction& function) {
   if (broken_.erase(function.name) != 0) {
     ClearFailures message;
     message.request.names = {function.name};
-    const std::string problem = call("clear_failures", &message);
+    std::string problem = call("clear_failures", &message);
     if (!problem.empty()) return problem;
     return message.response.success ? "" : message.response.result.message;
   }
@@ -122,7 +122,7 @@ std::string JoyFunctions::toggleFailure(const JoyFunction& function) {
   message.request.kind = function.failure;
   message.request.has_value = static_cast<std::uint8_t>(function.value.has_value());
   message.request.value = function.value.value_or(0.0F);
-  const std::string problem = call("set_failure", &message);
+  std::string problem = call("set_failure", &message);
   if (!problem.empty()) return problem;
   if (!message.response.success) return message.response.result.message;
   broken_.insert(function.name);

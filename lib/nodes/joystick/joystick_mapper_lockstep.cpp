@@ -24,7 +24,7 @@ void JoystickMapperNode::subscribeInLockstep() {
   subscribeEvents<sensor_msgs::Joy>("joy", kLockstepQueue,
                                     [this, stick](const ros::MessageEvent<const sensor_msgs::Joy>& event) {
                                       if (!core::isNamed(event.getPublisherName(), stick)) return;
-                                      const sensor_msgs::JoyConstPtr joy = event.getConstMessage();
+                                      const sensor_msgs::JoyConstPtr& joy = event.getConstMessage();
                                       frames_.push_back({joy->header.stamp, joy});
                                       answerFrames();
                                     });

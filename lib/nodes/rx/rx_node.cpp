@@ -35,9 +35,8 @@ constexpr std::uint32_t kRowsQueueSize = 100;
 
 std::vector<std::string> pathsOf(const std::vector<core::DatarefRequest>& requests) {
   std::vector<std::string> paths;
-  for (const core::DatarefRequest& request : requests) {
-    paths.push_back(request.path);
-  }
+  paths.reserve(requests.size());
+  for (const core::DatarefRequest& request : requests) paths.push_back(request.path);
   return paths;
 }
 

@@ -68,7 +68,7 @@ void TxNode::subscribeCommands(const std::string& topic, int rank, std::function
     return;
   }
   subscribeEvents<Message>(topic, kLockstepQueue, [this, rank, take](const ros::MessageEvent<const Message>& event) {
-    const boost::shared_ptr<const Message> message = event.getConstMessage();
+    const boost::shared_ptr<const Message>& message = event.getConstMessage();
     lockstep_->takeCommand(event.getPublisherName(), message->header.stamp, rank, [take, message] { take(*message); });
   });
 }
@@ -81,7 +81,7 @@ void TxNode::subscribeRequests(const std::string& topic, std::uint32_t queue_siz
     return;
   }
   subscribeEvents<Message>(topic, kLockstepQueue, [this, rank, take](const ros::MessageEvent<const Message>& event) {
-    const boost::shared_ptr<const Message> message = event.getConstMessage();
+    const boost::shared_ptr<const Message>& message = event.getConstMessage();
     lockstep_->takeRequest(event.getPublisherName(), message->header.stamp, rank, [take, message] { take(*message); });
   });
 }
@@ -102,7 +102,7 @@ void TxNode::subscribe() {
   if (lockstep_) {
     subscribeEvents<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue,
                                       [this](const ros::MessageEvent<const std_msgs::Header>& event) {
-                                        const auto done = event.getConstMessage();
+                                        const auto& done = event.getConstMessage();
                                         lockstep_->takeDone(event.getPublisherName(), done->stamp, done->frame_id);
                                       });
     // Its publisher has answered with it; joystick_mapper_node makes a command of it.
