@@ -160,8 +160,8 @@ MAY_USE_HOST_TIME = {
         {"sleep_for"},
     ),
     "lib/nodes/recorder/lockstep_recorder.cpp": ("names a file by the date, as rosbag does", {"time(nullptr)"}),
-    "include/xplane_bridge/nodes/tx/tx_node.hpp": ("shows its guardian that it runs", {"SteadyTimer"}),
-    "lib/nodes/tx/tx_guard.cpp": ("the same, also while the node's clock stands", {"createSteadyTimer"}),
+    "include/xplane_bridge/nodes/tx/heartbeat.hpp": ("shows the guardian that tx_node runs", {"SteadyTimer"}),
+    "lib/nodes/tx/heartbeat.cpp": ("the same, also while the node's clock stands", {"createSteadyTimer"}),
     "lib/actuation/guardian.cpp": (
         "a process of its own, which releases whatever clock the node had, and the beat that it compares with that",
         {"hostClock("},
@@ -360,8 +360,8 @@ def test_data_members_are_found():
 
 
 def test_tx_node_is_topics_services_and_diagnostics_only():
-    """What it does beyond that stands in classes of actuation/, which are tested without ROS."""
-    files = sorted((ROOT / "lib" / "nodes" / "tx").glob("tx_node*.cpp"))
+    """What it does beyond that stands in classes of actuation/, which are tested without ROS, and beside it."""
+    files = [file for file in (ROOT / "lib").rglob("*.cpp") if "TxNode::" in file.read_text(encoding="utf-8")]
     assert [file.name for file in files] == ["tx_node.cpp"]
     assert len(files[0].read_text(encoding="utf-8").splitlines()) < 300
     header = ROOT / "include" / "xplane_bridge" / "nodes" / "tx" / "tx_node.hpp"

@@ -68,7 +68,7 @@ def cpp_topics(verb):
     found = {}
     for path in sorted((ROOT / "lib/nodes").rglob("*.cpp")):
         text = path.read_text(encoding="utf-8")
-        for msgtype, topic in re.findall(rf'\b{verb}(?:Topic|Commands|Requests)?<([\w:]+)>\(\s*"([^"]+)"\s*,', text):
+        for msgtype, topic in re.findall(rf'\b{verb}(?:Topic|InFrames)?<([\w:]+)>\(\s*"([^"]+)"\s*,', text):
             package, _, name = msgtype.rpartition("::")
             found[topic] = f"{package or 'xplane_bridge'}/{name}"
     assert found

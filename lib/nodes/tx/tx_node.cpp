@@ -3,34 +3,18 @@
 #include <algorithm>
 #include <utility>
 
-#include <std_srvs/SetBool.h>
+#include <sensor_msgs/Joy.h>
+#include <std_msgs/Header.h>
+#include <std_srvs/Trigger.h>
 
-#include "xplane_bridge/AppliedCommand.h"
-#include "xplane_bridge/ClearFailures.h"
-#include "xplane_bridge/ControlMode.h"
-#include "xplane_bridge/DisturbanceState.h"
-#include "xplane_bridge/ExcitationState.h"
-#include "xplane_bridge/FailureState.h"
-#include "xplane_bridge/IdentifySurfaces.h"
-#include "xplane_bridge/InjectExcitation.h"
-#include "xplane_bridge/RunCommand.h"
-#include "xplane_bridge/ServiceResult.h"
-#include "xplane_bridge/SetDataref.h"
-#include "xplane_bridge/SetFailure.h"
-#include "xplane_bridge/SetView.h"
-#include "xplane_bridge/nodes/base/service_result.hpp"
-#include "xplane_bridge/nodes/messages/actuation_conversions.hpp"
 #include "xplane_bridge/nodes/messages/control_conversions.hpp"
 #include "xplane_bridge/nodes/tx/actuation_diagnostics.hpp"
 
 namespace xplane_bridge {
 namespace {
 
-template <class Response>
-void answer(const RequestResult& result, Response* response) {
-  response->result = toMessage(result);
-  response->success = result.success();
-}
+constexpr std::uint32_t kServiceThreads = 2;  // hold and run work while a step waits
+constexpr double kOldestPoses = 1.0;          // [s] in lock-step; what is older has no stamp of the flight
 
 }  // namespace
 
@@ -39,17 +23,10 @@ void answer(const RequestResult& result, Response* response) {
 void TxNode::loadParameters(const ParamLoader& own) { options_ = loadTxOptions(own, common().aircraft); }
 
 void TxNode::advertise() {
-  events_.start(advertiseTopic<EventList>("events", 1, true), clock());
-  mode_publisher_ = advertiseTopic<ControlMode>("control/mode", 10, true);
-  applied_publisher_ = advertiseTopic<AppliedCommand>("control/applied", 100);
-  failure_publisher_ = advertiseTopic<FailureState>("failures/state", 10, true);
-  excitation_publisher_ = advertiseTopic<ExcitationState>("excitation/state", 10, true);
-  disturbance_publisher_ = advertiseTopic<DisturbanceState>("disturbance/state", 100, true);
+  publishers_.advertise(topics(), clock(), [this] { return held(); });
   if (lockstep()) makeLockstep();
   advertiseLockstep();
   advertiseServices();
-  advertiseFailureServices();
-  advertiseFlightServices();
   advertiseDiagnostics();
 }
 
@@ -62,14 +39,27 @@ core::SimLinkCallbacks TxNode::linkCallbacks() {
 void TxNode::start() {
   if (!replays()) guardian_.start();  // it would write to the X-Plane of the recording
   options_.actuation.turns = turns();
-  actuation_ = std::make_unique<Actuation>(&link(), options_.actuation, hooks());
+  ActuationHooks hooks = publishers_.hooks();
+  hooks.stopping = [this] { return ending(); };
+  actuation_ = std::make_unique<Actuation>(&link(), options_.actuation, std::move(hooks));
+  intake_ = std::make_unique<CommandIntake>(actuation_.get());
+  services_ = std::make_unique<TxServices>(actuation_.get(), &publishers_.events(), [this] { return stampNow(); });
+  lockstep_services_ = std::make_unique<LockstepServices>(
+      lockstep_.get(), actuation_.get(), &link(), [this] { return ending(); }, name() + "/lockstep");
   actuation_->start();
   lockstep_spinner_->start();
   startBeating();
 }
 
+void TxNode::startBeating() {
+  if (lockstep()) return;  // a frame may take long: the guardian acts on death only
+  const auto beat = [this] { return guardian_.beat(options_.hang_timeout); };
+  const auto on_hang = [this] { actuation_->onHang(); };
+  wired() ? pollInput("hang", beat, on_hang) : heartbeat_.start(handle(), beat, on_hang);
+}
+
 void TxNode::tick() {
-  beat();
+  heartbeat_.beat();  // first: after a hang nothing may be sent as before
   actuation_->tick();
 }
 
@@ -82,9 +72,7 @@ void TxNode::onLink(const core::LinkStatus& status) {
 void TxNode::stopInputs() {
   heartbeat_.stop();
   guardian_.rest();
-  if (lockstep_) {
-    lockstep_->stop();
-  }
+  if (lockstep_) lockstep_->stop();
   lockstep_queue_.disable();
   lockstep_spinner_->stop();
   if (actuation_) actuation_->stop();
@@ -101,120 +89,114 @@ void TxNode::publishFinalState() {
 
 // --- topics ---
 
-template <class Message, class... Values>
-void TxNode::publishAs(const ros::Publisher& publisher, const Values&... values) {
-  if (held()) return;
-  Message message;
-  message.header.stamp = stampNow();
-  toMessage(values..., &message);
-  publisher.publish(message);
-}
-
-ActuationHooks TxNode::hooks() {
-  ActuationHooks hooks;
-  hooks.mode = [this](const auto&... mode) { publishAs<ControlMode>(mode_publisher_, mode...); };
-  hooks.applied = [this](const auto&... applied) { publishAs<AppliedCommand>(applied_publisher_, applied...); };
-  hooks.surfaces_applied = [this](const auto&... echo) { publishAs<AppliedCommand>(applied_publisher_, echo...); };
-  hooks.failures = [this](const auto& snapshot) { publishAs<FailureState>(failure_publisher_, snapshot); };
-  hooks.excitation = [this](const auto& label) { publishAs<ExcitationState>(excitation_publisher_, label); };
-  hooks.disturbance = [this](const auto& label) { publishAs<DisturbanceState>(disturbance_publisher_, label); };
-  hooks.event = [this](const ActuationEvent& event) { onEvent(event); };
-  hooks.warn = [](const std::string& text) { ROS_WARN("%s", text.c_str()); };
-  hooks.journal_problem = [](const std::string& text) { ROS_ERROR_THROTTLE(5.0, "%s", text.c_str()); };
-  hooks.stopping = [this] { return ending(); };
-  return hooks;
-}
-
-void TxNode::onEvent(const ActuationEvent& event) {
-  if (!event.success) {
-    ROS_ERROR("%s", event.text.c_str());
-  } else if (event.warning) {
-    ROS_WARN("%s", event.text.c_str());
-  } else {
-    ROS_INFO("%s", event.text.c_str());
+template <class Message>
+void TxNode::subscribeInFrames(const std::string& topic, std::uint32_t queue_size, Answers answers, int rank,
+                               std::function<void(const Message&)> take) {
+  if (!lockstep_) {
+    subscribeTopic<Message>(topic, queue_size, [take = std::move(take)](const auto& message) { take(*message); });
+    return;
   }
-  events_.add(static_cast<std::uint8_t>(event.kind), event.text, event.sim_time, event.who, event.success,
-              event.number);
+  subscribeEvents<Message>(
+      topic, kLockstepQueue, [this, answers, rank, take](const ros::MessageEvent<const Message>& event) {
+        const auto& message = event.getConstMessage();
+        const auto carry_out = [take, message] { take(*message); };
+        answers == Answers::kFrames
+            ? lockstep_->takeCommand(event.getPublisherName(), message->header.stamp, rank, carry_out)
+            : lockstep_->takeRequest(event.getPublisherName(), message->header.stamp, rank, carry_out);
+      });
+}
+
+void TxNode::subscribe() {
+  subscribeInFrames<ControlCommand>("control/manual", 1, Answers::kFrames, 0,
+                                    [this](const auto& command) { onCommand(core::FlightMode::kManual, command); });
+  subscribeInFrames<ControlCommand>("control/auto", 1, Answers::kFrames, 1,
+                                    [this](const auto& command) { onCommand(core::FlightMode::kAuto, command); });
+  subscribeInFrames<SurfaceCommand>("control/surfaces", 1, Answers::kFrames, 2,
+                                    [this](const auto& command) { intake_->onSurfaceCommand(command); });
+  // These are few and none may be lost.
+  subscribeInFrames<ModeRequest>("control/mode_request", 20, Answers::kNothing, 0,
+                                 [this](const auto& request) { intake_->onModeRequest(request); });
+  // Of traffic the newest list counts.
+  subscribeInFrames<TrafficCommand>("traffic/command", 1, Answers::kNothing, 1,
+                                    [this](const auto& command) { onTraffic(command); });
+  if (lockstep_) {
+    subscribeAnswers();
+    return;
+  }
+  addTimer(1.0 / options_.actuation.control.rate, [this] { tick(); });
+  deadline_ = addAlarm([this] { tick(); });
 }
 
 void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
-  beat();
-  ControlPath& path = actuation_->path();
-  if (const auto refusal = path.command(from, toCore(message))) {
-    ROS_WARN_THROTTLE(1.0, "control/%s is refused: %s", from == core::FlightMode::kManual ? "manual" : "auto",
-                      refusal->text.c_str());
-  } else if (const auto time_ns = path.deadline()) {
-    setAlarm(deadline_, *time_ns);
-  }
+  heartbeat_.beat();
+  if (const auto time_ns = intake_->onCommand(from, message)) setAlarm(deadline_, *time_ns);
 }
 
-void TxNode::onModeRequest(const ModeRequest& message) {
-  actuation_->path().requestMode({message.sequence, message.mode, message.requester, message.header.stamp.toSec()});
+void TxNode::onTraffic(const TrafficCommand& message) {
+  // In lock-step it is carried out some frames after its own, whose time its stamp is.
+  const double age = lockstep_ ? (stampNow() - message.header.stamp).toSec() : 0.0;
+  intake_->onTraffic(message, age > 0.0 && age < kOldestPoses ? age : 0.0);
 }
 
-void TxNode::onSurfaceCommand(const SurfaceCommand& message) {
-  const std::string refusal = actuation_->commandSurfaces(message.names, message.deflections_deg, message.sequence);
-  if (!refusal.empty()) ROS_WARN_THROTTLE(1.0, "control/surfaces is refused: %s", refusal.c_str());
+// --- services: they run on the service thread ---
+
+template <class Service, class Serve>
+void TxNode::advertiseOwn(const std::string& service, Serve serve) {
+  using Request = typename Service::Request;
+  using Response = typename Service::Response;
+  const std::string full_name = name() + "/" + service;
+  advertiseService<Request, Response>(full_name, [this, serve, full_name](const Request& request, Response& response) {
+    if (lockstep_) lockstep_->waitUntilOpen();
+    serve(request, &response, full_name);
+  });
 }
 
-// --- services: they run on the service thread and may wait for X-Plane; the control path never waits for them ---
+template <class Service>
+void TxNode::advertiseOwn(const std::string& service) {
+  advertiseOwn<Service>(service, [this](const auto& request, auto* response, const std::string& who) {
+    services_->serve(request, response, who);
+  });
+}
 
 void TxNode::advertiseServices() {
-  advertiseOwn<SetMode>("set_mode", [this](const auto& request, auto* response) { serveSetMode(request, response); });
-  advertiseOwn<SetDataref>("set_dataref", [this](const auto& request, auto* response) {
-    const auto written = actuation_->settings().setDataref(request.name, request.values);
-    answer(written.result, response);
-    response->values = written.values;
-  });
-  advertiseOwn<RunCommand>("run_command", [this](const auto& request, auto* response) {
-    answer(actuation_->settings().runCommand(request.name), response);
-  });
-  advertiseOwn<std_srvs::SetBool>("pause", [this](const auto& request, auto* response) {
-    const RequestResult result = actuation_->setPaused(request.data != 0, name() + "/pause");
-    response->success = result.success();
-    response->message = result.text;
-  });
-  advertiseOwn<SetView>("set_view", [this](const auto& request, auto* response) {
-    const core::ViewWish wish{
-        request.view, {request.roll_deg, request.pitch_deg, request.heading_deg}, request.field_of_view_deg};
-    answer(actuation_->views().setView(wish), response);
-  });
+  advertiseOwn<SetMode>("set_mode");
+  advertiseOwn<SetDataref>("set_dataref");
+  advertiseOwn<RunCommand>("run_command");
+  advertiseOwn<std_srvs::SetBool>("pause");
+  advertiseOwn<SetView>("set_view");
+  advertiseOwn<SetFailure>("set_failure");
+  advertiseOwn<ClearFailures>("clear_failures");
+  advertiseOwn<InjectExcitation>("inject_excitation");
+  advertiseOwn<IdentifySurfaces>("identify_surfaces");
+  advertiseOwn<ResetFlight>("reset_flight");
+  advertiseOwn<SetWind>("set_wind");
+  advertiseOwn<SetTime>("set_time");
+  advertiseOwn<SetWeather>("set_weather");
+  advertiseOwn<SetAutopilot>("set_autopilot");
+  advertiseOwn<SetLoading>("set_loading");
+  advertiseOwn<LoadAircraft>("load_aircraft");
+  advertiseOwn<Situation>("save_state", [this](const auto&... call) { services_->saveSituation(call...); });
+  advertiseOwn<Situation>("load_state", [this](const auto&... call) { services_->loadSituation(call...); });
+  advertiseOwn<SetDisturbance>("disturb");
 }
 
-void TxNode::serveSetMode(const SetMode::Request& request, SetMode::Response* response) {
-  ModeRequest message;
-  message.header.stamp = stampNow();
-  message.mode = request.mode;
-  message.requester = name() + "/set_mode";
-  onModeRequest(message);
-  const core::ModeStatus status = actuation_->path().mode();
-  response->mode = static_cast<std::uint8_t>(status.mode);
-  response->success = response->mode == request.mode;
-  response->result = response->success ? result(ServiceResult::OK, core::toString(status.mode))
-                                       : result(ServiceResult::REFUSED, status.reason);
-}
-
-void TxNode::advertiseFailureServices() {
-  advertiseOwn<SetFailure>("set_failure", [this](const auto& request, auto* response) {
-    answer(actuation_->failures().set(toCore(request), name() + "/set_failure"), response);
-  });
-  advertiseOwn<ClearFailures>("clear_failures", [this](const auto& request, auto* response) {
-    const auto done =
-        actuation_->failures().clear(request.names, request.include_simulator, name() + "/clear_failures");
-    answer(done.result, response);
-    response->cleared = done.cleared;
-  });
-  advertiseOwn<InjectExcitation>("inject_excitation", [this](const auto& request, auto* response) {
-    const auto injected = actuation_->inject(toCore(request), name() + "/inject_excitation");
-    answer(injected.result, response);
-    response->id = injected.id;
-  });
-  advertiseOwn<IdentifySurfaces>("identify_surfaces", [this](const auto& request, auto* response) {
-    const auto begun = actuation_->identifySurfaces(toCore(request), name() + "/identify_surfaces",
-                                                    [this] { return events_.reserve(); });
-    answer(begun.result, response);
-    response->event_number = begun.event_number;
-  });
+void TxNode::advertiseLockstep() {
+  advertiseService<LockstepStep::Request, LockstepStep::Response>(
+      "lockstep/step", [this](const auto& request, auto& response) { lockstep_services_->step(request, &response); },
+      &lockstep_queue_);
+  const auto advertise = [this](const std::string& service, bool running, const std::string& answer) {
+    advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
+        "lockstep/" + service,
+        [this, running, answer](const auto&, auto& response) {
+          const std::string why_not = lockstep_services_->setRunning(running);
+          response.success = why_not.empty();
+          response.message = response.success ? answer : why_not;
+        },
+        &lockstep_queue_);
+  };
+  advertise("run", true, "flies on");
+  advertise("hold", false, "holds the present frame");
+  lockstep_spinner_ = std::make_unique<ros::AsyncSpinner>(kServiceThreads, &lockstep_queue_);
 }
 
 // --- diagnostics ---
@@ -230,6 +212,60 @@ void TxNode::advertiseDiagnostics() {
   addDiagnostics("failures", [this](Status& status) {
     if (actuation_) fillDiagnostics(actuation_->failures().snapshot(), &status);
   });
+}
+
+// --- lock-step: commands wait for the end of their frame, and the node's timers are its frames ---
+
+void TxNode::makeLockstep() {
+  options_.actuation.control.each_frame = true;
+  // What an earlier run has left must make no difference.
+  options_.actuation.surfaces.mixing_folder.clear();
+  lockstep_ = std::make_unique<TxLockstep>(
+      common().lockstep, wallClock(), stampNow(), [this] { askFrameReady(); },
+      [this](const std::string& why) { requestStop(why, ExitCode::kRuntimeError); });
+  publishers_.events().mute(true);
+  frame_mode_publisher_ = advertiseTopic<ControlMode>(kLockstepModeTopic, kLockstepQueue);
+}
+
+void TxNode::subscribeAnswers() {
+  subscribeEvents<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue,
+                                    [this](const ros::MessageEvent<const std_msgs::Header>& event) {
+                                      const auto& done = event.getConstMessage();
+                                      lockstep_->takeDone(event.getPublisherName(), done->stamp, done->frame_id);
+                                    });
+  // Its publisher has answered with it; joystick_mapper_node makes a command of it.
+  subscribeEvents<sensor_msgs::Joy>(
+      "joy", kLockstepQueue, [this](const ros::MessageEvent<const sensor_msgs::Joy>& event) {
+        lockstep_->takeDone(event.getPublisherName(), event.getConstMessage()->header.stamp, "");
+      });
+}
+
+void TxNode::beginFlight() {
+  lockstep_->leaveFrameZero();
+  publishers_.events().mute(false);
+  actuation_->beginFlight();
+}
+
+void TxNode::beginFrame(const core::LockstepFrame& frame) { lockstep_->open(frame, stampNow()); }
+
+bool TxNode::frameReady(const core::LockstepFrame& frame) {
+  return (frame.number > 0 || actuation_->knowsFlight()) && lockstep_->ready();
+}
+
+void TxNode::closeFrame(const core::LockstepFrame& frame) {
+  if (frame.number > 0) lockstep_->close();
+  actuation_->tick();
+  if (held()) return;
+  frame_mode_.emplace();
+  frame_mode_->header.stamp = stampNow();
+  toMessage(actuation_->path().mode(), actuation_->simTime(), &*frame_mode_);
+}
+
+void TxNode::endFrame(const core::LockstepFrame& frame) {
+  link().write(core::kFenceDataref, static_cast<float>(frame.number));
+  // While the simulator is at its next frame.
+  if (frame_mode_) frame_mode_publisher_.publish(*frame_mode_);
+  frame_mode_.reset();
 }
 
 }  // namespace xplane_bridge

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "xplane_bridge/LockstepStep.h"
+#include "xplane_bridge/actuation/actuation.hpp"
+#include "xplane_bridge/nodes/tx/tx_lockstep.hpp"
+
+namespace xplane_bridge {
+
+/// lockstep/step, run and hold: of lock-step, or of a simulator that does not wait for participants, which flies and is
+/// paused then. They wait for frames.
+class LockstepServices {
+ public:
+  /// @param lockstep null without lock-step
+  /// @param ending whether the node ends, so that nothing is waited for any more
+  /// @param who asks for a pause
+  LockstepServices(TxLockstep* lockstep, Actuation* actuation, core::SimulatorPort* link, std::function<bool()> ending,
+                   std::string who);
+
+  void step(const LockstepStep::Request& request, LockstepStep::Response* response);
+  /// @return what was in the way; empty: nothing
+  std::string setRunning(bool running);
+
+ private:
+  void stepInLockstep(const LockstepStep::Request& request, LockstepStep::Response* response);
+  void stepFreely(const LockstepStep::Request& request, LockstepStep::Response* response);
+
+  TxLockstep* const lockstep_;
+  Actuation& actuation_;
+  core::SimulatorPort& link_;
+  const std::function<bool()> ending_;
+  const std::string who_;
+};
+
+}  // namespace xplane_bridge
