@@ -54,17 +54,28 @@ class BuildWithMessageCode(build_ext):
         super().run()
 
 
+#: Where Eigen's headers may lie.
+EIGEN = ("/usr/include/eigen3", "/usr/local/include/eigen3", "/opt/homebrew/include/eigen3")
+
+
 def compiled_module():
     """xplane_bridge._core, of the same files as lib/bindings/CMakeLists.txt makes it; left out without a compiler."""
-    control = ("control_arbiter", "control_channels", "control_command", "control_rows")
-    bindings = ("arbiter", "datagrams", "module", "state_reader", "twin_frame", "twin_loop", "twin_physics")
-    sources = [f"lib/core/control/{name}.cpp" for name in control] + [f"lib/bindings/{name}.cpp" for name in bindings]
+    control = ["control_arbiter", "control_channels", "control_command", "control_rows"]
+    bindings = ["arbiter", "datagrams", "module", "state_reader", "twin_frame", "twin_loop", "twin_physics"]
+    include_dirs, macros = ["include"], []
+    eigen = [path for path in EIGEN if os.path.exists(os.path.join(path, "unsupported", "Eigen", "FFT"))]
+    if eigen:  # else without excitations
+        control.append("excitation")
+        bindings.append("excitation")
+        include_dirs.append(eigen[0])
+        macros.append(("XPLANE_BRIDGE_WITH_EXCITATION", None))
     # The same bits as Python's own arithmetic: nothing fused, and every function the C library's.
     exact = ["-ffp-contract=off", "-fno-builtin"]
     return Extension(
         "xplane_bridge._core",
-        sources,
-        include_dirs=["include"],
+        [f"lib/core/control/{name}.cpp" for name in control] + [f"lib/bindings/{name}.cpp" for name in bindings],
+        include_dirs=include_dirs,
+        define_macros=macros,
         extra_compile_args=["-std=c++17", "-O2", "-fvisibility=hidden", *exact],
         language="c++",
         optional=True,

@@ -21,6 +21,9 @@ PyMODINIT_FUNC PyInit__core() {  // NOLINT(bugprone-reserved-identifier,readabil
     xplane_bridge::bindings::Object module(PyModule_Create(&definition));
     xplane_bridge::bindings::addArbiter(module.get());
     xplane_bridge::bindings::addDatagrams(module.get());
+#ifdef XPLANE_BRIDGE_WITH_EXCITATION  // left out by pip where Eigen is not there
+    xplane_bridge::bindings::addExcitation(module.get());
+#endif
     xplane_bridge::bindings::addStateReader(module.get());
     xplane_bridge::bindings::addTwinLoop(module.get());
     PyObject* out = module.get();

@@ -25,6 +25,30 @@ class Steady:
         }
 
 
+class Counting(Steady):
+    """Pitches up with every state since its last restart, so that each frame of that shows."""
+
+    _states = 0
+
+    def restart(self) -> None:
+        """Another source flies."""
+        self._states = 0
+
+    def fly(self, state: Any) -> Dict[str, float]:
+        """Fields of ControlCommand for a FlightState."""
+        self._states += 1
+        command = super().fly(state)
+        return {**command, "pitch": command["pitch"] + 0.002 * min(self._states, 40)}
+
+
+class Climbs(Steady):
+    """Looks at the climb, which rx_node works out."""
+
+    def fly(self, state: Any) -> Dict[str, float]:
+        """Fields of ControlCommand for a FlightState."""
+        return {**super().fly(state), "pitch": 0.02 * (1.0 - state.vertical_speed)}
+
+
 def level(state: Any) -> Dict[str, float]:
     """Wings level, as a function."""
     return Steady(0.0).fly(state)

@@ -126,6 +126,7 @@ PyCFunction method(Function* function) {
 /// What is in the module; each is added by its own file.
 void addArbiter(PyObject* module);
 void addDatagrams(PyObject* module);
+void addExcitation(PyObject* module);
 void addStateReader(PyObject* module);
 void addTwinLoop(PyObject* module);
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
@@ -14,9 +15,9 @@ from xplane_bridge.campaign.definition import FlightPlan, find_controller
 from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.compiled import require
 from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
-from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions
+from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, excitation_limits_deg
 from xplane_bridge.in_process.view import FlightView
-from xplane_bridge.scenario import FlightSample, Player, excitations, parse_scenario
+from xplane_bridge.scenario import FlightSample, Player, parse_scenario
 from xplane_bridge.scenario.ros_player import command_values, sample_of
 
 #: How a flight can end. Whatever it was, it is a row.
@@ -82,7 +83,10 @@ class Flight:
         self._plan = plan
         self._scenario = parse_scenario(plan.scenario)
         self._labels: Dict[str, float] = {}
-        self._excitation: Optional[Tuple[float, Dict[str, Any]]] = None
+        self._excitation: Optional[Tuple[str, Any]] = None  # target, runner
+        self._moved: Tuple[Optional[str], float] = (None, 0.0)  # by it, in this frame
+        self._limits = excitation_limits_deg(plan.aircraft)
+        self._modes = deque([0, 0])  # of the last two frames; 0: not known yet
         self._truth = hashlib.sha256()
         self._rows: List[Tuple[float, ...]] = []
 
@@ -148,15 +152,19 @@ class Flight:
                 return FLOWN, ""
             if now >= self._plan.longest:
                 return UNFINISHED, f"the scenario has not ended after {self._plan.longest:g} s (longest)"
+            self._go_on_exciting(view)
             for action in commands.actions:
-                self._act(action.kind, action.value, now)
+                self._act(action.kind, action.value, now, view)
+            mode = aircraft.mode
             self._command(MANUAL, command_values(commands))
+            if aircraft.mode != mode:  # taken over by the stick
+                self._end_excitation()
             try:
                 self._control(view)
             except Exception as error:
                 return CONTROLLER_FAILED, f"at {now:.2f} s: {type(error).__name__}: {error}"
             try:
-                state = aircraft.step(*self._excited(now))
+                state = aircraft.step(*self._moved)
             except (FlightModelError, ArithmeticError) as error:
                 return GAVE_UP, f"at {now:.2f} s: {error}"
             if state.crashed:
@@ -166,7 +174,9 @@ class Flight:
     def _control(self, view: FlightView) -> None:
         if self._controller is None:
             return
-        if self._aircraft.mode != AUTO and hasattr(self._made, "restart"):
+        # As through the nodes, where control/mode of a frame is known two frames later.
+        self._modes.append(self._aircraft.mode)
+        if self._modes.popleft() != AUTO and hasattr(self._made, "restart"):
             self._made.restart()
         self._command(AUTO, dict(self._controller(view)))
 
@@ -175,24 +185,51 @@ class Flight:
         if refusal is not None:
             raise _RefusedError(f"command refused: {refusal}")
 
-    def _excited(self, now: float) -> Tuple[Optional[str], float]:
-        """The channel that an excitation moves, and by how much."""
+    def _go_on_exciting(self, view: FlightView) -> None:
+        """The excitation of this frame: the channel that it moves, and by how much."""
+        self._moved = (None, 0.0)
         if self._excitation is not None:
-            began, parameters = self._excitation
-            if now - began < parameters["duration"]:
-                return parameters["target"], excitations.value(parameters, now - began)
-            self._excitation = None
-        return None, 0.0
+            target, runner = self._excitation
+            value = runner.step(view.sim_time, view.roll_deg, view.pitch_deg)
+            if value is None:
+                self._excitation = None
+            else:
+                self._moved = (target, value)
 
-    def _act(self, kind: str, value: Any, now: float) -> None:
+    def _end_excitation(self) -> None:
+        """As a change of the mode does it."""
+        self._excitation, self._moved = None, (None, 0.0)
+
+    def _excite(self, parameters: Mapping[str, Any], now: float) -> None:
+        """As the service inject_excitation does it, whose numbers are float32: it begins in the next frame."""
+        if self._excitation is not None:
+            raise CampaignError(f"scenario: an excitation at {now:g} s, while another runs: one at a time")
+        keys = ("amplitude", "duration", "frequency", "frequency_end")
+        amplitude, duration, low, high = struct.unpack("<4f", struct.pack("<4f", *[parameters[key] for key in keys]))
+        make = getattr(require("an excitation in process"), "Excitation", None)
+        if make is None:
+            raise CampaignError(
+                "scenario: excitations in process take Eigen's headers (libeigen3-dev) where the package is installed; "
+                "install them, and the package again"
+            )
+        try:
+            runner = make(parameters["kind"], amplitude, duration, low, high, parameters["seed"], *self._limits, now)
+        except ValueError as error:
+            raise CampaignError(f"scenario: excitation at {now:g} s: {error}") from None
+        self._excitation, self._moved = (parameters["target"], runner), (parameters["target"], 0.0)
+
+    def _act(self, kind: str, value: Any, now: float, view: FlightView) -> None:
         if kind == "mode":
+            before = self._aircraft.mode
             self._aircraft.set_mode(value, "scenario")
+            if self._aircraft.mode != before:
+                self._end_excitation()
         elif kind == "failure":
             self._aircraft.failures.act(value)
         elif kind == "clear_failures":
             self._aircraft.failures.clear()
         elif kind == "excitation":
-            self._excitation = (now, value)
+            self._excite(value, view.sim_time)
         elif kind == "label":
             self._labels.setdefault(value, now)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, Dict, Mapping, Optional
+from typing import Any, Dict, Mapping, Optional, Tuple
 
 import yaml
 
@@ -49,6 +49,12 @@ def arbiter_options(aircraft: str) -> Dict[str, Any]:
     options["initial_mode"] = AUTO if tx["initial_mode"] == "auto" else MANUAL
     options.update({key: own[key] for key in ("engines", "failsafe", "channels", "reverse_thrust") if key in own})
     return options
+
+
+def excitation_limits_deg(aircraft: str) -> Tuple[float, float]:
+    """Roll and pitch beyond which tx_node ends an excitation of an aircraft [deg]."""
+    limits = _configuration("aircraft", f"{aircraft}.yaml")["excitation"]
+    return limits["max_roll_deg"], limits["max_pitch_deg"]
 
 
 def initial_state(start: Mapping[str, Any]) -> InitialState:

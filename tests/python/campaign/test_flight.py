@@ -126,9 +126,56 @@ def test_an_excitation_is_added_to_what_is_commanded() -> None:
         {"at": 2, "end": True},
     ]
     trace = Flight(campaign(events).plan(0)).fly(trace=True).trace
-    # Row k holds what flew into it: the doublet, 30 frames up and 30 down, begins with the command of frame 30.
+    # Row k holds what flew into it: the doublet begins with the command of frame 31, and turns with that of 60.
     stick = trace["stick_roll"]
-    assert [round(stick[k], 6) for k in (30, 31, 60, 61, 90, 91)] == [0.1, 0.3, 0.3, -0.1, -0.1, 0.1]
+    assert [round(stick[k], 6) for k in (31, 32, 60, 61, 90, 91)] == [0.1, 0.3, 0.3, -0.1, -0.1, 0.1]
+
+
+def excited(*events: Dict[str, Any], end: float = 1.0, **more: Any) -> Any:
+    """The stick's pitch in each frame of a flight with these events."""
+    begin = {"at": 0, "stick": {"roll": 0, "pitch": 0, "yaw": 0}}
+    flight = Flight(campaign([begin, *events, {"at": end, "end": True}], **more).plan(0))
+    return flight.fly(trace=True).trace["stick_pitch"]
+
+
+def doublet(amplitude: float, duration: float) -> Dict[str, Any]:
+    return {"kind": "doublet", "target": "pitch", "amplitude": amplitude, "duration": duration}
+
+
+def test_an_excitation_begins_in_the_frame_after_its_event_as_through_the_nodes() -> None:
+    stick = excited({"at": 0.5, "excitation": doublet(0.1, 0.19)})  # until frame 41; a stick shows a frame later
+    tenth = struct.unpack("<f", struct.pack("<f", 0.1))[0]
+    assert list(stick[30:33]) == [0.0, 0.0, tenth]
+    assert list(stick[36:38]) == [tenth, -tenth]
+    assert list(stick[42:44]) == [-tenth, 0.0]
+
+
+def test_one_excitation_may_begin_where_another_ends_and_not_before() -> None:
+    first, second = {"at": 0.5, "excitation": doublet(0.1, 0.19)}, {"at": 0.7, "excitation": doublet(0.2, 0.2)}
+    assert excited(first, second)[44] == pytest.approx(0.2)
+    with pytest.raises(CampaignError, match=r"an excitation at 0\.65 s, while another runs"):
+        excited(first, {**second, "at": 0.65})
+
+
+def test_a_change_of_the_mode_ends_an_excitation() -> None:
+    stick = excited({"at": 0.5, "excitation": doublet(0.1, 0.4)}, {"at": 0.6, "mode": "auto"},
+                    controller=f"{__name__}:Recorder")  # fmt: skip
+    assert stick[36] > 0.05
+    assert not stick[37:].any()
+
+
+def test_an_excitation_ends_where_tx_node_would_end_it() -> None:
+    """Beyond the roll that the aircraft's file allows."""
+    stick = excited({"at": 0, "stick": {"roll": 1}}, {"at": 0.2, "excitation": doublet(0.05, 4.0)}, end=4.0)
+    assert stick[20] > 0.0
+    assert not stick[200:].any()
+
+
+def test_an_excitation_that_cannot_be_is_said() -> None:
+    wrong = {"kind": "multisine", "target": "pitch", "amplitude": 0.1, "duration": 2.0, "frequency": 0.6,
+             "frequency_end": 0.9}  # fmt: skip
+    with pytest.raises(CampaignError, match=r"scenario: excitation at 0\.5 s: "):
+        excited({"at": 0.5, "excitation": wrong})
 
 
 def test_the_stick_takes_over_from_the_controller() -> None:
