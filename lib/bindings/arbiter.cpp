@@ -149,6 +149,18 @@ core::ControlCommand readCommand(PyObject* dictionary) {
   return out;
 }
 
+// Those of an axis as excitations name it: "throttle" is every lever.
+core::ChannelSet channelsOf(const std::string& axis) {
+  core::ChannelSet out;
+  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+    const auto channel = static_cast<core::Channel>(i);
+    const bool lever = axis == "throttle" && core::isLever(channel);
+    if (lever || core::channelName(channel) == axis) out.set(i);
+  }
+  if (out.none()) throw std::invalid_argument("\"" + axis + "\" is no channel");
+  return out;
+}
+
 PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* /*keywords*/) {
   return guarded([&]() -> PyObject* {
     PyObject* options = nullptr;
@@ -180,6 +192,13 @@ PyObject* setMode(PyObject* object, PyObject* arguments) {
   });
 }
 
+PyObject* commands(PyObject* object, PyObject* axis) {
+  return guarded([&]() -> PyObject* {
+    const core::ChannelSet commanded = self(object).arbiter.commanded();
+    return PyBool_FromLong((commanded & channelsOf(text(axis))).any() ? 1 : 0);
+  });
+}
+
 PyObject* step(PyObject* object, PyObject* arguments) {
   return guarded([&]() -> PyObject* {
     double now = 0.0, value = 0.0;
@@ -187,13 +206,7 @@ PyObject* step(PyObject* object, PyObject* arguments) {
     if (!PyArg_ParseTuple(arguments, "d|Od", &now, &excited, &value)) throw PythonError{};
     core::ChannelExcitation excitation;
     if (excited != Py_None) {
-      const std::string wanted = text(excited);
-      for (std::size_t i = 0; i < core::kChannelCount; ++i) {
-        const auto channel = static_cast<core::Channel>(i);
-        const bool lever = wanted == "throttle" && core::isLever(channel);
-        if (lever || core::channelName(channel) == wanted) excitation.channels.set(i);
-      }
-      if (excitation.channels.none()) throw std::invalid_argument("\"" + wanted + "\" is no channel");
+      excitation.channels = channelsOf(text(excited));
       excitation.values.fill(value);
     }
     const core::ArbitratedControls& controls = self(object).arbiter.step(now, excitation);
@@ -223,6 +236,8 @@ PyMethodDef methods[] = {
     {"command", method(command), METH_VARARGS,
      "command(mode, values, now): a command on control/manual (1) or control/auto (2); why it is refused, or None."},
     {"set_mode", method(setMode), METH_VARARGS, "set_mode(mode, who, reason, now)"},
+    {"commands", method(commands), METH_O,
+     "commands(axis): whether what flies commands it now (roll, pitch, yaw, throttle, or another channel)."},
     {"step", method(step), METH_VARARGS,
      "step(now, excited=None, value=0.0): what goes to X-Plane now, by channel; `excited`: to which `value` is added."},
     {nullptr, nullptr, 0, nullptr},

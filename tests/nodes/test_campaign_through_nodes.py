@@ -83,19 +83,26 @@ def test_a_flight_that_differs_is_exit_code_1_and_said(tmp_path):
     assert "not the same states: from frame 1 of 181 on, " in done.stdout, done.stdout + done.stderr
 
 
-def test_excitations_and_restarts_come_in_the_same_frames_through_the_nodes(tmp_path):
+def test_excitations_restarts_hand_overs_and_failures_come_in_the_same_frames_through_the_nodes(tmp_path):
+    band = {"amplitude": 0.1, "duration": 1.5, "frequency": 0.7, "frequency_end": 3.0}
     events = [
         {"at": 0, "mode": "auto", "stick": {"roll": 0, "pitch": 0, "yaw": 0}},
         {"at": 0.5, "excitation": {"kind": "doublet", "target": "pitch", "amplitude": 0.1, "duration": 0.5}},
-        {"at": 1.25, "mode": "manual"},
+        {"at": 1, "failure": {"name": "engine_2"}},
+        {"at": 1.25, "mode": "manual", "stick": {"roll": 0.8}},
+        {"at": 1.4, "stick": {"roll": 0}},
         {"at": 1.5, "mode": "auto", "label": "half"},
         {"at": 1.6, "excitation": {"kind": "3-2-1-1", "target": "roll", "amplitude": 0.3, "duration": 0.35}},
-        {"at": 2, "end": True},
+        {"at": 2, "excitation": {"kind": "multisine", "target": "pitch", **band, "seed": 7}},
+        {"at": 2.5, "clear_failures": True},
+        {"at": 3.6, "excitation": {"kind": "chirp", "target": "roll", **band}},
+        {"at": 4.2, "stick": {"roll": 0.5}},
+        {"at": 5, "end": True},
     ]
     scenario = {**CAMPAIGN["scenario"], "events": events}
     folder = flown(tmp_path, scenario=scenario, controller="support.steady_controller:Counting")
     done = run("-o", folder, "--refly", 0, "--through-nodes")
-    assert "the same states as in process: 16 fields of 121 frames" in done.stdout, done.stdout + done.stderr
+    assert "the same states as in process: 16 fields of 301 frames" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(

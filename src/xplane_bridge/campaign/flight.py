@@ -167,6 +167,8 @@ class Flight:
                 state = aircraft.step(*self._moved)
             except (FlightModelError, ArithmeticError) as error:
                 return GAVE_UP, f"at {now:.2f} s: {error}"
+            if self._excitation is not None and not aircraft.commands(self._excitation[0]):
+                self._end_excitation()
             if state.crashed:
                 self._record(aircraft.now, state, sample_of(aircraft.view(), aircraft.mode, False))
                 return CRASHED, f"at {aircraft.now:.2f} s"
@@ -197,13 +199,12 @@ class Flight:
                 self._moved = (target, value)
 
     def _end_excitation(self) -> None:
-        """As a change of the mode does it."""
+        """As a change of the mode does it, or the end of the axis's commands."""
         self._excitation, self._moved = None, (None, 0.0)
 
-    def _excite(self, parameters: Mapping[str, Any], now: float) -> None:
+    def _excite(self, parameters: Mapping[str, Any], view: FlightView) -> None:
         """As the service inject_excitation does it, whose numbers are float32: it begins in the next frame."""
-        if self._excitation is not None:
-            raise CampaignError(f"scenario: an excitation at {now:g} s, while another runs: one at a time")
+        now, target = view.sim_time, parameters["target"]
         keys = ("amplitude", "duration", "frequency", "frequency_end")
         amplitude, duration, low, high = struct.unpack("<4f", struct.pack("<4f", *[parameters[key] for key in keys]))
         make = getattr(require("an excitation in process"), "Excitation", None)
@@ -216,7 +217,16 @@ class Flight:
             runner = make(parameters["kind"], amplitude, duration, low, high, parameters["seed"], *self._limits, now)
         except ValueError as error:
             raise CampaignError(f"scenario: excitation at {now:g} s: {error}") from None
-        self._excitation, self._moved = (parameters["target"], runner), (parameters["target"], 0.0)
+        why_not = ""
+        if self._excitation is not None:
+            why_not = "another runs: one at a time"
+        elif not self._aircraft.commands(target):
+            why_not = f"no source commands {target}: an excitation is added to a command"
+        elif not (abs(view.roll_deg) < self._limits[0] and abs(view.pitch_deg) < self._limits[1]):
+            why_not = "the attitude is beyond its limits already"
+        if why_not:
+            raise CampaignError(f"scenario: excitation at {now:g} s: {why_not}")
+        self._excitation, self._moved = (target, runner), (target, 0.0)
 
     def _act(self, kind: str, value: Any, now: float, view: FlightView) -> None:
         if kind == "mode":
@@ -229,7 +239,7 @@ class Flight:
         elif kind == "clear_failures":
             self._aircraft.failures.clear()
         elif kind == "excitation":
-            self._excite(value, view.sim_time)
+            self._excite(value, view)
         elif kind == "label":
             self._labels.setdefault(value, now)
 

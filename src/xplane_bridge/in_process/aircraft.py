@@ -142,8 +142,15 @@ class Aircraft:
         return FlightView(self.model.info, self.model.state, self.controls, self.frame, self.period)
 
     def set_mode(self, mode: int, who: str) -> None:
-        """Asks for a mode."""
+        """Asks for a mode. Its change acts at once, as through tx_node: on what was commanded before this frame."""
+        before = self.mode
         self._arbiter.set_mode(mode, who, "request", self._time)
+        if self.mode != before:
+            self._arbiter.step(self._time)
+
+    def commands(self, axis: str) -> bool:
+        """Whether what flies commands roll, pitch, yaw or throttle, as of the last command or step."""
+        return bool(self._arbiter.commands(axis))
 
     def command(self, mode: int, values: Mapping[str, Any]) -> Optional[str]:
         """A command on control/manual or control/auto, answering this frame; why it is refused, or None."""

@@ -153,7 +153,7 @@ def test_an_excitation_begins_in_the_frame_after_its_event_as_through_the_nodes(
 def test_one_excitation_may_begin_where_another_ends_and_not_before() -> None:
     first, second = {"at": 0.5, "excitation": doublet(0.1, 0.19)}, {"at": 0.7, "excitation": doublet(0.2, 0.2)}
     assert excited(first, second)[44] == pytest.approx(0.2)
-    with pytest.raises(CampaignError, match=r"an excitation at 0\.65 s, while another runs"):
+    with pytest.raises(CampaignError, match=r"excitation at 0\.65 s: another runs: one at a time"):
         excited(first, {**second, "at": 0.65})
 
 
@@ -171,11 +171,48 @@ def test_an_excitation_ends_where_tx_node_would_end_it() -> None:
     assert not stick[200:].any()
 
 
-def test_an_excitation_that_cannot_be_is_said() -> None:
-    wrong = {"kind": "multisine", "target": "pitch", "amplitude": 0.1, "duration": 2.0, "frequency": 0.6,
-             "frequency_end": 0.9}  # fmt: skip
-    with pytest.raises(CampaignError, match=r"scenario: excitation at 0\.5 s: "):
-        excited({"at": 0.5, "excitation": wrong})
+NO_BAND = {"kind": "multisine", "target": "pitch", "amplitude": 0.1, "duration": 2.0, "frequency": 0.6,
+           "frequency_end": 0.9}  # fmt: skip
+LEVER = {**doublet(0.1, 0.5), "target": "throttle"}
+
+
+@pytest.mark.parametrize(
+    ("events", "message"),
+    [
+        ([{"at": 0.5, "excitation": NO_BAND}], r"at 0\.5 s: excitation frequency_max is 0\.9"),
+        ([{"at": 0.5, "excitation": LEVER}], r"at 0\.5 s: no source commands throttle"),
+        # What is commanded from the first state flies in the second frame.
+        ([{"at": 0, "excitation": doublet(0.1, 0.5)}], "at 0 s: no source commands pitch"),
+        (
+            [{"at": 0, "stick": {"roll": 1}}, {"at": 3, "excitation": doublet(0.1, 0.5)}],
+            "at 3 s: the attitude is beyond",
+        ),
+    ],
+)
+def test_an_excitation_that_tx_node_refuses_is_refused(events: Any, message: str) -> None:
+    with pytest.raises(CampaignError, match=f"scenario: excitation {message}"):
+        excited(*events, end=4.0)
+
+
+def falls_silent(state: Any) -> Dict[str, float]:
+    """Commands for half a second, and again after one."""
+    return {"pitch": 0.0} if state.sim_time < 0.5 or state.sim_time > 1.0 else {}
+
+
+def test_an_excitation_ends_with_the_commands_of_its_axis() -> None:
+    begin = {"at": 0, "mode": "auto"}
+    stick = excited(begin, {"at": 0.3, "excitation": doublet(0.1, 4.0)}, end=1.5, controller=f"{__name__}:falls_silent")
+    silent = 30 + 30  # and config/tx.yaml's command_timeout
+    assert stick[silent - 2] > 0.05
+    assert not stick[silent + 2 :].any()
+
+
+def test_a_change_of_the_mode_acts_on_what_was_commanded_before_its_frame() -> None:
+    """As through tx_node: from where the stick was before; then its command of the frame comes, and is no hand-over."""
+    hand_over = {"at": 0.5, "mode": "manual", "stick": {"roll": 1}}
+    events = [{"at": 0, "mode": "auto", "stick": {"roll": 0}}, hand_over, {"at": 1, "end": True}]
+    trace = Flight(campaign(events, controller=f"{__name__}:Recorder").plan(0)).fly(trace=True).trace
+    assert list(trace["stick_roll"][30:32]) == [0.0, 1.0]
 
 
 def test_the_stick_takes_over_from_the_controller() -> None:
