@@ -230,9 +230,7 @@ class Flight:
 
     def _act(self, kind: str, value: Any, now: float, view: FlightView) -> None:
         if kind == "mode":
-            before = self._aircraft.mode
-            self._aircraft.set_mode(value, "scenario")
-            if self._aircraft.mode != before:
+            if self._aircraft.set_mode(value, "scenario"):
                 self._end_excitation()
         elif kind == "failure":
             self._aircraft.failures.act(value)

@@ -141,12 +141,17 @@ class Aircraft:
         """What a controller sees of this frame."""
         return FlightView(self.model.info, self.model.state, self.controls, self.frame, self.period)
 
-    def set_mode(self, mode: int, who: str) -> None:
-        """Asks for a mode. Its change acts at once, as through tx_node: on what was commanded before this frame."""
+    def set_mode(self, mode: int, who: str) -> bool:
+        """Asks for a mode; returns whether that changed it.
+
+        A change acts at once, as through tx_node: on what was commanded before this frame.
+        """
         before = self.mode
         self._arbiter.set_mode(mode, who, "request", self._time)
-        if self.mode != before:
+        changed = self.mode != before
+        if changed:
             self._arbiter.step(self._time)
+        return changed
 
     def commands(self, axis: str) -> bool:
         """Whether what flies commands roll, pitch, yaw or throttle, as of the last command or step."""
