@@ -11,17 +11,14 @@
 namespace xplane_bridge::bindings {
 namespace {
 
-PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* keywords) {
+PyObject* create(PyTypeObject* type, PyObject* arguments, PyObject* /*keywords*/) {
   return guarded([&]() -> PyObject* {
-    static const char* const kNames[] = {"kind", "amplitude",      "duration",        "frequency_min", "frequency_max",
-                                         "seed", "roll_limit_deg", "pitch_limit_deg", "sim_time",      nullptr};
     const char* kind = nullptr;
     core::ExcitationSpec spec;
     unsigned int seed = 0;
     double sim_time = 0.0;
-    if (!PyArg_ParseTupleAndKeywords(arguments, keywords, "sddddIddd", const_cast<char**>(kNames), &kind,
-                                     &spec.amplitude, &spec.duration, &spec.frequency_min, &spec.frequency_max, &seed,
-                                     &spec.roll_limit_deg, &spec.pitch_limit_deg, &sim_time)) {
+    if (!PyArg_ParseTuple(arguments, "sddddIddd", &kind, &spec.amplitude, &spec.duration, &spec.frequency_min,
+                          &spec.frequency_max, &seed, &spec.roll_limit_deg, &spec.pitch_limit_deg, &sim_time)) {
       throw PythonError{};
     }
     const auto shape = core::excitationShapeFrom(kind);
@@ -46,19 +43,10 @@ PyObject* step(PyObject* object, PyObject* arguments) {
   });
 }
 
-PyObject* getReason(PyObject* object, void* /*closure*/) {
-  return PyUnicode_FromString(ownedBy<core::ExcitationRunner>(object).reason().c_str());
-}
-
 PyMethodDef methods[] = {
     {"step", method(step), METH_VARARGS,
      "step(sim_time, roll_deg, pitch_deg): what to add to the command now, or None when it has ended."},
     {nullptr, nullptr, 0, nullptr},
-};
-
-PyGetSetDef properties[] = {
-    {"reason", getReason, nullptr, "why it was aborted, in words; else empty", nullptr},
-    {nullptr, nullptr, nullptr, nullptr, nullptr},
 };
 
 char description[] =
@@ -69,7 +57,6 @@ PyType_Slot slots[] = {
     {Py_tp_new, reinterpret_cast<void*>(create)},
     {Py_tp_dealloc, reinterpret_cast<void*>(destroyOwner<core::ExcitationRunner>)},
     {Py_tp_methods, methods},
-    {Py_tp_getset, properties},
     {Py_tp_doc, description},
     {0, nullptr},
 };

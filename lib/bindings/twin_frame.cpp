@@ -37,11 +37,6 @@ Object item(PyObject* sequence, std::size_t index) {
   return Object(PySequence_GetItem(sequence, static_cast<Py_ssize_t>(index)));
 }
 
-std::vector<Property> properties(PyObject* owner, const char* name) {
-  const std::vector<Object> methods = items(attribute(owner, name).get());
-  return {methods.begin(), methods.end()};
-}
-
 /// actuators.asymmetric.
 double asymmetric(double command, double up_deg, double down_deg) {
   return command * (command > 0.0 ? down_deg : up_deg);
@@ -109,26 +104,24 @@ struct Names {
 
 struct TwinFrame::Parts {
   explicit Parts(PyObject* model) : gear(attribute(model, "_gear")), gear_position(gear.get(), "position") {
-    const auto property = [](const Object& owner, const char* name) { return Property(attribute(owner.get(), name)); };
-    const Object owner = Object::borrowed(model);
     gear_steering = Attribute(gear.get(), "steering");
     gear_travel_s = constant(gear, "_travel_s");
-    set_extension = property(gear, "_set_extension");
-    set_steering = property(gear, "_set_steering");
+    set_extension = property(gear.get(), "_set_extension");
+    set_steering = property(gear.get(), "_set_steering");
     set_brakes = properties(gear.get(), "_set_brakes");
     if (set_brakes.size() != 2) throw std::invalid_argument("_set_brakes: expected 2 of them");
-    height = property(owner, "_height");
-    mass = property(owner, "_mass");
-    roll = property(owner, "_roll");
-    pitch = property(owner, "_pitch");
+    height = property(model, "_height");
+    mass = property(model, "_mass");
+    roll = property(model, "_roll");
+    pitch = property(model, "_pitch");
     set_masses = properties(model, "_mass_setters");
-    set_payload_aft = property(owner, "_payload_aft_setter");
-    hypot = property(Object(PyImport_ImportModule("math")), "hypot");
+    set_payload_aft = property(model, "_payload_aft_setter");
+    hypot = property(Object(PyImport_ImportModule("math")).get(), "hypot");
 
     const Object contacts = attribute(model, "_contacts");
     for (const Object& contact : items(attribute(contacts.get(), "_gear").get())) {
-      wheels.push_back({property(contact, "wow"), property(contact, "compression"),
-                        property(contact, "compression_rate"), constant(contact, "spring"),
+      wheels.push_back({property(contact.get(), "wow"), property(contact.get(), "compression"),
+                        property(contact.get(), "compression_rate"), constant(contact, "spring"),
                         constant(contact, "damping"), constant(contact, "max_steer_deg")});
     }
     const Object surface_set = attribute(model, "_surface_set");

@@ -36,12 +36,7 @@ class Loop {
  public:
   explicit Loop(PyObject* model) : frame_(model) {
     const auto getters = [model](const char* name) { return items(attribute(model, name).get()); };
-    const auto properties = [&getters](const char* name) {
-      const std::vector<Object> methods = getters(name);
-      return std::vector<Property>(methods.begin(), methods.end());
-    };
-    const auto property = [](PyObject* owner, const char* name) { return Property(attribute(owner, name)); };
-    air_ = properties("_air_getters");
+    air_ = properties(model, "_air_getters");
     if (air_.size() != 7) throw std::invalid_argument("_air_getters: expected 7 of them");
     alpha_ = property(model, "_alpha");
     pressure_ = property(model, "_pressure");
@@ -54,14 +49,14 @@ class Loop {
     gear_ = attribute(model, "_gear");
     gear_position_now_ = Attribute(gear_.get(), "position");
     extend_gear_ = property(gear_.get(), "_set_extension");
-    wind_ = properties("_wind_setters");
+    wind_ = properties(model, "_wind_setters");
     const Object fdm = attribute(model, "_fdm");
     run_ = property(fdm.get(), "run");
     set_dt_ = property(fdm.get(), "set_dt");
     hit_ = property(attribute(model, "_contacts").get(), "hit");
     contact_height_ = number(attribute(model, "contact_height_m").get());
     contact_runs_ = static_cast<int>(number(attribute(model, "contact_runs").get()));
-    surface_setters_ = properties("_surface_setters");
+    surface_setters_ = properties(model, "_surface_setters");
     for (const Object& pair : getters("_load_setters")) {
       const std::vector<Object> both = items(pair.get());
       load_setters_.push_back({Property(both.at(0)), number(both.at(1).get())});

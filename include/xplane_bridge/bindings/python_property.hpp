@@ -40,6 +40,13 @@ class Property {
   Object function_, self_;
 };
 
+inline Property property(PyObject* owner, const char* name) { return Property(attribute(owner, name)); }
+/// Those of a list or tuple.
+inline std::vector<Property> properties(PyObject* owner, const char* name) {
+  const std::vector<Object> methods = items(attribute(owner, name).get());
+  return {methods.begin(), methods.end()};
+}
+
 inline double constant(const Object& owner, const char* name) { return number(attribute(owner.get(), name).get()); }
 
 }  // namespace xplane_bridge::bindings
