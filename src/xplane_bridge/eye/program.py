@@ -157,8 +157,8 @@ class Eye:
                 self._wait_for(lambda: self._stream.alive, "waiting for X-Plane at {}:{}".format(*self._options.xplane))
                 self._prepare()
                 if self._verification:
-                    self._say("X-Plane prints its times into the picture; learning its digits for half a minute")
                     with self._screen:
+                        self._say("X-Plane prints its times into the picture; learning its digits for half a minute")
                         self._work(self._verification.work)
                 else:
                     self._work(lambda: None)
