@@ -12,8 +12,8 @@ import numpy as np
 from registry import Context, Measure, benchmark
 from rosbags.highlevel import AnyReader
 
-from support.long_recording import READERS, peak_mb, write_long_recording
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.long_recording import READERS, peak_mb, write_long_recording
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import HarnessError
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from registry import Context, Measure, benchmark
 
-from support.failsafe_flights import KINDS, MOMENTS, SHIPPED, STARTS, fly, table
+from support.flights.failsafe_flights import KINDS, MOMENTS, SHIPPED, STARTS, fly, table
 
 #: [s] of --seconds, the default, from which the program dies in every one of the moments.
 _ALL_FROM_S = 20.0

@@ -7,7 +7,7 @@ from typing import List
 
 from registry import Context, Measure, benchmark
 
-from support.approach_flight import fly_approach
+from support.flights.approach_flight import fly_approach
 from support.white_lines import MEDIAN_PX, P95_PX, flight_of, measure_flight
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import HarnessError

@@ -13,7 +13,7 @@ from bench_offline import cpp_program
 from measuring import measuring, report_of
 from registry import Context, Measure, benchmark
 
-from support.emulator_fixture import EmulatorFixture, XPlaneClient
+from support.simulator.emulator_fixture import EmulatorFixture, XPlaneClient
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.ros import free_port, roslaunch

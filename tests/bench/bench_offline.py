@@ -18,7 +18,7 @@ _PACKET = Path(__file__).parents[1] / "data" / "packets" / "20-data-139-rows.hex
 
 
 def cpp_program(name: str) -> Path:
-    """A program built from tests/bench/<name>.cpp.
+    """A program built from tests/bench/programs/<name>.cpp.
 
     Raises:
         HarnessError: It has not been built.

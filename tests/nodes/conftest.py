@@ -21,14 +21,14 @@ from xplane_bridge.resources import node_program
 _numbers = itertools.count(1)
 #: Tests that take half a minute and more, the longest first, none of which shares what its file has made with others.
 LONG = (
-    "test_first_day.py::",
-    "test_flights.py::",
-    "test_lockstep_scenario.py::test_runs_with",
-    "test_three_aircraft.py::test_position_loop",
-    "test_demo.py::test_the_demo_flies",
-    "test_bench.py::",
-    "test_labelled_approach.py",
-    "test_sender.py::",
+    "whole/test_first_day.py::",
+    "flights/test_flights.py::",
+    "lockstep/test_lockstep_scenario.py::test_runs_with",
+    "flights/test_three_aircraft.py::test_position_loop",
+    "flights/test_demo.py::test_the_demo_flies",
+    "whole/test_bench.py::",
+    "capture/test_labelled_approach.py",
+    "capture/test_sender.py::",
 )
 
 # Shells ignore SIGINT for what they run in the background, and programs would inherit that from here.

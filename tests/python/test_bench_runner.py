@@ -13,9 +13,9 @@ from typing import Any, Callable, Iterator
 
 import pytest
 
-from support.failsafe_flights import KINDS, SHIPPED, STARTS, Outcome
+from support.flights.failsafe_flights import KINDS, SHIPPED, STARTS, Outcome
+from support.flights.synthetic_flight import write_states
 from support.room_table import ROOT
-from support.synthetic_flight import write_states
 
 #: Three benchmarks; the first and the third report what the JSON file says while they run.
 BENCHMARKS = """

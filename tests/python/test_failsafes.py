@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from support.failsafe_flights import SHIPPED, STARTS, Outcome, outcomes, table
+from support.flights.failsafe_flights import SHIPPED, STARTS, Outcome, outcomes, table
 from xplane_bridge.emulator.aircraft import model_names
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "failsafes.md"

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from support.synthetic_flight import Definitions
+from support.flights.synthetic_flight import Definitions
 from xplane_bridge.topics import NAMESPACE, TOPICS
 
 ROOT = Path(__file__).parents[2]

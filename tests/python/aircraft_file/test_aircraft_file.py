@@ -7,8 +7,8 @@ from typing import Any, Dict
 import pytest
 import yaml
 
-from support.emulator_fixture import EmulatorFixture
-from support.name_check import Use, problems
+from support.simulator.emulator_fixture import EmulatorFixture
+from support.simulator.name_check import Use, problems
 from xplane_bridge.aircraft_file import observed
 from xplane_bridge.aircraft_file.observed import DESCRIPTION, ICAO, NotSeenError, Observed, taken, texts_of
 from xplane_bridge.aircraft_file.text import Facts, likely_failsafe, likely_kind, likely_name, yaml_of

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Sequence
 
 import pytest
 
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import BagError, Bags
 from xplane_bridge.bags.cameras import Camera, cameras, chosen_cameras
 

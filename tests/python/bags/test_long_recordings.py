@@ -10,7 +10,7 @@ from typing import Callable, Dict
 import numpy as np
 import pytest
 
-from support.long_recording import READERS, peak_mb, write_long_recording
+from support.flights.long_recording import READERS, peak_mb, write_long_recording
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.cli import bag_export, flight_report

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import BagError, Bags
 from xplane_bridge.bags.passport import read_passports
 from xplane_bridge.plotting.passports import differences_table, passport_section

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from support.export_flight import RATE, export, files_of, picture, pictures_in, write_flight
-from support.synthetic_flight import START, FlightBag, stamp_ns, state_at
+from support.flights.export_flight import RATE, export, files_of, picture, pictures_in, write_flight
+from support.flights.synthetic_flight import START, FlightBag, stamp_ns, state_at
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])

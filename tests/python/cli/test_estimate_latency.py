@@ -10,7 +10,7 @@ from typing import NamedTuple, Optional
 import cv2
 import pytest
 
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.cli.estimate_latency import main
 from xplane_bridge.emulator.view.renderer import Scene
 from xplane_bridge.emulator.view.renderer.painter import Painter

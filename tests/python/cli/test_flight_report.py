@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import pytest
 
-from support.export_flight import write_flight
-from support.synthetic_flight import FlightBag, stamp_ns, write_states
+from support.flights.export_flight import write_flight
+from support.flights.synthetic_flight import FlightBag, stamp_ns, write_states
 from xplane_bridge.analysis.quality import QUALITY_WORDS
 from xplane_bridge.cli import flight_report
 from xplane_bridge.plotting.spec import SHADES, Panel, Series

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from support.drawn_approach import frame_state, scene, write_approach
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.drawn_approach import frame_state, scene, write_approach
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from support.white_lines import airport_file
 from xplane_bridge.cli.sight import label_images
 from xplane_bridge.labels import table

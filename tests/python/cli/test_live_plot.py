@@ -1,4 +1,4 @@
-"""live_plot's parts that need neither ROS nor a screen; tests/nodes/test_live_plot.py sees the window."""
+"""live_plot's parts that need neither ROS nor a screen; tests/nodes/whole/test_live_plot.py sees the window."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from support.fake_xplane import FakeXPlane
+from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.cli import xplane_doctor
 from xplane_bridge.doctor.conformance import names, results

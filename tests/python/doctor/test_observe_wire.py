@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from support.fake_xplane import FakeXPlane
+from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol
 from xplane_bridge.doctor import names
 from xplane_bridge.doctor.observe import beacons, computer, data_output, ports, simulator

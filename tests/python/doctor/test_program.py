@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from support.fake_xplane import FakeXPlane
+from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge.cli import xplane_doctor
 from xplane_bridge.doctor import examination, names, report
 from xplane_bridge.doctor.checks import CHECKS

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture, XPlaneClient
+from support.simulator.emulator_fixture import EmulatorFixture, XPlaneClient
 from xplane_bridge import protocol
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.lockstep import Fences

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture, XPlaneClient
+from support.simulator.emulator_fixture import EmulatorFixture, XPlaneClient
 from xplane_bridge import protocol
 from xplane_bridge.emulator.options import OptionError, drop_ros_arguments, parse
 from xplane_bridge.emulator.truth import COLUMNS

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from support.drawn_approach import LEVER, write_approach
-from support.export_flight import export, write_flight
-from support.synthetic_flight import stamp_ns
+from support.flights.drawn_approach import LEVER, write_approach
+from support.flights.export_flight import export, write_flight
+from support.flights.synthetic_flight import stamp_ns
 from support.white_lines import airport_file
 from xplane_bridge.cli.sight import label_images
 from xplane_bridge.labels import table

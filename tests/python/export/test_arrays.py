@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from support.export_flight import export, write_flight
-from support.synthetic_flight import CLIMB, FlightBag, stamp_ns, state_at
+from support.flights.export_flight import export, write_flight
+from support.flights.synthetic_flight import CLIMB, FlightBag, stamp_ns, state_at
 from xplane_bridge.bags import Bags
 from xplane_bridge.export import arrays
 

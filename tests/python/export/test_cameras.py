@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from support.export_flight import DELAY_ASSUMED, export, write_flight
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.export_flight import DELAY_ASSUMED, export, write_flight
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
 from xplane_bridge.export.cameras import CameraRow, camera_rows
 

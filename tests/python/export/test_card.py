@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 import yaml
 
-from support.export_flight import export, write_flight
+from support.flights.export_flight import export, write_flight
 from xplane_bridge import __version__
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from support.export_flight import export, pictures_in, write_flight
-from support.synthetic_flight import FlightBag, stamp_ns, state_at
+from support.flights.export_flight import export, pictures_in, write_flight
+from support.flights.synthetic_flight import FlightBag, stamp_ns, state_at
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from support.drawn_approach import write_approach
-from support.export_flight import export, write_flight
+from support.flights.drawn_approach import write_approach
+from support.flights.export_flight import export, write_flight
 from support.markdown import blocks
 from support.white_lines import airport_file
 from xplane_bridge.cli.sight import label_images

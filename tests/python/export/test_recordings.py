@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from support.export_flight import export, picture, write_flight
-from support.synthetic_flight import FlightBag, stamp_ns, state_at
+from support.flights.export_flight import export, picture, write_flight
+from support.flights.synthetic_flight import FlightBag, stamp_ns, state_at
 from xplane_bridge.bags import Bags
 
 OLD_BAG = Path(__file__).resolve().parents[3] / "tests/data/bags/every_topic_0.1.0.bag"

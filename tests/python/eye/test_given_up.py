@@ -12,7 +12,7 @@ from typing import Any, Callable, Iterator, List
 import numpy as np
 import pytest
 
-from support.fake_xplane import FakeXPlane
+from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol
 from xplane_bridge.eye import calibrate, names, program
 from xplane_bridge.eye.calibrate import CalibrationError, Delay

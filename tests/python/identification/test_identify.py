@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from support.manoeuvre_flight import LATERAL, PITCH, Film, Manoeuvre, Recording, flown
+from support.flights.manoeuvre_flight import LATERAL, PITCH, Film, Manoeuvre, Recording, flown
 from xplane_bridge.bags.flight import Flight
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight import jsbsim_model

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from support.manoeuvre_flight import LATERAL, PITCH, Manoeuvre, flown
+from support.flights.manoeuvre_flight import LATERAL, PITCH, Manoeuvre, flown
 from support.markdown import blocks
 from support.room_table import ROOT
 from xplane_bridge.cli import identify_model

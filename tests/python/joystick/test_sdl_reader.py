@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from support.sdl_device import DOWN, LEFT, RIGHT, UP, SdlDevice
+from support.nodes.sdl_device import DOWN, LEFT, RIGHT, UP, SdlDevice
 from xplane_bridge.cli import joy_reader
 from xplane_bridge.joystick import sdl_reader
 from xplane_bridge.joystick.sdl_reader import JoyReader, JoystickError, choose, shape, start_sdl

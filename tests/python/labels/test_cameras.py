@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from support.drawn_approach import BELLY, FORWARD, write_approach
-from support.export_flight import export
+from support.flights.drawn_approach import BELLY, FORWARD, write_approach
+from support.flights.export_flight import export
 from support.white_lines import airport_file, flight_of, measure_flight
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli import flight_report
@@ -171,7 +171,7 @@ def test_the_report_shows_each_camera_with_its_own_labels(flight: Path, tmp_path
 
 
 def test_a_camera_without_pictures_or_camera_info_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from support.synthetic_flight import FlightBag
+    from support.flights.synthetic_flight import FlightBag
 
     whole = write_approach(tmp_path / "whole.bag", 2, views=(FORWARD, BELLY))
     for lost, words in (

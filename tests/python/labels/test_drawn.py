@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from support.drawn_approach import write_approach
+from support.flights.drawn_approach import write_approach
 from support.white_lines import MEDIAN_PX, P95_PX, flight_of, measure_flight
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.pictures import grey_pictures

@@ -11,9 +11,18 @@ import cv2
 import numpy as np
 import pytest
 
-from support.drawn_approach import ANCHOR, HEADING_DEG, PERIOD, SIZE, geodetic, scene, traffic_state, write_approach
-from support.export_flight import export
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.drawn_approach import (
+    ANCHOR,
+    HEADING_DEG,
+    PERIOD,
+    SIZE,
+    geodetic,
+    scene,
+    traffic_state,
+    write_approach,
+)
+from support.flights.export_flight import export
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from support.white_lines import airport_file, flight_of
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.sight.label_images import main as label_images

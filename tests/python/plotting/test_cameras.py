@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from support.synthetic_flight import FlightBag, stamp_ns
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli import flight_report
 

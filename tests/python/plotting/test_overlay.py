@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from support.drawn_approach import write_approach
-from support.export_flight import write_flight
+from support.flights.drawn_approach import write_approach
+from support.flights.export_flight import write_flight
 from support.white_lines import airport_file
 from xplane_bridge.cli import flight_report
 from xplane_bridge.cli.sight import label_images

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from support.emulator_fixture import EmulatorFixture
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge.constants import EXCITATION_KINDS
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import (

@@ -6,7 +6,7 @@ import struct
 import xmlrpc.client
 from pathlib import Path
 
-from support.udp_packets import udp
+from support.simulator.udp_packets import udp
 from xplane_bridge.wire_log.anonymous import Anonymiser, Disguise
 from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
 from xplane_bridge.wire_log.datagrams import datagram_in

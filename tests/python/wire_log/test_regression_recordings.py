@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from support.udp_packets import udp
+from support.simulator.udp_packets import udp
 from xplane_bridge.cli.wire import wire_replay
 from xplane_bridge.cli.wire.wire_replay import main
 from xplane_bridge.harness.processes import HarnessError

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from support.udp_packets import udp
+from support.simulator.udp_packets import udp
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import CaptureError, Packet, write_pcapng
 from xplane_bridge.wire_log.strangers import MAGIC, StrangersCapture

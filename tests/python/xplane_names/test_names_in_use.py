@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from support import failure_name_lines, name_check
-from support.name_check import Use, problem, problems, uses_in_dump, word_problem, words_in
+from support.simulator import failure_name_lines, name_check
+from support.simulator.name_check import Use, problem, problems, uses_in_dump, word_problem, words_in
 from xplane_bridge import xplane_names
 from xplane_bridge.doctor import names as doctor_names
 from xplane_bridge.eye import names as eye_names

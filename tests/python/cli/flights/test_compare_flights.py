@@ -9,7 +9,7 @@ import subprocess
 
 import pytest
 
-from support.synthetic_flight import START, FlightBag, stamp_ns
+from support.flights.synthetic_flight import START, FlightBag, stamp_ns
 from xplane_bridge.cli.flights import compare_flights
 from xplane_bridge.cli.flights.compare_flights import matched, read
 

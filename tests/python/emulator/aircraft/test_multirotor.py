@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from support.position_loop import PositionLoop
+from support.flights.position_loop import PositionLoop
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.flight_model import EngineFault, InitialState
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge import protocol
 from xplane_bridge.emulator.flight.flight_model import InitialState
 

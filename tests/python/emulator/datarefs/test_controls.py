@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from support.emulator_bench import (
+from support.simulator.emulator_bench import (
     OVERRIDE,
     POSITION,
     YOKE_PITCH,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator.datarefs.commands import all_commands
 from xplane_bridge.emulator.datarefs.store import DatarefStore

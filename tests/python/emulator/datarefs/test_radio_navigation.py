@@ -10,7 +10,7 @@ import math
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge.emulator.datarefs import radio_navigation as radio
 from xplane_bridge.emulator.flight.flight_model import InitialState, ModelState
 from xplane_bridge.emulator.flight.frame import Frame, magnetic_declination

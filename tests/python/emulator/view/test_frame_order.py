@@ -7,7 +7,7 @@ from typing import List
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.wire.faults import parse_faults

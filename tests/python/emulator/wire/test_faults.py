@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge import protocol
 from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, FaultyChannel, Outage, parse_faults
 

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from support.emulator_fixture import EmulatorFixture
+from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge import compiled
 from xplane_bridge.emulator.wire import server
 

@@ -7,8 +7,8 @@ import struct
 
 import pytest
 
-from support.emulator_fixture import XPlaneClient
-from support.emulator_wire import (
+from support.simulator.emulator_fixture import XPlaneClient
+from support.simulator.emulator_wire import (
     LATITUDE,
     LONGITUDE,
     PAUSED,

@@ -8,7 +8,7 @@ import socket
 
 import pytest
 
-from support.emulator_wire import (
+from support.simulator.emulator_wire import (
     LATITUDE,
     LONGITUDE,
     PAUSED,

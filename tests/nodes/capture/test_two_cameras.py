@@ -1,0 +1,137 @@
+"""Two windows of one X-Plane, a capture_node for each: forward and down, joined by the frame they show.
+
+The nodes read the windows, or two `xplane_eye` do and send them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from support.nodes.second_camera import NAME, WINDOW, second_camera
+from xplane_bridge.emulator.view.renderer import read_strip
+from xplane_bridge.harness import ManagedProcess, wait_until
+from xplane_bridge.harness.display import VirtualDisplay
+from xplane_bridge.harness.ros import free_port
+from xplane_bridge.resources import config_file, program
+
+FPS = 20
+PIPELINE_DELAY_S = 0.15
+#: A picture that appears this much off its time says nothing about the pairing [s].
+LATE_S = 0.2 / FPS
+ENOUGH = 60
+
+
+def on_time(swaps: Path) -> set:
+    """Frames that a window showed when they were due."""
+    offset = time.time_ns() - time.monotonic_ns()
+    with swaps.open() as file:
+        late = {
+            int(row["frame"]): (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9
+            for row in csv.DictReader(file)
+        }
+    return {frame for frame, delay in late.items() if abs(delay - PIPELINE_DELAY_S) < LATE_S}
+
+
+@contextlib.contextmanager
+def reading_windows(world, port: int, display: str):
+    """Two capture_node that read the windows."""
+    world.set_param("display_delay", PIPELINE_DELAY_S)
+    world.start("capture_node", {"window": {"display": display, "index": 0}})
+    with second_camera(world, port, display, display_delay=PIPELINE_DELAY_S) as launch:
+        yield launch
+
+
+@contextlib.contextmanager
+def taking_what_is_sent(world, port: int, display: str):
+    """Two capture_node with an xplane_eye for each."""
+    listen = [f"127.0.0.1:{free_port()}" for _ in range(2)]
+    world.start("capture_node", {"source": "sender", "sender": {"listen": listen[0]}})
+    second = yaml.safe_load(config_file("capture.yaml").read_text(encoding="utf-8"))
+    second["source"], second["sender"]["listen"] = "sender", listen[1]
+    config = world.folder / "second.yaml"
+    config.write_text(yaml.safe_dump(second), encoding="utf-8")
+    with contextlib.ExitStack() as running:
+        launch = running.enter_context(second_camera(world, port, display, capture_config=config))
+        for window, receiver in enumerate(listen):
+            which = [receiver, "--window", window, "--xplane", f"127.0.0.1:{port}", "--local-port", 0]
+            own = ["--undo-file", world.folder / f"undo_{window}.json", "--delay", PIPELINE_DELAY_S]
+            command = [str(word) for word in (program("xplane_eye"), *which, *own)]
+            running.enter_context(ManagedProcess(f"xplane_eye_{window}", command, world.folder))
+        yield launch
+
+
+@pytest.mark.parametrize("cameras_of", [reading_windows, taking_what_is_sent])
+def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cameras_of) -> None:
+    from sensor_msgs.msg import CameraInfo, Image
+    from xplane_bridge.msg import FrameState
+
+    with VirtualDisplay(tmp_path) as display:
+        monkeypatch.setenv("DISPLAY", display.display)
+        swaps = tmp_path / "swaps.csv"
+        views = ["--window", *WINDOW, "--swap-log", swaps]
+        emulator = world.emulator(*views, "--fps", FPS, "--pipeline-delay", f"{PIPELINE_DELAY_S}s", "--start", "air")
+        world.start("rx_node")
+        with cameras_of(world, emulator.port, display.display) as launch:
+            cameras = [
+                (
+                    world.watch(f"{place}camera/image_raw", Image),
+                    world.watch(f"{place}camera/camera_info", CameraInfo),
+                    world.watch(f"{place}camera/frame_state", FrameState),
+                )
+                for place in ("", f"{NAME}/")
+            ]
+
+            def shared() -> set:
+                """Keys of frames that both cameras have without a flag."""
+                keys = [{s.frame_sim_time for s in list(c[2].messages) if s.quality == 0} for c in cameras]
+                return keys[0] & keys[1]
+
+            wait_until(lambda: len(shared()) >= ENOUGH, 90.0, "frames that both cameras have")
+            launch.check_running()
+        emulator.stop()
+
+    punctual = on_time(swaps) & on_time(tmp_path / "swaps_2.csv")
+    compared = 0
+    states = [{s.frame_sim_time: s for s in camera[2].messages if s.quality == 0} for camera in cameras]
+    images = [{image.header.stamp: image for image in camera[0].messages} for camera in cameras]
+    for key in sorted(shared()):
+        pair = [by_key[key] for by_key in states]
+        assert pair[0].state == pair[1].state, "the same frame, the same state"
+        if not all(state.header.stamp in camera for state, camera in zip(pair, images)):
+            continue  # an image came after the end
+        shown = [read_strip(pixels(camera[state.header.stamp])) for state, camera in zip(pair, images)]
+        if not all(strip.frame in punctual for strip in shown):
+            continue
+        compared += 1
+        assert [np.float32(strip.sim_time) == pair[1].state.sim_time for strip in shown] == [True, True], (
+            [(strip.frame, strip.sim_time) for strip in shown],
+            [(state.display_time.to_nsec(), state.grab_time.to_nsec(), state.frame_sim_time) for state in pair],
+            [path.read_text() for path in (swaps, tmp_path / "swaps_2.csv")],
+        )
+    assert compared >= 5, "on a busy machine few windows are punctual"
+
+    forward, down = pair
+    assert (forward.header.frame_id, forward.view) == ("camera_optical", FrameState.VIEW_FORWARD)
+    assert (down.header.frame_id, down.view) == ("belly_optical", FrameState.VIEW_DOWN)
+    turn = down.body_to_camera.rotation
+    # Right is right (-y of base_link), down in the picture is aft (-x), the line of sight is down (-z); by hand.
+    wanted = np.array((math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0))
+    assert abs(np.dot((turn.x, turn.y, turn.z, turn.w), wanted)) == pytest.approx(
+        1.0, abs=1e-6
+    )  # q and -q are one turn
+    assert down.body_to_camera.translation == forward.body_to_camera.translation
+    assert down.field_of_view_deg == pytest.approx(90.0)
+    assert cameras[0][1].last.K[0] == pytest.approx(554.256, abs=1e-3)  # 320 / tan(30 deg)
+    assert cameras[1][1].last.K[0] == pytest.approx(320.0, abs=1e-3)  # 320 / tan(45 deg)
+
+
+def pixels(image) -> np.ndarray:
+    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)

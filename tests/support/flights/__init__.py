@@ -1,0 +1,1 @@
+"""Flights, controllers and recordings of them that tests use."""

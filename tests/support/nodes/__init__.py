@@ -1,0 +1,1 @@
+"""What tests of nodes start, publish and hear."""
