@@ -7,7 +7,7 @@
 #include <tuple>
 #include <vector>
 
-#include "driven_surfaces_test.hpp"
+#include "actuation/driven_surfaces_test.hpp"
 
 namespace xplane_bridge {
 namespace {

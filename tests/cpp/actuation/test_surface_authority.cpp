@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "driven_surfaces_test.hpp"
+#include "actuation/driven_surfaces_test.hpp"
 #include "xplane_bridge/actuation/control_path.hpp"
 
 namespace xplane_bridge {

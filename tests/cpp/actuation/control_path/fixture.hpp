@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "flown_path.hpp"
+#include "actuation/flown_path.hpp"
 #include "xplane_bridge/actuation/control_path.hpp"
 
 namespace xplane_bridge {

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "driven_surfaces_test.hpp"
+#include "actuation/driven_surfaces_test.hpp"
 #include "xplane_bridge/actuation/failure_manager.hpp"
 #include "xplane_bridge/core/failures/failure_names.hpp"
 

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "driven_surfaces_test.hpp"
+#include "actuation/driven_surfaces_test.hpp"
 #include "xplane_bridge/actuation/mixing_files.hpp"
 #include "xplane_bridge/actuation/surface_control.hpp"
 

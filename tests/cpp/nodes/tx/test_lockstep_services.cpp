@@ -1,0 +1,195 @@
+#include "xplane_bridge/nodes/tx/lockstep_services.hpp"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "actuation/actuation_rig.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+/// A paused X-Plane that does not wait for answers, and follows a pause command `late` frames after it.
+class FreeStepTest : public testing::Test, protected ActuationRig {
+ protected:
+  FreeStepTest() {
+    setPaused(true);
+    sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+      if (message.path == "sim/operation/pause_toggle") {
+        if (*sim_.status().paused) {
+          if (resumes_) setPaused(false);
+        } else {
+          frames_to_pause_ = late_;
+        }
+      }
+    };
+    sim_.on_frame = [this] {
+      if (frames_to_pause_ > 0 && --frames_to_pause_ == 0) setPaused(true);
+    };
+  }
+  LockstepStep::Response step(std::uint32_t frames) {
+    LockstepStep::Request request;
+    request.frames = frames;
+    LockstepStep::Response response;
+    services_.step(request, &response);
+    return response;
+  }
+
+  int late_ = 1;
+  int frames_to_pause_ = 0;
+  bool resumes_ = true;
+  bool ending_ = false;
+  LockstepServices services_{nullptr, actuation_.get(), &sim_, [this] { return ending_; }, "tx_node/lockstep"};
+};
+
+TEST_F(FreeStepTest, FliesPausesAndSaysHowManyFramesThatWere) {
+  const std::uint64_t before = actuation_->framesFlown();
+  late_ = 3;
+  const LockstepStep::Response response = step(5);
+  EXPECT_TRUE(response.success) << response.result.message;
+  EXPECT_EQ(response.result.code, ServiceResult::OK);
+  EXPECT_EQ(sim_.status().paused, true);
+  EXPECT_GT(response.flown, 5U) << "X-Plane pauses some frames late";
+  EXPECT_EQ(response.flown, actuation_->framesFlown() - before);
+  EXPECT_EQ(response.sim_time, actuation_->simTime());
+}
+
+TEST_F(FreeStepTest, NoFrameIsFlownForNone) {
+  const LockstepStep::Response response = step(0);
+  EXPECT_TRUE(response.success) << response.result.message;
+  EXPECT_EQ(response.flown, 0U);
+  EXPECT_EQ(sim_.status().paused, true);
+}
+
+TEST_F(FreeStepTest, SaysThatXPlaneDoesNotResume) {
+  resumes_ = false;
+  const LockstepStep::Response response = step(5);
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::NO_LINK);
+  EXPECT_EQ(response.result.message, "X-Plane did not follow in time");
+  EXPECT_EQ(response.flown, 0U);
+}
+
+TEST_F(FreeStepTest, SaysThatNoFrameComesAndPausesAllTheSame) {
+  sim_.on_frame = [this] { sim_.set("sim/time/total_running_time_sec", 100.0F); };  // its time stands, unpaused
+  late_ = 1;
+  const LockstepStep::Response response = step(5);
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.message, "no frame comes");
+  EXPECT_EQ(sim_.commands().size(), 2U) << "resumed, and paused again";
+}
+
+TEST_F(FreeStepTest, EndsWithTheNode) {
+  ending_ = true;
+  EXPECT_LT(step(1000000).flown, 1000000U);
+}
+
+TEST_F(FreeStepTest, RunsAndHolds) {
+  EXPECT_EQ(services_.setRunning(true), "");
+  EXPECT_EQ(sim_.status().paused, false);
+  EXPECT_EQ(services_.setRunning(false), "");
+  EXPECT_EQ(sim_.status().paused, true);
+  EXPECT_EQ(eventsOf(core::EventKind::kPause).back().who, "tx_node/lockstep");
+}
+
+/// A simulator in lock-step, on a thread of its own as the link's, and a participant that answers each frame at once.
+class LockstepStepTest : public testing::Test, protected ActuationRig {
+ protected:
+  LockstepStepTest() : flight_([this] { fly(); }) {}
+  ~LockstepStepTest() override {
+    end();
+    flight_.join();
+  }
+  void end() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ended_ = true;
+    woken_.notify_all();
+  }
+  void wake() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    asked_ = true;
+    woken_.notify_all();
+  }
+  void fly() {
+    answer(0);
+    while (true) {
+      if (lockstep_.ready()) {
+        number_ > 0 ? lockstep_.close() : lockstep_.leaveFrameZero();
+        ++number_;
+        core::LockstepFrame frame;
+        frame.number = number_;
+        lockstep_.open(frame, stamp(number_));
+        answer(number_);
+        continue;
+      }
+      std::unique_lock<std::mutex> lock(mutex_);
+      woken_.wait(lock, [this] { return asked_ || ended_; });
+      asked_ = false;
+      if (ended_) return;
+    }
+  }
+  void answer(std::uint32_t frame) {
+    lockstep_.takeDone("/rx_node", stamp(frame), frame == 0 ? kLockstepFrame0 : "");
+    if (frame > 0) lockstep_.takeDone("/player", stamp(frame), "");
+  }
+  static ros::Time stamp(std::uint32_t frame) { return {1000U + frame, 0U}; }
+  static LockstepOptions options() {
+    LockstepOptions out;
+    out.participants = {"player"};
+    out.hold = true;
+    return out;
+  }
+  LockstepStep::Response step(std::uint32_t frames) {
+    LockstepStep::Request request;
+    request.frames = frames;
+    LockstepStep::Response response;
+    services_.step(request, &response);
+    return response;
+  }
+
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  bool asked_ = false;
+  bool ended_ = false;
+  std::uint32_t number_ = 0;
+  TxLockstep lockstep_{options(), core::hostClock(), stamp(0), [this] { wake(); }, [](const std::string&) {}};
+  LockstepServices services_{&lockstep_, actuation_.get(), &sim_, [] { return false; }, "tx_node/lockstep"};
+  std::thread flight_;  // last: it uses all of the above
+};
+
+TEST_F(LockstepStepTest, FliesExactlyWhatIsAskedFor) {
+  EXPECT_EQ(step(3).flown, 3U);
+  const LockstepStep::Response response = step(40);
+  EXPECT_TRUE(response.success) << response.result.message;
+  EXPECT_EQ(response.result.code, ServiceResult::OK);
+  EXPECT_EQ(response.flown, 40U);
+  EXPECT_EQ(lockstep_.frame(), 43U);
+  EXPECT_EQ(step(0).flown, 0U);
+  EXPECT_TRUE(sim_.commands().empty()) << "X-Plane's pause is not used";
+}
+
+TEST_F(LockstepStepTest, HoldsWhatRuns) {
+  EXPECT_EQ(services_.setRunning(true), "");
+  EXPECT_EQ(services_.setRunning(false), "");
+  EXPECT_TRUE(step(0).success);
+  const std::uint32_t held = lockstep_.frame();
+  EXPECT_EQ(step(2).flown, 2U);
+  EXPECT_EQ(lockstep_.frame(), held + 2U);
+}
+
+TEST_F(LockstepStepTest, SaysThatTheNodeEnds) {
+  EXPECT_TRUE(step(1).success);
+  end();
+  lockstep_.stop();
+  const LockstepStep::Response response = step(1);
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::NO_LINK);
+  EXPECT_EQ(response.result.message, "tx_node ends");
+}
+
+}  // namespace
+}  // namespace xplane_bridge
