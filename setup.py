@@ -61,7 +61,8 @@ EIGEN = ("/usr/include/eigen3", "/usr/local/include/eigen3", "/opt/homebrew/incl
 def compiled_module():
     """xplane_bridge._core, of the same files as lib/bindings/CMakeLists.txt makes it; left out without a compiler."""
     control = ["control_arbiter", "control_channels", "control_command", "control_rows"]
-    bindings = ["arbiter", "datagrams", "module", "state_reader", "twin_frame", "twin_loop", "twin_physics"]
+    bindings = ["arbiter", "datagrams", "flight_record", "module"]
+    bindings += ["state_reader", "twin_frame", "twin_loop", "twin_physics"]
     include_dirs, macros = ["include"], []
     eigen = [path for path in EIGEN if os.path.exists(os.path.join(path, "unsupported", "Eigen", "FFT"))]
     if eigen:  # else without excitations

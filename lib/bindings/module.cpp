@@ -24,6 +24,7 @@ PyMODINIT_FUNC PyInit__core() {  // NOLINT(bugprone-reserved-identifier,readabil
 #ifdef XPLANE_BRIDGE_WITH_EXCITATION  // left out by pip where Eigen is not there
     xplane_bridge::bindings::addExcitation(module.get());
 #endif
+    xplane_bridge::bindings::addFlightRecord(module.get());
     xplane_bridge::bindings::addStateReader(module.get());
     xplane_bridge::bindings::addTwinLoop(module.get());
     PyObject* out = module.get();

@@ -127,6 +127,7 @@ PyCFunction method(Function* function) {
 void addArbiter(PyObject* module);
 void addDatagrams(PyObject* module);
 void addExcitation(PyObject* module);
+void addFlightRecord(PyObject* module);
 void addStateReader(PyObject* module);
 void addTwinLoop(PyObject* module);
 

@@ -78,7 +78,7 @@ class Flight:
     _aircraft: Aircraft
 
     def __init__(self, plan: FlightPlan, watch: Optional[Callable[[FlightView], None]] = None) -> None:
-        require("a campaign")
+        self._truth_bytes = require("a campaign").truth_bytes
         self._watch = watch
         self._plan = plan
         self._scenario = parse_scenario(plan.scenario)
@@ -242,7 +242,7 @@ class Flight:
             self._labels.setdefault(value, now)
 
     def _record(self, now: float, state: ModelState, s: FlightSample) -> None:
-        self._truth.update(truth_bytes(state))
+        self._truth.update(self._truth_bytes(state))
         c = self._aircraft.controls
         self._rows.append((
             now, s.roll, s.pitch, s.heading, s.altitude, s.agl, s.climb, s.speed, s.alpha, s.beta, s.roll_rate,
@@ -260,14 +260,3 @@ def conditions_of(plan: FlightPlan) -> Conditions:
         frame_rate=plan.frame_rate,
         seed=plan.seed,
     )
-
-
-def truth_bytes(s: ModelState) -> bytes:
-    """What the flight model really did, in doubles: what two flights must share to be the same."""
-    numbers = (
-        s.sim_time_s, s.latitude_deg, s.longitude_deg, s.altitude_m, *s.quaternion, s.p_rad_s, s.q_rad_s, s.r_rad_s,
-        s.v_north_mps, s.v_east_mps, s.v_down_mps, s.alpha_rad, s.beta_rad, s.calibrated_airspeed_mps,
-        s.wind_north_mps, s.wind_east_mps, s.wind_down_mps, s.mass_kg, *s.surfaces_deg.values(),
-        *[engine.thrust_n for engine in s.engines], *[engine.rpm for engine in s.engines],
-    )  # fmt: skip
-    return struct.pack(f"<{len(numbers)}d", *numbers)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import struct
 from typing import NamedTuple
 
+from xplane_bridge.compiled import require
 from xplane_bridge.emulator.flight.flight_model import Controls, ModelInfo, ModelState
 from xplane_bridge.emulator.flight.frame import PARKED_HEIGHT_M
 
@@ -21,7 +21,7 @@ class Vector3(NamedTuple):
 
 
 class _Numbers(NamedTuple):
-    """Those of FlightState, and the parts of its vectors."""
+    """Those of FlightState, and the parts of its vectors, in the order of lib/bindings/flight_record.cpp."""
 
     frame_period: float
     sim_time: float
@@ -67,10 +67,6 @@ class _Numbers(NamedTuple):
     wind_from_deg: float
 
 
-#: As float32, in which X-Plane sends every number.
-_LAYOUT = struct.Struct(f"<{len(_Numbers._fields)}f")
-
-
 class FlightView(_Numbers):
     """One instant of a flight, with names, units, signs and rounding of `FlightState.msg`.
 
@@ -91,23 +87,11 @@ class FlightView(_Numbers):
 
     def __new__(cls, info: ModelInfo, state: ModelState, controls: Controls, frame: int, period: float) -> FlightView:
         """That of a state, `frame` frames of `period` [s] after the start."""
-        s, degrees = state, math.degrees
-        north, east = s.wind_north_mps, s.wind_east_mps
-        self = tuple.__new__(cls, _LAYOUT.unpack(_LAYOUT.pack(
-            period, s.sim_time_s, s.latitude_deg, s.longitude_deg, s.altitude_m,
-            s.agl_m - info.standing_height_m + PARKED_HEIGHT_M,
-            degrees(s.roll_rad), degrees(s.pitch_rad), degrees(s.heading_rad) % 360.0,
-            s.p_rad_s, s.q_rad_s, s.r_rad_s, s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2,
-            s.v_north_mps, s.v_east_mps, s.v_down_mps, s.u_mps, s.v_mps, s.w_mps, north, east, s.wind_down_mps,
-            math.hypot(s.v_north_mps, s.v_east_mps), degrees(s.alpha_rad), degrees(s.beta_rad),
-            s.calibrated_airspeed_mps, s.equivalent_airspeed_mps, s.true_airspeed_mps, s.mach, s.dynamic_pressure_pa,
-            s.air_density_kg_m3,
-            -s.specific_force_z_mps2 / G0, s.specific_force_x_mps2 / G0, s.specific_force_y_mps2 / G0,
-            controls.roll, controls.pitch, controls.yaw, controls.throttle[0],
-            math.hypot(north, east), degrees(math.atan2(-east, -north)) % 360.0,
-        )))  # fmt: skip
+        heights = info.standing_height_m, PARKED_HEIGHT_M
+        numbers = require("a flight in process").flight_numbers(state, controls, period, *heights)
+        self = tuple.__new__(cls, numbers)
         self.frame_count = frame
-        self.on_ground, self.stall_warning = s.on_ground_any, s.stall_warning
+        self.on_ground, self.stall_warning = state.on_ground_any, state.stall_warning
         return self
 
     @property

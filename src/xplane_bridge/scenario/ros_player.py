@@ -32,25 +32,13 @@ MODE_NAMES = words(FlightMode)
 
 def sample_of(state: Any, mode: int, stall_warning: bool) -> FlightSample:
     """The player's view of a FlightState; what is unknown there is NaN here, and no condition on it holds."""
-    rates = state.angular_velocity
+    rates, degrees = state.angular_velocity, math.degrees
     return FlightSample(
-        roll=state.roll_deg,
-        pitch=state.pitch_deg,
-        heading=state.heading_true_deg,
-        altitude=state.altitude_msl,
-        agl=state.altitude_agl,
-        climb=state.vertical_speed,
-        speed=state.calibrated_airspeed,
-        alpha=state.alpha_deg,
-        beta=state.beta_deg,
-        roll_rate=math.degrees(rates.x),
-        pitch_rate=math.degrees(rates.y),
-        yaw_rate=math.degrees(rates.z),
-        load_factor=state.load_factor_normal,
-        on_ground=state.on_ground,
-        stall_warning=stall_warning,
-        mode=mode,
-    )
+        state.roll_deg, state.pitch_deg, state.heading_true_deg, state.altitude_msl, state.altitude_agl,
+        state.vertical_speed, state.calibrated_airspeed, state.alpha_deg, state.beta_deg,
+        degrees(rates.x), degrees(rates.y), degrees(rates.z), state.load_factor_normal,
+        state.on_ground, stall_warning, mode,
+    )  # fmt: skip
 
 
 def command_values(commands: Commands) -> Dict[str, float]:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+import struct
 
 import pytest
 
@@ -124,3 +125,26 @@ def test_the_options_of_the_arbiter_are_those_of_the_files() -> None:
 def test_modes_are_plain_numbers_of_the_message() -> None:
     assert (MANUAL, AUTO) == (FlightMode.MANUAL, FlightMode.AUTO)
     assert (type(MANUAL), type(AUTO)) == (int, int)
+
+
+def test_the_truth_of_a_frame_is_every_number_in_doubles() -> None:
+    model = create_model("fixed_wing", seed=1)
+    controls = model.reset(InitialState(airspeed_mps=70.0))
+    model.set_turbulence(1.0, seed=1)
+    s = model.step(1 / 60, controls)
+    numbers = (
+        s.sim_time_s, s.latitude_deg, s.longitude_deg, s.altitude_m, *s.quaternion, s.p_rad_s, s.q_rad_s, s.r_rad_s,
+        s.v_north_mps, s.v_east_mps, s.v_down_mps, s.alpha_rad, s.beta_rad, s.calibrated_airspeed_mps,
+        s.wind_north_mps, s.wind_east_mps, s.wind_down_mps, s.mass_kg, *s.surfaces_deg.values(),
+        *[engine.thrust_n for engine in s.engines], *[engine.rpm for engine in s.engines],
+    )  # fmt: skip
+    assert len(set(numbers)) > 20
+    assert core.truth_bytes(s) == struct.pack(f"={len(numbers)}d", *numbers)
+
+
+def test_a_number_beyond_float32_is_no_view() -> None:
+    model = create_model("fixed_wing")
+    controls = model.reset(InitialState(airspeed_mps=70.0))
+    model.state.p_rad_s = 1e39
+    with pytest.raises(OverflowError, match="too large"):
+        FlightView(model.info, model.state, controls, 60, 1 / 60)
