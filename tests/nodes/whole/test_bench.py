@@ -81,7 +81,7 @@ def test_the_benchmark_of_lockstep_measures(tmp_path: Path) -> None:
 
 
 def test_benchmarks_of_wire_and_files_measure(tmp_path: Path) -> None:
-    names = ["decode", "packet_rate", "emulator_period", "command_to_surface", "steps", "bags"]
+    names = ["decode", "packet_rate", "emulator_period", "command_to_surface", "steps", "campaign", "bags"]
     measures = measured(tmp_path, names)
     assert measures["bags: messages read / written"] == 1.0
     assert {name.split(":")[0] for name in measures} == set(names)
