@@ -22,11 +22,12 @@ from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ros import free_port
 from xplane_bridge.resources import config_file, program
 
-FPS = 20
+#: So few that pictures of half a frame late, by which a pairing could be off, are rare on a busy machine.
+FPS = 10
 PIPELINE_DELAY_S = 0.15
 #: A picture that appears this much off its time says nothing about the pairing [s].
 LATE_S = 0.2 / FPS
-ENOUGH = 60
+ENOUGH = 40
 
 
 def on_time(swaps: Path) -> set:
