@@ -1,4 +1,5 @@
-// Written from src/xplane_bridge/xplane_names/datarefs.txt by tests/support/simulator/failure_name_lines.py; do not edit.
+// Written from src/xplane_bridge/xplane_names/datarefs.txt by tests/support/simulator/failure_name_lines.py:
+// do not edit.
 
 #include "xplane_bridge/core/failures/failure_names.hpp"
 

@@ -18,7 +18,8 @@ PREFIX = "sim/operation/failures/rel_"
 Range = Tuple[int, Optional[int]]
 
 _HEAD = """\
-// Written from src/xplane_bridge/xplane_names/datarefs.txt by tests/support/simulator/failure_name_lines.py; do not edit.
+// Written from src/xplane_bridge/xplane_names/datarefs.txt by tests/support/simulator/failure_name_lines.py:
+// do not edit.
 
 #include "xplane_bridge/core/failures/failure_names.hpp"
 
