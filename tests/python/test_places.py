@@ -120,3 +120,19 @@ def test_the_panic_tool_knows_every_override_that_the_bridge_sets():
         named |= set(re.findall(r'"(sim/operation/override/override_\w*[a-z])"', path.read_text(encoding="utf-8")))
     # The whole stick is what other clients and earlier versions take.
     assert known == named | {"sim/operation/override/override_joystick"}
+
+
+def test_the_earth_and_the_units_are_written_once():
+    """In Python. Controllers are copied, and the analysis imports nothing but the messages' words."""
+    written = re.compile(r"\b6378145\b|(?<![\w.])(?:9\.80665|0\.3048)\b(?!\))|1852(?:\.0)? / 3600")
+    own = {
+        "src/xplane_bridge/units.py",
+        "src/xplane_bridge/controllers/geometry.py",
+        "src/xplane_bridge/analysis/consistency.py",
+    }
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "src").rglob("*.py")
+        if written.search(path.read_text(encoding="utf-8"))
+    }
+    assert found == own

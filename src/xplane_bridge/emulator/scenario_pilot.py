@@ -9,6 +9,7 @@ from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands
 from xplane_bridge.emulator.flight.frame import Frame
 from xplane_bridge.scenario import Action, FlightSample, Player, Scenario, ScenarioError
 from xplane_bridge.scenario.world import KINDS as WORLD_KINDS
+from xplane_bridge.units import GRAVITY_MPS2
 
 _FAILURES = "sim/operation/failures/"
 _TRIMS = {"trim_roll": "aileron_trim", "trim_pitch": "elevator_trim", "trim_yaw": "rudder_trim"}
@@ -116,7 +117,7 @@ def sample_of(frame: Frame) -> FlightSample:
         roll_rate=math.degrees(m.p_rad_s),
         pitch_rate=math.degrees(m.q_rad_s),
         yaw_rate=math.degrees(m.r_rad_s),
-        load_factor=-m.specific_force_z_mps2 / 9.80665,
+        load_factor=-m.specific_force_z_mps2 / GRAVITY_MPS2,
         on_ground=m.on_ground_any,
         stall_warning=m.stall_warning,
     )

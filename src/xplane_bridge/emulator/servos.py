@@ -11,9 +11,8 @@ from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight.flight_model import Controls, ModelInfo
 from xplane_bridge.emulator.flight.frame import MPS_TO_FPM, MPS_TO_KT, Frame
 from xplane_bridge.scenario.holds import HoldAutopilot, HoldGains, Targets
+from xplane_bridge.units import FOOT_M, GRAVITY_MPS2
 
-_M_PER_FT = 0.3048
-_GRAVITY_MPS2 = 9.80665
 _THROTTLE = "sim/cockpit2/engine/actuators/throttle_ratio"
 _OVERRIDE = "sim/operation/override/override_"
 #: An axis: attribute of `Controls`, name in `servo_*_ratio` and in the override that takes it.
@@ -77,7 +76,7 @@ class Servos:
             self._holds = self._holds or HoldAutopilot(HoldGains())
             targets = self._targets(frame, beam)
             rates = math.degrees(m.p_rad_s), math.degrees(m.q_rad_s)
-            climb, altitude = -m.v_down_mps, altitude_ft * _M_PER_FT
+            climb, altitude = -m.v_down_mps, altitude_ft * FOOT_M
             deflections["roll"] = self._holds.roll(targets, frame.true_phi, rates[0], frame.mag_psi) or 0.0
             deflections["pitch"] = (
                 self._holds.pitch(targets, dt, frame.true_theta, rates[1], frame.true_phi, climb, altitude) or 0.0
@@ -85,7 +84,7 @@ class Servos:
         else:
             self._holds = None
         if damper and m.true_airspeed_mps > _SLOW_MPS:
-            turn = _GRAVITY_MPS2 / m.true_airspeed_mps * math.sin(m.roll_rad) * math.cos(m.pitch_rad)
+            turn = GRAVITY_MPS2 / m.true_airspeed_mps * math.sin(m.roll_rad) * math.cos(m.pitch_rad)
             deflections["yaw"] = min(max(-_DAMPING * math.degrees(m.r_rad_s - turn), -0.3), 0.3)
         everything = joystick or flight_control or autopilot
         for (axis, name), taken in zip(_AXES, taken_axes):
@@ -104,7 +103,7 @@ class Servos:
         if beam is not None and get(ap.GLIDESLOPE):
             targets.climb = beam.climb_mps(frame)
         elif get(ap.ALTITUDE):
-            targets.altitude = get(ap.HELD_FT) * _M_PER_FT
+            targets.altitude = get(ap.HELD_FT) * FOOT_M
         elif get(ap.CLIMB):
             targets.climb = get(ap.CLIMB_DIAL) / MPS_TO_FPM
         elif get(ap.SPEED):

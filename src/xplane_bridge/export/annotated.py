@@ -27,6 +27,7 @@ from xplane_bridge.export.dataset import write_frames
 from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels, Thing, keypoints
 from xplane_bridge.export.pictures import Options, Picture, Pictures, write_pictures
 from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
+from xplane_bridge.units import FOOT_M
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
@@ -42,7 +43,7 @@ _LARD = (
     *("x_TR", "y_TR", "x_TL", "y_TL", "x_BL", "y_BL", "x_BR", "y_BR"),
     *("sigma_TR_px", "sigma_TL_px", "sigma_BL_px", "sigma_BR_px", "height_source", "stamp_ns", "camera"),
 )
-_MILE_M, _FOOT_M = 1852.0, 0.3048
+_MILE_M = 1852.0
 
 _Write = Callable[[Path, Pictures, "Optional[ImageLabels]"], None]
 
@@ -200,7 +201,7 @@ def _lard_row(picture: Picture, thing: Thing, size: tuple[int, int], labels: Ima
         "runway": label["name"],
         "slant_distance": label["slant_distance_m"] / _MILE_M,
         "along_track_distance": label["along_track_distance_m"] / _MILE_M,
-        "height_above_runway": label["height_above_threshold_m"] / _FOOT_M,
+        "height_above_runway": label["height_above_threshold_m"] / FOOT_M,
         "lateral_path_angle": label["lateral_path_angle_deg"],
         "vertical_path_angle": label["vertical_path_angle_deg"],
         "yaw": heading,

@@ -13,6 +13,7 @@ import numpy as np
 from xplane_bridge.bags import Bags, Table
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.units import EARTH_RADIUS_M
 
 #: Topics without which a flight has not been recorded.
 REQUIRED_TOPICS = tuple(
@@ -36,7 +37,6 @@ POSITION_TOLERANCE_M = 0.01
 VELOCITY_TOLERANCE_MPS = 0.02
 
 #: X-Plane's planet: a sphere of this radius [m].
-_EARTH_RADIUS_M = 6378145.0
 #: Rows of FlightState that are NaN by their definition in some attitudes or are no numbers.
 _NOT_JUDGED = ("header.",)
 
@@ -279,7 +279,7 @@ def check_positions(states: Table, truth: Mapping[str, np.ndarray]) -> Verdict:
     if not same.all():
         text = f"{int((~same).sum())} flight states carry a simulator time that the emulator never had"
         return Verdict("positions", False, text)
-    radius = _EARTH_RADIUS_M + truth["altitude_m"][index]
+    radius = EARTH_RADIUS_M + truth["altitude_m"][index]
     north = np.radians(states["latitude"] - truth["latitude_deg"][index]) * radius
     east = np.radians(states["longitude"] - truth["longitude_deg"][index]) * radius
     east *= np.cos(np.radians(truth["latitude_deg"][index]))

@@ -14,7 +14,6 @@ from xplane_bridge.identification.coefficients import Geometry, derivatives
 from xplane_bridge.identification.equation_error import equation_error
 from xplane_bridge.identification.model import (
     AXES,
-    GRAVITY_MPS2,
     Axis,
     AxisModel,
     IdentificationError,
@@ -26,6 +25,7 @@ from xplane_bridge.identification.model import (
 )
 from xplane_bridge.identification.output_error import Fit, fit, refit, simulate
 from xplane_bridge.identification.windows import TAIL_S, Window, find_windows
+from xplane_bridge.units import GRAVITY_MPS2
 
 #: An input that moves less than this in all windows is none [rad].
 _LEAST_INPUT_RAD = math.radians(0.1)

@@ -15,8 +15,6 @@ import numpy as np
 
 from xplane_bridge.errors import XplaneBridgeError
 
-GRAVITY_MPS2 = 9.80665
-
 
 class IdentificationError(XplaneBridgeError):
     """There is no model to be had; the text is one line with the remedy."""

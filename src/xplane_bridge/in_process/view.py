@@ -8,8 +8,7 @@ from typing import NamedTuple
 from xplane_bridge.compiled import require
 from xplane_bridge.emulator.flight.flight_model import Controls, ModelInfo, ModelState
 from xplane_bridge.emulator.flight.frame import PARKED_HEIGHT_M
-
-G0 = 9.80665
+from xplane_bridge.units import GRAVITY_MPS2
 
 
 class Vector3(NamedTuple):
@@ -144,4 +143,5 @@ class FlightView(_Numbers):
     @property
     def specific_force(self) -> Vector3:
         """[m/s^2] FRD."""
-        return Vector3(self.load_factor_axial * G0, self.load_factor_side * G0, -self.load_factor_normal * G0)
+        g = GRAVITY_MPS2
+        return Vector3(self.load_factor_axial * g, self.load_factor_side * g, -self.load_factor_normal * g)

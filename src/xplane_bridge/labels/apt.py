@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Iterable, Iterator, NamedTuple, Optional, Sequence, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M
 
 #: Versions of the file format whose rows are known.
 OLDEST, NEWEST = 1000, 1299
-FEET_M = 0.3048
 _AIRPORT_ROWS = {"1", "16", "17"}
 _RUNWAY, _METADATA, _END = "100", "1302", "99"
 #: Fields of a runway's row: 8 of the runway, 9 of each end.
@@ -163,7 +163,7 @@ def _airport(path: Path, version: int, block: _Block) -> Airport:
         raise AptError(msg)
     digest = hashlib.sha256("\n".join(row for _, row in block.rows).encode("utf-8")).hexdigest()
     name = words[5].strip() if len(words) > 5 else ""
-    return Airport(words[4], name, elevation * FEET_M, runways, str(path), digest, version)
+    return Airport(words[4], name, elevation * FOOT_M, runways, str(path), digest, version)
 
 
 def _runway(path: Path, number: int, row: str) -> Runway:
@@ -204,7 +204,7 @@ def _length(runway: Runway) -> float:
     a, b = runway.ends
     north = math.radians(b.latitude - a.latitude)
     east = math.radians((b.longitude - a.longitude + 180.0) % 360.0 - 180.0) * math.cos(math.radians(a.latitude))
-    return 6378145.0 * math.hypot(north, east)
+    return EARTH_RADIUS_M * math.hypot(north, east)
 
 
 def _number(path: Path, line: int, what: str, text: str, low: float, high: float) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.labels.apt import Airport, Runway
 from xplane_bridge.labels.world import RunwayFrame
+from xplane_bridge.units import EARTH_RADIUS_M
 
 #: How well each source knows a height [m].
 MEASURED_SIGMA_M, TABLE_SIGMA_M, AIRPORT_SIGMA_M = 0.3, 2.0, 15.0
@@ -101,7 +102,7 @@ def profile(airport: Airport, runway: Runway, ground: Optional[Ground], table: M
 def _measured(frame: RunwayFrame, ground: Ground) -> Optional[Profile]:
     """The medians of stretches of the runway that the aircraft was above, as it lies; None: it never was."""
     # Degrees first: most of a flight is elsewhere.
-    reach = math.degrees((frame.length + frame.width) / 6378145.0)
+    reach = math.degrees((frame.length + frame.width) / EARTH_RADIUS_M)
     wide = reach / max(math.cos(math.radians(frame.near.latitude)), 1e-3)
     turn = (ground.longitude - frame.near.longitude + 180.0) % 360.0 - 180.0
     near = np.nonzero((np.abs(ground.latitude - frame.near.latitude) < reach) & (np.abs(turn) < wide))[0]

@@ -10,7 +10,8 @@ import numpy as np
 from xplane_bridge.labels.apt import Airport, Runway
 from xplane_bridge.labels.camera import NEAR_M, Camera
 from xplane_bridge.labels.heights import Height, Profile
-from xplane_bridge.labels.world import EARTH_RADIUS_M, SIDE_PARTS, RunwayFrame, World
+from xplane_bridge.labels.world import SIDE_PARTS, RunwayFrame, World
+from xplane_bridge.units import EARTH_RADIUS_M
 
 #: A label less sure than this is `coarse` [px].
 COARSE_PX = 3.0
@@ -169,7 +170,7 @@ class Labeller:
         pose = camera.pose
         level = self._world.level(pose.latitude, pose.longitude)
         north, east, _ = level @ (camera.place - self._world.place(pose.latitude, pose.longitude, pose.altitude))
-        degrees = math.degrees(1.0 / 6378145.0)
+        degrees = math.degrees(1.0 / EARTH_RADIUS_M)
         cosine = max(math.cos(math.radians(pose.latitude)), 1e-6)
         return pose.latitude + degrees * float(north), pose.longitude + degrees * float(east) / cosine
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from xplane_bridge.bags import Bags, Table
 from xplane_bridge.labels.things import Other
-from xplane_bridge.labels.world import EARTH_RADIUS_M
+from xplane_bridge.units import EARTH_RADIUS_M
 
 _TRAFFIC = "xplane_bridge/TrafficState"
 #: Two states farther apart [s] say nothing of the time between them.

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
+from xplane_bridge.units import EARTH_RADIUS_M
+
 #: Numbers of one aircraft: metres ahead, to the right of and above the own one where it begins, its heading against the
 #: own one's [deg, right +], speed over ground and climb [m/s].
 RANGES: Mapping[str, Tuple[float, float]] = {
@@ -20,7 +22,6 @@ MOST = 19
 #: Between two messages [s] of scenario time; `tx_node` moves them on in between.
 PERIOD_S = 0.1
 _ROUND_OFF_S = 1e-6
-_EARTH_M = 6378145.0  # X-Plane's sphere
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,6 @@ class ScenarioTraffic:
 
 def moved(latitude: float, longitude: float, north: float, east: float) -> Tuple[float, float]:
     """A place [deg] so many metres away, for distances that are short on the earth."""
-    across = _EARTH_M * max(math.cos(math.radians(latitude)), 1e-6)
+    across = EARTH_RADIUS_M * max(math.cos(math.radians(latitude)), 1e-6)
     further = longitude + math.degrees(east / across)
-    return latitude + math.degrees(north / _EARTH_M), (further + 180.0) % 360.0 - 180.0
+    return latitude + math.degrees(north / EARTH_RADIUS_M), (further + 180.0) % 360.0 - 180.0

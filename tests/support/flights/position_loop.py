@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, Tuple
 
-from xplane_bridge.emulator.flight.earth import EARTH_RADIUS_M
+from xplane_bridge.units import EARTH_RADIUS_M
 
 _GRAVITY = 9.81
 #: What full stick tilts the stabilised quadrotor [deg].

@@ -13,6 +13,7 @@ from xplane_bridge.bags import Bags, Table
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
 from xplane_bridge.cli.entry import start_node
 from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
+from xplane_bridge.units import EARTH_RADIUS_M
 
 _NODE = "rerun_flight"
 #: Topics that are played, with their types.
@@ -25,7 +26,6 @@ _PLAYED = {
 PLACED_S = 60.0  #: a flight may take so long to load
 _MODE_S = 0.1  # between two looks whether another mode is recorded
 NEAR_M = 100.0  #: [m] within which an aircraft is where it was placed
-_EARTH_RADIUS_M = 6378145.0
 
 
 class Played(NamedTuple):
@@ -182,7 +182,7 @@ def far(state: Any, start: Any) -> float:
     """[m] from a flight state to where another one (fields by name) was."""
     north = np.radians(state.latitude - start["latitude"])
     east = np.radians(state.longitude - start["longitude"]) * np.cos(np.radians(start["latitude"]))
-    return float(np.hypot(np.hypot(north, east) * _EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))
+    return float(np.hypot(np.hypot(north, east) * EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))
 
 
 class _Player:

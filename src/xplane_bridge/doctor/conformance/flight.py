@@ -13,6 +13,7 @@ from xplane_bridge.doctor.conformance import names
 from xplane_bridge.doctor.conformance.link import Sample, XPlane
 from xplane_bridge.doctor.conformance.pilot import Pilot
 from xplane_bridge.doctor.conformance.verdict import NotTestableError
+from xplane_bridge.units import KNOT_MPS
 
 #: Above the present ground [m]; below the second a question is broken off, below the third it never gets.
 START_HEIGHT_M, LOW_M, LOWEST_M = 1500.0, 600.0, 300.0
@@ -20,7 +21,6 @@ START_HEIGHT_M, LOW_M, LOWEST_M = 1500.0, 600.0, 300.0
 _FROM_ORIGIN_DEG, _AWAY_DEG = 0.12, 0.2
 #: Speed by stall speed, and its limits [m/s].
 _BY_STALL, _SPEED_MPS, _USUAL_MPS = 1.7, (30.0, 130.0), 60.0
-_MPS_PER_KT = 1852.0 / 3600.0
 #: A placement of which nothing is seen counts as ignored after [s]; while X-Plane loads it does not answer.
 _SEEN_S, _LOAD_S = 4.0, 90.0
 _NEAR_DEG = 0.02
@@ -128,7 +128,7 @@ class Flight:
         ground = now[names.ELEVATION] - now[names.HEIGHT]
         stall = self.xplane.try_read([names.STALL_SPEED_KT], 0.5).get(names.STALL_SPEED_KT, 0.0)
         low, high = _SPEED_MPS
-        speed = min(max(_BY_STALL * stall * _MPS_PER_KT, low), high) if stall > 0.0 else _USUAL_MPS
+        speed = min(max(_BY_STALL * stall * KNOT_MPS, low), high) if stall > 0.0 else _USUAL_MPS
         return Place(latitude, longitude, ground + START_HEIGHT_M, now[names.TRUE_HEADING], speed)
 
     # --- beginning and end ----------------------------------------------------------------------------------------
@@ -294,7 +294,7 @@ class Flight:
         else:
             writes = {} if self.xplane.is_12 else {names.OLD_REAL_WEATHER: 0.0}
             writes.update(dict.fromkeys(names.OLD_WIND_FROM, from_deg))
-            writes.update(dict.fromkeys(names.OLD_WIND_SPEED, speed_mps / _MPS_PER_KT))
+            writes.update(dict.fromkeys(names.OLD_WIND_SPEED, speed_mps / KNOT_MPS))
 
         def blows(sample: Sample) -> bool:
             return abs(math.hypot(*(sample[path] for path in self.wind_now)) - speed_mps) < 0.1 * speed_mps

@@ -15,6 +15,7 @@ from typing import Callable, List, Optional, Sequence
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.flight.frame import Frame, magnetic_declination
+from xplane_bridge.units import EARTH_RADIUS_M
 
 METERS_PER_NM = 1852.0
 #: The runway's middle is where flights start [m].
@@ -119,7 +120,7 @@ class Aerodrome:
 
 def offset(place: Place, bearing_deg: float, distance_m: float) -> Place:
     """The place at a distance on a great circle."""
-    angle = distance_m / earth.EARTH_RADIUS_M
+    angle = distance_m / EARTH_RADIUS_M
     latitude, bearing = math.radians(place.latitude_deg), math.radians(bearing_deg)
     sine = math.sin(latitude) * math.cos(angle) + math.cos(latitude) * math.sin(angle) * math.cos(bearing)
     east = math.sin(bearing) * math.sin(angle) * math.cos(latitude)
@@ -134,7 +135,7 @@ def distance_m(a: Place, b: Place) -> float:
         math.sin((lat_b - lat_a) / 2.0) ** 2
         + math.cos(lat_a) * math.cos(lat_b) * math.sin(math.radians(b.longitude_deg - a.longitude_deg) / 2.0) ** 2
     )
-    return 2.0 * earth.EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(half)))
+    return 2.0 * EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(half)))
 
 
 def bearing_deg(a: Place, b: Place) -> float:

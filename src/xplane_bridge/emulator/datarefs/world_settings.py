@@ -10,6 +10,7 @@ from xplane_bridge.emulator.datarefs.aircraft_systems import INHG_PA, Weather
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.flight.frame import Clocks
+from xplane_bridge.units import KNOT_MPS
 
 #: Vertical gust per unit of X-Plane's turbulence, which goes from 0 to 10 [m/s].
 TURBULENCE_MPS_PER_UNIT = 0.5
@@ -20,7 +21,6 @@ _MAX_WIND_MPS = 100.0
 _MAX_TURBULENCE_MPS = 10.0
 _MAX_LOAD_KG = 5000.0
 _STATIONS = 9
-_MPS_PER_KT = 1852.0 / 3600.0
 _SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
 _SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
 #: Where the centre of gravity is set: by the first of these that the version has.
@@ -72,11 +72,11 @@ class WorldSettings:
         if not store.dataref("sim/weather/region/wind_speed_msc").visible:
             layer = "sim/weather/{}[0]"
             names = (layer.format("wind_direction_degt"), layer.format("wind_speed_kt"), layer.format("turbulence"))
-            factor = _MPS_PER_KT  # the layers' speed is in knots, unlike the present wind's
+            factor = KNOT_MPS  # the layers' speed is in knots, unlike the present wind's
         else:
             region = "sim/weather/region/"
             names = (region + "wind_direction_degt", region + "wind_speed_msc", region + "turbulence")
-            factor = _MPS_PER_KT if "wind-names" in self._otherwise else 1.0
+            factor = KNOT_MPS if "wind-names" in self._otherwise else 1.0
         direction, speed, turbulence = names
         self._wind_settings = (*names, factor)
 

@@ -6,7 +6,8 @@ import math
 import xml.etree.ElementTree as ElementTree
 
 from xplane_bridge.emulator.flight.flight_model import Controls, GearState, ModelState
-from xplane_bridge.emulator.flight.jsbsim_state import FOOT_M, Properties
+from xplane_bridge.emulator.flight.jsbsim_state import Properties
+from xplane_bridge.units import FOOT_M
 
 #: A structural part that meets the ground faster than this, or gear faster than the second, is a crash [m/s].
 CRASH_STRUCTURE_MPS = 2.0

@@ -11,13 +11,14 @@ from typing import Tuple
 
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.flight_model import ModelInfo, ModelState
+from xplane_bridge.units import FOOT_M
 
 MPS_TO_KT = 3600.0 / 1852.0
 MPS_TO_MPH = 3600.0 / 1609.344
-MPS_TO_FPM = 60.0 / 0.3048
-M_TO_FT = 1.0 / 0.3048
+MPS_TO_FPM = 60.0 / FOOT_M
+M_TO_FT = 1.0 / FOOT_M
 PA_TO_INHG = 1.0 / 3386.389
-PA_TO_PSF = 0.3048**2 / 4.4482216152605
+PA_TO_PSF = FOOT_M**2 / 4.4482216152605
 PA_TO_PSI = 1.0 / 6894.757293168
 SEA_LEVEL_DENSITY = 1.225
 SEA_LEVEL_PRESSURE_PA = 101325.0

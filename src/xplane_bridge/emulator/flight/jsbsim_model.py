@@ -30,7 +30,6 @@ from xplane_bridge.emulator.flight.flight_model import (
 )
 from xplane_bridge.emulator.flight.jsbsim_state import (
     AIR_PROPERTIES,
-    FOOT_M,
     INCH_M,
     LOADS,
     POUND_KG,
@@ -53,6 +52,7 @@ from xplane_bridge.emulator.flight.limits import (
 )
 from xplane_bridge.emulator.flight.rotors import Rotor, sum_loads
 from xplane_bridge.emulator.flight.turbulence import DrydenTurbulence
+from xplane_bridge.units import FOOT_M
 
 SITUATION_VERSION = 2
 #: Height below which contact with the ground is looked for.

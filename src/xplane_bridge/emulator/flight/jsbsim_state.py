@@ -10,14 +10,12 @@ from typing import Any, Callable, Sequence
 import jsbsim
 
 from xplane_bridge import compiled
-from xplane_bridge.emulator.flight.earth import EARTH_RADIUS_M, GRAVITY_MPS2
 from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
+from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M, GRAVITY_MPS2, KNOT_MPS
 
-FOOT_M = 0.3048
 POUND_FORCE_N = 4.4482216152605
 POUND_KG = 0.45359237
 SLUG_KG = 14.593902937206364
-KNOT_MPS = 1852.0 / 3600.0
 PSF_PA = POUND_FORCE_N / FOOT_M**2
 SLUG_FT3_KG_M3 = SLUG_KG / FOOT_M**3
 POUND_FOOT_NM = POUND_FORCE_N * FOOT_M

@@ -6,6 +6,8 @@ import math
 import random
 from typing import Any, Optional
 
+from xplane_bridge.units import FOOT_M
+
 #: Air passes a hovering aircraft too: floor of the speed at which the gust field goes by [m/s].
 MINIMUM_SPEED_MPS = 5.0
 
@@ -33,9 +35,9 @@ class DrydenTurbulence:
     def step(self, dt: float, speed_mps: float, agl_m: float) -> tuple[float, float, float]:
         """Next gusts [m/s]: along the horizontal path, to its right, down. Exact for any ``dt`` at constant speed."""
         speed = max(speed_mps, MINIMUM_SPEED_MPS)
-        height_ft = min(max(agl_m / 0.3048, 10.0), 1000.0)
+        height_ft = min(max(agl_m / FOOT_M, 10.0), 1000.0)
         shape = 0.177 + 0.000823 * height_ft
-        scale_w = height_ft * 0.3048
+        scale_w = height_ft * FOOT_M
         scale_u = scale_w / shape**1.2
         sigma_w = self.intensity_mps
         sigma_u = sigma_w / shape**0.4

@@ -17,6 +17,7 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceFault,
     SurfaceFaultKind,
 )
+from xplane_bridge.units import EARTH_RADIUS_M
 
 STEP = MAX_SUBSTEP_S
 
@@ -47,9 +48,7 @@ def test_rates_specific_force_and_air_velocity_belong_together():
         assert shown == pytest.approx(tuple(force), abs=1e-6)
         air = velocity(state) - np.array((5.0, -3.0, 0.0))
         assert state.true_airspeed_mps == pytest.approx(float(np.linalg.norm(air)), abs=1e-6)
-        north = (
-            math.radians(state.latitude_deg - before.latitude_deg) * (earth.EARTH_RADIUS_M + state.altitude_m) / STEP
-        )
+        north = math.radians(state.latitude_deg - before.latitude_deg) * (EARTH_RADIUS_M + state.altitude_m) / STEP
         assert north == pytest.approx(state.v_north_mps, abs=1e-3)
     assert abs(state.p_rad_s) > 0.1
     assert abs(state.q_rad_s) > 0.02

@@ -8,8 +8,8 @@ import pytest
 
 from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge import protocol
-from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.flight_model import InitialState
+from xplane_bridge.units import EARTH_RADIUS_M
 
 PLANE = "sim/multiplayer/position/" + "plane{}_"
 OVERRIDE = "sim/operation/override/override_planepath[{}]"
@@ -102,7 +102,7 @@ def test_tcas_reports_distance_bearing_and_height(bench):
     emulator = bench()
     m = emulator.sim.model.state
     client = emulator.client()
-    north = m.latitude_deg + math.degrees(2000.0 / earth.EARTH_RADIUS_M)
+    north = m.latitude_deg + math.degrees(2000.0 / EARTH_RADIUS_M)
     client.send(protocol.VehiclePose("VEHX", 2, north, m.longitude_deg, m.altitude_m + 100.0, 0.0, 0.0, 0.0))
     emulator.step(1)
     relative = "sim/cockpit2/tcas/indicators/relative_"

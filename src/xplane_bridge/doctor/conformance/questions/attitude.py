@@ -13,8 +13,8 @@ from xplane_bridge.doctor.conformance.link import Sample
 from xplane_bridge.doctor.conformance.question import Question
 from xplane_bridge.doctor.conformance.vectors import body_axes, dot, median, rms, turn
 from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
+from xplane_bridge.units import GRAVITY_MPS2
 
-_G = 9.80665
 #: Both kinds of angles must differ by so much [deg].
 _MEANINGFUL_DEG = 0.03
 #: Rates and forces below these prove nothing.
@@ -116,7 +116,7 @@ def _forces(flight: Flight, path: str, axis: int, signed: float) -> Tuple[float,
     own = []
     for sample in samples:
         east, up, south = (sample[each] for each in names.ACCELERATION)
-        own.append(dot(body_axes(sample)[axis], (east, up + _G, south)) / _G)
+        own.append(dot(body_axes(sample)[axis], (east, up + GRAVITY_MPS2, south)) / GRAVITY_MPS2)
     shown = [sample[path] for sample in samples]
     return (
         rms([signed * a - b for a, b in zip(shown, own)]),

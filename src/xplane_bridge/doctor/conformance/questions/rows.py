@@ -13,8 +13,9 @@ from xplane_bridge.doctor.conformance.link import Row, Sample
 from xplane_bridge.doctor.conformance.question import Question
 from xplane_bridge.doctor.conformance.vectors import median
 from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, judged
+from xplane_bridge.units import FOOT_M
 
-_FT_PER_M = 1.0 / 0.3048
+_FT_PER_M = 1.0 / FOOT_M
 _RPM = 30.0 / math.pi
 _WATCH_S = 0.8
 

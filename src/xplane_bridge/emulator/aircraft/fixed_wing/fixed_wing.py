@@ -10,7 +10,6 @@ import numpy as np
 from xplane_bridge import compiled
 from xplane_bridge.emulator.flight import trim
 from xplane_bridge.emulator.flight.actuators import asymmetric, sided
-from xplane_bridge.emulator.flight.earth import EARTH_RADIUS_M
 from xplane_bridge.emulator.flight.flight_model import (
     Controls,
     EngineFault,
@@ -22,8 +21,9 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceKind,
 )
 from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel, substeps
-from xplane_bridge.emulator.flight.jsbsim_state import FOOT_M, SLUG_FT3_KG_M3
+from xplane_bridge.emulator.flight.jsbsim_state import SLUG_FT3_KG_M3
 from xplane_bridge.emulator.flight.rotors import Governor, GovernorSpec, PistonEngine, PistonSpec, Rotor, RotorSpec
+from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M
 
 AILERON_UP_DEG, AILERON_DOWN_DEG = 25.0, 15.0
 ELEVATOR_UP_DEG, ELEVATOR_DOWN_DEG = 18.0, 13.0

@@ -32,6 +32,7 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceKind,
     SurfaceSpec,
 )
+from xplane_bridge.units import EARTH_RADIUS_M, GRAVITY_MPS2
 
 _ENGINES = 2
 _LIMIT_DEG = 20.0
@@ -233,7 +234,7 @@ class KinematicModel:
         if self._alt <= self._terrain_m + _GROUND_HEIGHT_M + 1e-6:
             return 0.0
         lift = 1.0 / max(math.cos(self._bank), 0.2)
-        weight = 1400.0 * earth.GRAVITY_MPS2
+        weight = 1400.0 * GRAVITY_MPS2
         return min(lift * weight / max(self.state.dynamic_pressure_pa, 200.0) / 90.0, 0.3)
 
     # --- motion -------------------------------------------------------------------------------------------------------
@@ -246,7 +247,7 @@ class KinematicModel:
         yaw = deg["vstab1_rud1"] / _LIMIT_DEG
         throttle = [self._throttle(i, controls) for i in range(_ENGINES)]
         thrust = _MAX_THRUST_MPS2 * sum(throttle) / _ENGINES
-        g = earth.GRAVITY_MPS2
+        g = GRAVITY_MPS2
         on_ground = self._alt <= self._terrain_m + _GROUND_HEIGHT_M + 1e-6
         rate = thrust - _DRAG_PER_V2 * self._speed**2 - g * math.sin(self._path)
         if on_ground:
@@ -329,7 +330,7 @@ class KinematicModel:
         air = self._air_velocity()
         on_ground = self._alt <= self._terrain_m + _GROUND_HEIGHT_M + 1e-6 and air[2] >= 0.0
         north, east, down = map(float, air if on_ground else air + self._wind + self._gust)
-        radius = earth.EARTH_RADIUS_M + self._alt
+        radius = EARTH_RADIUS_M + self._alt
         self._lat += math.degrees(north / radius) * dt
         self._lon = earth.wrap_half_turn(
             self._lon + math.degrees(east / (radius * math.cos(math.radians(self._lat)))) * dt
@@ -367,7 +368,7 @@ class KinematicModel:
         old = np.array((s.p_rad_s, s.q_rad_s, s.r_rad_s))
         s.p_dot_rad_s2, s.q_dot_rad_s2, s.r_dot_rad_s2 = map(float, (rates - old) / dt)
         self._previous = (rotation, ground)
-        specific = rotation.T @ (acceleration - np.array((0.0, 0.0, earth.GRAVITY_MPS2)))
+        specific = rotation.T @ (acceleration - np.array((0.0, 0.0, GRAVITY_MPS2)))
         body = rotation.T @ ground
 
         s.sim_time_s = self._time
@@ -397,7 +398,7 @@ class KinematicModel:
         s.mass_kg = 1000.0 + self._payload_kg + sum(self._fuel_kg)
         s.lift_n = -s.mass_kg * s.specific_force_z_mps2
         s.drag_n = s.mass_kg * _DRAG_PER_V2 * self._speed**2
-        load = s.mass_kg * earth.GRAVITY_MPS2 / 3.0 if on_ground else 0.0
+        load = s.mass_kg * GRAVITY_MPS2 / 3.0 if on_ground else 0.0
         s.gear = [GearState(name, self._gear, on_ground, 0.0, load, 0.0) for name in self.info.gear_names]
         s.on_ground_any = s.on_ground_all = on_ground
 

@@ -21,9 +21,10 @@ from xplane_bridge.emulator.flight.flight_model import (
     ModelState,
 )
 from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel
-from xplane_bridge.emulator.flight.jsbsim_state import FOOT_M, SLUG_FT3_KG_M3
+from xplane_bridge.emulator.flight.jsbsim_state import SLUG_FT3_KG_M3
 from xplane_bridge.emulator.flight.rotors import Rotor, RotorSpec, electric_torque
 from xplane_bridge.emulator.flight.stabilisation import Stabilisation, StabilisationSpec
+from xplane_bridge.units import FOOT_M
 
 ARM_FORWARD_M, ARM_RIGHT_M = 0.115, 0.135
 #: forward, right, direction: reaction of a + rotor (anticlockwise from above) turns the nose right.

@@ -15,7 +15,6 @@ import numpy as np
 
 from xplane_bridge.emulator.flight import trim
 from xplane_bridge.emulator.flight.actuators import sided
-from xplane_bridge.emulator.flight.earth import EARTH_RADIUS_M, GRAVITY_MPS2
 from xplane_bridge.emulator.flight.flight_model import (
     Controls,
     EngineFault,
@@ -27,9 +26,10 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceKind,
 )
 from xplane_bridge.emulator.flight.jsbsim_model import JsbsimModel
-from xplane_bridge.emulator.flight.jsbsim_state import FOOT_M, SLUG_FT3_KG_M3
+from xplane_bridge.emulator.flight.jsbsim_state import SLUG_FT3_KG_M3
 from xplane_bridge.emulator.flight.rotors import Rotor, RotorSpec
 from xplane_bridge.emulator.flight.stabilisation import Stabilisation, StabilisationSpec
+from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M, GRAVITY_MPS2
 
 FLAPERON_DEG, ELEVATOR_DEG, RUDDER_DEG = 25.0, 25.0, 22.0
 FLAP_DROOP_DEG = 20.0

@@ -17,6 +17,7 @@ from xplane_bridge.emulator.flight.frame import (
     PA_TO_PSF,
     Frame,
 )
+from xplane_bridge.units import EARTH_RADIUS_M, GRAVITY_MPS2
 
 _POSITION = "sim/flightmodel/position/"
 _FORCES = "sim/flightmodel/forces/"
@@ -56,8 +57,8 @@ def _position(t: Table, sim: Sources) -> None:
     t.value(_POSITION + "hpath", _air_path if "hpath" in sim.otherwise else lambda f: f.hpath)
     t.value(_POSITION + "vpath", lambda f: f.vpath)
     t.value("sim/flightmodel2/position/pressure_altitude", lambda f: f.m.pressure_altitude_m * M_TO_FT)
-    t.setting("sim/physics/earth_radius_m", earth.EARTH_RADIUS_M)
-    t.setting("sim/physics/g_sealevel", earth.GRAVITY_MPS2)
+    t.setting("sim/physics/earth_radius_m", EARTH_RADIUS_M)
+    t.setting("sim/physics/g_sealevel", GRAVITY_MPS2)
     t.value("_emulator/distance_m", lambda f: f.distance)
     t.value("_emulator/terrain_ft", lambda f: f.m.terrain_elevation_m * M_TO_FT)
     t.value("_emulator/corner_latitude", lambda f: math.floor(f.m.latitude_deg))
@@ -113,7 +114,7 @@ def _air_data(t: Table, sim: Sources) -> None:
 
 
 def _forces(t: Table, sim: Sources) -> None:
-    g0 = earth.GRAVITY_MPS2
+    g0 = GRAVITY_MPS2
     axial = 1.0 if "axial-sign" in sim.otherwise else -1.0
     side = -1.0 if "side-sign" in sim.otherwise else 1.0
     t.value(_FORCES + "g_nrml", lambda f: -f.m.specific_force_z_mps2 / g0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.view.renderer.scene import Scene
+from xplane_bridge.units import EARTH_RADIUS_M
 
 #: Nearest depth that is drawn [m].
 NEAR_M = 0.3
@@ -93,8 +94,8 @@ class Camera:
 
 def flat(latitude_deg: float, longitude_deg: float, anchor: tuple[float, float]) -> tuple[float, float]:
     """East and north [m] of the anchor, on the flat earth that is drawn around it."""
-    north = math.radians(latitude_deg - anchor[0]) * earth.EARTH_RADIUS_M
-    east = math.radians(earth.wrap_half_turn(longitude_deg - anchor[1])) * earth.EARTH_RADIUS_M
+    north = math.radians(latitude_deg - anchor[0]) * EARTH_RADIUS_M
+    east = math.radians(earth.wrap_half_turn(longitude_deg - anchor[1])) * EARTH_RADIUS_M
     return east * math.cos(math.radians(anchor[0])), north
 
 

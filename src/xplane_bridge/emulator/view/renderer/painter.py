@@ -14,6 +14,7 @@ from xplane_bridge.emulator.view.renderer.scene import Scene
 from xplane_bridge.emulator.view.renderer.strip import draw_strip, strip_height
 from xplane_bridge.emulator.view.renderer.world import GRAINS, make_world
 from xplane_bridge.protocol import UNUSED_SLOT
+from xplane_bridge.units import FOOT_M
 
 _ZENITH = np.array((200, 120, 52), np.float32)  # blue, green, red
 _PRINT = (255, 255, 255)
@@ -364,7 +365,7 @@ class Painter:
         cv2.circle(self._picture, tuple(int(v) for v in camera.centre), int(8 * scale), green, thick, cv2.LINE_AA)
         texts = (
             (f"{scene.airspeed_kt:4.0f} kt", 0.06, 0.5),
-            (f"{scene.altitude_m / 0.3048:6.0f} ft", 0.78, 0.5),
+            (f"{scene.altitude_m / FOOT_M:6.0f} ft", 0.78, 0.5),
             (f"{scene.vertical_speed_fpm:+6.0f} fpm", 0.78, 0.55),
             (f"HDG {scene.heading_deg % 360.0:03.0f}", 0.45, 0.07),
         )
