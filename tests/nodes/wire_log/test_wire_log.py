@@ -5,11 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
-from typing import Any
 
 import pytest
 
-from support.nodes.wire_replays import RawTopics, payloads_in, replay
+from support.nodes.wire_replays import RawTopics, assert_same_values, payloads_in, replay, states_by_time
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import Capture
@@ -132,20 +131,7 @@ def test_a_strangers_capture_gives_the_same_values(flight):
     common = sorted(set(there) & set(here))
     assert len(common) > 0.6 * len(there)
     for sim_time in common:
-        mine, theirs = here[sim_time], there[sim_time]
-        assert (mine.roll_deg, mine.pitch_deg, mine.latitude) == (theirs.roll_deg, theirs.pitch_deg, theirs.latitude)
-        assert abs((mine.header.stamp - theirs.header.stamp).to_sec()) < 1.0
-
-
-def states_by_time(payloads: list[bytes]) -> dict[float, Any]:
-    """Flight states by simulator time; of the same time in both runs of X-Plane, the first."""
-    from xplane_bridge.msg import FlightState
-
-    out: dict[float, Any] = {}
-    for payload in payloads:
-        state = FlightState().deserialize(payload)
-        out.setdefault(state.sim_time, state)
-    return out
+        assert_same_values(here[sim_time], there[sim_time])
 
 
 def test_a_recording_becomes_a_regression_test(flight):

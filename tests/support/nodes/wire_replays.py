@@ -77,3 +77,20 @@ def payloads_in(bag: Path) -> dict[str, list[bytes]]:
 def by_number(messages: Sequence[bytes]) -> dict[int, bytes]:
     """Messages that begin with a header, by header.seq."""
     return {struct.unpack_from("<I", message)[0]: message for message in messages}
+
+
+def states_by_time(payloads: list[bytes]) -> dict[float, Any]:
+    """Flight states by simulator time; of the same time in both runs of X-Plane, the first."""
+    from xplane_bridge.msg import FlightState
+
+    out: dict[float, Any] = {}
+    for payload in payloads:
+        state = FlightState().deserialize(payload)
+        out.setdefault(state.sim_time, state)
+    return out
+
+
+def assert_same_values(mine: Any, theirs: Any) -> None:
+    """What a FlightState shows of X-Plane is the same, and its stamp is nearly."""
+    assert (mine.roll_deg, mine.pitch_deg, mine.latitude) == (theirs.roll_deg, theirs.pitch_deg, theirs.latitude)
+    assert abs((mine.header.stamp - theirs.header.stamp).to_sec()) < 1.0
