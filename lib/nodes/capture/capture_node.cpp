@@ -25,7 +25,8 @@ constexpr double kOverduePeriod = 0.05;
 constexpr double kRestorePeriod = 0.5;  // [s] between looks whether a killed node's field of view is to be given back
 constexpr double kSlowRead = 0.005;     // [s] median above which reading pictures is said to be slow
 constexpr std::int64_t kFrozenRepeat = 1'000'000'000;  // [ns] between repetitions of a frozen picture
-constexpr std::size_t kPicturesWaiting = 2;            // for scaling, and for JPEG: more would only be older
+constexpr std::int64_t kSameTime = 50'000'000;  // [ns] by which a stamp may be behind the one before in one flight
+constexpr std::size_t kPicturesWaiting = 2;     // for scaling, and for JPEG: more would only be older
 constexpr std::size_t kSpareBuffers = 4;
 constexpr std::uint32_t kStateQueue = 200;  // states of a second and more: none may be lost for pairing
 constexpr std::uint32_t kImageQueue = 2;
@@ -51,11 +52,6 @@ CaptureNode::~CaptureNode() = default;
 void CaptureNode::loadParameters(const ParamLoader& own) {
   options_ = loadCaptureOptions(own);
   options_.prefixFrames(common().frames.prefix);
-  if (stampsBySimulator()) {
-    throw ParamError(
-        "capture_node pairs pictures by the host's time: expected publish_clock to be false; start the bridge with "
-        "capture:=false");
-  }
   if (lockstep()) requireLockstep(own);
   scaler_ = std::make_unique<vision::PictureScaler>(options_.width, options_.height, options_.fit);
   limiter_ = core::RateLimiter(options_.max_rate);
@@ -71,7 +67,9 @@ void CaptureNode::advertise() {
   measured_frame_ = std::make_unique<tf2_ros::TransformBroadcaster>();
   pairing_ = std::make_unique<ImagePairing>(
       common().display_delay, options_.max_wait, [this](const FrameState& state) { publishFrameState(state); },
-      lockstep());
+      lockstep()            ? ImagePairing::Stamps::kFrames
+      : stampsBySimulator() ? ImagePairing::Stamps::kSimulator
+                            : ImagePairing::Stamps::kHost);
   broadcastFrames();
   advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
       name() + "/calibrate_display_delay",
@@ -93,7 +91,7 @@ void CaptureNode::subscribe() {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     crashed_ = warnings->crashed > 0.5F;
   });
-  addTimer(kOverduePeriod, [this] { pairing_->flush(clock().system_ns()); });
+  addTimer(kOverduePeriod, [this] { pairing_->flush(pairingClock().system_ns()); });
   addTimer(kRestorePeriod, [this] { restoreFieldOfView(); });
 }
 
@@ -137,13 +135,13 @@ void CaptureNode::joinThreads() {
 
 void CaptureNode::captureLoop() {
   prctl(PR_SET_NAME, "capture");
-  const std::unique_ptr<vision::FrameSource> source = makeSource(options_, clock().system_ns);
+  const std::unique_ptr<vision::FrameSource> source = makeSource(options_, pairingClock().system_ns);
   while (!stop_) {
     vision::Change change;
     const vision::WaitResult result = source->waitChange(kSourceWait, change);
     if (result == vision::WaitResult::kChange) takePicture(source.get(), change);
     noteSource(*source, result != vision::WaitResult::kChange);
-    if (!calibrating_) repeatFrozen(clock().system_ns());
+    if (!calibrating_) repeatFrozen(pairingClock().system_ns());
   }
 }
 
@@ -262,7 +260,8 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   if (!decode(grabbed, raw || (jpeg && !verbatim))) return;
   const CameraFacts camera = cameraFacts();
   FrameState state;
-  state.header.stamp = toRosTime(grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns);
+  const std::int64_t shown_ns = grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns;
+  state.header.stamp = toRosTime(stampOfPicture(shown_ns));
   state.header.seq = image_count_;
   describeCamera(camera, &state);
   if (!grabbed->display_known) state.quality |= FrameState::QUALITY_DISPLAY_UNKNOWN;
@@ -275,8 +274,8 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
     state.quality |= FrameState::QUALITY_FROZEN;
     ++frozen_count_;
   }
-  state.display_time = toRosTime(grabbed->display_ns);
-  state.grab_time = toRosTime(grabbed->grab_ns);
+  state.display_time = grabbed->display_known ? state.header.stamp : toRosTime(published(grabbed->display_ns));
+  state.grab_time = toRosTime(published(grabbed->grab_ns));
   state.dropped = grabbed->dropped;
   state.frozen = frozen_count_;
   state.image_count = ++image_count_;
@@ -309,8 +308,24 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   }
   info_publisher_.publish(info);
   pairing_->addPicture(
-      state, clock().system_ns(),
+      state, shown_ns, pairingClock().system_ns(),
       grabbed->frame.has_value() ? std::optional<float>(grabbed->frame->sim_time) : std::optional<float>());
+}
+
+std::int64_t CaptureNode::published(std::int64_t host_ns) const {
+  if (!stampsBySimulator()) return host_ns;
+  const auto sim_time = pairing_->simTime(host_ns);
+  return sim_time.has_value() ? stampOf(*sim_time) : clock().system_ns();
+}
+
+std::int64_t CaptureNode::stampOfPicture(std::int64_t shown_ns) {
+  std::int64_t stamp_ns = published(shown_ns);
+  if (stampsBySimulator()) {
+    // It stands in a pause, and steps back a little where the clock has learnt: no two pictures have one stamp.
+    if (stamp_ns <= last_stamp_ns_ && last_stamp_ns_ - stamp_ns < kSameTime) stamp_ns = last_stamp_ns_ + 1;
+    last_stamp_ns_ = stamp_ns;
+  }
+  return stamp_ns;
 }
 
 sensor_msgs::ImagePtr CaptureNode::takeMessage() {
@@ -358,7 +373,7 @@ void CaptureNode::giveBuffer(cv::Mat buffer) {
 }
 
 void CaptureNode::onState(const FlightState::ConstPtr& state) {
-  const std::int64_t now_ns = clock().system_ns();
+  const std::int64_t now_ns = pairingClock().system_ns();
   pairing_->addState(state, now_ns);
   const std::lock_guard<std::mutex> lock(capture_mutex_);
   if (!moved_from_ || moved(*moved_from_, *state)) {

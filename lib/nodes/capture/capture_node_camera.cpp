@@ -54,7 +54,7 @@ void CaptureNode::publishFrameState(const FrameState& state) {
 void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo& info) {
   // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
   if (held()) return;  // no flight yet, and sent by wall time
-  const std::int64_t now_ns = clock().system_ns();
+  const std::int64_t now_ns = pairingClock().system_ns();
   const std::int64_t receive_ns =
       lockstep() ? now_ns : receive_clock_.toHostTime(info.stamp_ns, now_ns, clock().steady_ns());
   if (!view_stream_.add(datagram, receive_ns)) return;

@@ -31,13 +31,13 @@ core::ClockFilter::Options clockOptions(bool exact) {
 
 }  // namespace
 
-ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish, bool exact)
+ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish, Stamps stamps)
     : display_delay_(display_delay),
       delay_measured_(display_delay != 0.0),
       max_wait_ns_(core::toNanoseconds(max_wait)),
       publish_(std::move(publish)),
-      exact_(exact),
-      clock_(clockOptions(exact)) {}
+      stamps_(stamps),
+      clock_(clockOptions(stamps == Stamps::kFrames)) {}
 
 void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -51,6 +51,7 @@ void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, s
   sample.replay = status.replay;
   const core::ClockEstimate estimate = clock_.update(sample);
   if (!estimate.usable) return;
+  newest_sim_time_ = estimate.sim_time;
   core::SimFrame frame;
   frame.sim_time = estimate.sim_time;
   frame.sim_time_raw = sample.sim_time;
@@ -79,6 +80,7 @@ void ImagePairing::forgetClock() {
   clock_.reset();
   status_ = core::SimStatus();
   frame_period_ = 0.0F;
+  newest_sim_time_.reset();
 }
 
 void ImagePairing::addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns) {
@@ -86,7 +88,7 @@ void ImagePairing::addState(const FlightState::ConstPtr& state, std::int64_t arr
   core::StateKey key;
   key.id = next_state_id_++;
   key.sim_time_raw = state->sim_time;
-  key.stamp_ns = static_cast<std::int64_t>(state->header.stamp.toNSec());
+  key.stamp_ns = stamps_ == Stamps::kSimulator ? arrival_ns : static_cast<std::int64_t>(state->header.stamp.toNSec());
   key.epoch = state->epoch;
   key.paused = state->paused || state->replay;
   associator_.addState(key);
@@ -117,7 +119,8 @@ void ImagePairing::mapAnew(Waiting* picture) const {
   picture->slips = clock_.slips();
 }
 
-void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns, std::optional<float> frame_key) {
+void ImagePairing::addPicture(const FrameState& picture, std::int64_t shown_ns, std::int64_t now_ns,
+                              std::optional<float> frame_key) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Waiting waiting;
   waiting.answer = picture;
@@ -127,10 +130,9 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns, st
     if (!delay_measured_) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
   }
   if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
-  waiting.answer.clock_uncertainty = clock_.fitted() || exact_ ? clock_.uncertainty() : kNaN;
+  waiting.answer.clock_uncertainty = clock_.fitted() || stamps_ == Stamps::kFrames ? clock_.uncertainty() : kNaN;
   waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : std::numeric_limits<float>::quiet_NaN();
-  waiting.moment.host_time_ns =
-      static_cast<std::int64_t>(picture.header.stamp.toNSec()) - core::toNanoseconds(waiting.answer.display_delay);
+  waiting.moment.host_time_ns = shown_ns - core::toNanoseconds(waiting.answer.display_delay);
   waiting.deadline_ns = now_ns + max_wait_ns_;
   if (grace_until_ns_ == 0) grace_until_ns_ = now_ns + core::toNanoseconds(kFirstPictures);
   const bool starting = !state_seen_ || (!frame_key.has_value() && !clock_.fitted());
@@ -139,6 +141,12 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t now_ns, st
   waiting.slips = clock_.slips();
   waiting_.push_back(std::move(waiting));
   flushLocked(now_ns);
+}
+
+std::optional<double> ImagePairing::simTime(std::int64_t host_ns) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto known = clock_.simTime(host_ns);
+  return known.has_value() ? known : newest_sim_time_;
 }
 
 void ImagePairing::flush(std::int64_t now_ns) {

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import tx_params
+from xplane_bridge import protocol
+from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness.processes import wait_until
 
 START = 5e8
+FPS, DISPLAY_DELAY_S = 20, 0.1
 RUNNING_TIME, PAUSED = "sim/time/total_running_time_sec", "sim/time/paused"
 
 
@@ -63,13 +67,43 @@ def test_it_is_off_by_default(world):
     assert not any(world.namespace + "/rx_node" in publishers for publishers in nodes)
 
 
-def test_capture_node_says_that_it_cannot(world):
-    world.point_to(49000)
+def test_pictures_are_stamped_with_the_simulator_time_at_which_they_are_shown(world, display, screen):
+    from sensor_msgs.msg import CameraInfo, Image
+    from xplane_bridge.msg import FrameState
+
+    emulator = world.emulator("--window", "320x240", "--fps", FPS, "--pipeline-delay", f"{DISPLAY_DELAY_S}s")
+    wire = world.wire(emulator.port)
     world.set_param("publish_clock", True)
-    node = world.start("capture_node")
-    wait_until(lambda: not node.running, WAIT_S, "end of capture_node")
-    assert node.returncode == 1
-    assert "capture:=false" in node.describe("")
+    world.set_param("lockstep", {"start_time": START})
+    world.set_param("display_delay", DISPLAY_DELAY_S)
+    world.start("rx_node")
+    world.start("capture_node", {"window": {"display": display, "search_period": 0.05}})
+    images, infos = world.watch("camera/image_raw", Image), world.watch("camera/camera_info", CameraInfo)
+    states = world.watch("camera/frame_state", FrameState)
+    wait_until(lambda: sum(state.quality == 0 for state in states.messages) >= 40, WAIT_S, "paired pictures")
+
+    by_stamp = {state.header.stamp: state for state in list(states.messages)}
+    late = []
+    for image in list(images.messages):
+        state = by_stamp.get(image.header.stamp)
+        if state is None or state.quality:
+            continue
+        assert state.display_time == image.header.stamp
+        assert state.state.header.stamp.to_sec() == pytest.approx(START + state.state.sim_time_unwrapped, abs=1e-6)
+        shown = read_strip(np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3))
+        late.append(image.header.stamp.to_sec() - START - shown.sim_time - DISPLAY_DELAY_S)
+    assert len(late) >= 30
+    assert abs(np.median(late)) < 0.3 / FPS
+
+    wire.send(protocol.CommandRequest("sim/operation/pause_toggle"))
+    wire.wait_until_reads(PAUSED, 1.0)
+    before = len(images.messages)
+    wait_until(lambda: len(images.messages) >= before + 3, WAIT_S, "pictures of a simulator that stands")
+    stamps = [image.header.stamp for image in list(images.messages)]
+    assert all(later > earlier for earlier, later in zip(stamps, stamps[1:])), "each picture has a stamp of its own"
+    assert (stamps[-1] - stamps[-3]).to_sec() < 1e-6, "simulator time stands"
+    infos.wait_for(lambda info: info.header.stamp == stamps[-1])
+    states.wait_for(lambda state: state.header.stamp == stamps[-1])
 
 
 def test_a_simulator_that_does_not_wait_is_stepped_by_its_pause(world):

@@ -111,6 +111,11 @@ class CaptureNode : public BaseNode {
   void takePicture(vision::FrameSource* source, const vision::Change& change);
   void repeatFrozen(std::int64_t now_ns);
   void publishPicture(Grabbed* grabbed);
+  /// By which pictures are paired: the host's, also where stamps are the simulator's (`publish_clock`).
+  const core::Clock& pairingClock() const { return stampsBySimulator() ? wallClock() : clock(); }
+  /// [ns] a time of that clock as it is published.
+  std::int64_t published(std::int64_t host_ns) const;
+  std::int64_t stampOfPicture(std::int64_t shown_ns);
   bool decode(Grabbed* grabbed, bool whole);
   sensor_msgs::ImagePtr takeMessage();
   void encodeJpeg(const sensor_msgs::Image& image);
@@ -218,6 +223,7 @@ class CaptureNode : public BaseNode {
   std::vector<sensor_msgs::ImagePtr>
       messages_;  // used again once no publisher holds them: memory once touched is cheap
   std::uint32_t image_count_ = 0;
+  std::int64_t last_stamp_ns_ = 0;  // with `publish_clock`
   std::uint32_t frozen_count_ = 0;
 
   // Lock-step.

@@ -22,6 +22,13 @@ namespace xplane_bridge {
 /// simulator's time axis (core/image_association.hpp). All functions may be called from any thread.
 class ImagePairing {
  public:
+  /// Whose time it is that states are stamped with.
+  enum class Stamps : std::uint8_t {
+    kHost,
+    kFrames,     ///< in lock-step: receive times are the frames' own, the clock has no uncertainty
+    kSimulator,  ///< with `publish_clock`: of no use beside the host's times of pictures
+  };
+
   static constexpr double kFirstPictures = 2.0;  ///< [s] from the first one
   using Publish = std::function<void(const FrameState&)>;
 
@@ -29,8 +36,7 @@ class ImagePairing {
   /// @param max_wait [s] after a picture at which it is paired with what is there; the first pictures wait up to
   ///        kFirstPictures as long as there is no state, or no clock, yet
   /// @param publish called under the lock, in order; must not call back
-  /// @param exact receive times are the frames' own, as in lock-step: the clock has no uncertainty
-  ImagePairing(double display_delay, double max_wait, Publish publish, bool exact = false);
+  ImagePairing(double display_delay, double max_wait, Publish publish, Stamps stamps = Stamps::kHost);
 
   /// A frame heard on the capture host. @param receive_ns [ns] host time, running evenly
   void addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns);
@@ -44,9 +50,14 @@ class ImagePairing {
   void addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns);
   /// A published picture: its FrameState with everything the capture knows (header, times, view, counts, its quality
   /// bits, the newest pose); the rest is filled in here, and the pose of the very frame.
+  /// @param shown_ns [ns] host time, with the display delay
   /// @param frame_key [s] raw simulator time of the frame shown, where the source knows it: then no clock decides, and
   ///        the display delay is the picture's own
-  void addPicture(const FrameState& picture, std::int64_t now_ns, std::optional<float> frame_key = {});
+  void addPicture(const FrameState& picture, std::int64_t shown_ns, std::int64_t now_ns,
+                  std::optional<float> frame_key = {});
+  /// Unwrapped simulator time of a host time [s]; while the simulator stands, that of the newest frame; empty as long
+  /// as its clock is not known.
+  [[nodiscard]] std::optional<double> simTime(std::int64_t host_ns) const;
   /// Publishes what is ready or overdue.
   void flush(std::int64_t now_ns);
 
@@ -85,13 +96,14 @@ class ImagePairing {
   bool delay_measured_;
   const std::int64_t max_wait_ns_;
   const Publish publish_;
-  const bool exact_;
+  const Stamps stamps_;
 
   mutable std::mutex mutex_;
   core::ClockFilter clock_;
   core::ImageAssociator associator_;
   core::SimStatus status_;
   float frame_period_ = 0.0F;
+  std::optional<double> newest_sim_time_;  // [s] unwrapped
   std::map<std::uint64_t, KnownState> states_;
   std::uint64_t next_state_id_ = 0;
   std::deque<core::CheckedPose> poses_;

@@ -72,8 +72,8 @@ std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, doub
     picture.image_count = k;
     picture.camera_pose_source = FrameState::POSE_MEASURED;
     const std::int64_t shown = clocks.capture.at(t + kDelay + swap(random));
-    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(shown));
-    events.emplace_back(shown, [&pairing, picture](std::int64_t now) { pairing.addPicture(picture, now + ns(0.001)); });
+    events.emplace_back(
+        shown, [&pairing, picture, shown](std::int64_t now) { pairing.addPicture(picture, shown, now + ns(0.001)); });
     events.emplace_back(clocks.capture.at(t + 0.5 / kFps), [&pairing](std::int64_t now) { pairing.flush(now); });
   }
   std::stable_sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -161,9 +161,9 @@ TEST(ImagePairing, StuttersDoNotShiftThePairing) {
     events.emplace_back(host + 5e-4, [&pairing, state](std::int64_t now) { pairing.addState(state, now); });
     FrameState picture;
     picture.image_count = k;
-    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(host + kDelay)));
+    const std::int64_t shown = kStart + ns(host + kDelay);
     events.emplace_back(host + kDelay + 1e-3,
-                        [&pairing, picture](std::int64_t now) { pairing.addPicture(picture, now); });
+                        [&pairing, picture, shown](std::int64_t now) { pairing.addPicture(picture, shown, now); });
   }
   std::stable_sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (const auto& [time, event] : events) event(kStart + ns(time));
@@ -196,8 +196,7 @@ TEST(ImagePairing, TheFirstPicturesWaitForTheirStates) {
     if (k < 3) continue;
     FrameState picture;
     picture.image_count = k - 3;
-    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(t)));
-    pairing.addPicture(picture, kStart + ns(t));
+    pairing.addPicture(picture, kStart + ns(t), kStart + ns(t));
     ASSERT_TRUE(t >= late || answers.empty()) << "at " << t << " s";
   }
   ASSERT_GT(answers.size(), 250U);
@@ -215,12 +214,12 @@ TEST(ImagePairing, TheFirstPicturesDoNotWaitForEver) {
     ++answered;
     EXPECT_NE(answer.quality & FrameState::QUALITY_STATE_MISSING, 0U);
   });
-  for (int k = 0; k < 10; ++k) pairing.addPicture(FrameState(), kStart + ns(0.1 * k));
+  for (int k = 0; k < 10; ++k) pairing.addPicture(FrameState(), kStart, kStart + ns(0.1 * k));
   pairing.flush(kStart + ns(1.99));
   EXPECT_EQ(answered, 0);
   pairing.flush(kStart + ns(2.0));
   EXPECT_EQ(answered, 10);
-  pairing.addPicture(FrameState(), kStart + ns(3.0));
+  pairing.addPicture(FrameState(), kStart, kStart + ns(3.0));
   pairing.flush(kStart + ns(3.2));
   EXPECT_EQ(answered, 11);
 }
@@ -239,17 +238,50 @@ TEST(ImagePairing, AKeyNeedsNoClock) {
     FrameState picture;  // of a frame up to 15 frames ago
     picture.image_count = k;
     const std::uint32_t shown = k - static_cast<std::uint32_t>(random() % 16);
-    picture.header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(static_cast<double>(random() % 1000))));
+    const std::int64_t shown_ns = kStart + ns(static_cast<double>(random() % 1000));
     picture.display_delay = 0.06;
     picture.quality = shown % 2 == 0 ? 0U : static_cast<std::uint32_t>(FrameState::QUALITY_BORDERLINE);
     const auto key = static_cast<float>(kSimStart + shown / kFps);
-    pairing.addPicture(picture, kStart + ns(k / kFps), key);
+    pairing.addPicture(picture, shown_ns, kStart + ns(k / kFps), key);
     ASSERT_EQ(answers.count(k), 1U) << "picture " << k << " waits for something";
     EXPECT_EQ(answers[k].state.sim_time, key);
     EXPECT_EQ(answers[k].frame_sim_time, static_cast<double>(key));
     EXPECT_EQ(answers[k].quality, picture.quality);
     EXPECT_EQ(answers[k].display_delay, 0.06);
   }
+}
+
+/// With `publish_clock` states are stamped with simulator time, which says nothing of the host's; pictures get theirs.
+TEST(ImagePairing, StampsOfTheSimulatorAreNotTakenForTheHosts) {
+  std::map<std::uint32_t, FrameState> answers;
+  ImagePairing pairing(
+      kDelay, 0.2, [&answers](const FrameState& answer) { answers[answer.image_count] = answer; },
+      ImagePairing::Stamps::kSimulator);
+  EXPECT_FALSE(pairing.simTime(kStart).has_value()) << "nothing was heard yet";
+  core::SimStatus status;
+  for (std::uint32_t k = 0; k < 300; ++k) {
+    const double t = k / kFps;
+    status.sim_time = static_cast<float>(kSimStart + t);
+    pairing.addFrame(status, static_cast<float>(1.0 / kFps), kStart + ns(t));
+    const auto state = boost::make_shared<FlightState>();
+    state->sim_time = status.sim_time;
+    state->header.stamp.fromNSec(static_cast<std::uint64_t>(ns(kSimStart + t)));
+    pairing.addState(state, kStart + ns(t + 5e-4));
+    FrameState picture;
+    picture.image_count = k;
+    pairing.addPicture(picture, kStart + ns(t + kDelay), kStart + ns(t + kDelay));
+    pairing.flush(kStart + ns(t + kDelay));
+  }
+  pairing.flush(kStart + ns(10.0));
+  for (std::uint32_t k = 60; k < 290; ++k) {
+    EXPECT_EQ(answers[k].state.sim_time, static_cast<float>(kSimStart + k / kFps)) << "frame " << k;
+  }
+  EXPECT_NEAR(*pairing.simTime(kStart + ns(4.0)), kSimStart + 4.0, 2e-3);
+  status.paused = true;
+  pairing.addFrame(status, static_cast<float>(1.0 / kFps), kStart + ns(5.0));
+  EXPECT_NEAR(*pairing.simTime(kStart + ns(7.0)), status.sim_time, 1e-3) << "it stands";
+  pairing.forgetClock();
+  EXPECT_FALSE(pairing.simTime(kStart + ns(8.0)).has_value());
 }
 
 }  // namespace
