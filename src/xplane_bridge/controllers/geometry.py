@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, Optional, Tuple
+from typing import NamedTuple, Optional, Tuple
+
+from xplane_bridge.controllers.state import State
 
 #: X-Plane's planet is a sphere of this radius [m].
 EARTH_RADIUS_M = 6378145.0
@@ -28,7 +30,7 @@ class Pace:
     def __init__(self) -> None:
         self._last: Optional[float] = None
 
-    def step(self, state: Any) -> float:
+    def step(self, state: State) -> float:
         """Since the last state [s]; 0 for the first."""
         last, self._last = self._last, state.sim_time_unwrapped
         return 0.0 if last is None else clip(self._last - last, 0.0, _LONGEST_STEP_S)
@@ -57,19 +59,19 @@ class Field:
         state: The first FlightState.
     """
 
-    def __init__(self, state: Any) -> None:
+    def __init__(self, state: State) -> None:
         self._latitude, self._longitude = state.latitude, state.longitude
         self._scale = math.cos(math.radians(state.latitude))
         self.heading_deg = float(state.heading_true_deg)
         self.altitude = float(state.altitude_msl)
 
-    def place(self, state: Any) -> Place:
+    def place(self, state: State) -> Place:
         """Where the aircraft is."""
         north = math.radians(state.latitude - self._latitude) * EARTH_RADIUS_M
         east = math.radians(math.remainder(state.longitude - self._longitude, 360.0)) * EARTH_RADIUS_M * self._scale
         return self.seen(north, east)
 
-    def velocity(self, state: Any) -> Place:
+    def velocity(self, state: State) -> Place:
         """Over the ground [m/s]."""
         return self.seen(state.velocity_ned.x, state.velocity_ned.y)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Dict, Optional
+from typing import Callable, Dict, Optional
 
 from xplane_bridge.controllers.geometry import GRAVITY_MPS2, Field, Pace, Place, clip, turn_to
+from xplane_bridge.controllers.state import State
 
 AIRCRAFT = "multirotor"
 Command = Dict[str, float]
@@ -23,7 +24,7 @@ class Loops:
     def __init__(self) -> None:
         self._sums = [0.0, 0.0, 0.0]  # of the errors of velocity: ahead, right, up [m]
 
-    def attitude(self, state: Any, roll_deg: float, pitch_deg: float, heading_deg: float) -> Command:
+    def attitude(self, state: State, roll_deg: float, pitch_deg: float, heading_deg: float) -> Command:
         """Stick for an attitude and a true heading: its own stabilisation does the rest."""
         turn = 1.5 * turn_to(heading_deg, state.heading_true_deg)
         return {
@@ -32,7 +33,7 @@ class Loops:
             "yaw": clip(turn / _FULL_TURN_DPS, -0.5, 0.5),
         }
 
-    def velocity(self, state: Any, dt: float, field: Field, wanted: Place, climb: float) -> Command:
+    def velocity(self, state: State, dt: float, field: Field, wanted: Place, climb: float) -> Command:
         """Stick and throttle for a velocity over ground in the field's axes, its heading, and a climb [m/s]."""
         present = field.velocity(state)
         errors = (wanted.ahead - present.ahead, wanted.right - present.right, climb - state.vertical_speed)
@@ -49,7 +50,7 @@ class Loops:
         command["throttle"] = clip(HOVER * (1.0 + up / GRAVITY_MPS2) / upright, 0.05, 1.0)
         return command
 
-    def position(self, state: Any, dt: float, field: Field, there: Place, height: float) -> Command:
+    def position(self, state: State, dt: float, field: Field, there: Place, height: float) -> Command:
         """Stick and throttle that fly to a place and height above the start, and stay there."""
         way = field.place(state).to(there)
         slower = min(1.0, self.most_mps / max(0.8 * way.length, 1e-6))
@@ -75,9 +76,9 @@ class Square:
 
     def restart(self) -> None:
         """The next state is the first one."""
-        self.phase: Optional[Callable[[Any, float], Command]] = None
+        self.phase: Optional[Callable[[State, float], Command]] = None
 
-    def fly(self, state: Any) -> Command:
+    def fly(self, state: State) -> Command:
         """Fields of ControlCommand for a FlightState."""
         if self.phase is None:
             self._field, self._loops, self._pace = Field(state), Loops(), Pace()
@@ -85,7 +86,7 @@ class Square:
             self.phase = self.around
         return self.phase(state, self._pace.step(state))
 
-    def around(self, state: Any, dt: float) -> Command:
+    def around(self, state: State, dt: float) -> Command:
         """To each corner, the first of which is above the start; there, a while."""
         off = self._field.place(state).to(self._left[0]).length
         low = self._height - (state.altitude_msl - self._field.altitude)
@@ -98,7 +99,7 @@ class Square:
                 self._left.pop(0)
         return self._loops.position(state, dt, self._field, self._left[0], self._height)
 
-    def down(self, state: Any, dt: float) -> Command:
+    def down(self, state: State, dt: float) -> Command:
         """Sinks ever slower, over the same spot, until it stands."""
         if state.on_ground:
             self.phase = self.standing
@@ -107,7 +108,7 @@ class Square:
         wanted = Place(clip(0.8 * way.ahead, -1.0, 1.0), clip(0.8 * way.right, -1.0, 1.0))
         return self._loops.velocity(state, dt, self._field, wanted, -sink)
 
-    def standing(self, state: Any, dt: float) -> Command:
+    def standing(self, state: State, dt: float) -> Command:
         """Motors idle."""
         del state, dt
         return {"roll": 0.0, "pitch": 0.0, "yaw": 0.0, "throttle": 0.0}

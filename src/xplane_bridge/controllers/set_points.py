@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional, Tuple
+from typing import Optional, Tuple
 
 from xplane_bridge.controllers.geometry import Field, Pace
 from xplane_bridge.controllers.multirotor import AIRCRAFT as AIRCRAFT
 from xplane_bridge.controllers.multirotor import Command, Loops
+from xplane_bridge.controllers.state import MappedState
 
 #: A set-point is followed for so long; repeat it to hold it longer, as for other autopilots [s].
 HOLDS_S = 0.5
@@ -37,7 +38,7 @@ class SetPoints:
         """With a velocity, turning to the right."""
         self._wanted, self._age = (False, (east, north, up), turn_deg_s), 0.0
 
-    def fly(self, state: Any) -> Command:
+    def fly(self, state: MappedState) -> Command:
         """Fields of ControlCommand for a FlightState; none without a set-point."""
         dt = self._pace.step(state)
         self._age += dt

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Dict, Optional
+from typing import Callable, Dict, Optional
 
 from xplane_bridge.controllers.geometry import Field, Pace, Place, clip, turn_to
+from xplane_bridge.controllers.state import State
 
 AIRCRAFT = "tiltrotor"
 Command = Dict[str, float]
@@ -26,7 +27,7 @@ class Loops:
         wing = clip((min(speed, ahead + 18.0) - 12.0) / 50.0, 0.0, 1.0)
         return UPRIGHT * (1.0 - wing * wing)
 
-    def velocity(self, state: Any, dt: float, field: Field, speed: float, right: float, height: float) -> Command:
+    def velocity(self, state: State, dt: float, field: Field, speed: float, right: float, height: float) -> Command:
         """Flies ahead and to the right over ground [m/s], at a height above the start [m]."""
         present = field.velocity(state)
         vector = self.nacelles(speed, present.ahead)
@@ -54,7 +55,7 @@ class Loops:
             "gear": 1.0 if upright > 0.9 else 0.0,
         }  # fmt: skip
 
-    def position(self, state: Any, dt: float, field: Field, there: Place, height: float) -> Command:
+    def position(self, state: State, dt: float, field: Field, there: Place, height: float) -> Command:
         """Hovers over a place."""
         way = field.place(state).to(there)
         return self.velocity(
@@ -77,9 +78,9 @@ class OutAndBack:
 
     def restart(self) -> None:
         """The next state is the first one."""
-        self.phase: Optional[Callable[[Any, float], Command]] = None
+        self.phase: Optional[Callable[[State, float], Command]] = None
 
-    def fly(self, state: Any) -> Command:
+    def fly(self, state: State) -> Command:
         """Fields of ControlCommand for a FlightState."""
         if self.phase is None:
             self._field, self._loops, self._pace = Field(state), Loops(), Pace()
@@ -87,7 +88,7 @@ class OutAndBack:
             self.phase = self.up
         return {"parking_brake": 0.0, **self.phase(state, self._pace.step(state))}
 
-    def up(self, state: Any, dt: float) -> Command:
+    def up(self, state: State, dt: float) -> Command:
         """Up, and five seconds of hover."""
         low = self._height - (state.altitude_msl - self._field.altitude)
         self._time = self._time + dt if abs(low) < 2.0 else 0.0
@@ -95,7 +96,7 @@ class OutAndBack:
             self.phase, self._time = self.out, 0.0
         return self._loops.position(state, dt, self._field, self._there, self._height)
 
-    def out(self, state: Any, dt: float) -> Command:
+    def out(self, state: State, dt: float) -> Command:
         """Faster by 3 m/s a second, then cruise."""
         self._speed = min(self._speed + 3.0 * dt, self._cruise)
         if self._speed >= self._cruise:
@@ -104,7 +105,7 @@ class OutAndBack:
             self.phase = self.back
         return self._loops.velocity(state, dt, self._field, self._speed, 0.0, self._height)
 
-    def back(self, state: Any, dt: float) -> Command:
+    def back(self, state: State, dt: float) -> Command:
         """Slower by 2 m/s a second, until it hovers."""
         self._speed = max(self._speed - 2.0 * dt, 0.0)
         if self._speed <= 0.0 and state.ground_speed < 1.0:
@@ -112,14 +113,14 @@ class OutAndBack:
             self.phase = self.hover
         return self._loops.velocity(state, dt, self._field, self._speed, 0.0, self._height)
 
-    def hover(self, state: Any, dt: float) -> Command:
+    def hover(self, state: State, dt: float) -> Command:
         """Ten seconds over the place where it came to rest."""
         self._time += dt
         if self._time > 10.0:
             self.phase, self._sinking = self.down, self._height
         return self._loops.position(state, dt, self._field, self._there, self._height)
 
-    def down(self, state: Any, dt: float) -> Command:
+    def down(self, state: State, dt: float) -> Command:
         """Sinks, the last metres slowly, until it stands."""
         height = state.altitude_msl - self._field.altitude
         if state.on_ground:
@@ -127,7 +128,7 @@ class OutAndBack:
         self._sinking = max(self._sinking - (1.5 if height > 8.0 else 0.5) * dt, height - 4.0)
         return self._loops.position(state, dt, self._field, self._there, self._sinking)
 
-    def standing(self, state: Any, dt: float) -> Command:
+    def standing(self, state: State, dt: float) -> Command:
         """Levers idle."""
         del state, dt
         return {"roll": 0.0, "pitch": 0.0, "yaw": 0.0, "throttle": 0.0, "thrust_vector": UPRIGHT, "gear": 1.0}

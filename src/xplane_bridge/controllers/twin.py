@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional
 
 from xplane_bridge.controllers.geometry import GRAVITY_MPS2, Field, Leg, Pace, Place, clip, turn_to
+from xplane_bridge.controllers.state import State
 
 AIRCRAFT = "fixed_wing"
 Command = Dict[str, float]
@@ -19,12 +20,12 @@ class Loops:
         state: The first FlightState.
     """
 
-    def __init__(self, state: Any) -> None:
+    def __init__(self, state: State) -> None:
         self._pitch = float(state.pitch_deg)
         self._elevator, self._rudder = float(state.control_pitch), 0.0
         self._throttle = float(state.control_throttle)
 
-    def attitude(self, state: Any, dt: float, roll_deg: float, pitch_deg: float) -> Command:
+    def attitude(self, state: State, dt: float, roll_deg: float, pitch_deg: float) -> Command:
         """Stick for an attitude; pedals against sideslip.
 
         Args:
@@ -48,7 +49,7 @@ class Loops:
         """From this pitch `climb` goes on: what is right just after leaving the ground."""
         self._pitch = pitch_deg
 
-    def climb(self, state: Any, dt: float, climb: float) -> float:
+    def climb(self, state: State, dt: float, climb: float) -> float:
         """Pitch for a vertical speed [deg].
 
         Args:
@@ -61,25 +62,25 @@ class Loops:
         lean = 1.0 / max(math.cos(math.radians(state.roll_deg)), 0.3) - 1.0
         return clip(self._pitch + 1.2 * error + 10.0 * lean, -12.0, 16.0)
 
-    def airspeed(self, state: Any, dt: float, speed: float) -> float:
+    def airspeed(self, state: State, dt: float, speed: float) -> float:
         """Throttle for a calibrated airspeed [m/s]."""
         error = speed - state.calibrated_airspeed
         self._throttle = clip(self._throttle + 0.006 * error * dt, 0.0, 1.0)
         return clip(self._throttle + 0.03 * error, 0.0, 1.0)
 
     @staticmethod
-    def heading(state: Any, heading_deg: float) -> float:
+    def heading(state: State, heading_deg: float) -> float:
         """Bank for a true heading [deg]."""
         return clip(1.2 * turn_to(heading_deg, state.heading_true_deg), -_MOST_BANK_DEG, _MOST_BANK_DEG)
 
     @staticmethod
-    def position(state: Any, leg: Leg, place: Place) -> float:
+    def position(state: State, leg: Leg, place: Place) -> float:
         """Bank that brings it onto a leg, and along it [deg]."""
         course = leg.course_deg - math.degrees(math.atan2(leg.across(place), 350.0))
         return clip(1.4 * turn_to(course, state.track_deg), -_MOST_BANK_DEG, _MOST_BANK_DEG)
 
     @staticmethod
-    def altitude(state: Any, altitude: float) -> float:
+    def altitude(state: State, altitude: float) -> float:
         """Vertical speed for a height above the sea [m/s]."""
         return clip(0.2 * (altitude - state.altitude_msl), -5.0, 5.0)
 
@@ -92,9 +93,9 @@ class Flight:
 
     def restart(self) -> None:
         """The next state is the first one."""
-        self.phase: Optional[Callable[[Any, float], Command]] = None
+        self.phase: Optional[Callable[[State, float], Command]] = None
 
-    def fly(self, state: Any) -> Command:
+    def fly(self, state: State) -> Command:
         """Fields of ControlCommand for a FlightState."""
         if self.phase is None:
             self.field, self.loops, self._pace = Field(state), Loops(state), Pace()
@@ -102,7 +103,7 @@ class Flight:
             self.phase = self.first
         return self.phase(state, self._pace.step(state))
 
-    def first(self, state: Any, dt: float) -> Command:
+    def first(self, state: State, dt: float) -> Command:
         """The first phase."""
         raise NotImplementedError
 
@@ -120,7 +121,7 @@ class Hold(Flight):
         super().__init__()
         self._speed, self._after, self._turn = speed, turn_after, turn
 
-    def first(self, state: Any, dt: float) -> Command:
+    def first(self, state: State, dt: float) -> Command:
         """All of it."""
         turned = self._turn if state.sim_time_unwrapped - self.began > self._after else 0.0
         roll = self.loops.heading(state, self.field.heading_deg + turned)
@@ -145,7 +146,7 @@ class TakeOff(Flight):
         super().__init__()
         self._climb_speed, self.cruise_altitude = climb_speed, cruise_altitude
 
-    def first(self, state: Any, dt: float) -> Command:
+    def first(self, state: State, dt: float) -> Command:
         """The run."""
         del dt
         if state.calibrated_airspeed > self.rotation_mps:
@@ -155,7 +156,7 @@ class TakeOff(Flight):
             "parking_brake": 0.0, "left_brake": 0.0, "right_brake": 0.0, "gear": 1.0,
         }  # fmt: skip
 
-    def steered(self, state: Any) -> float:
+    def steered(self, state: State) -> float:
         """Pedals that keep to the runway's middle."""
         across = self.field.place(state).right
         heading = self.field.heading_deg - clip(0.5 * across, -5.0, 5.0)
@@ -163,7 +164,7 @@ class TakeOff(Flight):
             0.03 * turn_to(heading, state.heading_true_deg) - 0.02 * math.degrees(state.angular_velocity.z), -0.5, 0.5
         )
 
-    def climb_out(self, state: Any, dt: float) -> Command:
+    def climb_out(self, state: State, dt: float) -> Command:
         """Straight ahead; the climb gives way where the speed falls towards `climb_speed`."""
         height = state.altitude_msl - self.field.altitude
         middle = Leg(self.field, Place(0.0, 0.0), Place(1.0, 0.0))
@@ -173,7 +174,7 @@ class TakeOff(Flight):
         command["flaps"] = 0.0 if height > self.flaps_up_m else self.flaps
         return command
 
-    def climbing(self, state: Any, dt: float, roll: float) -> Command:
+    def climbing(self, state: State, dt: float, roll: float) -> Command:
         """Full throttle, speed by pitch, up to the cruise altitude."""
         spare = clip(0.6 * (state.calibrated_airspeed - self._climb_speed), -1.0, 5.0)
         climb = min(spare, self.loops.altitude(state, self.field.altitude + self.cruise_altitude))
@@ -193,7 +194,7 @@ class Circuit(TakeOff):
     aim_m, flare_m = 300.0, 9.0
     _corners = (Place(3600.0, 0.0), Place(3600.0, -1900.0), Place(-5200.0, -1900.0), Place(-5200.0, 0.0))
 
-    def climb_out(self, state: Any, dt: float) -> Command:
+    def climb_out(self, state: State, dt: float) -> Command:
         """Straight ahead, until the first turn."""
         if self.field.place(state).ahead > 2000.0:
             ways = [*zip((Place(0.0, 0.0), *self._corners), (*self._corners, Place(self.aim_m, 0.0)))]
@@ -201,7 +202,7 @@ class Circuit(TakeOff):
             self.phase, self._climbs = self.around, True
         return super().climb_out(state, dt)
 
-    def around(self, state: Any, dt: float) -> Command:
+    def around(self, state: State, dt: float) -> Command:
         """Leg by leg, each turn begun early enough to end on the next."""
         place, leg = self.field.place(state), self._legs[0]
         radius = state.ground_speed**2 / (GRAVITY_MPS2 * math.tan(math.radians(_MOST_BANK_DEG)))
@@ -216,7 +217,7 @@ class Circuit(TakeOff):
             return {**self.climbing(state, dt, roll), "gear": 0.0, "flaps": 0.0}
         return self._approach(state, dt, roll, place)
 
-    def _approach(self, state: Any, dt: float, roll: float, place: Place) -> Command:
+    def _approach(self, state: State, dt: float, roll: float, place: Place) -> Command:
         """Downwind slow and level, then down the glide path."""
         final = len(self._legs) <= 1
         away = sum(leg.length for leg in self._legs) - self._legs[0].along(place)
@@ -232,7 +233,7 @@ class Circuit(TakeOff):
             "flaps": 0.6 if final else 0.3,
         }  # fmt: skip
 
-    def flare(self, state: Any, dt: float) -> Command:
+    def flare(self, state: State, dt: float) -> Command:
         """Throttle to idle, sinking ever slower, wings level."""
         if state.on_ground:
             self.phase = self.roll_out
@@ -243,7 +244,7 @@ class Circuit(TakeOff):
         throttle = 0.2 * clip(state.altitude_agl / self.flare_m, 0.0, 1.0)
         return {**self.loops.attitude(state, dt, roll, pitch), "throttle": throttle, "gear": 1.0, "flaps": 0.6}
 
-    def roll_out(self, state: Any, dt: float) -> Command:
+    def roll_out(self, state: State, dt: float) -> Command:
         """Nose down gently, brakes, pedals to the middle."""
         brake = 0.0 if state.ground_speed > 35.0 else 0.6
         command = self.loops.attitude(state, dt, 0.0, 0.0)
@@ -261,7 +262,7 @@ class PitchAndPower(Flight):
     level_s, height, back_s = 20.0, 150.0, 130.0
     level_pitch_deg, level_throttle, throttle_per_mps, speed = 3.3, 0.385, 0.075, 58.0
 
-    def first(self, state: Any, dt: float) -> Command:
+    def first(self, state: State, dt: float) -> Command:
         """All of it; looks at attitude, heading, height and time."""
         time = state.sim_time_unwrapped - self.began
         up = self.height if self.level_s < time < self.back_s else 0.0
