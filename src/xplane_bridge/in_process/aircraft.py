@@ -8,6 +8,7 @@ config/tx.yaml and config/aircraft/<name>.yaml.
 from __future__ import annotations
 
 import math
+import struct
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Dict, Mapping, Optional, Tuple
@@ -107,6 +108,7 @@ class Aircraft:
     def __init__(self, conditions: Conditions) -> None:
         arbiter = require("a flight in process").ControlArbiter
         self.period = 1.0 / conditions.frame_rate  #: [s] of a frame
+        self._shown_period = struct.unpack("<f", struct.pack("<f", self.period))[0]  # as X-Plane sends it
         self.frame = 0
         self.model = conditions.model()
         self.controls = self.model.reset(initial_state(conditions.start))
@@ -120,12 +122,12 @@ class Aircraft:
 
     @property
     def now(self) -> float:
-        """[s] since the start."""
-        return self.frame * self.period
+        """[s] since the start, as a flight's states show it: by the frame's period in float32."""
+        return float(self.frame * self._shown_period)
 
     def _clock(self) -> float:
         """[s] as tx_node has it in lock-step: to the microsecond, rounded as seconds beside a large number are."""
-        return (_CLOCK_NS + round(self.now * 1e6) * 1000) / 1e9
+        return (_CLOCK_NS + round(self.frame * self.period * 1e6) * 1000) / 1e9
 
     @property
     def state(self) -> ModelState:
