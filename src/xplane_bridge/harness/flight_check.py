@@ -36,7 +36,6 @@ POSITION_TOLERANCE_M = 0.01
 #: Largest difference, per axis, of odom's differenced position from its mean twist [m/s].
 VELOCITY_TOLERANCE_MPS = 0.02
 
-#: X-Plane's planet: a sphere of this radius [m].
 #: Rows of FlightState that are NaN by their definition in some attitudes or are no numbers.
 _NOT_JUDGED = ("header.",)
 

@@ -10,7 +10,6 @@ import numpy as np
 from xplane_bridge.labels.apt import Runway
 from xplane_bridge.units import EARTH_RADIUS_M
 
-#: Radius of X-Plane's earth [m]; latitudes and longitudes are angles on this sphere, WGS 84 is some 20 m off at 3 km.
 #: Parts that a runway's sides are projected in.
 SIDE_PARTS = 8
 

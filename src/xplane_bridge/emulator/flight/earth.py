@@ -18,8 +18,6 @@ Vector = Tuple[float, float, float]
 #: A rotation, for what is worked out in each frame: of 3 x 3 numbers, arrays take longer, and round by their library.
 Rows = Tuple[Vector, Vector, Vector]
 
-#: Radius of X-Plane's earth, solved from a captured pair of rows 20 and 21 (`sim/physics/earth_radius_m`).
-#: Sea-level gravity of the simulated planet (constant with height) [m/s^2].
 #: How far the aircraft must be beyond the line where the origin changes before it jumps, so that flying along that
 #: line does not make it jump every frame [deg].
 ORIGIN_HYSTERESIS_DEG = 0.001
