@@ -61,20 +61,21 @@ EIGEN = ("/usr/include/eigen3", "/usr/local/include/eigen3", "/opt/homebrew/incl
 def compiled_module():
     """xplane_bridge._core, of the same files as lib/bindings/CMakeLists.txt makes it; left out without a compiler."""
     control = ["control_arbiter", "control_channels", "control_command", "control_rows"]
-    bindings = ["arbiter", "datagrams", "flight_record", "module"]
+    bindings = ["arbiter", "datagrams", "flight_truth", "module"]
     bindings += ["state_reader", "twin_frame", "twin_loop", "twin_physics"]
     include_dirs, macros = ["include"], []
+    core = [f"control/{name}" for name in control]
     eigen = [path for path in EIGEN if os.path.exists(os.path.join(path, "unsupported", "Eigen", "FFT"))]
-    if eigen:  # else without excitations
-        control.append("excitation")
-        bindings.append("excitation")
+    if eigen:  # else without flights in process: the emulator's own parts alone
+        core += ["control/excitation", "state/air_data", "state/flight_computation", "state/frames"]
+        bindings += ["excitation", "flight_view"]
         include_dirs.append(eigen[0])
-        macros.append(("XPLANE_BRIDGE_WITH_EXCITATION", None))
+        macros.append(("XPLANE_BRIDGE_WITH_EIGEN", None))
     # The same bits as Python's own arithmetic: nothing fused, and every function the C library's.
     exact = ["-ffp-contract=off", "-fno-builtin"]
     return Extension(
         "xplane_bridge._core",
-        [f"lib/core/control/{name}.cpp" for name in control] + [f"lib/bindings/{name}.cpp" for name in bindings],
+        [f"lib/core/{name}.cpp" for name in core] + [f"lib/bindings/{name}.cpp" for name in bindings],
         include_dirs=include_dirs,
         define_macros=macros,
         extra_compile_args=["-std=c++17", "-O2", "-fvisibility=hidden", *exact],

@@ -21,10 +21,11 @@ PyMODINIT_FUNC PyInit__core() {  // NOLINT(bugprone-reserved-identifier,readabil
     xplane_bridge::bindings::Object module(PyModule_Create(&definition));
     xplane_bridge::bindings::addArbiter(module.get());
     xplane_bridge::bindings::addDatagrams(module.get());
-#ifdef XPLANE_BRIDGE_WITH_EXCITATION  // left out by pip where Eigen is not there
+#ifdef XPLANE_BRIDGE_WITH_EIGEN  // left out by pip where Eigen is not there
     xplane_bridge::bindings::addExcitation(module.get());
+    xplane_bridge::bindings::addFlightView(module.get());
 #endif
-    xplane_bridge::bindings::addFlightRecord(module.get());
+    xplane_bridge::bindings::addFlightTruth(module.get());
     xplane_bridge::bindings::addStateReader(module.get());
     xplane_bridge::bindings::addTwinLoop(module.get());
     PyObject* out = module.get();

@@ -18,18 +18,20 @@ class NotCompiledError(XplaneBridgeError):
 
 
 def require(who: str) -> Any:
-    """The module.
+    """The module, whole.
 
     Args:
         who: Needs it, for the message.
 
     Raises:
-        NotCompiledError: It has not been built for this Python.
+        NotCompiledError: It has not been built for this Python, or without what flights in process take.
     """
-    if core is None:
+    if core is None or not hasattr(core, "flight_numbers"):
+        missing = "is not there" if core is None else "was built without Eigen's headers"
         msg = (
-            f"{who} flies with tx_node's own arbiter, and the compiled module xplane_bridge._core is not there: run "
-            "scripts/setup in the clone, or pip install the package where a C++ compiler and python3-dev are installed"
+            f"{who} flies with the bridge's own code, and the compiled module xplane_bridge._core {missing}: run "
+            "scripts/setup in the clone, or pip install the package where a C++ compiler, python3-dev and "
+            "libeigen3-dev are installed"
         )
         raise NotCompiledError(msg)
     return core

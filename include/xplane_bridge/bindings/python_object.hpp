@@ -127,7 +127,8 @@ PyCFunction method(Function* function) {
 void addArbiter(PyObject* module);
 void addDatagrams(PyObject* module);
 void addExcitation(PyObject* module);
-void addFlightRecord(PyObject* module);
+void addFlightTruth(PyObject* module);
+void addFlightView(PyObject* module);
 void addStateReader(PyObject* module);
 void addTwinLoop(PyObject* module);
 

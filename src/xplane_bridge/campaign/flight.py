@@ -207,12 +207,7 @@ class Flight:
         now, target = view.sim_time, parameters["target"]
         keys = ("amplitude", "duration", "frequency", "frequency_end")
         amplitude, duration, low, high = struct.unpack("<4f", struct.pack("<4f", *[parameters[key] for key in keys]))
-        make = getattr(require("an excitation in process"), "Excitation", None)
-        if make is None:
-            raise CampaignError(
-                "scenario: excitations in process take Eigen's headers (libeigen3-dev) where the package is installed; "
-                "install them, and the package again"
-            )
+        make = require("an excitation in process").Excitation
         try:
             runner = make(parameters["kind"], amplitude, duration, low, high, parameters["seed"], *self._limits, now)
         except ValueError as error:

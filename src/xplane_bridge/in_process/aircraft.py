@@ -19,6 +19,7 @@ from xplane_bridge.compiled import require
 from xplane_bridge.constants import FlightMode
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.command_channels import apply_channels
+from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.flight_model import FlightModel, InitialState, ModelState
 from xplane_bridge.in_process.failures import Failures
 from xplane_bridge.in_process.view import FlightView
@@ -113,6 +114,7 @@ class Aircraft:
         self.model = conditions.model()
         self.controls = self.model.reset(initial_state(conditions.start))
         conditions.disturb(self.model)
+        self._origin = LocalFrame(self.model.state.latitude_deg, self.model.state.longitude_deg)
         self.failures = Failures(self.model)
         options = arbiter_options(conditions.aircraft)
         if conditions.mode is not None:
@@ -141,7 +143,9 @@ class Aircraft:
 
     def view(self) -> FlightView:
         """What a controller sees of this frame."""
-        return FlightView(self.model.info, self.model.state, self.controls, self.frame, self.period)
+        state = self.model.state
+        self._origin.follow(state.latitude_deg, state.longitude_deg)
+        return FlightView(self.model.info, state, self.controls, self._origin, self.frame, self.period)
 
     def set_mode(self, mode: int, who: str) -> bool:
         """Asks for a mode; returns whether that changed it.

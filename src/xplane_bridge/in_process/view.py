@@ -1,14 +1,13 @@
-"""What a controller sees of a flight in process: fields of FlightState, rounded as they are on the bridge's way."""
+"""What a controller sees of a flight in process: fields of FlightState, the same numbers as on the bridge."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from xplane_bridge.compiled import require
+from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.flight_model import Controls, ModelInfo, ModelState
 from xplane_bridge.emulator.flight.frame import PARKED_HEIGHT_M
-from xplane_bridge.units import GRAVITY_MPS2
 
 
 class Vector3(NamedTuple):
@@ -20,7 +19,7 @@ class Vector3(NamedTuple):
 
 
 class _Numbers(NamedTuple):
-    """Those of FlightState, and the parts of its vectors, in the order of lib/bindings/flight_record.cpp."""
+    """Those of FlightState, and the parts of its vectors, in the order of lib/bindings/flight_view.cpp."""
 
     frame_period: float
     sim_time: float
@@ -46,7 +45,13 @@ class _Numbers(NamedTuple):
     wind_north: float
     wind_east: float
     wind_down: float
+    force_x: float
+    force_y: float
+    force_z: float
+    vertical_speed: float
     ground_speed: float
+    track_deg: float
+    flight_path_angle_deg: float
     alpha_deg: float
     beta_deg: float
     calibrated_airspeed: float
@@ -67,11 +72,10 @@ class _Numbers(NamedTuple):
 
 
 class FlightView(_Numbers):
-    """One instant of a flight, with names, units, signs and rounding of `FlightState.msg`.
+    """One instant of a flight, as `rx_node` publishes it: fields of `FlightState.msg`, worked out by its own code.
 
-    Not there: the header and stamps, positions in a map, what magnetism and the altimeter show, raw airflow angles,
-    aerodynamic moments, and the attitude as a quaternion or its derivatives. The position is float32 of X-Plane's own
-    numbers, where the bridge makes it from local coordinates, which are exact to 2 to 8 mm.
+    Not there: the header and stamps, positions in a map, what magnetism and instruments show, raw airflow angles,
+    aerodynamic moments, and the attitude as a quaternion or its derivatives.
     """
 
     # A tuple, because a flight makes one in each frame, and reads few of its numbers.
@@ -84,10 +88,14 @@ class FlightView(_Numbers):
     on_ground: bool
     stall_warning: bool
 
-    def __new__(cls, info: ModelInfo, state: ModelState, controls: Controls, frame: int, period: float) -> FlightView:
-        """That of a state, `frame` frames of `period` [s] after the start."""
+    def __new__(
+        cls, info: ModelInfo, state: ModelState, controls: Controls, origin: LocalFrame, frame: int, period: float
+    ) -> FlightView:
+        """That of a state, `frame` frames of `period` [s] after the start, in the scenery of `origin`."""
         heights = info.standing_height_m, PARKED_HEIGHT_M
-        numbers = require("a flight in process").flight_numbers(state, controls, period, *heights)
+        numbers = require("a flight in process").flight_numbers(
+            state, controls, period, *heights, origin.lat_ref, origin.lon_ref
+        )
         self = tuple.__new__(cls, numbers)
         self.frame_count = frame
         self.on_ground, self.stall_warning = state.on_ground_any, state.stall_warning
@@ -124,24 +132,6 @@ class FlightView(_Numbers):
         return Vector3(self.wind_north, self.wind_east, self.wind_down)
 
     @property
-    def vertical_speed(self) -> float:
-        """[m/s] up +."""
-        return -self.v_down
-
-    @property
-    def track_deg(self) -> float:
-        """[deg] 0..360 of the way over ground; below 0.5 m/s the heading."""
-        if self.ground_speed < 0.5:
-            return self.heading_true_deg
-        return math.degrees(math.atan2(self.v_east, self.v_north)) % 360.0
-
-    @property
-    def flight_path_angle_deg(self) -> float:
-        """[deg] climbing +."""
-        return math.degrees(math.atan2(-self.v_down, self.ground_speed))
-
-    @property
     def specific_force(self) -> Vector3:
         """[m/s^2] FRD."""
-        g = GRAVITY_MPS2
-        return Vector3(self.load_factor_axial * g, self.load_factor_side * g, -self.load_factor_normal * g)
+        return Vector3(self.force_x, self.force_y, self.force_z)

@@ -67,7 +67,8 @@ def test_it_is_off_by_default(world):
     assert not any(world.namespace + "/rx_node" in publishers for publishers in nodes)
 
 
-def test_pictures_are_stamped_with_the_simulator_time_at_which_they_are_shown(world, display, screen):
+@pytest.mark.usefixtures("screen")
+def test_pictures_are_stamped_with_the_simulator_time_at_which_they_are_shown(world, display):
     from sensor_msgs.msg import CameraInfo, Image
     from xplane_bridge.msg import FrameState
 

@@ -6,12 +6,14 @@ import struct
 import pytest
 
 from support.room_table import ROOT
+from xplane_bridge import compiled
 from xplane_bridge.compiled import core
 from xplane_bridge.constants import FAILURE_KINDS, SURFACE_FAILURE_KINDS, FlightMode
 from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
 from xplane_bridge.emulator.simulator import Simulator
-from xplane_bridge.in_process.aircraft import AUTO, MANUAL, arbiter_options
+from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, arbiter_options
 from xplane_bridge.in_process.failures import Failures, NotFlownError, model_surface
 from xplane_bridge.in_process.view import FlightView
 
@@ -87,7 +89,9 @@ def test_the_view_is_what_the_emulator_sends() -> None:
     simulator.inputs._pilot = None
     for _ in range(60):
         simulator.step(1 / 60)
-    view = FlightView(simulator.model.info, simulator.model.state, simulator.controls, 60, 1 / 60)
+    view = FlightView(
+        simulator.model.info, simulator.model.state, simulator.controls, simulator.frame.local, 60, 1 / 60
+    )
     units = {
         "": 1.0,
         "negated": -1.0,
@@ -147,4 +151,10 @@ def test_a_number_beyond_float32_is_no_view() -> None:
     controls = model.reset(InitialState(airspeed_mps=70.0))
     model.state.p_rad_s = 1e39
     with pytest.raises(OverflowError, match="too large"):
-        FlightView(model.info, model.state, controls, 60, 1 / 60)
+        FlightView(model.info, model.state, controls, LocalFrame(37.5, 127.0), 60, 1 / 60)
+
+
+def test_a_module_built_without_eigen_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "core", object())
+    with pytest.raises(compiled.NotCompiledError, match="was built without Eigen's headers: .*libeigen3-dev"):
+        Aircraft(Conditions("fixed_wing"))

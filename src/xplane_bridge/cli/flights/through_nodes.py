@@ -27,10 +27,14 @@ from xplane_bridge.resources import program
 from xplane_bridge.scenario import parse_scenario
 from xplane_bridge.scenario.judging import judge
 
-#: Fields of FlightState that are the same float32 in process; rx_node works out the others, or positions are coarser.
+_VECTORS = ("angular_velocity", "angular_acceleration", "velocity_ned", "velocity_body", "wind_ned", "specific_force")
+#: Fields of FlightState that a flight in process has, too.
 COMPARED = (
-    "roll_deg", "pitch_deg", "heading_true_deg", "angular_velocity.x", "angular_velocity.y", "angular_velocity.z",
-    "true_airspeed", "mach", "air_density", "load_factor_normal", "load_factor_axial", "load_factor_side",
+    "latitude", "longitude", "altitude_msl", "altitude_agl", "roll_deg", "pitch_deg", "heading_true_deg",
+    *(f"{vector}.{axis}" for vector in _VECTORS for axis in "xyz"),
+    "vertical_speed", "ground_speed", "track_deg", "flight_path_angle_deg", "alpha_deg", "beta_deg",
+    "calibrated_airspeed", "equivalent_airspeed", "true_airspeed", "mach", "dynamic_pressure", "air_density",
+    "load_factor_normal", "load_factor_axial", "load_factor_side", "wind_speed", "wind_from_deg",
     "control_roll", "control_pitch", "control_yaw", "control_throttle",
 )  # fmt: skip
 #: Where it is flown on after the end in process, so that the end of the scenario shows [s].
@@ -103,8 +107,8 @@ def first_difference(seen: Sequence[Any], states: Table, first: int) -> Optional
     """Where the states through the nodes, from `first` on, part from those in process; None: nowhere."""
     found: List[Difference] = []
     for name in COMPARED:
-        mine = np.array([reduce(getattr, name.split("."), view) for view in seen], dtype=np.float32)
-        theirs = np.asarray(states[name][first : first + len(mine)], dtype=np.float32)
+        mine = np.array([reduce(getattr, name.split("."), view) for view in seen])
+        theirs = np.asarray(states[name][first : first + len(mine)], dtype=float)
         differing = np.flatnonzero(mine[: len(theirs)] != theirs)
         if len(differing):
             frame = int(differing[0])

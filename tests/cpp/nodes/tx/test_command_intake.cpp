@@ -22,7 +22,7 @@ class CommandIntakeTest : public testing::Test, protected ActuationRig {
     message.roll = value;
     return message;
   }
-  /// Other aircraft that X-Plane was told to place.
+  /// Messages that place another aircraft.
   std::size_t placements() const {
     const auto& sent = sim_.messages();
     return static_cast<std::size_t>(
