@@ -156,5 +156,5 @@ def test_a_number_beyond_float32_is_no_view() -> None:
 
 def test_a_module_built_without_eigen_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled, "core", object())
-    with pytest.raises(compiled.NotCompiledError, match="was built without Eigen's headers: .*libeigen3-dev"):
+    with pytest.raises(compiled.NotCompiledError, match=r"was built without Eigen's headers: .*libeigen3-dev"):
         Aircraft(Conditions("fixed_wing"))
