@@ -17,9 +17,7 @@ namespace {
 using Vec = std::array<double, 3>;
 using Rows = std::array<Vec, 3>;
 
-constexpr double kEarthRadius = 6378145.0;                           // [m] units.EARTH_RADIUS_M
 constexpr double kPsfPerPascal = 0.3048 * 0.3048 / 4.4482216152605;  // frame.PA_TO_PSF
-constexpr double kGravity = 9.80665;                                 // [m/s^2] units.GRAVITY_MPS2
 
 /// Of a ModelState, in this order.
 enum StateNumber : std::size_t {
@@ -124,12 +122,12 @@ void placeInScenery(const std::array<double, kStateNumbers>& s, core::FlightInpu
     const Vec column = turned(origin, level[j]);
     for (std::size_t i = 0; i < 3; ++i) turn[i][j] = column[i];
   }
-  const double distance = -(kEarthRadius + s[kAltitude]);
+  const double distance = -(core::kEarthRadius + s[kAltitude]);
   const Vec place = turned(origin, {level[2][0] * distance, level[2][1] * distance, level[2][2] * distance});
-  in->local_position = {sent(place[1]), sent(-place[2] - kEarthRadius), sent(-place[0])};
+  in->local_position = {sent(place[1]), sent(-place[2] - core::kEarthRadius), sent(-place[0])};
   in->origin_latitude = sent(origin_latitude);
   in->origin_longitude = sent(origin_longitude);
-  in->earth_radius = sent(kEarthRadius);
+  in->earth_radius = sent(core::kEarthRadius);
   in->local_velocity = sentOpengl(turned(turn, {s[kNorth], s[kEast], s[kDown]}));
   in->wind_local = sentOpengl(turned(turn, {s[kWindNorth], s[kWindEast], s[kWindDown]}));
 }
@@ -156,9 +154,9 @@ core::FlightInputs inputsOf(const std::array<double, kStateNumbers>& s, const st
   in.mach = sent(s[kMach]);
   in.dynamic_pressure = sent(s[kDynamicPressure] * kPsfPerPascal) * core::kPascalsPerPoundPerSquareFoot;
   in.air_density = sent(s[kDensity]);
-  in.load_factor_normal = sent(-s[kForceZ] / kGravity) * core::kDatarefNormalSign;
-  in.load_factor_axial = sent(core::kDatarefAxialSign * s[kForceX] / kGravity) * core::kDatarefAxialSign;
-  in.load_factor_side = sent(s[kForceY] / kGravity) * core::kDatarefSideSign;
+  in.load_factor_normal = sent(-s[kForceZ] / core::kStandardGravity) * core::kDatarefNormalSign;
+  in.load_factor_axial = sent(core::kDatarefAxialSign * s[kForceX] / core::kStandardGravity) * core::kDatarefAxialSign;
+  in.load_factor_side = sent(s[kForceY] / core::kStandardGravity) * core::kDatarefSideSign;
   in.control_roll = sent(stick[0]);
   in.control_pitch = sent(stick[1]);
   in.control_yaw = sent(stick[2]);
