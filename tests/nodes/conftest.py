@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import signal
 import socket
 from pathlib import Path
 from typing import Any, Callable, Iterator
@@ -12,6 +11,7 @@ from typing import Any, Callable, Iterator
 import pytest
 
 from support.deadlines import WAIT_S
+from support.interrupts import heed_ctrl_c
 from support.scheduling import long_ones_first, rank
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
@@ -31,9 +31,7 @@ LONG = (
     "capture/test_sender.py::",
 )
 
-# Shells ignore SIGINT for what they run in the background, and programs would inherit that from here.
-if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+heed_ctrl_c()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from support.interrupts import heed_ctrl_c
 from support.scheduling import long_ones_first, rank
 
 #: Files and tests that take long, the longest first.
@@ -17,6 +18,9 @@ LONG = (
     "controllers/test_flights.py",
     "campaign/test_runner.py",
 )
+
+
+heed_ctrl_c()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -147,7 +147,7 @@ class Flight:
                 self._watch(view)
             sample = sample_of(view, aircraft.mode, view.stall_warning)
             self._record(now, aircraft.state, sample)
-            commands = self._player.step(now, sample)
+            commands = self._player.step(aircraft.shown_time, sample)
             if commands.finished:
                 return FLOWN, ""
             if now >= self._plan.longest:

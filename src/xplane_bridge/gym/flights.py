@@ -103,7 +103,7 @@ class InProcessFlight:
     @property
     def now(self) -> float:
         """[s] since the start."""
-        return self._aircraft.now
+        return self._aircraft.shown_time
 
     def close(self) -> None:
         """Nothing to end."""

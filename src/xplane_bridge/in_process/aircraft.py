@@ -124,12 +124,17 @@ class Aircraft:
 
     @property
     def now(self) -> float:
-        """[s] since the start, as a flight's states show it: by the frame's period in float32."""
+        """[s] since the start."""
+        return self.frame * self.period
+
+    @property
+    def shown_time(self) -> float:
+        """The same as the bridge's states show it [s]: by the frame's period in float32."""
         return float(self.frame * self._shown_period)
 
     def _clock(self) -> float:
         """[s] as tx_node has it in lock-step: to the microsecond, rounded as seconds beside a large number are."""
-        return (_CLOCK_NS + round(self.frame * self.period * 1e6) * 1000) / 1e9
+        return (_CLOCK_NS + round(self.now * 1e6) * 1000) / 1e9
 
     @property
     def state(self) -> ModelState:
