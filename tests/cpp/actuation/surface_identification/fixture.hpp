@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "actuation/quiet_hooks.hpp"
 #include "fake_airframe.hpp"
 #include "fake_simulator.hpp"
 #include "xplane_bridge/actuation/actuation.hpp"
@@ -47,17 +48,9 @@ class SurfaceIdentificationTest : public testing::Test {
     sim_.setAll(core::simulatorFailures(core::kXPlane11), 0.0F);
     showAircraft("DA62");
     sim_.on_frame = [this] { eachFrame(); };
-    ActuationHooks hooks;
-    hooks.mode = [](const core::ModeStatus&, double) {};
-    hooks.applied = [](const AppliedControls&, const auto&) {};
-    hooks.surfaces_applied = [](const SurfaceControl::Echo&, core::FlightMode, const auto&) {};
-    hooks.failures = [](const FailureSnapshot&) {};
+    ActuationHooks hooks = quietHooks();
     hooks.excitation = [this](const ExcitationLabel& label) { labels_.push_back(label); };
-    hooks.disturbance = [](const DisturbanceLabel&) {};
     hooks.event = [this](const ActuationEvent& event) { events_.push_back(event); };
-    hooks.warn = [](const std::string&) {};
-    hooks.journal_problem = [](const std::string&) {};
-    hooks.stopping = [] { return false; };
     ActuationOptions options;
     options.surfaces.mixing_folder = folder();
     options.control.arbiter.transition_rate = 1000.0;

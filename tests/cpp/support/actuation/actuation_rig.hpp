@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "actuation/quiet_hooks.hpp"
 #include "fake_simulator.hpp"
 #include "xplane_bridge/actuation/actuation.hpp"
 
@@ -29,17 +30,12 @@ class ActuationRig {
     sim_.set(kRoll, 0.0F);
     showAircraft("DA62");
     sim_.on_frame = [this] { sim_.set(kFlightTime, sim_.value(kFlightTime) + 0.02F); };
-    ActuationHooks hooks;
+    ActuationHooks hooks = quietHooks();
     hooks.mode = [this](const core::ModeStatus& status, double) { modes_.push_back(status); };
     hooks.applied = [this](const AppliedControls& applied, const auto&) { applied_.push_back(applied); };
-    hooks.surfaces_applied = [](const SurfaceControl::Echo&, core::FlightMode, const auto&) {};
     hooks.failures = [this](const FailureSnapshot& snapshot) { broken_.push_back(snapshot); };
     hooks.excitation = [this](const ExcitationLabel& label) { labels_.push_back(label); };
-    hooks.disturbance = [](const DisturbanceLabel&) {};
     hooks.event = [this](const ActuationEvent& event) { events_.push_back(event); };
-    hooks.warn = [](const std::string&) {};
-    hooks.journal_problem = [](const std::string&) {};
-    hooks.stopping = [] { return false; };
     ActuationOptions options;
     options.control.aircraft = {"DA62"};
     actuation_ = std::make_unique<Actuation>(&sim_, options, std::move(hooks));
