@@ -16,6 +16,9 @@ PyModuleDef definition = {
 
 }  // namespace
 
+// Headers of Python before 3.9 do not say that this is to be seen from outside, and hidden it is no module.
+extern "C" __attribute__((visibility("default"))) PyObject* PyInit__core();
+
 PyMODINIT_FUNC PyInit__core() {  // NOLINT(bugprone-reserved-identifier,readability-identifier-naming): Python's
   return xplane_bridge::bindings::guarded([] {
     xplane_bridge::bindings::Object module(PyModule_Create(&definition));
