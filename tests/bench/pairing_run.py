@@ -178,6 +178,13 @@ def fly(folder: Path, flight: Flight) -> None:
                     running.enter_context(node)
                 given_up = [one.wait_for_line("delay: (not measured)?", _WARM_UP_S).group(1) for one in eyes]
                 if flight.calibrate or any(given_up):
+                    wait_until(
+                        lambda: any(
+                            not s[1] & FrameState.QUALITY_FOV_ASSUMED for s in list(recorders[0].states.values())
+                        ),
+                        _WARM_UP_S,
+                        "pictures with X-Plane's own field of view",
+                    )
                     calibrated()
                     recorders[0].clear()
                     delays = (math.inf, *delays[1:])  # measured, whatever it is
