@@ -46,6 +46,7 @@ class Recorder:
         self.states: dict[int, tuple] = {}
         self.paired = False  #: whether a picture was paired without any flag but, maybe, that of the delay
         self.perfect = False  #: whether without any
+        self.knows_view = False  #: whether X-Plane has said its field of view
 
     def on_image(self, image) -> None:
         first = image.height - image.height // 20
@@ -54,6 +55,7 @@ class Recorder:
 
     def on_state(self, state) -> None:
         self.perfect = self.perfect or not state.quality
+        self.knows_view = self.knows_view or not state.quality & state.QUALITY_FOV_ASSUMED
         self.paired = self.paired or not state.quality & ~state.QUALITY_DELAY_ASSUMED
         self.states[state.header.stamp.to_nsec()] = (
             np.nan if state.quality & state.QUALITY_STATE_MISSING else state.state.sim_time,
@@ -178,13 +180,7 @@ def fly(folder: Path, flight: Flight) -> None:
                     running.enter_context(node)
                 given_up = [one.wait_for_line("delay: (not measured)?", _WARM_UP_S).group(1) for one in eyes]
                 if flight.calibrate or any(given_up):
-                    wait_until(
-                        lambda: any(
-                            not s[1] & FrameState.QUALITY_FOV_ASSUMED for s in list(recorders[0].states.values())
-                        ),
-                        _WARM_UP_S,
-                        "pictures with X-Plane's own field of view",
-                    )
+                    wait_until(lambda: recorders[0].knows_view, _WARM_UP_S, "pictures with X-Plane's field of view")
                     calibrated()
                     recorders[0].clear()
                     delays = (math.inf, *delays[1:])  # measured, whatever it is
