@@ -16,10 +16,11 @@ PyModuleDef definition = {
 
 }  // namespace
 
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): the name is Python's
 // Headers of Python before 3.9 do not say that this is to be seen from outside, and hidden it is no module.
 extern "C" __attribute__((visibility("default"))) PyObject* PyInit__core();
 
-PyMODINIT_FUNC PyInit__core() {  // NOLINT(bugprone-reserved-identifier,readability-identifier-naming): Python's
+PyMODINIT_FUNC PyInit__core() {
   return xplane_bridge::bindings::guarded([] {
     xplane_bridge::bindings::Object module(PyModule_Create(&definition));
     xplane_bridge::bindings::addArbiter(module.get());
@@ -36,3 +37,4 @@ PyMODINIT_FUNC PyInit__core() {  // NOLINT(bugprone-reserved-identifier,readabil
     return out;
   });
 }
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
