@@ -25,8 +25,8 @@ constexpr double kOverduePeriod = 0.05;
 constexpr double kRestorePeriod = 0.5;  // [s] between looks whether a killed node's field of view is to be given back
 constexpr double kSlowRead = 0.005;     // [s] median above which reading pictures is said to be slow
 constexpr std::int64_t kFrozenRepeat = 1'000'000'000;  // [ns] between repetitions of a frozen picture
-constexpr std::int64_t kSameTime = 50'000'000;  // [ns] by which a stamp may be behind the one before in one flight
-constexpr std::size_t kPicturesWaiting = 2;     // for scaling, and for JPEG: more would only be older
+constexpr std::int64_t kSameTime = 1'000'000'000;  // [ns] by which a stamp may be behind the one before in one flight
+constexpr std::size_t kPicturesWaiting = 2;        // for scaling, and for JPEG: more would only be older
 constexpr std::size_t kSpareBuffers = 4;
 constexpr std::uint32_t kStateQueue = 200;  // states of a second and more: none may be lost for pairing
 constexpr std::uint32_t kImageQueue = 2;
@@ -321,7 +321,8 @@ std::int64_t CaptureNode::published(std::int64_t host_ns) const {
 std::int64_t CaptureNode::stampOfPicture(std::int64_t shown_ns) {
   std::int64_t stamp_ns = published(shown_ns);
   if (stampsBySimulator()) {
-    // It stands in a pause, and steps back a little where the clock has learnt: no two pictures have one stamp.
+    // It stands in a pause, at the newest frame, which is up to a period before the picture last shown, and steps back
+    // a little where the clock has learnt: all the same each picture's stamp is later than the one before.
     if (stamp_ns <= last_stamp_ns_ && last_stamp_ns_ - stamp_ns < kSameTime) stamp_ns = last_stamp_ns_ + 1;
     last_stamp_ns_ = stamp_ns;
   }
