@@ -14,7 +14,7 @@ import argparse
 import sys
 import threading
 from pathlib import Path
-from typing import Any, Dict, List
+from typing import Any, Dict, List, Set
 
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.options import Options
@@ -53,6 +53,7 @@ class Soak:
         self.flown = 0
         self.resets = self.loads = self.starts = 0
         self.memory: Dict[str, List[int]] = {}
+        self.begun: Set[int] = set()  #: events of flights that have begun anew, since the bridge was started
         self._bridge = LockstepBridge()
         self._emulator: Emulator
         self._thread: threading.Thread
@@ -69,6 +70,7 @@ class Soak:
                 self._start()
                 self._fly(first, last)
                 self._check_memory()
+                assert self.begun, "no flight has begun anew, though that was asked for"
                 self._stop()
         finally:
             self._bridge.close()
@@ -80,8 +82,20 @@ class Soak:
         self._thread = threading.Thread(target=self._emulator.run, name="emulator", daemon=True)
         self._thread.start()
         self._state = self._bridge.begin(self._emulator.port, "fixed_wing")
+        self._listen()
         self.starts += 1
         self.memory = {node: [] for node in NODES}
+
+    def _listen(self) -> None:
+        import rospy
+        from xplane_bridge.msg import Event, EventList
+
+        self.begun = set()
+
+        def on_events(message: EventList) -> None:
+            self.begun |= {event.number for event in message.events if event.kind == Event.RESET and event.success}
+
+        rospy.Subscriber(f"/{self._bridge.name}/events", EventList, on_events)
 
     def _stop(self) -> None:
         self._bridge.end()

@@ -32,7 +32,8 @@ struct LockstepClock::State {
   std::int64_t host_mark_ns = 0;         // when the host's pace began to count
   std::int64_t steady_mark_ns = kBegin;  // steady time then, or of the frame
   std::int64_t system_ns;
-  std::int64_t sim_ns = 0;  // of the newest frame
+  std::int64_t sim_ns = 0;    // of the newest frame
+  std::int64_t frame_ns = 0;  // that the newest frame lasted in which time went on
 };
 
 LockstepClock::LockstepClock(Clock host, std::int64_t start_ns)
@@ -58,7 +59,10 @@ void LockstepClock::move(std::int64_t sim_ns) {
       s.steady_mark_ns = (now_ns + kNanosecondsPerSecond - 1) / kNanosecondsPerSecond * kNanosecondsPerSecond;
       s.phase = Phase::kFlying;
     } else if (sim_ns > s.sim_ns) {  // X-Plane's time may run back, the steady one may not
-      s.steady_mark_ns += sim_ns - s.sim_ns;
+      s.frame_ns = sim_ns - s.sim_ns;
+      s.steady_mark_ns += s.frame_ns;
+    } else if (sim_ns == s.sim_ns) {
+      s.steady_mark_ns += s.frame_ns;  // paused: deadlines are counted in frames
     }
     s.sim_ns = sim_ns;
     s.system_ns = s.start_ns + sim_ns;

@@ -12,7 +12,8 @@ namespace xplane_bridge::core {
 ///
 /// Before the first frame (held) and after release() nothing of the simulator moves it: its steady time goes at the
 /// host's pace then, so that X-Plane can be found and left, and its system time stands. While it flies, both go by
-/// simulated time. The steady time never steps. Thread-safe.
+/// simulated time; in a pause, in which that stands, the steady time goes on by a frame's length with each frame. The
+/// steady time never steps. Thread-safe.
 class LockstepClock {
  public:
   /// @param host whose pace it goes at while it does not fly

@@ -52,6 +52,17 @@ TEST_F(LockstepClockTest, SteadyTimeStandsWhereSimulatedTimeRunsBack) {
   EXPECT_EQ(clock_.steady_ns(), before + kS);
 }
 
+TEST_F(LockstepClockTest, SteadyTimeGoesOnByFramesWhereSimulatedTimeStands) {
+  lockstep_.move(40 * kS);
+  lockstep_.move(40 * kS);
+  const std::int64_t before = clock_.steady_ns();
+  lockstep_.move(40 * kS + 20'000'000);
+  lockstep_.move(40 * kS + 20'000'000);
+  lockstep_.move(40 * kS + 20'000'000);
+  EXPECT_EQ(clock_.steady_ns(), before + 60'000'000) << "who waits in a pause waits for frames";
+  EXPECT_EQ(clock_.system_ns(), kStart + 40 * kS + 20'000'000);
+}
+
 TEST_F(LockstepClockTest, GoesOnByTheHostOnceReleased) {
   lockstep_.move(40 * kS);
   const std::int64_t before = clock_.steady_ns();
