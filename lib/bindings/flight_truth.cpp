@@ -42,8 +42,7 @@ PyObject* truthBytes(PyObject* /*module*/, PyObject* state) {
 PyMethodDef functions[] = {
     {"truth_bytes", truthBytes, METH_O,
      "truth_bytes(state) -> bytes: what the flight model really did, in doubles of this computer: what two flights "
-     "must "
-     "share to be the same."},
+     "must share to be the same."},
     {nullptr, nullptr, 0, nullptr},
 };
 

@@ -107,12 +107,6 @@ double sent(double value) {
 /// Of north, east and down: OpenGL's X east, Y up, Z south.
 Eigen::Vector3d sentOpengl(const Vec& ned) { return {sent(ned[1]), sent(-ned[2]), sent(-ned[0])}; }
 
-double wrapped(double angle_deg) {
-  double out = std::fmod(angle_deg, 360.0);
-  if (out < 0.0) out += 360.0;
-  return out >= 360.0 ? 0.0 : out;
-}
-
 void placeInScenery(const std::array<double, kStateNumbers>& s, core::FlightInputs* in, double origin_latitude,
                     double origin_longitude) {
   const Rows origin = levelRows(origin_latitude, origin_longitude);
@@ -142,7 +136,7 @@ core::FlightInputs inputsOf(const std::array<double, kStateNumbers>& s, const st
   in.altitude_agl = sent(height);
   in.roll_deg = sent(degrees(s[kRoll]));
   in.pitch_deg = sent(degrees(s[kPitch]));
-  in.heading_true_deg = sent(wrapped(degrees(s[kHeading])));
+  in.heading_true_deg = sent(core::wrap360(degrees(s[kHeading])));
   in.roll_rate = sent(s[kP]);
   in.pitch_rate = sent(s[kQ]);
   in.yaw_rate = sent(s[kR]);

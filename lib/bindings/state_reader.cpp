@@ -17,6 +17,13 @@ namespace {
 constexpr std::size_t kInputs = 48;   // jsbsim_state._STATE_PROPERTIES
 constexpr std::size_t kOutputs = 51;  // numbers of a ModelState
 
+/// Python's % of a positive divisor.
+double modulo(double value, double divisor) {
+  const double rest = std::fmod(value, divisor);
+  if (rest == 0.0) return 0.0;
+  return rest < 0.0 ? rest + divisor : rest;
+}
+
 class Reader {
  public:
   explicit Reader(PyObject* getters) : quaternion_(PyUnicode_InternFromString("quaternion")) {

@@ -21,12 +21,6 @@ inline double clip(double value, double low, double high) { return pythonMin(pyt
 inline constexpr double kPi = 3.14159265358979323846;
 inline double degrees(double radians) { return radians * (180.0 / kPi); }
 inline double radians(double degrees) { return degrees * (kPi / 180.0); }
-/// Python's % of a positive divisor.
-inline double modulo(double value, double divisor) {
-  const double rest = std::fmod(value, divisor);
-  if (rest == 0.0) return 0.0;
-  return rest < 0.0 ? rest + divisor : rest;
-}
 
 struct Vector {
   double x = 0.0, y = 0.0, z = 0.0;

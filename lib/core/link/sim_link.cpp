@@ -422,13 +422,11 @@ void SimLink::step(int timeout_ms) {
   if (!reader_.idle()) {
     reader_.update(now_ns_);
   }
-  // In lock-step by frames, whatever the phase of the time before the flight; in a pause time stands.
-  const bool due =
-      options_.lockstep ? now_ns_ != maintained_ns_ || paused_ != maintained_paused_ : now_ns_ >= next_maintenance_ns_;
+  // In lock-step by frames, whatever the phase of the time before the flight.
+  const bool due = options_.lockstep ? now_ns_ != maintained_ns_ : now_ns_ >= next_maintenance_ns_;
   if (due) {
     next_maintenance_ns_ = now_ns_ + kMaintenanceNs;
     maintained_ns_ = now_ns_;
-    maintained_paused_ = paused_;
     maintain(now_ns_);
   }
   flushRequests(now_ns_);

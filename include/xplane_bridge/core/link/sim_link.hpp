@@ -260,7 +260,6 @@ class SimLink : public SimulatorPort {
   std::int64_t next_join_ns_ = 0;
   std::int64_t next_maintenance_ns_ = 0;
   std::int64_t maintained_ns_ = -1;
-  std::optional<bool> maintained_paused_;  // as it was then
   std::int64_t next_probe_ns_ = 0;
   std::int64_t now_ns_ = 0;
 
