@@ -3,9 +3,10 @@
 
     python3 tests/full/soak.py --hours 8
 
-Every two simulated minutes the flight begins anew at another place (the origin of X-Plane's local frame jumps); a third
-and two thirds of the way an aircraft is loaded; half-way the bridge is ended and started again. Every frame must be
-published once, in its order, and answered. The memory of each node may grow by 5 % and 4 MB after the first tenth.
+Every two simulated minutes the flight begins anew at another place (the origin of X-Plane's local frame jumps); after a
+third of the way another aircraft is loaded, which the bridge must leave alone, and then its own again; after two thirds
+its own is loaded anew; half-way the bridge is ended and started again. Every frame must be published once, in its order,
+and answered. The memory of each node may grow by 5 % and 4 MB after the first tenth.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any, Dict, List, Set
 
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.options import Options
+from xplane_bridge.emulator.simulator import aircraft_path
 from xplane_bridge.harness.lockstep_bridge import LockstepBridge
 
 FPS = 60
@@ -25,7 +27,7 @@ PLACES = ((47.2, 8.4), (46.4, 7.1), (35.8, 139.6))  # latitude, longitude [deg]
 RESET_EVERY_S = 120.0  # or six times in a short soak
 SHARE, ROOM_KB = 0.05, 4096
 NODES = ("rx_node", "tx_node")
-AIRCRAFT = "Aircraft/Laminar Research/Cessna 172SP/Cessna_172SP.acf"
+AIRCRAFT, OTHER_AIRCRAFT = "fixed_wing", "multirotor"
 
 
 def resident_kb(name: str, node: str) -> int:
@@ -51,9 +53,17 @@ class Soak:
     def __init__(self, frames: int) -> None:
         self.frames = frames
         self.flown = 0
+        self._period = min(int(RESET_EVERY_S * FPS), frames // 6)  # of flights begun anew [frames]
+        between = self._period // 2
+        self._loads = {
+            frames // 3 + between: OTHER_AIRCRAFT,
+            frames // 3 + between + self._period // 4: AIRCRAFT,
+            2 * frames // 3 + between: AIRCRAFT,
+        }
         self.resets = self.loads = self.starts = 0
         self.memory: Dict[str, List[int]] = {}
-        self.begun: Set[int] = set()  #: events of flights that have begun anew, since the bridge was started
+        self.done: Dict[int, Set[int]] = {}  #: numbers of events by their kind, since the bridge was started
+        self.failed: Set[str] = set()  #: what a failed change of the flight said
         self._bridge = LockstepBridge()
         self._emulator: Emulator
         self._thread: threading.Thread
@@ -70,7 +80,7 @@ class Soak:
                 self._start()
                 self._fly(first, last)
                 self._check_memory()
-                assert self.begun, "no flight has begun anew, though that was asked for"
+                self._check_events()
                 self._stop()
         finally:
             self._bridge.close()
@@ -81,7 +91,7 @@ class Soak:
         )
         self._thread = threading.Thread(target=self._emulator.run, name="emulator", daemon=True)
         self._thread.start()
-        self._state = self._bridge.begin(self._emulator.port, "fixed_wing")
+        self._state = self._bridge.begin(self._emulator.port, AIRCRAFT)
         self._listen()
         self.starts += 1
         self.memory = {node: [] for node in NODES}
@@ -90,10 +100,14 @@ class Soak:
         import rospy
         from xplane_bridge.msg import Event, EventList
 
-        self.begun = set()
+        self.done = {Event.RESET: set(), Event.AIRCRAFT: set()}
 
         def on_events(message: EventList) -> None:
-            self.begun |= {event.number for event in message.events if event.kind == Event.RESET and event.success}
+            for event in message.events:
+                if event.kind in self.done and event.success:
+                    self.done[event.kind].add(event.number)
+                elif event.kind in self.done:
+                    self.failed.add(event.text)
 
         rospy.Subscriber(f"/{self._bridge.name}/events", EventList, on_events)
 
@@ -105,10 +119,10 @@ class Soak:
     def _fly(self, first: int, last: int) -> None:
         count, period = int(self._state.frame_count), 1.0 / FPS
         for frame in range(first, last):
-            if frame > first and frame % min(int(RESET_EVERY_S * FPS), self.frames // 6) == 0:
+            if frame > first and frame % self._period == 0:
                 self._begin_anew()
-            if frame in (self.frames // 3, 2 * self.frames // 3):
-                self._load()
+            if frame in self._loads:
+                self._load(self._loads[frame])
             if (frame - first) % max(1, (last - first) // 20) == 0:
                 for node in NODES:
                     self.memory[node].append(resident_kb(self._bridge.name, node))
@@ -139,10 +153,10 @@ class Soak:
         )
         self.resets += 1
 
-    def _load(self) -> None:
+    def _load(self, aircraft: str) -> None:
         from xplane_bridge.srv import LoadAircraft
 
-        self._call("load_aircraft", LoadAircraft, path=AIRCRAFT)
+        self._call("load_aircraft", LoadAircraft, path=aircraft_path(aircraft))
         self.loads += 1
 
     def _call(self, service: str, kind: Any, **fields: Any) -> None:
@@ -150,6 +164,13 @@ class Soak:
 
         answer = rospy.ServiceProxy(f"/{self._bridge.name}/tx_node/{service}", kind)(**fields)
         assert answer.success, f"{service}: {answer.result.message}"
+
+    def _check_events(self) -> None:
+        from xplane_bridge.msg import Event
+
+        assert not self.failed, "; ".join(sorted(self.failed))
+        assert self.done[Event.RESET], "no flight has begun anew, though that was asked for"
+        assert self.done[Event.AIRCRAFT], "no aircraft was loaded, though that was asked for"
 
     def _check_memory(self) -> None:
         for node, seen in self.memory.items():

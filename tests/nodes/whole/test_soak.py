@@ -14,7 +14,7 @@ SOAK = ROOT / "tests/full/soak.py"
 def test_a_minute_of_much_happening_loses_no_frame_and_no_memory():
     done = subprocess.run([sys.executable, SOAK, "--hours", "0.02"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert re.search(r"^4320 frames, 1\.2 min: none lost; \d flights begun anew, 2 aircraft", done.stdout, re.MULTILINE)
+    assert re.search(r"^4320 frames, 1\.2 min: none lost; \d flights begun anew, 3 aircraft", done.stdout, re.MULTILINE)
     assert "Traceback" not in done.stderr
 
 
