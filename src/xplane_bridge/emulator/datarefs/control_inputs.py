@@ -201,6 +201,8 @@ class ControlInputs:
                 self._held.pop(key, None)
             elif np.isfinite(value):
                 self._held[key] = float(value)
+                # At once: it stays there, also when -999 comes before the next frame.
+                self._move_lever(row, slot, float(value))
 
     def release_data(self) -> None:
         """Gives back all that DATA rows held, as loading an aircraft does."""
@@ -258,15 +260,17 @@ class ControlInputs:
         return self._store.get(_OVERRIDE + name) != 0.0
 
     def _apply_held(self) -> None:
-        if not self._held:
-            return
-        throttle = self._store.dataref(_ACTUATORS + "throttle_ratio").slots
         for (row, slot), value in self._held.items():
-            if row == _THROTTLE_ROW:
-                self._store.values[throttle[slot]] = _clip(value, -1.0, 1.0)
-            elif (row, slot) in _HANDLES:
-                name, low, high = _HANDLES[(row, slot)]
-                self._store.set(name, _clip(value, low, high))
+            self._move_lever(row, slot, value)
+
+    def _move_lever(self, row: int, slot: int, value: float) -> None:
+        """Moves the lever or handle of a row's slot; a stick's slot is none."""
+        if row == _THROTTLE_ROW:
+            throttle = self._store.dataref(_ACTUATORS + "throttle_ratio").slots
+            self._store.values[throttle[slot]] = _clip(value, -1.0, 1.0)
+        elif (row, slot) in _HANDLES:
+            name, low, high = _HANDLES[(row, slot)]
+            self._store.set(name, _clip(value, low, high))
 
     def _move_handles(self, commands: PilotCommands, model: FlightModel) -> None:
         store = self._store

@@ -132,6 +132,15 @@ def test_data_rows_13_and_14_move_trims_flaps_gear_and_brakes(bench):
     assert values == pytest.approx([0.1, -0.2, 0.3, 0.5, -0.5, 0.0, 0.6])
 
 
+def test_handles_and_levers_stay_where_a_row_put_them_also_when_it_ends_within_the_frame(bench):
+    emulator = bench()
+    client = emulator.client()
+    for index, *values in ((13, -999.0, -999.0, -999.0, 0.5), (25, 0.2)):
+        client.send(row(index, *values))
+        client.send(row(index))
+    assert emulator.read("sim/cockpit2/controls/flap_ratio", THROTTLE + "[0]") == pytest.approx([0.5, 0.2])
+
+
 def test_toe_brakes_need_their_override(bench):
     emulator = bench(initial=InitialState(on_ground=True))
     brake = "sim/cockpit2/controls/left_brake_ratio"
