@@ -89,16 +89,17 @@ class Picture(NamedTuple):
 class SwapChain:
     """Pictures on their way to the screen, oldest first."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: int, height: int) -> None:
+        self._shape = (height, width, 4)
         self._pictures: collections.deque[Picture] = collections.deque()
         self._spare: list[np.ndarray] = []
         self._changed = threading.Condition()
         self._ended = False
 
-    def buffer(self, shape: tuple[int, int, int]) -> np.ndarray:
+    def buffer(self) -> np.ndarray:
         """Memory for a picture."""
         with self._changed:
-            return self._spare.pop() if self._spare else np.zeros(shape, np.uint8)
+            return self._spare.pop() if self._spare else np.zeros(self._shape, np.uint8)
 
     def put(self, picture: Picture) -> None:
         """Appends a picture; waits while the chain is full."""
@@ -154,9 +155,8 @@ def _draw(painter: Painter, chain: SwapChain, delay_ns: int, drawn: Callable[[],
         if len(record) < RECORD_BYTES:
             continue
         scene, record = Scene.unpack(record), b""
-        picture = painter.paint(scene)
-        pixels = chain.buffer((*picture.shape[:2], 4))
-        cv2.cvtColor(picture, cv2.COLOR_BGR2BGRA, dst=pixels)
+        pixels = chain.buffer()
+        painter.paint_into(scene, pixels)
         chain.put(Picture(scene, pixels, scene.time_ns + delay_ns))
         drawn()
 
@@ -178,7 +178,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     if args.realtime:
         take_realtime_priority()
     print("READY", flush=True)
-    chain = SwapChain()
+    chain = SwapChain(width, height)
     drawn, shown = ((lambda: None), _answer) if args.answer_shown else (_answer, (lambda: None))
     threading.Thread(target=_draw, args=(painter, chain, int(args.pipeline_delay * 1e9), drawn), daemon=True).start()
     while not window.closed() and not chain.ended:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Optional
 
 import cv2
 import numpy as np
 
 from xplane_bridge.emulator.view.renderer.camera import NEAR_M, Camera, clip
+from xplane_bridge.emulator.view.renderer.ground import GroundView
 from xplane_bridge.emulator.view.renderer.others import outlines
 from xplane_bridge.emulator.view.renderer.scene import Scene
 from xplane_bridge.emulator.view.renderer.strip import draw_strip, strip_height
-from xplane_bridge.emulator.view.renderer.world import GRAINS, make_world
+from xplane_bridge.emulator.view.renderer.world import make_world
 from xplane_bridge.protocol import UNUSED_SLOT
 from xplane_bridge.units import FOOT_M
 
@@ -28,8 +28,9 @@ _HAZE_M = 22000.0
 _LEAST_HAZE = 0.015
 #: Coarse grid for what varies slowly over the picture.
 _GRID = 16
-#: Width of the columns that the ground is drawn in [px].
-_TILE = 80
+_LEAST_FALLING = 1e-7
+#: The ground ends so far below the horizon [px].
+_LEAST_PIXEL = 0.8
 #: A texture level is used up to where its texel is this many pixels' footprints small.
 _SHARPNESS = 1.4
 _SHIFT = 4  # sub-pixel bits of OpenCV's polygon coordinates
@@ -65,13 +66,11 @@ class Painter:
         self._hud = hud
         self._strip = strip
         self._world = make_world(runway_heading_deg)
-        self._picture = np.empty((height, width, 3), np.uint8)
-        self._mask = np.zeros((height, width), np.uint8)
+        self._picture = np.empty((height, width, 4), np.uint8)
         columns, rows = width // _GRID + 2, height // _GRID + 2
         u, v = np.meshgrid(np.linspace(0, width - 1, columns), np.linspace(0, height - 1, rows))
         self._grid = np.stack((u.ravel(), v.ravel(), np.ones(u.size)))
         self._grid_shape = (rows, columns)
-        self._frame = np.array(((0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)), float)
         self._skyline = self._skyline_directions()
         self._face_centres = self._world.boxes[:, _BOX_FACES].mean(axis=2)
         outward = self._face_centres - self._world.boxes.mean(axis=1)[:, np.newaxis]
@@ -79,17 +78,28 @@ class Painter:
         self._face_light = 0.62 + 0.38 * np.maximum(0.0, self._face_normals @ self._world.sun)
 
     def paint(self, scene: Scene) -> np.ndarray:
-        """The picture (height, width, 3), blue, green, red; overwritten by the next call."""
+        """The picture (height, width, 3): blue, green, red."""
+        self.paint_into(scene, np.empty((*self._picture.shape[:2], 4), np.uint8))
+        picture: np.ndarray = cv2.cvtColor(self._picture, cv2.COLOR_BGRA2BGR)
+        return picture
+
+    def paint_into(self, scene: Scene, picture: np.ndarray) -> None:
+        """Draws into a picture (height, width, 4): blue, green, red, and one without a meaning.
+
+        OpenCV warps a texture that repeats five times faster with four channels than with three.
+        """
+        self._picture = picture
         camera = Camera(scene, self._size, self._anchor)
         rays = camera.rays @ self._grid
         elevation = (rays[2] / np.linalg.norm(rays, axis=0)).astype(np.float32).reshape(self._grid_shape)
         if elevation.max() > -0.02:
             self._paint_sky(camera, elevation)
         if elevation.min() < 0.0:
-            self._paint_ground(camera)
-            self._paint_haze(camera, elevation)
+            ground = GroundView(camera, self._size, _LEAST_PIXEL / camera.focal)
+            self._paint_ground(camera, ground)
+            self._paint_haze(camera, ground)
             self._paint_markings(camera)
-            self._paint_grain(camera)
+            self._paint_grain(camera, ground)
             self._paint_boxes(camera)
         for corners, colour, distance in outlines(scene, self._anchor, camera):
             self._fill(corners, self._hazed(np.array([colour], float), np.array([distance]))[0])
@@ -101,13 +111,13 @@ class Painter:
             self._print_rows(scene)
         if self._strip:
             draw_strip(self._picture, scene.frame, scene.sim_time)
-        return self._picture
 
     # --- sky -----------------------------------------------------------------------------------------------------
 
     def _paint_sky(self, camera: Camera, elevation: np.ndarray) -> None:
         share = np.clip(elevation, 0.0, 1.0)[..., np.newaxis] ** 0.6
         sky = (_HAZE + (_ZENITH - _HAZE) * share).astype(np.uint8)
+        sky = cv2.cvtColor(sky, cv2.COLOR_BGR2BGRA)
         cv2.resize(sky, self._size, dst=self._picture, interpolation=cv2.INTER_LINEAR)
         sun = camera.directions_to_camera(self._world.sun[np.newaxis])
         if sun[0, 2] > 0.05:
@@ -135,135 +145,49 @@ class Painter:
 
     # --- ground --------------------------------------------------------------------------------------------------
 
-    def _paint_ground(self, camera: Camera) -> None:
-        """Textures in bands of depth: parallel to the horizon, each with the level of detail that fits."""
+    def _paint_ground(self, camera: Camera, ground: GroundView) -> None:
+        """Textures in bands of depth, each with the level of detail that fits."""
         up = camera.eye[2]
-        falling = -camera.rays[2]  # height over depth of the ground at a pixel, linear in the picture
-        at_corners = self._frame @ falling[:2] + falling[2]
         # A texel of `size` suits where depth * sqrt(depth / up) / focal <= size.
         limits = [
-            (_SHARPNESS * size * camera.focal * math.sqrt(up)) ** (2.0 / 3.0) for size, _ in self._world.levels[:-1]
+            (_SHARPNESS * level.texel_m * camera.focal * math.sqrt(up)) ** (2.0 / 3.0)
+            for level in self._world.levels[:-1]
         ]
-        nearest = 0.0
-        for (size, texture), limit in zip(self._world.levels, [*limits, math.inf]):
-            depth = max(limit, nearest)
-            steepest = math.inf if nearest == 0.0 else up / nearest
-            self._paint_band(camera, texture, size, at_corners, falling, up / depth, steepest)
-            nearest = depth
+        steepest = math.inf
+        for level, limit in zip(self._world.levels, [*limits, math.inf]):
+            lowest = min(max(up / limit, ground.least), steepest)
+            for area in ground.boxes(lowest, steepest):
+                inside = cv2.inRange(ground.falling[area], lowest, steepest)
+                cv2.copyTo(ground.sample(level, area), inside, self._picture[ground.picture(area)])
+            steepest = lowest
 
-    def _band(
-        self, at_corners: np.ndarray, falling: np.ndarray, lowest: float, steepest: float
-    ) -> Optional[tuple[np.ndarray, tuple[int, int, int, int]]]:
-        """Corners and bounding box (x, y, width, height) of the part of the picture between two depths."""
-        region = clip(self._frame, at_corners - lowest)
-        if len(region) >= 3 and math.isfinite(steepest):
-            region = clip(region, steepest - (region @ falling[:2] + falling[2]))
-        if len(region) < 3:
-            return None
-        x0, y0 = np.maximum(np.floor(region.min(axis=0)).astype(int) - 1, 0)
-        x1, y1 = np.minimum(np.ceil(region.max(axis=0)).astype(int) + 2, self._size)
-        return region, (x0, y0, x1 - x0, y1 - y0)
-
-    def _warp(self, camera: Camera, texture: np.ndarray, size: float, area: tuple[int, int, int, int]) -> np.ndarray:
-        """The texture as the area of the picture sees it on the ground."""
-        x, y, width, height = area
-        up = camera.eye[2]
-        span = size * texture.shape[0]
-        east, north = camera.eye[0] % span, camera.eye[1] % span
-        falling = -camera.rays[2]
-        # Row 0 of a texture is its north edge.
-        to_texture = np.array(
-            (
-                (up * camera.rays[0] + east * falling) / size,
-                -(up * camera.rays[1] + north * falling) / size,
-                falling,
-            )
-        )
-        to_texture = to_texture @ np.array(((1, 0, x), (0, 1, y), (0, 0, 1.0)))
-        return cv2.warpPerspective(
-            texture,
-            to_texture,
-            (int(width), int(height)),
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_WRAP,
-        )
-
-    def _paint_band(
-        self,
-        camera: Camera,
-        texture: np.ndarray,
-        size: float,
-        at_corners: np.ndarray,
-        falling: np.ndarray,
-        lowest: float,
-        steepest: float,
-    ) -> None:
-        band = self._band(at_corners, falling, max(lowest, 0.8 / camera.focal), steepest)
-        if band is None:
-            return
-        region, (x, y, width, height) = band
-        mask = self._mask[y : y + height, x : x + width]
-        mask.fill(0)
-        cv2.fillConvexPoly(mask, np.round((region - (x, y)) * (1 << _SHIFT)).astype(np.int32), 255, cv2.LINE_8, _SHIFT)
-        # Column by column: the box around a band that lies askew is mostly outside it.
-        for left in range(x, x + width, _TILE):
-            right = min(left + _TILE, x + width)
-            part = clip(region, region[:, 0] - left)
-            part = clip(part, right - part[:, 0]) if len(part) >= 3 else part
-            if len(part) < 3:
-                continue
-            top = max(math.floor(part[:, 1].min()) - 1, y)
-            bottom = min(math.ceil(part[:, 1].max()) + 2, y + height)
-            seen = self._warp(camera, texture, size, (left, top, right - left, bottom - top))
-            inside = mask[top - y : bottom - y, left - x : right - x]
-            cv2.copyTo(seen, inside, self._picture[top:bottom, left:right])
-
-    def _paint_grain(self, camera: Camera) -> None:
-        falling = -camera.rays[2]
-        at_corners = self._frame @ falling[:2] + falling[2]
-        grain = self._world.detail
-        for span, depth in GRAINS:
+    def _paint_grain(self, camera: Camera, ground: GroundView) -> None:
+        for grain, depth in self._world.grains:
             lowest = camera.eye[2] / depth
-            band = self._band(at_corners, falling, lowest, math.inf)
-            if band is None:
-                continue
-            x, y, width, height = band[1]
-            seen = self._warp(camera, grain, span / grain.shape[0], (x, y, width, height))
-            # Fades out with depth, and beyond it in the corners of the box.
-            u, v = np.meshgrid(np.linspace(x, x + width - 1, 24), np.linspace(y, y + height - 1, 18))
-            strength = (u * falling[0] + v * falling[1] + falling[2]) / lowest - 1.0
-            weight = cv2.resize(np.clip(strength, 0.0, 1.0).astype(np.float32), (int(width), int(height)))
-            if weight.min() < 1.0:
-                seen = cv2.blendLinear(seen, np.full_like(seen, 128), weight, 1.0 - weight)
-            part = self._picture[y : y + height, x : x + width]
-            cv2.multiply(part, seen, dst=part, scale=1.0 / 128.0)
+            for area in ground.boxes(lowest, math.inf):
+                seen = ground.sample(grain, area)
+                # Fades out with depth, and beyond it in the corners of the box.
+                falling = ground.falling[area]
+                fading = np.nonzero(np.minimum(falling[:, 0], falling[:, -1]) < 2.0 * lowest)[0]
+                if fading.size:
+                    rows = slice(fading[0], fading[-1] + 1)
+                    weight = np.clip(falling[rows] * np.float32(1.0 / lowest) - np.float32(1.0), 0.0, 1.0)
+                    seen[rows] = cv2.blendLinear(seen[rows], np.full_like(seen[rows], 128), weight, 1.0 - weight)
+                part = self._picture[ground.picture(area)]
+                cv2.multiply(part, seen, dst=part, scale=1.0 / 128.0)
 
-    def _paint_haze(self, camera: Camera, elevation: np.ndarray) -> None:
-        distance = camera.eye[2] / np.maximum(-elevation, 1e-6)
-        clear = np.where(elevation < 0.0, np.exp(-distance / _HAZE_M), 1.0).astype(np.float32)
-        below = elevation < 0.0
-        if not below.any() or clear[below].min() > 0.97:
-            return
-        # Per pixel: a coarse grid would let the haze run over the horizon into the sky. Only where there is any.
-        width, height = self._size
-        toward = -camera.rays[2].astype(np.float32)
-        left = toward[1] * np.arange(height, dtype=np.float32) + toward[2]
-        right = left + toward[0] * (width - 1)
+    def _paint_haze(self, camera: Camera, ground: GroundView) -> None:
         thickness = float(camera.eye[2]) / _HAZE_M  # over what falls away: the share of the haze's length
-        rows = np.nonzero((np.minimum(left, right) < thickness / _LEAST_HAZE) & (np.maximum(left, right) > 0.0))[0]
-        if rows.size == 0:
-            return
-        part = slice(rows[0], rows[-1] + 1)
-        falling = toward[0] * np.arange(width, dtype=np.float32) + left[part, np.newaxis]
-        sky = falling <= 0.0
-        least: Any = 1e-7  # OpenCV takes a number too, which its types do not say
-        cv2.max(falling, least, dst=falling)
-        cv2.divide(-thickness, falling, dst=falling)
-        shares = cv2.exp(falling)
-        shares[sky] = 1.0
-        haze = np.empty_like(self._picture[part])
-        haze[:] = _HAZE.astype(np.uint8)
-        self._picture[part] = cv2.blendLinear(self._picture[part], haze, shares, 1.0 - shares)
+        for area in ground.boxes(0.0, thickness / _LEAST_HAZE):
+            falling = ground.falling[area]
+            # Over the mountains, too, where they end below the horizon.
+            clear = cv2.exp(cv2.divide(-thickness, np.maximum(falling, _LEAST_FALLING)))
+            clear += _LEAST_HAZE  # so that it begins without a step
+            clear[(falling <= 0.0) | (clear > 1.0)] = 1.0  # also the sky
+            part = self._picture[ground.picture(area)]
+            haze = np.empty_like(part)
+            haze[:] = (*_HAZE.astype(np.uint8), 255)
+            part[:] = cv2.blendLinear(part, haze, clear, 1.0 - clear)
 
     # --- things --------------------------------------------------------------------------------------------------
 

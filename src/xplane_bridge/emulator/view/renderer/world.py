@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 
 from xplane_bridge.emulator.view.renderer.camera import box
+from xplane_bridge.emulator.view.renderer.ground import Texture
 
 #: Side of the tile that repeats over the whole earth [m].
 TILE_M = 16384.0
 #: Sides [m] at which the grain is laid over it, and the depth [m] up to which each is seen.
-GRAINS = ((1024.0, 2200.0), (128.0, 260.0))
+_GRAINS = ((1024.0, 2200.0), (128.0, 260.0))
 _TILE_PX = 2048
 _DETAIL_PX = 512
 
@@ -36,8 +37,8 @@ RUNWAY_WIDTH_M = 45.0
 class World:
     """Positions east, north, up [m] relative to the anchor; colours blue, green, red."""
 
-    levels: list[tuple[float, np.ndarray]] = field(default_factory=list)  #: metres a texel, texture; finest first
-    detail: np.ndarray = field(default_factory=lambda: np.zeros((1, 1, 3), np.uint8))
+    levels: list[Texture] = field(default_factory=list)  #: of the ground, finest first
+    grains: list[tuple[Texture, float]] = field(default_factory=list)  #: around middle grey; depth [m] up to which seen
     markings: np.ndarray = field(default_factory=lambda: np.zeros((0, 4, 3)))  #: on the ground, in the order of drawing
     marking_colours: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     boxes: np.ndarray = field(default_factory=lambda: np.zeros((0, 8, 3)))  #: bottom four corners, top four
@@ -55,8 +56,9 @@ def make_world(heading_deg: float, seed: int = 7) -> World:
     for step in (1, 4, 16):
         size = _TILE_PX // step
         texture = tile if step == 1 else cv2.resize(tile, (size, size), interpolation=cv2.INTER_AREA)
-        world.levels.append((TILE_M / size, texture))
-    world.detail = _detail_tile(random)
+        world.levels.append(Texture(texture, TILE_M / size))
+    grain = Texture(_detail_tile(random), 1.0)
+    world.grains = [(grain.scaled(span / _DETAIL_PX), depth) for span, depth in _GRAINS]
     _add_aerodrome(world, heading_deg, random)
     azimuth = np.radians(np.arange(0.0, 361.0, 1.5))
     height = sum(
