@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
 import subprocess
 
 import yaml
 
 from support.room_table import ROOT
+from xplane_bridge.harness.processes import wait_until
 
 TEST = (ROOT / "scripts/test").read_text(encoding="utf-8")
 
@@ -18,6 +21,11 @@ def names(variable: str) -> list[str]:
     words = re.search(rf"^{variable}=\((.*)\)$", TEST, re.MULTILINE).group(1)
     first, _, rest = words.partition('"${static_checks[@]}"')
     return first.split() if first else [*names("static_checks"), *rest.split()]
+
+
+def function(name: str) -> str:
+    """A function of scripts/test."""
+    return re.search(rf"^{name}\(\) {{$.*?^}}$", TEST, re.MULTILINE | re.DOTALL).group(0)
 
 
 def test_pre_commit_runs_the_checks_that_need_no_build_and_no_others():
@@ -80,11 +88,10 @@ def test_without_options_all_checks_run_but_those_of_a_night():
 
 
 def test_what_runs_side_by_side_is_shown_in_order_and_a_failure_among_it_counts():
-    function = re.search(r"^side_by_side\(\) \{$.*?^\}$", TEST, re.MULTILINE | re.DOTALL).group(0)
     script = f"""set -uo pipefail
 root=here results= programs= expression=
 roslaunch_check() {{ :; }}
-{function}
+{function("side_by_side")}
 say() {{ [ "$1" != a/slow ] || sleep 0.3; echo "$1 of $root"; [ "$1" != a/bad ]; }}
 end() {{ kill -ABRT "$BASHPID"; }}
 side_by_side say a/slow "a/with space" a/3 && echo good
@@ -93,3 +100,44 @@ side_by_side end a/1 a/2 || echo failed"""
     done = subprocess.run(["bash", "-c", script], stdout=subprocess.PIPE, text=True, check=True)
     said = ["a/slow of here", "a/with space of here", "a/3 of here", "good"]
     assert done.stdout.splitlines() == [*said, "a/slow of here", "a/bad of here", "a/3 of here", "failed", "failed"]
+
+
+def beside_nodes(tmp_path, checks: str) -> subprocess.Popen:
+    """The node tests with the checks `python` and `tidy` beside them."""
+    script = f"""set -uo pipefail
+results={tmp_path}
+{function("run_checks")}
+{function("run_beside_nodes")}
+{checks}
+trap 'exit 130' INT
+run_beside_nodes python tidy"""
+    return subprocess.Popen(["bash", "-c", script], stdout=subprocess.PIPE, text=True, start_new_session=True)
+
+
+def test_what_runs_beside_the_node_tests_is_shown_after_them_and_counts(tmp_path):
+    done = beside_nodes(
+        tmp_path,
+        """check_nodes() { until [ -f "$results/seen" ]; do sleep 0.01; done; echo flown; }
+check_python() { touch "$results/seen"; echo "tested by $python_processes"; return 1; }
+check_tidy() { echo tidy; }""",
+    )
+    said = done.communicate(timeout=60)[0].split("\n")
+    processes = (os.cpu_count() + 1) // 2
+    assert said == ["", "=== nodes", "flown", "", "=== python", f"tested by {processes}", "", "=== tidy", "tidy", ""]
+    outcomes = {name: (tmp_path / f"{name}.outcome").read_text().split()[0] for name in ("nodes", "python", "tidy")}
+    assert outcomes == {"nodes": "passed", "python": "FAILED", "tidy": "passed"}
+
+
+def test_ctrl_c_ends_what_runs_beside_the_node_tests(tmp_path):
+    running = beside_nodes(
+        tmp_path,
+        """check_nodes() { touch "$results/nodes"; sleep 100; }
+check_python() { trap 'touch "$results/ended"; exit 2' INT; touch "$results/python"; while :; do sleep 0.01; done; }
+check_tidy() { touch "$results/tidy"; }""",
+    )
+    for name in ("nodes", "python"):
+        wait_until((tmp_path / name).exists, 60.0, f"the check {name}")
+    os.killpg(running.pid, signal.SIGINT)
+    assert running.wait(60) == 130
+    assert (tmp_path / "ended").exists()
+    assert not (tmp_path / "tidy").exists()
