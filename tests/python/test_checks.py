@@ -129,10 +129,18 @@ check_tidy() { echo tidy; }""",
 
 
 def test_ctrl_c_ends_what_runs_beside_the_node_tests(tmp_path):
+    endless = tmp_path / "endless"  # ends well on Ctrl-C, as pytest does: no shell stops for that
+    endless.write_text(
+        f"""#!/usr/bin/env bash
+trap 'touch "{tmp_path}/ended"; exit 2' INT
+touch "{tmp_path}/python"
+while :; do sleep 0.01; done"""
+    )
+    endless.chmod(0o755)
     running = beside_nodes(
         tmp_path,
         """check_nodes() { touch "$results/nodes"; sleep 100; }
-check_python() { trap 'touch "$results/ended"; exit 2' INT; touch "$results/python"; while :; do sleep 0.01; done; }
+check_python() { "$results/endless"; }
 check_tidy() { touch "$results/tidy"; }""",
     )
     for name in ("nodes", "python"):
