@@ -136,3 +136,21 @@ def test_the_earth_and_the_units_are_written_once():
         if written.search(path.read_text(encoding="utf-8"))
     }
     assert found == own
+
+
+#: Topics of mavros, which its relay publishes.
+OF_MAVROS = {"global_position/rel_alt", "global_position/compass_hdg"}
+
+
+def test_python_programs_name_topics_of_the_list_only():
+    roots = "|".join(sorted({topic.split("/")[0] for topic in TOPICS if "/" in topic}))
+    named = {
+        node.value.strip("/")
+        for path in (ROOT / "src").rglob("*.py")
+        if path.name != "topics.py"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        if re.fullmatch(rf"/?(?:{roots})(?:/[a-z_]+)+", node.value)
+    }
+    assert named >= {"control/manual", "control/auto", "mission/surfaces"}
+    assert named - set(TOPICS) == OF_MAVROS
