@@ -263,6 +263,22 @@ def test_pip_installs_the_same_programs():
     assert scripts == launchers()
 
 
+def test_launch_files_say_the_same_of_a_parameter():
+    """roslaunch can include a file, not the text of its argument: the copies must agree."""
+    texts = {}
+    for path in sorted((ROOT / "launch").glob("*.launch")):
+        for arg in ElementTree.parse(path).getroot().findall("arg"):
+            text, config, _ = arg.get("doc", "").partition("; config: as in")
+            if config:
+                texts.setdefault(arg.get("name"), set()).add(text.replace("driver xplane: ", ""))
+    assert len(texts["port"]) == 1
+    assert texts.pop("display_delay") == {  # a second camera's is of its own window
+        "[s] from a simulator frame to its picture",
+        "[s] from a simulator frame to its picture in this window",
+    }
+    assert {name: said for name, said in texts.items() if len(said) > 1} == {}
+
+
 def test_every_launch_argument_is_documented():
     wrong = []
     for path in (ROOT / "launch").glob("*.launch"):
