@@ -62,25 +62,35 @@ check_tidy_all() { python tests/tidy.py lib; }
 
 # Ten minutes each with libFuzzer and sanitizers, and as long for what reads files and packets in Python.
 check_long_fuzz() {
-  local build=$root/.workspace/libfuzzer seconds=${XPLANE_BRIDGE_FUZZ_SECONDS:-600} program failed=0
+  local build=$root/.workspace/libfuzzer seconds=${XPLANE_BRIDGE_FUZZ_SECONDS:-600} program programs_to_run=()
   mkdir -p -- "$build"
   { CXX=clang++ cmake -S lib/core -B "$build" -DCMAKE_BUILD_TYPE=Release -DXPLANE_BRIDGE_CORE_FUZZ=ON \
     -DXPLANE_BRIDGE_SANITIZE=fuzzer-no-link,address,undefined &&
     make -C "$build" -j"${XPLANE_BRIDGE_JOBS:-$(nproc)}" fuzz_targets; } >"$build/build.log" 2>&1 ||
     { tail -n 20 "$build/build.log"; return 1; }
   for program in "$build"/fuzz/fuzz_*; do
-    if [ ! -x "$program" ] || [ ! -f "$program" ]; then continue; fi
-    printf '%s: ' "$(basename "$program")"
-    if ! (cd "$build" && "$program" -max_total_time="$seconds" -max_len=6000 -timeout=20 \
-      "fuzz/seeds/$(basename "$program")" >"$program.log" 2>&1); then
-      failed=1
-      tail -n 40 "$program.log"
-    else
-      grep -E '^Done' "$program.log"
-    fi
+    if [ -x "$program" ] && [ -f "$program" ]; then programs_to_run+=("$program"); fi
   done
-  PYTHONPATH=src python tests/fuzz/fuzz_python.py --seconds "$seconds" --seed "$RANDOM" || failed=1
-  return "$failed"
+  export build seconds
+  side_by_side long_fuzz_program tests/fuzz/fuzz_python.py "${programs_to_run[@]}"
+}
+
+long_fuzz_program() {
+  local program=$1 name
+  name=$(basename "$program")
+  if [ "$name" = fuzz_python.py ]; then
+    PYTHONPATH=$root/src:${PYTHONPATH:-} python "$program" --seconds "$seconds" --seed "$RANDOM"
+    return
+  fi
+  printf '%s: ' "$name"
+  mkdir -p "$results/run/long_$name"
+  # A reader of files may make some where it runs.
+  if ! (cd "$results/run/long_$name" && "$program" -max_total_time="$seconds" -max_len=6000 -timeout=20 \
+    "$build/fuzz/seeds/$name" >"$program.log" 2>&1); then
+    tail -n 40 "$program.log"
+    return 1
+  fi
+  grep -E '^Done' "$program.log"
 }
 
 # The container's steps in a bare root file system: needs root and debootstrap.
