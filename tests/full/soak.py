@@ -3,10 +3,10 @@
 
     python3 tests/full/soak.py --hours 8
 
-Every two simulated minutes the flight begins anew at another place (the origin of X-Plane's local frame jumps); after a
-third of the way another aircraft is loaded, which the bridge must leave alone, and then its own again; after two thirds
-its own is loaded anew; half-way the bridge is ended and started again. Every frame must be published once, in its order,
-and answered. The memory of each node may grow by 5 % and 4 MB after the first tenth.
+Every two simulated minutes the flight begins anew at another place (the origin of X-Plane's local frame jumps); after
+a third of the way another aircraft is loaded, which the bridge must leave alone, and then its own again; after two
+thirds its own is loaded anew; half-way the bridge is ended and started again. Every frame must be published once, in
+its order, and answered. The memory of each node may grow by 5 % and 4 MB after the first tenth.
 """
 
 from __future__ import annotations
