@@ -10,8 +10,9 @@ from xplane_bridge.errors import XplaneBridgeError
 #: Titles of X-Plane's window, exactly: up to early 12, and since.
 TITLES = ("X-System", "X-Plane")
 
-#: Takes a picture (rows x columns x 4 of BGRX, the taker's own) and when it appeared, by time.perf_counter_ns [ns].
-Take = Callable[[Any, int], None]
+#: Takes a picture (rows x columns x 4 of BGRX, the taker's own), when it was seen, by time.perf_counter_ns [ns], and
+#: for how long before that the window had not been looked at [ns]: it may have appeared so much earlier.
+Take = Callable[[Any, int, int], None]
 
 
 #: Of a window on the screen: x, y, width, height [px].

@@ -159,11 +159,13 @@ class LinuxGrabber(Grabber):
         before: Optional[np.ndarray] = None
         changed_s, usual_s = time.monotonic(), 0.0
         checked_s = changed_s
+        looked_ns = time.perf_counter_ns()  # the look before this one began
         while not self._stop.wait(_POLL_S):
             if time.monotonic() - checked_s > _SEARCH_S:
                 checked_s = time.monotonic()
                 if self._size(window.number) != (window.width, window.height):
                     return
+            begun_ns, looked_ns = looked_ns, time.perf_counter_ns()
             if not image.read(window.number):
                 return
             change_ns = time.perf_counter_ns()
@@ -171,7 +173,7 @@ class LinuxGrabber(Grabber):
             if before is not None and np.array_equal(sample, before):
                 continue
             if before is not None:  # the first was there before it was looked at
-                self._take(image.pixels.copy(), change_ns)
+                self._take(image.pixels.copy(), change_ns, change_ns - begun_ns)
             before = sample
             now_s = time.monotonic()
             usual_s += 0.1 * (min(now_s - changed_s, 2 * _LONGEST_REST_S) - usual_s)

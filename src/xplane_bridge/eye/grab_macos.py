@@ -130,7 +130,7 @@ class MacGrabber(Grabber):
             pixels = lines[:, : 4 * video.CVPixelBufferGetWidth(buffer)].reshape(height, -1, 4).copy()
         finally:
             video.CVPixelBufferUnlockBaseAddress(buffer, _READ_ONLY)
-        self._take(pixels, now_ns)
+        self._take(pixels, now_ns, 0)
 
 
 def _place(window: Any) -> Rect:

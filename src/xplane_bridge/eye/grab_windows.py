@@ -187,7 +187,7 @@ class WindowsGrabber(Grabber):
             first, before[0] = before[0] is None, sample
             if not first:
                 composed_ns = 100 * int(frame.timespan)
-                self._take(pixels, composed_ns if 0 <= now_ns - composed_ns < _PLAUSIBLE_NS else now_ns)
+                self._take(pixels, composed_ns if 0 <= now_ns - composed_ns < _PLAUSIBLE_NS else now_ns, 0)
 
         def on_closed() -> None:
             closed.append(True)

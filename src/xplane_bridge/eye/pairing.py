@@ -18,6 +18,8 @@ from xplane_bridge.eye.wire import BORDERLINE, DELAY_ASSUMED
 
 #: A picture that is farther from its frame than this share of the gap to the next may be the neighbour's.
 _SURE_SHARE = 0.35
+#: A picture that may have appeared earlier than its frame by this share may be of the frame before.
+_EARLIER_SHARE = 0.5
 #: Farther than this share it is of no frame that was heard; nor of the frame after the nearest, where that was shown
 #: before: pictures would then stay one frame off.
 _OWN_SHARE = 0.65
@@ -78,7 +80,7 @@ class Pairing:
         self._delay_s = delay_s or 0.0
         self._measured = delay_s is not None
         self._frames: Deque[Frame] = deque(maxlen=_FRAMES)
-        self._waiting: Deque[Tuple[int, Any]] = deque()
+        self._waiting: Deque[Tuple[int, int, Any]] = deque()
         self._last = -1
         self._residuals: Deque[Tuple[int, float]] = deque(maxlen=_WINDOW)
         self._since_followed = 0
@@ -114,31 +116,31 @@ class Pairing:
         self._frames.append(frame)
         return frame
 
-    def add_picture(self, change_ns: int, picture: Any) -> None:
-        """Takes a picture that appeared; the oldest of too many is given up."""
+    def add_picture(self, change_ns: int, picture: Any, unseen_ns: int = 0) -> None:
+        """Takes a picture that appeared, up to `unseen_ns` before `change_ns`; the oldest of too many is given up."""
         if len(self._waiting) == _WAITING:
             self._waiting.popleft()
             self.dropped += 1
-        self._waiting.append((change_ns, picture))
+        self._waiting.append((change_ns, unseen_ns, picture))
 
     def decided(self, now_ns: int) -> List[Decision]:
         """Those pictures that can be decided now: a later frame has come, or none comes."""
         decisions = []
         while self._waiting:
-            change_ns, picture = self._waiting[0]
+            change_ns, unseen_ns, picture = self._waiting[0]
             moment_ns = change_ns - round(self._delay_s * 1e9)
             later_frame = bool(self._frames) and self._frames[-1].arrival_ns > moment_ns
             if not later_frame and now_ns - change_ns < _PATIENCE_S * 1e9:
                 break
             self._waiting.popleft()
-            decision = self._decide(change_ns, moment_ns, picture)
+            decision = self._decide(change_ns, unseen_ns, moment_ns, picture)
             if decision is None:
                 self.dropped += 1
             else:
                 decisions.append(decision)
         return decisions
 
-    def _decide(self, change_ns: int, moment_ns: int, picture: Any) -> Optional[Decision]:
+    def _decide(self, change_ns: int, unseen_ns: int, moment_ns: int, picture: Any) -> Optional[Decision]:
         place = self._nearest(moment_ns)
         if place is None:
             return None
@@ -152,7 +154,9 @@ class Pairing:
         residual_ns = moment_ns - frame.arrival_ns
         if gap_ns is None or abs(residual_ns) > _OWN_SHARE * gap_ns:
             return None
-        flags = BORDERLINE if second or abs(residual_ns) > _SURE_SHARE * gap_ns else 0
+        # Seen late, it may be the picture of the frame before.
+        late = residual_ns - unseen_ns < -_EARLIER_SHARE * gap_ns
+        flags = BORDERLINE if second or late or abs(residual_ns) > _SURE_SHARE * gap_ns else 0
         self._last = frame.index
         self._follow(change_ns, residual_ns, gap_ns)
         flags |= 0 if self._measured else DELAY_ASSUMED

@@ -196,7 +196,7 @@ class Eye:
                 )
         self._send_decided()
 
-    def _on_picture(self, pixels: Any, change_ns: int) -> None:
+    def _on_picture(self, pixels: Any, change_ns: int, unseen_ns: int) -> None:
         with self._lock:
             if self._calibration is not None:
                 self._calibration.add_picture(change_ns, pixels)
@@ -205,7 +205,7 @@ class Eye:
             if self._size is not None and pixels.shape[:2] != self._size:
                 self._pairing.doubt_delay()
             self._size = pixels.shape[:2]
-            self._pairing.add_picture(change_ns, pixels)
+            self._pairing.add_picture(change_ns, pixels, unseen_ns)
 
     def _send_decided(self) -> None:
         with self._lock:

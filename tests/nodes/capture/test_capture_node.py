@@ -5,9 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import math
+import random
+import signal
 import socket
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -93,8 +96,7 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
     frames = [read_strip(pixels(image)) for image in taken]
     assert all(b.frame > a.frame for a, b in zip(frames, frames[1:])), "a picture came twice"
 
-    with swaps.open() as file:
-        late = {int(row["frame"]): _lateness(row) for row in csv.DictReader(file)}
+    late = _lateness_by_frame(swaps)
     compared = 0
     for image, shown in zip(taken, frames):
         assert (image.width, image.height, image.encoding, image.step) == (640, 480, "bgr8", 1920)
@@ -115,6 +117,38 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
         assert state.state.sim_time == np.float32(shown.sim_time), f"frame {shown.frame}"
         assert state.sim_time_error == pytest.approx(0.0, abs=1e-6)
     assert compared >= 10, "on a busy machine few pictures are punctual"
+
+
+def test_a_node_that_is_scheduled_late_pairs_no_picture_wrongly(world, display, tmp_path: Path) -> None:
+    """Stopped for most of a frame, as on a busy computer: the X server's own stamps say when a picture appeared."""
+    draw = random.Random(3)
+    swaps = tmp_path / "swaps.csv"
+    emulator = window(world, "--swap-log", swaps)
+    world.set_param("display_delay", PIPELINE_DELAY_S)
+    world.start("rx_node")
+    node = capture(world, display)
+    images, states = watch(world, "image", "state")
+    states.wait_for(lambda state: state.quality == 0, what="a perfectly paired picture")
+    first = len(images.messages)
+    for _ in range(60):
+        time.sleep(draw.uniform(0.5, 2.0) / FPS)
+        node.send_signal(signal.SIGSTOP)
+        time.sleep(draw.uniform(0.5, 1.1) / FPS)
+        node.send_signal(signal.SIGCONT)
+    emulator.stop()
+    late, by_stamp = _lateness_by_frame(swaps), {state.header.stamp: state for state in states.messages}
+    compared = 0
+    for image in images.messages[first:]:
+        shown, state = read_strip(pixels(image)), by_stamp.get(image.header.stamp)
+        if state is not None and state.quality == 0 and abs(late[shown.frame]) < 0.2 / FPS:
+            compared += 1
+            assert state.state.sim_time == np.float32(shown.sim_time), f"frame {shown.frame}"
+    assert compared >= 10
+
+
+def _lateness_by_frame(swaps: Path) -> dict[int, float]:
+    with swaps.open() as file:
+        return {int(row["frame"]): _lateness(row) for row in csv.DictReader(file)}
 
 
 def _lateness(row: dict) -> float:

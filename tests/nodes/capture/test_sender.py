@@ -226,6 +226,20 @@ def test_a_poor_network_costs_pictures_and_mispairs_none(scene: Scene, chance: f
     check_exact(pairs, 15)
 
 
+def test_an_eye_that_looks_too_late_says_so(scene: Scene) -> None:
+    """Stopped for most of a frame, as on a busy computer, it sees pictures when the next one is nearer."""
+    draw = random.Random(3)
+    with scene.eye("--delay", str(PIPELINE_DELAY_S)) as eye:
+        scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
+        for _ in range(60):
+            time.sleep(draw.uniform(0.5, 2.0) / FPS)
+            eye.send_signal(signal.SIGSTOP)
+            time.sleep(draw.uniform(0.5, 1.1) / FPS)
+            eye.send_signal(signal.SIGCONT)
+        pairs = scene.judged()
+    check_exact(pairs, 15)
+
+
 def test_the_next_start_gives_the_field_of_view_back_after_a_kill(scene: Scene) -> None:
     wire = scene.world.wire(scene.emulator.port)
     own = wire.read(FIELD_OF_VIEW)

@@ -33,7 +33,7 @@ class OwnView(Grabber):
         self.problem = ""
         pixels = np.zeros((48, 64, 4), np.uint8)
         while not self._stop.wait(0.05):
-            self._take(pixels, program.time.perf_counter_ns())
+            self._take(pixels, program.time.perf_counter_ns(), 0)
 
 
 class Receiver:

@@ -56,6 +56,14 @@ def decide(pairing: Pairing, *changes_ms: float) -> list:
     return [(decision.frame.key, decision.flags) for decision in pairing.decided(round(max(changes_ms) * MS))]
 
 
+@pytest.mark.parametrize(("unseen_ms", "flags"), [(0, 0), (4, 0), (9, 0), (11, BORDERLINE), (60, BORDERLINE)])
+def test_a_picture_that_was_seen_so_late_that_it_may_be_the_frame_before_is_flagged(unseen_ms: int, flags: int):
+    pairing = Pairing(0.0)
+    frames(pairing, 0.0, 20.0, 40.0, 60.0)
+    pairing.add_picture(40 * MS, "seen now", unseen_ms * MS)
+    assert [(decision.frame.key, decision.flags) for decision in pairing.decided(60 * MS)] == [(40.0, flags)]
+
+
 def test_a_picture_waits_for_the_frame_after_it():
     pairing = Pairing(0.0)
     frames(pairing, 0, 20)
