@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +45,10 @@ class X11Connection {
 
   /// True when the request succeeded; its error, if any, is swallowed.
   [[nodiscard]] bool succeeded(xcb_void_cookie_t cookie) const;
+
+  /// Asks for the server's time so many times, and hands over each as it comes [ms]. Events of windows that come
+  /// meanwhile are lost, so it is asked before any are wanted.
+  void askTime(int times, const std::function<void(std::uint32_t)>& heard) const;
 
   /// Pixel format of a window's visual; empty when the server does not list it.
   [[nodiscard]] std::optional<PixelFormat> pixelFormat(xcb_visualid_t visual, int depth) const;

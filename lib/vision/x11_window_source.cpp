@@ -22,6 +22,8 @@ using SteadyClock = std::chrono::steady_clock;
 
 // Changes seen in the checksum while no damage event came: so often, and XDamage is not to be relied on here.
 constexpr int kSilentChangesToGiveUpDamage = 3;
+// The quickest answer of so many tells how the server's clock stands to ours.
+constexpr int kTimesAsked = 10;
 // Pause between two of those looks; long enough to cost nothing.
 constexpr std::chrono::milliseconds kDamageWatch{250};
 
@@ -189,6 +191,8 @@ class X11WindowSource::Impl {
       try {
         connection_ = std::make_unique<X11Connection>(options_.display);
         server_clock_.reset();
+        // So that also the first drawings have their time, however late they are seen.
+        connection_->askTime(kTimesAsked, [this](std::uint32_t ms) { (void)server_clock_.toHost(ms, clock_()); });
       } catch (const std::runtime_error& error) {
         problem_ = error.what();
         return false;

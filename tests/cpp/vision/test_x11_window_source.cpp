@@ -60,6 +60,23 @@ TEST_F(X11WindowSourceTest, ReadsAWindowByTitleAndSeesEveryChangeOnce) {
   }
 }
 
+TEST_F(X11WindowSourceTest, TheFirstDrawingHasItsTimeHoweverLateItIsSeen) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11WindowSource source(titled(server_), steadyNow);
+  Change change;
+  ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);  // it has found the window
+  const std::int64_t before = steadyNow();
+  window.fill(0x00ff00);
+  const std::int64_t after = steadyNow();
+  std::this_thread::sleep_for(milliseconds(80));  // all events so far are read late
+  ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);
+  ASSERT_EQ(source.grab(change, picture_), GrabResult::kNew);
+  EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kGreen);
+  EXPECT_TRUE(picture_.display_time_known);
+  EXPECT_GE(picture_.display_time_ns, before - 2'000'000);
+  EXPECT_LE(picture_.display_time_ns, after + 2'000'000);
+}
+
 TEST_F(X11WindowSourceTest, OfSeveralDrawingsTheLastOneIsThePicturesTime) {
   TestWindow window(server_.display(), "X-System", 320, 240);
   X11WindowSource source(titled(server_), steadyNow);
