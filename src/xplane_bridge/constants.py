@@ -130,7 +130,7 @@ class ImageQuality(enum.IntFlag):
     EXTERNAL_VIEW = 2048  #: the camera is outside the aircraft
     EPOCH_EDGE = 4096  #: the frame lies at a reset, pause or gap
     DELAY_ASSUMED = 8192  #: the display delay is the default, not measured on this set-up
-    BORDERLINE = 16384  #: the moment lies about half way between two frames: the pairing may be one frame off
+    BORDERLINE = 16384  #: half way between two frames, or seen late: the pairing may be one frame off
     POSE_UNSURE = 32768  #: how X-Plane's camera angles are to be read is open, or the camera moved in the cockpit
 
 

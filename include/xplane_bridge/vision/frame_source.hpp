@@ -24,7 +24,7 @@ struct Change {
 struct ShownFrame {
   float sim_time = 0.0F;      ///< [s] the frame's, as X-Plane sent it: the key by which its state is found
   double delay = 0.0;         ///< [s] from the frame to its display, as applied
-  bool borderline = false;    ///< the picture lies about half way between two frames
+  bool borderline = false;    ///< it may be the neighbouring frame's picture
   bool delay_assumed = true;  ///< the delay was not measured, or is not true any more
 };
 

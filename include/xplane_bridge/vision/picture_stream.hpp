@@ -32,7 +32,7 @@ struct SentPicture {
   int width = 0;              ///< [px]
   int height = 0;             ///< [px]
   float key = 0.0F;           ///< [s] simulator time of the frame, the float32 as X-Plane sent it
-  bool borderline = false;    ///< the picture lies half way between two frames
+  bool borderline = false;    ///< it may be the neighbouring frame's picture
   bool delay_assumed = true;  ///< `delay` was not measured, or is not true any more
   std::uint64_t index = 0;    ///< the sender's count of frames
   std::int64_t change_ns = 0;

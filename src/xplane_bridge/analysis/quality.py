@@ -40,7 +40,7 @@ QUALITY_WORDS = {
     "EXTERNAL_VIEW": "the camera is outside the aircraft",
     "EPOCH_EDGE": "its frame lies at a reset, a pause or a gap",
     "DELAY_ASSUMED": "the delay of the display was not measured: the state may be frames off",
-    "BORDERLINE": "it appeared half way between two frames: the state may be one frame off",
+    "BORDERLINE": "half way between two frames, or seen late: the state may be one frame off",
     "POSE_UNSURE": "where the camera was in the aircraft is not settled",
 }
 

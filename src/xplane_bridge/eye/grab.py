@@ -11,7 +11,8 @@ from xplane_bridge.errors import XplaneBridgeError
 TITLES = ("X-System", "X-Plane")
 
 #: Takes a picture (rows x columns x 4 of BGRX, the taker's own), when it was seen, by time.perf_counter_ns [ns], and
-#: for how long before that the window had not been looked at [ns]: it may have appeared so much earlier.
+#: for how long before that the window had not been looked at [ns]: it may have appeared so much earlier. 0 where the
+#: system brings the pictures: how late it does is not known on macOS, nor on Windows where it gives no time.
 Take = Callable[[Any, int, int], None]
 
 

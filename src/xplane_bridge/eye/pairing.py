@@ -54,7 +54,7 @@ class Decision:
 
     Attributes:
         picture: As it was handed in.
-        change_ns: When it appeared [ns].
+        change_ns: When it was seen [ns].
         frame: What it shows.
         delay_s: As applied [s].
         residual_s: Change - arrival - delay [s].
@@ -83,6 +83,7 @@ class Pairing:
         self._waiting: Deque[Tuple[int, int, Any]] = deque()
         self._last = -1
         self._residuals: Deque[Tuple[int, float]] = deque(maxlen=_WINDOW)
+        self._unseen_ns: Deque[int] = deque(maxlen=_WINDOW)
         self._since_followed = 0
         self._followed_ns: Optional[int] = None
         #: Pictures that were given up: of no frame that was heard, or a second one of the same frame.
@@ -154,8 +155,10 @@ class Pairing:
         residual_ns = moment_ns - frame.arrival_ns
         if gap_ns is None or abs(residual_ns) > _OWN_SHARE * gap_ns:
             return None
-        # Seen late, it may be the picture of the frame before.
-        late = residual_ns - unseen_ns < -_EARLIER_SHARE * gap_ns
+        # Seen late, it may be the picture of the frame before. What a look takes at least is part of the delay.
+        self._unseen_ns.append(unseen_ns)
+        late_ns = unseen_ns - min(self._unseen_ns)
+        late = residual_ns - late_ns < -_EARLIER_SHARE * gap_ns
         flags = BORDERLINE if second or late or abs(residual_ns) > _SURE_SHARE * gap_ns else 0
         self._last = frame.index
         self._follow(change_ns, residual_ns, gap_ns)

@@ -19,7 +19,7 @@ VERSION = 1
 MOST_BODY = 16 * 1024 * 1024
 #: Longest token, name of an X-Plane and status text [bytes].
 MOST_TEXT = 512
-#: Bits of `PictureHeader.flags`: the picture lies half way between two frames; the delay is not measured.
+#: Bits of `PictureHeader.flags`: it may be the neighbouring frame's picture; the delay is not measured.
 BORDERLINE = 1
 DELAY_ASSUMED = 2
 
@@ -63,7 +63,7 @@ class PictureHeader:
         key: `sim/time/total_running_time_sec` of the frame shown, the float32 as received.
         flags: BORDERLINE, DELAY_ASSUMED.
         index: The eye's count of frames, for the frame shown.
-        change_ns: When the picture appeared, by the eye's clock [ns].
+        change_ns: When the picture was seen, by the eye's clock [ns].
         arrival_ns: When the frame's datagram came, by the eye's clock [ns].
         sent_ns: When the message was made, by the eye's clock [ns].
         delay_s: From a frame to its picture, as applied [s].

@@ -56,12 +56,31 @@ def decide(pairing: Pairing, *changes_ms: float) -> list:
     return [(decision.frame.key, decision.flags) for decision in pairing.decided(round(max(changes_ms) * MS))]
 
 
-@pytest.mark.parametrize(("unseen_ms", "flags"), [(0, 0), (4, 0), (9, 0), (11, BORDERLINE), (60, BORDERLINE)])
-def test_a_picture_that_was_seen_so_late_that_it_may_be_the_frame_before_is_flagged(unseen_ms: int, flags: int):
+@pytest.mark.parametrize("usual_ms", [0, 4, 15])
+@pytest.mark.parametrize(
+    ("seen_ms", "late_ms", "flags"),
+    [
+        (100, 0, 0),
+        (100, 9, 0),
+        (100, 11, BORDERLINE),
+        (100, 60, BORDERLINE),
+        (105, 14, 0),
+        (105, 16, BORDERLINE),
+        (96, 5, 0),
+        (96, 7, BORDERLINE),
+    ],
+)
+def test_a_picture_that_was_seen_so_late_that_it_may_be_the_frame_before_is_flagged(
+    usual_ms: int, seen_ms: int, late_ms: int, flags: int
+):
+    """However long a look takes: what it usually takes is in the delay."""
     pairing = Pairing(0.0)
-    frames(pairing, 0.0, 20.0, 40.0, 60.0)
-    pairing.add_picture(40 * MS, "seen now", unseen_ms * MS)
-    assert [(decision.frame.key, decision.flags) for decision in pairing.decided(60 * MS)] == [(40.0, flags)]
+    frames(pairing, 0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 120.0)
+    for at in (20, 40, 60, 80):
+        pairing.add_picture(at * MS, "usual", usual_ms * MS)
+    pairing.add_picture(seen_ms * MS, "seen now", (usual_ms + late_ms) * MS)
+    decided = [(decision.frame.key, decision.flags) for decision in pairing.decided(120 * MS)]
+    assert decided == [(20.0, 0), (40.0, 0), (60.0, 0), (80.0, 0), (100.0, flags)]
 
 
 def test_a_picture_waits_for_the_frame_after_it():

@@ -114,7 +114,7 @@ def test_each_camera_has_its_pairing_and_its_quality_in_words(tmp_path: Path) ->
     assert own.startswith("camera</h3><p>60 images, 100.0 % with a state, 100.0 % without any remark")
     assert "<table>" not in own
     assert second.startswith("belly</h3><p>40 images, 100.0 % with a state, 80.0 % without any remark")
-    assert "<td>borderline</td><td>it appeared half way between two frames" in second
+    assert "<td>borderline</td><td>half way between two frames, or seen late" in second
     assert (
         "<td>pose unsure</td><td>where the camera was in the aircraft is not settled</td><td class=n>20.0 %" in second
     )
