@@ -49,7 +49,7 @@ def crossing(t: float) -> list[Pose]:
 def drawn_box(t: float, others: Sequence[Pose]) -> np.ndarray:
     """Left, top, right, bottom of what the emulator draws of others."""
     painter = Painter(*SIZE, ANCHOR, HEADING_DEG)
-    without = painter.paint(scene(t)).astype(int)  # a copy: the next call overwrites the picture
+    without = painter.paint(scene(t)).astype(int)
     drawn = painter.paint(replace(scene(t), others=tuple(others))).astype(int)
     rows, columns = np.nonzero(np.abs(drawn - without).max(axis=2) > 6)
     return np.array((columns.min(), rows.min(), columns.max(), rows.max()), float)

@@ -201,7 +201,7 @@ class ControlInputs:
                 self._held.pop(key, None)
             elif np.isfinite(value):
                 self._held[key] = float(value)
-                # At once: it stays there, also when -999 comes before the next frame.
+                # At once, so that it has moved also when -999 comes before the next frame.
                 self._move_lever(row, slot, float(value))
 
     def release_data(self) -> None:

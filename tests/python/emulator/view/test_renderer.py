@@ -119,8 +119,18 @@ def test_another_aircraft_appears_where_it_is_and_as_large_as_it_is() -> None:
 
 
 def test_painting_twice_gives_the_same_picture() -> None:
-    first = Painter(320, 240, ANCHOR).paint(LEVEL).copy()
+    first = Painter(320, 240, ANCHOR).paint(LEVEL)
     assert np.array_equal(first, Painter(320, 240, ANCHOR).paint(LEVEL))
+
+
+@pytest.mark.parametrize("pitch_deg", [-28.0, -31.0, -34.0, -90.0])
+@pytest.mark.parametrize("size", [(16, 16), (640, 480)])
+def test_every_pixel_is_painted_whatever_was_in_the_memory(pitch_deg: float, size: tuple[int, int]) -> None:
+    painter, scene = Painter(*size, ANCHOR, strip=False), replace(LEVEL, pitch_deg=pitch_deg)
+    pictures = [np.full((size[1], size[0], 4), value, np.uint8) for value in (0, 255)]
+    for picture in pictures:
+        painter.paint_into(scene, picture)
+    assert np.array_equal(pictures[0][..., :3], pictures[1][..., :3])
 
 
 @pytest.mark.parametrize("quality", [95, 60, 30])

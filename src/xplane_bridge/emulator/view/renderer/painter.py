@@ -66,7 +66,7 @@ class Painter:
         self._hud = hud
         self._strip = strip
         self._world = make_world(runway_heading_deg)
-        self._picture = np.empty((height, width, 4), np.uint8)
+        self._picture = np.empty((0, 0, 4), np.uint8)  # the one that is being drawn
         columns, rows = width // _GRID + 2, height // _GRID + 2
         u, v = np.meshgrid(np.linspace(0, width - 1, columns), np.linspace(0, height - 1, rows))
         self._grid = np.stack((u.ravel(), v.ravel(), np.ones(u.size)))
@@ -79,23 +79,22 @@ class Painter:
 
     def paint(self, scene: Scene) -> np.ndarray:
         """The picture (height, width, 3): blue, green, red."""
-        self.paint_into(scene, np.empty((*self._picture.shape[:2], 4), np.uint8))
-        picture: np.ndarray = cv2.cvtColor(self._picture, cv2.COLOR_BGRA2BGR)
-        return picture
+        width, height = self._size
+        picture = np.empty((height, width, 4), np.uint8)
+        self.paint_into(scene, picture)
+        return cv2.cvtColor(picture, cv2.COLOR_BGRA2BGR)
 
     def paint_into(self, scene: Scene, picture: np.ndarray) -> None:
-        """Draws into a picture (height, width, 4): blue, green, red, and one without a meaning.
-
-        OpenCV warps a texture that repeats five times faster with four channels than with three.
-        """
+        """Draws into a picture (height, width, 4): blue, green, red, and one without a meaning."""
         self._picture = picture
         camera = Camera(scene, self._size, self._anchor)
         rays = camera.rays @ self._grid
         elevation = (rays[2] / np.linalg.norm(rays, axis=0)).astype(np.float32).reshape(self._grid_shape)
-        if elevation.max() > -0.02:
+        nearest = _LEAST_PIXEL / camera.focal  # to the horizon that ground is drawn
+        if elevation.max() > -max(0.02, nearest):
             self._paint_sky(camera, elevation)
         if elevation.min() < 0.0:
-            ground = GroundView(camera, self._size, _LEAST_PIXEL / camera.focal)
+            ground = GroundView(camera, self._size, nearest)
             self._paint_ground(camera, ground)
             self._paint_haze(camera, ground)
             self._paint_markings(camera)
