@@ -15,7 +15,7 @@ import argparse
 import sys
 import threading
 from pathlib import Path
-from typing import Any, Dict, List, Set
+from typing import Any, Dict, List
 
 from xplane_bridge.emulator.emulator import Emulator
 from xplane_bridge.emulator.options import Options
@@ -55,15 +55,16 @@ class Soak:
         self.flown = 0
         self._period = min(int(RESET_EVERY_S * FPS), frames // 6)  # of flights begun anew [frames]
         between = self._period // 2
-        self._loads = {
-            frames // 3 + between: OTHER_AIRCRAFT,
-            frames // 3 + between + self._period // 4: AIRCRAFT,
-            2 * frames // 3 + between: AIRCRAFT,
-        }
+        third, two_thirds = (k * frames // 3 // self._period * self._period + between for k in (1, 2))
+        self._loads = {third: OTHER_AIRCRAFT, third + self._period // 4: AIRCRAFT, two_thirds: AIRCRAFT}
         self.resets = self.loads = self.starts = 0
         self.memory: Dict[str, List[int]] = {}
-        self.done: Dict[int, Set[int]] = {}  #: numbers of events by their kind, since the bridge was started
-        self.failed: Set[str] = set()  #: what a failed change of the flight said
+        # Numbers of events, since the bridge was started.
+        self.promised: Dict[int, str] = {}  #: to a call, and of which service
+        self.outcomes: Dict[int, str] = {}  #: empty, or what a change of the flight that failed said
+        self.applied: List[float] = []  #: times [s] at which commands went to another aircraft than the bridge's own
+        self._other = 0  #: number of the event by which that aircraft is there, while it is to be
+        self._times: Dict[int, Any] = {}  #: of those events
         self._bridge = LockstepBridge()
         self._emulator: Emulator
         self._thread: threading.Thread
@@ -98,18 +99,21 @@ class Soak:
 
     def _listen(self) -> None:
         import rospy
-        from xplane_bridge.msg import Event, EventList
+        from xplane_bridge.msg import AppliedCommand, EventList
 
-        self.done = {Event.RESET: set(), Event.AIRCRAFT: set()}
+        self.promised, self.outcomes, self._times, self._other = {}, {}, {}, 0
 
         def on_events(message: EventList) -> None:
-            for event in message.events:
-                if event.kind in self.done and event.success:
-                    self.done[event.kind].add(event.number)
-                elif event.kind in self.done:
-                    self.failed.add(event.text)
+            self.outcomes.update((event.number, "" if event.success else event.text) for event in message.events)
+            self._times.update((event.number, event.stamp) for event in message.events if event.number == self._other)
+
+        def on_applied(message: AppliedCommand) -> None:
+            there = self._times.get(self._other)
+            if there is not None and message.header.stamp > there:
+                self.applied.append(message.header.stamp.to_sec())
 
         rospy.Subscriber(f"/{self._bridge.name}/events", EventList, on_events)
+        rospy.Subscriber(f"/{self._bridge.name}/control/applied", AppliedCommand, on_applied)
 
     def _stop(self) -> None:
         self._bridge.end()
@@ -156,21 +160,25 @@ class Soak:
     def _load(self, aircraft: str) -> None:
         from xplane_bridge.srv import LoadAircraft
 
-        self._call("load_aircraft", LoadAircraft, path=aircraft_path(aircraft))
+        self._other = 0
+        number = self._call("load_aircraft", LoadAircraft, path=aircraft_path(aircraft))
+        self._other = number if aircraft == OTHER_AIRCRAFT else 0
         self.loads += 1
 
-    def _call(self, service: str, kind: Any, **fields: Any) -> None:
+    def _call(self, service: str, kind: Any, **fields: Any) -> int:
+        """The number of the event that brings the outcome."""
         import rospy
 
         answer = rospy.ServiceProxy(f"/{self._bridge.name}/tx_node/{service}", kind)(**fields)
         assert answer.success, f"{service}: {answer.result.message}"
+        self.promised[answer.event_number] = service
+        return int(answer.event_number)
 
     def _check_events(self) -> None:
-        from xplane_bridge.msg import Event
-
-        assert not self.failed, "; ".join(sorted(self.failed))
-        assert self.done[Event.RESET], "no flight has begun anew, though that was asked for"
-        assert self.done[Event.AIRCRAFT], "no aircraft was loaded, though that was asked for"
+        for number, service in self.promised.items():
+            outcome = self.outcomes.get(number, "nothing has come of it")
+            assert not outcome, f"{service}: {outcome}"
+        assert not self.applied, f"commands went to the {OTHER_AIRCRAFT} at {self.applied[:5]} s"
 
     def _check_memory(self) -> None:
         for node, seen in self.memory.items():
