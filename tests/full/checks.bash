@@ -62,17 +62,17 @@ check_tidy_all() { python tests/tidy.py lib; }
 
 # Ten minutes each with libFuzzer and sanitizers, and as long for what reads files and packets in Python.
 check_long_fuzz() {
-  local build=$root/.workspace/libfuzzer seconds=${XPLANE_BRIDGE_FUZZ_SECONDS:-600} program programs_to_run=()
+  local build=$root/.workspace/libfuzzer seconds=${XPLANE_BRIDGE_FUZZ_SECONDS:-600} program fuzzers=()
   mkdir -p -- "$build"
   { CXX=clang++ cmake -S lib/core -B "$build" -DCMAKE_BUILD_TYPE=Release -DXPLANE_BRIDGE_CORE_FUZZ=ON \
     -DXPLANE_BRIDGE_SANITIZE=fuzzer-no-link,address,undefined &&
     make -C "$build" -j"${XPLANE_BRIDGE_JOBS:-$(nproc)}" fuzz_targets; } >"$build/build.log" 2>&1 ||
     { tail -n 20 "$build/build.log"; return 1; }
   for program in "$build"/fuzz/fuzz_*; do
-    if [ -x "$program" ] && [ -f "$program" ]; then programs_to_run+=("$program"); fi
+    if [ -x "$program" ] && [ -f "$program" ]; then fuzzers+=("$program"); fi
   done
   export build seconds
-  side_by_side long_fuzz_program tests/fuzz/fuzz_python.py "${programs_to_run[@]}"
+  side_by_side long_fuzz_program tests/fuzz/fuzz_python.py "${fuzzers[@]}"
 }
 
 long_fuzz_program() {
@@ -83,14 +83,14 @@ long_fuzz_program() {
     return
   fi
   printf '%s: ' "$name"
-  mkdir -p "$results/run/long_$name"
-  # A reader of files may make some where it runs.
+  # A reader of files may make some where it runs. What was found is kept where no later run deletes it.
+  mkdir -p "$results/run/long_$name" "$build/findings"
   if ! (cd "$results/run/long_$name" && "$program" -max_total_time="$seconds" -max_len=6000 -timeout=20 \
-    "$build/fuzz/seeds/$name" >"$program.log" 2>&1); then
-    tail -n 40 "$program.log"
+    -artifact_prefix="$build/findings/$name-" "$build/fuzz/seeds/$name" >"$results/long_$name.log" 2>&1); then
+    tail -n 40 "$results/long_$name.log"
     return 1
   fi
-  grep -E '^Done' "$program.log"
+  grep -E '^Done' "$results/long_$name.log"
 }
 
 # The container's steps in a bare root file system: needs root and debootstrap.
