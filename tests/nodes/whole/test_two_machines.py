@@ -191,6 +191,8 @@ def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(fl
     here.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a picture with", after=pictures)
     there.wait_for("flight_state", lambda _: True, "a state")
 
+    for node in ("rx_node", "tx_node"):  # who has never had a link does not lose it
+        there.wait_for_status(f"{node}: link", lambda level, _: level == 0, f"a link of {node}")
     reported = len(there.all("link_state"))
     flight.simulator.lose_power()
     lost = there.wait_for("link_state", lambda link: link["state"] == "LOST", "the end of X-Plane", after=reported)
