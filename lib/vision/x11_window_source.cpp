@@ -22,7 +22,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 // Changes seen in the checksum while no damage event came: so often, and XDamage is not to be relied on here.
 constexpr int kSilentChangesToGiveUpDamage = 3;
-// The quickest answer of so many tells how the server's clock stands to ours.
+// The quickest answer of so many shows how the server's clock stands to ours.
 constexpr int kTimesAsked = 10;
 // Pause between two of those looks; long enough to cost nothing.
 constexpr std::chrono::milliseconds kDamageWatch{250};
