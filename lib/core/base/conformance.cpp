@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "xplane_bridge/core/base/simulator_version.hpp"
+#include "xplane_bridge/core/base/whole_number.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -53,12 +55,14 @@ Conformance conformanceFromText(const std::string& text) {
     if (root.at("format") != "xplane_bridge conformance") throw ConformanceError("it is no conformance file");
     if (root.at("version") != kVersion) throw ConformanceError("its version is not 1; fly the card anew");
     Conformance out;
-    out.xplane_version = root.at("xplane_version").get<std::int32_t>();
+    out.xplane_version = wholeNumber<std::int32_t>(root.at("xplane_version"));
     for (const auto& [id, question] : root.at("questions").items()) {
       if (question.at("verdict") == "refuted") out.refuted.push_back(id);
     }
     return out;
   } catch (const Json::exception& error) {
+    throw ConformanceError(error.what());
+  } catch (const std::out_of_range& error) {
     throw ConformanceError(error.what());
   }
 }

@@ -13,7 +13,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <utility>
+
+#include "xplane_bridge/core/base/whole_number.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -106,13 +109,18 @@ UndoOperation operationFrom(const json& document) {
     return UndoDref{document.at("path"), document.at("value"), document.value("confirm", true)};
   }
   if (op == "data") {
-    return UndoData{DataRow{document.at("row"), document.at("values")}};
+    return UndoData{DataRow{wholeNumber<std::int32_t>(document.at("row")), document.at("values")}};
   }
   if (op == "usel") {
-    return UndoUsel{document.at("rows").get<std::vector<std::int32_t>>()};
+    UndoUsel usel;
+    for (const json& row : document.at("rows")) {
+      usel.rows.push_back(wholeNumber<std::int32_t>(row));
+    }
+    return usel;
   }
   if (op == "ise4_off") {
-    return UndoIse4{document.at("target"), document.at("address"), document.at("port")};
+    return UndoIse4{wholeNumber<std::int32_t>(document.at("target")), document.at("address"),
+                    wholeNumber<std::uint16_t>(document.at("port"))};
   }
   if (op == "resume") {
     return UndoPause{};
@@ -150,8 +158,8 @@ JournalEntry entryFrom(const json& document) {
   entry.purpose = document.at("purpose");
   const json& owner = document.at("owner");
   entry.owner.node = owner.at("node");
-  entry.owner.pid = owner.at("pid");
-  entry.owner.start_ticks = owner.at("start_ticks");
+  entry.owner.pid = wholeNumber<std::int64_t>(owner.at("pid"));
+  entry.owner.start_ticks = wholeNumber<std::int64_t>(owner.at("start_ticks"));
   entry.owner.boot_id = owner.at("boot_id");
   entry.owner.computer = owner.at("computer");
   for (const json& operation : document.at("undo")) {
@@ -159,7 +167,8 @@ JournalEntry entryFrom(const json& document) {
   }
   entry.left = document.value("left", "");
   for (const json& subscription : document.value("subscriptions", json::array())) {
-    entry.subscriptions.push_back({subscription.at("port"), subscription.at("datarefs").get<std::vector<std::string>>(),
+    entry.subscriptions.push_back({wholeNumber<std::uint16_t>(subscription.at("port")),
+                                   subscription.at("datarefs").get<std::vector<std::string>>(),
                                    subscription.at("rpos")});
   }
   return entry;
@@ -203,7 +212,7 @@ std::vector<JournalEntry> read(const std::string& path) {
     if (document.at("format") != kFormat) {
       damage = "format is not '" + std::string(kFormat) + "'";
     } else {
-      version = document.at("version");
+      version = wholeNumber<int>(document.at("version"));
     }
     if (version == kVersion) {
       for (const json& entry : document.at("entries")) {
@@ -213,6 +222,8 @@ std::vector<JournalEntry> read(const std::string& path) {
   } catch (const json::exception& error) {
     damage = error.what();
   } catch (const JournalError& error) {
+    damage = error.what();
+  } catch (const std::out_of_range& error) {
     damage = error.what();
   }
   if (!damage.empty()) {

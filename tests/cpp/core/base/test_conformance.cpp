@@ -39,7 +39,8 @@ TEST(Conformance, EachSwitchSaysWhatTheNodesDo) {
 TEST(Conformance, RefusesWhatIsNoSuchFile) {
   for (const char* text : {"", "nothing: here", "{}", R"({"format": "xplane_bridge journal", "version": 1})",
                            R"({"format": "xplane_bridge conformance", "version": 2})",
-                           R"({"format": "xplane_bridge conformance", "version": 1, "xplane_version": "12"})"}) {
+                           R"({"format": "xplane_bridge conformance", "version": 1, "xplane_version": "12"})",
+                           R"({"format": "xplane_bridge conformance", "version": 1, "xplane_version": 1e50})"}) {
     EXPECT_THROW(conformanceFromText(text), ConformanceError) << text;
   }
 }

@@ -178,7 +178,8 @@ TEST_F(JournalTest, WhatWasUndoneIsRemovedUnlessAnotherProcessHasTakenItOver) {
 
 TEST_F(JournalTest, DamagedFileIsSetAsideAndSaid) {
   for (const char* text : {"{\"format\": \"xplane_b", "[]", "{\"format\": \"something else\"}", "",
-                           "{\"format\": \"xplane_bridge journal\", \"version\": 1, \"entries\": [{\"id\": 3}]}"}) {
+                           "{\"format\": \"xplane_bridge journal\", \"version\": 1, \"entries\": [{\"id\": 3}]}",
+                           "{\"format\": \"xplane_bridge journal\", \"version\": 1e50}"}) {
     writeFile(text);
     const Journal damaged = journal();
     try {
@@ -190,7 +191,7 @@ TEST_F(JournalTest, DamagedFileIsSetAsideAndSaid) {
     EXPECT_TRUE(damaged.entries().empty()) << "usable afterwards";
   }
   EXPECT_TRUE(fs::exists(path_ + ".damaged-1"));
-  EXPECT_TRUE(fs::exists(path_ + ".damaged-5"));
+  EXPECT_TRUE(fs::exists(path_ + ".damaged-6"));
 }
 
 TEST_F(JournalTest, NewerVersionIsLeftAlone) {
