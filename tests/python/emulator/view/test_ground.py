@@ -44,11 +44,12 @@ def test_between_two_texels_it_is_between_them_also_across_the_edge() -> None:
     assert texel(texture, 0.0, 1.0) == [15, 0]
 
 
-def test_places_count_from_the_origin_and_a_scaled_texture_has_larger_texels() -> None:
+def test_places_count_from_the_origin_in_texels_of_their_own_size() -> None:
     texture = Texture(numbered(), 2.0)
     assert texel(texture, 0.0, 0.0, np.array((2.0, -4.0, 9.0))) == [20, 10]
-    assert texel(texture.scaled(8.0), 8.0, -16.0) == [20, 10]
-    assert texture.scaled(8.0).span_m == 32.0
+    larger = Texture(numbered(), 8.0)
+    assert texel(larger, 8.0, -16.0) == [20, 10]
+    assert larger.span_m == 32.0
 
 
 def test_a_texture_that_cannot_repeat_by_bits_is_refused() -> None:

@@ -36,13 +36,6 @@ class Texture:
         # Four channels are looked up faster than three; the edge once more for what lies across it.
         self._texels = cv2.copyMakeBorder(cv2.cvtColor(picture, cv2.COLOR_BGR2BGRA), 0, 1, 0, 1, cv2.BORDER_WRAP)
 
-    def scaled(self, texel_m: float) -> Texture:
-        """The same texels with another side."""
-        other = Texture.__new__(Texture)
-        other._count, other._texels = self._count, self._texels
-        other.texel_m, other.span_m = texel_m, texel_m * self._count
-        return other
-
     def at(self, east_m: np.ndarray, north_m: np.ndarray, origin: np.ndarray) -> np.ndarray:
         """What lies at places relative to an origin.
 
@@ -84,12 +77,11 @@ class GroundView:
         to_east, to_north, down = camera.rays[0], camera.rays[1], -camera.rays[2]
         at_left = (down[1] * v + down[2]).astype(np.float32)
         seen = np.nonzero(at_left + max(float(down[0]) * (width - 1), 0.0) > 0.0)[0]
-        #: First row that looks below the horizon; those up to the last one are in the arrays.
-        self.top = int(seen[0]) if seen.size else height
-        self.bottom = int(seen[-1]) + 1 if seen.size else height
-        v = v[self.top : self.bottom, np.newaxis]
+        below = slice(int(seen[0]), int(seen[-1]) + 1) if seen.size else slice(height, height)
+        self._top = below.start  # first row that looks below the horizon, of those in the arrays
+        v = v[below, np.newaxis]
         #: Height over depth of what a pixel sees, (rows, width).
-        self.falling = np.float32(down[0]) * u + at_left[self.top : self.bottom, np.newaxis]
+        self.falling = np.float32(down[0]) * u + at_left[below, np.newaxis]
         depth = np.float32(self._eye[2]) / np.maximum(self.falling, np.float32(least))
         rise = abs(down[0] / down[1]) * width if down[1] else math.inf  # of the horizon, from edge to edge [px]
         boxes = int(min(max(rise / _RISE_PX, 1.0), _MOST_BOXES))
@@ -116,7 +108,7 @@ class GroundView:
 
     def picture(self, area: Area) -> Area:
         """The same box in the picture."""
-        return slice(area[0].start + self.top, area[0].stop + self.top), area[1]
+        return slice(area[0].start + self._top, area[0].stop + self._top), area[1]
 
     def sample(self, texture: Texture, area: Area) -> np.ndarray:
         """What a box of the arrays sees of a texture, (h, w, 4)."""

@@ -57,8 +57,8 @@ def make_world(heading_deg: float, seed: int = 7) -> World:
         size = _TILE_PX // step
         texture = tile if step == 1 else cv2.resize(tile, (size, size), interpolation=cv2.INTER_AREA)
         world.levels.append(Texture(texture, TILE_M / size))
-    grain = Texture(_detail_tile(random), 1.0)
-    world.grains = [(grain.scaled(span / _DETAIL_PX), depth) for span, depth in _GRAINS]
+    grain = _detail_tile(random)
+    world.grains = [(Texture(grain, span / _DETAIL_PX), depth) for span, depth in _GRAINS]
     _add_aerodrome(world, heading_deg, random)
     azimuth = np.radians(np.arange(0.0, 361.0, 1.5))
     height = sum(
