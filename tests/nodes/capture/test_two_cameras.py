@@ -6,15 +6,14 @@ The nodes read the windows, or two `xplane_eye` do and send them.
 from __future__ import annotations
 
 import contextlib
-import csv
 import math
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from support.nodes.late_pictures import display_delays
 from support.nodes.second_camera import NAME, WINDOW, second_camera
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -32,13 +31,7 @@ ENOUGH = 40
 
 def on_time(swaps: Path) -> set:
     """Frames that a window showed when they were due."""
-    offset = time.time_ns() - time.monotonic_ns()
-    with swaps.open() as file:
-        late = {
-            int(row["frame"]): (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9
-            for row in csv.DictReader(file)
-        }
-    return {frame for frame, delay in late.items() if abs(delay - PIPELINE_DELAY_S) < LATE_S}
+    return {frame for frame, delay in display_delays(swaps).items() if abs(delay - PIPELINE_DELAY_S) < LATE_S}
 
 
 @contextlib.contextmanager

@@ -6,9 +6,7 @@ out by making them; where it does not, the tests say so and are skipped.
 
 from __future__ import annotations
 
-import csv
 import sys
-import time
 from pathlib import Path
 from typing import Any, Iterator, Sequence
 
@@ -16,6 +14,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
+from support.nodes.late_pictures import complete_rows, display_delays
 from support.nodes.network_namespaces import Machine, TwoMachines, why_no_machines
 from support.nodes.recorded_topics import RecordedTopics
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -96,17 +95,6 @@ def flight(tmp_path: Path) -> Iterator[Flight]:
         flight.stop()
 
 
-def rows(file: Path) -> list[dict[str, str]]:
-    """The complete rows of a CSV file that is still being written."""
-    return list(csv.DictReader(file.read_text(encoding="utf-8").rpartition("\n")[0].splitlines()))
-
-
-def lateness(row: dict[str, str]) -> float:
-    """How much later than due a picture was shown [s]; the log has frame times on the monotonic clock."""
-    offset = time.time_ns() - time.monotonic_ns()
-    return (int(row["swap_end_ns"]) - offset - int(row["frame_monotonic_ns"])) * 1e-9 - PIPELINE_DELAY_S
-
-
 def perfect(recorder: RecordedTopics) -> list[dict[str, Any]]:
     """Pictures whose pairing is beyond doubt."""
     return [state for state in recorder.all("camera/frame_state") if not state["quality"]]
@@ -140,7 +128,7 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
 
     # States: every frame that was flown, one after the other.
     times = np.array([state["sim_time"] for state in recorder.all("flight_state")[begin:]], np.float32)
-    flown = np.array([row["sim_time"] for row in rows(flight.truth)], np.float32)
+    flown = np.array([row["sim_time"] for row in complete_rows(flight.truth)], np.float32)
     assert np.all(np.diff(times) > 0)
     assert set(times) == {t for t in flown if times[0] <= t <= times[-1]}, "a state was lost on the way"
 
@@ -153,13 +141,14 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     paired = [states[stamp] for stamp in sorted(images)]
     counts = np.array([state["image_count"] for state in paired])
     assert np.all(np.diff(counts) == 1), "an image was lost on the way"
-    drawn = [row for row in rows(flight.swaps) if first <= np.float32(row["sim_time"]) <= last]
+    drawn = [row for row in complete_rows(flight.swaps) if first <= np.float32(row["sim_time"]) <= last]
     assert len(images) >= 0.8 * len(drawn)
 
     # Pairing across the machines: the state is that of the very frame. A picture that appeared late because the
     # computer was busy says nothing about that.
     assert not any(state["quality"] & STATE_MISSING for state in paired)
-    punctual = {int(row["frame"]) for row in drawn if abs(lateness(row)) < 0.2 / FPS}
+    delays = display_delays(flight.swaps)
+    punctual = {int(row["frame"]) for row in drawn if abs(delays[int(row["frame"])] - PIPELINE_DELAY_S) < 0.2 / FPS}
     judged = [
         (states[s], image) for s, image in images.items() if image["frame"] in punctual and not states[s]["quality"]
     ]

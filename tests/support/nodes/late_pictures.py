@@ -12,14 +12,18 @@ from typing import Callable
 from xplane_bridge.harness import HarnessError, ManagedProcess
 
 
+def complete_rows(file: Path) -> list[dict[str, str]]:
+    """The complete rows of a CSV file that is still being written, or whose writer was killed."""
+    return list(csv.DictReader(file.read_text(encoding="utf-8").rpartition("\n")[0].splitlines()))
+
+
 def display_delays(swaps: Path) -> dict[int, float]:
     """From each frame of the emulator's swap log to its picture on the screen [s]."""
-    offset_ns = time.time_ns() - time.monotonic_ns()
-    with swaps.open() as file:
-        return {
-            int(row["frame"]): (int(row["swap_end_ns"]) - offset_ns - int(row["frame_monotonic_ns"])) * 1e-9
-            for row in csv.DictReader(file)
-        }
+    offset_ns = time.time_ns() - time.monotonic_ns()  # the log has frame times on the monotonic clock
+    return {
+        int(row["frame"]): (int(row["swap_end_ns"]) - offset_ns - int(row["frame_monotonic_ns"])) * 1e-9
+        for row in complete_rows(swaps)
+    }
 
 
 def schedule_late(
