@@ -59,12 +59,11 @@ class Soak:
         self._loads = {third: OTHER_AIRCRAFT, third + self._period // 4: AIRCRAFT, two_thirds: AIRCRAFT}
         self.resets = self.loads = self.starts = 0
         self.memory: Dict[str, List[int]] = {}
-        # Numbers of events, since the bridge was started.
-        self.promised: Dict[int, str] = {}  #: to a call, and of which service
-        self.outcomes: Dict[int, str] = {}  #: empty, or what a change of the flight that failed said
+        # By the number of the event, since the bridge was started.
+        self.promised: Dict[int, str] = {}  #: service that has promised it
+        self.events: Dict[int, Any] = {}  #: what came
         self.applied: List[float] = []  #: times [s] at which commands went to another aircraft than the bridge's own
         self._other = 0  #: number of the event by which that aircraft is there, while it is to be
-        self._times: Dict[int, Any] = {}  #: of those events
         self._bridge = LockstepBridge()
         self._emulator: Emulator
         self._thread: threading.Thread
@@ -101,15 +100,14 @@ class Soak:
         import rospy
         from xplane_bridge.msg import AppliedCommand, EventList
 
-        self.promised, self.outcomes, self._times, self._other = {}, {}, {}, 0
+        self.promised, self.events, self._other = {}, {}, 0
 
         def on_events(message: EventList) -> None:
-            self.outcomes.update((event.number, "" if event.success else event.text) for event in message.events)
-            self._times.update((event.number, event.stamp) for event in message.events if event.number == self._other)
+            self.events.update((event.number, event) for event in message.events)
 
         def on_applied(message: AppliedCommand) -> None:
-            there = self._times.get(self._other)
-            if there is not None and message.header.stamp > there:
+            loaded = self.events.get(self._other)
+            if loaded is not None and message.header.stamp > loaded.stamp:
                 self.applied.append(message.header.stamp.to_sec())
 
         rospy.Subscriber(f"/{self._bridge.name}/events", EventList, on_events)
@@ -176,8 +174,8 @@ class Soak:
 
     def _check_events(self) -> None:
         for number, service in self.promised.items():
-            outcome = self.outcomes.get(number, "nothing has come of it")
-            assert not outcome, f"{service}: {outcome}"
+            assert number in self.events, f"{service}: nothing has come of it"
+            assert self.events[number].success, f"{service}: {self.events[number].text}"
         assert not self.applied, f"commands went to the {OTHER_AIRCRAFT} at {self.applied[:5]} s"
 
     def _check_memory(self) -> None:
