@@ -22,6 +22,8 @@ from typing import Iterator, List, Optional, Sequence
 
 ROOT = Path(__file__).resolve().parents[2]
 RELEASES = {"debian:12": "bookworm"}
+#: Files of this machine that an engine gives every container, in its own way: names of computers, localhost among them.
+OF_ENGINE = (Path("/etc/resolv.conf"), Path("/etc/hosts"))
 #: Seen by a command in the root; nothing else of this machine's environment is.
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 
@@ -118,8 +120,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     """The program; see the module's text."""
     parser = argparse.ArgumentParser(
         description="Carries out the Containerfile in a bare root file system.",
-        epilog="Name servers are this machine's. Behind a proxy with a certificate of its own, e.g.: --from-here "
-        "/usr/local/share/ca-certificates --from-here /etc/pip.conf",
+        epilog="Name servers and hosts are this machine's. Behind a proxy with a certificate of its own, e.g.: "
+        "--from-here /usr/local/share/ca-certificates --from-here /etc/pip.conf",
     )
     parser.add_argument("folder", type=Path, help="of the new root; must be empty or not there")
     parser.add_argument(
@@ -131,7 +133,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
         parser.error(f"{options.folder} is not empty: give the folder of a new root")
     if os.geteuid() != 0 or not shutil.which("debootstrap"):
         parser.error("needs root and debootstrap (apt-get install debootstrap)")
-    root = BareRoot(options.folder, [Path("/etc/resolv.conf"), *options.from_here])
+    root = BareRoot(options.folder, [*OF_ENGINE, *options.from_here])
     leave_out = ignored((ROOT / ".containerignore").read_text(encoding="utf-8"))
     try:
         for step in steps((ROOT / "Containerfile").read_text(encoding="utf-8")):
