@@ -5,7 +5,8 @@ of simulated time, and the number of the frame that the window shows, each exact
 whatever rate, gets it after everything else that is sent in a frame, when its picture is drawn. A program with many
 sockets names the port of one of them by `GROUP`: that one gets every fence, as the last of them; the others get it in
 frames that send them something, at the end of that datagram. A DREF that writes a frame's number to the fence lets the
-simulator fly on from that frame; the program that writes it gets its frames last, because it waits for the others.
+simulator fly on from that frame; the program that writes it gets its frames first: it has read them when the others
+have answered.
 
 Frame 0 does not fly: it is sent again and again, in real time, until it is answered, so that clients can subscribe.
 """
@@ -123,13 +124,13 @@ class Fences:
         return out
 
     def _lay_out(self, shapes: Sequence[Shape]) -> List[_Place]:
-        """What is sent in which order: program by program, that which answers last."""
+        """What is sent in which order: program by program, first that which answers the frame."""
         programs: Dict[Address, List[int]] = {first: [] for first in self._always}  # places of its datagrams
         for place, (client, _, _) in enumerate(shapes):
             programs.setdefault(self._groups.get(client, client), []).append(place)
         answering = None if self._answers is None else self._groups.get(self._answers, self._answers)
         out: List[_Place] = []
-        for first in sorted(programs, key=lambda each: each == answering):
+        for first in sorted(programs, key=lambda each: each != answering):
             places = sorted(programs[first], key=lambda place: shapes[place][0] == first)
             endings = {shapes[place][0]: place for place in places if shapes[place][0] in self._groups}
             endings.pop(first, None)

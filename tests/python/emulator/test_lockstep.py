@@ -230,7 +230,7 @@ def test_who_joins_or_leaves_a_group_in_five_requests_is_counted_where_its_fence
     assert (FENCE_INDEX + 8 in server.sent[second]) == (server.sent[first][FENCE_INDEX + 8] == 2.0)
 
 
-def test_a_frame_goes_program_by_program_and_to_the_one_that_answers_last():
+def test_a_frame_goes_program_by_program_and_first_to_the_one_that_answers_it():
     barrier, second = ("127.0.0.1", 7001), ("127.0.0.1", 7002)
     other, alone = ("127.0.0.1", 7003), ("127.0.0.1", 7004)
     fences = Fences()
@@ -242,11 +242,15 @@ def test_a_frame_goes_program_by_program_and_to_the_one_that_answers_last():
     before = HeldServer(barrier, second)
     fences.send(before, 0.0, 1, 0.02)
     assert before.order == [second, barrier, barrier, other, alone]
+    fences.write(protocol.DrefWrite(FENCE, 0.0), other)
+    after = HeldServer(barrier, second)
+    fences.send(after, 0.0, 1, 0.02)
+    assert after.order == [other, second, barrier, barrier, alone]
     for answering in (barrier, second):
         fences.write(protocol.DrefWrite(FENCE, 1.0), answering)
         after = HeldServer(barrier, second)
         fences.send(after, 0.0, 2, 0.04)
-        assert after.order == [other, alone, second, barrier, barrier]
+        assert after.order == [second, barrier, barrier, other, alone]
         assert after.sent[barrier][FENCE_INDEX + 8] == 2.0
         assert after.sent[second][FENCE_INDEX] == 2.0
 
