@@ -388,6 +388,12 @@ void SimLink::wakeWaiting() {
   }
 }
 
+void SimLink::stepThrough() {
+  do {
+    step(0);
+  } while (hub_->busy());
+}
+
 int SimLink::patienceMs() const { return requests_.empty() ? kThreadStepMs : kRequestStepMs; }
 
 bool SimLink::receive() {

@@ -160,7 +160,8 @@ LockstepHub::LockstepHub(std::unique_ptr<DatagramHub> inner, LockstepClock clock
       clock_(std::move(clock)),
       host_(std::move(host)),
       hooks_(std::move(hooks)),
-      buffer_(1U << 16) {}
+      buffer_(1U << 16),
+      fd_(inner_->fdFor(nullptr)) {}
 
 LockstepHub::~LockstepHub() = default;
 
@@ -175,6 +176,7 @@ void LockstepHub::ignore(const DatagramSource& source) {
   const std::vector<std::shared_ptr<Source>> all = sources();
   for (const std::shared_ptr<Source>& each : all) {
     if (each.get() != &source) continue;
+    if (listened_to_.lock() == each) listenTo(nullptr);
     const std::lock_guard<std::mutex> lock(mutex_);
     each->ignored = true;
     if (std::exchange(each->fenced, false)) {
@@ -192,6 +194,19 @@ void LockstepHub::ignore(const DatagramSource& source) {
 
 bool LockstepHub::hasInput(const DatagramSource& source) const {
   return !static_cast<const Source&>(source).handed_out.empty();
+}
+
+bool LockstepHub::busy() const {
+  const bool goes_on = stage_ == Stage::kHandling || stage_ == Stage::kClosing;
+  return goes_on && clock_.phase() != LockstepClock::Phase::kReleased;
+}
+
+/// Who waits by fd() is to be woken by what this one gets; null: by anything.
+void LockstepHub::listenTo(const std::shared_ptr<Source>& source) {
+  if (source == nullptr ? !listens_to_one_ : source == listened_to_.lock()) return;
+  listens_to_one_ = source != nullptr;
+  listened_to_ = source;
+  inner_->fdFor(source == nullptr ? nullptr : source->inner.get());
 }
 
 std::vector<std::shared_ptr<LockstepHub::Source>> LockstepHub::sources() const {
@@ -219,10 +234,9 @@ void LockstepHub::askForFence(Source* source) {
 
 /// Requests may be lost as long as X-Plane is not in lock-step yet, or not there.
 void LockstepHub::askAgain() {
-  const std::vector<std::shared_ptr<Source>> all = sources();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (host_.steady_ns() - asked_ns_ < kAskAgainNs) return;
-  for (const std::shared_ptr<Source>& source : all) {
+  for (const std::shared_ptr<Source>& source : open_) {
     const bool late = !source->seen || (stage_ == Stage::kCollecting && source->newest.number <= frame_.number);
     if (source->fenced && late) askForFence(source.get());
   }
@@ -253,6 +267,9 @@ void LockstepHub::take(Source* source) {
       source->newest = fence->frame;
       source->sockets = fence->sockets;
       source->ended = source->waiting.size();
+      // Nothing more of this frame comes: asking for it would take as long as reading the datagram did.
+      const bool flying = clock_.phase() == LockstepClock::Phase::kFlying;
+      if (flying && source->newest.number > frame_.number) return;
     }
   }
 }
@@ -262,22 +279,27 @@ void LockstepHub::collect(int timeout_ms) {
   takeAll();
 }
 
-/// Waits for one source whose fence is missing, so that a frame wakes the thread once and not with each of its
-/// datagrams: the one that gets every fence, as the last, else the same each time while that is the last to come.
-void LockstepHub::collectFrame(int timeout_ms) {
-  const std::vector<std::shared_ptr<Source>> all = sources();
+/// One source whose fence is missing: the one that gets every fence, as the last, else the same each time while that
+/// is the last to come.
+std::shared_ptr<LockstepHub::Source> LockstepHub::missing() {
   std::shared_ptr<Source> awaited;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    const bool counted = std::any_of(all.begin(), all.end(), [](const auto& source) { return source->sockets > 0; });
-    for (const std::shared_ptr<Source>& source : all) {
+    const bool counted =
+        std::any_of(open_.begin(), open_.end(), [](const auto& source) { return source->sockets > 0; });
+    for (const std::shared_ptr<Source>& source : open_) {
       const bool missing = source->fenced && (!source->seen || source->newest.number != frame_.number + 1);
       const bool last = counted ? source->inner->localPort() == group_ : source.get() == awaited_;
       if (missing && (!awaited || last)) awaited = source;
     }
   }
   awaited_ = awaited.get();
-  if (awaited) {
+  return awaited;
+}
+
+/// Waits for one source, so that a frame wakes the thread once and not with each of its datagrams.
+void LockstepHub::collectFrame(int timeout_ms) {
+  if (const std::shared_ptr<Source> awaited = missing()) {
     inner_->waitFor(*awaited->inner, timeout_ms);
   } else {
     inner_->wait(timeout_ms);
@@ -286,20 +308,19 @@ void LockstepHub::collectFrame(int timeout_ms) {
 }
 
 void LockstepHub::takeAll() {
-  for (const std::shared_ptr<Source>& source : sources()) {
+  for (const std::shared_ptr<Source>& source : open_) {
     if (inner_->hasInput(*source->inner)) take(source.get());
   }
 }
 
 /// Whether all sources show a frame beyond the last one, the same; of a simulator that counts them, so many.
 bool LockstepHub::frameIsComplete() const {
-  const std::vector<std::shared_ptr<Source>> all = sources();
   const std::lock_guard<std::mutex> lock(mutex_);
   std::uint32_t shown = 0;
   std::uint32_t shown_of_group = 0;
   std::uint32_t counted = 0;
   bool missing = false;
-  for (const std::shared_ptr<Source>& source : all) {
+  for (const std::shared_ptr<Source>& source : open_) {
     if (source->seen && source->newest.number == frame_.number + 1) {
       ++shown;
       if (source->sockets > 0) ++shown_of_group;
@@ -325,7 +346,7 @@ void LockstepHub::forgetRetired() {
 }
 
 void LockstepHub::handOut(bool whole_frame) {
-  for (const std::shared_ptr<Source>& source : sources()) {
+  for (const std::shared_ptr<Source>& source : open_) {
     bool fenced = false;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -347,13 +368,18 @@ void LockstepHub::handOut(bool whole_frame) {
 }
 
 bool LockstepHub::anythingHandedOut() const {
-  const std::vector<std::shared_ptr<Source>> all = sources();
-  return std::any_of(all.begin(), all.end(),
+  return std::any_of(open_.begin(), open_.end(),
                      [](const auto& source) { return !source->ignored && !source->handed_out.empty(); });
 }
 
 void LockstepHub::wait(int timeout_ms) {
-  if (anythingHandedOut()) return;
+  open_ = sources();
+  if (listens_to_one_ && listened_to_.expired()) listenTo(nullptr);
+  if (!anythingHandedOut()) goOn(timeout_ms);
+  open_.clear();
+}
+
+void LockstepHub::goOn(int timeout_ms) {
   switch (clock_.phase()) {
     case LockstepClock::Phase::kHeld:
       waitHeld(timeout_ms);
@@ -369,7 +395,7 @@ void LockstepHub::wait(int timeout_ms) {
 }
 
 void LockstepHub::goToNewestFrame() {
-  for (const std::shared_ptr<Source>& source : sources()) {
+  for (const std::shared_ptr<Source>& source : open_) {
     if (source->seen && source->newest.number > frame_.number) frame_ = source->newest;
   }
 }
@@ -380,20 +406,18 @@ void LockstepHub::waitHeld(int timeout_ms) {
     if (--passes_ > 0) return;
     stage_ = Stage::kCollecting;
     hooks_.end(frame_);
+    return;  // frame 0 is answered again and again: the next time when something comes, or time has passed
   }
   collect(std::min(timeout_ms, kLongestWaitMs));
   askAgain();
   if (frameIsComplete() && frame_.number == 0) {
     // The simulator flies: this frame is the first.
     goToNewestFrame();
-    clock_.move(frame_.sim_ns);
-    hooks_.begin(frame_);
-    handOut(true);
-    stage_ = Stage::kHandling;
+    handOutFrame();
     return;
   }
   bool flies = false;
-  for (const std::shared_ptr<Source>& source : sources()) flies = flies || (source->seen && source->newest.number > 0);
+  for (const std::shared_ptr<Source>& source : open_) flies = flies || (source->seen && source->newest.number > 0);
   if (flies) return;
   handOut(false);
   hooks_.close(frame_);
@@ -405,6 +429,7 @@ void LockstepHub::waitHeld(int timeout_ms) {
 
 void LockstepHub::waitReleased(int timeout_ms) {
   clock_.tick();
+  listenTo(nullptr);
   if (released_frame_ < frame_.number) {
     released_frame_ = frame_.number;
     hooks_.end(frame_);
@@ -412,6 +437,13 @@ void LockstepHub::waitReleased(int timeout_ms) {
   collect(std::min(timeout_ms, kLongestWaitMs));
   goToNewestFrame();
   handOut(false);
+}
+
+void LockstepHub::handOutFrame() {
+  clock_.move(frame_.sim_ns);
+  hooks_.begin(frame_);
+  handOut(true);
+  stage_ = Stage::kHandling;
 }
 
 /// One stage on. Returns whether there is more to do before the caller has its turn.
@@ -439,15 +471,13 @@ bool LockstepHub::advance(int timeout_ms) {
   }
   if (!frameIsComplete()) collectFrame(timeout_ms);
   if (!frameIsComplete()) {
+    listenTo(missing());
     askAgain();
     return false;
   }
   goToNewestFrame();
   forgetRetired();
-  clock_.move(frame_.sim_ns);
-  hooks_.begin(frame_);
-  handOut(true);
-  stage_ = Stage::kHandling;
+  handOutFrame();
   return false;
 }
 

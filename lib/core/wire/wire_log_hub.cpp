@@ -111,6 +111,11 @@ bool WireLogHub::hasInput(const DatagramSource& source) const {
   return inner_->hasInput(*static_cast<const Source&>(source).inner);
 }
 
+int WireLogHub::fdFor(const DatagramSource* source) {
+  if (turn_ != nullptr) return -1;
+  return inner_->fdFor(source == nullptr ? nullptr : static_cast<const Source*>(source)->inner.get());
+}
+
 void WireLogHub::wait(int timeout_ms) {
   if (turn_ == nullptr) {
     inner_->wait(timeout_ms);

@@ -22,6 +22,7 @@ namespace {
 constexpr double kShortestLinkStop = 1.0;  // [s]
 // Of a node whose wire is logged, in the place of its process number.
 constexpr std::uint32_t kLoggedJitterSeed = 7;
+constexpr int kUnpacedStepMs = 5;  // in lock-step, while time goes at the host's pace
 
 }  // namespace
 
@@ -101,13 +102,25 @@ void BaseNode::startLink() {
   if (!link_) {
     return;
   }
-  if (!receivesOnNetworkThread() || link_->fd() < 0) {
+  if (!(receivesOnNetworkThread() || lockstep()) || link_->fd() < 0) {
     link_->start();
     return;
   }
   link_->startDriven();
-  const DrivenByNetwork driven{link_->fd(), [this] { return link_->receive(); }, [this] { link_->step(0); },
-                               [this] { return link_->patienceMs(); }};
+  DrivenByNetwork driven{link_->fd(), [this] { return link_->receive(); }, [this] { link_->stepThrough(); },
+                         [this] { return link_->patienceMs(); }};
+  if (lockstep()) {
+    // All of a frame is done on the thread that reads the answers of others, too: no thread wakes another. roscpp sends
+    // what was published behind that, in the order in which it was advertised.
+    driven.receive = [this] {
+      link_->stepThrough();
+      return false;
+    };
+    driven.patience_ms = [this] {
+      const bool flies = lockstep_clock_->phase() == core::LockstepClock::Phase::kFlying;
+      return flies ? link_->patienceMs() : std::min(link_->patienceMs(), kUnpacedStepMs);
+    };
+  }
   driver_ = std::make_unique<NetworkThreadDriver>(driven, host_clock_, &ros::PollManager::instance()->getPollSet());
 }
 

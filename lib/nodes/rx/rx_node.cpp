@@ -151,7 +151,11 @@ void RxNode::addStreams() {
 }
 
 void RxNode::advertise() {
-  flight_publisher_->advertise(topics());
+  // What is published at once is sent in this order: in lock-step who answers a state has all else of its frame.
+  if (lockstep() || stampsBySimulator()) {
+    clock_publisher_ = topics().advertise<rosgraph_msgs::Clock>(kClockTopic, 1, true);
+  }
+  if (!lockstep()) flight_publisher_->advertise(topics());
   for (const auto& mission : missions_) {
     mission->advertise(topics());
   }
@@ -161,6 +165,7 @@ void RxNode::advertise() {
     rows_publisher_ = advertiseTopic<DataRows>("data_rows", kRowsQueueSize);
   }
   link_state_publisher_ = advertiseTopic<LinkState>("link_state", 1, true);
+  if (lockstep()) flight_publisher_->advertise(topics());
   advertiseInput<SetOrigin::Request, SetOrigin::Response>(
       "set_origin", [this](const auto& request, auto& response) { setOrigin(request, response); });
   advertiseService<GetDataref::Request, GetDataref::Response>(
@@ -171,9 +176,6 @@ void RxNode::advertise() {
   addAllDiagnostics();
   experiment_->advertise(&handle());
   experiment_->setParameters(experiment_->readParameters(handle()));
-  if (lockstep() || stampsBySimulator()) {
-    clock_publisher_ = topics().advertise<rosgraph_msgs::Clock>(kClockTopic, 1, true);
-  }
   if (lockstep()) {
     done_publisher_ = advertiseTopic<std_msgs::Header>(kLockstepDoneTopic, 1, true);
     mute(true);

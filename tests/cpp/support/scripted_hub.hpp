@@ -45,12 +45,14 @@ class ScriptedHub : public DatagramHub {
     std::uint64_t dropped = 0;  // as the kernel counts it, of each source
     std::vector<std::string> opened;
     std::vector<std::string> awaited;  // of waitFor()
+    std::string listened_to;           // by fdFor(); empty: by none, "any"
 
     Clock clock() {
       return {[this] { return now_ns; }, [this] { return now_ns + kSystemMinusSteady; }};
     }
   };
   static constexpr std::int64_t kSystemMinusSteady = 1'700'000'000 * kNanosecondsPerSecond;
+  static constexpr int kFd = 1'000'000;  // of nothing
 
   explicit ScriptedHub(std::shared_ptr<Wire> wire) : wire_(std::move(wire)) {}
 
@@ -80,6 +82,10 @@ class ScriptedHub : public DatagramHub {
   void waitFor(const DatagramSource& source, int timeout_ms) override {
     wire_->awaited.push_back(static_cast<const Source&>(source).name);
     wait(timeout_ms);
+  }
+  int fdFor(const DatagramSource* source) override {
+    wire_->listened_to = source == nullptr ? "any" : static_cast<const Source*>(source)->name;
+    return kFd;
   }
   bool hasInput(const DatagramSource& source) const override {
     const auto& scripted = static_cast<const Source&>(source);

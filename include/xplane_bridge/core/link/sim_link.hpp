@@ -78,14 +78,17 @@ class SimLink : public SimulatorPort {
 
   /// Runs the link in a thread of its own.
   void start();
-  /// Instead: the caller's threads call, one at a time, receive() when fd() is readable, and step(0) patienceMs() after
-  /// the last one at the latest. They have ended before stop().
+  /// Instead: the caller's threads call, one at a time, receive() when fd() is readable, and stepThrough() patienceMs()
+  /// after the last one at the latest; in lock-step that also when fd() is readable. They have ended before
+  /// stop().
   void startDriven();
   /// Handles the datagrams that have come, and no more. @return whether step() is due at once
   bool receive();
   /// -1: it has to be start().
   int fd() const { return hub_->fd(); }
   int patienceMs() const;
+  /// step(0), again and again while that leads to more that is to be done at once.
+  void stepThrough();
   /// Undoes what was changed in X-Plane (read back, at most `timeout_s`), stops subscriptions, joins the thread.
   /// Waits. Returns whether everything was undone; what was not stays in the journal.
   bool stop(double timeout_s = 1.5);

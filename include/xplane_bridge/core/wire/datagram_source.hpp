@@ -116,8 +116,16 @@ class DatagramHub {
   }
   /// Whether the last wait() found a datagram there.
   virtual bool hasInput(const DatagramSource& source) const = 0;
-  /// Readable while wait() would find something; -1 where wait() does more than look for that.
+  /// Whether wait() has more to do at once, though nothing comes.
+  virtual bool busy() const { return false; }
+  /// Readable while wait() would find something to go on with; -1 where wait() does more than look for that.
   virtual int fd() const { return -1; }
+  /// A descriptor, always the same one, that is from now on readable on wake() and while this source has a datagram;
+  /// null: while any has. -1 as for fd().
+  virtual int fdFor(const DatagramSource* source) {
+    static_cast<void>(source);
+    return -1;
+  }
 };
 
 }  // namespace xplane_bridge::core

@@ -54,6 +54,8 @@ class LockstepHub : public DatagramHub {
   void ignore(const DatagramSource& source) override;
   void wait(int timeout_ms) override;
   bool hasInput(const DatagramSource& source) const override;
+  bool busy() const override;
+  int fd() const override { return fd_; }
 
  private:
   class Source;
@@ -67,7 +69,10 @@ class LockstepHub : public DatagramHub {
   void askForFence(Source* source);
   void askAgain();
   void collect(int timeout_ms);
+  std::shared_ptr<Source> missing();
   void collectFrame(int timeout_ms);
+  void listenTo(const std::shared_ptr<Source>& source);
+  void handOutFrame();
   void takeAll();
   void take(Source* source);
   bool frameIsComplete() const;
@@ -78,6 +83,7 @@ class LockstepHub : public DatagramHub {
   void waitHeld(int timeout_ms);
   void waitReleased(int timeout_ms);
   bool advance(int timeout_ms);
+  void goOn(int timeout_ms);
   std::vector<std::shared_ptr<Source>> sources() const;
 
   const std::unique_ptr<DatagramHub> inner_;
@@ -87,17 +93,21 @@ class LockstepHub : public DatagramHub {
 
   mutable std::mutex mutex_;  // guards the list, and what of a source is asked for
   std::vector<std::weak_ptr<Source>> sources_;
-  std::uint16_t group_ = 0;  // port of the source that gets every fence
+  std::uint16_t group_ = 0;    // port of the source that gets every fence
+  std::int64_t asked_ns_ = 0;  // [ns] of the host's steady clock
 
   // Of the thread that receives.
+  std::vector<std::shared_ptr<Source>> open_;  // in wait() only: what is closed meanwhile is closed at once
   Stage stage_ = Stage::kCollecting;
   int passes_ = 0;
   LockstepFrame frame_;
   std::uint32_t released_frame_ = 0;  // newest one let go after release()
-  std::int64_t asked_ns_ = 0;         // [ns] of the host's steady clock
   std::vector<Retired> retired_;      // ignored, perhaps while a frame is under way that counts them
   const Source* awaited_ = nullptr;   // whose fence was missing last; compared only
   std::vector<std::uint8_t> buffer_;
+  int fd_ = -1;
+  bool listens_to_one_ = false;
+  std::weak_ptr<Source> listened_to_;
 };
 
 }  // namespace xplane_bridge::core

@@ -26,13 +26,15 @@ class UdpHub : public DatagramHub {
   void waitFor(const DatagramSource& source, int timeout_ms) override;
   bool hasInput(const DatagramSource& source) const override;
   int fd() const override { return epoll_fd_; }
+  int fdFor(const DatagramSource* source) override;
 
  private:
-  void watch(int fd, const void* tag);
   bool isReady(const void* tag) const;
 
   int epoll_fd_ = -1;
   int wake_fd_ = -1;
+  int narrow_fd_ = -1;              // an epoll of wake_fd_ and the next; made when it is first asked for
+  int narrowed_to_ = -1;            // a socket, or epoll_fd_
   std::vector<epoll_event> ready_;  // as the last wait() found them
 };
 

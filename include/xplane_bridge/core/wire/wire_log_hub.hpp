@@ -25,6 +25,7 @@ class WireLogHub : public DatagramHub {
   void ignore(const DatagramSource& source) override;
   void wait(int timeout_ms) override;
   bool hasInput(const DatagramSource& source) const override;
+  int fdFor(const DatagramSource* source) override;
 
  private:
   class Source;

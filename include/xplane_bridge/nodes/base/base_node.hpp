@@ -60,15 +60,17 @@ enum class ExitCode {
 ///
 /// Threads: subscriptions and timers are served one at a time by one thread; services by another one, so that a
 /// service waiting for X-Plane never delays a control callback; diagnostics by a third at a steady 1 Hz; the link by a
-/// fourth, which knows no ROS and calls linkCallbacks(). Hooks run on the thread that calls initialize() or run().
+/// fourth, which knows no ROS and calls linkCallbacks(), or by roscpp's network thread (receivesOnNetworkThread()) and
+/// one beside it, one at a time: each of these is the link's thread. Hooks run on the thread that calls initialize() or
+/// run().
 ///
 /// Time: stamps, ages, deadlines, timers and the link go by clock(), the one clock of the node. Only what must come
 /// about while that clock stands goes by the host's: diagnostics and the stop sequence.
 ///
 /// Lock-step (the shared section `lockstep`): clock() is the simulator's, and all that the node does in a frame is done
 /// on the link's thread, in the order of the hooks below; timers too. A node without a link moves its clock itself.
-/// Subscriptions are served by roscpp's network thread (ImmediateQueue): each other thread to wake is a part of a
-/// frame.
+/// That thread is roscpp's network thread, which serves the subscriptions, too (ImmediateQueue): each other thread to
+/// wake is a part of a frame.
 ///
 /// With `publish_clock` and without lock-step, only clock()'s system time is the simulator's: stamps. rx_node moves it,
 /// and the others follow /clock. Receive times of datagrams stay wallClock()'s.
@@ -121,7 +123,7 @@ class BaseNode {
   /// Called from the link's thread; must return quickly.
   virtual core::SimLinkCallbacks linkCallbacks() { return {}; }
   /// Whether roscpp's network thread receives, because what comes is published at once: what its callbacks do must be
-  /// short. Not in lock-step and not where the wire is logged.
+  /// short. In lock-step it always does; where the wire is logged in its order, never.
   virtual bool receivesOnNetworkThread() const { return false; }
   /// Whether all that the node does follows from datagrams, messages, timers and inputs, so that it can be replayed.
   virtual bool wireIsOrdered() const { return false; }

@@ -20,7 +20,8 @@ struct DrivenByNetwork {
 
 /// Has a link receive on roscpp's network thread: what the link publishes is then sent by the thread that has received
 /// it, and no other has to be woken. What else is due is done by a thread of the driver's own, so that no subscriber
-/// waits for that, or for a name server that does not answer. One of the two at a time.
+/// waits for that, or for a name server that does not answer. (A link in lock-step does all in receive().) One of the
+/// two at a time.
 class NetworkThreadDriver {
  public:
   /// Begins at once. @param clock that runs by itself @param poll_set of roscpp; outlives the driver

@@ -30,8 +30,8 @@ namespace xplane_bridge {
 
 /// X-Plane -> ROS: flight state, mission state, standard messages, any dataref (docs/rx_node.md).
 ///
-/// Data are published as they arrive, by roscpp's network thread, which then sends them; in lock-step, and where the
-/// wire is logged, by a thread of the link's own. A timer on the subscription thread looks after what is asked of
+/// Data are published as they arrive, by roscpp's network thread, which then sends them; where the wire is logged in
+/// its order, by a thread of the link's own. A timer on the subscription thread looks after what is asked of
 /// X-Plane: it changes with X-Plane's version and with the aircraft. mutex_ guards everything both touch; it is never
 /// held while the link is called, except from the link's own callbacks.
 class RxNode : public BaseNode {

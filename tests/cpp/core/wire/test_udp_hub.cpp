@@ -1,5 +1,7 @@
 #include "xplane_bridge/core/wire/udp_hub.hpp"
 
+#include <poll.h>
+
 #include <gtest/gtest.h>
 
 #include <array>
@@ -72,6 +74,41 @@ TEST_F(UdpHubTest, WakeEndsTheWaitForOneSource) {
   hub_.wake();
   hub_.waitFor(*source, 600'000);  // would last ten minutes
   EXPECT_FALSE(hub_.hasInput(*source));
+}
+
+bool readable(int fd, int timeout_ms = 0) {
+  pollfd asked{fd, POLLIN, 0};
+  return poll(&asked, 1, timeout_ms) == 1;
+}
+
+TEST_F(UdpHubTest, HasADescriptorForOneSource) {
+  const auto first = open();
+  auto second = open();
+  const int fd = hub_.fdFor(second.get());
+  send(first.get(), *first);
+  hub_.wait(10'000);
+  ASSERT_TRUE(hub_.hasInput(*first));
+  EXPECT_FALSE(readable(fd));
+  EXPECT_EQ(hub_.fdFor(nullptr), fd);
+  EXPECT_TRUE(readable(fd)) << "for any";
+  EXPECT_EQ(hub_.fdFor(second.get()), fd);
+  EXPECT_FALSE(readable(fd));
+  send(first.get(), *second);
+  EXPECT_TRUE(readable(fd, 10'000));
+  second.reset();
+  EXPECT_FALSE(readable(fd));
+  EXPECT_EQ(hub_.fdFor(first.get()), fd);
+  EXPECT_TRUE(readable(fd)) << "from one that is closed to another";
+}
+
+TEST_F(UdpHubTest, WakeMakesTheDescriptorForOneSourceReadable) {
+  const auto source = open();
+  const int fd = hub_.fdFor(source.get());
+  EXPECT_FALSE(readable(fd));
+  hub_.wake();
+  EXPECT_TRUE(readable(fd));
+  hub_.wait(0);
+  EXPECT_FALSE(readable(fd));
 }
 
 TEST_F(UdpHubTest, WakeEndsTheNextWaitOnce) {

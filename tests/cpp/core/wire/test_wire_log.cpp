@@ -294,5 +294,23 @@ TEST_F(WireLogTest, TheHubLogsInTheOrderOfProcessingAndMovesTheClock) {
   EXPECT_NE(packetsOf(path())[0].text(1).find(" t="), std::string::npos);
 }
 
+TEST_F(WireLogTest, TheHubListensForOneSourceWhereTheNodeIsLoggedInNoOrder) {
+  auto wire = std::make_shared<ScriptedHub::Wire>();
+  const WireClock clock(wire->clock());
+  WireLogHub hub(std::make_unique<ScriptedHub>(wire), open(), clock, wire->clock(), nullptr);
+  const auto source = hub.open("a", {});
+  EXPECT_EQ(hub.fdFor(source.get()), ScriptedHub::kFd);
+  EXPECT_EQ(wire->listened_to, "a");
+  EXPECT_EQ(hub.fdFor(nullptr), ScriptedHub::kFd);
+  EXPECT_EQ(wire->listened_to, "any");
+}
+
+TEST_F(WireLogTest, TheHubHasNoDescriptorWhereTheNodesOwnInputsHaveTheirTurnInIt) {
+  auto wire = std::make_shared<ScriptedHub::Wire>();
+  Turn turn;
+  WireLogHub hub(std::make_unique<ScriptedHub>(wire), open(), WireClock(wire->clock()), wire->clock(), &turn);
+  EXPECT_EQ(hub.fdFor(nullptr), -1);
+}
+
 }  // namespace
 }  // namespace xplane_bridge::core
