@@ -29,6 +29,7 @@ class NetworkThreadDriver::Impl {
   void end() {
     poll_set_->delSocket(driven_.fd);
     {
+      const std::lock_guard<std::mutex> turn(turn_);
       const std::lock_guard<std::mutex> lock(mutex_);
       ended_ = true;
     }
@@ -37,33 +38,40 @@ class NetworkThreadDriver::Impl {
   }
 
  private:
-  /// On the network thread, which must not wait for the other one: that listens again when it is through.
+  /// On the network thread, which must not wait for the other one: that listens again when its turn is over.
   void onReadable() {
-    std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
-    if (!lock) {
+    std::unique_lock<std::mutex> turn(turn_, std::try_to_lock);
+    if (!turn) {
       poll_set_->delEvents(driven_.fd, POLLIN);
       passed_over_ = true;
-      if (!lock.try_lock()) return;
+      if (!turn.try_lock()) return;  // whose turn it is now looks at that when it is over
     }
-    if (ended_) return;
-    if (driven_.receive()) {
-      due_ = true;
+    if (!ended() && driven_.receive()) {
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        due_ = true;
+      }
       changed_.notifyAll();
     }
     listenAgain();
   }
 
   void stepWhenDue() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    while (!ended_) {
-      due_ = false;
+    while (!ended()) {
+      std::unique_lock<std::mutex> turn(turn_);
       driven_.step();
       const core::Deadline next(clock_, driven_.patience_ms() * kMillisecond);
-      lock.unlock();
+      turn.unlock();
       listenAgain();
-      lock.lock();
+      std::unique_lock<std::mutex> lock(mutex_);
       changed_.waitUntil(&lock, next, [this] { return ended_ || due_; });
+      due_ = false;
     }
+  }
+
+  bool ended() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return ended_;
   }
 
   /// Where the network thread has not been served.
@@ -75,7 +83,8 @@ class NetworkThreadDriver::Impl {
   const core::Clock clock_;
   ros::PollSet* const poll_set_;
   std::atomic<bool> passed_over_{false};
-  std::mutex mutex_;  // guards the following, and is held while one of the two is at it
+  std::mutex turn_;   // is held while one of the two is at it
+  std::mutex mutex_;  // guards the following
   core::ClockCondition changed_;
   bool ended_ = false, due_ = false;
   std::thread thread_;
