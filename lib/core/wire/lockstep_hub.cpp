@@ -19,7 +19,6 @@ constexpr std::int32_t kFenceElements = 4;
 constexpr std::int32_t kSocketsIndex = kFenceIndex + 8;
 constexpr std::int32_t kFenceRate = 1000;
 constexpr std::size_t kRateAt = 5;    // of a request: after the label
-constexpr int kLongestWaitMs = 5;     // while the clock goes at the host's pace
 constexpr int kPassesAfterClose = 2;  // of the link: calls posted by the first are carried out in the second
 constexpr std::int64_t kAskAgainNs = 300 * kNanosecondsPerMillisecond;
 constexpr int kFramesUntilForgotten = 2;  // by then X-Plane has read that a source wants no more
@@ -203,8 +202,6 @@ bool LockstepHub::busy() const {
 
 /// Who waits by fd() is to be woken by what this one gets; null: by anything.
 void LockstepHub::listenTo(const std::shared_ptr<Source>& source) {
-  if (source == nullptr ? !listens_to_one_ : source == listened_to_.lock()) return;
-  listens_to_one_ = source != nullptr;
   listened_to_ = source;
   inner_->fdFor(source == nullptr ? nullptr : source->inner.get());
 }
@@ -374,7 +371,7 @@ bool LockstepHub::anythingHandedOut() const {
 
 void LockstepHub::wait(int timeout_ms) {
   open_ = sources();
-  if (listens_to_one_ && listened_to_.expired()) listenTo(nullptr);
+  if (listened_to_.expired()) listenTo(nullptr);
   if (!anythingHandedOut()) goOn(timeout_ms);
   open_.clear();
 }

@@ -22,7 +22,6 @@ namespace {
 constexpr double kShortestLinkStop = 1.0;  // [s]
 // Of a node whose wire is logged, in the place of its process number.
 constexpr std::uint32_t kLoggedJitterSeed = 7;
-constexpr int kUnpacedStepMs = 5;  // in lock-step, while time goes at the host's pace
 
 }  // namespace
 
@@ -118,7 +117,7 @@ void BaseNode::startLink() {
     };
     driven.patience_ms = [this] {
       const bool flies = lockstep_clock_->phase() == core::LockstepClock::Phase::kFlying;
-      return flies ? link_->patienceMs() : std::min(link_->patienceMs(), kUnpacedStepMs);
+      return flies ? link_->patienceMs() : std::min(link_->patienceMs(), core::LockstepHub::kLongestWaitMs);
     };
   }
   driver_ = std::make_unique<NetworkThreadDriver>(driven, host_clock_, &ros::PollManager::instance()->getPollSet());

@@ -79,8 +79,7 @@ class SimLink : public SimulatorPort {
   /// Runs the link in a thread of its own.
   void start();
   /// Instead: the caller's threads call, one at a time, receive() when fd() is readable, and stepThrough() patienceMs()
-  /// after the last one at the latest; in lock-step that also when fd() is readable. They have ended before
-  /// stop().
+  /// after the last one at the latest; in lock-step that also when fd() is readable. They have ended before stop().
   void startDriven();
   /// Handles the datagrams that have come, and no more. @return whether step() is due at once
   bool receive();

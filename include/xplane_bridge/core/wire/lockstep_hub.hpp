@@ -46,6 +46,9 @@ struct LockstepHooks {
 /// While the clock is held, and once it is released, datagrams are handed out as they come, held ones with their fence.
 class LockstepHub : public DatagramHub {
  public:
+  /// [ms] Longest wait while the clock goes at the host's pace: held or released.
+  static constexpr int kLongestWaitMs = 5;
+
   LockstepHub(std::unique_ptr<DatagramHub> inner, LockstepClock clock, Clock host, LockstepHooks hooks);
   ~LockstepHub() override;
 
@@ -106,8 +109,7 @@ class LockstepHub : public DatagramHub {
   const Source* awaited_ = nullptr;   // whose fence was missing last; compared only
   std::vector<std::uint8_t> buffer_;
   int fd_ = -1;
-  bool listens_to_one_ = false;
-  std::weak_ptr<Source> listened_to_;
+  std::weak_ptr<Source> listened_to_;  // by fd_; none: any
 };
 
 }  // namespace xplane_bridge::core
