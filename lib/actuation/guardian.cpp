@@ -102,15 +102,19 @@ void Guardian::setPeer(const core::Endpoint& peer, const std::string& journal_pa
   sendLine("peer " + peer.addressString() + " " + std::to_string(peer.port) + " " + journal_path + "\n");
 }
 
-bool Guardian::beat(double hang_timeout) {
+void Guardian::beat(double hang_timeout) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const double now = core::hostClock().steadySeconds();
-  if (socket_ < 0 || now - last_beat_ < kBeatPeriod) return false;
+  if (socket_ < 0 || now - last_beat_ < kBeatPeriod) return;
   last_beat_ = now;
+  sendLine("beat " + std::to_string(hang_timeout) + "\n");
+}
+
+bool Guardian::hasActed() {
+  const std::lock_guard<std::mutex> lock(mutex_);
   char released = 0;
   bool undone = false;
   while (recv(socket_, &released, 1, MSG_DONTWAIT) == 1) undone = true;
-  sendLine("beat " + std::to_string(hang_timeout) + "\n");
   return undone;
 }
 

@@ -31,9 +31,10 @@ class Guardian {
   /// Where X-Plane is, and what was changed there, from now on.
   void setPeer(const core::Endpoint& peer, const std::string& journal_path);
   /// This process runs, and beat() will be called again within `hang_timeout` [s]; to be called by the thread that must
-  /// not hang, as often as it likes. Returns whether the guardian has given everything back since the last call,
-  /// because that was not so.
-  bool beat(double hang_timeout);
+  /// not hang, as often as it likes.
+  void beat(double hang_timeout);
+  /// Whether the guardian has given everything back since the last call, because a beat did not come in time.
+  bool hasActed();
   /// No beat() is to be expected any more.
   void rest();
   /// Everything is undone: the child ends without doing anything.

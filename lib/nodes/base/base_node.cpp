@@ -125,9 +125,9 @@ void BaseNode::showRosTime() const {
   if (moves_ros_time_ && lockstep()) ros::Time::setNow(stampNow());
 }
 
-void BaseNode::subscribeWith(ros::SubscribeOptions* options) {
+void BaseNode::subscribeWith(ros::SubscribeOptions* options, Served served) {
   options->transport_hints = ros::TransportHints().tcpNoDelay();
-  if (lockstep()) options->callback_queue = &immediate_;
+  if (lockstep() || (served == Served::kWhereRead && !wire_)) options->callback_queue = &immediate_;
   subscribers_.push_back(handle_.subscribe(*options));
 }
 

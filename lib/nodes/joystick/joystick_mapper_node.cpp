@@ -42,7 +42,8 @@ void JoystickMapperNode::subscribe() {
     subscribeInLockstep();
     return;
   }
-  subscribeTopic<sensor_msgs::Joy>("joy", 1, [this](const sensor_msgs::JoyConstPtr& joy) { onJoy(*joy); });
+  subscribeTopic<sensor_msgs::Joy>(
+      "joy", 1, [this](const sensor_msgs::JoyConstPtr& joy) { onJoy(*joy); }, Served::kWhereRead);
   subscribeTopic<ControlMode>("control/mode", 1, [this](const ControlModeConstPtr& mode) {
     if (mode->mode != ControlMode::MANUAL && mode->mode != ControlMode::AUTO) return;
     std::lock_guard<std::mutex> lock(mutex_);

@@ -9,10 +9,19 @@ const ros::WallDuration kPeriod(0.1);
 
 }  // namespace
 
-void Heartbeat::start(const ros::NodeHandle& handle, std::function<bool()> beat, std::function<void()> on_hang) {
-  beat_ = std::move(beat);
-  on_hang_ = std::move(on_hang);
-  timer_ = handle.createSteadyTimer(kPeriod, [this](const ros::SteadyTimerEvent&) { this->beat(); });
+void Heartbeat::start(const ros::NodeHandle& handle, Hooks hooks) {
+  start(std::move(hooks));
+  timer_ = handle.createSteadyTimer(kPeriod, [this](const ros::SteadyTimerEvent&) { beat(); });
+}
+
+void Heartbeat::beat() {
+  look();
+  if (hooks_.beat) hooks_.beat();
+}
+
+void Heartbeat::look() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (hooks_.acted && hooks_.acted()) hooks_.on_hang();
 }
 
 }  // namespace xplane_bridge

@@ -53,9 +53,21 @@ void TxNode::start() {
 
 void TxNode::startBeating() {
   if (lockstep()) return;  // a frame may take long: the guardian acts on death only
-  const auto beat = [this] { return guardian_.beat(options_.hang_timeout); };
+  const auto beat = [this] { guardian_.beat(options_.hang_timeout); };
+  const auto acted = [this] { return guardian_.hasActed(); };
   const auto on_hang = [this] { actuation_->onHang(); };
-  wired() ? pollInput("hang", beat, on_hang) : heartbeat_.start(handle(), beat, on_hang);
+  if (wired()) {
+    pollInput(
+        "hang",
+        [beat, acted] {
+          const bool hung = acted();
+          beat();
+          return hung;
+        },
+        on_hang);
+  } else {
+    heartbeat_.start(handle(), {beat, acted, on_hang});
+  }
 }
 
 void TxNode::tick() {
@@ -93,7 +105,8 @@ template <class Message>
 void TxNode::subscribeInFrames(const std::string& topic, std::uint32_t queue_size, Answers answers, int rank,
                                std::function<void(const Message&)> take) {
   if (!lockstep_) {
-    subscribeTopic<Message>(topic, queue_size, [take = std::move(take)](const auto& message) { take(*message); });
+    subscribeTopic<Message>(
+        topic, queue_size, [take = std::move(take)](const auto& message) { take(*message); }, Served::kWhereRead);
     return;
   }
   subscribeEvents<Message>(
@@ -128,7 +141,7 @@ void TxNode::subscribe() {
 }
 
 void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
-  heartbeat_.beat();
+  heartbeat_.look();  // no beat: it does not show that the timers go on
   if (const auto time_ns = intake_->onCommand(from, message)) setAlarm(deadline_, *time_ns);
 }
 

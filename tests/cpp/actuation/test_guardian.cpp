@@ -242,7 +242,8 @@ class GuardianProcess : public testing::Test {
 TEST_F(GuardianProcess, DismissedItEndsAndLeavesEverything) {
   Flown flown;
   EXPECT_TRUE(flown.guardian->running());
-  EXPECT_FALSE(flown.guardian->beat(60.0));
+  flown.guardian->beat(60.0);
+  EXPECT_FALSE(flown.guardian->hasActed());
   flown.guardian->dismiss();
   EXPECT_FALSE(flown.guardian->running());
   EXPECT_EQ(flown.journal().entries().size(), 1U);
@@ -258,11 +259,14 @@ TEST_F(GuardianProcess, UndoesWhatADeadParentHasLeft) {
 
 TEST_F(GuardianProcess, UndoesWhatAParentThatHangsHasSetAndReportsItWhenItRunsAgain) {
   Flown flown, resting;
-  EXPECT_FALSE(resting.guardian->beat(0.2));
+  resting.guardian->beat(0.2);
   resting.guardian->rest();
-  EXPECT_FALSE(flown.guardian->beat(1.0));
+  flown.guardian->beat(1.0);
+  EXPECT_FALSE(flown.guardian->hasActed());
   EXPECT_TRUE(undone(flown));
-  EXPECT_TRUE(comes([&flown] { return flown.guardian->beat(60.0); }));
+  EXPECT_TRUE(comes([&flown] { return flown.guardian->hasActed(); }));
+  EXPECT_FALSE(flown.guardian->hasActed()) << "that was asked";
+  EXPECT_FALSE(resting.guardian->hasActed());
   EXPECT_EQ(resting.journal().entries().size(), 1U) << "who rests does not hang";
   flown.guardian->dismiss();
   resting.guardian->dismiss();

@@ -180,6 +180,18 @@ def test_integer_does_for_a_double_and_callbacks_run(world, tiny):
     assert pong.wait_for().data == 6.0
 
 
+def test_a_subscription_that_is_served_where_it_is_read_does_not_wait_for_another(world, tiny):
+    import rospy
+    from std_msgs.msg import Float64, String
+
+    tiny(mode="await_nudge")
+    pong = world.watch("pong", Float64)
+    rospy.Publisher(f"{world.namespace}/ping", Float64, queue_size=1, latch=True).publish(2.0)
+    wait_until(lambda: "waits" in trace(world), WAIT_S, "the callback of ping")
+    rospy.Publisher(f"{world.namespace}/nudge", String, queue_size=1, latch=True).publish("")
+    assert pong.wait_for().data == 2.0
+
+
 def test_diagnostics_tick_at_one_hertz(world, tiny):
     tiny(gain=3)
     status = world.wait_for_diagnostics("tiny")

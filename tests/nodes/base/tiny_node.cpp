@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include <fstream>
+#include <future>
 #include <string>
 #include <thread>
 
@@ -22,7 +23,8 @@ class TinyNode : public BaseNode {
 
   void loadParameters(const ParamLoader& own) override {
     gain_ = own.number("gain", {0.0, 10.0}, 1.0);
-    mode_ = own.choice("mode", {"calm", "fail_at_start", "hang_in_undo", "rest_in_undo", "fail_later"}, "calm");
+    mode_ = own.choice("mode", {"calm", "fail_at_start", "hang_in_undo", "rest_in_undo", "fail_later", "await_nudge"},
+                       "calm");
     trace_.open(own.text("trace_file"));
     const ParamLoader limits = own.section("limits");
     limit_ = limits.number("upper", {}, 100.0);
@@ -44,7 +46,13 @@ class TinyNode : public BaseNode {
   }
 
   void subscribe() override {
+    subscribeTopic<std_msgs::String>(
+        "nudge", 1, [this](const std_msgs::StringConstPtr&) { nudged_.set_value(); }, Served::kWhereRead);
     subscribeTopic<std_msgs::Float64>("ping", 1, [this](const std_msgs::Float64ConstPtr& ping) {
+      if (mode_ == "await_nudge") {
+        trace("waits");
+        if (nudged_.get_future().wait_for(kPatience) != std::future_status::ready) return;
+      }
       std_msgs::Float64 pong;
       pong.data = std::min(gain_ * ping->data, limit_);
       pong_.publish(pong);
@@ -98,10 +106,12 @@ class TinyNode : public BaseNode {
   void trace(const std::string& step) { trace_ << step << std::endl; }
 
   static constexpr double kRest = 0.5;  // [s]
+  static constexpr std::chrono::seconds kPatience{60};
   double gain_ = 1.0;
   double limit_ = 0.0;
   std::string mode_;
   std::ofstream trace_;
+  std::promise<void> nudged_;
   ros::Publisher pong_;
   ros::Publisher last_word_;
 };

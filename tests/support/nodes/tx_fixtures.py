@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from support.deadlines import WAIT_S
+from xplane_bridge import protocol
 from xplane_bridge.constants import ControlField, FlightMode
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.harness.xplane_client import XPlaneClient
@@ -41,6 +42,15 @@ class WatchedDatarefs:
         """The newest value; nan before the first."""
         self._known.update(self._client.values())
         return self._known.get(self.paths.index(path), math.nan)
+
+    def history(self, path: str) -> list[float]:
+        """Its values that came since one was last asked for, of whatever path."""
+        found = []
+        for packet in self._client.received():
+            values = dict(protocol.decode_rref_response(packet))
+            self._known.update(values)
+            found += [value for index, value in values.items() if index == self.paths.index(path)]
+        return found
 
     def wait(self, path: str, expected: float, timeout: float = WAIT_S, tolerance: float = 1e-4) -> None:
         """Waits until a dataref has a value."""

@@ -58,11 +58,11 @@ enum class ExitCode {
 /// -> ros::shutdown() -> joinThreads(). If it takes longer than kStopTime in all, the process ends with
 /// ExitCode::kStopTimeout and says where it hung.
 ///
-/// Threads: subscriptions and timers are served one at a time by one thread; services by another one, so that a
-/// service waiting for X-Plane never delays a control callback; diagnostics by a third at a steady 1 Hz; the link by a
-/// fourth, which knows no ROS and calls linkCallbacks(), or by roscpp's network thread (receivesOnNetworkThread()) and
-/// one beside it, one at a time: each of these is the link's thread. Hooks run on the thread that calls initialize() or
-/// run().
+/// Threads: subscriptions and timers are served one at a time by one thread, but for subscriptions that are
+/// Served::kWhereRead; services by another one, so that a service waiting for X-Plane never delays a control callback;
+/// diagnostics by a third at a steady 1 Hz; the link by a fourth, which knows no ROS and calls linkCallbacks(), or by
+/// roscpp's network thread (receivesOnNetworkThread()) and one beside it, one at a time: each of these is the link's
+/// thread. Hooks run on the thread that calls initialize() or run().
 ///
 /// Time: stamps, ages, deadlines, timers and the link go by clock(), the one clock of the node. Only what must come
 /// about while that clock stands goes by the host's: diagnostics and the stop sequence.
@@ -211,15 +211,23 @@ class BaseNode {
   /// For what waits for X-Plane: whether to give up, because the node is stopping.
   bool ending() const { return wire_ ? wire_->closed() : stopping(); }
 
+  /// Which thread calls back for a message.
+  enum class Served {
+    kInTurn,    ///< that of the timers, never beside one of them
+    kWhereRead  ///< roscpp's network thread, so that no other one has to be woken: for what is short and locks what the
+                ///< timers use. In lock-step all are; where the wire is logged, none is.
+  };
+
   /// Subscribes without Nagle's delay. Use queue size 1 for control topics: the newest command counts.
   template <class Message>
   void subscribeTopic(const std::string& topic, uint32_t queue_size,
-                      std::function<void(const boost::shared_ptr<const Message>&)> callback) {
+                      std::function<void(const boost::shared_ptr<const Message>&)> callback,
+                      Served served = Served::kInTurn) {
     if (wire_) callback = throughWire<Message>("topic " + topic, std::move(callback));
     if (wire_ && wire_->replays()) return;
     ros::SubscribeOptions options;
     options.init<Message>(topic, queue_size, std::move(callback));
-    subscribeWith(&options);
+    subscribeWith(&options, served);
   }
 
   /// The same for a callback that needs to know the publisher.
@@ -228,7 +236,7 @@ class BaseNode {
                        std::function<void(const ros::MessageEvent<const Message>&)> callback) {
     ros::SubscribeOptions options;
     options.initByFullCallbackType<const ros::MessageEvent<const Message>&>(topic, queue_size, std::move(callback));
-    subscribeWith(&options);
+    subscribeWith(&options, Served::kInTurn);
   }
 
   /// Advertises a service on the service thread, or on that of another `queue`. While stopping, calls fail at once. An
@@ -294,7 +302,7 @@ class BaseNode {
   enum class State { kCreated, kInitialized, kRunning, kStopped };
 
   void stampBySimulator();
-  void subscribeWith(ros::SubscribeOptions* options);
+  void subscribeWith(ros::SubscribeOptions* options, Served served);
   void showRosTime() const;
   void openWire(const ParamLoader& shared, const ParamLoader& own);
   void startWire();
@@ -362,7 +370,7 @@ class BaseNode {
   std::shared_ptr<std::atomic<std::int64_t>> stamp_ns_;  // with stampsBySimulator()
   bool moves_ros_time_ = false;                          // `use_sim_time` is set
 
-  ImmediateQueue immediate_;  // of the subscriptions, in lock-step
+  ImmediateQueue immediate_;  // of the subscriptions that are served where they are read
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
   ros::CallbackQueue service_queue_;
