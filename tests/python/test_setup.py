@@ -1,8 +1,9 @@
-"""The Python packages that scripts/setup installs: which, when, and that no test lacks one."""
+"""The Python packages that scripts/setup installs: which, when, that no test lacks one; and what needs none."""
 
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -73,3 +74,19 @@ def test_no_test_is_always_left_out_for_want_of_a_package() -> None:
         listed.update(re.match(r"[\w-]+", line).group(0) for line in lines if not line.startswith("#"))
     assert "python3-tk" in SETUP  # tkinter
     assert {PACKAGES.get(name, name) for name in wanted - {"tkinter"}} - listed == set()
+
+
+@pytest.mark.parametrize("name", ["demo", "bench"])
+@pytest.mark.parametrize("arguments", [["--help"], ["--fps", "30", "-h"]])
+def test_asked_for_help_a_new_clone_is_not_set_up(tmp_path: Path, name: str, arguments: List[str]) -> None:
+    (tmp_path / "scripts").mkdir()
+    shutil.copy(ROOT / "scripts" / name, tmp_path / "scripts")
+    setup = tmp_path / "scripts/setup"
+    setup.write_text("#!/bin/sh\necho set up; exit 3\n", encoding="utf-8")
+    setup.chmod(0o755)
+    run = [str(tmp_path / "scripts" / name)]
+    helped = subprocess.run([*run, *arguments], stdout=subprocess.PIPE, text=True, check=True)
+    assert helped.stdout.startswith(f"{name}: ")
+    assert "set up" not in helped.stdout
+    started = subprocess.run([*run, "--helpless"], stdout=subprocess.PIPE, text=True, check=False)
+    assert (started.returncode, started.stdout) == (3, "set up\n")
