@@ -6,6 +6,7 @@
 
 #include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/core/link/journal.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -31,6 +32,7 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
   const Lock lock(*mutex_);
   std::set<int> wanted;
   std::vector<int> taken, given;
+  std::string refusal;
   for (const core::TrafficPose& pose : poses) wanted.insert(pose.number);
   for (auto it = flown_.begin(); it != flown_.end();) {
     if (wanted.count(it->first) != 0) {
@@ -45,7 +47,8 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
   for (const core::TrafficPose& pose : poses) {
     if (lost_.count(pose.number) != 0) continue;
     if (flown_.count(pose.number) == 0) {
-      if (!overrides_->acquire(core::trafficOverride(pose.number))) return "there is no journal to note it in";
+      refusal = take(pose.number);
+      if (!refusal.empty()) break;
       taken.push_back(pose.number);
     }
     flown_[pose.number].command(pose, sim_time);
@@ -55,7 +58,16 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
   follow();
   if (!taken.empty()) report_("traffic: " + listed(taken) + " placed by command", true);
   if (!given.empty()) report_("traffic: " + listed(given) + " given back", true);
-  return "";
+  return refusal;
+}
+
+/// Returns why it cannot be had; empty: it is had.
+std::string TrafficControl::take(int number) {
+  try {
+    return overrides_->acquire(core::trafficOverride(number)) ? "" : "there is no journal to note it in";
+  } catch (const core::JournalError& error) {
+    return core::whyNotChanged(error);
+  }
 }
 
 /// The scenery's origin is looked at while poses are written in its axes.

@@ -28,7 +28,8 @@ class TrafficControl {
 
   TrafficControl(core::SimulatorPort* link, OverrideManager* overrides, TrafficOptions options, Report report);
 
-  /// traffic/command: the complete list. Returns why it is refused; empty: it is taken.
+  /// traffic/command: the complete list. Returns why it is refused; empty: it is taken. Where an aircraft cannot be
+  /// taken, because that cannot be noted in the journal, those before it in the list are flown.
   /// @param sim_time [s] now
   std::string command(const std::vector<core::TrafficPose>& poses, double sim_time);
   /// Sends what is due. Often.
@@ -42,6 +43,7 @@ class TrafficControl {
   std::vector<int> numbers() const;
 
  private:
+  std::string take(int number);
   void follow();
   void send(const core::TrafficPose& pose);
 

@@ -65,6 +65,21 @@ class TrafficControlTest : public testing::Test {
   std::vector<std::string> reports_;
 };
 
+TEST_F(TrafficControlTest, TakesNoneThatCannotBeWrittenDownAndFliesThoseItHas) {
+  TrafficControl& traffic = control();
+  EXPECT_EQ(traffic.command({poseOf(3)}, now()), "");
+  fly(0.1);
+  sim_.breakJournal();
+  EXPECT_NE(traffic.command({poseOf(3, 30.0), poseOf(4)}, now()).find("journal"), std::string::npos);
+  EXPECT_EQ(traffic.numbers(), std::vector<int>{3});
+  fly(0.1);
+  EXPECT_EQ(sim_.value(kOverride4), 0.0F);
+  EXPECT_EQ(sim_.value(kPlane3 + "v_z"), -30.0F) << "by the newest command";
+  sim_.breakJournal(false);
+  EXPECT_EQ(traffic.command({poseOf(3), poseOf(4)}, now()), "");
+  EXPECT_EQ(traffic.numbers(), (std::vector<int>{3, 4}));
+}
+
 TEST_F(TrafficControlTest, PlacesAnAircraftAndMovesItOnBetweenCommands) {
   TrafficControl& traffic = control();
   EXPECT_EQ(traffic.command({poseOf(3)}, now()), "");
