@@ -90,8 +90,8 @@ struct ControlSnapshot {
 /// services, single settings, and the overrides all of these take. Passes on to them what X-Plane shows: frames,
 /// resets, aircraft, pauses.
 ///
-/// Threads: commands and tick() come on one thread, X-Plane's answers on the link's, requests on any; flight jobs and
-/// releases have threads of their own. One mutex guards what they share; nothing waits while holding it but for the
+/// Threads: commands and tick() come on one thread each, X-Plane's answers on the link's, requests on any; flight jobs
+/// and releases have threads of their own. One mutex guards what they share; nothing waits while holding it but for the
 /// journal's disk.
 class Actuation {
  public:

@@ -33,7 +33,8 @@ class Guardian {
   /// This process runs, and beat() will be called again within `hang_timeout` [s]; to be called by the thread that must
   /// not hang, as often as it likes.
   void beat(double hang_timeout);
-  /// Whether the guardian has given everything back since the last call, because a beat did not come in time.
+  /// Whether the guardian has given everything back since the last call, because a beat did not come in time. For any
+  /// thread.
   bool hasActed();
   /// No beat() is to be expected any more.
   void rest();

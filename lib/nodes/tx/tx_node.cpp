@@ -103,10 +103,13 @@ void TxNode::publishFinalState() {
 
 template <class Message>
 void TxNode::subscribeInFrames(const std::string& topic, std::uint32_t queue_size, Answers answers, int rank,
-                               std::function<void(const Message&)> take) {
+                               std::function<void(const Message&)> take, Served served) {
   if (!lockstep_) {
-    subscribeTopic<Message>(
-        topic, queue_size, [take = std::move(take)](const auto& message) { take(*message); }, Served::kWhereRead);
+    const auto take_now = [this, take = std::move(take)](const auto& message) {
+      heartbeat_.look();  // no beat: it does not show that the timers go on
+      take(*message);
+    };
+    subscribeTopic<Message>(topic, queue_size, take_now, served);
     return;
   }
   subscribeEvents<Message>(
@@ -129,9 +132,9 @@ void TxNode::subscribe() {
   // These are few and none may be lost.
   subscribeInFrames<ModeRequest>("control/mode_request", 20, Answers::kNothing, 0,
                                  [this](const auto& request) { intake_->onModeRequest(request); });
-  // Of traffic the newest list counts.
-  subscribeInFrames<TrafficCommand>("traffic/command", 1, Answers::kNothing, 1,
-                                    [this](const auto& command) { onTraffic(command); });
+  // Of traffic the newest list counts; each aircraft taken is a wait for the journal's disk.
+  subscribeInFrames<TrafficCommand>(
+      "traffic/command", 1, Answers::kNothing, 1, [this](const auto& command) { onTraffic(command); }, Served::kInTurn);
   if (lockstep_) {
     subscribeAnswers();
     return;
@@ -141,7 +144,6 @@ void TxNode::subscribe() {
 }
 
 void TxNode::onCommand(core::FlightMode from, const ControlCommand& message) {
-  heartbeat_.look();  // no beat: it does not show that the timers go on
   if (const auto time_ns = intake_->onCommand(from, message)) setAlarm(deadline_, *time_ns);
 }
 
@@ -160,6 +162,7 @@ void TxNode::advertiseOwn(const std::string& service, Serve serve) {
   const std::string full_name = name() + "/" + service;
   advertiseService<Request, Response>(full_name, [this, serve, full_name](const Request& request, Response& response) {
     if (lockstep_) lockstep_->waitUntilOpen();
+    heartbeat_.look();
     serve(request, &response, full_name);
   });
 }

@@ -218,7 +218,8 @@ class BaseNode {
                 ///< timers use. In lock-step all are; where the wire is logged, none is.
   };
 
-  /// Subscribes without Nagle's delay. Use queue size 1 for control topics: the newest command counts.
+  /// Subscribes without Nagle's delay. Use queue size 1 for control topics: the newest command counts. (What is served
+  /// where it is read has no queue: after a pause of the thread, each message that waited in the socket is served.)
   template <class Message>
   void subscribeTopic(const std::string& topic, uint32_t queue_size,
                       std::function<void(const boost::shared_ptr<const Message>&)> callback,

@@ -55,7 +55,7 @@ class JoystickMapperNode : public BaseNode {
   void fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper* status);
 
   double period_ = 0.02;  // [s]
-  std::mutex mutex_;      // the mapper, against the diagnostics thread
+  std::mutex mutex_;      // the mapper: sticks, timer and diagnostics are three threads
   std::unique_ptr<core::JoystickMapper> mapper_;
   ros::Publisher command_publisher_;
   ros::Publisher request_publisher_;

@@ -55,7 +55,7 @@ class TxNode : public BaseNode {
   enum class Answers { kFrames, kNothing };
   template <class Message>
   void subscribeInFrames(const std::string& topic, std::uint32_t queue_size, Answers answers, int rank,
-                         std::function<void(const Message&)> take);
+                         std::function<void(const Message&)> take, Served served = Served::kWhereRead);
   void subscribeAnswers();
 
   void advertiseServices();
