@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import functools
 import importlib
 import math
 import os
+import signal
 import sys
-from typing import Any, Callable, Optional, Sequence
+import threading
+from typing import Any, Callable, List, Optional, Sequence
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -99,15 +102,42 @@ def start_node(name: str, **options: Any) -> Any:
 
     Args:
         name: Of the node.
-        **options: For rospy.init_node.
+        **options: For rospy.init_node. Unless `disable_signals`, SIGINT and SIGTERM end ROS.
 
     Raises:
         NoRosError: rospy is not there, or ROS ended while the master was waited for.
     """
     rospy = rospy_module()
+    if not options.pop("disable_signals", False):
+        _end_on_signals(rospy)
     try:
-        rospy.init_node(name, **options)
+        rospy.init_node(name, disable_signals=True, **options)
     except rospy.exceptions.ROSInitException as error:
         msg = f"no ROS master at {os.environ.get('ROS_MASTER_URI', '(ROS_MASTER_URI is not set)')}: {error}"
         raise NoRosError(msg) from None
     return rospy
+
+
+def _end_on_signals(rospy: Any) -> None:
+    """End ROS on a thread of its own.
+
+    rospy's handler does it on the main thread, whatever that is at: where it holds a lock, as within a call of the
+    master, it would wait for itself for ever.
+    """
+    reader, writer = os.pipe()
+    came: List[int] = []
+
+    def end() -> None:
+        os.read(reader, 1)
+        rospy.signal_shutdown(f"signal {came[0]}")
+
+    def on_signal(number: int, _frame: Any) -> None:
+        came.append(number)
+        os.write(writer, b"!")
+
+    ending = threading.Thread(target=end, daemon=True)
+    ending.start()
+    # The node says good-bye to the master before the process ends.
+    atexit.register(lambda: ending.join() if came else None)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
