@@ -283,7 +283,7 @@ class BaseNode {
     services_.push_back(handle_.advertiseService(options));
   }
 
-  /// Calls `callback` every `period` [s] of clock(), on the thread of the subscriptions. From advertise() and
+  /// Calls `callback` every `period` [s] of clock(), on the thread of Served::kInTurn. From advertise() and
   /// subscribe() only.
   void addTimer(double period, std::function<void()> callback);
 

@@ -14,7 +14,7 @@ namespace {
 
 class HeartbeatTest : public testing::Test {
  protected:
-  /// Starts it with a guardian that has acted once.
+  /// Its guardian has acted where acted_ is set; what follows ends when relieved_ is.
   void start() {
     Heartbeat::Hooks hooks;
     hooks.beat = [this] { steps_.emplace_back("beat"); };
