@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any, Sequence
 
-from xplane_bridge.harness.processes import ManagedProcess
+from xplane_bridge.harness.processes import ManagedProcess, wait_until
 from xplane_bridge.resources import program
 
 _STATUS_TIMEOUT_S = 10.0
@@ -66,12 +66,19 @@ class EmulatorProcess(ManagedProcess):
         Raises:
             HarnessError: It does not answer.
         """
-        line = r"^STATUS (.*)$"
-        seen = len(re.findall(line, self.output(), re.MULTILINE))
+        seen = len(self._status_lines())
         self.send_signal(signal.SIGUSR1)
-        self.wait_for_line(rf"(?:{line}(?s:.)*?){{{seen + 1}}}", _STATUS_TIMEOUT_S)
-        status: dict[str, Any] = json.loads(re.findall(line, self.output(), re.MULTILINE)[seen])
+
+        def newer() -> list[str]:
+            self.check_running()
+            return self._status_lines()[seen:]
+
+        status: dict[str, Any] = json.loads(wait_until(newer, _STATUS_TIMEOUT_S, f"status of {self.name}")[0])
         return status
+
+    def _status_lines(self) -> list[str]:
+        """All of them so far, each whole."""
+        return re.findall(r"^STATUS (.*)\n", self.output(), re.MULTILINE)
 
     def restart(self) -> None:
         """Kills it if it runs and starts it anew on the same port."""
