@@ -7,6 +7,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import uuid
 import xmlrpc.client
 from pathlib import Path
 from typing import Any, Dict, Mapping, NamedTuple, Optional, Set, Tuple
@@ -83,7 +84,9 @@ class Graph(NamedTuple):
 
 
 class RosMaster(ManagedProcess):
-    """`roscore` on a free port of the loopback interface; ready when ``with`` or `start` returns.
+    """A ROS master on a free port of the loopback interface; ready when ``with`` or `start` returns.
+
+    It is what `roscore` starts, without roslaunch around it and without rosout, which the first roslaunch brings.
 
     Args:
         log_dir: folder of its log, of the nodes' logs, and of what else ROS keeps (ROS_HOME).
@@ -97,7 +100,7 @@ class RosMaster(ManagedProcess):
         self._base = ros_environment()
         #: ROS_MASTER_URI of this master; known after `start`.
         self.uri = ""
-        super().__init__("roscore", [], log_dir)
+        super().__init__("rosmaster", [], log_dir)
 
     @property
     def env(self) -> dict[str, str]:
@@ -122,11 +125,12 @@ class RosMaster(ManagedProcess):
         for attempt in range(self._ATTEMPTS):
             port = free_port()
             self.uri = f"http://127.0.0.1:{port}"
-            self.command = ["roscore", "-p", str(port)]
+            self.command = ["rosmaster", "--core", "-p", str(port)]
             self._env = self.env
             super().start()
             try:
                 wait_until(self._answers, _MASTER_TIMEOUT_S, "answer of the ROS master")
+                self.set_param("/run_id", str(uuid.uuid1()))  # `roslaunch --wait` waits for it
                 return
             except HarnessError:
                 self.stop()
@@ -138,11 +142,9 @@ class RosMaster(ManagedProcess):
         try:
             with xmlrpc.client.ServerProxy(self.uri) as master:
                 answer: Any = master.getPid(_CALLER)
-                code, _, _ = answer
-                nodes: Any = master.lookupNode(_CALLER, "/rosout")
         except (OSError, xmlrpc.client.Error):
             return False
-        return bool(code == 1 and nodes[0] == 1)
+        return bool(answer[0] == 1)
 
     def set_param(self, name: str, value: Any) -> None:
         """Sets a parameter by its full name."""
