@@ -150,6 +150,7 @@ bool SimLink::stop(double timeout_s) {
     data_output_.release(monitor_.alive() ? timeout_s : 0.0, [this](bool undone) {
       released_ = undone;
       stop_phase_ = StopPhase::kUnsubscribing;
+      stop_deadline_ns_ = now_ns_ + toNanoseconds(kUnsubscribeTime);
       stopSubscriptions();
     });
   };
@@ -162,7 +163,7 @@ bool SimLink::stop(double timeout_s) {
     thread_.join();
   } else {
     // Driven by the caller: the injected clock may stand still, so the number of steps is bounded, too.
-    const int max_steps = static_cast<int>(timeout_s * 1000.0) + 100;
+    const int max_steps = static_cast<int>((timeout_s + kUnsubscribeTime) * 1000.0) + 100;
     for (int i = 0; i < max_steps && stop_phase_ != StopPhase::kDone; ++i) {
       step(1);
     }

@@ -344,6 +344,10 @@ void SimLink::updateStop(std::int64_t now_ns) {
     stop_phase_ = StopPhase::kDone;
     if (requests_.empty()) {
       forgetSubscriptions();
+    } else {
+      log_(LogLevel::kWarn, "X-Plane's frames are so slow that " + std::to_string(requests_.size()) +
+                                " subscriptions could not be ended; the next start of this node, or release_overrides, "
+                                "ends them");
     }
   }
   if (stop_phase_ == StopPhase::kDone) {

@@ -88,9 +88,11 @@ class SimLink : public SimulatorPort {
   int patienceMs() const;
   /// step(0), again and again while that leads to more that is to be done at once.
   void stepThrough();
-  /// Undoes what was changed in X-Plane (read back, at most `timeout_s`), stops subscriptions, joins the thread.
-  /// Waits. Returns whether everything was undone; what was not stays in the journal.
+  /// Undoes what was changed in X-Plane (read back, at most `timeout_s`), stops subscriptions (at the pace at which
+  /// X-Plane reads requests, at most kUnsubscribeTime), joins the thread.
+  /// Waits. Returns whether everything was undone; what was not, and subscriptions that are left, stay in the journal.
   bool stop(double timeout_s = 1.5);
+  static constexpr double kUnsubscribeTime = 2.5;  ///< [s] for 950 datarefs at 20 frames a second
   /// Instead of start(): waits up to `timeout_ms` for datagrams, handles them and everything that is due.
   void step(int timeout_ms);
 

@@ -54,9 +54,9 @@ enum class ExitCode {
 ///
 /// Stop sequence, on SIGINT, SIGTERM, SIGHUP, `rosnode kill` (the master's shutdown request) or requestStop():
 /// subscriptions, timers and services end -> undo() and the link's own undoing (what was changed in X-Plane, on the
-/// node's own socket, at most kUndoTime; ROS is still there but is not needed) -> publishFinalState() (latched topics)
-/// -> ros::shutdown() -> joinThreads(). If it takes longer than kStopTime in all, the process ends with
-/// ExitCode::kStopTimeout and says where it hung.
+/// node's own socket, at most kUndoTime; then subscriptions end, core::SimLink::kUnsubscribeTime; ROS is still there
+/// but is not needed) -> publishFinalState() (latched topics) -> ros::shutdown() -> joinThreads(). If it takes longer
+/// than kStopTime in all, the process ends with ExitCode::kStopTimeout and says where it hung.
 ///
 /// Threads: subscriptions and timers are served one at a time by one thread, but for subscriptions that are
 /// Served::kWhereRead; services by another one, so that a service waiting for X-Plane never delays a control callback;

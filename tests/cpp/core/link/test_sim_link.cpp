@@ -356,6 +356,27 @@ TEST_F(ThreadedSimLink, WaitsForACondition) {
   link_->stop(2.0);
 }
 
+TEST_F(ThreadedSimLink, EndsItsSubscriptionsAtThePaceOfSlowFrames) {
+  sim_.stopThread();
+  sim_.datarefs["sim/operation/misc/frame_rate_period"] = 0.05F;
+  RrefGroup many{"many", {}, kEveryFrameRateHz, 0};
+  for (int i = 0; i < 170; ++i) {
+    many.datarefs.push_back("x/y[" + std::to_string(i) + "]");
+    sim_.datarefs[many.datarefs.back()] = 1.0F;
+  }
+  sim_.startThread();
+  std::atomic<bool> complete{false};
+  const Subscription subscription =
+      link_->subscribe(many, [&](const RrefView& view, const ReceiveInfo&) { complete = view.size() == 170; });
+  link_->start();
+  ASSERT_TRUE(link_->waitUntil([&] { return complete.load(); }, 10.0));
+  EXPECT_TRUE(link_->stop(0.1)) << "far less than 5 batches, 2 frames of 50 ms apart";
+  sim_.stopThread();
+  for (const auto& [client, indices] : sim_.subscriptions) {
+    EXPECT_TRUE(indices.empty()) << indices.size() << " are left";
+  }
+}
+
 TEST_F(ThreadedSimLink, StopsAlsoWhenNoXPlaneAnswers) {
   link_->start();
   sim_.stopThread();
