@@ -33,7 +33,15 @@ def test_the_quadrotor_flies_its_square_through_the_bridge_in_real_time(tmp_path
     assert labels["touchdown"] > labels["hover"] + 20.0
 
 
-@pytest.mark.parametrize("name", ["engine_out_after_takeoff", "tiltrotor_conversion", "twin_circuit"])
+#: In process (tests/python/controllers) all of them fly by default, and see the same numbers as through the nodes
+#: (test_campaign_through_nodes.py).
+@pytest.mark.parametrize(
+    "name",
+    [
+        "engine_out_after_takeoff",
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("tiltrotor_conversion", "twin_circuit")),
+    ],
+)
 @pytest.mark.full
 def test_flights_meet_their_criteria_in_lock_step(tmp_path, name):
     fly(name, tmp_path / "out", *IN_LOCK_STEP)
