@@ -19,6 +19,8 @@ from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import node_program
 
 _numbers = itertools.count(1)
+#: Frames a second of emulators that are not asked for others: half of xplane_emulator's own take half the processor.
+FRAME_RATE = 30
 #: Tests that take half a minute and more, the longest first, none of which shares what its file has made with others.
 LONG = (
     "whole/test_first_day.py::",
@@ -239,9 +241,8 @@ class World:
 
     def emulator(self, *options: str | Path | int | float, port: int = 0) -> EmulatorProcess:
         """Starts X-Plane's stand-in and makes it the X-Plane of this namespace's nodes (`host` and `port`)."""
-        process = EmulatorProcess(
-            self.folder, [str(option) for option in options], name=f"xplane_emulator_{next(_numbers)}", port=port
-        )
+        words = ["--fps", str(FRAME_RATE), *map(str, options)]  # of two, the last one holds
+        process = EmulatorProcess(self.folder, words, name=f"xplane_emulator_{next(_numbers)}", port=port)
         process.start()
         self._processes.append(process)
         self.point_to(process.port)

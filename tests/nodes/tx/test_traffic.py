@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -58,17 +59,28 @@ def subscriptions(emulator):
     return sum(emulator.status()["subscriptions"].values())
 
 
+def settled_subscriptions(emulator):
+    """Their number once it has stood for three seconds: they are asked for little by little."""
+    numbers = []
+
+    def look():
+        numbers.append(subscriptions(emulator))
+        time.sleep(0.1)
+        return numbers[-1] > 0 and numbers[-30:] == [numbers[-1]] * 30
+
+    wait_until(look, WAIT_S, "settled number of subscriptions")
+    return numbers[-1]
+
+
 def test_nothing_is_asked_for_without_a_subscriber(world):
-    from xplane_bridge.msg import FlightState, TrafficState
+    from xplane_bridge.msg import TrafficState
 
     emulator = world.emulator(*KINEMATIC, "--traffic", 1)
     world.start("rx_node")
-    states = world.watch("flight_state", FlightState)
-    states.wait_for_count(30, WAIT_S)
-    quiet = subscriptions(emulator)
+    quiet = settled_subscriptions(emulator)
     log = world.watch("traffic/state", TrafficState)
     log.wait_for(lambda state: list(state.number) == [1], WAIT_S, "the other aircraft")
-    assert subscriptions(emulator) >= quiet + 19 * 12
+    wait_until(lambda: subscriptions(emulator) >= quiet + 19 * 12, WAIT_S, "subscriptions for 19 aircraft")
     log.close()
     wait_until(lambda: subscriptions(emulator) == quiet, WAIT_S, "the subscription's end")
 
