@@ -33,7 +33,10 @@ class RawTopics:
         ]
 
     def _take(self, message: Any, topic: str) -> None:
-        self.payloads.setdefault(topic, []).append(message._buff)
+        payloads = self.payloads.setdefault(topic, [])
+        # roscpp sends a latched message twice to who subscribes in the moment in which it is published.
+        if payloads[-1:] != [message._buff]:
+            payloads.append(message._buff)
 
     def wait_for(self, topic: str, message_type: Any, condition: Callable[[Any], bool], timeout: float = WAIT_S) -> Any:
         """Waits for a message, from the first one on, that fulfils `condition`, and returns it."""
