@@ -19,8 +19,8 @@ from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import node_program
 
 _numbers = itertools.count(1)
-#: Frames a second of emulators that are not asked for others: half of xplane_emulator's own take half the processor.
-FRAME_RATE = 30
+#: Of emulators in real time that are not asked for another: half of xplane_emulator's own takes half the processor.
+FRAMES_PER_SECOND = 30
 #: Tests that take half a minute and more, the longest first, none of which shares what its file has made with others.
 LONG = (
     "whole/test_first_day.py::",
@@ -241,7 +241,9 @@ class World:
 
     def emulator(self, *options: str | Path | int | float, port: int = 0) -> EmulatorProcess:
         """Starts X-Plane's stand-in and makes it the X-Plane of this namespace's nodes (`host` and `port`)."""
-        words = ["--fps", str(FRAME_RATE), *map(str, options)]  # of two, the last one holds
+        words = [str(option) for option in options]
+        if "--stepped" not in words:
+            words = ["--fps", str(FRAMES_PER_SECOND), *words]  # of two, the last one holds
         process = EmulatorProcess(self.folder, words, name=f"xplane_emulator_{next(_numbers)}", port=port)
         process.start()
         self._processes.append(process)
