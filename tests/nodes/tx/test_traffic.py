@@ -200,12 +200,12 @@ def test_the_conflict_scenario_is_recorded_with_the_truth_of_both(tmp_path):
         own = bags.read("/xplane/flight_state", ["sim_time", "latitude", "longitude", "altitude_msl"])
         traffic = bags.read("/xplane/traffic/state", ["sim_time", "number", "latitude", "longitude", "altitude_msl"])
     distances = []
-    for i, time in enumerate(traffic["sim_time"]):
+    for i, sim_time in enumerate(traffic["sim_time"]):
         numbers = list(traffic["number"][i])
         if 1 not in numbers or traffic["altitude_msl"][i][numbers.index(1)] < 500.0:
             continue  # parked, before its begin
         at = numbers.index(1)
-        nearest = int(np.argmin(np.abs(own["sim_time"] - time)))
+        nearest = int(np.argmin(np.abs(own["sim_time"] - sim_time)))
         north = math.radians(traffic["latitude"][i][at] - own["latitude"][nearest]) * EARTH_RADIUS_M
         east = math.radians(traffic["longitude"][i][at] - own["longitude"][nearest]) * EARTH_RADIUS_M
         distances.append(math.hypot(north, east * math.cos(math.radians(LATITUDE))))
