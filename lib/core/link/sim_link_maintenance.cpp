@@ -335,12 +335,12 @@ void SimLink::stopSubscriptions() {
 }
 
 void SimLink::updateStop(std::int64_t now_ns) {
-  const bool late = now_ns >= stop_deadline_ns_;
-  if (stop_phase_ == StopPhase::kReleasing && late) {
-    reader_.cancelAll();
+  const auto late = [&] { return now_ns >= stop_deadline_ns_; };
+  if (stop_phase_ == StopPhase::kReleasing && late()) {
+    reader_.cancelAll();  // which says that it is not undone, and gives the subscriptions their time
     stop_phase_ = StopPhase::kUnsubscribing;
   }
-  if (stop_phase_ == StopPhase::kUnsubscribing && (requests_.empty() || late)) {
+  if (stop_phase_ == StopPhase::kUnsubscribing && (requests_.empty() || late())) {
     stop_phase_ = StopPhase::kDone;
     if (requests_.empty()) {
       forgetSubscriptions();
