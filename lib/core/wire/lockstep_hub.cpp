@@ -462,7 +462,9 @@ bool LockstepHub::advance(int timeout_ms) {
       if (--passes_ > 0) return false;
       stage_ = Stage::kCollecting;
       hooks_.end(frame_);
-      return true;
+      // Who waits by fd() has published its answer, which is not to wait until the next frame is looked for in vain.
+      listenTo(missing());
+      return false;
     case Stage::kCollecting:
       break;
   }

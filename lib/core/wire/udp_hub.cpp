@@ -86,8 +86,10 @@ void UdpHub::wait(int timeout_ms) {
 }
 
 void UdpHub::waitFor(const DatagramSource& source, int timeout_ms) {
-  std::array<pollfd, 2> ends{pollfd{wake_fd_, POLLIN, 0}, pollfd{fdOf(source), POLLIN, 0}};
-  poll(ends.data(), ends.size(), timeout_ms);  // interrupted: whatever there is
+  if (timeout_ms != 0) {
+    std::array<pollfd, 2> ends{pollfd{wake_fd_, POLLIN, 0}, pollfd{fdOf(source), POLLIN, 0}};
+    poll(ends.data(), ends.size(), timeout_ms);  // interrupted: whatever there is
+  }
   wait(0);
 }
 
