@@ -1,15 +1,18 @@
-// The floor of ways into X-Plane: nodes that turn sensor_msgs/Joy, or a datagram by way of FlightState, into
-// ControlCommand, or ControlCommand into a datagram, and do nothing else.
+// The floor of ways into X-Plane: nodes that turn sensor_msgs/Joy, or the fence of a simulator in lock-step by way of
+// FlightState, into ControlCommand, or ControlCommand into a datagram or the answer to a fence, and do nothing else.
 //
-//   bench_bare_hops reader PORT STATE_TOPIC
+//   bench_bare_hops reader XPLANE_PORT STATE_TOPIC
 //   bench_bare_hops law STATE_TOPIC COMMAND_TOPIC
 //   bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS
 //   bench_bare_hops sender COMMAND_TOPIC PORT
+//   bench_bare_hops answerer COMMAND_TOPIC XPLANE_PORT
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include <array>
+#include <cstring>
 #include <string>
 
 #include <ros/ros.h>
@@ -17,8 +20,15 @@
 
 #include "xplane_bridge/ControlCommand.h"
 #include "xplane_bridge/FlightState.h"
+#include "xplane_bridge/core/wire/lockstep_hub.hpp"
+#include "xplane_bridge/core/wire/packets.hpp"
 
 namespace {
+
+namespace core = xplane_bridge::core;
+
+constexpr int kFenceRate = 999;
+constexpr timeval kPatience{0, 300'000};  // [s, us] without a fence until it is asked for again
 
 const ros::TransportHints kHints = ros::TransportHints().tcpNoDelay();
 
@@ -35,35 +45,57 @@ void map(char** words) {
   ros::spin();
 }
 
-void send(char** words) {
+sockaddr_in onThisHost(const char* port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(std::stoul(port)));
+  return address;
+}
+
+/// Sends a datagram for each command. @param encode makes it of the command's roll; returns its size [bytes]
+template <typename Encode>
+void send(char** words, const Encode& encode) {
   ros::NodeHandle handle;
   const int out = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  to.sin_port = htons(static_cast<std::uint16_t>(std::stoul(words[1])));
+  const sockaddr_in to = onThisHost(words[1]);
   const auto on_command = [&](const xplane_bridge::ControlCommandConstPtr& command) {
-    sendto(out, &command->roll, sizeof command->roll, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+    std::array<std::uint8_t, core::kDrefSize> datagram;
+    const std::size_t size = encode(command->roll, datagram);
+    sendto(out, datagram.data(), size, 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
   };
   const ros::Subscriber subscriber =
       handle.subscribe<xplane_bridge::ControlCommand>(words[0], 1, on_command, nullptr, kHints);
   ros::spin();
 }
 
+std::size_t encodeNumber(float number, core::ByteSpan datagram) {
+  std::memcpy(datagram.data(), &number, sizeof number);
+  return sizeof number;
+}
+
+std::size_t encodeAnswer(float number, core::ByteSpan datagram) {
+  return *core::encodeDref(datagram, core::kFenceDataref, number);
+}
+
 void read(char** words) {
   ros::NodeHandle handle;
   ros::Publisher publisher = handle.advertise<xplane_bridge::FlightState>(words[1], 1);
-  const int in = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in at{};
-  at.sin_family = AF_INET;
-  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  at.sin_port = htons(static_cast<std::uint16_t>(std::stoul(words[0])));
-  bind(in, reinterpret_cast<const sockaddr*>(&at), sizeof at);
-  float number = 0.0F;
-  while (ros::ok() && recv(in, &number, sizeof number, 0) == sizeof number) {
-    xplane_bridge::FlightState state;
-    state.sim_time = number;
-    publisher.publish(state);
+  const int wire = socket(AF_INET, SOCK_DGRAM, 0);
+  const sockaddr_in to = onThisHost(words[0]);
+  setsockopt(wire, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
+  std::array<std::uint8_t, core::kRrefRequestSize> request;
+  core::encodeRref(request, std::string(core::kFenceDataref) + "[0]", kFenceRate, 0);
+  std::array<std::uint8_t, core::kHeaderSize + core::kRrefPairSize> fence;
+  xplane_bridge::FlightState state;
+  while (ros::ok()) {
+    const ssize_t size = recv(wire, fence.data(), fence.size(), 0);
+    if (size < 0) {
+      sendto(wire, request.data(), request.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+    } else if (static_cast<std::size_t>(size) == fence.size()) {
+      std::memcpy(&state.sim_time, fence.data() + core::kHeaderSize + 4, sizeof state.sim_time);
+      publisher.publish(state);
+    }
   }
 }
 
@@ -88,16 +120,17 @@ int main(int argc, char** argv) {
   if (role == "mapper" && argc == 5) {
     map(argv + 2);
   } else if (role == "sender" && argc == 4) {
-    send(argv + 2);
+    send(argv + 2, encodeNumber);
+  } else if (role == "answerer" && argc == 4) {
+    send(argv + 2, encodeAnswer);
   } else if (role == "reader" && argc == 4) {
     read(argv + 2);
   } else if (role == "law" && argc == 4) {
     command(argv + 2);
   } else {
     ROS_ERROR(
-        "usage: bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS | sender COMMAND_TOPIC PORT | reader PORT "
-        "STATE_TOPIC | "
-        "law STATE_TOPIC COMMAND_TOPIC");
+        "usage: bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS | sender COMMAND_TOPIC PORT | "
+        "reader XPLANE_PORT STATE_TOPIC | law STATE_TOPIC COMMAND_TOPIC | answerer COMMAND_TOPIC XPLANE_PORT");
     return 2;
   }
   return 0;
