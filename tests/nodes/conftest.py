@@ -13,6 +13,7 @@ import pytest
 from support.deadlines import WAIT_S
 from support.interrupts import heed_ctrl_c
 from support.scheduling import long_ones_first, rank
+from support.spare_time import is_further, wait_for_spare_time
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -21,7 +22,8 @@ from xplane_bridge.resources import node_program
 _numbers = itertools.count(1)
 #: Of emulators in real time that are not asked for another: half of xplane_emulator's own takes half the processor.
 FRAMES_PER_SECOND = 30
-#: Tests that take half a minute and more, the longest first, none of which shares what its file has made with others.
+#: Tests that take half a minute and more, none of which shares what its file has made with others; and files that take
+#: a minute and a half.
 LONG = (
     "whole/test_first_day.py::",
     "flights/test_flights.py::",
@@ -31,6 +33,12 @@ LONG = (
     "whole/test_bench.py::",
     "capture/test_labelled_approach.py",
     "capture/test_sender.py::",
+    "rx/test_rx_node.py",
+    "rx/test_rx_link.py",
+    "tx/test_traffic.py",
+    "capture/test_capture_node.py",
+    "tx/test_tx_node.py",
+    "whole/test_doctor.py",
 )
 
 heed_ctrl_c()
@@ -47,16 +55,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank(item.nodeid, LONG))
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> None:
+    """Has processes of pytest-xdist beyond those that always run a test wait for a machine that has time."""
+    workerinput = getattr(item.config, "workerinput", None)
+    if workerinput is not None and is_further(workerinput["workerid"]):
+        wait_for_spare_time()
+
+
 @pytest.fixture(scope="session")
 def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RosMaster]:
-    """A ROS master for the whole run; this process is a node under it."""
+    """A ROS master for the whole run; this process is a node under it.
+
+    To its end: after `rospy.signal_shutdown` a thread of rospy looks for calls on the socket that it has closed, again
+    and again, and takes a processor from the tests of other processes.
+    """
     with RosMaster(tmp_path_factory.mktemp("master")) as running:
         running.use_here()
         import rospy
 
         rospy.init_node("tests", anonymous=True, disable_signals=True)
         yield running
-        rospy.signal_shutdown("tests are over")
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,12 @@
-"""Tests side by side: the long ones begin, each by itself or with its file, and the others stay with their file."""
+"""Tests side by side: the long ones begin, each by itself or with its file, and the others stay with their file.
+
+More processes than the machine can always serve begin with the last ones, while it has time.
+"""
 
 from __future__ import annotations
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -10,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from support import spare_time
 from support.room_table import ROOT
 
 FOLDERS = [ROOT / "tests" / name for name in ("nodes", "python")]
@@ -65,22 +70,78 @@ def test_slow_2(): time.sleep(0.3)
 """
 
 
-def test_long_ones_begin_and_the_others_stay_with_their_file(tmp_path):
-    folder = tmp_path / "side_by_side"
-    folder.mkdir()
-    log = tmp_path / "log"
-    (folder / "conftest.py").write_text(CONFTEST.format(tests=str(ROOT / "tests"), log=str(log)), encoding="utf-8")
-    for name in "abcd":
-        text = FILE if name in "ab" else FILE[: FILE.index("def test_slow_1")]
-        (folder / f"test_{name}.py").write_text(text, encoding="utf-8")
-    command = [sys.executable, "-m", "pytest", "-q", "--numprocesses", "2", "--dist", "loadfile", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.returncode == 0, done.stdout + done.stderr
-    begun = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
-    assert len(begun) == 16
+@pytest.fixture(name="run")
+def fixture_run(tmp_path):
+    """Runs small tests in so many processes on one processor; returns each test and its process, as they began."""
+
+    def run(processes):
+        folder = tmp_path / "side_by_side"
+        folder.mkdir()
+        log = tmp_path / "log"
+        (folder / "conftest.py").write_text(CONFTEST.format(tests=str(ROOT / "tests"), log=str(log)), encoding="utf-8")
+        for name in "abcd":
+            text = FILE if name in "ab" else FILE[: FILE.index("def test_slow_1")]
+            (folder / f"test_{name}.py").write_text(text, encoding="utf-8")
+        one = str(min(os.sched_getaffinity(0)))
+        command = ["taskset", "-c", one, sys.executable, "-m", "pytest", "-q", "--dist", "loadfile", str(folder)]
+        command += ["--numprocesses", str(processes)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+        begun = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
+        assert len(begun) == 16
+        return begun
+
+    return run
+
+
+def test_long_ones_begin_and_the_others_stay_with_their_file(run):
+    begun = run(2)
     assert sorted(test for test, _ in begun[:2]) == [f"side_by_side/test_b.py::test_slow_{k}" for k in (1, 2)]
     assert len({process for _, process in begun[:2]}) == 2, "both at once"
     assert max(k for k, (test, _) in enumerate(begun) if "test_d" in test) < len(begun) - 3
     for name in "abcd":
         others = {process for test, process in begun if f"test_{name}.py" in test and "slow" not in test}
         assert len(others) == 1, begun
+
+
+def test_processes_that_may_have_to_wait_get_the_last_ones(run):
+    begun = run(3)
+    first = {process: test for test, process in reversed(begun)}
+    assert "slow" in first["gw0"]
+    assert "slow" in first["gw1"]
+    assert first["gw2"] == "side_by_side/test_c.py::test_one"
+
+
+@pytest.fixture(name="own_turn")
+def fixture_own_turn(monkeypatch, tmp_path):
+    """Has no test here wait for the processes of a run."""
+    turn = tmp_path / "turn"
+    turn.touch()
+    monkeypatch.setattr(spare_time, "TURN", turn)
+
+
+@pytest.mark.usefixtures("own_turn")
+def test_a_further_test_begins_when_the_processors_have_time_to_spare(monkeypatch):
+    shares = [1.0, 0.9, 0.81, 0.7, 0.1]
+    monkeypatch.setattr(spare_time, "_busy_share", lambda _: shares.pop(0))
+    spare_time.wait_for_spare_time()
+    assert shares == [0.1]
+
+
+@pytest.mark.usefixtures("own_turn")
+def test_a_further_test_begins_also_where_other_work_never_ends(monkeypatch):
+    now = iter(range(0, 10_000, 100))
+    monkeypatch.setattr(spare_time, "_busy_share", lambda _: 1.0)
+    monkeypatch.setattr(spare_time.time, "monotonic", lambda: next(now))
+    spare_time.wait_for_spare_time()
+    assert next(now) > spare_time.PATIENCE_S
+
+
+def test_the_share_is_that_of_all_processors(monkeypatch, tmp_path):
+    file = tmp_path / "stat"
+    # In ticks: user, nice, system, idle, waiting for a disk, interrupts twice, stolen, guests twice.
+    file.write_text("cpu  1000 100 500 8000 200 10 20 30 0 0\ncpu0 1 1 1 1 1 1 1 1 0 0\n", encoding="ascii")
+    later = "cpu  1030 110 515 8030 210 12 23 30 0 0\ncpu0 1 1 1 1 1 1 1 1 0 0\n"
+    monkeypatch.setattr(spare_time, "_STATISTICS", file)
+    monkeypatch.setattr(spare_time.time, "sleep", lambda _: file.write_text(later, encoding="ascii"))
+    assert spare_time._busy_share(1.0) == pytest.approx(0.6)

@@ -67,10 +67,12 @@ def add_picture(bag: FlightBag, painter: Painter, window: Window, k: int, scale:
     bag.add(f"{window.topics}/frame_state", "xplane_bridge/FrameState", stamp_ns(t), frame)
 
 
-def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False) -> None:
+def write_bag(
+    path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False, duration: float = DURATION_S
+) -> None:
     painter = Painter(320, 240, (47.02, 8.0))
     with FlightBag(path) as bag:
-        for k in range(round(DURATION_S * 60)):
+        for k in range(round(duration * 60)):
             t = k / 60
             state = bag.state(t, k)
             state["angular_velocity"] = {"x": roll_and_rate(t, scale)[1], "y": 0.0, "z": 0.0}
@@ -104,7 +106,7 @@ def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.C
 
 def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Path) -> None:
     bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.05), refresh=True)
+    write_bag(bag, Window(0.05), refresh=True, duration=12.0)
     assert main([str(bag), "--json", str(numbers)]) == 0
     assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
 
@@ -113,7 +115,7 @@ def test_of_several_cameras_one_is_measured_about_its_own_line_of_sight(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag, numbers = tmp_path / "two.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.085), belly(0.04))
+    write_bag(bag, Window(0.085), belly(0.04), duration=12.0)
     for arguments, delay in (([], 0.085), (["--camera", "belly"], 0.04)):
         assert main([str(bag), "--json", str(numbers), *arguments]) == 0
         found = json.loads(numbers.read_text())["display_delay"]
@@ -126,7 +128,7 @@ def test_of_several_cameras_one_is_measured_about_its_own_line_of_sight(
 
 def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = tmp_path / "calm.bag"
-    write_bag(bag, Window(0.05), scale=0.01)
+    write_bag(bag, Window(0.05), scale=0.01, duration=12.0)
     assert main([str(bag)]) == 1
     error = capsys.readouterr().err.strip()
     assert "\n" not in error
