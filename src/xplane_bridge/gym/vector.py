@@ -2,7 +2,7 @@
 
 A worker is sent one byte per step and sends one message back, empty but for what cannot be a number in an array: the
 infos of environments whose episode begins or ends. The calling process is a worker too: it would only wait for the
-others, and to be woken costs as much as half a step.
+others, and to be woken costs as much as half a step. Hence who waits for a message first looks for it a while.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ import contextlib
 import multiprocessing
 import os
 import pickle
+import select
+import time
 from multiprocessing.connection import Connection
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -25,10 +27,37 @@ from xplane_bridge.gym.errors import GymError
 _STEP, _RESET, _CLOSE = b"s", b"r", b"c"
 #: How long a worker may take to end by itself [s].
 _PATIENCE_S = 5.0
+#: How long a message is looked for before the process sleeps until it comes [s].
+_LOOK_S = 100e-6
 
 
 class WorkerError(GymError):
     """A worker process has ended, or its environment raised an error."""
+
+
+class _Inbox:
+    """Messages of a connection.
+
+    Args:
+        connection: Theirs.
+        looks: Whether to look for them a while: only where each process has a processor for itself.
+    """
+
+    def __init__(self, connection: Connection, looks: bool) -> None:
+        self._connection, self._look_s = connection, _LOOK_S if looks else 0.0
+        self._ready = select.poll()
+        self._ready.register(connection.fileno(), select.POLLIN)
+
+    def receive(self) -> bytes:
+        """Waits for the next message.
+
+        Raises:
+            EOFError, OSError: The other end is gone.
+        """
+        end = time.perf_counter() + self._look_s
+        while time.perf_counter() < end and not self._ready.poll(0):
+            pass
+        return self._connection.recv_bytes()
 
 
 class _Layout(NamedTuple):
@@ -109,6 +138,7 @@ def _work(
     memory: Mapping[str, Any],
     count: int,
     rows: slice,
+    looks: bool,
     arguments: Dict[str, Any],
 ) -> None:
     """What a worker process does until a message ends it or its parent is gone.
@@ -117,11 +147,12 @@ def _work(
     """
     for other in others:
         other.close()
+    inbox = _Inbox(connection, looks)
     worker = None
     try:
         worker = _Worker(arguments, rows, layout.arrays(memory, count))
         while True:
-            order = connection.recv_bytes()
+            order = inbox.receive()
             if order[:1] == _CLOSE:
                 break
             infos = worker.step() if order[:1] == _STEP else worker.reset(*pickle.loads(order[1:]))
@@ -169,14 +200,17 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         memory = layout.allocate(processes, num_envs)
         self._arrays = layout.arrays(memory, num_envs)
         self._connections: List[Connection] = []
+        self._inboxes: List[_Inbox] = []
         self._processes: List[Any] = []
         self.closed = False
         bounds = np.linspace(0, num_envs, min(workers or os.cpu_count() or 1, num_envs) + 1).astype(int).tolist()
         self._rows = list(zip(bounds, bounds[1:]))
+        looks = len(self._rows) <= len(os.sched_getaffinity(0))
         for first, end in self._rows[:-1]:
             ours, theirs = processes.Pipe()
             self._connections.append(ours)
-            work = (theirs, list(self._connections), layout, memory, num_envs, slice(first, end), arguments)
+            self._inboxes.append(_Inbox(ours, looks))
+            work = (theirs, list(self._connections), layout, memory, num_envs, slice(first, end), looks, arguments)
             process = processes.Process(target=_work, args=work, daemon=True)
             process.start()
             theirs.close()
@@ -253,9 +287,9 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
             raise WorkerError(f"{type(error).__name__}: {error}") from error
         for index, info in own.items():
             infos = self._add_info(infos, info, index)
-        for i, connection in enumerate(self._connections):
+        for i, inbox in enumerate(self._inboxes):
             try:
-                answer = connection.recv_bytes()
+                answer = inbox.receive()
             except (EOFError, OSError):
                 self._fail(i)
             if not answer:
