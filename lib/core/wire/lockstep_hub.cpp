@@ -462,6 +462,7 @@ bool LockstepHub::advance(int timeout_ms) {
       if (--passes_ > 0) return false;
       stage_ = Stage::kCollecting;
       hooks_.end(frame_);
+      if (frameIsComplete()) return true;
       // Who waits by fd() has published its answer, which is not to wait until the next frame is looked for in vain.
       listenTo(missing());
       return false;

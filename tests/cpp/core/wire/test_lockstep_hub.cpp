@@ -260,6 +260,21 @@ TEST_F(LockstepHubTest, LeavesTheNextFrameOfASourceWhereItIs) {
   EXPECT_EQ(steps(2), " begin3 a3 b3 close3");
 }
 
+TEST_F(LockstepHubTest, GoesOnAtOnceWithAFrameThatIsThereBeforeTheAnswer) {
+  takeOff();
+  ready_ = false;
+  fence("a", 2.0F);
+  fence("b", 2.0F);
+  EXPECT_EQ(steps(1), " begin2");
+  value("a", 3.0F);
+  fence("a", 3.0F);
+  fence("b", 3.0F);
+  EXPECT_EQ(steps(2), "");
+  ready_ = true;
+  EXPECT_EQ(steps(1), " close2");
+  EXPECT_EQ(steps(2), " end2 begin3 a3") << "nothing more comes that would wake who waits by the descriptor";
+}
+
 TEST_F(LockstepHubTest, IsBusyFromAFrameToItsAnswerAndFromThatToItsEnd) {
   EXPECT_FALSE(hub_->busy());
   fence("a", 0.0F);
