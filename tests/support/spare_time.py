@@ -14,8 +14,8 @@ from typing import Tuple
 
 #: A further test begins when the processors were busy no longer than this share of so long a time [s].
 BUSY, LOOK_S = 0.8, 0.5
-#: On a machine that other work keeps busy all the time, it begins nevertheless [s].
-PATIENCE_S = 300.0
+#: On a machine that is busy all the time, one begins nevertheless whenever so much has passed [s].
+PATIENCE_S = 20.0
 #: Is locked by the process that looks.
 TURN = Path(__file__)
 _STATISTICS = Path("/proc/stat")
@@ -35,15 +35,15 @@ def wait_for_spare_time() -> None:
 
     Processes look one after the other, so that each sees what the one before has begun.
     """
-    end = time.monotonic() + PATIENCE_S
     with TURN.open("rb") as turn:
         fcntl.flock(turn, fcntl.LOCK_EX)
+        end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end and _busy_share(LOOK_S) > BUSY:
             pass
 
 
 def _busy_share(seconds: float) -> float:
-    """Of all processors, of so long from now [s]."""
+    """Of this process's processors, of so long from now [s]."""
     idle, total = _ticks()
     time.sleep(seconds)
     idle_now, total_now = _ticks()
@@ -51,7 +51,12 @@ def _busy_share(seconds: float) -> float:
 
 
 def _ticks() -> Tuple[int, int]:
-    """Idle time and all time of all processors since the start."""
-    # user, nice, system, idle, waiting for a disk, ... (man 5 proc)
-    ticks = [int(word) for word in _STATISTICS.read_text(encoding="ascii").split("\n", 1)[0].split()[1:9]]
-    return ticks[3] + ticks[4], sum(ticks)
+    """Idle time and all time of these processors since the start."""
+    ours = {f"cpu{number}" for number in os.sched_getaffinity(0)}
+    idle = total = 0
+    for name, *words in map(str.split, _STATISTICS.read_text(encoding="ascii").splitlines()):
+        if name in ours:
+            # user, nice, system, idle, waiting for a disk, ... (man 5 proc)
+            ticks = [int(word) for word in words[:8]]
+            idle, total = idle + ticks[3] + ticks[4], total + sum(ticks)
+    return idle, total

@@ -205,7 +205,7 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         self.closed = False
         bounds = np.linspace(0, num_envs, min(workers or os.cpu_count() or 1, num_envs) + 1).astype(int).tolist()
         self._rows = list(zip(bounds, bounds[1:]))
-        looks = len(self._rows) <= len(os.sched_getaffinity(0))
+        looks = len(self._rows) <= (os.cpu_count() or 1)
         for first, end in self._rows[:-1]:
             ours, theirs = processes.Pipe()
             self._connections.append(ours)
