@@ -12,6 +12,7 @@ from typing import List
 from bench_offline import cpp_program
 from registry import Context, Measure, benchmark
 
+from xplane_bridge.emulator.lockstep import FENCE
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster
 from xplane_bridge.harness.lockstep_flight import Lockstep
 from xplane_bridge.harness.processes import wait_until
@@ -75,17 +76,17 @@ def _bare(context: Context) -> float:
     """Mean wait [s] of the same emulator for three bare roscpp nodes: its frames leave the machine as they do then."""
     folder = context.folder / "bare"
     folder.mkdir(parents=True, exist_ok=True)
-    hops = cpp_program("bench_bare_hops")
+    reader, hops = cpp_program("bench_bare_publisher"), cpp_program("bench_bare_hops")
     with contextlib.ExitStack() as stack:
         emulator = stack.enter_context(EmulatorProcess(folder, _options(context, Lockstep())))
         env = stack.enter_context(RosMaster(folder)).env
-        roles = [
-            ["reader", emulator.port, "/state"],
-            ["law", "/state", "/command"],
-            ["answerer", "/command", emulator.port],
-        ]
-        for role in roles:
-            stack.enter_context(ManagedProcess(f"bare_{role[0]}", [hops, *map(str, role)], folder, env=env))
+        nodes = {
+            "reader": [reader, "/state", emulator.port, f"{FENCE}[0]"],
+            "law": [hops, "law", "/state", "/command"],
+            "answerer": [hops, "answerer", "/command", emulator.port],
+        }
+        for name, command in nodes.items():
+            stack.enter_context(ManagedProcess(f"bare_{name}", list(map(str, command)), folder, env=env))
         return _flown(emulator, context)
 
 

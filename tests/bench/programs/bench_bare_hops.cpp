@@ -1,7 +1,6 @@
-// The floor of ways into X-Plane: nodes that turn sensor_msgs/Joy, or the fence of a simulator in lock-step by way of
-// FlightState, into ControlCommand, or ControlCommand into a datagram or the answer to a fence, and do nothing else.
+// The floor of ways into X-Plane: nodes that turn sensor_msgs/Joy or FlightState into ControlCommand, or ControlCommand
+// into a datagram or the answer to the fence of a simulator in lock-step, and do nothing else.
 //
-//   bench_bare_hops reader XPLANE_PORT STATE_TOPIC
 //   bench_bare_hops law STATE_TOPIC COMMAND_TOPIC
 //   bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS
 //   bench_bare_hops sender COMMAND_TOPIC PORT
@@ -26,9 +25,6 @@
 namespace {
 
 namespace core = xplane_bridge::core;
-
-constexpr int kFenceRate = 999;
-constexpr timeval kPatience{0, 300'000};  // [s, us] without a fence until it is asked for again
 
 const ros::TransportHints kHints = ros::TransportHints().tcpNoDelay();
 
@@ -78,27 +74,6 @@ std::size_t encodeAnswer(float number, core::ByteSpan datagram) {
   return *core::encodeDref(datagram, core::kFenceDataref, number);
 }
 
-void read(char** words) {
-  ros::NodeHandle handle;
-  ros::Publisher publisher = handle.advertise<xplane_bridge::FlightState>(words[1], 1);
-  const int wire = socket(AF_INET, SOCK_DGRAM, 0);
-  const sockaddr_in to = onThisHost(words[0]);
-  setsockopt(wire, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
-  std::array<std::uint8_t, core::kRrefRequestSize> request;
-  core::encodeRref(request, std::string(core::kFenceDataref) + "[0]", kFenceRate, 0);
-  std::array<std::uint8_t, core::kHeaderSize + core::kRrefPairSize> fence;
-  xplane_bridge::FlightState state;
-  while (ros::ok()) {
-    const ssize_t size = recv(wire, fence.data(), fence.size(), 0);
-    if (size < 0) {
-      sendto(wire, request.data(), request.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
-    } else if (static_cast<std::size_t>(size) == fence.size()) {
-      std::memcpy(&state.sim_time, fence.data() + core::kHeaderSize + 4, sizeof state.sim_time);
-      publisher.publish(state);
-    }
-  }
-}
-
 void command(char** words) {
   ros::NodeHandle handle;
   ros::Publisher publisher = handle.advertise<xplane_bridge::ControlCommand>(words[1], 1);
@@ -123,14 +98,12 @@ int main(int argc, char** argv) {
     send(argv + 2, encodeNumber);
   } else if (role == "answerer" && argc == 4) {
     send(argv + 2, encodeAnswer);
-  } else if (role == "reader" && argc == 4) {
-    read(argv + 2);
   } else if (role == "law" && argc == 4) {
     command(argv + 2);
   } else {
     ROS_ERROR(
         "usage: bench_bare_hops mapper JOY_TOPIC COMMAND_TOPIC AXIS | sender COMMAND_TOPIC PORT | "
-        "reader XPLANE_PORT STATE_TOPIC | law STATE_TOPIC COMMAND_TOPIC | answerer COMMAND_TOPIC XPLANE_PORT");
+        "law STATE_TOPIC COMMAND_TOPIC | answerer COMMAND_TOPIC XPLANE_PORT");
     return 2;
   }
   return 0;

@@ -1,7 +1,7 @@
-// The floor of a flight state's way: subscribes to the simulator's time, publishes a FlightState with it for each
-// datagram, and does nothing else.
+// The floor of a flight state's way: subscribes to one dataref, the simulator's time if none is named, publishes a
+// FlightState with its value as time for each datagram, and does nothing else.
 //
-//   bench_bare_publisher TOPIC PORT
+//   bench_bare_publisher TOPIC PORT [DATAREF]
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -25,8 +25,8 @@ constexpr timeval kPatience{0, 300'000};  // [s, us] without a datagram until it
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "bench_bare_publisher", ros::init_options::AnonymousName);
-  if (argc != 3) {
-    ROS_ERROR("usage: bench_bare_publisher TOPIC PORT");
+  if (argc != 3 && argc != 4) {
+    ROS_ERROR("usage: bench_bare_publisher TOPIC PORT [DATAREF]");
     return 2;
   }
   ros::NodeHandle handle;
@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
   const int wire = socket(AF_INET, SOCK_DGRAM, 0);
   setsockopt(wire, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
   std::array<std::uint8_t, xplane_bridge::core::kRrefRequestSize> request;
-  xplane_bridge::core::encodeRref(request, "sim/time/total_running_time_sec", kRateHz, 0);
+  xplane_bridge::core::encodeRref(request, argc == 4 ? argv[3] : "sim/time/total_running_time_sec", kRateHz, 0);
   std::array<std::uint8_t, 2048> datagram;
   xplane_bridge::FlightState state;
   state.header.frame_id = "base_link_frd";
