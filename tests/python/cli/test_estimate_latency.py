@@ -15,7 +15,7 @@ from xplane_bridge.cli.estimate_latency import main
 from xplane_bridge.emulator.view.renderer import Scene
 from xplane_bridge.emulator.view.renderer.painter import Painter
 
-DURATION_S = 25.0
+DURATION_S = 12.0
 _HALF = math.radians(-15.0)
 
 
@@ -67,12 +67,10 @@ def add_picture(bag: FlightBag, painter: Painter, window: Window, k: int, scale:
     bag.add(f"{window.topics}/frame_state", "xplane_bridge/FrameState", stamp_ns(t), frame)
 
 
-def write_bag(
-    path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False, duration: float = DURATION_S
-) -> None:
+def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False) -> None:
     painter = Painter(320, 240, (47.02, 8.0))
     with FlightBag(path) as bag:
-        for k in range(round(duration * 60)):
+        for k in range(round(DURATION_S * 60)):
             t = k / 60
             state = bag.state(t, k)
             state["angular_velocity"] = {"x": roll_and_rate(t, scale)[1], "y": 0.0, "z": 0.0}
@@ -106,7 +104,7 @@ def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.C
 
 def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Path) -> None:
     bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.05), refresh=True, duration=12.0)
+    write_bag(bag, Window(0.05), refresh=True)
     assert main([str(bag), "--json", str(numbers)]) == 0
     assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
 
@@ -115,7 +113,7 @@ def test_of_several_cameras_one_is_measured_about_its_own_line_of_sight(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag, numbers = tmp_path / "two.bag", tmp_path / "delay.json"
-    write_bag(bag, Window(0.085), belly(0.04), duration=12.0)
+    write_bag(bag, Window(0.085), belly(0.04))
     for arguments, delay in (([], 0.085), (["--camera", "belly"], 0.04)):
         assert main([str(bag), "--json", str(numbers), *arguments]) == 0
         found = json.loads(numbers.read_text())["display_delay"]
@@ -128,7 +126,7 @@ def test_of_several_cameras_one_is_measured_about_its_own_line_of_sight(
 
 def test_too_little_motion_is_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = tmp_path / "calm.bag"
-    write_bag(bag, Window(0.05), scale=0.01, duration=12.0)
+    write_bag(bag, Window(0.05), scale=0.01)
     assert main([str(bag)]) == 1
     error = capsys.readouterr().err.strip()
     assert "\n" not in error
