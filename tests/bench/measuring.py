@@ -34,8 +34,8 @@ class Use:
         return total
 
     def cpu_s(self) -> float:
-        """[s] of all its threads."""
-        return self._cpu_s() - self._began
+        """[s] of all its threads; at least the clock's tick, as less is not seen."""
+        return max(self._cpu_s() - self._began, 1.0 / _TICKS)
 
     def cpu_percent(self, elapsed_s: float) -> float:
         """Of one core."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -156,7 +157,7 @@ def module(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], Any]]:
     monkeypatch.syspath_prepend(str(ROOT / "tests" / "bench"))
     yield importlib.import_module
     for name in set(sys.modules) - before:
-        if name == "registry" or name.startswith("bench_"):
+        if name in ("measuring", "registry") or name.startswith("bench_"):
             del sys.modules[name]
 
 
@@ -211,3 +212,10 @@ def test_bags_shows_messages_that_were_not_read(
     monkeypatch.setattr(bags, "_require_rosbag", lambda: None)
     shares = [m for m in measured(bags, "bags", tmp_path, 0.02) if m.name == "messages read / written"]
     assert [(m.value, m.passed) for m in shares] == [(0.5, False)]
+
+
+def test_a_process_that_hardly_ran_has_used_a_tick(module: Callable[[str], Any]) -> None:
+    """Figures divide by what was used."""
+    no_such_process = 2**30
+    use = module("measuring").Use(no_such_process)
+    assert use.cpu_s() == 1.0 / os.sysconf("SC_CLK_TCK")
