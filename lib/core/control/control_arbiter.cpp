@@ -233,6 +233,8 @@ void ControlArbiter::setMode(FlightMode mode, const std::string& who, const std:
 
 void ControlArbiter::forgetCommands(const std::string& reason, double now) {
   advance(now);
+  const bool sent_nothing = !surfacesFly() && std::all_of(origin_.begin(), origin_.end(),
+                                                          [](Origin origin) { return origin == Origin::kNone; });
   for (Source& source : sources_) {
     source.expires.fill(kNever);
     source.alive_until = kNever;
@@ -243,6 +245,7 @@ void ControlArbiter::forgetCommands(const std::string& reason, double now) {
   blending_.reset();
   endSurfaces();
   beginMode();
+  if (sent_nothing) return updateStatus(false);
   status_.reason = reason;
   status_.requested_by.clear();
   status_.request_sequence = 0;

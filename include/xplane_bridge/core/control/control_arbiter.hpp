@@ -138,8 +138,8 @@ class ControlArbiter {
   /// Changes the mode from inside, e.g. by a service; `reason` and `who` are shown on control/mode.
   void setMode(FlightMode mode, const std::string& who, const std::string& reason, double now);
 
-  /// Nothing is sent any more before the next command, as before the first one. The mode stays; `reason` is shown on
-  /// control/mode.
+  /// Nothing is sent any more before the next command, as before the first one. The mode stays; where anything was
+  /// sent, `reason` is shown on control/mode.
   void forgetCommands(const std::string& reason, double now);
 
   /// Advances to `now` and says what to send. Call at the sending rate and right after each accepted command.

@@ -120,6 +120,11 @@ TEST_F(ControlPathTest, ARestartedXPlaneEndsAutoAndIsLeftAlone) {
   EXPECT_EQ(modes.back().mode, FlightMode::kManual);
   EXPECT_EQ(modes.back().reason, "X-Plane was restarted; AUTO is off until it is asked for; MANUAL is not commanded");
   EXPECT_TRUE(writesTo(kStickRoll).empty());
+  setState(LinkState::kLost);  // a busy computer: the new X-Plane's first frames come late
+  flyOn(FlightMode::kAuto, 1.0);
+  setState(LinkState::kConnected);
+  flyOn(FlightMode::kAuto, 1.0);
+  EXPECT_EQ(modes.back().reason.rfind("X-Plane was restarted; AUTO is off", 0), 0u) << modes.back().reason;
 }
 
 TEST_F(ControlPathTest, ARestartThatTookLongIsKnownByTheTimesOfTheFlight) {

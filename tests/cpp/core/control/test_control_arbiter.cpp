@@ -412,6 +412,8 @@ TEST(ControlArbiter, ForgottenCommandsAreAsBeforeTheFirst) {
   EXPECT_TRUE(arbiter.step(1.0).active.none());
   EXPECT_FALSE(arbiter.status().failsafe);
   EXPECT_EQ(arbiter.statistics(kAuto).accepted, 1u);
+  arbiter.forgetCommands("X-Plane is gone again", 2.0);
+  EXPECT_EQ(arbiter.status().reason, "X-Plane is gone") << "why nothing is sent";
 }
 
 TEST(ControlArbiter, AModeThatBeginsWithAFailsafeKeepsItsReason) {
