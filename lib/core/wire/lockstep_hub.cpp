@@ -209,6 +209,7 @@ void LockstepHub::listenTo(const std::shared_ptr<Source>& source) {
 std::vector<std::shared_ptr<LockstepHub::Source>> LockstepHub::sources() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<std::shared_ptr<Source>> out;
+  out.reserve(sources_.size());
   for (const std::weak_ptr<Source>& weak : sources_) {
     if (auto source = weak.lock()) out.push_back(std::move(source));
   }

@@ -39,7 +39,8 @@ std::size_t RequestPacer::urgentAllowance(std::int64_t now_ns, Jitter* jitter) {
   return kUrgentRequests - std::min(used_, kUrgentRequests);
 }
 
-RrefSubscription::RrefSubscription(RrefGroup group) : group_(std::move(group)), entries_(group_.datarefs.size()) {
+RrefSubscription::RrefSubscription(RrefGroup group)
+    : group_(std::move(group)), entries_(group_.datarefs.size()), silent_(entries_.size()) {
   const std::string name = "dataref group '" + group_.name + "': ";
   if (group_.datarefs.empty()) {
     throw std::invalid_argument(name + "it is empty; expected at least one dataref");
@@ -66,6 +67,7 @@ void RrefSubscription::restart(std::int64_t now_ns) {
   for (Entry& entry : entries_) {
     entry = {now_ns, 0, false};
   }
+  silent_ = entries_.size();
   earliest_due_ns_ = now_ns;
 }
 
@@ -101,7 +103,7 @@ std::size_t RrefSubscription::answered(const RrefView& values, std::int64_t now_
       continue;
     }
     Entry& entry = entries_[static_cast<std::size_t>(index)];
-    entry.answered = true;
+    if (!std::exchange(entry.answered, true)) --silent_;
     entry.attempts = 0;
     entry.due_ns = now_ns + patience_ns_;
   }
@@ -110,8 +112,9 @@ std::size_t RrefSubscription::answered(const RrefView& values, std::int64_t now_
 
 std::vector<std::string> RrefSubscription::unanswered() const {
   std::vector<std::string> paths;
+  if (suspended_ || silent_ == 0) return paths;  // asked with every datagram: nearly always so
   for (std::size_t i = 0; i < entries_.size(); ++i) {
-    if (!suspended_ && !entries_[i].answered && entries_[i].attempts >= kUnansweredAttempts) {
+    if (!entries_[i].answered && entries_[i].attempts >= kUnansweredAttempts) {
       paths.push_back(group_.datarefs[i]);
     }
   }

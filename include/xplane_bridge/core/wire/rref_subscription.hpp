@@ -98,6 +98,7 @@ class RrefSubscription {
 
   RrefGroup group_;
   std::vector<Entry> entries_;
+  std::size_t silent_;  // entries that have not answered since restart()
   std::int64_t patience_ns_;
   std::int64_t earliest_due_ns_ = 0;
   bool suspended_ = true;
