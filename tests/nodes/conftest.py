@@ -13,7 +13,7 @@ import pytest
 from support.deadlines import WAIT_S
 from support.interrupts import heed_ctrl_c
 from support.scheduling import long_ones_first, rank
-from support.spare_time import is_further, wait_for_spare_time
+from support.spare_time import running
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -55,12 +55,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank(item.nodeid, LONG))
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_runtest_protocol(item: pytest.Item) -> None:
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Has processes of pytest-xdist beyond those that always run a test wait for a machine that has time."""
     workerinput = getattr(item.config, "workerinput", None)
-    if workerinput is not None and is_further(workerinput["workerid"]):
-        wait_for_spare_time()
+    with contextlib.nullcontext() if workerinput is None else running(workerinput["workerid"]):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ More processes than the machine can always serve begin with the last ones, while
 from __future__ import annotations
 
 import ast
+import contextlib
 import os
 import re
 import subprocess
@@ -15,7 +16,9 @@ from pathlib import Path
 import pytest
 
 from support import spare_time
+from support.deadlines import WAIT_S
 from support.room_table import ROOT
+from xplane_bridge.harness import wait_until
 
 FOLDERS = [ROOT / "tests" / name for name in ("nodes", "python")]
 
@@ -112,29 +115,98 @@ def test_processes_that_may_have_to_wait_get_the_last_ones(run):
     assert first["gw2"] == "side_by_side/test_c.py::test_one"
 
 
-@pytest.fixture(name="own_turn")
-def fixture_own_turn(monkeypatch, tmp_path):
-    """Has no test here wait for the processes of a run."""
-    turn = tmp_path / "turn"
-    turn.touch()
-    monkeypatch.setattr(spare_time, "TURN", turn)
+#: A process with a test that ends when its input does. Arguments: its name, and the share of time that is busy.
+PROCESS = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from support import spare_time
+spare_time.TURN, spare_time.PLACES = Path({turn!r}), Path({places!r})
+name, busy = sys.argv[1], float(sys.argv[2])
+
+def note(what):
+    with Path({log!r}).open("a") as file:
+        file.write(f"{{name}} {{what}}\\n")
+
+def look(seconds):
+    note("looks")
+    spare_time.time.sleep(0.05)
+    return busy
+
+spare_time._busy_share = look
+with spare_time.running(name):
+    note("begins")
+    sys.stdin.read()
+    note("ends")
+"""
 
 
-@pytest.mark.usefixtures("own_turn")
-def test_a_further_test_begins_when_the_processors_have_time_to_spare(monkeypatch):
-    shares = [1.0, 0.9, 0.81, 0.7, 0.1]
-    monkeypatch.setattr(spare_time, "_busy_share", lambda _: shares.pop(0))
-    spare_time.wait_for_spare_time()
-    assert shares == [0.1]
+class Processes:
+    """Such processes on one processor, where two tests always run."""
+
+    def __init__(self, folder):
+        self._log = folder / "log"
+        for name in ("turn", "places", "log"):
+            (folder / name).touch()
+        files = {name: str(folder / name) for name in ("turn", "places", "log")}
+        self._program = PROCESS.format(tests=str(ROOT / "tests"), **files)
+        self._processes = {}
+
+    def start(self, name, busy):
+        one = str(min(os.sched_getaffinity(0)))
+        command = ["taskset", "-c", one, sys.executable, "-c", self._program, name, str(busy)]
+        self._processes[name] = subprocess.Popen(command, stdin=subprocess.PIPE)
+
+    def wait_for(self, line, count=1):
+        wait_until(lambda: self.lines().count(line) >= count, WAIT_S, f"{line}, {count} times")
+
+    def lines(self):
+        return self._log.read_text(encoding="utf-8").splitlines()
+
+    def end(self, name):
+        process = self._processes.pop(name)
+        process.stdin.close()
+        assert process.wait(WAIT_S) == 0
+
+    def close(self):
+        for process in self._processes.values():
+            process.kill()
+            process.wait()
+            process.stdin.close()
 
 
-@pytest.mark.usefixtures("own_turn")
-def test_a_further_test_begins_also_where_other_work_never_ends(monkeypatch):
-    now = iter(range(1000))
-    monkeypatch.setattr(spare_time, "_busy_share", lambda _: 1.0)
-    monkeypatch.setattr(spare_time.time, "monotonic", lambda: next(now))
-    spare_time.wait_for_spare_time()
-    assert next(now) == spare_time.PATIENCE_S + 1
+@pytest.fixture(name="processes")
+def fixture_processes(tmp_path):
+    with contextlib.closing(Processes(tmp_path)) as processes:
+        yield processes
+
+
+def test_on_a_busy_machine_a_further_test_waits_for_the_end_of_another(processes):
+    for name in ("gw0", "gw1"):
+        processes.start(name, busy=1.0)
+        processes.wait_for(f"{name} begins")
+    processes.start("gw2", busy=1.0)
+    processes.wait_for("gw2 looks", count=3)
+    assert "gw2 begins" not in processes.lines()
+    processes.end("gw1")
+    processes.wait_for("gw2 begins")
+
+
+def test_further_tests_begin_while_the_processors_have_time_to_spare(processes):
+    for name in ("gw0", "gw1", "gw2", "gw3"):
+        processes.start(name, busy=0.7)
+        processes.wait_for(f"{name} begins")
+
+
+def test_the_first_processes_wait_for_nobody(processes):
+    for name in ("gw7", "gw8", "gw0", "gw1"):
+        processes.start(name, busy=1.0)
+        processes.wait_for(f"{name} begins")
+    processes.start("gw9", busy=1.0)
+    processes.wait_for("gw9 looks")
+    processes.end("gw0")
+    processes.wait_for("gw9 looks", count=5)
+    assert "gw9 begins" not in processes.lines(), "three still run"
 
 
 def test_the_share_is_that_of_this_process_s_processors(monkeypatch, tmp_path):

@@ -6,18 +6,20 @@ on what runs beside them; more than that, and some answer later than they should
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import time
 from pathlib import Path
-from typing import Tuple
+from typing import Iterator, Tuple
 
 #: A further test begins when the processors were busy no longer than this share of so long a time [s].
 BUSY, LOOK_S = 0.8, 0.5
-#: On a machine that is busy all the time, one begins nevertheless whenever so much has passed [s].
-PATIENCE_S = 20.0
 #: Is locked by the process that looks.
 TURN = Path(__file__)
+#: A byte of it is locked by each test that runs, up to as many as always run. (Closing a file ends all such locks of
+#: the process on it: not that one.)
+PLACES = Path(__file__).with_name("scheduling.py")
 _STATISTICS = Path("/proc/stat")
 
 
@@ -30,16 +32,41 @@ def is_further(worker: str) -> bool:
     return int(worker[2:]) > len(os.sched_getaffinity(0))
 
 
-def wait_for_spare_time() -> None:
-    """Waits until the processors are idle enough for one more test.
+@contextlib.contextmanager
+def running(worker: str) -> Iterator[None]:
+    """Runs a test in the block, which begins when the machine has a place for it.
+
+    On a machine that is busy, however long, so many run side by side as there are processes that do not wait.
+
+    Args:
+        worker: Name of the process that runs it.
+    """
+    with PLACES.open("rb+") as places:
+        if is_further(worker):
+            _wait(places.fileno())
+        else:
+            _take_place(places.fileno())
+        yield  # the place is free with the end of the file
+
+
+def _wait(places: int) -> None:
+    """Until a place is free or the processors are idle enough for one more test.
 
     Processes look one after the other, so that each sees what the one before has begun.
     """
     with TURN.open("rb") as turn:
         fcntl.flock(turn, fcntl.LOCK_EX)
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end and _busy_share(LOOK_S) > BUSY:
+        while not _take_place(places) and _busy_share(LOOK_S) > BUSY:
             pass
+
+
+def _take_place(places: int) -> bool:
+    """Whether there was one."""
+    for place in range(len(os.sched_getaffinity(0)) + 1):
+        with contextlib.suppress(BlockingIOError):
+            fcntl.lockf(places, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+            return True
+    return False
 
 
 def _busy_share(seconds: float) -> float:
