@@ -149,10 +149,12 @@ def test_the_wind_of_before_comes_back_when_the_node_ends(world, end):
 
 
 def test_without_x_plane_nothing_is_accepted(world):
+    from xplane_bridge.srv import SetDisturbance
+
     world.point_to(9)  # no X-Plane there
     world.set_param("aircraft", "fixed_wing")
     world.start("tx_node", tx_params())
-    response = call(world, "disturb", "SetDisturbance", **GUST)
+    response = world.call("tx_node/disturb", SetDisturbance, **GUST)
     assert (response.success, response.result.code) == (False, NO_LINK)
 
 

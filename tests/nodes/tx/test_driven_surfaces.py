@@ -25,6 +25,7 @@ from support.flights.failing_twin import (  # noqa: F401
     fixture_twin,
     fly,
     follows,
+    has_said,
     said,
     wait_ready,
 )
@@ -37,8 +38,8 @@ from support.nodes.tx_fixtures import (
     WatchedDatarefs,
     call,
     journal_entries,
+    take_away,
 )
-from xplane_bridge import protocol
 from xplane_bridge.harness import wait_until
 
 
@@ -46,8 +47,8 @@ def test_override_that_another_client_releases_is_not_taken_again(healthy):
     world, name = healthy, "rudder1_fin1"
     assert fail(world, name, "stuck", 4.0).success
     world.wire.wait(RUDDER, 4.0)
-    type(world).wire(world.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
-    said(world, f"failure of {name} has ended: another client has released the surface override")
+    text = f"failure of {name} has ended: another client has released the surface override"
+    take_away(world, SURFACES, lambda: has_said(world, text))
     wait_until(lambda: not world.state.last.names and not world.state.last.surrogate_mixing, WAIT_S, "an empty state")
     wait_until(lambda: "override:" + SURFACES not in journal_entries(world), WAIT_S, "the journal's entry to go")
     assert world.wire.value(SURFACES) == 0.0
@@ -61,8 +62,8 @@ def test_who_takes_the_stick_from_the_bridge_gets_the_surfaces_too(healthy):
     world.wire.wait(RUDDER, 4.0)
     both = {"override_control_surfaces", "override_joystick_roll"}
     world.wait_for_diagnostics("control", lambda s: both <= set(world.values_of(s)["Overrides set"].split(", ")))
-    type(world).wire(world.xplane.port).send(protocol.DrefWrite("sim/operation/override/override_joystick_roll", 0.0))
-    said(world, f"failure of {name} has ended: another client has released")
+    text = f"failure of {name} has ended: another client has released"
+    take_away(world, "sim/operation/override/override_joystick_roll", lambda: has_said(world, text))
     world.wire.wait(SURFACES, 0.0)
     wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     assert call(world, "set_mode", "SetMode", mode=1).success  # flies on

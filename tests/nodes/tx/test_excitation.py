@@ -5,8 +5,16 @@ from __future__ import annotations
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.tx_fixtures import AUTO, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
-from xplane_bridge import protocol
+from support.nodes.tx_fixtures import (
+    AUTO,
+    ROLL,
+    CommandSource,
+    WatchedDatarefs,
+    call,
+    take_away,
+    tx_params,
+    write_mixing,
+)
 from xplane_bridge.harness import wait_until
 
 OK, ACCEPTED, REFUSED = range(3)
@@ -33,7 +41,7 @@ def twin(new_world, tmp_path_factory):
     world.mode = world.watch("control/mode", ControlMode)
     world.events = world.watch("events", EventList)
     world.set_param("aircraft", "fixed_wing")
-    world.start("tx_node", tx_params())
+    world.start("tx_node", tx_params(command_timeout=5.0))  # a busy machine's source may be silent for a moment
     world.manual = CommandSource(world, "control/manual")
     world.events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events))
     world.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
@@ -167,7 +175,7 @@ def test_a_surface_that_another_client_releases_is_not_taken_again(flown):
     assert began.success, began.result.message
     flown.wire.wait(SURFACES, 1.0)
     wait_until(lambda: abs(flown.wire.value(LEFT)) > 0.3, WAIT_S, "the left aileron to move")
-    type(flown).wire(flown.xplane.port).send(protocol.DrefWrite(SURFACES, 0.0))
+    take_away(flown, SURFACES, lambda: flown.state.last.id == began.id and not flown.state.last.active)
     ended = flown.state.wait_for(lambda s: s.id == began.id and not s.active)
     assert ended.result == "aborted: another client has released the surface override"
     flown.wire.wait(SURFACES, 0.0)

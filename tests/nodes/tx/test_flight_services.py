@@ -335,6 +335,8 @@ def test_weather_that_was_to_end_with_the_node_does(world, end):
 
 
 def test_without_x_plane_nothing_is_accepted(world):
+    from xplane_bridge import srv
+
     world.point_to(9)  # no X-Plane there
     world.set_param("aircraft", "fixed_wing")
     world.start("tx_node", tx_params())
@@ -343,7 +345,7 @@ def test_without_x_plane_nothing_is_accepted(world):
         ("set_wind", "SetWind", {"speed": 5.0}),
         ("load_aircraft", "LoadAircraft", {"path": "a/b.acf"}),
     ):
-        response = call(world, service, kind, **request)
+        response = world.call(f"tx_node/{service}", getattr(srv, kind), **request)
         assert (response.success, response.result.code) == (False, NO_LINK)
 
 

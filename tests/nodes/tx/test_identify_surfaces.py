@@ -29,7 +29,7 @@ def fly(world, *options):
     world.mode = world.watch("control/mode", ControlMode)
     world.signals = world.watch("excitation/state", ExcitationState)
     world.set_param("aircraft", "fixed_wing")
-    world.start("tx_node", tx_params())
+    world.start("tx_node", tx_params(command_timeout=5.0))  # a busy machine's law may be silent for a moment
     world.events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events))
     wait_until(lambda: world.wire.value(HEIGHT) == world.wire.value(HEIGHT), WAIT_S, "X-Plane's answers")
     return world

@@ -180,7 +180,8 @@ def test_killed_in_the_middle_of_a_reset_it_leaves_xplane_running(tx, world):
     node = tx("--version", "12")
     paused = "sim/time/paused"
     wire = WatchedDatarefs(world.xplane.port, paused)
-    place = {"latitude": 47.5, "longitude": 8.5, "altitude_msl": 900.0, "true_airspeed": 60.0}
+    # X-Plane never shows such a height, so tx_node still waits for it, with X-Plane paused, when it is killed.
+    place = {"latitude": 47.5, "longitude": 8.5, "altitude_msl": -400.0, "true_airspeed": 60.0}
     assert call(world, "reset_flight", "ResetFlight", **place).success
     wire.wait(paused, 1.0)
     node.send_signal(signal.SIGKILL)
@@ -266,6 +267,7 @@ def test_release_overrides_stops_a_node_that_flies_until_a_mode_is_asked_for(tx,
     world.events.wait_for(lambda e: "override_joystick_roll was released by another client" in e.events[-1].text)
     reported = world.events.wait_for(lambda e: "nothing is sent any more" in e.events[-1].text)
     assert "ask for a mode" in reported.events[-1].text
+    world.wait_for_diagnostics("control", lambda s: s.level == 1)  # by then what was under way has come
     count = len(world.applied.messages)
     for _ in range(2):  # longer than overrides take to be sent again, with commands coming all the time
         status = world.wait_for_diagnostics("control", lambda s: s.level == 1)

@@ -50,8 +50,8 @@ class SurfaceSource:
 
 
 @pytest.fixture
-def flight(world):
-    """The left aileron held at 4 deg by control/surfaces, the stick by control/auto."""
+def flight(world, request):
+    """The left aileron held at 4 deg by control/surfaces, the stick by control/auto; parameters as a test wants."""
     from xplane_bridge.msg import EventList
 
     write_mixing(world)
@@ -61,8 +61,9 @@ def flight(world):
     world.seen = WatchedDatarefs(world.xplane.port, SURFACES, OVERRIDE, STICK, LEFT)
     world.events = world.watch("events", EventList)
     world.set_param("aircraft", "fixed_wing")
-    world.set_param("lost_after", 1.0)
-    world.start("tx_node", tx_params())
+    wanted = {"lost_after": 1.0, "command_timeout": 0.5, **getattr(request, "param", {})}
+    world.set_param("lost_after", wanted["lost_after"])
+    world.start("tx_node", tx_params(command_timeout=wanted["command_timeout"]))
     world.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
     assert call(world, "set_mode", "SetMode", mode=AUTO).success
     world.controller = CommandSource(world, "control/auto")
@@ -95,7 +96,12 @@ def texts(world):
     return [event.text for event in world.events.last.events]
 
 
+# Long enough for a busy machine to be late with everything by some seconds.
+@pytest.mark.parametrize("flight", [{"lost_after": 10.0, "command_timeout": 5.0}], indirect=True)
 def test_stale_keeps_what_is_held(flight):
+    taken = OVERRIDE.rpartition("/")[2]
+    wait_until(lambda: any(t.startswith("overrides: set") and taken in t for t in texts(flight)), WAIT_S, taken)
+    wait_until(lambda: any("the surfaces are driven" in t for t in texts(flight)), WAIT_S, "driven surfaces")
     before = texts(flight)
     gap(flight, "STALE")
     go_on(flight)

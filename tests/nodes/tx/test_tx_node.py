@@ -111,8 +111,12 @@ def test_stick_takes_over(tx, world):
     world.manual.fly(roll=0.6)
     mode = world.mode.then_wait_for(lambda m: m.mode == MANUAL)
     assert mode.reason.startswith("stick take-over")
-    log = world.events.wait_for(lambda e: sum(event.kind == MODE for event in e.events) == 2)
-    reported = [(e.text.split(":")[0], e.requested_by) for e in log.events if e.kind == MODE]
+
+    def changes(log):  # a busy machine's source may be silent for long enough to be taken as failed
+        return [event for event in log.events if event.kind == MODE and "failsafe" not in event.text]
+
+    log = world.events.wait_for(lambda e: len(changes(e)) == 2)
+    reported = [(e.text.split(":")[0], e.requested_by) for e in changes(log)]
     assert reported == [("AUTO", "test"), ("MANUAL", "control/manual")]
     world.wire.wait(STICK, 0.6)
 
@@ -295,7 +299,8 @@ def test_a_failsafe_is_an_event_and_a_warning(tx, world):
     world.auto.fly(roll=0.2)
     world.events.then_wait_for(lambda e: e.events[-1].text == "AUTO: the failsafe ends: control/auto is back")
     warned = [line for line in node.output().splitlines() if "failsafe" in line and "WARN" in line]
-    assert len(warned) == 2, node.output()
+    assert any("timeout of control/auto" in line for line in warned), node.output()
+    assert any("the failsafe ends" in line for line in warned), node.output()
 
 
 def test_restarted_xplane_is_left_alone_without_commands(tx, world):

@@ -120,6 +120,11 @@ def follows(wire, aileron):
     return wire.value(aileron) == pytest.approx(15.0 * down if down > 0.0 else 25.0 * down, abs=0.02)
 
 
+def has_said(world, text):
+    """Whether an event with this text has come since the node started."""
+    return any(text in event.text for message in world.events.messages for event in message.events)
+
+
 def said(world, text):
     """An event with this text has come since the node started."""
     return world.events.wait_for(lambda e: any(text in event.text for event in e.events), what=f"event '{text}'")

@@ -8,8 +8,9 @@ from __future__ import annotations
 import json
 import math
 import threading
+import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Callable
 
 from support.deadlines import WAIT_S
 from xplane_bridge import protocol
@@ -35,17 +36,29 @@ class WatchedDatarefs:
     def __init__(self, port: int, *paths: str) -> None:
         self.paths = list(paths)
         self._client = XPlaneClient(port)
-        self._client.subscribe(self.paths, rate_hz=50, first_index=0)
         self._known: dict[int, float] = {}
+        self._asked = -math.inf
+        self._ask()
+
+    def _ask(self) -> None:
+        """For what has not answered, once a second: X-Plane drops requests of which too many come at once."""
+        if time.monotonic() < self._asked + 1.0:
+            return
+        self._asked = time.monotonic()
+        for index, path in enumerate(self.paths):
+            if index not in self._known:
+                self._client.subscribe([path], rate_hz=50, first_index=index)
 
     def value(self, path: str) -> float:
         """The newest value; nan before the first."""
+        self._ask()
         self._known.update(self._client.values())
         return self._known.get(self.paths.index(path), math.nan)
 
     def history(self, path: str) -> list[float]:
         """Its values that came since one was last asked for, of whatever path."""
         found = []
+        self._ask()
         for packet in self._client.received():
             values = dict(protocol.decode_rref_response(packet))
             self._known.update(values)
@@ -167,11 +180,33 @@ def journal_entries(world: Any) -> list[str]:
     return entries
 
 
+def take_away(world: Any, path: str, seen: Callable[[], Any]) -> None:
+    """Another client gives an override back until that is seen: the bridge's own refresh may come right after it."""
+    wire = type(world).wire(world.xplane.port)
+
+    def again() -> Any:
+        wire.send(protocol.DrefWrite(path, 0.0))
+        return seen()
+
+    wait_until(again, WAIT_S, f"what follows when another client gives {path} back")
+
+
 def call(world: Any, service: str, kind: str, /, **request: Any) -> Any:
-    """Calls one of tx_node's services, of a type of xplane_bridge.srv."""
+    """Calls one of tx_node's services, of a type of xplane_bridge.srv.
+
+    Again where it is refused for want of a link, which it is whenever the emulator's frames are late.
+    """
     import xplane_bridge.srv
 
-    return world.call(f"tx_node/{service}", getattr(xplane_bridge.srv, kind), **request)
+    answers = []
+
+    def answered() -> bool:
+        answers.append(world.call(f"tx_node/{service}", getattr(xplane_bridge.srv, kind), **request))
+        # What this one clears is cleared without a link, too; there is nothing to clear the second time.
+        return kind == "ClearFailures" or answers[-1].result.code != answers[-1].result.NO_LINK
+
+    wait_until(answered, WAIT_S, f"a link to X-Plane for {service}")
+    return answers[-1]
 
 
 #: How the emulator's twin moves its surfaces (docs/emulator.md), by hand: 15 deg down and 25 up, 13 and 18, 27.
