@@ -40,6 +40,8 @@ ATTEMPTS = 6  # on a busy machine pictures come late, and then it says that it h
 PIPELINE_DELAY_S = 0.15
 #: A picture that appeared this much off its time, as the machine was busy, says nothing about the pairing.
 LATE_S = 0.2 / FPS
+#: Of a delay that was measured while pictures may come late.
+MEASURED_WITHIN_S = 0.025
 
 
 class Relay:
@@ -125,10 +127,14 @@ class Scene:
         return ManagedProcess("xplane_eye", [program("xplane_eye"), *where, *own, *options], self.folder)
 
     def judged(self) -> list:
-        """State and strip of each picture that the emulator showed when it was due; ends the emulator."""
+        """`punctual` ones of all pictures; ends the emulator."""
         self.emulator.stop()
+        return self.punctual()
+
+    def punctual(self) -> list:
+        """State and strip of each picture so far that the emulator showed when it was due."""
         delays = display_delays(self.folder / "swaps.csv")
-        by_stamp = {state.header.stamp: state for state in self.states.messages}
+        by_stamp = {state.header.stamp: state for state in list(self.states.messages)}
         pairs = []
         for image in list(self.images.messages):
             shown = read_strip(np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3))
@@ -173,16 +179,21 @@ def measure(scene: Scene) -> str:
 
 def test_regular_frames_and_a_delay_of_three_periods_are_paired_exactly(scene: Scene) -> None:
     import cv2
+    from xplane_bridge.msg import FrameState
 
     with scene.eye() as eye:
         if eye.wait_for_line(r"delay: (\d+\.\d ms, from|not measured)", 90.0).group(1) == "not measured":
             measure(scene)
         scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
-        scene.images.wait_for_count(80, timeout=60.0)
+        for _ in range(ATTEMPTS):  # a busy machine shows few when they are due
+            scene.images.wait_for_count(80, timeout=60.0)
+            if sum(state.quality == 0 for state, _ in scene.punctual()) >= 30:
+                break
         jpegs, images = scene.jpegs.messages[-20:], {image.header.stamp: image for image in scene.images.messages}
         pairs = scene.judged()
     check_exact(pairs, 30)
-    assert [state.display_delay for state, _ in pairs] == pytest.approx([PIPELINE_DELAY_S] * len(pairs), abs=LATE_S)
+    measured = [s.display_delay for s, _ in pairs if not s.quality & FrameState.QUALITY_DELAY_ASSUMED]
+    assert measured == pytest.approx([PIPELINE_DELAY_S] * len(measured), abs=MEASURED_WITHIN_S)
     compared = 0
     for jpeg in jpegs:  # image_raw is what the sender's own JPEG decodes to
         if jpeg.header.stamp in images:
@@ -274,7 +285,7 @@ def test_the_delay_is_measured_on_request_without_a_restart_but_not_in_a_recordi
             message = measure(scene)
             assert re.match(r"\d+\.\d ms, from \d+ steps that lie", message)
             delay = float(message.split()[0]) * 1e-3
-            assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.025)
+            assert delay == pytest.approx(PIPELINE_DELAY_S, abs=MEASURED_WITHIN_S)
             sure = scene.states.wait_for_next(
                 lambda s: not s.quality & FrameState.QUALITY_DELAY_ASSUMED, timeout=WAIT_S
             )

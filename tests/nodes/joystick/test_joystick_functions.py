@@ -15,6 +15,7 @@ PAUSED, FLIGHT = "sim/time/paused", "sim/time/total_flight_time_sec"
 ENGINE = "sim/operation/failures/rel_engfai0"
 STICK = {
     "device": "a stick with buttons",
+    "joy_timeout": 10.0,  # a busy machine's stick may be silent for a moment
     "direct": {"roll": {"axis": 0}, "pitch": {"axis": 1}},
     "surfaces": {
         "aileron1_wing2_left": {"axis": 2, "select_button": 0, "low": -25.0, "high": 15.0, "dead_zone": 0.0},

@@ -77,6 +77,7 @@ def test_trigger_asks_for_the_other_mode_once_a_press(world, mapper):
 
     stick = mapper("logitech_extreme_3d_pro", axes=6, buttons=12)
     world.commands.wait_for()
+    wait_until(lambda: world.requests.connected, WAIT_S, "the topic of requests")
     stick.buttons[0] = 1
     request = world.requests.wait_for()
     assert request.mode == 2

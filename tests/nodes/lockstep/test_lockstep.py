@@ -150,7 +150,7 @@ def test_a_flight_is_the_same_bytes_under_random_stops(new_world, tmp_path):
 
 
 def test_a_participant_that_dies_ends_the_run_by_name(world):
-    _, _, tx_node = start(world, watchdog=2.0, hold=False)
+    _, _, tx_node = start(world, watchdog=15.0, hold=False)
     controller = start_controller(world, 30)
     try:
         wait_until(lambda: not tx_node.running, 60, "end of tx_node")
@@ -223,6 +223,7 @@ def test_the_controllers_of_the_page_answer_every_frame(new_world, tmp_path, lan
         start(world)
         with example(world, language):
             states, commands = world.watch("flight_state", FlightState), world.watch("control/auto", ControlCommand)
+            wait_until(lambda: states.connected and commands.connected, WAIT_S, "both topics")
             assert step(world, 60).flown == 60
             states.wait_for(lambda state: state.frame_count == 60)
             wait_until(lambda: len(commands.messages) == 60, WAIT_S, "60 commands")

@@ -123,6 +123,7 @@ def test_a_simulator_that_does_not_wait_is_stepped_by_its_pause(world):
     after = wire.read(RUNNING_TIME)
     assert answer.flown >= 30
     assert answer.sim_time == pytest.approx(after, abs=1e-4)
-    assert answer.flown == pytest.approx(60.0 * (after - before), abs=0.5)
+    # A busy machine's frames are longer; X-Plane's are never longer than 1/19.9 s.
+    assert 19.9 * (after - before) - 1 <= answer.flown <= 60.0 * (after - before) + 1
     assert world.call("lockstep/run", Trigger).success
     assert wire.read(PAUSED) == 0.0

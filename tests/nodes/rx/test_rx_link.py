@@ -32,15 +32,20 @@ def wait_for_link(world, name):
 # --- whatever X-Plane does --------------------------------------------------------------------------------------------
 
 
-@both_transports
-def test_bridge_first(world, rx):
+def rx_before_emulator(world, rx, *options):
+    """Starts an emulator whose options count from its start, once rx_node looks for it."""
     port = free_udp_port()
     world.point_to(port)
     rx()
     link = wait_for_link(world, "SEARCHING")
     assert link.reason
     assert not world.states.messages
-    world.emulator(*KINEMATIC, port=port)
+    world.emulator(*options, port=port)
+
+
+@both_transports
+def test_bridge_first(world, rx):
+    rx_before_emulator(world, rx, *KINEMATIC)
     wait_for_link(world, "CONNECTED")
     world.states.wait_for(lambda state: state.valid == ALL_VALID)
 
@@ -61,8 +66,7 @@ def test_search_in_vain_is_said_on_the_console_in_link_state_and_in_diagnostics(
 
 @both_transports
 def test_no_flight_loaded_yet(world, rx):
-    world.emulator(*KINEMATIC, "--load-time", 6)
-    rx()
+    rx_before_emulator(world, rx, *KINEMATIC, "--load-time", 6)
     world.wait_for_diagnostics("flight state", lambda s: "no flight is loaded" in s.message)
     assert not world.states.messages
     state = world.states.wait_for(timeout=WAIT_S)
@@ -156,8 +160,7 @@ def test_another_aircraft_is_reported_and_starts_an_epoch(world, rx):
 
 @both_transports
 def test_gap_of_seconds_is_survived(world, rx):
-    world.emulator(*KINEMATIC, "--fault", "freeze=2s@8")
-    rx()
+    rx_before_emulator(world, rx, *KINEMATIC, "--fault", "freeze=2s@8")
     wait_for_link(world, "STALE")
     wait_for_link(world, "CONNECTED")
     state = world.states.wait_for_next(lambda s: s.valid == ALL_VALID)

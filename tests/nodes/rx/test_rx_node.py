@@ -205,9 +205,9 @@ def test_max_publish_rate_thins_evenly(world, rx):
     world.emulator(*KINEMATIC, "--fps", 60)
     rx(max_publish_rate=20)
     states = world.states.wait_for_count(40, WAIT_S)
-    counts = np.diff([state.frame_count for state in states])
-    assert counts.mean() == pytest.approx(3.0, abs=0.2)
-    assert counts.min() >= 2
+    assert np.median(np.diff([state.frame_count for state in states])) == 3
+    took = (states[-1].header.stamp - states[0].header.stamp).to_sec()
+    assert took > 39 * 0.05 - 0.06, "more than 20 a second"
 
 
 def test_transforms(world, rx):
@@ -243,10 +243,11 @@ def test_wind_comes_slower(world, rx):
     world.emulator(*KINEMATIC, "--wind", "270/10")
     wind = world.watch("wind", TwistWithCovarianceStamped)
     rx(rates={"wind": 5})
-    first, second = wind.wait_for_count(2)
+    first, *later = wind.wait_for_count(10)
     assert first.header.frame_id == "map"
     assert (first.twist.twist.linear.x, first.twist.twist.linear.y) == pytest.approx((10.0, 0.0), abs=0.01)
-    assert (second.header.stamp - first.header.stamp).to_sec() == pytest.approx(0.2, abs=0.05)
+    periods = np.diff([message.header.stamp.to_sec() for message in (first, *later)])
+    assert np.median(periods) == pytest.approx(0.2, abs=0.05)
 
 
 def test_position_from_plane_connect(world, rx):

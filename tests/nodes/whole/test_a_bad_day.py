@@ -62,8 +62,9 @@ def test_a_controller_and_x_plane_die_and_the_recording_says_so(world) -> None:
     drifted = flies_for(state, 10.0)
     assert max(abs(later.altitude_msl - height) for later in drifted) < 60.0
 
+    mode.skip_to_now()
     xplane.restart()
-    off = mode.wait_for_next(lambda m: m.mode == MANUAL, WAIT_S)
+    off = mode.then_wait_for(lambda m: m.mode == MANUAL, WAIT_S)
     assert off.reason.startswith("X-Plane was restarted")
     state.wait_for_next(timeout=WAIT_S)
     flies_for(state, 5.0)
