@@ -198,7 +198,7 @@ def test_further_tests_begin_while_the_processors_have_time_to_spare(processes):
         processes.wait_for(f"{name} begins")
 
 
-def test_the_first_processes_wait_for_nobody(processes):
+def test_the_first_processes_do_not_wait(processes):
     for name in ("gw7", "gw8", "gw0", "gw1"):
         processes.start(name, busy=1.0)
         processes.wait_for(f"{name} begins")
