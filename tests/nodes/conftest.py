@@ -12,6 +12,7 @@ import pytest
 
 from support.deadlines import WAIT_S
 from support.interrupts import heed_ctrl_c
+from support.nodes.connections import is_connected
 from support.scheduling import long_ones_first, rank
 from support.spare_time import running
 from xplane_bridge import protocol
@@ -107,7 +108,7 @@ class TopicLog:
     @property
     def connected(self) -> bool:
         """Whether there is a publisher whose messages come from now on."""
-        return bool(self._subscriber.get_num_connections())
+        return is_connected(self._subscriber)
 
     @property
     def last(self) -> Any:

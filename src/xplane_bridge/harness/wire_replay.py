@@ -147,9 +147,13 @@ class WireReplay:
         subscribers = []
         for topic, _ in topics:
             subscribers.append(rospy.Subscriber(topic, rospy.AnyMsg, self._take, topic, tcp_nodelay=True))
-        wait_until(
-            lambda: all(each.get_num_connections() > 0 for each in subscribers), _READY_S, "connection to all topics"
-        )
+
+        def connected() -> bool:
+            # As the node has it: rospy counts a connection that it has only begun to make.
+            sent = self._sent(master)
+            return all(topic in sent for topic, _ in topics)
+
+        wait_until(connected, _READY_S, "connection to all topics")
         return subscribers
 
     @staticmethod
@@ -169,15 +173,19 @@ class WireReplay:
 
     def _has_all(self, master: RosMaster) -> bool:
         """Whether as much has come on each topic as the node says it has sent here."""
+        sent = self._sent(master)
+        with self._lock:
+            return all(self._counts.get(topic, 0) >= count for topic, count in sent.items())
+
+    def _sent(self, master: RosMaster) -> Dict[str, int]:
+        """How many messages the node says it has sent, of each topic that has a subscriber."""
         with xmlrpc.client.ServerProxy(master.uri) as api:
             where: Any = api.lookupNode(_CALLER, self._start.node)
         with xmlrpc.client.ServerProxy(where[2]) as slave:
             stats: Any = slave.getBusStats(_CALLER)
         # roscpp answers without the status code and its text.
         published: Any = stats[2][0] if isinstance(stats[0], int) else stats[0]
-        sent = {topic: max((row[3] for row in rows), default=0) for topic, rows in published if not _left_out(topic)}
-        with self._lock:
-            return all(self._counts.get(topic, 0) >= count for topic, count in sent.items())
+        return {topic: max(row[3] for row in rows) for topic, rows in published if rows and not _left_out(topic)}
 
     def _param(self, master: RosMaster, key: str) -> Any:
         with xmlrpc.client.ServerProxy(master.uri) as api:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from support.deadlines import WAIT_S
+from support.nodes.connections import is_connected
 from support.nodes.tx_fixtures import tx_params
 from xplane_bridge.harness.processes import ManagedProcess, wait_until
 
@@ -39,7 +40,7 @@ class Recording:
             )
 
     def connected(self):
-        return all(subscriber.get_num_connections() > 0 for subscriber in self._subscribers)
+        return all(map(is_connected, self._subscribers))
 
     def wait_for(self, topic, count):
         wait_until(lambda: len(self.payloads[topic]) >= count, WAIT_S, f"{count} messages on {topic}")
