@@ -23,13 +23,18 @@ PLACES = Path(__file__).with_name("scheduling.py")
 _STATISTICS = Path("/proc/stat")
 
 
+def _always() -> int:
+    """How many processes always run tests."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 def is_further(worker: str) -> bool:
     """Whether a process of pytest-xdist comes behind those that always run tests, one more than there are processors.
 
     Args:
         worker: Its name: "gw0" and so on.
     """
-    return int(worker[2:]) > len(os.sched_getaffinity(0))
+    return int(worker[2:]) >= _always()
 
 
 @contextlib.contextmanager
@@ -62,7 +67,7 @@ def _wait(places: int) -> None:
 
 def _take_place(places: int) -> bool:
     """Whether there was one."""
-    for place in range(len(os.sched_getaffinity(0)) + 1):
+    for place in range(_always()):
         with contextlib.suppress(BlockingIOError):
             fcntl.lockf(places, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
             return True

@@ -8,7 +8,14 @@ import struct
 
 import pytest
 
-from support.nodes.wire_replays import RawTopics, assert_same_values, by_number, payloads_in, replay, states_by_time
+from support.nodes.wire_replays import (
+    RawTopics,
+    assert_replayed,
+    assert_same_values,
+    payloads_in,
+    replay,
+    states_by_time,
+)
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.capture import Capture
@@ -75,9 +82,7 @@ def test_the_replay_is_the_flight_byte_for_byte(flight):
     assert " 0 otherwise than recorded" in done.stdout
     replayed = payloads_in(bag)
     for topic in (f"{namespace}/{name}" for name in TOPICS):
-        # By number: a busy machine's subscriber may miss some; the replay's does not.
-        there, here = by_number(live[topic]), by_number(replayed[topic])
-        assert {number: here.get(number) for number in there} == there, topic
+        assert_replayed(live[topic], replayed[topic], topic)
     # Its own summary says the same.
     line = next(line for line in done.stdout.splitlines() if line.startswith(f"{namespace}/flight_state "))
     digest = hashlib.sha256()

@@ -8,7 +8,7 @@ import pytest
 
 from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import AUTO, PITCH, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
-from support.nodes.wire_replays import RawTopics, by_number, payloads_in, replay
+from support.nodes.wire_replays import RawTopics, assert_replayed, by_number, payloads_in, replay
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.own_log import OwnLog
@@ -147,8 +147,7 @@ def test_the_replay_sends_the_flights_datagrams(flight):
     assert " 0 otherwise than recorded" in done.stdout
     replayed = payloads_in(bag)
     for topic in (f"{namespace}/{name}" for name in TOPICS):
-        there, here = by_number(live[topic]), by_number(replayed[topic])
-        assert {number: here.get(number) for number in there} == there, topic
+        assert_replayed(live[topic], replayed[topic], topic)
     # Of the list of events only the newest waits for a slow subscriber.
     there, here = (by_number(topics[f"{namespace}/events"]) for topics in (live, replayed))
     assert max(there) == max(here)

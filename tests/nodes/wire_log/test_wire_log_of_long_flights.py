@@ -7,7 +7,14 @@ import sys
 
 import pytest
 
-from support.nodes.wire_replays import RawTopics, assert_same_values, by_number, payloads_in, replay, states_by_time
+from support.nodes.wire_replays import (
+    RawTopics,
+    assert_replayed,
+    assert_same_values,
+    payloads_in,
+    replay,
+    states_by_time,
+)
 from xplane_bridge.harness import EmulatorProcess
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.resources import program
@@ -101,9 +108,7 @@ def test_a_flight_with_drops_a_restart_and_another_version_replays(world, second
     assert " 0 otherwise than recorded" in done.stdout
     replayed = payloads_in(bag)
     for topic, payloads in heard.payloads.items():
-        there, here = by_number(payloads), by_number(replayed[topic])
-        assert there
-        assert {number: here.get(number) for number in there} == there, topic
+        assert_replayed(payloads, replayed[topic], topic)
     # A busy machine's subscriber may miss some; the replay's does not.
     assert len(replayed[states]) > 0.8 * flown
     assert len(heard.payloads[states]) > 0.5 * flown

@@ -82,6 +82,13 @@ def by_number(messages: Sequence[bytes]) -> dict[int, bytes]:
     return {struct.unpack_from("<I", message)[0]: message for message in messages}
 
 
+def assert_replayed(live: Sequence[bytes], replayed: Sequence[bytes], topic: str) -> None:
+    """Each message that was heard is in the replay; a busy machine's subscriber may have missed some."""
+    there, here = by_number(live), by_number(replayed)
+    assert there, topic
+    assert {number: here.get(number) for number in there} == there, topic
+
+
 def states_by_time(payloads: list[bytes]) -> dict[float, Any]:
     """Flight states by simulator time; of the same time in both runs of X-Plane, the first."""
     from xplane_bridge.msg import FlightState
