@@ -205,7 +205,9 @@ def test_max_publish_rate_thins_evenly(world, rx):
     world.emulator(*KINEMATIC, "--fps", 60)
     rx(max_publish_rate=20)
     states = world.states.wait_for_count(40, WAIT_S)
-    assert np.median(np.diff([state.frame_count for state in states])) == 3
+    counts = np.diff([state.frame_count for state in states])
+    assert np.median(counts) == 3
+    assert np.mean(abs(counts - 3) <= 1) >= 0.9, counts  # a busy machine's frame may be late
     took = (states[-1].header.stamp - states[0].header.stamp).to_sec()
     assert took > 39 * 0.05 - 0.06, "more than 20 a second"
 

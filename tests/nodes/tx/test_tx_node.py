@@ -298,9 +298,14 @@ def test_a_failsafe_is_an_event_and_a_warning(tx, world):
     assert begun.events[-1].kind == MODE
     world.auto.fly(roll=0.2)
     world.events.then_wait_for(lambda e: e.events[-1].text == "AUTO: the failsafe ends: control/auto is back")
-    warned = [line for line in node.output().splitlines() if "failsafe" in line and "WARN" in line]
-    assert any("timeout of control/auto" in line for line in warned), node.output()
-    assert any("the failsafe ends" in line for line in warned), node.output()
+
+    def warned():
+        return sum("failsafe" in line and "WARN" in line for line in node.output().splitlines())
+
+    def failsafes():  # two, and two more whenever a busy machine's source is silent for too long
+        return sum("failsafe" in event.text for event in world.events.last.events)
+
+    wait_until(lambda: warned() == failsafes() >= 2, WAIT_S, "a warning for each event")
 
 
 def test_restarted_xplane_is_left_alone_without_commands(tx, world):
