@@ -14,7 +14,6 @@ from support.deadlines import WAIT_S
 from support.interrupts import heed_ctrl_c
 from support.nodes.connections import is_connected
 from support.scheduling import long_ones_first, rank
-from support.spare_time import running
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -54,14 +53,6 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts long tests first."""
     items.sort(key=lambda item: rank(item.nodeid, LONG))
-
-
-@pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Has processes of pytest-xdist beyond those that always run a test wait for a machine that has time."""
-    workerinput = getattr(item.config, "workerinput", None)
-    with contextlib.nullcontext() if workerinput is None else running(workerinput["workerid"]):
-        yield
 
 
 @pytest.fixture(scope="session")

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import Any, Sequence
 
-from support.spare_time import is_further
-
 
 def rank(nodeid: str, long: Sequence[str]) -> int:
     """The number of the name that a test has; as many as there are names when it has none of them.
@@ -24,8 +22,6 @@ def rank(nodeid: str, long: Sequence[str]) -> int:
 def long_ones_first(config: Any, log: Any, long: Sequence[str]) -> Any:
     """A scheduler that gives each test whose name is among these to a process by itself, and the others by file.
 
-    Processes that may have to wait for spare time get the last ones.
-
     Args:
         config: pytest's.
         log: pytest-xdist's.
@@ -37,11 +33,6 @@ def long_ones_first(config: Any, log: Any, long: Sequence[str]) -> Any:
         def _split_scope(self, nodeid: str) -> str:
             scope: str = nodeid if "::" in [*long, ""][rank(nodeid, long)] else super()._split_scope(nodeid)
             return scope
-
-        def _assign_work_unit(self, node: Any) -> None:
-            if is_further(node.gateway.id):
-                self.workqueue.move_to_end(next(reversed(self.workqueue)), last=False)
-            super()._assign_work_unit(node)
 
     config.option.loadscopereorder = False  # before pytest-xdist 3.7, files of many tests still come first
     return LongOnesFirst(config, log)
