@@ -7,6 +7,8 @@ import os
 import re
 import signal
 import subprocess
+import sys
+from pathlib import Path
 
 import yaml
 
@@ -85,6 +87,26 @@ def test_without_options_all_checks_run_but_those_of_a_night():
     assert re.search(r'^leave_out=\(-m "not nightly"\)$', TEST, re.MULTILINE)
     assert not set(names("all_checks")) & set(names("full_checks"))
     assert "\nscripts/test           # all checks but those of a night" in (ROOT / "CONTRIBUTING.md").read_text()
+
+
+def test_a_test_that_hangs_is_shown_and_fails_and_the_others_run(tmp_path):
+    (tmp_path / "test_of_two.py").write_text(
+        "import time\n\ndef test_hangs():\n    time.sleep(600)\n\ndef test_other():\n    pass\n", encoding="utf-8"
+    )
+    (tmp_path / "pytest.ini").touch()
+    assert re.search(r"^stuck_s=\d+", TEST, re.MULTILINE)
+    script = f"""set -uo pipefail
+results={tmp_path} leave_out=(-m "not nightly") expression= stuck_s=4
+{function("pytest_run")}
+cd {tmp_path}
+pytest_run . two 1"""
+    env = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, env=env, timeout=300, check=False)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "test_of_two.py::test_hangs - Failed: Timeout" in done.stdout
+    assert re.search(r"1 failed, 1 passed in", done.stdout), done.stdout
+    shown = done.stderr.partition("(most recent call first):")[2]
+    assert 'test_of_two.py", line 4 in test_hangs' in shown, done.stderr
 
 
 def test_what_runs_side_by_side_is_shown_in_order_and_a_failure_among_it_counts():
