@@ -240,5 +240,8 @@ class ManagedProcess:
         self._signal_group(signal.SIGKILL)
 
     def _signal_group(self, number: int) -> None:
+        # The system gives the number of a process that has ended, and whose group is empty, to another one.
+        if not self.running and Path(f"/proc/{self.pid}").exists():
+            return
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, number)

@@ -69,6 +69,18 @@ def test_stop_ends_the_grandchildren_too(tmp_path):
     wait_until(lambda: not alive(grandchild), 5.0, "end of the grandchild")
 
 
+def test_stop_leaves_a_process_alone_that_has_got_the_number_of_one_that_ended(tmp_path):
+    ended = ManagedProcess("ended", ["true"], tmp_path)
+    ended.start()
+    ended.wait(20.0)
+    with python("import time; print('READY'); time.sleep(600)", tmp_path) as other:
+        other.wait_for_line("^READY", 20.0)
+        ended._process.pid = other.pid  # as the system may give it
+        ended.stop()
+        other.send_signal(signal.SIGTERM)
+        assert other.wait(20.0) == -signal.SIGTERM, "by that signal, not by another before"
+
+
 def test_a_process_deaf_to_sigint_is_ended_by_the_next_signal(tmp_path):
     code = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('READY'); time.sleep(600)"
     child = python(code, tmp_path)
