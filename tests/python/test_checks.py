@@ -96,7 +96,7 @@ def test_a_test_that_hangs_is_shown_and_fails_and_the_others_run(tmp_path):
     (tmp_path / "pytest.ini").touch()
     assert re.search(r"^stuck_s=\d+", TEST, re.MULTILINE)
     script = f"""set -uo pipefail
-results={tmp_path} leave_out=(-m "not nightly") expression= stuck_s=4
+results={tmp_path} leave_out=(-m "not nightly") expression= stuck_s=16
 {function("pytest_run")}
 cd {tmp_path}
 pytest_run . two 1"""
