@@ -25,7 +25,7 @@ from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.lockstep import Fences, LockstepLoop
 from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.pictures import View, wait_until_shown
-from xplane_bridge.emulator.priority import collect_seldom, collected_by_hand, take_realtime_priority
+from xplane_bridge.emulator.priority import RealTimePriority, collect_seldom, collected_by_hand
 from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.emulator.simulator import INTERNAL_VERSIONS, Simulator
 from xplane_bridge.emulator.truth import TruthFile
@@ -311,8 +311,7 @@ class Emulator:
 
     def _run_real_time(self) -> None:
         clock, o = time.monotonic, self.options
-        if o.realtime:
-            take_realtime_priority()
+        priority = RealTimePriority() if o.realtime else None
         start = deadline = clock()
         last = start - self.period
         while not self.stopping:
@@ -338,6 +337,8 @@ class Emulator:
             if len(self._sent_at) < _KEPT_PERIODS:
                 self._sent_at.append(begin)
             collect_seldom(self._frames)
+            if priority is not None:
+                priority.watch()
             # A frame that takes too long (its picture, mostly) makes the next one late, and the frame rate fall.
             deadline = max(deadline + self.period + self._jitter.uniform(0.0, o.frame_jitter), end)
 

@@ -22,7 +22,7 @@ from typing import Callable, NamedTuple, Optional, Sequence
 import cv2
 import numpy as np
 
-from xplane_bridge.emulator.priority import take_realtime_priority
+from xplane_bridge.emulator.priority import RealTimePriority
 from xplane_bridge.emulator.view.renderer.painter import Painter
 from xplane_bridge.emulator.view.renderer.process import WINDOW_TITLE
 from xplane_bridge.emulator.view.renderer.scene import RECORD_BYTES, Scene
@@ -175,8 +175,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     if writer:
         times = ("frame", "sim_time", "frame_monotonic_ns", "swap_begin_ns", "swap_end_ns")
         writer.writerow((*times, *CAMERA_COLUMNS))
-    if args.realtime:
-        take_realtime_priority()
+    priority = RealTimePriority() if args.realtime else None
     print("READY", flush=True)
     chain = SwapChain(width, height)
     drawn, shown = ((lambda: None), _answer) if args.answer_shown else (_answer, (lambda: None))
@@ -191,6 +190,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         begin = time.time_ns()
         window.swap()
         shown()
+        if priority is not None:
+            priority.watch()
         if writer:
             scene = picture.scene
             camera = (repr(getattr(scene, name)) for name in CAMERA_COLUMNS)
