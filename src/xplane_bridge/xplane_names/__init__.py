@@ -17,7 +17,7 @@ import functools
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, FrozenSet, Iterator, List, Mapping, Optional, Tuple
+from typing import Dict, FrozenSet, List, Mapping, Optional, Tuple
 
 #: The lists there are, oldest first.
 VERSIONS = ("11.40", "11.55", "12.00", "12.08", "12.10")
@@ -81,7 +81,10 @@ def datarefs(version: str) -> Mapping[str, Dataref]:
     for name, cells in _rows("datarefs.txt"):
         cell = _resolved(cells, column)
         if cell is not None:
-            found[name] = _parsed(cell, name)
+            try:
+                found[name] = _parsed(cell)
+            except ValueError as error:
+                raise ValueError(f"datarefs.txt, {name}: {error}") from None
     return found
 
 
@@ -103,8 +106,9 @@ def _column(version: str) -> int:
     return VERSIONS.index(version)
 
 
-def _rows(file: str) -> Iterator[Tuple[str, List[str]]]:
-    folder = ""
+@functools.lru_cache(maxsize=None)
+def _rows(file: str) -> List[Tuple[str, List[str]]]:
+    folder, rows = "", []
     for line in (_FOLDER / file).read_text(encoding="utf-8").splitlines():
         if line.startswith("#"):
             continue
@@ -114,22 +118,26 @@ def _rows(file: str) -> Iterator[Tuple[str, List[str]]]:
             continue
         if len(cells) != len(VERSIONS):
             raise ValueError(f"{file}, {folder}{leaf}: {len(cells)} cells, expected {len(VERSIONS)}")
-        yield folder + leaf, cells
+        rows.append((folder + leaf, cells))
+    return rows
 
 
 def _resolved(cells: List[str], column: int) -> Optional[str]:
     """What a column says; None where the name is not in it."""
     if cells[column] == "-":
         return None
+    if cells[column] != "=":
+        return cells[column]
     return next((cell for cell in reversed(cells[: column + 1]) if cell not in ("-", "=")), "?")
 
 
-def _parsed(cell: str, name: str) -> Dataref:
+@functools.lru_cache(maxsize=None)  # thousands of datarefs have some hundred different ones
+def _parsed(cell: str) -> Dataref:
     if cell == "?":
         return Dataref()
     kind, access, unit = ([*cell.split(";", 2), "", ""])[:3]
     match = _TYPE.fullmatch(kind)
     if match is None or access not in ("", "r", "w"):
-        raise ValueError(f"datarefs.txt, {name}: '{cell}', expected type;access;unit, e.g. float[8];w;ratio")
+        raise ValueError(f"'{cell}', expected type;access;unit, e.g. float[8];w;ratio")
     shape = tuple(int(length or 0) for length in re.findall(r"\[(\d*)\]", match.group(2)))
     return Dataref(match.group(1), shape, None if access == "" else access == "w", unit)
