@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
+from support.deadlines import WAIT_S
 from xplane_bridge.emulator.datarefs.tables.views import SUN_HEADING_DEG, SUN_PITCH_DEG
 from xplane_bridge.emulator.view.renderer import (
     RendererError,
@@ -26,6 +27,7 @@ from xplane_bridge.emulator.view.renderer.camera import Camera, clip
 from xplane_bridge.emulator.view.renderer.painter import Painter
 from xplane_bridge.emulator.view.renderer.strip import draw_strip
 from xplane_bridge.emulator.view.renderer.world import make_world
+from xplane_bridge.harness.processes import wait_until
 
 ANCHOR = (47.0, 8.0)
 FOCAL = 554.256  # 320 / tan(30 deg)
@@ -133,6 +135,41 @@ def test_every_pixel_is_painted_whatever_was_in_the_memory(pitch_deg: float, siz
     assert np.array_equal(pictures[0][..., :3], pictures[1][..., :3])
 
 
+# The haze then ends in an area of at most four pixels, which OpenCV takes for a scalar.
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {
+            "latitude_deg": 37.437782020539125,
+            "longitude_deg": 126.46088827463582,
+            "altitude_m": 208.64162236428652,
+            "roll_deg": 39.260786279953834,
+            "pitch_deg": 11.253818783212559,
+            "heading_deg": 329.5727451803782,
+            "head_pitch_deg": -90.0,
+            "head_roll_deg": 10.0,
+        },
+        {
+            "latitude_deg": 37.475546383438676,
+            "longitude_deg": 126.39171685841302,
+            "altitude_m": 2946.8454334304593,
+            "roll_deg": -72.54906994680245,
+            "pitch_deg": 9.567096721364521,
+            "heading_deg": 319.66524670706855,
+            "head_pitch_deg": -90.0,
+            "eye_forward_m": 0.6,
+            "eye_down_m": -5.0,
+            "floor_down_m": 1.0,
+            "field_of_view_deg": 80.0,
+        },
+    ],
+)
+def test_haze_is_painted_on_areas_of_a_few_pixels(changes: dict) -> None:
+    picture = np.full((240, 320, 4), 0, np.uint8)
+    Painter(320, 240, (37.4602, 126.4407), strip=False).paint_into(Scene(**changes), picture)
+    assert picture[..., :3].max(axis=2).min() > 0, "painted everywhere"
+
+
 @pytest.mark.parametrize("quality", [95, 60, 30])
 @pytest.mark.parametrize("size", [(640, 480), (320, 240), (1024, 768), (533, 400)])
 def test_strip_survives_jpeg_and_scaling(quality: int, size: tuple[int, int]) -> None:
@@ -233,6 +270,16 @@ def test_process_shows_frames_after_the_pipeline_delay(display: str, tmp_path) -
         waited = int(row["swap_begin_ns"]) - offset - int(row["frame_monotonic_ns"])
         assert waited > 0.1499e9
         assert int(row["swap_end_ns"]) >= int(row["swap_begin_ns"])
+
+
+def test_a_window_whose_program_fails_keeps_no_frame_waiting_and_says_why(display: str, caplog) -> None:
+    renderer = RendererProcess(RendererOptions(anchor=ANCHOR, display=display))
+    renderer.show(replace(LEVEL, roll_deg=math.inf))
+    wait_until(lambda: renderer.drawn(0.1), WAIT_S, "end of the frame")
+    assert not renderer.alive
+    renderer.close()
+    assert "its program ended with" in caplog.text
+    assert "math domain error" in caplog.text
 
 
 def test_the_sun_is_drawn_where_its_datarefs_say() -> None:

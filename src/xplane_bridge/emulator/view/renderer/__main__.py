@@ -146,19 +146,21 @@ def _draw(painter: Painter, chain: SwapChain, delay_ns: int, drawn: Callable[[],
     """Draws scenes as they come, until the pipe is closed."""
     scenes = sys.stdin.fileno()
     record = b""
-    while True:
-        data = os.read(scenes, RECORD_BYTES - len(record))
-        if not data:
-            chain.end()
-            return
-        record += data
-        if len(record) < RECORD_BYTES:
-            continue
-        scene, record = Scene.unpack(record), b""
-        pixels = chain.buffer()
-        painter.paint_into(scene, pixels)
-        chain.put(Picture(scene, pixels, scene.time_ns + delay_ns))
-        drawn()
+    try:
+        while True:
+            data = os.read(scenes, RECORD_BYTES - len(record))
+            if not data:
+                return
+            record += data
+            if len(record) < RECORD_BYTES:
+                continue
+            scene, record = Scene.unpack(record), b""
+            pixels = chain.buffer()
+            painter.paint_into(scene, pixels)
+            chain.put(Picture(scene, pixels, scene.time_ns + delay_ns))
+            drawn()
+    finally:
+        chain.end()  # also where a scene cannot be drawn: the emulator would wait for its picture
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
@@ -179,7 +181,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     print("READY", flush=True)
     chain = SwapChain(width, height)
     drawn, shown = ((lambda: None), _answer) if args.answer_shown else (_answer, (lambda: None))
-    threading.Thread(target=_draw, args=(painter, chain, int(args.pipeline_delay * 1e9), drawn), daemon=True).start()
+    drawing = threading.Thread(target=_draw, args=(painter, chain, int(args.pipeline_delay * 1e9), drawn), daemon=True)
+    drawing.start()
     while not window.closed() and not chain.ended:
         picture = chain.next(_POLL_S)
         if picture is None:
@@ -196,6 +199,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             scene = picture.scene
             camera = (repr(getattr(scene, name)) for name in CAMERA_COLUMNS)
             writer.writerow((scene.frame, repr(scene.sim_time), scene.time_ns, begin, time.time_ns(), *camera))
+    if chain.ended:
+        drawing.join()  # it may be writing why
     if log:
         log.close()
     return 0

@@ -180,7 +180,8 @@ class Painter:
         for area in ground.boxes(0.0, thickness / _LEAST_HAZE):
             falling = ground.falling[area]
             # Over the mountains, too, where they end below the horizon.
-            clear = cv2.exp(cv2.divide(-thickness, np.maximum(falling, _LEAST_FALLING)))
+            # Not by OpenCV: an area of one to four pixels is a scalar to it.
+            clear = cv2.exp(np.float32(-thickness) / np.maximum(falling, np.float32(_LEAST_FALLING)))
             clear += _LEAST_HAZE  # so that it begins without a step
             clear[(falling <= 0.0) | (clear > 1.0)] = 1.0  # also the sky
             part = self._picture[ground.picture(area)]

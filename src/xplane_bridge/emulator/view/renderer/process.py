@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import select
 import subprocess
@@ -12,6 +13,8 @@ from typing import Optional
 
 from xplane_bridge.emulator.view.renderer.scene import RECORD_BYTES, Scene
 from xplane_bridge.errors import XplaneBridgeError
+
+_LOG = logging.getLogger(__name__)
 
 
 class RendererError(XplaneBridgeError):
@@ -122,15 +125,24 @@ class RendererProcess:
             os.write(self._scenes, record)  # all or nothing: shorter than PIPE_BUF
             self._in_work += 1
         except BrokenPipeError:
-            self._in_work, self._silent = 0, True  # the window was closed; X-Plane's packets go on
+            self._end()
 
     def drawn(self, timeout_s: float) -> bool:
         """Whether all frames handed over are drawn (or the window gone); waits for it so long."""
         if self._in_work and select.select((self._answers,), (), (), timeout_s)[0]:
             answers = os.read(self._answers, 4096)
-            self._silent = not answers
-            self._in_work = self._in_work - len(answers) if answers else 0
+            self._in_work -= len(answers)
+            if not answers:
+                self._end()
         return self._in_work == 0
+
+    def _end(self) -> None:
+        """The window was closed, or a scene could not be drawn, which is said; X-Plane's packets go on."""
+        self._in_work, self._silent = 0, True
+        assert self._child.stderr is not None
+        written = self._child.stderr.read().decode(errors="replace").strip()
+        if written:
+            _LOG.error("the window is gone: its program ended with\n%s", written)
 
     def close(self) -> None:
         """Closes the window."""
