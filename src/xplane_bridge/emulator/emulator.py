@@ -311,7 +311,7 @@ class Emulator:
 
     def _run_real_time(self) -> None:
         clock, o = time.monotonic, self.options
-        priority = RealTimePriority() if o.realtime else None
+        priority = RealTimePriority(o.realtime)
         start = deadline = clock()
         last = start - self.period
         while not self.stopping:
@@ -337,8 +337,7 @@ class Emulator:
             if len(self._sent_at) < _KEPT_PERIODS:
                 self._sent_at.append(begin)
             collect_seldom(self._frames)
-            if priority is not None:
-                priority.watch()
+            priority.watch()
             # A frame that takes too long (its picture, mostly) makes the next one late, and the frame rate fall.
             deadline = max(deadline + self.period + self._jitter.uniform(0.0, o.frame_jitter), end)
 

@@ -24,10 +24,13 @@ class RealTimePriority:
 
     One that wants a processor for itself would keep the programs waiting that it is there for: then it is given back. A
     system that does not grant it is no error.
+
+    Args:
+        wanted: Whether to ask for it.
     """
 
-    def __init__(self) -> None:
-        self._held = _schedule("SCHED_FIFO", _PRIORITY)
+    def __init__(self, wanted: bool) -> None:
+        self._held = wanted and _schedule("SCHED_FIFO", _PRIORITY)
         self._looked_at, self._used_s = time.monotonic(), time.thread_time()
         self._too_much_s = 0.0
 

@@ -20,7 +20,7 @@ def granted() -> bool:
     policies: list[int] = []
 
     def ask() -> None:
-        priority.RealTimePriority()
+        priority.RealTimePriority(True)
         policies.append(os.sched_getscheduler(0))
 
     thread = threading.Thread(target=ask)
@@ -36,7 +36,7 @@ def test_a_thread_without_rest_gives_it_back_and_one_that_rests_keeps_it(monkeyp
     ended = threading.Event()
 
     def fly(name: str, work_s: float, rest_s: float) -> None:
-        held = priority.RealTimePriority()
+        held = priority.RealTimePriority(True)
         while not ended.is_set():
             until = time.thread_time() + work_s
             while time.thread_time() < until:
@@ -72,7 +72,7 @@ def test_a_system_without_it_is_no_error(monkeypatch):
         raise PermissionError
 
     monkeypatch.setattr(os, "sched_setscheduler", refused)
-    priority.RealTimePriority().watch()
+    priority.RealTimePriority(True).watch()
 
 
 @pytest.mark.skipif(not granted(), reason="no real-time priority here")

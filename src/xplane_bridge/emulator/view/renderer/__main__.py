@@ -37,6 +37,10 @@ CAMERA_COLUMNS = ("eye_forward_m", "eye_right_m", "eye_down_m", "head_roll_deg",
 _SWITCH_INTERVAL_S = 0.0002
 
 
+class WindowError(Exception):
+    """The window cannot be opened; the text says why."""
+
+
 class Window:
     """An X11 window of 32-bit pixels; a swap is one request to the server."""
 
@@ -57,11 +61,11 @@ class Window:
             self._surface = pygame.display.set_mode((width, height))
         except pygame.error as error:
             msg = f"X display {os.environ.get('DISPLAY') or '(DISPLAY is not set)'}: {error}"
-            raise SystemExit(msg) from None
+            raise WindowError(msg) from None
         if self._surface.get_bytesize() != 4:
             bits = self._surface.get_bitsize()
             msg = f"the screen has {bits} bits per pixel; expected 24 or 32 (Xvfb: -screen 0 WxHx24)"
-            raise SystemExit(msg)
+            raise WindowError(msg)
 
     def closed(self) -> bool:
         """Handles what the server sent; true when the user closed the window."""
@@ -171,13 +175,17 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     width, height = (int(part) for part in args.size.split("x"))
     painter = Painter(width, height, tuple(args.anchor), args.runway_heading, args.hud, not args.no_strip)
-    window = Window(width, height)
+    try:
+        window = Window(width, height)
+    except WindowError as error:
+        print(error, flush=True)
+        return 1
     log = args.swap_log.open("w", newline="") if args.swap_log else None
     writer = csv.writer(log) if log else None
     if writer:
         times = ("frame", "sim_time", "frame_monotonic_ns", "swap_begin_ns", "swap_end_ns")
         writer.writerow((*times, *CAMERA_COLUMNS))
-    priority = RealTimePriority() if args.realtime else None
+    priority = RealTimePriority(args.realtime)
     print("READY", flush=True)
     chain = SwapChain(width, height)
     drawn, shown = ((lambda: None), _answer) if args.answer_shown else (_answer, (lambda: None))
@@ -193,8 +201,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         begin = time.time_ns()
         window.swap()
         shown()
-        if priority is not None:
-            priority.watch()
+        priority.watch()
         if writer:
             scene = picture.scene
             camera = (repr(getattr(scene, name)) for name in CAMERA_COLUMNS)

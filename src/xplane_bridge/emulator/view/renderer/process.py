@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import select
 import subprocess
@@ -13,8 +12,6 @@ from typing import Optional
 
 from xplane_bridge.emulator.view.renderer.scene import RECORD_BYTES, Scene
 from xplane_bridge.errors import XplaneBridgeError
-
-_LOG = logging.getLogger(__name__)
 
 
 class RendererError(XplaneBridgeError):
@@ -96,18 +93,15 @@ class RendererProcess:
             [sys.executable, "-m", __package__, *options.arguments()],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
             bufsize=0,
             env=environment,
         )
         assert self._child.stdin is not None
         assert self._child.stdout is not None
-        if self._child.stdout.readline().strip() != b"READY":
+        said = self._child.stdout.readline().decode(errors="replace").strip()
+        if said != "READY":
             self._child.wait()
-            assert self._child.stderr is not None
-            lines = self._child.stderr.read().decode(errors="replace").strip().splitlines()
-            msg = f"the window could not be opened: {lines[-1] if lines else 'the renderer ended without a word'}"
-            raise RendererError(msg)
+            raise RendererError(f"the window could not be opened: {said or 'its program ended before that'}")
         self._scenes, self._answers = self._child.stdin.fileno(), self._child.stdout.fileno()
         self._in_work = 0
         self._silent = False  # the pipes are closed, which comes before the process has ended
@@ -125,28 +119,19 @@ class RendererProcess:
             os.write(self._scenes, record)  # all or nothing: shorter than PIPE_BUF
             self._in_work += 1
         except BrokenPipeError:
-            self._end()
+            self._in_work, self._silent = 0, True  # the window was closed; X-Plane's packets go on
 
     def drawn(self, timeout_s: float) -> bool:
         """Whether all frames handed over are drawn (or the window gone); waits for it so long."""
         if self._in_work and select.select((self._answers,), (), (), timeout_s)[0]:
             answers = os.read(self._answers, 4096)
-            self._in_work -= len(answers)
-            if not answers:
-                self._end()
+            self._silent = not answers
+            self._in_work = self._in_work - len(answers) if answers else 0
         return self._in_work == 0
-
-    def _end(self) -> None:
-        """The window was closed, or a scene could not be drawn, which is said; X-Plane's packets go on."""
-        self._in_work, self._silent = 0, True
-        assert self._child.stderr is not None
-        written = self._child.stderr.read().decode(errors="replace").strip()
-        if written:
-            _LOG.error("the window is gone: its program ended with\n%s", written)
 
     def close(self) -> None:
         """Closes the window."""
-        for stream in (self._child.stdin, self._child.stdout, self._child.stderr):
+        for stream in (self._child.stdin, self._child.stdout):
             if stream is not None:
                 stream.close()
         try:
