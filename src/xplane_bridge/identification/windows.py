@@ -86,10 +86,10 @@ class Window:
 
 
 def axis_of(target: str) -> str:
-    """The axis that an excitation's target moves; empty where it is none of the two."""
-    if target == "pitch" or "_elv" in target:
+    """The axis that an excitation's target moves, of stick or single surface; empty where it is none of the two."""
+    if target == "pitch" or target.startswith("elevator"):
         return "longitudinal"
-    return "lateral" if target in ("roll", "yaw") or "_ail" in target or "_rud" in target else ""
+    return "lateral" if target in ("roll", "yaw") or target.startswith(("aileron", "rudder")) else ""
 
 
 def find_windows(flight: Flight, tail: float = TAIL_S) -> tuple[list[Window], list[str]]:

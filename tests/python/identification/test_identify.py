@@ -171,6 +171,17 @@ def covers(result: AxisResult, truth: LinearModel) -> tuple[bool, bool]:
     return tuple(abs(found[k].value - expected[k].value) <= found[k].interval for k in ("Cm_alpha", "Cm_q"))
 
 
+
+def test_an_excitation_of_single_surfaces_is_one_of_their_axis(calm: Recording, found: dict[str, AxisResult]) -> None:
+    surfaces = {"pitch": "elevator1_left, elevator1_right", "roll": "aileron1_wing2_left", "yaw": "rudder1_fin1"}
+    renamed = [{**row, "target": surfaces[row["target"]]} for row in calm.excitation]
+    flight = Recording(calm.state, calm.surfaces, renamed).flight()
+    results = identify(flight, geometry=GEOMETRY).results
+    assert {axis: result.model.derivatives for axis, result in results.items()} == {
+        axis: result.model.derivatives for axis, result in found.items()
+    }
+
+
 # ------------------------------------------------------------------------------------------------ what is to be noticed
 
 
