@@ -65,9 +65,15 @@ void SimLink::findPeer(std::int64_t now_ns) {
     }
     return;
   }
-  // The X-Plane we knew is silent. Only one that has begun to announce itself since may be it: never jump to another
-  // computer's that has been there all along.
+  // The X-Plane we knew is silent. It is where its beacon comes from now, or it is one that has begun to announce
+  // itself since: never jump to another computer's that has been there all along.
   if (now_ns - beacons_.lastHeard(peer_) < toNanoseconds(options_.beacon_settle_s)) {
+    return;
+  }
+  const std::optional<BeaconSighting> known = beacons_.at(peer_, now_ns);
+  if (known.has_value() && known->endpoint != peer_ &&
+      now_ns - last_heard_ns_ > toNanoseconds(options_.beacon_timeout_s)) {
+    setPeer(known->endpoint, "no longer heard from " + peer_.addressString() + ": " + toString(*known));
     return;
   }
   const std::optional<BeaconSighting> restarted = beacons_.onlyNewSince(last_heard_ns_, now_ns);

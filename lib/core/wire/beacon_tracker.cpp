@@ -19,18 +19,32 @@ std::string toString(const BeaconSighting& sighting) {
 BeaconTracker::BeaconTracker(double timeout_s, double settle_s, std::function<bool(std::uint32_t)> is_own)
     : timeout_ns_(toNanoseconds(timeout_s)), settle_ns_(toNanoseconds(settle_s)), is_own_(std::move(is_own)) {}
 
-bool BeaconTracker::isSame(const Endpoint& a, const Endpoint& b) const {
-  return a.port == b.port &&
-         (isSameHost(a.address, b.address) || (is_own_ && is_own_(a.address) && is_own_(b.address)));
+std::int64_t BeaconTracker::Known::lastNs() const {
+  return std::max_element(addresses.begin(), addresses.end(),
+                          [](const Address& a, const Address& b) { return a.last_ns < b.last_ns; })
+      ->last_ns;
 }
 
-bool BeaconTracker::isAt(const BeaconSighting& sighting, const Endpoint& endpoint) const {
-  if (isSame(sighting.endpoint, endpoint)) {
-    return true;
+bool BeaconTracker::isSame(std::uint32_t a, std::uint32_t b) const {
+  return isSameHost(a, b) || (is_own_ && is_own_(a) && is_own_(b));
+}
+
+bool BeaconTracker::isAt(const Known& known, const Endpoint& endpoint) const {
+  return known.port == endpoint.port &&
+         (isSame(known.addresses.front().address, endpoint.address) ||
+          std::any_of(known.addresses.begin(), known.addresses.end(),
+                      [&](const Address& each) { return each.address == endpoint.address; }));
+}
+
+BeaconSighting BeaconTracker::sightingOf(const Known& known, std::int64_t now_ns) const {
+  const std::uint32_t first = known.addresses.front().address;
+  BeaconSighting sighting{{first, known.port}, {}, known.version, known.computer_name};
+  for (const Address& each : known.addresses) {
+    if (isFresh(each.last_ns, now_ns) && !isSame(each.address, first)) {
+      sighting.other_addresses.push_back(each.address);
+    }
   }
-  const std::vector<std::uint32_t>& others = sighting.other_addresses;
-  return sighting.endpoint.port == endpoint.port &&
-         std::find(others.begin(), others.end(), endpoint.address) != others.end();
+  return sighting;
 }
 
 bool BeaconTracker::heard(const Beacon& beacon, std::uint32_t from_address, std::int64_t now_ns) {
@@ -38,28 +52,32 @@ bool BeaconTracker::heard(const Beacon& beacon, std::uint32_t from_address, std:
     return false;
   }
   const Endpoint endpoint{from_address, beacon.port};
-  auto known =
-      std::find_if(known_.begin(), known_.end(), [&](const Known& each) { return isAt(each.sighting, endpoint); });
+  auto known = std::find_if(known_.begin(), known_.end(), [&](const Known& each) { return isAt(each, endpoint); });
   if (known == known_.end()) {
     known = std::find_if(known_.begin(), known_.end(), [&](const Known& each) {
-      return isFresh(each, now_ns) && !beacon.computer_name.empty() && each.sighting.endpoint.port == beacon.port &&
-             each.sighting.computer_name == beacon.computer_name && each.sighting.version == beacon.version;
+      return isFresh(each, now_ns) && !beacon.computer_name.empty() && each.port == beacon.port &&
+             each.computer_name == beacon.computer_name && each.version == beacon.version;
     });
-    if (known != known_.end()) {
-      known->sighting.other_addresses.push_back(from_address);
-    }
   }
   if (known == known_.end()) {
-    known = known_.insert(known_.end(), Known{{endpoint, {}, 0, {}}, now_ns, now_ns});
+    known = known_.insert(known_.end(), Known{beacon.port, 0, {}, now_ns, {}});
   } else if (!isFresh(*known, now_ns)) {
     // Come back after an absence: as new, also under the address it is heard from now.
-    known->sighting.endpoint = endpoint;
-    known->sighting.other_addresses.clear();
+    known->addresses.clear();
     known->first_ns = now_ns;
   }
-  known->sighting.version = beacon.version;
-  known->sighting.computer_name = std::string(beacon.computer_name);
-  known->last_ns = now_ns;
+  std::vector<Address>& addresses = known->addresses;
+  auto address = std::find_if(addresses.begin(), addresses.end(),
+                              [&](const Address& each) { return each.address == from_address; });
+  if (address == addresses.end()) {
+    address = addresses.insert(addresses.end(), Address{from_address, now_ns});
+  }
+  address->last_ns = now_ns;
+  if (!isFresh(addresses.front().last_ns, now_ns)) {
+    std::iter_swap(addresses.begin(), address);
+  }
+  known->version = beacon.version;
+  known->computer_name = std::string(beacon.computer_name);
   return true;
 }
 
@@ -67,7 +85,7 @@ std::vector<BeaconSighting> BeaconTracker::sightings(std::int64_t now_ns) const 
   std::vector<BeaconSighting> result;
   for (const Known& known : known_) {
     if (isFresh(known, now_ns)) {
-      result.push_back(known.sighting);
+      result.push_back(sightingOf(known, now_ns));
     }
   }
   return result;
@@ -75,8 +93,8 @@ std::vector<BeaconSighting> BeaconTracker::sightings(std::int64_t now_ns) const 
 
 std::optional<BeaconSighting> BeaconTracker::at(const Endpoint& endpoint, std::int64_t now_ns) const {
   for (const Known& known : known_) {
-    if (isFresh(known, now_ns) && isAt(known.sighting, endpoint)) {
-      return known.sighting;
+    if (isFresh(known, now_ns) && isAt(known, endpoint)) {
+      return sightingOf(known, now_ns);
     }
   }
   return std::nullopt;
@@ -84,8 +102,10 @@ std::optional<BeaconSighting> BeaconTracker::at(const Endpoint& endpoint, std::i
 
 std::int64_t BeaconTracker::lastHeard(const Endpoint& endpoint) const {
   for (const Known& known : known_) {
-    if (isAt(known.sighting, endpoint)) {
-      return known.last_ns;
+    if (isAt(known, endpoint)) {
+      const auto address = std::find_if(known.addresses.begin(), known.addresses.end(),
+                                        [&](const Address& each) { return each.address == endpoint.address; });
+      return address == known.addresses.end() ? known.lastNs() : address->last_ns;
     }
   }
   return 0;
@@ -105,7 +125,7 @@ std::optional<BeaconSighting> BeaconTracker::onlyOne(std::int64_t now_ns) const 
   if (found == nullptr || now_ns - found->first_ns < settle_ns_) {
     return std::nullopt;
   }
-  return found->sighting;
+  return sightingOf(*found, now_ns);
 }
 
 std::optional<BeaconSighting> BeaconTracker::onlyNewSince(std::int64_t since_ns, std::int64_t now_ns) const {
@@ -119,7 +139,7 @@ std::optional<BeaconSighting> BeaconTracker::onlyNewSince(std::int64_t since_ns,
     }
     found = &known;
   }
-  return found == nullptr ? std::nullopt : std::optional<BeaconSighting>(found->sighting);
+  return found == nullptr ? std::nullopt : std::optional<BeaconSighting>(sightingOf(*found, now_ns));
 }
 
 }  // namespace xplane_bridge::core

@@ -14,7 +14,7 @@ namespace xplane_bridge::core {
 /// An X-Plane that announces itself.
 struct BeaconSighting {
   Endpoint endpoint;                           ///< where it listens
-  std::vector<std::uint32_t> other_addresses;  ///< of the same computer, from which its beacon comes as well
+  std::vector<std::uint32_t> other_addresses;  ///< of the same computer, from which its beacon comes as well now
   std::int32_t version = 0;
   std::string computer_name;
 };
@@ -29,8 +29,9 @@ class BeaconTracker {
   BeaconTracker(double timeout_s, double settle_s, std::function<bool(std::uint32_t)> is_own);
 
   /// Takes note of a beacon. One from another address but with the name, port and version of one that is heard at the
-  /// moment is the same X-Plane: its computer has several addresses. Ignores what is not a master X-Plane (external
-  /// visuals, instructor stations, Plane Maker); returns whether it was noted.
+  /// moment is the same X-Plane: its computer has several addresses. It listens where it was heard first; where its
+  /// beacon has not come from that address for the timeout, but comes from another, it listens there. Ignores what is
+  /// not a master X-Plane (external visuals, instructor stations, Plane Maker); returns whether it was noted.
   bool heard(const Beacon& beacon, std::uint32_t from_address, std::int64_t now_ns);
 
   /// Those heard within the timeout.
@@ -38,7 +39,8 @@ class BeaconTracker {
   /// The X-Plane at this place, if it has been heard within the timeout.
   std::optional<BeaconSighting> at(const Endpoint& endpoint, std::int64_t now_ns) const;
 
-  /// Since when [ns] the X-Plane at this place has not announced itself; 0 when it never has.
+  /// Since when [ns] the X-Plane at this place has not announced itself from this very address; 0 when it never has.
+  /// Of an address of this computer from which no beacon comes: from any address.
   std::int64_t lastHeard(const Endpoint& endpoint) const;
 
   /// The only X-Plane there is, once no other has announced itself for the settling time. Empty while waiting, or
@@ -49,14 +51,24 @@ class BeaconTracker {
   std::optional<BeaconSighting> onlyNewSince(std::int64_t since_ns, std::int64_t now_ns) const;
 
  private:
-  struct Known {
-    BeaconSighting sighting;
-    std::int64_t first_ns = 0;
+  struct Address {
+    std::uint32_t address = 0;
     std::int64_t last_ns = 0;
   };
-  bool isFresh(const Known& known, std::int64_t now_ns) const { return now_ns - known.last_ns <= timeout_ns_; }
-  bool isSame(const Endpoint& a, const Endpoint& b) const;
-  bool isAt(const BeaconSighting& sighting, const Endpoint& endpoint) const;
+  struct Known {
+    std::uint16_t port = 0;
+    std::int32_t version = 0;
+    std::string computer_name;
+    std::int64_t first_ns = 0;
+    std::vector<Address> addresses;  // the first is where it listens; never empty
+
+    std::int64_t lastNs() const;
+  };
+  bool isFresh(std::int64_t last_ns, std::int64_t now_ns) const { return now_ns - last_ns <= timeout_ns_; }
+  bool isFresh(const Known& known, std::int64_t now_ns) const { return isFresh(known.lastNs(), now_ns); }
+  bool isSame(std::uint32_t a, std::uint32_t b) const;
+  bool isAt(const Known& known, const Endpoint& endpoint) const;
+  BeaconSighting sightingOf(const Known& known, std::int64_t now_ns) const;
 
   std::int64_t timeout_ns_;
   std::int64_t settle_ns_;

@@ -44,6 +44,16 @@ std::vector<std::uint8_t> data(float speed) {
   return bytes;
 }
 
+/// Of a computer named "sim".
+std::vector<std::uint8_t> beacon() {
+  std::vector<std::uint8_t> bytes = {'B', 'E', 'C', 'N', 0, 1, 2, 1, 0, 0, 0};
+  const std::int32_t version = 122015;
+  const auto* begin = reinterpret_cast<const std::uint8_t*>(&version);
+  bytes.insert(bytes.end(), begin, begin + sizeof(version));
+  bytes.insert(bytes.end(), {1, 0, 0, 0, 0x68, 0xBF, 's', 'i', 'm', 0});  // master, port 49000
+  return bytes;
+}
+
 /// What a handler got: steady time, stamp, whether it is the kernel's, epoch, index and value.
 using Delivery = std::tuple<std::int64_t, std::int64_t, bool, std::uint32_t, std::int32_t, float>;
 
@@ -246,6 +256,65 @@ TEST_F(ScriptedLink, AnswersFromAnotherAddressAreNamed) {
   arriveStatus(10'000 * kMs, 50.0F);
   runUntil(10'100 * kMs);
   EXPECT_TRUE(link_->status().problems.empty());
+}
+
+TEST_F(ScriptedLink, FollowsToTheAddressThatIsLeftOfXPlanesComputer) {
+  SimLinkOptions options = defaults();
+  options.host = "";
+  options.listen_for_beacon = true;
+  for (const int joined : {500, 10'500}) {  // the second address is there from the start, or comes later
+    wire_ = std::make_shared<ScriptedHub::Wire>();
+    makeLink(options);
+    const Endpoint second{0x0A020203U, 49000};
+    for (int k = 0; k < 400; ++k) {
+      const int now = 100 * k;
+      if (k % 10 == 0 && now <= 11'000) {
+        arrive(now * kMs, "beacon", beacon(), kXPlane);
+      }
+      if (k % 10 == 5 && now >= joined) {
+        arrive(now * kMs, "beacon", beacon(), second);
+      }
+      if (now > 2000 && now <= 11'000) {
+        arriveStatus(now * kMs, 50.0F);
+      }
+    }
+    runUntil(11'000 * kMs);
+    EXPECT_EQ(link_->status().state, LinkState::kConnected);
+    EXPECT_EQ(link_->status().peer, kXPlane);
+    runUntil(13'400 * kMs);
+    EXPECT_EQ(link_->status().peer, kXPlane) << "a short silence, as when it loads";
+    runUntil(15'000 * kMs);
+    EXPECT_EQ(link_->status().peer, second);
+    EXPECT_EQ(link_->status().computer_name, "sim");
+    EXPECT_EQ(link_->status().reason, "X-Plane has moved to 10.2.2.3:49000");
+    EXPECT_EQ(wire_->sent.back().to, second);
+    flight_.reset();
+    link_.reset();
+  }
+}
+
+TEST_F(ScriptedLink, AnXPlaneThatAnswersIsKeptWhereverItsBeaconComesFrom) {
+  SimLinkOptions options = defaults();
+  options.host = "";
+  options.listen_for_beacon = true;
+  makeLink(options);
+  const Endpoint second{0x0A020203U, 49000};
+  for (int k = 0; k < 400; ++k) {
+    const int now = 100 * k;
+    if (k % 10 == 0) {
+      arrive(now * kMs, "beacon", beacon(), now <= 3000 ? kXPlane : second);
+    }
+    if (now > 2000 && now <= 20'000) {
+      arriveStatus(now * kMs, 50.0F);
+    }
+  }
+  runUntil(20'000 * kMs);
+  EXPECT_EQ(link_->status().peer, kXPlane);
+  EXPECT_EQ(link_->status().state, LinkState::kConnected);
+  runUntil(22'000 * kMs);
+  EXPECT_EQ(link_->status().peer, kXPlane) << "a short silence, as when it loads";
+  runUntil(23'000 * kMs);
+  EXPECT_EQ(link_->status().peer, second);
 }
 
 TEST_F(ScriptedLink, DataWithoutAnswersIsOneWayAndItsVersionIsTheOption) {

@@ -87,6 +87,37 @@ TEST(BeaconTracker, OneComputerHeardUnderTwoAddressesIsOne) {
   EXPECT_EQ(tracker.sightings(2 * kS).size(), 5U);
 }
 
+TEST(BeaconTracker, ListensWhereItsBeaconComesFromOnceTheFirstAddressIsSilent) {
+  BeaconTracker tracker = makeTracker();
+  tracker.heard(beacon(), kLan, 0);
+  tracker.heard(beacon(), kOther, kS);
+  tracker.heard(beacon(), kOther, 2 * kS);
+  EXPECT_EQ(tracker.at({kLan, 49000}, 2 * kS)->endpoint.address, kLan) << "two beacons may have been lost";
+  EXPECT_EQ(tracker.lastHeard({kLan, 49000}), 0);
+  tracker.heard(beacon(), kOther, 3 * kS);
+  ASSERT_EQ(tracker.sightings(3 * kS).size(), 1U);
+  EXPECT_EQ(toString(tracker.sightings(3 * kS)[0]), "sim (192.168.1.9:49000, version 115501)");
+  EXPECT_EQ(tracker.at({kLan, 49000}, 3 * kS)->endpoint.address, kOther) << "it was known there";
+  EXPECT_EQ(tracker.onlyOne(3 * kS)->endpoint.address, kOther);
+  EXPECT_EQ(tracker.lastHeard({kLan, 49000}), 0);
+  EXPECT_EQ(tracker.lastHeard({kOther, 49000}), 3 * kS);
+  EXPECT_FALSE(tracker.onlyNewSince(kS, 3 * kS).has_value()) << "it has been there all along";
+  // The first address comes back: no reason to leave the one that is heard.
+  tracker.heard(beacon(), kLan, 4 * kS);
+  EXPECT_EQ(toString(tracker.sightings(4 * kS).at(0)),
+            "sim (192.168.1.9:49000, version 115501, also heard from 192.168.1.5)");
+}
+
+TEST(BeaconTracker, OwnComputerIsHeardUnderTheAddressThatIsLeft) {
+  BeaconTracker tracker = makeTracker();
+  tracker.heard(beacon(), kOurLan, 0);
+  for (int k = 0; k < 4; ++k) {
+    tracker.heard(beacon(), kLoopbackAddress, k * kS);
+  }
+  EXPECT_EQ(tracker.at({kOurLan, 49000}, 3 * kS)->endpoint.address, kLoopbackAddress);
+  EXPECT_EQ(tracker.lastHeard({kOurLan, 49000}), 0);
+}
+
 TEST(BeaconTracker, OnlyMasterXPlanesCount) {
   BeaconTracker tracker = makeTracker();
   Beacon visual = beacon();
