@@ -18,11 +18,13 @@ import pytest
 from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.cli import xplane_doctor
+from xplane_bridge.doctor import names as doctor_names
 from xplane_bridge.doctor.conformance import names, results
 from xplane_bridge.doctor.conformance.journal import Journal
 from xplane_bridge.doctor.conformance.questions import CARD
 from xplane_bridge.doctor.conformance.verdict import Verdict
 from xplane_bridge.emulator.datarefs import otherwise
+from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.xplane_client import XPlaneClient
 from xplane_bridge.resources import program
 
@@ -276,6 +278,40 @@ def test_a_killed_card_is_undone(tmp_path, how):
 
 def written(journal):
     return json.loads(journal.file.read_text(encoding="utf-8"))["entries"] if journal.file.exists() else []
+
+
+# ------------------------------------------------------------------------------------------- what it asks X-Plane
+
+
+class Recorder(FakeXPlane):
+    """Keeps each request for a dataref, with the client that sent it."""
+
+    def __init__(self, values):
+        super().__init__(values)
+        self.requests = []
+
+    def _take(self, datagram, client):
+        request = protocol.decode_request(datagram)
+        if isinstance(request, protocol.RrefRequest):
+            self.requests.append((client, request))
+        super()._take(datagram, client)
+
+
+def test_a_subscription_is_ended_by_its_own_request_with_rate_0(tmp_path):
+    values = {**dict.fromkeys(names.READ, 0.0), doctor_names.VERSION: 122015.0}
+    with Recorder(values) as xplane:
+        assert doctor(xplane.port, tmp_path, "--yes", "--only", "same-index,paused-output")[0] == 0
+        wait_until(lambda: not any(xplane.subscriptions.values()), 10.0, "the end of the last subscription")
+        begun, ended = (
+            {
+                (client, request.index, request.path)
+                for client, request in xplane.requests
+                if bool(request.rate_hz) is on
+            }
+            for on in (True, False)
+        )
+    assert names.EARTH_RADIUS in {path for _, _, path in begun}
+    assert begun == ended
 
 
 # --------------------------------------------------------------------------------------------- what is put back

@@ -75,8 +75,8 @@ class Receiver:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for index in range(len(self._paths)):
-            self.send(protocol.RrefRequest(0, index, ""))
+        for index, path in enumerate(self._paths):
+            self.send(protocol.RrefRequest(0, index, path))
         self.socket.close()
 
     def send(self, message: protocol.Request) -> None:

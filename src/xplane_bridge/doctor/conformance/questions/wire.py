@@ -37,7 +37,7 @@ def _answers(flight: Flight, requests: Sequence[protocol.RrefRequest]) -> List[L
             if packet[:4] == b"RREF"
         ]
         for request in requests:
-            receiver.send(protocol.RrefRequest(0, request.index, ""))
+            receiver.send(protocol.RrefRequest(0, request.index, request.path))
     time.sleep(_APART_S)
     return packets
 
