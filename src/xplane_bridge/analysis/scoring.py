@@ -8,8 +8,10 @@ import numpy as np
 
 from xplane_bridge.analysis.criteria import CAMERA, Criterion
 
-#: Variables that wrap at 360 degrees.
-_WRAPPING = ("roll", "heading")
+#: Variables that wrap at 360 degrees, and the lowest value of each.
+_WRAPPING = {"roll": -180.0, "heading": 0.0}
+#: A flight may end this much before a window does: its last state is one of before that moment [s].
+_BEFORE_END_S = 0.1
 
 
 class Score(NamedTuple):
@@ -63,6 +65,9 @@ def _score(
         end = float(time[-1]) if len(time) else start
     else:
         end = labels[criterion.end] if isinstance(criterion.end, str) else criterion.end
+        ended = float(time[-1]) if len(time) else 0.0
+        if end - ended > max([_BEFORE_END_S, *(2.0 * np.diff(time[-2:]))]):
+            return _unmeasured(criterion, f"the flight ended at {ended:g} s, before {end:g} s")
     inside = (time >= start) & (time <= end)
     window, samples = time[inside], values[criterion.variable][inside]
     good = np.isfinite(samples)
@@ -90,8 +95,16 @@ def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> floa
             return float("inf")
         return float(time[outside[-1] + 1] - time[0])
     if criterion.measure == "final":
-        return float(np.mean(values[time >= time[-1] - 1.0]))
+        return _mean(criterion.variable, values[time >= time[-1] - 1.0])
     return float(values.min() if criterion.measure == "minimum" else values.max())
+
+
+def _mean(variable: str, values: np.ndarray) -> float:
+    """In the variable's own range, also where the values pass its end."""
+    if variable not in _WRAPPING:
+        return float(np.mean(values))
+    lowest = _WRAPPING[variable]
+    return float(lowest + (np.degrees(np.mean(np.unwrap(np.radians(values)))) - lowest) % 360.0)
 
 
 def _judged(criterion: Criterion, value: float) -> Score:

@@ -154,6 +154,11 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
     variable = _one_of(given.get("of"), f"{path}.of", SCORED)
     if measure in TARGETED and "target" not in given:
         raise ScenarioError(f"{path}.target: missing; expected what {measure} compares with")
+    if measure not in TARGETED and "target" in given:
+        raise ScenarioError(
+            f"{path}.target: does not go with {measure}, which is the variable's own value; expected bounds on that, "
+            f"or one of {', '.join(TARGETED)}"
+        )
     if measure == "settling" and "band" not in given:
         raise ScenarioError(f"{path}.band: missing; expected the largest |{variable} - target| that counts as settled")
     numbers = {

@@ -58,12 +58,38 @@ def test_final_and_extremes() -> None:
     assert one(criterion(measure="maximum", end=4.0), T).value == pytest.approx(4.0)
 
 
+@pytest.mark.parametrize(
+    ("variable", "values", "mean"),
+    [
+        ("roll", np.where(np.arange(len(T)) % 2, 179.0, -179.0), -180.0),  # on its back, not level
+        ("heading", np.where(np.arange(len(T)) % 2, 359.5, 0.5), 0.0),
+        ("heading", np.full(len(T), 359.0), 359.0),
+        ("pitch", np.full(len(T), -89.0), -89.0),
+    ],
+)
+def test_final_angles_are_meant_the_short_way(variable: str, values: np.ndarray, mean: float) -> None:
+    got = score([criterion(variable=variable, measure="final")], T, {variable: values}, {}, {})[0].value
+    assert abs((got - mean + 180.0) % 360.0 - 180.0) < 1.0
+    assert -180.0 <= got < 360.0
+
+
+def test_a_window_that_the_flight_did_not_reach_is_not_measured() -> None:
+    held = criterion(measure="rms", start=0.0, end=60.0, below=6.0)
+    got = one(held, 0 * T)  # T ends at 20 s
+    assert not got.passed
+    assert got.text == "below 6; the flight ended at 20 s, before 60 s"
+    assert one(criterion(measure="rms", start=0.0, end=20.05, below=6.0), 0 * T).passed
+    slow = np.arange(0.0, 20.1, 1.0)
+    each_second = criterion(measure="rms", start=0.0, end=21.5, below=6.0)
+    assert score([each_second], slow, {"roll": 0 * slow}, {}, {})[0].passed  # its next state would lie behind
+
+
 def test_what_cannot_be_measured_has_not_passed() -> None:
     label = one(criterion(measure="rms", start="fault", below=1.0), 0 * T)
     assert not label.passed
     assert "the event 'fault' never happened" in label.text
-    window = one(criterion(measure="rms", start=30.0, end=40.0, below=1.0), 0 * T)
-    assert "no samples between 30 s and 40 s" in window.text
+    window = one(criterion(measure="rms", start=5.001, end=5.009, below=1.0), 0 * T)
+    assert "no samples between 5.001 s and 5.009 s" in window.text
     camera = one(Criterion("p", "paired", above=0.9), 0 * T)
     assert "no images" in camera.text
     assert not camera.passed

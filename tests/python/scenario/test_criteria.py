@@ -36,6 +36,7 @@ def test_criteria_are_read_from_yaml() -> None:
             {"measure": "maximum", "of": "roll", "below": 1, "from": "x"},
             "criteria.c.from: 'x'; expected seconds, or the",
         ),
+        ({"measure": "final", "of": "heading", "target": 0, "below": 5}, "criteria.c.target: does not go with final"),
         ({"measure": "paired", "of": "roll", "above": 1}, "criteria.c.of: does not go with paired"),
         ({"measure": "maximum", "of": "roll", "below": "x"}, "criteria.c.below: 'x'; expected a number"),
         ({"measure": "maximum", "of": "roll", "under": 1}, "criteria.c.under: unknown key"),
