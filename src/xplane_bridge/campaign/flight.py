@@ -103,14 +103,15 @@ class Flight:
         outcome, reason = self._fly()
         columns = np.array(self._rows, dtype=float).reshape(len(self._rows), 1 + len(_VARIABLES) + len(_STICK))
         series = dict(zip(("time", *_VARIABLES, *_STICK), columns.T))
-        scores = score(self._scenario.criteria, series["time"], series, self._labels, {})
+        criteria = self._scenario.criteria
+        scores = score(criteria, series["time"], series, self._labels, {})
         return FlightResult(
             outcome,
             reason,
             outcome == FLOWN and all(s.passed for s in scores),
             float(series["time"][-1]),
             {s.name: s.value for s in scores},
-            {s.name: bool(s.passed) for s in scores},
+            {c.name: bool(s.passed and (outcome == FLOWN or c.end is not None)) for c, s in zip(criteria, scores)},
             self._truth.hexdigest(),
             series if trace else None,
         )

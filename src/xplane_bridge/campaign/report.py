@@ -45,11 +45,11 @@ def worst_first(campaign: Campaign, table: pd.DataFrame) -> pd.DataFrame:
     frame = pd.DataFrame({"ended": table["outcome"] == FLOWN, "missed": 0, "rank": 0.0, "flight": table["flight"]})
     for criterion in campaign.scenario_criteria:
         frame["missed"] += ~table[f"met_{criterion.name}"]
-        values = table[f"value_{criterion.name}"].fillna(math.inf)
+        values = table[f"value_{criterion.name}"]
         if criterion.below is not None:
-            frame["rank"] += values.rank(method="average")
+            frame["rank"] += values.fillna(math.inf).rank(method="average")
         if criterion.above is not None:
-            frame["rank"] += (-values).rank(method="average")
+            frame["rank"] += (-values).fillna(math.inf).rank(method="average")
     order = frame.sort_values(["ended", "missed", "rank", "flight"], ascending=[True, False, False, True]).index
     return table.loc[order]
 

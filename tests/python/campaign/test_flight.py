@@ -73,6 +73,14 @@ def test_however_a_flight_ends_it_has_an_outcome(changes: dict, outcome: str, re
     assert bool(result.sha256) == (outcome != "no start")
 
 
+def test_a_criterion_of_the_whole_flight_is_met_by_a_whole_flight_only() -> None:
+    level = {"measure": "peak", "of": "roll", "target": 0, "below": 60}
+    criteria = {"whole": level, "begin": {**level, "to": 0.3}, "longer": {**level, "to": 0.9}}
+    result = Flight(campaign(longest=0.5, scenario={"criteria": criteria}).plan(0)).fly()
+    assert result.outcome == "not finished"
+    assert result.met == {"whole": False, "begin": True, "longer": False}
+
+
 def test_a_flight_is_the_same_again_also_after_others() -> None:
     c = campaign(weather={"wind_speed": 5, "wind_from": 90, "turbulence": 2}, flights=2)
     first = Flight(c.plan(0)).fly().sha256

@@ -49,6 +49,11 @@ def test_the_worst_come_first() -> None:
     assert report.flights_to_draw(campaign, table()) == [4, 5, 1, 2, 0]  # 3 never flew
 
 
+def test_what_could_not_be_measured_is_the_worst() -> None:
+    flights = table().iloc[[4, 4, 4]].reset_index(drop=True).assign(flight=[0, 1, 2], value_high=[np.nan, 700.0, 800.0])
+    assert list(report.worst_first(parse_campaign(DOCUMENT), flights)["flight"]) == [0, 1, 2]
+
+
 def test_the_page_needs_no_network_and_says_what_was_flown() -> None:
     campaign = parse_campaign(DOCUMENT)
     trace = {"time": np.arange(3.0), "roll": np.arange(3.0), "altitude": np.ones(3), "speed": np.ones(3)}
