@@ -41,12 +41,15 @@ def covariance(found: Fit) -> np.ndarray:
 
 
 def _coloured(s: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Sum over all pairs of frames of s_i' R(i - j) s_j, R the residuals' tapered correlation; by their spectra."""
+    """Sum over all pairs of frames of s_i' R(j - i) s_j, by their spectra.
+
+    R(l) = E[v(t) v(t + l)'] is the residuals' tapered correlation.
+    """
     n = len(v)
     lags = max(1, round(_LAGS * n))
     length = 1 << int(np.ceil(np.log2(2 * n)))
     spectrum = np.fft.rfft(v, length, axis=0)
-    correlation = np.fft.irfft(np.conj(spectrum[:, :, None]) * spectrum[:, None, :], length, axis=0) / n
+    correlation = np.fft.irfft(spectrum[:, :, None] * np.conj(spectrum[:, None, :]), length, axis=0) / n
     taper = np.zeros(length)
     taper[: lags + 1] = 1.0 - np.arange(lags + 1) / (lags + 1)
     taper[length - lags :] = taper[1 : lags + 1][::-1]

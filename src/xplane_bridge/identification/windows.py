@@ -130,7 +130,8 @@ def read_excitations(table: Table) -> list[Excitation]:
         number = int(table["id"][k])
         if table["active"][k]:
             start, duration = float(table["start_sim_time"][k]), float(table["duration"][k])
-            if not out or out[-1].number != number:
+            # Numbers begin anew with tx_node.
+            if not out or out[-1].number != number or abs(out[-1].start - start) > _SAME_FRAME_S:
                 targets = tuple(str(table["target"][k]).replace(" ", "").split(","))
                 kind, stamp = str(table["kind"][k]), int(table.stamp[k])
                 out.append(Excitation(number, kind, targets, stamp, start, start + duration, "no end in the bag"))

@@ -17,8 +17,10 @@ from xplane_bridge.emulator.flight import jsbsim_model
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.identification.coefficients import geometry_of
 from xplane_bridge.identification.identify import AxisResult, identify
+from xplane_bridge.identification.intervals import _coloured
 from xplane_bridge.identification.linearisation import Condition, linearise
 from xplane_bridge.identification.model import IdentificationError, LinearModel
+from xplane_bridge.identification.windows import read_excitations
 
 GEOMETRY = geometry_of("fixed_wing")
 
@@ -149,6 +151,24 @@ def test_a_film_shows_what_the_model_flies(twin: FlightModel) -> None:
         assert shown.surfaces == flew.surfaces
 
 
+def test_residuals_that_follow_each_other_widen_the_intervals_as_they_should() -> None:
+    rng = np.random.default_rng(3)
+    noise = np.convolve(rng.normal(size=60), np.ones(4) / 2.0, mode="same")
+    residuals = np.column_stack([noise, np.roll(noise, 5)])[5:45]  # the second is the first of five frames before
+    slopes = rng.normal(size=(40, 2, 3))
+    count, lags = len(residuals), 10
+    expected = np.zeros((3, 3))
+    for i in range(count):
+        for j in range(max(0, i - lags), min(count, i + lags + 1)):
+            lag = abs(j - i)
+            early, late = (
+                (residuals[: count - lag], residuals[lag:]) if j >= i else (residuals[lag:], residuals[: count - lag])
+            )
+            together = early.T @ late / count * (1.0 - lag / (lags + 1))  # E[v(i) v(j)']
+            expected += slopes[i].T @ together @ slopes[j]
+    assert _coloured(slopes, residuals) == pytest.approx(expected)
+
+
 def test_intervals_cover_the_truth(twin: FlightModel, truth: LinearModel) -> None:
     assert coverage(twin, truth, range(6)).mean() > 0.7
 
@@ -170,6 +190,15 @@ def covers(result: AxisResult, truth: LinearModel) -> tuple[bool, bool]:
     expected, found = truth.axes["longitudinal"].derivatives, result.model.derivatives
     return tuple(abs(found[k].value - expected[k].value) <= found[k].interval for k in ("Cm_alpha", "Cm_q"))
 
+
+def test_an_excitation_of_a_restarted_node_is_another_one(calm: Recording) -> None:
+    first = [row for row in calm.excitation if row["id"] == calm.excitation[0]["id"]]
+    later = [row for row in calm.excitation if row["target"] == "roll"]
+    again = [{**row, "id": first[0]["id"]} for row in later if row["id"] == later[0]["id"]]
+    found = read_excitations(Recording(calm.state, calm.surfaces, first[:1] + again).flight().tables["excitation"])
+    assert [each.targets for each in found] == [("pitch",), ("roll",)]
+    assert found[0].result == "no end in the bag"
+    assert found[1].start == again[0]["start_sim_time"]
 
 
 def test_an_excitation_of_single_surfaces_is_one_of_their_axis(calm: Recording, found: dict[str, AxisResult]) -> None:
