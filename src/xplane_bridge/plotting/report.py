@@ -111,14 +111,13 @@ def _links(flight: Flight) -> str:
 def _events(flight: Flight) -> str:
     if "events" not in flight.tables:
         return ""
-    seen: dict[int, Any] = {}
+    # The list repeats the newest ones; numbers begin anew with tx_node.
+    seen: dict[tuple[int, int], Any] = {}
     for events in flight.tables["events"]["events"]:
         for event in events:
-            seen[event.number] = event
+            seen[event.stamp.sec * 1_000_000_000 + event.stamp.nanosec, event.number] = event
     rows = []
-    for key in sorted(seen):
-        event = seen[key]
-        stamp = event.stamp.sec * 1_000_000_000 + event.stamp.nanosec
+    for (stamp, _), event in sorted(seen.items(), key=lambda each: each[0]):
         rows.append((_seconds(stamp, flight), html.escape(event.text), html.escape(event.requested_by)))
     if not rows:
         return ""

@@ -72,6 +72,10 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "requested_by": "me",
         }
         bag.add("/xplane/events", "xplane_bridge/EventList", ns, {"events": [event]})
+        later = stamp_ns(19.0)  # of another tx_node, which counts anew
+        again = {**event, "stamp": {"sec": later // 10**9, "nanosec": 0}, "text": "<aileron> repaired"}
+        for _ in range(2):
+            bag.add("/xplane/events", "xplane_bridge/EventList", later, {"events": [again]})
         made = {"package_version": "0.2.0", "parameters": '{"experiment": {"pilot": "Kim"}}', "xplane_version": 115501}
         bag.add("/xplane/experiment", "xplane_bridge/Experiment", stamp_ns(0.0), made)
         for t, state in ((0.0, 1), (10.0, 3), (12.0, 1)):
@@ -98,6 +102,8 @@ def test_the_summary_reports_the_flight(page: Path) -> None:
     # 60 m/s over two stretches of 499 periods of 20 ms
     assert "<b>1198 m</b><span>distance over ground</span>" in text
     assert "&lt;aileron&gt; stuck" in text, "text from a bag must be escaped"
+    assert text.index("&lt;aileron&gt; stuck") < text.index("&lt;aileron&gt; repaired"), "numbers begin anew with tx_node"
+    assert text.count("&lt;aileron&gt; repaired") == 1
     assert re.search(r">stale</td>", text)
 
 
