@@ -38,6 +38,19 @@ def test_the_mapper_alone_where_another_program_reads_the_device(master):
     assert params["/xplane/joystick_mapper_node/stick_mode"] == 1
 
 
+def test_the_stick_mode_is_that_of_the_devices_file_unless_given(master, tmp_path):
+    text = config_file("joysticks", "xbox.yaml").read_text()
+    assert "stick_mode: 2" in text
+    file = tmp_path / "left_handed.yaml"
+    file.write_text(text.replace("stick_mode: 2", "stick_mode: 1"))
+    mine = f"joy_config_file:={file}"
+    for arguments, mode in (((mine,), 1), ((mine, "stick_mode:=2"), 2), (("joy_config:=xbox",), 2)):
+        _, params = load(master, "joystick.launch", *arguments)
+        assert params["/xplane/joystick_mapper_node/stick_mode"] == mode
+    nodes, _ = load(master, "joystick.launch", "driver:=virtual", mine)
+    assert "--stick-mode" not in nodes["virtual_joystick"].args  # it reads the same file
+
+
 @pytest.mark.parametrize(("given", "device"), [((), ""), (("device:=Extreme 3D",), "Extreme 3D")])
 def test_driver_sdl_is_our_reader(master, given, device):
     nodes, _ = load(master, "joystick.launch", "driver:=sdl", "ns:=lab", *given)
@@ -50,12 +63,13 @@ def test_driver_sdl_is_our_reader(master, given, device):
 
 
 def test_driver_virtual_plays_a_scenario_as_the_same_device(master):
-    nodes, _ = load(master, "joystick.launch", "driver:=virtual", "joy_config:=playstation", "scenario:=multisine")
+    of_scenario = ("joy_config:=playstation", "scenario:=multisine", "stick_mode:=1")
+    nodes, _ = load(master, "joystick.launch", "driver:=virtual", *of_scenario)
     assert set(nodes) == {"joystick_mapper_node", "virtual_joystick"}
     words = shlex.split(nodes["virtual_joystick"].args)
     assert words[0] == "multisine"
     assert words[words.index("--joy-config") + 1].endswith("config/joysticks/playstation.yaml")
-    assert words[words.index("--stick-mode") + 1] == "2"
+    assert words[words.index("--stick-mode") + 1] == "1"
 
 
 def test_driver_xplane_reads_the_stick_of_the_x_plane_that_is_meant(master):
