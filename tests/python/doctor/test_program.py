@@ -22,6 +22,21 @@ from xplane_bridge.doctor.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[3]
 DOCTOR = ROOT / "scripts" / "xplane_doctor"
+#: What Windows has not, and all of ROS: to import them is an error here.
+ABSENT = ("fcntl", "termios", "pwd", "resource", "grp", "rospy", "rosbag", "roslib", "genpy", "xplane_bridge.msg")
+ELSEWHERE = f"""
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name in {ABSENT!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+for name in {ABSENT!r}:
+    sys.modules.pop(name, None)
+sys.meta_path.insert(0, Absent())
+from xplane_bridge.cli.xplane_doctor import main
+sys.argv[0] = "xplane_doctor"
+sys.exit(main(sys.argv[1:]))
+"""
 
 
 def run(*arguments, **environment):
@@ -101,6 +116,26 @@ def test_help_names_the_options_and_exit_codes(capsys):
     assert end.value.code == 0
     text = capsys.readouterr().out
     assert all(word in text for word in ("--host", "--port", "--json", "0 all is well, 1 findings, 2 cannot run"))
+
+
+def test_it_starts_without_ros_and_without_what_only_linux_has(tmp_path):
+    def started(*arguments):
+        command = [sys.executable, "-c", ELSEWHERE, "--host", "127.0.0.1", *map(str, arguments)]
+        env = {key: value for key, value in os.environ.items() if key != "DISPLAY"}
+        env["ROS_HOME"] = str(tmp_path)
+        return subprocess.run(command, env=env, capture_output=True, text=True, check=False, timeout=60)
+
+    values = {names.VERSION: 115501.0, names.PAUSED: 0.0, names.REPLAY: 0.0, FakeXPlane.TIME: 5.0}
+    with FakeXPlane(values) as xplane:
+        examined = started("--port", xplane.port)
+        refused = started("--port", xplane.port, "--conformance", "--yes")
+        assert xplane.others == []
+    assert "(115501)" in examined.stdout, examined.stderr
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert refused.stderr == (
+        "xplane_doctor: changes can be noted on Linux only (No module named 'fcntl'): "
+        "fly the card from the nodes' computer, with --host\n"
+    )
 
 
 def test_what_was_not_seen_is_reported_and_not_judged():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
+import importlib
 import json
 import os
 import socket
@@ -64,6 +64,9 @@ class Journal:
         address: IPv4 address of X-Plane.
         port: UDP port it listens on.
         proc: Folder of Linux's process file system.
+
+    Raises:
+        JournalError: This system has not what the journal needs: it is not Linux.
     """
 
     def __init__(self, folder: Path, address: str, port: int, proc: Path = Path("/proc")) -> None:
@@ -71,13 +74,18 @@ class Journal:
         name = "127.0.0.1" if address.startswith("127.") else address
         self.file = folder / f"{name}_{port}.json"
         self._proc = proc
-        self._self: Dict[str, Any] = {
-            "node": NODE,
-            "pid": os.getpid(),
-            "start_ticks": process_status(proc, "self")[1],
-            "boot_id": boot_id(proc),
-            "computer": socket.gethostname(),
-        }
+        try:
+            self._fcntl = importlib.import_module("fcntl")  # the doctor starts without it, as on Windows
+            self._self: Dict[str, Any] = {
+                "node": NODE,
+                "pid": os.getpid(),
+                "start_ticks": process_status(proc, "self")[1],
+                "boot_id": boot_id(proc),
+                "computer": socket.gethostname(),
+            }
+        except (ImportError, OSError) as error:
+            msg = f"changes can be noted on Linux only ({error}): fly the card from the nodes' computer, with --host"
+            raise JournalError(msg) from None
 
     def holders(self) -> List[str]:
         """Who else has changed this X-Plane and still runs, in words."""
@@ -139,7 +147,7 @@ class Journal:
     def _locked(self) -> Iterator[None]:
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with open(f"{self.file}.lock", "a", encoding="utf-8") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            self._fcntl.flock(lock, self._fcntl.LOCK_EX)
             yield
 
     def _load(self) -> List[Entry]:
