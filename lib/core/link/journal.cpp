@@ -386,19 +386,28 @@ std::vector<JournalEntry> Journal::own() const {
 
 void Journal::record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo,
                      std::vector<JournalSubscription> subscriptions) {
+  record({JournalRecord{id, purpose, std::move(undo), std::move(subscriptions)}});
+}
+
+void Journal::record(std::vector<JournalRecord> records) {
+  if (records.empty()) {
+    return;
+  }
   const Lock lock(path_);
   std::vector<JournalEntry> entries = read(path_);
-  JournalEntry entry{id, purpose, self_, std::move(undo), "", std::move(subscriptions)};
-  const auto same =
-      std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == id; });
-  if (same == entries.end()) {
-    entries.push_back(std::move(entry));
-  } else if (same->owner != self_ && alive_(same->owner)) {
-    throw JournalTakenError("'" + id + "' belongs to " + same->owner.node + " (process " +
-                            std::to_string(same->owner.pid) + " on " + same->owner.computer +
-                            "), which still runs: end it first");
-  } else {
-    *same = std::move(entry);
+  for (JournalRecord& record : records) {
+    JournalEntry entry{record.id, record.purpose, self_, std::move(record.undo), "", std::move(record.subscriptions)};
+    const auto same =
+        std::find_if(entries.begin(), entries.end(), [&](const JournalEntry& each) { return each.id == record.id; });
+    if (same == entries.end()) {
+      entries.push_back(std::move(entry));
+    } else if (same->owner != self_ && alive_(same->owner)) {
+      throw JournalTakenError("'" + record.id + "' belongs to " + same->owner.node + " (process " +
+                              std::to_string(same->owner.pid) + " on " + same->owner.computer +
+                              "), which still runs: end it first");
+    } else {
+      *same = std::move(entry);
+    }
   }
   write(path_, entries);
 }

@@ -96,6 +96,14 @@ struct JournalEntry {
   std::vector<JournalSubscription> subscriptions = {};
 };
 
+/// An entry to be written in the name of this process; fields as in JournalEntry.
+struct JournalRecord {
+  std::string id;
+  std::string purpose;
+  std::vector<UndoOperation> undo;
+  std::vector<JournalSubscription> subscriptions = {};
+};
+
 /// The journal of one X-Plane (host and port), shared by all nodes that use it.
 ///
 /// Each call locks the file (flock on "<path>.lock"), reads it, changes it and replaces it atomically
@@ -128,6 +136,8 @@ class Journal {
   /// the entry of one that is gone is replaced, so look at orphans() first.
   void record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo,
               std::vector<JournalSubscription> subscriptions = {});
+  /// The same of several at the price of one, the file being replaced once: all of them or, when it throws, none.
+  void record(std::vector<JournalRecord> records);
   /// Writes into this process's entries of these ids why they are left behind.
   void leave(const std::vector<std::string>& ids, const std::string& why);
   /// Removes entries by id; unknown ids are no error. The file goes with its last entry.

@@ -1,10 +1,12 @@
 #include "xplane_bridge/core/link/journal.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -40,6 +42,32 @@ class JournalTest : public testing::Test {
 };
 
 const std::vector<UndoOperation> kReleaseJoystick = {UndoDref{"sim/operation/override/override_joystick", 0.0F}};
+
+/// How often a file of a folder has been replaced by another one since.
+class Replacements {
+ public:
+  explicit Replacements(const std::string& folder) {
+    EXPECT_GE(inotify_add_watch(fd_, folder.c_str(), IN_MOVED_TO), 0);
+  }
+  ~Replacements() { close(fd_); }
+  Replacements(const Replacements&) = delete;
+  Replacements& operator=(const Replacements&) = delete;
+
+  std::size_t count() const {
+    std::size_t out = 0;
+    std::array<char, 4096> events{};
+    const ssize_t length = read(fd_, events.data(), events.size());
+    for (ssize_t at = 0; at < length; ++out) {
+      inotify_event event{};
+      std::memcpy(&event, events.data() + at, sizeof event);
+      at += static_cast<ssize_t>(sizeof event + event.len);
+    }
+    return out;
+  }
+
+ private:
+  int fd_ = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+};
 
 JournalOwner deadOwner() {
   JournalOwner owner = thisProcess("/crashed");
@@ -143,6 +171,31 @@ TEST_F(JournalTest, EntryOfARunningProcessIsNotTaken) {
   } catch (const JournalTakenError& error) {
     EXPECT_NE(std::string(error.what()).find("/first"), std::string::npos) << error.what();
   }
+  EXPECT_EQ(journal().entries()[0].owner.node, "/first");
+}
+
+TEST_F(JournalTest, SeveralAreWrittenAtOnce) {
+  journal().record("b", "override", kReleaseJoystick);
+  const Replacements replacements(fs::path(path_).parent_path().string());
+  journal().record({{"a", "override", kReleaseJoystick}, {"b", "override", {UndoDref{"other", 1.0F}}}, {"c", "x", {}}});
+  EXPECT_EQ(replacements.count(), 1U);
+  const std::vector<JournalEntry> entries = journal().entries();
+  ASSERT_EQ(entries.size(), 3U);
+  EXPECT_EQ(entries[0].id, "b");
+  EXPECT_EQ(std::get<UndoDref>(entries[0].undo[0]).path, "other");
+  EXPECT_EQ(entries[1].id, "a");
+  EXPECT_EQ(entries[2].purpose, "x");
+  EXPECT_EQ(entries[2].owner, thisProcess(""));
+  journal().record({});
+  EXPECT_EQ(replacements.count(), 0U);
+}
+
+TEST_F(JournalTest, OfSeveralNoneIsWrittenWhereOneIsTaken) {
+  journal("/first").record("b", "override", kReleaseJoystick);
+  Journal other(path_, JournalOwner{"/second", 1, 2, "boot", "pc"});
+  EXPECT_THROW(other.record({{"a", "override", kReleaseJoystick}, {"b", "override", kReleaseJoystick}}),
+               JournalTakenError);
+  ASSERT_EQ(journal().entries().size(), 1U);
   EXPECT_EQ(journal().entries()[0].owner.node, "/first");
 }
 
