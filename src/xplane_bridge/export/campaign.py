@@ -3,7 +3,7 @@
 An export folder holds one entry per flight and format, a data card (README.md), and ``manifest.json``: versions,
 parameters, counts, and the SHA-256 of every file exported there. A flight is built under a temporary name and renamed
 when whole, so that an export that was cut off goes on where it stopped: flights whose record in ``.flights/<format>/``
-fits the bags and parameters are not made again. What another record names is never overwritten.
+fits the bags and parameters are not made again. What no record names, or another flight's, is never overwritten.
 """
 
 from __future__ import annotations
@@ -91,9 +91,7 @@ def export_flight(job: Job) -> Outcome:
         old = _read_json(record_file)
         if old and old["key"] == key and all((output / f).is_file() for f in old["record"]["files"]):
             return Outcome(job.name, old["record"], "", True)
-        record = _export(job, output)
-        record_file.parent.mkdir(parents=True, exist_ok=True)
-        _write_json(record_file, {"key": key, "record": record})
+        record = _export(job, output, key, record_file)
         for alias in (alias for alias, name in ALIASES.items() if name == job.format):
             _remove(output / _RECORDS / alias / record_file.name)  # of an earlier version, made anew
         return Outcome(job.name, record, "", False)
@@ -103,9 +101,10 @@ def export_flight(job: Job) -> Outcome:
         return Outcome(job.name, None, f"{error.filename}: {error.strerror}", False)
 
 
-def _export(job: Job, output: Path) -> dict[str, Any]:
+def _export(job: Job, output: Path, key: dict[str, Any], record_file: Path) -> dict[str, Any]:
     form = FORMATS[job.format]
     final = output / f"{job.name}{form.ending}"
+    _refuse_recordings(final, job)
     _refuse_foreign(final, job)
     # Under its own name already: some formats write it into their files.
     folder = final.with_name(f".{final.name}.part")
@@ -121,29 +120,53 @@ def _export(job: Job, output: Path) -> dict[str, Any]:
                 names = job.dataset.cameras if "dataset" in form.options else ()
                 about["quality"] = frame_quality(bags, names)
                 about["cameras"] = [row.plain() for row in camera_rows(bags, names)]
+        made = folder / final.name
+        files = _files(made, final.name) if made.is_dir() else [final.name]
+        record = {
+            "xplane_bridge": __version__,
+            "bags": [Path(path).name for path in job.bags],
+            "parameters": job.parameters,
+            "counts": counts,
+            **about,
+            "files": {name: _sha256(folder / name) for name in files},
+        }
         _remove(final)
-        os.replace(folder / final.name, final)
+        # Before the result: killed between the two, the next run must know what it finds as its own.
+        record_file.parent.mkdir(parents=True, exist_ok=True)
+        _write_json(record_file, {"key": key, "record": record})
+        os.replace(made, final)
     finally:
         _remove(folder)
-    files = _files(final, final.name) if final.is_dir() else [final.name]
-    return {
-        "xplane_bridge": __version__,
-        "bags": [Path(path).name for path in job.bags],
-        "parameters": job.parameters,
-        "counts": counts,
-        **about,
-        "files": {name: _sha256(output / name) for name in files},
-    }
+    return record
+
+
+def _refuse_recordings(final: Path, job: Job) -> None:
+    """Raise `ExportError` when what would be replaced is, or holds, a bag of the flight."""
+    place = final.resolve()
+    for bag in map(Path, job.bags):
+        if any(final in (path, *path.parents) or place in (path, *path.parents) for path in (bag, bag.resolve())):
+            msg = (
+                f"{bag}: the {job.format} export of this bag would replace {final}, where the bag itself lies; "
+                "give another folder with -o"
+            )
+            raise ExportError(msg)
 
 
 def _refuse_foreign(final: Path, job: Job) -> None:
-    """Raise `ExportError` when what would be written is on another export's record."""
+    """Raise `ExportError` when something is there that is not on the record of this flight's earlier export."""
+    own = False
     for form, flight, record in _records(Path(job.output)):
-        if (form, flight) == (job.format, job.name):
-            continue
         if any(name.split("/")[0] == final.name for name in record["files"]):
-            msg = f"{final} belongs to the {form} export of {flight}; give another folder with -o"
-            raise ExportError(msg)
+            if (form, flight) != (job.format, job.name):
+                msg = f"{final} belongs to the {form} export of {flight}; give another folder with -o"
+                raise ExportError(msg)
+            own = True
+    if os.path.lexists(final) and not own:
+        msg = (
+            f"{final} is there already, made by no export that this folder has a record of; expected nothing of that "
+            f"name, for the {job.format} export of {job.name}: give another folder with -o, or move it away"
+        )
+        raise ExportError(msg)
 
 
 def _records(output: Path) -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -314,9 +337,9 @@ def _files(folder: Path, name: str) -> Iterator[str]:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
-    elif path.exists():
+    elif os.path.lexists(path):
         path.unlink()
 
 

@@ -1,0 +1,116 @@
+"""What bag_export writes where: recordings and foreign files stay."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from support.flights.export_flight import export, files_of, write_flight
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+#: Runs an export that is killed in place of its nth renaming of a file or folder.
+KILLED = """
+import os, signal, sys
+from xplane_bridge.cli.bag_export import main
+left, rename = [int(sys.argv[1])], os.replace
+def replace(source, target):
+    left[0] -= 1
+    if not left[0]:
+        os.kill(os.getpid(), signal.SIGKILL)
+    rename(source, target)
+os.replace = replace
+main(sys.argv[2:])
+"""
+
+
+@pytest.fixture(name="split")
+def fixture_split(tmp_path: Path) -> Path:
+    """A folder of split bags."""
+    folder = tmp_path / "data" / "monday"
+    folder.mkdir(parents=True)
+    write_flight(folder / "a.bag", 0.4)
+    write_flight(folder / "b.bag", 0.4, offset=10.0)
+    return folder
+
+
+def test_a_recording_is_never_replaced_by_its_export(split: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = files_of(split)
+    assert export(split, "--format", "imagefolder", "-o", split.parent) == 1
+    err = capsys.readouterr().err
+    assert f"{split / 'a.bag'}: the imagefolder export of this bag would replace {split}, where the bag" in err
+    assert "give another folder with -o" in err
+    assert files_of(split) == before
+    # Also where an earlier export's record names that folder.
+    other = write_flight(split.parent / "other.bag", 0.4)
+    split.rename(split.parent / "later")
+    other.rename(split.parent / "monday.bag")
+    assert export(split.parent / "monday.bag", "--format", "imagefolder", "-o", split.parent) == 0
+    for name in before:
+        (split.parent / "later" / name).rename(split / name)
+    assert export(split, "--format", "imagefolder", "-o", split.parent) == 1
+    assert before.items() <= files_of(split).items()
+    assert export(split, "--format", "csv", "-o", split.parent) == 0
+
+
+def test_a_bag_of_any_name_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 0.4).rename(tmp_path / "flight.recorded")
+    before = bag.read_bytes()
+    assert export(bag, "--format", "imagefolder", "-o", tmp_path) == 1
+    assert "would replace" in capsys.readouterr().err
+    assert bag.read_bytes() == before
+
+
+def test_what_lies_behind_links_is_not_replaced(split: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "monday").symlink_to(split)
+    before = files_of(split)
+    assert export(split, "--format", "imagefolder", "-o", out) == 1
+    assert files_of(split) == before
+    linked = tmp_path / "links" / "tuesday"
+    linked.mkdir(parents=True)
+    for name in before:
+        (linked / name).symlink_to(split / name)
+    assert export(linked, "--format", "imagefolder", "-o", linked.parent) == 1
+    assert files_of(split) == before
+
+
+@pytest.mark.parametrize("form", ["imagefolder", "csv"])
+def test_what_no_export_made_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str], form: str) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 0.4)
+    out = tmp_path / "out"
+    own = out / "flight" / "thesis.tex" if form == "imagefolder" else out / "flight.csv"
+    own.parent.mkdir(parents=True)
+    own.write_text("years of work")
+    assert export(bag, "--format", form, "-o", out) == 1
+    err = capsys.readouterr().err
+    assert "is there already, made by no export that this folder has a record of" in err
+    assert "give another folder with -o, or move it away" in err
+    assert own.read_text() == "years of work"
+
+
+def test_an_earlier_export_of_the_same_flight_is_replaced(tmp_path: Path) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 1.0)
+    for form, option in (("imagefolder", "--keep-bad-frames"), ("csv", "--rate=10")):
+        assert export(bag, "--format", form, "-o", tmp_path) == 0
+        before = files_of(tmp_path)
+        assert export(bag, "--format", form, option, "-o", tmp_path) == 0
+        assert files_of(tmp_path) != before
+    assert export("--verify", "-o", tmp_path) == 1, "the bag itself"
+
+
+@pytest.mark.parametrize("renaming", [1, 2, 3])
+def test_an_export_that_was_killed_goes_on(tmp_path: Path, renaming: int) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 0.4)
+    for arguments in ([], ["--keep-bad-frames"]):  # a first one; one that replaces earlier results
+        command = [str(bag), "--format", "yolo", *arguments, "-o", str(tmp_path / "out")]
+        run = subprocess.run([sys.executable, "-c", KILLED, str(renaming), *command], timeout=60, check=False)
+        assert run.returncode == -signal.SIGKILL
+        assert export(*command) == 0
+        assert export("--verify", "-o", tmp_path / "out") == 0
