@@ -19,10 +19,12 @@ from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.cli import xplane_doctor
 from xplane_bridge.doctor import names as doctor_names
-from xplane_bridge.doctor.conformance import names, results
+from xplane_bridge.doctor.conformance import flight, names, results
+from xplane_bridge.doctor.conformance import program as conformance
 from xplane_bridge.doctor.conformance.journal import Journal
 from xplane_bridge.doctor.conformance.questions import CARD
 from xplane_bridge.doctor.conformance.verdict import Verdict
+from xplane_bridge.doctor.settings import Settings
 from xplane_bridge.emulator.datarefs import otherwise
 from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.xplane_client import XPlaneClient
@@ -330,3 +332,62 @@ def test_the_flight_is_put_back_and_answers_of_this_version_are_kept(tmp_path):
         report = file.with_name(file.stem + "_report.txt").read_text(encoding="utf-8")
         assert "prel: confirmed" in report
         assert "X-Plane 122015" in report
+
+
+def test_a_flight_that_loads_for_long_is_waited_for_and_paused_again(tmp_path):
+    options = emulator_options("", False, "12")
+    with emulator("--alt", "2500", "--loading-time", "7", *options) as port:
+        before = shown(port, names.LATITUDE)
+        client = XPlaneClient(port)
+        client.send(protocol.CommandRequest(names.PAUSE_TOGGLE))
+        client.close()
+        code, out, err = doctor(port, tmp_path, "--yes", "--only", "side-sign")
+        assert code == 0, err
+        assert out.startswith("side-sign: confirmed")
+        assert shown(port, names.LATITUDE) == pytest.approx(before, abs=0.02)
+        assert shown(port, names.PAUSED) == 1.0
+
+
+class Silenced(FakeXPlane):
+    """Says nothing any more once a situation is to be loaded."""
+
+    def _take(self, datagram, client):
+        super()._take(datagram, client)
+        if isinstance(protocol.decode_request(datagram), protocol.Situation):
+            self._values.clear()
+
+
+FLIES = {
+    **dict.fromkeys((*names.READ, *names.LOCAL_PLACE), 0.0),
+    names.HEIGHT: 1500.0,
+    doctor_names.VERSION: 115501.0,
+}
+
+
+def flown_here(xplane, home, monkeypatch, *ids):
+    """The card in this process, with little patience; its exit code and what it has written."""
+    for name, short_s in (("_SEEN_S", 0.5), ("_LOAD_S", 0.5), ("_PAUSE_S", 0.3)):
+        monkeypatch.setattr(flight, name, short_s)
+    code = conformance.main(Settings("127.0.0.1", xplane.port, environment={"ROS_HOME": str(home)}), ids, True)
+    file = results.file_of(home / "xplane_bridge", "127.0.0.1", xplane.port)
+    return code, json.loads(file.read_text(encoding="utf-8"))["questions"].keys()
+
+
+def test_answers_are_written_where_the_flight_cannot_be_put_back(tmp_path, monkeypatch, capsys):
+    def begin(self):
+        self._saved = True
+
+    monkeypatch.setattr(flight.Flight, "begin", begin)
+    with Silenced(FLIES) as xplane:
+        assert flown_here(xplane, tmp_path, monkeypatch, "side-sign") == (1, {"side-sign"})
+        sent = [protocol.decode_request(datagram) for datagram in xplane.others]
+    # It may load for longer yet: what does not answer is not paused for that.
+    assert sent == [protocol.Situation(protocol.Situation.LOAD, flight._SITUATION)]
+    assert "not put back: the aircraft is not back where it was" in capsys.readouterr().err
+
+
+def test_answers_are_written_where_the_aircraft_cannot_be_brought_into_the_air(tmp_path, monkeypatch, capsys):
+    with FakeXPlane(FLIES) as xplane:
+        flown = flown_here(xplane, tmp_path, monkeypatch, "same-index", "prel", "side-sign")
+    assert flown == (2, {"same-index"})
+    assert "X-Plane follows neither PREL nor VEHS nor local coordinates" in capsys.readouterr().err

@@ -30,11 +30,13 @@ class Flown:
         version: X-Plane's, as it gives it.
         answers: By id, in the order asked.
         left: What could not be put back, in words; empty: everything is as it was.
+        broken_off: Why the questions after these were not asked; empty: all were.
     """
 
     version: int
     answers: Dict[str, Answer]
     left: Tuple[str, ...]
+    broken_off: str = ""
 
 
 def chosen(ids: Sequence[str]) -> List[Question]:
@@ -67,7 +69,7 @@ def fly(
         say: Called with each answer as it comes.
 
     Raises:
-        CannotRunError: X-Plane does not answer, a node holds its journal, or it brings no aircraft into the air.
+        CannotRunError: X-Plane does not answer, or a node holds its journal.
     """
     try:
         return _fly(XPlane(address, port, Journal(journals, address, port)), questions, say)
@@ -88,24 +90,33 @@ def _fly(xplane: XPlane, questions: Sequence[Question], say: Callable[[Question,
             raise CannotRunError(f"nothing answers on {xplane.address}:{xplane.port}: scripts/xplane_doctor says why")
         xplane.version = round(version)
         left += xplane.undo(xplane.journal.orphans())
-        left += _ask_all(xplane, questions, answers, say)
+        broken_off = _ask_all(xplane, questions, answers, left, say)
     finally:
-        left += xplane.undo(xplane.journal.own())
+        left += _undo(xplane)
         xplane.close()
-    return Flown(xplane.version, answers, tuple(left))
+    return Flown(xplane.version, answers, tuple(left), broken_off)
+
+
+def _undo(xplane: XPlane) -> List[str]:
+    try:
+        return xplane.undo(xplane.journal.own())
+    except (JournalError, OSError) as error:  # the answers are to be written all the same
+        return [str(error)]
 
 
 def _ask_all(
     xplane: XPlane,
     questions: Sequence[Question],
     answers: Dict[str, Answer],
+    left: List[str],
     say: Callable[[Question, Answer], None],
-) -> List[str]:
+) -> str:
+    """Adds to `answers`, and to `left` what could not be put back; returns why it was broken off, or nothing."""
     try:
         flight = Flight(xplane)
     except NotTestableError as error:
         raise CannotRunError(f"{error}: is a flight loaded, and not paused?") from None
-    flying, problem = False, ""
+    flying = False
     try:
         for question in questions:
             if question.flies and not flying:
@@ -113,11 +124,11 @@ def _ask_all(
                 flying = True
             answers[question.id] = _ask(flight, question)
             say(question, answers[question.id])
-    except NoFlightError as error:
-        raise CannotRunError(str(error)) from None
+    except (NoFlightError, NotTestableError, JournalError) as error:
+        return str(error)
     finally:
-        problem = flight.end()
-    return [problem] if problem else []
+        left += flight.end()
+    return ""
 
 
 def _ask(flight: Flight, question: Question) -> Answer:

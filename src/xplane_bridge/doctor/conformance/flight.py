@@ -23,6 +23,8 @@ _FROM_ORIGIN_DEG, _AWAY_DEG = 0.12, 0.2
 _BY_STALL, _SPEED_MPS, _USUAL_MPS = 1.7, (30.0, 130.0), 60.0
 #: A placement of which nothing is seen counts as ignored after [s]; while X-Plane loads it does not answer.
 _SEEN_S, _LOAD_S = 4.0, 90.0
+#: By then X-Plane has begun to load: what it sends afterwards is of the flight that it loaded [s].
+_BEGINS_S = 0.5
 _NEAR_DEG = 0.02
 _NEAR_M = 300.0
 _PAUSE_S = 1.0
@@ -30,6 +32,7 @@ _SITUATION = "Output/situations/xplane_doctor.sit"
 _TAKE_WIND_S = 6.0
 _EARTH_M_PER_DEG = 111320.0
 _PLACE = (names.LATITUDE, names.LONGITUDE, names.ELEVATION)
+_SHOWN = (*_PLACE, names.FLIGHT_TIME, names.TRUE_AIRSPEED, names.TRUE_HEADING, names.GROUND_SPEED)
 _START = (
     *_PLACE,
     names.HEIGHT,
@@ -111,6 +114,7 @@ class Flight:
         self._pilot: Optional[Pilot] = None
         self._stack = contextlib.ExitStack()
         self._saved = False
+        self._paused = bool(self.before[names.PAUSED])  # as last asked for
 
     @property
     def pilot(self) -> Pilot:
@@ -151,49 +155,64 @@ class Flight:
             self.put(self.place)
             self.pilot.too_low.clear()
 
-    def end(self) -> str:
-        """Puts the flight back; says what could not be."""
+    def end(self) -> List[str]:
+        """Puts everything back that it can; says what could not be."""
+        left = []
+        for what, step in (("stick", self._let_go), ("flight", self._put_back), ("pause", self._put_back_pause)):
+            try:
+                left.append(step())
+            except Exception as error:  # the rest is put back all the same
+                left.append(f"{what}: {error}")
+        return [each for each in left if each]
+
+    def _let_go(self) -> str:
         if self._pilot is not None:
             self._pilot.end()
-        self._stack.close()
-        problem = "" if not self._saved else self._put_back()
-        self.pause(bool(self.before[names.PAUSED]))
-        return problem
+        self._stack.close()  # what X-Plane does not show stays in the journal
+        return ""
 
     def _put_back(self) -> str:
+        if not self._saved:
+            return ""
         was = self.before
         on_ground = bool(was[names.ON_GROUND])
         speed = 0.0 if on_ground else was[names.TRUE_AIRSPEED]
         heading = was[names.TRUE_HEADING]
         there = Place(was[names.LATITUDE], was[names.LONGITUDE], was[names.ELEVATION], heading, speed)
         self.xplane.send(protocol.Situation(protocol.Situation.LOAD, _SITUATION))
-        if self.shown(there, _SEEN_S):
+        time.sleep(_BEGINS_S)
+        if self._loaded(there.is_near):
             return ""
-        with contextlib.suppress(NoFlightError):
+        with contextlib.suppress(NoFlightError, NotTestableError):
             self.put(there)
             return ""
         return "the aircraft is not back where it was: load your flight again"
+
+    def _put_back_pause(self) -> str:
+        paused = bool(self.before[names.PAUSED])
+        if self.pause(paused, _SEEN_S):
+            return ""
+        return f"X-Plane does not show that it {'is paused' if paused else 'runs'}, as it did before: look at it"
 
     # --- placing --------------------------------------------------------------------------------------------------
 
     def shown(self, place: Place, patience_s: float) -> Optional[Sample]:
         """X-Plane's first sample there, or None."""
-        paths = (*_PLACE, names.FLIGHT_TIME, names.TRUE_AIRSPEED, names.TRUE_HEADING, names.GROUND_SPEED)
-        return self.xplane.wait_for(paths, place.is_near, patience_s)
+        return self.xplane.wait_for(_SHOWN, place.is_near, patience_s)
+
+    def _loaded(self, condition: Callable[[Sample], bool]) -> Optional[Sample]:
+        """The first sample of which the condition is true, after whatever X-Plane loads; None where there is none."""
+        seen = self.xplane.wait_for(_SHOWN, condition, _SEEN_S)
+        if seen is None:
+            loads = not self.xplane.try_read([names.FLIGHT_TIME], 0.5)
+            seen = self.xplane.wait_for(_SHOWN, condition, _LOAD_S if loads else 0.5)
+        return seen
 
     def begin_at(self, place: Place) -> Optional[Sample]:
         """PREL, once; the first sample of the flight there, or None where nothing of it is seen."""
         time_before = self.xplane.read(names.FLIGHT_TIME)[names.FLIGHT_TIME]
         self.xplane.send(place.placement())
-        paths = (*_PLACE, names.FLIGHT_TIME, names.TRUE_AIRSPEED, names.TRUE_HEADING, names.GROUND_SPEED)
-
-        def begun(sample: Sample) -> bool:
-            return place.is_near(sample) and sample[names.FLIGHT_TIME] < time_before
-
-        seen = self.xplane.wait_for(paths, begun, _SEEN_S)
-        if seen is None and not self.xplane.try_read([names.FLIGHT_TIME], 0.5):  # it loads
-            seen = self.xplane.wait_for(paths, begun, _LOAD_S)
-        return seen
+        return self._loaded(lambda sample: place.is_near(sample) and sample[names.FLIGHT_TIME] < time_before)
 
     def move_to(self, place: Place) -> Optional[Sample]:
         """VEHS, twice, as the elevation is wrong the first time; the first sample there, or None."""
@@ -241,14 +260,15 @@ class Flight:
 
     # --- pause ----------------------------------------------------------------------------------------------------
 
-    def pause(self, paused: bool) -> bool:
-        """Pauses or resumes by one toggle; returns whether X-Plane says that it follows."""
-        now = self.xplane.try_read([names.PAUSED], _PAUSE_S).get(names.PAUSED)
-        # One that is paused and sends nothing then is silent; one that flies is not.
-        is_paused = True if now is None else bool(now)
+    def pause(self, paused: bool, patience_s: float = _PAUSE_S) -> bool:
+        """Pauses or resumes by one toggle; returns whether X-Plane says in time [s] that it follows."""
+        now = self.xplane.try_read([names.PAUSED], patience_s).get(names.PAUSED)
+        # A silent one is as it was: it loads, or is paused and sends nothing then.
+        is_paused = self._paused if now is None else bool(now)
         if is_paused != paused:
             self.xplane.send(protocol.CommandRequest(names.PAUSE_TOGGLE))
-        return self.xplane.wait_for([names.PAUSED], lambda s: bool(s[names.PAUSED]) == paused, _PAUSE_S) is not None
+        self._paused = paused
+        return self.xplane.wait_for([names.PAUSED], lambda s: bool(s[names.PAUSED]) == paused, patience_s) is not None
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[bool]:

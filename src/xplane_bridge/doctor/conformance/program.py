@@ -28,7 +28,7 @@ def main(settings: Settings, only: Sequence[str], yes: bool) -> int:
         yes: Not to be asked.
 
     Returns:
-        0 flown, 1 flown but not everything could be put back, 2 it cannot run.
+        0 flown, 1 flown but not everything could be put back, 2 it cannot run or was broken off.
     """
     try:
         return _main(settings, only, yes)
@@ -54,11 +54,15 @@ def _main(settings: Settings, only: Sequence[str], yes: bool) -> int:
         print(results.line(question, answer), flush=True)
 
     flown = card.fly(where.address, where.port, settings.journal_folder, questions, say)
-    file = results.file_of(settings.journal_folder, where.address, where.port)
-    report = results.store(file, flown, where.address, where.port)
-    print(f"written: {file} (the nodes read it at start), {report} (for a bug report)", file=sys.stderr)
+    if flown.answers:
+        file = results.file_of(settings.journal_folder, where.address, where.port)
+        report = results.store(file, flown, where.address, where.port)
+        print(f"written: {file} (the nodes read it at start), {report} (for a bug report)", file=sys.stderr)
     for each in flown.left:
         print(f"xplane_doctor: not put back: {each}", file=sys.stderr)
+    if flown.broken_off:
+        print(f"xplane_doctor: {flown.broken_off}", file=sys.stderr)
+        return 2
     return 1 if flown.left else 0
 
 
