@@ -149,11 +149,14 @@ class WindowsGrabber(Grabber):
     def run(self) -> None:
         """Looks for the window and has it captured until the end."""
         while not self._stop.is_set():
-            window = self._find()
-            if window is None:
-                self._stop.wait(_SEARCH_S)
-            else:
-                self._capture(window)
+            try:
+                window = self._find()
+                if window is not None:
+                    self._capture(window)
+                    continue
+            except Exception as error:  # the library's own, some of them plain Exceptions
+                self.problem = f"Windows gives no pictures of X-Plane's window: {error}"
+            self._stop.wait(_SEARCH_S)
 
     def _find(self) -> Optional[int]:
         windows = self._desktop.windows()
@@ -169,8 +172,7 @@ class WindowsGrabber(Grabber):
         return None
 
     def _capture(self, window: int) -> None:
-        """Has the library call `arrived` until the window is closed."""
-        capture = self._library.WindowsCapture(cursor_capture=False, draw_border=False, window_hwnd=window)
+        """Has the library call `arrived` until the window is closed; raises where the capture fails."""
         before: List[Any] = [None]
         closed: List[bool] = []
 
@@ -192,12 +194,26 @@ class WindowsGrabber(Grabber):
         def on_closed() -> None:
             closed.append(True)
 
-        capture.event(on_frame_arrived)
-        capture.event(on_closed)
-        control = capture.start_free_threaded()
-        while not closed and not self._stop.wait(_CHECK_S):
-            minimised = self._desktop.minimised(window)
-            self.problem = "X-Plane's window is minimised: it has no picture" if minimised else ""
-            if control.is_finished():
-                break
-        control.stop()
+        control = self._started(window, on_frame_arrived, on_closed)
+        try:
+            while not closed and not self._stop.wait(_CHECK_S) and not control.is_finished():
+                minimised = self._desktop.minimised(window)
+                self.problem = "X-Plane's window is minimised: it has no picture" if minimised else ""
+        finally:
+            control.stop()
+        if not closed and not self._stop.is_set():
+            raise GrabError("the capture has ended")
+
+    def _started(self, window: int, *handlers: Any) -> Any:
+        """A capture that runs; without the yellow border where Windows can leave it out: version 10 cannot."""
+
+        def begin(border: Optional[bool]) -> Any:
+            capture = self._library.WindowsCapture(cursor_capture=False, draw_border=border, window_hwnd=window)
+            for handler in handlers:
+                capture.event(handler)
+            return capture.start_free_threaded()
+
+        try:
+            return begin(False)
+        except Exception:
+            return begin(None)

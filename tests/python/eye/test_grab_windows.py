@@ -1,0 +1,161 @@
+"""The eye's way of reading a window on Windows, with stand-ins for Windows and its library."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import types
+from typing import Any, Callable, List
+
+import numpy as np
+import pytest
+
+from xplane_bridge.eye import grab_windows
+from xplane_bridge.eye.grab_windows import WindowsGrabber
+from xplane_bridge.harness import wait_until
+
+LONGEST_S = 20.0
+PIXELS = 48, 64
+
+
+class Desktop:
+    """One window, of X-Plane."""
+
+    def windows(self) -> list:
+        return [(7, "X-Plane")]
+
+    def program_of(self, _: int) -> str:
+        return "C:\\X-Plane 12\\X-Plane.exe"
+
+    def place(self, _: int) -> tuple:
+        return 0, 0, PIXELS[1], PIXELS[0]
+
+    def minimised(self, _: int) -> bool:
+        return False
+
+    def client_area(self, _: int, picture: tuple) -> tuple:
+        return (0, 0, *picture)
+
+
+class Capture:
+    """windows_capture.WindowsCapture, and the control that it gives; as it is to go wrong: `fault`."""
+
+    started: List[Any]
+    fault: Callable[[str, Capture], None]
+
+    def __init__(self, cursor_capture: bool, draw_border: Any, window_hwnd: int) -> None:
+        assert (cursor_capture, window_hwnd) == (False, 7)
+        self.border = draw_border
+        self._handlers: dict = {}
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._deliver, daemon=True)
+
+    def event(self, handler: Any) -> None:
+        self._handlers[handler.__name__] = handler
+
+    def start_free_threaded(self) -> Capture:
+        assert self._handlers.keys() == {"on_frame_arrived", "on_closed"}
+        self.started.append(self.border)
+        type(self).fault("start", self)
+        self._thread.start()
+        return self
+
+    def _deliver(self) -> None:
+        shade = 0
+        while not self._end.wait(0.02):
+            shade = (shade + 1) % 256
+            pixels = np.full((*PIXELS, 4), shade, np.uint8)
+            frame = types.SimpleNamespace(width=PIXELS[1], height=PIXELS[0], frame_buffer=pixels, timespan=0)
+            self._handlers["on_frame_arrived"](frame, None)
+
+    def is_finished(self) -> bool:
+        type(self).fault("check", self)
+        return not self._thread.is_alive()
+
+    def end(self) -> None:
+        self._end.set()
+
+    def close(self) -> None:
+        self.end()
+        self._handlers["on_closed"]()
+
+    def stop(self) -> None:
+        self.end()
+        self._thread.join()
+        type(self).fault("stop", self)
+
+
+class Said(WindowsGrabber):
+    """Keeps what its problem was."""
+
+    @property
+    def problem(self) -> str:
+        return self.problems[-1]
+
+    @problem.setter
+    def problem(self, text: str) -> None:
+        self.__dict__.setdefault("problems", []).append(text)
+
+
+def no_border_setting(stage: str, capture: Capture) -> None:
+    """As Windows 10."""
+    if stage == "start" and capture.border is False:
+        raise RuntimeError("Toggling the capture border is not supported by the Graphics Capture API on this platform.")
+
+
+def gone_once(stage: str, _: Capture) -> None:
+    """The window was closed after it was found."""
+    if stage == "start" and len(Capture.started) <= 2:
+        raise RuntimeError("the window is gone")
+
+
+def ends_once(stage: str, capture: Capture) -> None:
+    """The library's thread ends by itself."""
+    if stage == "check" and len(Capture.started) == 1:
+        capture.stop()
+
+
+def fails_once(stage: str, capture: Capture) -> None:
+    """It ends by an error, which is raised when it is stopped."""
+    if len(Capture.started) == 1:
+        if stage == "check":
+            capture.end()
+        elif stage == "stop":
+            raise RuntimeError("the device was removed")
+
+
+def closes_once(stage: str, capture: Capture) -> None:
+    """The window is closed, and another opened."""
+    if stage == "check" and len(Capture.started) == 1:
+        capture.close()
+
+
+@pytest.mark.parametrize(
+    ("fault", "started", "reason"),
+    [
+        (no_border_setting, [False, None], ""),
+        (gone_once, [False, None, False], "the window is gone"),
+        (ends_once, [False, False], "the capture has ended"),
+        (fails_once, [False, False], "the device was removed"),
+        (closes_once, [False, False], ""),
+    ],
+)
+def test_a_capture_that_fails_is_said_and_begun_again(
+    monkeypatch: pytest.MonkeyPatch, fault: Callable[[str, Capture], None], started: list, reason: str
+):
+    monkeypatch.setitem(sys.modules, "windows_capture", types.SimpleNamespace(WindowsCapture=Capture))
+    monkeypatch.setattr(grab_windows, "_Desktop", Desktop)
+    monkeypatch.setattr(grab_windows, "_SEARCH_S", 0.05)
+    monkeypatch.setattr(grab_windows, "_CHECK_S", 0.05)
+    monkeypatch.setattr(Capture, "started", [], raising=False)
+    monkeypatch.setattr(Capture, "fault", staticmethod(fault), raising=False)
+    by: List[int] = []  # which of the captures each picture is of
+    grabber = Said(("X-Plane",), None, lambda *_: by.append(len(Capture.started)))
+    grabber.start()
+    try:
+        wait_until(lambda: len(started) in by and grabber.problem == "", LONGEST_S, "pictures")
+    finally:
+        grabber.stop()
+    assert Capture.started == started
+    reasons = list(dict.fromkeys(filter(None, grabber.problems[1:])))
+    assert reasons == ([f"Windows gives no pictures of X-Plane's window: {reason}"] if reason else [])
