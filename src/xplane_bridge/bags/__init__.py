@@ -43,6 +43,8 @@ from xplane_bridge.bags.units import Unit, later_units, parse_units
 from xplane_bridge.errors import XplaneBridgeError
 
 PathLike = Union[str, Path]
+#: The message beside which the bridge publishes all others.
+FLIGHT_STATE = "xplane_bridge/FlightState"
 _LOG = logging.getLogger(__name__)
 #: Messages are decoded so many at a time: bytes, and number of them.
 _PIECE_BYTES = 4 << 20
@@ -202,12 +204,18 @@ class Bags:
     def topic_of_type(self, msgtype: str, suffix: str = "") -> Optional[str]:
         """Find the topic of a message type (``package/Name``) whose name ends in `suffix`.
 
-        Of several, the one in the fewest name spaces: the bridge's own camera before a further one's; then by name.
+        Of several, one of the bridge's own, below the name space of the flight state: other nodes publish common types
+        too. Then the one in the fewest name spaces: the bridge's own camera before a further one's; then by name.
         """
-        for info in sorted(self.topics.values(), key=lambda info: (info.topic.count("/"), info.topic)):
-            if info.msgtype == msgtype and info.topic.endswith(suffix):
-                return info.topic
-        return None
+        space = f"{self.name_space}/"
+        found = [info.topic for info in self.topics.values() if info.msgtype == msgtype and info.topic.endswith(suffix)]
+        return min(found, key=lambda topic: (not topic.startswith(space), *_rank(topic)), default=None)
+
+    @property
+    def name_space(self) -> str:
+        """What precedes the bridge's topics, e.g. ``/xplane``; empty where there is no flight state."""
+        states = [info.topic for info in self.topics.values() if info.msgtype == FLIGHT_STATE]
+        return min(states, key=_rank, default="").rpartition("/")[0]
 
     def constants(self, topic: str) -> dict[str, Any]:
         """Give the constants of a topic's message, from the bag's own definition (e.g. ``VALID_POSITION``)."""
@@ -361,6 +369,11 @@ def _types_of(msgtype: str, definition: str) -> tuple[Types, Any]:
     types = get_types_from_msg(definition, _type_name(msgtype))
     store.register(types)
     return types, store
+
+
+def _rank(topic: str) -> tuple[int, str]:
+    """By which topics of a type are ordered."""
+    return topic.count("/"), topic
 
 
 def _type_name(msgtype: str) -> str:

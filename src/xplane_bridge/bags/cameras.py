@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple, Sequence
 
-from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags
 
 COMPRESSED = "sensor_msgs/CompressedImage"
 RAW = "sensor_msgs/Image"
 #: Name of the bridge's own camera, whose topics have no further name space.
 FIRST = "camera"
-_FRAMES, _STATES = "xplane_bridge/FrameState", "xplane_bridge/FlightState"
+_FRAMES = "xplane_bridge/FrameState"
 
 
 class Camera(NamedTuple):
@@ -29,9 +29,8 @@ def cameras(bags: Bags) -> list[Camera]:
     """
     topics = bags.topics
     filled = [name for name, info in sorted(topics.items()) if info.count and info.msgtype == _FRAMES]
-    state = bags.topic_of_type(_STATES)
-    space = state.rsplit("/", 1)[0] if state else ""
-    own = [name for name in filled if name.startswith(f"{space}/")] if state else []
+    space = bags.name_space
+    own = [name for name in filled if name.startswith(f"{space}/")] if bags.topic_of_type(FLIGHT_STATE) else []
     places = {name: _place(name) for name in own or filled}
     short = {name: place[len(space.strip("/")) :] if own else place.partition("/")[2] for name, place in places.items()}
     names = short if len(set(short.values())) == len(short) else places

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
 import numpy as np
 
-from xplane_bridge.bags import BagError, Bags, Table, TopicInfo
+from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags, Table, TopicInfo
 from xplane_bridge.bags.cameras import Camera, cameras
 from xplane_bridge.bags.segments import segments
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 #: Role in a flight to message type.
 ROLES = {
-    "state": "xplane_bridge/FlightState",
+    "state": FLIGHT_STATE,
     "controls": "xplane_bridge/ControlStates",
     "surfaces": "xplane_bridge/SurfaceStates",
     "engines": "xplane_bridge/EngineStates",

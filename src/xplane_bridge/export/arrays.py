@@ -52,7 +52,7 @@ from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.cameras import UNITS as CAMERA_UNITS
 from xplane_bridge.export.cameras import CameraRow, one_column_each
 from xplane_bridge.export.columns import name_of
-from xplane_bridge.export.flight import STATE, full_names, name_space
+from xplane_bridge.export.flight import STATE, full_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -175,7 +175,7 @@ def topic_arrays(bags: Bags, only: Sequence[str] = (), folder: Optional[Path] = 
         BagError: No such topic, a topic of pictures, or nothing in the bags.
     """
     infos = bags.topics
-    space = name_space(bags)
+    space = bags.name_space
     chosen = full_names(bags, only) or sorted(
         name for name, info in infos.items() if info.count and info.msgtype not in (RAW, COMPRESSED)
     )

@@ -8,11 +8,11 @@ from typing import Any, Mapping, Sequence
 import numpy as np
 
 from xplane_bridge.analysis.resampling import held
-from xplane_bridge.bags import BagError, Bags, Table
+from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags, Table
 from xplane_bridge.bags.cameras import cameras
 from xplane_bridge.errors import XplaneBridgeError
 
-STATE = "xplane_bridge/FlightState"
+STATE = FLIGHT_STATE
 FRAME_STATE = "xplane_bridge/FrameState"
 MODE = "xplane_bridge/ControlMode"
 FAILURES = "xplane_bridge/FailureState"
@@ -24,15 +24,9 @@ class ExportError(XplaneBridgeError):
     """An export that cannot be done; the text is one line with the remedy."""
 
 
-def name_space(bags: Bags) -> str:
-    """Give what precedes the bridge's topics, e.g. ``/xplane``; empty where there is no flight state."""
-    state = bags.topic_of_type(STATE)
-    return state.rsplit("/", 1)[0] if state else ""
-
-
 def full_names(bags: Bags, topics: Sequence[str]) -> list[str]:
     """Give topics their full names: one that begins with a slash has it, others are below the bridge's name space."""
-    return [topic if topic.startswith("/") else f"{name_space(bags)}/{topic}" for topic in topics]
+    return [topic if topic.startswith("/") else f"{bags.name_space}/{topic}" for topic in topics]
 
 
 def topic_of(bags: Bags, msgtype: str) -> str:

@@ -1,0 +1,39 @@
+"""Trajectories are the bridge's own odometry, as it was recorded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from support.flights.export_flight import export
+from support.flights.synthetic_flight import FlightBag, stamp_ns
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.flight import read_flight
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def add_odometry(bag: FlightBag, topic: str, t: float, x: float) -> None:
+    pose = {"position": {"x": x}, "orientation": {"w": 1.0}}
+    values = {"header": bag.header(stamp_ns(t), "map"), "pose": {"pose": pose}}
+    bag.add(topic, "nav_msgs/Odometry", stamp_ns(t), values)
+
+
+@pytest.mark.parametrize("space", ["/xplane", "/lab/aircraft/xplane", ""])
+def test_the_bridges_own_odometry_is_exported_beside_that_of_other_nodes(tmp_path: Path, space: str) -> None:
+    path = tmp_path / "flight.bag"
+    with FlightBag(path) as bag:
+        for k in range(3):
+            bag.add(f"{space}/flight_state", "xplane_bridge/FlightState", stamp_ns(k), bag.state(k, k))
+            for topic in ("/a_filter/odom", "/vio/odom", f"{space}/vio/odom"):
+                add_odometry(bag, topic, k, 99.0)
+            add_odometry(bag, f"{space}/odom", k, float(k))
+    assert export(path, "--format", "tum", "-o", tmp_path) == 0
+    assert np.loadtxt(tmp_path / "flight.tum")[:, 1].tolist() == [0.0, 1.0, 2.0]
+    with Bags(path) as bags:
+        assert bags.name_space == space
+        assert read_flight(bags).tables["odom"].topic == f"{space}/odom"
+        assert bags.topic_of_type("nav_msgs/Odometry", "vio/odom") == f"{space}/vio/odom"
