@@ -50,26 +50,34 @@ def flights(arguments: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
     Raises:
         BagError: A folder without bags.
-        ExportError: The same bag twice.
+        ExportError: The same bag twice, or two of one name whatever folders it takes.
     """
     paths = [Path(argument).resolve() for argument in arguments]
     for path in paths:
         if paths.count(path) > 1:
             msg = f"{path} is given twice"
             raise ExportError(msg)
-    names: dict[str, tuple[str, ...]] = {}
-    for path in paths:
-        parts = [*path.parent.parts, path.stem if path.suffix == ".bag" else path.name]
+    names: dict[str, Path] = {}
+    parts = {path: _parts(path) for path in paths}
+    for path, own in parts.items():
+        others = [other for key, other in parts.items() if key != path]
         depth = 1
-        while sum(_ends_alike(other, parts, depth) for other in paths) > 1:
+        while depth < len(own) and any(other[-depth:] == own[-depth:] for other in others):
             depth += 1
-        names["_".join(parts[-depth:]).replace("/", "")] = tuple(str(p) for p in Bags(path).paths)
-    return names
+        name = "_".join(own[-depth:]).replace("/", "")
+        if name in names:
+            msg = (
+                f"{names[name]} and {path} would both be exported as {name}; expected flights of different names: "
+                "rename one, or export them one after the other to folders of their own (-o)"
+            )
+            raise ExportError(msg)
+        names[name] = path
+    return {name: tuple(str(p) for p in Bags(path).paths) for name, path in names.items()}
 
 
-def _ends_alike(path: Path, parts: list[str], depth: int) -> bool:
-    own = [*path.parent.parts, path.stem if path.suffix == ".bag" else path.name]
-    return own[-depth:] == parts[-depth:]
+def _parts(path: Path) -> list[str]:
+    """Of which a flight's name is made, from the end."""
+    return [*path.parent.parts, path.stem if path.suffix == ".bag" else path.name]
 
 
 def choose_training(names: Iterable[str], options: Options) -> set[str]:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.flights.export_flight import export, files_of, write_flight
+from xplane_bridge.export.campaign import flights
+from xplane_bridge.export.flight import ExportError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -114,3 +116,31 @@ def test_an_export_that_was_killed_goes_on(tmp_path: Path, renaming: int) -> Non
         assert run.returncode == -signal.SIGKILL
         assert export(*command) == 0
         assert export("--verify", "-o", tmp_path / "out") == 0
+
+
+def bags(folder: Path, *names: str) -> list[str]:
+    """Give these files, written, by full name; their content does not matter."""
+    paths = [folder / name for name in names]
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"")
+    return [str(path) for path in paths]
+
+
+def test_flights_take_as_many_folders_into_their_names_as_they_need(tmp_path: Path) -> None:
+    given = bags(tmp_path, "a/run/flight.bag", "b/run/flight.bag", "b/flight.bag", "tail.bag")
+    assert list(flights(given)) == ["a_run_flight", "b_run_flight", "b_flight", "tail"]
+
+
+def test_flights_whose_names_stay_alike_are_refused(tmp_path: Path) -> None:
+    first, other, last = bags(tmp_path, "run/flight.bag", "other/flight.bag", "run_flight.bag")
+    with pytest.raises(ExportError, match=f"^{first} and {last} would both be exported as run_flight; .* rename one"):
+        flights([first, other, last])
+    assert list(flights([first, last])) == ["flight", "run_flight"]
+
+
+def test_a_folder_and_a_bag_of_one_name_are_refused(tmp_path: Path) -> None:
+    _, bag = bags(tmp_path, "data/flight/part.bag", "data/flight.bag")
+    folder = str(tmp_path / "data" / "flight")
+    with pytest.raises(ExportError, match=f"^{folder} and {bag} would both be exported as .*_data_flight; "):
+        flights([folder, bag])
