@@ -14,12 +14,14 @@ import json
 import os
 import random
 import shutil
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.export.cameras import camera_rows
 from xplane_bridge.export.card import CARD, card
 from xplane_bridge.export.flight import ExportError, frame_quality
@@ -103,7 +105,7 @@ def export_flight(job: Job) -> Outcome:
         for alias in (alias for alias, name in ALIASES.items() if name == job.format):
             _remove(output / _RECORDS / alias / record_file.name)  # of an earlier version, made anew
         return Outcome(job.name, record, "", False)
-    except (BagError, ExportError) as error:
+    except XplaneBridgeError as error:
         return Outcome(job.name, None, str(error), False)
     except OSError as error:
         return Outcome(job.name, None, f"{error.filename}: {error.strerror}", False)
@@ -187,13 +189,27 @@ def _records(output: Path) -> Iterator[tuple[str, str, dict[str, Any]]]:
 
 
 def run_local(jobs: Sequence[Job], workers: int) -> Iterator[Outcome]:
-    """Export in parallel processes, yielding each outcome as it comes."""
+    """Export in parallel processes, yielding each outcome as it comes; the flights of a pool that broke have failed."""
     if workers == 1 or len(jobs) == 1:
         yield from map(export_flight, jobs)
         return
     with ProcessPoolExecutor(max_workers=min(workers, len(jobs))) as pool:
-        for future in as_completed([pool.submit(export_flight, job) for job in jobs]):
-            yield future.result()
+        futures: dict[Future[Outcome], Job] = {}
+        for job in jobs:
+            try:
+                futures[pool.submit(export_flight, job)] = job
+            except BrokenProcessPool:
+                yield _lost(job)
+        for future in as_completed(futures):
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                yield _lost(futures[future])
+
+
+def _lost(job: Job) -> Outcome:
+    error = "a process of the export was killed, perhaps for want of memory; give the command again, with fewer --jobs"
+    return Outcome(job.name, None, error, False)
 
 
 def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:

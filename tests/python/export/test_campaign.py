@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import signal
 import subprocess
 import sys
@@ -10,11 +12,16 @@ from typing import TYPE_CHECKING
 import pytest
 
 from support.flights.export_flight import export, files_of, write_flight
+from support.flights.synthetic_flight import stamp_ns
+from xplane_bridge.export import campaign
 from xplane_bridge.export.campaign import flights
 from xplane_bridge.export.flight import ExportError
+from xplane_bridge.labels import table
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from xplane_bridge.export.formats import Job
 
 #: Runs an export that is killed in place of its nth renaming of a file or folder.
 KILLED = """
@@ -116,6 +123,37 @@ def test_an_export_that_was_killed_goes_on(tmp_path: Path, renaming: int) -> Non
         assert run.returncode == -signal.SIGKILL
         assert export(*command) == 0
         assert export("--verify", "-o", tmp_path / "out") == 0
+
+
+def test_labels_that_cannot_be_used_fail_their_flight_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = [write_flight(tmp_path / f"{name}.bag", 0.4) for name in "ab"]
+    header = {"labels": table.SCHEMA, "bags": ["b.bag"], "airport": "XEMU"}
+    frame = {"camera": "camera", "stamp_ns": stamp_ns(0.0), "objects": []}
+    table.beside(given[0]).write_text('{"labels": 1}\n')
+    table.beside(given[1]).write_text(f"{json.dumps(header)}\n{json.dumps(frame)}\n")
+    assert export(*given, "--format", "coco", "--labels", tmp_path, "--jobs", "1", "-o", tmp_path / "out") == 1
+    out = capsys.readouterr()
+    assert f"a: {table.beside(given[0])}: no labels of this version; label_images writes them anew" in out.err
+    assert "1 of 2 flights exported" in out.out
+    assert list(json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["coco"]) == ["b"]
+
+
+def test_a_killed_process_leaves_the_manifest_of_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made, *given = (write_flight(tmp_path / f"{name}.bag", 0.4) for name in "abc")
+    assert export(made, "-o", tmp_path / "out") == 0
+    monkeypatch.setattr(campaign, "export_flight", end_this_process)
+    assert export(*given, "--jobs", "2", "-o", tmp_path / "out") == 1
+    out = capsys.readouterr()
+    for name in "bc":
+        assert f"{name}: a process of the export was killed" in out.err
+    assert "0 of 2 flights exported" in out.out
+    assert list(json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["csv"]) == ["a"]
+
+
+def end_this_process(_: Job) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def bags(folder: Path, *names: str) -> list[str]:
