@@ -232,7 +232,7 @@ def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:
         )
         raise ExportError(msg) from None
     with client:
-        futures = [client.submit(export_flight, job, key=f"export-{job.name}", pure=False) for job in jobs]
+        futures = [client.submit(export_flight, job, pure=False) for job in jobs]
         for future in completed(futures):
             yield future.result()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
@@ -16,12 +17,12 @@ from support.flights.synthetic_flight import stamp_ns
 from xplane_bridge.export import campaign
 from xplane_bridge.export.campaign import flights
 from xplane_bridge.export.flight import ExportError
+from xplane_bridge.export.formats import Job
+from xplane_bridge.export.pictures import Options
 from xplane_bridge.labels import table
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from xplane_bridge.export.formats import Job
 
 #: Runs an export that is killed in place of its nth renaming of a file or folder.
 KILLED = """
@@ -154,6 +155,23 @@ def test_a_killed_process_leaves_the_manifest_of_the_others(
 
 def end_this_process(_: Job) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_two_exports_on_one_cluster_do_not_mix(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    jobs = []
+    for name in ("monday", "tuesday"):
+        (tmp_path / name).mkdir()
+        bag = write_flight(tmp_path / name / "flight.bag", 0.4, offset=len(jobs))
+        jobs.append(Job("flight", (str(bag),), str(tmp_path / name), "csv", None, (), Options(), True))
+    with distributed.LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster:
+        first = campaign.run_dask(jobs[:1], cluster.scheduler_address)
+        assert next(first).name == "flight"
+        (outcome,) = campaign.run_dask(jobs[1:], cluster.scheduler_address)
+        first.close()
+    made = tmp_path / "tuesday" / "flight.csv"
+    assert outcome.record is not None
+    assert outcome.record["files"] == {made.name: hashlib.sha256(made.read_bytes()).hexdigest()}
 
 
 def bags(folder: Path, *names: str) -> list[str]:
