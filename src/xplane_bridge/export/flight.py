@@ -43,6 +43,14 @@ def topic_of(bags: Bags, msgtype: str) -> str:
     return topic
 
 
+def breaks(state: Table) -> np.ndarray:
+    """Count how often time or place has begun anew up to each flight state: a reset, a jump, a new origin of `map`."""
+    anew = np.zeros(len(state), dtype=bool)
+    for name in ("epoch", "position_epoch"):
+        anew[1:] |= np.diff(state[name].astype(np.int64)) != 0
+    return np.cumsum(anew)
+
+
 def quality_bits(constants: Mapping[str, Any]) -> dict[str, int]:
     """Give FrameState's quality bits by their names in words, from the constants of the bag's definition."""
     prefix = "QUALITY_"

@@ -8,7 +8,7 @@ import numpy as np
 
 from xplane_bridge.analysis.resampling import interpolated, rotated, time_base
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
-from xplane_bridge.export.flight import ODOMETRY, topic_of
+from xplane_bridge.export.flight import ODOMETRY, STATE, breaks, topic_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,7 +24,7 @@ def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np
 
     Args:
         bags: Open bags of one flight.
-        rate: [1/s] of a uniform time base; None: the samples as they are.
+        rate: [1/s] of a uniform time base, without gaps, resets and jumps; None: the samples as they are.
 
     Returns:
         Stamps (int64 [ns], shape (n,)), positions (ENU in `map` [m], (n, 3)), orientations (x, y, z, w, (n, 4)).
@@ -39,9 +39,19 @@ def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np
     orientation = np.stack([table[name][order] for name in _ORIENTATION], axis=1)
     if rate is None:
         return stamp, position, orientation
-    parts = segments(stamp, max_gap=DEFAULT_MAX_GAP)
+    parts = segments(stamp, _breaks(bags, stamp), DEFAULT_MAX_GAP)
     base = time_base(stamp, parts, rate)
     return base, interpolated(base, stamp, position, parts), rotated(base, stamp, orientation, parts)
+
+
+def _breaks(bags: Bags, stamp: np.ndarray) -> Optional[np.ndarray]:
+    """Count the breaks of the flight states up to each stamp [ns]; None without states."""
+    topic = bags.topic_of_type(STATE)
+    if topic is None or not bags.topics[topic].count:
+        return None
+    state = bags.read(topic, ["header.stamp", "epoch", "position_epoch"]).by_stamp()
+    edges = state.stamp[1:][np.diff(breaks(state)) > 0]
+    return np.searchsorted(edges, stamp, side="right")
 
 
 def write_tum(path: Path, stamp: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> None:

@@ -37,3 +37,30 @@ def test_the_bridges_own_odometry_is_exported_beside_that_of_other_nodes(tmp_pat
         assert bags.name_space == space
         assert read_flight(bags).tables["odom"].topic == f"{space}/odom"
         assert bags.topic_of_type("nav_msgs/Odometry", "vio/odom") == f"{space}/vio/odom"
+
+
+@pytest.mark.parametrize("changed", ["epoch", "position_epoch"])
+@pytest.mark.parametrize("form", ["tum", "euroc"])
+def test_a_time_base_does_not_bridge_what_began_anew(tmp_path: Path, form: str, changed: str) -> None:
+    path = tmp_path / "flight.bag"
+    with FlightBag(path) as bag:
+        for k in range(20):
+            t, anew = k / 10, k >= 8
+            values = {**bag.state(t, k), "position_epoch": 1}
+            values[changed] = 2 if anew else 1
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), values)
+            add_odometry(bag, "/xplane/odom", t, 5000.0 if anew else 0.0)
+    assert export(path, "--format", form, "--rate", "50", "-o", tmp_path) == 0
+    (file,) = tmp_path.glob(f"flight*.{'csv' if form == 'euroc' else 'tum'}")
+    time, x = np.loadtxt(file, delimiter="," if form == "euroc" else None)[:, :2].T
+    seconds = (time - time[0]) / (1e9 if form == "euroc" else 1.0)
+    np.testing.assert_allclose(seconds, [k / 50 for k in range(96) if not 35 < k < 40], atol=1e-6)
+    assert x.tolist() == [0.0] * 36 + [5000.0] * 56
+
+
+def test_a_time_base_needs_no_flight_states(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in range(5):
+            add_odometry(bag, "/xplane/odom", k / 10, float(k))
+    assert export(tmp_path / "flight.bag", "--format", "tum", "--rate", "20", "-o", tmp_path) == 0
+    np.testing.assert_allclose(np.loadtxt(tmp_path / "flight.tum")[:, 1], np.arange(9) / 2)
