@@ -11,7 +11,7 @@ from xplane_bridge.analysis.resampling import held, time_base
 from xplane_bridge.bags.columns import ColumnFile, StoredColumn
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.columns import named, on_base
-from xplane_bridge.export.flight import STATE, labels, topic_of
+from xplane_bridge.export.flight import STATE, breaks, labels, topic_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -99,7 +99,7 @@ def flight_table(
     state = bags.read(topic, store=store).by_stamp()
     base, columns = state.stamp, iter(state.columns.items())
     if rate is not None:
-        parts = segments(state.stamp, state["epoch"], DEFAULT_MAX_GAP)
+        parts = segments(state.stamp, breaks(state), DEFAULT_MAX_GAP)
         base = time_base(state.stamp, parts, rate)
         columns = on_base(base, state.stamp, state.columns, units, parts)
     table = FlightTable(len(base), store)
