@@ -43,8 +43,11 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
                       }),
       path_(link, &overrides_, options.control, pathHooks(), mutex_),
       settings_(link, &overrides_, options.service_timeout,
-                [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
-      views_(link, [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
+                [this](const std::string& text, const std::string& who, bool success) {
+                  say(EventKind::kSetting, text, who, success);
+                }),
+      views_(link, [this](const std::string& text, const std::string& who,
+                          bool success) { say(EventKind::kSetting, text, who, success); }),
       traffic_(link, &overrides_, options.traffic,
                [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
       disturbance_(link, kOverridePurpose, hooks_.disturbance,
@@ -122,7 +125,7 @@ void Actuation::subscribe() {
   identity_subscription_ = link_->subscribe(
       {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1},
       [this](const core::RrefView& view, const core::ReceiveInfo& info) {
-        if (identity_.add(view, info.stamp_ns)) onIdentity();
+        onCharacters([&] { return identity_.add(view, info.stamp_ns); });
       },
       mutex_);
 }
@@ -142,7 +145,7 @@ void Actuation::onLink(const core::LinkStatus& status) {
     if (status.epoch != link_status_.epoch) {
       identity_.reset();
       reset_detector_.restart();
-      traffic_.forget();
+      traffic_.release("X-Plane began anew");
     }
     link_status_ = status;
     failures_.onLink(status);
@@ -159,7 +162,10 @@ void Actuation::onWatch(const core::RrefView& view) {
   const double before = watch_.sim_time;
   core::updateFlightWatch(view, &watch_);
   // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
-  if (watch_.sim_time < before - core::kOvertaking) reset_detector_.restart();
+  if (watch_.sim_time < before - core::kOvertaking) {
+    reset_detector_.restart();
+    askIdentity();
+  }
   if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
   sim_time_ = watch_.sim_time;
   if (watch_.sim_time > before) ++frames_flown_;
@@ -183,6 +189,16 @@ void Actuation::onSurfaces() {
   }
 }
 
+/// `add` takes them; returns whether they are those of another aircraft.
+void Actuation::onCharacters(const std::function<bool()>& add) {
+  const unsigned answers = identity_.answers();
+  if (add()) {
+    onIdentity();
+  } else if (identity_.answers() != answers) {
+    path_.onSameAircraft();
+  }
+}
+
 void Actuation::onIdentity() {
   const core::AircraftIdentity& loaded = identity_.identity();
   path_.onAircraft(loaded);
@@ -197,7 +213,7 @@ void Actuation::askIdentity() {
   link_->read(core::AircraftIdentityReader::datarefs(), kIdentityReadTimeout,
               [this](const std::vector<core::DatarefValue>& values) {
                 const Lock lock(*mutex_);
-                if (identity_.add(values)) onIdentity();
+                onCharacters([&] { return identity_.add(values); });
               });
 }
 

@@ -5,14 +5,11 @@
 
 #include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/core/base/text.hpp"
-#include "xplane_bridge/core/control/control_rows.hpp"
-#include "xplane_bridge/core/link/journal.hpp"
 
 namespace xplane_bridge {
 namespace {
 
 constexpr double kOverrideRefresh = 1.0;  // [s] a lost datagram must not leave the stick with X-Plane
-constexpr double kHandleRepeat = 0.3;     // [s] in which a changed handle is sent with every refresh
 constexpr double kSameFlight = 1.0;       // [s] by which a flight may seem to have run on too far in a gap
 constexpr double kGap = 0.4;              // [s] without a frame in which X-Plane may have been restarted
 
@@ -78,6 +75,9 @@ void ControlPath::settle() {
   } else if (!flight_shown_) {
     standing_ = Standing::kNotConnected;
     why_not_ = "X-Plane is back, but has not shown its flight yet";
+  } else if (!aircraft_shown_ && !options_.aircraft.empty()) {
+    standing_ = Standing::kNotConnected;
+    why_not_ = "X-Plane is back, but has not shown which aircraft is loaded yet";
   } else if (!suspension_.empty()) {
     standing_ = Standing::kSuspended;
     why_not_ = suspension_;
@@ -130,7 +130,7 @@ void ControlPath::onLink(const core::LinkStatus& status) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const std::uint32_t epoch = std::exchange(link_status_, status).epoch;
   // X-Plane has come back, or another one has come: which, its first frame shows.
-  if (status.epoch != epoch && epoch != 0) flight_shown_ = false;
+  if (status.epoch != epoch && epoch != 0) flight_shown_ = aircraft_shown_ = false;
   arbiter_.setTimeRunning(timeRuns(now()), now());
   if (status.version.known() && status.version != encoder_.options().version) {
     encoder_ = core::ControlEncoder(core::EncoderOptions{status.version, options_.reverse_thrust, options_.rows});
@@ -142,8 +142,15 @@ void ControlPath::onLink(const core::LinkStatus& status) {
 void ControlPath::onAircraft(const core::AircraftIdentity& aircraft) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   aircraft_ = aircraft;
+  aircraft_shown_ = true;
   overrides_->forgetShown();
   askMissing();
+  settle();
+}
+
+void ControlPath::onSameAircraft() {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  if (std::exchange(aircraft_shown_, true)) return;
   settle();
 }
 
@@ -194,6 +201,7 @@ void ControlPath::onFrame(const core::FlightWatch& watch) {
   const bool same_flight = !another && continues(watch);
   watch_ = watch;
   last_frame_ = now();
+  if (another) aircraft_shown_ = false;
   if (!flight_shown_ || another) resetAfterReconnect(same_flight, last_frame_);
   // A test signal goes out with every frame, however rarely commands come, and so does its end.
   if (!options_.each_frame && (excited_ || hooks_.excitation().channels.any())) send(now());
@@ -208,6 +216,7 @@ void ControlPath::resetAfterReconnect(bool same_flight, double time) {
   ever_sent_.reset();  // another X-Plane does not know where the handles are
   const core::ModeStatus& status = arbiter_.status();
   if (time - lastCommandOf(status.mode) <= options_.arbiter.command_timeout) {
+    if (standing_ != Standing::kFlying) overrides_->setRequired({});  // it may have another aircraft
     overrides_->refresh();
     return;
   }
@@ -375,79 +384,6 @@ void ControlPath::send(double time) {
     }
   }
   hooks_.stick(stick);
-}
-
-bool ControlPath::fly(const core::ArbitratedControls& controls, double time) {
-  try {
-    if (controls.active.none()) {
-      // An axis that only a test signal had taken is X-Plane's again.
-      if (std::exchange(taken_, false) && isUp(link_status_)) overrides_->setRequired({});
-      return false;
-    }
-    if (standing_ != Standing::kFlying) {
-      if (std::exchange(last_warning_, why_not_) != why_not_) hooks_.warn("commands are not sent: " + why_not_);
-      if (isUp(link_status_)) overrides_->setRequired({});
-      return false;
-    }
-    overrides_->setRequired(core::requiredOverrides(controls.active, encoder_.options()));
-    last_warning_.clear();
-    taken_ = controls.source == core::CommandSource::kNone;
-  } catch (const core::JournalError& error) {
-    const std::string why = core::whyNotChanged(error);
-    if (std::exchange(last_warning_, why) != why) hooks_.warn("commands are not sent: " + why);
-    return false;
-  }
-  writes_.clear();
-  const core::ChannelSet now = channelsToSend(controls, time);
-  encoder_.encode(controls.values, now, writes_);
-  for (const core::DatarefWrite& write : writes_) link_->write(write.dataref, write.value);
-  sendRows(controls, now);
-  prepareLevers(controls);
-  last_send_ = time;
-  publishApplied(controls);
-  watchReadBack(controls.active);
-  return true;
-}
-
-void ControlPath::sendRows(const core::ArbitratedControls& controls, const core::ChannelSet& now) {
-  const std::vector<core::DataRow> rows = core::controlRows(controls.values, controls.active, now, encoder_.options());
-  if (rows.empty()) return;
-  std::array<std::uint8_t, core::kHeaderSize + 4 * core::kDataRowSize> buffer;
-  const core::EncodeResult size = core::encodeData(buffer, rows.data(), rows.size());
-  if (size) link_->send({buffer.data(), *size});
-}
-
-/// When their override ends, motors go by their levers at once: those are to be where the motors are by then.
-void ControlPath::prepareLevers(const core::ArbitratedControls& controls) {
-  std::vector<core::UndoOperation> levers;
-  for (int engine = 0; engine < core::kMaxEngines; ++engine) {
-    const std::size_t motor = core::index(core::motorChannel(engine));
-    if (!controls.active.test(motor)) continue;
-    const core::Channel lever = core::leverChannel(engine);
-    const double position = std::clamp(controls.values[motor], options_.reverse_thrust ? -1.0 : 0.0, 1.0);
-    levers.emplace_back(core::UndoDref{core::writeDataref(lever, encoder_.options()), core::wireValue(lever, position),
-                                       /*confirm=*/false});
-  }
-  if (levers.empty()) return;
-  const char* override_name = core::channelWire(core::motorChannel(0), encoder_.options()).override_name;
-  overrides_->prepareRelease(override_name, std::move(levers));
-}
-
-core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& controls, double time) {
-  core::ChannelSet out;
-  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
-    if (!controls.active.test(i)) continue;
-    const auto channel = static_cast<core::Channel>(i);
-    if (core::channelWire(channel, encoder_.options()).refresh == core::Refresh::kOnChange) {
-      if (!ever_sent_.test(i) || last_values_[i] != controls.values[i]) changed_at_[i] = time;
-      last_values_[i] = controls.values[i];
-      // Sent a few times, because a datagram may be lost; then it may be moved in the cockpit.
-      if (time - changed_at_[i] > kHandleRepeat) continue;
-    }
-    ever_sent_.set(i);
-    out.set(i);
-  }
-  return out;
 }
 
 void ControlPath::publishMode() {

@@ -1,4 +1,4 @@
-// ControlPath's way back: what was sent, whether X-Plane shows it, and what the aircraft has nothing for.
+// ControlPath's way back: what was sent, and whether X-Plane shows it.
 
 #include <utility>
 
@@ -7,7 +7,6 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kMissingTimeout = 2.0;           // [s] of asking for it once
 constexpr double kReadBackTimeout = 1.0;          // [s] without read-back until it is said
 constexpr std::size_t kMaxAwaitingReadBack = 64;  // two frames of 200 commands and 20 frames a second, three times
 
@@ -72,41 +71,6 @@ void ControlPath::onReadBack(const core::RrefView& view) {
     awaiting_read_back_.erase(awaiting_read_back_.begin(), it.base());
     return;
   }
-}
-
-/// Once for each aircraft, whose file does not change while it is loaded.
-void ControlPath::askMissing() {
-  missing_.clear();
-  missing_reported_.reset();
-  link_->read(core::trimDatarefs(), kMissingTimeout, [this](const std::vector<core::DatarefValue>& values) {
-    const std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    missing_ = core::missingTrims(values);
-  });
-}
-
-core::ChannelSet ControlPath::missingChannels() const {
-  core::ChannelSet out;
-  for (const core::MissingChannel& missing : missing_) out.set(core::index(missing.channel));
-  return out;
-}
-
-/// The rest of a command is flown: a stick goes on though one of its levers has nothing to move.
-core::ArbitratedControls ControlPath::withoutMissing(core::ArbitratedControls controls) {
-  if (standing_ != Standing::kFlying) return controls;
-  for (const core::MissingChannel& missing : missing_) {
-    const std::size_t channel = core::index(missing.channel);
-    if (!controls.active.test(channel)) continue;
-    controls.active.reset(channel);
-    const std::uint32_t field = core::fieldOf(missing.channel);
-    controls.fields &= ~field;
-    controls.limited &= ~field;
-    controls.excited &= ~field;
-    if (missing_reported_.test(channel)) continue;
-    missing_reported_.set(channel);
-    hooks_.event(ControlPathHooks::Kind::kMissing, core::channelName(missing.channel) + " is not sent: " + missing.why,
-                 "");
-  }
-  return controls;
 }
 
 std::vector<std::string> ControlPath::notFollowed() const {

@@ -81,15 +81,42 @@ std::vector<core::UndoOperation> OverrideManager::releaseOf(const std::string& d
   return out;
 }
 
-bool OverrideManager::set(const std::string& dataref, float value) {
+/// Several at the price of one write to the disk. Where one cannot be noted the others are set all the same.
+OverrideManager::Outcome OverrideManager::set(const std::vector<core::DatarefWrite>& wanted) {
+  Outcome out;
   const auto journal = link_->journal();
-  if (!journal || ended_) return false;
+  if (!journal || ended_ || wanted.empty()) return out;
+  const auto note = [&](const std::vector<core::DatarefWrite>& writes) {
+    std::vector<core::JournalRecord> records;
+    records.reserve(writes.size());
+    for (const core::DatarefWrite& each : writes) {
+      records.push_back({entryId(each.dataref), kOverridePurpose, {undoOf(each.dataref)}});
+    }
+    try {
+      journal->record(std::move(records));
+      out.set.insert(out.set.end(), writes.begin(), writes.end());
+    } catch (const core::JournalError&) {
+      out.failed = std::current_exception();
+    }
+  };
   // On disk first: a crash right after the datagram must find it there.
-  journal->record(entryId(dataref), kOverridePurpose, {undoOf(dataref)});
-  releasing_.erase(dataref);
-  // A row goes out with the command that it is set for.
-  if (!core::rowOfName(dataref)) link_->write(dataref, value);
-  return true;
+  note(wanted);
+  if (out.failed && wanted.size() > 1) {
+    out.failed = nullptr;
+    for (const core::DatarefWrite& each : wanted) note({each});
+  }
+  for (const core::DatarefWrite& each : out.set) {
+    releasing_.erase(each.dataref);
+    // A row goes out with the command that it is set for.
+    if (!core::rowOfName(each.dataref)) link_->write(each.dataref, each.value);
+  }
+  return out;
+}
+
+bool OverrideManager::set(const std::string& dataref, float value) {
+  const Outcome outcome = set(std::vector<core::DatarefWrite>{{dataref, value}});
+  if (outcome.failed) std::rethrow_exception(outcome.failed);
+  return !outcome.set.empty();
 }
 
 void OverrideManager::giveBack(const std::string& dataref) {
@@ -230,16 +257,19 @@ void OverrideManager::setRequired(const std::vector<std::string>& wanted) {
   std::exception_ptr failed;
   {
     const Lock lock(*mutex_);
-    try {
-      for (const std::string& dataref : wanted) {
-        if (required_.count(dataref) != 0) continue;
-        if (acquired_.count(dataref) == 0 && !set(dataref, 1.0F)) continue;
-        required_.insert(dataref);
+    std::vector<core::DatarefWrite> missing;
+    for (const std::string& dataref : wanted) {
+      if (required_.count(dataref) != 0) continue;
+      if (acquired_.count(dataref) == 0) {
+        missing.push_back({dataref, 1.0F});
+      } else {
         taken.insert(dataref);
       }
-    } catch (const core::JournalError&) {
-      failed = std::current_exception();
     }
+    const Outcome outcome = set(missing);
+    failed = outcome.failed;
+    for (const core::DatarefWrite& each : outcome.set) taken.insert(each.dataref);
+    required_.insert(taken.begin(), taken.end());
     for (auto it = required_.begin(); it != required_.end();) {
       if (std::find(wanted.begin(), wanted.end(), *it) != wanted.end()) {
         ++it;
@@ -263,6 +293,22 @@ bool OverrideManager::acquire(const std::string& dataref, float value, bool refr
   acquired_[dataref] = {value, refreshed};
   updateWatch();
   return true;
+}
+
+void OverrideManager::acquire(const std::vector<std::string>& datarefs) {
+  const Lock lock(*mutex_);
+  std::vector<core::DatarefWrite> missing;
+  for (const std::string& dataref : datarefs) {
+    if (required_.count(dataref) == 0) {
+      missing.push_back({dataref, 1.0F});
+    } else {
+      acquired_[dataref] = {};
+    }
+  }
+  const Outcome outcome = set(missing);
+  for (const core::DatarefWrite& each : outcome.set) acquired_[each.dataref] = {};
+  updateWatch();
+  if (outcome.failed) std::rethrow_exception(outcome.failed);
 }
 
 void OverrideManager::release(const std::string& dataref) {

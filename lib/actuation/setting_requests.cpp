@@ -24,21 +24,23 @@ SettingRequests::SettingRequests(core::SimulatorPort* link, OverrideManager* ove
     : link_(link), overrides_(overrides), timeout_(timeout), report_(std::move(report)) {}
 
 /// In lock-step X-Plane shows it in the next frame, for which the caller may be awaited.
-void SettingRequests::confirmLater(const std::vector<core::DatarefWrite>& writes, const std::string& what) {
+void SettingRequests::confirmLater(const std::vector<core::DatarefWrite>& writes, const std::string& what,
+                                   const std::string& who) {
   std::vector<std::string> names;
   names.reserve(writes.size());
   for (const core::DatarefWrite& write : writes) names.push_back(write.dataref);
-  link_->read(names, timeout_, [this, writes, what](const std::vector<core::DatarefValue>& values) {
+  link_->read(names, timeout_, [this, writes, what, who](const std::vector<core::DatarefValue>& values) {
     for (std::size_t i = 0; i < writes.size(); ++i) {
       if (values[i] && std::abs(*values[i] - writes[i].value) <= toleranceOf(writes[i].value)) continue;
-      report_(what + ": X-Plane does not show it at " + writes[i].dataref, false);
+      report_(what + ": X-Plane does not show it at " + writes[i].dataref, who, false);
       return;
     }
-    report_(what + ": X-Plane shows it", true);
+    report_(what + ": X-Plane shows it", who, true);
   });
 }
 
-RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWrite>& writes, const std::string& what) {
+RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWrite>& writes, const std::string& what,
+                                               const std::string& who) {
   if (!isUp(link_->status())) return noLink();
   const core::Deadline deadline(link_->clock(), timeout_);
   for (const core::DatarefWrite& write : writes) {
@@ -48,7 +50,7 @@ RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWr
     }
   }
   if (link_->inLockstep()) {
-    confirmLater(writes, what);
+    confirmLater(writes, what, who);
     return {ResultCode::kAccepted, "sent; an event will report whether X-Plane shows it"};
   }
   for (const core::DatarefWrite& write : writes) {
@@ -62,7 +64,8 @@ RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWr
   return {ResultCode::kOk, "X-Plane shows it"};
 }
 
-SettingRequests::Written SettingRequests::setDataref(const std::string& name, const std::vector<float>& values) {
+SettingRequests::Written SettingRequests::setDataref(const std::string& name, const std::vector<float>& values,
+                                                     const std::string& who) {
   const bool finite = std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
   if (values.empty() || !finite) {
     return {{ResultCode::kRefused, "values: expected one or more finite numbers"}, {}};
@@ -86,10 +89,10 @@ SettingRequests::Written SettingRequests::setDataref(const std::string& name, co
     }
   }
   Written out;
-  out.result = writeAndConfirm(writes, "set_dataref " + name);
+  out.result = writeAndConfirm(writes, "set_dataref " + name, who);
   if (link_->inLockstep()) return out;
   for (const auto& value : link_->read(names, timeout_)) out.values.push_back(value.value_or(std::nanf("")));
-  report_("set_dataref " + name + ": " + out.result.text, out.result.code == ResultCode::kOk);
+  report_("set_dataref " + name + ": " + out.result.text, who, out.result.code == ResultCode::kOk);
   return out;
 }
 

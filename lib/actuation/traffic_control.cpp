@@ -32,7 +32,6 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
   const Lock lock(*mutex_);
   std::set<int> wanted;
   std::vector<int> taken, given;
-  std::string refusal;
   for (const core::TrafficPose& pose : poses) wanted.insert(pose.number);
   for (auto it = flown_.begin(); it != flown_.end();) {
     if (wanted.count(it->first) != 0) {
@@ -44,14 +43,12 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
     it = flown_.erase(it);
   }
   for (auto it = lost_.begin(); it != lost_.end();) it = wanted.count(*it) != 0 ? std::next(it) : lost_.erase(it);
+  const std::string refusal = take(poses, &taken);
   for (const core::TrafficPose& pose : poses) {
-    if (lost_.count(pose.number) != 0) continue;
-    if (flown_.count(pose.number) == 0) {
-      refusal = take(pose.number);
-      if (!refusal.empty()) break;
-      taken.push_back(pose.number);
+    const bool has = flown_.count(pose.number) != 0;
+    if (has || std::find(taken.begin(), taken.end(), pose.number) != taken.end()) {
+      flown_[pose.number].command(pose, sim_time);
     }
-    flown_[pose.number].command(pose, sim_time);
   }
   commanded_at_ = sim_time;
   due_ = std::min(due_, link_->clock().steadySeconds());
@@ -61,13 +58,28 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
   return refusal;
 }
 
-/// Returns why it cannot be had; empty: it is had.
-std::string TrafficControl::take(int number) {
-  try {
-    return overrides_->acquire(core::trafficOverride(number)) ? "" : "there is no journal to note it in";
-  } catch (const core::JournalError& error) {
-    return core::whyNotChanged(error);
+/// Those that are not had yet, in one write to the disk: many of them must not keep the thread from its other work.
+/// Returns why some cannot be had; empty: all are.
+std::string TrafficControl::take(const std::vector<core::TrafficPose>& poses, std::vector<int>* taken) {
+  std::vector<int> wanted;
+  std::vector<std::string> names;
+  for (const core::TrafficPose& pose : poses) {
+    if (lost_.count(pose.number) != 0 || flown_.count(pose.number) != 0) continue;
+    wanted.push_back(pose.number);
+    names.push_back(core::trafficOverride(pose.number));
   }
+  if (wanted.empty()) return "";
+  std::string refusal;
+  try {
+    overrides_->acquire(names);
+  } catch (const core::JournalError& error) {
+    refusal = core::whyNotChanged(error);
+  }
+  const std::vector<std::string> active = overrides_->active();
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (std::find(active.begin(), active.end(), names[i]) != active.end()) taken->push_back(wanted[i]);
+  }
+  return refusal.empty() && taken->size() < wanted.size() ? "there is no journal to note it in" : refusal;
 }
 
 /// The scenery's origin is looked at while poses are written in its axes.

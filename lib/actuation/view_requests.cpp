@@ -60,7 +60,7 @@ std::string described(const core::CameraPose& pose, int view_type) {
 
 ViewRequests::ViewRequests(core::SimulatorPort* link, Report report) : link_(link), report_(std::move(report)) {}
 
-RequestResult ViewRequests::setView(const core::ViewWish& wish) {
+RequestResult ViewRequests::setView(const core::ViewWish& wish, const std::string& who) {
   if (const auto problem = core::check(wish)) return {ResultCode::kRefused, *problem};
   if (link_->inLockstep()) {
     return {ResultCode::kNotSupported,
@@ -73,7 +73,7 @@ RequestResult ViewRequests::setView(const core::ViewWish& wish) {
   } catch (const core::JournalError& error) {
     result = {ResultCode::kRefused, core::whyNotChanged(error)};
   }
-  report_("set_view: " + result.text, result.success());
+  report_("set_view: " + result.text, who, result.success());
   return result;
 }
 
@@ -113,7 +113,7 @@ std::string ViewRequests::remember() {
   changed.emplace_back(core::kFieldOfViewDataref);
   const auto values = link_->read(changed, kViewReadWait);
   for (std::size_t i = 0; i < changed.size(); ++i) {
-    if (values[i]) before_[changed[i]] = *values[i];
+    if (values[i] && std::isfinite(*values[i])) before_[changed[i]] = *values[i];
   }
   view_before_ = shown->first;
   return "";
@@ -171,7 +171,7 @@ bool ViewRequests::giveBack(double timeout_s) {
   try {
     return giveBackLocked(timeout_s);
   } catch (const core::JournalError& error) {
-    report_(error.what(), false);
+    report_(error.what(), "", false);
     return false;
   }
 }

@@ -177,6 +177,7 @@ class Actuation {
   void setPausing(const std::string& who);
   void onWatch(const core::RrefView& view);
   void onSurfaces();
+  void onCharacters(const std::function<bool()>& add);
   void onIdentity();
   void askIdentity();
   void onReset(const std::string& how);

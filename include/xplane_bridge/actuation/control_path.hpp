@@ -105,8 +105,10 @@ class ControlPath {
   // What drives it.
 
   void onLink(const core::LinkStatus& status);
-  /// X-Plane has shown which aircraft is loaded.
+  /// X-Plane has shown which aircraft is loaded: another one.
   void onAircraft(const core::AircraftIdentity& aircraft);
+  /// X-Plane has shown that it is still the one of the last onAircraft(). Needed after a restart of X-Plane.
+  void onSameAircraft();
   /// The flight began anew, or was placed elsewhere: `how`, in words.
   void onNewFlight(const std::string& how);
   /// Another client has released the override under which this node flew: it waits for a mode.
@@ -150,7 +152,9 @@ class ControlPath {
   void afterModeChange(core::FlightMode before);
   void sendCommand(double time);
   void send(double time);
-  bool fly(const core::ArbitratedControls& controls, double time);
+  bool fly(core::ArbitratedControls controls, double time);
+  std::vector<core::Channel> notHeld(const core::ChannelSet& channels) const;
+  void warnOnce(const std::string& text);
   void sendRows(const core::ArbitratedControls& controls, const core::ChannelSet& now);
   void prepareLevers(const core::ArbitratedControls& controls);
   core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
@@ -174,9 +178,10 @@ class ControlPath {
   std::string why_not_;  // empty while flying
   // What the standing follows from; see settle().
   core::LinkStatus link_status_;
-  bool flight_shown_ = true;  // a frame has come since the link came up anew
-  std::string suspension_;    // why; empty: not suspended
-  std::string halted_;        // why a mode must be asked for; empty: it need not
+  bool flight_shown_ = true;    // a frame has come since the link came up anew
+  bool aircraft_shown_ = true;  // and which aircraft that X-Plane has loaded
+  std::string suspension_;      // why; empty: not suspended
+  std::string halted_;          // why a mode must be asked for; empty: it need not
   core::AircraftIdentity aircraft_;
   std::vector<core::MissingChannel> missing_;  // of it
   core::ChannelSet missing_reported_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/core/control/control_channels.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 
 namespace xplane_bridge {
@@ -31,6 +33,9 @@ class OverrideManager {
   /// (or core::releaseOf()) where no client sets it. Without `refreshed`, refresh() leaves it alone, so that it can be
   /// taken back in the simulator. Returns whether it was set: as in setRequired().
   bool acquire(const std::string& dataref, float value = 1.0F, bool refreshed = true);
+  /// The same of several overrides, with one write to the disk. Where one cannot be noted the others are set before it
+  /// throws; active() has those that are.
+  void acquire(const std::vector<std::string>& datarefs);
   /// What is to be written right before `dataref`, which is set, is released: by this node, and, as far as
   /// recordPreparations() has brought it into the journal, by its guardian, its next start and
   /// scripts/release_overrides. It is not read back.
@@ -77,6 +82,12 @@ class OverrideManager {
     bool in_journal = true;  // its entry is known to be there
   };
 
+  /// What set() has set, and what it met otherwise.
+  struct Outcome {
+    std::vector<core::DatarefWrite> set;
+    std::exception_ptr failed;
+  };
+
   struct Preparation {
     std::vector<core::UndoOperation> writes;
     std::vector<core::UndoOperation> recorded;  // as the journal has them
@@ -87,6 +98,7 @@ class OverrideManager {
   /// All that is set; nothing is required or acquired any more.
   std::set<std::string> takeAll();
   std::vector<core::UndoOperation> releaseOf(const std::string& dataref) const;
+  Outcome set(const std::vector<core::DatarefWrite>& wanted);
   bool set(const std::string& dataref, float value);
   void resend(const std::string& dataref, float value);
   void giveBack(const std::string& dataref);

@@ -15,8 +15,8 @@ namespace xplane_bridge {
 /// for. Thread-safe; all but runCommand() wait, up to the time-out.
 class SettingRequests {
  public:
-  /// `report(text, success)`: what was written, for events and the log.
-  using Report = std::function<void(const std::string& text, bool success)>;
+  /// `report(text, who, success)`: what was written, for events and the log.
+  using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
 
   /// @param timeout [s] until X-Plane must have shown what was asked for
   SettingRequests(core::SimulatorPort* link, OverrideManager* overrides, double timeout, Report report);
@@ -26,12 +26,14 @@ class SettingRequests {
     std::vector<float> values;  ///< as X-Plane shows them afterwards, NaN where it does not answer; empty: not written
   };
   /// Writes `values` to `name` and the elements that follow it. An override set so is given back like the bridge's own.
-  Written setDataref(const std::string& name, const std::vector<float>& values);
+  /// @param who asks for it
+  Written setDataref(const std::string& name, const std::vector<float>& values, const std::string& who);
   RequestResult runCommand(const std::string& name);
 
  private:
-  RequestResult writeAndConfirm(const std::vector<core::DatarefWrite>& writes, const std::string& what);
-  void confirmLater(const std::vector<core::DatarefWrite>& writes, const std::string& what);
+  RequestResult writeAndConfirm(const std::vector<core::DatarefWrite>& writes, const std::string& what,
+                                const std::string& who);
+  void confirmLater(const std::vector<core::DatarefWrite>& writes, const std::string& what, const std::string& who);
 
   core::SimulatorPort* link_;
   OverrideManager* overrides_;

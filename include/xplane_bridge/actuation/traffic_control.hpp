@@ -29,21 +29,21 @@ class TrafficControl {
   TrafficControl(core::SimulatorPort* link, OverrideManager* overrides, TrafficOptions options, Report report);
 
   /// traffic/command: the complete list. Returns why it is refused; empty: it is taken. Where an aircraft cannot be
-  /// taken, because that cannot be noted in the journal, those before it in the list are flown.
+  /// taken, because that cannot be noted in the journal, the others are flown.
   /// @param sim_time [s] now
   std::string command(const std::vector<core::TrafficPose>& poses, double sim_time);
   /// Sends what is due. Often.
   void tick(double sim_time);
   /// Gives all back; reports `why`, where there are any.
   void release(const std::string& why);
-  /// Another process has given everything back, or X-Plane is another one: none is placed any more.
+  /// Another process has given everything back: none is placed any more.
   void forget();
 
   /// Placed now.
   std::vector<int> numbers() const;
 
  private:
-  std::string take(int number);
+  std::string take(const std::vector<core::TrafficPose>& poses, std::vector<int>* taken);
   void follow();
   void send(const core::TrafficPose& pose);
 

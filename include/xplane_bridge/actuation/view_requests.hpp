@@ -18,14 +18,15 @@ namespace xplane_bridge {
 /// start and scripts/release_overrides can give it back as well. Thread-safe; all functions wait.
 class ViewRequests {
  public:
-  /// `report(text, success)`: what was done, for events and the log.
-  using Report = std::function<void(const std::string& text, bool success)>;
+  /// `report(text, who, success)`: what was done, for events and the log; `who` is empty where nothing asked for it.
+  using Report = std::function<void(const std::string& text, const std::string& who, bool success)>;
 
   ViewRequests(core::SimulatorPort* link, Report report);
 
   /// Tries the ways of a wish until X-Plane's camera is measured where it is wanted. Where none leads there, what was
   /// changed is given back.
-  RequestResult setView(const core::ViewWish& wish);
+  /// @param who asks for it
+  RequestResult setView(const core::ViewWish& wish, const std::string& who);
   /// Brings back what the first setView() found. Returns whether X-Plane shows it, or nothing was changed.
   bool giveBack(double timeout_s);
 

@@ -39,8 +39,8 @@ void TxServices::serve(const SetMode::Request& request, SetMode::Response* respo
                                        : result(ServiceResult::REFUSED, status.reason);
 }
 
-void TxServices::serve(const SetDataref::Request& request, SetDataref::Response* response, const std::string& /*who*/) {
-  const auto written = actuation_.settings().setDataref(request.name, request.values);
+void TxServices::serve(const SetDataref::Request& request, SetDataref::Response* response, const std::string& who) {
+  const auto written = actuation_.settings().setDataref(request.name, request.values, who);
   answer(written.result, response);
   response->values = written.values;
 }
@@ -49,10 +49,10 @@ void TxServices::serve(const RunCommand::Request& request, RunCommand::Response*
   answer(actuation_.settings().runCommand(request.name), response);
 }
 
-void TxServices::serve(const SetView::Request& request, SetView::Response* response, const std::string& /*who*/) {
+void TxServices::serve(const SetView::Request& request, SetView::Response* response, const std::string& who) {
   const core::ViewWish wish{
       request.view, {request.roll_deg, request.pitch_deg, request.heading_deg}, request.field_of_view_deg};
-  answer(actuation_.views().setView(wish), response);
+  answer(actuation_.views().setView(wish, who), response);
 }
 
 void TxServices::serve(const std_srvs::SetBool::Request& request, std_srvs::SetBool::Response* response,

@@ -60,6 +60,44 @@ TEST_F(ActuationTest, AnotherAircraftIsReportedAndNotFlown) {
   EXPECT_TRUE(actuation_->control().overrides.empty());
 }
 
+TEST_F(ActuationTest, ARestartedXPlaneIsNotFlownBeforeItHasShownItsAircraft) {
+  fly(0.2);
+  showAircraft("QUAD");
+  sim_.restart();
+  sim_.set(kFlightTime, 1.0F);
+  sim_.clearMessages();
+  actuation_->onLink(sim_.status());
+  fly(2.0);
+  for (const auto& [name, value] : sim_.writes()) EXPECT_NE(name, kRoll) << value;
+  EXPECT_EQ(eventsOf(EventKind::kAircraft).back().text, "aircraft: QUAD (Twin); not the one of the configuration");
+}
+
+TEST_F(ActuationTest, ARestartedXPlaneWithTheSameAircraftIsFlownOn) {
+  fly(0.2);
+  sim_.restart();
+  sim_.set(kFlightTime, 1.0F);
+  sim_.set(kRoll, 0.0F);
+  actuation_->onLink(sim_.status());
+  fly(1.0);
+  EXPECT_FLOAT_EQ(sim_.value(kRoll), 0.25F);
+}
+
+TEST_F(ActuationTest, AnotherXPlaneIsNotLeftWithTheTrafficOfTheLast) {
+  const std::string override_name = core::trafficOverride(3);
+  sim_.set(override_name, 0.0F);
+  core::TrafficPose pose;
+  pose.number = 3;
+  pose.place = {37.46, 126.44, 500.0};
+  ASSERT_EQ(actuation_->traffic().command({pose}, actuation_->simTime()), "");
+  ASSERT_FLOAT_EQ(sim_.value(override_name), 1.0F);
+  sim_.restart();
+  sim_.set(override_name, 0.0F);
+  actuation_->onLink(sim_.status());
+  run(3.0);
+  EXPECT_FLOAT_EQ(sim_.value(override_name), 0.0F);
+  EXPECT_TRUE(actuation_->control().overrides.empty());
+}
+
 TEST_F(ActuationTest, NewFlightIsReportedAndEndsAuto) {
   actuation_->path().requestMode({1, 2, "test", 0.0});
   ASSERT_EQ(actuation_->control().mode.mode, core::FlightMode::kAuto);
@@ -95,34 +133,35 @@ TEST_F(ActuationTest, PauseIsReportedWithWhoAskedForIt) {
 }
 
 TEST_F(ActuationTest, DatarefIsWrittenAndShown) {
-  const auto written = actuation_->settings().setDataref(kRoll, {0.5F});
+  const auto written = actuation_->settings().setDataref(kRoll, {0.5F}, "test");
+  EXPECT_EQ(eventsOf(EventKind::kSetting).back().who, "test");
   EXPECT_EQ(written.result.code, core::ResultCode::kOk);
   EXPECT_EQ(written.values, std::vector<float>{0.5F});
   EXPECT_EQ(eventsOf(EventKind::kSetting).back().text, std::string("set_dataref ") + kRoll + ": X-Plane shows it");
-  const auto unknown = actuation_->settings().setDataref("sim/no/such", {0.5F});
+  const auto unknown = actuation_->settings().setDataref("sim/no/such", {0.5F}, "test");
   EXPECT_EQ(unknown.result.code, core::ResultCode::kTimeout);
   EXPECT_TRUE(std::isnan(unknown.values[0]));
   EXPECT_FALSE(eventsOf(EventKind::kSetting).back().success);
-  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {}).result.code, core::ResultCode::kRefused);
+  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {}, "test").result.code, core::ResultCode::kRefused);
 }
 
 TEST_F(ActuationTest, DatarefThatIsShownOnlyNearlyIsNotSet) {
   sim_.set(kRoll, 0.49F);
   sim_.setReadOnly(kRoll);
-  const auto written = actuation_->settings().setDataref(kRoll, {0.5F});
+  const auto written = actuation_->settings().setDataref(kRoll, {0.5F}, "test");
   EXPECT_EQ(written.result.code, core::ResultCode::kTimeout);
   EXPECT_EQ(written.result.text, std::string(kRoll) + " shows 0.490000, not 0.500000");
-  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {std::nanf("")}).result.code, core::ResultCode::kRefused);
-  const auto too_long = actuation_->settings().setDataref("sim/" + std::string(600, 'a'), {0.5F});
+  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {std::nanf("")}, "test").result.code, core::ResultCode::kRefused);
+  const auto too_long = actuation_->settings().setDataref("sim/" + std::string(600, 'a'), {0.5F}, "test");
   EXPECT_EQ(too_long.result.code, core::ResultCode::kRefused) << too_long.result.text;
 }
 
 TEST_F(ActuationTest, OverrideOfAServiceIsHeldUntilItGivesItBack) {
   const std::string name = "sim/operation/override/override_joystick_roll";
-  EXPECT_TRUE(actuation_->settings().setDataref(name, {1.0F}).result.success());
+  EXPECT_TRUE(actuation_->settings().setDataref(name, {1.0F}, "test").result.success());
   EXPECT_EQ(actuation_->control().overrides, std::vector<std::string>{name});
   EXPECT_EQ(sim_.journal()->entries().size(), 1U);
-  EXPECT_TRUE(actuation_->settings().setDataref(name, {0.0F}).result.success());
+  EXPECT_TRUE(actuation_->settings().setDataref(name, {0.0F}, "test").result.success());
   EXPECT_TRUE(actuation_->control().overrides.empty());
   EXPECT_FLOAT_EQ(sim_.value(name), 0.0F);
 }
@@ -150,7 +189,7 @@ TEST_F(ActuationTest, LinkIsReportedWithItsReason) {
   actuation_->onLink(sim_.status());
   EXPECT_EQ(eventsOf(EventKind::kLink).back().text.substr(0, 6), "LOST: ");
   EXPECT_EQ(actuation_->setPaused(true, "test").code, core::ResultCode::kNoLink);
-  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {0.5F}).result.code, core::ResultCode::kNoLink);
+  EXPECT_EQ(actuation_->settings().setDataref(kRoll, {0.5F}, "test").result.code, core::ResultCode::kNoLink);
   EXPECT_EQ(actuation_->jobs().refusal()->code, core::ResultCode::kNoLink);
 }
 

@@ -104,11 +104,11 @@ TEST_F(OverrideManagerTest, NothingIsSetThatCannotBeWrittenDown) {
   EXPECT_EQ(sim_.value(kJoystick), 1.0F);
 }
 
-TEST_F(OverrideManagerTest, JournalThatFailsBetweenTwoLeavesTheFirstLookedAfter) {
+TEST_F(OverrideManagerTest, OneThatCannotBeWrittenDownKeepsNoOtherFromBeingSet) {
   manager_.setRequired({kThrottles});
-  sim_.on_message = [&](const core::FakeSimulator::Message&) { sim_.breakJournal(); };
-  EXPECT_THROW(manager_.setRequired({kJoystick, kFailure}), core::JournalError);
-  sim_.on_message = nullptr;
+  sim_.journalOfAnother(true).record(std::string("override:") + kFailure, kOverridePurpose,
+                                     {core::UndoDref{kFailure, 0.0F}});
+  EXPECT_THROW(manager_.setRequired({kFailure, kJoystick}), core::JournalTakenError);
   EXPECT_EQ(manager_.active(), Names{kJoystick}) << "the throttles need no journal to be given back";
   EXPECT_EQ(sim_.value(kThrottles), 0.0F);
   EXPECT_EQ(sim_.value(kFailure), 0.0F);
@@ -116,6 +116,18 @@ TEST_F(OverrideManagerTest, JournalThatFailsBetweenTwoLeavesTheFirstLookedAfter)
   EXPECT_EQ(reports_, (Reports{{"set override_throttles", true},
                                {"set override_joystick", true},
                                {"gave back override_throttles", true}}));
+  EXPECT_THROW(manager_.acquire(Names{kThrottles, kFailure, kJoystick}), core::JournalTakenError);
+  EXPECT_EQ(manager_.active(), (Names{kJoystick, kThrottles}));
+  EXPECT_EQ(sim_.value(kThrottles), 1.0F);
+  manager_.setRequired({});
+  EXPECT_EQ(manager_.active(), (Names{kJoystick, kThrottles})) << "acquired";
+}
+
+TEST_F(OverrideManagerTest, SeveralAreWrittenDownBeforeTheFirstIsSent) {
+  std::vector<std::size_t> noted;
+  sim_.on_message = [&](const auto&) { noted.push_back(sim_.journal()->entries().size()); };
+  manager_.setRequired({kJoystick, kThrottles});
+  EXPECT_EQ(noted, (std::vector<std::size_t>{2, 2}));
 }
 
 // ---------------------------------------------------------------------------------------- acquire() and release()

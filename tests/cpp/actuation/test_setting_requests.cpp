@@ -15,6 +15,8 @@ namespace {
 using core::ResultCode;
 using Reports = std::vector<std::pair<std::string, bool>>;
 
+constexpr const char* kWho = "/tx_node/set_dataref";
+
 constexpr double kTimeout = 2.0;
 constexpr const char* kQnh = "sim/weather/barometer_sealevel_inhg";
 constexpr const char* kFirst = "sim/cockpit2/engine/actuators/throttle_ratio[0]";
@@ -42,11 +44,14 @@ class SettingRequestsTest : public testing::Test {
   Reports reports_;
   OverrideManager overrides_{&sim_, [](const std::string&, bool) {}};
   SettingRequests settings_{&sim_, &overrides_, kTimeout,
-                            [this](const std::string& text, bool success) { reports_.emplace_back(text, success); }};
+                            [this](const std::string& text, const std::string& who, bool success) {
+                              EXPECT_EQ(who, kWho);
+                              reports_.emplace_back(text, success);
+                            }};
 };
 
 TEST_F(SettingRequestsTest, ElementsThatFollowAreWrittenToo) {
-  const auto written = settings_.setDataref(kFirst, {0.25F, 0.75F});
+  const auto written = settings_.setDataref(kFirst, {0.25F, 0.75F}, kWho);
   EXPECT_EQ(written.result.code, ResultCode::kOk);
   EXPECT_EQ(written.values, (std::vector<float>{0.25F, 0.75F}));
   EXPECT_EQ(sim_.value(kSecond), 0.75F);
@@ -57,7 +62,7 @@ TEST_F(SettingRequestsTest, WhatIsNoNumberIsRefusedBeforeAnythingIsSent) {
   const float infinite = std::numeric_limits<float>::infinity();
   for (const std::vector<float>& values :
        {std::vector<float>{}, {std::nanf("")}, {infinite}, {0.5F, -infinite}, {std::nanf(""), 0.5F}}) {
-    const auto written = settings_.setDataref(kFirst, values);
+    const auto written = settings_.setDataref(kFirst, values, kWho);
     EXPECT_EQ(written.result.code, ResultCode::kRefused);
     EXPECT_EQ(written.result.text, "values: expected one or more finite numbers");
     EXPECT_TRUE(written.values.empty());
@@ -69,7 +74,7 @@ TEST_F(SettingRequestsTest, WhatIsNoNumberIsRefusedBeforeAnythingIsSent) {
 TEST_F(SettingRequestsTest, WhatCannotBeSentIsSaidAtOnce) {
   sim_.refusal = core::SendStatus::kNoPeer;
   const double began = sim_.time();
-  const auto written = settings_.setDataref(kQnh, {29.5F});
+  const auto written = settings_.setDataref(kQnh, {29.5F}, kWho);
   EXPECT_EQ(written.result.code, ResultCode::kRefused);
   EXPECT_EQ(written.result.text, std::string(kQnh) + " is not sent: " + core::toString(core::SendStatus::kNoPeer));
   EXPECT_LT(sim_.time() - began, kTimeout) << "there is nothing to wait for";
@@ -92,8 +97,8 @@ TEST_F(SettingRequestsTest, ACommandWithoutANameIsRefusedWithWhatIsExpected) {
 TEST_F(SettingRequestsTest, LargeNumbersAreComparedAsFloatsAre) {
   sim_.set(kQnh, 200000.02F);
   sim_.setReadOnly(kQnh);
-  EXPECT_EQ(settings_.setDataref(kQnh, {200000.0F}).result.code, ResultCode::kOk);
-  EXPECT_EQ(settings_.setDataref(kQnh, {200100.0F}).result.code, ResultCode::kTimeout);
+  EXPECT_EQ(settings_.setDataref(kQnh, {200000.0F}, kWho).result.code, ResultCode::kOk);
+  EXPECT_EQ(settings_.setDataref(kQnh, {200100.0F}, kWho).result.code, ResultCode::kTimeout);
 }
 
 // ------------------------------------------------------------------------------------------------- in lock-step
@@ -101,7 +106,7 @@ TEST_F(SettingRequestsTest, LargeNumbersAreComparedAsFloatsAre) {
 TEST_F(SettingRequestsTest, InLockstepTheOutcomeIsReportedAfterwards) {
   sim_.lockstep = true;
   const double began = sim_.time();
-  const auto written = settings_.setDataref(kFirst, {0.25F, 0.75F});
+  const auto written = settings_.setDataref(kFirst, {0.25F, 0.75F}, kWho);
   EXPECT_EQ(written.result.code, ResultCode::kAccepted);
   EXPECT_EQ(sim_.time(), began) << "the caller may be awaited";
   EXPECT_TRUE(written.values.empty());
@@ -113,9 +118,9 @@ TEST_F(SettingRequestsTest, InLockstepTheOutcomeIsReportedAfterwards) {
 TEST_F(SettingRequestsTest, InLockstepWhatIsNotShownIsReportedWithItsName) {
   sim_.lockstep = true;
   sim_.setReadOnly(kSecond);
-  settings_.setDataref(kFirst, {0.25F, 0.75F});
+  settings_.setDataref(kFirst, {0.25F, 0.75F}, kWho);
   sim_.run(kTimeout + 0.1);
-  settings_.setDataref("sim/no/such", {0.0F});
+  settings_.setDataref("sim/no/such", {0.0F}, kWho);
   sim_.run(kTimeout + 0.1);
   EXPECT_EQ(reports_,
             (Reports{{std::string("set_dataref ") + kFirst + ": X-Plane does not show it at " + kSecond, false},

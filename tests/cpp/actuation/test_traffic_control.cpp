@@ -1,9 +1,13 @@
 #include "xplane_bridge/actuation/traffic_control.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -78,6 +82,34 @@ TEST_F(TrafficControlTest, TakesNoneThatCannotBeWrittenDownAndFliesThoseItHas) {
   sim_.breakJournal(false);
   EXPECT_EQ(traffic.command({poseOf(3), poseOf(4)}, now()), "");
   EXPECT_EQ(traffic.numbers(), (std::vector<int>{3, 4}));
+}
+
+TEST_F(TrafficControlTest, WritesAllThatItTakesDownAtOnce) {
+  std::vector<core::TrafficPose> poses;
+  for (int number = 1; number < 20; ++number) {
+    sim_.set(core::trafficOverride(number), 0.0F);
+    poses.push_back(poseOf(number));
+  }
+  std::optional<std::size_t> noted;
+  sim_.on_message = [&](const auto&) {
+    if (!noted) noted = inJournal();
+  };
+  const std::string folder = std::filesystem::path(sim_.journal()->path()).parent_path();
+  const int watch = ::inotify_init1(IN_NONBLOCK);
+  ASSERT_GE(::inotify_add_watch(watch, folder.c_str(), IN_CREATE | IN_MOVED_TO), 0);  // like ones in a row become one
+  EXPECT_EQ(control().command(poses, now()), "");
+  alignas(inotify_event) char events[8192];
+  const ssize_t size = ::read(watch, events, sizeof(events));
+  ::close(watch);
+  int replaced = 0;
+  for (ssize_t at = 0; at < size;) {
+    const auto* event = reinterpret_cast<const inotify_event*>(events + at);
+    replaced += (event->mask & IN_MOVED_TO) != 0U ? 1 : 0;
+    at += static_cast<ssize_t>(sizeof(inotify_event) + event->len);
+  }
+  EXPECT_EQ(replaced, 1) << "the file, for all of them";
+  EXPECT_EQ(noted, 19U) << "before the first is sent";
+  EXPECT_EQ(control_->numbers().size(), 19U);
 }
 
 TEST_F(TrafficControlTest, PlacesAnAircraftAndMovesItOnBetweenCommands) {

@@ -22,7 +22,10 @@ const std::string kField = kView + "field_of_view_deg";
 /// A level aircraft heading north, whose X-Plane shows the camera that its view and its visual offset make.
 class ViewRequestsTest : public testing::Test {
  protected:
-  ViewRequestsTest() : views_(&sim_, [this](const std::string& text, bool) { reports_.push_back(text); }) {
+  ViewRequestsTest()
+      : views_(&sim_, [this](const std::string& text, const std::string& who, bool) {
+          reports_.push_back(text + " by " + who);
+        }) {
     sim_.setAll(core::cameraDatarefs(), 0.0F);
     sim_.setAll(core::viewDatarefs(), 0.0F);
     sim_.set(kField, 60.0F);
@@ -72,7 +75,7 @@ class ViewRequestsTest : public testing::Test {
     ViewWish wish;
     wish.direction = direction;
     wish.field_of_view_deg = field_of_view_deg;
-    return views_.setView(wish);
+    return views_.setView(wish, "test");
   }
 
   std::vector<core::JournalEntry> journalled() { return sim_.journal()->entries(); }
@@ -92,7 +95,7 @@ TEST_F(ViewRequestsTest, DownIsTheVisualOffsetWithoutACockpit) {
   EXPECT_EQ(sim_.value(kVertical), -90.0F);
   ASSERT_EQ(journalled().size(), 1U);
   EXPECT_EQ(journalled()[0].id, "view:camera");
-  EXPECT_EQ(reports_.back().substr(0, 9), "set_view:");
+  EXPECT_EQ(reports_.back(), "set_view: " + result.text + " by test");
 }
 
 TEST_F(ViewRequestsTest, IsOnDiskBeforeXPlaneIsChanged) {

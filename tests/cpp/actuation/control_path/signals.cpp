@@ -37,6 +37,23 @@ TEST_F(ControlPathTest, AnAxisWithoutCommandsIsTakenForASignalAndGivenBack) {
   EXPECT_EQ(writesTo(kStickRoll), Floats{0.4F});
 }
 
+TEST_F(ControlPathTest, AnAxisOfASignalThatEndsWhileXPlaneIsSilentIsGivenBackWhenItAnswers) {
+  start();
+  excitation.channels.set(core::index(core::Channel::kRoll));
+  excitation.values.fill(0.3);
+  excitation.rest = 0.1;
+  sim.frame(0.001);
+  ASSERT_EQ(sim.value(kStickOverride), 1.0F);
+  setState(LinkState::kStale);
+  excitation = {};
+  frame();
+  EXPECT_EQ(sim.value(kStickOverride), 1.0F);
+  setState(LinkState::kConnected);
+  run(0.1);
+  EXPECT_EQ(sim.value(kStickOverride), 0.0F);
+  EXPECT_TRUE(overrides.active().empty());
+}
+
 TEST_F(ControlPathTest, AnExcitationOfSeveralAxesEndsWithTheFirstThatIsNotCommanded) {
   start();
   path->command(FlightMode::kManual, rollCommand(0.1));

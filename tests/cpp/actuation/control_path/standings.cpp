@@ -313,6 +313,38 @@ TEST_F(ControlPathTest, SuspendedDuringALossItGivesBackAfterwards) {
   EXPECT_FLOAT_EQ(sim.value(kStickOverride), 0.0F);
 }
 
+TEST_F(ControlPathTest, AnotherXPlaneIsNotFlownBeforeItHasShownItsAircraft) {
+  start();
+  runWith(rollCommand(0.3), 0.2);
+  shows_aircraft = false;
+  restartXPlane();
+  sim.clearMessages();
+  runWith(rollCommand(0.3), 1.5);
+  EXPECT_EQ(path->standing(), Standing::kNotConnected);
+  EXPECT_EQ(path->refusal(), "X-Plane is back, but has not shown which aircraft is loaded yet");
+  EXPECT_TRUE(writesTo(kStickRoll).empty());
+  EXPECT_EQ(sim.value(kStickOverride), 0.0F);
+  path->onAircraft({"QUAD", ""});
+  runWith(rollCommand(0.3), 0.2);
+  EXPECT_EQ(path->standing(), Standing::kWrongAircraft);
+  EXPECT_TRUE(writesTo(kStickRoll).empty());
+}
+
+TEST_F(ControlPathTest, ARestartWithinAGapIsNotFlownBeforeItsAircraftIsShown) {
+  start();
+  runWith(rollCommand(0.3), 0.2);
+  shows_aircraft = false;
+  sim.set(kRunningTime, 1.0F);  // the link has noticed nothing
+  sim.set(kStickOverride, 0.0F);
+  sim.frame();
+  sim.clearMessages();
+  runWith(rollCommand(0.3), 0.2);
+  EXPECT_TRUE(writesTo(kStickRoll).empty());
+  path->onSameAircraft();
+  runWith(rollCommand(0.3), 0.1);
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.3F);
+}
+
 TEST_F(ControlPathTest, ASecondBridgeIsNoCrash) {
   start();
   sim.journalOfAnother(true).record(std::string("override:") + kStickOverride, kOverridePurpose,
@@ -340,6 +372,33 @@ TEST_F(ControlPathTest, WithoutTheJournalNothingIsTaken) {
   path->command(FlightMode::kManual, rollCommand(0.3));
   frame();
   EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.3F);
+}
+
+TEST_F(ControlPathTest, AnOverrideThatCannotBeNotedKeepsItsOwnChannelsBackAndNoOther) {
+  constexpr const char* kLeftBrake = "sim/cockpit2/controls/left_brake_ratio";
+  constexpr const char* kRightBrake = "sim/cockpit2/controls/right_brake_ratio";
+  sim.set(kLeftBrake, 0.0F);
+  sim.set(kRightBrake, 0.0F);
+  start();
+  runWith(rollCommand(0.3), 0.2);
+  sim.breakJournal();
+  core::ControlCommand braking = rollCommand(-0.2);
+  braking.fields |= core::kFieldToeBrakes | core::kFieldFlaps;
+  braking.left_brake = braking.right_brake = 1.0;
+  braking.flaps = 0.5;
+  sim.clearMessages();
+  runWith(braking, 0.2);
+  EXPECT_FLOAT_EQ(sim.value(kStickRoll), -0.2F) << "its override is held";
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F) << "takes no override";
+  EXPECT_TRUE(writesTo(kLeftBrake).empty());
+  EXPECT_FLOAT_EQ(static_cast<float>(stick[0]), -0.2F);
+  EXPECT_FALSE(applied.back().controls.active.test(core::index(core::Channel::kLeftBrake)));
+  EXPECT_EQ(applied.back().controls.fields & core::kFieldToeBrakes, 0U);
+  ASSERT_EQ(warnings.size(), 1U) << "warned of once";
+  EXPECT_EQ(warnings[0].find("commands of left_brake, right_brake are not sent: it could not be given back"), 0U);
+  sim.breakJournal(false);
+  runWith(braking, 0.1);
+  EXPECT_FLOAT_EQ(sim.value(kLeftBrake), 1.0F);
 }
 
 TEST(Standing, EachHasAName) {

@@ -43,6 +43,7 @@ struct FlownPath {
   std::array<double, 3> stick{};
   int surface_ends = 0;
   core::ChannelExcitation excitation;  // the test's: what is to be added
+  bool shows_aircraft = true;
 
   FlownPath() {
     options.arbiter.transition_rate = std::numeric_limits<double>::infinity();
@@ -93,8 +94,10 @@ struct FlownPath {
     sim.setState(state);
     path->onLink(sim.status());
   }
-  /// A frame of X-Plane, then the node's timer.
+  /// A frame of X-Plane, then the node's timer. By then it has shown which aircraft it has, unless the test keeps that
+  /// back.
   void frame(double dt = core::FakeSimulator::kFrame) {
+    if (shows_aircraft) path->onSameAircraft();
     sim.frame(dt);
     path->tick();
   }

@@ -1,0 +1,160 @@
+// ControlPath's way down: what is sent to X-Plane, and what is left out.
+
+#include <algorithm>
+#include <utility>
+
+#include "xplane_bridge/actuation/control_path.hpp"
+#include "xplane_bridge/actuation/link_condition.hpp"
+#include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/core/control/control_rows.hpp"
+#include "xplane_bridge/core/link/journal.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+constexpr double kHandleRepeat = 0.3;    // [s] in which a changed handle is sent with every refresh
+constexpr double kMissingTimeout = 2.0;  // [s] of asking for it once
+
+void leaveOut(core::Channel channel, core::ArbitratedControls* controls) {
+  controls->active.reset(core::index(channel));
+  const std::uint32_t field = core::fieldOf(channel);
+  controls->fields &= ~field;
+  controls->limited &= ~field;
+  controls->excited &= ~field;
+}
+
+}  // namespace
+
+/// Once for each aircraft, whose file does not change while it is loaded.
+void ControlPath::askMissing() {
+  missing_.clear();
+  missing_reported_.reset();
+  link_->read(core::trimDatarefs(), kMissingTimeout, [this](const std::vector<core::DatarefValue>& values) {
+    const std::lock_guard<core::HandlerMutex> lock(*mutex_);
+    missing_ = core::missingTrims(values);
+  });
+}
+
+core::ChannelSet ControlPath::missingChannels() const {
+  core::ChannelSet out;
+  for (const core::MissingChannel& missing : missing_) out.set(core::index(missing.channel));
+  return out;
+}
+
+/// The rest of a command is flown: a stick goes on though one of its levers has nothing to move.
+core::ArbitratedControls ControlPath::withoutMissing(core::ArbitratedControls controls) {
+  if (standing_ != Standing::kFlying) return controls;
+  for (const core::MissingChannel& missing : missing_) {
+    const std::size_t channel = core::index(missing.channel);
+    if (!controls.active.test(channel)) continue;
+    leaveOut(missing.channel, &controls);
+    if (missing_reported_.test(channel)) continue;
+    missing_reported_.set(channel);
+    hooks_.event(ControlPathHooks::Kind::kMissing, core::channelName(missing.channel) + " is not sent: " + missing.why,
+                 "");
+  }
+  return controls;
+}
+
+bool ControlPath::fly(core::ArbitratedControls controls, double time) {
+  if (controls.active.none()) {
+    // An axis that only a test signal had taken is X-Plane's again, as soon as X-Plane can be asked.
+    if (taken_ && isUp(link_status_)) {
+      overrides_->setRequired({});
+      taken_ = false;
+    }
+    return false;
+  }
+  if (standing_ != Standing::kFlying) {
+    warnOnce("commands are not sent: " + why_not_);
+    if (isUp(link_status_)) overrides_->setRequired({});
+    return false;
+  }
+  try {
+    overrides_->setRequired(core::requiredOverrides(controls.active, encoder_.options()));
+    last_warning_.clear();
+  } catch (const core::JournalError& error) {
+    // What is held is flown on: left alone it would stand where it is, with X-Plane's own stick dead.
+    const std::vector<core::Channel> refused = notHeld(controls.active);
+    for (const core::Channel channel : refused) leaveOut(channel, &controls);
+    const bool some = controls.active.any();
+    warnOnce("commands" + (some ? " of " + core::join(refused, ", ", core::channelName) : "") +
+             " are not sent: " + core::whyNotChanged(error));
+    if (!some) return false;
+  }
+  taken_ = controls.source == core::CommandSource::kNone;
+  writes_.clear();
+  const core::ChannelSet now = channelsToSend(controls, time);
+  encoder_.encode(controls.values, now, writes_);
+  for (const core::DatarefWrite& write : writes_) link_->write(write.dataref, write.value);
+  sendRows(controls, now);
+  prepareLevers(controls);
+  last_send_ = time;
+  publishApplied(controls);
+  watchReadBack(controls.active);
+  return true;
+}
+
+/// Those whose overrides are not set.
+std::vector<core::Channel> ControlPath::notHeld(const core::ChannelSet& channels) const {
+  const std::vector<std::string> set = overrides_->active();
+  std::vector<core::Channel> out;
+  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+    if (!channels.test(i)) continue;
+    core::ChannelSet one;
+    one.set(i);
+    const std::vector<std::string> needed = core::requiredOverrides(one, encoder_.options());
+    const bool held = std::all_of(needed.begin(), needed.end(), [&set](const std::string& name) {
+      return std::find(set.begin(), set.end(), name) != set.end();
+    });
+    if (!held) out.push_back(static_cast<core::Channel>(i));
+  }
+  return out;
+}
+
+void ControlPath::warnOnce(const std::string& text) {
+  if (std::exchange(last_warning_, text) != text) hooks_.warn(text);
+}
+
+void ControlPath::sendRows(const core::ArbitratedControls& controls, const core::ChannelSet& now) {
+  const std::vector<core::DataRow> rows = core::controlRows(controls.values, controls.active, now, encoder_.options());
+  if (rows.empty()) return;
+  std::array<std::uint8_t, core::kHeaderSize + 4 * core::kDataRowSize> buffer;
+  const core::EncodeResult size = core::encodeData(buffer, rows.data(), rows.size());
+  if (size) link_->send({buffer.data(), *size});
+}
+
+/// When their override ends, motors go by their levers at once: those are to be where the motors are by then.
+void ControlPath::prepareLevers(const core::ArbitratedControls& controls) {
+  std::vector<core::UndoOperation> levers;
+  for (int engine = 0; engine < core::kMaxEngines; ++engine) {
+    const std::size_t motor = core::index(core::motorChannel(engine));
+    if (!controls.active.test(motor)) continue;
+    const core::Channel lever = core::leverChannel(engine);
+    const double position = std::clamp(controls.values[motor], options_.reverse_thrust ? -1.0 : 0.0, 1.0);
+    levers.emplace_back(core::UndoDref{core::writeDataref(lever, encoder_.options()), core::wireValue(lever, position),
+                                       /*confirm=*/false});
+  }
+  if (levers.empty()) return;
+  const char* override_name = core::channelWire(core::motorChannel(0), encoder_.options()).override_name;
+  overrides_->prepareRelease(override_name, std::move(levers));
+}
+
+core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& controls, double time) {
+  core::ChannelSet out;
+  for (std::size_t i = 0; i < core::kChannelCount; ++i) {
+    if (!controls.active.test(i)) continue;
+    const auto channel = static_cast<core::Channel>(i);
+    if (core::channelWire(channel, encoder_.options()).refresh == core::Refresh::kOnChange) {
+      if (!ever_sent_.test(i) || last_values_[i] != controls.values[i]) changed_at_[i] = time;
+      last_values_[i] = controls.values[i];
+      // Sent a few times, because a datagram may be lost; then it may be moved in the cockpit.
+      if (time - changed_at_[i] > kHandleRepeat) continue;
+    }
+    ever_sent_.set(i);
+    out.set(i);
+  }
+  return out;
+}
+
+}  // namespace xplane_bridge
