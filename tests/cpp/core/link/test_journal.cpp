@@ -47,7 +47,8 @@ const std::vector<UndoOperation> kReleaseJoystick = {UndoDref{"sim/operation/ove
 class Replacements {
  public:
   explicit Replacements(const std::string& folder) {
-    EXPECT_GE(inotify_add_watch(fd_, folder.c_str(), IN_MOVED_TO), 0);
+    // Both: the kernel may take several equal events in a row for one.
+    EXPECT_GE(inotify_add_watch(fd_, folder.c_str(), IN_MOVED_FROM | IN_MOVED_TO), 0);
   }
   ~Replacements() { close(fd_); }
   Replacements(const Replacements&) = delete;
@@ -57,9 +58,10 @@ class Replacements {
     std::size_t out = 0;
     std::array<char, 4096> events{};
     const ssize_t length = read(fd_, events.data(), events.size());
-    for (ssize_t at = 0; at < length; ++out) {
+    for (ssize_t at = 0; at < length;) {
       inotify_event event{};
       std::memcpy(&event, events.data() + at, sizeof event);
+      out += (event.mask & IN_MOVED_TO) != 0 ? 1U : 0U;
       at += static_cast<ssize_t>(sizeof event + event.len);
     }
     return out;
