@@ -14,6 +14,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <sstream>
 #include <stdexcept>
@@ -26,11 +27,12 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kFindTime = 2.0;     // [s] until X-Plane's address is known: a name may have to be resolved
-constexpr double kUndoTime = 2.0;     // [s] X-Plane answers within a frame or two, or it is gone too
-constexpr double kAttemptTime = 0.5;  // [s] until a release that is not shown is sent again
-constexpr double kBeatPeriod = 0.05;  // [s] at most often
-constexpr int kLookMs = 50;           // [ms] without hearing the parent
+constexpr double kFindTime = 2.0;      // [s] until X-Plane's address is known: a name may have to be resolved
+constexpr double kUndoTime = 2.0;      // [s] X-Plane answers within a frame or two, or it is gone too
+constexpr double kAttemptTime = 0.5;   // [s] until a release that is not shown is sent again
+constexpr double kJournalAgain = 0.1;  // [s] until a journal that another process has locked is tried again
+constexpr double kBeatPeriod = 0.05;   // [s] at most often
+constexpr int kLookMs = 50;            // [ms] without hearing the parent
 
 [[noreturn]] void fail(const std::string& what, int error) {
   throw std::runtime_error("the guardian process " + what + ": " + std::strerror(error));
@@ -167,17 +169,31 @@ bool HangWatch::passed(double elapsed, double timeout) {
 
 std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int64_t parent) {
   const auto runs = [parent](const core::JournalOwner& owner) { return owner.pid != parent && core::isAlive(owner); };
-  return std::make_shared<core::Journal>(path, core::thisProcess("override_guardian"), runs);
+  return std::make_shared<core::Journal>(path, core::thisProcess("override_guardian"), runs, false);
 }
 
 bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report& report) {
   if (!link->waitUntil([link] { return link->journal() != nullptr; }, kFindTime)) return false;
   OverrideManager overrides(link, report);
   const core::Deadline deadline(link->clock(), kUndoTime);
+  std::string problem;  // of the journal
+  const auto attempt = [&problem](const std::function<bool()>& give_back) {
+    try {
+      return give_back();
+    } catch (const core::JournalError& error) {
+      problem = error.what();
+      return false;
+    }
+  };
   do {
-    // The aircraft first.
-    if (overrides.releaseLeftovers(kAttemptTime) && resumeLeftovers(link, kAttemptTime)) return true;
+    problem.clear();
+    // The aircraft first; then the pause, also where only taking the first out of the journal has failed.
+    const bool released = attempt([&] { return overrides.releaseLeftovers(kAttemptTime); });
+    const bool resumed = (released || !problem.empty()) && attempt([&] { return resumeLeftovers(link, kAttemptTime); });
+    if (released && resumed) return true;
+    if (!problem.empty()) link->waitUntil([] { return false; }, kJournalAgain);
   } while (!deadline.over());
+  if (!problem.empty()) report(problem, false);
   return false;
 }
 

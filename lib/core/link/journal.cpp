@@ -54,8 +54,11 @@ class FileDescriptor {
 /// Holds flock on "<path>.lock" while it lives. The lock file is never deleted: that would race with those who wait.
 class Lock {
  public:
-  explicit Lock(const std::string& path) : file_(openLockFile(path + ".lock")) {
-    while (flock(file_.get(), LOCK_EX) != 0) {
+  Lock(const std::string& path, bool waits) : file_(openLockFile(path + ".lock")) {
+    while (flock(file_.get(), waits ? LOCK_EX : LOCK_EX | LOCK_NB) != 0) {
+      if (errno == EWOULDBLOCK) {
+        fail(path, "another process has it locked: it is writing, or was stopped while it did");
+      }
       if (errno != EINTR) {
         failErrno(path, "cannot be locked");
       }
@@ -174,7 +177,7 @@ JournalEntry entryFrom(const json& document) {
   return entry;
 }
 
-/// Moves a file that cannot be understood out of the way.
+/// Moves a file that cannot be understood out of the way. With the lock held.
 [[noreturn]] void setAside(const std::string& path, const std::string& why) {
   std::string aside;
   for (int n = 1;; ++n) {
@@ -191,7 +194,13 @@ JournalEntry entryFrom(const json& document) {
                               ". What it held was not undone in X-Plane: look there, or restart X-Plane"));
 }
 
-std::vector<JournalEntry> read(const std::string& path) {
+/// What a file holds, or why it cannot be understood.
+struct Content {
+  std::vector<JournalEntry> entries;
+  std::string damage;
+};
+
+Content look(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
     if (errno == ENOENT || !fs::exists(path)) {
@@ -205,35 +214,40 @@ std::vector<JournalEntry> read(const std::string& path) {
     fail(path, "cannot be read");
   }
   int version = 0;
-  std::vector<JournalEntry> entries;
-  std::string damage;
+  Content content;
   try {
     const json document = json::parse(text.str());
     if (document.at("format") != kFormat) {
-      damage = "format is not '" + std::string(kFormat) + "'";
+      content.damage = "format is not '" + std::string(kFormat) + "'";
     } else {
       version = wholeNumber<int>(document.at("version"));
     }
     if (version == kVersion) {
       for (const json& entry : document.at("entries")) {
-        entries.push_back(entryFrom(entry));
+        content.entries.push_back(entryFrom(entry));
       }
     }
   } catch (const json::exception& error) {
-    damage = error.what();
+    content.damage = error.what();
   } catch (const JournalError& error) {
-    damage = error.what();
+    content.damage = error.what();
   } catch (const std::out_of_range& error) {
-    damage = error.what();
+    content.damage = error.what();
   }
-  if (!damage.empty()) {
-    setAside(path, damage);
-  }
-  if (version != kVersion) {
+  if (content.damage.empty() && version != kVersion) {
     fail(path, "has version " + std::to_string(version) + ", this program knows version " + std::to_string(kVersion) +
                    " only: use the xplane_bridge that wrote it to undo its entries, or delete it");
   }
-  return entries;
+  return content;
+}
+
+/// With the lock held.
+std::vector<JournalEntry> read(const std::string& path) {
+  Content content = look(path);
+  if (!content.damage.empty()) {
+    setAside(path, content.damage);
+  }
+  return std::move(content.entries);
 }
 
 void writeAll(int fd, const std::string& text, const std::string& path) {
@@ -352,17 +366,22 @@ bool isAlive(const JournalOwner& owner) {
   return owner.start_ticks != 0 && startTicks(owner.pid) == owner.start_ticks;
 }
 
-Journal::Journal(std::string path, JournalOwner self, AliveFunction alive)
-    : path_(std::move(path)), self_(std::move(self)), alive_(std::move(alive)) {}
+Journal::Journal(std::string path, JournalOwner self, AliveFunction alive, bool waits)
+    : path_(std::move(path)), self_(std::move(self)), alive_(std::move(alive)), waits_(waits) {}
 
 std::shared_ptr<Journal> Journal::ofSubscriptions() const {
   const fs::path path(path_);
   const fs::path beside = path.parent_path() / (path.stem().string() + "_subscriptions" + path.extension().string());
-  return std::make_shared<Journal>(beside.string(), self_, alive_);
+  return std::make_shared<Journal>(beside.string(), self_, alive_, waits_);
 }
 
 std::vector<JournalEntry> Journal::entries() const {
-  const Lock lock(path_);
+  Content content = look(path_);
+  if (content.damage.empty()) {
+    return std::move(content.entries);
+  }
+  // Looked at again with the lock: another process may have moved it aside meanwhile, and written the next one.
+  const Lock lock(path_, false);
   return read(path_);
 }
 
@@ -393,7 +412,7 @@ void Journal::record(std::vector<JournalRecord> records) {
   if (records.empty()) {
     return;
   }
-  const Lock lock(path_);
+  const Lock lock(path_, waits_);
   std::vector<JournalEntry> entries = read(path_);
   for (JournalRecord& record : records) {
     JournalEntry entry{record.id, record.purpose, self_, std::move(record.undo), "", std::move(record.subscriptions)};
@@ -413,7 +432,7 @@ void Journal::record(std::vector<JournalRecord> records) {
 }
 
 void Journal::leave(const std::vector<std::string>& ids, const std::string& why) {
-  const Lock lock(path_);
+  const Lock lock(path_, waits_);
   std::vector<JournalEntry> entries = read(path_);
   for (JournalEntry& entry : entries) {
     if (entry.owner == self_ && std::find(ids.begin(), ids.end(), entry.id) != ids.end()) {
@@ -435,7 +454,7 @@ void Journal::removeUndone(const std::vector<JournalEntry>& undone) {
 }
 
 void Journal::removeIf(const std::function<bool(const JournalEntry&)>& chosen) {
-  const Lock lock(path_);
+  const Lock lock(path_, waits_);
   std::vector<JournalEntry> entries = read(path_);
   const std::size_t before = entries.size();
   entries.erase(std::remove_if(entries.begin(), entries.end(), chosen), entries.end());

@@ -1,6 +1,8 @@
 #include "xplane_bridge/actuation/guardian.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -22,6 +24,21 @@ namespace xplane_bridge {
 namespace {
 
 constexpr const char* kJoystick = "sim/operation/override/override_joystick";
+
+/// The lock of a journal, as a process has it that hangs while it is writing.
+class HeldLock {
+ public:
+  explicit HeldLock(const std::string& journal)
+      : fd_(open((journal + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+    EXPECT_EQ(flock(fd_, LOCK_EX), 0);
+  }
+  ~HeldLock() { close(fd_); }
+  HeldLock(const HeldLock&) = delete;
+  HeldLock& operator=(const HeldLock&) = delete;
+
+ private:
+  int fd_;
+};
 
 GuardianOrders read(const std::string& text) {
   GuardianOrders orders;
@@ -195,6 +212,48 @@ TEST_F(ReleaseLeftBehind, GivesUpWhereXPlaneIsNotFound) {
   EXPECT_TRUE(sim_.messages().empty());
 }
 
+/// X-Plane with the journal that a guardian has.
+class GuardedSimulator : public core::FakeSimulator {
+ public:
+  std::shared_ptr<core::Journal> journal() const override {
+    return guardedJournal(path(), journalOfAnother().self().pid);
+  }
+  std::string path() const { return folder() + "/journal.json"; }
+};
+
+TEST(ReleaseOfWhoHangs, XPlaneIsGivenBackBeforeTheJournalIsFree) {
+  GuardedSimulator sim;
+  sim.set(kJoystick, 1.0F);
+  sim.setState(core::LinkState::kPaused);
+  sim.on_message = [&sim](const core::FakeSimulator::Message& message) {
+    if (message.label == "CMND") sim.setState(core::LinkState::kConnected);
+  };
+  sim.journalOfAnother().record("one", kOverridePurpose, {core::UndoDref{kJoystick, 0.0F}});
+  sim.journalOfAnother().record("two", kPausePurpose, {core::UndoPause{}});
+  std::vector<std::string> failures;
+  const auto report = [&failures](const std::string& text, bool success) {
+    if (!success) failures.push_back(text);
+  };
+  auto held = std::make_unique<HeldLock>(sim.path());
+  const double begin = sim.time();
+  EXPECT_FALSE(releaseLeftBehind(&sim, report));
+  EXPECT_NEAR(sim.time() - begin, 2.0, 0.2);
+  EXPECT_EQ(sim.value(kJoystick), 0.0F);
+  EXPECT_EQ(sim.status().state, core::LinkState::kConnected);
+  EXPECT_EQ(sim.commands().size(), 1U) << "of toggles a second one would pause it again";
+  ASSERT_EQ(failures.size(), 1U);
+  EXPECT_NE(failures[0].find("journal.json: another process has it locked"), std::string::npos) << failures[0];
+  EXPECT_EQ(sim.journal()->entries().size(), 2U) << "for the next start";
+  const double again = sim.time();
+  sim.on_frame = [&] {
+    if (sim.time() > again + 1.0) held.reset();
+  };
+  EXPECT_TRUE(releaseLeftBehind(&sim, report));
+  EXPECT_NEAR(sim.time() - again, 1.1, 0.2);
+  EXPECT_TRUE(sim.journal()->entries().empty());
+  EXPECT_EQ(failures.size(), 1U);
+}
+
 // ------------------------------------------------------------------------------------- the program override_guardian
 
 /// This process with its guardian, which is the program that lies beside the test. X-Plane answers by UDP.
@@ -255,6 +314,23 @@ TEST_F(GuardianProcess, UndoesWhatADeadParentHasLeft) {
   flown.guardian.reset();  // without a word, as a process that is killed
   EXPECT_TRUE(undone(flown));
   EXPECT_EQ(flown.shown(), 0.0F);
+}
+
+TEST_F(GuardianProcess, GivesBackWhatAParentHasSetThatHangsWithTheJournalsLock) {
+  Flown flown;
+  {
+    const HeldLock held(flown.folder + "/journal.json");
+    flown.guardian->beat(0.5);
+    const auto released = [&flown] {
+      const bool out = flown.shown() == 0.0F;
+      flown.xplane.startThread();
+      return out;
+    };
+    EXPECT_TRUE(comes(released));
+    EXPECT_EQ(flown.journal().entries().size(), 1U);
+  }
+  flown.guardian.reset();
+  EXPECT_TRUE(undone(flown));
 }
 
 TEST_F(GuardianProcess, UndoesWhatAParentThatHangsHasSetAndReportsItWhenItRunsAgain) {

@@ -106,16 +106,18 @@ struct JournalRecord {
 
 /// The journal of one X-Plane (host and port), shared by all nodes that use it.
 ///
-/// Each call locks the file (flock on "<path>.lock"), reads it, changes it and replaces it atomically
-/// (write, fsync, rename), so that several processes use it safely and a crash leaves the old or the new file.
+/// Each call that writes locks the file (flock on "<path>.lock"), reads it, changes it and replaces it atomically
+/// (write, fsync, rename), so that several processes use it safely and a crash leaves the old or the new file. Calls
+/// that only read see the one or the other and wait for no lock: a process may have been stopped while it holds it.
 /// All calls throw JournalError; a file that cannot be understood is moved to "<path>.damaged-<n>" and said so once
 /// through the exception, after which the journal is empty and usable. Thread-safe.
 class Journal {
  public:
   using AliveFunction = std::function<bool(const JournalOwner&)>;
 
-  /// `path`: see journalPath(). The folder is made when first needed. `self` owns what record() writes.
-  Journal(std::string path, JournalOwner self, AliveFunction alive = isAlive);
+  /// `path`: see journalPath(). The folder is made when first needed. `self` owns what record() writes. `waits`: for
+  /// the lock; otherwise calls that write throw JournalError while another process has it.
+  Journal(std::string path, JournalOwner self, AliveFunction alive = isAlive, bool waits = true);
 
   const std::string& path() const { return path_; }
   const JournalOwner& self() const { return self_; }
@@ -151,6 +153,7 @@ class Journal {
   std::string path_;
   JournalOwner self_;
   AliveFunction alive_;
+  bool waits_;
 };
 
 /// "<folder>/<host>_<port>.json" with characters that do not belong in a file name replaced by '-'.

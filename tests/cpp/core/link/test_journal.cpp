@@ -1,14 +1,18 @@
 #include "xplane_bridge/core/link/journal.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/inotify.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -42,6 +46,20 @@ class JournalTest : public testing::Test {
 };
 
 const std::vector<UndoOperation> kReleaseJoystick = {UndoDref{"sim/operation/override/override_joystick", 0.0F}};
+
+/// The lock of a journal, as a process has it that was stopped while it was writing.
+class HeldLock {
+ public:
+  explicit HeldLock(const std::string& path) : fd_(open((path + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
+    EXPECT_EQ(flock(fd_, LOCK_EX), 0);
+  }
+  ~HeldLock() { close(fd_); }
+  HeldLock(const HeldLock&) = delete;
+  HeldLock& operator=(const HeldLock&) = delete;
+
+ private:
+  int fd_;
+};
 
 /// How often a file of a folder has been replaced by another one since.
 class Replacements {
@@ -199,6 +217,45 @@ TEST_F(JournalTest, OfSeveralNoneIsWrittenWhereOneIsTaken) {
                JournalTakenError);
   ASSERT_EQ(journal().entries().size(), 1U);
   EXPECT_EQ(journal().entries()[0].owner.node, "/first");
+}
+
+TEST_F(JournalTest, ReadingWaitsForNoLock) {
+  Journal(path_, deadOwner()).record("dead", "override", kReleaseJoystick);
+  journal().record("own", "override", kReleaseJoystick);
+  std::future<std::size_t> found;  // waited for once the lock is free
+  const HeldLock held(path_);
+  found = std::async(std::launch::async, [this] {
+    const Journal judge(path_, JournalOwner{"/next", 1, 2, "boot", "pc"});
+    return judge.entries().size() + judge.orphans("override").size() + journal().own().size();
+  });
+  ASSERT_EQ(found.wait_for(std::chrono::seconds(20)), std::future_status::ready);
+  EXPECT_EQ(found.get(), 4U);
+}
+
+TEST_F(JournalTest, DamagedFileIsNotMovedWhileAnotherProcessHasTheLock) {
+  writeFile("[]");
+  {
+    const HeldLock held(path_);
+    EXPECT_THROW(journal().entries(), JournalError);
+    EXPECT_TRUE(fs::exists(path_));
+  }
+  EXPECT_THROW(journal().entries(), JournalError);
+  EXPECT_FALSE(fs::exists(path_));
+}
+
+TEST_F(JournalTest, ThatDoesNotWaitRefusesToWriteWhileItIsLocked) {
+  journal().record("a", "override", kReleaseJoystick);
+  Journal hasty(path_, thisProcess("/hasty"), isAlive, false);
+  {
+    const HeldLock held(path_);
+    EXPECT_THROW(hasty.record("b", "override", kReleaseJoystick), JournalError);
+    EXPECT_THROW(hasty.remove({"a"}), JournalError);
+    EXPECT_THROW(hasty.removeUndone(hasty.entries()), JournalError);
+  }
+  hasty.record("b", "override", kReleaseJoystick);
+  hasty.remove({"a"});
+  ASSERT_EQ(journal().entries().size(), 1U);
+  EXPECT_EQ(journal().entries()[0].id, "b");
 }
 
 TEST_F(JournalTest, WhyAnEntryIsLeftIsKeptUntilItIsTakenAnew) {
