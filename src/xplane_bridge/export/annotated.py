@@ -3,7 +3,8 @@
 Folder of one flight: ``images/SPLIT/...`` as in an image folder, ``frames.csv`` with what is known of each picture, and
 
 * COCO: ``annotations/SPLIT.json``;
-* YOLO: ``labels/SPLIT/*.txt``, ``data.yaml``, and ``sigmas.csv`` for what those cannot say;
+* YOLO: ``labels/SPLIT/*.txt``, ``data.yaml``, and ``sigmas.csv`` for what those cannot say; only the pictures that
+  could be labelled;
 * LARD: ``SPLIT.csv``.
 
 Without labels there are the pictures, and annotations of nothing.
@@ -25,7 +26,7 @@ import numpy as np
 from xplane_bridge import __version__
 from xplane_bridge.export.dataset import write_frames
 from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels, Thing, keypoints
-from xplane_bridge.export.pictures import Options, Picture, Pictures, write_pictures
+from xplane_bridge.export.pictures import NO_LABELS, Options, Picture, Pictures, write_pictures
 from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
 from xplane_bridge.units import FOOT_M
 
@@ -49,17 +50,33 @@ _Write = Callable[[Path, Pictures, "Optional[ImageLabels]"], None]
 
 
 def export_annotated(
-    bags: Bags, folder: Path, options: Options, train_flight: bool, labels: Optional[ImageLabels], write: _Write
+    bags: Bags,
+    folder: Path,
+    options: Options,
+    train_flight: bool,
+    labels: Optional[ImageLabels],
+    write: _Write,
+    only_labelled: bool = False,
 ) -> dict[str, Any]:
     """Write pictures, what is known of them, and their annotations; gives counts for the manifest.
+
+    Args:
+        bags: Open bags of the flight.
+        folder: Created; must not hold a data set yet.
+        options: What to keep and how to split.
+        train_flight: With ``split_by="flight"``: whether this flight trains.
+        labels: Of its pictures.
+        write: Writes the annotations.
+        only_labelled: Leave out pictures that have no labels: where a picture without is one of nothing.
 
     Raises:
         BagError: No images or no frame states in the bag, or an image encoding that cannot be written.
         ExportError: The labels are of other pictures.
     """
-    pictures = write_pictures(bags, folder, options, train_flight)
-    counts = labels.counts(pictures.keys()) if labels else {"labelled": 0}
-    write_frames(folder / "frames.csv", pictures.names, pictures.pieces())
+    pictures = write_pictures(bags, folder, options, train_flight, labels if only_labelled else None)
+    left_out = pictures.counts.left_out.get(NO_LABELS, 0)
+    counts = labels.counts(pictures.keys(), left_out) if labels else {"labelled": 0}
+    write_frames(folder / "frames.csv", pictures, labels)
     write(folder, pictures, labels)
     return {**pictures.counts._asdict(), **counts}
 
@@ -111,7 +128,6 @@ def _image(picture: Picture, pictures: Pictures, labels: Optional[ImageLabels]) 
     def vector(prefix: str, axes: Sequence[object]) -> list[Any]:
         return [value(f"{prefix}_{axis}") for axis in axes]
 
-    frame = labels.frame(picture.key) if labels else None
     width, height = pictures.size(picture)
     return {
         "file_name": Path(picture.file).name,
@@ -129,8 +145,8 @@ def _image(picture: Picture, pictures: Pictures, labels: Optional[ImageLabels]) 
         "display_delay_s": value("display_delay_s"),
         "display_delay_source": value("display_delay_source"),
         "quality": value("quality_words"),
-        "labelled": frame is not None,
-        "others_known": bool(frame and frame.get("others_known")),
+        "labelled": bool(labels and picture.key in labels),
+        "others_known": bool(labels and labels.others_known(picture.key)),
         "horizon": labels.horizon(picture.key) if labels else None,
     }
 
@@ -159,7 +175,7 @@ def yolo(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
     """Write YOLO's text: a line an object, its class and its outline as shares of the picture; boxes follow from it."""
     with _csv(folder / "sigmas.csv", ("file", "line", "class", "sigma_px", "coarse"), ",") as write:
         for picture in pictures:
-            if labels is None or labels.frame(picture.key) is None:
+            if labels is None:
                 continue
             path = folder / "labels" / picture.split / f"{Path(picture.file).stem}.txt"
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -8,8 +8,9 @@ Folder of one flight::
     images/train/metadata.parquet the same rows for Hugging Face datasets, with `file_name` relative to this file
     images/validation/...         likewise
 
-With labels (`label_images`) there are also `labels_json`, everything that is labelled in the picture, and in the
-Parquet files `objects`: boxes (left, top, width, height in pixels from the picture's corner), categories and sigmas.
+With labels (`label_images`) there are also `labels_json`, everything that is labelled in the picture; `labelled`,
+whether it could be; `others_known`, whether that holds all other aircraft; and in the Parquet files `objects`: boxes
+(left, top, width, height in pixels from the picture's corner), categories and sigmas.
 
 The columns are those of `pictures`.
 """
@@ -18,7 +19,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterable, Iterator, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Iterable, Iterator, Optional
 
 import numpy as np
 import pandas as pd
@@ -60,31 +61,36 @@ def export_images(
     """
     pictures = write_pictures(bags, folder, options, train_flight)
     counts: dict[str, Any] = pictures.counts._asdict()
-    more = []
     if labels is not None:
         counts.update(labels.counts(pictures.keys()))
-        more = ["labels_json"]
-    write_frames(folder / "labels.csv", [*pictures.names, *more], _labelled(pictures.pieces(), labels))
+    write_frames(folder / "labels.csv", pictures, labels, texts=True)
     for split in pictures.splits:
         _write_metadata(folder / "images" / split / "metadata.parquet", pictures, split, labels)
     return counts
 
 
-def _labelled(pieces: Iterable[Piece], labels: Optional[ImageLabels]) -> Iterator[Piece]:
-    """Add to pieces what is labelled in each picture."""
+def _labelled(pieces: Iterable[Piece], labels: Optional[ImageLabels], texts: bool = True) -> Iterator[Piece]:
+    """Add to pieces what the labels say of each picture."""
     for piece in pieces:
         if labels is not None:
-            texts = [labels.text(picture.key) for picture in piece.pictures]
-            piece.columns["labels_json"] = np.array(texts, dtype=object)
+            piece.columns.update(labels.columns([picture.key for picture in piece.pictures], texts))
         yield piece
 
 
-def write_frames(path: Path, names: Sequence[str], pieces: Iterable[Piece]) -> None:
-    """Write the table of the pictures: file, split, stamp, then the columns of these names."""
+def write_frames(path: Path, pictures: Pictures, labels: Optional[ImageLabels], texts: bool = False) -> None:
+    """Write the table of the pictures: file, split, stamp, what is known of each, and what its labels say.
+
+    Args:
+        path: The file.
+        pictures: Those of a flight.
+        labels: Of the pictures.
+        texts: Whether it has the objects too, as JSON.
+    """
+    names = [*pictures.names, *(labels.columns([], texts) if labels is not None else ())]
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["file", "split", "stamp_ns", *names])
-        for piece in pieces:
+        for piece in _labelled(pictures.pieces(), labels, texts):
             columns = [piece.columns[name] for name in names]
             for picture in piece.pictures:
                 values = (_text(column[picture.row]) for column in columns)

@@ -105,7 +105,9 @@ def _coco(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 def _yolo(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
     from xplane_bridge.export import annotated
 
-    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, _labels(job), annotated.yolo)
+    labels = _labels(job)
+    # To a trainer, a picture without a file of labels shows nothing.
+    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, labels, annotated.yolo, True)
 
 
 def _lard(bags: Bags, path: Path, job: Job) -> dict[str, Any]:

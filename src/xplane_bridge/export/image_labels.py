@@ -11,6 +11,8 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Iterable, Iterator, NamedTuple, Optional, Sequence
 
+import numpy as np
+
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.labels import table
 
@@ -51,8 +53,12 @@ class ImageLabels:
         self._path = path
         self.about, self._frames = table.read(path)
 
-    def counts(self, keys: Iterable[Key]) -> dict[str, Any]:
+    def counts(self, keys: Iterable[Key], others: int = 0) -> dict[str, Any]:
         """Count for the manifest what is labelled of these pictures.
+
+        Args:
+            keys: Of the pictures.
+            others: How many were left out because they have no labels.
 
         Raises:
             ExportError: Nothing is: they are labels of other pictures.
@@ -65,10 +71,31 @@ class ImageLabels:
             if frame is not None:
                 labelled += 1
                 kinds.update(thing["kind"] for thing in frame["objects"])
-        if seen and not labelled:
+        if seen + others and not labelled:
             msg = f"{self._path} labels none of these pictures: it is of {', '.join(self.about['bags'])}"
             raise ExportError(msg)
         return {"labelled": labelled, "objects": dict(sorted(kinds.items()))}
+
+    def __contains__(self, key: object) -> bool:
+        """Whether a picture could be labelled."""
+        return key in self._frames
+
+    def others_known(self, key: Key) -> bool:
+        """Whether the labels of a picture hold all other aircraft that there were."""
+        frame = self.frame(key)
+        return bool(frame and frame.get("others_known"))
+
+    def columns(self, keys: Sequence[Key], texts: bool) -> dict[str, np.ndarray]:
+        """Give what the labels say of each picture, by column.
+
+        Args:
+            keys: Of the pictures.
+            texts: Whether the objects are wanted too, as JSON.
+        """
+        columns = {"labels_json": np.array([self.text(key) for key in keys], dtype=object)} if texts else {}
+        columns["labelled"] = np.array([key in self for key in keys], dtype=bool)
+        columns["others_known"] = np.array([self.others_known(key) for key in keys], dtype=bool)
+        return columns
 
     def frame(self, key: Key) -> Optional[dict[str, Any]]:
         """Give everything about a picture; None where it has no labels."""

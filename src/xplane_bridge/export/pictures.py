@@ -9,7 +9,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Iterator, Mapping, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Container, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _PIECE_ROWS = 4096
 _ENDINGS = (".jpg", ".png")
 _SPLITS = ("train", "validation")
+#: The reason of pictures that are left out because they could not be labelled.
+NO_LABELS = "no labels"
 
 
 class Options(NamedTuple):
@@ -87,11 +89,13 @@ class _Kept:
     Args:
         camera: Whose.
         prefix: Of the files' names.
+        labelled: Keys of the labels that each must be one of; None: labels do not matter.
     """
 
-    def __init__(self, camera: Camera, prefix: str) -> None:
+    def __init__(self, camera: Camera, prefix: str, labelled: Optional[Container[Key]]) -> None:
         self.camera = camera
         self.prefix = prefix
+        self._labelled = labelled
         self.images = 0  #: in the bag
         self.left_out: Counter[str] = Counter()
         self.stamp, self.row = array("q"), array("q")
@@ -100,6 +104,10 @@ class _Kept:
     def __len__(self) -> int:
         """Give the number of pictures."""
         return len(self.stamp)
+
+    def takes(self, stamp: int) -> bool:
+        """Whether a picture is one to write, by its labels."""
+        return self._labelled is None or (self.camera.name, stamp) in self._labelled
 
     def add(self, stamp: int, row: int, trains: bool, ending: str) -> str:
         """Adds a picture; gives its file's name."""
@@ -208,7 +216,9 @@ class Pictures:
         return (0, 0) if image is None else (int(image.shape[1]), int(image.shape[0]))
 
 
-def write_pictures(bags: Bags, folder: Path, options: Options, train_flight: bool) -> Pictures:
+def write_pictures(
+    bags: Bags, folder: Path, options: Options, train_flight: bool, labelled: Optional[Container[Key]] = None
+) -> Pictures:
     """Write the images of one flight below ``images/SPLIT``.
 
     Args:
@@ -216,6 +226,7 @@ def write_pictures(bags: Bags, folder: Path, options: Options, train_flight: boo
         folder: Created; must not hold a data set yet.
         options: What to keep and how to split.
         train_flight: With ``split_by="flight"``: whether this flight trains.
+        labelled: Keys of the labels that a picture must be one of; any picture is written when omitted.
 
     Raises:
         BagError: No such camera, no images or no frame states in the bag, or an image encoding that cannot be written.
@@ -236,7 +247,7 @@ def write_pictures(bags: Bags, folder: Path, options: Options, train_flight: boo
     folder.mkdir(parents=True)
     parts = []
     for camera in chosen:
-        kept = _Kept(camera, f"{camera.name}_" if len(chosen) > 1 else "")
+        kept = _Kept(camera, f"{camera.name}_" if len(chosen) > 1 else "", labelled)
         parts.append((kept, _write_camera(bags, kept, folder, options, train_flight, cut)))
     return Pictures(folder, parts)
 
@@ -273,6 +284,9 @@ def _write_camera(bags: Bags, kept: _Kept, folder: Path, options: Options, train
         reasons = [name for name, bit in bad.items() if int(quality[row]) & bit]
         if reasons and not options.keep_bad:
             kept.left_out.update(reasons)
+            continue
+        if not kept.takes(stamp):
+            kept.left_out[NO_LABELS] += 1
             continue
         trains = train_flight if options.split_by == "flight" else stamp < cut
         path = folder / kept.add(stamp, row, trains, ending)

@@ -157,6 +157,52 @@ def test_an_image_folder_takes_labels_too(flight: Path, tmp_path: Path, monkeypa
         assert json.loads(row["labels_json"])[0]["points"] == label["points"]
 
 
+def gapped(flight: Path, path: Path) -> Path:
+    """The labels of a flight, less the second picture's; of the third, other aircraft are known."""
+    lines = table.beside(flight).read_text().splitlines()
+    content = json.loads(lines[3])
+    lines[3] = json.dumps({**content, "others_known": True})
+    path.write_text("".join(f"{line}\n" for line in (lines[0], lines[1], *lines[3:])))
+    return path
+
+
+def test_yolo_leaves_out_what_could_not_be_labelled(
+    flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    labels = gapped(flight, tmp_path / "x.jsonl")
+    assert export(flight, "--format", "yolo", "--labels", labels, "-o", tmp_path / "out") == 0
+    assert "left out: 1 no labels" in capsys.readouterr().out
+    folder = tmp_path / "out" / "flight.yolo"
+    frames = pd.read_csv(folder / "frames.csv")
+    assert frames["stamp_ns"].tolist() == [stamp_ns(0.5 * k) for k in range(FRAMES) if k != 1]
+    assert frames["labelled"].tolist() == [1] * (FRAMES - 1)
+    assert frames["others_known"].tolist() == [0, 1, 0, 0, 0]
+    pictures, texts = (
+        {path.relative_to(folder / part).with_suffix("") for path in (folder / part).rglob("*.*")}
+        for part in ("images", "labels")
+    )
+    assert pictures == texts
+    assert len(pictures) == FRAMES - 1
+    record = json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["yolo"]["flight"]
+    assert record["counts"]["left_out"] == {"no labels": 1}
+    assert "no labels 1" in (tmp_path / "out" / "README.md").read_text()
+
+
+@pytest.mark.parametrize("form", ["coco", "lard", "imagefolder"])
+def test_what_is_labelled_is_said_of_each_picture(flight: Path, tmp_path: Path, form: str) -> None:
+    labels = gapped(flight, tmp_path / "x.jsonl")
+    assert export(flight, "--format", form, "--labels", labels, "-o", tmp_path / "out") == 0
+    folder = tmp_path / "out" / ("flight" if form == "imagefolder" else f"flight.{form}")
+    tables = [pd.read_csv(folder / ("labels.csv" if form == "imagefolder" else "frames.csv"))]
+    if form == "imagefolder":
+        parts = [pd.read_parquet(folder / "images" / split / "metadata.parquet") for split in ("train", "validation")]
+        tables.append(pd.concat(parts))
+        assert {str(tables[1][name].dtype) for name in ("labelled", "others_known")} == {"bool"}
+    for rows in tables:
+        assert rows["labelled"].astype(int).tolist() == [1, 0, 1, 1, 1, 1]
+        assert rows["others_known"].astype(int).tolist() == [0, 0, 1, 0, 0, 0]
+
+
 @pytest.mark.parametrize("form", FORMATS)
 def test_without_labels_there_are_none_and_that_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], form: str
@@ -179,6 +225,7 @@ def test_without_labels_there_are_none_and_that_is_said(
     else:
         assert len(pd.read_csv(folder / "train.csv", sep=";")) == 0
     frames = pd.read_csv(folder / "frames.csv")
+    assert not {"labelled", "others_known"} & set(frames)
     assert frames["display_delay_s"].tolist() == [0.058] * 3 + [0.0] + [0.058] * 4
     assert {"camera_matrix_0", "body_to_camera_rotation_w", "display_delay_source", "quality_words"} <= set(frames)
     assert export("--verify", "-o", tmp_path / "out") == 0
@@ -210,8 +257,9 @@ def test_new_labels_make_the_export_anew(flight: Path, tmp_path: Path, capsys: p
 def test_labels_that_do_not_fit_are_refused(flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     other = write_flight(tmp_path / "other.bag", 2.0, offset=100.0)
     labels = table.beside(flight)
-    assert export(other, "--format", "coco", "--labels", labels, "-o", tmp_path / "a") == 1
-    assert "labels none of these pictures: it is of flight.bag" in capsys.readouterr().err
+    for form in ("coco", "yolo"):
+        assert export(other, "--format", form, "--labels", labels, "-o", tmp_path / "a") == 1
+        assert "labels none of these pictures: it is of flight.bag" in capsys.readouterr().err
     assert export(other, flight, "--format", "coco", "--labels", labels, "-o", tmp_path / "b") == 1
     assert "a file for 2 flights" in capsys.readouterr().err
     assert export(flight, other, "--format", "coco", "--labels", labels.parent, "-o", tmp_path / "b") == 1
