@@ -41,6 +41,9 @@ bool sendSituation(core::SimulatorPort* link, core::SituationAction action, cons
   return sendMessage<core::kSimoSize>(link, [&](core::ByteSpan out) { return core::encodeSimo(out, action, path); });
 }
 
+/// Whether it could be put back. X-Plane may show NaN, which can be neither written nor noted.
+bool isKnown(const core::DatarefValue& value) { return value && std::isfinite(*value); }
+
 /// Empty: all is shown.
 std::string loadingDifference(const std::vector<core::DatarefWrite>& writes,
                               const std::vector<core::DatarefValue>& values) {
@@ -301,7 +304,7 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
   std::vector<std::string> names, unknown;
   for (const core::SettingWrite& each : settings) names.push_back(each.write.dataref);
   const auto all_known = [](const std::vector<core::DatarefValue>& values) {
-    return std::all_of(values.begin(), values.end(), [](const core::DatarefValue& value) { return value.has_value(); });
+    return std::all_of(values.begin(), values.end(), isKnown);
   };
   const std::vector<core::DatarefValue> values = link_->readUntil(names, options_.setting_timeout, all_known);
   const std::lock_guard<std::mutex> lock(restores_mutex_);
@@ -311,7 +314,7 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
       return std::get<core::UndoDref>(operation).path == names[i];
     });
     if (known) continue;  // what X-Plane had before the first of them counts
-    if (i < values.size() && values[i]) {
+    if (i < values.size() && isKnown(values[i])) {
       // Not looked at: time runs on, and X-Plane's own weather may change it at once.
       all.push_back(core::UndoDref{names[i], *values[i], false});
     } else if (settings[i].is_shown) {

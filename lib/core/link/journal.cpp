@@ -8,6 +8,7 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -85,9 +86,18 @@ class Lock {
   FileDescriptor file_;
 };
 
+/// JSON has no other numbers: with null in the place of one the whole file could not be read any more.
+void requireFinite(const std::string& what, float value) {
+  if (!std::isfinite(value)) {
+    throw JournalError("the journal cannot hold " + std::to_string(value) + " as what " + what +
+                       " is to be put back to: expected a finite number");
+  }
+}
+
 json toJson(const UndoOperation& operation) {
   struct Writer {
     json operator()(const UndoDref& dref) const {
+      requireFinite(dref.path, dref.value);
       json out = {{"op", "dref"}, {"path", dref.path}, {"value", dref.value}};
       if (!dref.confirm) {
         out["confirm"] = false;
@@ -95,6 +105,9 @@ json toJson(const UndoOperation& operation) {
       return out;
     }
     json operator()(const UndoData& data) const {
+      for (const float value : data.row.values) {
+        requireFinite("row " + std::to_string(data.row.index), value);
+      }
       return {{"op", "data"}, {"row", data.row.index}, {"values", data.row.values}};
     }
     json operator()(const UndoUsel& usel) const { return {{"op", "usel"}, {"rows", usel.rows}}; }

@@ -135,7 +135,7 @@ class Journal {
 
   /// Adds an entry in the name of this process, or replaces the one with the same id. Returns once it is on disk: only
   /// then may X-Plane be changed. Refuses to replace an entry of another process that still runs (JournalTakenError);
-  /// the entry of one that is gone is replaced, so look at orphans() first.
+  /// the entry of one that is gone is replaced, so look at orphans() first. Refuses a value that is not finite.
   void record(const std::string& id, const std::string& purpose, std::vector<UndoOperation> undo,
               std::vector<JournalSubscription> subscriptions = {});
   /// The same of several at the price of one, the file being replaced once: all of them or, when it throws, none.

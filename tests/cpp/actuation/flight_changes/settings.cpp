@@ -1,3 +1,5 @@
+#include <limits>
+
 #include "fixture.hpp"
 
 namespace xplane_bridge {
@@ -123,6 +125,23 @@ TEST_F(FlightChangesTest, WhatCouldNotBePutBackIsNotChanged) {
                 "set_weather: X-Plane does not report sim/weather/temperature_sealevel_c, which could not be put back "
                 "on exit");
   EXPECT_TRUE(sim_.writes().empty());
+}
+
+TEST_F(FlightChangesTest, WhatIsNoNumberCouldNotBePutBack) {
+  const std::string name = "sim/weather/temperature_sealevel_c";
+  sim_.set("sim/weather/use_real_weather_bool", 1.0F);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  for (const float value : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    sim_.set(name, value);
+    expectFailure(changes_.applyWeather(weather), EventKind::kSetting,
+                  "set_weather: X-Plane does not report " + name + ", which could not be put back on exit");
+  }
+  EXPECT_TRUE(sim_.writes().empty());
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+  sim_.set(name, 15.0F);
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
 }
 
 TEST_F(FlightChangesTest, WeatherThatIsNotTakenIsReported) {

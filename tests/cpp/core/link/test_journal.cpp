@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <fstream>
 #include <future>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -217,6 +218,26 @@ TEST_F(JournalTest, OfSeveralNoneIsWrittenWhereOneIsTaken) {
                JournalTakenError);
   ASSERT_EQ(journal().entries().size(), 1U);
   EXPECT_EQ(journal().entries()[0].owner.node, "/first");
+}
+
+TEST_F(JournalTest, WhatIsNoNumberIsRefusedAndTheOthersStay) {
+  journal().record("good", "override", kReleaseJoystick);
+  DataRow row;
+  row.index = 25;
+  row.values[3] = std::numeric_limits<float>::infinity();
+  const std::vector<UndoOperation> wrong = {UndoDref{"x/y", std::numeric_limits<float>::quiet_NaN()}, UndoData{row}};
+  const std::vector<std::string> words = {"nan as what x/y is", "inf as what row 25 is"};
+  for (std::size_t i = 0; i < wrong.size(); ++i) {
+    try {
+      journal().record({{"fine", "override", kReleaseJoystick}, {"wrong", "override", {wrong[i]}}});
+      FAIL() << "JSON has no such number";
+    } catch (const JournalError& error) {
+      EXPECT_NE(std::string(error.what()).find(words[i]), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("expected a finite number"), std::string::npos) << error.what();
+    }
+  }
+  ASSERT_EQ(journal().entries().size(), 1U);
+  EXPECT_EQ(journal().entries()[0].id, "good");
 }
 
 TEST_F(JournalTest, ReadingWaitsForNoLock) {
