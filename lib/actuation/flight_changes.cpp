@@ -25,6 +25,7 @@ constexpr double kBeginningVisibleWait = 1.0;   // [s] for that
 constexpr double kWriteAgain = 0.3;             // [s] until datarefs that are not shown are written once more
 constexpr double kStationsWait = 0.5;           // [s] until a payload that the stations do not take is written as a sum
 constexpr double kWindAgain = 1.0;              // [s] the same of the weather
+constexpr double kAnswerWait = 0.5;             // [s] for what X-Plane has now, also where its frames are slow
 constexpr double kPauseWait = 1.0;              // [s] until a pause must be shown
 constexpr double kIdentityChangeWait = 3.0;     // [s] until X-Plane must have shown its aircraft
 constexpr const char* kSettingsEntry = "override:settings of the flight";
@@ -306,7 +307,13 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
   const auto all_known = [](const std::vector<core::DatarefValue>& values) {
     return std::all_of(values.begin(), values.end(), isKnown);
   };
-  const std::vector<core::DatarefValue> values = link_->readUntil(names, options_.setting_timeout, all_known);
+  std::vector<core::DatarefValue> values;
+  bool complete = false;
+  for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !complete && !expired(deadline);) {
+    values = link_->readUntil(names, kAnswerWait, all_known);
+    complete = all_known(values);
+  }
+  if (stopping_) return "nothing was set";
   const std::lock_guard<std::mutex> lock(restores_mutex_);
   std::vector<core::UndoOperation> all = restores_;
   for (std::size_t i = 0; i < settings.size(); ++i) {
@@ -322,7 +329,10 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
     }
   }
   const auto journal = link_->journal();
-  if (!unknown.empty() || !journal) return core::join(unknown.empty() ? names : unknown);
+  if (!unknown.empty() || !journal) {
+    return "X-Plane does not report " + core::join(unknown.empty() ? names : unknown) +
+           ", which could not be put back on exit" + linkCondition();
+  }
   journal->record(kSettingsEntry, kOverridePurpose, all);
   restores_ = std::move(all);
   return "";
@@ -348,13 +358,8 @@ void FlightChanges::restoreSettings() {
 FlightChanges::Outcome FlightChanges::applySettings(const std::vector<core::SettingWrite>& settings,
                                                     const std::string& service, const std::string& done, bool restore) {
   if (restore) {
-    const std::string unknown = remember(settings);
-    if (!unknown.empty()) {
-      return {
-          core::EventKind::kSetting,
-          service + ": X-Plane does not report " + unknown + ", which could not be put back on exit" + linkCondition(),
-          false};
-    }
+    const std::string problem = remember(settings);
+    if (!problem.empty()) return {core::EventKind::kSetting, service + ": " + problem, false};
   }
   std::vector<core::DatarefWrite> writes;
   writes.reserve(settings.size());

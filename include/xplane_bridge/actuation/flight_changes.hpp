@@ -107,7 +107,7 @@ class FlightChanges {
                         const std::string& done, bool restore);
   /// Presses until X-Plane shows it; returns what it shows instead, empty: it does.
   std::string press(const core::AutopilotStep& step);
-  /// Writes into the journal what X-Plane has now; returns what it does not show, empty: nothing.
+  /// Writes into the journal what X-Plane has now; returns what went wrong, empty: nothing.
   std::string remember(const std::vector<core::SettingWrite>& settings);
   PauseOutcome pause(bool paused, const std::string& who);
 

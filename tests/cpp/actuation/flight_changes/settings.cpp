@@ -127,6 +127,23 @@ TEST_F(FlightChangesTest, WhatCouldNotBePutBackIsNotChanged) {
   EXPECT_TRUE(sim_.writes().empty());
 }
 
+TEST_F(FlightChangesTest, StopEndsTheWaitForWhatIsToBePutBack) {
+  const std::string name = "sim/weather/temperature_sealevel_c";
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  FlightChanges changes(&sim_, {300.0, 20.0}, hooks());
+  after(0.9, [&] {
+    sim_.set(name, 15.0F);  // too late
+    changes.stop();
+  });
+  const double begin = sim_.time();
+  expectFailure(changes.applyWeather(weather), EventKind::kSetting, "set_weather: nothing was set");
+  EXPECT_LT(sim_.time() - begin, 1.5);
+  EXPECT_TRUE(sim_.writes().empty());
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
 TEST_F(FlightChangesTest, WhatIsNoNumberCouldNotBePutBack) {
   const std::string name = "sim/weather/temperature_sealevel_c";
   sim_.set("sim/weather/use_real_weather_bool", 1.0F);
