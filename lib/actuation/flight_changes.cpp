@@ -120,8 +120,10 @@ PauseOutcome FlightChanges::pause(bool paused, const std::string& who) {
   const auto record = [this, paused] {
     if (paused) recordPause(link_);  // after a crash X-Plane must go on
   };
+  // Waited for also while stopping: a resume that goes by what is shown before a pause would leave X-Plane paused, and
+  // a resume that is not seen would leave the entry to end a pause of the user's.
   const PauseOutcome outcome = setPaused(
-      link_, paused, kPauseWait, [this] { return stopping_.load(); }, record);
+      link_, paused, kPauseWait, [] { return false; }, record);
   if (outcome != PauseOutcome::kFollowed) hooks_.pausing("");
   return outcome;
 }

@@ -175,11 +175,24 @@ TEST_F(FlightChangesTest, PlaceThatIsNotShownIsReported) {
 
 TEST_F(FlightChangesTest, StopEndsItAndLetsTheFlightGoOn) {
   flight_.ignores_prel = true;
+  pauseLater(0.1);
   after(1.0, [this] { changes_.stop(); });
   const double begin = sim_.time();
   EXPECT_FALSE(place().success);
   EXPECT_LT(sim_.time() - begin, 1.5);
   EXPECT_FALSE(flight_.paused());
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+TEST_F(FlightChangesTest, StopBeforeItsPauseIsShownLetsTheFlightGoOnToo) {
+  flight_.ignores_prel = true;
+  pauseLater(0.5);
+  after(0.1, [this] { changes_.stop(); });
+  EXPECT_FALSE(place().success);
+  sim_.run(1.0);
+  EXPECT_EQ(sim_.commands(), (Names{kToggle, kToggle}));
+  EXPECT_FALSE(flight_.paused());
+  EXPECT_TRUE(sim_.journal()->entries().empty());
 }
 
 // ------------------------------------------------------------------------------------------------ placing, version 12

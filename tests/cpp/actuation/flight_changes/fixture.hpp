@@ -60,6 +60,15 @@ class FlightChangesTest : public testing::Test {
   }
   void after(double seconds, const std::function<void()>& event) { events_.emplace_back(sim_.time() + seconds, event); }
 
+  /// From now on X-Plane follows a command to pause, or to go on, so many seconds late.
+  void pauseLater(double seconds) {
+    const auto obey = sim_.on_message;
+    sim_.on_message = [this, obey, seconds](const core::FakeSimulator::Message& message) {
+      if (message.label != "CMND") return obey(message);
+      after(seconds, [obey, message] { obey(message); });
+    };
+  }
+
   void expect(const FlightChangeOutcome& outcome, EventKind kind, const std::string& text) {
     EXPECT_EQ(outcome.kind, kind);
     EXPECT_EQ(outcome.text, text);
