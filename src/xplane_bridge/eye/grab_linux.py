@@ -81,7 +81,7 @@ class _SharedImage:
         self.pixels = lines[:, : 4 * size[0]].reshape(size[1], size[0], 4)
 
     def read(self, window: int) -> bool:
-        """Reads the window; False where it is gone or smaller."""
+        """Reads the window; False where it is gone, smaller, or partly off a screen that no compositor draws."""
         return bool(self._xext.XShmGetImage(self._display, window, self._image, 0, 0, _ALL_PLANES))
 
     def close(self) -> None:
@@ -129,8 +129,9 @@ class LinuxGrabber(Grabber):
                 self.problem = str(error)
                 self._stop.wait(_SEARCH_S)
                 continue
-            self.problem = ""
-            self._watch(found, image)
+            if not self._watch(found, image):
+                self.problem = "X-Plane's window cannot be read: move it wholly onto the screen, or make it smaller"
+                self._stop.wait(_SEARCH_S)
             image.close()
 
     def _find(self) -> Optional[windows.Window]:
@@ -153,8 +154,8 @@ class LinuxGrabber(Grabber):
         self._x11.XTranslateCoordinates(self._display, window.number, root, 0, 0, *results)
         return x.value, y.value, window.width, window.height
 
-    def _watch(self, window: windows.Window, image: _SharedImage) -> None:
-        """Hands over each new picture until the window is gone or has another size."""
+    def _watch(self, window: windows.Window, image: _SharedImage) -> bool:
+        """Hands over each new picture until the window is gone, or has another size; False where it cannot be read."""
         rows = np.linspace(0, window.height - 1, _ROWS).astype(int)
         before: Optional[np.ndarray] = None
         changed_s, usual_s = time.monotonic(), 0.0
@@ -164,10 +165,11 @@ class LinuxGrabber(Grabber):
             if time.monotonic() - checked_s > _SEARCH_S:
                 checked_s = time.monotonic()
                 if self._size(window.number) != (window.width, window.height):
-                    return
+                    return True
             begun_ns, looked_ns = looked_ns, time.perf_counter_ns()
             if not image.read(window.number):
-                return
+                return before is not None
+            self.problem = ""
             change_ns = time.perf_counter_ns()
             sample = image.pixels[rows]
             if before is not None and np.array_equal(sample, before):
@@ -179,6 +181,7 @@ class LinuxGrabber(Grabber):
             usual_s += 0.1 * (min(now_s - changed_s, 2 * _LONGEST_REST_S) - usual_s)
             changed_s = now_s
             self._stop.wait(max(0.0, _REST * usual_s - _POLL_S))
+        return True
 
     def _size(self, window: int) -> Optional[Tuple[int, int]]:
         attributes = windows.Attributes()
