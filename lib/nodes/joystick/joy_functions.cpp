@@ -110,11 +110,13 @@ std::string JoyFunctions::setView(const JoyFunction& function) {
 }
 
 std::string JoyFunctions::toggleFailure(const JoyFunction& function) {
-  if (broken_.erase(function.name) != 0) {
+  if (broken_.count(function.name) != 0) {
     ClearFailures message;
     message.request.names = {function.name};
     std::string problem = call("clear_failures", &message);
     if (!problem.empty()) return problem;
+    // Whatever the answer: what another client has repaired is refused, and would be so at every press.
+    broken_.erase(function.name);
     return message.response.success ? "" : message.response.result.message;
   }
   SetFailure message;
