@@ -96,9 +96,12 @@ class MacGrabber(Grabber):
     def run(self) -> None:
         """Looks for the window and has it streamed until the end."""
         while not self._stop.is_set():
-            window = self._find()
-            if window is not None:
-                self._stream(window)
+            try:
+                window = self._find()
+                if window is not None:
+                    self._stream(window)
+            except Exception as error:  # of Objective-C, which has its own
+                self.problem = f"macOS gives no pictures of X-Plane's window: {error}"
             self._stop.wait(_SEARCH_S)  # also after a stream: a window that changes its size takes its time
 
     def _find(self) -> Optional[Any]:
@@ -138,8 +141,13 @@ class MacGrabber(Grabber):
         output.title_bar = self._title_bar(window)
         stream = kit.SCStream.alloc().initWithFilter_configuration_delegate_(content, settings, output)
         stream.addStreamOutput_type_sampleHandlerQueue_error_(output, _SCREEN, None, None)
-        stream.startCaptureWithCompletionHandler_(lambda error: output.ended.set() if error else None)
+
+        def started(error: Any) -> None:
+            if error is not None:
+                output.stream_didStopWithError_(stream, error)
+
         self.problem = ""
+        stream.startCaptureWithCompletionHandler_(started)
         while not output.ended.is_set() and not self._stop.wait(_SEARCH_S):
             pass
         stream.stopCaptureWithCompletionHandler_(lambda _: None)

@@ -65,6 +65,7 @@ class Desktop:
     def __init__(self, place: Tuple[float, ...]) -> None:
         self.place = place
         self.streams = 0
+        self.fault: Any = None  #: with which the next stream's start ends
 
     def windows(self) -> list:
         return [types.SimpleNamespace(frame=lambda place=self.place: rect(*place), title=lambda: "X-Plane")]
@@ -119,7 +120,10 @@ def frameworks(desktop: Desktop) -> Dict[str, Any]:
 
         def startCaptureWithCompletionHandler_(self, done: Callable[[Any], None]) -> None:  # noqa: N802
             desktop.streams += 1
-            done(None)
+            fault, desktop.fault = desktop.fault, None
+            if isinstance(fault, Exception):
+                raise fault
+            done(fault)
             threading.Thread(target=self.deliver, daemon=True).start()
 
         def deliver(self) -> None:
@@ -203,3 +207,26 @@ def test_pictures_have_the_displays_resolution_and_follow_the_windows_size(deskt
         grabber.stop()
     assert not any((picture[[0, -1]] == 255).any() or (picture[-1, -1] == 0).any() for picture in pictures)
     assert len({picture.shape for picture in pictures}) == 4
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        (RuntimeError("no such selector"), "macOS gives no pictures of X-Plane's window: no such selector"),
+        ("the user declined", "macOS ended the capture: the user declined"),
+    ],
+)
+def test_a_stream_that_does_not_start_is_said_and_begun_again(
+    desktop: Desktop, monkeypatch: pytest.MonkeyPatch, fault: Any, text: str
+):
+    monkeypatch.setattr(grab_macos, "_SEARCH_S", 1.0)
+    desktop.fault = fault
+    pictures: List[np.ndarray] = []
+    grabber = MacGrabber(("X-Plane",), None, lambda pixels, *_: pictures.append(pixels))
+    grabber.start()
+    try:
+        wait_until(lambda: grabber.problem == text, LONGEST_S, "the reason")
+        wait_until(lambda: grabber.problem == "" and pictures, LONGEST_S, "pictures")
+    finally:
+        grabber.stop()
+    assert desktop.streams == 2
