@@ -120,7 +120,7 @@ class X11WindowSource::Impl {
   struct Target {
     xcb_window_t window = XCB_NONE;  // XCB_NONE: nothing to capture now
     bool redirected = false;         // drawn off the screen, by XComposite
-    xcb_pixmap_t pixmap = XCB_NONE;  // its contents there, renewed by every resize
+    xcb_pixmap_t pixmap = XCB_NONE;  // its contents there, renewed by every resize and whenever it is shown again
     xcb_damage_damage_t damage = XCB_NONE;
     PixelFormat format;
     std::uint16_t width = 0;
@@ -169,7 +169,7 @@ class X11WindowSource::Impl {
     }
     target_ = Target();
     drawn_.reset();
-    gone_ = resized_ = false;
+    gone_ = renewed_ = false;
   }
 
   void lose(const std::string& why) {
@@ -216,7 +216,7 @@ class X11WindowSource::Impl {
   }
 
   bool open(xcb_window_t window) {
-    const std::uint32_t events = XCB_EVENT_MASK_STRUCTURE_NOTIFY;
+    const std::uint32_t events = XCB_EVENT_MASK_STRUCTURE_NOTIFY | XCB_EVENT_MASK_VISIBILITY_CHANGE;
     if (!connection_->succeeded(
             xcb_change_window_attributes_checked(connection_->get(), window, XCB_CW_EVENT_MASK, &events))) {
       problem_ = wanted_ + " vanished while it was opened";
@@ -277,7 +277,7 @@ class X11WindowSource::Impl {
     last_checksum_.reset();
     next_poll_ = SteadyClock::now();
     first_picture_ = true;
-    resized_ = false;
+    renewed_ = false;
     drawn_.reset();
     return true;
   }
@@ -315,7 +315,7 @@ class X11WindowSource::Impl {
       next_search_ = SteadyClock::now();
       return false;
     }
-    if (resized_) return attach() && handleEvents(change);
+    if (renewed_) return attach() && handleEvents(change);
     if (!drawn_.has_value()) return false;
     change = *drawn_;
     drawn_.reset();
@@ -337,8 +337,13 @@ class X11WindowSource::Impl {
       gone_ = gone_ || notify.window == target_.window;
     } else if (type == XCB_CONFIGURE_NOTIFY) {
       const auto& notify = reinterpret_cast<const xcb_configure_notify_event_t&>(event);
-      resized_ = resized_ || (notify.window == target_.window &&
+      renewed_ = renewed_ || (notify.window == target_.window &&
                               (notify.width != target_.width || notify.height != target_.height));
+    } else if (type == XCB_VISIBILITY_NOTIFY) {
+      // All that says that a window manager's frame about it is shown again. What is drawn off the screen is never
+      // covered, so that nothing else leads here.
+      const auto& notify = reinterpret_cast<const xcb_visibility_notify_event_t&>(event);
+      renewed_ = renewed_ || (notify.window == target_.window && target_.pixmap != XCB_NONE);
     }
     return std::nullopt;
   }
@@ -418,7 +423,7 @@ class X11WindowSource::Impl {
   bool first_picture_ = false;
   std::optional<Change> drawn_;  // not reported yet
   bool gone_ = false;
-  bool resized_ = false;
+  bool renewed_ = false;  // its pixmap is another one
 };
 
 X11WindowSource::X11WindowSource(const X11SourceOptions& options, Clock clock)

@@ -48,9 +48,9 @@ struct X11SourceOptions {
 
 /// Pictures of a window (or a part of the screen) of an X server, over a connection of its own.
 ///
-/// The window is followed: moved, resized, covered, closed and opened again, and so is the X server itself. Every
-/// request is checked, so a window that vanishes between two requests is a kLost and nothing worse. The pointer is
-/// never in the picture.
+/// The window is followed: moved, resized, covered, hidden with the window manager's frame about it and shown again,
+/// closed and opened again, and so is the X server itself. Every request is checked, so a window that vanishes between
+/// two requests is a kLost and nothing worse. The pointer is never in the picture.
 class X11WindowSource : public FrameSource {
  public:
   /// @throws std::invalid_argument when the options contradict each other. A display that cannot be reached does not

@@ -166,6 +166,40 @@ TEST_F(X11WindowSourceTest, SeesAWindowThatIsCovered) {
   EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kGreen);
 }
 
+// As i3 and others do with a workspace: the window itself is neither unmapped nor resized.
+TEST_F(X11WindowSourceTest, FollowsAWindowWhoseFrameIsHiddenAndShownAgain) {
+  TestWindow frame(server_.display(), "frame", 400, 300);
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  putInto(frame, window, server_);
+  window.fill(0xff0000);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  for (const std::uint32_t colour : {0x00ff00U, 0x0000ffU}) {
+    frame.unmap();
+    EXPECT_TRUE(staysQuiet(source));
+    frame.map();
+    window.fill(colour);
+    ASSERT_TRUE(nextPicture(source, picture_));
+    EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), colour == 0x00ff00U ? kGreen : kBlue);
+  }
+  window.fill(0xff0000);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_TRUE(picture_.display_time_known) << "its drawings are followed as before";
+}
+
+TEST_F(X11WindowSourceTest, WindowsThatComeAndGoInFrontCostNoPicture) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  X11WindowSource source(titled(server_), steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  TestWindow cover(server_.display(), "cover", 200, 200, 0, 0);
+  for (int i = 0; i < 5; ++i) {
+    cover.move(i % 2 == 0 ? 600 : 50, 50);
+    window.fill(static_cast<std::uint32_t>(i + 1));
+    ASSERT_TRUE(nextPicture(source, picture_));
+    EXPECT_TRUE(picture_.display_time_known) << "nothing was begun anew";
+  }
+}
+
 TEST_F(X11WindowSourceTest, WithoutCompositeThePictureIsWhatTheScreenShows) {
   TestWindow window(server_.display(), "X-System", 320, 240);
   window.fill(0xff0000);

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstdlib>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -71,6 +72,13 @@ inline bool staysQuiet(X11WindowSource& source) {
     if (source.grab(change, picture) == GrabResult::kNew) return false;
   }
   return true;
+}
+
+/// Makes a window the child of another one, as window managers do.
+inline void putInto(const TestWindow& frame, const TestWindow& window, const Xvfb& server) {
+  xcb_connection_t* connection = xcb_connect(server.display().c_str(), nullptr);
+  std::free(xcb_request_check(connection, xcb_reparent_window_checked(connection, window.id(), frame.id(), 5, 5)));
+  xcb_disconnect(connection);
 }
 
 inline X11SourceOptions titled(const Xvfb& server, const std::string& title = "X-System") {
