@@ -28,8 +28,7 @@ bool isKnownPeriod(float period) { return std::isfinite(period) && period > 0.0F
 
 }  // namespace
 
-std::int64_t ReceiveClock::toHostTime(std::int64_t kernel_wall_ns, std::int64_t now_wall_ns,
-                                      std::int64_t now_steady_ns) {
+void ReceiveClock::read(std::int64_t now_wall_ns, std::int64_t now_steady_ns) {
   const std::int64_t offset = now_wall_ns - now_steady_ns;
   if (!started_) {
     started_ = true;
@@ -43,6 +42,11 @@ std::int64_t ReceiveClock::toHostTime(std::int64_t kernel_wall_ns, std::int64_t 
       ++steps_;
     }
   }
+}
+
+std::int64_t ReceiveClock::toHostTime(std::int64_t kernel_wall_ns, std::int64_t now_wall_ns,
+                                      std::int64_t now_steady_ns) {
+  read(now_wall_ns, now_steady_ns);
   return now_steady_ns + offset_ns_ - (now_wall_ns - kernel_wall_ns);
 }
 
@@ -272,7 +276,8 @@ bool ClockFilter::judgeSlip(const ClockSample& sample, const Point& point) {
   }
   const double before = sim_time_before_ - sim_reference_;
   // Such a frame says itself that it may have lasted longer; a datagram that was late only moves the line back soon.
-  if (isKnownPeriod(sample.frame_period) && static_cast<double>(sample.frame_period) >= options_.longest_frame) {
+  if (isKnownPeriod(sample.frame_period) &&
+      static_cast<double>(sample.frame_period) >= options_.longest_frame * static_cast<double>(sample.acceleration)) {
     slip(point, before, late);
     return true;
   }

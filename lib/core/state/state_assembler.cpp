@@ -153,7 +153,8 @@ const FlightState* FlightStateAssembler::assemble(std::int64_t receive_ns, Attit
   ClockSample sample;
   sample.receive_ns = receive_ns;
   sample.sim_time = static_cast<float>(inputs_.sim_time);
-  sample.frame_period = static_cast<float>(inputs_.frame_period);
+  sample.acceleration = timeAcceleration(static_cast<float>(inputs_.time_ratio_requested));
+  sample.frame_period = static_cast<float>(inputs_.frame_period) * sample.acceleration;
   sample.paused = state.paused;
   sample.replay = state.replay;
   const ClockEstimate clock = clock_.update(sample);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -12,12 +13,17 @@ namespace xplane_bridge::core {
 /// The kernel stamps datagrams with the wall clock (SO_TIMESTAMPNS). This carries that stamp over to the steady clock
 /// and adds the offset between the two, so that results are wall-clock times that run evenly. The offset follows a real
 /// step of the wall clock once it has persisted for `kReadings` readings; a reading delayed by the scheduler does not
-/// count.
+/// count. One thread reads; any may ask for the offset.
 class ReceiveClock {
  public:
   static constexpr int kReadings = 32;
   static constexpr std::int64_t kStepThresholdNs = 1000000;
 
+  /// Takes note of how the clocks stand to each other. @param now_wall_ns, now_steady_ns [ns] read in this order
+  void read(std::int64_t now_wall_ns, std::int64_t now_steady_ns);
+  /// [ns] from the steady clock to the evenly running wall clock; 0 before the first reading
+  std::int64_t offsetNs() const { return offset_ns_; }
+  /// The same as read(), and the result for a datagram.
   /// @param kernel_wall_ns the datagram's receive stamp
   /// @param now_wall_ns, now_steady_ns both clocks read after the datagram was taken, wall clock first
   /// @return receive time on the evenly running wall clock [ns]
@@ -27,7 +33,7 @@ class ReceiveClock {
 
  private:
   bool started_ = false;
-  std::int64_t offset_ns_ = 0;
+  std::atomic<std::int64_t> offset_ns_{0};
   std::int64_t best_offset_ns_ = 0;  ///< largest of the current batch: delays between the two readings only shrink it
   int readings_ = 0;
   std::uint32_t steps_ = 0;
@@ -38,9 +44,16 @@ struct ClockSample {
   std::int64_t receive_ns = 0;  ///< host receive time [ns]
   float sim_time = 0.0F;        ///< simulator running time, raw float32 as received [s]
   float frame_period = 0.0F;    ///< simulator time of one frame [s]; <= 0 or NaN: unknown
+  float acceleration = 1.0F;    ///< of time: so many times what X-Plane simulates of itself is in `frame_period` [-]
   bool paused = false;
   bool replay = false;
 };
+
+/// @param time_ratio_requested sim/time/sim_speed [-]; NaN: not received
+/// @return ClockSample::acceleration
+inline float timeAcceleration(float time_ratio_requested) {
+  return time_ratio_requested > 1.0F ? time_ratio_requested : 1.0F;
+}
 
 /// What a sample did to the clock.
 enum class ClockEvent : std::uint8_t {
@@ -92,8 +105,9 @@ class ClockFilter {
     double slip = 0.004;  ///< samples evenly later than the fit by more than this: simulator time has stood still [s]
     double slip_after = 0.1;          ///< ... for this long [s]
     double slip_evenness = 0.002;     ///< ... within this [s]
-    double longest_frame = 0.0495;    ///< frames of this much simulator time may have lasted longer: X-Plane simulates
-                                      ///< at most about 1/19.9 s; one that is late has slipped at once [s]
+    double longest_frame = 0.0495;    ///< frames of this much simulator time, without acceleration, may have lasted
+                                      ///< longer: X-Plane simulates at most about 1/19.9 s; one that is late has
+                                      ///< slipped at once [s]
     double backward_tolerance = 1.0;  ///< older samples within this are late datagrams, not a reset [s]
     double forward_jump = 2.0;        ///< simulator time ahead of `max_time_ratio` times host time by this: a reset [s]
     double max_time_ratio = 20.0;     ///< fastest time acceleration taken for real

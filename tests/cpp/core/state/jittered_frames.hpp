@@ -44,6 +44,7 @@ class Simulator {
     sample.receive_ns = kStart + ns(last_arrival_);
     sample.sim_time = static_cast<float>(sim_);
     sample.frame_period = options_.periods ? period : 0.0F;
+    sample.acceleration = timeAcceleration(static_cast<float>(options_.ratio));
     sample.paused = paused;
     sample.replay = replay;
     return sample;

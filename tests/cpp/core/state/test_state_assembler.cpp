@@ -146,6 +146,37 @@ TEST_P(EveryTransport, FramesThatDidNotComeAreCounted) {
   EXPECT_EQ(feed.assembler->clock().missedFrames(), 3U);
 }
 
+// At 4x each frame of 1/60 s is 4/60 s of simulator time.
+TEST(FlightStateAssembler, TimeAccelerationIsNoFrameThatDidNotCome) {
+  Hand hand;
+  for (int i = 0; i < 20; ++i) hand.send();
+  hand["sim/time/sim_speed"] = 4.0F;
+  for (int i = 0; i < 20; ++i) hand.send(4.0 / 60.0);
+  EXPECT_EQ(hand.assembler.clock().missedFrames(), 0U);
+  hand.send(12.0 / 60.0);  // two were lost
+  EXPECT_EQ(hand.assembler.clock().missedFrames(), 2U);
+  hand["sim/time/sim_speed"] = 1.0F;
+  for (int i = 0; i < 20; ++i) hand.send();
+  EXPECT_EQ(hand.assembler.clock().missedFrames(), 2U);
+}
+
+TEST(FlightStateAssembler, RowsCarryTimeAccelerationToo) {
+  for (const float ratio : {4.0F, 1.0F, -999.0F}) {
+    FlightStateAssembler::Options options;
+    options.transport = Transport::kData;
+    FlightStateAssembler assembler(options);
+    for (int i = 0; i < 20; ++i) {
+      const float sim_time = 1000.0F + std::max(ratio, 1.0F) / 60.0F * static_cast<float>(i);
+      const Datagram rows = Datagram::labelled("DATA*")
+                                .row(0, {60, 60, -999, 1.0F / 60.0F, 0, 0, 1, ratio})
+                                .row(1, {0, sim_time, 0, -999, 0, 0, 0, -999});
+      assembler.onData(rows.data(), kStart + i * kFrame);
+    }
+    EXPECT_EQ(assembler.counters().states, 20U);
+    EXPECT_EQ(assembler.clock().missedFrames(), 0U) << ratio;
+  }
+}
+
 TEST_P(EveryTransport, FirstPositionIsTheMapOrigin) {
   Feed feed(GetParam());
   EXPECT_FALSE(feed.assembler->map().has_value());
