@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kWindow = 10'000 * kMillisecond;  // clocks drift by well under a millisecond in this time
-constexpr std::int64_t kStep = 5'000 * kMillisecond;     // a host clock that was set starts the fit anew
+constexpr std::int64_t kStep = 5'000 * kMillisecond;     // a clock that was set or stood still starts the fit anew
 // The stamp is the whole millisecond below the drawing, so the least delay belongs to a drawing just after the stamp;
 // others lie half a millisecond later on average.
 constexpr std::int64_t kHalfResolution = kMillisecond / 2;

@@ -11,7 +11,8 @@
 
 namespace xplane_bridge::vision {
 
-/// Host time, [ns]; the clock every stamp of a source is taken from.
+/// Host time, [ns]; the clock every stamp of a source is taken from. Best one that is never set: a source compares it
+/// over seconds with the clock of a server, a sender or a stream.
 using Clock = std::function<std::int64_t()>;
 
 /// A picture appeared at the source.

@@ -91,7 +91,7 @@ void CaptureNode::subscribe() {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     crashed_ = warnings->crashed > 0.5F;
   });
-  addTimer(kOverduePeriod, [this] { pairing_->flush(pairingClock().system_ns()); });
+  addTimer(kOverduePeriod, [this] { pairing_->flush(pairingNow()); });
   addTimer(kRestorePeriod, [this] { restoreFieldOfView(); });
 }
 
@@ -135,13 +135,14 @@ void CaptureNode::joinThreads() {
 
 void CaptureNode::captureLoop() {
   prctl(PR_SET_NAME, "capture");
-  const std::unique_ptr<vision::FrameSource> source = makeSource(options_, pairingClock().system_ns);
+  const std::unique_ptr<vision::FrameSource> source = makeSource(options_, [this] { return picture_clock_.now(); });
   while (!stop_) {
+    picture_clock_.follow();
     vision::Change change;
     const vision::WaitResult result = source->waitChange(kSourceWait, change);
     if (result == vision::WaitResult::kChange) takePicture(source.get(), change);
     noteSource(*source, result != vision::WaitResult::kChange);
-    if (!calibrating_) repeatFrozen(pairingClock().system_ns());
+    if (!calibrating_) repeatFrozen(pairingNow());
   }
 }
 
@@ -308,13 +309,14 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   }
   info_publisher_.publish(info);
   pairing_->addPicture(
-      state, shown_ns, pairingClock().system_ns(),
+      state, shown_ns, pairingNow(),
       grabbed->frame.has_value() ? std::optional<float>(grabbed->frame->sim_time) : std::optional<float>());
 }
 
-std::int64_t CaptureNode::published(std::int64_t host_ns) const {
-  if (!stampsBySimulator()) return host_ns;
-  const auto sim_time = pairing_->simTime(host_ns);
+std::int64_t CaptureNode::published(std::int64_t time_ns) const {
+  if (lockstep()) return time_ns;
+  if (!stampsBySimulator()) return picture_clock_.toWall(time_ns);
+  const auto sim_time = pairing_->simTime(time_ns);
   return sim_time.has_value() ? stampOf(*sim_time) : clock().system_ns();
 }
 
@@ -374,8 +376,8 @@ void CaptureNode::giveBuffer(cv::Mat buffer) {
 }
 
 void CaptureNode::onState(const FlightState::ConstPtr& state) {
-  const std::int64_t now_ns = pairingClock().system_ns();
-  pairing_->addState(state, now_ns);
+  const std::int64_t now_ns = pairingNow();
+  pairing_->addState(state, now_ns, picture_clock_.fromWall(static_cast<std::int64_t>(state->header.stamp.toNSec())));
   const std::lock_guard<std::mutex> lock(capture_mutex_);
   if (!moved_from_ || moved(*moved_from_, *state)) {
     if (moved_from_) frozen_check_.stateMoved(now_ns);

@@ -147,7 +147,7 @@ std::string CaptureNode::calibrateSender() {
   link().waitUntil(answered, kSenderAnswers);
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
-    frozen_check_.pictureChanged(pairingClock().system_ns());
+    frozen_check_.pictureChanged(pairingNow());
     calibrating_ = false;
   }
   if (!answer.has_value()) {

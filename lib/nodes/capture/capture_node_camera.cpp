@@ -52,11 +52,9 @@ void CaptureNode::publishFrameState(const FrameState& state) {
 // --- X-Plane ---------------------------------------------------------------------------------------------------------
 
 void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo& info) {
-  // One thread is in here, the link's: neither the stream nor the receive clock needs a lock.
+  // One thread is in here, the link's: the stream needs no lock.
   if (held()) return;  // no flight yet, and sent by wall time
-  const std::int64_t now_ns = pairingClock().system_ns();
-  const std::int64_t receive_ns =
-      lockstep() ? now_ns : receive_clock_.toHostTime(info.stamp_ns, now_ns, clock().steady_ns());
+  const std::int64_t receive_ns = lockstep() ? pairingNow() : picture_clock_.received(info.stamp_ns);
   if (!view_stream_.add(datagram, receive_ns)) return;
   if (calibrating_) {
     const std::lock_guard<std::mutex> lock(capture_mutex_);

@@ -47,6 +47,7 @@ void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, s
   sample.receive_ns = receive_ns;
   sample.sim_time = static_cast<float>(status.sim_time);
   sample.frame_period = frame_period;
+  sample.acceleration = core::timeAcceleration(status.time_ratio_requested);
   sample.paused = status.paused;
   sample.replay = status.replay;
   const core::ClockEstimate estimate = clock_.update(sample);
@@ -83,12 +84,15 @@ void ImagePairing::forgetClock() {
   newest_sim_time_.reset();
 }
 
-void ImagePairing::addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns) {
+void ImagePairing::addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns,
+                            std::optional<std::int64_t> stamp_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
   core::StateKey key;
   key.id = next_state_id_++;
   key.sim_time_raw = state->sim_time;
-  key.stamp_ns = stamps_ == Stamps::kSimulator ? arrival_ns : static_cast<std::int64_t>(state->header.stamp.toNSec());
+  key.stamp_ns = stamps_ == Stamps::kSimulator
+                     ? arrival_ns
+                     : stamp_ns.value_or(static_cast<std::int64_t>(state->header.stamp.toNSec()));
   key.epoch = state->epoch;
   key.paused = state->paused || state->replay;
   associator_.addState(key);

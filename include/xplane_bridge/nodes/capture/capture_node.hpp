@@ -27,11 +27,11 @@
 #include "xplane_bridge/core/camera/delay_calibration.hpp"
 #include "xplane_bridge/core/camera/pose_check.hpp"
 #include "xplane_bridge/core/camera/view_stream.hpp"
-#include "xplane_bridge/core/state/clock_filter.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/base/latest_worker.hpp"
 #include "xplane_bridge/nodes/capture/capture_options.hpp"
 #include "xplane_bridge/nodes/capture/image_pairing.hpp"
+#include "xplane_bridge/nodes/capture/picture_clock.hpp"
 #include "xplane_bridge/vision/picture_checks.hpp"
 
 namespace xplane_bridge {
@@ -73,7 +73,7 @@ class CaptureNode : public BaseNode {
     std::shared_ptr<const std::vector<std::uint8_t>> jpeg;  // empty where it has pixels
     cv::Size size;                                          // [px]
     std::optional<vision::ShownFrame> frame;
-    std::int64_t display_ns = 0;
+    std::int64_t display_ns = 0;  // both in the time of pairingNow()
     std::int64_t grab_ns = 0;
     bool display_known = false;
     bool frozen = false;
@@ -111,10 +111,11 @@ class CaptureNode : public BaseNode {
   void takePicture(vision::FrameSource* source, const vision::Change& change);
   void repeatFrozen(std::int64_t now_ns);
   void publishPicture(Grabbed* grabbed);
-  /// By which pictures are paired: the host's, also where stamps are the simulator's (`publish_clock`).
-  const core::Clock& pairingClock() const { return stampsBySimulator() ? wallClock() : clock(); }
+  /// [ns] by the clock that pictures are paired by: the host's, also where stamps are the simulator's
+  /// (`publish_clock`); in lock-step the frames'.
+  std::int64_t pairingNow() const { return lockstep() ? clock().system_ns() : picture_clock_.now(); }
   /// [ns] a time of that clock as it is published.
-  std::int64_t published(std::int64_t host_ns) const;
+  std::int64_t published(std::int64_t time_ns) const;
   std::int64_t stampOfPicture(std::int64_t shown_ns);
   bool decode(Grabbed* grabbed, bool whole);
   sensor_msgs::ImagePtr takeMessage();
@@ -157,6 +158,7 @@ class CaptureNode : public BaseNode {
   void giveBuffer(cv::Mat buffer);
 
   CaptureOptions options_;
+  PictureClock picture_clock_{wallClock()};
   std::unique_ptr<vision::PictureScaler> scaler_;
   std::unique_ptr<ImagePairing> pairing_;
   std::unique_ptr<tf2_ros::StaticTransformBroadcaster> static_frames_;
@@ -175,7 +177,6 @@ class CaptureNode : public BaseNode {
   // Link's thread.
   core::ViewStream view_stream_;
   core::PoseCheck pose_check_;
-  core::ReceiveClock receive_clock_;
   std::uint32_t link_epoch_ = 0;
 
   mutable std::mutex camera_mutex_;

@@ -19,7 +19,8 @@ namespace xplane_bridge {
 /// Gives every picture its FrameState, in the order of the pictures, exactly one each.
 ///
 /// Simulator frames come from the capture host's own subscription, states from wherever rx_node runs; both meet on the
-/// simulator's time axis (core/image_association.hpp). All functions may be called from any thread.
+/// simulator's time axis (core/image_association.hpp). Host times are of one clock, best of one that is never set
+/// (PictureClock). All functions may be called from any thread.
 class ImagePairing {
  public:
   /// Whose time it is that states are stamped with.
@@ -47,7 +48,8 @@ class ImagePairing {
   /// The link is new or gone: the simulator's clock is to be learnt anew.
   void forgetClock();
   /// @param arrival_ns [ns] host time
-  void addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns);
+  /// @param stamp_ns [ns] the state's stamp in host time, where that is not the wall clock's; empty: as it stands there
+  void addState(const FlightState::ConstPtr& state, std::int64_t arrival_ns, std::optional<std::int64_t> stamp_ns = {});
   /// A published picture: its FrameState with everything the capture knows (header, times, view, counts, its quality
   /// bits, the newest pose); the rest is filled in here, and the pose of the very frame.
   /// @param shown_ns [ns] host time, with the display delay

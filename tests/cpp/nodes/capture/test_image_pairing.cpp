@@ -13,6 +13,9 @@
 
 #include <boost/make_shared.hpp>
 
+#include "xplane_bridge/nodes/capture/picture_clock.hpp"
+#include "xplane_bridge/vision/server_clock.hpp"
+
 namespace xplane_bridge {
 namespace {
 
@@ -283,6 +286,67 @@ TEST(ImagePairing, StampsOfTheSimulatorAreNotTakenForTheHosts) {
   pairing.forgetClock();
   EXPECT_FALSE(pairing.simTime(kStart + ns(8.0)).has_value());
 }
+
+/// The wall clock is set after 20 s, while a frame's datagram lies between the kernel's stamp and us. Frames come by
+/// the kernel's stamps, pictures by those of an X server, which like all of the host's steady clock knows nothing of
+/// it.
+class SetWallClock : public ::testing::TestWithParam<double> {};
+
+TEST_P(SetWallClock, PairsNoPictureWithAnotherFrame) {
+  constexpr double kSetAt = 20.0 + 2e-4;
+  constexpr std::int64_t kBoot = 5000'000000000;  // [ns] the steady clock at the start
+  double time = 0.0;
+  const auto wall = [step = GetParam()](double t) { return kStart + ns(t) + (t >= kSetAt ? ns(step) : 0); };
+  PictureClock clock({[&time] { return kBoot + ns(time); }, [&time, wall] { return wall(time); }});
+  std::map<std::uint32_t, FrameState> answers;
+  ImagePairing pairing(kDelay, 0.2, [&answers](const FrameState& answer) { answers[answer.image_count] = answer; });
+  vision::ServerClock server_clock;
+  std::vector<std::pair<double, std::function<void()>>> events;
+  for (std::uint32_t k = 0; k < 2400; ++k) {
+    const double t = k / kFps;
+    core::SimStatus status;
+    status.sim_time = static_cast<float>(kSimStart + t);
+    const std::int64_t kernel_stamp = wall(t + 1e-4);
+    events.emplace_back(t + 4e-4, [&pairing, &clock, status, kernel_stamp] {
+      pairing.addFrame(status, static_cast<float>(1.0 / kFps), clock.received(kernel_stamp));
+    });
+    const auto state = boost::make_shared<FlightState>();
+    state->sim_time = status.sim_time;
+    state->header.stamp.fromNSec(static_cast<std::uint64_t>(wall(t)));
+    events.emplace_back(t + 6e-4, [&pairing, &clock, state] {
+      pairing.addState(state, clock.now(), clock.fromWall(static_cast<std::int64_t>(state->header.stamp.toNSec())));
+    });
+    FrameState picture;
+    picture.image_count = k;
+    const auto server_ms = static_cast<std::uint32_t>((t + kDelay) * 1e3);
+    events.emplace_back(t + kDelay + (k % 7 == 0 ? 0.02 : 3e-4), [&pairing, &clock, &server_clock, picture, server_ms] {
+      clock.follow();
+      pairing.addPicture(picture, server_clock.toHost(server_ms, clock.now()), clock.now());
+    });
+  }
+  std::stable_sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [when, event] : events) {
+    time = when;
+    event();
+    if (when > 10.0 && when < kSetAt) {
+      ASSERT_EQ(clock.toWall(clock.now()), wall(when));
+    }
+  }
+  EXPECT_EQ(clock.toWall(clock.now()), wall(time)) << "what is published follows";
+  int judged = 0;
+  for (const auto& [k, answer] : answers) {
+    if (k < 60) continue;  // the clock is being learnt
+    ++judged;
+    ASSERT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + k / kFps)) << "frame " << k;
+    ASSERT_EQ(answer.quality & (FrameState::QUALITY_STATE_MISSING | FrameState::QUALITY_INTERPOLATED |
+                                FrameState::QUALITY_OFF_FRAME | FrameState::QUALITY_CLOCK_UNSURE),
+              0U)
+        << "frame " << k;
+  }
+  EXPECT_GT(judged, 2300);
+}
+
+INSTANTIATE_TEST_SUITE_P(Steps, SetWallClock, ::testing::Values(0.03, 0.3, 4.0, -0.3));  // [s]
 
 }  // namespace
 }  // namespace xplane_bridge
