@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from support.absent_modules import WITHOUT_THEM
 from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge.cli import xplane_doctor
 from xplane_bridge.doctor import examination, names, report
@@ -22,17 +23,7 @@ from xplane_bridge.doctor.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[3]
 DOCTOR = ROOT / "scripts" / "xplane_doctor"
-#: What Windows has not, and all of ROS: to import them is an error here.
-ABSENT = ("fcntl", "termios", "pwd", "resource", "grp", "rospy", "rosbag", "roslib", "genpy", "xplane_bridge.msg")
-ELSEWHERE = f"""
-import sys
-class Absent:
-    def find_spec(self, name, path=None, target=None):
-        if name in {ABSENT!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-for name in {ABSENT!r}:
-    sys.modules.pop(name, None)
-sys.meta_path.insert(0, Absent())
+ELSEWHERE = f"""{WITHOUT_THEM}
 from xplane_bridge.cli.xplane_doctor import main
 sys.argv[0] = "xplane_doctor"
 sys.exit(main(sys.argv[1:]))

@@ -9,21 +9,11 @@ import sys
 
 import pytest
 
+from support.absent_modules import WITHOUT_THEM
 from xplane_bridge.eye.grab import Grabber
 from xplane_bridge.eye.grab_windows import client_area, is_xplane
 
-#: What Windows has not, and all of ROS: to import them is an error here.
-ABSENT = ("fcntl", "termios", "pwd", "resource", "grp", "rospy", "rosbag", "roslib", "genpy", "xplane_bridge.msg")
-
-START = f"""
-import importlib, sys
-class Absent:
-    def find_spec(self, name, path=None, target=None):
-        if name in {ABSENT!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-for name in {ABSENT!r}:
-    sys.modules.pop(name, None)
-sys.meta_path.insert(0, Absent())
+START = f"""{WITHOUT_THEM}
 for module in ("grab_linux", "grab_windows", "grab_macos"):
     importlib.import_module("xplane_bridge.eye." + module)
 from xplane_bridge.cli.sight.xplane_eye import main
