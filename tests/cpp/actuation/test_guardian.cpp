@@ -1,8 +1,6 @@
 #include "xplane_bridge/actuation/guardian.hpp"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,27 +16,13 @@
 
 #include "fake_simulator.hpp"
 #include "fake_xplane.hpp"
+#include "journal_file.hpp"
 #include "xplane_bridge/actuation/pausing.hpp"
 
 namespace xplane_bridge {
 namespace {
 
 constexpr const char* kJoystick = "sim/operation/override/override_joystick";
-
-/// The lock of a journal, as a process has it that hangs while it is writing.
-class HeldLock {
- public:
-  explicit HeldLock(const std::string& journal)
-      : fd_(open((journal + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
-    EXPECT_EQ(flock(fd_, LOCK_EX), 0);
-  }
-  ~HeldLock() { close(fd_); }
-  HeldLock(const HeldLock&) = delete;
-  HeldLock& operator=(const HeldLock&) = delete;
-
- private:
-  int fd_;
-};
 
 GuardianOrders read(const std::string& text) {
   GuardianOrders orders;

@@ -1,8 +1,6 @@
 #include "xplane_bridge/actuation/traffic_control.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/inotify.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -13,6 +11,7 @@
 #include <vector>
 
 #include "fake_simulator.hpp"
+#include "journal_file.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -94,20 +93,9 @@ TEST_F(TrafficControlTest, WritesAllThatItTakesDownAtOnce) {
   sim_.on_message = [&](const auto&) {
     if (!noted) noted = inJournal();
   };
-  const std::string folder = std::filesystem::path(sim_.journal()->path()).parent_path();
-  const int watch = ::inotify_init1(IN_NONBLOCK);
-  ASSERT_GE(::inotify_add_watch(watch, folder.c_str(), IN_CREATE | IN_MOVED_TO), 0);  // like ones in a row become one
+  const Replacements replacements(std::filesystem::path(sim_.journal()->path()).parent_path().string());
   EXPECT_EQ(control().command(poses, now()), "");
-  alignas(inotify_event) char events[8192];
-  const ssize_t size = ::read(watch, events, sizeof(events));
-  ::close(watch);
-  int replaced = 0;
-  for (ssize_t at = 0; at < size;) {
-    const auto* event = reinterpret_cast<const inotify_event*>(events + at);
-    replaced += (event->mask & IN_MOVED_TO) != 0U ? 1 : 0;
-    at += static_cast<ssize_t>(sizeof(inotify_event) + event->len);
-  }
-  EXPECT_EQ(replaced, 1) << "the file, for all of them";
+  EXPECT_EQ(replacements.count(), 1U) << "of the file, for all of them";
   EXPECT_EQ(noted, 19U) << "before the first is sent";
   EXPECT_EQ(control_->numbers().size(), 19U);
 }

@@ -4,13 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <algorithm>
-#include <chrono>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <thread>

@@ -1,4 +1,7 @@
+#include <optional>
+
 #include "fixture.hpp"
+#include "journal_file.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -81,39 +84,11 @@ TEST_F(PreparedRelease, GoesToTheJournalOnceASecondWhereItChanges) {
   EXPECT_EQ(recorded(), 0.7F) << "a hundredth is not worth the disk";
 }
 
-/// The journal's lock file, held; and how many wait for it.
-class HeldLock {
- public:
-  explicit HeldLock(const std::string& path) : file_(open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {
-    EXPECT_EQ(flock(file_, LOCK_EX), 0);
-  }
-  ~HeldLock() { close(file_); }
-  HeldLock(const HeldLock&) = delete;
-  HeldLock& operator=(const HeldLock&) = delete;
-
-  void awaitWaiters(int count) const {
-    struct stat of {};
-    ASSERT_EQ(fstat(file_, &of), 0);
-    const std::string inode = ":" + std::to_string(of.st_ino) + " ";
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
-    for (int waiting = 0; waiting < count && std::chrono::steady_clock::now() < end; std::this_thread::yield()) {
-      std::ifstream locks("/proc/locks");
-      waiting = 0;
-      for (std::string line; std::getline(locks, line);) {
-        waiting += line.find("->") != std::string::npos && line.find(inode) != std::string::npos ? 1 : 0;
-      }
-    }
-  }
-
- private:
-  int file_;
-};
-
 TEST_F(PreparedRelease, WrittenDownLateItLeavesNothingOfWhatWasReleasedMeanwhile) {
   manager_.setRequired({kJoystick, kThrottles});
   prepare(0.5F);
   manager_.prepareRelease(kJoystick, {core::UndoDref{kLever, 0.5F, false}});
-  std::optional<HeldLock> lock(std::in_place, sim_.folder() + "/journal.json.lock");
+  std::optional<HeldLock> lock(std::in_place, sim_.folder() + "/journal.json");
   std::thread writing([this] { manager_.recordPreparations(); });  // of the joystick, then of the throttles
   lock->awaitWaiters(1);
   manager_.setRequired({kJoystick});

@@ -1,15 +1,11 @@
 #include "xplane_bridge/core/link/journal.hpp"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/file.h>
-#include <sys/inotify.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -18,6 +14,8 @@
 #include <set>
 #include <string>
 #include <vector>
+
+#include "journal_file.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -47,48 +45,6 @@ class JournalTest : public testing::Test {
 };
 
 const std::vector<UndoOperation> kReleaseJoystick = {UndoDref{"sim/operation/override/override_joystick", 0.0F}};
-
-/// The lock of a journal, as a process has it that was stopped while it was writing.
-class HeldLock {
- public:
-  explicit HeldLock(const std::string& path) : fd_(open((path + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644)) {
-    EXPECT_EQ(flock(fd_, LOCK_EX), 0);
-  }
-  ~HeldLock() { close(fd_); }
-  HeldLock(const HeldLock&) = delete;
-  HeldLock& operator=(const HeldLock&) = delete;
-
- private:
-  int fd_;
-};
-
-/// How often a file of a folder has been replaced by another one since.
-class Replacements {
- public:
-  explicit Replacements(const std::string& folder) {
-    // Both: the kernel may take several equal events in a row for one.
-    EXPECT_GE(inotify_add_watch(fd_, folder.c_str(), IN_MOVED_FROM | IN_MOVED_TO), 0);
-  }
-  ~Replacements() { close(fd_); }
-  Replacements(const Replacements&) = delete;
-  Replacements& operator=(const Replacements&) = delete;
-
-  std::size_t count() const {
-    std::size_t out = 0;
-    std::array<char, 4096> events{};
-    const ssize_t length = read(fd_, events.data(), events.size());
-    for (ssize_t at = 0; at < length;) {
-      inotify_event event{};
-      std::memcpy(&event, events.data() + at, sizeof event);
-      out += (event.mask & IN_MOVED_TO) != 0 ? 1U : 0U;
-      at += static_cast<ssize_t>(sizeof event + event.len);
-    }
-    return out;
-  }
-
- private:
-  int fd_ = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
-};
 
 JournalOwner deadOwner() {
   JournalOwner owner = thisProcess("/crashed");
