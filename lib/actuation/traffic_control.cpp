@@ -43,7 +43,7 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
     it = flown_.erase(it);
   }
   for (auto it = lost_.begin(); it != lost_.end();) it = wanted.count(*it) != 0 ? std::next(it) : lost_.erase(it);
-  const std::string refusal = take(poses, &taken);
+  std::string refusal = take(poses, &taken);
   for (const core::TrafficPose& pose : poses) {
     const bool has = flown_.count(pose.number) != 0;
     if (has || std::find(taken.begin(), taken.end(), pose.number) != taken.end()) {
