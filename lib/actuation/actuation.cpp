@@ -29,31 +29,19 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
           link, &overrides_, options.surfaces,
           [this](const std::string& text, bool success) { say(EventKind::kOverride, text, "", success); },
           [this] { onSurfaces(); }),
-      failures_(link, &overrides_, &surfaces_, options.service_timeout, hooks_.failures,
-                [this](const std::string& text, const std::string& who, bool success) {
-                  say(EventKind::kFailure, text, who, success);
-                }),
+      failures_(link, &overrides_, &surfaces_, options.service_timeout, hooks_.failures, saying(EventKind::kFailure)),
       excitation_(&surfaces_, options.max_roll_deg, options.max_pitch_deg, hooks_.excitation,
-                  [this](const std::string& text, const std::string& who, bool success) {
-                    say(EventKind::kExcitation, text, who, success);
-                  }),
+                  saying(EventKind::kExcitation)),
       identification_(&surfaces_, &excitation_, options.max_roll_deg, options.max_pitch_deg,
                       [this](std::uint32_t number, const std::string& text, const std::string& who, bool success) {
                         hooks_.event({EventKind::kSetting, text, who, success, false, number, sim_time_});
                       }),
       path_(link, &overrides_, options.control, pathHooks(), mutex_),
-      settings_(link, &overrides_, options.service_timeout,
-                [this](const std::string& text, const std::string& who, bool success) {
-                  say(EventKind::kSetting, text, who, success);
-                }),
-      views_(link, [this](const std::string& text, const std::string& who,
-                          bool success) { say(EventKind::kSetting, text, who, success); }),
+      settings_(link, &overrides_, options.service_timeout, saying(EventKind::kSetting)),
+      views_(link, saying(EventKind::kSetting)),
       traffic_(link, &overrides_, options.traffic,
                [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
-      disturbance_(link, kOverridePurpose, hooks_.disturbance,
-                   [this](const std::string& text, const std::string& who, bool success) {
-                     say(EventKind::kSetting, text, who, success);
-                   }),
+      disturbance_(link, kOverridePurpose, hooks_.disturbance, saying(EventKind::kSetting)),
       jobs_(
           link, options.flight, changeHooks(),
           [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
@@ -69,6 +57,10 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
 
 void Actuation::say(EventKind kind, const std::string& text, const std::string& who, bool success) {
   hooks_.event({kind, text, who, success, false, 0, sim_time_});
+}
+
+std::function<void(const std::string&, const std::string&, bool)> Actuation::saying(EventKind kind) {
+  return [this, kind](const std::string& text, const std::string& who, bool success) { say(kind, text, who, success); };
 }
 
 ControlPathHooks Actuation::pathHooks() {

@@ -368,7 +368,7 @@ void ControlPath::sendCommand(double time) {
 void ControlPath::send(double time) {
   command_waits_ = false;
   const core::ChannelExcitation excitation = hooks_.excitation();
-  const core::ArbitratedControls controls = withoutMissing(arbiter_.step(time, excitation));
+  core::ArbitratedControls controls = withoutMissing(arbiter_.step(time, excitation));
   watchSurfaces();
   watchFailsafe();
   excited_ = controls.excited != 0u;
@@ -377,7 +377,7 @@ void ControlPath::send(double time) {
   }
   publishMode();
   std::array<double, 3> stick{std::nan(""), std::nan(""), std::nan("")};
-  if (fly(controls, time)) {
+  if (fly(&controls, time)) {
     const core::Channel axes[] = {core::Channel::kRoll, core::Channel::kPitch, core::Channel::kYaw};
     for (std::size_t i = 0; i < stick.size(); ++i) {
       if (controls.active.test(core::index(axes[i]))) stick[i] = controls.values[core::index(axes[i])];

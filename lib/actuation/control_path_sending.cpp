@@ -58,8 +58,9 @@ core::ArbitratedControls ControlPath::withoutMissing(core::ArbitratedControls co
   return controls;
 }
 
-bool ControlPath::fly(core::ArbitratedControls controls, double time) {
-  if (controls.active.none()) {
+/// Whether anything is sent. What cannot be is left out of the controls.
+bool ControlPath::fly(core::ArbitratedControls* controls, double time) {
+  if (controls->active.none()) {
     // An axis that only a test signal had taken is X-Plane's again, as soon as X-Plane can be asked.
     if (taken_ && isUp(link_status_)) {
       overrides_->setRequired({});
@@ -73,27 +74,27 @@ bool ControlPath::fly(core::ArbitratedControls controls, double time) {
     return false;
   }
   try {
-    overrides_->setRequired(core::requiredOverrides(controls.active, encoder_.options()));
+    overrides_->setRequired(core::requiredOverrides(controls->active, encoder_.options()));
     last_warning_.clear();
   } catch (const core::JournalError& error) {
     // What is held is flown on: left alone it would stand where it is, with X-Plane's own stick dead.
-    const std::vector<core::Channel> refused = notHeld(controls.active);
-    for (const core::Channel channel : refused) leaveOut(channel, &controls);
-    const bool some = controls.active.any();
+    const std::vector<core::Channel> refused = notHeld(controls->active);
+    for (const core::Channel channel : refused) leaveOut(channel, controls);
+    const bool some = controls->active.any();
     warnOnce("commands" + (some ? " of " + core::join(refused, ", ", core::channelName) : "") +
              " are not sent: " + core::whyNotChanged(error));
     if (!some) return false;
   }
-  taken_ = controls.source == core::CommandSource::kNone;
+  taken_ = controls->source == core::CommandSource::kNone;
   writes_.clear();
-  const core::ChannelSet now = channelsToSend(controls, time);
-  encoder_.encode(controls.values, now, writes_);
+  const core::ChannelSet now = channelsToSend(*controls, time);
+  encoder_.encode(controls->values, now, writes_);
   for (const core::DatarefWrite& write : writes_) link_->write(write.dataref, write.value);
-  sendRows(controls, now);
-  prepareLevers(controls);
+  sendRows(*controls, now);
+  prepareLevers(*controls);
   last_send_ = time;
-  publishApplied(controls);
-  watchReadBack(controls.active);
+  publishApplied(*controls);
+  watchReadBack(controls->active);
   return true;
 }
 

@@ -171,6 +171,8 @@ class Actuation {
   FlightChangeHooks changeHooks();
   void subscribe();
   void say(core::EventKind kind, const std::string& text, const std::string& who = "", bool success = true);
+  /// The same as a hook: (text, who, success).
+  std::function<void(const std::string&, const std::string&, bool)> saying(core::EventKind kind);
   void endSignals(const std::string& why);
   IdentificationConditions conditions() const;
   void suspend(const std::string& reason);

@@ -152,7 +152,7 @@ class ControlPath {
   void afterModeChange(core::FlightMode before);
   void sendCommand(double time);
   void send(double time);
-  bool fly(core::ArbitratedControls controls, double time);
+  bool fly(core::ArbitratedControls* controls, double time);
   std::vector<core::Channel> notHeld(const core::ChannelSet& channels) const;
   void warnOnce(const std::string& text);
   void sendRows(const core::ArbitratedControls& controls, const core::ChannelSet& now);

@@ -401,6 +401,19 @@ TEST_F(ControlPathTest, AnOverrideThatCannotBeNotedKeepsItsOwnChannelsBackAndNoO
   EXPECT_FLOAT_EQ(sim.value(kLeftBrake), 1.0F);
 }
 
+TEST_F(ControlPathTest, AnAxisThatIsNotHeldIsNoneThatIsSent) {
+  start();
+  sim.journalOfAnother(true).record(std::string("override:") + kYawOverride, kOverridePurpose,
+                                    {core::UndoDref{kYawOverride, 0.0F}});
+  core::ControlCommand command = rollCommand(0.3);
+  command.fields |= core::kFieldYaw;
+  command.yaw = 0.5;
+  runWith(command, 0.1);
+  EXPECT_FLOAT_EQ(static_cast<float>(stick[0]), 0.3F);
+  EXPECT_TRUE(std::isnan(stick[2])) << "surfaces that are driven by hand must not follow it";
+  EXPECT_TRUE(writesTo(kStickYaw).empty());
+}
+
 TEST(Standing, EachHasAName) {
   for (const Standing standing : {Standing::kFlying, Standing::kWrongAircraft, Standing::kWaitingForMode,
                                   Standing::kSuspended, Standing::kNotConnected}) {
