@@ -20,7 +20,7 @@ from xplane_bridge.analysis.latency import (
     require_usable,
     value_motion,
 )
-from xplane_bridge.bags import Bags
+from xplane_bridge.bags import FLIGHT_STATE, Bags
 from xplane_bridge.bags.cameras import FIRST, cameras, chosen_cameras
 from xplane_bridge.cli.bridge.waiting import Listener, print_waiting, wait_for_state, wait_until
 from xplane_bridge.cli.entry import guarded, number, start_node
@@ -228,7 +228,7 @@ def _refreshes(sent: np.ndarray, value: np.ndarray) -> np.ndarray:
 
 def _rates(bags: Bags) -> tuple[np.ndarray, np.ndarray]:
     """Stamps [ns] and body rates [rad/s] of the longest stretch of one epoch that is not paused."""
-    table = _first_of_type(bags, "xplane_bridge/FlightState")
+    table = _first_of_type(bags, FLIGHT_STATE)
     if table is None:
         msg = "no flight states: record flight_state too (launch/record.launch does)"
         raise LatencyError(msg)

@@ -44,7 +44,7 @@ import numpy as np
 
 from xplane_bridge import __version__
 from xplane_bridge.analysis.resampling import interpolated
-from xplane_bridge.bags import BagError
+from xplane_bridge.bags import FLIGHT_STATE, BagError
 from xplane_bridge.bags.cameras import COMPRESSED, RAW
 from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.decoding import MessageList
@@ -52,7 +52,7 @@ from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.cameras import UNITS as CAMERA_UNITS
 from xplane_bridge.export.cameras import CameraRow, one_column_each
 from xplane_bridge.export.columns import name_of
-from xplane_bridge.export.flight import STATE, full_names
+from xplane_bridge.export.flight import full_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -182,7 +182,7 @@ def topic_arrays(bags: Bags, only: Sequence[str] = (), folder: Optional[Path] = 
     if not chosen:
         msg = f"{', '.join(map(str, bags.paths))}: no message that a table can hold; nothing was recorded but pictures"
         raise BagError(msg)
-    clock = _sim_clock(bags, bags.topic_of_type(STATE))
+    clock = _sim_clock(bags, bags.topic_of_type(FLIGHT_STATE))
     taken = ["units", "topics", "about", _CAMERAS]
     for topic in chosen:
         if topic in infos and infos[topic].msgtype in (RAW, COMPRESSED):

@@ -8,11 +8,10 @@ from typing import Any, Mapping, Sequence
 import numpy as np
 
 from xplane_bridge.analysis.resampling import held
-from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags, Table
+from xplane_bridge.bags import BagError, Bags, Table
 from xplane_bridge.bags.cameras import cameras
 from xplane_bridge.errors import XplaneBridgeError
 
-STATE = FLIGHT_STATE
 FRAME_STATE = "xplane_bridge/FrameState"
 MODE = "xplane_bridge/ControlMode"
 FAILURES = "xplane_bridge/FailureState"

@@ -107,7 +107,9 @@ def _yolo(bags: Bags, path: Path, job: Job) -> dict[str, Any]:
 
     labels = _labels(job)
     # To a trainer, a picture without a file of labels shows nothing.
-    return annotated.export_annotated(bags, path, job.dataset, job.train_flight, labels, annotated.yolo, True)
+    return annotated.export_annotated(
+        bags, path, job.dataset, job.train_flight, labels, annotated.yolo, only_labelled=True
+    )
 
 
 def _lard(bags: Bags, path: Path, job: Job) -> dict[str, Any]:

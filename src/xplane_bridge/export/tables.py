@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from xplane_bridge.analysis.resampling import held, time_base
+from xplane_bridge.bags import FLIGHT_STATE
 from xplane_bridge.bags.columns import ColumnFile, StoredColumn
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.columns import named, on_base
-from xplane_bridge.export.flight import STATE, breaks, labels, topic_of
+from xplane_bridge.export.flight import breaks, labels, topic_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -94,7 +95,7 @@ def flight_table(
         BagError: No flight state in the bag, or no such further topic.
     """
     store = ColumnFile(folder)
-    topic = topic_of(bags, STATE)
+    topic = topic_of(bags, FLIGHT_STATE)
     units = bags.units(topic)
     state = bags.read(topic, store=store).by_stamp()
     base, columns = state.stamp, iter(state.columns.items())

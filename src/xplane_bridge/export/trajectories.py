@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Optional
 import numpy as np
 
 from xplane_bridge.analysis.resampling import interpolated, rotated, time_base
+from xplane_bridge.bags import FLIGHT_STATE
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
-from xplane_bridge.export.flight import ODOMETRY, STATE, breaks, topic_of
+from xplane_bridge.export.flight import ODOMETRY, breaks, topic_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -46,7 +47,7 @@ def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np
 
 def _breaks(bags: Bags, stamp: np.ndarray) -> Optional[np.ndarray]:
     """Count the breaks of the flight states up to each stamp [ns]; None without states."""
-    topic = bags.topic_of_type(STATE)
+    topic = bags.topic_of_type(FLIGHT_STATE)
     if topic is None or not bags.topics[topic].count:
         return None
     state = bags.read(topic, ["header.stamp", "epoch", "position_epoch"]).by_stamp()

@@ -10,7 +10,7 @@ from typing import Any, Iterator, Mapping, NamedTuple, Optional, Sequence
 import numpy as np
 
 from xplane_bridge import __version__
-from xplane_bridge.bags import Bags, Table
+from xplane_bridge.bags import FLIGHT_STATE, Bags, Table
 from xplane_bridge.bags.cameras import Camera as Recorded
 from xplane_bridge.bags.cameras import chosen_cameras
 from xplane_bridge.labels import table as label_table
@@ -22,7 +22,7 @@ from xplane_bridge.labels.things import MAP_SIGMA_M, SPAN_M, Labeller, Sun
 from xplane_bridge.labels.traffic import RecordedTraffic
 from xplane_bridge.labels.world import Flat, Sphere, World
 
-_STATE, _DATAREFS = "xplane_bridge/FlightState", "xplane_bridge/DatarefValues"
+_DATAREFS = "xplane_bridge/DatarefValues"
 #: Where the sun stands, and the origin whose axes that is in.
 _SUN = ("sim/graphics/scenery/sun_pitch_degrees", "sim/graphics/scenery/sun_heading_degrees")
 _ORIGIN = ("sim/flightmodel/position/lat_ref", "sim/flightmodel/position/lon_ref")
@@ -245,7 +245,7 @@ def _suns(bags: Bags, stamps: np.ndarray) -> dict[int, Sun]:
 
 
 def _ground(bags: Bags, standing: Optional[float]) -> Optional[Ground]:
-    topic = bags.topic_of_type(_STATE)
+    topic = bags.topic_of_type(FLIGHT_STATE)
     if topic is None or not bags.topics[topic].count:
         return None
     states = bags.read(topic, ["valid", "latitude", "longitude", "altitude_msl", "altitude_agl"])

@@ -9,7 +9,7 @@ from typing import Any, Callable, List, NamedTuple
 import numpy as np
 
 from xplane_bridge import lockstep
-from xplane_bridge.bags import Bags, Table
+from xplane_bridge.bags import FLIGHT_STATE, Bags, Table
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
 from xplane_bridge.cli.entry import start_node
 from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
@@ -53,7 +53,7 @@ def read_commands(bag: Path) -> Commands:
         ReplayError: There is no flight, or no command in it.
     """
     with Bags(bag) as bags:
-        topic = bags.topic_of_type("xplane_bridge/FlightState")
+        topic = bags.topic_of_type(FLIGHT_STATE)
         if topic is None or not bags.topics[topic].count:
             raise ReplayError(f"{bag}: no flight state in it, by whose simulated time commands are played")
         namespace = topic[: -len("/flight_state")]

@@ -9,7 +9,7 @@ from typing import Any, Callable, Dict, List, NamedTuple
 import numpy as np
 
 from xplane_bridge import lockstep
-from xplane_bridge.bags import Bags
+from xplane_bridge.bags import FLIGHT_STATE, Bags
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
 from xplane_bridge.cli.entry import start_node
 from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
@@ -54,7 +54,7 @@ def read_poses(bag: Path) -> Poses:
         ReplayError: There are no two valid poses in it.
     """
     with Bags(bag) as bags:
-        topic = bags.topic_of_type("xplane_bridge/FlightState")
+        topic = bags.topic_of_type(FLIGHT_STATE)
         state = bags.read(topic) if topic is not None and bags.topics[topic].count else None
     if state is not None:
         elapsed = elapsed_of(state)
