@@ -18,7 +18,7 @@ from registry import Context, Measure, benchmark
 
 from xplane_bridge.harness import HarnessError, ManagedProcess, RosMaster
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.harness.ros import free_port
+from xplane_bridge.harness.ports import free_tcp_port
 
 _TITLE = "bench window"
 _DRAWN_FPS = 57.0  # not a divisor of any rate here: periods vary, too
@@ -148,7 +148,7 @@ class _Stage:
 def _capture_node(stage: _Stage) -> _Figures:
     width, height = stage.size
     own = {"window": {"title": _TITLE}, "width": width, "height": height, "max_rate": 0.0}
-    shared = {"host": "127.0.0.1", "port": free_port(), "listen_for_beacon": False}
+    shared = {"host": "127.0.0.1", "port": free_tcp_port(), "listen_for_beacon": False}
     stage.set_param("/bench", {**shared, "capture_node": own})
     node = stage.program(["capture_node", "__ns:=/bench"])
     return stage.measure(node, "/bench/camera/image_raw", "/bench/camera/frame_state")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import socket
 import sys
 from pathlib import Path
 from typing import Callable, Dict, List, Sequence
@@ -16,7 +15,8 @@ from registry import Context, Measure, benchmark
 from support.simulator.emulator_fixture import EmulatorFixture, XPlaneClient
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
-from xplane_bridge.harness.ros import free_port, roslaunch
+from xplane_bridge.harness.ports import free_udp_port
+from xplane_bridge.harness.ros import roslaunch
 
 
 def _socket_drops(pid: int) -> int:
@@ -59,7 +59,7 @@ class _Field:
         self.rate = rate
         self.folder = context.folder
         self.folder.mkdir(parents=True, exist_ok=True)
-        self.port = free_port(socket.SOCK_DGRAM)
+        self.port = free_udp_port()
         self._stack = contextlib.ExitStack()
         self.values = self.folder / "values.txt"
 
@@ -196,7 +196,7 @@ def control(context: Context) -> List[Measure]:
 
     The messages drift through a period of the nodes' timers; the worst phase is the slowest eighth of that period.
     """
-    bare_port = free_port(socket.SOCK_DGRAM)
+    bare_port = free_udp_port()
     with _Field(context, 50.0) as field, EmulatorProcess(context.folder, ["--fps", "60"]) as emulator:
         script = cpp_program("bench_bare_hops")
         field.start("bare_mapper", [script, "mapper", "/bare/joy", "/bare/command", _XBOX_ROLL_AXIS])

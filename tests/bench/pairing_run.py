@@ -22,7 +22,7 @@ from measuring import Use
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.harness.ros import free_port
+from xplane_bridge.harness.ports import free_tcp_port
 from xplane_bridge.resources import config_file, node_program, program
 
 COLUMNS = (
@@ -151,7 +151,7 @@ def fly(folder: Path, flight: Flight) -> None:
                 "listen_for_beacon": False,
                 "display_delay": delays[0],
             }
-            receiver = free_port()
+            receiver = free_tcp_port()
             source = {"source": "sender", "sender": {"listen": f"127.0.0.1:{receiver}"}} if sender else {}
             window = {"window": {"index": 0}} if flight.windows > 1 else {}
             rospy.set_param(_NAMESPACE, {**shared, "capture_node": {"max_rate": 0.0, **source, **window}})

@@ -15,7 +15,7 @@ from support.interrupts import heed_ctrl_c
 from support.nodes.connections import is_connected
 from support.scheduling import long_ones_first, rank
 from xplane_bridge import protocol
-from xplane_bridge.harness import EmulatorProcess, ManagedProcess, RosMaster, wait_until
+from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import node_program
 
@@ -153,7 +153,11 @@ class TopicLog:
                     return True
             return False
 
-        wait_until(look, timeout, f"{what or 'fitting message'} on {self.topic}")
+        try:
+            wait_until(look, timeout, f"{what or 'fitting message'} on {self.topic}")
+        except HarnessError as error:
+            msg = f"{error}; {len(self.messages)} came, the last:\n{self.last}"
+            raise HarnessError(msg) from error
         return found[0]
 
     def close(self) -> None:

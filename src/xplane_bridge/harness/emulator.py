@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any, Sequence
 
+from xplane_bridge.harness.ports import free_udp_port
 from xplane_bridge.harness.processes import ManagedProcess, wait_until
 from xplane_bridge.resources import program
 
@@ -51,6 +52,7 @@ class EmulatorProcess(ManagedProcess):
         Raises:
             HarnessError: It ends before that, or is silent for a minute.
         """
+        self.port = self.port or free_udp_port()
         where = ["--bind", "127.0.0.1", "--port", self.port, "--no-beacon"]
         self.command = [str(part) for part in [*self._program, *where, *self._options]]
         super().start()

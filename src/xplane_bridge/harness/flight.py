@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 import xmlrpc.client
@@ -13,8 +12,9 @@ from typing import Any, Callable, Dict, List, Optional
 
 from xplane_bridge.harness.emulator import EmulatorProcess
 from xplane_bridge.harness.lockstep_flight import Lockstep, LockstepRun, wait_for_bridge
+from xplane_bridge.harness.ports import free_udp_port
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
-from xplane_bridge.harness.ros import RosMaster, free_port, roslaunch
+from xplane_bridge.harness.ros import RosMaster, roslaunch
 from xplane_bridge.harness.running_flight import RunningFlight
 from xplane_bridge.topics import NAMESPACE
 
@@ -135,7 +135,7 @@ def fly(
             port=emulator.port,
             transport=plan.transport,
             aircraft=plan.aircraft,
-            data_port=free_port(socket.SOCK_DGRAM),
+            data_port=free_udp_port(),
             listen_for_beacon=False,
             bag=_RECORDING,  # in ROS_HOME: a path with a space in it cannot be passed through a launch file
             **launch_args,

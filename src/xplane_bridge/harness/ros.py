@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import uuid
@@ -12,18 +11,12 @@ import xmlrpc.client
 from pathlib import Path
 from typing import Any, Dict, Mapping, NamedTuple, Optional, Set, Tuple
 
+from xplane_bridge.harness.ports import free_tcp_port
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.resources import clone_dir
 
 _MASTER_TIMEOUT_S = 30.0
 _CALLER = "/xplane_bridge_harness"
-
-
-def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
-    """A port of the loopback interface that is free now: TCP, or UDP with `socket.SOCK_DGRAM`."""
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def ros_environment(base: Optional[Mapping[str, str]] = None) -> dict[str, str]:
@@ -123,7 +116,7 @@ class RosMaster(ManagedProcess):
         """
         self.ros_home.mkdir(parents=True, exist_ok=True)
         for attempt in range(self._ATTEMPTS):
-            port = free_port()
+            port = free_tcp_port()
             self.uri = f"http://127.0.0.1:{port}"
             self.command = ["rosmaster", "--core", "-p", str(port)]
             self._env = self.env

@@ -11,7 +11,7 @@ import pytest
 
 from support.deadlines import WAIT_S
 from xplane_bridge.harness import ManagedProcess, RosMaster, wait_until
-from xplane_bridge.harness.ros import free_port
+from xplane_bridge.harness.ports import free_tcp_port
 
 STOP_ORDER = ["start", "stop_inputs", "undo", "final_state", "join"]
 
@@ -99,7 +99,7 @@ def test_ending_needs_no_master(world, tmp_path):
 
 
 def test_ctrl_c_while_waiting_for_a_master(world, tmp_path):
-    env = {**world.env, "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}"}
+    env = {**world.env, "ROS_MASTER_URI": f"http://127.0.0.1:{free_tcp_port()}"}
     with ManagedProcess("tiny", [world.program("tiny_node")], tmp_path, env=env) as node:
         node.wait_for_line("no ROS master at .* waiting", WAIT_S)
         node.send_signal(signal.SIGINT)

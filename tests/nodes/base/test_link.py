@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ import pytest
 
 from support.deadlines import WAIT_S
 from xplane_bridge.harness import wait_until
+from xplane_bridge.harness.ports import free_udp_port
 from xplane_bridge.resources import config_file
 
 KINEMATIC = ("--model", "kinematic")
@@ -93,9 +93,7 @@ def one_way(world, version, *arguments, **params):
     """
     from xplane_bridge.msg import DataRows, FlightState, LinkState
 
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_udp_port()
     rows = ("--data-target", f"127.0.0.1:{port}", "--data-rows", "0,1,3-6,8,14-21", "--rate", "60")
     pilot = config_file("scenarios", "demo.yaml")
     world.xplane = world.emulator(*KINEMATIC, "--version", version, "--pilot", pilot, "--deaf", *rows)

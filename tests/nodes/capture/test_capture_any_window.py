@@ -13,7 +13,7 @@ import pytest
 from support.deadlines import WAIT_S
 from xplane_bridge.harness import ManagedProcess, RosMaster, roslaunch
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.harness.ros import free_port
+from xplane_bridge.harness.ports import free_tcp_port
 
 TITLE = "Field notes - page 7"
 #: Two halves, and each half of the other's colour a moment later. 400x300 is of the shape of 640x480.
@@ -63,7 +63,7 @@ def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, 
     from xplane_bridge.msg import FrameState
 
     namespace = f"{world.namespace.lstrip('/')}/desktop"
-    nowhere = {"host": "127.0.0.1", "port": free_port(), "listen_for_beacon": False}
+    nowhere = {"host": "127.0.0.1", "port": free_tcp_port(), "listen_for_beacon": False}
     args = {"ns": namespace, "window_title": TITLE, "x_display": display, **nowhere}
     with roslaunch(master, tmp_path, "capture.launch", **args) as launch:
         images = world.watch("desktop/camera/image_raw", Image)

@@ -24,7 +24,7 @@ from xplane_bridge.eye.grab import TITLES
 from xplane_bridge.eye.pairing import Decision
 from xplane_bridge.eye.verify import Verification
 from xplane_bridge.harness import EmulatorProcess, ManagedProcess, wait_until
-from xplane_bridge.harness.ros import free_port
+from xplane_bridge.harness.ports import free_tcp_port
 from xplane_bridge.resources import program
 
 pytestmark = pytest.mark.usefixtures("screen")
@@ -98,7 +98,7 @@ class Scene:
 
         self.world = world
         self.folder = folder
-        self.port = free_port()
+        self.port = free_tcp_port()
         self.emulator = world.emulator(
             "--window",
             f"{WIDTH}x{HEIGHT}",

@@ -18,7 +18,7 @@ from support.nodes.second_camera import NAME, WINDOW, second_camera
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.harness.ros import free_port
+from xplane_bridge.harness.ports import free_tcp_port
 from xplane_bridge.resources import config_file, program
 
 #: So few that pictures of half a frame late, by which a pairing could be off, are rare on a busy machine.
@@ -46,7 +46,7 @@ def reading_windows(world, port: int, display: str):
 @contextlib.contextmanager
 def taking_what_is_sent(world, port: int, display: str):
     """Two capture_node with an xplane_eye for each."""
-    listen = [f"127.0.0.1:{free_port()}" for _ in range(2)]
+    listen = [f"127.0.0.1:{free_tcp_port()}" for _ in range(2)]
     world.start("capture_node", {"source": "sender", "sender": {"listen": listen[0]}})
     second = yaml.safe_load(config_file("capture.yaml").read_text(encoding="utf-8"))
     second["source"], second["sender"]["listen"] = "sender", listen[1]

@@ -17,10 +17,10 @@ from support.nodes.rx_fixtures import (
     both_transports,
     fixture_rx,  # noqa: F401
     fixture_transport,  # noqa: F401
-    free_udp_port,
 )
 from xplane_bridge import protocol
 from xplane_bridge.harness import ManagedProcess
+from xplane_bridge.harness.ports import free_udp_port
 from xplane_bridge.resources import program
 
 

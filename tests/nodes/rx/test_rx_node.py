@@ -20,10 +20,10 @@ from support.nodes.rx_fixtures import (  # noqa: F401
     both_transports,
     fixture_rx,
     fixture_transport,
-    free_udp_port,
 )
 from xplane_bridge import __version__, protocol
 from xplane_bridge.harness import wait_until
+from xplane_bridge.harness.ports import free_udp_port
 from xplane_bridge.resources import config_file
 
 MISSION = {

@@ -15,8 +15,8 @@ from support.nodes.rx_fixtures import (
     EARTH_RADIUS_M,
     KINEMATIC,
     fixture_rx,  # noqa: F401
-    free_udp_port,
 )
+from xplane_bridge.harness.ports import free_udp_port
 
 # --- services ---------------------------------------------------------------------------------------------------------
 

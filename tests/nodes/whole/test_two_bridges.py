@@ -17,7 +17,7 @@ from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import ROLL, CommandSource, WatchedDatarefs
 from xplane_bridge.harness import ManagedProcess, roslaunch, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.harness.ros import free_port
+from xplane_bridge.harness.ports import free_tcp_port
 from xplane_bridge.resources import program
 
 LONGITUDES = {"first": 20.0, "second": 40.0}
@@ -31,7 +31,7 @@ class Side:
     def __init__(self, world: Any, name: str) -> None:
         self.name, self._world, self.folder = name, world, world.folder / name
         self.namespace = f"{world.namespace}/{name}"
-        self.port = free_port()
+        self.port = free_tcp_port()
         self.display = VirtualDisplay(self.folder)
         self.display.start()
         self.xplane = self._emulator()

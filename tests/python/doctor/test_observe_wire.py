@@ -16,15 +16,10 @@ from xplane_bridge.doctor.observe import beacons, computer, data_output, ports, 
 from xplane_bridge.doctor.observe.beacons import BeaconWatch, Sighting
 from xplane_bridge.doctor.observe.target import Chosen, choose, distinct
 from xplane_bridge.doctor.settings import Settings
+from xplane_bridge.harness.ports import free_udp_port
 
 GROUP = "239.255.1.1"
 VALUES = {names.VERSION: 115501.0, FakeXPlane.TIME: 10.0, names.PAUSED: 0.0, names.REPLAY: 0.0, names.DATA_RATE: 20.0}
-
-
-def free_udp_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Repeat:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import socket
-
 import pytest
 
 EARTH_RADIUS_M = 6378145.0
@@ -33,9 +31,3 @@ def fixture_rx(world):
         return world.start("rx_node", params)
 
     return start
-
-
-def free_udp_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]

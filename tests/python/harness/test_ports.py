@@ -1,0 +1,32 @@
+"""Ports of the test harness: free, and not of those that other sockets get by chance."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from xplane_bridge.harness import HarnessError, ports
+
+
+@pytest.mark.parametrize(
+    ("free_port", "kind"), [(ports.free_tcp_port, socket.SOCK_STREAM), (ports.free_udp_port, socket.SOCK_DGRAM)]
+)
+def test_a_port_is_free_and_not_of_those_given_away(monkeypatch, free_port, kind):
+    with socket.socket(socket.AF_INET, kind) as taken, socket.socket(socket.AF_INET, kind) as given:
+        first = free_port()
+        taken.bind(("127.0.0.1", first))
+        given.bind(("127.0.0.1", 0))
+        assert first < given.getsockname()[1]
+        drawn = [first, first + 1]
+        monkeypatch.setattr(ports.secrets, "randbelow", lambda count: drawn.pop(0) - (32768 - count))
+        assert free_port() != first
+        assert not drawn
+
+
+def test_no_free_port_is_said(monkeypatch):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", ports.free_udp_port()))
+        monkeypatch.setattr(ports.secrets, "randbelow", lambda count: taken.getsockname()[1] - (32768 - count))
+        with pytest.raises(HarnessError, match="no free port between 20000 and 32767"):
+            ports.free_udp_port()
