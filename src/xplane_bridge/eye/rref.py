@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
-from typing import Callable, Optional, Tuple
+from typing import Callable, Collection, Optional, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.errors import XplaneBridgeError
@@ -25,6 +25,8 @@ THIS_COMPUTER: Address = ("127.0.0.1", protocol.DEFAULT_PORT)
 _EVERY_FRAME_HZ = 999
 #: X-Plane is asked again after so long a silence [s].
 _SILENCE_S = 1.0
+#: And after so long for what its frames lack [s]: the request was lost, or this X-Plane has no such dataref.
+_LACKS_S = 3.0
 _LISTEN_S = 0.25
 _SAME_MOMENT_NS = 100_000
 _STAMP = struct.Struct("@qq")
@@ -53,7 +55,9 @@ class Heard:
 
 
 class FrameStream:
-    """A subscription to X-Plane's frames; use it with ``with``. Asks again when X-Plane was restarted.
+    """A subscription to X-Plane's frames; use it with ``with``.
+
+    Asks again when X-Plane was restarted, and for what a lost request did not bring.
 
     Args:
         xplane: IPv4 address and port X-Plane listens on.
@@ -84,6 +88,7 @@ class FrameStream:
         self._socket.settimeout(_LISTEN_S)
         self._stop = threading.Event()
         self._heard_ns: Optional[int] = None
+        self._lacks: Collection[int] = ()  # indices of names.SUBSCRIBED
         self._thread = threading.Thread(target=self._run, name="rref", daemon=True)
 
     def __enter__(self) -> FrameStream:
@@ -94,7 +99,7 @@ class FrameStream:
         self._stop.set()
         self._thread.join()
         with contextlib.suppress(OSError):
-            self._subscribe(0)
+            self._subscribe(0, range(len(names.SUBSCRIBED)))
         self._socket.close()
 
     @property
@@ -107,17 +112,18 @@ class FrameStream:
         with contextlib.suppress(OSError):
             self._socket.sendto(protocol.DrefWrite(path, value).encode(), self._xplane)
 
-    def _subscribe(self, rate_hz: int) -> None:
-        for index, path in enumerate(names.SUBSCRIBED):
-            self._socket.sendto(protocol.RrefRequest(rate_hz, index, path).encode(), self._xplane)
+    def _subscribe(self, rate_hz: int, indices: Collection[int]) -> None:
+        for index in indices:
+            self._socket.sendto(protocol.RrefRequest(rate_hz, index, names.SUBSCRIBED[index]).encode(), self._xplane)
 
     def _run(self) -> None:
         asked_s = -math.inf
         while not self._stop.is_set():
-            if not self.alive and time.monotonic() - asked_s > _SILENCE_S:
+            lacks: Collection[int] = self._lacks if self.alive else range(len(names.SUBSCRIBED))
+            if lacks and time.monotonic() - asked_s > (_LACKS_S if self.alive else _SILENCE_S):
                 asked_s = time.monotonic()
                 with contextlib.suppress(OSError):
-                    self._subscribe(_EVERY_FRAME_HZ)
+                    self._subscribe(_EVERY_FRAME_HZ, lacks)
             try:
                 heard = self._receive()
             except (OSError, protocol.DecodeError):  # silence, ICMP's answer, or a datagram from another program
@@ -143,7 +149,10 @@ class FrameStream:
             return None
         values = dict(protocol.decode_rref_response(datagram))
         key, field_of_view_deg, times_on_screen = (values.get(k, math.nan) for k in range(len(names.SUBSCRIBED)))
-        return Heard(arrival_ns, key, field_of_view_deg, times_on_screen) if math.isfinite(key) else None
+        if not math.isfinite(key):
+            return None
+        self._lacks = set(range(len(names.SUBSCRIBED))).difference(values)
+        return Heard(arrival_ns, key, field_of_view_deg, times_on_screen)
 
 
 def _both_clocks() -> Tuple[int, int]:
