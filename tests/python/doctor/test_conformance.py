@@ -391,3 +391,14 @@ def test_answers_are_written_where_the_aircraft_cannot_be_brought_into_the_air(t
         flown = flown_here(xplane, tmp_path, monkeypatch, "same-index", "prel", "side-sign")
     assert flown == (2, {"same-index"})
     assert "X-Plane follows neither PREL nor VEHS nor local coordinates" in capsys.readouterr().err
+
+
+def test_answers_are_written_where_the_card_is_ended_by_ctrl_c(tmp_path, monkeypatch, capsys):
+    def interrupted(_self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(flight.Flight, "begin", interrupted)
+    with FakeXPlane(FLIES) as xplane:
+        flown = flown_here(xplane, tmp_path, monkeypatch, "same-index", "side-sign")
+    assert flown == (2, {"same-index"})
+    assert "ended by Ctrl-C: the questions after these were not asked" in capsys.readouterr().err

@@ -126,6 +126,8 @@ def _ask_all(
             say(question, answers[question.id])
     except (NoFlightError, NotTestableError, JournalError) as error:
         return str(error)
+    except KeyboardInterrupt:
+        return "ended by Ctrl-C: the questions after these were not asked"
     finally:
         left += flight.end()
     return ""

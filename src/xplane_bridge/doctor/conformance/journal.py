@@ -7,6 +7,7 @@ import importlib
 import json
 import os
 import socket
+import time
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List, Sequence
 
@@ -16,6 +17,8 @@ from xplane_bridge.doctor.observe.journals import HEAD, Owner, boot_id, judge_ow
 NODE = "xplane_doctor"
 #: Purposes as the nodes have them: tx_node and rx_node undo what a doctor left that was killed.
 OVERRIDE, DATA_OUTPUT = "override", "data_output"
+#: How long another process may write [s].
+_LOCK_TIMEOUT_S = 10.0
 _OPERATIONS = ("dref", "data", "usel", "ise4_off")
 
 Operation = Dict[str, Any]
@@ -133,8 +136,7 @@ class Journal:
         return judge_owner(entry["owner"], self._proc) is Owner.GONE
 
     def _entries(self) -> List[Entry]:
-        with self._locked():
-            return self._load()
+        return self._load()  # replaced as a whole: it reads without the lock, which a hung node may have
 
     def _change(self, how: Callable[[List[Entry]], List[Entry]]) -> None:
         with self._locked():
@@ -147,7 +149,16 @@ class Journal:
     def _locked(self) -> Iterator[None]:
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with open(f"{self.file}.lock", "a", encoding="utf-8") as lock:
-            self._fcntl.flock(lock, self._fcntl.LOCK_EX)
+            deadline = time.monotonic() + _LOCK_TIMEOUT_S
+            while True:
+                try:
+                    self._fcntl.flock(lock, self._fcntl.LOCK_EX | self._fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    if time.monotonic() > deadline:
+                        msg = f"{self.file}: another process has it locked: it was stopped while it wrote; end it first"
+                        raise JournalError(msg) from None
+                    time.sleep(0.02)
             yield
 
     def _load(self) -> List[Entry]:
@@ -162,8 +173,13 @@ class Journal:
     def _store(self, entries: List[Entry]) -> None:
         if entries:
             new = Path(f"{self.file}.new")
+            try:
+                text = json.dumps({**HEAD, "entries": entries}, indent=2, allow_nan=False)
+            except ValueError:
+                msg = f"{self.file}: a value that is no number cannot be noted, so it could not be put back"
+                raise JournalError(msg) from None
             with new.open("w", encoding="utf-8") as file:
-                json.dump({**HEAD, "entries": entries}, file, indent=2)
+                file.write(text)
                 file.flush()
                 os.fsync(file.fileno())
             new.rename(self.file)
