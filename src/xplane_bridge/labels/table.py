@@ -139,7 +139,7 @@ def read(path: Path) -> Labels:
             else:
                 places.setdefault(str(content["camera"]), {})[int(content["stamp_ns"])] = at
             at += len(line)
-    except ValueError:
+    except (ValueError, KeyError, TypeError):
         about = None
     if not isinstance(about, dict) or about.get("labels") != SCHEMA:
         file.close()

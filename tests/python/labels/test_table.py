@@ -58,7 +58,19 @@ def test_what_ends_in_an_error_leaves_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"labels": 1}\n', '{"labels": 2}\n{"camera": "a", "stamp', "\xff"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        "[1]",
+        '{"labels": 1}\n',
+        '{"labels": 2}\n{"camera": "a", "stamp',
+        '{"labels": 2}\n{"camera": "a"}\n',
+        '{"labels": 2}\n[1]\n',
+        "\xff",
+    ],
+)
 def test_what_is_no_file_of_labels_is_refused_in_words(tmp_path: Path, text: str) -> None:
     path = tmp_path / "a.labels.jsonl"
     path.write_text(text, encoding="latin-1")
