@@ -128,7 +128,7 @@ class ImageQuality(enum.IntFlag):
     VIEW_UNKNOWN = 512  #: the view could not be read back: frame_id is the configured one
     FOV_ASSUMED = 1024  #: the field of view could not be read back: the parameter's was used
     EXTERNAL_VIEW = 2048  #: the camera is outside the aircraft
-    EPOCH_EDGE = 4096  #: the frame lies at a reset, pause or gap
+    EPOCH_EDGE = 4096  #: the frame lies at a reset, pause, new origin or gap
     DELAY_ASSUMED = 8192  #: the display delay is the default, not measured on this set-up
     BORDERLINE = 16384  #: half way between two frames, or seen late: the pairing may be one frame off
     POSE_UNSURE = 32768  #: how X-Plane's camera angles are to be read is open, or the camera moved in the cockpit

@@ -85,22 +85,26 @@ void ImageAssociator::addFrame(const SimFrame& frame) {
 
 void ImageAssociator::addState(const StateKey& state) {
   if (!std::isfinite(state.sim_time_raw)) return;
+  std::int64_t age_axis_ns = 0;
   if (!states_.empty()) {
     const StateKey& last = states_.back().key;
+    age_axis_ns = states_.back().age_axis_ns +
+                  std::clamp<std::int64_t>(state.stamp_ns - last.stamp_ns, 0, toNanoseconds(options_.max_gap));
     const double step = static_cast<double>(state.sim_time_raw) - static_cast<double>(last.sim_time_raw);
     if (step < 0.0) {
       states_.clear();
       ++state_segment_;
-    } else if (step > options_.max_gap || last.epoch != state.epoch || last.paused != state.paused) {
+    } else if (step > options_.max_gap || last.epoch != state.epoch || last.paused != state.paused ||
+               last.position_epoch != state.position_epoch) {
       ++state_segment_;
     }
   }
-  states_.push_back({state, state_segment_});
+  states_.push_back({state, state_segment_, age_axis_ns});
   const std::int64_t history_ns = toNanoseconds(options_.history);
   while (states_.size() > 2 &&
          (static_cast<double>(state.sim_time_raw) - static_cast<double>(states_.front().key.sim_time_raw) >
               options_.history ||
-          state.stamp_ns - states_.front().key.stamp_ns > history_ns)) {
+          age_axis_ns - states_.front().age_axis_ns > history_ns)) {
     states_.pop_front();
   }
 }

@@ -95,6 +95,7 @@ void ImagePairing::addState(const FlightState::ConstPtr& state, std::int64_t arr
                      : stamp_ns.value_or(static_cast<std::int64_t>(state->header.stamp.toNSec()));
   key.epoch = state->epoch;
   key.paused = state->paused || state->replay;
+  key.position_epoch = state->position_epoch;
   associator_.addState(key);
   states_[key.id] = {state, arrival_ns};
   state_seen_ = true;

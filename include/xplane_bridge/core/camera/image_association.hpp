@@ -16,7 +16,7 @@ namespace xplane_bridge::core {
 /// that was heard, and that frame to the flight state carrying the same `sim_time`. A state is a received one, never a
 /// mixture, as long as states arrive for every frame; only when their rate is below the frame rate is the state of the
 /// frame interpolated between its neighbours, and that is flagged. Nothing is ever interpolated across a pause, a
-/// reset, an epoch or a gap.
+/// reset, an epoch, a new origin or a gap.
 ///
 /// No clock, no thread, no ROS: one thread calls, or the caller locks.
 
@@ -36,6 +36,7 @@ struct StateKey {
   std::int64_t stamp_ns = 0;  ///< [ns] FlightState.header.stamp (its publisher's clock)
   std::uint32_t epoch = 0;    ///< FlightState.epoch
   bool paused = false;
+  std::uint32_t position_epoch = 0;  ///< FlightState.position_epoch
 };
 
 /// When the picture appeared.
@@ -136,6 +137,7 @@ class ImageAssociator {
   struct State {
     StateKey key;
     std::uint32_t segment;
+    std::int64_t age_axis_ns;  // the stamps' time without the steps of a clock that is set
   };
   struct FrameChoice {
     double raw;     // [s] in the raw float32's numbers

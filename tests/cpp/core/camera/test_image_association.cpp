@@ -163,6 +163,35 @@ TEST(ImageAssociator, InterpolatesOnlyBelowTheFrameRateAndFlagsIt) {
   EXPECT_EQ(exact.id, 63U);
 }
 
+TEST(ImageAssociator, NeverInterpolatesAcrossANewOrigin) {
+  core::ImageAssociator associator;
+  for (int k = 0; k < 60; ++k) {
+    associator.addFrame(frameAt(k / 60.0));
+    core::StateKey state = stateAt(static_cast<std::uint64_t>(k), k / 60.0);
+    state.position_epoch = k > 30 ? 1U : 0U;
+    if (k % 3 == 0) associator.addState(state);
+  }
+  EXPECT_EQ(associator.associate(momentAt(28.0 / 60.0), false).method, PairingMethod::kInterpolated);
+  EXPECT_EQ(associator.associate(momentAt(30.0 / 60.0), false).method, PairingMethod::kFrame);
+  EXPECT_EQ(associator.associate(momentAt(31.0 / 60.0), false).method, PairingMethod::kNone);
+  EXPECT_EQ(associator.associate(momentAt(33.0 / 60.0), false).method, PairingMethod::kFrame);
+}
+
+TEST(ImageAssociator, KeepsTheStatesWhereTheWallClockIsSet) {
+  for (const std::int64_t step_ns : {8'000'000'000, -8'000'000'000}) {
+    core::ImageAssociator associator;
+    for (int k = 0; k < 60; ++k) {
+      associator.addFrame(frameAt(k / 60.0));
+      core::StateKey state = stateAt(static_cast<std::uint64_t>(k), k / 60.0);
+      state.stamp_ns += k > 30 ? step_ns : 0;
+      associator.addState(state);
+    }
+    const auto answer = associator.associate(momentAt(28.0 / 60.0), false);
+    EXPECT_EQ(answer.method, PairingMethod::kFrame);
+    EXPECT_EQ(answer.id, 28U);
+  }
+}
+
 TEST(ImageAssociator, NeverInterpolatesAcrossAnEpochPauseOrGap) {
   const auto between = [](bool new_epoch, bool pause, double gap) {
     core::ImageAssociator associator;
