@@ -14,7 +14,7 @@ import json
 import os
 import random
 import shutil
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence
@@ -208,18 +208,23 @@ def run_local(jobs: Sequence[Job], workers: int) -> Iterator[Outcome]:
 
 
 def _lost(job: Job) -> Outcome:
-    error = "a process of the export was killed, perhaps for want of memory; give the command again, with fewer --jobs"
+    error = (
+        "a process of the export was killed, perhaps for want of memory; give the command again, with fewer --jobs or "
+        "Dask workers"
+    )
     return Outcome(job.name, None, error, False)
 
 
 def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:
     """Export on a running Dask cluster whose workers see the same paths.
 
+    The flights of a worker that was killed, again and again, have failed.
+
     Raises:
-        ExportError: dask.distributed is not installed, or nothing answers at the address.
+        ExportError: dask.distributed is not installed, nothing answers at the address, or the scheduler ended.
     """
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker
         from distributed import as_completed as completed
     except ImportError:
         msg = "--scheduler needs dask.distributed: pip install 'dask[distributed]'"
@@ -232,9 +237,18 @@ def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:
         )
         raise ExportError(msg) from None
     with client:
-        futures = [client.submit(export_flight, job, pure=False) for job in jobs]
-        for future in completed(futures):
-            yield future.result()
+        futures = {client.submit(export_flight, job, pure=False): job for job in jobs}
+        for future in completed(list(futures)):
+            try:
+                yield future.result()
+            except KilledWorker:
+                yield _lost(futures[future])
+            except CancelledError:
+                msg = (
+                    f"the Dask scheduler at {address} ended; what is exported is kept: start scheduler and workers, "
+                    "then give the command again"
+                )
+                raise ExportError(msg) from None
 
 
 def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]]) -> Iterator[Outcome]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -155,6 +156,31 @@ def test_a_killed_process_leaves_the_manifest_of_the_others(
 
 def end_this_process(_: Job) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_killed_worker_of_a_cluster_leaves_the_manifest_of_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dask = pytest.importorskip("dask")
+    distributed = pytest.importorskip("distributed")
+    cloudpickle = pytest.importorskip("cloudpickle")
+    made, *given = (write_flight(tmp_path / f"{name}.bag", 0.4) for name in "abc")
+    assert export(made, "-o", tmp_path / "out") == 0
+    module = sys.modules[__name__]
+    cloudpickle.register_pickle_by_value(module)  # the workers cannot import it
+    monkeypatch.setattr(campaign, "export_flight", end_this_process)
+    try:
+        with dask.config.set({"distributed.scheduler.allowed-failures": 0}), distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+        ) as cluster:
+            assert export(*given, "--scheduler", cluster.scheduler_address, "-o", tmp_path / "out") == 1
+    finally:
+        cloudpickle.unregister_pickle_by_value(module)
+    out = capsys.readouterr()
+    for name in "bc":
+        assert f"{name}: a process of the export was killed" in out.err
+    assert "0 of 2 flights exported" in out.out
+    assert list(json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["csv"]) == ["a"]
 
 
 def test_two_exports_on_one_cluster_do_not_mix(tmp_path: Path) -> None:
