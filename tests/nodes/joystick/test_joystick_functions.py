@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.tx_fixtures import RepeatedJoy, WatchedDatarefs, tx_params, write_mixing
+from support.nodes.tx_fixtures import RepeatedJoy, WatchedDatarefs, call, tx_params, write_mixing
 from xplane_bridge.harness import wait_until
 
 CONTROLS = "sim/flightmodel/controls/"
@@ -109,6 +109,20 @@ def test_functions_ask_tx_node(stick, world):
     wait_until(lambda: world.wire.value(FLIGHT) > 3.0, WAIT_S, "a flight of some seconds")
     stick.press(5)
     wait_until(lambda: world.wire.value(FLIGHT) < 3.0, WAIT_S, "a new flight")
+
+
+def test_a_failure_that_another_client_repaired_fails_again_at_the_press_after_the_refused_one(stick, world):
+    stick.press(4)
+    world.wire.wait(ENGINE, 6.0, WAIT_S)
+    release(stick, world)
+    assert call(world, "clear_failures", "ClearFailures", names=["engine_1"]).success
+    world.wire.wait(ENGINE, 0.0, WAIT_S)
+    stick.press(4)
+    reported(world, 'functions.engine: "engine_1" is not broken')
+    assert world.wire.value(ENGINE) == 0.0
+    release(stick, world)
+    stick.press(4)
+    world.wire.wait(ENGINE, 6.0, WAIT_S)
 
 
 @pytest.mark.parametrize(
