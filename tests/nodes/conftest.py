@@ -13,6 +13,7 @@ import pytest
 from support.deadlines import WAIT_S
 from support.interrupts import heed_ctrl_c
 from support.nodes.connections import is_connected
+from support.nodes.forked_emulator import ForkedEmulator
 from support.scheduling import long_ones_first, rank
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
@@ -259,7 +260,7 @@ class World:
         words = [str(option) for option in options]
         if "--stepped" not in words:
             words = ["--fps", str(FRAMES_PER_SECOND), *words]  # of two, the last one holds
-        process = EmulatorProcess(self.folder, words, name=f"xplane_emulator_{next(_numbers)}", port=port)
+        process = ForkedEmulator(self.folder, words, name=f"xplane_emulator_{next(_numbers)}", port=port)
         process.start()
         self._processes.append(process)
         self.point_to(process.port)

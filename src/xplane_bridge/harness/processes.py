@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 from types import FrameType
-from typing import Callable, Iterator, Mapping, Optional, Sequence, TypeVar
+from typing import BinaryIO, Callable, Iterator, Mapping, Optional, Protocol, Sequence, TypeVar
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -70,6 +70,31 @@ def interrupted_by_signals(name: str) -> Iterator[None]:
         signal.signal(number, handler)
 
 
+class Process(Protocol):
+    """What a `ManagedProcess` needs of the process it has started; `subprocess.Popen` has it."""
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+
+    def poll(self) -> Optional[int]:
+        """Its exit status, negative for a signal; None while it runs."""
+
+    def wait(self, timeout: float) -> int:
+        """Waits for its exit status, at most so long [s], or raises `subprocess.TimeoutExpired`."""
+
+    def send_signal(self, sig: int) -> None:
+        """Sends it a signal, unless it has ended."""
+
+
+def end_with_parent(parent: int) -> None:
+    """Asks the system for SIGINT when the parent of this process, which has this process id, dies."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells ignore it for what they run in the background
+    if os.getppid() != parent:
+        os._exit(1)
+
+
 class ManagedProcess:
     """A child process in a session of its own (the terminal's Ctrl-C does not reach it), its output in a log file.
 
@@ -99,7 +124,7 @@ class ManagedProcess:
         self.log = Path(log_dir) / f"{name}.log"
         self._env = dict(env) if env is not None else None
         self._cwd = cwd
-        self._process: Optional[subprocess.Popen[bytes]] = None
+        self._process: Optional[Process] = None
 
     def __enter__(self) -> ManagedProcess:
         self.start()
@@ -118,29 +143,26 @@ class ManagedProcess:
             msg = f"{self.name} runs already"
             raise HarnessError(msg)
         self.log.parent.mkdir(parents=True, exist_ok=True)
-        parent = os.getpid()
-
-        def end_with_parent() -> None:
-            _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
-            signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells ignore it for what they run in the background
-            if os.getppid() != parent:
-                os._exit(1)
-
         with self.log.open("wb") as log:
             try:
-                self._process = subprocess.Popen(
-                    self.command,
-                    env=self._env,
-                    cwd=self._cwd,
-                    stdin=subprocess.DEVNULL,
-                    stdout=log,
-                    stderr=subprocess.STDOUT,
-                    start_new_session=True,
-                    preexec_fn=end_with_parent,
-                )
+                self._process = self._spawn(log)
             except OSError as error:
                 msg = f"{self.name}: {self.command[0]} cannot be started: {error.strerror}"
                 raise HarnessError(msg) from None
+
+    def _spawn(self, log: BinaryIO) -> Process:
+        """Starts the process, its output to `log`."""
+        parent = os.getpid()
+        return subprocess.Popen(
+            self.command,
+            env=self._env,
+            cwd=self._cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            preexec_fn=lambda: end_with_parent(parent),
+        )
 
     @property
     def running(self) -> bool:
