@@ -58,10 +58,8 @@ FlightChanges::Outcome FlightChanges::applyAutopilot(const core::AutopilotSettin
   };
   const core::SimulatorVersion version = link_->status().version;
   if (setting.restore_on_exit) {
-    const std::string unknown = remember(core::autopilotRestored(setting, version));
-    if (!unknown.empty()) {
-      return failed("X-Plane does not report " + unknown + ", which could not be put back on exit" + linkCondition());
-    }
+    const std::string problem = remember(core::autopilotRestored(setting, version));
+    if (!problem.empty()) return failed(problem);
   }
   const std::vector<core::SettingWrite> dials = core::autopilotDials(setting, version);
   const auto turnDials = [&] {

@@ -216,7 +216,7 @@ struct Content {
 Content look(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {
-    if (errno == ENOENT || !fs::exists(path)) {
+    if (errno == ENOENT) {
       return {};
     }
     failErrno(path, "cannot be read");

@@ -238,6 +238,7 @@ const core::GeoPoint kOrigin{9.9, 20.1, 50.0};
 const MessageValues kChosen = {
     {"sim_time", {100.1}},
     {"frame_period", {0.02}},
+    {"time_ratio_requested", {1.0}},
     {"local_position", {0.0, kHeight, 0.0}},
     {"origin_latitude", {kLatitude}},
     {"origin_longitude", {kLongitude}},
