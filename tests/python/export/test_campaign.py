@@ -163,7 +163,8 @@ def test_a_killed_worker_of_a_cluster_leaves_the_manifest_of_the_others(
 ) -> None:
     dask = pytest.importorskip("dask")
     distributed = pytest.importorskip("distributed")
-    cloudpickle = pytest.importorskip("cloudpickle")
+    import cloudpickle
+
     made, *given = (write_flight(tmp_path / f"{name}.bag", 0.4) for name in "abc")
     assert export(made, "-o", tmp_path / "out") == 0
     module = sys.modules[__name__]
