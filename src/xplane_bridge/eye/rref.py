@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
-from typing import Callable, Collection, Optional, Tuple
+from typing import Callable, Iterable, List, Optional, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.errors import XplaneBridgeError
@@ -29,6 +29,8 @@ _SILENCE_S = 1.0
 _LACKS_S = 3.0
 _LISTEN_S = 0.25
 _SAME_MOMENT_NS = 100_000
+#: Indices of what is asked for.
+_ALL = range(len(names.SUBSCRIBED))
 _STAMP = struct.Struct("@qq")
 _SO_TIMESTAMPNS = 35
 
@@ -88,7 +90,7 @@ class FrameStream:
         self._socket.settimeout(_LISTEN_S)
         self._stop = threading.Event()
         self._heard_ns: Optional[int] = None
-        self._lacks: Collection[int] = ()  # indices of names.SUBSCRIBED
+        self._lacks: List[int] = []  # of _ALL, in the newest frame
         self._thread = threading.Thread(target=self._run, name="rref", daemon=True)
 
     def __enter__(self) -> FrameStream:
@@ -99,7 +101,7 @@ class FrameStream:
         self._stop.set()
         self._thread.join()
         with contextlib.suppress(OSError):
-            self._subscribe(0, range(len(names.SUBSCRIBED)))
+            self._subscribe(0, _ALL)
         self._socket.close()
 
     @property
@@ -112,15 +114,15 @@ class FrameStream:
         with contextlib.suppress(OSError):
             self._socket.sendto(protocol.DrefWrite(path, value).encode(), self._xplane)
 
-    def _subscribe(self, rate_hz: int, indices: Collection[int]) -> None:
+    def _subscribe(self, rate_hz: int, indices: Iterable[int]) -> None:
         for index in indices:
             self._socket.sendto(protocol.RrefRequest(rate_hz, index, names.SUBSCRIBED[index]).encode(), self._xplane)
 
     def _run(self) -> None:
         asked_s = -math.inf
         while not self._stop.is_set():
-            lacks: Collection[int] = self._lacks if self.alive else range(len(names.SUBSCRIBED))
-            if lacks and time.monotonic() - asked_s > (_LACKS_S if self.alive else _SILENCE_S):
+            lacks, patience_s = (self._lacks, _LACKS_S) if self.alive else (_ALL, _SILENCE_S)
+            if lacks and time.monotonic() - asked_s > patience_s:
                 asked_s = time.monotonic()
                 with contextlib.suppress(OSError):
                     self._subscribe(_EVERY_FRAME_HZ, lacks)
@@ -148,10 +150,10 @@ class FrameStream:
         if sender[0] != self._xplane[0]:
             return None
         values = dict(protocol.decode_rref_response(datagram))
-        key, field_of_view_deg, times_on_screen = (values.get(k, math.nan) for k in range(len(names.SUBSCRIBED)))
+        key, field_of_view_deg, times_on_screen = (values.get(index, math.nan) for index in _ALL)
         if not math.isfinite(key):
             return None
-        self._lacks = set(range(len(names.SUBSCRIBED))).difference(values)
+        self._lacks = [index for index in _ALL if index not in values]
         return Heard(arrival_ns, key, field_of_view_deg, times_on_screen)
 
 
