@@ -94,7 +94,7 @@ class Journal:
         """Who else has changed this X-Plane and still runs, in words."""
         return [
             f"{entry['owner']['node']} (process {entry['owner']['pid']} on {entry['owner']['computer']})"
-            for entry in self._entries()
+            for entry in self._load()
             if entry["purpose"] in (OVERRIDE, DATA_OUTPUT) and not self._is_gone(entry) and not self._is_own(entry)
         ]
 
@@ -102,13 +102,13 @@ class Journal:
         """What processes that are gone have left: to be undone, then removed. Without what only nodes can undo."""
         return [
             entry
-            for entry in self._entries()
+            for entry in self._load()
             if self._is_gone(entry) and all(operation["op"] in _OPERATIONS for operation in entry["undo"])
         ]
 
     def own(self) -> List[Entry]:
         """What this process has noted, in the order in which it did."""
-        return [entry for entry in self._entries() if self._is_own(entry)]
+        return [entry for entry in self._load() if self._is_own(entry)]
 
     def record(self, id_: str, purpose: str, undo: Sequence[Operation]) -> None:
         """Notes how to undo a change; only when this returns may it be made. The first note of an id counts."""
@@ -135,9 +135,6 @@ class Journal:
     def _is_gone(self, entry: Entry) -> bool:
         return judge_owner(entry["owner"], self._proc) is Owner.GONE
 
-    def _entries(self) -> List[Entry]:
-        return self._load()  # replaced as a whole: it reads without the lock, which a hung node may have
-
     def _change(self, how: Callable[[List[Entry]], List[Entry]]) -> None:
         with self._locked():
             before = self._load()
@@ -162,6 +159,7 @@ class Journal:
             yield
 
     def _load(self) -> List[Entry]:
+        """Also without the lock, which a hung node may have: the file is replaced as a whole."""
         try:
             return load(self.file)
         except FileNotFoundError:
