@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
@@ -147,11 +148,15 @@ def test_a_killed_process_leaves_the_manifest_of_the_others(
     assert export(made, "-o", tmp_path / "out") == 0
     monkeypatch.setattr(campaign, "export_flight", end_this_process)
     assert export(*given, "--jobs", "2", "-o", tmp_path / "out") == 1
+    assert_lost_but_a(tmp_path / "out", capsys)
+
+
+def assert_lost_but_a(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = capsys.readouterr()
     for name in "bc":
         assert f"{name}: a process of the export was killed" in out.err
     assert "0 of 2 flights exported" in out.out
-    assert list(json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["csv"]) == ["a"]
+    assert list(json.loads((folder / "manifest.json").read_text())["exports"]["csv"]) == ["a"]
 
 
 def end_this_process(_: Job) -> None:
@@ -177,11 +182,27 @@ def test_a_killed_worker_of_a_cluster_leaves_the_manifest_of_the_others(
             assert export(*given, "--scheduler", cluster.scheduler_address, "-o", tmp_path / "out") == 1
     finally:
         cloudpickle.unregister_pickle_by_value(module)
-    out = capsys.readouterr()
-    for name in "bc":
-        assert f"{name}: a process of the export was killed" in out.err
-    assert "0 of 2 flights exported" in out.out
-    assert list(json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["csv"]) == ["a"]
+    assert_lost_but_a(tmp_path / "out", capsys)
+
+
+def test_a_scheduler_that_ends_midway_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(campaign, "export_flight", take_a_moment)
+    jobs = [Job(str(number), (), "", "csv", None, (), Options(), True) for number in range(200)]
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        outcomes = campaign.run_dask(jobs, address)
+        next(outcomes)
+        cluster.close()
+        with pytest.raises(ExportError, match=f"the Dask scheduler at {address} ended; what is exported is kept"):
+            list(outcomes)
+
+
+def take_a_moment(job: Job) -> campaign.Outcome:
+    time.sleep(0.2)
+    return campaign.Outcome(job.name, {}, "", False)
 
 
 def test_two_exports_on_one_cluster_do_not_mix(tmp_path: Path) -> None:
