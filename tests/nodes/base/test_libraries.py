@@ -11,7 +11,7 @@ NODES = ("rx_node", "tx_node", "joystick_mapper_node", "xplane_joy_node")
 
 def loaded(world, name):
     """Libraries that the system loads for one of the package's programs."""
-    return subprocess.run(["ldd", world.program(name)], env=world.env, check=True, text=True, stdout=-1).stdout
+    return subprocess.check_output(["ldd", world.program(name)], env=world.env, text=True)
 
 
 @pytest.mark.parametrize("name", [*NODES, "override_guardian", "lockstep_recorder"])
