@@ -6,7 +6,6 @@ import asyncio
 import logging
 import os
 import tempfile
-from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
@@ -14,19 +13,11 @@ from xplane_bridge.campaign.definition import Campaign, parse_campaign
 from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.campaign.fingerprint import CPU, Fingerprint, differences, fingerprint
 from xplane_bridge.campaign.rows import Row, dead_row, fly_rows
+from xplane_bridge.dask_scheduler import connected, watched
 
 #: How often a task may lose its worker and be flown again.
 _SECOND_CHANCES = 1
 _FIRST_WORKER_S = 30.0
-
-
-def available() -> bool:
-    """Whether dask.distributed is installed."""
-    try:
-        import distributed  # noqa: F401
-    except ImportError:
-        return False
-    return True
 
 
 class Cluster:
@@ -42,9 +33,10 @@ class Cluster:
         """What all workers fly with: what is here, but for the kind of CPU, which is the workers'.
 
         Raises:
-            CampaignError: There is no worker, or one that flies with something else; or the scheduler has gone.
+            CampaignError: There is no worker, or one that flies with something else.
+            SchedulerError: The scheduler has gone.
         """
-        with self._scheduler_watched():
+        with watched(self._client):
             try:
                 self._client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
             except asyncio.TimeoutError:
@@ -72,11 +64,12 @@ class Cluster:
         flight ends its worker: that one becomes a row too.
 
         Raises:
-            CampaignError: A worker, perhaps one that came later, flies with something else; or the scheduler has gone.
+            CampaignError: A worker, perhaps one that came later, flies with something else.
+            SchedulerError: The scheduler has gone.
         """
         if self._flies != campaign:
             self.fingerprint(campaign)
-        with self._scheduler_watched():
+        with watched(self._client):
             yield from self._fly(campaign, chunks)
 
     def _fly(self, campaign: Campaign, chunks: Sequence[Tuple[int, int]]) -> Iterator[List[Row]]:
@@ -106,17 +99,6 @@ class Cluster:
 
     def _submit(self, campaign: Campaign, first: int, count: int) -> Any:
         return self._client.submit(_fly_chunk, campaign.document, self._flies_with, first, count, pure=False)
-
-    @contextmanager
-    def _scheduler_watched(self) -> Iterator[None]:
-        """Says in a line that the scheduler has gone: all that was asked of it is cancelled then."""
-        try:
-            yield
-        except (CancelledError, OSError):
-            raise CampaignError(
-                f"the Dask scheduler at {self._address} ended, or cannot be reached any more; what is flown is kept: "
-                "start scheduler and workers, then start the same command again"
-            ) from None
 
 
 def _own_fingerprint(document: Dict[str, Any]) -> Fingerprint:
@@ -171,19 +153,7 @@ def running_cluster(address: str) -> Iterator[Cluster]:
     """A Dask cluster whose workers have this package, with its compiled module.
 
     Raises:
-        CampaignError: Nothing answers there.
+        SchedulerError: Nothing answers there, or dask.distributed is not installed.
     """
-    from distributed import Client
-
-    # Of a scheduler that ends, tracebacks: what the user needs to know is the error's line.
-    for logger in ("distributed", "distributed.client", "asyncio"):
-        logging.getLogger(logger).setLevel(logging.CRITICAL)
-    try:
-        client = Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        raise CampaignError(
-            f"no Dask scheduler at {address} ({error}); start one with `dask scheduler` and workers with `dask worker "
-            "--nthreads 1`"
-        ) from None
-    with client:
+    with connected(address) as client:
         yield Cluster(client)

@@ -12,6 +12,7 @@ from typing import Any, Iterator, List, Optional, Sequence
 import pandas as pd
 from tqdm import tqdm
 
+from xplane_bridge import dask_scheduler
 from xplane_bridge.analysis.intervals import wilson
 from xplane_bridge.campaign import cluster, report
 from xplane_bridge.campaign.definition import Campaign, load_campaign
@@ -56,17 +57,14 @@ def parser() -> argparse.ArgumentParser:
 def executor_of(args: argparse.Namespace) -> Iterator[Any]:
     """Who flies."""
     one_thread()
-    missing = "dask.distributed is not installed (pip install 'dask[distributed]')"
     if args.scheduler:
-        if not cluster.available():
-            raise CampaignError(f"--scheduler: {missing}")
         context: Any = cluster.running_cluster(args.scheduler)
     else:
         workers = (os.cpu_count() or 1) if args.workers is None else args.workers
         if workers < 0:
             raise CampaignError(f"--workers: {workers}; expected 0 or more")
-        if workers > 0 and not cluster.available():
-            print(f"run_campaign: {missing}: flying in one process", file=sys.stderr)
+        if workers > 0 and not dask_scheduler.available():
+            print(f"run_campaign: {dask_scheduler.MISSING}: flying in one process", file=sys.stderr)
             workers = 0
         context = cluster.local_cluster(workers) if workers else nullcontext(in_process)
     with context as executor:

@@ -14,13 +14,14 @@ import json
 import os
 import random
 import shutil
-from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.dask_scheduler import connected, watched
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.export.cameras import camera_rows
 from xplane_bridge.export.card import CARD, card
@@ -221,34 +222,18 @@ def run_dask(jobs: Sequence[Job], address: str) -> Iterator[Outcome]:
     The flights of a worker that was killed, again and again, have failed.
 
     Raises:
-        ExportError: dask.distributed is not installed, nothing answers at the address, or the scheduler ended.
+        SchedulerError: Nothing answers at the address, dask.distributed is not installed, or the scheduler ended.
     """
-    try:
-        from distributed import Client, KilledWorker
+    with connected(address) as client, watched(client):
+        from distributed import KilledWorker
         from distributed import as_completed as completed
-    except ImportError:
-        msg = "--scheduler needs dask.distributed: pip install 'dask[distributed]'"
-        raise ExportError(msg) from None
-    try:
-        client = Client(address, timeout="10s")
-    except (OSError, ValueError) as error:
-        msg = (
-            f"no Dask scheduler at {address} ({error}); start one with `dask scheduler` and workers with `dask worker`"
-        )
-        raise ExportError(msg) from None
-    with client:
+
         futures = {client.submit(export_flight, job, pure=False): job for job in jobs}
         for future in completed(list(futures)):
             try:
                 yield future.result()
             except KilledWorker:
                 yield _lost(futures[future])
-            except CancelledError:
-                msg = (
-                    f"the Dask scheduler at {address} ended; what is exported is kept: start scheduler and workers, "
-                    "then give the command again"
-                )
-                raise ExportError(msg) from None
 
 
 def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]]) -> Iterator[Outcome]:

@@ -307,7 +307,7 @@ def test_a_scheduler_that_ends_midway_is_a_line_and_the_same_command_goes_on(
         address = cluster.scheduler_address
         assert program_of(document(), tmp_path / "c", "--scheduler", address) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert f": the Dask scheduler at {address} ended, or cannot be reached any more; what is flown is kept" in line
+    assert f": the Dask scheduler at {address} ended, or cannot be reached any more; what is done is kept" in line
     assert line.endswith("then start the same command again")
     assert len(list((tmp_path / "c/parts").glob("*.parquet"))) == 1
     campaign = parse_campaign(document())

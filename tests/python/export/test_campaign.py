@@ -16,6 +16,7 @@ import pytest
 
 from support.flights.export_flight import export, files_of, write_flight
 from support.flights.synthetic_flight import stamp_ns
+from xplane_bridge.dask_scheduler import SchedulerError
 from xplane_bridge.export import campaign
 from xplane_bridge.export.campaign import flights
 from xplane_bridge.export.flight import ExportError
@@ -196,7 +197,7 @@ def test_a_scheduler_that_ends_midway_is_one_line(monkeypatch: pytest.MonkeyPatc
         outcomes = campaign.run_dask(jobs, address)
         next(outcomes)
         cluster.close()
-        with pytest.raises(ExportError, match=f"the Dask scheduler at {address} ended; what is exported is kept"):
+        with pytest.raises(SchedulerError, match=f"the Dask scheduler at {address} ended, or cannot be reached"):
             list(outcomes)
 
 
