@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import display_delays, schedule_late
+from support.nodes.late_pictures import punctual_frames, schedule_late
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess, wait_until
@@ -93,7 +93,7 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
     frames = [read_strip(pixels(image)) for image in taken]
     assert all(b.frame > a.frame for a, b in zip(frames, frames[1:])), "a picture came twice"
 
-    delays = display_delays(swaps)
+    punctual = punctual_frames(swaps, PIPELINE_DELAY_S, FPS)
     compared = 0
     for image, shown in zip(taken, frames):
         assert (image.width, image.height, image.encoding, image.step) == (640, 480, "bgr8", 1920)
@@ -107,7 +107,7 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
         assert not state.quality & FrameState.QUALITY_STATE_MISSING
         assert not state.quality & FrameState.QUALITY_INTERPOLATED
         assert state.grab_time >= state.display_time
-        if state.quality or not punctual(delays[shown.frame]):
+        if state.quality or shown.frame not in punctual:
             continue
         compared += 1
         assert state.state.sim_time == np.float32(shown.sim_time), f"frame {shown.frame}"
@@ -127,19 +127,15 @@ def test_a_node_that_is_scheduled_late_pairs_no_picture_wrongly(world, display, 
     first = len(states.messages)
     schedule_late(node, 1.0 / FPS, lambda: sum(state.quality == 0 for state in states.messages[first:]) >= 80)
     emulator.stop()
-    delays, by_stamp = display_delays(swaps), {state.header.stamp: state for state in states.messages[first:]}
+    punctual = punctual_frames(swaps, PIPELINE_DELAY_S, FPS)
+    by_stamp = {state.header.stamp: state for state in states.messages[first:]}
     compared = 0
     for image in list(images.messages):
         shown, state = read_strip(pixels(image)), by_stamp.get(image.header.stamp)
-        if state is not None and state.quality == 0 and punctual(delays.get(shown.frame, 1.0)):
+        if state is not None and state.quality == 0 and shown.frame in punctual:
             compared += 1
             assert state.state.sim_time == np.float32(shown.sim_time), f"frame {shown.frame}"
     assert compared >= 10
-
-
-def punctual(delay_s: float) -> bool:
-    """Whether a picture appeared when it was due; one that was late says nothing about the pairing."""
-    return abs(delay_s - PIPELINE_DELAY_S) < 0.2 / FPS
 
 
 def test_views_and_field_of_view_are_read_back(world, display) -> None:

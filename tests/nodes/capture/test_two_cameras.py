@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from support.nodes.late_pictures import display_delays
+from support.nodes.late_pictures import punctual_frames
 from support.nodes.second_camera import NAME, WINDOW, second_camera
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -24,14 +24,7 @@ from xplane_bridge.resources import config_file, program
 #: So few that pictures of half a frame late, by which a pairing could be off, are rare on a busy machine.
 FPS = 10
 PIPELINE_DELAY_S = 0.15
-#: A picture that appears this much off its time says nothing about the pairing [s].
-LATE_S = 0.2 / FPS
 ENOUGH = 40
-
-
-def on_time(swaps: Path) -> set:
-    """Frames that a window showed when they were due."""
-    return {frame for frame, delay in display_delays(swaps).items() if abs(delay - PIPELINE_DELAY_S) < LATE_S}
 
 
 @contextlib.contextmanager
@@ -92,7 +85,8 @@ def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: 
             launch.check_running()
         emulator.stop()
 
-    punctual = on_time(swaps) & on_time(tmp_path / "swaps_2.csv")
+    logs = swaps, tmp_path / "swaps_2.csv"
+    punctual = set.intersection(*(punctual_frames(log, PIPELINE_DELAY_S, FPS) for log in logs))
     compared = 0
     states = [{s.frame_sim_time: s for s in camera[2].messages if s.quality == 0} for camera in cameras]
     images = [{image.header.stamp: image for image in camera[0].messages} for camera in cameras]
@@ -108,7 +102,7 @@ def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: 
         assert [np.float32(strip.sim_time) == pair[1].state.sim_time for strip in shown] == [True, True], (
             [(strip.frame, strip.sim_time) for strip in shown],
             [(state.display_time.to_nsec(), state.grab_time.to_nsec(), state.frame_sim_time) for state in pair],
-            [path.read_text() for path in (swaps, tmp_path / "swaps_2.csv")],
+            [log.read_text() for log in logs],
         )
     assert compared >= 5, "on a busy machine few windows are punctual"
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import complete_rows, display_delays
+from support.nodes.late_pictures import complete_rows, punctual_frames
 from support.nodes.network_namespaces import Machine, TwoMachines, why_no_machines
 from support.nodes.recorded_topics import RecordedTopics
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -152,8 +152,7 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     # computer was busy says nothing about that, nor does one whose state came too late.
     missing = sum(bool(state["quality"] & STATE_MISSING) for state in paired)
     assert missing <= 0.1 * len(paired)
-    delays = display_delays(flight.swaps)
-    punctual = {int(row["frame"]) for row in drawn if abs(delays[int(row["frame"])] - PIPELINE_DELAY_S) < 0.2 / FPS}
+    punctual = punctual_frames(flight.swaps, PIPELINE_DELAY_S, FPS) & {int(row["frame"]) for row in drawn}
     judged = [
         (states[s], image) for s, image in images.items() if image["frame"] in punctual and not states[s]["quality"]
     ]

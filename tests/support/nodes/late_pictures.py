@@ -26,6 +26,17 @@ def display_delays(swaps: Path) -> dict[int, float]:
     }
 
 
+def punctual_frames(swaps: Path, delay_s: float, frame_rate: float) -> set[int]:
+    """Frames of the swap log whose pictures appeared when they were due; late ones say nothing about the pairing.
+
+    Args:
+        swaps: the log.
+        delay_s: when they are due, after their frame [s].
+        frame_rate: a fifth of a frame earlier or later is punctual [Hz].
+    """
+    return {frame for frame, delay in display_delays(swaps).items() if abs(delay - delay_s) < 0.2 / frame_rate}
+
+
 def schedule_late(
     process: ManagedProcess, period_s: float, enough: Callable[[], bool], timeout_s: float = 90.0
 ) -> None:
