@@ -67,6 +67,8 @@ class Painter:
         self._strip = strip
         self._world = make_world(runway_heading_deg)
         self._picture = np.empty((0, 0, 4), np.uint8)  # the one that is being drawn
+        self._all_haze = np.empty((height, width, 4), np.uint8)
+        self._all_haze[:] = (*_HAZE.astype(np.uint8), 255)
         columns, rows = width // _GRID + 2, height // _GRID + 2
         u, v = np.meshgrid(np.linspace(0, width - 1, columns), np.linspace(0, height - 1, rows))
         self._grid = np.stack((u.ravel(), v.ravel(), np.ones(u.size)))
@@ -183,11 +185,11 @@ class Painter:
             # Not by OpenCV: an area of one to four pixels is a scalar to it.
             clear = cv2.exp(np.float32(-thickness) / np.maximum(falling, np.float32(_LEAST_FALLING)))
             clear += _LEAST_HAZE  # so that it begins without a step
-            clear[(falling <= 0.0) | (clear > 1.0)] = 1.0  # also the sky
+            np.minimum(clear, 1.0, out=clear)
+            np.copyto(clear, 1.0, where=falling <= 0.0)  # also the sky
             part = self._picture[ground.picture(area)]
-            haze = np.empty_like(part)
-            haze[:] = (*_HAZE.astype(np.uint8), 255)
-            part[:] = cv2.blendLinear(part, haze, clear, 1.0 - clear)
+            haze = self._all_haze[: part.shape[0], : part.shape[1]]
+            cv2.blendLinear(part, haze, clear, 1.0 - clear, dst=part)
 
     # --- things --------------------------------------------------------------------------------------------------
 
