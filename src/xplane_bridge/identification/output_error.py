@@ -7,6 +7,7 @@ weighted by the inverse of their residuals' variance, which is estimated with th
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Optional, Sequence, Tuple
 
@@ -103,9 +104,10 @@ class _Problem:
         self._u = [s.inputs - s.inputs[0] for s in samples]
         self._steps = []
         for s in samples:
-            grains = np.maximum(np.round(np.diff(s.time) / _TIME_GRAIN).astype(int), 1)
-            lengths, which = np.unique(grains, return_inverse=True)
-            self._steps.append((lengths * _TIME_GRAIN, which))
+            steps = np.diff(s.time)
+            which = np.unique(np.round(steps / _TIME_GRAIN), return_inverse=True)[1]
+            lengths = np.bincount(which, weights=steps) / np.bincount(which)
+            self._steps.append((lengths, which))
 
     def start(self) -> np.ndarray:
         """A and B as given, with the initial states and biases that suit them: the response is linear in those."""
@@ -207,16 +209,28 @@ def _step_maps(a: np.ndarray, lengths: np.ndarray) -> Maps:
 
 
 def _walk(maps: Maps, which: np.ndarray, initial: np.ndarray, forcing: np.ndarray) -> np.ndarray:
-    """States at all frames, shape (n, 4, columns)."""
+    """States at all frames, shape (n, 4, columns).
+
+    In blocks of frames: first all of them at once, each from rest, then from one to the next. For Python, a step of one
+    block takes as long as one of all.
+    """
     phi, first, last = maps
-    push = first[which] @ forcing[:-1] + last[which] @ forcing[1:]
-    out = np.empty_like(forcing)
-    out[0] = x = initial
-    if len(phi) == 1:
-        step = phi[0]
-        for k in range(len(push)):
-            out[k + 1] = x = step @ x + push[k]
-    else:
-        for k, kind in enumerate(which):
-            out[k + 1] = x = phi[kind] @ x + push[k]
-    return out
+    frames, (n, columns) = len(which), initial.shape
+    length = math.isqrt(max(frames, 1) - 1) + 1
+    blocks = -(-frames // length)
+    kinds = np.zeros(blocks * length, dtype=int)
+    pushes = np.zeros((blocks * length, n, columns))
+    kinds[:frames] = which
+    pushes[:frames] = first[which] @ forcing[:-1] + last[which] @ forcing[1:]
+    through = phi[kinds].reshape(blocks, length, n, n)
+    states = pushes.reshape(blocks, length, n, columns)
+    for k in range(1, length):
+        states[:, k] += through[:, k] @ states[:, k - 1]
+        through[:, k] = through[:, k] @ through[:, k - 1]
+    begin = np.empty((blocks, n, columns))
+    x = initial
+    for block in range(blocks):
+        begin[block] = x
+        x = through[block, -1] @ x + states[block, -1]
+    states += (through.reshape(blocks, length * n, n) @ begin).reshape(states.shape)
+    return np.concatenate([initial[np.newaxis], states.reshape(-1, n, columns)[:frames]])
