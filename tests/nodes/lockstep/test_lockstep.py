@@ -63,7 +63,9 @@ class Recording:
 def start(world, **lockstep):
     emulator = world.emulator("--stepped", "lockstep", "--seed", 3, "--turbulence", 1)
     world.set_param("lockstep", {"enabled": True, "participants": ["controller"], "hold": True, **lockstep})
-    return [emulator, world.start("rx_node"), world.start("tx_node", tx_params())]
+    # All parameters before the first node, as roslaunch does it: rx_node reads them as it starts, for `experiment`.
+    world.set_param("tx_node", tx_params())
+    return [emulator, world.start("rx_node"), world.start("tx_node")]
 
 
 def start_controller(world, *arguments):

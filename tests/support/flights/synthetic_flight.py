@@ -33,6 +33,7 @@ class Definitions:
 
     def __init__(self) -> None:
         self.store, self._texts = _parsed()
+        self._known: dict[str, tuple[dict[str, tuple[int, Any]], dict[str, Any]]] = {}
 
     def text(self, msgtype: str) -> str:
         """Give the definition as a recorder stores it: own text with comments, then all it depends on."""
@@ -62,14 +63,20 @@ class Definitions:
 
     def message(self, msgtype: str, values: Mapping[str, Any]) -> Any:
         """Make a message: zeros, false and empty, but for the given fields (nested ones by mapping or message)."""
-        kwargs: dict[str, Any] = {}
-        for name, (kind, detail) in _fields(self.store)[msgtype][1]:
-            kwargs[name] = self._value(int(kind), detail, values.get(name))
-        unknown = set(values) - set(kwargs)
+        kinds, empty = self._prepared(msgtype)
+        unknown = set(values) - set(kinds)
         if unknown:
             msg = f"{msgtype} has no field {sorted(unknown)}"
             raise KeyError(msg)
+        kwargs = {**empty, **{name: self._value(*kinds[name], given) for name, given in values.items()}}
         return self.store.types[msgtype](**kwargs)
+
+    def _prepared(self, msgtype: str) -> tuple[dict[str, tuple[int, Any]], dict[str, Any]]:
+        """The fields of a message, and what each has where nothing is given; most of a message is not given."""
+        if msgtype not in self._known:
+            kinds = {name: (int(kind), detail) for name, (kind, detail) in _fields(self.store)[msgtype][1]}
+            self._known[msgtype] = kinds, {name: self._value(*kinds[name], None) for name in kinds}
+        return self._known[msgtype]
 
     def _value(self, kind: int, detail: Any, given: Any) -> Any:
         if kind == 2:
