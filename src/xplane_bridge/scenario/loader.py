@@ -12,7 +12,7 @@ import yaml
 
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
 from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
-from xplane_bridge.errors import is_number, yaml_problem
+from xplane_bridge.errors import is_number, read_yaml, yaml_problem
 from xplane_bridge.scenario.holds import HoldGains
 from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS
 from xplane_bridge.scenario.schema import (
@@ -41,6 +41,8 @@ _START = {
     "heading": (-360.0, 360.0),
     "speed": (0.0, 300.0),
 }
+#: Variables that are true or false.
+_YES_OR_NO = ("on_ground", "stall_warning")
 _AERODROME = ("latitude", "longitude", "heading")
 _TIMING = ("at", "after", "when", "timeout", "over")
 
@@ -56,7 +58,7 @@ def load_scenario(path: Path) -> Scenario:
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror or error}") from None
     try:
-        document = yaml.safe_load(text)
+        document = read_yaml(text)
     except yaml.YAMLError as error:
         raise ScenarioError(f"{path}: {yaml_problem(error)}") from None
     try:
@@ -146,6 +148,7 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
     }
     if not bounds:
         raise ScenarioError(f"{path}: no bound; expected above and/or below")
+    _check_order(bounds, path)
     if measure in CAMERA:
         surplus = [key for key in ("of", "target", "from", "to", "band") if key in given]
         if surplus:
@@ -162,11 +165,22 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
     if measure == "settling" and "band" not in given:
         raise ScenarioError(f"{path}.band: missing; expected the largest |{variable} - target| that counts as settled")
     numbers = {
-        key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("target", "band") if key in given
+        key: _number(given[key], f"{path}.{key}", low, math.inf)
+        for key, low in (("target", -math.inf), ("band", 0.0))
+        if key in given
     }
     start = _edge(given.get("from", 0.0), f"{path}.from", labels)
     end = _edge(given["to"], f"{path}.to", labels) if "to" in given else None
+    if not isinstance(start, str) and isinstance(end, float) and start >= end:
+        raise ScenarioError(f"{path}.to: {end:g}; expected more than from ({start:g})")
     return Criterion(name, measure, variable, start=start, end=end, **numbers, **bounds)
+
+
+def _check_order(bounds: Mapping[str, float], path: str) -> None:
+    """Nothing is above the higher of two bounds and below the lower one."""
+    above, below = bounds.get("above", -math.inf), bounds.get("below", math.inf)
+    if above >= below:
+        raise ScenarioError(f"{path}: above {above:g} and below {below:g}, which nothing is; expected above < below")
 
 
 def _edge(value: Any, path: str, labels: Sequence[str]) -> Union[float, str]:
@@ -205,17 +219,21 @@ def _conditions(item: Any, path: str) -> Tuple[Condition, ...]:
             mode = MODES[_one_of(bounds, place, MODES)]
             conditions.append(Condition(variable, mode - 0.5, mode + 0.5))
         elif isinstance(bounds, bool):
+            if variable not in _YES_OR_NO:
+                raise ScenarioError(f"{place}: {bounds!r}; expected [low, high], or above and/or below")
             conditions.append(Condition(variable, above=0.5) if bounds else Condition(variable, below=0.5))
         elif isinstance(bounds, list):
             if len(bounds) != 2:
                 raise ScenarioError(f"{place}: {bounds!r}; expected two bounds [low, high]")
             low, high = (_number(bound, place, -math.inf, math.inf) for bound in bounds)
+            _check_order({"above": low, "below": high}, place)
             conditions.append(Condition(variable, low, high))
         else:
             limits = _mapping(bounds, place, ("above", "below"))
             if not limits:
                 raise ScenarioError(f"{place}: {_short(bounds)}; expected above and/or below")
             numbers = {key: _number(value, f"{place}.{key}", -math.inf, math.inf) for key, value in limits.items()}
+            _check_order(numbers, place)
             conditions.append(Condition(variable, **numbers))
     return tuple(conditions)
 

@@ -103,6 +103,7 @@ class Player:
         self._waiting_since: Optional[float] = None
         self._finished = False
         self._throttle: Optional[float] = None
+        self._held: Dict[str, float] = {}
 
     @property
     def time(self) -> float:
@@ -148,6 +149,7 @@ class Player:
                 continue
             event = events[self._next]
             due = self._last_fired + event.after if event.at is None else self._round_start + event.at
+            due = max(due, self._last_fired)  # it is its turn when the event before it has happened
             if now < due or not self._ready(event, now, due, sample):
                 return
             self._last_fired = due if not event.when else now
@@ -169,7 +171,7 @@ class Player:
     def _act(self, kind: str, value: Any, event: Event, now: float, actions: List[Action]) -> None:
         if kind == "stick":
             for axis, target in value.items():
-                present = self._axes[axis].at(now) if axis in self._axes else self._present(axis)
+                present = self._present(axis, now)
                 self._axes[axis] = _Ramp(now, event.over, present, target)
                 self._release(axis)
         elif kind == "hold":
@@ -189,7 +191,12 @@ class Player:
                 self._running.append((now, value))
             actions.append(Action(kind, value, now))
 
-    def _present(self, axis: str) -> float:
+    def _present(self, axis: str, now: float) -> float:
+        """Where a movement of this axis begins: where a hold has it, or else the movement before."""
+        if axis in self._held:
+            return self._held[axis]
+        if axis in self._axes:
+            return self._axes[axis].at(now)
         return self._throttle or 0.0 if axis == "throttle" else 0.0
 
     def _release(self, axis: str) -> None:
@@ -212,6 +219,7 @@ class Player:
             "yaw": autopilot.yaw(targets, s.yaw_rate),
             "throttle": autopilot.throttle(targets, dt, s.speed, 0.5 if self._throttle is None else self._throttle),
         }
+        self._held = {axis: value for axis, value in held.items() if value is not None and math.isfinite(value)}
         for axis, (low, high) in STICK_AXES.items():
             value = held[axis]
             if value is None and axis in self._axes:

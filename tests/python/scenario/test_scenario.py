@@ -95,6 +95,9 @@ def test_the_example_of_the_manual_is_a_scenario():
         ),
         ({"name": "x", "events": [{"at": 0, "when": {"speed": {"over": 3}}}]}, "when.speed.over: unknown key"),
         ({"name": "x", "events": [{"at": 0, "when": {"speed": [1]}}]}, r"expected two bounds"),
+        ({"name": "x", "events": [{"at": 0, "when": {"altitude": [1000, 900]}}]}, "altitude: above 1000 and below 900"),
+        ({"name": "x", "events": [{"at": 0, "when": {"roll": {"above": 5, "below": 5}}}]}, "roll: above 5 and below 5"),
+        ({"name": "x", "events": [{"at": 0, "when": {"altitude": True}}]}, "altitude: True; expected .low, high."),
         ({"name": "x", "events": [{"at": 0, "timeout": 3}]}, "timeout: without 'when'"),
         ({"name": "x", "events": [{"at": 0, "buttons": {"press": [99]}}]}, "button numbers 0..63"),
         ({"name": "x", "gains": {"rol": 1}, "events": [{"at": 0}]}, "gains.rol: unknown key"),
@@ -119,6 +122,12 @@ def test_files_that_are_no_scenarios(tmp_path):
     bad.write_text("name: [")
     with pytest.raises(ScenarioError, match=r"bad\.yaml: does not parse as YAML: line 1, column 8: "):
         load_scenario(bad)
+    twice = "failure: {name: engine_1}, failure: {name: engine_2}"
+    bad.write_text(f"name: x\nevents:\n- {{at: 5, {twice}}}\n")
+    with pytest.raises(ScenarioError, match=r"YAML: line 3, column 38: 'failure' is there twice; expected each key"):
+        load_scenario(bad)
+    bad.write_text("name: x\nevents:\n- &a {at: 1, label: b}\n- {<<: *a, label: c}\n- *a\n- {<<: *a, at: 2}\n")
+    assert [event.at for event in load_scenario(bad).events] == [1.0, 1.0, 1.0, 2.0]  # that is none
     bad.write_text("name: x\nevents: 3\n")
     with pytest.raises(ScenarioError, match=r"bad\.yaml: events: 3"):
         load_scenario(bad)
@@ -148,6 +157,26 @@ def test_a_condition_is_waited_for():
 def test_a_condition_times_out():
     player = Player(scenario({"at": 1, "when": {"stall_warning": True}, "timeout": 2, "label": "go on"}))
     assert labels(play(player, 5.0)) == [(3.0, "go on")]
+
+
+def rolled_at(player, moment, pitched_at=math.inf):
+    """Plays half a minute with 20 deg of roll from a moment on, and 10 deg of pitch."""
+    out = []
+    for i in range(300):
+        t = i * 0.1
+        sample = FlightSample(roll=20.0 * (t >= moment), pitch=10.0 * (t >= pitched_at))
+        out.append((t, player.step(100.0 + t, sample)))
+    return labels(out)
+
+
+def test_it_is_an_events_turn_when_the_one_before_it_has_happened():
+    late = {"at": 5, "when": {"roll": {"above": 10}}, "label": "rolled"}
+    player = Player(scenario(late, {"at": 10, "label": "next"}, {"after": 5, "label": "last"}))
+    assert rolled_at(player, 20.0) == [(20.0, "rolled"), (20.0, "next"), (25.0, "last")]
+    # So its condition is waited for, too, and its time-out begins then.
+    pitched = {"at": 10, "when": {"pitch": {"above": 5}}, "timeout": 5, "label": "pitched"}
+    assert rolled_at(Player(scenario(late, pitched)), 20.0, 22.0) == [(20.0, "rolled"), (22.0, "pitched")]
+    assert rolled_at(Player(scenario(late, pitched)), 20.0) == [(20.0, "rolled"), (25.0, "pitched")]
 
 
 def test_all_conditions_must_hold():
@@ -206,6 +235,24 @@ def test_stick_moves_at_once_or_over_a_time():
     assert steps[1.9].throttle is None  # never said: the lever stays where it is
     assert steps[2.5].throttle == pytest.approx(0.5)
     assert steps[4.0].throttle == 1.0
+
+
+def test_a_stick_movement_begins_where_the_hold_of_its_axis_has_it():
+    player = Player(
+        scenario(
+            {"at": 0, "stick": {"throttle": 1.0, "roll": 0.5}},
+            {"at": 1, "hold": {"speed": 60, "roll": 0, "pitch": 5}},
+            {"at": 5, "stick": {"throttle": 0.0, "roll": 0.0, "pitch": 0.0}, "over": 2},
+        )
+    )
+    steps = {round(t, 1): c for t, c in play(player, 8.0, FlightSample(speed=70.0, roll=3.0))}
+    held, begun, half = steps[4.9], steps[5.0], steps[6.0]
+    assert held.throttle < 0.9
+    assert held.stick["roll"] < 0.0 < held.stick["pitch"]
+    for axis in ("roll", "pitch"):
+        assert begun.stick[axis] == pytest.approx(held.stick[axis])
+        assert half.stick[axis] == pytest.approx(held.stick[axis] / 2)
+    assert (begun.throttle, half.throttle) == pytest.approx((held.throttle, held.throttle / 2))
 
 
 def test_handles_have_the_names_of_the_command_and_old_names_still_work():
