@@ -10,6 +10,7 @@ from gymnasium import spaces
 
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.flight_model import ModelState
+from xplane_bridge.errors import is_number
 from xplane_bridge.gym.episodes import Episodes
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.gym.flights import Flight, InProcessFlight
@@ -204,13 +205,16 @@ def _check(
     frame_rate: float, frames: int, duration: float, image: Optional[Tuple[int, int]], render_mode: Optional[str]
 ) -> None:
     low, high = _FRAME_RATES
-    if not low <= frame_rate <= high:
+    if not (is_number(frame_rate) and low <= frame_rate <= high):
         raise GymError(f"frame_rate: {frame_rate!r}; expected {low:g}..{high:g} Hz")
     if isinstance(frames, bool) or not isinstance(frames, int) or frames < 1:
         raise GymError(f"frames: {frames!r}; expected a whole number from 1")
-    if not duration > 0.0:
+    if not (is_number(duration) and duration > 0.0):
         raise GymError(f"duration: {duration!r}; expected seconds, more than 0")
-    if image is not None and not (len(image) == 2 and all(16 <= size <= _MOST_PIXELS for size in image)):
+    sizes = image if isinstance(image, (tuple, list)) else ()
+    if image is not None and not (
+        len(sizes) == 2 and all(isinstance(size, int) and 16 <= size <= _MOST_PIXELS for size in sizes)
+    ):
         raise GymError(f"image: {image!r}; expected (width, height), each 16..{_MOST_PIXELS} pixels")
     if render_mode not in (None, "rgb_array"):
         raise GymError(f"render_mode: {render_mode!r}; expected None or 'rgb_array'")

@@ -10,8 +10,9 @@ import numpy as np
 from xplane_bridge.campaign.distributions import Parameter, parse_parameter
 from xplane_bridge.constants import FAILURE_KINDS
 from xplane_bridge.emulator.flight.flight_model import ModelInfo
+from xplane_bridge.errors import is_number
 from xplane_bridge.gym.errors import GymError
-from xplane_bridge.in_process.aircraft import AUTO, LOADING, START, WEATHER, Conditions
+from xplane_bridge.in_process.aircraft import AUTO, LOADING, MOST_WIND_MPS, START, WEATHER, Conditions
 
 ATTITUDE = ("roll", "pitch")
 #: What can be given, in the order in which it is drawn.
@@ -44,11 +45,15 @@ class Episode:
 def _chosen(key: str, item: Any, where: str = "episode.") -> _Chosen:
     if isinstance(item, Mapping):
         return parse_parameter(key, item, where)
-    number = isinstance(item, (int, float)) and not isinstance(item, bool) and np.isfinite(item)
-    if key == "fuel" and isinstance(item, (list, tuple)):
+    if key == "on_ground" and isinstance(item, bool):
+        return float(item)
+    if key == "fuel" and isinstance(item, (list, tuple)) and all(map(is_number, item)):
         return [float(kg) for kg in item]
-    if not number:
-        raise GymError(f"{where}{key}: {item!r}; expected a number, or a distribution such as {{'uniform': [0, 1]}}")
+    if not is_number(item):
+        tanks = ", a list of one for each tank" if key == "fuel" else ""
+        raise GymError(
+            f"{where}{key}: {item!r}; expected a number{tanks}, or a distribution such as {{'uniform': [0, 1]}}"
+        )
     return float(item)
 
 
@@ -63,7 +68,11 @@ def _failure(index: int, item: Any) -> Dict[str, Any]:
     out: Dict[str, Any] = {"kind": "failed", "at": 0.0}
     for key, value in item.items():
         text = key in ("name", "kind") and isinstance(value, str)
-        out[key] = value if text or value is None else _chosen(key, value, f"episode.{where}.")
+        given = text or (key == "value" and value is None)
+        out[key] = value if given else _chosen(key, value, f"episode.{where}.")
+    names = out["name"].values if isinstance(out["name"], Parameter) else (out["name"],)
+    if not all(isinstance(name, str) for name in names):
+        raise GymError(f"episode.{where}.name: {item['name']!r}; expected a text, or a choice of texts")
     kinds = out["kind"].values if isinstance(out["kind"], Parameter) else (out["kind"],)
     unknown = [kind for kind in kinds if kind not in FAILURE_KINDS]
     if unknown:
@@ -110,7 +119,14 @@ class Episodes:
         values = {key: _value(chosen, shares[key]) for key, chosen in self._chosen.items()}
         if "fuel" in values and not isinstance(values["fuel"], list):
             values["fuel"] = [values["fuel"]] * self._info.tank_count
-        failures = [self._drawn_failure(item, random.random(_FAILURE_SHARES)) for item in self._failures]
+        # Of a generator of their own, so that an episode without them changes no later one.
+        apart = np.random.default_rng(seed)
+        failures = [self._drawn_failure(item, apart.random(_FAILURE_SHARES)) for item in self._failures]
+        if not 0.0 <= values.get("wind_speed", 0.0) <= MOST_WIND_MPS:
+            raise GymError(
+                f"episode.wind_speed: {values['wind_speed']:g}; expected 0..{MOST_WIND_MPS:g} [m/s] (clip: [low, high] "
+                "bounds what a distribution gives)"
+            )
         seed = seed if self._seed is None else int(self._seed)
 
         def of(keys: Sequence[str]) -> Dict[str, Any]:

@@ -33,6 +33,7 @@ START = {
     "speed": "airspeed_mps", "on_ground": "on_ground",
 }  # fmt: skip
 WEATHER = ("wind_speed", "wind_from", "turbulence", "temperature_offset", "sea_level_pressure")
+MOST_WIND_MPS = 100.0
 LOADING = ("fuel", "payload", "cg_aft")
 #: Where tx_node's clock stands when a flight in lock-step begins [ns], but for whole seconds that change no difference.
 _CLOCK_NS = 2**20 * 10**9

@@ -233,6 +233,11 @@ def test_pictures_show_the_flight_and_are_the_same_again() -> None:
         ({"episode": {"speed": "fast"}}, "episode.speed: 'fast'; expected a number, or a distribution"),
         ({"episode": {"failures": [{"kind": "stuck"}]}}, "episode.failures[0]: {'kind': 'stuck'}; expected"),
         ({"episode": {"failures": [{"name": "x", "kind": "bent"}]}}, "episode.failures[0].kind: 'bent'; expected one"),
+        ({"episode": {"failures": [{"name": "x", "at": None}]}}, "episode.failures[0].at: None; expected a number"),
+        ({"episode": {"failures": [{"name": 5}]}}, "episode.failures[0].name: 5; expected a text"),
+        ({"episode": {"fuel": ["a", 2]}}, "episode.fuel: ['a', 2]; expected a number, a list of one for each tank"),
+        ({"frame_rate": "60"}, "frame_rate: '60'; expected 20..240 Hz"),
+        ({"image": (64.0, 64.0)}, "image: (64.0, 64.0); expected"),
         ({"frame_rate": 10.0}, "frame_rate: 10.0; expected 20..240 Hz"),
         ({"frames": 0}, "frames: 0; expected"),
         ({"duration": 0}, "duration: 0; expected"),
@@ -264,6 +269,27 @@ def test_a_wrong_reset_or_action_is_reported() -> None:
         env.step(np.array([np.nan], np.float32))
     with pytest.raises(GymError, match=r"action of shape \(2,\); expected 1 numbers: roll"):
         env.step(np.zeros(2, np.float32))
+
+
+def test_wind_blows_from_where_it_is_said_to() -> None:
+    with pytest.raises(GymError, match=r"episode\.wind_speed: -8; expected 0\.\.100 \[m/s\] \(clip"):
+        FlyEnv(episode={"wind_speed": -8}).reset(seed=0)
+
+
+def test_an_episode_may_begin_on_the_ground_by_true() -> None:
+    assert FlyEnv(episode={"on_ground": True, "altitude": 0}).reset(seed=0)[1]["conditions"]["on_ground"]
+
+
+def test_an_episode_without_its_failures_changes_no_later_one() -> None:
+    speeds = []
+    for options in ({}, {"failures": []}):
+        env = FlyEnv(
+            episode={"speed": {"uniform": [60, 80]}, "failures": [{"name": "engine_1", "at": {"uniform": [1, 3]}}]}
+        )
+        env.reset(seed=1, options=options)
+        info = env.reset()[1]
+        speeds.append((info["conditions"]["speed"], info["conditions"]["failures"][0]["at"]))
+    assert speeds[0] == speeds[1]
 
 
 def test_nothing_is_broken_over_the_bridge() -> None:
