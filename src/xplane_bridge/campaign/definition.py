@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,8 +22,8 @@ from xplane_bridge.campaign.distributions import (
     parse_parameter,
 )
 from xplane_bridge.emulator.aircraft import model_names
-from xplane_bridge.errors import is_number, yaml_problem
-from xplane_bridge.in_process.aircraft import LOADING, WEATHER
+from xplane_bridge.errors import is_number, read_yaml, yaml_problem
+from xplane_bridge.in_process.aircraft import LOADING, MOST_WIND_MPS, WEATHER
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
 from xplane_bridge.scenario.schema import STICK_AXES
@@ -33,6 +34,14 @@ _TOP = (
     "loading", "parameters", "sampling", "flights", "seed", "stop",
 )  # fmt: skip
 _REFERENCE = re.compile(r"\$(\w+)")
+_DRAWN = ("scenario", "aircraft", "arguments", "weather", "loading")  #: may refer to parameters
+_WEATHER_RANGES = {
+    "wind_speed": (0.0, MOST_WIND_MPS),
+    "wind_from": (-360.0, 360.0),
+    "turbulence": (0.0, 20.0),
+    "temperature_offset": (-60.0, 60.0),
+    "sea_level_pressure": (85000.0, 110000.0),
+}
 
 
 @dataclass(frozen=True)
@@ -168,7 +177,7 @@ def _scenario_file(name: str, campaign: Path) -> Path:
 
 def _read_yaml(path: Path) -> Any:
     try:
-        return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        return read_yaml(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise CampaignError(f"{path}: cannot be read: {error.strerror or error}") from None
     except yaml.YAMLError as error:
@@ -182,6 +191,7 @@ def parse_campaign(document: Any) -> Campaign:
         CampaignError: Says the key's path, what was given, and what was expected.
     """
     d = _mapping(document, "campaign", _TOP)
+    _check_plain(d, "")
     name = d.get("name")
     if not isinstance(name, str) or not name:
         raise CampaignError(f"name: {name!r}; expected a short name of the campaign")
@@ -212,6 +222,13 @@ def parse_campaign(document: Any) -> Campaign:
     aircraft = d.get("aircraft")
     if aircraft is not None and not isinstance(aircraft, str):
         raise CampaignError(f"aircraft: {aircraft!r}; expected the name of one")
+    referred = set(_REFERENCE.findall(repr([d.get(key) for key in _DRAWN])))
+    for parameter in drawn:
+        if parameter.name not in referred:
+            raise CampaignError(
+                f"parameters.{parameter.name}: nothing refers to it; expected ${parameter.name} in some of "
+                f"{', '.join(_DRAWN)}"
+            )
     campaign = Campaign(name, dict(d), drawn, flights, seed, sampling, None)
     scenario = _check_first(campaign)
     stop = _stop(d.get("stop"), [criterion.name for criterion in scenario.criteria])
@@ -225,14 +242,53 @@ def _check_first(campaign: Campaign) -> Scenario:
     except ScenarioError as error:
         raise CampaignError(f"scenario: {error}") from None
     plan = campaign.plan(0)
-    if plan.aircraft not in model_names():
-        raise CampaignError(f"aircraft: {plan.aircraft!r}; expected one of {', '.join(model_names())}")
-    if scenario.aircraft and plan.aircraft not in scenario.aircraft:
-        raise CampaignError(f"aircraft: the scenario is for {', '.join(scenario.aircraft)}, not for {plan.aircraft}")
+    for aircraft in _all_aircraft(campaign, plan):
+        if aircraft not in model_names():
+            raise CampaignError(f"aircraft: {aircraft!r}; expected one of {', '.join(model_names())}")
+        if scenario.aircraft and aircraft not in scenario.aircraft:
+            raise CampaignError(f"aircraft: the scenario is for {', '.join(scenario.aircraft)}, not for {aircraft}")
+    _check_weather_and_loading(plan)
     _refuse_unflyable(scenario)
     if plan.controller:
         find_controller(plan.controller)
     return scenario
+
+
+def _all_aircraft(campaign: Campaign, first: FlightPlan) -> Tuple[Value, ...]:
+    """That of the first flight; where it is drawn, all."""
+    reference = _REFERENCE.fullmatch(campaign.document.get("aircraft") or "")
+    for parameter in campaign.parameters:
+        if reference and parameter.name == reference.group(1):
+            return parameter.values
+    return (first.aircraft,)
+
+
+def _check_weather_and_loading(plan: FlightPlan) -> None:
+    for key, value in plan.weather.items():
+        low, high = _WEATHER_RANGES[key]
+        if not is_number(value) or not low <= value <= high:
+            raise CampaignError(f"weather.{key}: {value!r}; expected a number from {low:g} to {high:g}")
+    fuel = plan.loading.get("fuel", [])
+    if not isinstance(fuel, list) or not all(is_number(tank) and tank >= 0.0 for tank in fuel):
+        raise CampaignError(f"loading.fuel: {fuel!r}; expected a list of numbers of 0 or more [kg], one for each tank")
+    for key, low in (("payload", 0.0), ("cg_aft", -math.inf)):
+        value = plan.loading.get(key, 0.0)
+        if not is_number(value) or value < low:
+            raise CampaignError(f"loading.{key}: {value!r}; expected a number{' of 0 or more' if low == 0.0 else ''}")
+
+
+def _check_plain(item: Any, path: str) -> None:
+    """Refuses what JSON does not hold as it is: workers, and who flies a flight again, have the campaign from there."""
+    if isinstance(item, Mapping):
+        for key, value in item.items():
+            if not isinstance(key, str):
+                raise CampaignError(f"{path or 'campaign'}: the key {key!r} is no text; expected it in quotes: '{key}'")
+            _check_plain(value, f"{path}.{key}" if path else key)
+    elif isinstance(item, (list, tuple)):
+        for i, value in enumerate(item):
+            _check_plain(value, f"{path}[{i}]")
+    elif not (item is None or isinstance(item, (str, bool, int, float))):
+        raise CampaignError(f"{path}: {item} is a {type(item).__name__}; expected a number or a text: in quotes")
 
 
 def _refuse_unflyable(scenario: Scenario) -> None:

@@ -112,7 +112,9 @@ def parse_parameter(name: str, item: Any, where: str = "parameters.") -> Paramet
         if not (isinstance(clip, list) and len(clip) == 2 and all(map(is_number, clip)) and clip[0] <= clip[1]):
             raise CampaignError(f"{path}.clip: {clip!r}; expected [low, high]")
         clip = (float(clip[0]), float(clip[1]))
-    numbers = tuple(v if isinstance(v, str) else float(v) for v in values)
+    # Whole numbers stay whole, for what takes no others, as the seed of a test signal.
+    whole = kind == "choice" and all(isinstance(v, int) for v in values)
+    numbers = tuple(v if whole or isinstance(v, str) else float(v) for v in values)
     return Parameter(str(name), kind, numbers, str(item.get("unit", "")), clip)
 
 

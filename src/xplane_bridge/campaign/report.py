@@ -9,6 +9,7 @@ from typing import Dict, Iterable, List, Mapping, Sequence, Tuple
 import numpy as np
 import pandas as pd
 
+from xplane_bridge.analysis.criteria import Criterion
 from xplane_bridge.analysis.intervals import quantile, rank_correlation, wilson
 from xplane_bridge.campaign.definition import Campaign
 from xplane_bridge.campaign.flight import FLOWN
@@ -80,7 +81,8 @@ def page(campaign: Campaign, table: pd.DataFrame, traces: Mapping[int, Mapping[s
         "<h2>Criteria</h2>", _shares(campaign, table),
         "<p class=note>95 % intervals by Wilson. Every flight that was started counts, also those without a start.</p>",
         "<h2>Measured values</h2>", _quantiles(campaign, table),
-        "<p class=note>By order statistics; intervals of 95 %; &ndash; where there are too few flights for one.</p>",
+        "<p class=note>By order statistics; intervals of 95 %; &ndash; where there are too few flights for one. "
+        "What is of the whole flight is of flights that ended, here and below.</p>",
         "<h2>What drives them</h2>", _correlations(campaign, table), _figures(campaign, table),
         f"<h2>The worst {WORST}</h2>", _worst(campaign, table, traces, refly),
     ]  # fmt: skip
@@ -112,13 +114,22 @@ def _shares(campaign: Campaign, table: pd.DataFrame) -> str:
 
 def _quantiles(campaign: Campaign, table: pd.DataFrame) -> str:
     rows = []
-    for name in campaign.criteria:
-        cells = [html.escape(name)]
+    for criterion in campaign.scenario_criteria:
+        values = _measured(table, criterion)
+        cells = [html.escape(criterion.name), f"{int((~np.isnan(values)).sum())} of {len(values)}"]
         for share in (0.05, 0.5, 0.95):
-            got = quantile(table[f"value_{name}"].to_numpy(dtype=float), share)
+            got = quantile(values, share)
             cells += [_number(got.value), f"{_number(got.interval.low)} .. {_number(got.interval.high)}"]
         rows.append(cells)
-    return _rows(("criterion", "5 %", "", "median", "", "95 %", ""), rows)
+    return _rows(("criterion", "flights", "5 %", "", "median", "", "95 %", ""), rows)
+
+
+def _measured(table: pd.DataFrame, criterion: Criterion) -> np.ndarray:
+    """Its values; NaN of a flight that did not end, where it is of the whole flight: that part says nothing of it."""
+    values: np.ndarray = table[f"value_{criterion.name}"].to_numpy(dtype=float, copy=True)
+    if criterion.end is None:
+        values[(table["outcome"] != FLOWN).to_numpy()] = math.nan
+    return values
 
 
 def _number(value: float) -> str:
@@ -137,10 +148,10 @@ def _correlations(campaign: Campaign, table: pd.DataFrame) -> str:
     if not names:
         return "<p>No parameter is a number.</p>"
     rows = []
-    for criterion in campaign.criteria:
-        values = table[f"value_{criterion}"].to_numpy(dtype=float)
+    for criterion in campaign.scenario_criteria:
+        values = _measured(table, criterion)
         drawn = (table[f"parameter_{name}"].to_numpy(dtype=float) for name in names)
-        rows.append((html.escape(criterion), *(_signed(rank_correlation(d, values)) for d in drawn)))
+        rows.append((html.escape(criterion.name), *(_signed(rank_correlation(d, values)) for d in drawn)))
     note = "<p class=note>Rank correlation (Spearman) of each parameter with each measured value. Near 0 does not mean "
     note += "that a parameter has no effect: an effect of both signs on both sides does not show here, but below.</p>"
     return _rows(("value of", *map(html.escape, names)), rows) + note
@@ -154,13 +165,14 @@ def _figures(campaign: Campaign, table: pd.DataFrame) -> str:
     every = max(1, math.ceil(len(table) / _MOST_POINTS))
     drawn = table.iloc[::every]
     out = []
-    for criterion in campaign.criteria:
-        y = drawn[f"value_{criterion}"].to_numpy(dtype=float)
-        met = drawn[f"met_{criterion}"].to_numpy(dtype=bool)
+    for criterion in campaign.scenario_criteria:
+        y = _measured(drawn, criterion)
+        met = drawn[f"met_{criterion.name}"].to_numpy(dtype=bool)
         for name, label in _numeric(campaign):
-            out.append(_scatter(drawn[f"parameter_{name}"].to_numpy(dtype=float), y, met, label, criterion))
+            out.append(_scatter(drawn[f"parameter_{name}"].to_numpy(dtype=float), y, met, label, criterion.name))
     note = "" if every == 1 else f"<p class=note>Every {every}th flight is drawn.</p>"
-    return f"<div>{''.join(out)}</div>{note}<p class=note>Red: the criterion is missed.</p>"
+    note += "<p class=note>Red: the criterion is missed; on the lower edge: there is no value.</p>"
+    return f"<div>{''.join(out)}</div>{note}"
 
 
 class _Axes:
@@ -179,6 +191,11 @@ class _Axes:
             f'<text transform="rotate(-90)" x="{-(_TOP + bottom) / 2}" y="12" text-anchor="middle">'
             f"{html.escape(y_label)}</text>"
         )
+
+    @property
+    def lowest(self) -> float:
+        """The value on the lower edge."""
+        return self._y[0]
 
     def place(self, x: float, y: float) -> Tuple[float, float]:
         """Where a point is drawn [px]."""
@@ -208,9 +225,9 @@ def _scatter(x: np.ndarray, y: np.ndarray, met: np.ndarray, x_label: str, y_labe
     axes = _Axes(x, y, x_label, y_label)
     dots = []
     for across, value, good in zip(x, y, met):
-        if not (math.isfinite(across) and math.isfinite(value)):
+        if not math.isfinite(across) or math.isinf(value):
             continue
-        cx, cy = axes.place(across, value)
+        cx, cy = axes.place(across, axes.lowest if math.isnan(value) else value)
         dots.append(f'<circle class={"flown" if good else "missed"} cx="{cx:.1f}" cy="{cy:.1f}" r="2"/>')
     return _svg(axes.frame + "".join(dots))
 

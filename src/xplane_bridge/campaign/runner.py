@@ -132,6 +132,8 @@ class CampaignFolder:
                 self._write(pd.DataFrame(rows), self._part((rows[0]["flight"], len(rows))))
                 progress(len(rows))
             table = self.table()
+            # Of an interrupted run, not those of later rounds: each look sees what an uninterrupted one sees.
+            table = table[table["flight"] < end]
             if campaign.stop and narrow_enough(campaign, table):
                 break
         return table

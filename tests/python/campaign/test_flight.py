@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import datetime
 import math
 import struct
 from typing import Any, Dict
@@ -255,12 +256,35 @@ def test_without_the_compiled_module_the_way_to_it_is_said(monkeypatch: pytest.M
         ({"flights": 0}, "flights: 0; expected a whole number from 1"),
         ({"stop": {"criterion": "x", "width": 0.1}}, "stop.criterion: 'x'"),
         ({"parameter": {}}, "campaign.parameter: unknown key"),
+        ({"weather": {"wind_speed": "6 m/s"}}, "weather.wind_speed: '6 m/s'; expected a number from 0 to 100"),
+        ({"weather": {"wind_speed": -6}}, "weather.wind_speed: -6; expected a number from 0"),
+        ({"weather": {"turbulence": True}}, "weather.turbulence: True; expected a number from 0 to 20"),
+        ({"weather": {"sea_level_pressure": 1013.25}}, "expected a number from 85000 to 110000"),
+        ({"loading": {"fuel": 100}}, "loading.fuel: 100; expected a list of numbers"),
+        ({"loading": {"payload": -1}}, "loading.payload: -1; expected a number of 0 or more"),
+        (
+            {"aircraft": "$a", "parameters": {"a": {"choice": ["fixed_wing", "quadcopter"]}}},
+            "aircraft: 'quadcopter'; expected one of",
+        ),
+        ({"parameters": {"gusts": {"uniform": [0, 5]}}}, "parameters.gusts: nothing refers to it; expected $gusts in"),
+        (
+            {"controller": "math:sin", "arguments": {"schedule": {40: 0.03}}},
+            "arguments.schedule: the key 40 is no text; expected it in quotes: '40'",
+        ),
+        ({"description": datetime.date(2024, 5, 1)}, "description: 2024-05-01 is a date; expected"),
     ],
 )
 def test_a_wrong_campaign_is_named(changes: dict, text: str) -> None:
     with pytest.raises(CampaignError) as raised:
         campaign(**changes)
     assert text in str(raised.value)
+
+
+def test_a_whole_number_that_is_chosen_stays_one() -> None:
+    excitation = {"kind": "multisine", "target": "roll", "amplitude": 0.1, "duration": 1, "seed": "$s"}
+    events = [{"at": 0, "excitation": excitation}, {"at": 0.1, "end": True}]
+    plan = campaign(events, parameters={"s": {"choice": [3, 4]}}).plan(0)
+    assert repr(plan.scenario["events"][0]["excitation"]["seed"]) in ("3", "4")
 
 
 def test_parameters_go_anywhere_in_the_scenario() -> None:

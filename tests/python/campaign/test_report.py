@@ -16,6 +16,7 @@ DOCUMENT = {
     "parameters": {"x": {"uniform": [0, 1], "unit": "m"}, "word": {"choice": ["p", "q"]}},
     "scenario": {
         "name": "s",
+        "description": "$x m, $word",
         "criteria": {
             "low": {"measure": "peak", "of": "roll", "target": 0, "below": 5},
             "high": {"measure": "minimum", "of": "altitude", "above": 900},
@@ -54,6 +55,20 @@ def test_what_could_not_be_measured_is_the_worst() -> None:
     assert list(report.worst_first(parse_campaign(DOCUMENT), flights)["flight"]) == [0, 1, 2]
 
 
+def test_what_a_flight_that_did_not_end_had_measured_is_no_value_of_the_whole_flight() -> None:
+    """Those that crash early have had no time to roll: with them, the correlation has the wrong sign."""
+    count = 100
+    x = np.linspace(0.0, 1.0, count)
+    crashed = x > 0.6
+    flights = pd.DataFrame({"flight": range(count), "outcome": np.where(crashed, "crashed", "flown")})
+    flights["value_low"], flights["met_low"] = np.where(crashed, 0.1, 1.0 + 6.0 * x), ~crashed
+    flights["value_high"], flights["met_high"], flights["passed"] = 950.0, True, ~crashed
+    flights["parameter_x"], flights["parameter_word"], flights["reason"], flights["sha256"] = x, "p", "", "a"
+    text = report.page(parse_campaign(DOCUMENT), flights, {}, "")
+    assert "<td>low</td><td>60 of 100</td><td>1.121</td>" in text
+    assert "<td>low</td><td>+1.00</td>" in text
+
+
 def test_the_page_needs_no_network_and_says_what_was_flown() -> None:
     campaign = parse_campaign(DOCUMENT)
     trace = {"time": np.arange(3.0), "roll": np.arange(3.0), "altitude": np.ones(3), "speed": np.ones(3)}
@@ -66,7 +81,7 @@ def test_the_page_needs_no_network_and_says_what_was_flown() -> None:
     # 1 of 6 passed; Wilson by hand: centre (1/6 + 0.3201) / 1.6402, half 0.5975 / 1.6402 * ...
     assert "<td>1 of 6</td><td>16.7%</td><td>3.0% .. 56.4%</td>" in text
     assert "5 flown, 1 no start" in text
-    assert text.count("<circle") == 4 + 5  # one value is infinite, one flight has none
+    assert text.count("<circle") == 4 + 5 + 2  # one value is infinite, one flight has none: on the lower edges
     assert text.count("<polyline") == 3
 
 

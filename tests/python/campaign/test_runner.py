@@ -33,6 +33,7 @@ def document(**more: Any) -> dict:
         "flights": 14,
         "scenario": {
             "name": "s",
+            "description": "$height m",
             "aircraft": "fixed_wing",
             "start": {"speed": 70, "altitude": 1000},
             "criteria": {"high": {"measure": "maximum", "of": "roll", "below": 90}},
@@ -131,7 +132,7 @@ def test_a_flight_that_ends_its_worker_is_a_row(tmp_path: Path) -> None:
 def test_the_interval_covers_a_known_share(tmp_path: Path) -> None:
     """The criterion hangs on a parameter alone: a start at 200 m/s, 3 of 10, is refused, and is a row that failed."""
     parameters = {"speed": {"choice": [70] * 7 + [200] * 3}, "share": {"uniform": [0, 1]}}
-    scenario = {**document()["scenario"], "start": {"speed": "$speed"}}
+    scenario = {**document()["scenario"], "description": "", "start": {"speed": "$speed"}}
     campaign = parse_campaign(document(flights=40, parameters=parameters, scenario=scenario, seed=5))
     table = CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
     assert len(table) == 40
@@ -155,6 +156,17 @@ def test_it_stops_when_the_interval_is_narrow_enough_and_looks_only_after_whole_
     # All pass: the interval is 1 - 1 / (1 + 3.84 / n) wide, at most 0.2 from n = 16 on; looks at 10 and 20.
     campaign = parse_campaign(document(flights=60, stop={"width": 0.2, "every": 10}))
     assert len(CampaignFolder(tmp_path).fly(campaign, in_process, quiet)) == 20
+
+
+def test_an_interrupted_campaign_stops_where_an_uninterrupted_one_does(tmp_path: Path) -> None:
+    campaign = parse_campaign(document(flights=60, stop={"width": 0.17, "every": 20}))  # narrow enough from 19 on
+    folder = CampaignFolder(tmp_path)
+    assert len(folder.fly(campaign, in_process, quiet)) == 20
+    later = CampaignFolder(tmp_path / "later")
+    later.fly(parse_campaign(document(flights=60, stop={"width": 0.01, "every": 20})), in_process, quiet)
+    for part in (later.folder / "parts").iterdir():  # of rounds that it need not have flown
+        part.rename(folder.folder / "parts" / part.name)
+    assert list(folder.fly(campaign, in_process, quiet)["flight"]) == list(range(20))
 
 
 def test_a_folder_of_another_campaign_is_refused_and_so_is_one_in_use(tmp_path: Path) -> None:
