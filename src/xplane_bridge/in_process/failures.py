@@ -73,7 +73,21 @@ class Failures:
             raise NotFlownError(
                 f"failure {name!r}: instruments and busses are not flown in process; it takes the bridge"
             )
-        (self._systems.discard if failure["clear"] else self._systems.add)(leaf)
+        if not self._effects.acts(leaf, self._model):
+            raise NotFlownError(
+                f"failure {name!r}: {self._model.info.name} has none of that name that acts in process; expected one "
+                f"of its surfaces ({', '.join(sorted(self._surfaces))}), engine_1..{self._model.info.engine_count}, or "
+                "a rel_* of its controls"
+            )
+        if failure["clear"]:
+            self._systems.discard(leaf)
+        elif kind != "failed" or failure["value"] is not None:
+            raise NotFlownError(
+                f"failure {name!r}: kind {kind}, value {failure['value']}; expected kind failed, and no value: a "
+                "system works or does not"
+            )
+        else:
+            self._systems.add(leaf)
 
     def _fault(self, surface: str, failure: Mapping[str, Any]) -> SurfaceFault:
         """A surface's failure as the flight model has it, which takes the rate of a slow one as a share of its own."""

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import copy
 import re
 import struct
 
@@ -11,6 +12,7 @@ from xplane_bridge.compiled import core
 from xplane_bridge.constants import FAILURE_KINDS, SURFACE_FAILURE_KINDS, FlightMode
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.earth import LocalFrame
+from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, arbiter_options
@@ -37,6 +39,60 @@ def test_a_surface_fails_in_the_model_and_an_engine_by_its_dataref() -> None:
         failures.act({"name": "pitot_1", "kind": "failed", "value": None, "clear": False})
     with pytest.raises(NotFlownError, match="wing2l_ail1"):
         failures.act({"name": "aileron2_wing1_left", "kind": "stuck", "value": None, "clear": False})
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "engine_3",
+        "rel_engfai2",
+        "rel_engfail0",
+        "rel_nonsense",
+        "rel_fcon_ail_9_lft_lock",
+        "rel_fcon_x",
+        "rel_adc_comp",
+    ],
+)
+def test_what_would_break_nothing_is_refused(name: str) -> None:
+    failures = Failures(create_model("fixed_wing"))
+    for clear in (False, True):
+        with pytest.raises(
+            NotFlownError, match=r"none of that name that acts in process; .* engine_1\.\.2, or a rel_\*"
+        ):
+            failures.act({"name": name, "kind": "failed", "value": None, "clear": clear})
+
+
+@pytest.mark.parametrize(("kind", "value"), [("reduced", 0.5), ("stuck", None), ("failed", 0.3)])
+def test_a_system_works_or_does_not(kind: str, value: object) -> None:
+    failures = Failures(create_model("fixed_wing"))
+    with pytest.raises(NotFlownError, match="expected kind failed, and no value"):
+        failures.act({"name": "engine_1", "kind": kind, "value": value, "clear": False})
+
+
+@pytest.mark.parametrize(
+    "leaf",
+    ["stbaug", "conlock", "ail_L_jam", "elv_R_jam", "rud_trim_run", "trim_elv", "flap_act", "gear_act", "lbrakes",
+     "rbrakes", "throt_lo", "throt_hi", "fc_thr", "fc_ail_L", "ail_R2", "fc_elv_U1", "elv_D", "rud_L", "fc_rud_R",
+     "fc_L_flp", "R_flp_off", "fcon_ailn_1_lft_lock", "seize_0", "engfla1", "engsep0", "fuelfl1"],
+)  # fmt: skip
+def test_what_is_said_to_act_does(leaf: str) -> None:
+    model = create_model("fixed_wing")
+    assert FailureEffects.acts(f"rel_{leaf}", model)
+    differs = False
+    for sign in (1.0, -1.0):
+        effects, seen = FailureEffects(), []
+        for failed in (set(), {f"rel_{leaf}"}):
+            controls = Controls()
+            for frame in range(2):  # what freezes keeps what the first had
+                for name in ("roll", "pitch", "yaw", "trim_roll", "trim_pitch", "trim_yaw"):
+                    setattr(controls, name, sign * 0.2 * (frame + 1))
+                controls.flap_request, controls.gear_down = 0.3 * (frame + 1), bool(frame)
+                controls.brake_left = controls.brake_right = 0.5
+                controls.throttle[:2] = [0.3 * (frame + 1)] * 2
+                effects.apply(controls, failed, model, 1 / 60)
+            seen.append(copy.deepcopy(controls))
+        differs |= seen[0] != seen[1]
+    assert differs
 
 
 def test_every_kind_of_the_service_breaks_a_surface_in_the_model() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Callable, Dict, Set
 
 from xplane_bridge.emulator.flight.flight_model import (
@@ -24,6 +25,13 @@ _EVENTS = {
     "gone": SurfaceFaultKind.GONE,
 }
 _LEAVES = {"ailn": "ail", "elev": "elv", "rudd": "rud", "rspo": "spo", "flap": "fla", "sbrk": "sbrk", "yawb": "yawb"}
+_ENGINE = re.compile(r"rel_(?:engfai|engfla|engsep|fuelfl|seize_)(\d+)")
+_SURFACES = re.compile(r"rel_(fcon_.*|fc_[LR]_flp|[LR]_flp_off)")
+#: What else acts on controls.
+_CONTROLS = re.compile(
+    r"rel_(stbaug|conlock|(ail|elv|rud)_[LR]_jam|(ail|elv|rud)_trim_run|trim_(ail|elv|rud)|flap_act|gear_act|[lr]brakes"
+    r"|throt_lo|throt_hi|fc_thr|(fc_)?((ail|rud)_[LR]|elv_[UD])[12]?)"
+)
 _SIDES = {"lft": Side.LEFT, "rgt": Side.RIGHT, "ctr": Side.CENTRE}
 
 
@@ -85,6 +93,16 @@ class FailureEffects:
             else:
                 self._frozen.pop(f"throttle{i}", None)
 
+    @staticmethod
+    def acts(leaf: str, model: FlightModel) -> bool:
+        """Whether a failure of this name does anything to this aircraft."""
+        engine = _ENGINE.fullmatch(leaf)
+        if engine:
+            return int(engine.group(1)) < model.info.engine_count
+        if _SURFACES.fullmatch(leaf):
+            return bool(FailureEffects._surface_faults({leaf}, model))
+        return bool(_CONTROLS.fullmatch(leaf))
+
     def _freeze(self, controls: Controls, attribute: str, failed: bool) -> None:
         if failed:
             setattr(controls, attribute, self._frozen.setdefault(attribute, getattr(controls, attribute)))
@@ -135,6 +153,8 @@ class FailureEffects:
         for leaf in failed:
             parts = leaf.split("_")
             if parts[:2] != ["rel", "fcon"]:
+                continue
+            if len(parts) != 6 or parts[2] not in _LEAVES or parts[4] not in _SIDES or parts[5] not in _EVENTS:
                 continue
             _, _, kind, number, where, event = parts
             suffix = _LEAVES[kind] + number.replace("x", "")
