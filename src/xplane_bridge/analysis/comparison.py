@@ -26,7 +26,8 @@ SIGNALS: dict[str, tuple[str, str, float, float]] = {
     "load_factor_normal": ("normal load factor", "g", 1.0, 0.0),
 }
 _UNKNOWN = Interval(math.nan, math.nan)
-_RESAMPLES = 1000
+#: How often as long as its memory a block is.
+_MEMORIES = 5
 #: Independent stretches that an interval needs.
 _FEWEST_BLOCKS = 6
 
@@ -122,34 +123,39 @@ def _at(time: np.ndarray, flight: Matched, column: str, period: float) -> np.nda
 
 
 def mean_interval(samples: np.ndarray) -> Interval:
-    """The 95 % interval of the mean of a signal whose samples follow from each other: blocks of it are drawn anew.
+    """The 95 % interval of the mean of a signal whose samples follow from each other, by the means of blocks of it.
 
-    A block is as long as the signal remembers, five times the lag at which its autocorrelation falls below 1/e. NaN
-    where there are fewer than six such blocks.
+    A block is five times as long as the lag at which its autocorrelation falls below 1/e. What neighbouring blocks have
+    in common still, up to a fifth of the variance, is that of a memory that fades exponentially. NaN where there are
+    fewer than six such blocks.
     """
     if len(samples) and np.ptp(samples) == 0.0:
         return Interval(float(samples[0]), float(samples[0]))
-    block = _block(samples)
+    block, step = _memory(samples)
     count = len(samples) // block
     if count < _FEWEST_BLOCKS:
         return _UNKNOWN
+    from scipy.stats import t
+
     means = samples[: count * block].reshape(count, block).mean(axis=1)
-    random = np.random.default_rng(0)  # the same page each time
-    drawn = np.array([means[random.integers(0, count, size=count)].mean() for _ in range(_RESAMPLES)])
-    low, high = np.quantile(drawn, (0.025, 0.975))
-    return Interval(float(low), float(high))
+    middle = float(samples.mean())
+    shared = 2.0 * step * (1.0 - step**block) / (block * (1.0 - step**2))
+    half = float(t.ppf(0.975, count - 1) * means.std(ddof=1) / math.sqrt(count * (1.0 - shared)))
+    return Interval(middle - half, middle + half)
 
 
-def _block(samples: np.ndarray) -> int:
+def _memory(samples: np.ndarray) -> tuple[int, float]:
+    """How long a block is, and how much a sample has of the one before."""
     n = len(samples)
     centred = samples - samples.mean() if n else samples
     power = float(centred @ centred) if n else 0.0
     if n < 2 or power == 0.0:
-        return max(n, 1)
+        return max(n, 1), 0.0
     spectrum = np.fft.rfft(centred, 2 * n)
     correlation = np.fft.irfft(spectrum * spectrum.conj())[:n] / power
     below = np.flatnonzero(correlation < 1.0 / math.e)
-    return 5 * int(below[0]) if len(below) else n
+    step = min(max(float(correlation[1]), 0.0), 1.0 - 1.0 / n)
+    return (_MEMORIES * int(below[0]) if len(below) else n), step
 
 
 class ScoreDifference(NamedTuple):

@@ -112,12 +112,19 @@ def require_usable(result: Delay, what: str, gain_range: Optional[tuple[float, f
         gain_range: What the gain must lie in; None: anything.
 
     Raises:
-        LatencyError: The motion is too small, or the signals do not belong together.
+        LatencyError: The motion is too small, the delay too long, or the signals do not belong together.
     """
     if not result.correlation >= MIN_CORRELATION:
         msg = (
             f"{what}: the two signals do not move together (correlation {result.correlation:.2f}, expected "
             f"{MIN_CORRELATION} or more): wrong topic, frozen picture, or no motion"
+        )
+        raise LatencyError(msg)
+    shortest, longest = result.searched[0], result.searched[-1]
+    if not shortest <= result.delay <= longest:
+        msg = (
+            f"{what}: the delay lies outside {1e3 * shortest:.0f} .. {1e3 * longest:.0f} ms, where it is looked for: "
+            "the clocks of the two signals differ, or they are of different flights"
         )
         raise LatencyError(msg)
     if 2.0 * result.sigma > MAX_HALF_WIDTH_S:

@@ -86,7 +86,9 @@ def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> floa
     if criterion.measure == "peak":
         return float(np.abs(error).max())
     if criterion.measure == "overshoot":
-        return max(0.0, float((-np.sign(error[0]) * error).max()))
+        # Where it begins on the target, both sides lie beyond it.
+        beyond = np.abs(error) if error[0] == 0.0 else -np.sign(error[0]) * error
+        return max(0.0, float(beyond.max()))
     if criterion.measure == "settling":
         outside = np.flatnonzero(np.abs(error) > criterion.band)
         if not len(outside):

@@ -65,6 +65,16 @@ def test_small_motion_is_refused_in_words() -> None:
         require_usable(fit_delay(late, lead_time, multisine(lead_time, 0.05)), "pictures")
 
 
+@pytest.mark.parametrize("delay", [-0.14, 0.45, 0.5])
+def test_a_delay_outside_the_search_is_refused(delay: float) -> None:
+    lead_time = np.arange(0.0, 62.0, 1 / 60)
+    stamps = np.arange(1.0, 61.0, 1 / 30)
+    noise = np.random.default_rng(3).normal(0.0, 0.002, len(stamps))
+    late = value_motion(stamps, multisine(stamps - delay) + noise)
+    with pytest.raises(LatencyError, match=r"the delay lies outside -100 \.\. 400 ms"):
+        require_usable(fit_delay(late, lead_time, multisine(lead_time)), "pictures")
+
+
 def test_foreign_motion_and_wrong_gain_are_refused() -> None:
     lead_time = np.arange(0.0, 32.0, 1 / 60)
     stamps = np.arange(0.5, 31.0, 1 / 30)

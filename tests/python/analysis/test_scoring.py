@@ -35,6 +35,11 @@ def test_overshoot_is_seen_from_the_start() -> None:
     assert down.value == pytest.approx(up.value)
 
 
+def test_where_it_begins_on_the_target_both_sides_are_beyond_it() -> None:
+    rolled = np.where(T < 1, 0.0, -30 * np.sin(T - 1))
+    assert one(criterion(measure="overshoot", target=0.0), rolled).value == pytest.approx(30.0, abs=0.01)
+
+
 def test_settling_counts_to_the_last_time_outside() -> None:
     roll = np.where(T < 5, 0.0, 30 * np.exp(-0.5 * (T - 5)))
     # 30 exp(-t / 2) = 3 at t = 2 ln 10
