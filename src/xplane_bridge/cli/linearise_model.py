@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Optional, Sequence
 
@@ -53,6 +54,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     geometry = read_geometry(Path(args.geometry)) if args.geometry else geometry_of(args.aircraft)
     fuel = None if args.fuel is None else tuple(args.fuel)
     model = linearise(Condition(args.aircraft, args.speed, args.altitude, fuel, args.payload), geometry)
+    for text in {text: None for axis in model.axes.values() for text in axis.warnings}:
+        print(f"warning: {text}", file=sys.stderr)
     write_outputs(model, args.output)
     return 0
 

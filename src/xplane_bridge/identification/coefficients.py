@@ -85,6 +85,20 @@ def _size(path: Path, content: dict[str, Any], name: str) -> float:
     return float(value)
 
 
+#: Of the geometry's, by which the mass in flight may be another before its moments of inertia are said to be.
+_MASS_SHARE = 0.02
+
+
+def mass_warning(geometry: Geometry, mass: Optional[float]) -> list[str]:
+    """A line where the aircraft was loaded otherwise than the geometry's moments of inertia are for."""
+    if mass is None or abs(mass - geometry.mass) <= _MASS_SHARE * geometry.mass:
+        return []
+    return [
+        f"the aircraft had {mass:.0f} kg, the geometry {geometry.mass:.0f} kg: coefficients of moments are worked out "
+        "by the geometry's moments of inertia, which are another loading's"
+    ]
+
+
 def derivatives(
     model: AxisModel, geometry: Geometry, speed: float, pressure: float, mass: Optional[float] = None
 ) -> dict[str, Estimate]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from xplane_bridge.bags.flight import Flight
 from xplane_bridge.identification import intervals
-from xplane_bridge.identification.coefficients import Geometry, derivatives
+from xplane_bridge.identification.coefficients import Geometry, derivatives, mass_warning
 from xplane_bridge.identification.equation_error import equation_error
 from xplane_bridge.identification.model import (
     AXES,
@@ -136,15 +136,17 @@ def identify_axis(
     c, d = _output_rows(fitted, axis, inputs)
     model = AxisModel(axis, inputs, found.a, found.b, c, d, modes)
     model.a_interval, model.b_interval = intervals.element_intervals(found, covariance, width)
+    of_loading: list[str] = []
     if geometry is not None:
         speed, pressure = conditions["true_airspeed"][0], conditions["dynamic_pressure"][0]
         mass = conditions["mass"][0]
         if math.isfinite(pressure):
             known = None if not math.isfinite(mass) else mass
             model.derivatives = derivatives(model, geometry, speed, pressure, known)
+            of_loading = mass_warning(geometry, known)
     result = AxisResult(model, fitted, found.simulated, spare)
     result.validated = [simulate(w.samples(axis, inputs), found.a, found.b) for w in spare]
-    model.warnings = _input_warning(fitted) + [text for w in fitted for text in w.warnings]
+    model.warnings = of_loading + _input_warning(fitted) + [text for w in fitted for text in w.warnings]
     model.warnings += _size_warnings(fitted, axis)
     model.warnings += _shift_warning(fitted, axis, inputs, found, free)
     _judge_residuals(result, found)

@@ -24,7 +24,7 @@ from xplane_bridge.emulator.flight.flight_model import (
     SurfaceKind,
 )
 from xplane_bridge.emulator.flight.jsbsim_state import quaternion_from_euler
-from xplane_bridge.identification.coefficients import Geometry, derivatives
+from xplane_bridge.identification.coefficients import Geometry, derivatives, mass_warning
 from xplane_bridge.identification.model import (
     AXES,
     Axis,
@@ -233,6 +233,7 @@ def _axis_model(
     if geometry is not None:
         pressure, mass = trimmed.dynamic_pressure_pa, trimmed.mass_kg
         found.derivatives = derivatives(found, geometry, speed, pressure, mass)
+        found.warnings = mass_warning(geometry, mass)
     return found
 
 

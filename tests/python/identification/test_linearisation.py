@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -184,3 +185,12 @@ def test_a_file_that_is_no_model_is_refused_in_words(text: str, tmp_path: Path) 
     path.write_text(text, encoding="utf-8")
     with pytest.raises(IdentificationError, match=r"model\.yaml: (not a model of identify_model|does not parse)"):
         files.read_model(path)
+
+
+def test_another_loading_than_that_of_the_moments_of_inertia_is_said(twin: LinearModel) -> None:
+    geometry = geometry_of("fixed_wing")
+    assert twin.axes["lateral"].warnings == []
+    light = linearise(Condition("fixed_wing", 75.0, 1000.0, fuel_kg=(5.0, 5.0)), geometry)
+    for axis in light.axes.values():
+        (warning,) = axis.warnings
+        assert re.match(rf"the aircraft had \d+ kg, the geometry {geometry.mass:.0f} kg: coefficients of mom", warning)
