@@ -22,8 +22,10 @@ from xplane_bridge.campaign.distributions import (
     parse_parameter,
 )
 from xplane_bridge.emulator.aircraft import model_names
+from xplane_bridge.emulator.flight.flight_model import FlightModelError
+from xplane_bridge.emulator.flight.limits import check_atmosphere, check_turbulence, check_wind
 from xplane_bridge.errors import is_number, read_yaml, yaml_problem
-from xplane_bridge.in_process.aircraft import LOADING, MOST_WIND_MPS, WEATHER
+from xplane_bridge.in_process.aircraft import LOADING, WEATHER
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
 from xplane_bridge.scenario.schema import STICK_AXES
@@ -35,13 +37,6 @@ _TOP = (
 )  # fmt: skip
 _REFERENCE = re.compile(r"\$(\w+)")
 _DRAWN = ("scenario", "aircraft", "arguments", "weather", "loading")  #: may refer to parameters
-_WEATHER_RANGES = {
-    "wind_speed": (0.0, MOST_WIND_MPS),
-    "wind_from": (-360.0, 360.0),
-    "turbulence": (0.0, 20.0),
-    "temperature_offset": (-60.0, 60.0),
-    "sea_level_pressure": (85000.0, 110000.0),
-}
 
 
 @dataclass(frozen=True)
@@ -264,10 +259,16 @@ def _all_aircraft(campaign: Campaign, first: FlightPlan) -> Tuple[Value, ...]:
 
 
 def _check_weather_and_loading(plan: FlightPlan) -> None:
-    for key, value in plan.weather.items():
-        low, high = _WEATHER_RANGES[key]
-        if not is_number(value) or not low <= value <= high:
-            raise CampaignError(f"weather.{key}: {value!r}; expected a number from {low:g} to {high:g}")
+    weather = plan.weather
+    for key, value in weather.items():
+        if not is_number(value):
+            raise CampaignError(f"weather.{key}: {value!r}; expected a number")
+    try:
+        check_wind(weather.get("wind_speed", 0.0))
+        check_turbulence(weather.get("turbulence", 0.0))
+        check_atmosphere(weather.get("temperature_offset", 0.0), weather.get("sea_level_pressure", 101325.0))
+    except FlightModelError as error:
+        raise CampaignError(f"weather: {error}") from None
     fuel = plan.loading.get("fuel", [])
     if not isinstance(fuel, list) or not all(is_number(tank) and tank >= 0.0 for tank in fuel):
         raise CampaignError(f"loading.fuel: {fuel!r}; expected a list of numbers of 0 or more [kg], one for each tank")

@@ -12,7 +12,7 @@ from xplane_bridge.constants import FAILURE_KINDS
 from xplane_bridge.emulator.flight.flight_model import ModelInfo
 from xplane_bridge.errors import is_number
 from xplane_bridge.gym.errors import GymError
-from xplane_bridge.in_process.aircraft import AUTO, LOADING, MOST_WIND_MPS, START, WEATHER, Conditions
+from xplane_bridge.in_process.aircraft import AUTO, LOADING, START, WEATHER, Conditions
 
 ATTITUDE = ("roll", "pitch")
 #: What can be given, in the order in which it is drawn.
@@ -122,11 +122,6 @@ class Episodes:
         # Of a generator of their own, so that an episode without them changes no later one.
         apart = np.random.default_rng(seed)
         failures = [self._drawn_failure(item, apart.random(_FAILURE_SHARES)) for item in self._failures]
-        if not 0.0 <= values.get("wind_speed", 0.0) <= MOST_WIND_MPS:
-            raise GymError(
-                f"episode.wind_speed: {values['wind_speed']:g}; expected 0..{MOST_WIND_MPS:g} [m/s] (clip: [low, high] "
-                "bounds what a distribution gives)"
-            )
         seed = seed if self._seed is None else int(self._seed)
 
         def of(keys: Sequence[str]) -> Dict[str, Any]:

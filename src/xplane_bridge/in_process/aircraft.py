@@ -21,6 +21,7 @@ from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.command_channels import apply_channels
 from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.flight_model import FlightModel, InitialState, ModelState
+from xplane_bridge.emulator.flight.limits import check_wind
 from xplane_bridge.in_process.failures import Failures
 from xplane_bridge.in_process.view import FlightView
 from xplane_bridge.resources import config_file
@@ -33,7 +34,6 @@ START = {
     "speed": "airspeed_mps", "on_ground": "on_ground",
 }  # fmt: skip
 WEATHER = ("wind_speed", "wind_from", "turbulence", "temperature_offset", "sea_level_pressure")
-MOST_WIND_MPS = 100.0
 LOADING = ("fuel", "payload", "cg_aft")
 #: Where tx_node's clock stands when a flight in lock-step begins [ns], but for whole seconds that change no difference.
 _CLOCK_NS = 2**20 * 10**9
@@ -82,6 +82,7 @@ class Conditions:
         """The aircraft, loaded, in its wind and air, before its start."""
         model = create_model(self.aircraft, self.seed)
         from_rad, speed = math.radians(self.weather.get("wind_from", 0.0)), self.weather.get("wind_speed", 0.0)
+        check_wind(speed)
         model.set_wind(-speed * math.cos(from_rad), -speed * math.sin(from_rad), 0.0)
         model.set_atmosphere(
             self.weather.get("temperature_offset", 0.0), self.weather.get("sea_level_pressure", 101325.0)

@@ -47,6 +47,12 @@ def check_turbulence(intensity_mps: float) -> None:
         raise FlightModelError(f"turbulence of {intensity_mps} m/s: expected 0..20 (light 1, moderate 2, severe 4)")
 
 
+def check_wind(speed_mps: float) -> None:
+    """Raises a `FlightModelError` unless it is a speed; from where it blows is another number."""
+    if not 0.0 <= speed_mps <= 100.0:
+        raise FlightModelError(f"wind of {speed_mps:g} m/s: expected 0..100")
+
+
 def check_atmosphere(temperature_offset_k: float, sea_level_pressure_pa: float) -> None:
     """Raises a `FlightModelError` unless there are such days."""
     if not (abs(temperature_offset_k) <= 60.0 and 85000.0 <= sea_level_pressure_pa <= 110000.0):
