@@ -92,7 +92,7 @@ class TopicLog:
 
         self.topic = topic
         self.messages: list[Any] = []
-        self._after_found = 0
+        self._after_found = self._event_number = 0
         self._subscriber = rospy.Subscriber(
             topic, message_type, self.messages.append, queue_size=queue_size, tcp_nodelay=True
         )
@@ -129,8 +129,21 @@ class TopicLog:
         return self._find(self._after_found, condition, timeout, what)
 
     def skip_to_now(self) -> None:
-        """What has come until now is not what then_wait_for() looks for."""
+        """What has come until now is not what then_wait_for() and then_wait_for_event() look for."""
         self._after_found = len(self.messages)
+        self._event_number = max((event.number for event in getattr(self.last, "events", ())), default=0)
+
+    def then_wait_for_event(
+        self, condition: Callable[[Any], bool] = lambda _: True, timeout: float = WAIT_S, what: str = ""
+    ) -> Any:
+        """Of an EventList, whose messages may bring several events: one after that found last, or skip_to_now()."""
+
+        def newer(message: Any) -> list[Any]:
+            return [event for event in message.events if event.number > self._event_number and condition(event)]
+
+        event = newer(self._find(0, lambda message: bool(newer(message)), timeout, what))[0]
+        self._event_number = event.number
+        return event
 
     def wait_for_count(self, count: int, timeout: float = WAIT_S) -> list[Any]:
         """Waits until `count` more messages have come, and returns those."""

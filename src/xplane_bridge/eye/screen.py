@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Callable
 
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.eye import names
 from xplane_bridge.eye.calibrate import UndoFile, write_until_reported
+
+_HEARD_WITHIN_S = 5.0
 
 
 class ScreenError(XplaneBridgeError):
@@ -34,7 +37,7 @@ class TimesOnScreen:
 
     def __enter__(self) -> None:
         self.restore()
-        own = self._read()
+        own = self._heard()
         if own == 1.0:
             return  # the user wants to see it anyway
         taken = False
@@ -51,6 +54,13 @@ class TimesOnScreen:
 
     def __exit__(self, *_: object) -> None:
         self.restore()
+
+    def _heard(self) -> float:
+        """What X-Plane says of it, whose answers to a new client come one by one; nan where none comes for a while."""
+        end = time.monotonic() + _HEARD_WITHIN_S
+        while math.isnan(own := self._read()) and time.monotonic() < end:
+            time.sleep(0.01)
+        return own
 
     def restore(self) -> None:
         """Gives the user's choice back where a run, this one or a killed one, has changed it.

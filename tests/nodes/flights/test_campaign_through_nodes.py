@@ -26,6 +26,7 @@ CAMPAIGN = {
     "loading": {"payload": 60},
     "scenario": {
         "name": "short",
+        "description": "$bank deg of bank at $altitude m",
         "aircraft": "fixed_wing",
         "start": {"altitude": "$altitude", "speed": 70, "heading": 90},
         "criteria": {

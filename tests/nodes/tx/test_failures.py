@@ -306,7 +306,7 @@ def test_xplane_12_whose_own_failure_does_not_act(new_world, tmp_path):
     said_so = wire.value(TIME)
     world.events.skip_to_now()
     world.xplane.send_signal(signal.SIGSTOP)
-    world.events.then_wait_for(lambda e: "STALE" in e.events[-1].text)
+    world.events.then_wait_for_event(lambda event: "STALE" in event.text)
     world.xplane.send_signal(signal.SIGCONT)
     asking.join(20)
     assert answer[0].result.code == OK, answer[0].result.message

@@ -402,11 +402,7 @@ def test_x_plane_10_is_not_supported_and_why(world):
 
 def wait_for_event(world, kind, text=""):
     """Waits for an event after those looked at before; none of the bridge's own."""
-
-    def fits(e):
-        return e.events[-1].kind == kind and text in e.events[-1].text
-
-    event = world.events.then_wait_for(fits, what=text).events[-1]
+    event = world.events.then_wait_for_event(lambda event: event.kind == kind and text in event.text, what=text)
     assert event.requested_by == ""
     return event
 
@@ -422,10 +418,10 @@ def test_pause_by_another_client_is_reported(menu):
 def test_pause_by_service_is_reported_with_its_name(menu):
     menu.events.skip_to_now()
     pause(menu, True)
-    reported = menu.events.then_wait_for(lambda e: e.events[-1].kind == PAUSE).events[-1]
+    reported = menu.events.then_wait_for_event(lambda event: event.kind == PAUSE)
     assert (reported.text, reported.requested_by.rsplit("/", 1)[-1]) == ("paused", "pause")
     pause(menu, False)
-    menu.events.then_wait_for(lambda e: e.events[-1].text == "resumed")
+    menu.events.then_wait_for_event(lambda event: event.text == "resumed")
 
 
 def test_reset_by_another_client_is_reported(menu):
@@ -459,7 +455,7 @@ def test_aircraft_by_another_client_is_reported_and_not_flown(menu):
     menu.seen.wait(OVERRIDE, 1.0)
     menu.events.skip_to_now()
     menu.other.send(protocol.AircraftLoad(0, aircraft_path("multirotor")))
-    reported = menu.events.then_wait_for(lambda e: e.events[-1].kind == AIRCRAFT).events[-1]
+    reported = menu.events.then_wait_for_event(lambda event: event.kind == AIRCRAFT)
     assert "QUAD" in reported.text
     assert reported.requested_by == ""
     menu.seen.wait(OVERRIDE, 0.0)

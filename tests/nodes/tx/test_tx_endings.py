@@ -264,9 +264,9 @@ def test_release_overrides_stops_a_node_that_flies_until_a_mode_is_asked_for(tx,
     # Shown as set for a while, as it is when a user panics.
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "override_joystick_roll")
     release_overrides(world)
-    world.events.wait_for(lambda e: "override_joystick_roll was released by another client" in e.events[-1].text)
-    reported = world.events.wait_for(lambda e: "nothing is sent any more" in e.events[-1].text)
-    assert "ask for a mode" in reported.events[-1].text
+    world.events.wait_for(lambda e: has(e, "override_joystick_roll was released by another client"))
+    reported = world.events.then_wait_for_event(lambda event: "nothing is sent any more" in event.text)
+    assert "ask for a mode" in reported.text
     world.wait_for_diagnostics("control", lambda s: s.level == 1)  # by then what was under way has come
     count = len(world.applied.messages)
     for _ in range(2):  # longer than overrides take to be sent again, with commands coming all the time
@@ -289,7 +289,7 @@ def test_what_x_plane_releases_with_a_new_flight_is_taken_again(tx, world):
     other = type(world).wire(world.xplane.port)
     world.events.skip_to_now()
     other.send(protocol.CommandRequest("sim/operation/reset_flight"), protocol.DrefWrite(OVERRIDE, 0.0))
-    world.events.then_wait_for(lambda e: e.events[-1].text == "the flight began anew")
+    world.events.then_wait_for_event(lambda event: event.text == "the flight began anew")
     for _ in range(2):  # longer than it takes to see who has released it; 0 may be shown for one frame only
         status = world.wait_for_diagnostics("control")
         assert world.values_of(status)["Overrides set"] == "override_joystick_roll", status.message

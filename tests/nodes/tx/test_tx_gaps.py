@@ -82,13 +82,13 @@ def gap(world, until):
     """X-Plane stands still until the node has said so."""
     world.events.skip_to_now()
     world.xplane.send_signal(signal.SIGSTOP)
-    world.events.then_wait_for(lambda e: e.events[-1].text.startswith(until), what=until)
+    world.events.then_wait_for_event(lambda event: event.text.startswith(until), what=until)
 
 
 def go_on(world):
     """X-Plane flies on."""
     world.xplane.send_signal(signal.SIGCONT)
-    world.events.then_wait_for(lambda e: e.events[-1].text.startswith("CONNECTED"), what="CONNECTED")
+    world.events.then_wait_for_event(lambda event: event.text.startswith("CONNECTED"), what="CONNECTED")
 
 
 def texts(world):

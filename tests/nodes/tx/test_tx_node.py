@@ -294,10 +294,10 @@ def test_a_failsafe_is_an_event_and_a_warning(tx, world):
     world.wire.wait(STICK, 0.3)
     world.events.skip_to_now()
     world.auto.stop()
-    begun = world.events.then_wait_for(lambda e: e.events[-1].text == "AUTO: failsafe: timeout of control/auto")
-    assert begun.events[-1].kind == MODE
+    begun = world.events.then_wait_for_event(lambda event: event.text == "AUTO: failsafe: timeout of control/auto")
+    assert begun.kind == MODE
     world.auto.fly(roll=0.2)
-    world.events.then_wait_for(lambda e: e.events[-1].text == "AUTO: the failsafe ends: control/auto is back")
+    world.events.then_wait_for_event(lambda event: event.text == "AUTO: the failsafe ends: control/auto is back")
 
     def warned():
         return sum("failsafe" in line and "WARN" in line for line in node.output().splitlines())
@@ -316,7 +316,7 @@ def test_restarted_xplane_is_left_alone_without_commands(tx, world):
     world.mode.wait_for(lambda m: m.failsafe)  # X-Plane may be back before the last command has timed out
     world.events.skip_to_now()
     world.xplane.restart()
-    world.events.then_wait_for(lambda e: "CONNECTED" in e.events[-1].text, timeout=WAIT_S)
+    world.events.then_wait_for_event(lambda event: "CONNECTED" in event.text)
     wire = WatchedDatarefs(world.xplane.port, OVERRIDE)
     world.wait_for_diagnostics("control", lambda s: world.values_of(s)["Overrides set"] == "none")
     wire.wait(OVERRIDE, 0.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from pathlib import Path
 from typing import List, Optional, Tuple
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 
 from xplane_bridge.eye import calibrate
+from xplane_bridge.eye import screen as screen_module
 from xplane_bridge.eye.calibrate import UndoFile
 from xplane_bridge.eye.pairing import Decision, Frame
 from xplane_bridge.eye.screen import ScreenError, TimesOnScreen
@@ -186,9 +189,19 @@ def test_times_that_the_user_wants_to_see_stay(tmp_path: Path) -> None:
     assert screen.value == 1.0
 
 
+def test_what_x_plane_prints_is_waited_for_as_its_first_answers_come_one_by_one(tmp_path: Path) -> None:
+    screen = Screen(math.nan)
+    answer = threading.Timer(0.2, setattr, (screen, "value", 0.0))
+    answer.start()
+    with screen.times(tmp_path / "undo.json"):
+        assert screen.value == 1.0
+    assert screen.value == 0.0
+
+
 @pytest.mark.parametrize("value", [0.0, float("nan")])
 def test_an_x_plane_that_does_not_print_is_said(value: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calibrate, "_WRITE_TIMEOUT_S", 0.05)
+    monkeypatch.setattr(screen_module, "_HEARD_WITHIN_S", 0.05)
     path = tmp_path / "undo.json"
     with pytest.raises(ScreenError, match="tick row 1"):
         Screen(value, takes=False).times(path).__enter__()
