@@ -20,7 +20,7 @@ def read_yaml(text: str) -> Any:
     """A YAML document in which no mapping has a key twice: YAML's own reader keeps the last one, and says nothing.
 
     Raises:
-        yaml.YAMLError: It does not parse, or has.
+        yaml.YAMLError: It does not parse, or a key is there twice.
     """
     import yaml  # here, as rooms of the standard library alone have this one
 
