@@ -16,29 +16,6 @@ def is_number(value: Any) -> bool:
         return False
 
 
-def read_yaml(text: str) -> Any:
-    """A YAML document in which no mapping has a key twice: YAML's own reader keeps the last one, and says nothing.
-
-    Raises:
-        yaml.YAMLError: It does not parse, or a key is there twice.
-    """
-    import yaml  # here, as rooms of the standard library alone have this one
-
-    class Loader(yaml.SafeLoader):  # type: ignore[misc]
-        def compose_mapping_node(self, anchor: Any) -> Any:
-            node = super().compose_mapping_node(anchor)
-            seen = set()
-            for key, _ in node.value:
-                name = (key.tag, key.value) if isinstance(key, yaml.ScalarNode) else None
-                if name in seen:
-                    problem = f"{key.value!r} is there twice; expected each key of a mapping once"
-                    raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
-                seen.update({name} - {None})
-            return node
-
-    return yaml.load(text, Loader)
-
-
 def yaml_problem(error: Exception) -> str:
     """One line about a `yaml.YAMLError`: where, and what."""
     mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)

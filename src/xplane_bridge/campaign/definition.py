@@ -24,12 +24,13 @@ from xplane_bridge.campaign.distributions import (
 from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.emulator.flight.limits import check_atmosphere, check_turbulence, check_wind
-from xplane_bridge.errors import is_number, read_yaml, yaml_problem
+from xplane_bridge.errors import is_number, yaml_problem
 from xplane_bridge.in_process.aircraft import LOADING, WEATHER
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
 from xplane_bridge.scenario.schema import STICK_AXES
 from xplane_bridge.scenario.world import KINDS as WORLD_KINDS
+from xplane_bridge.scenario.yaml_file import read_yaml
 
 _TOP = (
     "name", "description", "scenario", "aircraft", "controller", "arguments", "frame_rate", "longest", "weather",

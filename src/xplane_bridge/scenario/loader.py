@@ -12,7 +12,7 @@ import yaml
 
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
 from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
-from xplane_bridge.errors import is_number, read_yaml, yaml_problem
+from xplane_bridge.errors import is_number, yaml_problem
 from xplane_bridge.scenario.holds import HoldGains
 from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS
 from xplane_bridge.scenario.schema import (
@@ -29,6 +29,7 @@ from xplane_bridge.scenario.schema import (
 )
 from xplane_bridge.scenario.traffic import MOST, RANGES
 from xplane_bridge.scenario.world import DISTURBANCE_NEEDS, DISTURBANCES, LAYERS, TIME, WEATHER, WIND
+from xplane_bridge.scenario.yaml_file import read_yaml
 
 _TOP = (
     *("name", "description", "aircraft", "controller", "repeat_every", "start", "aerodrome", "gains", "criteria"),
