@@ -135,13 +135,18 @@ def mean_interval(samples: np.ndarray) -> Interval:
     count = len(samples) // block
     if count < _FEWEST_BLOCKS:
         return _UNKNOWN
+    means = samples[: count * block].reshape(count, block).mean(axis=1)
+    shared = 2.0 * step * (1.0 - step**block) / (block * (1.0 - step**2))
+    variance = float(means.var(ddof=1)) / (count * (1.0 - shared))
+    return _student(float(samples.mean()), variance, count - 1)
+
+
+def _student(mean: float, variance: float, freedom: float) -> Interval:
+    """Of 95 %; the variance is that of the mean."""
     from scipy.stats import t
 
-    means = samples[: count * block].reshape(count, block).mean(axis=1)
-    middle = float(samples.mean())
-    shared = 2.0 * step * (1.0 - step**block) / (block * (1.0 - step**2))
-    half = float(t.ppf(0.975, count - 1) * means.std(ddof=1) / math.sqrt(count * (1.0 - shared)))
-    return Interval(middle - half, middle + half)
+    half = float(t.ppf(0.975, freedom)) * math.sqrt(variance)
+    return Interval(mean - half, mean + half)
 
 
 def _memory(samples: np.ndarray) -> tuple[int, float]:
@@ -189,8 +194,5 @@ def welch(a: np.ndarray, b: np.ndarray) -> Interval:
     variance = sum(parts)
     if variance == 0.0:
         return Interval(middle, middle)
-    from scipy.stats import t
-
     freedom = variance**2 / sum(part**2 / (len(side) - 1) for part, side in zip(parts, (a, b)))
-    half = float(t.ppf(0.975, freedom)) * math.sqrt(variance)
-    return Interval(middle - half, middle + half)
+    return _student(middle, variance, freedom)

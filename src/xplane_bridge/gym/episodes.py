@@ -61,6 +61,11 @@ def _value(chosen: Optional[_Chosen], share: float) -> Any:
     return chosen.at(share) if isinstance(chosen, Parameter) else chosen
 
 
+def _possible(chosen: _Chosen) -> Tuple[Any, ...]:
+    """All that may be drawn."""
+    return chosen.values if isinstance(chosen, Parameter) else (chosen,)
+
+
 def _failure(index: int, item: Any) -> Dict[str, Any]:
     where = f"failures[{index}]"
     if not isinstance(item, Mapping) or "name" not in item or set(item) - set(_FAILURE_KEYS):
@@ -70,11 +75,9 @@ def _failure(index: int, item: Any) -> Dict[str, Any]:
         text = key in ("name", "kind") and isinstance(value, str)
         given = text or (key == "value" and value is None)
         out[key] = value if given else _chosen(key, value, f"episode.{where}.")
-    names = out["name"].values if isinstance(out["name"], Parameter) else (out["name"],)
-    if not all(isinstance(name, str) for name in names):
+    if not all(isinstance(name, str) for name in _possible(out["name"])):
         raise GymError(f"episode.{where}.name: {item['name']!r}; expected a text, or a choice of texts")
-    kinds = out["kind"].values if isinstance(out["kind"], Parameter) else (out["kind"],)
-    unknown = [kind for kind in kinds if kind not in FAILURE_KINDS]
+    unknown = [kind for kind in _possible(out["kind"]) if kind not in FAILURE_KINDS]
     if unknown:
         raise GymError(f"episode.{where}.kind: {unknown[0]!r}; expected one of {', '.join(FAILURE_KINDS)}")
     return out

@@ -144,12 +144,9 @@ def _criteria(item: Any, events: Sequence[Event]) -> Tuple[Criterion, ...]:
 def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criterion:
     given = _mapping(item, path, ("measure", "of", "target", "from", "to", "band", "above", "below"))
     measure = _one_of(given.get("measure"), f"{path}.measure", MEASURES)
-    bounds: Dict[str, float] = {
-        key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("above", "below") if key in given
-    }
+    bounds = _limits(given, path)
     if not bounds:
         raise ScenarioError(f"{path}: no bound; expected above and/or below")
-    _check_order(bounds, path)
     if measure in CAMERA:
         surplus = [key for key in ("of", "target", "from", "to", "band") if key in given]
         if surplus:
@@ -177,11 +174,13 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
     return Criterion(name, measure, variable, start=start, end=end, **numbers, **bounds)
 
 
-def _check_order(bounds: Mapping[str, float], path: str) -> None:
-    """Nothing is above the higher of two bounds and below the lower one."""
-    above, below = bounds.get("above", -math.inf), bounds.get("below", math.inf)
+def _limits(given: Mapping[str, Any], path: str) -> Dict[str, float]:
+    """Those of `above` and `below` that are given; nothing is above the higher of two and below the lower one."""
+    out = {key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("above", "below") if key in given}
+    above, below = out.get("above", -math.inf), out.get("below", math.inf)
     if above >= below:
         raise ScenarioError(f"{path}: above {above:g} and below {below:g}, which nothing is; expected above < below")
+    return out
 
 
 def _edge(value: Any, path: str, labels: Sequence[str]) -> Union[float, str]:
@@ -223,20 +222,22 @@ def _conditions(item: Any, path: str) -> Tuple[Condition, ...]:
             if variable not in _YES_OR_NO:
                 raise ScenarioError(f"{place}: {bounds!r}; expected [low, high], or above and/or below")
             conditions.append(Condition(variable, above=0.5) if bounds else Condition(variable, below=0.5))
-        elif isinstance(bounds, list):
-            if len(bounds) != 2:
-                raise ScenarioError(f"{place}: {bounds!r}; expected two bounds [low, high]")
-            low, high = (_number(bound, place, -math.inf, math.inf) for bound in bounds)
-            _check_order({"above": low, "below": high}, place)
-            conditions.append(Condition(variable, low, high))
         else:
-            limits = _mapping(bounds, place, ("above", "below"))
-            if not limits:
-                raise ScenarioError(f"{place}: {_short(bounds)}; expected above and/or below")
-            numbers = {key: _number(value, f"{place}.{key}", -math.inf, math.inf) for key, value in limits.items()}
-            _check_order(numbers, place)
-            conditions.append(Condition(variable, **numbers))
+            conditions.append(Condition(variable, **_bounds(bounds, place)))
     return tuple(conditions)
+
+
+def _bounds(item: Any, path: str) -> Dict[str, float]:
+    """Of a condition, `above` and/or `below`, however they are written."""
+    if isinstance(item, list):
+        if len(item) != 2:
+            raise ScenarioError(f"{path}: {item!r}; expected two bounds [low, high]")
+        low, high = (_number(bound, path, -math.inf, math.inf) for bound in item)
+        return _limits({"above": low, "below": high}, path)
+    limits = _limits(_mapping(item, path, ("above", "below")), path)
+    if not limits:
+        raise ScenarioError(f"{path}: {_short(item)}; expected above and/or below")
+    return limits
 
 
 # --- actions: each checks its value and returns it in its final form ---

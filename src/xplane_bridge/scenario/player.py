@@ -148,8 +148,10 @@ class Player:
                 self._waiting_since = None
                 continue
             event = events[self._next]
-            due = self._last_fired + event.after if event.at is None else self._round_start + event.at
-            due = max(due, self._last_fired)  # it is its turn when the event before it has happened
+            if event.at is None:
+                due = self._last_fired + event.after
+            else:  # it is its turn when the event before it has happened
+                due = max(self._round_start + event.at, self._last_fired)
             if now < due or not self._ready(event, now, due, sample):
                 return
             self._last_fired = due if not event.when else now
