@@ -42,6 +42,8 @@ _UNSURE = 4 | 16 | 8192 | 16384
 _MEASURED = 2
 #: What cannot be known of the motion is taken for lively, where it matters.
 _TURN_RATE, _SPEED = 0.5, 100.0
+#: Below about 20 frames a second X-Plane slows its time instead (docs/protocol.md).
+_LONGEST_FRAME_S = 0.05
 
 
 class Options(NamedTuple):
@@ -261,6 +263,7 @@ def _pose(frames: Table, row: int) -> Pose:
 
     quality = int(frames["quality"][row])
     rates, velocity = vector("state.angular_velocity"), vector("state.velocity_ned")
+    period = float(frames["frame_period"][row])
     # A spread as wide as the bound, not an even one: cautious.
     angle, place = float(frames["camera_pose_uncertainty_deg"][row]), float(frames["camera_pose_uncertainty"][row])
     return Pose(
@@ -274,6 +277,6 @@ def _pose(frames: Table, row: int) -> Pose:
         place if math.isfinite(place) else 0.0,
         float(np.linalg.norm(rates)) if np.isfinite(rates).all() else _TURN_RATE,
         velocity if np.isfinite(velocity).all() else np.full(3, _SPEED / math.sqrt(3.0)),
-        float(frames["frame_period"][row]),
+        period if period > 0.0 else _LONGEST_FRAME_S,
         bool(quality & _UNSURE),
     )
