@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Set
 
 import numpy as np
 import yaml
@@ -34,7 +34,7 @@ class Read(NamedTuple):
     path: Path
     variant: str
     flight: Flight
-    labels: Dict[str, int]  #: receive time [ns] of the first message of each text on scenario/label
+    labels: Dict[str, Set[int]]  #: receive times [ns] of the messages of each text on scenario/label
     passport: Optional[Passport]
     played: Mapping[str, Any]  #: of the player's log beside the bag; empty: there is none
 
@@ -61,7 +61,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     p.add_argument(
         "--event", metavar="TEXT",
-        help="time 0 is the first event, or label of a scenario, that has this text in it",
+        help="time 0 is the first event of the flight, or label of a scenario, that has this text in it",
     )  # fmt: skip
     p.add_argument("-o", "--output", type=Path, default=Path("comparison.html"), metavar="FILE", help="(%(default)s)")
     return p
@@ -133,14 +133,14 @@ def read(path: Path, variant: str, store: Optional[ColumnFile] = None) -> Read:
         BagError: The bag cannot be read.
         CompareError: It holds no flight, or what lies beside it is no log of a player.
     """
-    labels: Dict[str, int] = {}
+    labels: Dict[str, Set[int]] = {}
     with Bags(path) as bags:
         flight = read_flight(bags, store)
         passports = read_passports(bags)
         for topic, info in bags.topics.items():
             if topic.endswith("scenario/label") and info.count:
                 for time, message in bags.messages(topic):
-                    labels.setdefault(str(message.data), time)
+                    labels.setdefault(str(message.data), set()).add(time)
     if "state" not in flight.tables:
         raise CompareError(f"{path}: no flight state in it")
     played: Mapping[str, Any] = {}
@@ -192,20 +192,26 @@ def matched(each: Read, name: str, by: str, event: Optional[str]) -> Matched:
 
 
 def event_time(each: Read, text: str) -> int:
-    """[ns] stamp of the first event with `text` in it.
+    """[ns] stamp of the flight's first event with `text` in it.
 
     Raises:
         CompareError: There is none; the text lists what there is.
     """
-    times = dict(each.labels)
+    times = {said: set(stamps) for said, stamps in each.labels.items()}
     if "events" in each.flight.tables:
         for events in each.flight.tables["events"]["events"]:
             for event in events:
-                times.setdefault(str(event.text), event.stamp.sec * 1_000_000_000 + event.stamp.nanosec)
-    fitting = [time for said, time in times.items() if text.lower() in said.lower()]
+                stamp = event.stamp.sec * 1_000_000_000 + event.stamp.nanosec
+                times.setdefault(str(event.text), set()).add(stamp)
+    # The list of events and the latest label are latched: those of earlier flights come with them.
+    begin, end = each.flight.start, each.flight.end
+    inside = {said: [stamp for stamp in stamps if begin <= stamp <= end] for said, stamps in times.items()}
+    fitting = [stamp for said, stamps in inside.items() if text.lower() in said.lower() for stamp in stamps]
     if not fitting:
-        have = "; ".join(times) or "no event at all"
-        raise CompareError(f"{each.path}: no event with {text!r} in it; it has: {have}")
+        outside = any(text.lower() in said.lower() for said in times)
+        where = " between its first and its last flight state, only before or after" if outside else ""
+        have = "; ".join(said for said, stamps in inside.items() if stamps) or "no event at all"
+        raise CompareError(f"{each.path}: no event with {text!r} in it{where}; it has: {have}")
     return min(fitting)
 
 

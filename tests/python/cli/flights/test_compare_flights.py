@@ -23,8 +23,8 @@ criteria:
 RATE = 10.0
 
 
-def write(path, begin=0.0, event=5.0, higher=0.0, commit="abc", played=True):
-    """20 s of flight; `begin` [s]: when its scenario began; `event` [s]: when an aileron stuck."""
+def write(path, begin=0.0, event=5.0, higher=0.0, commit="abc", played=True, earlier=()):
+    """20 s of flight; `begin` [s]: when its scenario began; `event` [s]: when an aileron stuck, `earlier` too."""
     path.parent.mkdir(parents=True, exist_ok=True)
     flight = {"scenario": "weave", "text": SCENARIO, "options": []}
     with FlightBag(path) as bag:
@@ -35,14 +35,21 @@ def write(path, begin=0.0, event=5.0, higher=0.0, commit="abc", played=True):
             bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
         values = {"commit": commit, "parameters": json.dumps({"experiment": {"flight": flight}})}
         bag.add("/xplane/experiment", "xplane_bridge/Experiment", stamp_ns(0.0), values)
-        stamp = {"sec": START + int(event), "nanosec": int(event % 1 * 1e9)}
-        reported = {"events": [{"number": 1, "stamp": stamp, "text": "aileron stuck"}]}
-        bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(event), reported)
+        reported = [stuck(number, time) for number, time in enumerate((*earlier, event), 1)]
+        if earlier:  # the latched list, as of when the recording began
+            bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(0.0), {"events": reported[:-1]})
+        bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(event), {"events": reported})
     if played:
         first = {"epoch": int(state["epoch"]), "sim_time_unwrapped": first_sim_time(path) + begin}
         log = {"scenario": "weave", "begin": first, "labels": {}}
         (path.parent / "played.json").write_text(json.dumps(log), encoding="utf-8")
     return path
+
+
+def stuck(number, time):
+    """An Event."""
+    stamp = {"sec": START + int(time // 1), "nanosec": int(time % 1 * 1e9)}
+    return {"number": number, "stamp": stamp, "text": "aileron stuck"}
 
 
 def first_sim_time(path):
@@ -84,6 +91,28 @@ def test_matched_by_an_event(tmp_path):
     found = [matched(read(path, ""), "x", "event", "Stuck") for path in (a, b)]
     assert [round(float(each.time[0]), 3) for each in found] == [-5.0, -7.5]
     assert "aileron" in page_of(a, b, "--event", "aileron", tmp_path / "page.html")
+
+
+def test_events_of_earlier_flights_in_the_latched_list_match_nothing(tmp_path, capsys):
+    a = write(tmp_path / "a.bag", event=5.0, played=False)
+    b = write(tmp_path / "b.bag", event=7.5, played=False, earlier=(-300.0, -120.0))
+    found = [matched(read(path, ""), "x", "event", "stuck") for path in (a, b)]
+    assert [round(float(each.time[0]), 3) for each in found] == [-5.0, -7.5]
+    c = write(tmp_path / "c.bag", event=-60.0, played=False)
+    assert compare_flights.main([str(a), str(c), "--event", "stuck", "-o", str(tmp_path / "page.html")]) == 1
+    said = capsys.readouterr().err
+    assert "c.bag: no event with 'stuck' in it between its first and its last flight state" in said
+    assert said.endswith("it has: no event at all\n")
+
+
+def test_a_label_counts_where_it_comes_again_in_the_flight(tmp_path):
+    path = tmp_path / "a.bag"
+    with FlightBag(path) as bag:
+        for k in range(100):
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / RATE), bag.state(k / RATE, k))
+        for t in (-1.0, 4.0, 8.0):  # at first the latched one of an earlier flight
+            bag.add("/xplane/scenario/label", "std_msgs/String", stamp_ns(t), {"data": "turn"})
+    assert round(float(matched(read(path, ""), "x", "event", "turn").time[0]), 3) == -4.0
 
 
 def test_folders_are_repetitions_and_give_intervals(tmp_path):
