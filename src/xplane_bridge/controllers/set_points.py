@@ -22,7 +22,7 @@ class SetPoints:
     def __init__(self) -> None:
         self._wanted: Optional[Tuple[bool, Tuple[float, float, float], float]] = None
         self._pace, self._age = Pace(), 0.0
-        self._heading: Optional[float] = None
+        self._heading: Optional[float] = None  # what a velocity's turn goes on from, while one is followed
         self.restart()
 
     def restart(self) -> None:
@@ -43,10 +43,12 @@ class SetPoints:
         dt = self._pace.step(state)
         self._age += dt
         if self._wanted is None or self._age > HOLDS_S:
+            self._heading = None  # what flies meanwhile may turn the nose
             return {}
         is_place, (east, north, up), turning = self._wanted
         here = Field(state)
         if is_place:
+            self._heading = None
             here.heading_deg = turning
             there = here.seen(north - state.position_north, east - state.position_east)
             return self._loops.position(state, dt, here, there, up + state.position_down)
