@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from pathlib import Path
 from typing import Any, Callable, List, NamedTuple
@@ -181,7 +182,8 @@ def place(start: Any, namespace: str) -> None:
 def far(state: Any, start: Any) -> float:
     """[m] from a flight state to where another one (fields by name) was."""
     north = np.radians(state.latitude - start["latitude"])
-    east = np.radians(state.longitude - start["longitude"]) * np.cos(np.radians(start["latitude"]))
+    turn = math.remainder(state.longitude - start["longitude"], 360.0)
+    east = np.radians(turn) * np.cos(np.radians(start["latitude"]))
     return float(np.hypot(np.hypot(north, east) * EARTH_RADIUS_M, state.altitude_msl - start["altitude_msl"]))
 
 

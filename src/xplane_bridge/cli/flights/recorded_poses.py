@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from pathlib import Path
 from typing import Any, Callable, Dict, List, NamedTuple
@@ -41,7 +42,10 @@ class Poses(NamedTuple):
         turn = slice(names.index("orientation.x"), names.index("orientation.w") + 1)
         if ends[0][turn] @ ends[1][turn] < 0.0:  # both signs are the same attitude
             ends[1][turn] *= -1.0
+        east = names.index("longitude")  # the shorter way round
+        ends[1][east] = ends[0][east] + math.remainder(ends[1][east] - ends[0][east], 360.0)
         pose = ends[0] + share * (ends[1] - ends[0])
+        pose[east] = math.remainder(pose[east], 360.0)
         pose[turn] /= np.linalg.norm(pose[turn])
         return dict(zip(names, map(float, pose)))
 

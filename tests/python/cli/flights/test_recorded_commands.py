@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
-from xplane_bridge.cli.flights.recorded_commands import Commands, Played, _Player
+import pytest
+
+from xplane_bridge.cli.flights.recorded_commands import Commands, Played, _Player, far
+from xplane_bridge.units import EARTH_RADIUS_M
 
 START = {"latitude": 37.5, "longitude": 127.0, "altitude_msl": 900.0}
 AUTO = 2
@@ -33,3 +37,10 @@ def test_a_recorded_mode_is_asked_for_again_where_the_flight_begins_again():
             player.change_mode()
             player.change_mode()
     assert asked == [AUTO, AUTO]
+
+
+@pytest.mark.parametrize(("shown", "placed"), [(179.9999, -179.9999), (-179.9999, 179.9999), (0.0001, -0.0001)])
+def test_how_far_it_is_from_where_it_was_placed_is_known_also_across_the_date_line(shown: float, placed: float):
+    there = SimpleNamespace(latitude=60.0, longitude=shown, altitude_msl=900.0)
+    start = {"latitude": 60.0, "longitude": placed, "altitude_msl": 900.0}
+    assert far(there, start) == pytest.approx(math.radians(0.0002) * EARTH_RADIUS_M * 0.5, rel=1e-6)

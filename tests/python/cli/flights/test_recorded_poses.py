@@ -1,9 +1,13 @@
-"""The poses of rerun_flight end when they are to."""
+"""The poses of rerun_flight: what lies between two, and that they end when they are to."""
 
 from __future__ import annotations
 
 import socket
 
+import numpy as np
+import pytest
+
+from xplane_bridge.cli.flights.recorded_poses import Poses
 from xplane_bridge.harness.pose_sender import PoseSender, Scenery
 
 POSE = {
@@ -22,3 +26,21 @@ def test_once_closed_it_moves_nothing_whichever_thread_is_about_to():
         assert all(xplane.recv(600).startswith(b"DREF\0") for _ in range(10))
         sender.close()
         sender.send(POSE)  # a flight state that was on its way
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "between"),
+    [
+        (179.9999, -179.9997, -179.9999),
+        (-179.9999, 179.9997, 179.9999),
+        (-179.9997, 179.9999, -179.9999),
+        (-0.0001, 0.0003, 0.0001),
+        (126.5, 126.7, 126.6),
+    ],
+)
+def test_a_pose_between_two_lies_on_the_shorter_way_also_across_the_date_line(first, second, between):
+    columns = {name: np.array([value, value]) for name, value in POSE.items()}
+    columns["longitude"] = np.array([first, second])
+    poses = Poses(np.array([0.0, 0.5]), columns, None)
+    found = [poses.at(time)["longitude"] for time in (0.0, 0.25, 0.5)]
+    assert found == pytest.approx([first, between, second], rel=0.0, abs=1e-9)
