@@ -157,7 +157,7 @@ def _check(
     name: str, unit: str, errors: list[np.ndarray], quantity: np.ndarray, limit: float, share: float = 0.0
 ) -> Check:
     """Make a check of the worst axis; the limit is at least `share` of the size of `quantity`, the observed side."""
-    rows = np.concatenate([e.reshape(len(e), -1) for e in errors]) if errors else np.empty((0, 1))
+    rows = np.concatenate([e if e.ndim > 1 else e[:, None] for e in errors]) if errors else np.empty((0, 1))
     rows = np.abs(rows[np.isfinite(rows).all(axis=1)])
     finite = quantity[np.isfinite(quantity)]
     scale = float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0

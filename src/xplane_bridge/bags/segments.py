@@ -8,6 +8,8 @@ import numpy as np
 
 #: [s] Two samples further apart than this are a gap.
 DEFAULT_MAX_GAP = 0.5
+#: Slow samples lie further apart: of them a gap is longer than this many median periods.
+_SLOW_PERIODS = 3.0
 
 
 def segments(time: np.ndarray, epoch: Optional[np.ndarray] = None, max_gap: float = DEFAULT_MAX_GAP) -> list[slice]:
@@ -16,7 +18,7 @@ def segments(time: np.ndarray, epoch: Optional[np.ndarray] = None, max_gap: floa
     Args:
         time: int64 [ns], shape (n,), non-decreasing inside an epoch.
         epoch: Counter of shape (n,) that changes at resets and jumps; none when omitted.
-        max_gap: [s] longest distance of two samples of one segment.
+        max_gap: [s] longest distance of two samples of one segment; of slow samples, three median periods.
 
     Returns:
         Slices of the samples, in order, that together cover all of them.
@@ -24,7 +26,9 @@ def segments(time: np.ndarray, epoch: Optional[np.ndarray] = None, max_gap: floa
     if not len(time):
         return []
     step = np.diff(time)
-    cut = (step > max_gap * 1e9) | (step < 0)
+    onward = step[step > 0]
+    longest = max(max_gap * 1e9, _SLOW_PERIODS * float(np.median(onward)) if len(onward) else 0.0)
+    cut = (step > longest) | (step < 0)
     if epoch is not None:
         cut |= np.diff(epoch.astype(np.int64)) != 0
     edges = [0, *(np.flatnonzero(cut) + 1).tolist(), len(time)]

@@ -100,6 +100,13 @@ def test_missing_values_leave_nothing_to_compare() -> None:
     assert (check.samples, check.ok) == (0, True)
 
 
+@pytest.mark.parametrize("rows", [slice(0, 1), slice(0, 0)])
+def test_one_state_or_none_leaves_nothing_to_compare(rows: slice) -> None:
+    columns = {name: values[rows] for name, values in turn().items()}
+    found = {c.name: c.samples for c in check_flight(columns, [rows] if rows.stop else [])}
+    assert sum(found.values()) == found["|velocity - wind| against true airspeed"] == rows.stop
+
+
 def test_odometry_is_compared_over_a_second() -> None:
     t = np.arange(500) / 50.0
     time = np.round(t * S).astype(np.int64)

@@ -15,3 +15,10 @@ def test_segments_cut_at_gaps_epochs_and_backward_time() -> None:
     assert segments(time, epoch) == [slice(0, 3), slice(3, 4), slice(4, 5), slice(5, 7)]
     assert segments(time) == [slice(0, 3), slice(3, 5), slice(5, 7)]
     assert segments(ns()) == []
+
+
+def test_slow_samples_are_one_segment_and_their_gaps_still_cut() -> None:
+    # States at 1 Hz, one of them lost, then silence for ten seconds.
+    assert segments(ns(0, 1, 2, 4, 5, 6, 16, 17)) == [slice(0, 6), slice(6, 8)]
+    assert segments(ns(0, 0, 0)) == [slice(0, 3)]
+    assert segments(ns(5)) == [slice(0, 1)]

@@ -253,6 +253,25 @@ def test_missing_topics_are_said_and_the_rest_stands(tmp_path: Path) -> None:
     assert "figure-attitude" in section(page, "attitude")
 
 
+def test_a_recording_of_a_pause_gets_a_page(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "paused.bag") as bag:
+        for k in range(100):
+            ns = stamp_ns(k / 20)
+            state = {**bag.state(0.0, k), "header": bag.header(ns, "base_link_frd", k), "paused": True}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, state)
+    page = tmp_path / "r.html"
+    assert flight_report.main([str(tmp_path / "paused.bag"), "-o", str(page)]) == 0
+    assert section(page, "quality").count("nothing to compare") == 3
+
+
+def test_slow_states_count(tmp_path: Path) -> None:
+    write_states(tmp_path / "slow.bag", 60.0, 1.0)
+    page = tmp_path / "r.html"
+    assert flight_report.main([str(tmp_path / "slow.bag"), "-o", str(page)]) == 0
+    assert "<b>3540 m</b><span>distance over ground</span>" in section(page, "summary")
+    assert "1 stretch without a gap" in section(page, "quality")
+
+
 def test_a_bag_without_state_gets_a_page_and_an_error(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     with FlightBag(tmp_path / "link.bag") as bag:
         bag.add("/xplane/link_state", "xplane_bridge/LinkState", stamp_ns(0), {"state": 0})
