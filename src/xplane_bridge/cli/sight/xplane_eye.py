@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import codecs
 import contextlib
 import time
 from pathlib import Path
 from typing import Callable, Optional, Sequence, Tuple
 
 from xplane_bridge.cli.entry import guarded, number
+from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.eye.calibrate import default_undo_file
 from xplane_bridge.eye.grab import TITLES, Which
 from xplane_bridge.eye.program import Eye, EyeOptions
 from xplane_bridge.eye.rref import THIS_COMPUTER
+from xplane_bridge.eye.wire import MOST_TEXT
 
 _LOCAL_PORT = 49711
+
+
+class TokenError(XplaneBridgeError):
+    """The file of --token-file holds no token that can be sent."""
 
 
 @guarded
@@ -24,7 +31,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     given = parser.parse_args(argv)
     if (given.receiver is None) != given.verify:
         parser.error("expected either HOST:PORT of capture_node, to send pictures there, or --verify, which sends none")
-    token = given.token_file.read_text(encoding="utf-8").strip() if given.token_file else ""
+    token = _token(given.token_file) if given.token_file else ""
     options = EyeOptions(
         receiver=given.receiver,
         xplane=given.xplane,
@@ -43,6 +50,26 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     for line in eye.findings.lines() if eye.findings else ():
         _say(line)
     return 0 if eye.findings is None or eye.findings.good else 1
+
+
+def _token(path: Path) -> str:
+    """The text of a file as editors and shells of Windows write it: PowerShell 5's `>` makes UTF-16.
+
+    Raises:
+        TokenError: It cannot be read, or is no such text.
+    """
+    try:
+        raw = path.read_bytes()
+        wide = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        token = raw.decode("utf-16" if wide else "utf-8-sig").strip()
+        if len(token.encode("utf-8")) <= MOST_TEXT:
+            return token
+        problem = f"its text is longer than {MOST_TEXT} bytes"
+    except OSError as error:
+        problem = str(error.strerror or error)
+    except UnicodeDecodeError:
+        problem = "it is no text in UTF-8 or UTF-16"
+    raise TokenError(f"{path}: {problem}; --token-file takes a text file that holds capture_node's sender/token")
 
 
 def _say(text: str) -> None:
