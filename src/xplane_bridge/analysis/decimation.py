@@ -10,8 +10,8 @@ def min_max(time: np.ndarray, values: np.ndarray, points: int) -> tuple[np.ndarr
 
     Args:
         time: Shape (n,).
-        values: Shape (n,); NaN stays where a whole run is NaN, so that gaps stay visible.
-        points: Wanted number of points, at least 4; a shorter series is given back as it is.
+        values: Shape (n,); where there was a NaN between two points that are kept, one stays: lines stay broken.
+        points: Wanted number of points but for NaN, at least 4; a shorter series is given back as it is.
     """
     count = len(values)
     if count <= points:
@@ -23,7 +23,7 @@ def min_max(time: np.ndarray, values: np.ndarray, points: int) -> tuple[np.ndarr
         run = values[a:b]
         if np.isfinite(run).any():
             keep += sorted({a + int(np.nanargmin(run)), a + int(np.nanargmax(run))})
-        else:
-            keep.append(a)
-    index = np.array(keep)
+    missing = np.flatnonzero(np.isnan(values))
+    _, first = np.unique(np.searchsorted(keep, missing), return_index=True)
+    index = np.union1d(np.array(keep, dtype=int), missing[first])
     return time[index], values[index]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Callable, Optional, Sequence
 
 import numpy as np
@@ -89,7 +90,21 @@ def _figure(key: str, title: str, flight: Flight, panels: list[Panel]) -> TimeFi
     if not filled:
         msg = "the messages hold no valid value of these quantities"
         raise MissingError(msg)
+    for panel in filled:
+        panel.series = [_cut(series, flight) for series in panel.series]
     return TimeFigure(key, title, filled, episodes(flight))
+
+
+def _cut(series: Series, flight: Flight) -> Series:
+    """Break a line where the flight states have a gap or a reset."""
+    if len(flight.parts) < 2:
+        return series
+    stamp = flight.tables["state"].stamp
+    behind = np.array([part.start for part in flight.parts[1:]])
+    edges = stamp[behind - 1] + (stamp[behind] - stamp[behind - 1]) // 2
+    rows = np.searchsorted(series.time, edges)
+    time, values = np.insert(series.time, rows, edges), np.insert(series.values.astype(np.float64), rows, np.nan)
+    return replace(series, time=time, values=values)
 
 
 def _broken(values: np.ndarray, jump: float = 180.0) -> np.ndarray:
@@ -251,12 +266,13 @@ def _path(flight: Flight, in_space: bool) -> PathFigure:
     if not good.any():
         msg = "no valid position"
         raise MissingError(msg)
-    broken = [part.start for part in flight.parts[1:]]
+    moved = np.flatnonzero(np.diff(t["position_epoch"].astype(np.int64))) + 1
+    broken = [*(part.start for part in flight.parts[1:]), *moved]
     columns = [values.astype(np.float64).copy() for values in (east, north, up)]
     x, y, z = columns
     for values in columns:
         values[~good] = np.nan
-        values[broken] = np.nan  # no line across a gap or reset
+        values[broken] = np.nan  # no line across a gap, a reset or a new origin
     colour, label = (t["true_airspeed"], "true airspeed [m/s]") if in_space else (up, "altitude MSL [m]")
     key, title = ("path", "Flight path") if in_space else ("track", "Ground track")
     return PathFigure(key, title, x, y, z, colour.astype(np.float64), label, in_space)

@@ -211,6 +211,19 @@ def test_decimation_keeps_every_peak() -> None:
     assert np.isnan(min_max(time, gap, 1000)[1]).any()
 
 
+def test_decimation_keeps_lines_broken() -> None:
+    time = np.arange(100_000.0)
+    heading = (time * 0.01) % 360.0  # wraps 2 times, and 200 samples make a run
+    heading[1:][np.diff(heading) < 0] = np.nan
+    kept = min_max(time, heading, 1000)[1]
+    assert np.nanmax(np.abs(np.diff(kept))) < 180.0
+    assert np.isnan(kept).sum() == 2
+    short = np.where((time > 50_010) & (time < 50_020), np.nan, 7.0)
+    t, v = min_max(time, short, 1000)
+    assert t[np.isnan(v)].tolist() == [50_011.0]
+    assert np.isnan(min_max(time, np.full(100_000, np.nan), 1000)[1]).all()
+
+
 def keyed(*pictures: tuple) -> dict:
     """FrameStates of pictures: epoch, simulator time of the frame, quality."""
     epoch, time, quality = zip(*pictures)

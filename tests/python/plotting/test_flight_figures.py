@@ -1,0 +1,57 @@
+"""Figures of a flight draw nothing where there are no data."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from support.flights.synthetic_flight import FlightBag, stamp_ns
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.flight import Flight, read_flight
+from xplane_bridge.plotting.flight_figures import all_figures
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from xplane_bridge.plotting.spec import PathFigure, TimeFigure
+
+
+def figure(flight: Flight, wanted: str) -> TimeFigure | PathFigure:
+    return next(make for key, _, make in all_figures() if key == wanted)(flight)
+
+
+def read(path: Path) -> Flight:
+    with Bags(path) as bags:
+        return read_flight(bags)
+
+
+def test_lines_of_every_topic_are_broken_where_states_are_missing(tmp_path: Path) -> None:
+    """Of 1 min without states; the engines' first message behind it comes before the first state."""
+    with FlightBag(tmp_path / "gap.bag") as bag:
+        for k in range(200):
+            t = k / 20 + (60.0 if k >= 100 else 0.0)
+            state = {**bag.state(t, k), "altitude_msl": 3000.0 if k < 100 else 100.0}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
+            ns = stamp_ns(t - 0.01)
+            engines = {"header": bag.header(ns, ""), "count": 1, "thrust": [1000.0 + k] + [0.0] * 7}
+            bag.add("/xplane/mission/engines", "xplane_bridge/EngineStates", ns, engines)
+    flight = read(tmp_path / "gap.bag")
+    for key in ("altitude", "engines", "attitude"):
+        for series in (series for panel in figure(flight, key).panels for series in panel.series):
+            missing = np.flatnonzero(np.isnan(series.values))
+            assert missing.tolist() == [100], series.name
+            assert len(series.values) == 201, series.name
+            assert (np.diff(series.time) > 0).all()
+
+
+def test_the_track_is_broken_at_a_new_origin(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "origin.bag") as bag:
+        for k in range(100):
+            t = k / 20
+            place = {"position_epoch": 1 + (k >= 50), "position_north": 60.0 * t - (5000.0 if k >= 50 else 0.0)}
+            values = {**bag.state(t, k), "position_east": 0.0, **place}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), values)
+    track = figure(read(tmp_path / "origin.bag"), "track")
+    assert np.nanmax(np.abs(np.diff(track.north))) < 3.01
+    assert np.flatnonzero(np.isnan(track.north)).tolist() == [50]
