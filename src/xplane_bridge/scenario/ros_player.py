@@ -112,7 +112,8 @@ class RosPlayer:
         self._mode: Optional[int] = None
         self._stall = False
         self._traffic = ScenarioTraffic()
-        self._sequence = self._mode_sequence = 0
+        self._sequence = 0
+        self._mode_sequence = int(time.time())  # the next run is heard by the tx_node that heard this one
         self._tapped: Dict[int, float] = {}  # button to the time of its release
         self._actions: queue.Queue[Optional[Action]] = queue.Queue()
         self._finished = threading.Event()

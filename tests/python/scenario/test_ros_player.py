@@ -72,3 +72,11 @@ def test_what_is_unknown_for_a_moment_is_forgotten_after_it():
     after = flying._to_send()
     assert after.throttle == pytest.approx(before.throttle, abs=0.05)
     assert all(math.isfinite(value) for value in after.stick.values())
+
+
+def test_tx_node_hears_the_mode_requests_of_a_second_run(monkeypatch):
+    """It ignores a number that it has had from the same node; a run asks for a mode less than once a second."""
+    monkeypatch.setattr(ros_player.time, "time", lambda: 1000.0)
+    first = player({"at": 60, "end": True})
+    monkeypatch.setattr(ros_player.time, "time", lambda: 1060.0)
+    assert player({"at": 60, "end": True})._mode_sequence >= first._mode_sequence + 60
