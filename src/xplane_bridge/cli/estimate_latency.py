@@ -26,6 +26,7 @@ from xplane_bridge.cli.bridge.waiting import Listener, print_waiting, wait_for_s
 from xplane_bridge.cli.entry import guarded, number, start_node
 from xplane_bridge.constants import CameraView, ImageQuality, words
 from xplane_bridge.harness.processes import ManagedProcess
+from xplane_bridge.plotting.figure_file import figure_file
 from xplane_bridge.topics import NAMESPACE
 
 if TYPE_CHECKING:
@@ -80,19 +81,9 @@ def parser() -> argparse.ArgumentParser:
         metavar="0..1",
         help="share of the picture at its lower edge that does not show the scene (default: %(default)s)",
     )
-    p.add_argument("--plot", type=_picture, metavar="FILE", help="figure of cost and fit, e.g. delay.png")
+    p.add_argument("--plot", type=figure_file, metavar="FILE", help="figure of cost and fit, e.g. delay.png")
     p.add_argument("--json", type=Path, metavar="FILE", help="the numbers as JSON")
     return p
-
-
-def _picture(text: str) -> Path:
-    from matplotlib.figure import Figure
-
-    kinds = Figure().canvas.get_supported_filetypes()
-    if Path(text).suffix[1:].lower() not in kinds:
-        msg = f"{text}: expected a file name that ends in one of {', '.join(sorted(kinds))}"
-        raise argparse.ArgumentTypeError(msg)
-    return Path(text)
 
 
 @guarded

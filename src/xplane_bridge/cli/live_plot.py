@@ -9,6 +9,7 @@ from typing import Any, Callable, NamedTuple, Optional, Sequence
 
 from xplane_bridge.cli.entry import guarded, positive, ros_arguments, start_node
 from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.plotting.figure_file import figure_file
 from xplane_bridge.plotting.live import LiveWindow, RollingSeries, can_show
 
 _TOPIC_POLL_S = 0.2
@@ -36,7 +37,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("fields", nargs="+", metavar="TOPIC/FIELD[,FIELD...]", help="as for rqt_plot")
     p.add_argument("--window", type=positive, default=60.0, metavar="S", help="width of the time axis (%(default)g s)")
     p.add_argument("--wait", type=positive, default=30.0, metavar="S", help="for the topics to appear (%(default)g s)")
-    p.add_argument("--png", default="live_plot.png", metavar="FILE", help="what the s key writes (%(default)s)")
+    p.add_argument(
+        "--png", type=figure_file, default="live_plot.png", metavar="FILE", help="what the s key writes (%(default)s)"
+    )
     p.add_argument(
         "--after", type=positive, metavar="S", help="write the PNG by itself after so long, and end; needs no display"
     )
@@ -113,8 +116,13 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         for name, one in zip(group, series):
             _subscribe(found[name], one)
     window = LiveWindow(groups, args.window, args.png)
-    window.run(args.after)
-    rospy.signal_shutdown("closed")
+    try:
+        window.run(args.after)
+    except OSError as error:
+        msg = f"{args.png} is not written: {error.strerror or error}"
+        raise LivePlotError(msg) from None
+    finally:
+        rospy.signal_shutdown("closed")
     return 0
 
 

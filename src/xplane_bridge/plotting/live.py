@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import collections
+import sys
 import threading
 import time
-from typing import Optional, Sequence
+from typing import TYPE_CHECKING, Optional, Sequence
 
 import matplotlib
 import numpy as np
 
 from xplane_bridge.plotting.spec import COLOURS
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _REFRESH_MS = 50
 _WINDOWLESS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")  #: matplotlib's backends
@@ -61,10 +65,10 @@ class LiveWindow:
     Args:
         groups: One list of series for each pair of axes, with the axes' label.
         window: [s] width of the time axis.
-        png: File that the s key writes.
+        png: File that the s key writes; its ending says the format.
     """
 
-    def __init__(self, groups: Sequence[tuple[str, Sequence[RollingSeries]]], window: float, png: str) -> None:
+    def __init__(self, groups: Sequence[tuple[str, Sequence[RollingSeries]]], window: float, png: Path) -> None:
         from matplotlib import pyplot
 
         for key in ("keymap.quit", "keymap.save"):
@@ -72,6 +76,7 @@ class LiveWindow:
         self._window = window
         self._png = png
         self._paused = False
+        self._failed: Optional[OSError] = None
         self._pyplot = pyplot
         self._groups = groups
         self.figure, axes = pyplot.subplots(
@@ -91,11 +96,20 @@ class LiveWindow:
         self.figure.canvas.mpl_connect("key_press_event", self._key)
 
     def run(self, seconds: Optional[float] = None) -> None:
-        """Show the window until it is closed; or for so long [s], and write the PNG then, also without any window."""
+        """Show the window until it is closed; or for so long [s], and write the PNG then, also without any window.
+
+        Raises:
+            OSError: The PNG cannot be written then.
+        """
         if seconds is not None and not can_show():
             time.sleep(seconds)
             self._save_and_close()
-            return
+        else:
+            self._show(seconds)
+        if self._failed is not None:
+            raise self._failed
+
+    def _show(self, seconds: Optional[float]) -> None:
         timer = self.figure.canvas.new_timer(interval=_REFRESH_MS)
         timer.add_callback(self.refresh)
         timer.start()
@@ -108,7 +122,10 @@ class LiveWindow:
 
     def _save_and_close(self) -> None:
         self.refresh()
-        self.save(self._png)
+        try:
+            self.save(self._png)
+        except OSError as error:  # a timer's exception would be printed, and the window stay
+            self._failed = error
         self._pyplot.close(self.figure)
 
     def refresh(self) -> None:
@@ -125,8 +142,8 @@ class LiveWindow:
         self._axes[-1].set_xlim(-self._window, 0.0)
         self.figure.canvas.draw_idle()
 
-    def save(self, path: str) -> None:
-        """Write what the window shows as PNG."""
+    def save(self, path: Path) -> None:
+        """Write what the window shows."""
         self.figure.savefig(path, dpi=120)
 
     def _all(self) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -144,7 +161,11 @@ class LiveWindow:
             self._paused = not self._paused
             self._title()
         elif key == "s":
-            self.save(self._png)
-            print(f"wrote {self._png}", flush=True)
+            try:
+                self.save(self._png)
+            except OSError as error:
+                print(f"{self._png} is not written: {error.strerror or error}", file=sys.stderr, flush=True)
+            else:
+                print(f"wrote {self._png}", flush=True)
         elif key == "q":
             self._pyplot.close(self.figure)

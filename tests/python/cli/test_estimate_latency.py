@@ -138,3 +138,12 @@ def test_bag_without_pictures_is_one_line_and_exit_1(tmp_path: Path, capsys: pyt
     write_bag(bag)
     assert main([str(bag)]) == 1
     assert "no camera images" in capsys.readouterr().err
+
+
+def test_a_figure_that_cannot_be_written_is_refused_before_anything_is_measured(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([str(tmp_path / "flight.bag"), "--plot", str(tmp_path / "none" / "delay.png")])
+    assert ended.value.code == 2
+    assert f"there is no folder {tmp_path / 'none'}; make it" in capsys.readouterr().err

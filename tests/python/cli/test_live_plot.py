@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Callable
+
+import matplotlib
 import numpy as np
 import pytest
 
+from xplane_bridge.cli import live_plot
 from xplane_bridge.cli.live_plot import Field, LivePlotError, getter, locate, split
-from xplane_bridge.plotting.live import RollingSeries
+from xplane_bridge.plotting.live import LiveWindow, RollingSeries
 
 
 class Vector:
@@ -76,3 +82,58 @@ def test_a_series_keeps_its_window_and_begins_anew_when_time_goes_back() -> None
     np.testing.assert_array_equal(values, 2.0 * np.arange(19, 30))
     series.add(5.0, 1.0)
     assert series.arrays()[0].tolist() == [5.0]
+
+
+def plot_for_a_moment(monkeypatch: pytest.MonkeyPatch, png: Path, meanwhile: Callable[[], None]) -> int:
+    """Runs `live_plot --after`, for which a topic is there; `meanwhile` is called once it is found."""
+
+    def wait_for(names: Any, _timeout: float) -> dict:
+        meanwhile()
+        return dict.fromkeys(names)
+
+    matplotlib.use("Agg")
+    node = SimpleNamespace(resolve_name=lambda name: name, signal_shutdown=lambda _why: None)
+    monkeypatch.setattr(live_plot, "start_node", lambda *_args, **_options: node)
+    monkeypatch.setattr(live_plot, "_wait_for", wait_for)
+    monkeypatch.setattr(live_plot, "_subscribe", lambda _field, _series: None)
+    return live_plot.main(["/a/b", "--after", "0.01", "--png", str(png)])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("none/x.png", "there is no folder"), ("x.foo", "expected a file name that ends in one of")]
+)
+def test_a_file_that_no_picture_can_become_is_refused_at_the_start(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        plot_for_a_moment(monkeypatch, tmp_path / name, lambda: pytest.fail("it has started"))
+    assert ended.value.code == 2
+    assert text in capsys.readouterr().err
+
+
+def test_a_picture_that_cannot_be_written_in_the_end_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    png = folder / "x.png"
+    assert plot_for_a_moment(monkeypatch, png, lambda: None) == 0
+    assert png.stat().st_size > 1000
+    png.unlink()
+    assert plot_for_a_moment(monkeypatch, png, folder.rmdir) == 1
+    said = capsys.readouterr().err
+    assert said.endswith(f"{png} is not written: No such file or directory\n")
+    assert said.count("\n") == 1
+
+
+def test_the_s_key_says_when_the_picture_is_not_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    matplotlib.use("Agg")
+    png = tmp_path / "none" / "x.png"
+    window = LiveWindow([("b", [RollingSeries("b", 10.0)])], 10.0, png)
+    press = SimpleNamespace(key="s")
+    window._key(press)
+    png.parent.mkdir()
+    window._key(press)
+    said = capsys.readouterr()
+    assert said.err == f"{png} is not written: No such file or directory\n"
+    assert said.out == f"wrote {png}\n"
