@@ -7,6 +7,9 @@ messages read as they were; fields that came later are there too: NaN, 0, false 
 layout (all lengths inside equal) are decoded together by numpy; a topic whose lengths vary is split into its layouts,
 and only messages that hold lists of messages or of strings are decoded one by one.
 
+Where X-Plane was restarted and stamps go by its time (`publish_clock`), they go back; they are read as going on, and so
+are receive times of a recorder that goes by that time (`bags.restarts`). A warning says by how much.
+
 A long recording needs little memory in pieces (`Bags.pieces`), or with its columns in a temporary file (`ColumnFile`).
 
 Columns are named by path: ``header.stamp``, ``angular_velocity.x``, ``gear_deploy_ratio``. Times and durations are
@@ -23,7 +26,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
-from typing import Any, Iterator, Mapping, NamedTuple, Optional, Sequence, Union
+from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 from rosbags.serde import SerdeError
@@ -39,6 +42,7 @@ from xplane_bridge.bags.decoding import (
     decode_objects,
     wanted,
 )
+from xplane_bridge.bags.restarts import Restarts, let_receive_times_go_on
 from xplane_bridge.bags.units import Unit, later_units, parse_units
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -151,6 +155,7 @@ class Bags:
             raise BagError(msg)
         self._stack: Optional[ExitStack] = None
         self._files: list[BagFile] = []
+        self._restarts = Restarts(self.paths[0], self._state_stamps)
 
     def __enter__(self) -> Bags:
         """Open all files."""
@@ -160,6 +165,8 @@ class Bags:
                 file = _opened(path)
                 stack.callback(file.close)
                 self._files.append(file)
+            if self._states():
+                let_receive_times_go_on(self._states(), self._epochs, self._files)
         except BaseException:
             stack.close()
             self._files = []
@@ -173,6 +180,7 @@ class Bags:
             self._stack.close()
         self._stack = None
         self._files = []
+        self._restarts = Restarts(self.paths[0], self._state_stamps)
 
     @property
     def topics(self) -> dict[str, TopicInfo]:
@@ -205,17 +213,34 @@ class Bags:
         """Find the topic of a message type (``package/Name``) whose name ends in `suffix`.
 
         Of several, one of the bridge's own, below the name space of the flight state: other nodes publish common types
-        too. Then the one in the fewest name spaces: the bridge's own camera before a further one's; then by name.
+        too. Then the one in the fewest name spaces: the bridge's own camera before a further one's; then by name. The
+        bridge's own types are of another aircraft elsewhere: beside a flight state they are taken from nowhere else.
         """
-        space = f"{self.name_space}/"
         found = [info.topic for info in self.topics.values() if info.msgtype == msgtype and info.topic.endswith(suffix)]
-        return min(found, key=lambda topic: (not topic.startswith(space), *_rank(topic)), default=None)
+        own = self.own(found)
+        only_own = msgtype.startswith("xplane_bridge/") and self._name_spaces
+        return min(own if own or only_own else found, key=_rank, default=None)
+
+    def own(self, topics: Iterable[str]) -> list[str]:
+        """Give those of some topics that are below `name_space`, and not below that of a further bridge in there."""
+        spaces = self._name_spaces or [""]
+        own = []
+        for topic in topics:
+            around = [space for space in spaces if topic.startswith(f"{space}/")]
+            if max(around, key=len, default=None) == spaces[0]:
+                own.append(topic)
+        return own
 
     @property
     def name_space(self) -> str:
         """What precedes the bridge's topics, e.g. ``/xplane``; empty where there is no flight state."""
-        states = [info.topic for info in self.topics.values() if info.msgtype == FLIGHT_STATE]
-        return min(states, key=_rank, default="").rpartition("/")[0]
+        return next(iter(self._name_spaces), "")
+
+    @property
+    def _name_spaces(self) -> list[str]:
+        """Of each flight state, the first is the bridge's that is read."""
+        states = sorted((info.topic for info in self.topics.values() if info.msgtype == FLIGHT_STATE), key=_rank)
+        return [state.rpartition("/")[0] for state in states]
 
     def constants(self, topic: str) -> dict[str, Any]:
         """Give the constants of a topic's message, from the bag's own definition (e.g. ``VALID_POSITION``)."""
@@ -243,7 +268,7 @@ class Bags:
         filling = Filling(sum(len(file.times(c.id)) for file, c in connections), store)
         for file, connection in connections:
             for time, found in self._pieces(file, connection, columns):
-                filling.add(time, found)
+                filling.add(time, self._restarts.columns(time, found))
         return _table(topic, connections[-1][1].msgtype, filling, columns)
 
     def pieces(self, topic: str, columns: Optional[Sequence[str]] = None) -> Iterator[Table]:
@@ -259,7 +284,7 @@ class Bags:
         for file, connection in self._connections(topic):
             for time, found in self._pieces(file, connection, columns):
                 filling = Filling(len(time), None)
-                filling.add(time, found)
+                filling.add(time, self._restarts.columns(time, found))
                 yield _table(topic, connection.msgtype, filling, columns)
 
     def messages(self, topic: str, spans: Optional[Sequence[tuple[int, int]]] = None) -> Iterator[tuple[int, Any]]:
@@ -309,6 +334,22 @@ class Bags:
         if raws:
             yield np.concatenate(times), self._decode(connection, raws, columns)
 
+    def _states(self) -> list[tuple[BagFile, int]]:
+        """The connections of the flight state: file, number of the connection."""
+        topic = self.topic_of_type(FLIGHT_STATE)
+        return [] if topic is None else [(file, connection.id) for file, connection in self._connections(topic)]
+
+    def _epochs(self, file: BagFile, id_: int) -> np.ndarray:
+        pieces = self._pieces(file, file.connections[id_], ["epoch"])
+        found = [piece.get("epoch", np.zeros(len(time), np.uint32)) for time, piece in pieces]
+        return np.concatenate([np.empty(0, np.uint32), *found])
+
+    def _state_stamps(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Receive times and stamps of the flight states, as recorded."""
+        for file, id_ in self._states():
+            for time, found in self._pieces(file, file.connections[id_], ["header.stamp"]):
+                yield time, found.get("header.stamp", time)
+
     def _undecoded(self, file: BagFile, connections: list[Connection]) -> Iterator[tuple[Recorded, int, bytes]]:
         known = {c.id: Recorded(*c[1:]) for c in connections}
         try:
@@ -324,7 +365,9 @@ class Bags:
         name = _type_name(connection.msgtype)
         try:
             for _, time, raw in file.by_time([connection.id], spans):
-                yield time, store.deserialize_ros1(raw, name)
+                message = store.deserialize_ros1(raw, name)
+                self._restarts.message(time, message)
+                yield time, message
         except (DamagedError, OSError, SerdeError, struct.error, AssertionError) as error:
             raise _damaged(file, error) from None
 

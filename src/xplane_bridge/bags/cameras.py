@@ -30,9 +30,12 @@ def cameras(bags: Bags) -> list[Camera]:
     topics = bags.topics
     filled = [name for name, info in sorted(topics.items()) if info.count and info.msgtype == _FRAMES]
     space = bags.name_space
-    own = [name for name in filled if name.startswith(f"{space}/")] if bags.topic_of_type(FLIGHT_STATE) else []
-    places = {name: _place(name) for name in own or filled}
-    short = {name: place[len(space.strip("/")) :] if own else place.partition("/")[2] for name, place in places.items()}
+    beside_state = bags.topic_of_type(FLIGHT_STATE) is not None
+    places = {name: _place(name) for name in (bags.own(filled) if beside_state else filled)}
+    short = {
+        name: place[len(space.strip("/")) :] if beside_state else place.partition("/")[2]
+        for name, place in places.items()
+    }
     names = short if len(set(short.values())) == len(short) else places
     found = []
     for name in places:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.units import Unit
 
+ODOMETRY = "nav_msgs/Odometry"
 #: Role in a flight to message type.
 ROLES = {
     "state": FLIGHT_STATE,
@@ -29,7 +30,7 @@ ROLES = {
     "excitation": "xplane_bridge/ExcitationState",
     "link": "xplane_bridge/LinkState",
     "events": "xplane_bridge/EventList",
-    "odom": "nav_msgs/Odometry",
+    "odom": ODOMETRY,
 }
 
 
@@ -69,6 +70,21 @@ class Flight:
         return max(int(t[-1]) for t in self.times.values())
 
 
+def odometry_topic(bags: Bags) -> Optional[str]:
+    """Find the bridge's odometry: `odom` beside the flight state, else where mavros.launch has it; None without.
+
+    Estimators publish the same type, so that it is found by its name. Without a flight state to be beside of, that name
+    must be the only one.
+    """
+    found = [name for name, info in bags.topics.items() if info.msgtype == ODOMETRY and info.count]
+    beside = f"{bags.name_space}/odom"
+    if beside in found:
+        return beside
+    ending = "/odom" if bags.topic_of_type(FLIGHT_STATE) is None else "/local_position/odom"
+    named = [name for name in found if name.endswith(ending)]
+    return named[0] if len(named) == 1 else None
+
+
 def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
     """Read everything but images.
 
@@ -87,7 +103,7 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
         raise BagError(msg)
     flight = Flight(bags.paths[0].stem, topics, {name: bags.times(name) for name in filled})
     for role, msgtype in ROLES.items():
-        topic = bags.topic_of_type(msgtype)
+        topic = odometry_topic(bags) if msgtype == ODOMETRY else bags.topic_of_type(msgtype)
         if topic is None or not topics[topic].count:
             continue
         flight.tables[role] = bags.read(topic, store=store).by_stamp()

@@ -10,13 +10,13 @@ import numpy as np
 from xplane_bridge.analysis.resampling import held
 from xplane_bridge.bags import BagError, Bags, Table
 from xplane_bridge.bags.cameras import cameras
+from xplane_bridge.bags.flight import odometry_topic
 from xplane_bridge.errors import XplaneBridgeError
 
 FRAME_STATE = "xplane_bridge/FrameState"
 MODE = "xplane_bridge/ControlMode"
 FAILURES = "xplane_bridge/FailureState"
 EXCITATION = "xplane_bridge/ExcitationState"
-ODOMETRY = "nav_msgs/Odometry"
 
 
 class ExportError(XplaneBridgeError):
@@ -38,6 +38,23 @@ def topic_of(bags: Bags, msgtype: str) -> str:
     if topic is None or not bags.topics[topic].count:
         names = ", ".join(str(path) for path in bags.paths)
         msg = f"{names}: no message of type {msgtype}; record that topic (launch/record.launch does)"
+        raise BagError(msg)
+    return topic
+
+
+def odometry_of(bags: Bags) -> str:
+    """Find the topic of the bridge's odometry, for an export that cannot do without.
+
+    Raises:
+        BagError: The bag has no such topic, or several; the text says what to record.
+    """
+    topic = odometry_topic(bags)
+    if topic is None:
+        names = ", ".join(str(path) for path in bags.paths)
+        msg = (
+            f"{names}: no odometry of the bridge; expected odom beside flight_state, or local_position/odom of "
+            "mavros.launch; record both (launch/record.launch records odom)"
+        )
         raise BagError(msg)
     return topic
 

@@ -9,7 +9,7 @@ import numpy as np
 from xplane_bridge.analysis.resampling import interpolated, rotated, time_base
 from xplane_bridge.bags import FLIGHT_STATE
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
-from xplane_bridge.export.flight import ODOMETRY, breaks, topic_of
+from xplane_bridge.export.flight import breaks, odometry_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +33,7 @@ def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np
     Raises:
         BagError: No odometry in the bag.
     """
-    table = bags.read(topic_of(bags, ODOMETRY), ["header.stamp", *_POSITION, *_ORIENTATION])
+    table = bags.read(odometry_of(bags), ["header.stamp", *_POSITION, *_ORIENTATION])
     order = np.argsort(table.stamp, kind="stable")
     stamp = table.stamp[order]
     position = np.stack([table[name][order] for name in _POSITION], axis=1)

@@ -194,6 +194,18 @@ def test_topic_of_type_and_empty_topics(tmp_path: Path) -> None:
         assert len(bags.read("/b/s")) == 0
 
 
+@pytest.mark.parametrize("spaces", [("/lead", "/wing"), ("", "/wing"), ("/lead", "/lead/wing")])
+def test_the_bridges_types_are_not_taken_from_another_aircraft(tmp_path: Path, spaces: tuple[str, str]) -> None:
+    first, second = spaces
+    topics = [(f"{space}/flight_state", "xplane_bridge/msg/FlightState") for space in spaces]
+    topics += [(f"{second}/control/mode", "xplane_bridge/msg/ControlMode"), (f"{second}/wind", "pkg/msg/Wind")]
+    path = write(tmp_path / "a.bag", [(topic, msgtype, STATE, [(1, state(1))]) for topic, msgtype in topics])
+    with Bags(path) as bags:
+        assert bags.topic_of_type("xplane_bridge/FlightState") == f"{first}/flight_state"
+        assert bags.topic_of_type("xplane_bridge/ControlMode") is None
+        assert bags.topic_of_type("pkg/Wind") == f"{second}/wind", "common types are found wherever they are"
+
+
 def damage(path: Path, change: object) -> Path:
     path.write_bytes(change(path.read_bytes()))
     return path

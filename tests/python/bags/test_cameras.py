@@ -60,6 +60,7 @@ def test_the_bridges_own_comes_first_and_each_has_its_own_topics(tmp_path: Path)
         # Two bridges: the cameras of the first, as with all other topics.
         (["/a/camera/frame_state", "/b/camera/frame_state"], "/a/flight_state", ["camera"]),
         (["/a/camera/frame_state", "/b/camera/frame_state"], "", ["a", "b"]),
+        (["/b/camera/frame_state"], "/a/flight_state", []),
         (["/x/a/b/camera/frame_state"], "/x/flight_state", ["a_b"]),
         (["/my/own_frames"], "", ["own_frames"]),
         ([], "/x/flight_state", []),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 import pytest
@@ -39,6 +39,34 @@ def test_the_bridges_own_odometry_is_exported_beside_that_of_other_nodes(tmp_pat
         assert bags.topic_of_type("nav_msgs/Odometry", "vio/odom") == f"{space}/vio/odom"
 
 
+@pytest.mark.parametrize(
+    ("topics", "own"),
+    [
+        (["/xplane/odom", "/xplane/ekf", "/lio/local_position/odom"], "/xplane/odom"),
+        (["/mavros/local_position/odom", "/vio/odometry", "/vio/odom", "/xplane/ekf"], "/mavros/local_position/odom"),
+        (["/vins/odometry", "/xplane/vio/odom"], None),
+        (["/lead/local_position/odom", "/wing/local_position/odom"], None),
+    ],
+)
+def test_an_estimate_is_never_taken_for_the_bridges_odometry(
+    tmp_path: Path, topics: list[str], own: Optional[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "flight.bag"
+    with FlightBag(path) as bag:
+        for k in range(3):
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k), bag.state(k, k))
+            for topic in topics:
+                add_odometry(bag, topic, k, 1.0 if topic == own else 999.0)
+    assert export(path, "--format", "tum", "-o", tmp_path) == (0 if own else 1)
+    if own:
+        assert np.loadtxt(tmp_path / "flight.tum")[:, 1].tolist() == [1.0, 1.0, 1.0]
+    else:
+        assert "no odometry of the bridge; expected odom beside flight_state" in capsys.readouterr().err
+    with Bags(path) as bags:
+        tables = read_flight(bags).tables
+    assert (tables["odom"].topic if "odom" in tables else None) == own, "the report's check of physics"
+
+
 @pytest.mark.parametrize("changed", ["epoch", "position_epoch"])
 @pytest.mark.parametrize("form", ["tum", "euroc"])
 def test_a_time_base_does_not_bridge_what_began_anew(tmp_path: Path, form: str, changed: str) -> None:
@@ -64,3 +92,10 @@ def test_a_time_base_needs_no_flight_states(tmp_path: Path) -> None:
             add_odometry(bag, "/xplane/odom", k / 10, float(k))
     assert export(tmp_path / "flight.bag", "--format", "tum", "--rate", "20", "-o", tmp_path) == 0
     np.testing.assert_allclose(np.loadtxt(tmp_path / "flight.tum")[:, 1], np.arange(9) / 2)
+
+
+def test_without_flight_states_the_odometry_must_be_the_only_one(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for topic in ("/vio/odom", "/xplane/odom"):
+            add_odometry(bag, topic, 0.0, 1.0)
+    assert export(tmp_path / "flight.bag", "--format", "tum", "-o", tmp_path) == 1
