@@ -298,14 +298,17 @@ def decode_objects(
                 put(name, known.setdefault(tuple(value), value))
             elif isinstance(value, np.ndarray):
                 put(name, value.copy())  # it is a view that keeps the whole message
+                if kind == Nodetype.ARRAY:
+                    fixed.add(name)
             else:
                 put(name, value)
 
     readers: dict[str, _Reader] = {}
+    fixed: set[str] = set()  # lists do not become a matrix because they happen to be of one length
     known: dict[tuple[str, ...], list[str]] = {}  # lists of names repeat: keep each once
     for raw in raws:
         walk(deserialise(raw), msgtype, "")
-    return {name: _column(values) for name, values in rows.items()}
+    return {name: _column(values, name in fixed) for name, values in rows.items()}
 
 
 class _Reader:
@@ -320,12 +323,11 @@ class _Reader:
         return found
 
 
-def _column(values: list[Any]) -> np.ndarray:
-    first = values[0]
-    if isinstance(first, (bool, int, float)):
-        return np.array(values)
-    if isinstance(first, np.ndarray) and all(v.shape == first.shape for v in values):
+def _column(values: list[Any], fixed: bool) -> np.ndarray:
+    if fixed:
         return np.stack(values)
+    if isinstance(values[0], (bool, int, float)):
+        return np.array(values)
     column = np.empty(len(values), dtype=object)
     for k, value in enumerate(values):
         column[k] = value

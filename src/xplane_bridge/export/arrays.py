@@ -15,9 +15,6 @@ Beside the topics there is ``cameras``, with one row per camera (`CameraRow`).
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import math
 import re
 import struct
 import tempfile
@@ -47,11 +44,10 @@ from xplane_bridge.analysis.resampling import interpolated
 from xplane_bridge.bags import FLIGHT_STATE, BagError
 from xplane_bridge.bags.cameras import COMPRESSED, RAW
 from xplane_bridge.bags.columns import ColumnFile
-from xplane_bridge.bags.decoding import MessageList
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.cameras import UNITS as CAMERA_UNITS
 from xplane_bridge.export.cameras import CameraRow, one_column_each
-from xplane_bridge.export.columns import name_of
+from xplane_bridge.export.columns import json_text, name_of
 from xplane_bridge.export.flight import full_names
 
 if TYPE_CHECKING:
@@ -390,10 +386,10 @@ def _without_objects(values: np.ndarray, folder: Optional[Path]) -> dict[str, So
         return {"": Texts(("" if value is None else value for value in values), folder)}
     if all(isinstance(value, np.ndarray) for value in filled):
         return _padded(values, np.result_type(*filled))
-    if all(isinstance(value, (list, MessageList)) and all(isinstance(text, str) for text in value) for value in filled):
+    if all(isinstance(value, list) and all(isinstance(text, str) for text in value) for value in filled):
         longest = max((len(text) for value in filled for text in value), default=1)
         return _padded(values, np.dtype(f"U{max(longest, 1)}"))
-    return {"": Texts(("" if value is None else json.dumps(_plain(value)) for value in values), folder)}
+    return {"": Texts(("" if value is None else json_text(value) for value in values), folder)}
 
 
 def _padded(values: np.ndarray, dtype: np.dtype) -> dict[str, Source]:
@@ -405,21 +401,6 @@ def _padded(values: np.ndarray, dtype: np.dtype) -> dict[str, Source]:
         if lengths[k]:
             out[k, : lengths[k]] = value
     return {"": out, "_count": lengths}
-
-
-def _plain(value: Any) -> Any:
-    """Give a message as what JSON knows; numbers that are not finite are null."""
-    if dataclasses.is_dataclass(value):
-        # Constants have a default, what was sent has none.
-        fields = [field.name for field in dataclasses.fields(value) if field.default is dataclasses.MISSING]
-        return {name: _plain(getattr(value, name)) for name in fields}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, (list, tuple, MessageList)):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _texts(values: Sequence[Any]) -> np.ndarray:

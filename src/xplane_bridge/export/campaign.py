@@ -110,6 +110,9 @@ def export_flight(job: Job) -> Outcome:
         return Outcome(job.name, None, str(error), False)
     except OSError as error:
         return Outcome(job.name, None, f"{error.filename}: {error.strerror}", False)
+    except Exception as error:  # of a library that writes a format: the other flights, and the manifest, are made
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        return Outcome(job.name, None, f"the {job.format} export failed: {said}; try another --format", False)
 
 
 def _export(job: Job, output: Path, key: dict[str, Any], record_file: Path) -> dict[str, Any]:

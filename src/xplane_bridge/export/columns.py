@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Iterator, Mapping
+import dataclasses
+import json
+import math
+from typing import TYPE_CHECKING, Any, Iterator, Mapping
 
 import numpy as np
 
 from xplane_bridge.analysis.resampling import held, interpolated, rotated
+from xplane_bridge.bags.decoding import MessageList
 
 if TYPE_CHECKING:
     from xplane_bridge.bags.units import Unit
@@ -22,7 +26,8 @@ def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: 
 
     Returns:
         ``altitude_msl_m``, ``velocity_ned_x_mps``, ``roll_deg``, ``throttle_command_0``, ... in message order, without
-        the header; arrays are spread over numbered columns, lists of varying length stay objects.
+        the header; arrays are spread over numbered columns, lists of varying length stay objects, lists of messages
+        are JSON.
     """
     out: dict[str, np.ndarray] = {}
     for path, values in columns.items():
@@ -30,12 +35,40 @@ def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: 
             continue
         base, ending = _parts(path, units, prefix)
         if values.ndim == 1:
-            out[base + ending] = values
+            out[base + ending] = as_json(values, MessageList)
         else:
             flat = values.reshape(len(values), -1)
             for k in range(flat.shape[1]):
                 out[f"{base}_{k}{ending}"] = flat[:, k]
     return out
+
+
+def as_json(values: np.ndarray, *kinds: type) -> np.ndarray:
+    """Give a column where what is of some kinds of lists is JSON."""
+    if not values.dtype.hasobject or not any(isinstance(value, kinds) for value in values):
+        return values
+    texts = np.empty(len(values), dtype=object)  # values beside them keep their types
+    texts[:] = [json_text(value) if isinstance(value, kinds) else value for value in values]
+    return texts
+
+
+def json_text(value: Any) -> str:
+    """Give a list, or messages, as JSON; numbers that are not finite are null."""
+    return json.dumps(_plain(value))
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        # Constants have a default, what was sent has none.
+        fields = [field.name for field in dataclasses.fields(value) if field.default is dataclasses.MISSING]
+        return {name: _plain(getattr(value, name)) for name in fields}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple, MessageList)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def name_of(path: str, units: Mapping[str, Unit]) -> str:

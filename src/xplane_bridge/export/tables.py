@@ -11,7 +11,7 @@ from xplane_bridge.analysis.resampling import held, time_base
 from xplane_bridge.bags import FLIGHT_STATE
 from xplane_bridge.bags.columns import ColumnFile, StoredColumn
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
-from xplane_bridge.export.columns import named, on_base
+from xplane_bridge.export.columns import as_json, named, on_base
 from xplane_bridge.export.flight import breaks, labels, topic_of
 
 if TYPE_CHECKING:
@@ -119,13 +119,16 @@ def _add_newest(table: FlightTable, bags: Bags, topic: str, base: np.ndarray, sp
     other = bags.read(full, store=table.store).by_stamp()
     prefix = full[len(space) :].strip("/") if full.startswith(space + "/") else full.strip("/")
     for path, values in other.columns.items():
-        table.add(named({path: held(base, other.stamp, values)}, units, prefix.replace("/", "_")))
+        for name, column in named({path: values}, units, prefix.replace("/", "_")).items():
+            table.add({name: held(base, other.stamp, column)})
 
 
 def write_csv(table: FlightTable, path: Path) -> None:
-    """Write a table as CSV; numbers read back to the very same values."""
+    """Write a table as CSV; numbers read back to the very same values, lists are JSON."""
     with path.open("w", encoding="utf-8", newline="") as file:
         for k, frame in enumerate(table.frames()):
+            for name in table.objects():
+                frame[name] = as_json(frame[name].to_numpy(), list, np.ndarray)
             frame.to_csv(file, index=False, header=k == 0, lineterminator="\n")
 
 
@@ -150,6 +153,8 @@ def schema_of(sample: pd.DataFrame, objects: Mapping[str, np.ndarray]) -> Any:
     schema = pa.Schema.from_pandas(sample, preserve_index=False)
     for name, values in objects.items():
         whole = pa.Schema.from_pandas(pd.DataFrame({name: values}), preserve_index=False).field(name)
+        if whole.type == pa.list_(pa.null()):  # all empty, and of texts: those of numbers are arrays with a type
+            whole = whole.with_type(pa.list_(pa.string()))
         schema = schema.set(schema.get_field_index(name), whole)
     return schema
 

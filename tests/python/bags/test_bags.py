@@ -11,6 +11,7 @@ import pytest
 from rosbags.rosbag1 import Writer
 
 from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags.columns import ColumnFile
 
 HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
 SEP = "=" * 80 + "\n"
@@ -100,6 +101,18 @@ def test_lists_of_numbers_vary_and_lists_of_messages_stay_objects(tmp_path: Path
     assert [list(v) for v in values] == [[1.5, 2.5], [], [9.0]]
     assert [(i.k, i.s) for i in table["items"][0]] == [(5, "a"), (6, "")]
     assert table["n"][0] == 2
+
+
+def test_lists_beside_texts_stay_lists_where_all_have_one_length(tmp_path: Path) -> None:
+    definition = "string[] names\nfloat32[] values\nfloat32[2] axes\n"
+    raws = [struct.pack("<II1sI3f", 1, 1, b"a", 1, k, k + 1, k + 2) for k in range(3)]
+    path = write(tmp_path / "a.bag", [("/l", "pkg/msg/L", definition, list(enumerate(raws)))])
+    for store in (None, ColumnFile(tmp_path)):
+        with Bags(path) as bags:
+            table = bags.read("/l", store=store)
+        assert [list(value) for value in table["values"]] == [[0.0], [1.0], [2.0]]
+        assert table["values"].dtype == object, "another flight has lists of other lengths in this column"
+        assert table["axes"].tolist() == [[1.0, 2.0], [2.0, 3.0], [3.0, 4.0]]
 
 
 def test_columns_can_be_selected_alone_or_as_a_group(tmp_path: Path) -> None:

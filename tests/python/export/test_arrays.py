@@ -115,6 +115,26 @@ def test_lists_that_vary_are_filled_up_and_lists_of_messages_are_json(tmp_path: 
     assert read == expected
 
 
+def test_arrays_of_lists_are_the_same_in_every_flight(tmp_path: Path) -> None:
+    found = set()
+    for number, counts in enumerate(([0, 0], [1, 1], [0, 2])):
+        path = tmp_path / f"{number}.bag"
+        with FlightBag(path) as bag:
+            for k, count in enumerate(counts):
+                header, event = bag.header(stamp_ns(k), ""), {"number": 1}
+                lists = {name: [text] * count for name, text in (("names", "engine_1"), ("active", True))}
+                bag.add(
+                    "/xplane/failures/state", "xplane_bridge/FailureState", stamp_ns(k), {"header": header, **lists}
+                )
+                events = {"header": header, "events": [event] * count}
+                bag.add("/xplane/events", "xplane_bridge/EventList", stamp_ns(k), events)
+        assert export(path, "--format", "npz", "-o", tmp_path) == 0
+        content = np.load(tmp_path / f"{number}.npz")
+        found.add(tuple((name, content[name].ndim, content[name].dtype.kind) for name in content.files))
+        assert content["xplane_failures_state/active_count"].tolist() == counts
+    assert len(found) == 1
+
+
 def test_topics_choose_and_pictures_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     bag = write_flight(tmp_path / "flight.bag", 0.2)
     assert export(bag, "--format", "npz", "--topics", "odom", "control/mode", "-o", tmp_path) == 0

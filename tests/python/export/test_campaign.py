@@ -17,7 +17,7 @@ import pytest
 from support.flights.export_flight import export, files_of, write_flight
 from support.flights.synthetic_flight import stamp_ns
 from xplane_bridge.dask_scheduler import SchedulerError
-from xplane_bridge.export import campaign
+from xplane_bridge.export import campaign, tables
 from xplane_bridge.export.campaign import flights
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.export.formats import Job
@@ -158,6 +158,21 @@ def assert_lost_but_a(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert f"{name}: a process of the export was killed" in out.err
     assert "0 of 2 flights exported" in out.out
     assert list(json.loads((folder / "manifest.json").read_text())["exports"]["csv"]) == ["a"]
+
+
+def test_a_library_that_fails_on_a_flight_leaves_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write_csv(table: tables.FlightTable, path: Path) -> None:
+        if path.stem == "b":
+            raise ValueError("cannot hold\nwhat is there")
+        path.write_text(f"{table.rows}\n")
+
+    monkeypatch.setattr(tables, "write_csv", write_csv)
+    paths = [write_flight(tmp_path / f"{name}.bag", 0.2) for name in "ba"]
+    assert export(*paths, "--jobs", "1", "-o", tmp_path / "out") == 1
+    assert "b: the csv export failed: ValueError: cannot hold what is there; try another" in capsys.readouterr().err
+    assert list(json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["csv"]) == ["a"]
 
 
 def end_this_process(_: Job) -> None:

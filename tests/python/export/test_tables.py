@@ -1,10 +1,13 @@
-"""Tables on a uniform time base hold nothing that was not flown."""
+"""Tables hold nothing that was not flown, and lists so that every program can read them."""
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import pandas as pd
+import pyarrow.parquet
+import pytest
 
 from support.flights.export_flight import export
 from support.flights.synthetic_flight import FlightBag, stamp_ns
@@ -22,3 +25,45 @@ def test_a_time_base_does_not_bridge_a_new_origin(tmp_path: Path) -> None:
     assert export(tmp_path / "flight.bag", "--rate", "50", "-o", tmp_path) == 0
     table = pd.read_csv(tmp_path / "flight.csv")
     assert table["position_north_m"].tolist() == [0.0] * 21 + [5000.0] * 21
+
+
+LISTS = ("--topics", "events", "failures/state")
+
+
+def write_lists(path: Path, *failures: int) -> Path:
+    """As many failures and events as given at each second; flight states before them, too."""
+    with FlightBag(path) as bag:
+        for k in range(10 * len(failures)):
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 10), bag.state(k / 10, k))
+        for k, count in enumerate(failures):
+            ns, names = stamp_ns(k + 0.5), [f"engine_{number}" for number in range(count)]
+            lists = {"names": names, "values": [float("nan")] * count, "active": [True] * count}
+            header = bag.header(ns, "")
+            bag.add("/xplane/failures/state", "xplane_bridge/FailureState", ns, {"header": header, **lists})
+            events = [{"number": number, "text": name} for number, name in enumerate(names)]
+            bag.add("/xplane/events", "xplane_bridge/EventList", ns, {"header": header, "events": events})
+    return path
+
+
+def test_lists_are_json_in_csv(tmp_path: Path) -> None:
+    assert export(write_lists(tmp_path / "flight.bag", 1, 2), *LISTS, "-o", tmp_path) == 0
+    table = pd.read_csv(tmp_path / "flight.csv")
+    assert table["events_events"].isna().tolist() == [True] * 5 + [False] * 15
+    assert [event["text"] for event in json.loads(table["events_events"].iloc[-1])] == ["engine_0", "engine_1"]
+    assert json.loads(table["failures_state_names"].iloc[5]) == ["engine_0"]
+    assert json.loads(table["failures_state_values_deg"].iloc[-1]) == [None, None]
+    assert json.loads(table["failures_state_active"].iloc[-1]) == [True, True]
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_columns_of_lists_are_the_same_in_every_flight(tmp_path: Path, form: str) -> None:
+    found = set()
+    for name, counts in (("none", (0, 0)), ("always", (1, 1)), ("comes", (0, 2))):
+        bag = write_lists(tmp_path / f"{name}.bag", *counts)
+        assert export(bag, "--format", form, *LISTS, "-o", tmp_path) == 0
+        path = tmp_path / f"{name}.{form}"
+        if form == "csv":
+            found.add(tuple(pd.read_csv(path).columns))
+        else:
+            found.add(str(pyarrow.parquet.read_schema(path).remove_metadata()))
+    assert len(found) == 1
