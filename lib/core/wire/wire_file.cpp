@@ -1,13 +1,13 @@
 #include "xplane_bridge/core/wire/wire_file.hpp"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
@@ -20,10 +20,21 @@ namespace {
 constexpr std::uint32_t kNotes = 0;  // interface of what is no datagram
 constexpr std::size_t kLongestComment = 20'000;
 constexpr const char* kEnding = ".pcapng";
+const std::string kPart = "_part";
 
-bool exists(const std::string& path) {
-  struct stat status {};
-  return stat(path.c_str(), &status) == 0;
+/// Whether there is a part of a log of this name, be it that the first ones have been removed.
+bool isTaken(const std::string& stem) {
+  const std::filesystem::path path(stem);
+  const std::string name = path.filename().string();
+  std::error_code error;
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  for (std::filesystem::directory_iterator each(folder, error), end; !error && each != end; each.increment(error)) {
+    const std::string file = each->path().filename().string();
+    if (file.compare(0, name.size(), name) != 0) continue;
+    const std::string rest = file.substr(name.size());
+    if (rest == kEnding || rest.compare(0, kPart.size(), kPart) == 0) return true;
+  }
+  return false;
 }
 
 std::string times(const WireRecord& record) {
@@ -40,7 +51,7 @@ WireFile::WireFile(WireFileOptions options) : options_(std::move(options)) {
   }
   base += "." + options_.node;
   stem_ = base;
-  for (int run = 2; exists(pathOf(1)); ++run) stem_ = base + "_run" + std::to_string(run);
+  for (int run = 2; isTaken(stem_); ++run) stem_ = base + "_run" + std::to_string(run);
   begin();
   if (!flush()) throw std::runtime_error(problem_);
 }
@@ -50,7 +61,7 @@ WireFile::~WireFile() {
 }
 
 std::string WireFile::pathOf(int part) const {
-  return stem_ + (part > 1 ? "_part" + std::to_string(part) : "") + kEnding;
+  return stem_ + (part > 1 ? kPart + std::to_string(part) : "") + kEnding;
 }
 
 void WireFile::begin() {

@@ -224,6 +224,22 @@ TEST_F(WireLogTest, BeginsAPartWhenOneIsFullAndKeepsTheNewest) {
   EXPECT_FALSE(contentOf(path("_part2")).empty());
 }
 
+TEST_F(WireLogTest, TheNextRunHasANameOfItsOwnAlsoWhereTheFirstPartsAreGone) {
+  options_.file_bytes = 2000;
+  options_.parts = 2;
+  Bytes records;
+  appendRecord(opened(name_, 51000), &records);
+  for (int i = 0; i < 20; ++i) appendRecord(datagram(WireKind::kReceived, Bytes(150, 1), i), &records);
+  ASSERT_TRUE(WireFile(options_).write(records));
+  ASSERT_TRUE(contentOf(path()).empty());
+  const Bytes before = contentOf(path("_part3"));
+  WireFile next(options_);
+  EXPECT_EQ(next.path(), path("_run2"));
+  EXPECT_TRUE(next.write(records)) << next.problem();
+  EXPECT_EQ(contentOf(path("_part3")), before);
+  EXPECT_EQ(WireFile(options_).path(), path("_run3"));
+}
+
 TEST_F(WireLogTest, OverwritesNothing) {
   { WireFile file(options_); }
   const Bytes before = contentOf(path());
