@@ -37,7 +37,10 @@ bool RrefFrameAssembler::add(const RrefView& datagram, std::int64_t receive_ns) 
       continue;
     }
     const auto p = static_cast<std::size_t>(position);
-    if (open_ && seen_[p] != 0) closeFrame(false);
+    if (open_ && seen_[p] != 0) {
+      completed = completed || isWhole();  // one datagram may complete a sample and begin the next
+      closeFrame(isWhole());
+    }
     if (!open_) beginFrame(receive_ns);
     seen_[p] = 1;
     if (silent_[p] != 0) {
@@ -52,7 +55,7 @@ bool RrefFrameAssembler::add(const RrefView& datagram, std::int64_t receive_ns) 
       ++counters_.non_finite;
     }
   }
-  if (open_ && expected_seen_ + silent_count_ == size()) {
+  if (open_ && isWhole()) {
     closeFrame(true);
     completed = true;
   }

@@ -63,6 +63,8 @@ class RrefFrameAssembler {
   void reset();
 
  private:
+  /// Whether every index that answers has come for the open frame.
+  bool isWhole() const { return expected_seen_ + silent_count_ == size(); }
   void closeFrame(bool complete);
   void beginFrame(std::int64_t receive_ns);
 

@@ -51,6 +51,22 @@ TEST(RrefFrameAssembler, PiecesOfOneFrameAreJoined) {
   EXPECT_EQ(frames.counters().incomplete, 0U);
 }
 
+// 20 a second of 30 frames: two of three, for each index other ones.
+TEST(RrefFrameAssembler, ADatagramMayCompleteASampleAndBeginTheNext) {
+  RrefFrameAssembler frames(2, 0, RrefFrameAssembler::Options::joinedWithin(1.5 / 20.0));
+  int samples = 0;
+  for (int frame = 0; frame < 300; ++frame) {
+    Datagram datagram = Datagram::labelled("RREF,");
+    if (frame % 3 != 0) datagram.pair(0, static_cast<float>(frame));
+    if (frame % 3 != 2) datagram.pair(1, static_cast<float>(frame));
+    if (!frames.add(datagram.rref(), frame * 2 * kFrame)) continue;
+    ++samples;
+    EXPECT_LE(std::abs(frames.values()[0] - frames.values()[1]), 1.0F);
+  }
+  EXPECT_EQ(samples, 200);
+  EXPECT_EQ(frames.counters().incomplete, 0U);
+}
+
 TEST(RrefFrameAssembler, LostPieceLosesTheFrameAndNothingElse) {
   RrefFrameAssembler frames(4);
   EXPECT_FALSE(frames.add(pairs({0, 1}, 0).rref(), 0));  // {2, 3} of this frame is lost
