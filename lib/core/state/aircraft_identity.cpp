@@ -1,6 +1,8 @@
 #include "xplane_bridge/core/state/aircraft_identity.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 namespace xplane_bridge::core {
@@ -11,6 +13,15 @@ constexpr std::size_t kIcaoLength = 8;
 constexpr std::size_t kDescriptionLength = 64;
 // X-Plane may answer the characters in different frames of a period.
 constexpr double kJoinWindow = 1.5 / AircraftIdentityReader::kRateHz;
+
+/// Whether a character is missing that stands before the end of a text that X-Plane has.
+bool isBroken(const std::vector<float>& values, std::size_t first, std::size_t length) {
+  const auto begin = values.begin() + static_cast<std::ptrdiff_t>(first);
+  const auto end = std::find_if(begin, begin + static_cast<std::ptrdiff_t>(length),
+                                [](float value) { return std::isfinite(value) && value < 1.0F; });
+  const auto missing = [](float value) { return !std::isfinite(value); };
+  return std::any_of(begin, end, missing) && !std::all_of(begin, end, missing);
+}
 
 std::string textFrom(const std::vector<float>& values, std::size_t first, std::size_t length) {
   std::string text;
@@ -69,6 +80,10 @@ bool AircraftIdentityReader::add(const std::vector<DatarefValue>& values) {
 }
 
 bool AircraftIdentityReader::take(const std::vector<float>& characters) {
+  // Its request may have been lost, and comes again: "C1" is another aircraft than "C172".
+  if (isBroken(characters, 0, kIcaoLength) || isBroken(characters, kIcaoLength, kDescriptionLength)) {
+    return false;
+  }
   AircraftIdentity identity{textFrom(characters, 0, kIcaoLength),
                             textFrom(characters, kIcaoLength, kDescriptionLength)};
   ++answers_;

@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <map>
+#include <set>
 
 namespace xplane_bridge::core {
 namespace {
@@ -12,6 +13,7 @@ namespace {
 class Feeder {
  public:
   void set(const std::string& dataref, const std::string& text) { texts_[dataref] = text; }
+  void lose(const std::set<std::string>& datarefs) { lost_ = datarefs; }
 
   bool feed(AircraftIdentityReader* reader) {
     std::vector<std::uint8_t> pairs;
@@ -20,6 +22,10 @@ class Feeder {
       const std::size_t bracket = name.find('[');
       const std::string& text = texts_[name.substr(0, bracket)];
       const std::size_t position = std::stoul(name.substr(bracket + 1));
+      if (lost_.count(name) != 0) {
+        ++index;
+        continue;
+      }
       const float value = position < text.size() ? static_cast<float>(text[position]) : 0.0F;
       std::uint8_t pair[8];
       std::memcpy(pair, &index, 4);
@@ -33,6 +39,7 @@ class Feeder {
 
  private:
   std::map<std::string, std::string> texts_;
+  std::set<std::string> lost_;
   std::int64_t now_ns_ = 0;
 };
 
@@ -57,6 +64,36 @@ TEST(AircraftIdentity, ReadsBothStringsAndSaysWhenTheyChange) {
   EXPECT_TRUE(feeder.feed(&reader));
   EXPECT_EQ(reader.identity().icao, "BE58");
   EXPECT_EQ(reader.answers(), 3u);
+}
+
+TEST(AircraftIdentity, WaitsForACharacterWhoseRequestWasLost) {
+  for (const char* lost : {"sim/aircraft/view/acf_ICAO[2]", "sim/aircraft/view/acf_descrip[0]"}) {
+    AircraftIdentityReader reader;
+    Feeder feeder;
+    feeder.set("sim/aircraft/view/acf_ICAO", "C172");
+    feeder.set("sim/aircraft/view/acf_descrip", "Skyhawk");
+    feeder.lose({lost});
+    for (int second = 0; second < 6; ++second) EXPECT_FALSE(feeder.feed(&reader)) << lost;
+    EXPECT_EQ(reader.answers(), 0U);
+    feeder.lose({});
+    EXPECT_TRUE(feeder.feed(&reader));
+    EXPECT_EQ(reader.identity().icao, "C172");
+    EXPECT_EQ(reader.identity().description, "Skyhawk");
+  }
+}
+
+TEST(AircraftIdentity, ATextThatXPlaneDoesNotHaveIsEmpty) {
+  AircraftIdentityReader reader;
+  Feeder feeder;
+  feeder.set("sim/aircraft/view/acf_descrip", "Skyhawk");
+  std::set<std::string> lost{"sim/aircraft/view/acf_descrip[60]"};  // behind its end
+  for (int i = 0; i < 8; ++i) lost.insert("sim/aircraft/view/acf_ICAO[" + std::to_string(i) + "]");
+  feeder.lose(lost);
+  bool known = false;
+  for (int second = 0; second < 6; ++second) known = feeder.feed(&reader) || known;
+  EXPECT_TRUE(known);
+  EXPECT_EQ(reader.identity().icao, "");
+  EXPECT_EQ(reader.identity().description, "Skyhawk");
 }
 
 TEST(AircraftIdentity, TakesAnAnswerReadAtOnceLikeOneOfTheStream) {
