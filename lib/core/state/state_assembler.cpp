@@ -214,9 +214,10 @@ PositionFix FlightStateAssembler::fromExternalPosition(const ExternalPosition& p
   const double age = toSeconds(receive_ns - position.receive_ns);
   if (!position.known || std::abs(age) > options_.max_external_position_age) return {};
   // The position has no simulator time: it is moved by its age along the velocity. Origin axes do, over so short a way.
-  const Eigen::Vector3d velocity = enuFromOpengl(inputs_.local_velocity);
-  if (!velocity.allFinite()) return {position.place, source};
-  return {TangentFrame(position.place, usableEarthRadius(inputs_)).geoPoint(velocity * age), source};
+  const Eigen::Vector3d velocity = enuFromOpengl(inputs_.local_velocity);  // which X-Plane keeps through a pause
+  if (!velocity.allFinite() || inputs_.paused > 0.5) return {position.place, source};
+  const double flown = age * static_cast<double>(timeAcceleration(static_cast<float>(inputs_.time_ratio_requested)));
+  return {TangentFrame(position.place, usableEarthRadius(inputs_)).geoPoint(velocity * flown), source};
 }
 
 bool FlightStateAssembler::jumped(const FlightState& state) const {

@@ -311,6 +311,27 @@ TEST(FlightStateAssembler, RposTakesOverWhereTheSphereDoesNot) {
   EXPECT_EQ(hand.send(1.0)->position_source, PositionSource::kFloat32);
 }
 
+TEST(FlightStateAssembler, APositionOfAnotherFrameIsMovedBySimulatedTime) {
+  FlightStateAssembler::Options options = Hand::withVersion();
+  options.position = PositionMode::kRpos;
+  for (const double time_ratio : {1.0, 4.0, 0.0}) {  // 0: paused; one frame in four has a position of its own
+    Hand hand(options);
+    hand.setLocal("local_v", openglFromEnu({0.0, 100.0, 0.0}));
+    hand["sim/time/paused"] = time_ratio == 0.0 ? 1.0F : 0.0F;
+    hand["sim/time/sim_speed"] = std::max(1.0F, static_cast<float>(time_ratio));
+    GeoPoint there{37.5, 126.5, 1000.0};
+    for (int frame = 0; frame < 40; ++frame) {
+      there = TangentFrame(there).geoPoint({0.0, 100.0 * time_ratio / 60.0, 0.0});
+      Rpos rpos;
+      rpos.latitude_deg = there.latitude_deg;
+      rpos.longitude_deg = there.longitude_deg;
+      if (frame % 4 == 0) hand.assembler.onRpos(rpos, hand.now + kFrame);
+      const FlightState* const state = hand.send(time_ratio / 60.0);
+      EXPECT_LT(groundDistance({state->latitude, state->longitude, 0.0}, there), 0.1) << time_ratio;
+    }
+  }
+}
+
 TEST(FlightStateAssembler, CheckAgainstRposDecidesOnTheSource) {
   for (const bool right : {true, false}) {
     Hand hand;
