@@ -14,7 +14,9 @@ namespace {
 constexpr const char* kEntryId = "data_output";
 constexpr const char* kPurpose = "data_output";
 
-constexpr std::int64_t kQuietNs = kNanosecondsPerSecond;  // without DATA, or without one row, until something is done
+/// Without DATA, or without one row, until something is done [s], and in periods of Data Output.
+constexpr double kQuiet = 1.0;
+constexpr double kQuietPeriods = 3.0;
 constexpr int kMaxTries = 3;
 constexpr float kRateTolerance = 0.5F;  // the dataref is an int
 
@@ -39,7 +41,10 @@ std::string dataRowDataref(std::int32_t row) {
 }
 
 DataOutput::DataOutput(DataOutputOptions options, double read_timeout_s, Services services)
-    : options_(std::move(options)), read_timeout_s_(read_timeout_s), services_(std::move(services)) {}
+    : options_(std::move(options)),
+      read_timeout_s_(read_timeout_s),
+      services_(std::move(services)),
+      quiet_ns_(toNanoseconds(std::max(kQuiet, kQuietPeriods / static_cast<double>(options_.rate_hz)))) {}
 
 void DataOutput::linkUp(std::shared_ptr<Journal> journal, const Endpoint& target, std::int64_t now_ns) {
   journal_ = std::move(journal);
@@ -191,7 +196,7 @@ void DataOutput::update(bool flowing, std::int64_t now_ns) {
     row_heard_ns_.fill(now_ns);
     return;
   }
-  if (now_ns - quiet_since_ns_ > kQuietNs) {
+  if (now_ns - quiet_since_ns_ > quiet_ns_) {
     quiet_since_ns_ = now_ns;
     row_heard_ns_.fill(now_ns);
     handleQuiet();
@@ -228,7 +233,7 @@ void DataOutput::handleQuiet() {
 void DataOutput::repairRows(std::int64_t now_ns) {
   std::vector<std::int32_t> missing;
   for (const std::int32_t row : options_.rows) {
-    if (now_ns - row_heard_ns_[static_cast<std::size_t>(row)] > kQuietNs) {
+    if (now_ns - row_heard_ns_[static_cast<std::size_t>(row)] > quiet_ns_) {
       missing.push_back(row);
     }
   }
@@ -332,6 +337,7 @@ void DataOutput::undoEntry(const JournalEntry& entry, double timeout_s, const st
 
 void DataOutput::release(double timeout_s, std::function<void(bool)> done) {
   ++generation_;
+  const bool of_another = phase_ == Phase::kForeign && ever_heard_;
   phase_ = Phase::kReleasing;
   if (!options_.enabled || !options_.configure || journal_ == nullptr) {
     done(true);
@@ -341,6 +347,11 @@ void DataOutput::release(double timeout_s, std::function<void(bool)> done) {
     const std::optional<JournalEntry> entry = previousEntry();
     if (!entry.has_value()) {
       done(true);
+      return;
+    }
+    if (of_another) {
+      services_.log(LogLevel::kInfo, "Data Output of X-Plane is left as it is, with the client that owns it now");
+      done(forget(entry->id));
       return;
     }
     undoEntry(*entry, timeout_s,

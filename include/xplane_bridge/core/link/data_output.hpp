@@ -37,7 +37,8 @@ struct DataOutputOptions {
 ///
 /// X-Plane has one target for DATA and does not show which it is. So: rows, rate and target are set when the link comes
 /// up, written to the journal first; when DATA stays away while X-Plane answers and is not paused, the target is set
-/// once more, and if that does not last, another client owns Data Output and is left in peace.
+/// once more, and if that does not last, another client owns Data Output and is left in peace,
+/// also by release().
 class DataOutput {
  public:
   struct Services {
@@ -82,6 +83,7 @@ class DataOutput {
   DataOutputOptions options_;
   double read_timeout_s_;
   Services services_;
+  std::int64_t quiet_ns_;
   std::shared_ptr<Journal> journal_;
   Endpoint target_;
   Phase phase_ = Phase::kIdle;

@@ -167,6 +167,43 @@ TEST_F(DataOutputTest, TakenBackOnceThenLeftToTheOther) {
   EXPECT_TRUE(link_->status().problems.empty());
 }
 
+TEST_F(DataOutputTest, AnotherClientKeepsItWhenTheLinkEnds) {
+  FakeXPlane sim;
+  makeLink(withRows(sim, {17}));
+  ASSERT_TRUE(dataFlowsWithin(3.0, &sim));
+  const FakeXPlane::Address other = {INADDR_LOOPBACK, 9};
+  const auto taken = [&] {
+    sim.data_target = other;
+    return hasProblem("another client owns Data Output");
+  };
+  ASSERT_GE(runUntil(taken, 10.0, {&sim}), 0.0);
+  sim.startThread();
+  EXPECT_TRUE(link_->stop(3.0));
+  sim.stopThread();
+  EXPECT_EQ(sim.data_target, other);
+  EXPECT_TRUE(sim.data_target_on);
+  EXPECT_TRUE(isSelected(&sim, 17));
+  EXPECT_TRUE(link_->journal()->entries().empty());
+}
+
+TEST_F(DataOutputTest, OneDatagramASecondIsNoTheft) {
+  FakeXPlane sim;
+  SimLinkOptions options = withRows(sim, {17});
+  options.data_output.rate_hz = 1;
+  makeLink(options);
+  ASSERT_GE(runUntilState(LinkState::kConnected, 3.0, {&sim}), 0.0);
+  sim.ignores_target = true;  // sent by hand, a little late as by a frame
+  std::vector<std::uint8_t> datagram{'D', 'A', 'T', 'A', '*'};
+  FakeXPlane::append(&datagram, std::int32_t{17});
+  for (int i = 0; i < 8; ++i) FakeXPlane::append(&datagram, 1.0F);
+  for (int second = 0; second < 8; ++second) {
+    sim.send({INADDR_LOOPBACK, link_->dataPort()}, datagram);
+    run(1.035, {&sim});
+    EXPECT_TRUE(link_->status().problems.empty()) << second;
+  }
+  EXPECT_EQ(data_datagrams_, 8);
+}
+
 TEST_F(DataOutputTest, SilenceDuringAPauseIsNoTheft) {
   FakeXPlane sim;
   makeLink(withRows(sim, {17}));
