@@ -48,7 +48,9 @@ void SimLink::maintain(std::int64_t now_ns) {
 
 void SimLink::findPeer(std::int64_t now_ns) {
   if (!options_.host.empty()) {
-    if (!monitor_.alive() && now_ns >= next_resolve_ns_) {
+    // Not at every hitch: a name server that does not answer holds this thread up for seconds.
+    const bool away = monitor_.state() == LinkState::kSearching || monitor_.state() == LinkState::kLost;
+    if (away && now_ns >= next_resolve_ns_) {
       resolve(now_ns);
     }
     return;
@@ -110,7 +112,9 @@ void SimLink::setPeer(const Endpoint& peer, const std::string& why) {
   intruder_.reset();
   other_address_.reset();
   answered_ns_.reset();
+  ended_in_silence_.clear();
   version_ = {};
+  version_epoch_ = 0;
   judged_version_ = 0;
   paused_.reset();
   sim_time_s_.reset();
@@ -131,6 +135,8 @@ void SimLink::refreshLink(std::int64_t now_ns) {
   const bool came_up = alive && monitor_.epoch() != seen_epoch_;
   if (alive && (!was_alive_ || came_up)) {
     restartSubscriptions(now_ns);
+    requests_.insert(requests_.end(), ended_in_silence_.begin(), ended_in_silence_.end());
+    ended_in_silence_.clear();
   } else if (!alive && was_alive_) {
     for (Group& group : groups_) {
       group.subscription.suspend();
@@ -291,8 +297,8 @@ void SimLink::recordSubscriptions() {
 }
 
 void SimLink::forgetSubscriptions() {
-  if (subscriptions_journal_ == nullptr || monitor_.epoch() == 0 || monitor_.state() == LinkState::kStale) {
-    return;  // while it loads, X-Plane does not read that it is to stop
+  if (subscriptions_journal_ == nullptr || !monitor_.alive()) {
+    return;  // while it loads, X-Plane does not read that it is to stop, and may be silent for longer than LOST takes
   }
   try {
     subscriptions_journal_->remove({subscriptionsId(*subscriptions_journal_)});
@@ -314,12 +320,14 @@ void SimLink::removeGroup(const RrefDelivery* delivery) {
 void SimLink::stopGroup(const Group& group) {
   retired_udp_ += group.source->counters();
   hub_->ignore(*group.source);  // it may live on for requests that are still to be sent
-  if (!monitor_.alive()) {
-    return;  // X-Plane has forgotten us, or will find no program on that port
+  if (!group.subscription.asked()) {
+    return;
   }
+  // One that is silent may only be loading, and goes on sending afterwards.
+  std::deque<Request>& requests = monitor_.alive() ? requests_ : ended_in_silence_;
   const RrefGroup& stopped = group.subscription.group();
   for (std::size_t i = 0; i < stopped.datarefs.size(); ++i) {
-    requests_.push_back({group.source, stopped.datarefs[i], 0, static_cast<std::int32_t>(i)});
+    requests.push_back({group.source, stopped.datarefs[i], 0, static_cast<std::int32_t>(i)});
   }
 }
 

@@ -101,6 +101,7 @@ void SimLink::takeStatus(const RrefPair& pair) {
     case kVersionIndex:
       if (pair.value > 0.0F) {  // zero before a flight is loaded
         version_.number = static_cast<std::int32_t>(std::lround(pair.value));
+        version_epoch_ = monitor_.epoch();
       }
       break;
     case kPausedIndex:

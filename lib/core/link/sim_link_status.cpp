@@ -99,7 +99,8 @@ bool SimLink::isOneWay(std::int64_t now_ns) const {
 }
 
 SimulatorVersion SimLink::versionNow(std::int64_t now_ns) const {
-  if (version_.known() || !isOneWay(now_ns)) {
+  // One that never answers may be another than the one that did before it went away.
+  if (!isOneWay(now_ns) || (version_.known() && version_epoch_ == monitor_.epoch())) {
     return version_;
   }
   const std::optional<BeaconSighting> beacon = beacons_.at(peer_, now_ns);

@@ -86,6 +86,7 @@ std::optional<std::size_t> RrefSubscription::nextRequest(std::int64_t now_ns, Ji
       entry.due_ns = now_ns + jitter->around(std::min(wait, std::max(kMaxPatienceNs, patience_ns_)));
       repeats_ += entry.attempts > 0 || entry.answered ? 1U : 0U;
       ++entry.attempts;
+      asked_ = true;
       return i;
     }
     earliest = std::min(earliest, entry.due_ns);

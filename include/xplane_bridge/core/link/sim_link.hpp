@@ -286,6 +286,7 @@ class SimLink : public SimulatorPort {
   bool subscriptions_changed_ = false;              // since recordSubscriptions()
   std::vector<Group> groups_;                       // by falling priority
   std::deque<Request> requests_;
+  std::deque<Request> ended_in_silence_;  // as requests_, for when X-Plane answers again
   bool was_alive_ = false;
   std::uint32_t seen_epoch_ = 0;
 
@@ -294,6 +295,7 @@ class SimLink : public SimulatorPort {
   std::int64_t next_xpc_request_ns_ = 0;
 
   SimulatorVersion version_;
+  std::uint32_t version_epoch_ = 0;  // monitor_'s, when X-Plane said it
   std::int32_t judged_version_ = 0;  // for which options_.otherwise was asked
   std::optional<bool> paused_;
   std::optional<float> sim_time_s_;

@@ -70,6 +70,8 @@ class RrefSubscription {
   const RrefGroup& group() const { return group_; }
 
   bool urgent() const { return group_.priority >= kUrgentPriority; }
+  /// Whether anything was ever asked for.
+  bool asked() const { return asked_; }
 
   /// Everything has to be asked for again: X-Plane is new, or was away.
   void restart(std::int64_t now_ns);
@@ -102,6 +104,7 @@ class RrefSubscription {
   std::int64_t patience_ns_;
   std::int64_t earliest_due_ns_ = 0;
   bool suspended_ = true;
+  bool asked_ = false;
   std::uint64_t repeats_ = 0;
 };
 

@@ -356,6 +356,25 @@ TEST_F(ScriptedLink, DataWithoutAnswersIsOneWayAndItsVersionIsTheOption) {
   }
 }
 
+TEST_F(ScriptedLink, OneThatNeverAnswersIsNotTakenForTheOneThatDid) {
+  SimLinkOptions options = defaults();
+  options.unheard_version = 122015;
+  options.data_output.enabled = true;
+  options.data_output.configure = false;
+  options.data_output.rows = {3};
+  makeLink(options);
+  arriveStatus(1000 * kMs, 50.0F);
+  for (int k = 0; k < 100; ++k) arrive((20'000 + 50 * k) * kMs, "data", data(1.0F));
+  runUntil(19'000 * kMs);
+  ASSERT_EQ(link_->status().state, LinkState::kLost);
+  EXPECT_EQ(link_->status().version.number, 115501);
+  runUntil(21'000 * kMs);
+  EXPECT_EQ(link_->status().version.number, 115501) << "it may still answer";
+  runUntil(24'000 * kMs);
+  EXPECT_TRUE(link_->status().one_way);
+  EXPECT_EQ(link_->status().version.number, 122015);
+}
+
 TEST_F(ScriptedLink, SameScriptGivesTheSameDatagrams) {
   std::vector<std::vector<ScriptedHub::Sent>> sent;
   std::vector<std::vector<Delivery>> delivered;

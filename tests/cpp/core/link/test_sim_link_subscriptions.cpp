@@ -33,6 +33,44 @@ TEST_F(SimLinkTest, NeverAnsweringDatarefIsNamed) {
   EXPECT_TRUE(link_->unansweredDatarefs().empty());
 }
 
+TEST_F(SimLinkTest, AGroupThatEndsInAHitchIsEndedInXPlaneAfterIt) {
+  FakeXPlane sim;
+  sim.datarefs["a/b"] = sim.datarefs["c/d"] = 1.0F;
+  makeLink(optionsFor(sim));
+  const auto sent = [&sim] {
+    std::size_t datarefs = 0;
+    for (const auto& [client, indices] : sim.subscriptions) datarefs += indices.size();
+    return datarefs;
+  };
+  subscribe(group({"a/b"}));
+  const int other = subscribe(group({"c/d"}));
+  ASSERT_GE(runUntil([&] { return datagrams_[other] > 0; }, 1.0, {&sim}), 0.0);
+  const std::size_t before = sent();
+  ASSERT_GE(runUntilState(LinkState::kStale, 2.0, {}), 0.0);
+  subscriptions_[0].reset();
+  subscribe(group({"e/f"}));  // and one that X-Plane never hears of
+  subscriptions_[2].reset();
+  run(0.1, {});
+  EXPECT_EQ(sent(), before);
+  run(1.0, {&sim});
+  EXPECT_EQ(sent(), before - 1);
+  link_->stop(1.0);
+  sim.pump();
+  EXPECT_EQ(sent(), 0U);
+}
+
+TEST_F(SimLinkTest, StoppedInALongSilenceItsSubscriptionsStayInTheJournal) {
+  FakeXPlane sim;
+  sim.datarefs["a/b"] = 1.0F;
+  makeLink(optionsFor(sim));
+  const int id = subscribe(group({"a/b"}));
+  ASSERT_GE(runUntil([&] { return datagrams_[id] > 0; }, 1.0, {&sim}), 0.0);
+  run(0.2, {&sim});
+  ASSERT_GE(runUntilState(LinkState::kLost, 20.0, {}), 0.0);  // loading a flight takes longer at times
+  link_->stop(1.0);
+  EXPECT_EQ(link_->journal()->ofSubscriptions()->entries().size(), 1U);
+}
+
 TEST_F(SimLinkTest, LostRequestIsRepeated) {
   FakeXPlane sim;
   sim.datarefs["a/b"] = 1.0F;
