@@ -1,6 +1,7 @@
 """Pictures of a flight as files, and what is known of each: kept in a temporary file and taken some thousand at a time.
 
-Columns: every field of FrameState with the state of the frame the image shows; the latched labels (`flight.labels`);
+Columns: every field of FrameState with the state of the frame the image shows; the latched labels (`flight.labels`)
+at that frame;
 each quality bit, and the bits in words; where the display delay is from; CameraInfo's size and matrix.
 """
 
@@ -324,11 +325,19 @@ def _known(bags: Bags, camera: Camera, table: Table, constants: Mapping[str, Any
     for path in table.columns:
         if not path.startswith(("header.", "state.header.")):
             known.add(named({path: table[path]}, units))
-    known.add(flight_labels(bags, table.stamp))
+    known.add(flight_labels(bags, _flown(table)))
     known.add(_quality(table["quality"], constants))
     for column, values in _camera(bags, camera.info, table.stamp, store):
         known.add({column: values})
     return known
+
+
+def _flown(table: Table) -> np.ndarray:
+    """Give the instant [ns] of each frame that is shown: that of its state; without one, its display less the delay."""
+    delay = np.nan_to_num(table["display_delay"].astype(np.float64))
+    state = table["state.header.stamp"]
+    instants: np.ndarray = np.where(state > 0, state, table.stamp - np.rint(1e9 * delay).astype(np.int64))
+    return instants
 
 
 def _quality(quality: np.ndarray, constants: Mapping[str, Any]) -> dict[str, np.ndarray]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -48,6 +49,32 @@ def test_metadata_has_what_is_known_of_each_picture(tmp_path: Path) -> None:
     np.testing.assert_array_equal(matrix, expected)
     assert rows.index[rows["camera_width_px"].isna()].tolist() == [six]
     assert rows["camera_height_px"].dropna().unique().tolist() == [24]
+
+
+def test_mode_and_failures_are_those_of_the_frame_shown(tmp_path: Path) -> None:
+    _, jpg = cv2.imencode(".jpg", np.zeros((24, 32, 3), np.uint8))
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in range(20):
+            t, shown = k / 10, stamp_ns(k / 10 + 0.25)
+            state = bag.state(t, k)
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
+            header = bag.header(shown, "camera_optical")
+            frame = {"header": header, "display_delay": 0.25, "frame_sim_time": t}
+            frame.update({"state": state} if k % 2 else {"quality": 1})  # every other one has no state
+            bag.add("/xplane/camera/frame_state", "xplane_bridge/FrameState", shown, frame)
+            values = {"header": header, "format": "jpeg", "data": jpg.reshape(-1)}
+            bag.add("/xplane/camera/image_raw/compressed", "sensor_msgs/CompressedImage", shown, values)
+        at = stamp_ns(0.95)
+        lists = {"names": ["engine_1"], "kinds": ["failed"], "values": [np.nan], "active": [True]}
+        header = bag.header(at, "")
+        bag.add("/xplane/failures/state", "xplane_bridge/FailureState", at, {"header": header, **lists})
+        bag.add("/xplane/control/mode", "xplane_bridge/ControlMode", at, {"header": header, "mode": 2})
+    options = ("--format", "imagefolder", "--keep-bad-frames", "-o", tmp_path)
+    assert export(tmp_path / "flight.bag", *options) == 0
+    rows = pd.read_csv(tmp_path / "flight" / "labels.csv")
+    for name, value in (("failures", "engine_1:failed"), ("mode", 2)):
+        assert rows[name].dropna().unique().tolist() == [value]
+        assert rows["frame_sim_time_s"][rows[name].notna()].min() == 1.0, "0.9 s and earlier are before it"
 
 
 def test_labels_csv_has_the_same_rows(tmp_path: Path) -> None:
