@@ -124,6 +124,29 @@ class BagFile:
         """Receive times of a connection's messages, int64 [ns], in the order of the file."""
         return self._index[id_].time
 
+    def places(self, id_: int) -> np.ndarray:
+        """Where a connection's messages lie, int64, in the order of `times`: what was written later lies higher."""
+        _, chunk, offset = self._index[id_]
+        places: np.ndarray = chunk.astype(np.int64) << 32 | offset
+        return places
+
+    def move(self, after: int, until: int, middle: int, by: int) -> None:
+        """Moves the receive times [ns] of what lies behind the place where the recorder's clock went back.
+
+        Args:
+            after: Place of a message that was written before that.
+            until: Place of one that was written behind it.
+            middle: Between those two, messages received before this time were written behind it.
+            by: What is added to their receive times.
+        """
+        begin = until
+        for id_, index in self._index.items():
+            place = self.places(id_)
+            behind = place[(place > after) & (place < until) & (index.time < middle)]
+            begin = min(begin, int(behind.min())) if len(behind) else begin
+        for id_, index in self._index.items():
+            index.time[self.places(id_) >= begin] += by
+
     def by_chunk(self, id_: int) -> Iterator[Tuple[np.ndarray, List[bytes]]]:
         """Messages of one connection, a chunk at a time: receive times, and the messages as they were serialised.
 
