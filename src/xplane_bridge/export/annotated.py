@@ -27,6 +27,7 @@ from xplane_bridge import __version__
 from xplane_bridge.export.dataset import write_frames
 from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels, Thing, keypoints
 from xplane_bridge.export.pictures import NO_LABELS, Options, Picture, Pictures, write_pictures
+from xplane_bridge.export.yolo_yaml import DATA_YAML, data_yaml
 from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
 from xplane_bridge.units import FOOT_M
 
@@ -186,10 +187,9 @@ def yolo(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
                 label = thing.label
                 write([picture.file, number, thing.category, label["sigma_px"], int(label["coarse"])])
             _write_text(path, "".join(line + "\n" for line in lines))
-    names = "".join(f"  {k}: {name}\n" for k, name in enumerate(CATEGORIES))
-    said = json.dumps(_about(labels))
-    head = f"# xplane_bridge {__version__}; labels: {said}\n"
-    _write_text(folder / "data.yaml", f"{head}train: images/train\nval: images/validation\nnames:\n{names}")
+    head = f"xplane_bridge {__version__}; labels: {json.dumps(_about(labels))}"
+    folders = {split: [f"images/{split}"] for split in pictures.splits}
+    _write_text(folder / DATA_YAML, data_yaml(head, folders))
 
 
 def lard(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> None:

@@ -1,9 +1,10 @@
 """Many flights, exported side by side: here in processes, or on a Dask cluster; the same files either way.
 
-An export folder holds one entry per flight and format, a data card (README.md), and ``manifest.json``: versions,
-parameters, counts, and the SHA-256 of every file exported there. A flight is built under a temporary name and renamed
-when whole, so that an export that was cut off goes on where it stopped: flights whose record in ``.flights/<format>/``
-fits the bags and parameters are not made again. What no record names, or another flight's, is never overwritten.
+An export folder holds one entry per flight and format, a data card (README.md), ``data.yaml`` of all flights in YOLO's
+format, and ``manifest.json``: versions, parameters, counts, and the SHA-256 of every file exported there. A flight is
+built under a temporary name and renamed when whole, so that an export that was cut off goes on where it stopped:
+flights whose record in ``.flights/<format>/`` fits the bags and parameters are not made again. What no record names, or
+another flight's, is never overwritten.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from xplane_bridge.export.cameras import camera_rows
 from xplane_bridge.export.card import CARD, card
 from xplane_bridge.export.flight import ExportError, frame_quality
 from xplane_bridge.export.formats import ALIASES, FORMATS, Job
+from xplane_bridge.export.yolo_yaml import DATA_YAML, of_all_flights
 
 if TYPE_CHECKING:
     from xplane_bridge.export.pictures import Options
@@ -263,25 +265,29 @@ def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]
     }
     content = {"schema": SCHEMA, "xplane_bridge": __version__, "counts": counts, "exports": exports}
     try:
-        content["files"] = _write_card(output, exports)
+        content["files"] = _write_shared(output, exports)
         _write_json(output / MANIFEST, content)
     except OSError as error:
         msg = f"{output / MANIFEST}: {error.strerror}"
         raise ExportError(msg) from None
 
 
-def _write_card(output: Path, exports: dict[str, dict[str, Any]]) -> dict[str, str]:
-    """Write the data card, unless there is a file of its name that no export has written, or that a user has changed.
+def _write_shared(output: Path, exports: dict[str, dict[str, Any]]) -> dict[str, str]:
+    """Write what is of all flights, but not over files that no export has written, or that a user has changed.
 
     Returns:
-        Its name and SHA-256 for the manifest; nothing where there is no card of ours.
+        Name and SHA-256 of each for the manifest.
     """
-    path = output / CARD
-    written = (_read_json(output / MANIFEST) or {}).get("files", {}).get(CARD)
-    if not exports or (path.exists() and _sha256(path) != written):
-        return {CARD: written} if written else {}
-    _write_text(path, card(__version__, exports))
-    return {CARD: _sha256(path)}
+    files: dict[str, str] = dict((_read_json(output / MANIFEST) or {}).get("files", {}))
+    texts = {CARD: card(__version__, exports)} if exports else {}
+    if "yolo" in exports:
+        texts[DATA_YAML] = of_all_flights(__version__, exports["yolo"])
+    for name, text in texts.items():
+        path = output / name
+        if not os.path.lexists(path) or (path.is_file() and _sha256(path) == files.get(name)):
+            _write_text(path, text)
+            files[name] = _sha256(path)
+    return files
 
 
 def make_folder(output: Path) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import shutil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from support.flights.drawn_approach import LEVER, write_approach
 from support.flights.export_flight import export, write_flight
@@ -118,6 +120,37 @@ def test_yolos_text_is_shares_of_the_picture(flight: Path, tmp_path: Path) -> No
         assert kind == "0"
         outline = np.array(shares, float).reshape(-1, 2) * (640, 480) - 0.5
         np.testing.assert_allclose(outline, label["polygon"], atol=2e-3)
+
+
+@pytest.mark.parametrize("form", ["csv", "yolo"])
+def test_whole_flights_train_and_validate_by_one_yaml(flight: Path, tmp_path: Path, form: str) -> None:
+    bags = [tmp_path / f"{day}.bag" for day in ("monday", "to: 'tuesday'")]
+    for bag in bags:
+        shutil.copy(flight, bag)
+        shutil.copy(table.beside(flight), table.beside(bag))
+    output = tmp_path / "out"
+    options = ("--labels", tmp_path, "--split-by", "flight") if form == "yolo" else ()
+    assert export(*bags, "--format", form, *options, "-o", output) == 0
+    assert (output / "data.yaml").exists() == (form == "yolo")
+    assert export("--verify", "-o", output) == 0
+    named = []
+    for path in output.rglob("data.yaml"):
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        assert content["names"] == {0: "runway", 1: "sun", 2: "aircraft"}
+        folders = [content[split] for split in ("train", "val") if split in content]
+        assert all(any((path.parent / folder).iterdir()) for folder in folders), "a trainer ends at one that is missing"
+        named.append(len(folders))
+    assert sorted(named) == ([1, 1, 2] if form == "yolo" else [])
+
+
+def test_one_yaml_has_the_pictures_of_all_flights(flight: Path, tmp_path: Path) -> None:
+    for name in ("b", "a"):
+        bag = shutil.copy(flight, tmp_path / f"{name}.bag")
+        labels = ("--labels", table.beside(flight))
+        assert export(bag, "--format", "yolo", *labels, "-o", tmp_path / "out") == 0
+    content = yaml.safe_load((tmp_path / "out" / "data.yaml").read_text())
+    assert content["train"] == ["a.yolo/images/train", "b.yolo/images/train"]
+    assert content["val"] == ["a.yolo/images/validation", "b.yolo/images/validation"]
 
 
 def test_lard_is_read_by_its_columns(flight: Path, tmp_path: Path) -> None:
