@@ -69,7 +69,10 @@ std::optional<std::string> validate(const ArbiterOptions& o) {
 
 ControlArbiter::ControlArbiter(const ArbiterOptions& options, double now) : options_(options), now_(now) {
   if (const auto text = validate(options)) throw std::invalid_argument(*text);
-  for (Source& source : sources_) source.expires.fill(kNever);
+  for (Source& source : sources_) {
+    source.expires.fill(kNever);
+    source.latest.fill(kNever);
+  }
   stick_reference_.fill(kUnset);
   status_.mode = options.initial_mode;
   status_.since = now;
@@ -83,14 +86,14 @@ void ControlArbiter::advance(double now) {
 void ControlArbiter::setTimeRunning(bool running, double now) {
   advance(now);
   if (running && !time_running_) {
-    // Sources that were alive when time stopped get time to be heard again.
-    const double until = running_time_ + options_.resume_grace;
-    if (surfacesFly()) surfaces_until_ = std::max(surfaces_until_, until);
+    // Sources that were alive when time stopped get time to be heard again: once, however often it stops.
+    const auto extend = [this](double latest, double* until) {
+      if (*until > running_time_) *until = std::max(*until, std::min(latest, running_time_ + options_.resume_grace));
+    };
+    extend(surfaces_latest_, &surfaces_until_);
     for (Source& source : sources_) {
-      if (source.alive_until > running_time_) source.alive_until = std::max(source.alive_until, until);
-      for (double& expires : source.expires) {
-        if (expires > running_time_) expires = std::max(expires, until);
-      }
+      extend(source.alive_latest, &source.alive_until);
+      for (std::size_t i = 0; i < kChannelCount; ++i) extend(source.latest[i], &source.expires[i]);
     }
   }
   time_running_ = running;
@@ -109,7 +112,9 @@ std::optional<CommandRefusal> ControlArbiter::onCommand(FlightMode from, const C
   const double until = running_time_ + options_.command_timeout;
   source.arrival = now_;
   source.sequence = command.sequence;
+  const double latest = until + options_.resume_grace;
   source.alive_until = std::max(source.alive_until, until);
+  source.alive_latest = latest;
   heard_ = heard_ || from == status_.mode;
 
   const std::uint32_t throttle = command.fields & kThrottleFields;
@@ -126,6 +131,7 @@ std::optional<CommandRefusal> ControlArbiter::onCommand(FlightMode from, const C
     if (!expanded.commanded.test(i)) continue;
     source.values[i] = expanded.values[i];
     source.expires[i] = std::max(source.expires[i], until);
+    source.latest[i] = latest;
   }
   if (from == FlightMode::kManual) watchStick(expanded.commanded, expanded.values, was_alive, now_);
   return std::nullopt;
@@ -166,6 +172,7 @@ std::string ControlArbiter::refusalOfSurfaces(double now) {
 void ControlArbiter::onSurfaces(double now) {
   advance(now);
   surfaces_until_ = running_time_ + options_.command_timeout;
+  surfaces_latest_ = surfaces_until_ + options_.resume_grace;
   surfaces_heard_ = true;
 }
 
@@ -259,12 +266,25 @@ ChannelSet ControlArbiter::commanded() const {
   return out;
 }
 
+/// Levers or motors: whichever the source that flies commands now takes over where the others are. What it has
+/// commanded once and no longer does leaves the others to their failsafe.
 void ControlArbiter::dropOtherThrottleKind() {
   const std::uint32_t kind = sourceOf(status_.mode).throttle_field;
   if (kind == 0u) return;
+  const auto wanted = kind == kFieldMotors ? motorChannel : leverChannel;
+  const auto unwanted = kind == kFieldMotors ? leverChannel : motorChannel;
+  bool commanded = false;
   for (int engine = 0; engine < kMaxEngines; ++engine) {
-    const Channel unused = kind == kFieldMotors ? leverChannel(engine) : motorChannel(engine);
-    origin_[index(unused)] = Origin::kNone;
+    commanded = commanded || fresh(status_.mode, index(wanted(engine)));
+  }
+  if (!commanded) return;
+  for (int engine = 0; engine < kMaxEngines; ++engine) {
+    const std::size_t to = index(wanted(engine)), from = index(unwanted(engine));
+    if (origin_[to] == Origin::kNone && fresh(status_.mode, to)) {
+      origin_[to] = origin_[from];
+      output_[to] = output_[from];
+    }
+    origin_[from] = Origin::kNone;
   }
 }
 

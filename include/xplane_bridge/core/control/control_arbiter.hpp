@@ -41,7 +41,7 @@ struct ArbiterOptions {
   std::array<ChannelOptions, kChannelCount> channels;
   int engines = 1;                  ///< 1..kMaxEngines, for the one lever that moves all
   double command_timeout = 0.5;     ///< [s] since arrival; > 0
-  double resume_grace = 1.0;        ///< [s] after a pause or gap before time-outs count again; >= 0
+  double resume_grace = 1.0;        ///< [s] after a pause or gap in which a source may be heard again; >= 0
   double transition_rate = 2.0;     ///< [1/s] fastest change of a channel that changes hands; > 0
   double takeover_threshold = 0.3;  ///< stick movement since AUTO was engaged that takes over; 0: never
   FlightMode initial_mode = FlightMode::kManual;
@@ -157,7 +157,9 @@ class ControlArbiter {
   struct Source {
     ChannelValues values{};
     std::array<double, kChannelCount> expires;  // by running_time_; kNever: not commanded
+    std::array<double, kChannelCount> latest;   // until then a pause may put `expires` off
     double alive_until = kNever;
+    double alive_latest = kNever;
     double arrival = 0.0;
     std::uint32_t sequence = 0;
     std::uint32_t throttle_field = 0;  // the kind commanded last
@@ -195,6 +197,7 @@ class ControlArbiter {
   std::bitset<kChannelCount> blending_;  // changes hands: transition_rate applies until it has caught up
   std::array<double, 3> stick_reference_;
   double surfaces_until_ = kNever;  // by running_time_
+  double surfaces_latest_ = kNever;
   bool heard_ = false;              // the topic of the mode, since the mode was asked for
   bool surfaces_heard_ = false;     // control/surfaces, likewise
   struct Seen {

@@ -153,6 +153,22 @@ TEST_F(ControlPathTest, ARestartedXPlaneIsFlownOnByHand) {
   EXPECT_TRUE(events.empty());
 }
 
+TEST_F(ControlPathTest, ADeadSourceTimesOutHoweverOftenXPlaneIsPaused) {
+  for (const LinkState away : {LinkState::kPaused, LinkState::kStale}) {
+    SCOPED_TRACE(core::toString(away));
+    start();
+    runWith(rollCommand(0.25), 0.5);
+    for (int i = 0; i < 10; ++i) {
+      setState(away);
+      run(0.1);
+      setState(LinkState::kConnected);
+      run(0.2);
+    }
+    EXPECT_TRUE(path->mode().failsafe);
+    EXPECT_FLOAT_EQ(sim.value(kStickRoll), 0.0F);
+  }
+}
+
 TEST_F(ControlPathTest, WhilePausedNoTimeOutAdvances) {
   start();
   path->command(FlightMode::kManual, rollCommand(0.4));

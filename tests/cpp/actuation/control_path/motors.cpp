@@ -45,6 +45,58 @@ TEST_F(MotorsTest, LeversAreWhereTheMotorsAreWhenTheirOverrideEnds) {
   EXPECT_FLOAT_EQ(at_release[1], 0.7F);
 }
 
+core::ControlCommand throttleCommand(double value) {
+  core::ControlCommand command;
+  command.fields = core::kFieldThrottle;
+  command.throttle = value;
+  return command;
+}
+
+TEST_F(MotorsTest, GoToTheirFailsafeWhereTheStickHasOnceMovedALeverAndIsSilent) {
+  constexpr float kNeutral = 0.4F;
+  for (int engine = 0; engine < 2; ++engine) {
+    options.arbiter.channels[core::index(core::motorChannel(engine))].neutral = kNeutral;
+  }
+  start();
+  runWith(throttleCommand(0.0), 0.2);
+  ask(FlightMode::kAuto);
+  for (int i = 0; i < 100; ++i) {
+    path->command(FlightMode::kAuto, motorsCommand(0.8, 0.8));
+    frame();
+  }
+  ask(FlightMode::kManual);
+  run(2.0);
+  EXPECT_TRUE(path->mode().failsafe);
+  EXPECT_FLOAT_EQ(sim.value("sim/flightmodel/engine/ENGN_thro_use[1]"), kNeutral);
+  runWith(throttleCommand(0.1), 2.0);
+  EXPECT_FALSE(path->mode().failsafe);
+  EXPECT_EQ(sim.value(kMotorOverride), 0.0F);
+  EXPECT_FLOAT_EQ(lever(1), 0.1F);
+}
+
+TEST_F(MotorsTest, ThrustGoesOverToALeverAtTheTransitionRate) {
+  options.arbiter.transition_rate = 2.0;
+  start();
+  runWith(throttleCommand(0.0), 0.2);
+  ask(FlightMode::kAuto);
+  const auto both = [&](int frames) {
+    for (int i = 0; i < frames; ++i) {
+      path->command(FlightMode::kManual, throttleCommand(0.0));
+      path->command(FlightMode::kAuto, motorsCommand(0.8, 0.6));
+      frame();
+    }
+  };
+  both(100);
+  ASSERT_FLOAT_EQ(sim.value("sim/flightmodel/engine/ENGN_thro_use[1]"), 0.6F);
+  ask(FlightMode::kManual);
+  both(1);
+  EXPECT_EQ(sim.value(kMotorOverride), 0.0F);
+  EXPECT_NEAR(lever(0), 0.8F, 0.1F);
+  EXPECT_NEAR(lever(1), 0.6F, 0.1F);
+  both(50);
+  EXPECT_FLOAT_EQ(lever(0), 0.0F);
+}
+
 TEST_F(MotorsTest, LeverWithoutReverseIsNotBelowZero) {
   start();
   core::ControlCommand command = motorsCommand(-0.5, 0.7);
