@@ -157,6 +157,9 @@ void ControlPath::onSameAircraft() {
 void ControlPath::onNewFlight(const std::string& how) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   overrides_->forgetShown();
+  // It has put the handles to its own start.
+  ever_sent_.reset();
+  awaiting_read_back_.clear();
   endAuto(how, now());
 }
 

@@ -61,7 +61,7 @@ core::ArbitratedControls ControlPath::withoutMissing(core::ArbitratedControls co
 /// Whether anything is sent. What cannot be is left out of the controls.
 bool ControlPath::fly(core::ArbitratedControls* controls, double time) {
   if (controls->active.none()) {
-    // An axis that only a test signal had taken is X-Plane's again, as soon as X-Plane can be asked.
+    // What was taken last, be it by a test signal alone, is X-Plane's again as soon as X-Plane can be asked.
     if (taken_ && isUp(link_status_)) {
       overrides_->setRequired({});
       taken_ = false;
@@ -73,6 +73,7 @@ bool ControlPath::fly(core::ArbitratedControls* controls, double time) {
     if (isUp(link_status_)) overrides_->setRequired({});
     return false;
   }
+  taken_ = true;
   try {
     overrides_->setRequired(core::requiredOverrides(controls->active, encoder_.options()));
     last_warning_.clear();
@@ -85,7 +86,6 @@ bool ControlPath::fly(core::ArbitratedControls* controls, double time) {
              " are not sent: " + core::whyNotChanged(error));
     if (!some) return false;
   }
-  taken_ = controls->source == core::CommandSource::kNone;
   writes_.clear();
   const core::ChannelSet now = channelsToSend(*controls, time);
   encoder_.encode(controls->values, now, writes_);
@@ -93,7 +93,7 @@ bool ControlPath::fly(core::ArbitratedControls* controls, double time) {
   sendRows(*controls, now);
   prepareLevers(*controls);
   last_send_ = time;
-  publishApplied(*controls);
+  publishApplied(*controls, now);
   watchReadBack(controls->active);
   return true;
 }
@@ -144,12 +144,18 @@ void ControlPath::prepareLevers(const core::ArbitratedControls& controls) {
 }
 
 core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& controls, double time) {
+  const core::ChannelSet commanded = arbiter_.commanded();
   core::ChannelSet out;
   for (std::size_t i = 0; i < core::kChannelCount; ++i) {
     if (!controls.active.test(i)) continue;
     const auto channel = static_cast<core::Channel>(i);
-    if (core::channelWire(channel, encoder_.options()).refresh == core::Refresh::kOnChange) {
-      if (!ever_sent_.test(i) || last_values_[i] != controls.values[i]) changed_at_[i] = time;
+    if (isHandle(channel)) {
+      // What is only held since its source fell silent is not put into a flight that began without it.
+      if (!ever_sent_.test(i) && !commanded.test(i)) continue;
+      if (!ever_sent_.test(i) || last_values_[i] != controls.values[i]) {
+        changed_at_[i] = time;
+        handles_shown_.reset(i);
+      }
       last_values_[i] = controls.values[i];
       // Sent a few times, because a datagram may be lost; then it may be moved in the cockpit.
       if (time - changed_at_[i] > kHandleRepeat) continue;
@@ -162,12 +168,14 @@ core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& con
 
 // --- read-back ---
 
-void ControlPath::publishApplied(const core::ArbitratedControls& controls) {
+void ControlPath::publishApplied(const core::ArbitratedControls& controls, const core::ChannelSet& sent) {
   AppliedControls applied;
   applied.controls = controls;
+  applied.sent = sent;
   applied.sent_ns = link_->clock().system_ns();
   applied.sim_time = watch_.sim_time;
   hooks_.applied(applied);
+  if (sent.none()) return;                                  // handles that go by themselves by now
   if (awaiting_read_back_.empty()) last_followed_ = now();  // until now there was nothing to show
   awaiting_read_back_.push_back(applied);
   if (awaiting_read_back_.size() > kMaxAwaitingReadBack) awaiting_read_back_.pop_front();
@@ -201,14 +209,18 @@ void ControlPath::onReadBack(const core::RrefView& view) {
     const std::size_t channel = core::index(watched_order_[static_cast<std::size_t>(pair.index) - 1]);
     read_back_values_[channel] = static_cast<double>(pair.value);
     read_back_known_.set(channel);
+    if (isHandle(static_cast<core::Channel>(channel)) && ever_sent_.test(channel) &&
+        isShown(channel, last_values_[channel])) {
+      handles_shown_.set(channel);
+    }
   }
   // The newest that fits: older ones were overtaken.
   for (auto it = awaiting_read_back_.rbegin(); it != awaiting_read_back_.rend(); ++it) {
     bool all = true;
     for (std::size_t i = 0; i < core::kChannelCount && all; ++i) {
-      if (!it->controls.active.test(i)) continue;
-      all = read_back_known_.test(i) &&
-            encoder_.matches(static_cast<core::Channel>(i), it->controls.values[i], read_back_values_[i]);
+      // A handle that was shown may be moved in the cockpit, also while it is still repeated.
+      if (!it->sent.test(i) || handles_shown_.test(i)) continue;
+      all = isShown(i, it->controls.values[i]);
     }
     // What stood there before the command reached X-Plane is not its doing.
     const bool too_early = link_status_.state != core::LinkState::kPaused && sim_time <= it->sim_time;
@@ -226,19 +238,31 @@ void ControlPath::onReadBack(const core::RrefView& view) {
 std::vector<std::string> ControlPath::notFollowed() const {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   std::vector<std::string> out;
-  if (awaiting_read_back_.empty() || link_status_.state != core::LinkState::kConnected ||
-      now() - last_followed_ <= kReadBackTimeout) {
-    return out;
-  }
-  const core::ArbitratedControls& last = awaiting_read_back_.back().controls;
+  if (link_status_.state != core::LinkState::kConnected) return out;
+  const double time = now();
+  const bool waits = !awaiting_read_back_.empty() && time - last_followed_ > kReadBackTimeout;
   for (std::size_t i = 0; i < core::kChannelCount; ++i) {
     const auto channel = static_cast<core::Channel>(i);
-    if (!last.active.test(i) ||
-        (read_back_known_.test(i) && encoder_.matches(channel, last.values[i], read_back_values_[i])))
-      continue;
-    out.push_back(core::channelName(channel));
+    bool late = false;
+    if (isHandle(channel)) {
+      late =
+          watched_.test(i) && ever_sent_.test(i) && !handles_shown_.test(i) && time - changed_at_[i] > kReadBackTimeout;
+    } else if (waits && awaiting_read_back_.back().sent.test(i)) {
+      late = !isShown(i, awaiting_read_back_.back().controls.values[i]);
+    }
+    if (late) out.push_back(core::channelName(channel));
   }
   return out;
+}
+
+/// One that is sent for a while after a change, and may be moved in the cockpit after that.
+bool ControlPath::isHandle(core::Channel channel) const {
+  return core::channelWire(channel, encoder_.options()).refresh == core::Refresh::kOnChange;
+}
+
+bool ControlPath::isShown(std::size_t channel, double value) const {
+  return read_back_known_.test(channel) &&
+         encoder_.matches(static_cast<core::Channel>(channel), value, read_back_values_[channel]);
 }
 
 }  // namespace xplane_bridge

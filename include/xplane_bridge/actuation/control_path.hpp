@@ -46,6 +46,7 @@ struct ControlPathOptions {
 /// What was sent to X-Plane at one moment, and what X-Plane has shown of it.
 struct AppliedControls {
   core::ArbitratedControls controls;
+  core::ChannelSet sent;                     ///< of them; handles go out for a while after a change only
   std::int64_t sent_ns = 0;                  ///< [ns] host time
   double sim_time = std::nan("");            ///< [s] of the frame known at sending
   bool read_back = false;                    ///< X-Plane has shown all of it
@@ -159,9 +160,11 @@ class ControlPath {
   void prepareLevers(const core::ArbitratedControls& controls);
   core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
   void publishMode();
-  void publishApplied(const core::ArbitratedControls& controls);
+  void publishApplied(const core::ArbitratedControls& controls, const core::ChannelSet& sent);
   void watchReadBack(const core::ChannelSet& channels);
   void onReadBack(const core::RrefView& view);
+  bool isHandle(core::Channel channel) const;
+  bool isShown(std::size_t channel, double value) const;
   void askMissing();
   core::ChannelSet missingChannels() const;
   core::ArbitratedControls withoutMissing(core::ArbitratedControls controls);
@@ -199,12 +202,13 @@ class ControlPath {
   double last_override_refresh_ = -1e9;                // [s] steady
   bool surfaces_fly_ = false;  // control/surfaces commands, as far as end_surface_commands has not been called
   bool excited_ = false;       // what was sent last
-  bool taken_ = false;         // overrides, for a test signal on channels without a command
+  bool taken_ = false;         // overrides may be held
   std::string last_warning_;   // why commands are not sent, as warned of last
 
   core::ChannelValues last_values_{};                     // of Refresh::kOnChange channels
   std::array<double, core::kChannelCount> changed_at_{};  // [s] steady; of the same
-  core::ChannelSet ever_sent_;
+  core::ChannelSet ever_sent_;                            // in this flight
+  core::ChannelSet handles_shown_;                        // by X-Plane, since they were changed
   std::vector<core::DatarefWrite> writes_;
 
   std::deque<AppliedControls> awaiting_read_back_;  // oldest first

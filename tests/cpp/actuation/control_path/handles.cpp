@@ -1,0 +1,69 @@
+// Handles and trims: sent for a while after a change, the cockpit's after that.
+
+#include "fixture.hpp"
+
+namespace xplane_bridge {
+namespace {
+
+class HandlesTest : public ControlPathTest {
+ protected:
+  static core::ControlCommand rollAndFlaps(double roll, double flaps) {
+    core::ControlCommand command = rollCommand(roll);
+    command.fields |= core::kFieldFlaps;
+    command.flaps = flaps;
+    return command;
+  }
+};
+
+TEST_F(HandlesTest, ANewFlightGetsThoseThatAreCommanded) {
+  start();
+  runWith(rollAndFlaps(0.25, 0.5), 1.0);
+  ASSERT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F);
+  sim.set(kFlapHandle, 0.0F);
+  path->onNewFlight("the flight began anew");
+  runWith(rollAndFlaps(0.25, 0.5), 1.0);
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F);
+  EXPECT_EQ(path->notFollowed(), Texts{});
+}
+
+TEST_F(HandlesTest, ANewFlightDoesNotGetThoseThatAreOnlyHeld) {
+  start();
+  runWith(rollAndFlaps(0.25, 0.5), 0.5);
+  runWith(rollCommand(0.25), 2.0);
+  sim.set(kFlapHandle, 0.0F);
+  path->onNewFlight("the flight began anew");
+  runWith(rollCommand(0.25), 1.0);
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.0F);
+  runWith(rollAndFlaps(0.25, 0.5), 0.1);
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F) << "the same value as before, and commanded again";
+}
+
+TEST_F(HandlesTest, OneThatIsMovedInTheCockpitEndsNoReadBack) {
+  start();
+  runWith(rollAndFlaps(0.25, 0.5), 1.0);
+  sim.set(kFlapHandle, 0.25F);
+  runWith(rollAndFlaps(0.25, 0.5), 0.2);
+  applied.clear();
+  for (int i = 1; i <= 50; ++i) runWith(rollAndFlaps(0.01 * i, 0.5), 0.02);
+  const auto shown = std::count_if(applied.begin(), applied.end(), [](const auto& each) { return each.read_back; });
+  EXPECT_GT(shown, 40);
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.25F);
+  run(1.5);
+  EXPECT_EQ(path->notFollowed(), Texts{});
+}
+
+TEST_F(HandlesTest, OneThatXPlaneDoesNotMoveIsNamedAndTheStickIsReadBack) {
+  start();
+  sim.on_frame = [this] {
+    if (sim.value(kFlapHandle) > 0.0F) sim.set(kFlapHandle, 0.33F);  // its nearest detent
+  };
+  runWith(rollAndFlaps(0.0, 0.5), 0.5);
+  applied.clear();
+  for (int i = 1; i <= 50; ++i) runWith(rollAndFlaps(0.01 * i, 0.5), 0.02);
+  const auto shown = std::count_if(applied.begin(), applied.end(), [](const auto& each) { return each.read_back; });
+  EXPECT_GT(shown, 40);
+  EXPECT_EQ(path->notFollowed(), Texts{"flaps"});
+}
+
+}  // namespace
+}  // namespace xplane_bridge
