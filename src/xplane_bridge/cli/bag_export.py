@@ -7,7 +7,7 @@ import os
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Optional, Sequence
+from typing import Mapping, Optional, Sequence
 
 from tqdm import tqdm
 
@@ -57,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
         type=Path,
         metavar="FILE",
         help="labels of the pictures, made by label_images; for several flights the folder with their "
-        "NAME.labels.jsonl (default: none are exported)",
+        "NAME.labels.jsonl, NAME as in DIR (default: none are exported)",
     )
     data.add_argument(
         "--camera",
@@ -123,7 +123,7 @@ def _jobs(args: argparse.Namespace, output: Path) -> list[Job]:
     training = campaign.choose_training(named, dataset)
     jobs = []
     for name, bags in sorted(named.items()):
-        labels, digest = _labels(args, bags, len(named))
+        labels, digest = _labels(args, name, named)
         job = Job(
             name, bags, str(output.resolve()), args.format, args.rate, tuple(args.topics), dataset, name in training
         )
@@ -131,7 +131,7 @@ def _jobs(args: argparse.Namespace, output: Path) -> list[Job]:
     return jobs
 
 
-def _labels(args: argparse.Namespace, bags: Sequence[str], flights: int) -> tuple[str, str]:
+def _labels(args: argparse.Namespace, name: str, flights: Mapping[str, Sequence[str]]) -> tuple[str, str]:
     """Give the file of a flight's labels and its SHA-256; empty without.
 
     Raises:
@@ -142,9 +142,13 @@ def _labels(args: argparse.Namespace, bags: Sequence[str], flights: int) -> tupl
         return "", ""
     path = args.labels
     if path.is_dir():
-        path = path / table.beside(Path(bags[0])).name
-    elif flights > 1:
-        msg = f"--labels {path}: a file for {flights} flights; expected the folder with one for each"
+        own = path / f"{name}{table.ENDING}"
+        # label_images calls it as the first bag; of several flights with bags of one name it would be of any of them.
+        written = path / table.beside(Path(flights[name][0])).name
+        alike = sum(table.beside(Path(bags[0])).name == written.name for bags in flights.values())
+        path = written if not own.exists() and written.exists() and alike == 1 else own
+    elif len(flights) > 1:
+        msg = f"--labels {path}: a file for {len(flights)} flights; expected the folder with one for each"
         raise ExportError(msg)
     return str(path.resolve()), table.digest(path)
 

@@ -142,6 +142,38 @@ def test_labels_that_cannot_be_used_fail_their_flight_alone(tmp_path: Path, caps
     assert list(json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["coco"]) == ["b"]
 
 
+def write_labels(path: Path, t: float) -> None:
+    header = {"labels": table.SCHEMA, "bags": ["flight.bag"], "airport": "XEMU"}
+    frame = {"camera": "camera", "stamp_ns": stamp_ns(t), "objects": []}
+    path.write_text(f"{json.dumps(header)}\n{json.dumps(frame)}\n")
+
+
+def test_labels_in_a_folder_are_found_by_the_flights_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    labels = tmp_path / "labels"
+    labels.mkdir()
+    for name, bag, t in (("monday", "flight", 0.0), ("tuesday", "flight", 100.0), ("split", "part_0", 200.0)):
+        (tmp_path / name).mkdir()
+        write_flight(tmp_path / name / f"{bag}.bag", 0.4, t)
+    given = [tmp_path / "monday" / "flight.bag", tmp_path / "tuesday" / "flight.bag", tmp_path / "split"]
+    options = ("--format", "coco", "--labels", labels, "--jobs", "1", "-o", tmp_path / "out")
+
+    write_labels(labels / "flight.labels.jsonl", 0.0)  # of either
+    write_labels(labels / "split.labels.jsonl", 200.0)
+    assert export(*given, *options) == 1
+    assert f"{labels / 'monday_flight.labels.jsonl'}: No such file" in capsys.readouterr().err
+    write_labels(labels / "monday_flight.labels.jsonl", 0.0)
+    write_labels(labels / "tuesday_flight.labels.jsonl", 100.0)
+    assert export(*given, *options) == 0
+    records = json.loads((tmp_path / "out" / "manifest.json").read_text())["exports"]["coco"]
+    for name, record in records.items():
+        assert record["parameters"]["labels_sha256"] == table.digest(labels / f"{name}.labels.jsonl")
+    assert list(records) == ["monday_flight", "split", "tuesday_flight"]
+
+    (labels / "split.labels.jsonl").rename(labels / "part_0.labels.jsonl")  # as label_images calls it
+    assert export(given[2], *options) == 0
+    assert export(given[1], *options) == 1, "flight.labels.jsonl is monday's"
+
+
 def test_a_killed_process_leaves_the_manifest_of_the_others(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
