@@ -187,9 +187,9 @@ bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report&
   };
   do {
     problem.clear();
-    // The aircraft first; then the pause, also where only taking the first out of the journal has failed.
+    // The aircraft first; then the pause, also where one of the first is not shown released.
     const bool released = attempt([&] { return overrides.releaseLeftovers(kAttemptTime); });
-    const bool resumed = (released || !problem.empty()) && attempt([&] { return resumeLeftovers(link, kAttemptTime); });
+    const bool resumed = attempt([&] { return resumeLeftovers(link, kAttemptTime); });
     if (released && resumed) return true;
     if (!problem.empty()) link->waitUntil([] { return false; }, kJournalAgain);
   } while (!deadline.over());

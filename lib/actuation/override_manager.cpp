@@ -23,12 +23,6 @@ constexpr float kSame = 1e-3F;
 constexpr float kSamePreparation = 0.01F;
 constexpr double kRecordPeriod = 1.0;  // [s]
 
-core::DataRow rowOfUnused(std::int32_t row) {
-  core::DataRow out;
-  out.index = row;
-  return out;
-}
-
 std::string entryId(const std::string& dataref) { return "override:" + dataref; }
 
 std::vector<std::string> entryIds(const std::set<std::string>& datarefs) {
@@ -39,16 +33,58 @@ std::vector<std::string> entryIds(const std::set<std::string>& datarefs) {
 }
 
 core::UndoOperation undoOf(const std::string& dataref) {
-  if (const auto row = core::rowOfName(dataref)) return core::UndoData{rowOfUnused(*row)};
+  if (const auto row = core::rowOfName(dataref)) {
+    core::UndoData unused;
+    unused.row.index = *row;
+    return unused;
+  }
   const auto release = core::releaseOf(dataref);
   return core::UndoDref{dataref, release ? release->value : 0.0F};
 }
 
-std::vector<core::UndoOperation> undoOf(const std::set<std::string>& datarefs) {
-  std::vector<core::UndoOperation> out;
-  out.reserve(datarefs.size());
-  for (const std::string& dataref : datarefs) out.push_back(undoOf(dataref));
-  return out;
+using Operations = std::vector<core::UndoOperation>;
+
+/// Waits until X-Plane shows what each of several, which were sent, has written; returns of which it has. What has
+/// nothing to be read back counts as shown where X-Plane answers, or where none of them has.
+std::vector<bool> awaitEach(core::SimulatorPort* link, const std::vector<Operations>& each, double timeout_s) {
+  std::vector<std::string> paths;
+  std::vector<std::pair<std::size_t, float>> expected;  // of which, and what
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    for (const core::UndoOperation& operation : each[i]) {
+      const auto* dref = std::get_if<core::UndoDref>(&operation);
+      if (dref == nullptr || !dref->confirm) continue;
+      paths.push_back(dref->path);
+      expected.emplace_back(i, dref->value);
+    }
+  }
+  if (paths.empty()) return std::vector<bool>(each.size(), true);
+  const auto missing = [expected](const std::vector<core::DatarefValue>& values) {
+    std::set<std::size_t> out;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      if (!values[k] || !(std::abs(*values[k] - expected[k].second) <= kSame)) out.insert(expected[k].first);
+    }
+    return out;
+  };
+  const auto values =
+      link->readUntil(std::move(paths), timeout_s, [missing](const auto& answers) { return missing(answers).empty(); });
+  const bool answered = std::any_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
+  std::vector<bool> shown(each.size(), answered || isUp(link->status()));
+  for (const std::size_t i : missing(values)) shown[i] = false;
+  return shown;
+}
+
+/// Carries out the operations of each of several; returns of which X-Plane has shown them.
+std::vector<bool> undoEach(core::SimulatorPort* link, std::vector<Operations> each, double timeout_s) {
+  std::set<std::size_t> not_sent;
+  for (std::size_t i = 0; i < each.size(); ++i) {
+    for (const core::UndoOperation& operation : each[i]) {
+      if (link->sendUndo(operation) != core::SendStatus::kSent) not_sent.insert(i);
+    }
+  }
+  for (const std::size_t i : not_sent) each[i].clear();  // there is nothing to wait for
+  std::vector<bool> shown = awaitEach(link, each, timeout_s);
+  for (const std::size_t i : not_sent) shown[i] = false;
+  return shown;
 }
 
 /// Whether the journal must be brought up to date; small changes are not worth its disk.
@@ -62,6 +98,18 @@ bool differ(const std::vector<core::UndoOperation>& a, const std::vector<core::U
 }
 
 std::string joined(const std::set<std::string>& names) { return core::join(names, ", ", core::afterLastSlash); }
+
+/// By the cause for which they were left.
+std::string causes(const std::vector<core::JournalEntry>& entries) {
+  std::map<std::string, std::set<std::string>> names;
+  for (const core::JournalEntry& entry : entries) names[entry.left].insert(entry.id);
+  std::vector<std::string> out;
+  out.reserve(names.size());
+  for (const auto& [cause, ids] : names) {
+    out.push_back(joined(ids) + (cause.empty() ? " left by a run that crashed" : " left because " + cause));
+  }
+  return core::join(out);
+}
 
 }  // namespace
 
@@ -121,7 +169,7 @@ bool OverrideManager::set(const std::string& dataref, float value) {
 
 void OverrideManager::giveBack(const std::string& dataref) {
   if (isSet(dataref)) return;
-  releasing_.insert(dataref);
+  startRelease(dataref);
   for (const core::UndoOperation& operation : releaseOf(dataref)) link_->sendUndo(operation);
   prepared_.erase(dataref);  // from now on it may be commanded otherwise
 }
@@ -236,7 +284,7 @@ std::vector<std::string> OverrideManager::releasedByOthers() {
       if (const auto journal = link_->journal()) journal->remove(entryIds(all));
     } catch (const core::JournalError& error) {
       problem = error.what();
-      releasing_.insert(all.begin(), all.end());  // confirmReleases() tries again to take the entries out
+      for (const std::string& dataref : all) startRelease(dataref);  // so that the entries are taken out later
     }
     updateWatch();
   }
@@ -345,99 +393,100 @@ void OverrideManager::resend(const std::string& dataref, float value) {
 
 // --- confirming releases ---
 
+void OverrideManager::startRelease(const std::string& dataref) { releasing_[dataref] = {++releases_, 0, -1e9}; }
+
 bool OverrideManager::releasesPending() const {
   const Lock lock(*mutex_);
   return !releasing_.empty();
 }
 
 void OverrideManager::confirmReleases(double timeout_s) {
-  std::set<std::string> pending;
+  std::vector<std::pair<std::string, std::uint64_t>> pending;
+  std::vector<Operations> operations;
   {
     const Lock lock(*mutex_);
-    pending = releasing_;
-    // Sent with the lock held, so that none goes out after one of them has been set again.
-    for (const std::string& dataref : pending) link_->sendUndo(undoOf(dataref));
-  }
-  if (pending.empty() || !link_->waitUntilUndone(undoOf(pending), timeout_s)) return;
-  const auto journal = link_->journal();
-  const Lock lock(*mutex_);
-  for (const std::string& dataref : pending) {
-    // It may have been set again meanwhile.
-    if (releasing_.count(dataref) == 0) continue;
-    if (journal) journal->remove({entryId(dataref)});
-    releasing_.erase(dataref);
-  }
-}
-
-bool OverrideManager::confirm(const std::vector<core::UndoOperation>& operations, double timeout_s,
-                              const std::string& what, const std::function<void(core::Journal&)>& remove) {
-  if (operations.empty()) return true;
-  const bool shown = link_->undo(operations, timeout_s);
-  const auto journal = link_->journal();
-  if (shown && journal) remove(*journal);
-  if (shown) {
-    report_("released " + what, true);
-  } else if (std::exchange(unreleased_, what) != what) {  // it is tried again and again, but reported once
-    if (answers()) {
-      report_(what + " could not be seen released; it stays in the journal", false);
-    } else {
-      report_(
-          what + " could not be released, because X-Plane went first, or is silent. If it still runs, the next start " +
-              "releases it, or scripts/release_overrides",
-          ended_);  // closing X-Plane before the bridge is nothing wrong
+    const double now = link_->clock().steadySeconds();
+    const bool fresh =
+        std::any_of(releasing_.begin(), releasing_.end(), [](const auto& r) { return !r.second.attempts; });
+    for (auto& [dataref, release] : releasing_) {
+      // One that X-Plane does not show holds up no other.
+      if (now < release.not_before || (fresh && release.attempts > 0)) continue;
+      if (++release.attempts >= kPromptAttempts) release.not_before = now + kLateRetry;
+      // Sent with the lock held, so that none goes out after one of them has been set again.
+      const core::UndoOperation undo = undoOf(dataref);
+      if (link_->sendUndo(undo) != core::SendStatus::kSent) continue;
+      pending.emplace_back(dataref, release.number);
+      operations.push_back({undo});
     }
   }
-  return shown;
+  const std::vector<bool> shown = awaitEach(link_, operations, timeout_s);
+  const auto journal = link_->journal();
+  const Lock lock(*mutex_);
+  std::set<std::string> done;
+  for (std::size_t i = 0; i < pending.size(); ++i) {
+    // It may have been set again meanwhile, and given back once more.
+    const auto found = releasing_.find(pending[i].first);
+    if (shown[i] && found != releasing_.end() && found->second.number == pending[i].second) done.insert(found->first);
+  }
+  if (journal && !done.empty()) journal->remove(entryIds(done));
+  for (const std::string& dataref : done) releasing_.erase(dataref);
+}
+
+void OverrideManager::reportReleases(const std::string& released, const std::string& left) {
+  if (!released.empty()) report_("released " + released, true);
+  // It is tried again and again, but reported once.
+  if (left.empty() || std::exchange(unreleased_, left) == left) return;
+  const bool up = isUp(link_->status());
+  const char* why = up ? " could not be seen released; it stays in the journal"
+                       : " could not be released, because X-Plane went first, or is silent. If it still runs, the "
+                         "next start releases it, or scripts/release_overrides";
+  report_(left + why, !up && ended_);  // closing X-Plane before the bridge is nothing wrong
 }
 
 bool OverrideManager::releaseAll(double timeout_s) {
-  std::set<std::string> all;
-  std::vector<core::UndoOperation> operations;
+  std::vector<std::string> all;
+  std::vector<Operations> operations;
   {
     const Lock lock(*mutex_);
-    all = takeAll();
-    all.insert(releasing_.begin(), releasing_.end());
+    for (const std::string& dataref : takeAll()) startRelease(dataref);
     updateWatch();
-    releasing_ = all;
     ended_ = true;
-    for (const std::string& dataref : all) {
-      const std::vector<core::UndoOperation> release = releaseOf(dataref);
-      operations.insert(operations.end(), release.begin(), release.end());
+    for (const auto& [dataref, release] : releasing_) {
+      all.push_back(dataref);
+      operations.push_back(releaseOf(dataref));
     }
   }
-  const auto remove = [&all](core::Journal& journal) { journal.remove(entryIds(all)); };
-  if (!confirm(operations, timeout_s, joined(all), remove)) {
-    const char* why = answers() ? "X-Plane did not show it released" : "X-Plane went first";
-    if (const auto journal = link_->journal()) journal->leave(entryIds(all), why);
-    return false;
+  const std::vector<bool> shown = undoEach(link_, operations, timeout_s);
+  std::set<std::string> done, left;
+  for (std::size_t i = 0; i < all.size(); ++i) (shown[i] ? done : left).insert(all[i]);
+  if (const auto journal = link_->journal(); journal && !all.empty()) {
+    journal->remove(entryIds(done));
+    const char* why = isUp(link_->status()) ? "X-Plane did not show it released" : "X-Plane went first";
+    if (!left.empty()) journal->leave(entryIds(left), why);
   }
+  reportReleases(joined(done), joined(left));
   const Lock lock(*mutex_);
-  releasing_.clear();
-  return true;
+  for (const std::string& dataref : done) releasing_.erase(dataref);
+  return left.empty();
 }
 
 bool OverrideManager::releaseLeftovers(double timeout_s) {
   const auto journal = link_->journal();
   if (!journal) return false;
-  const std::vector<core::JournalEntry> left = journal->orphans(kOverridePurpose);
-  std::vector<core::UndoOperation> operations;
-  std::map<std::string, std::set<std::string>> names;  // by the cause for which they were left
-  for (const core::JournalEntry& entry : left) {
-    names[entry.left].insert(entry.id);
-    operations.insert(operations.end(), entry.undo.begin(), entry.undo.end());
-  }
-  std::vector<std::string> what;
-  what.reserve(names.size());
-  for (const auto& [cause, ids] : names) {
-    what.push_back(joined(ids) + (cause.empty() ? " left by a run that crashed" : " left because " + cause));
-  }
-  const std::string all = core::join(what);
-  if (!answers() && names.count("") == 0) unreleased_ = all;  // the runs that left them have said so
+  const std::vector<core::JournalEntry> all = journal->orphans(kOverridePurpose);
+  std::vector<Operations> operations;
+  operations.reserve(all.size());
+  for (const core::JournalEntry& entry : all) operations.push_back(entry.undo);
+  const std::vector<bool> shown = undoEach(link_, operations, timeout_s);
+  std::vector<core::JournalEntry> done, left;
+  for (std::size_t i = 0; i < all.size(); ++i) (shown[i] ? done : left).push_back(all[i]);
   // This run may have set one of them anew meanwhile: that entry is not theirs.
-  return confirm(operations, timeout_s, all, [&left](core::Journal& journal_now) { journal_now.removeUndone(left); });
+  if (!done.empty()) journal->removeUndone(done);
+  const bool known = std::none_of(left.begin(), left.end(), [](const auto& entry) { return entry.left.empty(); });
+  if (!isUp(link_->status()) && known) unreleased_ = causes(left);  // the runs that left them have said so
+  reportReleases(causes(done), causes(left));
+  return left.empty();
 }
-
-bool OverrideManager::answers() const { return isUp(link_->status()); }
 
 std::vector<std::string> OverrideManager::active() const {
   const Lock lock(*mutex_);

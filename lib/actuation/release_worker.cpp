@@ -65,17 +65,41 @@ void ReleaseWorker::loop() {
 void ReleaseWorker::work() {
   const core::LinkStatus status = link_->status();
   if (!isUp(status)) return;
-  try {
-    if (leftovers_of_epoch_ != status.epoch && overrides_->releaseLeftovers(kReleaseAttempt) &&
-        resumeLeftovers(link_, kReleaseAttempt)) {
-      leftovers_of_epoch_ = status.epoch;
+  std::string problem;  // of the journal
+  const auto attempt = [&problem](const std::function<bool()>& step) {
+    try {
+      return step();
+    } catch (const core::JournalError& error) {
+      problem = error.what();
+      return false;
     }
-    overrides_->recordPreparations();
-    if (watch_) watch_();
-    if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseAttempt);
-  } catch (const core::JournalError& error) {
-    problem_(error.what());
+  };
+  const double now = link_->clock().steadySeconds();
+  if (std::exchange(epoch_, status.epoch) != status.epoch) {
+    leftovers_ = true;
+    attempts_ = 0;
   }
+  if (leftovers_ && (attempts_ < kPromptAttempts || now - attempted_at_ >= kLateRetry)) {
+    ++attempts_;
+    attempted_at_ = now;
+    // An override that X-Plane does not show released is no reason to leave it paused.
+    const bool released = attempt([this] { return overrides_->releaseLeftovers(kReleaseAttempt); });
+    const bool resumed = attempt([this] { return resumeLeftovers(link_, kReleaseAttempt); });
+    leftovers_ = !released || !resumed;
+  }
+  attempt([this] {
+    overrides_->recordPreparations();
+    return true;
+  });
+  attempt([this] {
+    if (watch_) watch_();
+    return true;
+  });
+  attempt([this] {
+    if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseAttempt);
+    return true;
+  });
+  if (!problem.empty()) problem_(problem);
 }
 
 }  // namespace xplane_bridge

@@ -13,6 +13,7 @@ namespace {
 
 using core::ResultCode;
 
+constexpr const char* kNoAnswer = " does not answer: is the name right?";
 constexpr std::size_t kShownOfName = 80;  // [characters] of a name that is too long
 
 // X-Plane keeps float32; integers come back exactly.
@@ -59,9 +60,35 @@ RequestResult SettingRequests::writeAndConfirm(const std::vector<core::DatarefWr
     if (fits) continue;
     return {ResultCode::kTimeout,
             write.dataref + (shown ? " shows " + std::to_string(*shown) + ", not " + std::to_string(write.value)
-                                   : std::string(" does not answer: is the name right?"))};
+                                   : std::string(kNoAnswer))};
   }
   return {ResultCode::kOk, "X-Plane shows it"};
+}
+
+/// Those among what is to be written that are set are held from now on, those that are not are given back.
+std::optional<RequestResult> SettingRequests::holdOverrides(const std::vector<core::DatarefWrite>& writes) {
+  std::vector<std::string> set;
+  for (const core::DatarefWrite& write : writes) {
+    const auto release = core::releaseOf(write.dataref);
+    if (release && write.value != release->value) set.push_back(write.dataref);
+  }
+  // One that X-Plane does not have could never be seen released.
+  if (!set.empty() && !link_->inLockstep()) {
+    const auto shown = link_->read(set, timeout_);
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      if (!shown[i]) return RequestResult{ResultCode::kTimeout, set[i] + kNoAnswer};
+    }
+  }
+  for (const core::DatarefWrite& write : writes) {
+    const auto release = core::releaseOf(write.dataref);
+    if (!release) continue;
+    if (write.value != release->value) {
+      overrides_->acquire(write.dataref, write.value);
+    } else {
+      overrides_->release(write.dataref);
+    }
+  }
+  return std::nullopt;
 }
 
 SettingRequests::Written SettingRequests::setDataref(const std::string& name, const std::vector<float>& values,
@@ -79,16 +106,12 @@ SettingRequests::Written SettingRequests::setDataref(const std::string& name, co
   if (!isUp(link_->status())) return {noLink(), {}};
   std::vector<core::DatarefWrite> writes;
   for (std::size_t i = 0; i < names.size(); ++i) writes.push_back({names[i], values[i]});
-  for (const core::DatarefWrite& write : writes) {
-    const auto release = core::releaseOf(write.dataref);
-    if (!release) continue;
-    if (write.value != release->value) {
-      overrides_->acquire(write.dataref, write.value);
-    } else {
-      overrides_->release(write.dataref);
-    }
-  }
   Written out;
+  if (const auto refused = holdOverrides(writes)) {
+    out.result = *refused;
+    report_("set_dataref " + name + ": " + out.result.text, who, false);
+    return out;
+  }
   out.result = writeAndConfirm(writes, "set_dataref " + name, who);
   if (link_->inLockstep()) return out;
   for (const auto& value : link_->read(names, timeout_)) out.values.push_back(value.value_or(std::nanf("")));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <map>
@@ -12,6 +13,9 @@
 #include "xplane_bridge/core/link/simulator_port.hpp"
 
 namespace xplane_bridge {
+
+constexpr int kPromptAttempts = 5;  ///< to release what X-Plane does not show released
+constexpr double kLateRetry = 5.0;  ///< [s] between those after that
 
 /// The overrides this node has set in X-Plane, and nothing else's: each is in the journal before it is set, and taken
 /// out after it is released and read back. Thread-safe. Functions that wait for X-Plane say so; those that write to the
@@ -57,7 +61,8 @@ class OverrideManager {
   void forgetShown();
   /// True while a release has not been read back.
   bool releasesPending() const;
-  /// Reads pending releases back, sending them again. Waits up to `timeout_s`.
+  /// Reads pending releases back, sending them again; one that X-Plane does not show is tried apart from those that are
+  /// new, a few times at once, then every few seconds. Waits up to `timeout_s`.
   void confirmReleases(double timeout_s);
   /// Releases everything; nothing is set after that. Waits up to `timeout_s`. Returns whether X-Plane has shown all of
   /// it; what it has not stays in the journal.
@@ -88,6 +93,12 @@ class OverrideManager {
     std::exception_ptr failed;
   };
 
+  struct Release {
+    std::uint64_t number = 0;  // of all releases
+    int attempts = 0;          // to see it shown
+    double not_before = -1e9;  // [s] steady; of the next one
+  };
+
   struct Preparation {
     std::vector<core::UndoOperation> writes;
     std::vector<core::UndoOperation> recorded;  // as the journal has them
@@ -105,24 +116,23 @@ class OverrideManager {
   void updateWatch();
   void onShown(const core::RrefView& view);
 
-  /// Waits until X-Plane shows `operations`, reports `what`; `remove` takes what was undone out of the journal.
-  bool confirm(const std::vector<core::UndoOperation>& operations, double timeout_s, const std::string& what,
-               const std::function<void(core::Journal&)>& remove);
+  void startRelease(const std::string& dataref);
 
-  bool answers() const;
+  void reportReleases(const std::string& released, const std::string& left);
 
   core::SimulatorPort* link_;
   Report report_;
   const std::shared_ptr<core::HandlerMutex> mutex_ = std::make_shared<core::HandlerMutex>();
   std::set<std::string> required_;
   std::map<std::string, Acquired> acquired_;
-  std::set<std::string> releasing_;
+  std::map<std::string, Release> releasing_;
+  std::uint64_t releases_ = 0;
   std::map<std::string, Preparation> prepared_;
   double recorded_at_ = -1e9;         // [s] steady
   std::vector<std::string> watched_;  // datarefs of the subscription
   std::map<std::string, Shown> shown_;
   bool ended_ = false;               // by releaseAll()
-  std::string unreleased_;           // what confirm() has reported last; of the one thread that waits
+  std::string unreleased_;           // as reported last; of the one thread that waits
   core::Subscription subscription_;  // last: it ends first
 };
 

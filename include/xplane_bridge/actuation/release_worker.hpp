@@ -45,7 +45,10 @@ class ReleaseWorker {
   OverrideManager* overrides_;
   std::function<void(const std::string&)> problem_;
   std::function<void()> watch_;
-  std::uint32_t leftovers_of_epoch_ = 0;  // link epoch whose leftovers were released
+  std::uint32_t epoch_ = 0;    // of the link
+  bool leftovers_ = true;      // of earlier runs may be in this X-Plane
+  int attempts_ = 0;           // to give them back
+  double attempted_at_ = 0.0;  // [s] steady, last
   std::mutex mutex_;
   core::ClockCondition wanted_;
   bool now_ = false;  // without waiting for the end of the period

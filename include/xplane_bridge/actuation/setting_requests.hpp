@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,12 +26,14 @@ class SettingRequests {
     RequestResult result;
     std::vector<float> values;  ///< as X-Plane shows them afterwards, NaN where it does not answer; empty: not written
   };
-  /// Writes `values` to `name` and the elements that follow it. An override set so is given back like the bridge's own.
+  /// Writes `values` to `name` and the elements that follow it. An override set so is given back like the bridge's own;
+  /// one that X-Plane does not answer for is not set (in lock-step that is not asked).
   /// @param who asks for it
   Written setDataref(const std::string& name, const std::vector<float>& values, const std::string& who);
   RequestResult runCommand(const std::string& name);
 
  private:
+  std::optional<RequestResult> holdOverrides(const std::vector<core::DatarefWrite>& writes);
   RequestResult writeAndConfirm(const std::vector<core::DatarefWrite>& writes, const std::string& what,
                                 const std::string& who);
   void confirmLater(const std::vector<core::DatarefWrite>& writes, const std::string& what, const std::string& who);

@@ -174,6 +174,18 @@ TEST_F(ReleaseLeftBehind, LetsXPlaneGoOn) {
   EXPECT_TRUE(sim_.journal()->entries().empty());
 }
 
+TEST_F(ReleaseLeftBehind, LetsXPlaneGoOnThoughAnOverrideIsNotShownReleased) {
+  sim_.setState(core::LinkState::kPaused);
+  sim_.setReadOnly(kJoystick);
+  sim_.journalOfAnother().record("two", kPausePurpose, {core::UndoPause{}});
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.label == "CMND") sim_.setState(core::LinkState::kConnected);
+  };
+  EXPECT_FALSE(release());
+  EXPECT_EQ(sim_.status().state, core::LinkState::kConnected);
+  EXPECT_EQ(sim_.journal()->entries().size(), 1U);
+}
+
 TEST_F(ReleaseLeftBehind, LostDatagramIsSentAgain) {
   sim_.loseMessages(2);
   EXPECT_TRUE(release());

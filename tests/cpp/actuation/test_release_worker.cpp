@@ -85,6 +85,37 @@ TEST_F(ReleaseWorkerTest, LetsXPlaneGoOnThatACrashedRunHasPaused) {
   EXPECT_EQ(entries(), 0U);
 }
 
+TEST_F(ReleaseWorkerTest, LetsXPlaneGoOnThoughAnOverrideIsNotShownReleased) {
+  sim_.setState(core::LinkState::kPaused);
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.label == "CMND") sim_.setState(core::LinkState::kConnected);
+  };
+  crashedRunHas(kJoystick);
+  crashedRunHas(kThrottles);
+  sim_.setReadOnly(kThrottles);
+  sim_.journalOfAnother().record("pause:one", kPausePurpose, {core::UndoPause{}});
+  worker_.work();
+  EXPECT_EQ(sim_.status().paused, false);
+  EXPECT_EQ(entries(), 1U) << "of the throttles";
+  sim_.set(kJoystick, 1.0F);  // by another program
+  worker_.work();
+  EXPECT_EQ(sim_.value(kJoystick), 1.0F);
+}
+
+TEST_F(ReleaseWorkerTest, TriesRarelyAfterAWhileAndAnewInTheNextXPlane) {
+  crashedRunHas(kJoystick);
+  sim_.setReadOnly(kJoystick);
+  const auto tries = [this] {
+    sim_.clearMessages();
+    for (double end = sim_.time() + 20.0; sim_.time() < end; sim_.run(0.2)) worker_.work();
+    return static_cast<double>(sim_.messages().size());
+  };
+  EXPECT_NEAR(tries(), 5.0 + 2.0, 1.0);
+  EXPECT_NEAR(tries(), 4.0, 1.0);
+  sim_.restart();
+  EXPECT_NEAR(tries(), 5.0 + 2.0, 1.0);
+}
+
 TEST_F(ReleaseWorkerTest, WithoutXPlaneItDoesNotWaitForIt) {
   crashedRunHas(kJoystick);
   sim_.setState(core::LinkState::kLost);

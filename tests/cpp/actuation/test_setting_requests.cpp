@@ -85,6 +85,26 @@ TEST_F(SettingRequestsTest, WhatCannotBeSentIsSaidAtOnce) {
   EXPECT_NE(command.text.find(core::toString(core::SendStatus::kNoPeer)), std::string::npos) << command.text;
 }
 
+TEST_F(SettingRequestsTest, AnOverrideThatXPlaneDoesNotHaveIsNotSet) {
+  constexpr const char* kMisspelt = "sim/operation/override/override_joystik";
+  const auto written = settings_.setDataref(kMisspelt, {1.0F}, kWho);
+  EXPECT_EQ(written.result.code, ResultCode::kTimeout);
+  EXPECT_EQ(written.result.text, std::string(kMisspelt) + " does not answer: is the name right?");
+  EXPECT_EQ(reports_, (Reports{{std::string("set_dataref ") + kMisspelt + ": " + written.result.text, false}}));
+  EXPECT_TRUE(sim_.messages().empty());
+  EXPECT_TRUE(sim_.journal()->entries().empty()) << "it could never be seen released";
+  EXPECT_TRUE(overrides_.active().empty());
+}
+
+TEST_F(SettingRequestsTest, AnOverrideIsHeldUntilItIsGivenBack) {
+  constexpr const char* kRoll = "sim/operation/override/override_joystick_roll";
+  sim_.set(kRoll, 0.0F);
+  EXPECT_EQ(settings_.setDataref(kRoll, {1.0F}, kWho).result.code, ResultCode::kOk);
+  EXPECT_EQ(overrides_.active(), std::vector<std::string>{kRoll});
+  EXPECT_EQ(settings_.setDataref(kRoll, {0.0F}, kWho).result.code, ResultCode::kOk);
+  EXPECT_TRUE(overrides_.active().empty());
+}
+
 TEST_F(SettingRequestsTest, ACommandWithoutANameIsRefusedWithWhatIsExpected) {
   for (const std::string& name : {std::string(), std::string(2000, 'a')}) {
     const RequestResult command = settings_.runCommand(name);

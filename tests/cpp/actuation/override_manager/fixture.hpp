@@ -23,6 +23,7 @@ using Reports = std::vector<std::pair<std::string, bool>>;
 
 constexpr const char* kJoystick = "sim/operation/override/override_joystick";
 constexpr const char* kThrottles = "sim/operation/override/override_throttles";
+constexpr const char* kUnknown = "sim/operation/override/override_joystik";  // to X-Plane
 constexpr const char* kFailure = "sim/operation/failures/rel_elv_L_jam";
 constexpr const char* kThrottle12 = "sim/flightmodel/engine/ENGN_thro_override[0]";
 

@@ -38,6 +38,27 @@ TEST_F(OverrideManagerTest, ReleaseAllSaysWhatCouldNotBeSeen) {
   EXPECT_TRUE(inJournal().empty());
 }
 
+TEST_F(OverrideManagerTest, WhatReleaseAllHasSeenLeavesTheJournalWhateverElseHasNot) {
+  manager_.acquire(kUnknown, 1.0F);
+  manager_.setRequired({kJoystick, "DATA row 8"});
+  reports_.clear();
+  EXPECT_FALSE(manager_.releaseAll(0.5));
+  EXPECT_EQ(inJournal(), Names{kUnknown});
+  EXPECT_EQ(sim_.journal()->entries()[0].left, "X-Plane did not show it released");
+  EXPECT_EQ(reports_, (Reports{{"released DATA row 8, override_joystick", true},
+                               {"override_joystik could not be seen released; it stays in the journal", false}}));
+  sim_.set(kJoystick, 1.0F);  // by another program
+  EXPECT_FALSE(manager_.releaseAll(0.5));
+  EXPECT_EQ(sim_.value(kJoystick), 1.0F);
+}
+
+TEST_F(OverrideManagerTest, NothingLeavesTheJournalBecauseOfSilence) {
+  manager_.setRequired({kJoystick, "DATA row 8"});
+  sim_.setState(core::LinkState::kLost);
+  EXPECT_FALSE(manager_.releaseAll(0.5));
+  EXPECT_EQ(sim_.journal()->entries().size(), 2U) << "the row cannot be read back, but nothing was";
+}
+
 TEST_F(OverrideManagerTest, XPlaneThatWentFirstIsNoCrashOfOurs) {
   manager_.setRequired({kJoystick});
   sim_.setState(core::LinkState::kLost);
@@ -121,6 +142,19 @@ TEST_F(OverrideManagerTest, LeftoversStayUntilXPlaneShowsThemReleased) {
   sim_.setReadOnly(kJoystick, false);
   EXPECT_TRUE(manager_.releaseLeftovers(0.5));
   EXPECT_TRUE(inJournal().empty());
+}
+
+TEST_F(OverrideManagerTest, LeftoverThatThisXPlaneDoesNotHaveHoldsUpNoOther) {
+  crashedRunHas(kJoystick);
+  sim_.journalOfAnother().record("override:" + std::string(kUnknown), kOverridePurpose,
+                                 {core::UndoDref{kJoystick, 0.0F}, core::UndoDref{kUnknown, 0.0F}});
+  EXPECT_FALSE(manager_.releaseLeftovers(0.5));
+  EXPECT_EQ(inJournal(), (Names{kJoystick, kUnknown})) << "an entry of two is undone when both are shown";
+  EXPECT_EQ(sim_.journal()->entries().size(), 1U);
+  EXPECT_EQ(reports_, (Reports{{"released override_joystick left by a run that crashed", true},
+                               {"override_joystik left by a run that crashed could not be seen released; it stays in "
+                                "the journal",
+                                false}}));
 }
 
 TEST_F(OverrideManagerTest, LeftoverTakenOverMeanwhileStaysInTheJournal) {

@@ -114,6 +114,53 @@ TEST_F(OverrideManagerTest, ReleaseThatXPlaneDoesNotShowStaysPending) {
   EXPECT_TRUE(inJournal().empty());
 }
 
+TEST_F(OverrideManagerTest, ReleaseThatCannotBeShownHoldsUpNoOther) {
+  manager_.acquire(kUnknown, 1.0F);
+  manager_.setRequired({kJoystick, kThrottles});
+  manager_.release(kUnknown);
+  manager_.setRequired({kThrottles});
+  manager_.confirmReleases(1.0);
+  EXPECT_EQ(inJournal(), (Names{kUnknown, kThrottles}));
+  manager_.setRequired({});
+  const double began = sim_.time();
+  manager_.confirmReleases(1.0);
+  EXPECT_LT(sim_.time() - began, 0.1);
+  EXPECT_EQ(inJournal(), Names{kUnknown});
+  sim_.setAll({kJoystick, kThrottles}, 1.0F);  // by another program
+  for (int i = 0; i < 20; ++i) manager_.confirmReleases(1.0);
+  EXPECT_EQ(sim_.value(kJoystick), 1.0F);
+  EXPECT_EQ(sim_.value(kThrottles), 1.0F);
+  EXPECT_EQ(inJournal(), Names{kUnknown}) << "X-Plane has not shown it released";
+}
+
+TEST_F(OverrideManagerTest, ReleaseThatIsNotShownIsSentRarelyAfterAWhile) {
+  manager_.setRequired({kJoystick});
+  sim_.setReadOnly(kJoystick);
+  manager_.setRequired({});
+  sim_.clearMessages();
+  for (double end = sim_.time() + 30.0; sim_.time() < end; sim_.frame()) manager_.confirmReleases(1.0);
+  EXPECT_GE(sim_.messages().size(), 8U);
+  EXPECT_LE(sim_.messages().size(), 11U);
+  sim_.setReadOnly(kJoystick, false);
+  for (double end = sim_.time() + 5.1; sim_.time() < end; sim_.frame()) manager_.confirmReleases(1.0);
+  EXPECT_TRUE(inJournal().empty());
+}
+
+TEST_F(OverrideManagerTest, GivenBackOnceMoreItHasToBeShownOnceMore) {
+  manager_.setRequired({kJoystick});
+  manager_.setRequired({});
+  sim_.loseMessages(1);  // so that X-Plane goes on showing the first release
+  const core::Subscription meanwhile =
+      sim_.subscribe({"meanwhile", {kJoystick}, 10, 0}, [this](const core::RrefView&, const core::ReceiveInfo&) {
+        sim_.loseMessages(2);
+        manager_.setRequired({kJoystick});
+        manager_.setRequired({});
+      });
+  manager_.confirmReleases(0.5);
+  EXPECT_EQ(inJournal(), Names{kJoystick});
+  EXPECT_TRUE(manager_.releasesPending());
+}
+
 TEST_F(OverrideManagerTest, LostReleaseIsSentAgain) {
   manager_.setRequired({kJoystick});
   sim_.loseMessages(1);
