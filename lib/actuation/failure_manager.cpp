@@ -96,10 +96,10 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
     const auto undone = undone_.find(dataref);
     if (undone != undone_.end() && now() - undone->second < kRepairWait) continue;
     const std::string name = core::failureName(dataref);
-    const bool known = registry_.knows(name);
+    const bool known = registry_.isOfMenu(name);
     if (!registry_.observe(dataref, static_cast<double>(pair.value), flight_.sim_time)) continue;
     any = true;
-    if (known != registry_.knows(name)) {
+    if (known != registry_.isOfMenu(name)) {
       report_(known ? name + " was repaired in the simulator" : name + " was failed in the simulator", "", true);
     }
   }

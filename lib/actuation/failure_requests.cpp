@@ -28,7 +28,7 @@ std::optional<RequestResult> FailureManager::add(const core::FailureRequest& req
     return RequestResult{core::ResultCode::kNoLink, "X-Plane has not shown its time yet"};
   }
   // A failure of the same name is replaced; a surface that stays driven goes from where it is.
-  for (const core::FailurePlan& plan : registry_.clear({name}, true).undo) undo(plan);
+  for (const core::FailurePlan& plan : registry_.clear({name}, false).undo) undo(plan);
   not_shown_.erase(name);
   asked_by_[name] = who;
   registry_.add(request, planned.plan, flight_);

@@ -210,15 +210,12 @@ FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion ve
 
 std::optional<std::string> FailureRegistry::sameAs(const FailurePlan& plan) const {
   for (const auto& [name, entry] : entries_) {
-    if (entry.by_bridge && name != plan.name && shareDataref(entry.plan, plan)) return name;
+    if (name != plan.name && shareDataref(entry.plan, plan)) return name;
   }
   return std::nullopt;
 }
 
 void FailureRegistry::add(const FailureRequest& request, const FailurePlan& plan, const FlightConditions& now) {
-  for (auto it = entries_.begin(); it != entries_.end();) {
-    it = !it->second.by_bridge && shareDataref(it->second.plan, plan) ? entries_.erase(it) : std::next(it);
-  }
   Entry entry;
   entry.plan = plan;
   entry.trigger = static_cast<FailureTrigger>(request.trigger);
@@ -235,6 +232,7 @@ std::vector<FailurePlan> FailureRegistry::due(const FlightConditions& now) {
     entry.active = true;
     entry.since = now.sim_time;
     out.push_back(entry.plan);
+    for (const std::string& dataref : entry.plan.datarefs) of_menu_.erase(failureName(dataref));
   }
   return out;
 }
@@ -251,15 +249,11 @@ void FailureRegistry::setValue(const std::string& name, double value) {
 
 bool FailureRegistry::observe(const std::string& dataref, double value, double sim_time) {
   const bool failed = value == kFailedNow;
-  for (auto it = entries_.begin(); it != entries_.end(); ++it) {
-    Entry& entry = it->second;
+  for (auto& [name, entry] : entries_) {
     const auto& names = entry.plan.datarefs;
-    if (std::find(names.begin(), names.end(), dataref) == names.end()) continue;
-    if (!entry.active || entry.driven) return false;
-    if (!entry.by_bridge && !failed) {
-      entries_.erase(it);
-      return true;
-    }
+    // One that is armed only is not what X-Plane shows.
+    if (!entry.active || std::find(names.begin(), names.end(), dataref) == names.end()) continue;
+    if (entry.driven) return false;
     if (failed) {
       entry.shown.insert(dataref);
     } else {
@@ -268,32 +262,30 @@ bool FailureRegistry::observe(const std::string& dataref, double value, double s
     const bool all = entry.shown.size() == names.size();
     return std::exchange(entry.confirmed, all) != all;
   }
-  if (!failed) return false;
-  Entry entry;
-  entry.plan.name = failureName(dataref);
-  entry.plan.kind = "failed";
-  entry.plan.datarefs = {dataref};
-  entry.by_bridge = false;
-  entry.active = entry.confirmed = true;
-  entry.shown = {dataref};
-  entry.since = sim_time;
-  entries_[entry.plan.name] = entry;
-  return true;
+  return failed ? of_menu_.emplace(failureName(dataref), sim_time).second : of_menu_.erase(failureName(dataref)) != 0;
 }
 
 FailureRegistry::Cleared FailureRegistry::clear(const std::vector<std::string>& names, bool include_simulator) {
   Cleared out;
   for (auto it = entries_.begin(); it != entries_.end();) {
     const bool named = std::find(names.begin(), names.end(), it->first) != names.end();
-    const bool chosen = names.empty() ? it->second.by_bridge || include_simulator
-                                      : named && (it->second.by_bridge || include_simulator);
-    if (!chosen) {
+    if (!names.empty() && !named) {
       ++it;
       continue;
     }
     if (it->second.active) out.undo.push_back(it->second.plan);
     out.names.push_back(it->first);
     it = entries_.erase(it);
+  }
+  for (auto it = of_menu_.begin(); include_simulator && it != of_menu_.end();) {
+    const std::string& name = it->first;
+    if (!names.empty() && std::find(names.begin(), names.end(), name) == names.end()) {
+      ++it;
+      continue;
+    }
+    out.undo.push_back({name, "failed", std::nullopt, {failureDataref(name)}, std::nullopt});
+    if (std::find(out.names.begin(), out.names.end(), name) == out.names.end()) out.names.push_back(name);
+    it = of_menu_.erase(it);
   }
   return out;
 }
@@ -305,12 +297,21 @@ std::vector<FailureLabel> FailureRegistry::labels() const {
     label.name = name;
     label.kind = entry.plan.kind;
     if (entry.plan.value) label.value = *entry.plan.value;
-    label.by_bridge = entry.by_bridge;
     label.active = entry.active;
     label.confirmed = entry.confirmed;
     label.since_sim_time = entry.since;
     out.push_back(label);
   }
+  for (const auto& [name, since] : of_menu_) {
+    FailureLabel label;
+    label.name = name;
+    label.kind = "failed";
+    label.by_bridge = false;
+    label.active = label.confirmed = true;
+    label.since_sim_time = since;
+    out.push_back(label);
+  }
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
   return out;
 }
 

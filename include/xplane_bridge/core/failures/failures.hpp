@@ -66,11 +66,12 @@ struct FailureLabel {
   double since_sim_time = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// All failures that are armed or active, by name. The caller carries plans out and reports what X-Plane shows.
+/// All failures that are armed or active, by name. One that is set in the simulator's menu stands beside one of the
+/// bridge's that is armed for the same dataref, and is the bridge's once that comes true. The caller carries plans out
+/// and reports what X-Plane shows.
 class FailureRegistry {
  public:
-  /// The other failure of the bridge's that one of the plan's datarefs belongs to already; nullopt: none. One that was
-  /// set in the simulator's menu gives way.
+  /// The other failure of the bridge's that one of the plan's datarefs belongs to already; nullopt: none.
   std::optional<std::string> sameAs(const FailurePlan& plan) const;
 
   /// Arms a failure, replacing one of the same name. Its trigger is looked at by due(), also kNow.
@@ -96,7 +97,9 @@ class FailureRegistry {
   };
   Cleared clear(const std::vector<std::string>& names, bool include_simulator);
 
-  bool knows(const std::string& name) const { return entries_.count(name) != 0; }
+  bool knows(const std::string& name) const { return entries_.count(name) != 0 || isOfMenu(name); }
+  /// It is set in the simulator's menu.
+  bool isOfMenu(const std::string& name) const { return of_menu_.count(name) != 0; }
   /// SurfaceDriver flies it, or will when it comes true.
   bool isDriven(const std::string& name) const;
   /// Datarefs that show an active failure; none for one that SurfaceDriver flies, or an unknown name.
@@ -113,11 +116,12 @@ class FailureRegistry {
     FailurePlan plan;
     FailureTrigger trigger = FailureTrigger::kNow;
     double trigger_value = 0.0;
-    bool by_bridge = true, active = false, confirmed = false, driven = false;
+    bool active = false, confirmed = false, driven = false;
     double since = std::numeric_limits<double>::quiet_NaN();
     std::set<std::string> shown;  // of the datarefs, those X-Plane shows failed
   };
-  std::map<std::string, Entry> entries_;
+  std::map<std::string, Entry> entries_;   // of the bridge
+  std::map<std::string, double> of_menu_;  // [s] simulator time since when
 };
 
 /// Full dataref of a rel_* name: "rel_pitot" or the full path.

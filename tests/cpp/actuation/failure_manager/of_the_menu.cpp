@@ -53,6 +53,44 @@ TEST_F(FailureManagerTest, FailureOfTheMenuGivesWayToOneOfTheBridge) {
   EXPECT_EQ(sim_.value(kEngine), 0.0F);
 }
 
+TEST_F(FailureManagerTest, FailureOfTheMenuIsLabelledThoughOneIsArmed) {
+  for (const char* name : {"engine_1", "rel_engfai0"}) {
+    SCOPED_TRACE(name);
+    reported_.clear();
+    ASSERT_EQ(set(triggered(name, FailureTrigger::kAtSimTime, 8.0)).code, ResultCode::kAccepted);
+    sim_.set(kEngine, 6.0F);
+    sim_.run(1.1);
+    EXPECT_EQ(labelNames(), (Names{name, "rel_engfai0"}));
+    EXPECT_TRUE(reported("rel_engfai0 was failed in the simulator", "", true));
+    sim_.set(kEngine, 0.0F);
+    sim_.run(1.1);
+    EXPECT_EQ(labelNames(), Names{name});
+    EXPECT_TRUE(reported("rel_engfai0 was repaired in the simulator", "", true));
+    sim_.set(kEngine, 6.0F);
+    sim_.run(1.1);
+    ASSERT_EQ(set(triggered(name, FailureTrigger::kAtSimTime, 1.0)).code, ResultCode::kAccepted);
+    EXPECT_EQ(sim_.value(kEngine), 6.0F) << "to arm one repairs nothing";
+    EXPECT_EQ(labelNames(), (Names{name, "rel_engfai0"}));
+    sim_.run(1.2);
+    EXPECT_EQ(labelNames(), Names{name});
+    EXPECT_TRUE(label(name).active && label(name).confirmed && label(name).by_bridge);
+    requireClear();
+    EXPECT_EQ(sim_.value(kEngine), 0.0F);
+    sim_.run(2.0);
+    EXPECT_TRUE(labelNames().empty());
+  }
+}
+
+TEST_F(FailureManagerTest, ClearedTheArmedOneLeavesThatOfTheMenu) {
+  ASSERT_EQ(set(triggered("engine_1", FailureTrigger::kAtSimTime, 100.0)).code, ResultCode::kAccepted);
+  sim_.set(kEngine, 6.0F);
+  sim_.run(1.1);
+  requireClear();
+  sim_.run(1.1);
+  EXPECT_EQ(labelNames(), Names{"rel_engfai0"});
+  EXPECT_EQ(sim_.value(kEngine), 6.0F);
+}
+
 TEST_F(FailureManagerTest, OursThatIsRepairedInTheSimulatorIsLetGo) {
   require(failed("engine_1"));
   sim_.set(kEngine, 0.0F);

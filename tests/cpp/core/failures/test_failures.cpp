@@ -130,7 +130,7 @@ TEST(FailureRegistry, ConfirmsByReadBackAndSeesTheSimulatorsOwn) {
   FailureRegistry registry;
   const auto r = request("engine_1");
   registry.add(r, planFailure(r, k11).plan, at(10.0));
-  EXPECT_FALSE(registry.observe("sim/operation/failures/rel_engfai0", 6, 10.0)) << "not active yet";
+  EXPECT_TRUE(registry.observe("sim/operation/failures/rel_engfai0", 6, 10.0)) << "not active yet: it is the menu's";
   registry.due(at(10.0));
   EXPECT_TRUE(registry.observe("sim/operation/failures/rel_engfai0", 6, 10.1));
   EXPECT_TRUE(registry.labels()[0].confirmed);
@@ -169,13 +169,54 @@ TEST(FailureRegistry, OneDatarefHasOneName) {
   const auto ours = planFailure(request("static_1"), k11).plan;
   EXPECT_EQ(registry.sameAs(ours), std::nullopt) << "what the simulator has failed may be failed";
   registry.add(request("static_1"), ours, at(2.0));
-  ASSERT_EQ(registry.labels().size(), 1u) << "and is the bridge's from then on";
   registry.due(at(2.0));
+  ASSERT_EQ(registry.labels().size(), 1u) << "and is the bridge's from then on";
+  EXPECT_TRUE(registry.labels()[0].by_bridge);
   EXPECT_TRUE(registry.observe("sim/operation/failures/rel_static", 6, 2.1));
   EXPECT_TRUE(registry.labels()[0].confirmed);
   EXPECT_EQ(registry.sameAs(ours), std::nullopt) << "itself is replaced";
   EXPECT_EQ(registry.sameAs(planFailure(request("rel_static"), k11).plan), "static_1");
   EXPECT_EQ(registry.sameAs(planFailure(request("rel_pitot"), k11).plan), std::nullopt);
+}
+
+TEST(FailureRegistry, OneOfTheMenuStandsBesideOneThatIsArmed) {
+  const std::string pitot = "sim/operation/failures/rel_pitot";
+  for (const char* name : {"pitot_1", "rel_pitot"}) {
+    SCOPED_TRACE(name);
+    FailureRegistry registry;
+    const auto armed = request(name, "failed", {}, 1, 100.0);
+    registry.add(armed, planFailure(armed, k11).plan, at(1.0));
+    EXPECT_FALSE(registry.observe(pitot, 0, 1.5));
+    EXPECT_TRUE(registry.observe(pitot, 6, 2.0));
+    EXPECT_FALSE(registry.observe(pitot, 6, 3.0));
+    ASSERT_EQ(registry.labels().size(), 2u);
+    EXPECT_FALSE(registry.labels()[0].active);
+    EXPECT_TRUE(registry.labels()[0].by_bridge);
+    const FailureLabel menu = registry.labels()[1];
+    EXPECT_EQ(menu.name, "rel_pitot");
+    EXPECT_TRUE(!menu.by_bridge && menu.active && menu.confirmed);
+    EXPECT_DOUBLE_EQ(menu.since_sim_time, 2.0);
+    EXPECT_TRUE(registry.observe(pitot, 0, 4.0)) << "repaired in the menu";
+    ASSERT_EQ(registry.labels().size(), 1u);
+    EXPECT_FALSE(registry.isOfMenu("rel_pitot"));
+
+    registry.observe(pitot, 6, 5.0);
+    const FailureRegistry before = registry;
+    EXPECT_TRUE(registry.clear({name}, false).undo.empty()) << "the armed one has nothing to undo";
+    ASSERT_EQ(registry.labels().size(), 1u);
+    EXPECT_FALSE(registry.labels()[0].by_bridge);
+
+    registry = before;
+    EXPECT_EQ(registry.clear({}, true).undo.size(), 1u);
+    EXPECT_TRUE(registry.labels().empty());
+
+    registry = before;
+    EXPECT_EQ(registry.due(at(101.5)).size(), 1u);
+    ASSERT_EQ(registry.labels().size(), 1u) << "it is the bridge's from then on";
+    EXPECT_TRUE(registry.labels()[0].by_bridge);
+    EXPECT_TRUE(registry.observe(pitot, 6, 101.6));
+    EXPECT_TRUE(registry.labels()[0].confirmed);
+  }
 }
 
 TEST(FailureRegistry, ClearsOnlyWhatItIsAskedTo) {
