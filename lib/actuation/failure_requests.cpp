@@ -145,7 +145,8 @@ FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>
     return out;
   }
   out.result = awaitRepair(datarefs, given_back);
-  if (out.result.success()) out.result.text = cleared.names.empty() ? "nothing was broken" : "repaired";
+  if (out.result.code == core::ResultCode::kOk)
+    out.result.text = cleared.names.empty() ? "nothing was broken" : "repaired";
   return out;
 }
 
@@ -159,9 +160,12 @@ RequestResult FailureManager::awaitRepair(const std::vector<std::string>& datare
   if (!given_back) return {};
   const auto back = [this] {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
-    return stopped_ || !surfaces_->givingBack();
+    return stopped_ || !surfaces_->givingBack() || link_status_.state == core::LinkState::kPaused;
   };
   const bool ended = link_->waitUntil(back, left());
+  if (surfaces_->givingBack() && link_->status().state == core::LinkState::kPaused) {
+    return {core::ResultCode::kAccepted, "repaired; X-Plane is paused: its surfaces run back when it goes on"};
+  }
   // It also ends by being given up.
   if (!ended || (!surfaces_->driving() &&
                  !link_->waitForDataref(core::kSurfaceOverride, 0.0F, 0.0F, std::max(left(), kReadWait)).first)) {

@@ -74,6 +74,7 @@ void SurfaceControl::onLink(const core::LinkStatus& status) {
   {
     std::lock_guard<std::mutex> lock(mutex_);
     flowing_ = status.state == core::LinkState::kConnected;
+    paused_ = status.state == core::LinkState::kPaused;
     if (!flowing_) watch_.interrupt();
     if (!status.version.known() || status.version == version_) return;
     const bool same = core::surfaceWatchDatarefs(status.version) == core::surfaceWatchDatarefs(version_);
@@ -159,10 +160,10 @@ void SurfaceControl::onSample() {
   }
 }
 
-/// Surfaces are where X-Plane will have them, or cannot be brought there.
+/// Surfaces are where X-Plane will have them, or cannot be brought there. In a pause they stand, and run back after it.
 bool SurfaceControl::settled() const {
   const bool there = settling_ > 0.0 && driver_->offTarget() <= kSettledDeg;
-  return there || settling_ > kSettleWait || !flowing_ || !blocked_reason_.empty();
+  return there || settling_ > kSettleWait || !(flowing_ || paused_) || !blocked_reason_.empty();
 }
 
 bool SurfaceControl::wanted() const { return !failures_.empty() || !commands_.empty() || offset_; }

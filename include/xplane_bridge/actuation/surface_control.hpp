@@ -218,7 +218,7 @@ class SurfaceControl {
   core::SurfaceSample sample_;
   double last_time_ = std::nan("");    // [s] simulator time of the previous frame
   double solved_time_ = std::nan("");  // [s] the same, of the last solution
-  bool flowing_ = false;
+  bool flowing_ = false, paused_ = false;
   bool disturbed_ = false;
   bool stopped_ = false;
   std::string blocked_reason_ = "X-Plane is not connected";

@@ -172,6 +172,40 @@ TEST_F(SurfaceAuthorityTest, WhilePausedTheyNeedNotBeRepeated) {
   EXPECT_FLOAT_EQ(sim_.value(kLeft), 6.0F);
 }
 
+TEST_F(SurfaceAuthorityTest, EndedInAPauseTheyRunBackAfterItWithoutAJump) {
+  flySurface();
+  setLink(core::LinkState::kPaused);
+  path_->onLink(sim_.status());
+  commanded_.reset();
+  ask(FlightMode::kManual);
+  sim_.run(5.0);
+  ASSERT_EQ(state(), State::kDriving);
+  EXPECT_FLOAT_EQ(sim_.value(kLeft), 6.0F);
+  sim_.clearMessages();
+  setLink(core::LinkState::kConnected);
+  path_->onLink(sim_.status());
+  sim_.frame();
+  expectOnItsWay();
+  sim_.run(0.3);
+  expectNoJump();
+  EXPECT_NEAR(written(kLeft).back(), 0.0, 0.5) << "where the stick wants it";
+  EXPECT_EQ(state(), State::kIdle) << "given back";
+}
+
+TEST_F(SurfaceAuthorityTest, ALostLinkDoesNotKeepThem) {
+  flySurface();
+  setLink(core::LinkState::kPaused);
+  commanded_.reset();
+  ask(FlightMode::kManual);
+  sim_.run(0.1);
+  ASSERT_EQ(state(), State::kDriving);
+  sim_.setState(core::LinkState::kStale);
+  surfaces_.onLink(sim_.status());
+  sim_.setState(core::LinkState::kConnected);  // a frame comes before the link is up
+  sim_.run(0.1);
+  EXPECT_EQ(state(), State::kIdle);
+}
+
 TEST_F(SurfaceAuthorityTest, ThePanicToolEndsItUntilAModeIsAskedFor) {
   flySurface();
   sim_.set(core::kSurfaceOverride, 0.0F);

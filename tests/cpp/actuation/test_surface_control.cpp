@@ -111,12 +111,27 @@ TEST_F(SurfaceControlTest, GivesBackWithinTwoSecondsWhateverTheStickDoes) {
   EXPECT_EQ(state(), State::kIdle);
 }
 
-TEST_F(SurfaceControlTest, WhilePausedItGivesBackAtOnce) {
+TEST_F(SurfaceControlTest, WhatEndsInAPauseIsGivenBackAfterIt) {
   drive();
   setLink(core::LinkState::kPaused);
   surfaces_.setFailures({});
+  sim_.run(5.0);
+  EXPECT_EQ(state(), State::kDriving);
+  EXPECT_EQ(sim_.value(kLeft), 6.0F);
+  setLink(core::LinkState::kConnected);
   sim_.frame();
-  EXPECT_EQ(state(), State::kReleasing);
+  EXPECT_EQ(sim_.value(kLeft), 4.8F) << "on its way";
+  sim_.run(0.2);
+  EXPECT_EQ(state(), State::kIdle);
+}
+
+TEST_F(SurfaceControlTest, WhatMayNotBeDrivenIsGivenBackInAPauseToo) {
+  drive();
+  setLink(core::LinkState::kPaused);
+  surfaces_.setFailures({});
+  blocked_ = "the aircraft is not the one of the configuration";
+  sim_.run(0.1);
+  EXPECT_EQ(state(), State::kIdle);
 }
 
 TEST_F(SurfaceControlTest, WhatIsNeededAgainWhileReleasingGoesOnFromThere) {

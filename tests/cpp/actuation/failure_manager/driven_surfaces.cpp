@@ -36,6 +36,23 @@ TEST_F(FailureManagerTest, EachKindOfASurfaceIsDriven) {
   }
 }
 
+TEST_F(FailureManagerTest, RepairedInAPauseItRunsBackAfterIt) {
+  require(broken(FakeAirframe::kLeft, "stuck", 8.0));
+  setLink(LinkState::kPaused);
+  const double began = sim_.time();
+  const auto done = clear();
+  EXPECT_LT(sim_.time() - began, 0.5) << "there is nothing to wait for";
+  EXPECT_EQ(done.result.code, ResultCode::kAccepted);
+  EXPECT_EQ(done.result.text, "repaired; X-Plane is paused: its surfaces run back when it goes on");
+  EXPECT_TRUE(labelNames().empty());
+  sim_.run(5.0);
+  EXPECT_FLOAT_EQ(sim_.value(kLeft), 8.0F);
+  setLink(LinkState::kConnected);
+  sim_.run(0.5);
+  EXPECT_EQ(state(), SurfaceControlState::kIdle);
+  EXPECT_NEAR(sim_.value(kLeft), 0.0, 0.5);
+}
+
 TEST_F(FailureManagerTest, LabelShowsWhereASurfaceGotStuck) {
   airframe_.setStick(0.25);
   sim_.run(0.1);
