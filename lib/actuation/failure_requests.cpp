@@ -117,7 +117,9 @@ FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>
     return out;
   }
   const bool driven = surfaces_->driving();
-  const auto cleared = registry_.clear(labels, include_simulator);
+  // What is written to an X-Plane that is away is lost; only what is held is written again.
+  const bool up = isUp(link_status_);
+  const auto cleared = registry_.clear(labels, include_simulator && up);
   std::vector<std::string> datarefs;
   for (const core::FailurePlan& plan : cleared.undo) {
     undo(plan);
@@ -129,15 +131,16 @@ FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>
   watchOwn();
   applySurfaces();
   const bool given_back = driven && registry_.drivenSurfaces().empty();
-  const bool up = isUp(link_status_);
   for (const std::string& name : labels) {
-    if (!registry_.knows(name)) continue;
+    if (include_simulator || !registry_.knows(name)) continue;
     out.result = {core::ResultCode::kRefused, name + " was failed in the simulator: set include_simulator"};
     return out;
   }
   lock.unlock();
   if (!up) {
-    out.result = {core::ResultCode::kNoLink, "X-Plane is not connected; it is repaired when it comes back"};
+    out.result = {core::ResultCode::kNoLink,
+                  std::string("X-Plane is not connected; what the bridge has broken is repaired when it comes back") +
+                      (include_simulator ? ", what was failed in the simulator has to be cleared then" : "")};
     return out;
   }
   if (link_->inLockstep()) {

@@ -31,6 +31,27 @@ TEST_F(FailureManagerTest, FailureOfTheMenuIsClearedOnRequestOnly) {
   EXPECT_EQ(sim_.value(kPitot), 0.0F);
 }
 
+TEST_F(FailureManagerTest, ClearedWhileXPlaneIsAwayOnlyOursIsRepaired) {
+  require(failed("pitot_1"));
+  sim_.set(kEngine, 6.0F);
+  sim_.run(1.1);
+  setLink(LinkState::kStale);
+  const auto done = clear({}, true);
+  EXPECT_EQ(done.result.code, ResultCode::kNoLink);
+  EXPECT_EQ(done.result.text,
+            "X-Plane is not connected; what the bridge has broken is repaired when it comes back, what was failed in "
+            "the simulator has to be cleared then");
+  EXPECT_EQ(done.cleared, Names{"pitot_1"});
+  EXPECT_EQ(clear({"rel_engfai0"}, true).result.text, done.result.text);
+  EXPECT_EQ(clear().result.text, "X-Plane is not connected; what the bridge has broken is repaired when it comes back");
+  EXPECT_EQ(labelNames(), Names{"rel_engfai0"});
+  setLink(LinkState::kConnected);
+  overrides_.confirmReleases(1.0);
+  EXPECT_EQ(sim_.value(kPitot), 0.0F);
+  requireClear({}, true);
+  EXPECT_EQ(sim_.value(kEngine), 0.0F);
+}
+
 TEST_F(FailureManagerTest, ValuesFromBeforeARepairAreIgnored) {
   sim_.set(kPitot, 6.0F);
   sim_.run(1.1);
