@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "xplane_bridge/actuation/link_condition.hpp"
+#include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/simulator/simulator_settings.hpp"
 
 namespace xplane_bridge {
@@ -79,14 +80,18 @@ std::optional<RequestResult> SettingRequests::holdOverrides(const std::vector<co
       if (!shown[i]) return RequestResult{ResultCode::kTimeout, set[i] + kNoAnswer};
     }
   }
-  for (const core::DatarefWrite& write : writes) {
-    const auto release = core::releaseOf(write.dataref);
-    if (!release) continue;
-    if (write.value != release->value) {
-      overrides_->acquire(write.dataref, write.value);
-    } else {
-      overrides_->release(write.dataref);
+  try {
+    for (const core::DatarefWrite& write : writes) {
+      const auto release = core::releaseOf(write.dataref);
+      if (!release) continue;
+      if (write.value != release->value) {
+        overrides_->acquire(write.dataref, write.value);
+      } else {
+        overrides_->release(write.dataref);
+      }
     }
+  } catch (const core::JournalError& error) {
+    return RequestResult{ResultCode::kRefused, core::whyNotChanged(error)};
   }
   return std::nullopt;
 }

@@ -96,6 +96,18 @@ TEST_F(SettingRequestsTest, AnOverrideThatXPlaneDoesNotHaveIsNotSet) {
   EXPECT_TRUE(overrides_.active().empty());
 }
 
+TEST_F(SettingRequestsTest, AnOverrideThatCannotBeWrittenDownIsRefusedInWords) {
+  constexpr const char* kRoll = "sim/operation/override/override_joystick_roll";
+  sim_.set(kRoll, 0.0F);
+  sim_.breakJournal();
+  const auto written = settings_.setDataref(kRoll, {1.0F}, kWho);
+  EXPECT_EQ(written.result.code, ResultCode::kRefused);
+  EXPECT_EQ(written.result.text.find("it could not be given back after a crash, should there be one: "), 0U);
+  EXPECT_TRUE(written.values.empty());
+  EXPECT_EQ(reports_, (Reports{{std::string("set_dataref ") + kRoll + ": " + written.result.text, false}}));
+  EXPECT_TRUE(sim_.messages().empty());
+}
+
 TEST_F(SettingRequestsTest, AnOverrideIsHeldUntilItIsGivenBack) {
   constexpr const char* kRoll = "sim/operation/override/override_joystick_roll";
   sim_.set(kRoll, 0.0F);
