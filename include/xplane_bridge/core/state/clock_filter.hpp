@@ -88,7 +88,7 @@ struct ClockEstimate {
 /// Datagrams are only ever late, never early: the line host = offset + slope * sim that lies below all samples of a
 /// short window and closest to them is the one with the smallest delay. Samples are thinned to the least delayed one of
 /// each bucket, so an update costs the same at any rate. Simulator time arrives as float32 (steps of 3.9 ms after nine
-/// hours); it is rebuilt from the frame periods and kept within one step of the raw value.
+/// hours); it is rebuilt from the frame periods and kept within two steps of the raw value.
 ///
 /// A stutter of X-Plane is a slip: the frame lasts longer than the simulator flies in it, so that simulator time stays
 /// behind by what was left out. The line moves by that much from this frame on; before it, times map as before.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "jittered_frames.hpp"
+#include "xplane_bridge/core/base/units.hpp"
 
 namespace xplane_bridge::core {
 namespace {
@@ -25,6 +26,26 @@ TEST(ClockFilter, FirstSampleStartsEpochZero) {
   EXPECT_DOUBLE_EQ(estimate.sim_time, static_cast<double>(sample.sim_time));
   EXPECT_FALSE(filter.fitted());
   EXPECT_FALSE(filter.simTime(sample.receive_ns).has_value());
+}
+
+// So that who integrates over frames finds the same in any flight, whenever X-Plane was started.
+TEST(ClockFilter, FramesOfOneLengthAreStepsOfExactlyThat) {
+  for (const double rate : {30.0, 50.0, 59.94, 60.0, 100.0, 240.0}) {
+    ClockFilter filter;
+    ClockSample sample;
+    sample.frame_period = static_cast<float>(1.0 / rate);
+    double before = filter.update(sample).sim_time;
+    int different = 0;
+    for (int frame = 1; frame < 60'000; ++frame) {
+      const double time = frame / rate;
+      sample.sim_time = static_cast<float>(time);
+      sample.receive_ns = toNanoseconds(time);
+      const double now = filter.update(sample).sim_time;
+      different += now - before != static_cast<double>(sample.frame_period) ? 1 : 0;
+      before = now;
+    }
+    EXPECT_EQ(different, 0) << rate;
+  }
 }
 
 TEST(ClockFilter, WithoutJitterStampsAreExactButForTheDelay) {
