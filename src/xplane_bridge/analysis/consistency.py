@@ -9,7 +9,11 @@ from typing import Iterator, Mapping, NamedTuple
 
 import numpy as np
 
+from xplane_bridge.analysis.odometry import Odometry, differences
+
 GRAVITY = 9.80665  #: [m/s^2]
+#: Largest difference, per axis, of odom's differenced position from its mean twist that is still noise [m/s].
+ODOMETRY_LIMIT_MPS = 0.02
 _PIECE = 16384  # samples
 
 
@@ -46,34 +50,10 @@ def check_flight(columns: Mapping[str, np.ndarray], parts: list[slice]) -> list[
     ]
 
 
-def check_odometry(time: np.ndarray, position: np.ndarray, velocity: np.ndarray, parts: list[slice]) -> Check:
-    """Check that the odometry's position moves as its twist says.
-
-    Args:
-        time: int64 [ns], shape (n,).
-        position: `map` [m], shape (n, 3).
-        velocity: Twist turned into `map` [m/s], shape (n, 3).
-        parts: Segments of `time`.
-
-    Returns:
-        The difference over steps of about 1 s.
-    """
-    errors = []
-    for part in parts:
-        t = (time[part] - time[part][0]) / 1e9
-        if len(t) < 3:
-            continue
-        step = max(1, round(1.0 / float(np.median(np.diff(t)))))
-        if len(t) <= step:
-            continue
-        dt = np.diff(t)[:, None]
-        flown = np.concatenate(
-            [np.zeros((1, 3)), np.cumsum((velocity[part][1:] + velocity[part][:-1]) / 2 * dt, axis=0)]
-        )
-        moved = position[part]
-        span = (t[step:] - t[:-step])[:, None]
-        errors.append(((moved[step:] - moved[:-step]) - (flown[step:] - flown[:-step])) / span)
-    return _check("odometry: position against twist", "m/s", errors, velocity, 0.02)
+def check_odometry(odometry: Odometry) -> Check:
+    """Check that the odometry's position moves as its twist says, over steps of 1 s of simulator time."""
+    errors = differences(odometry)
+    return _check("odometry: position against twist", "m/s", [errors], odometry.velocity, ODOMETRY_LIMIT_MPS)
 
 
 def _neighbours(columns: Mapping[str, np.ndarray], parts: list[slice]) -> np.ndarray:

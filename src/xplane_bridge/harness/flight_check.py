@@ -10,7 +10,10 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from xplane_bridge.analysis.consistency import ODOMETRY_LIMIT_MPS
+from xplane_bridge.analysis.odometry import differences, of_frames
 from xplane_bridge.bags import Bags, Table
+from xplane_bridge.bags.segments import segments
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.topics import NAMESPACE
 from xplane_bridge.units import EARTH_RADIUS_M
@@ -33,8 +36,6 @@ REQUIRED_TOPICS = tuple(
 RATE_TOLERANCE = 0.02
 #: Largest distance of a position from the truth [m].
 POSITION_TOLERANCE_M = 0.01
-#: Largest difference, per axis, of odom's differenced position from its mean twist [m/s].
-VELOCITY_TOLERANCE_MPS = 0.02
 
 #: Rows of FlightState that are NaN by their definition in some attitudes or are no numbers.
 _NOT_JUDGED = ("header.",)
@@ -220,7 +221,7 @@ def judge(bag: Path, truth: Path) -> List[Verdict]:
     verdicts.append(check_stamps(states))
     verdicts.append(check_rate(states, flown))
     verdicts.append(check_positions(states, flown))
-    verdicts.append(check_odometry(*with_simulator_time(odom, states)))
+    verdicts.append(check_odometry(odom, states))
     return verdicts
 
 
@@ -288,52 +289,15 @@ def check_positions(states: Table, truth: Mapping[str, np.ndarray]) -> Verdict:
     return Verdict("positions", worst <= POSITION_TOLERANCE_M, text)
 
 
-def with_simulator_time(odom: Table, states: Table) -> Tuple[Table, np.ndarray]:
-    """The odometry messages that have a flight state of the same stamp, and the simulator time [s] of each.
-
-    The recorder does not begin both topics at once, so the first messages of one may lack the other.
-    """
-    row = np.minimum(np.searchsorted(states.stamp, odom.stamp), len(states) - 1)
-    both = states.stamp[row] == odom.stamp
-    columns = {name: column[both] for name, column in odom.columns.items()}
-    return Table(odom.topic, odom.msgtype, odom.time[both], columns), states["sim_time_unwrapped"][row[both]]
-
-
-def check_odometry(odom: Table, sim_time: Optional[np.ndarray] = None, window: float = 1.0) -> Verdict:
-    """Odom's position, differenced over a second, is its mean twist turned into `map`, on every axis.
-
-    Args:
-        odom: The odometry.
-        sim_time: [s] of each message, so that what is judged does not hang on how busy the machine was; the stamps
-            when omitted.
-        window: [s]
-    """
-    time = odom.stamp / 1e9 if sim_time is None else sim_time
-    time = time - time[0] if len(time) else time
-    position = np.column_stack([odom[f"pose.pose.position.{axis}"] for axis in "xyz"])
-    quaternion = np.column_stack([odom[f"pose.pose.orientation.{part}"] for part in "xyzw"])
-    velocity = _rotated(quaternion, np.column_stack([odom[f"twist.twist.linear.{axis}"] for axis in "xyz"]))
-    # The integral of the velocity, by the trapezoidal rule, from the first sample to each.
-    way = np.vstack([np.zeros(3), np.cumsum((velocity[1:] + velocity[:-1]) / 2 * np.diff(time)[:, None], axis=0)])
-    ends = np.searchsorted(time, time + window)
-    starts = np.flatnonzero(ends < len(time))
-    ends = ends[starts]
-    whole = time[ends] - time[starts] < 1.1 * window  # a gap within the window: not a second any more
-    starts, ends = starts[whole], ends[whole]
-    if not len(starts):
-        return Verdict("odometry", False, f"less than {window:g} s of odometry without a gap")
-    span = (time[ends] - time[starts])[:, None]
-    difference = np.abs((position[ends] - position[starts]) - (way[ends] - way[starts])) / span
-    worst = float(difference.max())
-    text = f"position and twist agree to {worst:.4f} m/s over {window:g} s (wanted {VELOCITY_TOLERANCE_MPS:g} m/s)"
-    return Verdict("odometry", worst <= VELOCITY_TOLERANCE_MPS, text)
-
-
-def _rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Vectors turned by quaternions (x, y, z, w), row by row."""
-    axis, w = quaternion[:, :3], quaternion[:, 3:]
-    twice = 2.0 * np.cross(axis, vector)
-    return vector + w * twice + np.cross(axis, twice)
+def check_odometry(odom: Table, states: Table) -> Verdict:
+    """Odom's position, differenced over a second of simulator time, is its mean twist turned into `map`."""
+    parts = segments(states.stamp, states["epoch"])
+    difference = differences(of_frames(odom.stamp, odom.columns, states.stamp, states["sim_time_unwrapped"], parts))
+    if not len(difference):
+        return Verdict("odometry", False, "less than 1 s of odometry without a gap")
+    worst = float(np.abs(difference).max())
+    text = f"position and twist agree to {worst:.4f} m/s over 1 s (wanted {ODOMETRY_LIMIT_MPS:g} m/s)"
+    return Verdict("odometry", worst <= ODOMETRY_LIMIT_MPS, text)
 
 
 def read_truth(path: Path) -> Dict[str, np.ndarray]:

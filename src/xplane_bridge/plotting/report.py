@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Callable, Optional, Sequence, Union
 
 import numpy as np
 
-from xplane_bridge.analysis.consistency import check_flight, check_odometry
+from xplane_bridge.analysis.consistency import Check, check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values, who_flew
+from xplane_bridge.analysis.odometry import of_frames
 from xplane_bridge.analysis.quality import bit_shares, timing
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.bags.passport import read_passports
@@ -185,15 +186,7 @@ def _physics(flight: Flight) -> str:
     return "<h3>Physics</h3>" + rows_table(("relation", "median error", "limit", ""), rows, (1, 2))
 
 
-def _odometry(flight: Flight) -> Any:
-    t = flight.tables["odom"]
-    position = np.stack([t[f"pose.pose.position.{axis}"] for axis in "xyz"], axis=1)
-    body = np.stack([t[f"twist.twist.linear.{axis}"] for axis in "xyz"], axis=1)
-    q = np.stack([t[f"pose.pose.orientation.{axis}"] for axis in "xyzw"], axis=1)
-    cross = np.cross(q[:, :3], body)
-    velocity = body + 2 * (q[:, 3:] * cross + np.cross(q[:, :3], cross))
-    state = flight.tables["state"]
-    edges = [int(state.stamp[part.start]) for part in flight.parts[1:]]
-    cuts = [0, *np.searchsorted(t.stamp, edges).tolist(), len(t)]
-    parts = [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:]) if b > a]
-    return check_odometry(t.stamp, position, velocity, parts)
+def _odometry(flight: Flight) -> Check:
+    odom, state = flight.tables["odom"], flight.tables["state"]
+    sim_time = state["sim_time_unwrapped"]
+    return check_odometry(of_frames(odom.stamp, odom.columns, state.stamp, sim_time, flight.parts))

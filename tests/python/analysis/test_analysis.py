@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from xplane_bridge.analysis.consistency import GRAVITY, check_flight, check_odometry
+from xplane_bridge.analysis.consistency import GRAVITY, check_flight
 from xplane_bridge.analysis.decimation import min_max
 from xplane_bridge.analysis.episodes import Episode, from_sets, from_values
 from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, joined, pairing, timing
@@ -105,17 +105,6 @@ def test_one_state_or_none_leaves_nothing_to_compare(rows: slice) -> None:
     columns = {name: values[rows] for name, values in turn().items()}
     found = {c.name: c.samples for c in check_flight(columns, [rows] if rows.stop else [])}
     assert sum(found.values()) == found["|velocity - wind| against true airspeed"] == rows.stop
-
-
-def test_odometry_is_compared_over_a_second() -> None:
-    t = np.arange(500) / 50.0
-    time = np.round(t * S).astype(np.int64)
-    position = np.stack([10 * np.sin(t), 5 * t, 0 * t], axis=1)
-    velocity = np.stack([10 * np.cos(t), 5 + 0 * t, 0 * t], axis=1)
-    assert check_odometry(time, position, velocity, [slice(0, 500)]).error < 1e-3
-    wrong = check_odometry(time, position, velocity + 0.05, [slice(0, 500)])
-    assert wrong.error == pytest.approx(0.05, abs=1e-3)
-    assert not wrong.ok
 
 
 def test_timing_counts_gaps_and_jitter() -> None:

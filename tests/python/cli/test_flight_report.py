@@ -264,6 +264,28 @@ def test_a_recording_of_a_pause_gets_a_page(tmp_path: Path) -> None:
     assert section(page, "quality").count("nothing to compare") == 3
 
 
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of 12 s of flight straight north that took 18 s of real time."""
+    folder = tmp_path_factory.mktemp("slow")
+    with FlightBag(folder / "flight.bag") as bag:
+        for k in range(240):
+            t, ns = k / 20, stamp_ns(1.5 * k / 20)
+            header = bag.header(ns, "base_link_frd", k)
+            state = {**bag.state(t, k), "header": header, "frame_period": np.float32(0.05)}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, state)
+            pose = {"position": {"x": 60.0 * t, "y": 0.0, "z": 0.0}, "orientation": {"w": 1.0}}
+            odom = {"pose": {"pose": pose}, "twist": {"twist": {"linear": {"x": 60.0}}}}
+            bag.add("/xplane/odom", "nav_msgs/Odometry", ns, {"header": bag.header(ns, "map", k), **odom})
+    assert flight_report.main([str(folder / "flight.bag"), "-o", str(folder / "report.html")]) == 0
+    return folder / "report.html"
+
+
+def test_a_simulator_slower_than_real_time_does_not_break_physics(slow: Path) -> None:
+    row = re.search(r"<tr><td>odometry: position against twist</td>.*?</tr>", section(slow, "quality")).group(0)
+    assert "holds" in row
+
+
 def test_slow_states_count(tmp_path: Path) -> None:
     write_states(tmp_path / "slow.bag", 60.0, 1.0)
     page = tmp_path / "r.html"
