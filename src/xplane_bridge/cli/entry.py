@@ -17,6 +17,9 @@ from xplane_bridge.errors import XplaneBridgeError
 
 Main = Callable[..., int]
 
+#: How long init_node may go on after a signal [s]: long for a master that answers.
+_INIT_S = 0.5
+
 
 def guarded(main: Main) -> Main:
     """Wrap a program's `main(argv=None) -> exit code`.
@@ -102,33 +105,39 @@ def start_node(name: str, **options: Any) -> Any:
 
     Args:
         name: Of the node.
-        **options: For rospy.init_node. Unless `disable_signals`, SIGINT and SIGTERM end ROS.
+        **options: For rospy.init_node. Unless `disable_signals`, SIGINT and SIGTERM end ROS, and the process with 130
+            while init_node still waits for the master.
 
     Raises:
         NoRosError: rospy is not there, or ROS ended while the master was waited for.
     """
     rospy = rospy_module()
+    initialised = threading.Event()
     if not options.pop("disable_signals", False):
-        _end_on_signals(rospy)
+        _end_on_signals(rospy, initialised)
     try:
         rospy.init_node(name, disable_signals=True, **options)
+        initialised.set()
     except rospy.exceptions.ROSInitException as error:
         msg = f"no ROS master at {os.environ.get('ROS_MASTER_URI', '(ROS_MASTER_URI is not set)')}: {error}"
         raise NoRosError(msg) from None
     return rospy
 
 
-def _end_on_signals(rospy: Any) -> None:
+def _end_on_signals(rospy: Any, initialised: threading.Event) -> None:
     """End ROS on a thread of its own.
 
     rospy's handler does it on the main thread, whatever that is at: where it holds a lock, as within a call of the
-    master, it would wait for itself for ever.
+    master, it would wait for itself for ever. While init_node waits for a master, it holds a lock that the end of ROS
+    takes as well: there is nothing to sign off from yet, and the process ends.
     """
     reader, writer = os.pipe()
     came: List[int] = []
 
     def end() -> None:
         os.read(reader, 1)
+        if not initialised.wait(_INIT_S):
+            os._exit(130)
         rospy.signal_shutdown(f"signal {came[0]}")
 
     def on_signal(number: int, _frame: Any) -> None:

@@ -9,6 +9,8 @@ import pytest
 
 from support.deadlines import WAIT_S
 from xplane_bridge.harness import ManagedProcess
+from xplane_bridge.harness.ports import free_tcp_port
+from xplane_bridge.resources import program
 
 #: Its main thread is within a call of the master, so to say, until the file in argv[1] is there.
 _NODE = """
@@ -42,3 +44,13 @@ def test_a_signal_within_a_call_of_the_master_ends_the_node(world, tmp_path, num
         answered.touch()
         assert node.wait(WAIT_S) == 0, node.output()
     assert not talks(world)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_node_that_waits_for_a_master(world, tmp_path, number):
+    nowhere = {**world.master.env, "ROS_MASTER_URI": f"http://127.0.0.1:{free_tcp_port()}"}
+    command = [str(program("attitude_hold")), "--heading", "40", "--engage"]
+    with ManagedProcess("waiting", command, tmp_path, env=nowhere) as node:
+        node.wait_for_line("Unable to register with master", WAIT_S)
+        node.send_signal(number)
+        assert node.wait(WAIT_S) == 130, node.output()
