@@ -95,6 +95,45 @@ def bit_shares(values: np.ndarray, constants: Mapping[str, int], prefix: str) ->
     return out
 
 
+class Pace(NamedTuple):
+    """How fast a simulator ran; pauses and gaps left out."""
+
+    host: float  #: [s] of real time
+    simulated: float  #: [s] of the simulator, by the speed of time that was asked of it
+    slowest: float  #: [1/s] frames in the worst second of real time; NaN where not known
+    fastest: float  #: [1/s] frames in the best one
+
+    @property
+    def factor(self) -> float:
+        """How many times as long as it should simulated time took; NaN where there is none."""
+        return self.host / self.simulated if self.simulated > 0.0 else float("nan")
+
+
+def pace(time: np.ndarray, state: Mapping[str, np.ndarray], parts: list[slice], asked: np.ndarray) -> Pace:
+    """Compare the simulator's time with the host's.
+
+    Args:
+        time: Stamps, int64 [ns], shape (n,).
+        state: Columns of FlightState.
+        parts: Segments of the flight states.
+        asked: Speed of the simulator's time that was asked for, 1 real time, shape (n,).
+    """
+    pairs = [np.arange(part.start, part.stop - 1) for part in parts if part.stop - part.start > 1]
+    k = np.concatenate(pairs) if pairs else np.empty(0, dtype=int)
+    sim, paused = state["sim_time_unwrapped"], state["paused"].astype(bool)
+    k = k[(sim[k + 1] > sim[k]) & ~paused[k] & ~paused[k + 1]]
+    if not len(k):
+        return Pace(0.0, 0.0, float("nan"), float("nan"))
+    host, simulated = (time[k + 1] - time[k]) / 1e9, sim[k + 1] - sim[k]
+    period = state["frame_period"][k + 1]
+    frames = simulated / np.where(period > 0.0, period, np.nan)
+    second = np.cumsum(host).astype(int)
+    spans, counts = np.bincount(second, host), np.bincount(second, frames)
+    rates = counts[spans > 0.5] / spans[spans > 0.5]
+    ends = (float(rates.min()), float(rates.max())) if len(rates) else (float("nan"), float("nan"))
+    return Pace(float(host.sum()), float(np.sum(simulated / asked[k + 1])), *ends)
+
+
 class Pairing(NamedTuple):
     """How images and states were paired."""
 

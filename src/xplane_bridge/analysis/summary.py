@@ -16,11 +16,10 @@ class Quantity(NamedTuple):
 
 
 def distance(time: np.ndarray, ground_speed: np.ndarray, parts: list[slice]) -> float:
-    """Integrate the ground speed [m/s] over `time` (int64 [ns]) inside the segments: metres flown over ground."""
+    """Integrate the ground speed [m/s] over `time` [s] inside the segments: metres flown over ground."""
     total = 0.0
     for part in parts:
-        t = (time[part] - time[part][0]) / 1e9
-        v = ground_speed[part].astype(np.float64)
+        t, v = time[part], ground_speed[part].astype(np.float64)
         good = np.isfinite(v)
         t, v = t[good], v[good]
         total += float(np.sum((v[1:] + v[:-1]) / 2 * np.diff(t)))
@@ -32,7 +31,7 @@ def summary(time: np.ndarray, columns: Mapping[str, np.ndarray], parts: list[sli
 
     Args:
         time: int64 [ns], shape (n,).
-        columns: Of FlightState; what is missing is left out.
+        columns: Of FlightState; what is missing is left out, but simulator time must be there.
         parts: Segments of `time`.
 
     Returns:
@@ -40,7 +39,8 @@ def summary(time: np.ndarray, columns: Mapping[str, np.ndarray], parts: list[sli
     """
     out = [Quantity("duration", float((time[-1] - time[0]) / 1e9) if len(time) else 0.0, "s")]
     if "ground_speed" in columns:
-        out.append(Quantity("distance over ground", distance(time, columns["ground_speed"], parts), "m"))
+        flown = distance(columns["sim_time_unwrapped"], columns["ground_speed"], parts)
+        out.append(Quantity("distance over ground", flown, "m"))
     extremes = (
         ("altitude_msl", "altitude MSL", "m", ("min", "max")),
         ("indicated_airspeed", "indicated airspeed", "m/s", ("min", "max")),

@@ -10,7 +10,7 @@ import numpy as np
 from xplane_bridge.analysis.consistency import Check, check_flight, check_odometry
 from xplane_bridge.analysis.episodes import from_values, who_flew
 from xplane_bridge.analysis.odometry import of_frames
-from xplane_bridge.analysis.quality import bit_shares, timing
+from xplane_bridge.analysis.quality import bit_shares, pace, timing
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.bags.passport import read_passports
 from xplane_bridge.constants import LinkState, words
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from xplane_bridge.labels.table import Labels
     from xplane_bridge.plotting.spec import PathFigure, TimeFigure
 
+#: Of simulated time to the time that it should take, from which on the page says so.
+_SLOW = 1.05
 _LINK_STATES = words(LinkState)
 
 
@@ -80,7 +82,26 @@ def _summary(flight: Flight) -> str:
     rate = timing(state.stamp)
     cards.append(f'<div class="card"><b>{number(rate.rate)} /s</b><span>flight states</span></div>')
     text = f'<div class="cards">{"".join(cards)}</div>'
-    return text + _who_flew(flight) + _links(flight) + _events(flight)
+    return text + _pace(flight) + _who_flew(flight) + _links(flight) + _events(flight)
+
+
+def _pace(flight: Flight) -> str:
+    """Say that the simulator ran slower than real time, where it did."""
+    state, asked = flight.tables["state"], np.ones(len(flight.tables["state"]))
+    if "sim" in flight.tables:
+        sim = flight.tables["sim"]
+        latest = np.maximum(np.searchsorted(sim.stamp, state.stamp, side="right") - 1, 0)
+        ratio = sim["time_ratio_requested"][latest]
+        asked = np.where(ratio > 0.0, ratio, 1.0)
+    found = pace(state.stamp, state.columns, flight.parts, asked)
+    if not found.factor > _SLOW:
+        return ""
+    ends = [number(rate, 2) for rate in (found.slowest, found.fastest)]
+    rate = ends[0] if ends[0] == ends[1] else " to ".join(ends)
+    return (
+        f"<p>X-Plane ran slower than real time, at {rate} frames/s: {number(found.simulated, 3)} s of its time took "
+        f"{number(found.host, 3)} s, {found.factor:.3g} times as long. Duration, rates and gaps are of real time.</p>"
+    )
 
 
 def _who_flew(flight: Flight) -> str:

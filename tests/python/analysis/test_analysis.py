@@ -11,7 +11,7 @@ import pytest
 from xplane_bridge.analysis.consistency import GRAVITY, check_flight
 from xplane_bridge.analysis.decimation import min_max
 from xplane_bridge.analysis.episodes import Episode, from_sets, from_values
-from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, joined, pairing, timing
+from xplane_bridge.analysis.quality import BAD_QUALITY, QUALITY_WORDS, bit_shares, joined, pace, pairing, timing
 from xplane_bridge.analysis.summary import distance, summary
 
 S = 10**9
@@ -107,6 +107,20 @@ def test_one_state_or_none_leaves_nothing_to_compare(rows: slice) -> None:
     assert sum(found.values()) == found["|velocity - wind| against true airspeed"] == rows.stop
 
 
+def test_pace_is_of_frames_that_were_flown_by_the_speed_that_was_asked_for() -> None:
+    """1 s in real time at 50 frames/s, a pause of 1 s, 1 s in 2 s at 25, a gap, 2 s in 1 s as asked."""
+    sim = np.concatenate([np.arange(51) / 50, np.full(50, 1.0), 1.0 + np.arange(1, 51) / 50, 9.0 + np.arange(51) / 25])
+    host = np.concatenate([np.arange(101) / 50, 2.0 + np.arange(1, 51) / 25, 6.0 + np.arange(51) / 50])
+    time, asked = np.round(host * S).astype(np.int64), np.where(np.arange(202) < 151, 1.0, 2.0)
+    state = {"sim_time_unwrapped": sim, "frame_period": 0.02 * asked, "paused": (np.arange(202) // 50 == 1)}
+    found = pace(time, state, [slice(0, 151), slice(151, 202)], asked)
+    assert (found.host, found.simulated) == (pytest.approx(4.0, abs=0.1), pytest.approx(3.0, abs=0.1))
+    assert (found.slowest, found.fastest) == (pytest.approx(25.0), pytest.approx(50.0))
+    assert found.factor == pytest.approx(4 / 3, abs=0.02)
+    unknown = pace(time, {**state, "frame_period": np.full(202, np.nan)}, [slice(0, 202)], asked)
+    assert np.isnan(unknown.slowest)
+
+
 def test_timing_counts_gaps_and_jitter() -> None:
     time = np.array([0, 10, 20, 30, 90, 100, 112, 108], dtype=np.int64) * 1_000_000
     got = timing(time)
@@ -161,9 +175,15 @@ def test_counters_go_on_over_a_restart_of_the_node() -> None:
 
 
 def test_distance_is_the_integral_inside_segments() -> None:
-    time = np.array([0, 1, 2, 10, 11]) * S
+    time = np.array([0.0, 1.0, 2.0, 10.0, 11.0])
     speed = np.array([10.0, 20.0, 20.0, 4.0, 6.0])
     assert distance(time, speed, [slice(0, 3), slice(3, 5)]) == pytest.approx(15 + 20 + 5)
+
+
+def test_summary_takes_distance_by_the_time_of_the_simulator() -> None:
+    columns = {"ground_speed": np.array([60.0, 60.0]), "sim_time_unwrapped": np.array([7.0, 8.0])}
+    found = {q.name: q.value for q in summary(np.array([0, 2]) * S, columns, [slice(0, 2)])}
+    assert found["distance over ground"] == pytest.approx(60.0)
 
 
 def test_summary_names_extremes_with_units() -> None:

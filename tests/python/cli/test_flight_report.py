@@ -286,6 +286,13 @@ def test_a_simulator_slower_than_real_time_does_not_break_physics(slow: Path) ->
     assert "holds" in row
 
 
+def test_a_simulator_slower_than_real_time_is_said(slow: Path, page: Path) -> None:
+    text = section(slow, "summary")
+    assert "X-Plane ran slower than real time, at 13 frames/s: 11.9 s of its time took 17.9 s, 1.5 times as" in text
+    assert "<b>717 m</b><span>distance over ground</span>" in text
+    assert "slower than real time" not in section(page, "summary")
+
+
 def test_slow_states_count(tmp_path: Path) -> None:
     write_states(tmp_path / "slow.bag", 60.0, 1.0)
     page = tmp_path / "r.html"
