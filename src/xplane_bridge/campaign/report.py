@@ -41,18 +41,25 @@ def worst_first(campaign: Campaign, table: pd.DataFrame) -> pd.DataFrame:
     """The flights, the worst first.
 
     Those that were not flown to their end come first, then those that miss most criteria, then those whose values lie
-    farthest on the wrong side among all flights (the sum of their ranks); last the number, so that the order is one.
+    farthest beyond the bounds that they violate (the sum of their ranks among all flights; how well a criterion was met
+    does not count); last the number, so that the order is one.
     """
     frame = pd.DataFrame({"ended": table["outcome"] == FLOWN, "missed": 0, "rank": 0.0, "flight": table["flight"]})
     for criterion in campaign.scenario_criteria:
         frame["missed"] += ~table[f"met_{criterion.name}"]
-        values = table[f"value_{criterion.name}"]
-        if criterion.below is not None:
-            frame["rank"] += values.fillna(math.inf).rank(method="average")
-        if criterion.above is not None:
-            frame["rank"] += (-values).fillna(math.inf).rank(method="average")
+        frame["rank"] += _beyond(criterion, table[f"value_{criterion.name}"]).rank(method="average")
     order = frame.sort_values(["ended", "missed", "rank", "flight"], ascending=[True, False, False, True]).index
     return table.loc[order]
+
+
+def _beyond(criterion: Criterion, values: pd.Series) -> pd.Series:
+    """How far values lie beyond the bound that they violate: 0 where they violate none, infinite where not measured."""
+    beyond = pd.Series(0.0, values.index)
+    if criterion.below is not None:
+        beyond = np.maximum(beyond, values - criterion.below)
+    if criterion.above is not None:
+        beyond = np.maximum(beyond, criterion.above - values)
+    return beyond.fillna(math.inf)
 
 
 def flights_to_draw(campaign: Campaign, table: pd.DataFrame) -> List[int]:
@@ -240,10 +247,8 @@ def _line(x: np.ndarray, y: np.ndarray, x_label: str, y_label: str) -> str:
 
 
 def _worst(campaign: Campaign, table: pd.DataFrame, traces: Mapping[int, Mapping[str, np.ndarray]], refly: str) -> str:
-    note = (
-        "<p class=note>First what was not flown to its end, then what misses most criteria, then what lies farthest on "
-    )
-    note += f"the wrong side. One of them again: <code>{html.escape(refly)} NUMBER</code></p>"
+    note = "<p class=note>First what was not flown to its end, then what misses most criteria, then what lies farthest "
+    note += f"beyond the bounds that it violates. One of them again: <code>{html.escape(refly)} NUMBER</code></p>"
     rows: List[List[str]] = []
     drawings: Dict[int, str] = {}
     worst = worst_first(campaign, table).head(WORST)

@@ -55,6 +55,21 @@ def test_what_could_not_be_measured_is_the_worst() -> None:
     assert list(report.worst_first(parse_campaign(DOCUMENT), flights)["flight"]) == [0, 1, 2]
 
 
+def test_of_two_bounds_the_one_that_is_violated_counts() -> None:
+    criterion = {"measure": "final", "of": "altitude", "above": -10, "below": 10}
+    campaign = parse_campaign({**DOCUMENT, "scenario": {**DOCUMENT["scenario"], "criteria": {"level": criterion}}})
+    flights = pd.DataFrame({"flight": range(5), "outcome": "flown", "value_level": [12.0, -40.0, 25.0, -11.0, np.nan]})
+    flights["met_level"] = False
+    assert list(report.worst_first(campaign, flights)["flight"]) == [4, 1, 2, 0, 3]
+
+
+def test_how_well_a_criterion_was_met_does_not_decide() -> None:
+    """Flight 0 is 1 deg beyond the bound and hardly high enough, flight 1 is 2 deg beyond it and high up."""
+    flights = table().iloc[[1, 1, 0]].reset_index(drop=True).assign(flight=[0, 1, 2])
+    flights["value_low"], flights["value_high"] = [6.0, 7.0, 0.0], [901.0, 5000.0, 950.0]
+    assert list(report.worst_first(parse_campaign(DOCUMENT), flights)["flight"]) == [1, 0, 2]
+
+
 def test_what_a_flight_that_did_not_end_had_measured_is_no_value_of_the_whole_flight() -> None:
     """Those that crash early have had no time to roll: with them, the correlation has the wrong sign."""
     count = 100
