@@ -50,7 +50,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     with Bags(args.bags) as bags:
         flight = read_flight(bags)
     found = identify(flight, args.axis, geometry, args.aircraft, args.tail, args.validate)
-    for text in found.notes + [text for axis in found.model.axes.values() for text in axis.warnings]:
+    for text in found.notes + found.model.warnings:
         print(f"warning: {text}", file=sys.stderr)
     if args.report:
         _write_page(identification_page.build(found, flight), Path(args.report))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import Optional, Sequence
@@ -11,6 +12,9 @@ from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.identification.coefficients import geometry_of, read_geometry
 from xplane_bridge.identification.files import write_model
 from xplane_bridge.identification.model import AxisModel, Estimate, LinearModel
+
+#: Derivatives in a line of the terminal.
+_COLUMNS = 3
 
 
 def parser() -> argparse.ArgumentParser:
@@ -54,7 +58,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     geometry = read_geometry(Path(args.geometry)) if args.geometry else geometry_of(args.aircraft)
     fuel = None if args.fuel is None else tuple(args.fuel)
     model = linearise(Condition(args.aircraft, args.speed, args.altitude, fuel, args.payload), geometry)
-    for text in {text: None for axis in model.axes.values() for text in axis.warnings}:
+    for text in model.warnings:
         print(f"warning: {text}", file=sys.stderr)
     write_outputs(model, args.output)
     return 0
@@ -77,6 +81,18 @@ def summary(axis: AxisModel) -> list[str]:
         imaginary = f" +- {mode.eigenvalue.imag:.4g}i" if mode.eigenvalue.imag else ""
         interval = f" (95 %: +-{value.interval:.2g})" if value.interval == value.interval else ""
         lines.append(f"  {mode.name:<14}{value.value:9.4g}{imaginary} 1/s, damping {mode.damping:.3g}{interval}")
-    if axis.derivatives:
-        lines.append("  " + ", ".join(f"{name} {entry.value:.4g}" for name, entry in axis.derivatives.items()))
+    found = axis.derivatives.items()
+    if any(math.isfinite(entry.interval) for _, entry in found):
+        cells = [f"{name:<9}{entry.value:>9.4g}{_width(entry):<13}" for name, entry in found]
+        lines += ["  " + "".join(cells[k : k + _COLUMNS]).rstrip() for k in range(0, len(cells), _COLUMNS)]
+        if any(entry.unsure for _, entry in found):
+            lines.append("  ?: the interval (95 %) is more than half of the value")
+    elif found:
+        lines.append("  " + ", ".join(f"{name} {entry.value:.4g}" for name, entry in found))
     return lines
+
+
+def _width(entry: Estimate) -> str:
+    if not math.isfinite(entry.interval):
+        return ""
+    return f" +- {entry.interval:.2g}{' ?' if entry.unsure else ''}"

@@ -68,6 +68,11 @@ class Estimate:
     unit: str = ""
     interval: float = math.nan
 
+    @property
+    def unsure(self) -> bool:
+        """Whether the interval is so wide that hardly the sign is known."""
+        return self.interval > 0.5 * abs(self.value)
+
 
 @dataclass(frozen=True)
 class Mode:
@@ -143,6 +148,11 @@ class LinearModel:
     trim: dict[str, Estimate]
     axes: dict[str, AxisModel]
     source: dict[str, Any]  #: the program, and what it was given
+
+    @property
+    def warnings(self) -> list[str]:
+        """Of all axes; what holds of several is said once."""
+        return list(dict.fromkeys(text for axis in self.axes.values() for text in axis.warnings))
 
 
 def name_modes(axis: Axis, a: np.ndarray) -> list[Mode]:

@@ -48,7 +48,7 @@ def _summary(found: Identification) -> str:
     text = f'<h3>Trim point: means of the windows</h3><div class="cards">{cards}</div>'
     for title, style, lines in (
         ("What speaks against the model", "bad", found.refusals),
-        ("Warnings", "note", [line for axis in found.model.axes.values() for line in axis.warnings]),
+        ("Warnings", "note", found.model.warnings),
         ("Left out", "note", found.notes),
     ):
         if lines:

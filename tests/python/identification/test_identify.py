@@ -251,6 +251,11 @@ def test_surfaces_at_20_hz_are_interpolated_with_a_warning(twin: FlightModel, tr
     assert "(up to 50 ms apart)" in result.model.warnings[0]
 
 
+def test_what_holds_of_both_axes_is_warned_of_once(truth: LinearModel) -> None:
+    axes = {name: replace(model, warnings=[f"{name} alone", "of both"]) for name, model in truth.axes.items()}
+    assert replace(truth, axes=axes).warnings == ["longitudinal alone", "of both", "lateral alone"]
+
+
 def test_a_controller_in_the_loop_is_noticed(twin: FlightModel) -> None:
     result = longitudinal(flown(PITCH, model=twin, pitch_feedback=2.0))
     assert "the elevator goes on moving after the excitation's end" in result.model.warnings[0]

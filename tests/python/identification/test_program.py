@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,12 @@ from support.flights.manoeuvre_flight import LATERAL, PITCH, Manoeuvre, flown
 from support.markdown import blocks
 from support.room_table import ROOT
 from xplane_bridge.cli import identify_model
+from xplane_bridge.cli.linearise_model import summary
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.identification import files
+from xplane_bridge.identification.linearisation import Condition, linearise
+from xplane_bridge.identification.model import Estimate
 
 PAGE = ROOT / "docs" / "identification.md"
 
@@ -76,6 +80,34 @@ def test_the_page_needs_no_network_and_shows_every_window(bag: Path, tmp_path: P
     for words in ("dutch roll", "Theil coefficient", "Cl_p", "Trim point", "Lateral validation 9: 3-2-1-1 on yaw"):
         assert words in text, words
     assert "longitudinal" not in without_plotly.lower()
+
+
+def test_values_are_printed_with_intervals_and_warnings_once(
+    twin: FlightModel, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    bag = flown(PITCH + LATERAL, model=twin, surfaces_every=3).write(tmp_path / "flight.bag")
+    model, page = tmp_path / "model.yaml", tmp_path / "model.html"
+    assert identify_model.main([str(bag), "-o", str(model), "--report", str(page)]) == 0
+    out, err = capsys.readouterr()
+    assert err.count("surfaces: 999") == 1
+    assert page.read_text(encoding="utf-8").count("surfaces: 999") == 1
+    printed = {name: rest for name, *rest in re.findall(r"(C\w+) +(\S+) \+- (\S+)( \?)?", out)}
+    axes = files.read_model(model).axes.values()
+    found = {name: entry for axis in axes for name, entry in axis.derivatives.items()}
+    assert list(printed) == list(found)
+    for name, (value, width, mark) in printed.items():
+        assert float(value) == pytest.approx(found[name].value, rel=1e-3)
+        assert float(width) == pytest.approx(found[name].interval, rel=0.06)
+        assert bool(mark) == (found[name].interval > 0.5 * abs(found[name].value))
+
+
+def test_a_value_whose_interval_is_wide_is_marked() -> None:
+    derivatives = {"Cm_q": Estimate(-22.0, "", 0.4), "CL_de": Estimate(-0.15, "1/rad", 0.08), "Cm_de": Estimate(-1.2)}
+    lines = summary(
+        replace(linearise(Condition("fixed_wing", 75.0, 1000.0)).axes["longitudinal"], derivatives=derivatives)
+    )
+    assert lines[-2].split() == ["Cm_q", "-22", "+-", "0.4", "CL_de", "-0.15", "+-", "0.08", "?", "Cm_de", "-1.2"]
+    assert lines[-1] == "  ?: the interval (95 %) is more than half of the value"
 
 
 def test_turbulence_ends_with_an_error_and_the_page_shows_why(
