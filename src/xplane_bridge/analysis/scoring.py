@@ -12,6 +12,8 @@ from xplane_bridge.analysis.criteria import CAMERA, Criterion
 _WRAPPING = {"roll": -180.0, "heading": 0.0}
 #: A flight may end this much before a window does: its last state is one of before that moment [s].
 _BEFORE_END_S = 0.1
+#: Windows are that much wider, so that it does not hang on the last bit of a time whether a sample lies in them [s].
+_EDGE_S = 5e-4
 
 
 class Score(NamedTuple):
@@ -68,7 +70,7 @@ def _score(
         ended = float(time[-1]) if len(time) else 0.0
         if end - ended > max([_BEFORE_END_S, *(2.0 * np.diff(time[-2:]))]):
             return _unmeasured(criterion, f"the flight ended at {ended:g} s, before {end:g} s")
-    inside = (time >= start) & (time <= end)
+    inside = (time >= start - _EDGE_S) & (time <= end + _EDGE_S)
     window, samples = time[inside], values[criterion.variable][inside]
     good = np.isfinite(samples)
     window, samples = window[good], samples[good]
@@ -97,7 +99,7 @@ def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> floa
             return float("inf")
         return float(time[outside[-1] + 1] - time[0])
     if criterion.measure == "final":
-        return _mean(criterion.variable, values[time >= time[-1] - 1.0])
+        return _mean(criterion.variable, values[time >= time[-1] - 1.0 - _EDGE_S])
     return float(values.min() if criterion.measure == "minimum" else values.max())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Dict, List, Mapping
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional
 
 import numpy as np
 
@@ -28,13 +28,14 @@ _COLUMNS = {
 _RATES = {"roll_rate": "angular_velocity.x", "pitch_rate": "angular_velocity.y", "yaw_rate": "angular_velocity.z"}
 
 
-def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any]) -> List[Score]:
+def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any], frames: Optional[int] = None) -> List[Score]:
     """Scores a flight that was flown by a `RosPlayer`.
 
     Args:
         scenario: What was flown.
         flight: The recording.
         played: The player's log: `begin` (epoch and sim_time_unwrapped of its first state) and `labels` [s].
+        frames: How many flight states count, from that state on; all when omitted.
 
     Raises:
         ScenarioError: The recording has no state of the time the scenario was played in.
@@ -49,9 +50,10 @@ def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any]) -> List
     first = np.flatnonzero((epoch == begin["epoch"]) & (sim_time >= begin["sim_time_unwrapped"] - 1e-6))
     if not len(first):
         raise ScenarioError(f"{scenario.name}: the state it began with was not recorded")
-    time = elapsed[first[0] :] - elapsed[first[0]]
-    values = {name: np.asarray(state[column][first[0] :], dtype=float) for name, column in _COLUMNS.items()}
-    values.update({name: np.degrees(state[column][first[0] :]) for name, column in _RATES.items()})
+    rows = slice(first[0], None if frames is None else first[0] + frames)
+    time = elapsed[rows] - elapsed[first[0]]
+    values = {name: np.asarray(state[column][rows], dtype=float) for name, column in _COLUMNS.items()}
+    values.update({name: np.degrees(state[column][rows]) for name, column in _RATES.items()})
     return score(scenario.criteria, time, values, played["labels"], _camera(flight))
 
 

@@ -70,7 +70,7 @@ def flown(tmp_path: Path, **changes: object) -> Path:
 def test_a_flight_through_the_nodes_is_the_one_in_process(tmp_path, frame_rate, frames):
     folder = flown(tmp_path, frame_rate=frame_rate)
     done = run("-o", folder, "--refly", 1, "--through-nodes")
-    assert f"the same states as in process: 46 fields of {frames} frames" in done.stdout, done.stdout + done.stderr
+    assert f"the same states as in process: 47 fields of {frames} frames" in done.stdout, done.stdout + done.stderr
     assert done.returncode == 0
     lines = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines() if line}
     assert [lines["banks"][i] for i in (1, 3)] == ["met", "met"]
@@ -84,7 +84,12 @@ def test_a_flight_through_the_nodes_is_the_one_in_process(tmp_path, frame_rate, 
 def test_what_rx_node_works_out_is_the_same_in_process(tmp_path):
     climbs = {"controller": "support.flights.steady_controller:Climbs"}
     done = run("-o", flown(tmp_path, **climbs), "--refly", 0, "--through-nodes")
-    assert "the same states as in process: 46 fields of 181 frames" in done.stdout, done.stdout + done.stderr
+    assert "the same states as in process: 47 fields of 181 frames" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_controller_that_integrates_over_frames_is_the_same_through_the_nodes(tmp_path):
+    done = run("-o", flown(tmp_path, controller="xplane_bridge.controllers.twin:Hold"), "--refly", 0, "--through-nodes")
+    assert "the same states as in process: 47 fields of 181 frames" in done.stdout, done.stdout + done.stderr
 
 
 def test_a_flight_that_differs_is_exit_code_1_and_said(tmp_path):
@@ -116,7 +121,7 @@ def test_excitations_restarts_hand_overs_and_failures_come_in_the_same_frames_th
     scenario = {**CAMPAIGN["scenario"], "events": events}
     folder = flown(tmp_path, scenario=scenario, controller="support.flights.steady_controller:Counting")
     done = run("-o", folder, "--refly", 0, "--through-nodes")
-    assert "the same states as in process: 46 fields of 301 frames" in done.stdout, done.stdout + done.stderr
+    assert "the same states as in process: 47 fields of 301 frames" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,19 @@ def test_heading_compares_the_short_way() -> None:
     assert got.value == pytest.approx(10.0)
 
 
+def test_whether_a_sample_lies_in_a_window_does_not_hang_on_the_last_bit_of_its_time() -> None:
+    criteria = (
+        criterion(measure="maximum", start=1.0, end=3.0, above=0.0),
+        criterion(measure="minimum", start=1.0, end=3.0, above=0.0),
+        criterion(measure="final", above=0.0),
+    )
+    frames = np.arange(241)
+    values = np.where(frames % 60 == 0, frames, 100.0)  # at the whole seconds 0, 60, 120, 180 and 240
+    for period in (1.0 / 60.0, float(np.float32(1.0 / 60.0)), 1.0 / 60.0 - 1e-9):
+        found = [score([each], frames * period, {"roll": values}, {}, {})[0].value for each in criteria]
+        assert found == pytest.approx([180.0, 60.0, np.mean(values[180:])])
+
+
 def test_final_and_extremes() -> None:
     assert one(criterion(measure="final"), T).value == pytest.approx(19.5)
     assert one(criterion(measure="minimum", start=3.0), T).value == pytest.approx(3.0)

@@ -30,6 +30,7 @@ from xplane_bridge.scenario.judging import judge
 _VECTORS = ("angular_velocity", "angular_acceleration", "velocity_ned", "velocity_body", "wind_ned", "specific_force")
 #: Fields of FlightState that a flight in process has, too.
 COMPARED = (
+    "sim_time_unwrapped",
     "latitude", "longitude", "altitude_msl", "altitude_agl", "roll_deg", "pitch_deg", "heading_true_deg",
     *(f"{vector}.{axis}" for vector in _VECTORS for axis in "xyz"),
     "vertical_speed", "ground_speed", "track_deg", "flight_path_angle_deg", "alpha_deg", "beta_deg",
@@ -109,6 +110,8 @@ def first_difference(seen: Sequence[Any], states: Table, first: int) -> Optional
     for name in COMPARED:
         mine = np.array([reduce(getattr, name.split("."), view) for view in seen])
         theirs = np.asarray(states[name][first : first + len(mine)], dtype=float)
+        if name == "sim_time_unwrapped":  # it begins with X-Plane
+            mine, theirs = mine - mine[0], theirs - theirs[0]
         differing = np.flatnonzero(mine[: len(theirs)] != theirs)
         if len(differing):
             frame = int(differing[0])
@@ -150,7 +153,7 @@ def compare(plan: FlightPlan, result: FlightResult, seen: Sequence[Any], output:
     played = json.loads((output / "played.json").read_text(encoding="utf-8"))
     with Bags(flown.bag) as bags:
         recorded = read_flight(bags)
-        scores = judge(parse_scenario(plan.scenario), recorded, played)
+        scores = judge(parse_scenario(plan.scenario), recorded, played, len(seen))
     page = write_report([flown.bag], output / "report.html")
     print(f"through the nodes: {flown.bag}, drawn in {page}")
     print(render(result, scores))
