@@ -119,10 +119,12 @@ def _caption(camera: CameraFrames, row: Optional[int], at: str) -> str:
     frames = camera.table
     names = ("roll_deg", "pitch_deg", "heading_true_deg", "altitude_msl", "indicated_airspeed")
     value = {name: frames[f"state.{name}"][row] for name in names}
+    error = float(frames["sim_time_error"][row])
     return (
         f"{at} s &middot; roll {value['roll_deg']:.1f}&deg; &middot; pitch {value['pitch_deg']:.1f}&deg; &middot; "
         f"true heading {value['heading_true_deg']:.1f}&deg;<br>{value['altitude_msl']:.0f} m MSL &middot; "
-        f"IAS {value['indicated_airspeed']:.1f} m/s &middot; time error {frames['sim_time_error'][row] * 1e3:.1f} ms"
+        f"IAS {value['indicated_airspeed']:.1f} m/s"
+        + (f" &middot; time error {error * 1e3:.1f} ms" if np.isfinite(error) else "")
         + _remarks(int(frames["quality"][row]), camera.constants)
     )
 

@@ -116,15 +116,26 @@ def _broken(values: np.ndarray, jump: float = 180.0) -> np.ndarray:
 
 def _attitude(flight: Flight) -> TimeFigure:
     t = _state(flight)
-    heading = [
-        Series(name, t.stamp, _broken(t[column]))
-        for name, column in (("true heading", "heading_true_deg"), ("magnetic heading", "heading_magnetic_deg"),
-                             ("track", "track_deg"))
-        if column in t and np.isfinite(t[column]).any()
-    ]  # fmt: skip
+    lines = [
+        ("true heading", "heading_true_deg"),
+        ("magnetic heading", "heading_magnetic_deg"),
+        ("track", "track_deg"),
+    ]
     roll = Panel("roll [deg]", [Series("roll", t.stamp, _broken(t["roll_deg"]))])
-    panels = [roll, _panel("pitch [deg]", t, [("pitch", "pitch_deg")]), Panel("heading [deg]", heading)]
+    panels = [roll, _panel("pitch [deg]", t, [("pitch", "pitch_deg")]), _headings(_panel("heading [deg]", t, lines))]
     return _figure("attitude", "Attitude", flight, panels)
+
+
+def _headings(panel: Panel) -> Panel:
+    """Let the axis begin where lines break least often: from 0 on, a flight to the north is shreds at both edges."""
+    turned = {}
+    for first in (0, -180, -90):
+        values = [np.mod(s.values.astype(np.float64) - first, 360.0) + first for s in panel.series]
+        turned[first] = [_broken(each) for each in values]
+    lost = {first: sum(int(np.isnan(each).sum()) for each in lines) for first, lines in turned.items()}
+    first = min(lost, key=lambda each: lost[each])
+    label = panel.label if first == 0 else f"heading {first}..{first + 360} [deg]"
+    return Panel(label, [replace(s, values=values) for s, values in zip(panel.series, turned[first])])
 
 
 def _airspeed(flight: Flight) -> TimeFigure:
@@ -157,9 +168,10 @@ def _altitude(flight: Flight) -> TimeFigure:
 
 def _airflow(flight: Flight) -> TimeFigure:
     t = _state(flight)
+    sideslip = [("computed, wind from the right +", "beta_deg"), ("X-Plane's, sign disputed", "xplane_beta_deg")]
     panels = [
         _panel("angle of attack [deg]", t, [("computed", "alpha_deg"), ("X-Plane's", "xplane_alpha_deg")]),
-        _panel("sideslip [deg]", t, [("computed", "beta_deg"), ("X-Plane's", "xplane_beta_deg")]),
+        _panel("sideslip [deg]", t, sideslip),
         _panel("path angle [deg]", t, [("flight-path angle", "flight_path_angle_deg"), ("vpath", "xplane_vpath_deg")]),
     ]
     return _figure("airflow", "Angle of attack, sideslip and path angles", flight, panels)

@@ -68,7 +68,9 @@ def build(
 
 def _page(flight: Flight, bags: Bags, sections: Sequence[Section]) -> str:
     names = ", ".join(path.name for path in bags.paths)
-    return page(f"Flight report: {flight.name}", f"{names} \u00b7 {day_of(flight.start)}", sections)
+    # Most recordings are called alike: they go by their folder.
+    title = flight.name if flight.name != "flight" else bags.paths[0].resolve().parent.name or flight.name
+    return page(f"Flight report: {title}", f"{names} \u00b7 {day_of(flight.start)}", sections)
 
 
 def _summary(flight: Flight) -> str:

@@ -139,6 +139,16 @@ def test_the_last_section_says_how_it_was_made(page: Path) -> None:
         assert f"<td>{name}</td><td>{value}</td>" in text
 
 
+def test_a_recording_called_as_most_goes_by_its_folder(full: Path, page: Path) -> None:
+    assert f"<h1>Flight report: {full.parent.name}</h1>" in page.read_text()
+
+
+def test_sideslip_says_whose_sign_it_has(page: Path) -> None:
+    text = section(page, "airflow")
+    assert '"name":"computed, wind from the right +"' in text
+    assert "sign disputed" in text
+
+
 def test_the_quality_section_finds_the_gap_and_judges_physics(page: Path) -> None:
     text = section(page, "quality")
     row = re.search(r"<td>/xplane/flight_state</td>(.*?)</tr>", text).group(1)
@@ -243,6 +253,7 @@ def test_missing_topics_are_said_and_the_rest_stands(tmp_path: Path) -> None:
     write_states(tmp_path / "bare.bag", 2.0, 50.0)
     assert flight_report.main([str(tmp_path / "bare.bag"), "-o", str(tmp_path / "r.html")]) == 0
     page = tmp_path / "r.html"
+    assert "<h1>Flight report: bare</h1>" in page.read_text()
     for key, topic in (
         ("controls", "mission/controls"),
         ("surfaces", "mission/surfaces"),

@@ -32,6 +32,7 @@ class Sight(NamedTuple):
     late_ms: int = 0  #: of its stamps, as each window has a delay of its own
     kind: str = "CompressedImage"
     pictures_every: int = 1  #: pictures were recorded of every so many of these frames
+    error: float = 0.001  #: sim_time_error [s]
 
 
 def write(path: Path, *sights: Sight, count: int = 60) -> Path:
@@ -49,7 +50,8 @@ def write(path: Path, *sights: Sight, count: int = 60) -> Path:
 def add_picture(bag: FlightBag, sight: Sight, k: int, state: dict, ns: int) -> None:
     header = bag.header(ns, "camera_optical", k)
     quality = sight.quality if k % 5 == 0 else 0
-    frame = {"header": header, "state": state, "quality": quality, "frame_sim_time": k / RATE, "sim_time_error": 0.001}
+    frame = {"header": header, "state": state, "quality": quality, "frame_sim_time": k / RATE}
+    frame["sim_time_error"] = sight.error
     bag.add(f"{sight.topics}/frame_state", "xplane_bridge/FrameState", ns + 40_000_000, frame)
     if sight.frames.index(k) % sight.pictures_every:
         return
@@ -167,3 +169,9 @@ def test_only_pictures_near_those_of_the_strip_are_read(tmp_path: Path, monkeypa
     pair = Sight(OWN, 0, range(600)), Sight(BELLY, 2, range(600))
     sections(write(tmp_path / "long.bag", *pair, count=600))
     assert 24 <= sum(read) <= 24 * 16
+
+
+def test_a_time_error_that_is_not_known_is_left_out(tmp_path: Path) -> None:
+    pictures, _ = sections(write(tmp_path / "one.bag", Sight(OWN, 0, range(20), error=float("nan"))))
+    assert "IAS" in pictures
+    assert "time error" not in pictures

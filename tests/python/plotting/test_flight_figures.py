@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 
 from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
@@ -43,6 +44,35 @@ def test_lines_of_every_topic_are_broken_where_states_are_missing(tmp_path: Path
             assert missing.tolist() == [100], series.name
             assert len(series.values) == 201, series.name
             assert (np.diff(series.time) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("middle", "label", "low"),
+    [(0.0, "heading -180..180 [deg]", -30.0), (180.0, "heading [deg]", 150.0), (90.0, "heading [deg]", 60.0)],
+)
+def test_a_heading_about_north_is_one_line(tmp_path: Path, middle: float, label: str, low: float) -> None:
+    with FlightBag(tmp_path / "weave.bag") as bag:
+        for k in range(500):
+            heading = (middle + 30.0 * np.sin(k / 20)) % 360.0
+            state = {**bag.state(k / 20, k), "heading_true_deg": heading, "heading_magnetic_deg": heading}
+            bag.add(
+                "/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 20), {**state, "track_deg": heading}
+            )
+    panel = figure(read(tmp_path / "weave.bag"), "attitude").panels[2]
+    assert panel.label == label
+    for series in panel.series:
+        assert not np.isnan(series.values).any(), series.name
+        assert (series.values.min(), series.values.max()) == pytest.approx((low, low + 60.0), abs=0.1)
+
+
+def test_a_heading_that_goes_round_is_broken_once_a_turn(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "turns.bag") as bag:
+        for k in range(400):
+            heading = (5.0 + 3.0 * k) % 360.0
+            state = {**bag.state(k / 20, k), "heading_true_deg": heading}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 20), state)
+    true = figure(read(tmp_path / "turns.bag"), "attitude").panels[2].series[0]
+    assert np.isnan(true.values).sum() == 3
 
 
 def test_the_track_is_broken_at_a_new_origin(tmp_path: Path) -> None:
