@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import importlib
 import math
+import os
 import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
 import yaml
@@ -315,22 +318,45 @@ def _refuse_unflyable(scenario: Scenario) -> None:
 
 
 def find_controller(name: str) -> Any:
-    """The object `module:name` refers to.
+    """The object `module:name` refers to; the working folder is searched last.
 
     Raises:
         CampaignError: There is none.
     """
     module, _, attribute = name.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
     try:
         found = getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, ValueError) as error:
         raise CampaignError(
             f"controller: {name!r} cannot be had ({error}); expected module:class or module:function, the module's "
-            "folder in PYTHONPATH"
+            "folder in PYTHONPATH, or the one you are in"
         ) from None
     if not callable(found):
         raise CampaignError(f"controller: {name!r} is no class and no function")
     return found
+
+
+def make_controller(name: str, arguments: Mapping[str, Any]) -> Any:
+    """What flies, with a method `fly`: a class is made with the arguments, a function is asked itself.
+
+    Raises:
+        CampaignError: There is none, it does not take the arguments, or does not fly.
+    """
+    found = find_controller(name)
+    if not isinstance(found, type):
+        if arguments:
+            raise CampaignError(f"arguments: {name} is a function, which takes the state alone; expected none")
+        restart = getattr(found, "restart", None)
+        return SimpleNamespace(fly=found) if restart is None else SimpleNamespace(fly=found, restart=restart)
+    try:
+        made = found(**arguments)
+    except TypeError as error:
+        raise CampaignError(f"arguments: {name} does not take them ({error})") from None
+    if not callable(getattr(made, "fly", None)):
+        raise CampaignError(f"controller: {name} has no method fly; expected a class whose fly(state) gives a command")
+    return made
 
 
 def _stop(item: Any, criteria: Sequence[str]) -> Optional[Stop]:

@@ -11,7 +11,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 import numpy as np
 
 from xplane_bridge.analysis.scoring import score
-from xplane_bridge.campaign.definition import FlightPlan, find_controller
+from xplane_bridge.campaign.definition import FlightPlan, make_controller
 from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.compiled import require
 from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
@@ -30,8 +30,6 @@ _VARIABLES = (
     "yaw_rate", "load_factor",
 )  # fmt: skip
 _STICK = ("stick_roll", "stick_pitch", "stick_yaw", "throttle")
-
-Controller = Callable[[FlightView], Mapping[str, float]]
 
 
 class _RefusedError(Exception):
@@ -121,22 +119,8 @@ class Flight:
     def _start(self) -> None:
         self._aircraft = Aircraft(conditions_of(self._plan))
         self._player = Player(self._scenario)
-        self._controller = self._make_controller()
-
-    def _make_controller(self) -> Optional[Controller]:
-        """A class is made anew for each flight and its `fly` asked; a function is asked itself."""
-        if not self._plan.controller:
-            return None
-        found = find_controller(self._plan.controller)
-        if isinstance(found, type):
-            try:
-                self._made = found(**self._plan.arguments)
-            except TypeError as error:
-                raise CampaignError(f"arguments: {self._plan.controller} does not take them ({error})") from None
-            controller: Controller = self._made.fly
-        else:
-            self._made = controller = found
-        return controller
+        plan = self._plan
+        self._controller = make_controller(plan.controller, plan.arguments) if plan.controller else None
 
     # ---- frames
 
@@ -179,9 +163,9 @@ class Flight:
             return
         # As through the nodes, where control/mode of a frame is known two frames later.
         self._modes.append(self._aircraft.mode)
-        if self._modes.popleft() != AUTO and hasattr(self._made, "restart"):
-            self._made.restart()
-        self._command(AUTO, dict(self._controller(view)))
+        if self._modes.popleft() != AUTO and hasattr(self._controller, "restart"):
+            self._controller.restart()
+        self._command(AUTO, dict(self._controller.fly(view)))
 
     def _command(self, mode: int, values: Dict[str, float]) -> None:
         refusal = self._aircraft.command(mode, values)

@@ -12,6 +12,7 @@ from typing import Any, Dict, Optional, Sequence
 from xplane_bridge.analysis.scoring import Score
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import read_flight
+from xplane_bridge.campaign.definition import make_controller
 from xplane_bridge.cli.entry import guarded, positive
 from xplane_bridge.cli.scenario_player import scenario_file, scenario_of
 from xplane_bridge.harness.display import screen
@@ -81,9 +82,16 @@ def parser() -> argparse.ArgumentParser:
 
 
 def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
-    """What to start for a scenario."""
+    """What to start for a scenario.
+
+    Raises:
+        ScenarioError: It cannot be flown so.
+        CampaignError: Its controller cannot be had.
+    """
     if scenario.repeat_every is not None and args.duration is None:
         raise ScenarioError(f"{scenario.name} repeats for ever (repeat_every): give --duration")
+    if scenario.controller and not args.controller:
+        make_controller(scenario.controller, {})  # as fly_controller will: what it refuses is said before a start
     lockstep = lockstep_of(args)
     options = ["--fps", f"{_FPS:g}", "--seed", str(args.seed), *(["--window"] if args.camera else [])]
     if lockstep is not None and args.camera:

@@ -103,5 +103,5 @@ class Scenario:
     gains: Mapping[str, float] = field(default_factory=dict)
     criteria: Tuple[Criterion, ...] = ()  #: for run_scenario, which checks them
     events: Tuple[Event, ...] = ()
-    controller: str = ""  #: module:class that flies in mode auto; empty: none of its own
+    controller: str = ""  #: module:class or module:function that flies in mode auto; empty: none of its own
     aerodrome: Mapping[str, float] = field(default_factory=dict)  #: what the emulator draws; empty: where it begins

@@ -73,9 +73,10 @@ PROGRAMS = [
     (
         "fly_controller xplane_bridge.controllers.twin:Hold --arguments {fast:1}",
         1,
-        ["--arguments: xplane_bridge.controllers.twin:Hold does not take them", "fast"],
+        ["arguments: xplane_bridge.controllers.twin:Hold does not take them", "fast"],
     ),
     ("fly_controller collections:Counter", 1, ["collections:Counter has no method fly"]),
+    ("fly_controller math:sin --arguments {fast:1}", 1, ["math:sin is a function, which takes the state alone"]),
     ("joy_config_check wheel", 1, ["wheel.yaml does not exist", "xbox.yaml"]),
     ("identify_model empty.bag", 1, ["empty.bag: the file is empty; the recording never wrote to it"]),
     ("identify_model good.bag", 1, ["good has no", "record all topics (launch/record.launch)"]),

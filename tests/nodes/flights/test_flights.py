@@ -33,6 +33,22 @@ def test_the_quadrotor_flies_its_square_through_the_bridge_in_real_time(tmp_path
     assert labels["touchdown"] > labels["hover"] + 20.0
 
 
+def test_a_function_in_the_folder_one_is_in_flies_a_scenario(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    law = "def level(state):\n    return {'roll': 0.03 * (10.0 - state.roll_deg), 'pitch': 0.0, 'throttle': 0.6}\n"
+    (tmp_path / "my_controller.py").write_text(law, encoding="utf-8")
+    flown = {
+        "name": "banks",
+        "aircraft": "fixed_wing",
+        "controller": "my_controller:level",
+        "start": {"altitude": 1000, "speed": 70},
+        "criteria": {"banks": {"measure": "maximum", "of": "roll", "above": 3}},
+        "events": [{"at": 0, "mode": "auto"}, {"at": 3, "end": True}],
+    }
+    (tmp_path / "banks.yaml").write_text(json.dumps(flown), encoding="utf-8")  # which is YAML
+    fly("banks.yaml", tmp_path / "out", *IN_LOCK_STEP)
+
+
 #: In process (tests/python/controllers) all of them fly by default, and see the same numbers as through the nodes
 #: (test_campaign_through_nodes.py).
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Any, Dict
 
 import pytest
 
-from xplane_bridge.campaign.definition import CampaignError, parse_campaign
+from xplane_bridge.campaign.definition import CampaignError, make_controller, parse_campaign
 from xplane_bridge.campaign.flight import Flight
 from xplane_bridge.compiled import NotCompiledError
 
@@ -41,6 +41,21 @@ def test_a_command_flies_in_the_frame_after_the_state_it_answers_and_as_float32(
     assert times == pytest.approx((0.0, 1 / 60, 2 / 60, 3 / 60))
     exact = [struct.unpack("<f", struct.pack("<f", 0.01 * k))[0] for k in range(4)]
     assert list(rolls) == exact
+
+
+def test_a_function_is_asked_itself_and_restarted_as_an_object_is() -> None:
+    assert make_controller(f"{__name__}:nothing", {}).fly(None) == {}
+    assert not hasattr(make_controller(f"{__name__}:nothing", {}), "restart")
+    assert make_controller(f"{__name__}:restarted", {}).restart() == "again"
+    with pytest.raises(CampaignError, match=r"arguments: .*:nothing is a function, which takes the state alone"):
+        make_controller(f"{__name__}:nothing", {"gain": 1})
+
+
+def restarted(_state: Any) -> Dict[str, float]:
+    return {}
+
+
+restarted.restart = lambda: "again"  # type: ignore[attr-defined]
 
 
 def nothing(_state: Any) -> Dict[str, float]:

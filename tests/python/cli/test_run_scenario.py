@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from xplane_bridge.cli.run_scenario import lockstep_of, parser
-from xplane_bridge.scenario import ScenarioError
+from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.cli.run_scenario import lockstep_of, parser, plan_of
+from xplane_bridge.scenario import ScenarioError, parse_scenario
 
 
 @pytest.mark.parametrize(
@@ -35,3 +36,33 @@ def test_frames_a_second_that_are_none_are_refused(capsys):
 def test_options_that_do_not_go_together_are_refused(arguments, said):
     with pytest.raises(ScenarioError, match=said):
         lockstep_of(parser().parse_args(["demo", *arguments]))
+
+
+def level(_state):
+    """A controller that is a function."""
+    return {"roll": 0.0}
+
+
+def scenario(controller):
+    return parse_scenario({"name": "s", "controller": controller, "events": [{"at": 1, "end": True}]})
+
+
+@pytest.mark.parametrize("controller", [f"{__name__}:level", "xplane_bridge.controllers.twin:Hold"])
+def test_a_controller_is_a_class_or_a_function(controller):
+    plan = plan_of(scenario(controller), parser().parse_args(["s"]))
+    assert plan.programs["controller"][1:] == [controller]
+
+
+@pytest.mark.parametrize(
+    ("controller", "said"),
+    [
+        ("nowhere:level", "'nowhere:level' cannot be had"),
+        ("math:level", "'math:level' cannot be had"),
+        ("collections:Counter", "collections:Counter has no method fly"),
+        ("xplane_bridge.cli.attitude_hold:AttitudeHold", "AttitudeHold does not take them .* 'wanted'"),
+    ],
+)
+def test_a_controller_that_cannot_fly_is_said_before_anything_starts(controller, said):
+    with pytest.raises(CampaignError, match=said):
+        plan_of(scenario(controller), parser().parse_args(["s"]))
+    assert plan_of(scenario(controller), parser().parse_args(["s", "--controller", "my_own"]))

@@ -1,36 +1,36 @@
-"""fly_controller: flies a controller of campaigns, module:class, through the bridge."""
+"""fly_controller: flies a controller of campaigns, module:class or module:function, through the bridge."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
-import os
-import sys
 from typing import Any, Dict, List, Optional, Sequence
 
 import yaml
 
 from xplane_bridge import lockstep
-from xplane_bridge.campaign.definition import find_controller
-from xplane_bridge.cli.bridge.flown_law import FlownLaw, Law
+from xplane_bridge.campaign.definition import make_controller
+from xplane_bridge.cli.bridge.flown_law import FlownLaw
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.errors import XplaneBridgeError, yaml_problem
 from xplane_bridge.topics import NAMESPACE
 
 
 class ControllerError(XplaneBridgeError):
-    """The controller cannot be made."""
+    """--arguments is no mapping."""
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     p = argparse.ArgumentParser(
         prog="fly_controller",
-        description="Flies a controller on control/auto: a class that answers flight states, as campaigns fly it "
-        "(docs/campaigns.md), e.g. xplane_bridge.controllers.twin:Circuit.",
+        description="Flies a controller on control/auto: a class or a function that answers flight states, as "
+        "campaigns fly it (docs/campaigns.md), e.g. xplane_bridge.controllers.twin:Circuit.",
     )
-    p.add_argument("controller", metavar="MODULE:CLASS", help="what flies; its module's folder in PYTHONPATH, or here")
-    p.add_argument("--arguments", default="{}", metavar="YAML", help='what it is made with, e.g. "{speed: 66}"')
+    p.add_argument(
+        "controller", metavar="MODULE:NAME", help="what flies; its module's folder in PYTHONPATH, or the one you are in"
+    )
+    p.add_argument("--arguments", default="{}", metavar="YAML", help='what a class is made with, e.g. "{speed: 66}"')
     p.add_argument("--engage", action="store_true", help="ask for mode AUTO")
     p.add_argument("--any-aircraft", action="store_true", help="fly whatever is loaded")
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
@@ -52,23 +52,6 @@ def arguments_of(text: str) -> Dict[str, Any]:
     return found
 
 
-def made(name: str, arguments: Dict[str, Any]) -> Law:
-    """The controller `module:class`, made.
-
-    Raises:
-        CampaignError: There is none.
-        ControllerError: It does not take the arguments, or does not fly.
-    """
-    found = find_controller(name)
-    try:
-        law: Law = found(**arguments)
-    except TypeError as error:
-        raise ControllerError(f"--arguments: {name} does not take them ({error})") from None
-    if not callable(getattr(law, "fly", None)):
-        raise ControllerError(f"{name} has no method fly; expected a class whose fly(state) gives a command")
-    return law
-
-
 def aircraft_of(name: str) -> List[str]:
     """The aircraft that a controller is for, by the constant AIRCRAFT of its module; empty: any."""
     aircraft = getattr(importlib.import_module(name.partition(":")[0]), "AIRCRAFT", "")
@@ -79,8 +62,7 @@ def aircraft_of(name: str) -> List[str]:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
     args = parser().parse_args(ros_arguments(argv))
-    sys.path.append(os.getcwd())
-    law = made(args.controller, arguments_of(args.arguments))
+    law = make_controller(args.controller, arguments_of(args.arguments))
     wanted = [] if args.any_aircraft else aircraft_of(args.controller)
     namespace = args.namespace.rstrip("/")
     start_node("fly_controller", **lockstep.node_options(namespace))
