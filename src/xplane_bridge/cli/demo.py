@@ -171,7 +171,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     verdicts = flight_check.judge(plan.bag, plan.truth)
     verdicts += control_check.judge_control(plan.bag, **_LABELS) + overrides.verdicts
     for verdict in verdicts:
-        print(f"{'ok    ' if verdict.passed else 'FAILED'}  {verdict.name:10} {verdict.text}")
+        print(verdict.line)
     report = write_report([plan.bag], plan.output / "report.html")
     failed = [verdict.name for verdict in verdicts if not verdict.passed]
     print()

@@ -176,14 +176,14 @@ def judge_control(bag: Path, back_by: str, stuck: str, repaired: str) -> List[Ve
             modes = bags.read(f"{NAMESPACE}/control/mode")
             verdicts.append(check_modes(modes, applied, f"{NAMESPACE}/joystick_mapper_node"))
         else:
-            verdicts.append(Verdict("modes", True, "not judged: the flight ended before automatic flight was over"))
+            verdicts.append(Verdict("modes", True, "the flight ended before automatic flight was over", judged=False))
         if repaired in labels:
             failures = bags.read(f"{NAMESPACE}/failures/state")
             surfaces = bags.read(f"{NAMESPACE}/mission/surfaces")
             verdicts.append(check_stuck(failures, surfaces, ("aileron1", 2, 3), "aileron1_wing2_left", 5.0))
         else:
             began = "ended with it broken" if stuck in labels else "was too short for it (the mixing is learnt first)"
-            verdicts.append(Verdict("failure", True, f"stuck left aileron not judged: the flight {began}"))
+            verdicts.append(Verdict("failure", True, f"stuck left aileron: the flight {began}", judged=False))
     return verdicts
 
 

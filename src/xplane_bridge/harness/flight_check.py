@@ -51,6 +51,13 @@ class Verdict(NamedTuple):
     name: str
     passed: bool
     text: str  #: what was measured, and what was wanted
+    judged: bool = True  #: whether there was something to judge; otherwise the text says why not
+
+    @property
+    def line(self) -> str:
+        """It in a line."""
+        word = "FAILED" if not self.passed else "ok" if self.judged else "skipped"
+        return f"{word:7}  {self.name:10} {self.text}"
 
 
 @dataclass

@@ -8,9 +8,10 @@ import threading
 import numpy as np
 import pytest
 
+from support.flights.synthetic_flight import FlightBag
 from xplane_bridge import protocol
 from xplane_bridge.bags import Table
-from xplane_bridge.harness.control_check import check_modes, check_stick, check_stuck, spells
+from xplane_bridge.harness.control_check import check_modes, check_stick, check_stuck, judge_control, spells
 from xplane_bridge.harness.override_watch import OVERRIDES, OverrideWatch
 
 S = 1_000_000_000
@@ -200,6 +201,26 @@ class FakeXPlane:
         self._ended.set()
         self._thread.join()
         self._socket.close()
+
+
+@pytest.mark.parametrize(
+    ("labels", "why"),
+    [((), "too short"), (("stuck",), "ended with it broken")],
+)
+def test_what_a_short_flight_does_not_come_to_is_skipped(tmp_path, labels, why):
+    path = tmp_path / "short.bag"
+    types = {"flight_state": "FlightState", "control/mode": "ControlMode", "control/applied": "AppliedCommand"}
+    types["control/manual"] = "ControlCommand"
+    with FlightBag(path) as bag:
+        for topic, kind in types.items():
+            bag.add(f"/xplane/{topic}", f"xplane_bridge/{kind}", S, {})
+        bag.add("/xplane/joy", "sensor_msgs/Joy", S, {})
+        for label in labels:
+            bag.add("/xplane/scenario/label", "std_msgs/String", S, {"data": label})
+    modes, failure = judge_control(path, back_by="back", stuck="stuck", repaired="repaired")[1:]
+    assert modes.line.startswith("skipped  modes ")
+    assert failure.line.startswith("skipped  failure ")
+    assert why in failure.line
 
 
 @pytest.fixture

@@ -106,6 +106,14 @@ def test_a_stamp_that_stands_still_is_found_unless_a_new_epoch_begins():
     assert flight_check.check_stamps(states(**changed, epoch=epoch)).passed
 
 
+@pytest.mark.parametrize(
+    ("passed", "judged", "word"), [(True, True, "ok"), (False, True, "FAILED"), (True, False, "skipped")]
+)
+def test_what_was_not_judged_is_not_called_ok(passed, judged, word):
+    verdict = flight_check.Verdict("failure", passed, "why", judged)
+    assert verdict.line.split() == [word, "failure", "why"]
+
+
 @pytest.mark.parametrize(("lost", "passed"), [(4, True), (6, False)])
 def test_more_than_two_per_cent_of_lost_frames_fail(lost, passed):
     whole = states()
