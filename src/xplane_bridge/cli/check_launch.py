@@ -7,6 +7,7 @@ Ranges and single parameters are the nodes' own to judge.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import Callable, Dict, List, Mapping, Optional, Sequence
@@ -108,6 +109,13 @@ def _shipped(kind: str, folder: str, stem: str) -> Check:
     return check
 
 
+def _recording(_: str, value: str, __: Given) -> str:
+    """A file that rosbag writes, from ROS's folder on."""
+    home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
+    folder = (home / value).parent
+    return "" if folder == home or folder.is_dir() else f"there is no folder {folder}; make it, then record"
+
+
 def _scenario(_: str, value: str, __: Given) -> str:
     from xplane_bridge.cli.scenario_player import scenario_of
 
@@ -126,6 +134,7 @@ CHECKS: Dict[str, Check] = {
     **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
     **dict.fromkeys(("set_points", "engage", "lockstep"), _flag),
     "compression": _one_of("none", "lz4", "bz2"),
+    **dict.fromkeys(("bag", "prefix"), _recording),
     "joystick": _joystick,
     "joy_config": _joy_config,
     **dict.fromkeys(("common_config", "rx_config", "tx_config", "capture_config"), _parameters),

@@ -89,6 +89,7 @@ PROGRAMS = [
     ("xplane_emulator --fps 0", 2, ["--fps 0.0: expected 1..500"]),
     ("xplane_emulator --pilot none.yaml", 2, ["--pilot none.yaml: expected an existing file"]),
     ("xplane_emulator --pilot broken.yaml", 1, [UNPARSED]),
+    ("check_launch bag=/nonexistent/flight.bag", 1, ["there is no folder /nonexistent; make it, then record"]),
     ("check_launch prt=49000", 2, ["'prt=49000': expected KEY=VALUE", "port"]),
 ]
 
@@ -116,6 +117,8 @@ LAUNCHES = [
     ("failure.launch scenario:=nothing", 1, ["scenario:=nothing: ", SCENARIOS]),
     ("failure.launch scenario:={}/typo.yaml", 1, ["typo.yaml: scenario.evnts: unknown key; expected one of"]),
     ("record.launch split_size:=big", 1, ["split_size:=big: expected a whole number"]),
+    ("record.launch bag:=/nonexistent/flight.bag", 1, ["there is no folder /nonexistent; make it, then record"]),
+    ("record.launch prefix:=flights/one", 1, ["prefix:=flights/one: there is no folder ", "/flights; make it"]),
     ("record.launch compression:=zip", 1, ["compression:=zip: expected one of none, lz4, bz2"]),
     ("bridge.launch joystick:=wheel", 1, ["joystick:=wheel: expected one of none, mapper, joy, sdl, virtual, xplane"]),
     ("failure.launch scenario:=left_aileron_stuck joystick:=yes", 1, ["joystick:=yes: expected true or false"]),
