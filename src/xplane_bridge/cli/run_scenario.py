@@ -185,4 +185,6 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     missed = [s.name for s in scores if not s.passed]
     print(render(scores) if scores else f"{scenario.name} has no criteria")
     print(f"{scenario.name}: {len(scores) - len(missed)} of {len(scores)} criteria met; the recording is {plan.bag}")
+    page = [str(plan.bag), "-o", str(plan.output / "report.html")]
+    print(f"for a report: scripts/flight_report {' '.join(map(shlex.quote, page))}")
     return 1 if missed else 0

@@ -22,6 +22,7 @@ def fly(name: str, folder: Path, *options: str) -> dict:
     command = [sys.executable, str(program("run_scenario")), name, "--output", str(folder), *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=550, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+    assert f"scripts/flight_report {folder / 'flight.bag'} -o {folder / 'report.html'}" in done.stdout.splitlines()[-1]
     report = json.loads((folder / "scores.json").read_text(encoding="utf-8"))
     assert report["played"]["finished"]
     assert report["criteria"]
