@@ -58,6 +58,7 @@ NO_NAMES = {
     "sim/no/such_command": "a name that X-Plane does not have, in tests",
     "sim/operation/failures/rel_inver0": "a name that X-Plane does not have, in tests",
     "sim/operation/failures/rel_fcon_flap_1_lft_cntr": "a name that X-Plane does not have, in tests",
+    "sim/operation/override/override_joystik": "a name that X-Plane does not have, in tests",
     "sim/operation/failures/rel_nothing": "a name that X-Plane does not have, in tests",
     "sim/operation/failures/rel_of_another_version": "a name that X-Plane does not have, in tests",
     "sim/flightmodel/engine/ENGN_thro_override[1]": "an element of a scalar, in tests",

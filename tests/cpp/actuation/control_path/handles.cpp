@@ -52,6 +52,30 @@ TEST_F(HandlesTest, OneThatIsMovedInTheCockpitEndsNoReadBack) {
   EXPECT_EQ(path->notFollowed(), Texts{});
 }
 
+TEST_F(HandlesTest, OneThatTakesSecondsIsReadBackWhenItIsThere) {
+  start();
+  float wanted = 0.0F, there = 0.0F;
+  sim.on_message = [&](const core::FakeSimulator::Message& message) {
+    if (message.path == kFlapHandle) wanted = message.value;
+  };
+  sim.on_frame = [&] {
+    there = std::min(there + 0.005F, wanted);
+    sim.set(kFlapHandle, there);
+  };
+  core::ControlCommand command;
+  command.fields = core::kFieldFlaps;
+  command.flaps = 0.5;
+  const auto shown = [this] {
+    return std::count_if(applied.begin(), applied.end(), [](const auto& each) { return each.read_back; });
+  };
+  runWith(command, 1.0);
+  EXPECT_EQ(shown(), 0);
+  runWith(command, 1.5);
+  EXPECT_GT(shown(), 0);
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F);
+  EXPECT_EQ(path->notFollowed(), Texts{});
+}
+
 TEST_F(HandlesTest, OneThatXPlaneDoesNotMoveIsNamedAndTheStickIsReadBack) {
   start();
   sim.on_frame = [this] {
