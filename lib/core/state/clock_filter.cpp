@@ -236,8 +236,8 @@ void ClockFilter::advanceSimTime(const ClockSample& sample) {
       sim_time_step_ = 0.0;
     }
   }
-  // A period is off by half a step of its own, and the sum of many by up to a step of theirs; the raw value by half one.
-  // A narrower bound would make single steps differ from the period.
+  // A period is off by half a step of its own, and the sum of many by up to a step of theirs; the raw value by half
+  // one. A narrower bound would make single steps differ from the period.
   constexpr double kSteps = 2.0;
   sim_time_ = std::clamp(sim_time_ + step, raw - kSteps * quantum, raw + kSteps * quantum);
 }

@@ -198,8 +198,8 @@ class ControlArbiter {
   std::array<double, 3> stick_reference_;
   double surfaces_until_ = kNever;  // by running_time_
   double surfaces_latest_ = kNever;
-  bool heard_ = false;              // the topic of the mode, since the mode was asked for
-  bool surfaces_heard_ = false;     // control/surfaces, likewise
+  bool heard_ = false;           // the topic of the mode, since the mode was asked for
+  bool surfaces_heard_ = false;  // control/surfaces, likewise
   struct Seen {
     std::uint32_t sequence;
     double stamp;

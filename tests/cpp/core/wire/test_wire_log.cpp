@@ -3,7 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -78,11 +79,13 @@ std::vector<Block> packetsOf(const std::string& path) {
 class WireLogTest : public testing::Test {
  protected:
   WireLogTest() {
-    options_.file = testing::TempDir() + "wire_" + testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::string pattern = (std::filesystem::temp_directory_path() / "wire-log-XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+    options_.file = (folder_ / "wire").string();
     options_.node = "rx_node";
     options_.about = "<about/>";
-    for (const char* part : {"", "_part2", "_part3", "_run2"}) std::remove(path(part).c_str());
   }
+  ~WireLogTest() override { std::filesystem::remove_all(folder_); }
   std::string path(const std::string& part = "") const { return options_.file + ".rx_node" + part + ".pcapng"; }
   std::unique_ptr<WireLog> open(std::size_t buffer = WireLog::kBufferBytes) {
     return std::make_unique<WireLog>(
@@ -105,6 +108,7 @@ class WireLogTest : public testing::Test {
     return record;
   }
 
+  std::filesystem::path folder_;
   WireFileOptions options_;
   std::vector<std::string> said_;
   const std::string name_ = "flight";
