@@ -176,7 +176,7 @@ void ControlPath::publishApplied(const core::ArbitratedControls& controls, const
   applied.sim_time = watch_.sim_time;
   hooks_.applied(applied);
   // Handles that go by themselves by now, which takes some of them seconds.
-  if (sent.none()) applied.sent = controls.active & ever_sent_ & ~handles_shown_;
+  if (sent.none()) applied.sent = controls.active & ever_sent_;
   if (applied.sent.none()) return;
   if (awaiting_read_back_.empty()) last_followed_ = now();  // until now there was nothing to show
   awaiting_read_back_.push_back(applied);
