@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "xplane_bridge/actuation/pausing.hpp"
+#include "xplane_bridge/actuation/release_worker.hpp"
 #include "xplane_bridge/core/link/sim_link.hpp"
 
 namespace xplane_bridge {
@@ -177,20 +178,9 @@ bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report&
   OverrideManager overrides(link, report);
   const core::Deadline deadline(link->clock(), kUndoTime);
   std::string problem;  // of the journal
-  const auto attempt = [&problem](const std::function<bool()>& give_back) {
-    try {
-      return give_back();
-    } catch (const core::JournalError& error) {
-      problem = error.what();
-      return false;
-    }
-  };
   do {
     problem.clear();
-    // The aircraft first; then the pause, also where one of the first is not shown released.
-    const bool released = attempt([&] { return overrides.releaseLeftovers(kAttemptTime); });
-    const bool resumed = attempt([&] { return resumeLeftovers(link, kAttemptTime); });
-    if (released && resumed) return true;
+    if (giveBackLeftovers(link, &overrides, kAttemptTime, &problem)) return true;
     if (!problem.empty()) link->waitUntil([] { return false; }, kJournalAgain);
   } while (!deadline.over());
   if (!problem.empty()) report(problem, false);

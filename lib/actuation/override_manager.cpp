@@ -393,7 +393,7 @@ void OverrideManager::resend(const std::string& dataref, float value) {
 
 // --- confirming releases ---
 
-void OverrideManager::startRelease(const std::string& dataref) { releasing_[dataref] = {++releases_, 0, -1e9}; }
+void OverrideManager::startRelease(const std::string& dataref) { releasing_[dataref] = {++releases_, {}}; }
 
 bool OverrideManager::releasesPending() const {
   const Lock lock(*mutex_);
@@ -407,11 +407,11 @@ void OverrideManager::confirmReleases(double timeout_s) {
     const Lock lock(*mutex_);
     const double now = link_->clock().steadySeconds();
     const bool fresh =
-        std::any_of(releasing_.begin(), releasing_.end(), [](const auto& r) { return !r.second.attempts; });
+        std::any_of(releasing_.begin(), releasing_.end(), [](const auto& r) { return !r.second.retries.attempts; });
     for (auto& [dataref, release] : releasing_) {
       // One that X-Plane does not show holds up no other.
-      if (now < release.not_before || (fresh && release.attempts > 0)) continue;
-      if (++release.attempts >= kPromptAttempts) release.not_before = now + kLateRetry;
+      if (!release.retries.due(now) || (fresh && release.retries.attempts > 0)) continue;
+      release.retries.attempted(now);
       // Sent with the lock held, so that none goes out after one of them has been set again.
       const core::UndoOperation undo = undoOf(dataref);
       if (link_->sendUndo(undo) != core::SendStatus::kSent) continue;

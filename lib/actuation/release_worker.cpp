@@ -12,7 +12,23 @@ namespace {
 constexpr double kPeriod = 0.2;          // [s]
 constexpr double kReleaseAttempt = 1.0;  // [s] of one attempt
 
+/// A step that may throw core::JournalError, which is noted in `problem`. Returns what the step does; false then.
+bool attempt(std::string* problem, const std::function<bool()>& step) {
+  try {
+    return step();
+  } catch (const core::JournalError& error) {
+    *problem = error.what();
+    return false;
+  }
+}
+
 }  // namespace
+
+bool giveBackLeftovers(core::SimulatorPort* link, OverrideManager* overrides, double timeout_s, std::string* problem) {
+  const bool released = attempt(problem, [&] { return overrides->releaseLeftovers(timeout_s); });
+  const bool resumed = attempt(problem, [&] { return resumeLeftovers(link, timeout_s); });
+  return released && resumed;
+}
 
 ReleaseWorker::ReleaseWorker(core::SimulatorPort* link, OverrideManager* overrides,
                              std::function<void(const std::string&)> problem, std::shared_ptr<core::ThreadTurns> turns,
@@ -66,38 +82,25 @@ void ReleaseWorker::work() {
   const core::LinkStatus status = link_->status();
   if (!isUp(status)) return;
   std::string problem;  // of the journal
-  const auto attempt = [&problem](const std::function<bool()>& step) {
-    try {
-      return step();
-    } catch (const core::JournalError& error) {
-      problem = error.what();
-      return false;
-    }
+  const auto always = [&problem](const std::function<void()>& step) {
+    attempt(&problem, [&step] {
+      step();
+      return true;
+    });
   };
   const double now = link_->clock().steadySeconds();
   if (std::exchange(epoch_, status.epoch) != status.epoch) {
     leftovers_ = true;
-    attempts_ = 0;
+    retries_ = {};
   }
-  if (leftovers_ && (attempts_ < kPromptAttempts || now - attempted_at_ >= kLateRetry)) {
-    ++attempts_;
-    attempted_at_ = now;
-    // An override that X-Plane does not show released is no reason to leave it paused.
-    const bool released = attempt([this] { return overrides_->releaseLeftovers(kReleaseAttempt); });
-    const bool resumed = attempt([this] { return resumeLeftovers(link_, kReleaseAttempt); });
-    leftovers_ = !released || !resumed;
+  if (leftovers_ && retries_.due(now)) {
+    retries_.attempted(now);
+    leftovers_ = !giveBackLeftovers(link_, overrides_, kReleaseAttempt, &problem);
   }
-  attempt([this] {
-    overrides_->recordPreparations();
-    return true;
-  });
-  attempt([this] {
-    if (watch_) watch_();
-    return true;
-  });
-  attempt([this] {
+  always([this] { overrides_->recordPreparations(); });
+  if (watch_) always(watch_);
+  always([this] {
     if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseAttempt);
-    return true;
   });
   if (!problem.empty()) problem_(problem);
 }

@@ -14,8 +14,19 @@
 
 namespace xplane_bridge {
 
-constexpr int kPromptAttempts = 5;  ///< to release what X-Plane does not show released
-constexpr double kLateRetry = 5.0;  ///< [s] between those after that
+/// When what X-Plane does not show released is tried again: a few times at once, then every few seconds.
+struct Retries {
+  static constexpr int kPrompt = 5;
+  static constexpr double kPeriod = 5.0;  ///< [s]
+
+  int attempts = 0;
+  double not_before = -1e9;  ///< [s] steady; of the next one
+
+  bool due(double now) const { return now >= not_before; }
+  void attempted(double now) {
+    if (++attempts >= kPrompt) not_before = now + kPeriod;
+  }
+};
 
 /// The overrides this node has set in X-Plane, and nothing else's: each is in the journal before it is set, and taken
 /// out after it is released and read back. Thread-safe. Functions that wait for X-Plane say so; those that write to the
@@ -95,8 +106,7 @@ class OverrideManager {
 
   struct Release {
     std::uint64_t number = 0;  // of all releases
-    int attempts = 0;          // to see it shown
-    double not_before = -1e9;  // [s] steady; of the next one
+    Retries retries;           // to see it shown
   };
 
   struct Preparation {

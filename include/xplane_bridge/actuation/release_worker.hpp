@@ -14,6 +14,11 @@
 
 namespace xplane_bridge {
 
+/// Gives back what earlier runs have left in X-Plane: the aircraft first, then a pause, also where one of the first is
+/// not shown released. Waits up to `timeout_s` for each. Returns whether nothing is left.
+/// @param problem what is wrong with the journal; as it was where nothing is
+bool giveBackLeftovers(core::SimulatorPort* link, OverrideManager* overrides, double timeout_s, std::string* problem);
+
 /// The thread that waits until X-Plane has shown what was given back, and gives back what a crashed run has left in
 /// each X-Plane the link finds, so that nothing else has to wait for that.
 class ReleaseWorker {
@@ -45,10 +50,9 @@ class ReleaseWorker {
   OverrideManager* overrides_;
   std::function<void(const std::string&)> problem_;
   std::function<void()> watch_;
-  std::uint32_t epoch_ = 0;    // of the link
-  bool leftovers_ = true;      // of earlier runs may be in this X-Plane
-  int attempts_ = 0;           // to give them back
-  double attempted_at_ = 0.0;  // [s] steady, last
+  std::uint32_t epoch_ = 0;  // of the link
+  bool leftovers_ = true;    // of earlier runs may be in this X-Plane
+  Retries retries_;          // to give them back
   std::mutex mutex_;
   core::ClockCondition wanted_;
   bool now_ = false;  // without waiting for the end of the period
