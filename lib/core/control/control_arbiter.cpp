@@ -69,10 +69,6 @@ std::optional<std::string> validate(const ArbiterOptions& o) {
 
 ControlArbiter::ControlArbiter(const ArbiterOptions& options, double now) : options_(options), now_(now) {
   if (const auto text = validate(options)) throw std::invalid_argument(*text);
-  for (Source& source : sources_) {
-    source.expires.fill(kNever);
-    source.latest.fill(kNever);
-  }
   stick_reference_.fill(kUnset);
   status_.mode = options.initial_mode;
   status_.since = now;
@@ -87,13 +83,14 @@ void ControlArbiter::setTimeRunning(bool running, double now) {
   advance(now);
   if (running && !time_running_) {
     // Sources that were alive when time stopped get time to be heard again: once, however often it stops.
-    const auto extend = [this](double latest, double* until) {
-      if (*until > running_time_) *until = std::max(*until, std::min(latest, running_time_ + options_.resume_grace));
+    const auto extend = [this](Expiry* each) {
+      if (each->until <= running_time_) return;
+      each->until = std::max(each->until, std::min(each->latest, running_time_ + options_.resume_grace));
     };
-    extend(surfaces_latest_, &surfaces_until_);
+    extend(&surfaces_);
     for (Source& source : sources_) {
-      extend(source.alive_latest, &source.alive_until);
-      for (std::size_t i = 0; i < kChannelCount; ++i) extend(source.latest[i], &source.expires[i]);
+      extend(&source.alive);
+      for (Expiry& expires : source.expires) extend(&expires);
     }
   }
   time_running_ = running;
@@ -109,20 +106,19 @@ std::optional<CommandRefusal> ControlArbiter::onCommand(FlightMode from, const C
   }
   ++source.statistics.accepted;
   const bool was_alive = alive(from);
-  const double until = running_time_ + options_.command_timeout;
+  const Expiry expiry = nextExpiry();
+  const auto renew = [&expiry](Expiry* each) { *each = {std::max(each->until, expiry.until), expiry.latest}; };
   source.arrival = now_;
   source.sequence = command.sequence;
-  const double latest = until + options_.resume_grace;
-  source.alive_until = std::max(source.alive_until, until);
-  source.alive_latest = latest;
+  renew(&source.alive);
   heard_ = heard_ || from == status_.mode;
 
   const std::uint32_t throttle = command.fields & kThrottleFields;
   if (throttle != 0u) {
     // Levers and motors exclude each other: the newer kind ends the older one.
     for (int engine = 0; engine < kMaxEngines; ++engine) {
-      source.expires[index(leverChannel(engine))] = kNever;
-      source.expires[index(motorChannel(engine))] = kNever;
+      source.expires[index(leverChannel(engine))] = {};
+      source.expires[index(motorChannel(engine))] = {};
     }
     source.throttle_field = throttle;
   }
@@ -130,8 +126,7 @@ std::optional<CommandRefusal> ControlArbiter::onCommand(FlightMode from, const C
   for (std::size_t i = 0; i < kChannelCount; ++i) {
     if (!expanded.commanded.test(i)) continue;
     source.values[i] = expanded.values[i];
-    source.expires[i] = std::max(source.expires[i], until);
-    source.latest[i] = latest;
+    renew(&source.expires[i]);
   }
   if (from == FlightMode::kManual) watchStick(expanded.commanded, expanded.values, was_alive, now_);
   return std::nullopt;
@@ -171,14 +166,13 @@ std::string ControlArbiter::refusalOfSurfaces(double now) {
 
 void ControlArbiter::onSurfaces(double now) {
   advance(now);
-  surfaces_until_ = running_time_ + options_.command_timeout;
-  surfaces_latest_ = surfaces_until_ + options_.resume_grace;
+  surfaces_ = nextExpiry();
   surfaces_heard_ = true;
 }
 
 std::string ControlArbiter::endingSurfaces() {
   if (!surfacesFly()) return "";
-  surfaces_until_ = kNever;
+  endSurfaces();
   return "; control/surfaces ends";
 }
 
@@ -243,8 +237,8 @@ void ControlArbiter::forgetCommands(const std::string& reason, double now) {
   const bool sent_nothing = !surfacesFly() && std::all_of(origin_.begin(), origin_.end(),
                                                           [](Origin origin) { return origin == Origin::kNone; });
   for (Source& source : sources_) {
-    source.expires.fill(kNever);
-    source.alive_until = kNever;
+    source.expires.fill({});
+    source.alive = {};
     source.throttle_field = 0;
   }
   stick_reference_.fill(kUnset);

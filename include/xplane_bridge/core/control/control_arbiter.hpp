@@ -129,9 +129,9 @@ class ControlArbiter {
   /// A command of single surfaces that arrived at `now` and may fly. It has to be repeated like any other.
   void onSurfaces(double now);
   /// They were given up by those who command them.
-  void endSurfaces() { surfaces_until_ = kNever; }
+  void endSurfaces() { surfaces_ = {}; }
   /// Single surfaces are commanded, as of the last call.
-  bool surfacesFly() const { return surfaces_until_ > running_time_; }
+  bool surfacesFly() const { return surfaces_.until > running_time_; }
 
   RequestOutcome onModeRequest(const ModeRequest& request, double now);
 
@@ -154,12 +154,15 @@ class ControlArbiter {
  private:
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
+  /// When something falls silent, by running_time_.
+  struct Expiry {
+    double until = kNever;   // kNever: not commanded
+    double latest = kNever;  // until then a pause may put it off
+  };
   struct Source {
     ChannelValues values{};
-    std::array<double, kChannelCount> expires;  // by running_time_; kNever: not commanded
-    std::array<double, kChannelCount> latest;   // until then a pause may put `expires` off
-    double alive_until = kNever;
-    double alive_latest = kNever;
+    std::array<Expiry, kChannelCount> expires;
+    Expiry alive;
     double arrival = 0.0;
     std::uint32_t sequence = 0;
     std::uint32_t throttle_field = 0;  // the kind commanded last
@@ -173,9 +176,16 @@ class ControlArbiter {
 
   Source& sourceOf(FlightMode mode) { return sources_[mode == FlightMode::kManual ? 0 : 1]; }
   const Source& sourceOf(FlightMode mode) const { return sources_[mode == FlightMode::kManual ? 0 : 1]; }
-  bool fresh(FlightMode mode, std::size_t channel) const { return sourceOf(mode).expires[channel] > running_time_; }
-  bool alive(FlightMode mode) const { return sourceOf(mode).alive_until > running_time_; }
+  bool fresh(FlightMode mode, std::size_t channel) const {
+    return sourceOf(mode).expires[channel].until > running_time_;
+  }
+  bool alive(FlightMode mode) const { return sourceOf(mode).alive.until > running_time_; }
   void advance(double now);
+  /// Of what is commanded now.
+  Expiry nextExpiry() const {
+    const double until = running_time_ + options_.command_timeout;
+    return {until, until + options_.resume_grace};
+  }
   void watchStick(const ChannelSet& commanded, const ChannelValues& values, bool was_alive, double now);
   void dropOtherThrottleKind();
   std::optional<Target> targetOf(std::size_t channel) const;
@@ -196,8 +206,7 @@ class ControlArbiter {
   std::array<Origin, kChannelCount> origin_{};
   std::bitset<kChannelCount> blending_;  // changes hands: transition_rate applies until it has caught up
   std::array<double, 3> stick_reference_;
-  double surfaces_until_ = kNever;  // by running_time_
-  double surfaces_latest_ = kNever;
+  Expiry surfaces_;
   bool heard_ = false;           // the topic of the mode, since the mode was asked for
   bool surfaces_heard_ = false;  // control/surfaces, likewise
   struct Seen {
