@@ -165,8 +165,9 @@ class Bags:
                 file = _opened(path)
                 stack.callback(file.close)
                 self._files.append(file)
-            if self._states():
-                let_receive_times_go_on(self._states(), self._epochs, self._files)
+            states = self._states()
+            if states:
+                let_receive_times_go_on(states, self._epochs, self._files)
         except BaseException:
             stack.close()
             self._files = []
