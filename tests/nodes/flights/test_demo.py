@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import re
 import signal
 import socket
@@ -18,6 +17,7 @@ import pandas as pd
 import pytest
 
 from support.deadlines import WAIT_S
+from support.process_tree import alive, descendants
 from xplane_bridge import protocol, xplane_names
 from xplane_bridge.bags import Bags
 from xplane_bridge.emulator.view.renderer import StripError, read_strip
@@ -264,28 +264,3 @@ def test_the_bridge_survives_the_death_and_return_of_its_simulator(tmp_path: Pat
     assert len(states) - silent > 60, "states flow again after the return"
     assert states["epoch"][-1] > states["epoch"][silent], "histories must not cross the restart"
     assert int(states["valid"][-1]) & valid_all == valid_all
-
-
-def descendants(pid: int) -> list:
-    """All processes below `pid`, by /proc."""
-    parents = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                stat = (entry / "stat").read_text()
-            except OSError:
-                continue
-            parents[int(entry.name)] = int(stat.rpartition(")")[2].split()[1])
-    found, level = [], [pid]
-    while level:
-        level = [child for child, parent in parents.items() if parent in level]
-        found += level
-    return found
-
-
-def alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return False

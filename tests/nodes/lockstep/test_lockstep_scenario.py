@@ -18,6 +18,7 @@ from typing import Iterator
 import numpy as np
 import pytest
 
+from support.process_tree import descendants, named
 from xplane_bridge.bags import Bags
 from xplane_bridge.resources import program
 
@@ -53,22 +54,6 @@ events:
 """
 
 
-def children_of(pid: int) -> list[int]:
-    """A process's children, theirs, and so on."""
-    parents = {}
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            parents[int(folder.name)] = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-        except OSError:
-            continue
-    found: list[int] = []
-    new = {pid}
-    while new:
-        new = {child for child, parent in parents.items() if parent in new}
-        found += new
-    return found
-
-
 @contextlib.contextmanager
 def load() -> Iterator[None]:
     """Wants all processors."""
@@ -94,13 +79,12 @@ def shake(flying: subprocess.Popen, seed: int, truth: Path, stalled: str | None)
     dice = random.Random(seed)
     with load():
         while flying.poll() is None:
-            pids = children_of(flying.pid)
+            pids = descendants(flying.pid)
             if stalled and truth.is_file() and truth.stat().st_size > FLIES_BYTES:
                 long, stalled = stalled, None
                 for name, time_s in ((long, STALL_S), (RECORDER, RECORDER_STALL_S)):
-                    named = [pid for pid in pids if Path(f"/proc/{pid}/comm").read_text().startswith(name)]
                     print(f"{name} stands still")
-                    stop_for(min(named), time_s)  # tx_node's guardian is its child
+                    stop_for(min(named(pids, name)), time_s)  # tx_node's guardian is its child
             elif pids:
                 stop_for(dice.choice(pids), dice.uniform(0.0, 0.1))
             time.sleep(dice.uniform(0.0, 0.1))

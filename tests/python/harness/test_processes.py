@@ -9,16 +9,8 @@ import time
 
 import pytest
 
+from support.process_tree import alive
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
-
-
-def alive(pid):
-    """Whether a process runs (a zombie does not)."""
-    try:
-        with open(f"/proc/{pid}/stat", encoding="ascii") as stat:
-            return stat.read().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def python(code, tmp_path, name="child"):
