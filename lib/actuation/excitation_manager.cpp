@@ -46,7 +46,7 @@ std::string planAxes(const std::string& target, std::vector<core::ChannelSet>* c
     const core::ChannelSet own = channelsOf(axis);
     if (own.none()) {
       return "target is \"" + target +
-             "\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md), of a " +
+             "\"; expected roll, pitch, yaw, throttle or a surface (docs/control/surfaces.md), of a " +
              "multisine also several axes, for example \"roll,pitch\"";
     }
     if ((all & own).any()) return "target is \"" + target + "\"; expected each axis once";

@@ -1,4 +1,4 @@
-"""A node's part in lock-step (docs/lockstep.md): it answers every flight_state, with a command or without one."""
+"""A node's part in lock-step (docs/experiments/lockstep.md): an answer to every flight_state, commanding or not."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ _ALL_FROM_S = 20.0
 
 @benchmark
 def failsafes(context: Context) -> list[Measure]:
-    """Altitude lost in 30 s after the program that flew died, stepped; prints the table of docs/failsafes.md.
+    """Altitude lost in 30 s after the program that flew died, stepped; prints the table of docs/control/failsafes.md.
 
     With less than 20 s it flies less often, a third of the flights at least: the budgets are for flights of 30 s.
     """

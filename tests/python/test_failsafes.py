@@ -1,4 +1,4 @@
-"""docs/failsafes.md: its table is what the emulator's aircraft do, and the shipped failsafes are the ones to have."""
+"""docs/control/failsafes.md: its table is what the emulator's aircraft do, and the shipped ones are right."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from support.flights.failsafe_flights import SHIPPED, STARTS, Outcome, outcomes, table
 from xplane_bridge.emulator.aircraft import model_names
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "failsafes.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs/control/failsafes.md"
 
 
 @pytest.fixture(scope="module")

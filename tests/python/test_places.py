@@ -54,7 +54,7 @@ def test_the_table_has_the_changes_that_are_asked_for_most():
 
 
 def test_documents_explain_every_kind():
-    surfaces, scenarios = (ROOT / "docs/surfaces.md", ROOT / "config/scenarios/README.md")
+    surfaces, scenarios = (ROOT / "docs/control/surfaces.md", ROOT / "config/scenarios/README.md")
     for document, kinds in ((surfaces, FAILURE_KINDS), (scenarios, (*FAILURE_KINDS, *EXCITATION_KINDS))):
         words = document.read_text(encoding="utf-8")
         assert [kind for kind in kinds if not re.search(rf"\b{re.escape(kind)}\b", words)] == [], document

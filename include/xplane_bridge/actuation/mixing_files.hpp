@@ -7,7 +7,8 @@
 
 namespace xplane_bridge {
 
-/// The mixing kept for an aircraft (docs/mixing_file.md); nullopt where there is no file. @throws core::MixingFileError
+/// The mixing kept for an aircraft (docs/control/mixing_file.md); nullopt where there is none.
+/// @throws core::MixingFileError
 std::optional<core::MixingModel> readMixingFile(const std::string& folder, const std::string& aircraft);
 
 /// Keeps a mixing; makes the folder. Returns the file's path. @throws core::MixingFileError

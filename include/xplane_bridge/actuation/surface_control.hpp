@@ -21,7 +21,7 @@ namespace xplane_bridge {
 
 struct SurfaceControlOptions {
   core::MixingRequirements mixing;
-  std::string mixing_folder;   ///< of the mixing files (docs/mixing_file.md); empty: none are kept
+  std::string mixing_folder;   ///< of the mixing files (docs/control/mixing_file.md); empty: none are kept
   std::string shipped_mixing;  ///< of those to begin with; empty: none
   core::DriverOptions driver;
   double flap_rate = 0.15;       ///< [1/s] of full travel, while they are driven
@@ -57,7 +57,7 @@ struct SurfaceControlStatus {
 };
 
 /// Every control surface, driven one by one while something needs that (a broken surface, a command to single surfaces,
-/// an excitation of one), and left to X-Plane otherwise. Learns the mixing that takes (docs/surfaces.md).
+/// an excitation of one), and left to X-Plane otherwise. Learns the mixing that takes (docs/control/surfaces.md).
 ///
 /// X-Plane's frames drive it: what is sent goes out on arrival of each. It goes by the link's clock. Thread-safe;
 /// nothing waits but for the journal's disk.

@@ -197,10 +197,11 @@ FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion ve
     }
   }
   if (out.plan.datarefs.empty()) {
-    return refuse(FailureError::kInvalid,
-                  "name is \"" + request.name +
-                      "\": expected a surface (docs/surfaces.md), engine_<n>, bus_<n>, generator_<n>, battery_<n>, "
-                      "pitot_<n>, static_<n>, gyro_<n>, or a rel_* dataref");
+    return refuse(
+        FailureError::kInvalid,
+        "name is \"" + request.name +
+            "\": expected a surface (docs/control/surfaces.md), engine_<n>, bus_<n>, generator_<n>, battery_<n>, "
+            "pitot_<n>, static_<n>, gyro_<n>, or a rel_* dataref");
   }
   if (request.kind != "failed") {
     return refuse(FailureError::kInvalid, "kind is \"" + request.kind + "\": expected failed for " + request.name);

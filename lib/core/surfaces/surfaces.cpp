@@ -85,8 +85,8 @@ SurfaceCommandResult checkSurfaceCommand(const std::vector<std::string>& names,
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto number = surfaceNumber(names[i]);
     if (!number) {
-      out.refusal =
-          refuse(Refusal::kUnknownSurface, "\"" + names[i] + "\" is no surface: expected a name of docs/surfaces.md");
+      out.refusal = refuse(Refusal::kUnknownSurface,
+                           "\"" + names[i] + "\" is no surface: expected a name of docs/control/surfaces.md");
       return out;
     }
     if (std::any_of(surfaces.begin(), surfaces.end(), [&](const auto& s) { return s.surface == *number; })) {

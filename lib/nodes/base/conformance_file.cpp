@@ -41,7 +41,7 @@ std::uint32_t readConformance(const std::string& file, const core::Endpoint& pee
     for (const std::string& id : found.refuted) {
       const std::string consequence = core::consequenceOf(id);
       ROS_INFO("%s: %s is refuted: %s", path.c_str(), id.c_str(),
-               consequence.empty() ? "see docs/doctor.md" : consequence.c_str());
+               consequence.empty() ? "see docs/setups/doctor.md" : consequence.c_str());
     }
     return found.otherwise();
   } catch (const core::ConformanceError& error) {

@@ -92,7 +92,7 @@ core::SurfaceInput surfaceOf(const std::string& name, const ParamLoader& in) {
   out.name = name;
   if (!core::surfaceNumber(name)) {
     throw ParamError("parameter " + in.fullKey("") + ": there is no surface \"" + name +
-                     "\"; expected one as aileron1_wing2_left, see docs/surfaces.md");
+                     "\"; expected one as aileron1_wing2_left, see docs/control/surfaces.md");
   }
   out.axis = axisOf(in);
   out.increase_button = in.integer("increase_button", kIndexOrNone, -1);

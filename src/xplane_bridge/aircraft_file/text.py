@@ -69,12 +69,12 @@ def yaml_of(seen: Observed, facts: Facts) -> str:
     lines.append(f"engines: {min(max(seen.engines, 1), 8)}")
     if facts.reverse:
         lines.append("reverse_thrust: true    # levers below 0")
-    lines.append(f"failsafe: {facts.failsafe}    # see it fly by it before you rely on it: docs/failsafes.md")
+    lines.append(f"failsafe: {facts.failsafe}    # see it fly by it before you rely on it: docs/control/failsafes.md")
     lines += ["", "channels:", *_channels(seen, facts)]
     roll, pitch = _EXCITATION[facts.kind]
     lines += ["", f"excitation: {{max_roll_deg: {roll}, max_pitch_deg: {pitch}}}    # there a test signal ends"]
     if seen.surfaces:
-        lines.append("surfaces: {rate_deg_s: 60.0}    # of surfaces driven one by one: docs/surfaces.md")
+        lines.append("surfaces: {rate_deg_s: 60.0}    # of surfaces driven one by one: docs/control/surfaces.md")
     return "\n".join(lines) + "\n"
 
 

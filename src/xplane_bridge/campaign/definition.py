@@ -1,4 +1,4 @@
-"""Reads and checks campaign files (docs/campaigns.md)."""
+"""Reads and checks campaign files (docs/experiments/campaigns.md)."""
 
 from __future__ import annotations
 

@@ -32,8 +32,8 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="run_campaign",
         description=(
-            "Flies a campaign (docs/campaigns.md) into DIR: table.parquet has a row for each flight, report.html shows "
-            "them. What was interrupted, by whatever, goes on where it stopped when it is started again."
+            "Flies a campaign (docs/experiments/campaigns.md) into DIR: table.parquet has a row for each flight, "
+            "report.html shows them. What was interrupted, by whatever, goes on where it stopped if started again."
         ),
     )
     p.add_argument("campaign", metavar="CAMPAIGN", nargs="?", type=Path, help="file; not needed with --refly")

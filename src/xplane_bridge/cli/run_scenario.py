@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
         "--lockstep",
         action="store_true",
         help="the emulator waits for all answers to each frame: the same flight every time, as fast as that goes; all "
-        "times are simulated (docs/lockstep.md)",
+        "times are simulated (docs/experiments/lockstep.md)",
     )
     p.add_argument("--speed", type=positive, metavar="X", help="of --lockstep: at most so many times real time")
     p.add_argument(

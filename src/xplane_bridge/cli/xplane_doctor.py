@@ -1,4 +1,4 @@
-"""The doctor's command line; docs/doctor.md describes it."""
+"""The doctor's command line; docs/setups/doctor.md describes it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="xplane_doctor",
         description="Says within 15 s why nothing arrives from X-Plane, or that all is well. Changes nothing, but with "
         "--conformance, which flies a card of two minutes that finds out what only a live X-Plane can settle.",
-        epilog="exit code: 0 all is well, 1 findings, 2 cannot run. docs/doctor.md lists all findings.",
+        epilog="exit code: 0 all is well, 1 findings, 2 cannot run. docs/setups/doctor.md lists all findings.",
     )
     parser.add_argument(
         "--host", default="", help="X-Plane's computer, name or IPv4 address (default: as the nodes find it)"

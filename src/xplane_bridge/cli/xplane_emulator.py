@@ -1,4 +1,4 @@
-"""The X-Plane emulator's command line; docs/emulator.md describes it."""
+"""The X-Plane emulator's command line; docs/experiments/emulator.md describes it."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Settings:
 
     @property
     def journal_folder(self) -> Path:
-        """Where the bridge keeps its journals (docs/journal.md)."""
+        """Where the bridge keeps its journals (docs/nodes/journal.md)."""
         ros_home = self.environment.get("ROS_HOME")
         return (Path(ros_home) if ros_home else Path.home() / ".ros") / "xplane_bridge"
 

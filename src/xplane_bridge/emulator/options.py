@@ -130,7 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="xplane_emulator",
         description="Speaks X-Plane's UDP protocol and flies aircraft of its own. Prints `READY {json}` with its port.",
-        epilog="docs/emulator.md describes what is modelled, the faults, and the stepping protocol.",
+        epilog="docs/experiments/emulator.md describes what is modelled, the faults, and the stepping protocol.",
     )
     flight = p.add_argument_group("flight")
     flight.add_argument("--aircraft", default="fixed_wing", metavar="NAME", help=f"{', '.join(model_names())}")
@@ -317,7 +317,7 @@ def _parser() -> argparse.ArgumentParser:
         type=otherwise_ids,
         default=frozenset(),
         metavar="ID,...",
-        help="where X-Plane is not as the bridge assumes: questions of docs/doctor.md, or 'all'",
+        help="where X-Plane is not as the bridge assumes: questions of docs/setups/doctor.md, or 'all'",
     )
     wire.add_argument(
         "--surface-failures",

@@ -1,4 +1,4 @@
-"""Gymnasium environments that fly as the bridge flies (docs/gym.md).
+"""Gymnasium environments that fly as the bridge flies (docs/experiments/gym.md).
 
 Importing this registers `xplane_bridge/FixedWing-v0`, `xplane_bridge/Multirotor-v0` and `xplane_bridge/Tiltrotor-v0`.
 """

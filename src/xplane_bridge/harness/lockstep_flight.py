@@ -31,7 +31,7 @@ _QUIET_S = 1.0  # without a flight state, while the simulator stands: all that w
 
 @dataclass
 class Lockstep:
-    """How to fly in lock-step (docs/lockstep.md)."""
+    """How to fly in lock-step (docs/experiments/lockstep.md)."""
 
     participants: List[str] = field(default_factory=list)  #: names of nodes that answer every frame
     stick: str = ""  #: the one of them that publishes joy

@@ -10,7 +10,7 @@ from xplane_bridge.harness.processes import HarnessError, wait_until
 from xplane_bridge.harness.xplane_client import XPlaneClient
 
 _FOLDER = "sim/operation/override/"
-#: What tx_node may take (docs/journal.md), without the folder.
+#: What tx_node may take (docs/nodes/journal.md), without the folder.
 OVERRIDES = (
     "override_joystick_roll",
     "override_joystick_pitch",

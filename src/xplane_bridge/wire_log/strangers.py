@@ -86,7 +86,7 @@ class StrangersCapture:
         if incomplete:
             out.append(
                 f"{incomplete} datagrams are not replayed because the capture does not have all fragments of them; "
-                "capture with the filter of docs/wire_log.md, which takes fragments too"
+                "capture with the filter of docs/experiments/wire_log.md, which takes fragments too"
             )
         if cut:
             out.append(f"{cut} datagrams are not replayed because they were cut short; capture whole packets (-s 0)")

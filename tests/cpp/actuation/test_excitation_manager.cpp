@@ -76,10 +76,10 @@ TEST_F(ExcitationManagerTest, PlanSaysWhatIsWrongWithARequest) {
   ExcitationRequest request = doubletOn("roll");
   request.kind = "square";
   EXPECT_NE(wrongWith(request).find("kind is \"square\""), std::string::npos) << wrongWith(request);
-  EXPECT_EQ(
-      wrongWith(doubletOn("gear")),
-      "target is \"gear\"; expected roll, pitch, yaw, throttle or a surface (docs/surfaces.md), of a multisine also "
-      "several axes, for example \"roll,pitch\"");
+  EXPECT_EQ(wrongWith(doubletOn("gear")),
+            "target is \"gear\"; expected roll, pitch, yaw, throttle or a surface (docs/control/surfaces.md), of a "
+            "multisine also "
+            "several axes, for example \"roll,pitch\"");
   EXPECT_EQ(wrongWith(doubletOn("roll", 1.1)), "amplitude of an axis must be at most 1 (full travel)");
   EXPECT_EQ(wrongWith(doubletOn(FakeAirframe::kLeft, 1.1)), "") << "degrees";
   request = doubletOn("roll");

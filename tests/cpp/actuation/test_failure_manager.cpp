@@ -103,7 +103,7 @@ TEST_F(FailureManagerTest, WithoutTheJournalNothingIsBroken) {
 // ------------------------------------------------------------------------------------------------ refusals
 
 TEST_F(FailureManagerTest, RefusesWhatCannotBeBroken) {
-  refused(failed("wing_9"), ResultCode::kRefused, "name is \"wing_9\": expected a surface (docs/surfaces.md)");
+  refused(failed("wing_9"), ResultCode::kRefused, "name is \"wing_9\": expected a surface (docs/control/surfaces.md)");
   refused(failed("engine_9"), ResultCode::kRefused, "name is \"engine_9\": expected engine_1 to engine_8");
   refused(broken("engine_1", "stuck"), ResultCode::kRefused, "kind is \"stuck\": expected failed for engine_1");
   refused(broken(FakeAirframe::kLeft, "bent"), ResultCode::kRefused, "kind is \"bent\": expected stuck");

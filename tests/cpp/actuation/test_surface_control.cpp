@@ -230,7 +230,7 @@ TEST_F(SurfaceControlTest, RefusedCommandsSayWhatWasExpected) {
     return surfaces_.command(names, angles, 1).value_or("taken");
   };
   EXPECT_EQ(refusal({FakeAirframe::kLeft}, {}), "names has 1 entries and deflections_deg 0: expected as many");
-  EXPECT_EQ(refusal({"wing"}, {1.0F}), "\"wing\" is no surface: expected a name of docs/surfaces.md");
+  EXPECT_EQ(refusal({"wing"}, {1.0F}), "\"wing\" is no surface: expected a name of docs/control/surfaces.md");
   EXPECT_EQ(refusal({FakeAirframe::kLeft}, {25.0F}),
             "aileron1_wing2_left is 25.0 deg: expected its travel, -21.0..21.0");
   EXPECT_NE(refusal({"flap1_wing1_left"}, {1.0F}).find("has not been seen to move"), std::string::npos);

@@ -73,7 +73,7 @@ inline std::string fieldTableMarkdown() {
           "with\n"
           "  transport `data` too.\n"
           "* **Row**: transport `data`, `row.slot`. In brackets: unit on the wire and factor into the field's unit.\n"
-          "* **[? id]** marks what only a live simulator can settle: see docs/doctor.md.\n\n"
+          "* **[? id]** marks what only a live simulator can settle: see docs/setups/doctor.md.\n\n"
           "Datarefs are checked against Laminar's lists of 11.40, 11.55, 12.00, 12.08 and 12.10\n"
           "(`src/xplane_bridge/xplane_names`); rows are those of X-Plane 11's Data Output screen.\n";
   const FieldSpec* previous = nullptr;

@@ -15,7 +15,7 @@ REFUSED = 2
 #: A refusal says what is missing.
 WORDS = re.compile(r"expected|give a place")
 
-#: Services that an empty request asks for something, in the words of docs/services.md.
+#: Services that an empty request asks for something, in the words of docs/nodes/services.md.
 MEANT = {
     "lockstep/step": "holds or pauses",
     "tx_node/clear_failures": "repairs all",
@@ -50,11 +50,11 @@ def test_nothing_given_is_refused_by_every_service_that_does_not_mean_it(bridge:
     bridge.wait_for_diagnostics("flight state")  # both nodes have started
     services = own_services(bridge)
     assert set(MEANT) < set(services)
-    page = (ROOT / "docs" / "services.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/nodes/services.md").read_text(encoding="utf-8")
     for name, kind in sorted(services.items()):
         if name in MEANT:
             leaf = name.rsplit("/", 1)[-1]
-            assert f'`{leaf} "{{}}"` {MEANT[name]}' in page, "docs/services.md says which mean something, and what"
+            assert f'`{leaf} "{{}}"` {MEANT[name]}' in page, "docs/nodes/services.md says what which means"
             continue
         answer = bridge.call(name, kind)
         assert (answer.success, answer.result.code) == (False, REFUSED), f"{name}: {answer}"

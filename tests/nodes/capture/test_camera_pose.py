@@ -121,7 +121,7 @@ def test_pose_is_that_of_the_drawn_camera_in_every_view(
         assert compared >= 10, f"{view}: only {compared} of {len(numbers)} pictures"
     assert fastest > 60.0, "the aircraft was to roll"
 
-    # The aircraft of a picture is at its frame's stamp, the camera in it at its own: docs/capture_node.md.
+    # The aircraft of a picture is at its frame's stamp, the camera in it at its own: docs/nodes/capture_node.md.
     aircraft = {t.header.stamp for m in transforms.messages for t in m.transforms if t.child_frame_id == "base_link"}
     of_frame = [states.messages[number] for numbers in seen.values() for number in numbers]
     of_frame = [state for state in of_frame if not state.quality & (unsure | FrameState.QUALITY_INTERPOLATED)]

@@ -13,7 +13,7 @@ import pytest
 from xplane_bridge.bags import Bags
 from xplane_bridge.resources import program
 
-#: A third of the frames: the controllers meet the same limits as with the 60 a second in process (docs/flights.md).
+#: A third of the frames: the controllers meet the same limits as with 60 a second in process (docs/control/flights.md).
 IN_LOCK_STEP = ("--lockstep", "--emulator=--fps 20")
 
 

@@ -203,8 +203,8 @@ def test_ros_time_of_a_node_is_that_of_the_frame(world):
 
 
 def example(world, language):
-    """The controller of docs/lockstep.md, started as it stands there."""
-    page = (Path(__file__).resolve().parents[3] / "docs/lockstep.md").read_text(encoding="utf-8")
+    """The controller of docs/experiments/lockstep.md, started as it stands there."""
+    page = (Path(__file__).resolve().parents[3] / "docs/experiments/lockstep.md").read_text(encoding="utf-8")
     code = page.partition(f"```{language}\n")[2].partition("```")[0]
     if language == "cpp":
         assert code == Path(__file__).with_name("lockstep_controller.cpp").read_text(encoding="utf-8")

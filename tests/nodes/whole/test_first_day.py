@@ -205,7 +205,7 @@ def scores(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def test_the_afternoon_of_the_tutorial(shells: Shells) -> None:
-    todo = blocks(ROOT / "docs" / "tutorial.md")
+    todo = blocks(ROOT / "docs/tutorial.md")
     ready = {"shell 1": r"^READY\b", "shell 2": "started", "shell 3": "started", "shell 4": "started"}
     recorded: RecordedTopics | None = None
     for number, block in enumerate(todo):

@@ -38,7 +38,7 @@ pytestmark = pytest.mark.skipif(bool(_NOT_PERMITTED), reason=_NOT_PERMITTED)
 
 
 class Flight:
-    """Simulator and bridge, started on the two machines with the very commands of docs/two_machines.md."""
+    """Simulator and bridge, started on the two machines with the very commands of docs/setups/two_machines.md."""
 
     def __init__(self, machines: TwoMachines, folder: Path, display: str) -> None:
         self.simulator, self.bridge = machines.simulator, machines.bridge

@@ -101,7 +101,7 @@ def test_the_page_needs_no_network_and_says_what_was_flown() -> None:
 
 
 def test_the_example_of_the_document_flies(tmp_path: Path, monkeypatch) -> None:
-    text = (ROOT / "docs/campaigns.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/experiments/campaigns.md").read_text(encoding="utf-8")
     for name, language in (("gusts.yaml", "yaml"), ("my_controller.py", "python")):
         block = text.split(f"`{name}`:\n\n```{language}\n", 1)[1].split("```", 1)[0]
         (tmp_path / name).write_text(block, encoding="utf-8")

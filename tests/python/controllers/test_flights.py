@@ -82,8 +82,8 @@ class WatchedOutAndBack(Watched, OutAndBack):
 
 
 def shown(name: str) -> Dict[str, float]:
-    """The numbers that docs/flights.md shows of a flight, by criterion."""
-    text = (ROOT / "docs/flights.md").read_text(encoding="utf-8")
+    """The numbers that docs/control/flights.md shows of a flight, by criterion."""
+    text = (ROOT / "docs/control/flights.md").read_text(encoding="utf-8")
     section = next(part for part in text.split("\n## ") if f"`{name}`, " in part)
     rows = re.findall(r"^\| ([\w ]+) \| .*? \| (-?[\d.]+)\D* \| \w+ ", section, re.MULTILINE)
     return {criterion: float(number) for criterion, number in rows}

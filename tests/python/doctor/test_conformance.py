@@ -101,7 +101,7 @@ def test_each_open_question_in_the_sources_is_on_the_card_and_the_other_way_roun
 
 def test_each_question_has_a_switch_of_the_emulator_and_a_line_in_the_documentation():
     assert sorted(IDS) == sorted(otherwise.IDS)
-    text = (ROOT / "docs/doctor.md").read_text(encoding="utf-8").split("\n## The card\n", 1)[1]
+    text = (ROOT / "docs/setups/doctor.md").read_text(encoding="utf-8").split("\n## The card\n", 1)[1]
     assert re.findall(r"^\| `([a-z0-9-]+)` \|", text, re.MULTILINE)[1:] == IDS
 
 

@@ -144,7 +144,7 @@ def test_every_check_needs_observations_that_there_are():
 
 
 def test_every_finding_is_explained_in_the_docs():
-    text = (ROOT / "docs" / "doctor.md").read_text(encoding="utf-8").partition("| `id` | when |")[2]
+    text = (ROOT / "docs/setups/doctor.md").read_text(encoding="utf-8").partition("| `id` | when |")[2]
     text = text.partition("\n## ")[0]
     explained = {
         name for row in re.findall(r"^\| (`.*?) \|", text, re.MULTILINE) for name in re.findall(r"`([^`]+)`", row)

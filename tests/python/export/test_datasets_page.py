@@ -1,4 +1,4 @@
-"""docs/datasets.md: its table names the formats there are, and each example runs as it stands there."""
+"""docs/pictures/datasets.md: its table names the formats there are, and each example runs as it stands there."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from support.white_lines import airport_file
 from xplane_bridge.cli.sight import label_images
 from xplane_bridge.export.formats import FORMATS
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "datasets.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs/pictures/datasets.md"
 BLOCKS = blocks(PAGE)
 
 

@@ -48,7 +48,7 @@ def test_what_is_observed_has_the_names_and_units_of_the_message() -> None:
     assert {name: field.unit for name, field in FIELDS.items()} == {
         name: units[name.partition(".")[0]] for name in FIELDS
     }
-    page = (ROOT / "docs/gym.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/experiments/gym.md").read_text(encoding="utf-8")
     for name, field in FIELDS.items():
         bounds = "sine and cosine" if field.turns else f"{field.low:g} .. {field.high:g}"
         assert f"| `{name}` | {field.unit} | {bounds} |" in page

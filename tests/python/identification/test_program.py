@@ -1,4 +1,4 @@
-"""The program identify_model: files, page, refusals; and the example of docs/identification.md as it stands there."""
+"""The program identify_model: files, page, refusals; and the example of docs/experiments/identification.md."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from xplane_bridge.identification import files
 from xplane_bridge.identification.linearisation import Condition, linearise
 from xplane_bridge.identification.model import Estimate
 
-PAGE = ROOT / "docs" / "identification.md"
+PAGE = ROOT / "docs/experiments/identification.md"
 
 
 @pytest.fixture(scope="module")

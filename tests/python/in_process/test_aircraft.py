@@ -130,7 +130,7 @@ def test_a_value_that_tx_node_refuses_is_refused_in_process(kind: str, value: ob
 
 
 def test_surfaces_have_the_names_of_the_core() -> None:
-    text = (ROOT / "docs/surfaces.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/control/surfaces.md").read_text(encoding="utf-8")
     assert "aileron1_wing2_left" in text
     assert model_surface("aileron1_wing2_left") == "wing2l_ail1"
     assert model_surface("elevator1_right") == "hstab2_elv1"

@@ -94,7 +94,7 @@ def test_data_output_in_fragments_is_played_and_what_is_missing_is_said(tmp_path
     assert strange.rows == 1
     assert strange.left_out() == [
         "1 datagrams are not replayed because the capture does not have all fragments of them; capture with the filter "
-        "of docs/wire_log.md, which takes fragments too",
+        "of docs/experiments/wire_log.md, which takes fragments too",
         "1 datagrams of X-Plane are not replayed: they are neither RREF, DATA, RPOS nor BECN",
         f"{file} is cut off; the replay ends there",
     ]

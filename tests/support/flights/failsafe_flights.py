@@ -1,4 +1,4 @@
-"""What becomes of the emulator's aircraft when their program dies: the flights behind docs/failsafes.md."""
+"""What becomes of the emulator's aircraft when their program dies: the flights behind docs/control/failsafes.md."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def outcomes() -> Iterator[Outcome]:
 
 
 def table(flown: List[Outcome]) -> str:
-    """docs/failsafes.md's table."""
+    """docs/control/failsafes.md's table."""
     lines = [
         "| aircraft | program dies in | failsafe | altitude lost | speed lost | largest bank | lives |",
         "|---|---|---|---|---|---|---|",

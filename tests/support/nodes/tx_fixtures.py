@@ -209,7 +209,7 @@ def call(world: Any, service: str, kind: str, /, **request: Any) -> Any:
     return answers[-1]
 
 
-#: How the emulator's twin moves its surfaces (docs/emulator.md), by hand: 15 deg down and 25 up, 13 and 18, 27.
+#: How the emulator's twin moves its surfaces (docs/experiments/emulator.md), by hand: 15 down, 25 up, 13, 18, 27 deg.
 LAW: dict[str, Any] = {  # name: slopes, travel
     "aileron1_wing2_left": ({"roll+": 15.0, "roll-": 25.0}, (-25.0, 15.0)),
     "aileron1_wing2_right": ({"roll+": -25.0, "roll-": -15.0}, (-25.0, 15.0)),
@@ -222,7 +222,7 @@ LAW: dict[str, Any] = {  # name: slopes, travel
 
 
 def write_mixing(world: Any) -> Path:
-    """The mixing file of the emulator's twin, as docs/mixing_file.md describes it."""
+    """The mixing file of the emulator's twin, as docs/control/mixing_file.md describes it."""
     folder = world.folder / "ros_home" / "xplane_bridge" / "mixing"
     folder.mkdir(parents=True)
     surfaces = {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-/// What the doctor's card has found out of an X-Plane (docs/doctor.md): one JSON document, which every YAML reader
-/// takes.
+/// What the doctor's card has found out of an X-Plane (docs/setups/doctor.md): one JSON document, which every YAML
+/// reader takes.
 namespace xplane_bridge::core {
 
 /// The text is no such document. what() says what is wrong with it.

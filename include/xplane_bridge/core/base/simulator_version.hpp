@@ -5,7 +5,7 @@
 
 namespace xplane_bridge::core {
 
-/// Where an X-Plane was found to be otherwise than is assumed, of the doctor's card (docs/doctor.md); a bit each.
+/// Where the doctor's card (docs/setups/doctor.md) found an X-Plane to be otherwise than is assumed; a bit each.
 enum class Otherwise : std::uint32_t {
   kRow1Hours = 1U << 0U,    ///< zulu and local time of row 1 are no hours
   kRow16 = 1U << 1U,        ///< row 16 has another order or unit

@@ -13,7 +13,7 @@
 #include "xplane_bridge/core/wire/udp_socket.hpp"
 
 /// What we changed in X-Plane, written down before it is changed, so that it can be undone by another process: the
-/// same node on exit, its guardian, its next start, or scripts/release_overrides. Format: docs/journal.md.
+/// same node on exit, its guardian, its next start, or scripts/release_overrides. Format: docs/nodes/journal.md.
 namespace xplane_bridge::core {
 
 /// The journal could not be read or written. what() has the file and the cause.

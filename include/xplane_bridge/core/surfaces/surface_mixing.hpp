@@ -148,7 +148,7 @@ class MixingFileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The model as the text of a mixing file (docs/mixing_file.md): JSON, which is YAML too.
+/// The model as the text of a mixing file (docs/control/mixing_file.md): JSON, which is YAML too.
 std::string toText(const MixingModel& model);
 /// The model in a file's text. Throws MixingFileError.
 MixingModel mixingFromText(const std::string& text);

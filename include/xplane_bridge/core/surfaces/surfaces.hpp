@@ -2,7 +2,8 @@
 
 /// Every control surface X-Plane can show and take one by one: names, datarefs, and commands to single surfaces.
 ///
-/// Deflections in degrees with X-Plane's sign: trailing edge down +, rudder trailing edge right +. docs/surfaces.md.
+/// Deflections in degrees with X-Plane's sign: trailing edge down +, rudder trailing edge right +.
+/// docs/control/surfaces.md.
 
 #include <cstddef>
 #include <cstdint>

@@ -19,7 +19,7 @@ struct FrameNames {
   std::string base_link_frd = "base_link_frd";  ///< the aircraft, FRD
 };
 
-/// Whole-loop lock-step (docs/lockstep.md): the section `lockstep` of the shared parameters.
+/// Whole-loop lock-step (docs/experiments/lockstep.md): the section `lockstep` of the shared parameters.
 struct LockstepOptions {
   bool enabled = false;
   std::vector<std::string> participants;  ///< nodes that answer every frame; rx_node does so without being named
@@ -63,7 +63,7 @@ struct CommonOptions {
   int beacon_port = 49707;        ///< UDP port of the announcement
   bool publish_clock = false;     ///< stamps are lockstep.start_time + simulator time, on /clock too
 
-  std::string wire_log;      ///< file of the wire log, without the node's name (docs/wire_log.md); empty: none
+  std::string wire_log;  ///< file of the wire log, without the node's name (docs/experiments/wire_log.md); empty: none
   int wire_log_size = 1000;  ///< [MB] of one part of it
   int wire_log_parts = 4;    ///< parts kept; the oldest is deleted for a further one
 

@@ -1,8 +1,8 @@
 #pragma once
 
 /// @file
-/// For controllers of other packages: a node's part in lock-step (docs/lockstep.md). Needs roscpp and the messages
-/// only.
+/// For controllers of other packages: a node's part in lock-step (docs/experiments/lockstep.md). Needs roscpp and the
+/// messages only.
 
 #include <cstdint>
 #include <functional>

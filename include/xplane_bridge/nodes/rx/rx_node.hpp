@@ -28,7 +28,7 @@
 
 namespace xplane_bridge {
 
-/// X-Plane -> ROS: flight state, mission state, standard messages, any dataref (docs/rx_node.md).
+/// X-Plane -> ROS: flight state, mission state, standard messages, any dataref (docs/nodes/rx_node.md).
 ///
 /// Data are published as they arrive, by roscpp's network thread, which then sends them; where the wire is logged in
 /// its order, by a thread of the link's own. A timer on the subscription thread looks after what is asked of

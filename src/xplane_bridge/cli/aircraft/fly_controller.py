@@ -25,7 +25,7 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="fly_controller",
         description="Flies a controller on control/auto: a class or a function that answers flight states, as "
-        "campaigns fly it (docs/campaigns.md), e.g. xplane_bridge.controllers.twin:Circuit.",
+        "campaigns fly it (docs/experiments/campaigns.md), e.g. xplane_bridge.controllers.twin:Circuit.",
     )
     p.add_argument(
         "controller", metavar="MODULE:NAME", help="what flies; its module's folder in PYTHONPATH, or the one you are in"

@@ -16,7 +16,7 @@ _REMEDY = "fly another controller, or this one all the same with --any-aircraft"
 
 
 class Law(Protocol):
-    """What flies: the same as in campaigns (docs/campaigns.md)."""
+    """What flies: the same as in campaigns (docs/experiments/campaigns.md)."""
 
     def fly(self, state: Any) -> Mapping[str, float]:
         """Fields of ControlCommand for a FlightState; empty: none for now."""

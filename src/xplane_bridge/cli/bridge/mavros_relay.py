@@ -18,7 +18,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line."""
     p = argparse.ArgumentParser(
         prog="mavros_relay",
-        description="Pose, velocity and heading under MAVROS's names, and set-points from them (docs/mavros.md).",
+        description="Pose, velocity and heading under MAVROS's names, and set-points (docs/setups/mavros.md).",
     )
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     p.add_argument("--mavros", default="/mavros", metavar="NS", help="where MAVROS's names begin (%(default)s)")

@@ -49,7 +49,7 @@ def parser() -> argparse.ArgumentParser:
     """Build the command line."""
     p = argparse.ArgumentParser(
         prog="compare_flights",
-        description="Makes one self-contained HTML page of what differs between flights (docs/experiments.md).",
+        description="One self-contained HTML page of what differs between flights (docs/experiments/passport.md).",
     )
     p.add_argument(
         "flights", nargs="+", type=Path, metavar="BAG",

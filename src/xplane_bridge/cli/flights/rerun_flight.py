@@ -28,8 +28,8 @@ def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(
         prog="rerun_flight",
         description=(
-            "Flies a flight of run_scenario again as its passport says (docs/experiments.md): scenario, aircraft, "
-            "seed, options. Exit code as run_scenario's. With --commands or --pose: plays what was recorded."
+            "Flies a flight of run_scenario again as its passport says (docs/experiments/passport.md): scenario, "
+            "aircraft, seed, options. Exit code as run_scenario's. With --commands or --pose: plays what was recorded."
         ),
     )
     p.add_argument("bag", metavar="BAG", type=Path, help="the recording")

@@ -152,7 +152,8 @@ def compare(plan: FlightPlan, result: FlightResult, seen: Sequence[Any], output:
     if difference is not None:
         print(
             f"not the same states: from frame {difference.frame} of {len(seen)} on, {difference.field} is "
-            f"{difference.in_process:.9g} in process, {difference.nodes:.9g} through the nodes (docs/campaigns.md)"
+            f"{difference.in_process:.9g} in process, {difference.nodes:.9g} through the nodes "
+            "(docs/experiments/campaigns.md)"
         )
     elif not whole:
         print(f"not the same states: {len(seen)} frames in process, {frames} through the nodes; the same until then")

@@ -22,7 +22,7 @@ def parser() -> argparse.ArgumentParser:
             "Labels a flight's pictures with runways, horizon, sun and other aircraft, by the camera's measured pose: "
             "FLIGHT.labels.jsonl beside the bag, which bag_export and flight_report take with --labels."
         ),
-        epilog="docs/labels.md describes what is in the file, and how sure it is.",
+        epilog="docs/pictures/labels.md describes what is in the file, and how sure it is.",
     )
     p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
     p.add_argument(
@@ -87,7 +87,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     for line in about["heights"]:
         print(f"height of runway {line}")
     if not about["sun"]:
-        print("no sun: record sun_pitch_degrees and sun_heading_degrees (docs/labels.md says how)")
+        print("no sun: record sun_pitch_degrees and sun_heading_degrees (docs/pictures/labels.md says how)")
     if flight.traffic.recorded:
         print(f"other aircraft: known in {count - flight.others_unknown} of {count} pictures")
     else:

@@ -1,4 +1,4 @@
-"""The command line of the sender of pictures; docs/windows.md describes it."""
+"""The command line of the sender of pictures; docs/setups/windows.md describes it."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ def window(evidence: Evidence) -> List[Finding]:
     display = evidence.display
     if evidence.target.address and not evidence.target.here:
         text = "X-Plane runs on another computer: its window is there, and so must capture_node be"
-        return [note("window-elsewhere", text, "docs/two_machines.md")]
+        return [note("window-elsewhere", text, "docs/setups/two_machines.md")]
     if not display.name:
         return [note("no-display", "DISPLAY is not set: windows were not looked at", "export DISPLAY=:0")]
     if display.error:

@@ -1,4 +1,4 @@
-"""Notes in the bridge's journal what is to be undone, before it is changed (docs/journal.md)."""
+"""Notes in the bridge's journal what is to be undone, before it is changed (docs/nodes/journal.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reads what the bridge has noted of changes in X-Plane that it has not undone yet (docs/journal.md)."""
+"""Reads what the bridge has noted of changes in X-Plane that it has not undone yet (docs/nodes/journal.md)."""
 
 from __future__ import annotations
 

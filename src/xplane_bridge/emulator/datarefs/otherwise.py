@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-#: The ids are the doctor's (docs/doctor.md); each is obeyed where its subject is.
+#: The ids are the doctor's (docs/setups/doctor.md); each is obeyed where its subject is.
 IDS = (
     "axial-sign",
     "beta-sign",

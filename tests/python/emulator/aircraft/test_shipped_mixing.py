@@ -13,7 +13,7 @@ from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.resources import config_file
 
 FRAME_S = 1.0 / 60.0
-#: Names of docs/surfaces.md to those of the emulator's aircraft.
+#: Names of docs/control/surfaces.md to those of the emulator's aircraft.
 PLACES = {
     "aileron1_wing2_left": "wing2l_ail1",
     "aileron1_wing2_right": "wing2r_ail1",
@@ -28,7 +28,7 @@ PLACES = {
 
 
 def terms(state) -> dict[str, float]:
-    """The terms of docs/mixing_file.md."""
+    """The terms of docs/control/mixing_file.md."""
     values = {"bias": 1.0, "flap1": state.flap_ratio, "speedbrake": state.speed_brake_ratio}
     for axis, ratio in (("roll", state.roll_ratio), ("pitch", state.pitch_ratio), ("yaw", state.yaw_ratio)):
         values[f"{axis}+"], values[f"{axis}-"] = max(ratio, 0.0), min(ratio, 0.0)
@@ -40,7 +40,7 @@ def shipped() -> list[Path]:
 
 
 def test_only_the_twin_ships() -> None:
-    """The quadrotor has no surfaces; the tiltrotor's follow no law of docs/mixing_file.md."""
+    """The quadrotor has no surfaces; the tiltrotor's follow no law of docs/control/mixing_file.md."""
     assert [file.name for file in shipped()] == ["DA62-Light-twin.yaml"]
 
 

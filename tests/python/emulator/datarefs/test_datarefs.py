@@ -15,7 +15,7 @@ from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.xplane_names import VERSIONS
 
 ROOT = Path(__file__).resolve().parents[4]
-FIELDS = ROOT / "docs" / "fields.md"
+FIELDS = ROOT / "docs/fields.md"
 
 
 @pytest.fixture(name="emulator", scope="module", params=VERSIONS)
