@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from xplane_bridge.bags.units import Unit
 
 ODOMETRY = "nav_msgs/Odometry"
+LABEL = "std_msgs/String"
 #: Role in a flight to message type.
 ROLES = {
     "state": FLIGHT_STATE,
@@ -28,9 +29,11 @@ ROLES = {
     "mode": "xplane_bridge/ControlMode",
     "failures": "xplane_bridge/FailureState",
     "excitation": "xplane_bridge/ExcitationState",
+    "disturbance": "xplane_bridge/DisturbanceState",
     "link": "xplane_bridge/LinkState",
     "events": "xplane_bridge/EventList",
     "odom": ODOMETRY,
+    "label": LABEL,
 }
 
 
@@ -85,6 +88,15 @@ def odometry_topic(bags: Bags) -> Optional[str]:
     return named[0] if len(named) == 1 else None
 
 
+def _topic(bags: Bags, msgtype: str) -> Optional[str]:
+    """The bridge's topic of a type; types that others publish as well are found by name."""
+    if msgtype == ODOMETRY:
+        return odometry_topic(bags)
+    if msgtype == LABEL:
+        return f"{bags.name_space}/scenario/label"
+    return bags.topic_of_type(msgtype)
+
+
 def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
     """Read everything but images.
 
@@ -103,8 +115,8 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
         raise BagError(msg)
     flight = Flight(bags.paths[0].stem, topics, {name: bags.times(name) for name in filled})
     for role, msgtype in ROLES.items():
-        topic = odometry_topic(bags) if msgtype == ODOMETRY else bags.topic_of_type(msgtype)
-        if topic is None or not topics[topic].count:
+        topic = _topic(bags, msgtype)
+        if topic is None or topic not in filled:
             continue
         flight.tables[role] = bags.read(topic, store=store).by_stamp()
         flight.units[role] = bags.units(topic)

@@ -46,7 +46,7 @@ def all_figures() -> list[tuple[str, str, Callable[[Flight], TimeFigure | PathFi
 
 
 def episodes(flight: Flight) -> list[tuple[str, Episode]]:
-    """Give the stretches to shade: who flew, failures, excitations."""
+    """Give the stretches to shade: who flew, failures, excitations, disturbances of the air."""
     out: list[tuple[str, Episode]] = []
     if "mode" in flight.tables:
         table = flight.tables["mode"]
@@ -62,6 +62,10 @@ def episodes(flight: Flight) -> list[tuple[str, Episode]]:
         rows = zip(table["active"], table["kind"], table["target"])
         names = [f"{kind} {target}" if on else "" for on, kind, target in rows]
         out += [("excitation", e) for e in from_values(table.stamp, names, flight.end)]
+    if "disturbance" in flight.tables:
+        table = flight.tables["disturbance"]
+        names = [str(kind) if on else "" for on, kind in zip(table["active"], table["kind"])]
+        out += [("disturbance", e) for e in from_values(table.stamp, names, flight.end)]
     return out
 
 

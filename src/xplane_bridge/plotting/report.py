@@ -20,7 +20,7 @@ from xplane_bridge.plotting.page import Section, day_of, missing, number, page, 
 from xplane_bridge.plotting.passports import passport_section
 
 if TYPE_CHECKING:
-    from xplane_bridge.bags import Bags
+    from xplane_bridge.bags import Bags, Table
     from xplane_bridge.bags.flight import Flight
     from xplane_bridge.labels.table import Labels
     from xplane_bridge.plotting.spec import PathFigure, TimeFigure
@@ -84,7 +84,7 @@ def _summary(flight: Flight) -> str:
     rate = timing(state.stamp)
     cards.append(f'<div class="card"><b>{number(rate.rate)} /s</b><span>flight states</span></div>')
     text = f'<div class="cards">{"".join(cards)}</div>'
-    return text + _pace(flight) + _who_flew(flight) + _links(flight) + _events(flight)
+    return text + _pace(flight) + _who_flew(flight) + _scenario(flight) + _links(flight) + _events(flight)
 
 
 def _pace(flight: Flight) -> str:
@@ -120,16 +120,29 @@ def _who_flew(flight: Flight) -> str:
     return "<h3>Who flew</h3>" + rows_table(("at [s]", "for [s]", "who", "why", "asked by"), rows, (0, 1))
 
 
+def _scenario(flight: Flight) -> str:
+    if "label" not in flight.tables:
+        return ""
+    table = flight.tables["label"]
+    return _stretches("Scenario", "label", table, list(table["data"]), flight)
+
+
 def _links(flight: Flight) -> str:
     if "link" not in flight.tables:
         return ""
     table = flight.tables["link"]
-    names = [_LINK_STATES.get(int(k), str(k)) for k in table["state"]]
+    return _stretches(
+        "Link to X-Plane", "state", table, [_LINK_STATES.get(int(k), str(k)) for k in table["state"]], flight
+    )
+
+
+def _stretches(title: str, column: str, table: Table, labels: Sequence[str], flight: Flight) -> str:
+    """List what was so for how long: of a latched topic's messages, the label of each."""
     rows = [
         (_seconds(e.start, flight), f"{(e.end - e.start) / 1e9:.1f}", html.escape(e.label))
-        for e in from_values(table.stamp, names, max(flight.end, int(table.stamp[-1])))
+        for e in from_values(table.stamp, labels, max(flight.end, int(table.stamp[-1])))
     ]
-    return "<h3>Link to X-Plane</h3>" + rows_table(("at [s]", "for [s]", "state"), rows, (0, 1))
+    return f"<h3>{title}</h3>" + rows_table(("at [s]", "for [s]", column), rows, (0, 1))
 
 
 def _events(flight: Flight) -> str:

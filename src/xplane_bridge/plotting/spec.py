@@ -13,7 +13,14 @@ if TYPE_CHECKING:
 #: Colours of series in the order they are added to a panel; distinguishable with colour-blind eyes (Okabe-Ito).
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#999933", "#000000")
 #: Background of episodes by kind.
-SHADES = {"auto": "#56b4e9", "manual": "#bbbbbb", "failsafe": "#6a3d9a", "failure": "#d62728", "excitation": "#e69f00"}
+SHADES = {
+    "auto": "#56b4e9",
+    "manual": "#bbbbbb",
+    "failsafe": "#6a3d9a",
+    "failure": "#d62728",
+    "excitation": "#e69f00",
+    "disturbance": "#009e73",
+}
 #: Episodes overlap: each only tints.
 SHADE_OPACITY = 0.12
 _FLAT = 1e-6  # of any unit that is plotted: less is rounding

@@ -76,6 +76,13 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Path:
         again = {**event, "stamp": {"sec": later // 10**9, "nanosec": 0}, "text": "<aileron> repaired"}
         for _ in range(2):
             bag.add("/xplane/events", "xplane_bridge/EventList", later, {"events": [again]})
+        for t, active in ((15.0, True), (15.5, True), (16.5, False)):
+            ns = stamp_ns(t)
+            gust = {"header": bag.header(ns, ""), "active": active, "kind": "gust"}
+            bag.add("/xplane/disturbance/state", "xplane_bridge/DisturbanceState", ns, gust)
+        for t, label in ((1.0, "climb"), (13.5, "<break>"), (20.0, "")):
+            bag.add("/xplane/scenario/label", "std_msgs/String", stamp_ns(t), {"data": label})
+        bag.add("/other", "std_msgs/String", stamp_ns(2.0), {"data": "not the scenario's"})
         made = {"package_version": "0.2.0", "parameters": '{"experiment": {"pilot": "Kim"}}', "xplane_version": 115501}
         bag.add("/xplane/experiment", "xplane_bridge/Experiment", stamp_ns(0.0), made)
         for t, state in ((0.0, 1), (10.0, 3), (12.0, 1)):
@@ -121,6 +128,21 @@ def test_a_failsafe_is_distinguished_from_the_automatic_flight_it_interrupts(pag
     shaded = {(colour, float(x0), float(x1)) for colour, x0, x1 in shapes}
     assert {(SHADES["auto"], 5.0, 16.0), (SHADES["failsafe"], 16.0, 18.0), (SHADES["auto"], 18.0, 21.98)} <= shaded
     assert '"text":"failsafe"' in attitude
+
+
+def test_a_disturbance_of_the_air_is_shaded(page: Path) -> None:
+    attitude = section(page, "attitude")
+    shapes = re.findall(r'"fillcolor":"(#\w+)".*?"x0":([-\d.]+),"x1":([-\d.]+)', attitude)
+    assert {(float(x0), float(x1)) for colour, x0, x1 in shapes if colour == SHADES["disturbance"]} == {(15.0, 16.5)}
+    assert '"text":"gust"' in attitude
+
+
+def test_the_labels_of_a_scenario_are_listed(page: Path) -> None:
+    text = section(page, "summary")
+    table = text.split("<h3>Scenario</h3>")[1].split("</table>")[0]
+    rows = [re.findall(r"<td.*?>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
+    assert rows == [["1.0", "12.5", "climb"], ["13.5", "6.5", "&lt;break&gt;"]]
+    assert "not the scenario" not in text
 
 
 def test_every_section_is_there_and_filled(page: Path) -> None:

@@ -137,10 +137,10 @@ def read(path: Path, variant: str, store: Optional[ColumnFile] = None) -> Read:
     with Bags(path) as bags:
         flight = read_flight(bags, store)
         passports = read_passports(bags)
-        for topic, info in bags.topics.items():
-            if topic.endswith("scenario/label") and info.count:
-                for time, message in bags.messages(topic):
-                    labels.setdefault(str(message.data), set()).add(time)
+    if "label" in flight.tables:
+        table = flight.tables["label"]
+        for time, label in zip(table.time, table["data"]):
+            labels.setdefault(str(label), set()).add(int(time))
     if "state" not in flight.tables:
         raise CompareError(f"{path}: no flight state in it")
     played: Mapping[str, Any] = {}
