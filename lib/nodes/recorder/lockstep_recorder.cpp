@@ -6,12 +6,14 @@
 #include <memory>
 #include <stdexcept>
 
+#include <ros/ros.h>
 #include <rosbag/bag.h>
 #include <std_msgs/Header.h>
 #include <topic_tools/shape_shifter.h>
 
 #include "xplane_bridge/FlightState.h"
 #include "xplane_bridge/nodes/base/common_options.hpp"
+#include "xplane_bridge/nodes/base/ros_time.hpp"
 #include "xplane_bridge/nodes/network/immediate_queue.hpp"
 
 namespace xplane_bridge {
@@ -94,9 +96,12 @@ LockstepRecording LockstepRecording::parse(const std::vector<std::string>& argum
   return out;
 }
 
-class LockstepRecorder::Impl {
+namespace {
+
+/// Opens the file and subscribes; what rosbag throws leaves the constructor and finish() only.
+class LockstepRecorder {
  public:
-  Impl(const LockstepRecording& recording, const ros::NodeHandle& handle) : file_(recording.bag) {
+  LockstepRecorder(const LockstepRecording& recording, const ros::NodeHandle& handle) : file_(recording.bag) {
     bag_->setCompression(rosbagsName(recording.compression));
     bag_->setChunkThreshold(recording.chunk_size);
     bag_->open(file_ + kUnfinished, rosbag::bagmode::Write);
@@ -120,6 +125,8 @@ class LockstepRecorder::Impl {
     queue_.open();
   }
 
+  /// Ends the subscriptions and completes the file. @throws rosbag::BagException it cannot be written, or a message
+  /// could not, for which ROS has been shut down
   void finish() {
     for (ros::Subscriber& subscriber : subscribers_) subscriber.shutdown();
     try {
@@ -163,10 +170,28 @@ class LockstepRecorder::Impl {
   std::vector<ros::Subscriber> subscribers_;
 };
 
-LockstepRecorder::LockstepRecorder(const LockstepRecording& recording, const ros::NodeHandle& handle)
-    : impl_(std::make_unique<Impl>(recording, handle)) {}
-LockstepRecorder::~LockstepRecorder() = default;
+}  // namespace
 
-void LockstepRecorder::finish() { impl_->finish(); }
+int runLockstepRecorder(int argc, char** argv) {
+  try {
+    initWithOwnTime(&argc, argv, "record");
+    const LockstepRecording recording = LockstepRecording::parse({argv + 1, argv + argc});
+    ros::NodeHandle handle;
+    ImmediateQueue at_once;
+    at_once.open();
+    const ros::Subscriber clock = movesRosTime() ? followClock(&at_once) : ros::Subscriber();
+    if (!ros::Time::isValid()) ROS_WARN("no time on /clock yet: nothing can be recorded before rx_node gives it");
+    ros::Time::waitForValid();
+    if (!ros::ok()) return 0;
+    LockstepRecorder recorder(recording, handle);
+    ROS_INFO("recording %zu topics to %s", recording.topics.size(), recording.bag.c_str());
+    ros::spin();
+    recorder.finish();
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "lockstep_recorder: %s\n", error.what());
+    return 1;
+  }
+}
 
 }  // namespace xplane_bridge

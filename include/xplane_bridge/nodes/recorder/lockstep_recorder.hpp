@@ -1,11 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <vector>
-
-#include <ros/ros.h>
 
 namespace xplane_bridge {
 
@@ -25,24 +22,11 @@ struct LockstepRecording {
   static LockstepRecording parse(const std::vector<std::string>& arguments);
 };
 
-/// Records topics of a flight in lock-step and answers each frame, so that the flight waits for a recorder that is slow
-/// or stands: `rosbag record`, which the flight does not wait for, drops what exceeds 100 waiting messages of a topic.
-/// Times of receipt are the simulator's (`use_sim_time`).
-class LockstepRecorder {
- public:
-  /// Opens the file and subscribes. @throws rosbag::BagException the file cannot be written
-  LockstepRecorder(const LockstepRecording& recording, const ros::NodeHandle& handle);
-  ~LockstepRecorder();
-  LockstepRecorder(const LockstepRecorder&) = delete;
-  LockstepRecorder& operator=(const LockstepRecorder&) = delete;
-
-  /// Ends the subscriptions and completes the file. @throws rosbag::BagException it cannot be written, or a message
-  /// could not, for which ROS has been shut down
-  void finish();
-
- private:
-  class Impl;  // rosbag's headers need more than users of this package's library have
-  std::unique_ptr<Impl> impl_;
-};
+/// The program `lockstep_recorder`: records topics of a flight in lock-step until ROS ends, and answers each frame, so
+/// that the flight waits for a recorder that is slow or stands: `rosbag record`, which the flight does not wait for,
+/// drops what exceeds 100 waiting messages of a topic. Times of receipt are the simulator's (`use_sim_time`).
+/// @returns the exit code; 1 with a reason on stderr: an argument, a file that cannot be written, a message that could
+/// not
+int runLockstepRecorder(int argc, char** argv);
 
 }  // namespace xplane_bridge
