@@ -9,6 +9,7 @@ import numpy as np
 
 from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags, Table, TopicInfo
 from xplane_bridge.bags.cameras import Camera, cameras
+from xplane_bridge.bags.events import RecordedEvent, events_of
 from xplane_bridge.bags.segments import segments
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class Flight:
     units: dict[str, dict[str, Unit]] = field(default_factory=dict)
     constants: dict[str, dict[str, Any]] = field(default_factory=dict)
     parts: list[slice] = field(default_factory=list)  #: segments of the state: not to be bridged
+    events: list[RecordedEvent] = field(default_factory=list)  #: in the order of their stamps
     cameras: list[CameraFrames] = field(default_factory=list)  #: the bridge's own first
 
     @property
@@ -121,6 +123,8 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
         flight.tables[role] = bags.read(topic, store=store).by_stamp()
         flight.units[role] = bags.units(topic)
         flight.constants[role] = bags.constants(topic)
+    if "events" in flight.tables:
+        flight.events = events_of(flight.tables["events"], bags.moved_by)
     for camera in cameras(bags):
         table = bags.read(camera.frames, store=store).by_stamp()
         flight.cameras.append(CameraFrames(camera, table, bags.constants(camera.frames)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from typing import TYPE_CHECKING, Any, Callable, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Callable, Optional, Sequence, Union
 
 import numpy as np
 
@@ -146,16 +146,7 @@ def _stretches(title: str, column: str, table: Table, labels: Sequence[str], fli
 
 
 def _events(flight: Flight) -> str:
-    if "events" not in flight.tables:
-        return ""
-    # The list repeats the newest ones; numbers begin anew with tx_node.
-    seen: dict[tuple[int, int], Any] = {}
-    for events in flight.tables["events"]["events"]:
-        for event in events:
-            seen[event.stamp.sec * 1_000_000_000 + event.stamp.nanosec, event.number] = event
-    rows = []
-    for (stamp, _), event in sorted(seen.items(), key=lambda each: each[0]):
-        rows.append((_seconds(stamp, flight), html.escape(event.text), html.escape(event.requested_by)))
+    rows = [(_seconds(e.stamp, flight), html.escape(e.text), html.escape(e.requested_by)) for e in flight.events]
     if not rows:
         return ""
     return "<h3>Events</h3>" + rows_table(("at [s]", "what", "asked by"), rows, (0,))

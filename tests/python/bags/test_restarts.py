@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, List, NamedTuple
+from typing import TYPE_CHECKING, Dict, List, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -53,7 +53,12 @@ def flights(by_clock: bool) -> List[Received]:
     return out
 
 
-def write(path: Path, received: List[Received]) -> None:
+def time_of(stamp: int) -> Dict[str, int]:
+    return dict(zip(("sec", "nanosec"), divmod(stamp, S)))
+
+
+def write(path: Path, received: List[Received], happened: List[Dict[str, object]]) -> None:
+    """Writes these states into a bag; the list of events, latched, goes on from bag to bag."""
     with FlightBag(path) as bag:
         for k, flight, stamp, receive in received:
             header = bag.header(stamp, "")
@@ -69,15 +74,18 @@ def write(path: Path, received: List[Received]) -> None:
             if k in (30, BOTH - 10):  # a stamp of the second flight that is later than that of the first
                 mode = {"header": header, "mode": 1 + flight}
                 bag.add(MODE, "xplane_bridge/ControlMode", receive, mode)
+                happened.append({"number": len(happened) + 1, "stamp": time_of(stamp), "text": f"of flight {flight}"})
+                bag.add("/xplane/events", "xplane_bridge/EventList", receive, {"events": happened})
 
 
 @pytest.fixture(params=["host", "clock", "host, split", "clock, split"])
 def recording(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     received = flights("clock" in request.param)
     (tmp_path / "bags").mkdir()
+    happened: List[Dict[str, object]] = []
     cuts = [0, 50, 100, BOTH] if "split" in request.param else [0, BOTH]
     for n, (first, end) in enumerate(zip(cuts[:-1], cuts[1:])):
-        write(tmp_path / "bags" / f"flight_{n}.bag", received[first:end])
+        write(tmp_path / "bags" / f"flight_{n}.bag", received[first:end], happened)
     return tmp_path / "bags"
 
 
@@ -94,6 +102,10 @@ def test_two_flights_lie_behind_each_other(recording: Path, caplog: pytest.LogCa
     assert sorted(pictures) == [(stamp, int(k >= EACH)) for k, stamp in enumerate(state.stamp.tolist())]
     assert state.stamp[0] == CLOCK + 40 * S  # the first flight as recorded, the second as it was flown
     np.testing.assert_array_equal(np.diff(state.stamp[EACH:]), S // 20)
+    assert [(event.stamp, event.text) for event in flight.events] == [
+        (int(state.stamp[30]), "of flight 0"),
+        (int(state.stamp[BOTH - 10]), "of flight 1"),
+    ]
     assert flight.parts == [slice(0, EACH), slice(EACH, BOTH)]
     assert "stamps go back where X-Plane was restarted" in caplog.text
 
@@ -107,7 +119,7 @@ def test_a_table_joins_what_was_of_one_flight(recording: Path, tmp_path: Path) -
 
 
 def test_the_stamps_go_on_as_the_host_s_time_did(tmp_path: Path) -> None:
-    write(tmp_path / "flight.bag", flights(by_clock=False))
+    write(tmp_path / "flight.bag", flights(by_clock=False), [])
     with Bags(tmp_path / "flight.bag") as bags:
         stamp = bags.read(STATE, ["header.stamp"]).by_stamp().stamp
     assert stamp[EACH] - stamp[0] == LOADING_S * S
@@ -116,8 +128,8 @@ def test_the_stamps_go_on_as_the_host_s_time_did(tmp_path: Path) -> None:
 @pytest.mark.parametrize("epochs", [(1, 1), (1, 2)])
 def test_bags_in_disorder_are_put_in_order(tmp_path: Path, epochs: tuple) -> None:
     received = flights(by_clock=True)[:EACH]
-    write(tmp_path / "b.bag", [each._replace(flight=epochs[0] - 1) for each in received[:40]])
-    write(tmp_path / "a.bag", [each._replace(flight=epochs[1] - 1) for each in received[40:]])
+    write(tmp_path / "b.bag", [each._replace(flight=epochs[0] - 1) for each in received[:40]], [])
+    write(tmp_path / "a.bag", [each._replace(flight=epochs[1] - 1) for each in received[40:]], [])
     with Bags([tmp_path / "a.bag", tmp_path / "b.bag"]) as bags:
         state = bags.read(STATE)
     assert state.by_stamp().stamp.tolist() == sorted(each.stamp for each in received)

@@ -198,11 +198,8 @@ def event_time(each: Read, text: str) -> int:
         CompareError: There is none; the text lists what there is.
     """
     times = {said: set(stamps) for said, stamps in each.labels.items()}
-    if "events" in each.flight.tables:
-        for events in each.flight.tables["events"]["events"]:
-            for event in events:
-                stamp = event.stamp.sec * 1_000_000_000 + event.stamp.nanosec
-                times.setdefault(str(event.text), set()).add(stamp)
+    for event in each.flight.events:
+        times.setdefault(event.text, set()).add(event.stamp)
     # The list of events and the latest label are latched: those of earlier flights come with them.
     begin, end = each.flight.start, each.flight.end
     inside = {said: [stamp for stamp in stamps if begin <= stamp <= end] for said, stamps in times.items()}
