@@ -11,6 +11,7 @@ from xplane_bridge.analysis.consistency import Check, check_flight, check_odomet
 from xplane_bridge.analysis.episodes import from_values, who_flew
 from xplane_bridge.analysis.odometry import of_frames
 from xplane_bridge.analysis.quality import bit_shares, pace, timing
+from xplane_bridge.analysis.resampling import held
 from xplane_bridge.analysis.summary import summary
 from xplane_bridge.bags.passport import read_passports
 from xplane_bridge.constants import LinkState, words
@@ -92,9 +93,8 @@ def _pace(flight: Flight) -> str:
     state, asked = flight.tables["state"], np.ones(len(flight.tables["state"]))
     if "sim" in flight.tables:
         sim = flight.tables["sim"]
-        latest = np.maximum(np.searchsorted(sim.stamp, state.stamp, side="right") - 1, 0)
-        ratio = sim["time_ratio_requested"][latest]
-        asked = np.where(ratio > 0.0, ratio, 1.0)
+        ratio = held(state.stamp, sim.stamp, sim["time_ratio_requested"])
+        asked = np.where(ratio > 0.0, ratio, 1.0)  # unknown: 1, as X-Plane begins
     found = pace(state.stamp, state.columns, flight.parts, asked)
     if not found.factor > _SLOW:
         return ""
