@@ -82,11 +82,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     args = p.parse_args(ros_arguments(argv))
     rospy = start_node("record_watch", anonymous=True)
-    from xplane_bridge.msg import FlightState, LinkState
-
     namespace = args.namespace.rstrip("/")
     if lockstep.is_on(namespace):
         return 0  # who keeps a frame waiting is tx_node's to say, and a listener to each frame slows the flight down
+    from xplane_bridge.msg import FlightState, LinkState
+
     link = Listener(f"{namespace}/link_state", LinkState)
     states = Listener(f"{namespace}/flight_state", FlightState)
     patience = Patience(
