@@ -25,17 +25,23 @@ _COLUMNS = {
     "beta": "beta_deg",
     "load_factor": "load_factor_normal",
 }
+#: A state counts as that of the player's last step when its time is so near to it: far below a frame [s].
+_SAME_TIME_S = 1e-6
 _RATES = {"roll_rate": "angular_velocity.x", "pitch_rate": "angular_velocity.y", "yaw_rate": "angular_velocity.z"}
 
 
 def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any], frames: Optional[int] = None) -> List[Score]:
     """Scores a flight that was flown by a `RosPlayer`.
 
+    Where the scenario was played to its end, the state that ended it is the last that counts, as in a campaign: what is
+    recorded until all programs have ended is not of the scenario.
+
     Args:
         scenario: What was flown.
         flight: The recording.
-        played: The player's log: `begin` (epoch and sim_time_unwrapped of its first state) and `labels` [s].
-        frames: How many flight states count, from that state on; all when omitted.
+        played: The player's log: `begin` (epoch and sim_time_unwrapped of its first state), `labels` [s], `finished`
+            and `duration` [s].
+        frames: How many flight states count at most, from that state on; all when omitted.
 
     Raises:
         ScenarioError: The recording has no state of the time the scenario was played in.
@@ -47,10 +53,14 @@ def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any], frames:
     steps = np.where(np.diff(epoch) == 0, np.maximum(np.diff(sim_time), 0.0), 0.0)
     elapsed = np.concatenate(([0.0], np.cumsum(steps)))
     begin = played["begin"]
-    first = np.flatnonzero((epoch == begin["epoch"]) & (sim_time >= begin["sim_time_unwrapped"] - 1e-6))
+    first = np.flatnonzero((epoch == begin["epoch"]) & (sim_time >= begin["sim_time_unwrapped"] - _SAME_TIME_S))
     if not len(first):
         raise ScenarioError(f"{scenario.name}: the state it began with was not recorded")
-    rows = slice(first[0], None if frames is None else first[0] + frames)
+    end = len(elapsed) if frames is None else first[0] + frames
+    if played.get("finished"):
+        last = elapsed[first[0]] + played["duration"] + _SAME_TIME_S
+        end = min(end, int(np.searchsorted(elapsed, last, side="right")))
+    rows = slice(first[0], end)
     time = elapsed[rows] - elapsed[first[0]]
     values = {name: np.asarray(state[column][rows], dtype=float) for name, column in _COLUMNS.items()}
     values.update({name: np.degrees(state[column][rows]) for name, column in _RATES.items()})
