@@ -1,4 +1,4 @@
-"""The panic tool where a node was stopped while it was writing the journal."""
+"""The panic tool where one journal, entry or X-Plane is not as it should be: all others are released."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
-from typing import Dict, Tuple
+from typing import Any, Dict, List, Tuple
 
 import pytest
 
@@ -18,6 +18,8 @@ TOOL = Path(__file__).resolve().parents[3] / "scripts" / "release_overrides"
 FOLDER = "sim/operation/override/"
 STICK, THROTTLES = FOLDER + "override_joystick_roll", FOLDER + "override_throttles"
 TIMEOUT_S = 60.0
+#: Nothing can be sent there: the system demands that broadcasts are asked for, and says so at once.
+NO_WAY = "255.255.255.255"
 
 
 class XPlane:
@@ -46,18 +48,36 @@ def _path(text: bytes) -> str:
     return text.split(b"\0")[0].decode()
 
 
+def entry(id_: str, *undo: Dict[str, Any], **more: Any) -> Dict[str, Any]:
+    owner = {"node": "/tx_node", "pid": 1, "start_ticks": 1, "boot_id": "b", "computer": socket.gethostname()}
+    return {"id": id_, "purpose": "override", "owner": owner, "undo": list(undo), **more}
+
+
+def override(path: str) -> Dict[str, Any]:
+    return entry("override:" + path, {"op": "dref", "path": path, "value": 0.0})
+
+
+def write(file: Path, *entries: Any) -> Path:
+    journal = {"format": "xplane_bridge journal", "version": 1, "entries": entries}
+    file.write_text(json.dumps(journal), "utf-8")
+    return file
+
+
+def ids(file: Path) -> List[str]:
+    return [each["id"] for each in json.loads(file.read_text("utf-8"))["entries"]]
+
+
 @pytest.fixture
 def left(tmp_path: Path) -> Tuple[XPlane, Path]:
     """An X-Plane with two overrides, and the journal that has them."""
     xplane = XPlane()
-    owner = {"node": "/tx_node", "pid": 1, "start_ticks": 1, "boot_id": "b", "computer": "pc"}
-    entries = [
-        {"id": "override:" + path, "purpose": "override", "owner": owner, "undo": [undo]}
-        for path, undo in ((path, {"op": "dref", "path": path, "value": 0.0}) for path in (STICK, THROTTLES))
-    ]
-    journal = tmp_path / f"127.0.0.1_{xplane.port}.json"
-    journal.write_text(json.dumps({"format": "xplane_bridge journal", "version": 1, "entries": entries}), "utf-8")
-    return xplane, journal
+    return xplane, write(tmp_path / f"127.0.0.1_{xplane.port}.json", override(STICK), override(THROTTLES))
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])
 
 
 def release(journal: Path, *more: str) -> subprocess.CompletedProcess[str]:
@@ -86,3 +106,27 @@ def test_a_locked_journal_is_listed_and_all_is_released(left: Tuple[XPlane, Path
     assert len(json.loads(journal.read_text("utf-8"))["entries"]) == 2
     assert release(journal).returncode == 0
     assert not journal.exists()
+
+
+def test_where_nothing_can_be_sent_is_said_and_the_next_x_plane_is_released(left: Tuple[XPlane, Path]) -> None:
+    xplane, journal = left
+    second = journal.rename(journal.with_name(f"localhost_{xplane.port}.json"))  # sorted behind
+    unseen = entry("data_output:26", {"op": "data", "row": 26, "values": [-999.0] * 8})
+    first = write(journal.with_name(f"{NO_WAY}_49000.json"), override(STICK), unseen)
+    asked = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": True}])
+    ports = write(journal.with_name(f"{NO_WAY}_49000_subscriptions.json"), asked)
+    done = release(first)
+    assert done.returncode == 1
+    assert done.stderr == ""
+    assert done.stdout.count("nothing can be sent there (Permission denied); kept in the journal") == 3, done.stdout
+    assert set(xplane.values.values()) == {0.0}
+    assert not second.exists()
+    assert ids(first) == ["override:" + STICK, "data_output:26"]
+    assert ids(ports) == ["subscriptions:/rx_node"]
+
+
+def test_all_says_where_nothing_can_be_sent(tmp_path: Path) -> None:
+    done = release(tmp_path / "none.json", "--all", "--host", NO_WAY)
+    assert done.returncode == 1
+    assert done.stderr == ""
+    assert done.stdout.count("nothing can be sent there (Permission denied)") == 7
