@@ -36,11 +36,12 @@ class XPlane:
         while True:
             packet, client = self._socket.recvfrom(2048)
             if packet[:4] == b"DREF":
-                self.values[_path(packet[9:])] = struct.unpack_from("<f", packet, 5)[0]
+                if _path(packet[9:]) in self.values:
+                    self.values[_path(packet[9:])] = struct.unpack_from("<f", packet, 5)[0]
             elif packet[:4] == b"RREF":
                 rate, index = struct.unpack_from("<ii", packet, 5)
                 if rate:
-                    answer = struct.pack("<if", index, self.values[_path(packet[13:])])
+                    answer = struct.pack("<if", index, self.values.get(_path(packet[13:]), -1.0))
                     self._socket.sendto(b"RREF," + answer, client)
 
 
@@ -130,3 +131,34 @@ def test_all_says_where_nothing_can_be_sent(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert done.stderr == ""
     assert done.stdout.count("nothing can be sent there (Permission denied)") == 7
+
+
+@pytest.mark.parametrize("in_the_way", [".lock", ".new"])
+def test_a_journal_that_cannot_be_changed_holds_up_nothing(left: Tuple[XPlane, Path], in_the_way: str) -> None:
+    xplane, journal = left
+    asked = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": False}])
+    kept = entry("subscriptions:/gone", subscriptions=[{"port": xplane.port, "datarefs": [], "rpos": False}])
+    ports = write(journal.with_name(f"{journal.stem}_subscriptions.json"), asked, kept)
+    for each in (journal, ports):
+        each.with_name(each.name + in_the_way).mkdir()  # refused to root as well, unlike a file of another user
+    unknown = override("sim/no/such_name")  # stays, and so does the file
+    write(journal, override(STICK), override(THROTTLES), entry("data_output:26", {"op": "usel", "rows": [26]}), unknown)
+    (journal.parent / f"localhost_{xplane.port}.json").write_text(journal.read_text("utf-8"), "utf-8")
+    done = release(journal)
+    assert done.returncode == 1
+    assert done.stderr == ""
+    assert done.stdout.count(": released") == 6
+    assert "1 subscriptions of /tx_node, process 1: ended" in done.stdout
+    for each in (journal, ports):
+        assert done.stdout.count(f"{each}: cannot be changed (Is a directory): what was released stays in it") == 1
+    assert "sudo" in done.stdout
+    assert set(xplane.values.values()) == {0.0}
+    assert ids(journal.with_name(f"localhost_{xplane.port}.json")) == ["override:sim/no/such_name"]
+
+
+def test_a_full_disk_keeps_no_journal_of_which_all_is_released(left: Tuple[XPlane, Path]) -> None:
+    _, journal = left
+    journal.with_name(journal.name + ".new").mkdir()  # nothing can be written, but the journal can be deleted
+    done = release(journal)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not journal.exists()
