@@ -162,3 +162,84 @@ def test_a_full_disk_keeps_no_journal_of_which_all_is_released(left: Tuple[XPlan
     done = release(journal)
     assert done.returncode == 0, done.stdout + done.stderr
     assert not journal.exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            ["--host", "no-such-host.invalid"],
+            ["--host: 'no-such-host.invalid' has no address", "IPv4 address"],
+        ),
+        (["--host", "a..b"], ["argument --host: 'a..b' has no address"]),
+        (["--port", "99999"], ["argument --port: port '99999'; expected 1 to 65535", "49000"]),
+        (["--port", "0"], ["argument --port: port '0'"]),
+        (["--port", "x"], ["argument --port: port 'x'"]),
+    ],
+)
+def test_a_host_or_port_that_is_none_is_said(tmp_path: Path, given: List[str], words: List[str]) -> None:
+    done = release(tmp_path / "none.json", "--all", *given)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
+
+
+@pytest.mark.parametrize("content", ["[]", "{}", "{", "\x00", '{"format": "xplane_bridge journal", "version": 1}'])
+@pytest.mark.parametrize("suffix", ["", "_subscriptions"])
+def test_what_is_no_journal_holds_up_nothing(left: Tuple[XPlane, Path], content: str, suffix: str) -> None:
+    xplane, journal = left
+    damaged = journal.with_name(f"1.1.1.1_49000{suffix}.json")  # sorted before
+    damaged.write_text(content, "utf-8")
+    journal.with_name(f"1.1.1.1_99999{suffix}.json").write_text("[]", "utf-8")
+    done = release(journal)
+    assert done.returncode == (0 if suffix else 1)
+    assert "Traceback" not in done.stderr
+    assert f"{damaged}: " in done.stderr
+    assert "port '99999'; expected 1 to 65535" in done.stderr
+    assert set(xplane.values.values()) == {0.0}
+    assert not journal.exists()
+    assert damaged.read_text("utf-8") == content
+
+
+DREF = {"op": "dref", "path": STICK, "value": 0.0}
+DAMAGED = [
+    (entry("x", {"op": "teleport"}), "operation 'teleport' is not known"),
+    (entry("x", {"op": "dref", "path": STICK}), "'value' is missing"),
+    (entry("x", {"op": "dref", "path": "h\u00f6he", "value": 0.0}), "ascii"),
+    (entry("x", {"op": "dref", "path": STICK, "value": 1e300}), "too large"),
+    (entry("x", {"op": "data", "row": 26, "values": [0.0]}), "9 items"),
+    (entry("x", "dref"), "indices"),
+    ({"id": "x", "undo": [DREF]}, "'owner' is missing"),
+    ({**entry("x", DREF), "id": 7}, "its id"),
+    (17, "subscriptable"),
+]
+
+
+@pytest.mark.parametrize(("damaged", "why"), DAMAGED)
+def test_an_entry_that_cannot_be_carried_out_stays_and_the_others_go(
+    left: Tuple[XPlane, Path], damaged: Any, why: str
+) -> None:
+    xplane, journal = left
+    write(journal, damaged, override(STICK), override(THROTTLES))
+    done = release(journal)
+    assert done.returncode == 1
+    assert done.stderr == ""
+    assert why in done.stdout
+    assert "cannot be carried out" in done.stdout
+    assert set(xplane.values.values()) == {0.0}
+    assert json.loads(journal.read_text("utf-8"))["entries"] == [damaged]
+
+
+def test_damaged_subscriptions_stay_and_the_others_end(tmp_path: Path) -> None:
+    sound = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": False}])
+    damaged = [
+        entry("subscriptions:/a", subscriptions=[{"port": 99999, "datarefs": [], "rpos": False}]),
+        entry("subscriptions:/b", subscriptions=[{"port": 4711, "datarefs": [7], "rpos": False}]),
+        entry("subscriptions:/c", subscriptions=[{"datarefs": [], "rpos": False}]),
+        entry("subscriptions:/d"),
+    ]
+    file = write(tmp_path / f"127.0.0.1_{free_port()}_subscriptions.json", *damaged, sound)
+    done = release(file)
+    assert done.stderr == ""
+    assert done.stdout.count("cannot be carried out") == 4
+    assert json.loads(file.read_text("utf-8"))["entries"] == damaged
