@@ -297,6 +297,25 @@ def test_a_journal_of_another_x_plane_explains_nothing_here(host, port):
     only(leftovers.overrides(evidence), WARNING, "overrides-on", "override_joystick", "--all --host 192.0.2.1")
 
 
+@pytest.mark.parametrize(
+    ("host", "target", "is_explained"),
+    [
+        ("127.0.0.1", "198.51.100.7", True),
+        ("198.51.100.7", "127.0.0.1", True),
+        ("127.0.0.1", FAR, False),
+        (FAR, "127.0.0.1", False),
+        ("no_address", "198.51.100.7", False),
+    ],
+)
+def test_the_loopback_and_this_computers_address_name_one_x_plane(monkeypatch, host, target, is_explained):
+    own = ("127.", "198.51.100.")
+    monkeypatch.setattr("xplane_bridge.doctor.observe.computer.is_own", lambda address: address.startswith(own))
+    journal = Journal(Path(f"{host}_49000.json"), host, 49000, (entry(Owner.RUNS),))
+    seen = answers(values={JOYSTICK: 1.0})
+    evidence = Evidence(target=Target(target, target, 49000, Chosen.OPTION), answers=seen, journals=[journal])
+    assert (leftovers.overrides(evidence) == []) is is_explained
+
+
 def test_a_journal_that_cannot_be_understood():
     journal = Journal(Path("192.0.2.1_49000.json"), FAR, 49000, error="ValueError: broken")
     only(leftovers.journals(Evidence(journals=[journal])), WARNING, "journal-damaged", "192.0.2.1_49000.json", "broken")

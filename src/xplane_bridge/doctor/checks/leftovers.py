@@ -85,9 +85,9 @@ def _is_examined(evidence: Evidence, journal: Journal) -> bool:
     """Whether a journal is about the X-Plane that was asked."""
     if journal.port != evidence.target.port or not evidence.target.address:
         return False
-    return journal.host == evidence.target.address or (
-        is_loopback(evidence.target.address) and is_same_computer(journal.host, evidence.target.address)
-    )
+    hosts = (journal.host, evidence.target.address)
+    # One computer's X-Plane is reached by its own address and by the loopback's, whichever the node was given.
+    return hosts[0] == hosts[1] or (any(map(is_loopback, hosts)) and is_same_computer(*hosts))
 
 
 def _has(entries: Sequence[Entry], path: str) -> bool:

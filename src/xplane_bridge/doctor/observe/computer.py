@@ -60,8 +60,10 @@ def is_same_computer(a: str, b: str) -> bool:
 
 
 def is_loopback(address: str) -> bool:
-    """Whether an IPv4 address reaches only the computer it is used on."""
-    return ipaddress.IPv4Address(address).is_loopback
+    """Whether an IPv4 address reaches only the computer it is used on; False for what is no address."""
+    with contextlib.suppress(ValueError):
+        return ipaddress.IPv4Address(address).is_loopback
+    return False
 
 
 def _addresses(proc: Path) -> Tuple[str, ...]:
