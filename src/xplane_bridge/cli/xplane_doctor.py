@@ -43,7 +43,10 @@ def _parser() -> argparse.ArgumentParser:
         "--host", default="", help="X-Plane's computer, name or IPv4 address (default: as the nodes find it)"
     )
     parser.add_argument(
-        "--port", type=udp_port, default=0, help="UDP port X-Plane listens on (default: the beacon's, else 49000)"
+        "--port",
+        type=udp_port,
+        default=0,
+        help="UDP port X-Plane listens on (default: the nodes', the beacon's, or 49000)",
     )
     parser.add_argument("--json", action="store_true", help="write the findings as a JSON list")
     parser.add_argument("--namespace", default="/xplane", help="of the bridge's nodes (default: %(default)s)")

@@ -90,6 +90,7 @@ def test_one_computer_with_two_addresses_is_one_x_plane():
 # ---------------------------------------------------------------------------------------------------------- target
 
 HEARD = BeaconWatch((Sighting("192.0.2.1", 49007, 115501, "lab-pc"),))
+HEARD_HERE = BeaconWatch((*HEARD.sightings, Sighting("127.0.0.1", 49008, 115501, "my-pc")))
 
 
 @pytest.mark.parametrize(
@@ -97,6 +98,19 @@ HEARD = BeaconWatch((Sighting("192.0.2.1", 49007, 115501, "lab-pc"),))
     [
         (Settings("192.0.2.5", 49100), {"host": "192.0.2.6"}, HEARD, ("192.0.2.5", 49100, Chosen.OPTION)),
         (Settings("192.0.2.5"), {}, HEARD, ("192.0.2.5", 49000, Chosen.OPTION)),
+        (Settings("192.0.2.1"), {}, HEARD, ("192.0.2.1", 49007, Chosen.OPTION)),
+        (Settings("127.0.0.2"), {}, HEARD_HERE, ("127.0.0.2", 49008, Chosen.OPTION)),
+        (
+            Settings("192.0.2.1", 49100),
+            {"host": "192.0.2.1", "port": 49200},
+            HEARD,
+            ("192.0.2.1", 49100, Chosen.OPTION),
+        ),
+        (Settings("192.0.2.1"), {"host": "192.0.2.1", "port": 49200}, HEARD, ("192.0.2.1", 49200, Chosen.OPTION)),
+        (Settings("127.0.0.1"), {"host": "localhost", "port": 49200}, HEARD, ("127.0.0.1", 49200, Chosen.OPTION)),
+        (Settings("192.0.2.1"), {"host": "192.0.2.6", "port": 49200}, HEARD, ("192.0.2.1", 49007, Chosen.OPTION)),
+        (Settings("192.0.2.1"), {"host": "", "port": 49200}, HEARD, ("192.0.2.1", 49007, Chosen.OPTION)),
+        (Settings("192.0.2.1"), {"host": "192.0.2.1", "port": "x"}, HEARD, ("192.0.2.1", 49007, Chosen.OPTION)),
         (Settings(), {"host": "192.0.2.6", "port": 49200}, HEARD, ("192.0.2.6", 49200, Chosen.PARAMETER)),
         (Settings(port=49300), {"host": "", "port": 49200}, HEARD, ("192.0.2.1", 49300, Chosen.BEACON)),
         (Settings(), {"host": ""}, HEARD, ("192.0.2.1", 49007, Chosen.BEACON)),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import enum
 import socket
-from dataclasses import dataclass
-from typing import Any, List, Mapping, Sequence, Tuple
+from dataclasses import dataclass, replace
+from typing import Any, List, Mapping, Optional, Sequence, Tuple
 
 from xplane_bridge import protocol
 from xplane_bridge.doctor.observe.beacons import BeaconWatch, Sighting
@@ -62,7 +62,8 @@ def choose(settings: Settings, parameters: Mapping[str, Any], beacons: BeaconWat
     # Only what the nodes would read: a port that is no number is reported by them, not used here.
     port = parameters.get("port") if isinstance(parameters.get("port"), int) else None
     if settings.host:
-        return _named(settings.host, settings.port or protocol.DEFAULT_PORT, Chosen.OPTION)
+        given = _named(settings.host, settings.port or protocol.DEFAULT_PORT, Chosen.OPTION)
+        return given if settings.port else replace(given, port=_port_at(given, configured, port, beacons))
     if isinstance(configured, str) and configured:
         return _named(configured, settings.port or port or protocol.DEFAULT_PORT, Chosen.PARAMETER)
     flying = distinct(beacons.sightings)
@@ -90,6 +91,22 @@ def distinct(sightings: Sequence[Sighting]) -> List[Tuple[Sighting, Tuple[str, .
         else:
             found.append((seen, (seen.address,)))
     return found
+
+
+def _port_at(given: Target, configured: Any, port: Optional[int], beacons: BeaconWatch) -> int:
+    """The port of a host without one: the parameter's where that is of the same host, else its beacon's."""
+    if not given.address:
+        return given.port
+    if port and isinstance(configured, str) and configured:
+        address = given.address if configured == given.host else _named(configured, port, Chosen.PARAMETER).address
+        if address and is_same_computer(given.address, address):
+            return port
+    announced = (
+        seen.port
+        for seen, addresses in distinct(beacons.sightings)
+        if any(is_same_computer(given.address, address) for address in addresses)
+    )
+    return next(announced, given.port)
 
 
 def _named(host: str, port: int, chosen: Chosen) -> Target:
