@@ -133,13 +133,13 @@ class Flight:
             sample = sample_of(view, aircraft.mode, view.stall_warning)
             self._record(now, aircraft.state, sample)
             commands = self._player.step(aircraft.shown_time, sample)
-            if commands.finished:
-                return FLOWN, ""
-            if now >= self._plan.longest:
+            if now >= self._plan.longest and not commands.finished:
                 return UNFINISHED, f"the scenario has not ended after {self._plan.longest:g} s (longest)"
             self._go_on_exciting(view)
             for action in commands.actions:
                 self._act(action.kind, action.value, now, view)
+            if commands.finished:  # with what its last event asked for, as the other players do it
+                return FLOWN, ""
             mode = aircraft.mode
             self._command(MANUAL, command_values(commands))
             if aircraft.mode != mode:  # taken over by the stick

@@ -97,6 +97,24 @@ def test_a_criterion_of_the_whole_flight_is_met_by_a_whole_flight_only() -> None
     assert result.met == {"whole": False, "begin": True, "longer": False}
 
 
+@pytest.mark.parametrize("last", [{"at": 1, "label": "done", "end": True}, {"at": 1, "label": "done"}])
+def test_the_event_that_ends_a_flight_is_labelled(last: Dict[str, Any]) -> None:
+    level = {"measure": "peak", "of": "roll", "target": 0, "to": "done", "below": 60}
+    result = Flight(campaign([*EVENTS[:1], last], scenario={"criteria": {"level": level}}).plan(0)).fly()
+    assert (result.outcome, result.met) == ("flown", {"level": True})
+    assert result.duration == pytest.approx(1.0)
+
+
+def test_what_the_last_event_asks_for_is_refused_as_at_any_other() -> None:
+    refused = {"at": 1, "excitation": {**doublet(0.1, 0.5), "target": "throttle"}, "end": True}
+    with pytest.raises(CampaignError, match="at 1 s: no source commands throttle"):
+        Flight(campaign([EVENTS[0], refused]).plan(0)).fly()
+
+
+def test_a_flight_that_ends_in_its_last_frame_is_flown() -> None:
+    assert Flight(campaign(longest=1.0).plan(0)).fly().outcome == "flown"
+
+
 def test_a_flight_is_the_same_again_also_after_others() -> None:
     c = campaign(weather={"wind_speed": 5, "wind_from": 90, "turbulence": 2}, flights=2)
     first = Flight(c.plan(0)).fly().sha256
