@@ -5,6 +5,12 @@ from __future__ import annotations
 #: Namespace under which the launch files put everything.
 NAMESPACE = "/xplane"
 
+
+def absolute(namespace: str) -> str:
+    """A namespace as users write it (`lab`, `/lab/`), as ROS's names begin with it (`/lab`)."""
+    return "/" + namespace.strip("/")
+
+
 #: Relative name to ROS 1 type.
 TOPICS = {
     "flight_state": "xplane_bridge/FlightState",

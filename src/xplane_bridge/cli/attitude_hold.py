@@ -14,7 +14,7 @@ from typing import Any, Dict, Mapping, Optional, Sequence
 from xplane_bridge import lockstep
 from xplane_bridge.cli.bridge.flown_law import FlownLaw
 from xplane_bridge.cli.entry import guarded, number, ros_arguments, start_node
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 #: Whose gains these are: stem of a file in config/aircraft.
 AIRCRAFT = "fixed_wing"
@@ -108,7 +108,7 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--engage", action="store_true", help="ask for mode AUTO")
     p.add_argument("--any-aircraft", action="store_true", help=f"fly others than {AIRCRAFT} too, with the same gains")
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     return p
 
 

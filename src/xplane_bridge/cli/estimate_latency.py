@@ -27,7 +27,7 @@ from xplane_bridge.cli.entry import guarded, number, start_node
 from xplane_bridge.constants import CameraView, ImageQuality, words
 from xplane_bridge.harness.processes import ManagedProcess
 from xplane_bridge.plotting.figure_file import figure_file
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Table
@@ -66,7 +66,9 @@ def parser() -> argparse.ArgumentParser:
         metavar="SECONDS",
         help="instead of a BAG: record the running bridge for so long, while the aircraft rolls",
     )
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge, for --live (%(default)s)")
+    p.add_argument(
+        "--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge, for --live (%(default)s)"
+    )
     p.add_argument(
         "--camera",
         default="",

@@ -22,7 +22,7 @@ from xplane_bridge.harness.processes import ManagedProcess
 from xplane_bridge.harness.ros import ros_environment
 from xplane_bridge.joystick.config_table import JoyConfigError, Live, load_joy_config, screen, skeleton
 from xplane_bridge.resources import config_file, node_program
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 _REFRESH_S = 0.1
 _RATE_OVER_S = 2.0
@@ -50,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--skeleton", type=Path, metavar="FILE", help="write a file to start from for the device that is there"
     )
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     return p
 
 

@@ -8,7 +8,7 @@ from typing import Any, List, Optional, Sequence
 
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.joystick.sdl_reader import JoyReader, JoyState, device_names, start_sdl
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 _DIAGNOSTICS_S = 1.0
 
@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--coalesce-interval", type=float, default=0.005, metavar="S", help="axes within it: one message (%(default)g)"
     )
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     p.add_argument("--list", action="store_true", help="list the joysticks that are plugged in; needs no ROS")
     return p
 

@@ -9,7 +9,7 @@ from typing import Any, Callable, Optional, Sequence
 from xplane_bridge import lockstep
 from xplane_bridge.cli.bridge.waiting import Listener, Patience, Surroundings, link_text, surroundings
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 _POLL_S = 0.1
 _LOOK_S = 2.0  # between two looks at the master
@@ -79,7 +79,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         description="Warns while no flight states come, because a recording has no flight then, and of cameras that "
         "are not recorded.",
     )
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     args = p.parse_args(ros_arguments(argv))
     rospy = start_node("record_watch", anonymous=True)
     namespace = args.namespace.rstrip("/")

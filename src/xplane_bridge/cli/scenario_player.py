@@ -15,7 +15,7 @@ from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
 from xplane_bridge.scenario.ros_player import RosPlayer
 from xplane_bridge.scenario.virtual_stick import load_stick
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 
 def scenario_of(name: str) -> Scenario:
@@ -91,7 +91,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         ),
     )
     p.add_argument("scenario", metavar="SCENARIO", help="file, or stem of a file in config/scenarios")
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     p.add_argument("--joystick", action="store_true", help="fly by messages on joy, through joystick_mapper_node")
     add_stick_options(p)
     p.add_argument("--log", type=Path, metavar="FILE", help="write there when what happened (JSON)")

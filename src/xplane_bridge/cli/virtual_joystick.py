@@ -7,7 +7,7 @@ from typing import Optional, Sequence
 
 from xplane_bridge.cli.entry import guarded, ros_arguments
 from xplane_bridge.cli.scenario_player import add_stick_options, play
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 
 @guarded
@@ -21,7 +21,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         ),
     )
     p.add_argument("scenario", metavar="SCENARIO", help="file, or stem of a file in config/scenarios")
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     add_stick_options(p)
     args = p.parse_args(ros_arguments(argv))
     return play(args, argv, "virtual_joystick", joystick=True)

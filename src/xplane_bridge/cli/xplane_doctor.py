@@ -10,6 +10,7 @@ from xplane_bridge.doctor import report
 from xplane_bridge.doctor.conformance import program
 from xplane_bridge.doctor.examination import examine, judge
 from xplane_bridge.doctor.settings import Settings
+from xplane_bridge.topics import NAMESPACE, absolute
 
 
 @guarded
@@ -49,7 +50,7 @@ def _parser() -> argparse.ArgumentParser:
         help="UDP port X-Plane listens on (default: the nodes', the beacon's, or 49000)",
     )
     parser.add_argument("--json", action="store_true", help="write the findings as a JSON list")
-    parser.add_argument("--namespace", default="/xplane", help="of the bridge's nodes (default: %(default)s)")
+    parser.add_argument("--namespace", type=absolute, default=NAMESPACE, help="of the nodes (default: %(default)s)")
     parser.add_argument(
         "--window-title",
         default="",

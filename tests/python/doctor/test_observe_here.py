@@ -173,6 +173,14 @@ def test_a_master_its_parameters_and_nodes_are_seen():
     assert (facts.ip, facts.hostname) == ("127.0.0.1", "")
 
 
+@pytest.mark.parametrize("namespace", ["xplane", "xplane/"])
+def test_a_namespace_without_a_slash_is_found(namespace):
+    with FakeMaster({"/xplane/rx_node": "http://127.0.0.1:1/"}, {"port": 49100}) as master:
+        facts = ros.observe({"ROS_MASTER_URI": master.uri}, namespace)
+    assert [each.name for each in facts.nodes] == ["/xplane/rx_node"]
+    assert facts.parameters == {"port": 49100}
+
+
 def test_a_master_without_the_bridge():
     with FakeMaster({}, None) as master:
         facts = ros.observe({"ROS_MASTER_URI": master.uri}, "/xplane")

@@ -13,7 +13,7 @@ from xplane_bridge.campaign.definition import make_controller
 from xplane_bridge.cli.bridge.flown_law import FlownLaw
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.errors import XplaneBridgeError, yaml_problem
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 
 class ControllerError(XplaneBridgeError):
@@ -33,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--arguments", default="{}", metavar="YAML", help='what a class is made with, e.g. "{speed: 66}"')
     p.add_argument("--engage", action="store_true", help="ask for mode AUTO")
     p.add_argument("--any-aircraft", action="store_true", help="fly whatever is loaded")
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     return p
 
 

@@ -9,7 +9,7 @@ from typing import Any, Optional, Sequence, Tuple
 from xplane_bridge.cli.bridge.flown_law import FlownLaw
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.controllers.set_points import AIRCRAFT, SetPoints
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 _DEG = 180.0 / math.pi
 
@@ -20,7 +20,7 @@ def parser() -> argparse.ArgumentParser:
         prog="mavros_relay",
         description="Pose, velocity and heading under MAVROS's names, and set-points (docs/setups/mavros.md).",
     )
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of the bridge (%(default)s)")
     p.add_argument("--mavros", default="/mavros", metavar="NS", help="where MAVROS's names begin (%(default)s)")
     p.add_argument("--set-points", action="store_true", help=f"fly set-points on control/auto ({AIRCRAFT} only)")
     p.add_argument("--engage", action="store_true", help="with --set-points: ask for mode AUTO")

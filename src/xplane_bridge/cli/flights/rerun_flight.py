@@ -14,7 +14,7 @@ from xplane_bridge.cli.flights.recorded_commands import play, read_commands
 from xplane_bridge.cli.flights.recorded_poses import play_poses, read_poses
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.harness.processes import interrupted_by_signals
-from xplane_bridge.topics import NAMESPACE
+from xplane_bridge.topics import NAMESPACE, absolute
 
 _BAG = "flight.bag"
 
@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="move the aircraft of a running bridge along the recorded poses; its flight model stands still meanwhile",
     )
-    p.add_argument("--namespace", default=NAMESPACE, metavar="NS", help="of that bridge (%(default)s)")
+    p.add_argument("--namespace", type=absolute, default=NAMESPACE, metavar="NS", help="of that bridge (%(default)s)")
     return p
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from xplane_bridge.doctor.observe.computer import is_own
+from xplane_bridge.topics import absolute
 
 _CALLER = "/xplane_doctor"
 _TIMEOUT_S = 2.0
@@ -107,7 +108,7 @@ def observe(environment: Mapping[str, str], namespace: str) -> RosFacts:
     facts = replace(facts, host=host, port=port, address=address, here=bool(address) and is_own(address))
     if not address:
         return replace(facts, error=f"the name {host} is not known on this computer")
-    return _call_master(facts, namespace.rstrip("/"))
+    return _call_master(facts, absolute(namespace).rstrip("/"))
 
 
 def _call_master(facts: RosFacts, namespace: str) -> RosFacts:
