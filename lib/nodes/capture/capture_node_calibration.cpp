@@ -105,7 +105,7 @@ core::MeasuredDelay CaptureNode::calibrate() {
   double own = std::numeric_limits<double>::quiet_NaN();
   {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
-    if (camera_known_) own = frustum_.horizontal_deg;
+    if (camera_known_) own = field_of_view_deg_;
   }
   if (!std::isfinite(own))
     throw std::runtime_error("X-Plane does not say its field of view: is it heard (link_state)?");

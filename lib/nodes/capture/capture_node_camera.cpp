@@ -7,6 +7,7 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <sensor_msgs/distortion_models.h>
 
+#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/nodes/capture/capture_node.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 
@@ -62,13 +63,20 @@ void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo
   }
   auto pose = pose_check_.add(view_stream_.camera());
   if (pose) pose->pose.orientation = pose->pose.orientation * options_.mount;
+  core::FrameCamera camera;
+  camera.external = view_stream_.camera().external;
+  camera.pose = pose;
+  if (pose && !camera.external) {
+    camera.view = core::classifyView(pose->pose.orientation, options_.view_tolerance_deg);
+  }
+  core::FrustumSample frustum = view_stream_.frustum();
   {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
     camera_known_ = true;
-    external_ = view_stream_.camera().external;
-    frustum_ = view_stream_.frustum();
-    frustum_.shift_up = frustum_shift_up_;
-    camera_pose_ = pose;
+    field_of_view_deg_ = frustum.horizontal_deg;
+    frustum.shift_up = frustum_shift_up_;
+    camera.frustum = frustumOf(frustum);
+    cameras_.add(view_stream_.receiveTime(), view_stream_.camera().sim_time, camera);
     pose_report_ = pose ? pose_check_.report() : "X-Plane does not answer";
     lever_scatter_ = pose_check_.leverScatter();
   }
@@ -81,6 +89,7 @@ void CaptureNode::onLinkState(const core::LinkStatus& status) {
   if (!known) {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
     camera_known_ = false;
+    cameras_.clear();
   }
   if (status.epoch == link_epoch_) return;
   link_epoch_ = status.epoch;
@@ -151,22 +160,26 @@ void CaptureNode::undo(const Deadline& deadline) {
   }
 }
 
-CaptureNode::CameraFacts CaptureNode::cameraFacts() const {
-  const std::lock_guard<std::mutex> lock(camera_mutex_);
-  CameraFacts facts;
-  const bool known = camera_known_ && !options_.own_field_of_view;
-  facts.frustum = core::frustumOf(known ? frustum_ : core::FrustumSample(), options_.field_of_view_deg);
-  if (options_.own_field_of_view) facts.frustum.known = true;
-  if (!camera_known_) return facts;
-  facts.external = external_;
-  facts.pose = camera_pose_;
-  if (facts.pose && !facts.external) {
-    facts.view = core::classifyView(facts.pose->pose.orientation, options_.view_tolerance_deg);
-  }
-  return facts;
+core::Frustum CaptureNode::frustumOf(const core::FrustumSample& sample) const {
+  if (!options_.own_field_of_view) return core::frustumOf(sample, options_.field_of_view_deg);
+  core::Frustum own = core::frustumOf(core::FrustumSample(), options_.field_of_view_deg);
+  own.known = true;
+  return own;
 }
 
-void CaptureNode::describeCamera(const CameraFacts& camera, FrameState* state) const {
+core::FrameCamera CaptureNode::cameraOf(const Grabbed& grabbed, std::int64_t shown_ns) const {
+  const std::int64_t frame_ns = shown_ns - core::toNanoseconds(pairing_->displayDelay());
+  const std::lock_guard<std::mutex> lock(camera_mutex_);
+  std::optional<core::FrameCamera> camera;
+  if (grabbed.frame.has_value()) camera = cameras_.ofFrame(static_cast<double>(grabbed.frame->sim_time));
+  if (!camera) camera = cameras_.at(frame_ns);
+  if (camera) return *camera;
+  core::FrameCamera unknown;
+  unknown.frustum = frustumOf(core::FrustumSample());
+  return unknown;
+}
+
+void CaptureNode::describeCamera(const core::FrameCamera& camera, FrameState* state) const {
   const core::CameraView nominal = camera.view == core::CameraView::kUnknown ? options_.assumed_view : camera.view;
   const bool measured = camera.pose.has_value() && !options_.nominal_frames;
   state->header.frame_id = measured ? options_.measured_frame : options_.frame_ids[static_cast<std::size_t>(nominal)];

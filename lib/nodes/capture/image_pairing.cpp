@@ -75,6 +75,11 @@ void ImagePairing::setDisplayDelay(double delay) {
   delay_measured_ = true;
 }
 
+double ImagePairing::displayDelay() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return display_delay_;
+}
+
 void ImagePairing::forgetClock() {
   const std::lock_guard<std::mutex> lock(mutex_);
   poses_.clear();

@@ -23,6 +23,7 @@
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/rate_limiter.hpp"
 #include "xplane_bridge/core/camera/camera_frustum.hpp"
+#include "xplane_bridge/core/camera/camera_history.hpp"
 #include "xplane_bridge/core/camera/camera_view.hpp"
 #include "xplane_bridge/core/camera/delay_calibration.hpp"
 #include "xplane_bridge/core/camera/pose_check.hpp"
@@ -79,14 +80,6 @@ class CaptureNode : public BaseNode {
     bool frozen = false;
     std::uint32_t dropped = 0;
   };
-  /// What the camera is, as far as X-Plane says.
-  struct CameraFacts {
-    core::CameraView view = core::CameraView::kUnknown;
-    bool external = false;
-    core::Frustum frustum;
-    std::optional<core::CheckedPose> pose;  // of the newest frame
-  };
-
   /// What is done for a frame of lock-step.
   enum class FrameStage {
     kReading,     ///< its flight_state has not come
@@ -122,10 +115,12 @@ class CaptureNode : public BaseNode {
   void encodeJpeg(const sensor_msgs::Image& image);
   void publishJpeg(const std_msgs::Header& header, const std::vector<std::uint8_t>& jpeg);
   bool hasSubscribers() const;
-  CameraFacts cameraFacts() const;
+  /// The camera of the frame that a picture shows, as far as X-Plane says. @param shown_ns [ns] by pairingNow()'s clock
+  core::FrameCamera cameraOf(const Grabbed& grabbed, std::int64_t shown_ns) const;
+  core::Frustum frustumOf(const core::FrustumSample& sample) const;
   sensor_msgs::CameraInfo cameraInfo(const std_msgs::Header& header, cv::Size source,
                                      const vision::FieldOfView& shown) const;
-  void describeCamera(const CameraFacts& camera, FrameState* state) const;
+  void describeCamera(const core::FrameCamera& camera, FrameState* state) const;
   void broadcastFrames();
   void publishFrameState(const FrameState& state);
   void subscribeFrustumShift(core::SimulatorVersion version);
@@ -181,9 +176,8 @@ class CaptureNode : public BaseNode {
 
   mutable std::mutex camera_mutex_;
   bool camera_known_ = false;
-  bool external_ = false;
-  core::FrustumSample frustum_;
-  std::optional<core::CheckedPose> camera_pose_;
+  double field_of_view_deg_ = 0.0;  // horizontal, of the newest frame
+  core::CameraHistory cameras_;
   std::string pose_report_;
   double lever_scatter_ = 0.0;  // [m]
   double frustum_shift_up_ = std::numeric_limits<double>::quiet_NaN();

@@ -39,6 +39,8 @@ class ImagePairing {
   /// @param publish called under the lock, in order; must not call back
   ImagePairing(double display_delay, double max_wait, Publish publish, Stamps stamps = Stamps::kHost);
 
+  /// [s] applied to pictures whose source does not know their frame.
+  [[nodiscard]] double displayDelay() const;
   /// A frame heard on the capture host. @param receive_ns [ns] host time, running evenly
   void addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns);
   /// The camera's pose of a frame, before that frame or after it.
