@@ -233,7 +233,7 @@ X11Connection::Found X11Connection::findWindow(const X11SourceOptions& options) 
     best_rank = rank;
     best.push_back(window);
   }
-  found.alike = best.size();
+  found.alike = best;
   if (options.point.has_value()) {
     const auto elsewhere = [&](xcb_window_t window) { return !covers(window, *options.point); };
     best.erase(std::remove_if(best.begin(), best.end(), elsewhere), best.end());

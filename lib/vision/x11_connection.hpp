@@ -55,7 +55,7 @@ class X11Connection {
 
   struct Found {
     std::optional<xcb_window_t> window;
-    std::size_t alike = 0;            ///< windows that fit as well, this one included
+    std::vector<xcb_window_t> alike;  ///< those that fit as well, this one included
     std::vector<std::string> titles;  ///< of all viewable windows that have one
   };
   /// Viewable window that fits best, see X11SourceOptions.

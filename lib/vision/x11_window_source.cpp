@@ -86,8 +86,8 @@ class X11WindowSource::Impl {
     std::ostringstream text;
     text << wanted_ << ": " << hex(target_.window);
     if (options_.region.empty()) text << " \"" << connection_->title(target_.window) << "\"";
-    if (alike_ > 1 && options_.index < 0 && !options_.point.has_value()) {
-      text << ", the largest of " << alike_ << " that are alike (the window's index or point chooses one)";
+    if (alike_.size() > 1 && options_.index < 0 && !options_.point.has_value()) {
+      text << ", the largest of " << alike_.size() << " that are alike (the window's index or point chooses one)";
     }
     text << " on display " << connection_->displayName() << ", " << grabber_->area().width << "x"
          << grabber_->area().height << ", depth " << target_.format.depth
@@ -191,6 +191,8 @@ class X11WindowSource::Impl {
       try {
         connection_ = std::make_unique<X11Connection>(options_.display);
         server_clock_.reset();
+        chosen_ = XCB_NONE;
+        alike_.clear();
         // So that also the first drawings have their time, however late they are seen.
         connection_->askTime(kTimesAsked, [this](std::uint32_t ms) { (void)server_clock_.toHost(ms, clock_()); });
       } catch (const std::runtime_error& error) {
@@ -201,18 +203,29 @@ class X11WindowSource::Impl {
     X11Connection::Found found;
     found.window = connection_->root();
     if (options_.region.empty()) found = connection_->findWindow(options_);
-    alike_ = found.alike;
+    if (found.window.has_value() && wasBeside(*found.window)) {
+      problem_ = wanted_ + " is hidden or closed (" + hex(chosen_) + "); " + hex(*found.window) +
+                 " was there beside it and is not taken in its place: show it again, or start anew";
+      return false;
+    }
     if (!found.window.has_value()) {
       problem_ = "no visible " + wanted_ + " on display " + connection_->displayName();
-      if (alike_ > 0) {
-        problem_ += "; there are " + std::to_string(alike_) +
+      if (!found.alike.empty()) {
+        problem_ += "; there are " + std::to_string(found.alike.size()) +
                     (options_.point.has_value() ? ", none of them there" : ", counted from 0");
       } else if (options_.window_id == 0) {
         problem_ += thereAre(std::move(found.titles));
       }
       return false;
     }
-    return open(*found.window);
+    chosen_ = *found.window;
+    alike_ = std::move(found.alike);
+    return open(chosen_);
+  }
+
+  // Where one of several windows alike goes, numbers and sizes choose another, which shows another view.
+  [[nodiscard]] bool wasBeside(xcb_window_t window) const {
+    return window != chosen_ && std::find(alike_.begin(), alike_.end(), window) != alike_.end();
   }
 
   bool open(xcb_window_t window) {
@@ -407,9 +420,10 @@ class X11WindowSource::Impl {
 
   X11SourceOptions options_;
   Clock clock_;
-  std::string wanted_;     // the window or region, in words
-  std::string problem_;    // empty while there is a picture
-  std::size_t alike_ = 0;  // windows that fit as well as the one captured
+  std::string wanted_;               // the window or region, in words
+  std::string problem_;              // empty while there is a picture
+  xcb_window_t chosen_ = XCB_NONE;   // the last that was captured
+  std::vector<xcb_window_t> alike_;  // windows that fitted as well, this one included
   std::unique_ptr<X11Connection> connection_;
   Target target_;
   std::unique_ptr<X11Grabber> grabber_;

@@ -4,6 +4,8 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -64,6 +66,34 @@ TEST_F(X11WindowSourceTest, OfWindowsAlikeTheIndexChoosesFromTheLeft) {
   EXPECT_TRUE(becomesLost(none));
   EXPECT_NE(none.problem().find("number 3 from the left"), std::string::npos) << none.problem();
   EXPECT_NE(none.problem().find("there are 3, counted from 0"), std::string::npos) << none.problem();
+}
+
+TEST_F(X11WindowSourceTest, OfWindowsAlikeNoneTakesThePlaceOfAnother) {
+  for (const int index : {0, -1}) {
+    auto left = std::make_unique<TestWindow>(server_.display(), "X-System", 320, 240, 10, 20);
+    TestWindow right(server_.display(), "X-System", 100, 80, 400, 0);
+    left->fill(0xff0000);
+    X11SourceOptions options = titled(server_, "");
+    options.index = index;
+    X11WindowSource source(options, steadyNow);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+    ASSERT_EQ(source.window(), left->id());
+    left->unmap();
+    EXPECT_TRUE(becomesLost(source));
+    EXPECT_TRUE(saysSo(source, "is hidden or closed")) << source.problem();
+    EXPECT_EQ(source.window(), std::nullopt);
+    left->map();
+    left->fill(0xff0000);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+    EXPECT_EQ(source.window(), left->id());
+    left.reset();
+    EXPECT_TRUE(becomesLost(source));
+    EXPECT_TRUE(saysSo(source, "was there beside it and is not taken in its place")) << source.problem();
+    TestWindow again(server_.display(), "X-System", 320, 240, 10, 20);  // opened anew
+    again.fill(0xff0000);
+    ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+    EXPECT_EQ(source.window(), again.id());
+  }
 }
 
 TEST_F(X11WindowSourceTest, OfWindowsAlikeThePointChoosesTheOneThatCoversIt) {

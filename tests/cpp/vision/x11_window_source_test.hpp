@@ -62,6 +62,17 @@ inline bool becomesLost(X11WindowSource& source) {
   return false;
 }
 
+/// Waits until what the source says of its problem contains a text.
+inline bool saysSo(X11WindowSource& source, const std::string& text) {
+  const auto deadline = std::chrono::steady_clock::now() + kDeadline;
+  while (std::chrono::steady_clock::now() < deadline) {
+    Change change;
+    (void)source.waitChange(kShort, change);
+    if (source.problem().find(text) != std::string::npos) return true;
+  }
+  return false;
+}
+
 /// True when no new picture comes within a while.
 inline bool staysQuiet(X11WindowSource& source) {
   Change change;
