@@ -115,6 +115,7 @@ class VideoSource::Impl {
     next_open_ = SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(
                                           std::chrono::duration<double>(options_.retry_period));
     bool opened = false;
+    bool silent = false;
     try {
       const bool number = isDevice(options_.address) && options_.address.front() != '/';
       if (number) {
@@ -122,12 +123,15 @@ class VideoSource::Impl {
       } else {
 #if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 6)
         if (isStream(options_.address)) {
+          const auto began = SteadyClock::now();
           opened = video_.open(
               options_.address, cv::CAP_FFMPEG,
               {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, kReadTimeoutMs, cv::CAP_PROP_READ_TIMEOUT_MSEC, kReadTimeoutMs});
+          silent = SteadyClock::now() - began > std::chrono::milliseconds(kReadTimeoutMs / 2);
         }
 #endif
-        if (!opened) opened = video_.open(options_.address);
+        // Asked once more, without a time-out, a silent stream would be waited for half a minute.
+        if (!opened && !silent) opened = video_.open(options_.address);
       }
     } catch (const std::exception& error) {  // OpenCV, or a device number beyond int
       problem_ = "\"" + options_.address + "\": " + error.what();

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <arpa/inet.h>
+#include <sys/socket.h>
 #include <unistd.h>
 #include <chrono>
 #include <cstdio>
@@ -122,3 +124,25 @@ TEST(VideoSource, KeepsLookingForWhatIsNotThere) {
   for (int i = 0; i < 3; ++i) EXPECT_EQ(source.waitChange(milliseconds(20), change), WaitResult::kLost);
   EXPECT_NE(source.problem().find("/nonexistent/flight.avi"), std::string::npos);
 }
+
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 6)
+TEST(VideoSource, WaitsForASilentStreamForItsTimeOutOnly) {
+  const int listening = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(bind(listening, reinterpret_cast<sockaddr*>(&address), size), 0);
+  ASSERT_EQ(listen(listening, 8), 0);  // connects, and says nothing
+  ASSERT_EQ(getsockname(listening, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  VideoSourceOptions options;
+  options.address = "rtsp://127.0.0.1:" + std::to_string(ntohs(address.sin_port)) + "/";
+  VideoSource source(options, steadyNow);
+  const auto began = std::chrono::steady_clock::now();
+  Change change;
+  EXPECT_EQ(source.waitChange(milliseconds(10), change), WaitResult::kLost);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(20));  // OpenCV's own is 30 s
+  EXPECT_NE(source.problem().find("cannot be opened"), std::string::npos) << source.problem();
+  close(listening);
+}
+#endif
