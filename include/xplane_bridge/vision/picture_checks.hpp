@@ -24,6 +24,9 @@ class FrozenCheck {
   /// The picture changed.
   void pictureChanged(std::int64_t now_ns) { standing_since_ns_ = now_ns; }
 
+  /// No pictures are looked at for now: nothing is known of them until the next.
+  void interrupt() { standing_since_ns_ = 0; }
+
   /// The flight state moved (attitude or position clearly different from before).
   void stateMoved(std::int64_t now_ns) { moved_at_ns_ = now_ns; }
 

@@ -24,6 +24,7 @@ constexpr std::chrono::milliseconds kSourceWait{50};
 constexpr double kOverduePeriod = 0.05;
 constexpr double kRestorePeriod = 0.5;  // [s] between looks whether a killed node's field of view is to be given back
 constexpr double kSlowRead = 0.005;     // [s] median above which reading pictures is said to be slow
+constexpr double kPeriodsFrozen = 2.0;  // of max_rate: longer than it leaves pictures out
 constexpr std::int64_t kFrozenRepeat = 1'000'000'000;  // [ns] between repetitions of a frozen picture
 constexpr std::int64_t kSameTime = 1'000'000'000;  // [ns] by which a stamp may be behind the one before in one flight
 constexpr std::size_t kPicturesWaiting = 2;        // for scaling, and for JPEG: more would only be older
@@ -55,7 +56,9 @@ void CaptureNode::loadParameters(const ParamLoader& own) {
   if (lockstep()) requireLockstep(own);
   scaler_ = std::make_unique<vision::PictureScaler>(options_.width, options_.height, options_.fit);
   limiter_ = core::RateLimiter(options_.max_rate);
-  frozen_check_ = vision::FrozenCheck(core::toNanoseconds(options_.frozen_after));
+  // Pictures that max_rate leaves out are not looked at.
+  const double looked_at = options_.max_rate > 0.0 ? kPeriodsFrozen / options_.max_rate : 0.0;
+  frozen_check_ = vision::FrozenCheck(core::toNanoseconds(std::max(options_.frozen_after, looked_at)));
 }
 
 void CaptureNode::advertise() {
@@ -174,7 +177,10 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     ++changes_;
-    if (!heard) periods_.interrupt();
+    if (!heard) {
+      periods_.interrupt();
+      frozen_check_.interrupt();
+    }
     if (!due) {
       ++skipped_;
       return;
@@ -259,9 +265,9 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   // The sender's own JPEG goes out as it is, where it has the size that is asked for.
   const bool verbatim = grabbed->jpeg && grabbed->size == scaler_->size();
   if (!decode(grabbed, raw || (jpeg && !verbatim))) return;
-  const CameraFacts camera = cameraFacts();
   FrameState state;
   const std::int64_t shown_ns = grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns;
+  const core::FrameCamera camera = cameraOf(*grabbed, shown_ns);
   state.header.stamp = toRosTime(stampOfPicture(shown_ns));
   state.header.seq = image_count_;
   describeCamera(camera, &state);

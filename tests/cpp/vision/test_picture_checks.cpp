@@ -66,4 +66,6 @@ TEST(FrozenCheck, NeedsAStandingPictureAndAMovingState) {
   EXPECT_FALSE(check.frozen(14 * kSecond));      // and the state stopped
   check.stateMoved(14 * kSecond);
   EXPECT_TRUE(check.frozen(14 * kSecond));
+  check.interrupt();  // no subscriber
+  EXPECT_FALSE(check.frozen(14 * kSecond));
 }
