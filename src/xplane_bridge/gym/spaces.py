@@ -189,7 +189,8 @@ class Commander:
             elif kind == "gear":
                 value = float(controls.gear_down)
             else:
-                levers = controls.throttle_use if kind == "motors" else controls.throttle
-                value = levers[int(engine or 0)]
+                # Without an override, what the levers say is what drives the engines.
+                driven = kind == "motors" and controls.override_throttles
+                value = (controls.throttle_use if driven else controls.throttle)[int(engine or 0)]
             values.append(2.0 * (value - low) / (high - low) - 1.0)
         return np.clip(np.array(values, np.float32), -1.0, 1.0)

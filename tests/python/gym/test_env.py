@@ -79,6 +79,16 @@ def test_each_axis_spans_its_own_range_and_the_trim_action_holds_the_flight() ->
     assert observed[1] == 0.0
 
 
+@pytest.mark.parametrize("axes", [None, ("motors",), ("engine_throttles",), ("throttle",)])
+@pytest.mark.parametrize("aircraft", ["fixed_wing", "multirotor", "tiltrotor"])
+def test_the_trim_action_holds_the_height_whatever_is_commanded(aircraft: str, axes: Any) -> None:
+    env = FlyEnv(aircraft, axes=axes, frames=60)
+    _, info = env.reset(seed=1)
+    begin = env.truth.altitude_m
+    env.step(info["trim_action"])
+    assert env.truth.altitude_m == pytest.approx(begin, abs=0.01)  # with its engines off it is 4 cm lower, or metres
+
+
 def test_motors_are_commanded_one_by_one() -> None:
     env = FlyEnv("multirotor", axes=("motors",), fields=("angular_velocity.x",), frames=1)
     env.reset(seed=1)
