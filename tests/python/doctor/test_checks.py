@@ -443,6 +443,11 @@ def test_where_no_window_can_be_nothing_is_wrong():
 def test_joysticks():
     denied = Evidence(joysticks=Joysticks((Joystick("/dev/input/js0", "Extreme 3D", False),)))
     only(joystick.joystick(denied), WARNING, "joystick-denied", "/dev/input/js0", "Extreme 3D", "input")
+    half = Evidence(joysticks=Joysticks((Joystick("/dev/input/js0", "Extreme 3D", True, "/dev/input/event5", False),)))
+    words = ("/dev/input/js0", "driver:=sdl", "/dev/input/event5", "usermod -aG input")
+    only(joystick.joystick(half), WARNING, "joystick-event-denied", *words)
+    whole = Evidence(joysticks=Joysticks((Joystick("/dev/input/js0", "Extreme 3D", True, "/dev/input/event5", True),)))
+    only(joystick.joystick(whole), OK, "joystick", "/dev/input/js0")
     only(joystick.joystick(Evidence()), NOTE, "no-joystick", "/dev/input")
     assert joystick.joystick(Evidence(joysticks=Joysticks(supported=False))) == []
 

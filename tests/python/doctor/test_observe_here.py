@@ -272,18 +272,23 @@ H: Handlers=sysrq kbd event0 leds
 """
 
 
-def test_joysticks_are_listed_with_their_names(tmp_path):
+def test_joysticks_are_listed_with_their_names(tmp_path, monkeypatch):
     devices, proc = tmp_path / "input", tmp_path / "proc"
     devices.mkdir()
     (proc / "bus" / "input").mkdir(parents=True)
     (proc / "bus" / "input" / "devices").write_text(INPUT_DEVICES, encoding="utf-8")
     for name in ("js0", "js1", "event0", "event5"):
         (devices / name).touch()
-    found = joysticks.observe(devices, proc).found
-    assert [(each.device, each.name, each.readable) for each in found] == [
-        (str(devices / "js0"), "Logitech Extreme 3D", True),
-        (str(devices / "js1"), "", True),
-    ]
+    event = str(devices / "event5")
+    for event_readable in (True, False):  # to root every file is readable: the system's answer is given here
+        monkeypatch.setattr(os, "access", lambda file, _mode, said=event_readable: str(file) != event or said)
+        assert joysticks.observe(devices, proc).found == (
+            joysticks.Joystick(str(devices / "js0"), "Logitech Extreme 3D", True, event, event_readable),
+            joysticks.Joystick(str(devices / "js1"), "", True),
+        )
+    monkeypatch.undo()
+    (devices / "event5").unlink()  # a container that was given js0 alone
+    assert [each.event_readable for each in joysticks.observe(devices, proc).found] == [False, True]
     assert joysticks.observe(tmp_path / "nothing", tmp_path / "nothing") == joysticks.Joysticks((), supported=False)
 
 

@@ -18,10 +18,14 @@ def joystick(evidence: Evidence) -> List[Finding]:
     findings = []
     for each in evidence.joysticks.found:
         text = f"joystick {each.device}" + (f": {each.name}" if each.name else "")
-        facts = {"device": each.device, "name": each.name}
-        if each.readable:
-            findings.append(ok("joystick", text, **facts))
-        else:
-            remedy = "sudo usermod -aG input $USER, then log in anew"
+        facts = {"device": each.device, "name": each.name, "event": each.event}
+        remedy = "sudo usermod -aG input $USER, then log in anew"
+        if not each.readable:
             findings.append(warning("joystick-denied", f"{text} may not be read by this user", remedy, **facts))
+        elif not each.event_readable:
+            text += f" serves driver:=joy only: driver:=sdl reads {each.event}, which this user may not read"
+            remedy += "; in a container: start it with --device /dev/input"
+            findings.append(warning("joystick-event-denied", text, remedy, **facts))
+        else:
+            findings.append(ok("joystick", text, **facts))
     return findings

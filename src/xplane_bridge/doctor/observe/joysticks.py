@@ -17,11 +17,15 @@ class Joystick:
         device: Its file, e.g. `/dev/input/js0`.
         name: As the device calls itself; empty where the kernel does not say.
         readable: Whether this user may read it.
+        event: The file of the same device that SDL reads, e.g. `/dev/input/event5`; empty where the kernel names none.
+        event_readable: Whether this user may read that; it has permissions of its own.
     """
 
     device: str
     name: str
     readable: bool
+    event: str = ""
+    event_readable: bool = True
 
 
 @dataclass(frozen=True)
@@ -39,24 +43,30 @@ class Joysticks:
 
 def observe(devices: Path = Path("/dev/input"), proc: Path = Path("/proc")) -> Joysticks:
     """Looks for joysticks."""
-    names = _names(proc)
-    found = tuple(
-        Joystick(str(device), names.get(device.name, ""), os.access(device, os.R_OK))
-        for device in sorted(devices.glob("js*"))
-    )
-    return Joysticks(found, supported=proc.is_dir())
+    known = _known(proc)
+    found = []
+    for device in sorted(devices.glob("js*")):
+        name, event = known.get(device.name, ("", ""))
+        file = devices / event
+        event_readable = not event or os.access(file, os.R_OK)
+        found.append(
+            Joystick(str(device), name, os.access(device, os.R_OK), str(file) if event else "", event_readable)
+        )
+    return Joysticks(tuple(found), supported=proc.is_dir())
 
 
-def _names(proc: Path) -> Dict[str, str]:
-    """The name of each device by its handlers (`js0`, `event5`)."""
+def _known(proc: Path) -> Dict[str, Tuple[str, str]]:
+    """The name and the event handler (`event5`) of each device, by its handlers (`js0`, `event5`)."""
     try:
         text = (proc / "bus" / "input" / "devices").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return {}
-    names: Dict[str, str] = {}
+    known: Dict[str, Tuple[str, str]] = {}
     for block in text.split("\n\n"):
         name = re.search(r'^N: Name="(.*)"$', block, re.MULTILINE)
         handlers = re.search(r"^H: Handlers=(.*)$", block, re.MULTILINE)
         if name and handlers:
-            names.update((handler, name.group(1)) for handler in handlers.group(1).split())
-    return names
+            all_of_it = handlers.group(1).split()
+            event = next((handler for handler in all_of_it if re.fullmatch(r"event\d+", handler)), "")
+            known.update((handler, (name.group(1), event)) for handler in all_of_it)
+    return known
