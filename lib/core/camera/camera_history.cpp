@@ -37,13 +37,17 @@ std::optional<FrameCamera> CameraHistory::at(std::int64_t moment_ns) const {
              moment_ns - std::prev(nearest)->receive_ns <= nearest->receive_ns - moment_ns) {
     --nearest;
   }
-  FrameCamera camera = nearest->camera;
-  const auto doubt = [&camera, &nearest](const Heard& neighbour) {
-    camera.external = camera.external || neighbour.camera.external;
-    if (!sameFrustum(neighbour.camera.frustum, nearest->camera.frustum)) camera.frustum.known = false;
+  bool external = nearest->camera.external;
+  bool known = nearest->camera.frustum.known;
+  const auto doubt = [&](const Heard& neighbour) {
+    external = external || neighbour.camera.external;
+    known = known && sameFrustum(neighbour.camera.frustum, nearest->camera.frustum);
   };
   if (nearest != frames_.begin()) doubt(*std::prev(nearest));
   if (std::next(nearest) != frames_.end()) doubt(*std::next(nearest));
+  std::optional<FrameCamera> camera(nearest->camera);
+  camera->external = external;
+  camera->frustum.known = known;
   return camera;
 }
 
