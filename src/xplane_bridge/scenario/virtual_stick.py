@@ -36,20 +36,25 @@ class VirtualStick:
     def __init__(self, device: Dict[str, Any], stick_mode: Optional[int] = None) -> None:
         self.name = str(device.get("device", "joystick"))
         mode = stick_mode or int(device.get("stick_mode", 2))
-        direct = device.get("direct", {})
+        direct = {str(entry.get("target", key)): (key, entry) for key, entry in device.get("direct", {}).items()}
         self._axes: Dict[str, Tuple[int, Dict[str, Any]]] = {}
         for axis in ("roll", "pitch", "yaw", "throttle"):
             if axis in direct:
-                entry = direct[axis]
+                key, entry = direct[axis]
                 index = entry.get("axis", entry.get(f"axis_mode_{mode}"))
-                if index is None:
-                    raise ScenarioError(f"{self.name}: direct.{axis} names no axis")
+                if index is None or int(index) < 0:
+                    raise ScenarioError(f"{self.name}: direct.{key} names no axis")
                 self._axes[axis] = (int(index), entry)
         for axis in ("roll", "pitch", "yaw"):
             if axis not in self._axes:
                 raise ScenarioError(f"{self.name}: direct.{axis} is missing; a virtual stick needs it")
-        self._buttons = {key: int(entry["button"]) for key, entry in device.get("buttons", {}).items()}
-        self._mode_buttons = {key: int(value) for key, value in device.get("mode", {}).items()}
+        #: By target and whether the handle is far from 0 while they are pressed.
+        self._buttons = {
+            (str(entry.get("target", key)), float(entry.get("value", 1.0)) >= 0.5): int(entry["button"])
+            for key, entry in device.get("buttons", {}).items()
+            if int(entry["button"]) >= 0
+        }
+        self._mode_buttons = {key: int(value) for key, value in device.get("mode", {}).items() if int(value) >= 0}
         self._throttle_axis_known = "throttle" in self._axes
 
     def mode_button(self, mode: str, present: str) -> Optional[int]:
@@ -92,9 +97,9 @@ class VirtualStick:
 
     def _handle_button(self, handle: str, value: float) -> Optional[int]:
         if handle == "gear":
-            return self._buttons.get("gear_down" if value >= 0.5 else "gear_up")
-        if handle == "brakes" and "brakes" in self._buttons:
-            return self._buttons["brakes"] if value > 0.5 else None
+            return self._buttons.get((handle, value >= 0.5))
+        if handle == "brakes" and (handle, True) in self._buttons:
+            return self._buttons[handle, True] if value > 0.5 else None
         if value == _SPRUNG:
             return None
         raise ScenarioError(

@@ -58,9 +58,40 @@ def test_buttons_for_modes_gear_and_brakes():
     assert toggling.mode_button("auto", "auto") is None
 
 
+def test_sections_go_by_their_target_and_not_by_their_name():
+    content = device(LEVER)
+    plain = VirtualStick(content)
+    renamed = {
+        **content,
+        "direct": {
+            f"my_{key}" if key != "roll" else key: {"target": key, **entry} for key, entry in content["direct"].items()
+        },
+        "buttons": {
+            "wheels_in": {"target": "gear", "button": 3, "value": 0.0},
+            "wheels_out": {"target": "gear", "button": 4, "value": 1.0},
+            "gear_up": {"target": "parking_brake", "button": 5, "value": 1.0},
+            "stop": {"target": "brakes", "button": 6, "value": 1.0, "released": 0.0},
+        },
+    }
+    stick = VirtualStick(renamed)
+    moved = Commands(stick={"roll": 0.3, "pitch": -0.2, "yaw": 0.1}, throttle=0.7)
+    assert stick.joy(moved)[0] == plain.joy(moved)[0]
+    for handles, pressed in (({"gear": 1.0, "brakes": 1.0}, [4, 6]), ({"gear": 0.0, "brakes": 0.0}, [3])):
+        assert [i for i, down in enumerate(stick.joy(Commands(handles=handles))[1]) if down] == pressed
+
+
+def test_mode_buttons_below_0_are_none():
+    toggling = VirtualStick({**device(LEVER), "mode": {"toggle": 0, "manual": -1, "auto": -1}})
+    assert toggling.mode_button("auto", "manual") == 0
+    silent = VirtualStick({**device(LEVER), "mode": {"toggle": -1, "manual": -1, "auto": -1}})
+    with pytest.raises(ScenarioError, match="no button for mode auto"):
+        silent.mode_button("auto", "manual")
+
+
 @pytest.mark.parametrize(
     ("content", "commands", "part"),
     [
+        ({"direct": {"bank": {"target": "roll", "axis": -1}}}, None, r"direct\.bank names no axis"),
         ({"mode": {}}, None, "no button for mode auto"),
         ({"direct": {"roll": {"axis": 0}}}, None, "direct.pitch is missing"),
         ({}, Commands(handles={"flaps": 0.5}), "flaps is moved by a hat"),
