@@ -1,6 +1,9 @@
 #include "xplane_bridge/nodes/base/common_options.hpp"
 
+#include <algorithm>
 #include <cstdint>
+
+#include "xplane_bridge/core/base/node_name.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -17,11 +20,27 @@ std::string frameName(const ParamLoader& shared, const std::string& prefix, cons
   return prefix + frame;
 }
 
+/// Each names a node of its own: an answer counts for one name.
+void checkParticipants(const ParamLoader& in, const std::vector<std::string>& names) {
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (core::isNamed("/rx_node", *name) || core::isNamed(*name, "rx_node")) {
+      in.refuse("participants", "other nodes than rx_node, which answers every frame without being named");
+    }
+    const auto same = [&name](const std::string& other) {
+      return core::isNamed(*name, other) || core::isNamed(other, *name);
+    };
+    if (std::any_of(names.begin(), name, same)) {
+      in.refuse("participants", "each node once: \"" + *name + "\" is named already");
+    }
+  }
+}
+
 LockstepOptions loadLockstep(const ParamLoader& shared, const CommonOptions& common) {
   const ParamLoader in = shared.section("lockstep");
   LockstepOptions out;
   out.enabled = in.boolean("enabled", out.enabled);
   out.participants = in.textList("participants");
+  checkParticipants(in, out.participants);
   out.stick = in.text("stick", out.stick);
   out.hold = in.boolean("hold", out.hold);
   out.watchdog = in.number("watchdog", {1.0, 86400.0}, out.watchdog);

@@ -150,6 +150,20 @@ TEST(CommonOptions, RefusesWhatCannotWork) {
   EXPECT_EQ(load("another_nodes_parameter", 3), "");
 }
 
+TEST(CommonOptions, RefusesParticipantsThatAreNamedTwiceOrAnswerAnyhow) {
+  const auto load = [](const std::vector<std::string>& names) {
+    XmlRpcValue tree;
+    for (int i = 0; i < static_cast<int>(names.size()); ++i) tree["lockstep"]["participants"][i] = names[i];
+    return messageOf([&] { loadCommonOptions(ParamLoader("/xplane", tree)); });
+  };
+  EXPECT_EQ(load({"controller", "/a/player", "/b/player", "capture_node"}), "");
+  EXPECT_TRUE(contains(load({"controller", "player", "controller"}), "\"controller\" is named already"));
+  EXPECT_TRUE(contains(load({"/xplane/controller", "controller"}), "\"controller\" is named already"));
+  EXPECT_TRUE(contains(load({"controller", "/xplane/controller"}), "\"/xplane/controller\" is named already"));
+  EXPECT_TRUE(contains(load({"rx_node"}), "answers every frame without being named"));
+  EXPECT_TRUE(contains(load({"/xplane/rx_node"}), "answers every frame without being named"));
+}
+
 TEST(ParamLoader, ReportsWhatWasGivenThatIsNoDefault) {
   const ParamLoader loader("/xplane/node", sampleTree());
   loader.integer("rate", {}, 50);  // given, but what it would be anyway
