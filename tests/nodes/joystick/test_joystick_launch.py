@@ -86,6 +86,33 @@ def test_driver_xplane_reads_the_stick_of_the_x_plane_that_is_meant(master):
     }
 
 
+@pytest.mark.parametrize(
+    ("file", "given", "device"),
+    [
+        ("joystick.launch", ("driver:=xplane",), "X-Plane's joystick"),
+        ("bridge.launch", ("joystick:=xplane",), "X-Plane's joystick"),
+        ("bridge.launch", ("joystick:=mapper",), "Logitech Extreme 3D Pro"),
+        ("bridge.launch", ("joystick:=xplane", "joy_config:=xbox"), "Xbox-type gamepad"),
+    ],
+)
+def test_the_device_is_x_planes_where_its_joystick_is_read(master, file, given, device):
+    _, params = load(master, file, *given)
+    assert params["/xplane/joystick_mapper_node/device"] == device
+
+
+def test_a_scenario_is_played_in_the_stick_mode_that_is_given(master):
+    for given, words in ((("stick_mode:=1",), ["--stick-mode", "1"]), ((), [])):
+        nodes, _ = load(master, "failure.launch", "joystick:=true", "joy_config:=xbox", *given)
+        assert shlex.split(nodes["scenario_player"].args)[6:] == words
+
+
+def test_a_further_camera_has_its_frames_below_the_bridges_prefix(master):
+    given = ("ns:=first", "camera:=belly", "frame_prefix:=first/", "wire_log:=/tmp/belly.pcapng")
+    _, params = load(master, "camera.launch", *given)
+    assert params["/first/belly/frame_prefix"] == "first/"
+    assert params["/first/belly/wire_log"] == "/tmp/belly.pcapng"
+
+
 def test_driver_joy_is_ros_joy_node_where_it_is_installed(master, tmp_path, monkeypatch):
     package = tmp_path / "joy"
     package.mkdir()
