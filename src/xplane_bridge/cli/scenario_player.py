@@ -53,6 +53,21 @@ def add_stick_options(p: argparse.ArgumentParser) -> None:
     p.add_argument("--stick-mode", type=int, choices=(1, 2), help="1: pitch left, throttle right; 2: the other way")
 
 
+def stick_mode_of(given: Optional[int], mapped: Any) -> Optional[int]:
+    """The stick mode to play: of joystick_mapper_node, which takes the axes by it; None: of the device's file.
+
+    Raises:
+        ScenarioError: Another one was given.
+    """
+    mode = mapped if mapped in (1, 2) else None  # what else is there, the mapper refuses itself
+    if given is not None and mode is not None and given != mode:
+        raise ScenarioError(
+            f"--stick-mode {given}: joystick_mapper_node takes the axes as stick mode {mode}; leave the option out, or "
+            f"start the mapper with stick_mode:={given}"
+        )
+    return given if mode is None else mode
+
+
 def play(
     args: argparse.Namespace, argv: Optional[Sequence[str]], node: str, joystick: bool, log: Optional[Path] = None
 ) -> int:
@@ -65,7 +80,10 @@ def play(
             file = config_file("joysticks", f"{args.joy_config}.yaml")
         stick = load_stick(file, args.stick_mode)
     namespace = args.namespace.rstrip("/")
-    start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
+    rospy = start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
+    if joystick:
+        mapped = rospy.get_param(f"{namespace}/joystick_mapper_node/stick_mode", None)
+        stick = load_stick(file, stick_mode_of(args.stick_mode, mapped))
     remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"
     aircraft = LoadedAircraft(namespace, node, scenario.aircraft, remedy, lambda text: player.fail(text))
     kwargs: Dict[str, Any] = {"stick": stick, "log": log, "say": lambda text: print(text, flush=True)}
