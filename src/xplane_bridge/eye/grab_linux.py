@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 import time
-from typing import Any, Optional, Tuple
+from typing import Any, List, NoReturn, Optional, Tuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ _LONGEST_REST_S = 0.02
 _ROWS = 16
 _Z_PIXMAP, _ALL_PLANES = 2, ctypes.c_ulong(-1)
 _IPC_PRIVATE, _IPC_CREAT, _IPC_RMID = 0, 0o1000, 0
+_NO_ADDRESS = ctypes.c_void_p(-1).value
 
 
 class _Segment(ctypes.Structure):
@@ -70,15 +71,60 @@ class _SharedImage:
             )
         length = head.bytes_per_line * head.height
         self._segment.shmid = self._libc.shmget(_IPC_PRIVATE, ctypes.c_size_t(length), _IPC_CREAT | 0o600)
+        if self._segment.shmid < 0:
+            self._refuse(length)
         self._segment.shmaddr = self._libc.shmat(self._segment.shmid, None, 0)
+        if self._segment.shmaddr == _NO_ADDRESS:
+            refused = ctypes.get_errno()
+            self._libc.shmctl(self._segment.shmid, _IPC_RMID, None)
+            ctypes.set_errno(refused)
+            self._refuse(length)
         head.data = self._segment.shmaddr
-        xext.XShmAttach(display, ctypes.byref(self._segment))
-        x11.XSync(display, 0)
+        attached = self._attach()
         self._libc.shmctl(self._segment.shmid, _IPC_RMID, None)  # goes with the last process that has it
+        if not attached:
+            self._free()
+            raise GrabError(
+                "the X server shares no memory with this program (a container? start it with --ipc host; the display "
+                "of another computer? start xplane_eye there)"
+            )
         memory = (ctypes.c_uint8 * length).from_address(self._segment.shmaddr)
         lines = np.frombuffer(memory, np.uint8).reshape(head.height, head.bytes_per_line)
         #: What was read last; overwritten by the next `read`.
         self.pixels = lines[:, : 4 * size[0]].reshape(size[1], size[0], 4)
+
+    def _attach(self) -> bool:
+        """Asks the X server to take the memory as well; False where it does not, which it says only later."""
+        errors: List[int] = []
+
+        def note(display: int, _error: int) -> int:
+            errors.append(display)
+            return 0
+
+        handler = windows.ErrorHandler(note)
+        self._x11.XSync(self._display, 0)  # errors of what was asked before are not its own
+        self._x11.XSetErrorHandler(handler)
+        try:
+            asked = self._xext.XShmAttach(self._display, ctypes.byref(self._segment))
+            self._x11.XSync(self._display, 0)
+        finally:
+            self._x11.XSetErrorHandler(windows.IGNORE_ERRORS)
+        return bool(asked) and self._display not in errors
+
+    def _refuse(self, length: int) -> NoReturn:
+        """Raises what is said where the system gives no shared memory."""
+        why = os.strerror(ctypes.get_errno())
+        windows.Image.from_address(self._image).data = None
+        self._x11.XDestroyImage(self._image)
+        raise GrabError(
+            f"the system gives no shared memory of {length} bytes ({why}): end programs that hold some (ipcs -m), or "
+            "raise kernel.shmmax and kernel.shmall"
+        )
+
+    def _free(self) -> None:
+        self._libc.shmdt(self._segment.shmaddr)
+        windows.Image.from_address(self._image).data = None
+        self._x11.XDestroyImage(self._image)
 
     def read(self, window: int) -> bool:
         """Reads the window; False where it is gone, smaller, or partly off a screen that no compositor draws."""
@@ -89,9 +135,7 @@ class _SharedImage:
         self._xext.XShmDetach(self._display, ctypes.byref(self._segment))
         self._x11.XSync(self._display, 0)
         self.pixels = np.empty((0, 0, 4), np.uint8)
-        self._libc.shmdt(self._segment.shmaddr)
-        windows.Image.from_address(self._image).data = None
-        self._x11.XDestroyImage(self._image)
+        self._free()
 
 
 class LinuxGrabber(Grabber):

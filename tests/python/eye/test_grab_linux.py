@@ -9,10 +9,11 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Callable, Iterator, List, Tuple
+from typing import Any, Callable, Iterator, List, Tuple
 
 import pytest
 
+from xplane_bridge.eye import grab_linux
 from xplane_bridge.eye.grab_linux import LinuxGrabber
 from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -73,6 +74,69 @@ def fixture_display(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator
     with VirtualDisplay(tmp_path) as display:
         monkeypatch.setenv("DISPLAY", display.display)
         yield display.display
+
+
+class ForeignMemory:
+    """Xext of a program whose memory the X server does not see, as in a container."""
+
+    def __init__(self, xext: Any) -> None:
+        self._xext = xext
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._xext, name)
+
+    def XShmAttach(self, display: int, segment: Any) -> int:  # noqa: N802 - Xext's name
+        info = segment._obj
+        own, info.shmid = info.shmid, 0x7FFFFFF0
+        try:
+            return self._xext.XShmAttach(display, segment)
+        finally:
+            info.shmid = own
+
+
+def problem_of(grabber: LinuxGrabber) -> str:
+    """What the grabber says; it must not become less certain at the next try."""
+    grabber.start()
+    try:
+        wait_until(lambda: grabber.problem, LONGEST_S, "the reason")
+        time.sleep(WATCH_S)
+    finally:
+        grabber.stop()
+    return grabber.problem
+
+
+def segments() -> int:
+    """How many pieces of shared memory this process has made that are still there."""
+    rows = [line.split() for line in Path("/proc/sysvipc/shm").read_text("ascii").splitlines()]
+    creator = rows[0].index("cpid")
+    return sum(row[creator] == str(os.getpid()) for row in rows[1:])
+
+
+def test_an_x_server_that_does_not_see_the_memory_is_said(display: str):
+    pictures: List[Tuple[int, ...]] = []
+    with window(display) as move:
+        move("320x240+100+50")
+        grabber = LinuxGrabber(("X-Plane",), None, lambda pixels, *_: pictures.append(pixels.shape))
+        grabber._xext = ForeignMemory(grabber._xext)
+        said = problem_of(grabber)
+        assert "the X server shares no memory with this program (a container? start it with --ipc host" in said
+        assert not pictures
+        assert segments() == 0, "memory is given back"
+        whole = LinuxGrabber(("X-Plane",), None, lambda pixels, *_: pictures.append(pixels.shape))
+        whole.start()
+        try:
+            wait_until(lambda: whole.problem == "" and len(pictures) > 3, LONGEST_S, "pictures")
+        finally:
+            whole.stop()
+
+
+def test_a_system_without_shared_memory_is_said(display: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(grab_linux, "_IPC_PRIVATE", 0x7FFF1234)  # a key that nothing has, and it is not made either
+    monkeypatch.setattr(grab_linux, "_IPC_CREAT", 0)
+    with window(display) as move:
+        move("320x240+100+50")
+        said = problem_of(LinuxGrabber(("X-Plane",), None, lambda *_: None))
+    assert "the system gives no shared memory of 307200 bytes (No such file or directory)" in said
 
 
 def test_a_window_partly_off_the_screen_is_said_and_not_searched_without_rest(display: str):

@@ -109,8 +109,8 @@ class Attributes(ctypes.Structure):
 
 
 #: Xlib ends the process on an error unless a handler is set; windows may go while they are looked at.
-_ErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
-IGNORE_ERRORS = _ErrorHandler(lambda _display, _error: 0)
+ErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+IGNORE_ERRORS = ErrorHandler(lambda _display, _error: 0)
 
 
 def observe(name: str, is_wanted: Callable[[str], bool]) -> Display:
@@ -251,7 +251,7 @@ def declared(x11: Any) -> Any:
     signatures = {
         "XOpenDisplay": (pointer, [ctypes.c_char_p]),
         "XCloseDisplay": (integer, [pointer]),
-        "XSetErrorHandler": (pointer, [_ErrorHandler]),
+        "XSetErrorHandler": (pointer, [ErrorHandler]),
         "XScreenCount": (integer, [pointer]),
         "XRootWindow": (window, [pointer, integer]),
         "XInternAtom": (ctypes.c_ulong, [pointer, ctypes.c_char_p, integer]),
