@@ -9,9 +9,9 @@ import numpy as np
 from gymnasium import spaces
 
 from xplane_bridge.emulator.aircraft import create_model
-from xplane_bridge.emulator.flight.flight_model import ModelState
+from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
 from xplane_bridge.errors import is_number
-from xplane_bridge.gym.episodes import Episodes
+from xplane_bridge.gym.episodes import Episode, Episodes
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.gym.flights import Flight, InProcessFlight
 from xplane_bridge.gym.spaces import DEFAULT_AXES, DEFAULT_FIELDS, Commander, Observer
@@ -22,6 +22,8 @@ TIME = "time is up"
 _RENDERED = (640, 480)
 _FRAME_RATES = (20.0, 240.0)
 _MOST_PIXELS = 4096
+#: How often a start is drawn before it is said that none can be flown.
+_DRAWS = 20
 
 Observation = Union[np.ndarray, Dict[str, np.ndarray]]
 
@@ -67,12 +69,13 @@ class FlyEnv(gymnasium.Env[Any, Any]):
         self._info = info = create_model(aircraft).info
         self._task = task()
         self._observer = Observer(tuple(fields or self._task.fields or DEFAULT_FIELDS))
-        self._commander = Commander(tuple(axes or self._task.axes or DEFAULT_AXES[aircraft]), info)
+        #: What makes commands of actions.
+        self.commander = Commander(tuple(axes or self._task.axes or DEFAULT_AXES[aircraft]), info)
         self._episodes = Episodes(info, frame_rate, {**self._task.episode, **(episode or {})})
         self._frames, self._longest = frames, duration - 0.5 / frame_rate
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": round(frame_rate / frames)}
-        self.action_space = self._commander.space
+        self.action_space = self.commander.space
         self.observation_space = self._observer.space
         self._image = image
         self._cameras: Dict[Tuple[int, int], Any] = {}
@@ -92,7 +95,7 @@ class FlyEnv(gymnasium.Env[Any, Any]):
     @property
     def axis_names(self) -> Tuple[str, ...]:
         """Of the elements of an action."""
-        return self._commander.names
+        return self.commander.names
 
     @property
     def truth(self) -> ModelState:
@@ -109,13 +112,13 @@ class FlyEnv(gymnasium.Env[Any, Any]):
             options: Keys of `episode`, for this episode alone.
 
         Raises:
-            FlightModelError: The aircraft cannot fly like this.
+            FlightModelError: The aircraft cannot fly like this; of a start that is drawn, in none of 20 draws.
             GymError, CampaignError, NotFlownError, ScenarioError: An option makes no sense.
         """
         super().reset(seed=seed)
-        drawn = self._episodes.fixed(options or {}).draw(self.np_random)
+        episodes = self._episodes.fixed(options or {})
         self._flying = False
-        self._flight.begin(drawn)
+        drawn = self._begin(episodes)
         self._place_cameras()
         state = self._flight.state()
         self._began = self._flight.now
@@ -124,7 +127,7 @@ class FlyEnv(gymnasium.Env[Any, Any]):
         info = {
             "sim_time": self._began,
             "conditions": drawn.options,
-            "trim_action": self._commander.action_of(self._flight.trim),
+            "trim_action": self.commander.action_of(self._flight.trim),
         }
         return self._observation(state), info
 
@@ -136,7 +139,7 @@ class FlyEnv(gymnasium.Env[Any, Any]):
         """
         if not self._flying:
             raise GymError("step: no episode is being flown; call reset first")
-        command = self._commander.command(action)
+        command = self.commander.command(action)
         flight, outcome = self._flight, ""
         for _ in range(self._frames):
             outcome = flight.fly(command)
@@ -161,6 +164,25 @@ class FlyEnv(gymnasium.Env[Any, Any]):
         """Ends what was started for it; may be called again."""
         self._flying = False
         self._flight.close()
+
+    def _begin(self, episodes: Episodes) -> Episode:
+        """Begins the next episode that the aircraft can fly: tails of distributions reach where it cannot."""
+        draws = _DRAWS if episodes.vary else 1
+        for draw in range(1, draws + 1):
+            drawn = episodes.draw(self.np_random)
+            try:
+                self._flight.begin(drawn)
+                break
+            except FlightModelError as error:
+                if draw < draws:
+                    continue
+                if draws == 1:
+                    raise
+                raise FlightModelError(
+                    f"{error} (the last of {draws} draws, none of which can be flown: narrow the distributions of "
+                    "episode)"
+                ) from None
+        return drawn
 
     def _left_envelope(self, state: Any) -> str:
         return OVERSPEED if state.calibrated_airspeed > self._info.never_exceed_mps else ""

@@ -115,6 +115,11 @@ class Episodes:
         """These with some of it chosen otherwise."""
         return Episodes(self._info, self._frame_rate, {**self._given, **options}) if options else self
 
+    @property
+    def vary(self) -> bool:
+        """Whether start, weather or loading are drawn, so that the next may be another."""
+        return any(isinstance(chosen, Parameter) for chosen in self._chosen.values())
+
     def draw(self, random: np.random.Generator) -> Episode:
         """The next episode. As many numbers are drawn whatever is fixed: fixing one thing changes no other."""
         shares = dict(zip(KEYS, random.random(len(KEYS))))

@@ -21,6 +21,8 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from xplane_bridge.emulator.flight.flight_model import FlightModelError
+from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.gym.env import FlyEnv, Observation
 from xplane_bridge.gym.errors import GymError
 
@@ -29,6 +31,10 @@ _STEP, _RESET, _CLOSE = b"s", b"r", b"c"
 _PATIENCE_S = 5.0
 #: How long a message is looked for before the process sleeps until it comes [s].
 _LOOK_S = 100e-6
+#: What options of a reset are refused with; the environments can be reset again.
+_REFUSALS = (XplaneBridgeError, FlightModelError)
+
+_Infos = Dict[int, Dict[str, Any]]
 
 
 class WorkerError(GymError):
@@ -96,11 +102,15 @@ class _Worker:
         self._ended = [False] * len(self._envs)
         self._parts = [name[len("observation ") :] for name in arrays if name.startswith("observation ")]
 
-    def reset(self, seeds: Sequence[Optional[int]], options: Any) -> Dict[int, Dict[str, Any]]:
+    def reset(self, seeds: Sequence[Optional[int]], options: Any) -> Union[_Infos, Exception]:
+        """Infos, or why the options are refused."""
         self._arrays["terminated"][:] = self._arrays["truncated"][:] = False
-        return {self._first + i: self._begin(i, seed, options) for i, seed in enumerate(seeds)}
+        try:
+            return {self._first + i: self._begin(i, seed, options) for i, seed in enumerate(seeds)}
+        except _REFUSALS as error:
+            return error
 
-    def step(self) -> Dict[int, Dict[str, Any]]:
+    def step(self) -> _Infos:
         arrays, infos = self._arrays, {}
         for i, env in enumerate(self._envs):
             if self._ended[i]:
@@ -155,8 +165,8 @@ def _work(
             order = inbox.receive()
             if order[:1] == _CLOSE:
                 break
-            infos = worker.step() if order[:1] == _STEP else worker.reset(*pickle.loads(order[1:]))
-            connection.send_bytes(pickle.dumps(infos) if infos else b"")
+            answer = worker.step() if order[:1] == _STEP else worker.reset(*pickle.loads(order[1:]))
+            connection.send_bytes(pickle.dumps(answer) if answer else b"")
     except (EOFError, KeyboardInterrupt):
         pass
     except Exception as error:
@@ -186,6 +196,7 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         self, num_envs: int = 1, workers: Optional[int] = None, context: Optional[str] = None, **arguments: Any
     ) -> None:
         self.closed = True  # until there is something to close
+        self._flying = False
         if num_envs < 1 or (workers is not None and workers < 1):
             raise GymError(f"num_envs: {num_envs!r}, workers: {workers!r}; expected 1 or more")
         model = FlyEnv(**arguments)  # raises what is wrong before a process is started
@@ -194,6 +205,7 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(model.observation_space, num_envs)
         self.action_space = batch_space(model.action_space, num_envs)
         self.metadata = {**model.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+        self._commander = model.commander
         model.close()
         layout = _layout(model.observation_space, model.action_space)
         processes: Any = multiprocessing.get_context(context)
@@ -225,6 +237,11 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         Args:
             seed: Of the first, the next is that of the second and so on; or a list, one of each.
             options: As `FlyEnv.reset` has them, for all.
+
+        Raises:
+            GymError, CampaignError, FlightModelError, NotFlownError, ScenarioError: As `FlyEnv.reset`; the environments
+                stay open and are to be reset again.
+            WorkerError: A worker has ended; the environments are closed.
         """
         if seed is None or isinstance(seed, (int, np.integer)):
             seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
@@ -233,16 +250,22 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
         if len(seeds) != self.num_envs:
             raise GymError(f"seed: {len(seeds)} of them; expected one number, or {self.num_envs}")
         options = None if options is None else dict(options)
+        self._flying = False
         shares = [seeds[first:end] for first, end in self._rows]
         self._send([_RESET + pickle.dumps((share, options)) for share in shares[:-1]])
         infos = self._receive(lambda: self._own.reset(shares[-1], options))
+        self._flying = True
         return self._observations(), infos
 
     def step(self, actions: Any) -> Tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]:
-        """Flies on in all."""
+        """Flies on in all.
+
+        Raises:
+            GymError: There are no episodes, or one of these is no action: nothing was flown, the next step may follow.
+            WorkerError: A worker has ended; the environments are closed.
+        """
         given = np.asarray(actions, np.float32)
-        if given.shape != self.action_space.shape:
-            raise GymError(f"actions of shape {given.shape}; expected {self.action_space.shape}")
+        self._check(given)
         arrays = self._arrays
         arrays["action"][:] = given
         self._send([_STEP] * len(self._connections))
@@ -268,6 +291,19 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
             return {name: self._arrays[f"observation {name}"].copy() for name in self.single_observation_space.spaces}
         return self._arrays["observation "].copy()
 
+    def _check(self, actions: np.ndarray) -> None:
+        """Refuses what an environment would refuse, before any of them flies."""
+        if not (self.closed or self._flying):
+            raise GymError("step: no episodes are being flown; call reset first")
+        if actions.shape != self.action_space.shape:
+            raise GymError(f"actions of shape {actions.shape}; expected {self.action_space.shape}")
+        flown = ~(self._arrays["terminated"] | self._arrays["truncated"])  # the others begin anew
+        for index in np.flatnonzero(flown & ~(np.abs(actions) <= 1.0).all(axis=1)):
+            try:
+                self._commander.command(actions[index])
+            except GymError as error:
+                raise GymError(f"environment {index}: {error}") from None
+
     def _send(self, orders: Sequence[bytes]) -> None:
         if self.closed:
             raise GymError("the environments are closed")
@@ -277,14 +313,18 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
             except OSError:
                 self._fail(i)
 
-    def _receive(self, fly_own: Callable[[], Dict[int, Dict[str, Any]]]) -> Dict[str, Any]:
-        """Flies this process's share, and gathers the infos of all."""
+    def _receive(self, fly_own: Callable[[], Union[_Infos, Exception]]) -> Dict[str, Any]:
+        """Flies this process's share, and gathers the infos of all; raises what one of them has refused."""
         infos: Dict[str, Any] = {}
+        refused: List[Exception] = []
         try:
             own = fly_own()
         except Exception as error:
             self.close()
             raise WorkerError(f"{type(error).__name__}: {error}") from error
+        if isinstance(own, Exception):
+            refused.append(own)
+            own = {}
         for index, info in own.items():
             infos = self._add_info(infos, info, index)
         for i, inbox in enumerate(self._inboxes):
@@ -298,8 +338,13 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
             if isinstance(received, str):
                 self.close()
                 raise WorkerError(received)
+            if isinstance(received, Exception):
+                refused.append(received)
+                continue
             for index, info in received.items():
                 infos = self._add_info(infos, info, index)
+        if refused:
+            raise refused[0]
         infos["sim_time"], infos["_sim_time"] = self._arrays["sim_time"].copy(), np.ones(self.num_envs, bool)
         return infos
 

@@ -127,6 +127,22 @@ def test_what_info_says_of_an_episode_brings_it_about_again() -> None:
     assert np.array_equal(flown(env, seed=99, options=info["conditions"]), first)
 
 
+def test_a_drawn_start_that_cannot_be_flown_is_drawn_again_the_same_way_each_time() -> None:
+    env = FlyEnv(episode={"speed": {"choice": [70, 200]}, "altitude": {"uniform": [500, 1500]}})
+    first = [env.reset(seed=2)[1]["conditions"], *(env.reset()[1]["conditions"] for _ in range(20))]
+    assert {conditions["speed"] for conditions in first} == {70.0}
+    assert [env.reset(seed=2)[1]["conditions"], *(env.reset()[1]["conditions"] for _ in range(20))] == first
+
+
+def test_a_start_that_no_draw_makes_fly_is_reported() -> None:
+    env = FlyEnv(episode={"speed": {"uniform": [200, 201]}})
+    with pytest.raises(FlightModelError, match=r"airspeed 20.*\(the last of 20 draws, .*: narrow the distributions"):
+        env.reset(seed=1)
+    with pytest.raises(FlightModelError) as raised:  # nothing is drawn
+        env.reset(seed=1, options={"speed": 200})
+    assert "draws" not in str(raised.value)
+
+
 def test_fixing_one_thing_changes_no_other_draw() -> None:
     env = FlyEnv(episode={key: {"uniform": [0, 9]} for key in ("wind_speed", "wind_from", "turbulence", "payload")})
     _, drawn = env.reset(seed=4)

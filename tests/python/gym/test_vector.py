@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -14,6 +15,8 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.gym import FlyEnv, FlyVectorEnv, Task, WingsLevel
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.gym.vector import WorkerError
@@ -126,9 +129,63 @@ def test_an_error_in_a_worker_is_raised_here(workers: int) -> None:
     with pytest.raises(WorkerError, match="ZeroDivisionError"):
         fly_on(envs)
     assert envs.closed
-    envs = FlyVectorEnv(2, workers=workers)
-    with pytest.raises(WorkerError, match="FlightModelError: airspeed 200"):
-        envs.reset(options={"speed": 200})
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize(
+    ("options", "error", "text"),
+    [
+        ({"speed": 200}, FlightModelError, "airspeed 200"),
+        ({"speeds": 70}, GymError, "episode.speeds: unknown key"),
+        ({"speed": {"uniform": [9, 5]}}, CampaignError, "episode.speed.uniform"),
+        ({"failures": [{"name": "engine_9"}]}, Exception, "engine_9"),
+    ],
+)
+def test_wrong_options_are_refused_and_the_next_are_flown(workers: int, options: Any, error: Any, text: str) -> None:
+    envs = FlyVectorEnv(3, workers=workers, **GUSTY)
+    envs.reset(seed=1)
+    with pytest.raises(error, match=text):
+        envs.reset(options=options)
+    with pytest.raises(GymError, match="no episodes are being flown; call reset first"):
+        envs.step(np.zeros((3, 1), np.float32))
+    observed, _ = envs.reset(seed=1)
+    assert np.array_equal(observed[0], FlyEnv(**GUSTY).reset(seed=1)[0])
+    envs.step(np.zeros((3, 1), np.float32))
+    envs.close()
+
+
+@pytest.mark.parametrize("wrong", [1.5, math.nan])
+def test_an_action_out_of_range_is_refused_before_any_is_flown(vector: FlyVectorEnv, wrong: float) -> None:
+    vector.reset(seed=1)
+    actions = np.zeros((5, 1), np.float32)
+    actions[3] = wrong
+    with pytest.raises(GymError, match=rf"environment 3: action roll is {wrong}: expected -1\.\.1"):
+        vector.step(actions)
+    *_, infos = vector.step(np.zeros((5, 1), np.float32))
+    assert infos["sim_time"] == pytest.approx([3 / 60] * 5)
+
+
+def test_an_action_that_is_not_flown_may_be_anything(vector: FlyVectorEnv) -> None:
+    vector.reset(seed=1)
+    for _ in range(15):
+        vector.step(np.zeros((5, 1), np.float32))
+    *_, infos = vector.step(np.full((5, 1), math.nan, np.float32))
+    assert "conditions" in infos
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_drawn_start_that_cannot_be_flown_is_drawn_again(workers: int) -> None:
+    """Of two speeds one is far beyond what the aircraft can fly."""
+    episode = {"speed": {"choice": [70, 200]}}
+    envs = FlyVectorEnv(4, workers=workers, task=WingsLevel, episode=episode, duration=1 / 30)
+    envs.reset(seed=3)
+    alone = FlyEnv(task=WingsLevel, episode=episode, duration=1 / 30)
+    alone.reset(seed=3)
+    for _ in range(10):
+        envs.step(np.zeros((4, 1), np.float32))
+        observed, *_ = envs.step(np.zeros((4, 1), np.float32))
+        assert np.array_equal(observed[0], alone.reset()[0])
+    envs.close()
 
 
 def test_a_killed_worker_is_named() -> None:
