@@ -145,12 +145,13 @@ class Episodes:
             seed=seed,
             mode=AUTO,
         )
-        options: Dict[str, Any] = {**values, "seed": seed}
-        if failures:
-            options["failures"] = [
-                {"name": f.action["name"], "kind": f.action["kind"], "value": f.action["value"], "at": f.at}
-                for f in failures
-            ]
+        # Also what an option has switched off: the environment's own `episode` has it.
+        switched_off = {key: None for key in KEYS if key in self._given and key not in values}
+        broken = [
+            {"name": f.action["name"], "kind": f.action["kind"], "value": f.action["value"], "at": f.at}
+            for f in failures
+        ]
+        options: Dict[str, Any] = {**values, **switched_off, "failures": broken, "seed": seed}
         return Episode(conditions, tuple(sorted(failures, key=lambda failure: failure.at)), options)
 
     @staticmethod

@@ -127,6 +127,16 @@ def test_what_info_says_of_an_episode_brings_it_about_again() -> None:
     assert np.array_equal(flown(env, seed=99, options=info["conditions"]), first)
 
 
+@pytest.mark.parametrize("options", [{"failures": []}, {"turbulence": None}, {"wind_speed": None, "failures": None}])
+def test_what_info_says_is_also_what_an_option_switched_off(options: dict) -> None:
+    failures = [{"name": "aileron1_wing2_left", "kind": "stuck", "value": 5, "at": 0.2}]
+    env = FlyEnv(task=WingsLevel, episode={"wind_speed": 8, "turbulence": 1.0, "failures": failures})
+    first = flown(env, seed=3, options=options)
+    _, info = env.reset(seed=3, options=options)
+    assert np.array_equal(flown(env, seed=99, options=info["conditions"]), first)
+    assert not np.array_equal(flown(env, seed=3), first)
+
+
 def test_a_drawn_start_that_cannot_be_flown_is_drawn_again_the_same_way_each_time() -> None:
     env = FlyEnv(episode={"speed": {"choice": [70, 200]}, "altitude": {"uniform": [500, 1500]}})
     first = [env.reset(seed=2)[1]["conditions"], *(env.reset()[1]["conditions"] for _ in range(20))]
