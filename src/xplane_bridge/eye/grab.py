@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import Any, Callable, Optional, Sequence, Tuple, TypeVar, Union
+from typing import Any, Callable, List, Optional, Sequence, Tuple, TypeVar, Union
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -46,6 +46,8 @@ class Grabber:
         self.problem = "the window was not looked for yet"
         self._titles = titles
         self._which = which
+        self._taken: Any = None
+        self._beside: List[Any] = []  # the one taken among them
         self._take = take
         self._stop = threading.Event()
         self._thread: Optional[threading.Thread] = None
@@ -65,8 +67,30 @@ class Grabber:
         """Hands pictures over until the end; runs in a thread of its own."""
         raise NotImplementedError
 
+    def _number_of(self, window: Any) -> Any:
+        """By which a window is known again when it has moved."""
+        return window
+
     def _chosen(self, windows: Sequence[Tuple[Rect, W]]) -> Optional[W]:
-        """The window that is asked for, of those that fit; says why there is none, and that there are several."""
+        """The window that is asked for, of those that fit; says why there is none, and that there are several.
+
+        Where one of several goes, numbers and sizes choose another, which shows another view: that is not taken.
+        """
+        found = self._fitting(windows)
+        if found is None:
+            return None
+        number = self._number_of(found)
+        if number != self._taken and number in self._beside:
+            self.problem = (
+                "the window that was captured is hidden or closed, and another that was there beside it is not taken "
+                "in its place: show it again, or start anew"
+            )
+            return None
+        self._taken = number
+        self._beside = [self._number_of(window) for _, window in windows]
+        return found
+
+    def _fitting(self, windows: Sequence[Tuple[Rect, W]]) -> Optional[W]:
         if self._which is None:
             count = len(windows)
             self.remark = f"{count} windows are alike: the largest is taken, --window chooses" if count > 1 else ""

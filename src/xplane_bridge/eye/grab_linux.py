@@ -191,6 +191,9 @@ class LinuxGrabber(Grabber):
         )
         return None
 
+    def _number_of(self, window: windows.Window) -> int:
+        return window.number
+
     def _place(self, window: windows.Window) -> Rect:
         x, y, child = ctypes.c_int(), ctypes.c_int(), ctypes.c_ulong()
         root = self._x11.XDefaultRootWindow(self._display)

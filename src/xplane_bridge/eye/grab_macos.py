@@ -125,6 +125,9 @@ class MacGrabber(Grabber):
         self.problem = self._no_window(tuple(str(window.title()) for window in found if window.title()))
         return None
 
+    def _number_of(self, window: Any) -> Any:
+        return window.windowID()
+
     def _stream(self, window: Any) -> None:
         """Has pictures delivered until the window is closed or its size changes."""
         kit, area = self._kit, window.frame().size

@@ -68,7 +68,11 @@ class Desktop:
         self.fault: Any = None  #: with which the next stream's start ends
 
     def windows(self) -> list:
-        return [types.SimpleNamespace(frame=lambda place=self.place: rect(*place), title=lambda: "X-Plane")]
+        return [
+            types.SimpleNamespace(
+                frame=lambda place=self.place: rect(*place), title=lambda: "X-Plane", windowID=lambda: 7
+            )
+        ]
 
     def displays(self) -> list:
         return [types.SimpleNamespace(frame=lambda: rect(*SCREEN))]

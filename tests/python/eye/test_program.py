@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+from typing import Optional
 
 import pytest
 
@@ -110,11 +111,23 @@ def test_of_windows_alike_the_number_chooses_from_the_left():
     largest = Windows((), None, lambda *_: None)
     assert largest.choose(LEFT, RIGHT, BELOW) == "right"
     assert largest.remark == "3 windows are alike: the largest is taken, --window chooses"
-    assert largest.choose(LEFT) == "left"
-    assert largest.remark == ""
+    alone = Windows((), None, lambda *_: None)
+    assert alone.choose(LEFT) == "left"
+    assert alone.remark == ""
     beyond = Windows((), 3, lambda *_: None)
     assert beyond.choose(LEFT, RIGHT, BELOW) is None
     assert beyond.problem == "there is no window number 3: 3 are alike, counted from 0"
+
+
+@pytest.mark.parametrize("which", [0, None])
+def test_of_windows_alike_none_takes_the_place_of_another(which: Optional[int]):
+    windows = Windows((), which, lambda *_: None)
+    large = ((0, 0, 900, 600), "large")
+    assert windows.choose(large, BELOW) == "large"
+    assert windows.choose(BELOW) is None
+    assert windows.problem.startswith("the window that was captured is hidden or closed, and another")
+    assert windows.choose(((5, 5, 900, 600), "large"), BELOW) == "large"
+    assert windows.choose(((0, 0, 900, 600), "opened anew"), BELOW) == "opened anew"
 
 
 def test_of_windows_alike_a_point_of_the_screen_chooses_the_one_there():
