@@ -141,10 +141,16 @@ def substituted(item: Any, values: Mapping[str, Value], path: str) -> Any:
             raise CampaignError(
                 f"{path}: {item!r}; expected a parameter of {', '.join(values) or 'which there are none'}"
             )
-    whole = _REFERENCE.fullmatch(item)
-    if whole:
-        return values[whole.group(1)]
+    whole = parameter_of(item)
+    if whole is not None:
+        return values[whole]
     return _REFERENCE.sub(lambda match: _short(values[match.group(1)]), item)
+
+
+def parameter_of(item: Any) -> Optional[str]:
+    """Name of the parameter that `item` is drawn as; None: it is none as a whole."""
+    whole = _REFERENCE.fullmatch(item) if isinstance(item, str) else None
+    return whole.group(1) if whole else None
 
 
 def _short(value: Value) -> str:
@@ -255,9 +261,9 @@ def _check_first(campaign: Campaign) -> Scenario:
 
 def _all_aircraft(campaign: Campaign, first: FlightPlan) -> Tuple[Value, ...]:
     """That of the first flight; where it is drawn, all."""
-    reference = _REFERENCE.fullmatch(campaign.document.get("aircraft") or "")
+    drawn = parameter_of(campaign.document.get("aircraft"))
     for parameter in campaign.parameters:
-        if reference and parameter.name == reference.group(1):
+        if parameter.name == drawn:
             return parameter.values
     return (first.aircraft,)
 

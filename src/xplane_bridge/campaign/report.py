@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import html
 import math
-from typing import Dict, Iterable, List, Mapping, Sequence, Tuple
+from typing import Dict, Iterable, List, Mapping, Sequence, Tuple, Union
 
 import numpy as np
 import pandas as pd
 
 from xplane_bridge.analysis.criteria import Criterion
 from xplane_bridge.analysis.intervals import quantile, rank_correlation, wilson
-from xplane_bridge.campaign.definition import Campaign
+from xplane_bridge.campaign.definition import Campaign, parameter_of
 from xplane_bridge.campaign.flight import FLOWN
 from xplane_bridge.campaign.rows import WORKER_DIED
 
@@ -47,19 +47,26 @@ def worst_first(campaign: Campaign, table: pd.DataFrame) -> pd.DataFrame:
     frame = pd.DataFrame({"ended": table["outcome"] == FLOWN, "missed": 0, "rank": 0.0, "flight": table["flight"]})
     for criterion in campaign.scenario_criteria:
         frame["missed"] += ~table[f"met_{criterion.name}"]
-        frame["rank"] += _beyond(criterion, table[f"value_{criterion.name}"]).rank(method="average")
+        frame["rank"] += _beyond(campaign, criterion, table).rank(method="average")
     order = frame.sort_values(["ended", "missed", "rank", "flight"], ascending=[True, False, False, True]).index
     return table.loc[order]
 
 
-def _beyond(criterion: Criterion, values: pd.Series) -> pd.Series:
+def _beyond(campaign: Campaign, criterion: Criterion, table: pd.DataFrame) -> pd.Series:
     """How far values lie beyond the bound that they violate: 0 where they violate none, infinite where not measured."""
+    values = table[f"value_{criterion.name}"]
     beyond = pd.Series(0.0, values.index)
     if criterion.below is not None:
-        beyond = np.maximum(beyond, values - criterion.below)
+        beyond = np.maximum(beyond, values - _bound(campaign, criterion.name, "below", criterion.below, table))
     if criterion.above is not None:
-        beyond = np.maximum(beyond, criterion.above - values)
+        beyond = np.maximum(beyond, _bound(campaign, criterion.name, "above", criterion.above, table) - values)
     return beyond.fillna(math.inf)
+
+
+def _bound(campaign: Campaign, name: str, side: str, first: float, table: pd.DataFrame) -> Union[float, pd.Series]:
+    """A criterion's bound: one number, or that of each flight where it is drawn; `first` is that of flight 0."""
+    drawn = parameter_of(campaign.document["scenario"]["criteria"].get(name, {}).get(side))
+    return first if drawn is None else table[f"parameter_{drawn}"].astype(float)
 
 
 def flights_to_draw(campaign: Campaign, table: pd.DataFrame) -> List[int]:

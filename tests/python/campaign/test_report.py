@@ -63,6 +63,22 @@ def test_of_two_bounds_the_one_that_is_violated_counts() -> None:
     assert list(report.worst_first(campaign, flights)["flight"]) == [4, 1, 2, 0, 3]
 
 
+def test_a_bound_that_is_drawn_is_that_of_each_flight() -> None:
+    """Beyond its own bound flight 0 is by 1, 1 by 3, 2 by 2; beyond that of flight 0, flight 2 would be the first."""
+    criteria = {
+        "low": {"measure": "peak", "of": "roll", "target": 0, "below": "$t"},
+        "high": {"measure": "minimum", "of": "altitude", "above": "$t"},
+    }
+    document = {**DOCUMENT, "parameters": {"t": {"uniform": [1, 90]}}, "scenario": {**DOCUMENT["scenario"],
+                "description": "", "criteria": criteria}}  # fmt: skip
+    flights = pd.DataFrame({"flight": range(3), "outcome": "flown", "parameter_t": [10.0, 20.0, 40.0], "met_low": False,
+                            "value_low": [11.0, 23.0, 42.0], "met_high": True, "value_high": 1000.0})  # fmt: skip
+    assert list(report.worst_first(parse_campaign(document), flights)["flight"]) == [1, 2, 0]
+    flights["value_low"], flights["met_low"], flights["met_high"] = 0.0, True, False
+    flights["value_high"] = [9.0, 17.0, 38.0]
+    assert list(report.worst_first(parse_campaign(document), flights)["flight"]) == [1, 2, 0]
+
+
 def test_how_well_a_criterion_was_met_does_not_decide() -> None:
     """Flight 0 is 1 deg beyond the bound and hardly high enough, flight 1 is 2 deg beyond it and high up."""
     flights = table().iloc[[1, 1, 0]].reset_index(drop=True).assign(flight=[0, 1, 2])
