@@ -306,7 +306,7 @@ def _refuse_unflyable(scenario: Scenario) -> None:
     """What takes an X-Plane, or a joystick: a flight in process has neither."""
     for i, event in enumerate(scenario.events):
         for kind, value in event.actions:
-            if kind in ("dataref", "command", "buttons", "hat", *WORLD_KINDS):
+            if kind in ("dataref", "command", "buttons", *WORLD_KINDS):
                 raise CampaignError(
                     f"scenario.events[{i}].{kind}: takes the bridge; expected mode, stick, hold, handles, "
                     "failure, clear_failures, excitation, label or end"

@@ -279,10 +279,6 @@ def _buttons(item: Any, path: str) -> Dict[str, List[int]]:
     return out
 
 
-def _hat(item: Any, path: str) -> Dict[str, float]:
-    return _ranged(item, path, {"x": (-1.0, 1.0), "y": (-1.0, 1.0)}, some=True)
-
-
 def _mode(item: Any, path: str) -> int:
     return MODES[_one_of(item, path, MODES)]
 
@@ -437,7 +433,6 @@ _ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
     "hold": _hold,
     "handles": _handles,
     "buttons": _buttons,
-    "hat": _hat,
     "mode": _mode,
     "failure": _failure,
     "clear_failures": _true,

@@ -57,7 +57,6 @@ class Commands:
     throttle: Optional[float] = None  #: None: never said, leave it
     handles: Dict[str, float] = field(default_factory=dict)  #: those said so far
     buttons: Set[int] = field(default_factory=set)  #: pressed ones
-    hat: Tuple[float, float] = (0.0, 0.0)
     actions: List[Action] = field(default_factory=list)  #: new ones, in order
     finished: bool = False
 
@@ -93,7 +92,6 @@ class Player:
         self._handles: Dict[str, float] = {}
         self._buttons: Set[int] = set()
         self._taps: Set[int] = set()
-        self._hat = (0.0, 0.0)
         self._running: List[Tuple[float, Dict[str, Any]]] = []
         self._next = 0
         self._start: Optional[float] = None
@@ -124,7 +122,6 @@ class Player:
         self._fly(now, dt, sample, commands)
         commands.handles = dict(self._handles)
         commands.buttons = self._buttons | self._taps
-        commands.hat = self._hat
         commands.finished = self._finished
         return commands
 
@@ -184,8 +181,6 @@ class Player:
             self._buttons |= set(value.get("press", ()))
             self._buttons -= set(value.get("release", ()))
             self._taps |= set(value.get("tap", ()))
-        elif kind == "hat":
-            self._hat = (value.get("x", self._hat[0]), value.get("y", self._hat[1]))
         elif kind == "end":
             self._finished = True
         else:

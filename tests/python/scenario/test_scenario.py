@@ -99,6 +99,7 @@ def test_the_example_of_the_manual_is_a_scenario():
         ({"name": "x", "events": [{"at": 0, "when": {"roll": {"above": 5, "below": 5}}}]}, "roll: above 5 and below 5"),
         ({"name": "x", "events": [{"at": 0, "when": {"altitude": True}}]}, "altitude: True; expected .low, high."),
         ({"name": "x", "events": [{"at": 0, "timeout": 3}]}, "timeout: without 'when'"),
+        ({"name": "x", "events": [{"at": 0, "hat": {"y": 1}}]}, r"events\[0\].hat: unknown key; .*handles"),
         ({"name": "x", "events": [{"at": 0, "buttons": {"press": [99]}}]}, "button numbers 0..63"),
         ({"name": "x", "gains": {"rol": 1}, "events": [{"at": 0}]}, "gains.rol: unknown key"),
         ({"name": "x", "start": {"altitude": 1e6}, "events": [{"at": 0}]}, "start.altitude: 1000000.0"),
@@ -263,18 +264,17 @@ def test_handles_have_the_names_of_the_command_and_old_names_still_work():
     assert accepted == parse_scenario({"name": "s", "events": [{"at": 0, "handles": new}]})
 
 
-def test_buttons_hat_and_handles():
+def test_buttons_and_handles():
     player = Player(
         scenario(
-            {"at": 1, "buttons": {"press": [2], "tap": 5}, "hat": {"y": 1}},
-            {"at": 2, "buttons": {"release": 2}, "hat": {"y": 0}, "handles": {"flaps": 0.5, "gear": 0}},
+            {"at": 1, "buttons": {"press": [2], "tap": 5}},
+            {"at": 2, "buttons": {"release": 2}, "handles": {"flaps": 0.5, "gear": 0}},
         )
     )
     steps = {round(t, 1): c for t, c in play(player, 3.0)}
     assert steps[0.5].buttons == set()
     assert steps[1.0].buttons == {2, 5}
     assert steps[1.1].buttons == {2}
-    assert steps[1.5].hat == (0.0, 1.0)
     assert steps[2.0].buttons == set()
     assert steps[2.0].handles == {"flaps": 0.5, "gear": 0.0}
 
