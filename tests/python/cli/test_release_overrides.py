@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
-from typing import Any, Dict, List, Tuple
+from typing import Any, Callable, Dict, List, Tuple
 
 import pytest
 
@@ -27,6 +27,7 @@ class XPlane:
 
     def __init__(self) -> None:
         self.values: Dict[str, float] = {STICK: 1.0, THROTTLES: 1.0}
+        self.on_write: Callable[[], object] = lambda: None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self.port = self._socket.getsockname()[1]
@@ -36,6 +37,7 @@ class XPlane:
         while True:
             packet, client = self._socket.recvfrom(2048)
             if packet[:4] == b"DREF":
+                self.on_write()
                 if _path(packet[9:]) in self.values:
                     self.values[_path(packet[9:])] = struct.unpack_from("<f", packet, 5)[0]
             elif packet[:4] == b"RREF":
@@ -162,6 +164,16 @@ def test_a_full_disk_keeps_no_journal_of_which_all_is_released(left: Tuple[XPlan
     done = release(journal)
     assert done.returncode == 0, done.stdout + done.stderr
     assert not journal.exists()
+
+
+def test_a_journal_that_is_damaged_meanwhile_holds_up_nothing(left: Tuple[XPlane, Path]) -> None:
+    xplane, journal = left
+    xplane.on_write = lambda: journal.write_text("{", "utf-8")
+    done = release(journal)
+    assert done.returncode == 1
+    assert done.stderr == ""
+    assert set(xplane.values.values()) == {0.0}
+    assert done.stdout.count(f"{journal}: cannot be changed (") == 1
 
 
 @pytest.mark.parametrize(
