@@ -14,7 +14,7 @@ from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
 from xplane_bridge.scenario.ros_player import RosPlayer
-from xplane_bridge.scenario.virtual_stick import load_stick
+from xplane_bridge.scenario.virtual_stick import load_stick, refuse_buttons
 from xplane_bridge.topics import NAMESPACE, absolute
 
 
@@ -79,6 +79,8 @@ def play(
         if file.suffix != ".yaml":
             file = config_file("joysticks", f"{args.joy_config}.yaml")
         stick = load_stick(file, args.stick_mode)
+    else:
+        refuse_buttons(scenario, "--joystick")
     namespace = args.namespace.rstrip("/")
     rospy = start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
     if joystick:

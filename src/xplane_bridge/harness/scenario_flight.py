@@ -9,6 +9,7 @@ from xplane_bridge.harness.flight import FlightPlan
 from xplane_bridge.harness.lockstep_flight import Lockstep
 from xplane_bridge.resources import config_file, program
 from xplane_bridge.scenario import Scenario, ScenarioError
+from xplane_bridge.scenario.virtual_stick import refuse_buttons
 
 PLAYER, CONTROLLER = "scenario_player", "controller"
 #: What the player writes when it begins.
@@ -52,7 +53,7 @@ def scenario_plan(
         lockstep: fly in lock-step so; player, joystick_mapper_node and a controller are participants by themselves.
 
     Raises:
-        ScenarioError: It is for other aircraft.
+        ScenarioError: It is for other aircraft, or presses buttons of a joystick that there is none of.
         ResourceError: There is no such joystick.
     """
     chosen = aircraft or (scenario.aircraft[0] if scenario.aircraft else "fixed_wing")
@@ -77,6 +78,8 @@ def scenario_plan(
         if lockstep is not None:
             lockstep.participants.append("joystick_mapper_node")
             lockstep.stick = PLAYER
+    else:
+        refuse_buttons(scenario, "--joystick NAME")
     if scenario.controller and not controller:
         controller = [str(program("fly_controller")), scenario.controller]
         if lockstep is None:  # there it commands when the flight begins, which waits for all participants

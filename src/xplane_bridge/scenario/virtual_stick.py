@@ -14,7 +14,7 @@ import yaml
 
 from xplane_bridge.errors import yaml_problem
 from xplane_bridge.scenario.player import Commands
-from xplane_bridge.scenario.schema import ScenarioError
+from xplane_bridge.scenario.schema import Scenario, ScenarioError
 
 AXIS_COUNT, BUTTON_COUNT = 8, 12
 _GRID = np.linspace(0.0, 1.0, 2001)
@@ -106,6 +106,24 @@ class VirtualStick:
             f"{self.name}: {handle} is moved by a hat as long as that is pressed, not to a value; "
             "fly this scenario with commands instead of a stick"
         )
+
+
+def refuse_buttons(scenario: Scenario, way: str) -> None:
+    """Of a scenario that is flown by commands, which have no buttons.
+
+    Args:
+        scenario: What is to be flown.
+        way: The option by which a joystick flies it.
+
+    Raises:
+        ScenarioError: It presses some.
+    """
+    for i, event in enumerate(scenario.events):
+        if any(kind == "buttons" for kind, _ in event.actions):
+            raise ScenarioError(
+                f"{scenario.name}: events[{i}].buttons: commands have no buttons; fly it through a joystick ({way}), "
+                "or write mode or handles instead"
+            )
 
 
 def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:

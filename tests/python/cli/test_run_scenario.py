@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
+
 import pytest
 
 from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.cli.run_scenario import lockstep_of, parser, plan_of
-from xplane_bridge.scenario import ScenarioError, parse_scenario
+from xplane_bridge.cli.scenario_player import play
+from xplane_bridge.scenario import ScenarioError, load_scenario, parse_scenario
 
 
 @pytest.mark.parametrize(
@@ -36,6 +39,17 @@ def test_frames_a_second_that_are_none_are_refused(capsys):
 def test_options_that_do_not_go_together_are_refused(arguments, said):
     with pytest.raises(ScenarioError, match=said):
         lockstep_of(parser().parse_args(["demo", *arguments]))
+
+
+def test_buttons_without_a_joystick_are_refused_before_anything_starts(tmp_path):
+    file = tmp_path / "s.yaml"
+    file.write_text("name: s\nevents:\n- {at: 0, label: a}\n- {at: 1, buttons: {tap: 0}}\n")
+    pressing, arguments = load_scenario(file), [str(file), "--output", str(tmp_path / "out")]
+    with pytest.raises(ScenarioError, match=r"s: events\[1\]\.buttons: .* a joystick \(--joystick NAME\)"):
+        plan_of(pressing, parser().parse_args(arguments))
+    assert plan_of(pressing, parser().parse_args([*arguments, "--joystick", "xbox"]))
+    with pytest.raises(ScenarioError, match=r"s: events\[1\]\.buttons: .* a joystick \(--joystick\)"):
+        play(Namespace(scenario=str(file)), [], "scenario_player", joystick=False)
 
 
 def level(_state):
