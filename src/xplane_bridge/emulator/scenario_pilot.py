@@ -13,6 +13,7 @@ from xplane_bridge.units import GRAVITY_MPS2
 
 _FAILURES = "sim/operation/failures/"
 _TRIMS = {"trim_roll": "aileron_trim", "trim_pitch": "elevator_trim", "trim_yaw": "rudder_trim"}
+_EXCITED = ("roll", "pitch", "yaw")
 _FAILED, _REPAIRED = 6.0, 0.0
 #: Failures of systems by their plain names; {} is the number counted from 0.
 _SYSTEMS = {
@@ -28,7 +29,7 @@ class ScenarioPilot:
     """Callable that the emulator asks once a frame: (flight time, frame) -> PilotCommands.
 
     Raises:
-        ScenarioError: The scenario has a failure that only a client can bring about.
+        ScenarioError: The scenario asks for what only a client can bring about.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -39,6 +40,11 @@ class ScenarioPilot:
                 if kind == "excitation" and "," in value["target"]:
                     raise ScenarioError(
                         "excitation: the emulator's pilot moves one axis; tx_node moves several at once"
+                    )
+                if kind == "excitation" and value["target"] not in _EXCITED:
+                    raise ScenarioError(
+                        f"excitation of {value['target']}: the emulator's pilot moves {', '.join(_EXCITED)}; tx_node "
+                        "moves throttle and surfaces (inject_excitation)"
                     )
                 if kind in WORLD_KINDS:
                     way = {"reset": "reset_flight", "traffic": "traffic/command"}.get(kind, f"set_{kind}")

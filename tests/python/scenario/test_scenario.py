@@ -457,6 +457,15 @@ def test_pilot_refuses_what_it_cannot_do():
         ScenarioPilot(scenario({"at": 0, "failure": {"name": "aileron1_wing2_left", "kind": "stuck", "value": 5}}))
 
 
+@pytest.mark.parametrize("target", ["throttle", "aileron1_wing2_left", "roll,pitch"])
+def test_the_emulators_pilot_refuses_excitations_that_it_does_not_fly(target):
+    excitation = {"kind": "multisine", "amplitude": 0.1, "duration": 2}
+    for axis in ("roll", "pitch", "yaw"):
+        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": axis}}))
+    with pytest.raises(ScenarioError, match="excitation.*: the emulator's pilot moves .*; tx_node moves"):
+        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": target}}))
+
+
 def test_scenario_of_another_aircraft_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match="is a scenario for multirotor, not for fixed_wing"):
         fly(tmp_path, "name: t\naircraft: multirotor\nevents:\n- {at: 0}\n", 0.1, aircraft="fixed_wing")
