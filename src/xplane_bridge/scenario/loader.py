@@ -162,6 +162,8 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
         )
     if measure == "settling" and "band" not in given:
         raise ScenarioError(f"{path}.band: missing; expected the largest |{variable} - target| that counts as settled")
+    if measure != "settling" and "band" in given:
+        raise ScenarioError(f"{path}.band: does not go with {measure}; expected it with settling only")
     numbers = {
         key: _number(given[key], f"{path}.{key}", low, math.inf)
         for key, low in (("target", -math.inf), ("band", 0.0))

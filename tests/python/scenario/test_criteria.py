@@ -37,6 +37,11 @@ def test_criteria_are_read_from_yaml() -> None:
             "criteria.c.from: 'x'; expected seconds, or the",
         ),
         ({"measure": "final", "of": "heading", "target": 0, "below": 5}, "criteria.c.target: does not go with final"),
+        (
+            {"measure": "rms", "of": "roll", "target": 0, "band": 3, "below": 5},
+            "criteria.c.band: does not go with rms; expected it with settling only",
+        ),
+        ({"measure": "maximum", "of": "roll", "band": 3, "below": 5}, "criteria.c.band: does not go with maximum"),
         ({"measure": "paired", "of": "roll", "above": 1}, "criteria.c.of: does not go with paired"),
         ({"measure": "maximum", "of": "roll", "below": "x"}, "criteria.c.below: 'x'; expected a number"),
         ({"measure": "maximum", "of": "roll", "under": 1}, "criteria.c.under: unknown key"),

@@ -462,7 +462,7 @@ def test_the_emulators_pilot_refuses_excitations_that_it_does_not_fly(target):
     excitation = {"kind": "multisine", "amplitude": 0.1, "duration": 2}
     for axis in ("roll", "pitch", "yaw"):
         ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": axis}}))
-    with pytest.raises(ScenarioError, match="excitation.*: the emulator's pilot moves .*; tx_node moves"):
+    with pytest.raises(ScenarioError, match=r"excitation.*: the emulator's pilot moves .*; tx_node moves"):
         ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": target}}))
 
 
