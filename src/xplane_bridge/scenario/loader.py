@@ -44,6 +44,7 @@ _START = {
 }
 #: Variables that are true or false.
 _YES_OR_NO = ("on_ground", "stall_warning")
+_MOST_SEED = 2**32 - 1  # InjectExcitation's is a uint32
 _AERODROME = ("latitude", "longitude", "heading")
 _TIMING = ("at", "after", "when", "timeout", "over")
 
@@ -321,8 +322,9 @@ def _excitation(item: Any, path: str) -> Dict[str, Any]:
         if key not in given and default is None:
             raise ScenarioError(f"{path}.{key}: missing; expected a number from {low} to {high}")
         out[key] = _number(given.get(key, default), f"{path}.{key}", low, high)
-    if not isinstance(out["seed"], int):
-        raise ScenarioError(f"{path}.seed: {out['seed']!r}; expected a whole number")
+    seed = out["seed"]
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= _MOST_SEED:
+        raise ScenarioError(f"{path}.seed: {_short(seed)}; expected a whole number from 0 to {_MOST_SEED}")
     return out
 
 

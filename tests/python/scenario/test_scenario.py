@@ -116,6 +116,15 @@ def test_what_is_wrong_is_said_with_its_key(document, message):
         parse_scenario(document)
 
 
+@pytest.mark.parametrize("seed", [-1, 2**32, 2**40, True, 1.5, "1"])
+def test_a_seed_of_an_excitation_is_one_of_the_service(seed):
+    excitation = {"kind": "multisine", "target": "roll", "amplitude": 0.1, "duration": 1}
+    for good in (0, 2**32 - 1):
+        parse_scenario({"name": "x", "events": [{"at": 0, "excitation": {**excitation, "seed": good}}]})
+    with pytest.raises(ScenarioError, match=r"excitation\.seed: .*; expected a whole number from 0 to 4294967295"):
+        parse_scenario({"name": "x", "events": [{"at": 0, "excitation": {**excitation, "seed": seed}}]})
+
+
 def test_files_that_are_no_scenarios(tmp_path):
     with pytest.raises(ScenarioError, match=r"no\.yaml: cannot be read: No such file"):
         load_scenario(tmp_path / "no.yaml")
