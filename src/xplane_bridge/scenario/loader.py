@@ -337,9 +337,7 @@ def _datarefs(item: Any, path: str) -> Dict[str, float]:
 def _reset(item: Any, path: str) -> Dict[str, Any]:
     given = _mapping(item, path, (*TEXTS, *NUMBERS))
     out: Dict[str, Any] = _ranged({k: v for k, v in given.items() if k in NUMBERS}, path, NUMBERS)
-    start = given.get("start", "place")
-    if start not in STARTS:
-        raise ScenarioError(f"{path}.start: {start!r}; expected one of {', '.join(STARTS)}")
+    start = _one_of(given.get("start", "place"), f"{path}.start", STARTS)
     needed = ("latitude", "longitude", "altitude_msl") if start == "place" else ("airport",)
     for key in (*needed, *(("final_distance", "true_airspeed") if start == "final" else ())):
         if key not in given:
