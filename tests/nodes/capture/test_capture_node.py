@@ -160,10 +160,38 @@ def test_views_and_field_of_view_are_read_back(world, display) -> None:
     assert not state.quality & FrameState.QUALITY_VIEW_UNKNOWN, "it is none of the three, but it is known"
     assert state.camera_pose_source == FrameState.POSE_MEASURED
     write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
-    state = states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3)
-    assert not state.quality & FrameState.QUALITY_FOV_ASSUMED
+    unsure = FrameState.QUALITY_FOV_ASSUMED  # which frame of the change the first pictures show
+    states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3 and not state.quality & unsure)
     info = infos.wait_for_next()
     assert info.K[0] == pytest.approx(320.0, abs=1e-3)  # 320 / tan(45 deg)
+
+
+def test_a_picture_has_the_field_of_view_of_the_frame_that_it_shows(world, display) -> None:
+    from xplane_bridge.msg import FrameState
+
+    world.set_param("display_delay", PIPELINE_DELAY_S)
+    emulator = window(world)
+    world.start("rx_node")
+    capture(world, display)
+    images, infos, states = watch(world, "image", "info", "state")
+    states.wait_for(lambda state: state.quality == 0, timeout=60.0)
+    write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
+    states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3 and state.quality == 0)
+    for _ in range(FPS // 2):
+        states.wait_for_next()
+    focal = {info.header.stamp: info.K[0] for info in list(infos.messages)}
+    quality = {state.header.stamp: state.quality for state in list(states.messages)}
+    seen = [image for image in list(images.messages) if image.header.stamp in focal and image.header.stamp in quality]
+    small = [pixels(image)[::8, ::8, 1].astype(float) for image in seen]
+    zoomed = 1 + int(np.argmax([np.abs(b - a).mean() for a, b in zip(small, small[1:])]))
+    sure = 0
+    for k, image in enumerate(seen):
+        stamp = image.header.stamp
+        if not quality[stamp] & FrameState.QUALITY_FOV_ASSUMED:
+            sure += 1
+            assert focal[stamp] == pytest.approx(FOCAL_60_DEG if k < zoomed else 320.0, abs=0.01), k - zoomed
+    assert zoomed >= 2
+    assert len(seen) - sure <= 4, "only beside the change it is not known which frame a picture shows"
 
 
 def test_nominal_frames_where_wanted(world, display) -> None:
