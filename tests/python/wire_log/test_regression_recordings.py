@@ -56,6 +56,9 @@ def replays(monkeypatch):
             starts.append(start)
             self.messages = [Message("/x/odom", 1, b"same")]
 
+        def write_bag(self, path):
+            path.write_bytes(b"a bag")
+
         def run(self, *_):
             if self.fails:
                 raise HarnessError("the node has failed")
@@ -134,6 +137,23 @@ def test_options_are_kept_in_disguise_and_used_again(tmp_path, replays, capsys):
     assert (first["host"], first["aircraft"]) == ("10.0.0.1", "quadrotor")
     assert (other["host"], other["aircraft"]) == ("10.0.0.1", "helicopter")
     assert capsys.readouterr().out.count("X-Plane at 10.0.0.1: 0 answers with 0 datarefs, 1 datagrams") == 4
+
+
+@pytest.mark.usefixtures("replays")
+@pytest.mark.parametrize(("live", "code"), [(b"same", 0), (b"other", 1)])
+@pytest.mark.parametrize("changed", [False, True])
+def test_a_bag_is_written_and_compared_also_where_something_is_expected(tmp_path, monkeypatch, live, code, changed):
+    kept, bag = tmp_path / "kept", tmp_path / "replay.bag"
+    assert main([str(log(tmp_path / "wire.rx_node.pcapng")), "--regression", str(kept)]) == 0
+    file = kept / "wire.rx_node.json"
+    if changed:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        content["topics"]["/x/odom"]["messages"] = 2
+        file.write_text(json.dumps(content), encoding="utf-8")
+    monkeypatch.setattr(wire_replay, "payloads_of", lambda *_: {"/x/odom": [live]})
+    replay = [str(kept / "wire.rx_node.pcapng"), "--expect", str(file), "-o", str(bag), "--against", "flight.bag"]
+    assert main(replay) == max(code, int(changed))
+    assert bag.read_bytes() == b"a bag"
 
 
 @pytest.mark.usefixtures("replays")

@@ -353,17 +353,16 @@ def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
         text = json.dumps(kept, indent=2, sort_keys=True) + "\n"
         path.with_suffix(".json").write_text(text, encoding="utf-8")
         written.clear()
-    if expected is not None:
-        return _say(_judge(expected.topics, found))
     if args.output:
         replay.write_bag(args.output)
+    code = 0 if expected is None else _say(_judge(expected.topics, found))
     if not args.against:
-        return 0
+        return code
     verdicts = compare(payloads_of(args.against, start.node), messages)
     if not verdicts:
         msg = f"{args.against} has no topic of {start.node}"
         raise ReplayError(msg)
-    return _say(verdicts)
+    return max(code, _say(verdicts))
 
 
 def _say(verdicts: Sequence[Tuple[str, str]]) -> int:
