@@ -18,6 +18,11 @@ _BEACON_NAME = 21  #: where the computer's name begins
 _NAME = b"computer"
 #: In texts, also within words such as 192.168.1.77_49000_conformance.yaml; and the zeros that fill a field.
 _ADDRESS = re.compile(rb"(?<![0-9])((?:[0-9]{1,3}\.){3}[0-9]{1,3})(?![0-9])(\0*)")
+#: Paths that do not begin with a slash: of a home, relative, of a URL, of Windows, of another computer (as scp has it),
+#: and folders with a file that has an ending. A topic, a frame, a dataref and udp://... are none.
+_PATH = re.compile(r"~|\.\.?[/\\]|file:|[^/\\]*:[/\\](?!/)|[^/]*\\|(?![^/]*://)[^\s]*/[^\s/]*\.[^\s/]*$")
+#: A user's name behind ~ goes with the folders.
+_SEPARATOR = re.compile(r"^~[^/\\]*|[/\\]")
 #: Fits wherever an address has stood.
 _SHORTEST = b"0.0.0.0"
 
@@ -93,8 +98,8 @@ class Disguise:
         if word != value:
             return word
         path = Path(value)
-        has_folder = path.is_absolute() and path.parent != Path("/")
-        data = (path.name if has_folder else value).encode()
+        has_folder = (path.is_absolute() and path.parent != Path("/")) or _PATH.match(value) is not None
+        data = (_SEPARATOR.split(value.rstrip("/\\"))[-1] if has_folder else value).encode()
         # A topic, a frame or a dataref may hold the same word as the host's name; a file's name is the user's own.
         is_file = has_folder or path.suffix != ""
         return (self._text(data) if is_file else _ADDRESS.sub(self._in_text, data)).decode()

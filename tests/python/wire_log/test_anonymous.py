@@ -6,6 +6,8 @@ import struct
 import xmlrpc.client
 from pathlib import Path
 
+import pytest
+
 from support.simulator.udp_packets import udp
 from xplane_bridge.wire_log.anonymous import Anonymiser, Disguise
 from xplane_bridge.wire_log.capture import Capture, Packet, write_pcapng
@@ -139,6 +141,37 @@ def test_a_host_called_as_the_words_of_a_file_leaves_it_readable():
         "frame": "xplane/base_link",
         "host": "10.0.0.1",
     }
+
+
+@pytest.mark.parametrize(
+    ("value", "kept"),
+    [
+        ("/home/alice/x.yaml", "x.yaml"),
+        ("/home/alice/", "alice"),
+        ("~/alice/x.yaml", "x.yaml"),
+        ("~alice/x", "x"),
+        ("~alice", ""),
+        ("../alice/x", "x"),
+        ("./alice/x", "x"),
+        ("alice/config/x.yaml", "x.yaml"),
+        ("file:///home/alice/x", "x"),
+        ("C:/Users/alice/x", "x"),
+        ("C:\\Users\\alice\\x.yaml", "x.yaml"),
+        ("\\\\server\\alice\\x", "x"),
+        ("alice@lab:/home/alice/x", "x"),
+        # None of these is a path of the user's.
+        ("xplane/base_link", "xplane/base_link"),
+        ("/xplane", "/xplane"),
+        ("udp://127.0.0.1:5600", "udp://127.0.0.1:5600"),
+        ("sim/flightmodel/position/theta", "sim/flightmodel/position/theta"),
+        ("x.yaml", "x.yaml"),
+        ("a word: and more", "a word: and more"),
+        ("", ""),
+    ],
+)
+def test_of_a_path_the_last_part_is_kept(value, kept):
+    assert Disguise().value(value) == kept
+    assert Disguise().value({"list": [value]}) == {"list": [kept]}
 
 
 def test_a_host_of_which_nothing_was_sent_gets_an_address(tmp_path):
