@@ -78,9 +78,8 @@ class Servos:
             rates = math.degrees(m.p_rad_s), math.degrees(m.q_rad_s)
             climb, altitude = -m.v_down_mps, altitude_ft * FOOT_M
             deflections["roll"] = self._holds.roll(targets, frame.true_phi, rates[0], frame.mag_psi) or 0.0
-            deflections["pitch"] = (
-                self._holds.pitch(targets, dt, frame.true_theta, rates[1], frame.true_phi, climb, altitude) or 0.0
-            )
+            attitude = frame.true_theta, rates[1], frame.true_phi
+            deflections["pitch"] = self._holds.pitch(targets, dt, *attitude, climb, altitude, present=0.0) or 0.0
         else:
             self._holds = None
         if damper and m.true_airspeed_mps > _SLOW_MPS:

@@ -10,6 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Dict, Optional
 
+_MOST_INTEGRAL = 0.6  # of the pitch hold: stick
+
 
 @dataclass(frozen=True)
 class HoldGains:
@@ -66,7 +68,7 @@ class HoldAutopilot:
 
     def __init__(self, gains: HoldGains) -> None:
         self._g = gains
-        self._pitch_integral = 0.0
+        self._pitch_integral: Optional[float] = None
         self._climb_integral: Optional[float] = None
         self._throttle_integral: Optional[float] = None
 
@@ -91,8 +93,9 @@ class HoldAutopilot:
         roll_deg: float,
         climb: float,
         altitude: float,
+        present: float,
     ) -> Optional[float]:
-        """Stick, nose up +; None if nothing is to be held."""
+        """Stick, nose up +, where it is `present` before; None if nothing is to be held."""
         g = self._g
         wanted_climb = targets.climb
         if targets.altitude is not None:
@@ -109,12 +112,16 @@ class HoldAutopilot:
             self._climb_integral = None
             wanted = targets.pitch
         else:
-            self._climb_integral = None
+            self._climb_integral = self._pitch_integral = None
             return None
         lean = 1.0 / max(math.cos(math.radians(roll_deg)), 0.3) - 1.0
         wanted += g.turn_compensation * 10.0 * lean if wanted_climb is not None else 0.0
         error = wanted - pitch_deg
-        self._pitch_integral = _integrate(self._pitch_integral, g.pitch_integral * error * dt, -0.6, 0.6)
+        if self._pitch_integral is None:
+            self._pitch_integral = _clip(present, -_MOST_INTEGRAL, _MOST_INTEGRAL)
+        self._pitch_integral = _integrate(
+            self._pitch_integral, g.pitch_integral * error * dt, -_MOST_INTEGRAL, _MOST_INTEGRAL
+        )
         return _clip(g.pitch * error - g.pitch_rate * pitch_rate_dps + self._pitch_integral, -1.0, 1.0)
 
     def yaw(self, targets: Targets, yaw_rate_dps: float) -> Optional[float]:

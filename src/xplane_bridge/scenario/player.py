@@ -212,7 +212,9 @@ class Player:
         autopilot, targets = self._autopilot, self.targets
         held = {
             "roll": autopilot.roll(targets, s.roll, s.roll_rate, s.heading),
-            "pitch": autopilot.pitch(targets, dt, s.pitch, s.pitch_rate, s.roll, s.climb, s.altitude),
+            "pitch": autopilot.pitch(
+                targets, dt, s.pitch, s.pitch_rate, s.roll, s.climb, s.altitude, self._present("pitch", now)
+            ),
             "yaw": autopilot.yaw(targets, s.yaw_rate),
             "throttle": autopilot.throttle(targets, dt, s.speed, 0.5 if self._throttle is None else self._throttle),
         }

@@ -266,6 +266,26 @@ def test_a_stick_movement_begins_where_the_hold_of_its_axis_has_it():
     assert (begun.throttle, half.throttle) == pytest.approx((held.throttle, held.throttle / 2))
 
 
+NOSE_LOW = LEVEL._replace(pitch=-10.0)
+
+
+def test_a_pitch_hold_takes_over_where_the_stick_is():
+    """Without an error, the stick is what was integrated: that begins with what the stick was."""
+    held = scenario({"at": 0, "stick": {"pitch": 0.25}}, {"at": 1, "hold": {"pitch": LEVEL.pitch}})
+    pitch = {round(t, 1): commands.stick["pitch"] for t, commands in play(Player(held), 2.0)}
+    assert pitch[0.9] == 0.25
+    assert (pitch[1.0], pitch[1.9]) == (pytest.approx(0.25), pytest.approx(0.25))
+
+
+def test_a_pitch_hold_that_begins_again_knows_nothing_of_the_last():
+    low = {"at": 1, "hold": {"pitch": NOSE_LOW.pitch + 20.0}}
+    player = Player(scenario(low, {"at": 3, "hold": {"pitch": None}}, {"at": 5, "hold": {"pitch": NOSE_LOW.pitch}}))
+    pitch = {round(t, 1): commands.stick["pitch"] for t, commands in play(player, 6.0, sample=NOSE_LOW)}
+    assert pitch[2.9] > 0.8  # 0.6 of the error, and what was integrated
+    assert pitch[4.0] == 0.0
+    assert pitch[5.0] == pitch[5.9] == 0.0
+
+
 def test_handles_have_the_names_of_the_command_and_old_names_still_work():
     old = {"speed_brake": 0.5, "roll_trim": 0.1, "pitch_trim": -0.2, "yaw_trim": 0.3}
     new = {"speedbrake": 0.5, "trim_roll": 0.1, "trim_pitch": -0.2, "trim_yaw": 0.3}
