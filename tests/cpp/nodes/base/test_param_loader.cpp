@@ -153,7 +153,8 @@ TEST(CommonOptions, RefusesWhatCannotWork) {
 TEST(CommonOptions, RefusesParticipantsThatAreNamedTwiceOrAnswerAnyhow) {
   const auto load = [](const std::vector<std::string>& names) {
     XmlRpcValue tree;
-    for (int i = 0; i < static_cast<int>(names.size()); ++i) tree["lockstep"]["participants"][i] = names[i];
+    int i = 0;
+    for (const std::string& name : names) tree["lockstep"]["participants"][i++] = name;
     return messageOf([&] { loadCommonOptions(ParamLoader("/xplane", tree)); });
   };
   EXPECT_EQ(load({"controller", "/a/player", "/b/player", "capture_node"}), "");
