@@ -266,9 +266,6 @@ def test_a_stick_movement_begins_where_the_hold_of_its_axis_has_it():
     assert (begun.throttle, half.throttle) == pytest.approx((held.throttle, held.throttle / 2))
 
 
-NOSE_LOW = LEVEL._replace(pitch=-10.0)
-
-
 def test_a_pitch_hold_takes_over_where_the_stick_is():
     """Without an error, the stick is what was integrated: that begins with what the stick was."""
     held = scenario({"at": 0, "stick": {"pitch": 0.25}}, {"at": 1, "hold": {"pitch": LEVEL.pitch}})
@@ -278,9 +275,8 @@ def test_a_pitch_hold_takes_over_where_the_stick_is():
 
 
 def test_a_pitch_hold_that_begins_again_knows_nothing_of_the_last():
-    low = {"at": 1, "hold": {"pitch": NOSE_LOW.pitch + 20.0}}
-    player = Player(scenario(low, {"at": 3, "hold": {"pitch": None}}, {"at": 5, "hold": {"pitch": NOSE_LOW.pitch}}))
-    pitch = {round(t, 1): commands.stick["pitch"] for t, commands in play(player, 6.0, sample=NOSE_LOW)}
+    holds = ({"at": at, "hold": {"pitch": pitch}} for at, pitch in ((1, 20.0), (3, None), (5, 0.0)))
+    pitch = {round(t, 1): commands.stick["pitch"] for t, commands in play(Player(scenario(*holds)), 6.0)}
     assert pitch[2.9] > 0.8  # 0.6 of the error, and what was integrated
     assert pitch[4.0] == 0.0
     assert pitch[5.0] == pitch[5.9] == 0.0
