@@ -126,7 +126,7 @@ class ImageQuality(enum.IntFlag):
     PAUSED = 128  #: the simulator stood still
     REPLAY = 256
     VIEW_UNKNOWN = 512  #: the view could not be read back: frame_id is the configured one
-    FOV_ASSUMED = 1024  #: the field of view could not be read back: the parameter's was used
+    FOV_ASSUMED = 1024  #: the field of view was not read back (the parameter's was used), or changed just here
     EXTERNAL_VIEW = 2048  #: the camera is outside the aircraft
     EPOCH_EDGE = 4096  #: the frame lies at a reset, pause, new origin or gap
     DELAY_ASSUMED = 8192  #: the display delay is the default, not measured on this set-up
