@@ -78,7 +78,8 @@ def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, 
         first = images.messages[0]
         assert (first.width, first.height, first.encoding) == (640, 480, "bgr8")
         assert infos.wait_for().K[0] == pytest.approx(554.256, abs=1e-3)  # 320 / tan(30 deg), the parameter's
-        known = states.wait_for(lambda state: not state.quality & FrameState.QUALITY_DISPLAY_UNKNOWN)
+        unknown, began = FrameState.QUALITY_DISPLAY_UNKNOWN, first.header.stamp  # states may be heard before pictures
+        known = states.wait_for(lambda state: not state.quality & unknown and state.header.stamp >= began)
         assert known.quality == (
             FrameState.QUALITY_STATE_MISSING
             | FrameState.QUALITY_VIEW_UNKNOWN
@@ -87,7 +88,7 @@ def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, 
         )
         assert known.state.valid == 0
         assert np.isnan(known.state.latitude)
-        assert known.header.stamp in {image.header.stamp for image in images.messages}
+        images.wait_for(lambda image: image.header.stamp == known.header.stamp, what="the picture of the state")
         launch.check_running()
 
 
