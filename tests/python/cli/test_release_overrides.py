@@ -143,7 +143,7 @@ def test_a_journal_that_cannot_be_changed_holds_up_nothing(left: Tuple[XPlane, P
     ports = write(journal.with_name(f"{journal.stem}_subscriptions.json"), asked, kept)
     for each in (journal, ports):
         each.with_name(each.name + in_the_way).mkdir()  # refused to root as well, unlike a file of another user
-    unknown = override("sim/no/such_name")  # stays, and so does the file
+    unknown = override("sim/no/such_dataref")  # stays, and so does the file
     write(journal, override(STICK), override(THROTTLES), entry("data_output:26", {"op": "usel", "rows": [26]}), unknown)
     (journal.parent / f"localhost_{xplane.port}.json").write_text(journal.read_text("utf-8"), "utf-8")
     done = release(journal)
@@ -155,7 +155,7 @@ def test_a_journal_that_cannot_be_changed_holds_up_nothing(left: Tuple[XPlane, P
         assert done.stdout.count(f"{each}: cannot be changed (Is a directory): what was released stays in it") == 1
     assert "sudo" in done.stdout
     assert set(xplane.values.values()) == {0.0}
-    assert ids(journal.with_name(f"localhost_{xplane.port}.json")) == ["override:sim/no/such_name"]
+    assert ids(journal.with_name(f"localhost_{xplane.port}.json")) == ["override:sim/no/such_dataref"]
 
 
 def test_a_full_disk_keeps_no_journal_of_which_all_is_released(left: Tuple[XPlane, Path]) -> None:
