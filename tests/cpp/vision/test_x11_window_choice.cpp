@@ -69,6 +69,7 @@ TEST_F(X11WindowSourceTest, OfWindowsAlikeTheIndexChoosesFromTheLeft) {
 }
 
 TEST_F(X11WindowSourceTest, OfWindowsAlikeNoneTakesThePlaceOfAnother) {
+  TestWindow other(server_.display(), "notes", 100, 80);  // a server that its last client leaves begins anew
   for (const int index : {0, -1}) {
     auto left = std::make_unique<TestWindow>(server_.display(), "X-System", 320, 240, 10, 20);
     TestWindow right(server_.display(), "X-System", 100, 80, 400, 0);
