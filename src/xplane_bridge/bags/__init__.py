@@ -288,13 +288,6 @@ class Bags:
                 filling.add(time, self._restarts.columns(time, found))
                 yield _table(topic, connection.msgtype, filling, columns)
 
-    def moved_by(self, time: np.ndarray) -> np.ndarray:
-        """Give by how much [ns] stamps of messages received at these times [ns] are read later than they were recorded.
-
-        Zero but behind a restart of X-Plane with stamps of its own time; `read` and `messages` do so with each header.
-        """
-        return self._restarts.moved_by(time)
-
     def messages(self, topic: str, spans: Optional[Sequence[tuple[int, int]]] = None) -> Iterator[tuple[int, Any]]:
         """Yield (receive time [ns], message) of one topic one at a time, in time order: for images and lists.
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from xplane_bridge.bags import Table
 
@@ -18,17 +16,17 @@ class RecordedEvent(NamedTuple):
     requested_by: str
 
 
-def events_of(lists: Table, moved_by: Callable[[np.ndarray], np.ndarray]) -> list[RecordedEvent]:
-    """Give each event of the lists once, by its stamp.
+def events_of(lists: Table) -> list[RecordedEvent]:
+    """Give each event of the lists, the topic `events`, once, in the order of their stamps.
 
-    Args:
-        lists: The topic `events`.
-        moved_by: `Bags.moved_by`, of the first list with an event: what happened before a restart is repeated after it.
+    A list's header has the stamp of its newest event. Behind a restart of X-Plane headers are read with later stamps
+    than were recorded (`bags.restarts`), and so are the events that are new there: those before are only repeated.
     """
     found: dict[tuple[int, int], RecordedEvent] = {}
-    for by, events in zip(moved_by(lists.time).tolist(), lists["events"]):
-        for event in events:
-            stamp = event.stamp.sec * 1_000_000_000 + event.stamp.nanosec
-            new = RecordedEvent(stamp + by, event.number, str(event.text), str(event.requested_by))
+    for read, events in zip(lists.stamp.tolist(), lists["events"]):
+        stamps = [event.stamp.sec * 1_000_000_000 + event.stamp.nanosec for event in events]
+        later_by = read - stamps[-1] if events and read else 0
+        for stamp, event in zip(stamps, events):
+            new = RecordedEvent(stamp + later_by, event.number, str(event.text), str(event.requested_by))
             found.setdefault((stamp, event.number), new)
     return sorted(found.values())

@@ -124,7 +124,7 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
         flight.units[role] = bags.units(topic)
         flight.constants[role] = bags.constants(topic)
     if "events" in flight.tables:
-        flight.events = events_of(flight.tables["events"], bags.moved_by)
+        flight.events = events_of(flight.tables["events"])
     for camera in cameras(bags):
         table = bags.read(camera.frames, store=store).by_stamp()
         flight.cameras.append(CameraFrames(camera, table, bags.constants(camera.frames)))

@@ -44,14 +44,10 @@ class Restarts:
         names = [name for name in found if name == "header.stamp" or name.endswith(".header.stamp")]
         if all((np.abs(time - found[name]) < _NEAR_NS).all() for name in names):
             return found
-        by = self.moved_by(time)
-        return {**found, **{name: np.where(found[name] == 0, 0, found[name] + by) for name in names}}
-
-    def moved_by(self, time: np.ndarray) -> np.ndarray:
-        """Give by how much [ns] the stamps of messages received at these times [ns] are moved."""
         if self._since is None:
             self._since = self._read()
-        return self._by[np.searchsorted(self._since, time)]
+        by = self._by[np.searchsorted(self._since, time)]
+        return {**found, **{name: np.where(found[name] == 0, 0, found[name] + by) for name in names}}
 
     def message(self, time: int, message: Any) -> None:
         """Move the stamp of one message's header."""

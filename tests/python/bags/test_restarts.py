@@ -75,7 +75,7 @@ def write(path: Path, received: List[Received], happened: List[Dict[str, object]
                 mode = {"header": header, "mode": 1 + flight}
                 bag.add(MODE, "xplane_bridge/ControlMode", receive, mode)
                 happened.append({"number": len(happened) + 1, "stamp": time_of(stamp), "text": f"of flight {flight}"})
-                bag.add("/xplane/events", "xplane_bridge/EventList", receive, {"events": happened})
+                bag.add("/xplane/events", "xplane_bridge/EventList", receive, {"header": header, "events": happened})
 
 
 @pytest.fixture(params=["host", "clock", "host, split", "clock, split"])
