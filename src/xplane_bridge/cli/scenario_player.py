@@ -85,7 +85,8 @@ def play(
     rospy = start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
     if joystick:
         mapped = rospy.get_param(f"{namespace}/joystick_mapper_node/stick_mode", None)
-        stick = load_stick(file, stick_mode_of(args.stick_mode, mapped))
+        mode = stick_mode_of(args.stick_mode, mapped)
+        stick = stick if mode == args.stick_mode else load_stick(file, mode)
     remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"
     aircraft = LoadedAircraft(namespace, node, scenario.aircraft, remedy, lambda text: player.fail(text))
     kwargs: Dict[str, Any] = {"stick": stick, "log": log, "say": lambda text: print(text, flush=True)}
