@@ -27,6 +27,13 @@ std::optional<FrameCamera> CameraHistory::ofFrame(double sim_time) const {
   return found == frames_.rend() ? std::nullopt : std::optional<FrameCamera>(found->camera);
 }
 
+std::optional<CheckedPose> CameraHistory::poseOf(double sim_time) const {
+  const auto found = std::find_if(frames_.rbegin(), frames_.rend(), [sim_time](const Heard& frame) {
+    return frame.camera.pose.has_value() && frame.camera.pose->sim_time == sim_time;
+  });
+  return found == frames_.rend() ? std::nullopt : found->camera.pose;
+}
+
 std::optional<FrameCamera> CameraHistory::at(std::int64_t moment_ns) const {
   if (frames_.empty()) return std::nullopt;
   const auto later = [](std::int64_t moment, const Heard& frame) { return moment < frame.receive_ns; };

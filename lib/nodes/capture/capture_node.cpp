@@ -267,7 +267,8 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   if (!decode(grabbed, raw || (jpeg && !verbatim))) return;
   FrameState state;
   const std::int64_t shown_ns = grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns;
-  const core::FrameCamera camera = cameraOf(*grabbed, shown_ns);
+  const auto frame_key = grabbed->frame.has_value() ? std::optional<float>(grabbed->frame->sim_time) : std::nullopt;
+  const core::FrameCamera camera = cameraOf(shown_ns, frame_key);
   state.header.stamp = toRosTime(stampOfPicture(shown_ns));
   state.header.seq = image_count_;
   describeCamera(camera, &state);
@@ -314,9 +315,7 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
     }
   }
   info_publisher_.publish(info);
-  pairing_->addPicture(
-      state, shown_ns, pairingNow(),
-      grabbed->frame.has_value() ? std::optional<float>(grabbed->frame->sim_time) : std::optional<float>());
+  pairing_->addPicture(state, shown_ns, pairingNow(), frame_key);
 }
 
 std::int64_t CaptureNode::published(std::int64_t time_ns) const {

@@ -7,7 +7,6 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <sensor_msgs/distortion_models.h>
 
-#include "xplane_bridge/core/base/units.hpp"
 #include "xplane_bridge/nodes/capture/capture_node.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 
@@ -76,11 +75,10 @@ void CaptureNode::onView(const core::RrefView& datagram, const core::ReceiveInfo
     field_of_view_deg_ = frustum.horizontal_deg;
     frustum.shift_up = frustum_shift_up_;
     camera.frustum = frustumOf(frustum);
-    cameras_.add(view_stream_.receiveTime(), view_stream_.camera().sim_time, camera);
     pose_report_ = pose ? pose_check_.report() : "X-Plane does not answer";
     lever_scatter_ = pose_check_.leverScatter();
   }
-  if (pose) pairing_->addPose(*pose);
+  pairing_->addCamera(view_stream_.receiveTime(), view_stream_.camera().sim_time, camera);
   pairing_->addFrame(view_stream_.status(), view_stream_.simulatedFramePeriod(), view_stream_.receiveTime());
 }
 
@@ -89,7 +87,6 @@ void CaptureNode::onLinkState(const core::LinkStatus& status) {
   if (!known) {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
     camera_known_ = false;
-    cameras_.clear();
   }
   if (status.epoch == link_epoch_) return;
   link_epoch_ = status.epoch;
@@ -167,16 +164,15 @@ core::Frustum CaptureNode::frustumOf(const core::FrustumSample& sample) const {
   return own;
 }
 
-core::FrameCamera CaptureNode::cameraOf(const Grabbed& grabbed, std::int64_t shown_ns) const {
-  const std::int64_t frame_ns = shown_ns - core::toNanoseconds(pairing_->displayDelay());
-  const std::lock_guard<std::mutex> lock(camera_mutex_);
-  std::optional<core::FrameCamera> camera;
-  if (grabbed.frame.has_value()) camera = cameras_.ofFrame(static_cast<double>(grabbed.frame->sim_time));
-  if (!camera) camera = cameras_.at(frame_ns);
-  if (camera) return *camera;
+core::FrameCamera CaptureNode::cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const {
+  bool known = false;
+  {
+    const std::lock_guard<std::mutex> lock(camera_mutex_);
+    known = camera_known_;
+  }
   core::FrameCamera unknown;
   unknown.frustum = frustumOf(core::FrustumSample());
-  return unknown;
+  return known ? pairing_->cameraOf(shown_ns, frame_key).value_or(unknown) : unknown;
 }
 
 void CaptureNode::describeCamera(const core::FrameCamera& camera, FrameState* state) const {

@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kOffsetSmoothing = 0.05;
-constexpr std::size_t kPoses = 600;  // the frames of several seconds: longer than a picture waits
 
 /// A state that nothing is known of: valid = 0 and NaN, never zero for unknown.
 FlightState unknownState() {
@@ -63,10 +62,17 @@ void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, s
   flushLocked(receive_ns);
 }
 
-void ImagePairing::addPose(const core::CheckedPose& pose) {
+void ImagePairing::addCamera(std::int64_t receive_ns, double sim_time, const core::FrameCamera& camera) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  poses_.push_back(pose);
-  if (poses_.size() > kPoses) poses_.pop_front();
+  cameras_.add(receive_ns, sim_time, camera);
+}
+
+std::optional<core::FrameCamera> ImagePairing::cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::optional<core::FrameCamera> camera;
+  if (frame_key.has_value()) camera = cameras_.ofFrame(static_cast<double>(*frame_key));
+  if (!camera) camera = cameras_.at(shown_ns - core::toNanoseconds(display_delay_));
+  return camera;
 }
 
 void ImagePairing::setDisplayDelay(double delay) {
@@ -75,14 +81,9 @@ void ImagePairing::setDisplayDelay(double delay) {
   delay_measured_ = true;
 }
 
-double ImagePairing::displayDelay() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return display_delay_;
-}
-
 void ImagePairing::forgetClock() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  poses_.clear();
+  cameras_.clear();
   clock_.reset();
   status_ = core::SimStatus();
   frame_period_ = 0.0F;
@@ -208,10 +209,8 @@ void ImagePairing::complete(const core::Association& association, std::int64_t n
 void ImagePairing::completePose(const core::Association& association, Waiting* picture) const {
   FrameState& answer = picture->answer;
   if (answer.camera_pose_source != FrameState::POSE_MEASURED || picture->moment.paused) return;
-  const auto of_frame = std::find_if(poses_.rbegin(), poses_.rend(), [&](const core::CheckedPose& pose) {
-    return association.frame_known && pose.sim_time == association.frame_sim_time;
-  });
-  if (of_frame != poses_.rend()) {
+  const auto of_frame = association.frame_known ? cameras_.poseOf(association.frame_sim_time) : std::nullopt;
+  if (of_frame) {
     setPose(*of_frame, &answer);
   } else {
     answer.quality |= FrameState::QUALITY_POSE_UNSURE;  // of another frame

@@ -32,6 +32,8 @@ class CameraHistory {
 
   /// The camera of the newest frame with this raw simulator time [s]; nothing where that was not heard.
   [[nodiscard]] std::optional<FrameCamera> ofFrame(double sim_time) const;
+  /// The newest pose of the frame with this raw simulator time [s], which may have come with another frame.
+  [[nodiscard]] std::optional<CheckedPose> poseOf(double sim_time) const;
   /// The camera of the frame heard nearest to a host time [ns], which may be its neighbour: where the frustums differ
   /// there, it is not known, and the camera is external if it is in one of them. Nothing before the first frame.
   [[nodiscard]] std::optional<FrameCamera> at(std::int64_t moment_ns) const;

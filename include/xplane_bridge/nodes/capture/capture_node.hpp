@@ -116,7 +116,7 @@ class CaptureNode : public BaseNode {
   void publishJpeg(const std_msgs::Header& header, const std::vector<std::uint8_t>& jpeg);
   bool hasSubscribers() const;
   /// The camera of the frame that a picture shows, as far as X-Plane says. @param shown_ns [ns] by pairingNow()'s clock
-  core::FrameCamera cameraOf(const Grabbed& grabbed, std::int64_t shown_ns) const;
+  core::FrameCamera cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const;
   core::Frustum frustumOf(const core::FrustumSample& sample) const;
   sensor_msgs::CameraInfo cameraInfo(const std_msgs::Header& header, cv::Size source,
                                      const vision::FieldOfView& shown) const;
@@ -177,7 +177,6 @@ class CaptureNode : public BaseNode {
   mutable std::mutex camera_mutex_;
   bool camera_known_ = false;
   double field_of_view_deg_ = 0.0;  // horizontal, of the newest frame
-  core::CameraHistory cameras_;
   std::string pose_report_;
   double lever_scatter_ = 0.0;  // [m]
   double frustum_shift_up_ = std::numeric_limits<double>::quiet_NaN();

@@ -9,6 +9,7 @@
 
 #include "xplane_bridge/FlightState.h"
 #include "xplane_bridge/FrameState.h"
+#include "xplane_bridge/core/camera/camera_history.hpp"
 #include "xplane_bridge/core/camera/image_association.hpp"
 #include "xplane_bridge/core/camera/pose_check.hpp"
 #include "xplane_bridge/core/state/clock_filter.hpp"
@@ -39,12 +40,13 @@ class ImagePairing {
   /// @param publish called under the lock, in order; must not call back
   ImagePairing(double display_delay, double max_wait, Publish publish, Stamps stamps = Stamps::kHost);
 
-  /// [s] applied to pictures whose source does not know their frame.
-  [[nodiscard]] double displayDelay() const;
   /// A frame heard on the capture host. @param receive_ns [ns] host time, running evenly
   void addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns);
-  /// The camera's pose of a frame, before that frame or after it.
-  void addPose(const core::CheckedPose& pose);
+  /// The camera of a frame, before that frame or after it; its pose may be of another one.
+  /// @param receive_ns [ns] as of addFrame() @param sim_time [s] raw simulator time
+  void addCamera(std::int64_t receive_ns, double sim_time, const core::FrameCamera& camera);
+  /// The camera of the frame that a picture shows, as addPicture() will be given it; nothing where no frame was heard.
+  [[nodiscard]] std::optional<core::FrameCamera> cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const;
   /// The display delay was measured; pictures that wait keep theirs. @param delay [s]
   void setDisplayDelay(double delay);
   /// The link is new or gone: the simulator's clock is to be learnt anew.
@@ -110,7 +112,7 @@ class ImagePairing {
   std::optional<double> newest_sim_time_;  // [s] unwrapped
   std::map<std::uint64_t, KnownState> states_;
   std::uint64_t next_state_id_ = 0;
-  std::deque<core::CheckedPose> poses_;
+  core::CameraHistory cameras_;
   std::deque<Waiting> waiting_;
   std::int64_t grace_until_ns_ = 0;  // 0: no picture yet
   bool state_seen_ = false;

@@ -30,6 +30,18 @@ TEST(CameraHistory, KnowsTheCameraOfAFrameByItsTime) {
   EXPECT_FALSE(history.ofFrame(100.01).has_value());
 }
 
+TEST(CameraHistory, KnowsAPoseByTheFrameThatItIsOf) {
+  CameraHistory history;
+  for (int k = 0; k < 5; ++k) {
+    FrameCamera camera = zoomed(60.0);
+    if (k > 0) camera.pose.emplace().sim_time = 100.0 + k - 1;  // of the frame before
+    history.add(k * kPeriod, 100.0 + k, camera);
+  }
+  EXPECT_EQ(history.poseOf(102.0)->sim_time, 102.0);
+  EXPECT_FALSE(history.poseOf(104.0).has_value());
+  EXPECT_FALSE(history.ofFrame(100.0)->pose.has_value());
+}
+
 TEST(CameraHistory, TakesTheNewestOfTwoFramesOfOneTime) {
   CameraHistory history = zooming();
   history.add(10 * kPeriod, 100.0, zoomed(45.0));  // a flight that began anew

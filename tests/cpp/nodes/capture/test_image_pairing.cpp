@@ -57,12 +57,13 @@ std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, doub
     core::SimStatus status;
     status.sim_time = static_cast<float>(kSimStart + t);
     last_arrival = std::max(last_arrival, t + 1e-4 + clocks.jitter * extra(random));
-    core::CheckedPose pose;  // the camera moves a metre a frame
-    pose.sim_time = static_cast<double>(status.sim_time);
-    pose.pose.position.x() = k;
-    pose.sure = true;
-    events.emplace_back(clocks.capture.at(last_arrival), [&pairing, status, pose](std::int64_t now) {
-      pairing.addPose(pose);
+    core::FrameCamera camera;  // moves a metre a frame
+    camera.pose.emplace();
+    camera.pose->sim_time = static_cast<double>(status.sim_time);
+    camera.pose->pose.position.x() = k;
+    camera.pose->sure = true;
+    events.emplace_back(clocks.capture.at(last_arrival), [&pairing, status, camera](std::int64_t now) {
+      pairing.addCamera(now, camera.pose->sim_time, camera);
       pairing.addFrame(status, static_cast<float>(1.0 / kFps), now);
     });
     const auto state = boost::make_shared<FlightState>();
