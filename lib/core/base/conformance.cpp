@@ -11,7 +11,7 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kCardVersion = 1;
 
 struct Switch {
   const char* id;
@@ -53,7 +53,7 @@ Conformance conformanceFromText(const std::string& text) {
   try {
     const Json root = Json::parse(text);
     if (root.at("format") != "xplane_bridge conformance") throw ConformanceError("it is no conformance file");
-    if (root.at("version") != kVersion) throw ConformanceError("its version is not 1; fly the card anew");
+    if (root.at("version") != kCardVersion) throw ConformanceError("its version is not 1; fly the card anew");
     Conformance out;
     out.xplane_version = wholeNumber<std::int32_t>(root.at("xplane_version"));
     for (const auto& [id, question] : root.at("questions").items()) {

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "xplane_bridge/core/base/units.hpp"
+#include "xplane_bridge/core/base/unknown.hpp"
 #include "xplane_bridge/core/state/frames.hpp"
 
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSmallOffsetDeg = 0.1;   // a visual offset below this does not matter
 constexpr double kOrthonormal = 1e-2;     // of world_matrix: farthest from a rotation
 constexpr double kOffsetsNearDeg = 10.0;  // a reference farther than this speaks for neither

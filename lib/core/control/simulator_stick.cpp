@@ -8,13 +8,15 @@
 namespace xplane_bridge::core {
 namespace {
 
-const std::string kFolder = "sim/joystick/";
+const std::string kJoystickFolder = "sim/joystick/";
 constexpr std::size_t kRoll = 0, kPitch = 1, kYaw = 2;  // of kStickFunctions
 constexpr float kPressed = 0.5F;
 // X-Plane may answer the datarefs of one rate in different frames of a period.
 constexpr double kJoinPeriods = 1.5;
 
-std::string element(const char* name, int index) { return kFolder + name + "[" + std::to_string(index) + "]"; }
+std::string joystickElement(const char* name, int index) {
+  return kJoystickFolder + name + "[" + std::to_string(index) + "]";
+}
 
 RrefFrameAssembler assemblerOf(std::size_t size, int rate) {
   RrefFrameAssembler::Options options;
@@ -30,8 +32,8 @@ SimulatorStick::SimulatorStick(const Options& options)
       axes_(std::size(kStickFunctions), 0.0F),
       buttons_(static_cast<std::size_t>(options.buttons), 0) {
   for (int axis = 0; axis < options_.axes; ++axis) {
-    setting_requests_.push_back(element("joystick_axis_assignments", axis));
-    setting_requests_.push_back(element("joystick_axis_reverse", axis));
+    setting_requests_.push_back(joystickElement("joystick_axis_assignments", axis));
+    setting_requests_.push_back(joystickElement("joystick_axis_reverse", axis));
   }
   askForValues();
 }
@@ -68,13 +70,13 @@ bool SimulatorStick::addSettings(const RrefView& datagram, std::int64_t receive_
 }
 
 void SimulatorStick::askForValues() {
-  value_requests_ = {kFolder + "has_joystick"};
+  value_requests_ = {kJoystickFolder + "has_joystick"};
   for (int button = 0; button < options_.buttons; ++button) {
-    value_requests_.push_back(element("joystick_button_values", options_.first_button + button));
+    value_requests_.push_back(joystickElement("joystick_button_values", options_.first_button + button));
   }
   if (sources_) {
     for (const Source& source : *sources_) {
-      if (source.axis >= 0) value_requests_.push_back(element("joystick_axis_values", source.axis));
+      if (source.axis >= 0) value_requests_.push_back(joystickElement("joystick_axis_values", source.axis));
     }
   }
   values_ = assemblerOf(value_requests_.size(), options_.rate);

@@ -12,7 +12,7 @@
 namespace xplane_bridge::core {
 namespace {
 
-const std::string kFolder = "sim/operation/failures/";
+const std::string kFailureFolder = "sim/operation/failures/";
 constexpr std::size_t kLongestName = 100;  // of a rel_*: none is nearly as long
 
 // A system whose failures X-Plane has by number.
@@ -162,11 +162,11 @@ bool hasCome(FailureTrigger trigger, double value, const FlightConditions& now) 
 }  // namespace
 
 std::string failureDataref(const std::string& name) {
-  return name.compare(0, kFolder.size(), kFolder) == 0 ? name : kFolder + name;
+  return name.compare(0, kFailureFolder.size(), kFailureFolder) == 0 ? name : kFailureFolder + name;
 }
 
 std::string failureName(const std::string& name) {
-  return name.compare(0, kFolder.size(), kFolder) == 0 ? name.substr(kFolder.size()) : name;
+  return name.compare(0, kFailureFolder.size(), kFailureFolder) == 0 ? name.substr(kFailureFolder.size()) : name;
 }
 
 FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion version) {

@@ -16,7 +16,7 @@ constexpr double kAirspeedTolerance = 0.6;  // [kt]; whole knots
 constexpr double kMachTolerance = 0.006;    // hundredths
 constexpr double kFullTurn = 360.0;         // [deg]
 
-const std::string kFolder = "sim/cockpit2/autopilot/";
+const std::string kAutopilotFolder = "sim/cockpit2/autopilot/";
 const std::string kCommands = "sim/autopilot/";
 constexpr const char* kYawDamper = "sim/cockpit2/switches/yaw_damper_on";
 
@@ -31,7 +31,7 @@ std::optional<std::string> notAmong(const std::string& name, int value, int low,
 }
 
 SettingWrite dial(const std::string& name, double value, double tolerance, double turns_over_at = 0.0) {
-  return {{kFolder + name, static_cast<float>(value)}, tolerance, true, turns_over_at};
+  return {{kAutopilotFolder + name, static_cast<float>(value)}, tolerance, true, turns_over_at};
 }
 
 /// @param master what flight_director_mode shows now
@@ -46,7 +46,7 @@ AutopilotStep masterStep(AutopilotMaster wanted, float master) {
 }
 
 AutopilotStep modeStep(const char* name, const char* command, std::vector<std::string> shown) {
-  for (std::string& each : shown) each.insert(0, kFolder);
+  for (std::string& each : shown) each.insert(0, kAutopilotFolder);
   return {name, kCommands + command, std::move(shown)};
 }
 
@@ -117,7 +117,8 @@ std::optional<std::string> check(const AutopilotSetting& setting) {
 std::vector<SettingWrite> autopilotDials(const AutopilotSetting& setting, SimulatorVersion version) {
   std::vector<SettingWrite> out;
   const bool wants_power = setting.master && *setting.master != AutopilotMaster::kOff;
-  if (wants_power && version.is12()) out.push_back({{kFolder + "autopilot_electric_master", 1.0F}, 0.0, false, 0.0});
+  if (wants_power && version.is12())
+    out.push_back({{kAutopilotFolder + "autopilot_electric_master", 1.0F}, 0.0, false, 0.0});
   if (setting.heading_magnetic_deg) {
     const double heading = *setting.heading_magnetic_deg;
     out.push_back(dial("heading_dial_deg_mag_pilot", heading, kHeadingTolerance, kFullTurn));
@@ -150,7 +151,7 @@ std::vector<AutopilotStep> autopilotSteps(const AutopilotSetting& setting, const
   }
   if (setting.autothrottle) {
     out.push_back(switchStep("autothrottle", "sim/autopilot/autothrottle_on", "sim/autopilot/autothrottle_off",
-                             *setting.autothrottle, kFolder + "autothrottle_enabled"));
+                             *setting.autothrottle, kAutopilotFolder + "autothrottle_enabled"));
   }
   if (setting.yaw_damper) {
     out.push_back(switchStep("yaw damper", "sim/systems/yaw_damper_on", "sim/systems/yaw_damper_off",
@@ -162,7 +163,7 @@ std::vector<AutopilotStep> autopilotSteps(const AutopilotSetting& setting, const
 std::vector<SettingWrite> autopilotRestored(const AutopilotSetting& setting, SimulatorVersion version) {
   std::vector<SettingWrite> out = autopilotDials(setting, version);
   if (setting.master || setting.lateral || setting.vertical) out.push_back({{kAutopilotMaster, 0.0F}, 0.0, true, 0.0});
-  if (setting.autothrottle) out.push_back({{kFolder + "autothrottle_enabled", 0.0F}, 0.0, true, 0.0});
+  if (setting.autothrottle) out.push_back({{kAutopilotFolder + "autothrottle_enabled", 0.0F}, 0.0, true, 0.0});
   if (setting.yaw_damper) out.push_back({{kYawDamper, 0.0F}, 0.0, true, 0.0});
   return out;
 }

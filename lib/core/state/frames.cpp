@@ -1,14 +1,12 @@
 #include "xplane_bridge/core/state/frames.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "xplane_bridge/core/base/units.hpp"
+#include "xplane_bridge/core/base/unknown.hpp"
 
 namespace xplane_bridge::core {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Turns NED into ENU and ENU into NED.
 Eigen::Matrix3d nedEnuSwap() {

@@ -13,7 +13,7 @@ namespace {
 double finite(double value) { return std::isfinite(value) ? value : 0.0; }
 
 /// [m], height included; NaN while either place is unknown.
-double distance(const FlightWatch& a, const FlightWatch& b) {
+double distanceMoved(const FlightWatch& a, const FlightWatch& b) {
   const double over_ground =
       groundDistance({a.latitude_deg, a.longitude_deg, 0.0}, {b.latitude_deg, b.longitude_deg, 0.0});
   return std::hypot(over_ground, a.elevation - b.elevation);
@@ -31,7 +31,7 @@ std::optional<std::string> ResetDetector::add(const FlightWatch& now) {
   // Twice the way it could have flown: accelerations over a gap in the stream are no jump.
   const double elapsed = std::max(0.0, finite(now.sim_time - before.sim_time));
   const double reach = options_.jump_distance + 2.0 * finite(before.ground_speed) * elapsed;
-  const double moved = distance(before, now);
+  const double moved = distanceMoved(before, now);
   if (!(moved > reach)) return std::nullopt;
   char text[64];
   std::snprintf(text, sizeof text, "the aircraft was placed %.0f m away", moved);

@@ -55,7 +55,7 @@ Elimination eliminate(const MixingMatrix& xx, std::size_t samples, double indepe
   return out;
 }
 
-std::string number(double value) {
+std::string rounded(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f", value);
   return text;
@@ -146,11 +146,11 @@ MixingIdentifier::Solution MixingIdentifier::solve(const std::string& aircraft) 
   for (const AxisHalf& half : kAxisHalves) {
     const auto j = static_cast<Eigen::Index>(half.term);
     if (reach_[j] < requirements_.excursion) {
-      quality.needs.push_back(std::string(half.advice) + ": seen up to " + number(reach_[j]) + ", need " +
-                              number(requirements_.excursion) + " of full stick");
+      quality.needs.push_back(std::string(half.advice) + ": seen up to " + rounded(reach_[j]) + ", need " +
+                              rounded(requirements_.excursion) + " of full stick");
     } else if (!out.model.known[static_cast<std::size_t>(j)]) {
-      quality.needs.push_back(std::string(half.advice) + ": moved alone by " + number(kept.independent[j]) +
-                              " rms, need " + number(requirements_.independence) +
+      quality.needs.push_back(std::string(half.advice) + ": moved alone by " + rounded(kept.independent[j]) +
+                              " rms, need " + rounded(requirements_.independence) +
                               "; move it independently of the other axes");
     }
   }
@@ -181,8 +181,8 @@ MixingIdentifier::Solution MixingIdentifier::solve(const std::string& aircraft) 
       const double error = law.residual_deg * std::sqrt(inverse(a, a));
       if (error > requirements_.slope_error_deg) {
         quality.needs.push_back(surfaceTable()[s].name + " to " + kTermNames[static_cast<std::size_t>(term)] +
-                                ": its answer is known to " + number(error) + " deg only, need " +
-                                number(requirements_.slope_error_deg));
+                                ": its answer is known to " + rounded(error) + " deg only, need " +
+                                rounded(requirements_.slope_error_deg));
       }
     }
     for (const AxisHalf& half : kAxisHalves) {
@@ -207,8 +207,8 @@ MixingIdentifier::Solution MixingIdentifier::solve(const std::string& aircraft) 
   }
   if (quality.worst_residual_deg > requirements_.residual_deg) {
     quality.needs.push_back(quality.worst_surface +
-                            " does not follow stick, trims and flaps: " + number(quality.worst_residual_deg) +
-                            " deg rms remain, need " + number(requirements_.residual_deg));
+                            " does not follow stick, trims and flaps: " + rounded(quality.worst_residual_deg) +
+                            " deg rms remain, need " + rounded(requirements_.residual_deg));
   }
   if (out.model.laws.empty()) quality.needs.emplace_back("no surface has moved");
   quality.good = quality.needs.empty();

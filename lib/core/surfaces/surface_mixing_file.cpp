@@ -9,7 +9,7 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr int kVersion = 1;
+constexpr int kFormatVersion = 1;
 using Json = nlohmann::json;
 
 Json termsToJson(const MixingVector& values, const std::array<bool, kMixingTerms>& chosen) {
@@ -63,7 +63,7 @@ std::string toText(const MixingModel& model) {
                                                   {"high_deg", law.high_deg}};
   }
   const Json root = {{"format", "xplane_bridge mixing"},
-                     {"version", kVersion},
+                     {"version", kFormatVersion},
                      {"aircraft", model.aircraft},
                      {"samples", model.samples},
                      {"level", termsToJson(model.level, unknown)},
@@ -75,7 +75,8 @@ MixingModel mixingFromText(const std::string& text) {
   try {
     const Json root = Json::parse(text);
     if (root.at("format") != "xplane_bridge mixing") throw MixingFileError("mixing file: not a mixing file");
-    if (root.at("version") != kVersion) throw MixingFileError("mixing file: version is not 1; remove it and fly anew");
+    if (root.at("version") != kFormatVersion)
+      throw MixingFileError("mixing file: version is not 1; remove it and fly anew");
     MixingModel model;
     model.aircraft = root.at("aircraft").get<std::string>();
     model.samples = root.at("samples").get<std::size_t>();

@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "xplane_bridge/core/base/units.hpp"
+#include "xplane_bridge/core/base/unknown.hpp"
 #include "xplane_bridge/nodes/messages/conversions.hpp"
 #include "xplane_bridge/nodes/messages/flight_state_interpolation.hpp"
 
 namespace xplane_bridge {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kOffsetSmoothing = 0.05;
 
 /// A state that nothing is known of: valid = 0 and NaN, never zero for unknown.
@@ -141,8 +140,8 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t shown_ns, 
     if (!delay_measured_) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
   }
   if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
-  waiting.answer.clock_uncertainty = clock_.fitted() || stamps_ == Stamps::kFrames ? clock_.uncertainty() : kNaN;
-  waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : std::numeric_limits<float>::quiet_NaN();
+  waiting.answer.clock_uncertainty = clock_.fitted() || stamps_ == Stamps::kFrames ? clock_.uncertainty() : core::kNaN;
+  waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : core::kNaNf;
   waiting.moment.host_time_ns = shown_ns - core::toNanoseconds(waiting.answer.display_delay);
   waiting.deadline_ns = now_ns + max_wait_ns_;
   if (grace_until_ns_ == 0) grace_until_ns_ = now_ns + core::toNanoseconds(kFirstPictures);
@@ -185,9 +184,9 @@ void ImagePairing::flushLocked(std::int64_t now_ns) {
 void ImagePairing::complete(const core::Association& association, std::int64_t now_ns, Waiting* picture) {
   FrameState& answer = picture->answer;
   answer.quality |= core::pairingQuality(picture->moment, association);
-  answer.frame_sim_time = association.frame_known ? association.frame_sim_time : kNaN;
-  answer.sim_time_error = kNaN;
-  answer.state_age = kNaN;
+  answer.frame_sim_time = association.frame_known ? association.frame_sim_time : core::kNaN;
+  answer.sim_time_error = core::kNaN;
+  answer.state_age = core::kNaN;
   const auto state = states_.find(association.id);
   const auto after = states_.find(association.id_after);
   if (association.method == core::PairingMethod::kNone || state == states_.end() || after == states_.end()) {
