@@ -10,7 +10,7 @@ from typing import Optional, Sequence
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli.entry import guarded, number
 from xplane_bridge.cli.linearise_model import add_output_arguments, write_outputs
-from xplane_bridge.identification.coefficients import geometry_of, read_geometry
+from xplane_bridge.identification.coefficients import read_geometry
 from xplane_bridge.identification.model import AXES, IdentificationError
 
 
@@ -23,8 +23,9 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("bags", nargs="+", metavar="BAG", help="the flight's bag, its split bags, or a folder of them")
     p.add_argument("--axis", choices=sorted(AXES), help="only this one; default: all that were excited")
     p.add_argument(
-        "--aircraft", default="fixed_wing", metavar="NAME", help="whose sizes are taken; default: %(default)s"
-    )
+        "--aircraft", metavar="NAME",
+        help="whose sizes in config/geometry are taken; default: those of the one that the recording names",
+    )  # fmt: skip
     p.add_argument(
         "--tail", type=number("a time from 0 to 60 s", 0.0, 60.0), default=2.0, metavar="S",
         help="how long the motion is followed after each excitation; default: %(default)s",
@@ -43,13 +44,23 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     args = parser().parse_args(argv)
     from xplane_bridge.bags.flight import read_flight
+    from xplane_bridge.bags.passport import read_passports
+    from xplane_bridge.identification.aircraft import named_geometry, recorded_aircraft
     from xplane_bridge.identification.identify import identify
     from xplane_bridge.plotting import identification_page
 
-    geometry = read_geometry(Path(args.geometry)) if args.geometry else geometry_of(args.aircraft)
+    geometry = read_geometry(Path(args.geometry)) if args.geometry else None
+    if geometry is None and args.aircraft is not None:
+        geometry = named_geometry(args.aircraft)
     with Bags(args.bags) as bags:
         flight = read_flight(bags)
-    found = identify(flight, args.axis, geometry, args.aircraft, args.tail, args.validate)
+        aircraft = recorded_aircraft(read_passports(bags))
+    without = aircraft.why_not if geometry is None else ""
+    name = aircraft.name if args.aircraft is None else args.aircraft
+    found = identify(flight, args.axis, geometry or aircraft.geometry, name, args.tail, args.validate)
+    if without:
+        for axis in found.model.axes.values():
+            axis.warnings.insert(0, without)
     for text in found.notes + found.model.warnings:
         print(f"warning: {text}", file=sys.stderr)
     if args.report:

@@ -64,6 +64,11 @@ def geometry_of(aircraft: str) -> Optional[Geometry]:
     return read_geometry(path) if path.is_file() else None
 
 
+def geometry_names() -> List[str]:
+    """The aircraft that config/geometry has."""
+    return sorted(path.stem for path in (share_dir() / "config" / "geometry").glob("*.yaml"))
+
+
 def _checked_keys(path: Path, content: dict[str, Any], known: list[str]) -> list[str]:
     unknown = sorted(set(content) - set(known))
     if unknown:

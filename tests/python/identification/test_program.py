@@ -13,8 +13,10 @@ import pytest
 from scipy.io import loadmat
 
 from support.flights.manoeuvre_flight import LATERAL, PITCH, Manoeuvre, flown
+from support.flights.synthetic_flight import FlightBag
 from support.markdown import blocks
 from support.room_table import ROOT
+from xplane_bridge.bags import Bags
 from xplane_bridge.cli import identify_model
 from xplane_bridge.cli.linearise_model import summary
 from xplane_bridge.emulator.aircraft import create_model
@@ -31,9 +33,24 @@ def twin() -> FlightModel:
     return create_model("fixed_wing")
 
 
+#: What the passport of a flight of the emulator's twin says of the aircraft.
+TWIN = {"aircraft_file": "fixed_wing", "aircraft_icao": "DA62", "aircraft_description": "Light twin"}
+
+
 @pytest.fixture(scope="module")
 def bag(twin: FlightModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return flown(PITCH + LATERAL, model=twin).write(tmp_path_factory.mktemp("flown") / "flight.bag")
+    folder = tmp_path_factory.mktemp("flown")
+    return with_passports(flown(PITCH + LATERAL, model=twin).write(folder / "bare.bag"), folder / "flight.bag", TWIN)
+
+
+def with_passports(bare: Path, path: Path, *aircraft: dict[str, str]) -> Path:
+    with Bags(bare) as bags, FlightBag(path) as out:
+        for k, (topic, time, raw) in enumerate(bags.recorded()):
+            if k < len(aircraft):
+                values = {"header": out.header(time, ""), "parameters": "{}", **aircraft[k]}
+                out.add("/xplane/experiment", "xplane_bridge/Experiment", time, values)
+            out.add_recorded(topic, time, raw)
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +104,8 @@ def test_values_are_printed_with_intervals_and_warnings_once(
 ) -> None:
     bag = flown(PITCH + LATERAL, model=twin, surfaces_every=3).write(tmp_path / "flight.bag")
     model, page = tmp_path / "model.yaml", tmp_path / "model.html"
-    assert identify_model.main([str(bag), "-o", str(model), "--report", str(page)]) == 0
+    arguments = [str(bag), "--aircraft", "fixed_wing", "-o", str(model), "--report", str(page)]
+    assert identify_model.main(arguments) == 0
     out, err = capsys.readouterr()
     assert err.count("surfaces: 999") == 1
     assert page.read_text(encoding="utf-8").count("surfaces: 999") == 1
@@ -130,6 +148,7 @@ def test_turbulence_ends_with_an_error_and_the_page_shows_why(
     [
         (["--axis", "lateral"], "no excitation moves the lateral axis"),
         (["--validate", "9"], "excitation 9 cannot be kept for validation; gusty has: 1, 2"),
+        (["--aircraft", "fixed_wings"], "--aircraft fixed_wings: config/geometry has: fixed_wing; give the sizes of"),
         (["--geometry", "none.yaml"], "none.yaml: No such file or directory; give a file as in config/geometry"),
         (["--accept", "-o", "model.doc"], "model.doc: expected a file that ends in .yaml, .json, .mat"),
     ],
@@ -141,6 +160,53 @@ def test_refusals_are_in_words(
     monkeypatch.chdir(tmp_path)
     assert identify_model.main([str(gusty), *arguments]) == 1
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("aircraft", "name", "why"),
+    [
+        ([TWIN], "fixed_wing", ""),
+        ([], "", "the recording does not say which aircraft was flown"),
+        # Flown by the twin's file of config/aircraft, which knows this code too.
+        (
+            [{**TWIN, "aircraft_description": "Diamond DA62"}],
+            "DA62 Diamond DA62",
+            "config/geometry has no sizes of the recorded aircraft, DA62 Diamond DA62: no coefficients",
+        ),
+        (
+            [{"aircraft_file": "b737_800", "aircraft_icao": "B738", "aircraft_description": "Boeing 737-800"}],
+            "B738 Boeing 737-800",
+            "config/geometry has no sizes of the recorded aircraft, B738 Boeing 737-800: no coefficients",
+        ),
+        (
+            [{"aircraft_file": "tiltrotor", "aircraft_icao": "TILT", "aircraft_description": "Tiltrotor"}],
+            "tiltrotor",
+            "config/geometry has no sizes of the recorded aircraft, tiltrotor: no coefficients",
+        ),
+        ([TWIN, {**TWIN, "aircraft_icao": "C172"}], "", "several aircraft (DA62 Light twin, then C172 Light twin)"),
+    ],
+)
+def test_coefficients_are_those_of_the_aircraft_that_was_flown(
+    gusty: Path, aircraft: list[dict[str, str]], name: str, why: str, capsys: pytest.CaptureFixture, tmp_path: Path
+) -> None:
+    bag = with_passports(gusty, tmp_path / "flight.bag", *aircraft)
+    output = tmp_path / "model.yaml"
+    assert identify_model.main([str(bag), "--accept", "-o", str(output)]) == 0
+    model = files.read_model(output)
+    assert model.aircraft == name
+    assert bool(model.axes["longitudinal"].derivatives) == (not why)
+    said = capsys.readouterr().err
+    assert why in said
+    assert [text for text in model.warnings if "no coefficients" in text] == [
+        text[len("warning: ") :] for text in said.splitlines() if "no coefficients" in text
+    ]
+
+
+def test_an_aircraft_that_is_named_is_taken_whatever_was_recorded(gusty: Path, tmp_path: Path) -> None:
+    output = tmp_path / "model.yaml"
+    assert identify_model.main([str(gusty), "--accept", "--aircraft", "fixed_wing", "-o", str(output)]) == 0
+    model = files.read_model(output)
+    assert (model.aircraft, "Cm_de" in model.axes["longitudinal"].derivatives) == ("fixed_wing", True)
 
 
 def test_no_bag_is_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
