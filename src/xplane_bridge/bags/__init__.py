@@ -113,8 +113,9 @@ class Table:
 
     @property
     def stamp(self) -> np.ndarray:
-        """int64 [ns]: header.stamp where the message has one, else the receive time."""
-        return self.columns.get("header.stamp", self.time)
+        """int64 [ns]: header.stamp of each message that has one, else its receive time. 0 is none: rospy leaves it so."""
+        stamp = self.columns.get("header.stamp", self.time)
+        return stamp if stamp.all() else np.where(stamp == 0, self.time, stamp)
 
     def by_stamp(self) -> Table:
         """Give the table in the order of its stamps; messages of one stamp stay in receive order."""

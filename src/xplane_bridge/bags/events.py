@@ -23,7 +23,7 @@ def events_of(lists: Table) -> list[RecordedEvent]:
     than were recorded (`bags.restarts`), and so are the events that are new there: those before are only repeated.
     """
     found: dict[tuple[int, int], RecordedEvent] = {}
-    for read, events in zip(lists.stamp.tolist(), lists["events"]):
+    for read, events in zip(lists["header.stamp"].tolist(), lists["events"]):
         stamps = [event.stamp.sec * 1_000_000_000 + event.stamp.nanosec for event in events]
         later_by = read - stamps[-1] if events and read else 0
         for stamp, event in zip(stamps, events):

@@ -68,6 +68,18 @@ def test_every_kind_of_field_is_decoded_to_its_column(tmp_path: Path) -> None:
     assert table["axes"].dtype == np.float32
 
 
+def test_a_message_whose_stamp_is_zero_has_the_time_of_its_receipt(tmp_path: Path) -> None:
+    zero = header(1, 0, 0, b"") + state(1, b"")[16:]
+    messages = [(10, state(0)), (1005 * 10**9, zero), (1006 * 10**9, state(2))]
+    path = write(tmp_path / "a.bag", [("/s", "pkg/msg/State", STATE, messages)])
+    for store in (None, ColumnFile(tmp_path)):
+        with Bags(path) as bags:
+            table = bags.read("/s", store=store)
+        assert table.stamp.tolist() == [1000 * 10**9 + 7, 1005 * 10**9, 1002 * 10**9 + 7]
+        assert table.by_stamp()["x"].tolist() == [0.5, 2.5, 1.5]
+        assert table["header.stamp"].tolist()[1] == 0, "what was recorded is still to be seen"
+
+
 def test_strings_of_changing_length_keep_order_and_values(tmp_path: Path) -> None:
     frames = [b"map", b"odom", b"map", b"", b"axe"]  # "map" and "axe" share a length, not a value
     messages = [(k, state(k, frame)) for k, frame in enumerate(frames)]

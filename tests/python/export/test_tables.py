@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 import pyarrow.parquet
 import pytest
@@ -25,6 +26,25 @@ def test_a_time_base_does_not_bridge_a_new_origin(tmp_path: Path) -> None:
     assert export(tmp_path / "flight.bag", "--rate", "50", "-o", tmp_path) == 0
     table = pd.read_csv(tmp_path / "flight.csv")
     assert table["position_north_m"].tolist() == [0.0] * 21 + [5000.0] * 21
+
+
+def test_commands_without_a_stamp_come_when_they_were_received(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in range(10):
+            ns = stamp_ns(k / 10)
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, bag.state(k / 10, k))
+            # As rospy sends a command whose header nothing fills.
+            command = {"fields": 1, "roll": np.float32(k / 16)}
+            bag.add("/xplane/control/auto", "xplane_bridge/ControlCommand", ns + 1_000_000, command)
+    assert export(tmp_path / "flight.bag", "--topics", "control/auto", "-o", tmp_path) == 0
+    rolls = pd.read_csv(tmp_path / "flight.csv")["control_auto_roll"]
+    assert np.isnan(rolls[0])
+    assert rolls[1:].tolist() == [k / 16 for k in range(9)]
+    assert export(tmp_path / "flight.bag", "--format", "npz", "-o", tmp_path) == 0
+    arrays = np.load(tmp_path / "flight.npz")
+    expected = np.arange(10) / 10 + 0.001
+    np.testing.assert_allclose(arrays["control_auto/time_s"], expected, atol=1e-9)
+    np.testing.assert_allclose(arrays["control_auto/sim_time_unwrapped_s"], [*expected[:9], np.nan], atol=1e-9)
 
 
 LISTS = ("--topics", "events", "failures/state")
