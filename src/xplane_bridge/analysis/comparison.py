@@ -39,7 +39,7 @@ class Matched:
     Attributes:
         name: As the tables call it.
         variant: What it is a repetition of; flights of one variant are taken together.
-        time: [s] since what the flights are matched by, shape (n,), increasing.
+        time: [s] since what the flights are matched by, shape (n,), increasing: each simulated frame once.
         values: Samples by column of `SIGNALS`, in SI and degrees.
         parts: Segments of `time`: nothing is interpolated between them.
         scores: What the scenario's criteria have measured, by name.

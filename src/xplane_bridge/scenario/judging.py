@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional
 
 import numpy as np
 
+from xplane_bridge.analysis.frames import frames_of
 from xplane_bridge.analysis.scoring import Score, score
 from xplane_bridge.scenario.schema import Scenario, ScenarioError
 
@@ -34,14 +35,14 @@ def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any], frames:
     """Scores a flight that was flown by a `RosPlayer`.
 
     Where the scenario was played to its end, the state that ended it is the last that counts, as in a campaign: what is
-    recorded until all programs have ended is not of the scenario.
+    recorded until all programs have ended is not of the scenario. A frame that a pause repeats counts once.
 
     Args:
         scenario: What was flown.
         flight: The recording.
         played: The player's log: `begin` (epoch and sim_time_unwrapped of its first state), `labels` [s], `finished`
             and `duration` [s].
-        frames: How many flight states count at most, from that state on; all when omitted.
+        frames: How many frames count at most, from that state on; all when omitted.
 
     Raises:
         ScenarioError: The recording has no state of the time the scenario was played in.
@@ -50,17 +51,17 @@ def judge(scenario: Scenario, flight: Flight, played: Mapping[str, Any], frames:
         raise ScenarioError(f"{scenario.name}: no flight state was recorded while it was played")
     state = flight.tables["state"]
     epoch, sim_time = state["epoch"], state["sim_time_unwrapped"]
-    steps = np.where(np.diff(epoch) == 0, np.maximum(np.diff(sim_time), 0.0), 0.0)
-    elapsed = np.concatenate(([0.0], np.cumsum(steps)))
+    elapsed, once = frames_of(epoch, sim_time)
     begin = played["begin"]
     first = np.flatnonzero((epoch == begin["epoch"]) & (sim_time >= begin["sim_time_unwrapped"] - _SAME_TIME_S))
     if not len(first):
         raise ScenarioError(f"{scenario.name}: the state it began with was not recorded")
-    end = len(elapsed) if frames is None else first[0] + frames
+    end = len(elapsed)
     if played.get("finished"):
         last = elapsed[first[0]] + played["duration"] + _SAME_TIME_S
         end = min(end, int(np.searchsorted(elapsed, last, side="right")))
-    rows = slice(first[0], end)
+    once[first[0]] = True
+    rows = first[0] + np.flatnonzero(once[first[0] : end])[:frames]
     time = elapsed[rows] - elapsed[first[0]]
     values = {name: np.asarray(state[column][rows], dtype=float) for name, column in _COLUMNS.items()}
     values.update({name: np.degrees(state[column][rows]) for name, column in _RATES.items()})

@@ -54,3 +54,28 @@ def test_as_many_frames_count_as_a_campaign_has_flown() -> None:
 @pytest.mark.parametrize("log", [played(finished=False), played()])
 def test_of_a_scenario_that_was_not_played_to_its_end_all_counts(log: Dict[str, Any]) -> None:
     assert values(log)["whole"] == 40.0
+
+
+def test_a_frame_counts_once_however_long_it_was_paused() -> None:
+    scenario = parse_scenario(
+        {
+            "name": "n",
+            "criteria": {"level": {"measure": "rms", "of": "roll", "target": 0, "below": 50}},
+            "events": [{"at": 2, "end": True}],
+        }
+    )
+    paused = flight()
+    states = paused.tables["state"]
+    # A second of pause at 40 deg, the frame before the end; in it the terrain below loads.
+    states["roll_deg"][119] = 40.0
+    rows = np.sort(np.concatenate([np.arange(150), np.full(60, 119)]))
+    repeated = {column: values[rows] for column, values in states.items()}
+    repeated["altitude_agl"] = np.linspace(0.0, 1.0, len(rows))
+    paused.tables["state"] = repeated
+    expected = np.sqrt(40.0**2 / 121)
+    for more in ({}, {"frames": 121}):
+        assert judge(scenario, paused, played(finished=True), **more)[0].value == pytest.approx(expected)
+    # The first frame of a reset is one of its own, though simulated time stands there.
+    repeated["epoch"] = np.where(np.arange(len(rows)) > 119, 4, 3)
+    expected = np.sqrt(2 * 40.0**2 / 122)
+    assert judge(scenario, paused, played(), frames=122)[0].value == pytest.approx(expected)

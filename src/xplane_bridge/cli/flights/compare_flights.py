@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 
 from xplane_bridge.analysis.comparison import SIGNALS, Matched
+from xplane_bridge.analysis.frames import frames_of
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.flight import Flight, read_flight
@@ -164,15 +165,14 @@ def usual(found: Sequence[Read]) -> str:
 
 
 def matched(each: Read, name: str, by: str, event: Optional[str]) -> Matched:
-    """One flight on the time axis of the comparison: simulated time.
+    """One flight on the time axis of the comparison: simulated time, each frame once.
 
     Raises:
         CompareError: What it is matched by is not in it.
     """
     state = each.flight.tables["state"]
     epoch, sim_time = state["epoch"], state["sim_time_unwrapped"]
-    steps = np.where(np.diff(epoch) == 0, np.maximum(np.diff(sim_time), 0.0), 0.0)
-    elapsed = np.concatenate(([0.0], np.cumsum(steps)))
+    elapsed, once = frames_of(epoch, sim_time)
     zero = 0.0
     if by == "scenario":
         begin = each.played.get("begin")
@@ -188,7 +188,12 @@ def matched(each: Read, name: str, by: str, event: Optional[str]) -> Matched:
     elif by == "event":
         zero = float(np.interp(event_time(each, str(event)) - state.stamp[0], state.stamp - state.stamp[0], elapsed))
     values = {column: np.asarray(state[column]) for column in SIGNALS if column in state}
-    return Matched(name, each.variant, elapsed - zero, values, each.flight.parts, scores_of(each))
+    parts = each.flight.parts
+    if not once.all():
+        elapsed, values = elapsed[once], {column: samples[once] for column, samples in values.items()}
+        kept = np.concatenate(([0], np.cumsum(once)))
+        parts = [slice(int(kept[p.start]), int(kept[p.stop])) for p in parts if kept[p.start] < kept[p.stop]]
+    return Matched(name, each.variant, elapsed - zero, values, parts, scores_of(each))
 
 
 def event_time(each: Read, text: str) -> int:

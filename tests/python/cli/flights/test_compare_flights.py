@@ -115,6 +115,32 @@ def test_a_label_counts_where_it_comes_again_in_the_flight(tmp_path):
     assert round(float(matched(read(path, ""), "x", "event", "turn").time[0]), 3) == -4.0
 
 
+def test_a_frame_that_a_pause_repeats_counts_once(tmp_path):
+    def fly(path, rate_deg_s, paused_for=0):
+        host = 0.0
+        with FlightBag(path) as bag:
+            for k in range(100):
+                for repeated in range(1 + (paused_for if k == 90 else 0)):
+                    state = bag.state(k / RATE, k)
+                    state.update(header=bag.header(stamp_ns(host), ""), roll_deg=rate_deg_s * k / RATE, paused=bool(repeated))
+                    bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(host), state)
+                    host += 1.0 / RATE
+        return path
+
+    level = fly(tmp_path / "level.bag", 0.0)
+    paused = fly(tmp_path / "paused.bag", 0.0, paused_for=200)
+    rolls = fly(tmp_path / "rolls.bag", 1.0)
+    rows = [
+        re.search(r"<tr><td>roll</td>.*?</tr>", page_of(reference, rolls, tmp_path / "page.html")).group(0)
+        for reference in (level, paused)
+    ]
+    assert rows[0] == rows[1]
+    assert "<td class=n>4.95</td>" in rows[0]  # mean of 0, 0.1, ... 9.9
+    found = matched(read(paused, ""), "x", "time", None)
+    assert len(found.time) == 100
+    assert found.parts == [slice(0, 100)]
+
+
 def test_folders_are_repetitions_and_give_intervals(tmp_path):
     for k in range(3):
         write(tmp_path / "before" / str(k) / "flight.bag", higher=0.1 * k)
