@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import functools
 import logging
+import re
 import struct
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -53,6 +54,8 @@ _LOG = logging.getLogger(__name__)
 #: Messages are decoded so many at a time: bytes, and number of them.
 _PIECE_BYTES = 4 << 20
 _PIECE_MESSAGES = 8192
+#: Ends the name of each part of a split recording.
+_PART = re.compile(r"_[0-9]+$")
 
 
 class BagError(XplaneBridgeError):
@@ -113,7 +116,7 @@ class Table:
 
     @property
     def stamp(self) -> np.ndarray:
-        """int64 [ns]: header.stamp of each message that has one, else its receive time. 0 is none: rospy leaves it so."""
+        """int64 [ns]: header.stamp of each message that has one, else its receive time. 0 is none: rospy leaves it."""
         stamp = self.columns.get("header.stamp", self.time)
         return stamp if stamp.all() else np.where(stamp == 0, self.time, stamp)
 
@@ -144,7 +147,7 @@ class Bags:
         self.paths: list[Path] = []
         for item in (Path(p) for p in given):
             if item.is_dir():
-                found = sorted(item.glob("*.bag"))
+                found = sorted(sorted(item.glob("*.bag")), key=_part)
                 if not found:
                     msg = f"{item}: a directory without any .bag file"
                     raise BagError(msg)
@@ -154,6 +157,8 @@ class Bags:
         if not self.paths:
             msg = "no bag given: name at least one .bag file"
             raise BagError(msg)
+        if len({(path.parent, _PART.sub("", path.stem)) for path in self.paths}) == 1:
+            self.paths.sort(key=_part)  # a shell gives them in the order of texts
         self._stack: Optional[ExitStack] = None
         self._files: list[BagFile] = []
         self._restarts = Restarts(self.paths[0], self._state_stamps)
@@ -419,6 +424,11 @@ def _types_of(msgtype: str, definition: str) -> tuple[Types, Any]:
 def _rank(topic: str) -> tuple[int, str]:
     """By which topics of a type are ordered."""
     return topic.count("/"), topic
+
+
+def _part(path: Path) -> list[Union[str, int]]:
+    """By which the parts of a recording are ordered: NAME_2 before NAME_10."""
+    return [int(text) if k % 2 else text for k, text in enumerate(re.split("([0-9]+)", path.name))]
 
 
 def _type_name(msgtype: str) -> str:

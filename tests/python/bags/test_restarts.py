@@ -110,6 +110,18 @@ def test_two_flights_lie_behind_each_other(recording: Path, caplog: pytest.LogCa
     assert "stamps go back where X-Plane was restarted" in caplog.text
 
 
+def test_a_recording_of_more_than_ten_parts_is_in_their_order(tmp_path: Path) -> None:
+    received = flights(by_clock=True)
+    happened: List[Dict[str, object]] = []
+    for n in range(12):
+        write(tmp_path / f"flight_{n}.bag", received[14 * n : 14 * (n + 1)], happened)
+    for given in (tmp_path, sorted(tmp_path.glob("*.bag"))):  # the second as a shell gives flight_*.bag
+        with Bags(given) as bags:
+            assert [path.stem for path in bags.paths] == [f"flight_{n}" for n in range(12)]
+            state = bags.read(STATE).by_stamp()
+        assert state["epoch"].tolist() == [1] * EACH + [2] * EACH
+
+
 def test_a_table_joins_what_was_of_one_flight(recording: Path, tmp_path: Path) -> None:
     assert export(recording, "-o", tmp_path) == 0
     table = pd.read_csv(tmp_path / "bags.csv")
