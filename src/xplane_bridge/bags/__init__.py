@@ -12,9 +12,9 @@ are receive times of a recorder that goes by that time (`bags.restarts`). A warn
 
 A long recording needs little memory in pieces (`Bags.pieces`), or with its columns in a temporary file (`ColumnFile`).
 
-Columns are named by path: ``header.stamp``, ``angular_velocity.x``, ``gear_deploy_ratio``. Times and durations are
-int64 nanoseconds. A fixed array is a column of shape (n, k); strings, lists of varying length and lists of messages
-(`MessageList`) are object columns. Units are those of the message definition.
+Columns are named by path: ``header.stamp``, ``angular_velocity.x``, ``gear_deploy_ratio``. Times are int64 nanoseconds,
+durations float64 seconds. A fixed array is a column of shape (n, k); strings, lists of varying length and lists of
+messages (`MessageList`) are object columns. Units are those of the message definition.
 """
 
 from __future__ import annotations

@@ -28,9 +28,10 @@ _DTYPES = {
     "float32": np.dtype("<f4"),
     "float64": np.dtype("<f8"),
 }
+_TIME, _DURATION = "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"
 _TIME_TYPES = {
-    "builtin_interfaces/msg/Time": np.dtype([("sec", "<u4"), ("nanosec", "<u4")]),
-    "builtin_interfaces/msg/Duration": np.dtype([("sec", "<i4"), ("nanosec", "<i4")]),
+    _TIME: np.dtype([("sec", "<u4"), ("nanosec", "<u4")]),
+    _DURATION: np.dtype([("sec", "<i4"), ("nanosec", "<i4")]),
 }
 #: Message definitions by type name: (constants, fields), as rosbags parses them.
 Types = Dict[str, Tuple[Any, Any]]
@@ -45,7 +46,7 @@ class _Leaf:
     dtype: np.dtype
     offset: int
     count: int  # -1: scalar
-    kind: str  # base, time, string, sequence
+    kind: str  # base, string, sequence, or a key of _TIME_TYPES
 
 
 class _Layout(NamedTuple):
@@ -129,7 +130,7 @@ def _layout(types: Types, msgtype: str, raw: bytes) -> _Layout:
 
     def nested(name: str, typename: str, at: int) -> int:
         if typename in _TIME_TYPES:
-            leaves.append(_Leaf(name, _TIME_TYPES[typename], at, -1, "time"))
+            leaves.append(_Leaf(name, _TIME_TYPES[typename], at, -1, typename))
             return at + 8
         return walk(typename, name + ".", at)
 
@@ -231,9 +232,9 @@ def _extract(block: np.ndarray, layout: _Layout, columns: Optional[Sequence[str]
     for leaf in layout.leaves:
         if not wanted(leaf.name, columns):
             continue
-        if leaf.kind == "time":
+        if leaf.kind in _TIME_TYPES:
             raw = _view(block, leaf.offset, leaf.dtype, -1)
-            out[leaf.name] = raw["sec"].astype(np.int64) * 1_000_000_000 + raw["nanosec"].astype(np.int64)
+            out[leaf.name] = _instant(raw["sec"].astype(np.int64), raw["nanosec"].astype(np.int64), leaf.kind)
         elif leaf.kind == "string":
             out[leaf.name] = _strings(block, leaf)
         elif leaf.kind == "sequence":
@@ -245,6 +246,11 @@ def _extract(block: np.ndarray, layout: _Layout, columns: Optional[Sequence[str]
         else:
             out[leaf.name] = _view(block, leaf.offset, leaf.dtype, leaf.count)
     return out
+
+
+def _instant(sec: Any, nanosec: Any, typename: str) -> Any:
+    """Give times in [ns], which floats do not hold, and durations in [s], as the messages say of them."""
+    return sec + nanosec / 1e9 if typename == _DURATION else sec * 1_000_000_000 + nanosec
 
 
 def _strings(block: np.ndarray, leaf: _Leaf) -> np.ndarray:
@@ -289,7 +295,7 @@ def decode_objects(
         for field, (kind, detail) in types[typename][1]:
             name, value = f"{prefix}{field}", getattr(message, field)
             if kind == Nodetype.NAME and detail in _TIME_TYPES:
-                put(name, int(value.sec) * 1_000_000_000 + int(value.nanosec))
+                put(name, _instant(int(value.sec), int(value.nanosec), detail))
             elif kind == Nodetype.NAME:
                 walk(value, detail, name + ".")
             elif kind != Nodetype.BASE and detail[0][0] == Nodetype.NAME:

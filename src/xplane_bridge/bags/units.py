@@ -30,6 +30,7 @@ class Unit(NamedTuple):
 
 
 NO_UNIT = Unit("", 0.0, 0.0)
+_SECONDS = Unit("s", 0.0, 0.0)
 
 
 def parse_units(definition: str, msgtype: str) -> dict[str, Unit]:
@@ -64,6 +65,8 @@ def _walk(
 ) -> None:
     for typename, field, comment in types.get(msgtype, []):
         unit = _unit(comment) or inherited
+        if typename == "duration":
+            unit = _SECONDS  # as it is read, whatever the comment says
         nested = _resolve(types, typename, msgtype)
         if nested:
             _walk(types, nested, f"{prefix}{field}.", unit, units)

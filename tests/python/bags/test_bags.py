@@ -62,7 +62,7 @@ def test_every_kind_of_field_is_decoded_to_its_column(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table["x"], [0.5, 1.5, 2.5, 3.5, 4.5])
     np.testing.assert_array_equal(table["axes"], [[k, 2 * k, -k] for k in range(5)])
     np.testing.assert_array_equal(table["on"], [True, False, True, False, True])
-    np.testing.assert_array_equal(table["age"], [-k * 10**9 + 250 for k in range(5)])
+    np.testing.assert_array_equal(table["age"], [0.00000025, -0.99999975, -1.99999975, -2.99999975, -3.99999975])
     np.testing.assert_array_equal(table["step"], [0, -5, -10, -15, -20])
     assert list(table["header.frame_id"]) == ["base_link_frd"] * 5
     assert table["axes"].dtype == np.float32
@@ -125,6 +125,15 @@ def test_lists_beside_texts_stay_lists_where_all_have_one_length(tmp_path: Path)
         assert [list(value) for value in table["values"]] == [[0.0], [1.0], [2.0]]
         assert table["values"].dtype == object, "another flight has lists of other lengths in this column"
         assert table["axes"].tolist() == [[1.0, 2.0], [2.0, 3.0], [3.0, 4.0]]
+
+
+def test_durations_beside_texts_are_seconds_too(tmp_path: Path) -> None:
+    definition = "string[] names\nduration age\ntime at\n"
+    raws = [struct.pack("<IiiII", 0, -1, 500_000_000, 3, 4), struct.pack("<IiiII", 0, 2, 250_000_000, 5, 6)]
+    with Bags(write(tmp_path / "a.bag", [("/l", "pkg/msg/L", definition, list(enumerate(raws)))])) as bags:
+        table = bags.read("/l")
+    assert table["age"].tolist() == [-0.5, 2.25]
+    assert table["at"].tolist() == [3 * 10**9 + 4, 5 * 10**9 + 6]
 
 
 def test_columns_can_be_selected_alone_or_as_a_group(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ float32 ratio            # [-1..1] right +
 float32 stop             # [0, 1] pressed
 geometry_msgs/Vector3 rates   # [rad/s^2] body
 bool on
+duration age             # how old it is
 ================================================================================
 MSG: std_msgs/Header
 uint32 seq
@@ -39,8 +40,9 @@ def test_units_and_wraps_follow_the_comments() -> None:
     assert units["oil"].symbol == "deg C"
     for plain in ("ratio", "stop", "on", "header.stamp", "header.seq"):
         assert units[plain] == NO_UNIT
+    assert units["age"].symbol == "s"
     assert "FLAG" not in units
-    assert len(units) == 13
+    assert len(units) == 14
 
 
 @pytest.mark.parametrize(

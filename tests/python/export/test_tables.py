@@ -47,6 +47,22 @@ def test_commands_without_a_stamp_come_when_they_were_received(tmp_path: Path) -
     np.testing.assert_allclose(arrays["control_auto/sim_time_unwrapped_s"], [*expected[:9], np.nan], atol=1e-9)
 
 
+@pytest.mark.parametrize("form", ["csv", "parquet", "npz"])
+def test_durations_are_seconds(tmp_path: Path, form: str) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(1.0), bag.state(1.0, 0))
+        applied = {"header": bag.header(stamp_ns(0.5), ""), "source_age": {"sec": 0, "nanosec": 31_250_000}}
+        bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", stamp_ns(0.5), applied)
+    assert export(tmp_path / "flight.bag", "--format", form, "--topics", "control/applied", "-o", tmp_path) == 0
+    if form == "npz":
+        arrays = np.load(tmp_path / "flight.npz")
+        assert arrays["control_applied/source_age_s"].tolist() == [0.03125]
+        assert dict(arrays["units"])["control_applied/source_age_s"] == "s"
+    else:
+        table = {"csv": pd.read_csv, "parquet": pd.read_parquet}[form](tmp_path / f"flight.{form}")
+        assert table["control_applied_source_age_s"].tolist() == [0.03125]
+
+
 LISTS = ("--topics", "events", "failures/state")
 
 
