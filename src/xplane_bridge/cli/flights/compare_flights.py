@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Set
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
 import numpy as np
 import yaml
@@ -18,6 +18,7 @@ from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.flight import Flight, read_flight
 from xplane_bridge.bags.passport import Passport, read_passports
 from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.flights.split_recordings import joined
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.scenario import ScenarioError, parse_scenario
 from xplane_bridge.scenario.judging import judge
@@ -32,7 +33,8 @@ class CompareError(XplaneBridgeError):
 class Read(NamedTuple):
     """One flight as it was read."""
 
-    path: Path
+    path: Path  #: of its first part
+    parts: int  #: files of the recording
     variant: str
     flight: Flight
     labels: Dict[str, Set[int]]  #: receive times [ns] of the messages of each text on scenario/label
@@ -54,7 +56,8 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument(
         "flights", nargs="+", type=Path, metavar="BAG",
-        help="a flight's bag, or a folder: each bag below it is a repetition of the same; the first is the reference",
+        help="a flight's bag or its split bags, or a folder: each flight below it is a repetition of the same; the "
+        "first is the reference",
     )  # fmt: skip
     p.add_argument(
         "--match", choices=("scenario", "time"),
@@ -76,11 +79,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(argv)
     if args.match and args.event is not None:
         raise CompareError("--match and --event: give one of them")
-    paths = paths_of(args.flights)
+    given = paths_of(args.flights)
     try:
         args.output.parent.mkdir(parents=True, exist_ok=True)
         store = ColumnFile(args.output.parent)
-        found = [read(path, variant, store) for path, variant in paths]
+        found = [read(paths, variant, store) for paths, variant in given]
     except OSError as error:
         raise CompareError(f"{error.filename or args.output}: {error.strerror}") from None
     if len(found) < 2:
@@ -89,7 +92,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     zero = {"scenario": "the begin of the scenario", "time": "the first flight state"}.get(
         by, f"the event {args.event!r}"
     )
-    names = short_names([each.path for each in found])
+    names = [
+        f"{name} ({each.parts} parts)" if each.parts > 1 else name
+        for name, each in zip(short_names([each.path for each in found]), found)
+    ]
     flights = [matched(each, name, by, args.event) for each, name in zip(found, names)]
     text = comparison.build(flights, [each.passport for each in found], zero)
     try:
@@ -100,21 +106,25 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     return 0
 
 
-def paths_of(given: Sequence[Path]) -> List[tuple[Path, str]]:
-    """The bags with the variants they belong to.
+def paths_of(given: Sequence[Path]) -> List[Tuple[List[Path], str]]:
+    """The recordings, each with all its parts, and the variants they belong to.
 
     Raises:
+        BagError: A bag that may be a part of another one's recording cannot be read.
         CompareError: A folder has no bag.
     """
-    out = []
+    out: List[Tuple[List[Path], str]] = []
+    files = list(dict.fromkeys(path for path in given if not path.is_dir()))
+    parts = {path: paths for paths in joined(files) for path in paths}
     for path in given:
         if not path.is_dir():
-            out.append((path, str(path)))
+            if path == parts[path][0]:
+                out.append((parts[path], str(path)))
             continue
         bags = sorted(path.rglob("*.bag"))
         if not bags:
             raise CompareError(f"{path}: a folder without any .bag file")
-        out += [(bag, str(path)) for bag in bags]
+        out += [(paths, str(path)) for paths in joined(bags)]
     return out
 
 
@@ -127,15 +137,16 @@ def short_names(paths: Sequence[Path]) -> List[str]:
     return ["/".join(each[common:]) for each in parts]
 
 
-def read(path: Path, variant: str, store: Optional[ColumnFile] = None) -> Read:
-    """Read one flight; its columns into `store`, into memory when omitted.
+def read(paths: Sequence[Path], variant: str, store: Optional[ColumnFile] = None) -> Read:
+    """Read one flight from its parts; its columns into `store`, into memory when omitted.
 
     Raises:
         BagError: The bag cannot be read.
         CompareError: It holds no flight, or what lies beside it is no log of a player.
     """
+    path = paths[0]
     labels: Dict[str, Set[int]] = {}
-    with Bags(path) as bags:
+    with Bags(paths) as bags:
         flight = read_flight(bags, store)
         passports = read_passports(bags)
     if "label" in flight.tables:
@@ -151,7 +162,7 @@ def read(path: Path, variant: str, store: Optional[ColumnFile] = None) -> Read:
             played = json.loads(beside.read_text(encoding="utf-8"))
         except ValueError as error:
             raise CompareError(f"{beside}: no log of a scenario's player: {error}") from None
-    return Read(path, variant, flight, labels, passports[-1] if passports else None, played)
+    return Read(path, len(paths), variant, flight, labels, passports[-1] if passports else None, played)
 
 
 def usual(found: Sequence[Read]) -> str:

@@ -53,7 +53,7 @@ def stuck(number, time):
 
 
 def first_sim_time(path):
-    return float(read(path, "").flight.tables["state"]["sim_time_unwrapped"][0])
+    return float(read([path], "").flight.tables["state"]["sim_time_unwrapped"][0])
 
 
 def page_of(*arguments):
@@ -65,7 +65,7 @@ def page_of(*arguments):
 def test_two_flights_of_a_scenario_are_matched_by_its_begin(tmp_path):
     a = write(tmp_path / "a" / "flight.bag", begin=2.0)
     b = write(tmp_path / "b" / "flight.bag", begin=3.0, higher=2.0, commit="def")
-    found = [matched(read(path, str(path)), path.parent.name, "scenario", None) for path in (a, b)]
+    found = [matched(read([path], str(path)), path.parent.name, "scenario", None) for path in (a, b)]
     assert [round(float(each.time[0]), 3) for each in found] == [-2.0, -3.0]
     assert found[1].scores["climb"] - found[0].scores["climb"] == pytest.approx(2.0)
     page = page_of(a, b, tmp_path / "page.html")
@@ -88,7 +88,7 @@ def test_matched_by_time_equal_flights_are_equal(tmp_path):
 
 def test_matched_by_an_event(tmp_path):
     a, b = write(tmp_path / "a.bag", event=5.0, played=False), write(tmp_path / "b.bag", event=7.5, played=False)
-    found = [matched(read(path, ""), "x", "event", "Stuck") for path in (a, b)]
+    found = [matched(read([path], ""), "x", "event", "Stuck") for path in (a, b)]
     assert [round(float(each.time[0]), 3) for each in found] == [-5.0, -7.5]
     assert "aileron" in page_of(a, b, "--event", "aileron", tmp_path / "page.html")
 
@@ -96,7 +96,7 @@ def test_matched_by_an_event(tmp_path):
 def test_events_of_earlier_flights_in_the_latched_list_match_nothing(tmp_path, capsys):
     a = write(tmp_path / "a.bag", event=5.0, played=False)
     b = write(tmp_path / "b.bag", event=7.5, played=False, earlier=(-300.0, -120.0))
-    found = [matched(read(path, ""), "x", "event", "stuck") for path in (a, b)]
+    found = [matched(read([path], ""), "x", "event", "stuck") for path in (a, b)]
     assert [round(float(each.time[0]), 3) for each in found] == [-5.0, -7.5]
     c = write(tmp_path / "c.bag", event=-60.0, played=False)
     assert compare_flights.main([str(a), str(c), "--event", "stuck", "-o", str(tmp_path / "page.html")]) == 1
@@ -112,7 +112,7 @@ def test_a_label_counts_where_it_comes_again_in_the_flight(tmp_path):
             bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / RATE), bag.state(k / RATE, k))
         for t in (-1.0, 4.0, 8.0):  # at first the latched one of an earlier flight
             bag.add("/xplane/scenario/label", "std_msgs/String", stamp_ns(t), {"data": "turn"})
-    assert round(float(matched(read(path, ""), "x", "event", "turn").time[0]), 3) == -4.0
+    assert round(float(matched(read([path], ""), "x", "event", "turn").time[0]), 3) == -4.0
 
 
 def test_a_frame_that_a_pause_repeats_counts_once(tmp_path):
@@ -122,7 +122,8 @@ def test_a_frame_that_a_pause_repeats_counts_once(tmp_path):
             for k in range(100):
                 for repeated in range(1 + (paused_for if k == 90 else 0)):
                     state = bag.state(k / RATE, k)
-                    state.update(header=bag.header(stamp_ns(host), ""), roll_deg=rate_deg_s * k / RATE, paused=bool(repeated))
+                    state.update(header=bag.header(stamp_ns(host), ""), paused=bool(repeated))
+                    state["roll_deg"] = rate_deg_s * k / RATE
                     bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(host), state)
                     host += 1.0 / RATE
         return path
@@ -136,9 +137,62 @@ def test_a_frame_that_a_pause_repeats_counts_once(tmp_path):
     ]
     assert rows[0] == rows[1]
     assert "<td class=n>4.95</td>" in rows[0]  # mean of 0, 0.1, ... 9.9
-    found = matched(read(paused, ""), "x", "time", None)
+    found = matched(read([paused], ""), "x", "time", None)
     assert len(found.time) == 100
     assert found.parts == [slice(0, 100)]
+
+
+def write_part(path, start, higher=0.0):
+    """5 s of flight that begin at `start` [s]."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with FlightBag(path) as bag:
+        for k in range(int(5.0 * RATE)):
+            t = start + k / RATE
+            state = bag.state(t, k)
+            state["altitude_msl"] += higher
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
+    return path
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"flight_{k}.bag" for k in range(12)],  # sorted as text, 10 comes before 2
+        [f"flight_2026-11-28-07-{k:02d}-30_{k}.bag" for k in range(12)],  # as record.launch names them
+    ],
+)
+def test_the_parts_of_a_split_recording_are_one_flight(tmp_path, names):
+    for folder, higher in (("before", 0.0), ("after", 3.0)):
+        for k, name in enumerate(names):
+            write_part(tmp_path / folder / name, 5.0 * k, higher)
+    before, after = tmp_path / "before", tmp_path / "after"
+    page = page_of(before, after, tmp_path / "page.html")
+    assert "<h1>2 flights compared</h1>" in page
+    assert f"after/{names[0]} (12 parts)" in page
+    assert "0 to 59.9" in page
+    row = re.search(r"<tr><td>altitude MSL</td>.*?</tr>", page).group(0)
+    assert "<td class=n>3</td>" in row
+    # So are parts that are named one by one, in whatever order.
+    files = [path for folder in (before, after) for path in sorted(folder.iterdir())]
+    assert page_of(*files, tmp_path / "page.html").count("(12 parts)") == page.count("(12 parts)")
+
+
+def test_what_was_flown_one_after_the_other_stays_apart(tmp_path):
+    folder = tmp_path / "flights"
+    for k, start in enumerate((0.0, 30.0, 60.0)):  # numbered by their pilot
+        write_part(folder / f"run_{k}.bag", start)
+    write_part(folder / "flight_2026-11-28-07-00-00_0.bag", 100.0)
+    write_part(folder / "flight_2026-11-28-07-00-05_1.bag", 105.0)
+    write_part(folder / "flight_2026-11-28-07-00-30_0.bag", 130.0)
+    write_part(folder / "flight_2026-11-28-07-00-35_1.bag", 135.0)
+    write_part(folder / "flight_2026-11-28-07-00-45_3.bag", 145.0)  # the one between them is lost
+    page = page_of(folder, tmp_path / "page.html")
+    assert "<h1>6 flights compared</h1>" in page
+    assert set(re.findall(r"([\w-]+\.bag)(?: \((\d) parts\))?<", page)) >= {
+        ("flight_2026-11-28-07-00-00_0.bag", "2"),
+        ("flight_2026-11-28-07-00-30_0.bag", "2"),
+        ("flight_2026-11-28-07-00-45_3.bag", ""),
+    }
 
 
 def test_folders_are_repetitions_and_give_intervals(tmp_path):
