@@ -230,13 +230,13 @@ class Bags:
 
     def own(self, topics: Iterable[str]) -> list[str]:
         """Give those of some topics that are below `name_space`, and not below that of a further bridge in there."""
+        return [topic for topic, space in self.bridges_of(topics).items() if space == self.name_space]
+
+    def bridges_of(self, topics: Iterable[str]) -> dict[str, Optional[str]]:
+        """Give the name space of each topic's bridge, the innermost around it; None where it is below none."""
         spaces = self._name_spaces or [""]
-        own = []
-        for topic in topics:
-            around = [space for space in spaces if topic.startswith(f"{space}/")]
-            if max(around, key=len, default=None) == spaces[0]:
-                own.append(topic)
-        return own
+        around = {topic: [space for space in spaces if topic.startswith(f"{space}/")] for topic in topics}
+        return {topic: max(found, key=len, default=None) for topic, found in around.items()}
 
     @property
     def name_space(self) -> str:

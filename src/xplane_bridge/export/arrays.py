@@ -4,9 +4,9 @@ Of every topic but the pictures there is, with one row per message:
 
 * ``stamp_ns``, host time of the message's header (of its arrival where it has none), and ``receive_ns``, when the
   recorder had it: int64 nanoseconds since 1970;
-* ``time_s`` since the first flight state, the same zero in every topic;
-* ``sim_time_unwrapped_s``, the simulator's time at the stamp, between flight states interpolated, never across a gap or
-  an epoch (NaN there);
+* ``time_s`` since the first flight state of the topic's bridge, the same zero in every topic below its name space;
+* ``sim_time_unwrapped_s``, the simulator's time at the stamp, between flight states of that bridge interpolated, never
+  across a gap or an epoch (NaN there);
 * every field with its unit in the name, as in the other tables. Fixed arrays are two-dimensional. Lists of varying
   length are filled up (NaN, 0, false or empty text) beside their lengths, ``<name>_count``; lists of messages are JSON.
 
@@ -178,7 +178,7 @@ def topic_arrays(bags: Bags, only: Sequence[str] = (), folder: Optional[Path] = 
     if not chosen:
         msg = f"{', '.join(map(str, bags.paths))}: no message that a table can hold; nothing was recorded but pictures"
         raise BagError(msg)
-    clock = _sim_clock(bags, bags.topic_of_type(FLIGHT_STATE))
+    clocks = _Clocks(bags, chosen)
     taken = ["units", "topics", "about", _CAMERAS]
     for topic in chosen:
         if topic in infos and infos[topic].msgtype in (RAW, COMPRESSED):
@@ -187,7 +187,8 @@ def topic_arrays(bags: Bags, only: Sequence[str] = (), folder: Optional[Path] = 
     for topic in chosen:
         name = topic[len(space) :] if topic.startswith(space + "/") else topic
         taken.append(_valid_name(name.strip("/"), taken))
-        yield _arrays(taken[-1], bags.read(topic, store=ColumnFile(folder)), bags.units(topic), clock, folder)
+        units, clock = bags.units(topic), clocks.of(topic)
+        yield _arrays(taken[-1], bags.read(topic, store=ColumnFile(folder)), units, clock, folder)
 
 
 class _Written:
@@ -337,6 +338,33 @@ def _sim_clock(bags: Bags, state: Optional[str]) -> _SimClock:
     stamp = table.stamp[order]
     parts = segments(stamp, table["epoch"][order], DEFAULT_MAX_GAP)
     return _SimClock(int(stamp[0]), stamp, table["sim_time_unwrapped"][order], parts)
+
+
+class _Clocks:
+    """The clocks of the bridges in a recording, each read once.
+
+    Args:
+        bags: Open bags of one flight.
+        topics: Those to be read.
+    """
+
+    def __init__(self, bags: Bags, topics: Iterable[str]) -> None:
+        self._bags = bags
+        self._bridges = bags.bridges_of(topics)
+        self._states: dict[Optional[str], str] = {}
+        for name, info in sorted(bags.topics.items()):
+            if info.msgtype == FLIGHT_STATE:
+                self._states.setdefault(name.rpartition("/")[0], name)
+        self._read: dict[Optional[str], _SimClock] = {}
+
+    def of(self, topic: str) -> _SimClock:
+        """Give the clock of a topic's bridge; of a topic of none, that of the only one, or of several just the zero."""
+        space = self._bridges[topic]
+        if space not in self._read:
+            clock = _sim_clock(self._bags, self._states.get(space, self._bags.topic_of_type(FLIGHT_STATE)))
+            known = space is not None or len(self._states) == 1
+            self._read[space] = clock if known else clock._replace(stamp=np.empty(0, np.int64))
+        return self._read[space]
 
 
 def _arrays(key: str, table: Table, units: dict[str, Unit], clock: _SimClock, folder: Optional[Path]) -> TopicArrays:

@@ -95,6 +95,35 @@ def test_simulator_time_is_never_interpolated_across_a_gap(tmp_path: Path) -> No
     assert label.columns["data"].tolist() == ["at 1.0", "at 2.5", "at 3.01", "at 9.0"]
 
 
+def test_each_topic_has_the_clock_of_its_own_bridge(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in range(20):
+            for space, later, sim_later in (("/a", 0.0, 0.0), ("/b", 0.5, 1000.0), ("/b/inner", 0.25, 5000.0)):
+                t = k / 10 + later
+                state = {**bag.state(t, k), "sim_time_unwrapped": t + sim_later}
+                bag.add(f"{space}/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
+        for space in ("/a", "/a/mine", "/b", "/b/inner", "/b/inner/camera", "/c", ""):
+            bag.add(f"{space}/label", "std_msgs/String", stamp_ns(1.0), {"data": space})
+    with Bags(tmp_path / "flight.bag") as bags:
+        found = {topic.topic: topic.columns for topic in arrays.topic_arrays(bags) if topic.topic.endswith("/label")}
+    times = {topic[: -len("/label")]: columns["sim_time_unwrapped_s"][0] for topic, columns in found.items()}
+    expected = {"/a": 1.0, "/a/mine": 1.0, "/b": 1001.0, "/b/inner": 5001.0, "/b/inner/camera": 5001.0}
+    assert {space: round(time, 9) for space, time in times.items() if time == time} == expected
+    since = {topic[: -len("/label")]: round(columns["time_s"][0], 9) for topic, columns in found.items()}
+    inner = {"/b/inner": 0.75, "/b/inner/camera": 0.75}
+    assert since == {"/a": 1.0, "/a/mine": 1.0, "/b": 0.5, **inner, "/c": 1.0, "": 1.0}
+
+
+def test_an_only_bridge_has_the_clock_of_all_topics(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in range(20):
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 10), bag.state(k / 10, k))
+        bag.add("/mine/label", "std_msgs/String", stamp_ns(1.0), {"data": ""})
+    with Bags(tmp_path / "flight.bag") as bags:
+        (label,) = arrays.topic_arrays(bags, ["/mine/label"])
+    np.testing.assert_allclose(label.columns["sim_time_unwrapped_s"], [1.0], atol=1e-9)
+
+
 def test_lists_that_vary_are_filled_up_and_lists_of_messages_are_json(tmp_path: Path) -> None:
     with FlightBag(tmp_path / "flight.bag") as bag:
         for k, axes in enumerate(([0.5], [], [1.0, 2.0])):
