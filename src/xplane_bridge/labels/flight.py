@@ -13,6 +13,7 @@ from xplane_bridge import __version__
 from xplane_bridge.bags import FLIGHT_STATE, Bags, Table
 from xplane_bridge.bags.cameras import Camera as Recorded
 from xplane_bridge.bags.cameras import chosen_cameras
+from xplane_bridge.constants import ImageQuality
 from xplane_bridge.labels import table as label_table
 from xplane_bridge.labels.apt import Airport
 from xplane_bridge.labels.camera import Camera, Optics, Pose
@@ -36,9 +37,19 @@ _COLUMNS = (
     *("state.valid", "state.epoch", "state.sim_time", "state.latitude", "state.longitude", "state.altitude_msl"),
     *("state.orientation", "state.angular_velocity", "state.velocity_ned"),
 )
-_STATE_MISSING = 1
-#: QUALITY_* by which a picture may be of the neighbouring frame: off frame, clock unsure, delay assumed, borderline.
-_UNSURE = 4 | 16 | 8192 | 16384
+#: Pictures that do not show what their state says, and why.
+_SHOWS_ELSE = {
+    ImageQuality.FROZEN: "frozen: the same pixels while the aircraft moved",
+    ImageQuality.BLACK: "black, or almost",
+}
+#: By these a picture may be of the neighbouring frame.
+_UNSURE = (
+    ImageQuality.OFF_FRAME
+    | ImageQuality.DISPLAY_UNKNOWN
+    | ImageQuality.CLOCK_UNSURE
+    | ImageQuality.DELAY_ASSUMED
+    | ImageQuality.BORDERLINE
+)
 _MEASURED = 2
 #: What cannot be known of the motion is taken for lively, where it matters.
 _TURN_RATE, _SPEED = 0.5, 100.0
@@ -63,6 +74,7 @@ class Frame(NamedTuple):
     camera: Camera
     epoch: int  #: of its state
     sim_time: float  #: [s] of its state
+    quality: int  #: QUALITY_* of its FrameState
 
 
 class _Seen:
@@ -74,12 +86,20 @@ class _Seen:
         self.infos = _optics(bags, camera.info)
         self.suns = _suns(bags, self.frames.stamp)
 
+    def quality(self, row: int) -> int:
+        """Give QUALITY_* of a picture."""
+        return int(self.frames["quality"][row])
+
     def why_not(self, row: int) -> str:
         """Give why a picture cannot be labelled; empty where it can."""
-        if int(self.frames["quality"][row]) & _STATE_MISSING:
+        quality = self.quality(row)
+        if quality & ImageQuality.STATE_MISSING:
             return "no state, or its position or attitude is not known"
         if int(self.frames["state.valid"][row]) & _NEEDED != _NEEDED:
             return "no state, or its position or attitude is not known"
+        for bit, why in _SHOWS_ELSE.items():
+            if quality & bit:
+                return why
         if int(self.frames["camera_pose_source"][row]) != _MEASURED:
             return "the camera's pose was not measured"
         if int(self.frames.stamp[row]) not in self.infos:
@@ -138,7 +158,7 @@ class Flight:
                 else:
                     camera = Camera(self._world, _pose(seen.frames, row), seen.infos[stamp])
                     epoch, time = (seen.frames[f"state.{name}"][row] for name in ("epoch", "sim_time"))
-                    yield Frame(seen.name, stamp, camera, int(epoch), float(time))
+                    yield Frame(seen.name, stamp, camera, int(epoch), float(time), seen.quality(row))
 
     def labels(self) -> Iterator[dict[str, Any]]:
         """Label all pictures: what each line of the file is."""
@@ -155,6 +175,7 @@ class Flight:
                 "stamp_ns": frame.stamp,
                 "width": optics.width,
                 "height": optics.height,
+                "quality": frame.quality,
                 "others_known": others is not None,
                 "objects": self.labeller.label(frame.camera, suns[frame.name].get(frame.stamp), others or ()),
             }

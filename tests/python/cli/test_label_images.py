@@ -91,7 +91,7 @@ def test_a_table_that_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str
 def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "flight.bag"
     with FlightBag(path) as bag:
-        for k in range(8):
+        for k in range(11):
             ns = stamp_ns(0.1 * k)
             changes = {
                 1: {"camera_pose_source": 1},
@@ -99,6 +99,9 @@ def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: py
                 5: {"quality": 16384},
                 6: {"quality": 8192},
                 7: {"quality": 16},
+                8: {"quality": 8},
+                9: {"quality": 32 | 8},
+                10: {"quality": 64},
             }.get(k, {})
             frame = frame_state(bag, scene(0.1 * k), ns, **changes)
             if k == 3:
@@ -109,15 +112,20 @@ def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: py
                 bag.add("/xplane/camera/camera_info", "sensor_msgs/CameraInfo", ns, info)
     assert label(path) == 0
     out = capsys.readouterr().out.splitlines()
-    assert out[0].endswith(f"4 pictures labelled; XEMU of {airport_file()}")
+    assert out[0].endswith(f"5 pictures labelled; XEMU of {airport_file()}")
     assert out[2].startswith("no sun: record sun_pitch_degrees")
     assert out[3].startswith("no other aircraft")
     assert out[4:] == [
+        "left out: 1: black, or almost",
+        "left out: 1: frozen: the same pixels while the aircraft moved",
         "left out: 1: no camera_info of the same stamp",
         "left out: 2: no state, or its position or attitude is not known",
         "left out: 1: the camera's pose was not measured",
     ]
-    sure, *unsure = table.read(tmp_path / "flight.labels.jsonl").frames.values()
+    labels = table.read(tmp_path / "flight.labels.jsonl")
+    assert [frame["quality"] for frame in labels.frames.values()] == [0, 16384, 8192, 16, 8]
+    assert labels.about["left_out"]["black, or almost"] == 1
+    sure, *unsure = labels.frames.values()
     for frame in unsure:  # they may be of the neighbouring frame
         assert frame["objects"][1]["sigma_px"] > sure["objects"][1]["sigma_px"] + 0.1
 
