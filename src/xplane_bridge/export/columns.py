@@ -26,8 +26,8 @@ def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: 
 
     Returns:
         ``altitude_msl_m``, ``velocity_ned_x_mps``, ``roll_deg``, ``throttle_command_0``, ... in message order, without
-        the header; arrays are spread over numbered columns, lists of varying length stay objects, lists of messages
-        are JSON.
+        the header; arrays are spread over numbered columns, or ``clock_zulu_h``, ``clock_zulu_min``, ... where each
+        element has its own unit; lists of varying length stay objects, lists of messages are JSON.
     """
     out: dict[str, np.ndarray] = {}
     for path, values in columns.items():
@@ -38,8 +38,10 @@ def named(columns: Mapping[str, np.ndarray], units: Mapping[str, Unit], prefix: 
             out[base + ending] = as_json(values, MessageList)
         else:
             flat = values.reshape(len(values), -1)
-            for k in range(flat.shape[1]):
-                out[f"{base}_{k}{ending}"] = flat[:, k]
+            each = units[path].each if path in units else ()
+            endings = each or [f"{k}{ending}" for k in range(flat.shape[1])]
+            for k, last in enumerate(endings):
+                out[f"{base}_{last}"] = flat[:, k]
     return out
 
 

@@ -45,6 +45,20 @@ def test_units_and_wraps_follow_the_comments() -> None:
     assert len(units) == 14
 
 
+def test_units_of_elements_and_of_kinds_are_no_unit_of_all() -> None:
+    text = """float32[3] clock        # [h, min, s] of the cockpit
+float32[2] heat_on      # [0, 1] left, right
+float32[8] oil          # [deg C, or deg F by aircraft] temperature
+float32[] values        # [deg] angle of a stuck surface; [0..1] what remains; [deg/s] rate of a slow one; NaN else
+float32[] since         # [s] raw simulator time; sim/time[0]
+"""
+    units = parse_units(text, "pkg/State")
+    assert (units["clock"].each, units["clock"].suffix) == (("h", "min", "s"), "")
+    assert units["heat_on"] == units["values"] == NO_UNIT
+    assert (units["oil"].symbol, units["oil"].each) == ("deg C", ())
+    assert units["since"].symbol == "s"
+
+
 @pytest.mark.parametrize(
     ("symbol", "suffix"),
     [("m/s", "mps"), ("rad/s^2", "radps2"), ("N m", "Nm"), ("%", "percent"), ("deg C", "degC"), ("", "")],

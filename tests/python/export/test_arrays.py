@@ -67,7 +67,7 @@ def test_npz_has_units_topics_and_lists_without_pickle(tmp_path: Path) -> None:
     assert not any(name.startswith("camera_image") for name, _, _ in content["topics"])
     assert content["failures_state/names"].tolist() == [["aileron1_left", "engine_1", "pitot_1"]]
     assert content["failures_state/names_count"].tolist() == [3]
-    np.testing.assert_array_equal(content["failures_state/values_deg"], np.float32([[5.0, np.nan, np.nan]]))
+    np.testing.assert_array_equal(content["failures_state/values"], np.float32([[5.0, np.nan, np.nan]]))
     assert content["failures_state/active"].tolist() == [[True, True, False]]
 
 

@@ -63,6 +63,22 @@ def test_durations_are_seconds(tmp_path: Path, form: str) -> None:
         assert table["control_applied_source_age_s"].tolist() == [0.03125]
 
 
+def test_each_element_of_a_clock_has_its_own_unit(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(1.0), bag.state(1.0, 0))
+        values = {"header": bag.header(stamp_ns(0.5), ""), "clock_zulu": [12, 30, 4], "airspeed": [50, 51]}
+        bag.add("/xplane/mission/instruments", "xplane_bridge/InstrumentState", stamp_ns(0.5), values)
+    topic = ("--topics", "mission/instruments")
+    assert export(tmp_path / "flight.bag", *topic, "-o", tmp_path) == 0
+    (row,) = pd.read_csv(tmp_path / "flight.csv").to_dict("records")
+    assert [row[f"mission_instruments_clock_zulu_{unit}"] for unit in ("h", "min", "s")] == [12, 30, 4]
+    assert [row[f"mission_instruments_airspeed_{k}_mps"] for k in (0, 1)] == [50, 51]
+    assert export(tmp_path / "flight.bag", "--format", "npz", *topic, "-o", tmp_path) == 0
+    arrays = np.load(tmp_path / "flight.npz")
+    assert arrays["mission_instruments/clock_zulu"].tolist() == [[12, 30, 4]]
+    assert dict(arrays["units"])["mission_instruments/clock_zulu"] == "h, min, s"
+
+
 LISTS = ("--topics", "events", "failures/state")
 
 
@@ -87,7 +103,7 @@ def test_lists_are_json_in_csv(tmp_path: Path) -> None:
     assert table["events_events"].isna().tolist() == [True] * 5 + [False] * 15
     assert [event["text"] for event in json.loads(table["events_events"].iloc[-1])] == ["engine_0", "engine_1"]
     assert json.loads(table["failures_state_names"].iloc[5]) == ["engine_0"]
-    assert json.loads(table["failures_state_values_deg"].iloc[-1]) == [None, None]
+    assert json.loads(table["failures_state_values"].iloc[-1]) == [None, None]
     assert json.loads(table["failures_state_active"].iloc[-1]) == [True, True]
 
 
