@@ -48,7 +48,7 @@ from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.cameras import UNITS as CAMERA_UNITS
 from xplane_bridge.export.cameras import CameraRow, one_column_each
 from xplane_bridge.export.columns import json_text, name_of
-from xplane_bridge.export.flight import full_names
+from xplane_bridge.export.flight import full_names, refuse_pictures
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -180,10 +180,7 @@ def topic_arrays(bags: Bags, only: Sequence[str] = (), folder: Optional[Path] = 
         raise BagError(msg)
     clocks = _Clocks(bags, chosen)
     taken = ["units", "topics", "about", _CAMERAS]
-    for topic in chosen:
-        if topic in infos and infos[topic].msgtype in (RAW, COMPRESSED):
-            msg = f"{topic}: pictures do not go into a table; use --format imagefolder, mcap or ros2"
-            raise BagError(msg)
+    refuse_pictures(bags, chosen)
     for topic in chosen:
         name = topic[len(space) :] if topic.startswith(space + "/") else topic
         taken.append(_valid_name(name.strip("/"), taken))

@@ -9,7 +9,7 @@ import numpy as np
 
 from xplane_bridge.analysis.resampling import held
 from xplane_bridge.bags import BagError, Bags, Table
-from xplane_bridge.bags.cameras import cameras
+from xplane_bridge.bags.cameras import COMPRESSED, RAW, cameras
 from xplane_bridge.bags.flight import odometry_topic
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -26,6 +26,15 @@ class ExportError(XplaneBridgeError):
 def full_names(bags: Bags, topics: Sequence[str]) -> list[str]:
     """Give topics their full names: one that begins with a slash has it, others are below the bridge's name space."""
     return [topic if topic.startswith("/") else f"{bags.name_space}/{topic}" for topic in topics]
+
+
+def refuse_pictures(bags: Bags, topics: Sequence[str]) -> None:
+    """Raise `BagError` when one of the topics, by full names, holds pictures: a table of them would be of no use."""
+    infos = bags.topics
+    for topic in topics:
+        if topic in infos and infos[topic].msgtype in (RAW, COMPRESSED):
+            msg = f"{topic}: pictures do not go into a table; use --format imagefolder, mcap or ros2"
+            raise BagError(msg)
 
 
 def topic_of(bags: Bags, msgtype: str) -> str:

@@ -12,7 +12,7 @@ from xplane_bridge.bags import FLIGHT_STATE
 from xplane_bridge.bags.columns import ColumnFile, StoredColumn
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.columns import as_json, named, on_base
-from xplane_bridge.export.flight import breaks, labels, topic_of
+from xplane_bridge.export.flight import breaks, full_names, labels, refuse_pictures, topic_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -92,8 +92,10 @@ def flight_table(
         labels ``mode``, ``failsafe``, ``failures``, ``excitation``, then the further topics.
 
     Raises:
-        BagError: No flight state in the bag, or no such further topic.
+        BagError: No flight state in the bag, or no such further topic, or one of pictures.
     """
+    further = full_names(bags, topics)
+    refuse_pictures(bags, further)
     store = ColumnFile(folder)
     topic = topic_of(bags, FLIGHT_STATE)
     units = bags.units(topic)
@@ -108,13 +110,13 @@ def flight_table(
     for path, values in columns:
         table.add(named({path: values}, units))
     table.add(labels(bags, base))
-    for other in topics:
-        _add_newest(table, bags, other, base, topic.rsplit("/", 1)[0])
+    for other in further:
+        _add_newest(table, bags, other, base)
     return table
 
 
-def _add_newest(table: FlightTable, bags: Bags, topic: str, base: np.ndarray, space: str) -> None:
-    full = topic if topic.startswith("/") else f"{space}/{topic}"
+def _add_newest(table: FlightTable, bags: Bags, full: str, base: np.ndarray) -> None:
+    space = bags.name_space
     units = bags.units(full)
     other = bags.read(full, store=table.store).by_stamp()
     prefix = full[len(space) :].strip("/") if full.startswith(space + "/") else full.strip("/")

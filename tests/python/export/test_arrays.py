@@ -164,15 +164,22 @@ def test_arrays_of_lists_are_the_same_in_every_flight(tmp_path: Path) -> None:
     assert len(found) == 1
 
 
-def test_topics_choose_and_pictures_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_topics_choose(tmp_path: Path) -> None:
     bag = write_flight(tmp_path / "flight.bag", 0.2)
     assert export(bag, "--format", "npz", "--topics", "odom", "control/mode", "-o", tmp_path) == 0
     names = {key.split("/")[0] for key in np.load(tmp_path / "flight.npz").files}
     assert names == {"odom", "control_mode", "units", "topics", "about"}
-    capsys.readouterr()
-    pictures = "camera/image_raw/compressed"
-    assert export(bag, "--format", "npz", "--topics", pictures, "-o", tmp_path / "o") == 1
-    assert "pictures do not go into a table; use --format imagefolder, mcap or ros2" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "npz", "mat"])
+@pytest.mark.parametrize("raw", [False, True])
+def test_pictures_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture, form: str, raw: bool) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 0.2, raw_images=raw)
+    pictures = "camera/image_raw" if raw else "camera/image_raw/compressed"
+    assert export(bag, "--format", form, "--topics", "odom", pictures, "-o", tmp_path / "o") == 1
+    error = f"/xplane/{pictures}: pictures do not go into a table; use --format imagefolder, mcap or ros2"
+    assert error in capsys.readouterr().err
+    assert not list((tmp_path / "o").glob("flight*"))
 
 
 @pytest.mark.parametrize(
