@@ -167,21 +167,25 @@ class ScoreDifference(NamedTuple):
     """How a criterion's measure differs between two variants."""
 
     name: str
-    reference: float  #: mean of the reference's flights
-    other: float  #: mean of the other's
-    difference: float
-    interval: Interval  #: of `difference`, 95 % (Welch's); NaN where a variant has one flight only
+    reference: float  #: mean of the reference's flights; infinite where one of them never settles
+    other: float  #: mean of the other's, likewise
+    difference: float  #: infinite or NaN where flights never settle
+    interval: Interval  #: of `difference`, 95 % (Welch's); NaN: one flight only, or one that never settles
+    never: tuple[int, int] = (0, 0)  #: flights of both that never settle
+    flights: tuple[int, int] = (1, 1)
 
 
 def score_differences(reference: Sequence[Matched], others: Sequence[Matched]) -> list[ScoreDifference]:
-    """Compare criteria between the flights of two variants; those that both have and that are finite in all flights."""
+    """Compare criteria between the flights of two variants; those that were measured in all flights of both."""
     out = []
     for name in reference[0].scores if reference else ():
         sides = [[flight.scores.get(name, math.nan) for flight in side] for side in (reference, others)]
-        if not all(side and np.isfinite(side).all() for side in sides):
+        if any(not side or np.isnan(side).any() for side in sides):
             continue
         a, b = (float(np.mean(side)) for side in sides)
-        out.append(ScoreDifference(name, a, b, b - a, welch(*map(np.asarray, sides))))
+        never = (int(np.isinf(sides[0]).sum()), int(np.isinf(sides[1]).sum()))
+        interval = _UNKNOWN if any(never) else welch(*map(np.asarray, sides))
+        out.append(ScoreDifference(name, a, b, b - a, interval, never, (len(sides[0]), len(sides[1]))))
     return out
 
 

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Optional, Sequence
 
 import numpy as np
 
-from xplane_bridge.analysis.comparison import SIGNALS, Matched, difference, score_differences, signal_differences
+from xplane_bridge.analysis.comparison import (
+    SIGNALS,
+    Matched,
+    ScoreDifference,
+    difference,
+    score_differences,
+    signal_differences,
+)
 from xplane_bridge.plotting import interactive
 from xplane_bridge.plotting.page import Section, missing, number, page, rows_table
 from xplane_bridge.plotting.passports import differences_table
@@ -81,7 +88,7 @@ def _criteria(flights: Sequence[Matched]) -> str:
         changed = [
             (
                 html.escape(each.name), number(each.reference), number(each.other), number(each.difference),
-                _interval(each.interval), _verdict(each.interval),
+                _interval(each.interval), _settled(each) if any(each.never) else _verdict(each.interval),
             )
             for each in score_differences(variants[reference], others)
         ]  # fmt: skip
@@ -125,6 +132,18 @@ def _verdict(interval: Interval) -> str:
     if interval.low == interval.high == 0.0:
         return '<span class="good">equal</span>'
     return '<span class="bad">differs</span>' if interval.low > 0.0 or interval.high < 0.0 else "not significant"
+
+
+def _settled(each: ScoreDifference) -> str:
+    """Which of two variants never settles: numbers do not say it."""
+    never, of = each.never, each.flights
+    if never == of:
+        return "neither ever settles"
+    if never == (of[0], 0):
+        return '<span class="good">settles here, never in the reference</span>'
+    if never == (0, of[1]):
+        return '<span class="bad">never settles here, does in the reference</span>'
+    return f"never settles in {never[1]} of {of[1]} flights here, in {never[0]} of {of[0]} of the reference"
 
 
 def _figure(key: str, title: str, panels: list[Panel]) -> Section:

@@ -101,10 +101,12 @@ def missing(text: str) -> str:
 
 
 def number(value: Any, digits: int = 4) -> str:
-    """Give a number with so many digits; a dash where it is not known."""
+    """Give a number with so many digits; a dash where it is not known, the sign of infinity where it is infinite."""
     number = float(value)
-    if not np.isfinite(number):
+    if np.isnan(number):
         return "&ndash;"
+    if np.isinf(number):
+        return "&infin;" if number > 0.0 else "-&infin;"
     return f"{number:.{digits}g}" if abs(number) < 10**digits else f"{number:,.0f}"
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
 import tracemalloc
 
 import numpy as np
@@ -16,6 +18,7 @@ from xplane_bridge.analysis.comparison import (
     signal_differences,
     welch,
 )
+from xplane_bridge.plotting.comparison import build
 
 
 def flight(offset=0.0, shift=0.0, variant="a", scores=None, name="roll_deg", wrap=False):
@@ -98,10 +101,50 @@ def test_welchs_interval_is_that_of_scipy():
 
 
 def test_criteria_are_compared_between_variants_where_all_flights_have_them():
-    before = [flight(scores={"error": 1.0, "lost": math.inf}), flight(scores={"error": 1.2, "lost": 1.0})]
+    before = [flight(scores={"error": 1.0, "lost": math.nan}), flight(scores={"error": 1.2, "lost": 1.0})]
     after = [flight(scores={"error": 3.0, "lost": 1.0}), flight(scores={"error": 3.4, "lost": 1.0})]
     (found,) = score_differences(before, after)
     assert (found.name, found.difference) == ("error", pytest.approx(2.1))
     assert found.interval.low > 0.0
     (single,) = score_differences(before[1:], [flight(scores={"error": 2.0})])
     assert math.isnan(single.interval.low)
+
+
+def test_a_settling_that_never_came_is_a_difference():
+    settled, never = (
+        [flight(scores={"settle": value}) for value in values] for values in ((2.0, 2.1), (math.inf,) * 2)
+    )
+    (found,) = score_differences(settled, never)
+    assert (found.reference, found.other, found.difference) == (pytest.approx(2.05), math.inf, math.inf)
+    assert (found.never, found.flights) == ((0, 2), (2, 2))
+    assert math.isnan(found.interval.low)
+    assert score_differences(never, settled)[0].difference == -math.inf
+    assert math.isnan(score_differences(never, never)[0].difference)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "cells", "words"),
+    [
+        ((2.0, 2.2), (math.inf, math.inf), "2.1 &infin; &infin; &ndash;", "never settles here, does in the reference"),
+        ((math.inf,), (2.0,), "&infin; 2 -&infin; &ndash;", "settles here, never in the reference"),
+        ((math.inf,), (math.inf,), "&infin; &infin; &ndash; &ndash;", "neither ever settles"),
+        (
+            (2.0, 2.0, math.inf),
+            (math.inf, 2.0),
+            "&infin; &infin; &ndash; &ndash;",
+            "never settles in 1 of 2 flights here, in 1 of 3 of the reference",
+        ),
+    ],
+)
+def test_the_page_shows_that_one_settles_and_the_other_never_does(before, after, cells, words):
+    flights = [
+        dataclasses.replace(flight(variant=variant, scores={"settle": value}), name=f"{variant}{k}")
+        for variant, values in (("before", before), ("after", after))
+        for k, value in enumerate(values)
+    ]
+    page = build(flights, [None] * len(flights), "the start")
+    rows = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in re.findall(r"<tr><td>settle</td>.*?</tr>", page)]
+    shown = {2.0: "2", 2.2: "2.2", math.inf: "&infin;"}
+    assert rows[0][1:] == [shown[value] for value in (*before, *after)]
+    assert " ".join(rows[1][1:5]) == cells
+    assert re.sub(r"<.*?>", "", rows[1][5]) == words
