@@ -18,6 +18,18 @@ from xplane_bridge.export.formats import ALIASES, FORMATS, Job
 from xplane_bridge.export.pictures import Options
 from xplane_bridge.labels import table
 
+#: What of a format (`Format.options`) an option is for.
+_NEEDED = {
+    "rate": "rate",
+    "topics": "topics",
+    "labels": "labels",
+    "split_by": "dataset",
+    "train_share": "dataset",
+    "seed": "dataset",
+    "camera": "dataset",
+    "keep_bad_frames": "dataset",
+}
+
 
 def parser() -> argparse.ArgumentParser:
     """Build the command line."""
@@ -38,20 +50,21 @@ def parser() -> argparse.ArgumentParser:
     table.add_argument(
         "--topics",
         nargs="+",
-        default=[],
         metavar="TOPIC",
         help="csv, parquet: further topics, newest value in each row; npz, mat, mcap, ros2: these topics only, not all",
     )
     data = p.add_argument_group("image data sets")
-    data.add_argument("--split-by", choices=("time", "flight"), default="time", help="default: %(default)s")
+    usual = (
+        Options()
+    )  # the defaults, which are not argparse's: what was given is refused by formats without a use of it
+    data.add_argument("--split-by", choices=("time", "flight"), help=f"default: {usual.split_by}")
     data.add_argument(
         "--train-share",
         type=number("a share from 0 to 1", 0.0, 1.0),
-        default=0.8,
         metavar="0..1",
-        help="default: %(default)s",
+        help=f"default: {usual.train_share}",
     )
-    data.add_argument("--seed", type=int, default=0, help="of the draw with --split-by flight (default: %(default)s)")
+    data.add_argument("--seed", type=int, help=f"of the draw with --split-by flight (default: {usual.seed})")
     data.add_argument(
         "--labels",
         type=Path,
@@ -62,11 +75,15 @@ def parser() -> argparse.ArgumentParser:
     data.add_argument(
         "--camera",
         nargs="+",
-        default=[],
         metavar="NAME",
         help="export these cameras' pictures, as camera.launch names them; camera is the bridge's own (default: all)",
     )
-    data.add_argument("--keep-bad-frames", action="store_true", help="keep frames whose quality bits say they are bad")
+    data.add_argument(
+        "--keep-bad-frames",
+        action="store_true",
+        default=None,
+        help="keep frames whose quality bits say they are bad",
+    )
     run = p.add_argument_group("how to run")
     run.add_argument(
         "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: all cores)"
@@ -90,10 +107,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         p.error("no BAG given")
     if args.jobs < 1:
         p.error(f"--jobs {args.jobs}: at least 1 process is needed")
-    for option, needed in (("rate", "rate"), ("topics", "topics"), ("labels", "labels"), ("camera", "dataset")):
-        if getattr(args, option) and needed not in FORMATS[args.format].options:
+    for option, needed in _NEEDED.items():
+        if getattr(args, option) is not None and needed not in FORMATS[args.format].options:
             having = ", ".join(name for name, form in FORMATS.items() if needed in form.options)
-            p.error(f"--{option} is not for {args.format}; it is for {having}")
+            p.error(f"--{option.replace('_', '-')} is not for {args.format}; it is for {having}")
     jobs = _jobs(args, output)
     campaign.make_folder(output)
     run = (
@@ -117,16 +134,21 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 
 def _jobs(args: argparse.Namespace, output: Path) -> list[Job]:
-    cameras = tuple(sorted(set(args.camera)))
-    dataset = Options(args.keep_bad_frames, args.train_share, args.split_by, args.seed, cameras)
+    chosen = {
+        "keep_bad": args.keep_bad_frames,
+        "train_share": args.train_share,
+        "split_by": args.split_by,
+        "seed": args.seed,
+        "cameras": tuple(sorted(set(args.camera or ()))),
+    }
+    dataset = Options(**{name: value for name, value in chosen.items() if value is not None})
+    topics = tuple(args.topics or ())
     named = campaign.flights(args.bags)
     training = campaign.choose_training(named, dataset)
     jobs = []
     for name, bags in sorted(named.items()):
         labels, digest = _labels(args, name, named)
-        job = Job(
-            name, bags, str(output.resolve()), args.format, args.rate, tuple(args.topics), dataset, name in training
-        )
+        job = Job(name, bags, str(output.resolve()), args.format, args.rate, topics, dataset, name in training)
         jobs.append(job._replace(labels=labels, labels_sha256=digest))
     return jobs
 

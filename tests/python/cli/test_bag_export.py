@@ -234,6 +234,24 @@ def test_errors_are_one_line(
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--train-share", "0.8"], "--train-share is not for csv; it is for imagefolder, coco, yolo, lard"),
+        (["--train-share", "0"], "--train-share is not for csv"),
+        (["--split-by", "time", "--format", "tum"], "--split-by is not for tum; it is for imagefolder"),
+        (["--seed", "0", "--format", "npz"], "--seed is not for npz; it is for imagefolder"),
+        (["--keep-bad-frames", "--format", "mcap"], "--keep-bad-frames is not for mcap; it is for imagefolder"),
+    ],
+)
+def test_options_of_data_sets_are_refused_by_other_formats(
+    options: list, text: str, capsys: pytest.CaptureFixture
+) -> None:
+    with pytest.raises(SystemExit):
+        export("flight.bag", *options)
+    assert text in capsys.readouterr().err
+
+
 def test_bags_without_images_say_what_to_record(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     with FlightBag(tmp_path / "a.bag") as bag:
         bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(0), bag.state(0, 0))
