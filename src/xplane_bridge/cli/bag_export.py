@@ -54,9 +54,8 @@ def parser() -> argparse.ArgumentParser:
         help="csv, parquet: further topics, newest value in each row; npz, mat, mcap, ros2: these topics only, not all",
     )
     data = p.add_argument_group("image data sets")
-    usual = (
-        Options()
-    )  # the defaults, which are not argparse's: what was given is refused by formats without a use of it
+    # These defaults are not argparse's: what was given is refused where a format has no use of it.
+    usual = Options()
     data.add_argument("--split-by", choices=("time", "flight"), help=f"default: {usual.split_by}")
     data.add_argument(
         "--train-share",
