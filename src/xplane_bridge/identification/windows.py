@@ -21,7 +21,7 @@ from xplane_bridge.identification.output_error import Samples
 TAIL_S = 2.0
 #: Shortest window and fewest frames of one.
 _SHORTEST_S, _FEWEST = 1.0, 40
-#: Around an excitation's start, what is looked at for its frames by stamp [s].
+#: Between an excitation's report and its nearest frame at most, by stamp: X-Plane's time begins anew with X-Plane [s].
 _NEIGHBOURHOOD_S = 5.0
 #: Longest time between two samples of the surfaces that is bridged [s].
 _LONGEST_GAP_S = 0.15
@@ -147,9 +147,7 @@ def _window(flight: Flight, excitation: Excitation, end: float) -> Window:
         msg = f"{excitation.label}: moves neither elevator nor aileron nor rudder"
         raise IdentificationError(msg)
     state = flight.tables["state"]
-    near = np.abs(state.stamp - excitation.stamp) < (end - excitation.start + _NEIGHBOURHOOD_S) * 1e9
-    within = (state["sim_time"] > excitation.start - _SAME_FRAME_S) & (state["sim_time"] <= end + _SAME_FRAME_S)
-    rows = np.flatnonzero(near & within)
+    rows = _rows(state, excitation, end)
     _check_frames(state, rows, excitation)
     stamp, time = state.stamp[rows], state["sim_time_unwrapped"][rows]
     columns = _states(state, rows)
@@ -160,6 +158,24 @@ def _window(flight: Flight, excitation: Excitation, end: float) -> Window:
     return window
 
 
+def _rows(state: Table, excitation: Excitation, end: float) -> np.ndarray:
+    """The frames from an excitation's start to `end`, by simulated time: real time may be several times as long."""
+    within = (state["sim_time"] > excitation.start - _SAME_FRAME_S) & (state["sim_time"] <= end + _SAME_FRAME_S)
+    rows = np.flatnonzero(within)
+    if not len(rows):
+        return rows
+    # Of several flights with the same simulated times, that of its stamp.
+    off = np.abs(state.stamp[rows] - excitation.stamp)
+    nearest = int(np.argmin(off))
+    if off[nearest] > _NEIGHBOURHOOD_S * 1e9:
+        return rows[:0]
+    other = np.flatnonzero(~within)
+    first, last = np.searchsorted(other, rows[nearest]) + np.array([-1, 0])
+    begin = other[first] + 1 if first >= 0 else 0
+    stop = other[last] if last < len(other) else len(within)
+    return np.arange(begin, stop)
+
+
 def _check_frames(state: Table, rows: np.ndarray, excitation: Excitation) -> None:
     """Refuse what cannot be one stretch of free flight."""
     if excitation.result.startswith("aborted"):
@@ -168,7 +184,7 @@ def _check_frames(state: Table, rows: np.ndarray, excitation: Excitation) -> Non
     if len(rows) < _FEWEST or np.ptp(state["sim_time_unwrapped"][rows]) < _SHORTEST_S:
         msg = f"{excitation.label}: {len(rows)} flight states, expected at least {_FEWEST} over {_SHORTEST_S:.0f} s"
         raise IdentificationError(msg)
-    if len(segments(state.stamp[rows], state["epoch"][rows])) > 1 or np.any(np.diff(rows) != 1):
+    if len(segments(state.stamp[rows], state["epoch"][rows])) > 1:
         msg = f"{excitation.label}: the flight states have a gap or a reset in it"
         raise IdentificationError(msg)
     if np.any(np.diff(state["sim_time_unwrapped"][rows]) <= 0.0) or state["paused"][rows].any():
@@ -201,7 +217,8 @@ def _inputs(
 ) -> tuple[dict[str, np.ndarray], float]:
     """Deflections at the frames, and the longest time over which they had to be interpolated [s]."""
     low, high = state.stamp[rows[0]], state.stamp[rows[-1]]
-    near = np.flatnonzero((surfaces.stamp > low - 10**9) & (surfaces.stamp < high + 10**9))
+    around = max(1e9, float(high - low) / float(np.ptp(state["sim_time_unwrapped"][rows])))  # a second of either time
+    near = np.flatnonzero((surfaces.stamp > low - around) & (surfaces.stamp < high + around))
     order = near[np.argsort(surfaces["sim_time"][near], kind="stable")]
     known = surfaces["sim_time"][order].astype(float)
     wanted = state["sim_time"][rows].astype(float)

@@ -20,7 +20,7 @@ from xplane_bridge.identification.identify import AxisResult, identify
 from xplane_bridge.identification.intervals import _coloured
 from xplane_bridge.identification.linearisation import Condition, linearise
 from xplane_bridge.identification.model import IdentificationError, LinearModel
-from xplane_bridge.identification.windows import read_excitations
+from xplane_bridge.identification.windows import find_windows, read_excitations
 
 GEOMETRY = geometry_of("fixed_wing")
 
@@ -199,6 +199,47 @@ def test_an_excitation_of_a_restarted_node_is_another_one(calm: Recording) -> No
     assert [each.targets for each in found] == [("pitch",), ("roll",)]
     assert found[0].result == "no end in the bag"
     assert found[1].start == again[0]["start_sim_time"]
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0, 12.0])
+@pytest.mark.parametrize("surfaces_every", [1, 3])
+def test_a_simulator_slower_than_real_time_gives_the_same_windows(
+    twin: FlightModel, calm: Recording, factor: float, surfaces_every: int
+) -> None:
+    recording = calm if surfaces_every == 1 else flown(PITCH, model=twin, surfaces_every=surfaces_every)
+    expected, _ = find_windows(recording.flight())
+    slow = recording.flight()
+    begin = slow.tables["state"].time[0]
+    for role, table in slow.tables.items():
+        slow.tables[role] = replace(table, time=begin + ((table.time - begin) * factor).astype(np.int64))
+    found, left_out = find_windows(slow)
+    assert left_out == []
+    assert [len(window.time) for window in found] == [len(window.time) for window in expected]
+    for window, other in zip(found, expected):
+        lasts = 3.5 if window.excitation.kind == "3-2-1-1" else 2.0
+        assert window.time[-1] == pytest.approx(lasts + 2.0, abs=0.02)  # with its tail
+        assert window.bridged == other.bridged
+        for name, values in window.columns.items():
+            assert np.array_equal(values, other.columns[name]), name
+
+
+def test_each_of_two_flights_with_the_same_simulated_times_has_its_own_frames(calm: Recording) -> None:
+    # X-Plane was restarted after the first one, and its time began anew.
+    hour = 3_600_000_000_000
+    later = {
+        role: [{**row, "stamp": row["stamp"] + hour, **({"epoch": row["epoch"] + 100} if "epoch" in row else {})}
+               for row in getattr(calm, role)]
+        for role in ("state", "surfaces", "excitation")
+    }  # fmt: skip
+    both = Recording(*(getattr(calm, role) + rows for role, rows in later.items()))
+    once, _ = find_windows(calm.flight())
+    twice, left_out = find_windows(both.flight())
+    assert left_out == []
+    assert [int(w.stamp[0]) for w in twice] == [int(w.stamp[0]) + more for more in (0, hour) for w in once]
+    # Where the second one's frames are missing, the first one's are not taken for them.
+    lost, left_out = find_windows(Recording(calm.state, both.surfaces, both.excitation).flight())
+    assert [int(w.stamp[0]) for w in lost] == [int(w.stamp[0]) for w in once]
+    assert len(left_out) == len(once)
 
 
 def test_an_excitation_of_single_surfaces_is_one_of_their_axis(calm: Recording, found: dict[str, AxisResult]) -> None:
