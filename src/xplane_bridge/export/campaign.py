@@ -15,10 +15,12 @@ import json
 import os
 import random
 import shutil
+import sqlite3
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence, TextIO
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import BagError, Bags
@@ -110,11 +112,20 @@ def export_flight(job: Job) -> Outcome:
         return Outcome(job.name, record, "", False)
     except XplaneBridgeError as error:
         return Outcome(job.name, None, str(error), False)
-    except OSError as error:
-        return Outcome(job.name, None, f"{error.filename}: {error.strerror}", False)
+    except (OSError, sqlite3.OperationalError) as error:
+        return Outcome(job.name, None, _not_written(error, output / f"{job.name}{FORMATS[job.format].ending}"), False)
     except Exception as error:  # of a library that writes a format: the other flights, and the manifest, are made
         said = " ".join(f"{type(error).__name__}: {error}".split())
         return Outcome(job.name, None, f"the {job.format} export failed: {said}; try another --format", False)
+
+
+def _not_written(error: Exception, final: Path) -> str:
+    """Say what could not be written, and the system's reason; of a full disk Python says no name, SQLite no reason."""
+    given = getattr(error, "filename", None)
+    name = Path(given) if isinstance(given, str) else final
+    if _part(final) in (name, *name.parents):
+        name = final  # where it is built goes with it
+    return f"{name}: {getattr(error, 'strerror', None) or error}"
 
 
 def _export(job: Job, output: Path, key: dict[str, Any], record_file: Path) -> dict[str, Any]:
@@ -122,8 +133,7 @@ def _export(job: Job, output: Path, key: dict[str, Any], record_file: Path) -> d
     final = output / f"{job.name}{form.ending}"
     _refuse_recordings(final, job)
     _refuse_foreign(final, job)
-    # Under its own name already: some formats write it into their files.
-    folder = final.with_name(f".{final.name}.part")
+    folder = _part(final)
     _remove(folder)
     try:
         with Bags(job.bags) as bags:
@@ -154,6 +164,11 @@ def _export(job: Job, output: Path, key: dict[str, Any], record_file: Path) -> d
     finally:
         _remove(folder)
     return record
+
+
+def _part(final: Path) -> Path:
+    """Where a result is built, under its own name already: some formats write it into their files."""
+    return final.with_name(f".{final.name}.part")
 
 
 def _refuse_recordings(final: Path, job: Job) -> None:
@@ -252,7 +267,7 @@ def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]
         Every outcome, as it comes.
 
     Raises:
-        ExportError: The manifest cannot be written.
+        ExportError: The manifest, or another file of all flights, cannot be written.
     """
     yield from run(jobs)
     output = Path(jobs[0].output)
@@ -268,7 +283,7 @@ def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]
         content["files"] = _write_shared(output, exports)
         _write_json(output / MANIFEST, content)
     except OSError as error:
-        msg = f"{output / MANIFEST}: {error.strerror}"
+        msg = f"{error.filename or output / MANIFEST}: {error.strerror}"
         raise ExportError(msg) from None
 
 
@@ -391,14 +406,27 @@ def _read_json(path: Path) -> Any:
 
 
 def _write_json(path: Path, content: Any) -> None:
-    part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8") as file:
+    with _replaced(path) as file:
         json.dump(content, file, indent=1, sort_keys=True)
         file.write("\n")
-    os.replace(part, path)
 
 
 def _write_text(path: Path, text: str) -> None:
+    with _replaced(path) as file:
+        file.write(text)
+
+
+@contextmanager
+def _replaced(path: Path) -> Iterator[TextIO]:
+    """Give a file that takes the place of another when it is whole.
+
+    Raises:
+        OSError: It cannot be written; with the name of the other.
+    """
     part = path.with_name(path.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, path)
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            yield file
+        os.replace(part, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None

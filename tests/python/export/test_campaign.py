@@ -27,6 +27,15 @@ from xplane_bridge.labels import table
 if TYPE_CHECKING:
     from pathlib import Path
 
+#: Exports to several formats where no file may grow beyond some bytes.
+LIMITED = """
+import resource, sys
+from xplane_bridge.cli.bag_export import main
+limit, formats, *rest = sys.argv[1:]
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), int(limit)))
+for form in formats.split():
+    main([*rest, "--format", form])
+"""
 #: Runs an export that is killed in place of its nth renaming of a file or folder.
 KILLED = """
 import os, signal, sys
@@ -296,3 +305,24 @@ def test_a_folder_and_a_bag_of_one_name_are_refused(tmp_path: Path) -> None:
     folder = str(tmp_path / "data" / "flight")
     with pytest.raises(ExportError, match=f"^{folder} and {bag} would both be exported as .*_data_flight; "):
         flights([folder, bag])
+
+
+def test_a_full_disk_is_said_with_what_was_written(tmp_path: Path) -> None:
+    bag, out = write_flight(tmp_path / "flight.bag", 1.0), tmp_path / "out"
+    files = {"csv": "flight.csv", "tum": "flight.tum", "npz": "flight.npz", "ros2": "flight.ros2"}
+    files["imagefolder"] = "flight"
+    limited = [sys.executable, "-c", LIMITED, "2000", " ".join(files), str(bag), "-o", str(out)]
+    run = subprocess.run(limited, capture_output=True, text=True, timeout=120, check=False)
+    reasons = {"ros2": "disk I/O error"}  # of SQLite
+    expected = [f"flight: {out / file}: {reasons.get(form, 'File too large')}" for form, file in files.items()]
+    assert run.stderr.splitlines() == expected
+    assert [path.name for path in out.iterdir()] == ["manifest.json"]
+
+
+def test_what_is_of_all_flights_is_said_by_its_name(tmp_path: Path) -> None:
+    bag, out = write_flight(tmp_path / "flight.bag", 0.2), tmp_path / "out"
+    assert export(bag, "--format", "tum", "-o", out) == 0
+    (out / "README.md").unlink()
+    limited = [sys.executable, "-c", LIMITED, "400", "tum", str(bag), "-o", str(out)]  # it is made already
+    run = subprocess.run(limited, capture_output=True, text=True, timeout=120, check=False)
+    assert f"{out / 'README.md'}: File too large" in run.stderr
