@@ -94,7 +94,8 @@ def refly(folder: CampaignFolder, flight: int, nodes: bool) -> int:
     result = Flight(plan, seen.append if nodes else None).fly(trace=True)
     if result.trace is not None:
         path = folder.folder / f"refly_{flight}.csv"
-        pd.DataFrame(result.trace).to_csv(path, index=False, float_format="%.9g")
+        with writing(path, "--refly writes beside the campaign: copy DIR to where you can write, and give the copy"):
+            pd.DataFrame(result.trace).to_csv(path, index=False, float_format="%.9g")
         print(f"flight {flight}: {path}")
     row = rows.iloc[0]
     print(f"outcome {result.outcome} {result.reason}; sha256 {result.sha256 or '(none: it did not begin)'}")
@@ -107,7 +108,23 @@ def refly(folder: CampaignFolder, flight: int, nodes: bool) -> int:
         return 0
     if not seen:
         raise CampaignError(f"--through-nodes: flight {flight} did not begin ({result.reason}); expected one that did")
-    return 0 if through_nodes.compare(plan, result, seen, folder.folder / f"refly_{flight}") else 1
+    output = folder.folder / f"refly_{flight}"
+    with writing(output, "the recording goes into a folder of this name"):
+        output.mkdir(exist_ok=True)
+    return 0 if through_nodes.compare(plan, result, seen, output) else 1
+
+
+@contextmanager
+def writing(path: Path, remedy: str) -> Iterator[None]:
+    """Writes a file or folder of the campaign's.
+
+    Raises:
+        CampaignError: It cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise CampaignError(f"{path}: {error.strerror or error}; {remedy}") from None
 
 
 @guarded
@@ -138,4 +155,6 @@ def write_page(folder: CampaignFolder, campaign: Campaign, table: pd.DataFrame) 
         if trace is not None:
             traces[flight] = trace
     refly = f"scripts/run_campaign -o {folder.folder} --refly"
-    (folder.folder / PAGE).write_text(report.page(campaign, table, traces, refly), encoding="utf-8")
+    text, path = report.page(campaign, table, traces, refly), folder.folder / PAGE
+    with writing(path, f"all flights are in {TABLE}: the same command draws them, and flies none again"):
+        path.write_text(text, encoding="utf-8")

@@ -181,6 +181,30 @@ def test_a_folder_of_another_campaign_is_refused_and_so_is_one_in_use(tmp_path: 
         CampaignFolder(tmp_path / "none").load()
 
 
+def test_what_cannot_be_written_is_a_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder, file = tmp_path / "flown", tmp_path / "c.json"
+    file.write_text(json.dumps(document(flights=2)))
+    fly = [str(file), "-o", str(folder), "--workers", "0"]
+    in_the_way = folder / "report.html"
+    in_the_way.mkdir(parents=True)
+    assert run_campaign.main(fly) == 1
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert f"{in_the_way}: Is a directory; all flights are in table.parquet: the same command draws them" in said
+    in_the_way.rmdir()
+    assert run_campaign.main(fly) == 0
+    assert in_the_way.is_file()
+    capsys.readouterr()
+    (folder / "refly_1.csv").mkdir()
+    assert run_campaign.main(["-o", str(folder), "--refly", "1"]) == 1
+    said = capsys.readouterr().err
+    assert f"{folder / 'refly_1.csv'}: Is a directory; --refly writes beside the campaign" in said
+    assert said.count("\n") == 1
+    (folder / "refly_1.csv").rmdir()
+    (folder / "refly_1").write_text("")
+    assert run_campaign.main(["-o", str(folder), "--refly", "1", "--through-nodes"]) == 1
+    assert f"{folder / 'refly_1'}: File exists; " in capsys.readouterr().err
+
+
 def test_other_code_under_the_same_campaign_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     campaign = parse_campaign(document(flights=1))
     CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
