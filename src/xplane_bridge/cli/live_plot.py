@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import time
-from typing import Any, Callable, NamedTuple, Optional, Sequence
+from typing import Any, Callable, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge.cli.entry import guarded, positive, ros_arguments, start_node
 from xplane_bridge.errors import XplaneBridgeError
@@ -98,6 +98,35 @@ def getter(path: str, message_type: Any) -> Callable[[Any], float]:
     return get
 
 
+def without_field(topic: str, message_type: Any) -> LivePlotError:
+    """Make the error for a topic that is given without a field of it.
+
+    Args:
+        topic: Its name.
+        message_type: Of its messages; None: not built here.
+    """
+    if message_type is None:
+        return LivePlotError(f"{topic} is a topic: name a field of it, e.g. {topic}/x")
+    example = next(_numbers(message_type()), "FIELD")
+    have = ", ".join(message_type.__slots__) or "no field"
+    kind = message_type._type
+    return LivePlotError(f"{topic} is a topic ({kind}): name a field of it, e.g. {topic}/{example}; it has: {have}")
+
+
+def _numbers(sample: Any) -> Iterator[str]:
+    """Paths of the numbers in a message, headers left out; those with a fraction first, which make curves."""
+    found: list[tuple[bool, str]] = []
+    for name in sample.__slots__:
+        value, path = getattr(sample, name), name
+        if isinstance(value, (list, tuple)) and value:
+            value, path = value[0], f"{name}[0]"
+        if isinstance(value, (int, float)):
+            found.append((not isinstance(value, float), path))
+        elif name != "header" and hasattr(value, "__slots__") and hasattr(value, "_type"):
+            found += [(False, f"{path}/{inner}") for inner in _numbers(value)]
+    return (path for _, path in sorted(found, key=lambda each: each[0]))
+
+
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
@@ -127,12 +156,17 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 
 def _wait_for(names: Sequence[str], timeout: float) -> dict[str, Field]:
+    import roslib.message
     import rospy
 
     deadline = time.monotonic() + timeout
     while True:
-        topics = [topic for topic, _ in rospy.get_published_topics()]
+        types = dict(rospy.get_published_topics())
+        topics = list(types)
         found = {name: locate(name, topics) for name in names}
+        for name, where in found.items():
+            if where is None and name in types:
+                raise without_field(name, roslib.message.get_message_class(types[name]))
         missing = [name for name, where in found.items() if where is None]
         if not missing:
             return {name: where for name, where in found.items() if where is not None}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Callable
@@ -71,6 +72,31 @@ def test_wrong_paths_are_explained(path: str, text: str) -> None:
     with pytest.raises(LivePlotError, match="pkg/Message") as caught:
         getter(path, Message)
     assert text in str(caught.value)
+
+
+def test_a_topic_without_a_field_is_explained_as_soon_as_it_is_seen(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    published = [[["/other", "pkg/Other"]], [["/other", "pkg/Other"], ["/a/b", "pkg/Message"]]]
+    node = SimpleNamespace(
+        resolve_name=lambda name: name,
+        signal_shutdown=lambda _why: None,
+        get_published_topics=lambda: published.pop(0),
+    )
+    built: dict = {"pkg/Message": Message}
+    roslib = SimpleNamespace(message=SimpleNamespace(get_message_class=built.get))
+    for name, module in (("rospy", node), ("roslib", roslib), ("roslib.message", roslib.message)):
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setattr(live_plot, "start_node", lambda *_args, **_options: node)
+    matplotlib.use("Agg")
+    assert live_plot.main(["/a/b", "--after", "1"]) == 1
+    said = capsys.readouterr().err
+    assert said.endswith(
+        "/a/b is a topic (pkg/Message): name a field of it, e.g. /a/b/speeds[0]; it has: many, name, speeds, vector\n"
+    )
+    published[:] = [[["/other", "pkg/Other"]]]
+    assert live_plot.main(["/other", "--after", "1"]) == 1
+    assert capsys.readouterr().err.endswith("/other is a topic: name a field of it, e.g. /other/x\n")
 
 
 def test_a_series_keeps_its_window_and_begins_anew_when_time_goes_back() -> None:
