@@ -15,7 +15,7 @@ class Frames(NamedTuple):
 
 
 def frames_of(epoch: np.ndarray, sim_time: np.ndarray) -> Frames:
-    """Tell frames from repetitions: a state of the same epoch at the same simulated time shows the same frame.
+    """Separates frames from repetitions: a state of the same epoch at the same simulated time shows the same frame.
 
     Args:
         epoch: Of FlightState.
