@@ -12,6 +12,13 @@ constexpr double kTroposphereLapse = 0.0065;  // [K/m]
 constexpr double kTropopause = 11000.0;       // [m]
 constexpr double kTropopauseTemperature = kSeaLevelTemperature - kTroposphereLapse * kTropopause;
 
+/// Impact pressure over static pressure at a Mach number; above 1 behind the shock ahead of the tube (Rayleigh).
+double impactRatio(double mach) {
+  const double m2 = mach * mach;
+  if (mach <= 1.0) return std::pow(1.0 + 0.2 * m2, 3.5) - 1.0;
+  return std::pow(1.2 * m2, 3.5) * std::pow(6.0 / (7.0 * m2 - 1.0), 2.5) - 1.0;
+}
+
 }  // namespace
 
 double pressureAltitude(double static_pressure) {
@@ -32,17 +39,23 @@ double equivalentAirspeed(double true_airspeed, double air_density) {
 }
 
 double impactPressure(double dynamic_pressure, double mach) {
-  // qc = p ((1 + M^2/5)^3.5 - 1) with p = q / (0.7 M^2); towards M = 0 the series avoids 0/0.
+  // The static pressure is q / (0.7 M^2); towards M = 0 the series avoids 0/0.
   const double m2 = mach * mach;
   if (m2 < 1e-3) return dynamic_pressure * (1.0 + m2 / 4.0 + m2 * m2 / 40.0);
-  return dynamic_pressure * (std::pow(1.0 + 0.2 * m2, 3.5) - 1.0) / (0.5 * kHeatCapacityRatio * m2);
+  return dynamic_pressure * impactRatio(std::abs(mach)) / (0.5 * kHeatCapacityRatio * m2);
 }
 
 double calibratedAirspeed(double impact_pressure) {
-  const double speed =
-      kSeaLevelSoundSpeed *
-      std::sqrt(5.0 * (std::pow(std::abs(impact_pressure) / kSeaLevelPressure + 1.0, 2.0 / 7.0) - 1.0));
-  return std::copysign(speed, impact_pressure);
+  const double ratio = std::abs(impact_pressure) / kSeaLevelPressure;
+  double mach = std::sqrt(5.0 * (std::pow(ratio + 1.0, 2.0 / 7.0) - 1.0));
+  // The Rayleigh formula solved for the Mach number outside: a contraction, by less than 0.4 a step. From NaN come
+  // none.
+  for (double last = 0.0; mach > 1.0 && std::abs(mach - last) > 1e-12;) {
+    last = mach;
+    mach =
+        std::sqrt((ratio + 1.0) * std::pow(7.0 - 1.0 / (mach * mach), 2.5) / (std::pow(1.2, 3.5) * std::pow(6.0, 2.5)));
+  }
+  return std::copysign(kSeaLevelSoundSpeed * mach, impact_pressure);
 }
 
 }  // namespace xplane_bridge::core

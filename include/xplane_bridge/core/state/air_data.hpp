@@ -18,10 +18,12 @@ double pressureAltitude(double static_pressure);
 /// @param air_density [kg/m^3]
 double equivalentAirspeed(double true_airspeed, double air_density);
 
-/// Impact pressure (total - static) of subsonic flow [Pa] from dynamic pressure rho/2 V^2 and Mach number.
+/// Impact pressure (total - static) [Pa] from dynamic pressure rho/2 V^2 and Mach number; above Mach 1 behind a normal
+/// shock, as a pitot tube has it.
 double impactPressure(double dynamic_pressure, double mach);
 
-/// Calibrated airspeed: what an error-free instrument calibrated to the standard sea level shows [m/s].
+/// Calibrated airspeed: what an error-free instrument calibrated to the standard sea level shows [m/s]; above Mach 1
+/// there by the Rayleigh formula.
 /// @param impact_pressure total - static [Pa]; negative gives the negative of the mirrored value
 double calibratedAirspeed(double impact_pressure);
 

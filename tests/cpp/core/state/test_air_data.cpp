@@ -54,6 +54,21 @@ TEST(CalibratedAirspeed, IsTrueAirspeedAtSeaLevel) {
   }
 }
 
+// Behind the shock ahead of the tube (Rayleigh): at Mach 2 qc/p = (1.2 x 4)^3.5 (6/27)^2.5 - 1 = 4.640441; p of 11597
+// Pa makes that 53815.2 Pa, by which the isentropic formula is 322 m/s. The sea level's Mach number that has it is
+// below 1: 340.294 sqrt(5 ((53815.2/101325 + 1)^(2/7) - 1)) = 273.75 m/s. At sea level it is true airspeed again.
+TEST(CalibratedAirspeed, AboveMachOneIsThatOfAPitotTube) {
+  EXPECT_NEAR(impactPressure(0.7 * 11597.0 * 4.0, 2.0), 53815.2, 0.1);
+  EXPECT_NEAR(calibratedAirspeed(53815.2), 273.752, 0.001);
+  EXPECT_NEAR(calibratedAirspeed(impactPressure(0.7 * 22632.0 * 2.56, 1.6)), 293.8, 0.05);
+  for (const double mach : {1.0 + 1e-9, 1.2, 2.0, 3.5}) {
+    const double q = 0.7 * kSeaLevelPressure * mach * mach;
+    EXPECT_NEAR(calibratedAirspeed(impactPressure(q, mach)), mach * kSeaLevelSoundSpeed, 1e-6) << mach;
+  }
+  EXPECT_TRUE(std::isnan(calibratedAirspeed(std::nan(""))));
+  EXPECT_TRUE(std::isinf(calibratedAirspeed(HUGE_VAL)));
+}
+
 TEST(CalibratedAirspeed, IsSmoothTowardsStandstillAndOdd) {
   EXPECT_DOUBLE_EQ(calibratedAirspeed(impactPressure(0.0, 0.0)), 0.0);
   EXPECT_NEAR(impactPressure(100.0, std::sqrt(0.999e-3)), impactPressure(100.0, std::sqrt(1.001e-3)), 1e-3);
