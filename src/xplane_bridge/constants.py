@@ -207,6 +207,8 @@ class SurfaceStatesValid(enum.IntFlag):
     YAW_BRAKE = 256
     ELEVATOR = 512
     RUDDER = 1024
+    WING_ELEVATOR1 = 2048
+    WING_ELEVATOR2 = 4096
 
 
 class ControlStatesValid(enum.IntFlag):

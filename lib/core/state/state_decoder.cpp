@@ -176,18 +176,26 @@ void computeEquivalentDeflections(SurfaceStates& s) {
     }
     s.delta_aileron = mean(sum, wings);
   }
-  const auto meanOfMoving = [&mean](const std::array<float, 4>& surfaces) {
-    double sum = 0.0;
-    int count = 0;
+  double sum = 0.0;
+  int count = 0;
+  const auto add = [&sum, &count](const auto& surfaces) {
     for (const float d : surfaces) {
       if (!std::isfinite(d) || d == 0.0F) continue;
       sum += static_cast<double>(d);
       ++count;
     }
-    return mean(sum, count);
   };
-  if ((s.valid & SurfaceStates::kValidElevator) != 0) s.delta_elevator = meanOfMoving(s.elevator);
-  if ((s.valid & SurfaceStates::kValidRudder) != 0) s.delta_rudder = -meanOfMoving(s.rudder);
+  if ((s.valid & SurfaceStates::kValidElevator) != 0) {
+    add(s.elevator);
+    if ((s.valid & SurfaceStates::kValidWingElevator1) != 0) add(s.wing_elevator1);
+    if ((s.valid & SurfaceStates::kValidWingElevator2) != 0) add(s.wing_elevator2);
+    s.delta_elevator = mean(sum, count);
+  }
+  if ((s.valid & SurfaceStates::kValidRudder) != 0) {
+    sum = 0.0, count = 0;
+    add(s.rudder);
+    s.delta_rudder = -mean(sum, count);
+  }
 }
 
 }  // namespace xplane_bridge::core

@@ -53,6 +53,8 @@ std::vector<SurfaceInfo> makeTable() {
                      SurfaceKind::kRudder, set, fin});
     }
   }
+  addWingSurfaces(out, "elevator1", SurfaceKind::kElevator, 1, "elv1");  // elevons, canards
+  addWingSurfaces(out, "elevator2", SurfaceKind::kElevator, 2, "elv2");
   return out;
 }
 

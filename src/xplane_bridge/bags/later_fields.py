@@ -75,4 +75,8 @@ LATER_FIELDS: Dict[str, Dict[str, Tuple[str, int, str]]] = {
     "xplane_bridge/SimStatus": {
         "frames_missed": ("uint32", 0, "-"),
     },
+    "xplane_bridge/SurfaceStates": {
+        "wing_elevator1": ("float32", 8, "deg"),
+        "wing_elevator2": ("float32", 8, "deg"),
+    },
 }

@@ -55,7 +55,7 @@ class Beam:
         dots = shown("hdef_dots_pilot")
         course = store.get(f"{_RADIOS}actuators/nav{number}_obs_deg_mag_pilot")
         beam = cls(course, dots, distance * math.sin(math.radians(dots * per_dot)))
-        if shown("flag_glideslope"):
+        if shown("flag_glideslope_mech"):
             return beam
         path = shown("vdef_dots_pilot")
         above = distance * math.tan(math.radians(path * radio.GLIDESLOPE_DEG_PER_DOT))

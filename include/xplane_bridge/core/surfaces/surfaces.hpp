@@ -30,7 +30,8 @@ struct SurfaceInfo {
   std::string dataref;  ///< read and, under kSurfaceOverride, written; deg
   SurfaceKind kind;
   int set;    ///< 1 or 2: aileron1, aileron2
-  int place;  ///< wings: 0 wing1 left, 1 wing1 right, 2 wing2 left ..; elevators: 0 left, 1 right; rudders: fin - 1
+  int place;  ///< wings: 0 wing1 left, 1 wing1 right, 2 wing2 left ..; elevators of the tail: 0 left, 1 right; rudders:
+              ///< fin - 1
 };
 
 /// All surfaces, in a fixed order. Their positions are the surface numbers used elsewhere.

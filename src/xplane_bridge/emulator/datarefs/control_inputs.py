@@ -9,9 +9,9 @@ from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from xplane_bridge.emulator.datarefs.sources import LoadedAircraft
+from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.store import DatarefStore
-from xplane_bridge.emulator.datarefs.tables.engines import RPM_TO_RAD_S, THROTTLE_RELEASED
+from xplane_bridge.emulator.datarefs.tables.engines import NORMAL, REVERSE, RPM_TO_RAD_S, THROTTLE_RELEASED
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel
 from xplane_bridge.emulator.flight.frame import Frame
 from xplane_bridge.protocol import UNUSED_SLOT
@@ -65,6 +65,7 @@ _READ_HANDLES = (
 #: Levers and handles that a saved situation brings back and a new flight sets.
 _LEVERS = (
     _ACTUATORS + "throttle_ratio",
+    _ENGINE + "ENGN_propmode",
     _ACTUATORS + "prop_ratio",
     _ACTUATORS + "mixture_ratio",
     *_HANDLE_NAMES,
@@ -131,13 +132,22 @@ class ControlInputs:
         commands = self._surface_commands
         self._store.on_write(name, lambda index, value: commands.__setitem__(int(slots[index]), value))
 
-    def connect(self, sim: LoadedAircraft) -> None:
+    def connect(self, sim: Sources) -> None:
         """Connects the datarefs that act on others."""
         store = self._store
-        for name in ("throttle_ratio", "throttle_jet_rev_ratio", "mixture_ratio", "prop_ratio"):
+        for name in ("throttle_ratio", "mixture_ratio", "prop_ratio"):
             store.on_write(
                 f"{_ACTUATORS}{name}_all", partial(lambda lever, _, value: store.set(_ACTUATORS + lever, value), name)
             )
+        if "reverse-lever" not in sim.otherwise:
+            signed = _ACTUATORS + "throttle_jet_rev_ratio"
+            store.on_write(signed, self._move_reversing_lever)
+
+            def move_all(_: int, value: float) -> None:
+                for engine in range(store.elements(signed)):
+                    self._move_reversing_lever(engine, value)
+
+            store.on_write(signed + "_all", move_all)
 
         def set_speed(index: int, value: float) -> None:
             highest = sim.model.info.maximum_rpm * RPM_TO_RAD_S
@@ -168,6 +178,7 @@ class ControlInputs:
         for name, values in levers:
             slots = self._store.dataref(_ACTUATORS + name).slots[:engines]
             self._store.values[slots] = values[:engines]
+        self._store.set(_ENGINE + "ENGN_propmode", NORMAL)
         for name, value in (
             (_COCKPIT + "elevator_trim", controls.trim_pitch),
             (_COCKPIT + "aileron_trim", controls.trim_roll),
@@ -267,10 +278,16 @@ class ControlInputs:
         """Moves the lever or handle of a row's slot; a stick's slot is none."""
         if row == _THROTTLE_ROW:
             throttle = self._store.dataref(_ACTUATORS + "throttle_ratio").slots
-            self._store.values[throttle[slot]] = _clip(value, -1.0, 1.0)
+            self._store.values[throttle[slot]] = _clip(value, 0.0, 1.0)
         elif (row, slot) in _HANDLES:
             name, low, high = _HANDLES[(row, slot)]
             self._store.set(name, _clip(value, low, high))
+
+    def _move_reversing_lever(self, engine: int, value: float) -> None:
+        """A lever that is below 0 in reverse: X-Plane keeps how far it is, and the propeller's mode."""
+        store = self._store
+        store.values[store.locate(_ACTUATORS + "throttle_ratio", engine)] = _clip(abs(value), 0.0, 1.0)
+        store.values[store.locate(_ENGINE + "ENGN_propmode", engine)] = REVERSE if value < 0.0 else NORMAL
 
     def _move_handles(self, commands: PilotCommands, model: FlightModel) -> None:
         store = self._store
@@ -318,10 +335,12 @@ class ControlInputs:
         levers = store.array(_ACTUATORS + "throttle_ratio")
         overridden = store.get(_ENGINE + "ENGN_thro_override")  # one number for all engines
         propeller, mixture = store.array(_ACTUATORS + "prop_ratio"), store.array(_ACTUATORS + "mixture_ratio")
-        use = store.array(_ENGINE + "ENGN_thro_use")
+        use, mode = store.array(_ENGINE + "ENGN_thro_use"), store.array(_ENGINE + "ENGN_propmode")
         controls.override_throttles = self._overrides("throttles")
         for i in range(info.engine_count):
-            lever = levers[i] if overridden == THROTTLE_RELEASED else overridden
+            lever = -levers[i] if mode[i] == REVERSE else levers[i]
+            if overridden != THROTTLE_RELEASED:
+                lever = overridden
             controls.throttle[i] = _clip(float(lever), info.min_throttle, info.max_throttle)
             controls.propeller[i] = _clip(float(propeller[i]), 0.0, 1.0)
             controls.mixture[i] = _clip(float(mixture[i]), 0.0, 1.0)

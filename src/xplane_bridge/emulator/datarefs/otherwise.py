@@ -34,6 +34,7 @@ IDS = (
     "same-index",
     "samples-whole",
     "side-sign",
+    "slip-sign",
     "stations",
     "totals-move",
     "unknown-omitted",

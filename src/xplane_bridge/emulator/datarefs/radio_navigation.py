@@ -76,7 +76,8 @@ class Reading:
     deviation_dots: float = 0.0
     to_from: int = NO_SIGNAL
     glideslope_dots: float = 0.0
-    glideslope_flag: bool = True
+    glideslope_flag: bool = True  #: none is received
+    glideslope_expected: bool = False  #: it is an ILS that has one
     has_dme: bool = False
     distance_m: float = 0.0
     speed_mps: float = 0.0
@@ -231,6 +232,7 @@ class Receivers:
         reading.to_from = TO
         reading.deviation_dots = _needle(aside / LOCALIZER_DEG_PER_DOT)
         touchdown = station.touchdown
+        reading.glideslope_expected = touchdown is not None
         if touchdown is None or abs(aside) > GLIDESLOPE_SECTOR_DEG or not self._works("rel_gls"):
             return
         ground = distance_m(here, touchdown)

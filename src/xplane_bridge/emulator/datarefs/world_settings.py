@@ -24,7 +24,8 @@ _STATIONS = 9
 _SEA_LEVEL = "sim/weather/barometer_sealevel_inhg"
 _SEA_LEVEL_TEMPERATURE = "sim/weather/temperature_sealevel_c"
 #: Where the centre of gravity is set: by the first of these that the version has.
-CG_OFFSETS = ("sim/flightmodel2/misc/cg_offset_z", "sim/flightmodel/misc/cgz_ref_to_default")
+#: Of the centre of gravity, aft: without fuel; with it.
+DRY_CG, LOADED_CG = "sim/flightmodel/misc/cgz_ref_to_default", "sim/flightmodel2/misc/cg_offset_z"
 
 
 class WorldSettings:
@@ -60,7 +61,8 @@ class WorldSettings:
         store.on_write("sim/flightmodel/weight/m_fixed", self._set_payload)
         store.on_write("sim/flightmodel/weight/m_stations", self._set_station)
         store.on_write("sim/flightmodel/weight/m_fuel", self._set_fuel)
-        store.on_write(next(name for name in CG_OFFSETS if store.dataref(name).visible), self._set_balance)
+        store.on_write(DRY_CG, lambda _, value: self._model().set_loading(cg_aft_m=value))
+        store.on_write(LOADED_CG, self._set_balance)
         store.on_write("sim/time/local_date_days", lambda _i, value: setattr(clocks, "date_days", int(value)))
         # 12 has the sea level's air by two names, one of them in another unit
         for name, region, factor in (
@@ -121,7 +123,8 @@ class WorldSettings:
         self._model().set_loading(payload_kg=sum(self.stations_kg))
 
     def _set_balance(self, _index: int, value: float) -> None:
-        self._model().set_loading(cg_aft_m=value)
+        loaded = self._model().state
+        self._model().set_loading(cg_aft_m=value * loaded.mass_kg / (loaded.mass_kg - sum(loaded.fuel_kg)))
 
     def _set_atmosphere(self, other: str, value: float) -> None:
         """Takes what was written; `other` is its second name, with the value there."""

@@ -365,7 +365,7 @@ class FlightModel(Protocol):
         payload_kg: Optional[float] = None,
         cg_aft_m: Optional[float] = None,
     ) -> None:
-        """Fuel per tank, payload, and where the centre of gravity is now; what is None stays as it is.
+        """Fuel per tank, payload, and where the centre of gravity without fuel is now; what is None stays as it is.
 
         The payload is moved to bring the centre of gravity there, and stays where it was put.
         """

@@ -482,7 +482,7 @@ class JsbsimModel:
         fuel = self._fuel_kg if fuel_kg is None else list(fuel_kg)
         aft = self._payload_aft_m
         if cg_aft_m is not None:
-            aft = payload_place(cg_aft_m, self._empty_mass_kg + sum(fuel) + payload, payload, self.payload_reach_m)
+            aft = payload_place(cg_aft_m, self._empty_mass_kg + payload, payload, self.payload_reach_m)
         if fuel_kg is not None:
             self._loaded_fuel_kg = list(fuel)
         self._fuel_kg, self._payload_kg, self._payload_aft_m = fuel, payload, aft

@@ -25,7 +25,7 @@ def payload_place(cg_aft_m: float, mass_kg: float, payload_kg: float, reach_m: f
 
     Args:
         cg_aft_m: Wanted, aft of the reference point.
-        mass_kg: Of all, with the payload.
+        mass_kg: Of what it is the centre of: all with the payload, without the fuel.
         payload_kg: What is moved.
         reach_m: How far it can be moved.
 

@@ -201,6 +201,22 @@ TEST(EquivalentDeflections, MatchHandWorkedNumbers) {
   EXPECT_FLOAT_EQ(s.delta_rudder, -7.0F);
 }
 
+// A flying wing: its elevons up 10 and 2 pitch it up like an elevator at -6; the tail that it does not have shows 0.
+TEST(EquivalentDeflections, CountElevatorsOnWings) {
+  SurfaceStates s;
+  s.valid = SurfaceStates::kValidAll;
+  s.elevator.fill(0.0F);
+  s.wing_elevator1.fill(0.0F);
+  s.wing_elevator2.fill(0.0F);
+  s.wing_elevator1[0] = -10.0F;
+  s.wing_elevator2[3] = -2.0F;
+  computeEquivalentDeflections(s);
+  EXPECT_FLOAT_EQ(s.delta_elevator, -6.0F);
+  s.valid &= ~SurfaceStates::kValidWingElevator2;
+  computeEquivalentDeflections(s);
+  EXPECT_FLOAT_EQ(s.delta_elevator, -10.0F) << "what is not known does not count";
+}
+
 TEST(EquivalentDeflections, AreZeroAtNeutralAndUnknownWithoutSurfaces) {
   SurfaceStates s;
   computeEquivalentDeflections(s);

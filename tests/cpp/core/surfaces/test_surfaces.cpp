@@ -24,6 +24,8 @@ TEST(Surfaces, NamesLeadToTheDatarefsOfTheReference) {
   EXPECT_EQ(datarefOf("elevator2_right"), "sim/flightmodel/controls/hstab2_elv2def");
   EXPECT_EQ(datarefOf("rudder1_fin1"), "sim/flightmodel/controls/vstab1_rud1def");
   EXPECT_EQ(datarefOf("rudder2_fin1"), "sim/flightmodel/controls/vstab1_rud2def");
+  EXPECT_EQ(datarefOf("elevator1_wing1_left"), "sim/flightmodel/controls/wing1l_elv1def") << "an elevon";
+  EXPECT_EQ(datarefOf("elevator2_wing3_right"), "sim/flightmodel/controls/wing3r_elv2def");
   EXPECT_FALSE(surfaceNumber("aileron"));
 }
 
@@ -33,9 +35,9 @@ TEST(Surfaces, TableHasEachOnce) {
     names.insert(s.name);
     datarefs.insert(s.dataref);
   }
-  EXPECT_EQ(surfaceTable().size(), 80u);  // 9 kinds on 8 wing parts, 4 elevators, 4 rudders
-  EXPECT_EQ(names.size(), 80u);
-  EXPECT_EQ(datarefs.size(), 80u);
+  EXPECT_EQ(surfaceTable().size(), 96u);  // 11 kinds on 8 wing parts, 4 elevators of the tail, 4 rudders
+  EXPECT_EQ(names.size(), 96u);
+  EXPECT_EQ(datarefs.size(), 96u);
 }
 
 TEST(Surfaces, CommandIsTakenWhole) {

@@ -25,6 +25,18 @@ ELEVATOR = "sim/flightmodel/controls/hstab1_elv1def"
 FAILURES = "sim/operation/failures/"
 
 
+def test_a_lever_in_reverse_is_below_0_by_one_name_and_above_by_the_other(bench):
+    emulator = bench()
+    reverse, mode = "sim/cockpit2/engine/actuators/throttle_jet_rev_ratio", "sim/flightmodel/engine/ENGN_propmode"
+    emulator.write({reverse + "[0]": -0.5, reverse + "[1]": 0.25})
+    shown = [f"{name}[{engine}]" for name in (reverse, THROTTLE, mode) for engine in (0, 1)]
+    assert emulator.read(*shown) == [-0.5, 0.25, 0.5, 0.25, 3.0, 1.0]
+    emulator.write({reverse + "_all": 0.75})
+    assert emulator.read(*shown) == [0.75, 0.75, 0.75, 0.75, 1.0, 1.0]
+    emulator.write({THROTTLE + "[0]": 0.5})
+    assert emulator.read(*shown)[:3] == [0.5, 0.75, 0.5]
+
+
 # --- the stick ---
 
 

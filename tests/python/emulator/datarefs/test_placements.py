@@ -61,6 +61,7 @@ def test_prel_into_the_ground_is_not_flown(bench):
     [
         ("11", "sim/flightmodel/misc/cgz_ref_to_default"),
         ("12.00", "sim/flightmodel/misc/cgz_ref_to_default"),
+        ("12.08", "sim/flightmodel/misc/cgz_ref_to_default"),
         ("12.08", "sim/flightmodel2/misc/cg_offset_z"),
     ],
 )
@@ -76,6 +77,20 @@ def test_balance_is_moved_by_the_payload_and_pitches_the_aircraft(bench, version
     assert emulator.read(pitch)[0] - before == pytest.approx(34.0, rel=0.3)
     emulator.write({name: 1.0})  # farther than the payload can be moved
     assert emulator.read(name) == [pytest.approx(0.1, abs=1e-3)]
+
+
+def test_the_balance_without_fuel_stays_where_the_fuel_goes(bench):
+    emulator = bench(aircraft="fixed_wing", version="12.08")
+    weight = "sim/flightmodel/weight/"
+    dry, loaded = "sim/flightmodel/misc/cgz_ref_to_default", "sim/flightmodel2/misc/cg_offset_z"
+    emulator.write({dry: 0.05})
+    mass, fuel = emulator.read(weight + "m_total", weight + "m_fuel_total")
+    # the fuel is at the reference point: all together is less far aft than all but the fuel
+    assert emulator.read(dry, loaded) == pytest.approx([0.05, 0.05 * (mass - fuel) / mass], abs=1e-4)
+    emulator.write({weight + "m_fuel[0]": 10.0, weight + "m_fuel[1]": 10.0})
+    assert emulator.read(dry, loaded) == pytest.approx([0.05, 0.05 * (mass - fuel) / (mass - fuel + 20.0)], abs=1e-4)
+    emulator.write({loaded: 0.0})
+    assert emulator.read(dry, loaded) == pytest.approx([0.0, 0.0], abs=1e-4)
 
 
 def test_loading_is_shown_while_the_flight_stands(bench):

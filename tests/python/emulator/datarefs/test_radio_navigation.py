@@ -110,6 +110,14 @@ def test_behind_too_far_or_aside_there_is_no_glide_path(frame):
     assert ils(frame).glideslope_flag
 
 
+def test_a_glide_path_is_missed_where_the_station_has_one(bench):
+    radios = "sim/cockpit2/radios/"
+    shown = [f"{radios}indicators/nav1_flag_glideslope{way}" for way in ("", "_mech")]
+    bench.write({radios + "actuators/nav1_frequency_hz": 11030.0})  # the VOR, from anywhere
+    bench.step()
+    assert bench.read(*shown) == [0.0, 1.0]
+
+
 def test_out_of_range_another_frequency_a_failure_and_no_current_are_no_signal():
     none = radio.Reading()
     assert vor(0.0, frame_at(north_m=-250000.0)) == none

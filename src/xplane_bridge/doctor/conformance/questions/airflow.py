@@ -14,6 +14,7 @@ from xplane_bridge.doctor.conformance.verdict import Answer, NotTestableError, j
 
 _WIND_MPS = 15.0
 _SLIP_DEG = 1.0
+_BALL_DEG = 0.3
 _MEANINGFUL_DEG = 2.0
 _MEANINGFUL_MPS = 2.0
 
@@ -47,6 +48,19 @@ def _beta(flight: Flight) -> Answer:
         f"beta taken + with wind from the left is {left:.2f} deg off, from the right {right:.2f} deg, of {size:.2f} deg"
     )
     return judged(left < right, text, off_left_deg=left, off_right_deg=right, size_deg=size)
+
+
+def _slip(flight: Flight) -> Answer:
+    flight.pilot.rudder = 0.4
+    flight.wait(1.2)
+    samples = flight.fly((*names.ORIGIN_ANGLES, *names.LOCAL_VELOCITY, *flight.wind_now, names.SLIP), 1.0)
+    own = median(_sideslips(flight, samples))
+    shown = median([sample[names.SLIP] for sample in samples])
+    if abs(own) < _SLIP_DEG or abs(shown) < _BALL_DEG:
+        raise NotTestableError(f"full rudder makes {own:.1f} deg of sideslip and moves the ball by {shown:.1f} deg only")
+    # A ball goes to the side that the wind comes from: from the left where the nose points right of the path.
+    text = f"slip_deg is {shown:+.1f} deg with wind from the {'right' if own > 0.0 else 'left'}, {abs(own):.1f} deg"
+    return judged(shown * own < 0.0, text, slip_deg=shown, sideslip_deg=own)
 
 
 def _across(flight: Flight) -> float:
@@ -117,6 +131,7 @@ def _wind_direction(flight: Flight) -> Answer:
 
 QUESTIONS = (
     Question("beta-sign", "beta is + with wind from the left: hpath + beta = psi", _beta),
+    Question("slip-sign", "slip_deg is + with the ball to the left", _slip),
     Question("wind-names", "the names and units that set_wind writes set the wind", _wind_names),
     Question("wind-direction", "wind_now_* is the velocity of the air, not where it comes from", _wind_direction),
     Question("hpath", "hpath is the path over ground", _hpath),

@@ -17,6 +17,8 @@ _CONTROLS2 = "sim/flightmodel2/controls/"
 
 #: Wing parts in the order of X-Plane's arrays; tailplanes and fins follow them.
 WINGS = tuple(f"wing{number}{side}" for number in (1, 2, 3, 4) for side in "lr")
+#: Elevons and canards. No aircraft of the emulator has any.
+WING_ELEVATORS = tuple(f"sim/flightmodel/controls/{wing}_elv{number}def" for number in (1, 2) for wing in WINGS)
 PARTS = (*WINGS, "hstab1", "hstab2", "vstab1", "vstab2")
 #: Place of the first of PARTS in the old arrays `sim/flightmodel/controls/*_def`: eight propellers come before. The
 #: arrays `sim/flightmodel2/wing/*_deg` begin with it.
@@ -119,6 +121,9 @@ def _surfaces(t: Table, sim: Sources) -> None:
     for names in single.values():
         for name in names:
             t.setting(name)
+    for name in WING_ELEVATORS:
+        t.setting(name)
+        sim.watch_surface(name)
     t.setting("_emulator/no_surface")
     for leaf, name in _ARRAYS.items():
         array = f"sim/flightmodel2/wing/{name}"

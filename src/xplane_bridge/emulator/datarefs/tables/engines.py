@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Callable, List
 
+import numpy as np
+
 from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import Table
 from xplane_bridge.emulator.flight.flight_model import EngineState
@@ -15,6 +17,8 @@ _GAUGE = "sim/aircraft/engine/acf_"
 _INDICATORS = "sim/cockpit2/engine/indicators/"
 _ACTUATORS = "sim/cockpit2/engine/actuators/"
 RPM_TO_RAD_S = math.pi / 30.0
+#: Of ENGN_propmode.
+NORMAL, REVERSE = 1.0, 3.0
 #: Value of ENGN_thro_override that gives the engines back to their levers.
 THROTTLE_RELEASED = -2.0
 _FUEL_PRESSURE_PSI = 24.0
@@ -36,11 +40,17 @@ def define(t: Table, sim: Sources) -> None:
     # levers
     t.setting(_ACTUATORS + "throttle_ratio")
     t.alias(_ENGINE + "ENGN_thro", _ACTUATORS + "throttle_ratio")
-    # reverse is the negative part of the lever by every name; X-Plane has a mode of its own for it
+    t.setting(_ENGINE + "ENGN_propmode", NORMAL)
+    # throttle_ratio is 0..1 also in reverse, which the propeller's mode says; this one is below 0 then
     if "reverse-lever" in sim.otherwise:
         t.setting(_ACTUATORS + "throttle_jet_rev_ratio")
     else:
-        t.alias(_ACTUATORS + "throttle_jet_rev_ratio", _ACTUATORS + "throttle_ratio")
+        lever, mode = (t.store.dataref(name).slots for name in (_ACTUATORS + "throttle_ratio", _ENGINE + "ENGN_propmode"))
+        lever, mode = lever[: len(mode)], mode[: len(lever)]
+        t.array(
+            _ACTUATORS + "throttle_jet_rev_ratio",
+            lambda _: np.where(t.store.values[mode] == REVERSE, -t.store.values[lever], t.store.values[lever]),
+        )
     for name in ("throttle_ratio_all", "throttle_jet_rev_ratio_all"):
         t.setting(_ACTUATORS + name)
     t.setting(_ACTUATORS + "mixture_ratio")
@@ -57,7 +67,6 @@ def define(t: Table, sim: Sources) -> None:
     t.alias(_ACTUATORS + "prop_rotation_speed_rad_sec", _ENGINE + "ENGN_prop")
     t.array(_ENGINE + "ENGN_thro_use", each(lambda e: e.throttle))
     t.setting(_ENGINE + "ENGN_thro_override", THROTTLE_RELEASED)
-    t.setting(_ENGINE + "ENGN_propmode", 1)
     t.setting(_ENGINE + "ENGN_heat")
     t.setting(_ENGINE + "ENGN_cowl")
     for name, initial in (("fuel_pump_on", 1), ("igniter_on", 1), ("ignition_on", 3), ("ignition_key", 3)):

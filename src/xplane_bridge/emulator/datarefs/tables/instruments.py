@@ -27,7 +27,8 @@ def define(t: Table, sim: Sources) -> None:
     for number in (1, 2):
         t.value(f"{_GAUGES}suction_{number}_ratio", partial(_suction, sim=sim, system=number))
     t.value(_GAUGES + "compass_heading_deg_mag", lambda f: f.mag_psi)
-    t.value(_GAUGES + "slip_deg", slip_deg)
+    left = 1.0 if "slip-sign" not in sim.otherwise else -1.0
+    t.value(_GAUGES + "slip_deg", lambda f: left * slip_deg(f))
     beta_sign = -BETA_SIGN if "beta-sign" in sim.otherwise else BETA_SIGN
     t.value(_GAUGES + "sideslip_degrees", lambda f: beta_sign * math.degrees(f.m.beta_rad))
     t.value(_GAUGES + "ground_track_mag_pilot", lambda f: earth.wrap_degrees(f.hpath - f.declination))
@@ -77,5 +78,5 @@ def _suction(f: Frame, sim: Sources, system: int) -> float:
 
 
 def slip_deg(f: Frame) -> float:
-    """The ball: where the side force pushes it, right +."""
-    return -math.degrees(math.atan2(f.m.specific_force_y_mps2, max(-f.m.specific_force_z_mps2, 1.0)))
+    """The ball, left + [? slip-sign]: against the side force, as instruments of X-Plane that move it by this value."""
+    return math.degrees(math.atan2(f.m.specific_force_y_mps2, max(-f.m.specific_force_z_mps2, 1.0)))

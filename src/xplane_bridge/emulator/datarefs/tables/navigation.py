@@ -130,7 +130,8 @@ def _nav(t: Table, number: int, frequency: int, readings: _Readings) -> None:
         ("hdef_dots_pilot", lambda r: r.deviation_dots),
         ("flag_from_to_pilot", lambda r: r.to_from),
         ("vdef_dots_pilot", lambda r: r.glideslope_dots),
-        ("flag_glideslope", lambda r: r.glideslope_flag),
+        ("flag_glideslope", lambda r: r.glideslope_expected and r.glideslope_flag),
+        ("flag_glideslope_mech", lambda r: r.glideslope_flag),
         ("has_dme", lambda r: r.has_dme),
         *_DISTANCES,
     ):
