@@ -69,6 +69,8 @@ double ControlPath::now() const { return link_->clock().steadySeconds(); }
 void ControlPath::settle() {
   const bool away = link_status_.state == core::LinkState::kSearching || link_status_.state == core::LinkState::kLost;
   const bool fits = this->fits(aircraft_);
+  const bool was_given_back = standing_ == Standing::kSuspended || standing_ == Standing::kWaitingForMode ||
+                              standing_ == Standing::kWrongAircraft;
   if (away) {
     standing_ = Standing::kNotConnected;
     why_not_ = "X-Plane is not connected";
@@ -97,6 +99,8 @@ void ControlPath::settle() {
   }
   if (standing_ == Standing::kFlying) {
     last_warning_.clear();
+    // Others may have flown since: a lever held at what was sent then would move by itself.
+    if (was_given_back) arbiter_.forgetSent(core::ChannelSet{}.set());
   } else {
     hooks_.end_excitation("nothing is sent: " + why_not_);
   }
@@ -160,6 +164,12 @@ void ControlPath::onNewFlight(const std::string& how) {
   // It has put the handles to its own start.
   ever_sent_.reset();
   awaiting_read_back_.clear();
+  // Nor does it begin with levers where they were in the last one, unless a source goes on to command them.
+  core::ChannelSet levers;
+  for (int engine = 0; engine < core::kMaxEngines; ++engine) {
+    levers.set(core::index(core::leverChannel(engine))).set(core::index(core::motorChannel(engine)));
+  }
+  arbiter_.forgetSent(levers);
   endAuto(how, now());
 }
 
@@ -190,6 +200,11 @@ bool ControlPath::isAnotherXPlane(const core::FlightWatch& watch) const {
   if (!std::isfinite(watch_.sim_time)) return false;
   const double gap = now() - last_frame_;
   return watch.sim_time < watch_.sim_time - core::kOvertaking || (gap > kGap && watch.sim_time <= gap);
+}
+
+bool ControlPath::showsAnother(const core::FlightWatch& watch) {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  return isAnotherXPlane(watch) || (!flight_shown_ && !continues(watch));
 }
 
 void ControlPath::beginFlight() {

@@ -118,6 +118,8 @@ class ControlPath {
   void onGivenBack(const std::string& why);
   /// The next frame is the first one of a simulator in lock-step, which stood until now: that was no gap.
   void beginFlight();
+  /// Whether this frame, which onFrame() has not had yet, is of another X-Plane, or after a gap of another flight.
+  bool showsAnother(const core::FlightWatch& watch);
   /// Every frame of X-Plane.
   void onFrame(const core::FlightWatch& watch);
   /// Refreshes, and notices what others do to overrides. To be called at `rate` or more often, and at deadline().

@@ -254,6 +254,13 @@ void ControlArbiter::forgetCommands(const std::string& reason, double now) {
   updateStatus(false);
 }
 
+void ControlArbiter::forgetSent(const ChannelSet& channels) {
+  for (std::size_t i = 0; i < kChannelCount; ++i) {
+    if (channels.test(i)) origin_[i] = Origin::kNone;
+  }
+  blending_ &= ~channels;
+}
+
 ChannelSet ControlArbiter::commanded() const {
   ChannelSet out;
   for (std::size_t i = 0; i < kChannelCount; ++i) out.set(i, fresh(status_.mode, i));

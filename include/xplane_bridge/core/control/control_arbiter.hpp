@@ -141,6 +141,9 @@ class ControlArbiter {
   /// Nothing is sent any more before the next command, as before the first one. The mode stays; where anything was
   /// sent, `reason` is shown on control/mode.
   void forgetCommands(const std::string& reason, double now);
+  /// What these channels were sent last has been given back since: they are sent what is commanded, from there on, and
+  /// nothing before a command.
+  void forgetSent(const ChannelSet& channels);
 
   /// Advances to `now` and says what to send. Call at the sending rate and right after each accepted command.
   const ArbitratedControls& step(double now, const ChannelExcitation& excitation = {});
