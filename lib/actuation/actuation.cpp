@@ -161,6 +161,10 @@ void Actuation::onWatch(const core::RrefView& view) {
   if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
   sim_time_ = watch_.sim_time;
   if (watch_.sim_time > before) ++frames_flown_;
+  if (path_.showsAnother(watch_)) {
+    failures_.onRestart();
+    jobs_.forgetSettings();
+  }
   failures_.onFrame(watch_);
   excitation_.onFrame(watch_);
   disturbance_.onFrame(watch_);

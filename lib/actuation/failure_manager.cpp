@@ -113,8 +113,13 @@ void FailureManager::onFrame(const core::FlightWatch& watch) {
   const double before = flight_.sim_time;
   flight_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
   if (stopped_) return;
-  if (flight_.sim_time < before - core::kOvertaking) end(false, "X-Plane was restarted");
+  if (flight_.sim_time < before - core::kOvertaking) onRestart();
   for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
+}
+
+void FailureManager::onRestart() {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  if (!stopped_) end(false, "X-Plane was restarted");
 }
 
 void FailureManager::applySurfaces() {
@@ -328,6 +333,7 @@ void FailureManager::stop() {
 void FailureManager::repaired() {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   registry_.clear({}, false);
+  for (const auto& [name, pending] : pending_) not_shown_[name] = "everything was given back meanwhile";
   pending_.clear();
 }
 

@@ -27,6 +27,7 @@ constexpr double kStationsWait = 0.5;           // [s] until a payload that the 
 constexpr double kWindAgain = 1.0;              // [s] the same of the weather
 constexpr double kAnswerWait = 0.5;             // [s] for what X-Plane has now, also where its frames are slow
 constexpr double kPauseWait = 1.0;              // [s] until a pause must be shown
+constexpr double kPauseAgain = 20.0;            // [s] in which it is asked for again
 constexpr double kIdentityChangeWait = 3.0;     // [s] until X-Plane must have shown its aircraft
 constexpr const char* kSettingsEntry = "override:settings of the flight";
 constexpr const char* kLoading = "another aircraft is being loaded";
@@ -141,18 +142,30 @@ FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, cons
     again = pause(true, who);
     problem = waitForMotion(start, &shown);
   }
-  pauseAsBefore(before, again, who);
+  const std::string stands = pauseAsBefore(before, again, who);
   if (!problem.empty())
-    return {core::EventKind::kReset, "reset_flight: X-Plane did not place the aircraft: " + problem, false};
+    return {core::EventKind::kReset, "reset_flight: X-Plane did not place the aircraft: " + problem + stands, false};
+  if (!stands.empty()) return {core::EventKind::kReset, "reset_flight: the aircraft is placed" + stands, false};
   return {core::EventKind::kReset, "the flight goes on at the place, attitude and speed asked for", true};
 }
 
-void FlightChanges::pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who) {
-  // A silent X-Plane has not shown at first whether it was paused.
+/// Returns what is to be said where X-Plane does not show it, however often it is asked for.
+std::string FlightChanges::pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who) {
+  // A silent X-Plane has not shown at first whether it was paused; and the pause found may be one of ours.
   const PauseOutcome first = before == PauseOutcome::kUnknown ? again : before;
-  if (first == PauseOutcome::kUnknown) return;
-  const PauseOutcome last = pause(first == PauseOutcome::kWasSo, who);
-  if (last == PauseOutcome::kWasSo || last == PauseOutcome::kFollowed) forgetPause(link_);
+  const bool ours = isPauseOurs(link_);
+  if (first == PauseOutcome::kUnknown && !ours) return "";
+  const bool paused = first == PauseOutcome::kWasSo && !ours;
+  const core::Deadline deadline = deadlineAfter(kPauseAgain);
+  do {
+    const PauseOutcome last = pause(paused, who);
+    if (last != PauseOutcome::kWasSo && last != PauseOutcome::kFollowed) continue;
+    forgetPause(link_);
+    return "";
+  } while (!expired(deadline));
+  if (paused) return ", but X-Plane does not show that it is paused, as it was" + linkCondition();
+  leavePause(link_);
+  return ", but X-Plane does not show that it goes on" + linkCondition() + ": it is let go on when it is back";
 }
 
 std::optional<core::ShownFlight> FlightChanges::shownFlight() {
@@ -254,8 +267,8 @@ FlightChanges::Outcome FlightChanges::placeAt(const core::AirportStart& asked, c
   std::optional<core::ShownFlight> shown;
   const std::string problem = waitForAirport(start, &shown);
   if (problem.empty()) again = pause(true, who);
-  pauseAsBefore(before, again, who);
-  if (!problem.empty()) return failed(problem);
+  const std::string stands = pauseAsBefore(before, again, who);
+  if (!problem.empty() || !stands.empty()) return failed((problem.empty() ? "the flight is placed" : problem) + stands);
   if (start.spot != core::AirportSpot::kFinal) {
     return {core::EventKind::kReset, "the flight begins at " + spotOf(start), true};
   }
@@ -340,13 +353,15 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
   return "";
 }
 
-void FlightChanges::restoreSettings() {
+void FlightChanges::endSettings(bool restore) {
   const std::lock_guard<std::mutex> lock(restores_mutex_);
   const auto journal = link_->journal();
   if (restores_.empty() || !journal) return;
   try {
-    if (isUp()) {
-      for (const core::UndoOperation& operation : restores_) link_->sendUndo(operation);
+    if (isUp() || !restore) {
+      for (const core::UndoOperation& operation : restores_) {
+        if (restore) link_->sendUndo(operation);
+      }
       restores_.clear();
       journal->remove({kSettingsEntry});
     } else {
@@ -389,13 +404,15 @@ FlightChanges::Outcome FlightChanges::applyWeather(const core::Weather& weather)
   if (const auto refusal = core::refusalBy(version, weather)) {
     return {core::EventKind::kSetting, "set_weather: " + *refusal, false};
   }
-  return applySettings(core::weatherWrites(weather, version), "set_weather", "the weather is set as asked for",
-                       weather.restore_on_exit);
+  Outcome outcome = applySettings(core::weatherWrites(weather, version), "set_weather",
+                                  "the weather is set as asked for", weather.restore_on_exit);
+  if (const auto command = core::cloudCommand(weather, version); command && outcome.success) link_->command(*command);
+  return outcome;
 }
 
 FlightChanges::Outcome FlightChanges::applyLoading(const core::Loading& loading) {
   const core::SimulatorVersion version = link_->status().version;
-  const auto shown = core::loadingShown(loading, version);
+  const auto shown = core::loadingShown(loading);
   std::vector<std::string> names;
   names.reserve(shown.size());
   for (const core::DatarefWrite& each : shown) names.push_back(each.dataref);
@@ -406,7 +423,7 @@ FlightChanges::Outcome FlightChanges::applyLoading(const core::Loading& loading)
   const bool spread = loading.payload_mass && !stations.empty();
   std::vector<core::DatarefValue> values;
   if (spread) values = link_->read(stations, kWriteAgain);
-  const auto writes = core::loadingWrites(loading, version, values);
+  const auto writes = core::loadingWrites(loading, values);
   const core::Deadline by_stations = deadlineAfter(kStationsWait);
   for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !expired(deadline);) {
     write(writes);

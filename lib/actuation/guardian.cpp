@@ -83,6 +83,22 @@ void Guardian::start() {
   const std::lock_guard<std::mutex> lock(mutex_);
   socket_ = ends[1];
   child_ = child;
+  wanted_ = true;
+  if (!peer_line_.empty()) sendLine(peer_line_);
+}
+
+bool Guardian::restartIfEnded() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!wanted_) return false;
+    // One that took its end of the socket for its parent's undoes what it knows, and ends.
+    if (child_ > 0 && waitpid(child_, nullptr, WNOHANG) == 0) return false;
+    child_ = -1;
+    if (socket_ >= 0) close(socket_);
+    socket_ = -1;
+  }
+  start();
+  return true;
 }
 
 /// With mutex_ held.
@@ -102,7 +118,8 @@ bool Guardian::running() const {
 
 void Guardian::setPeer(const core::Endpoint& peer, const std::string& journal_path) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  sendLine("peer " + peer.addressString() + " " + std::to_string(peer.port) + " " + journal_path + "\n");
+  peer_line_ = "peer " + peer.addressString() + " " + std::to_string(peer.port) + " " + journal_path + "\n";
+  sendLine(peer_line_);
 }
 
 void Guardian::beat(double hang_timeout) {
@@ -128,6 +145,7 @@ void Guardian::rest() {
 
 void Guardian::dismiss() {
   const std::lock_guard<std::mutex> lock(mutex_);
+  wanted_ = false;
   sendLine("bye\n");
   if (socket_ >= 0) close(socket_);
   socket_ = -1;

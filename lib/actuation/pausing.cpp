@@ -1,5 +1,7 @@
 #include "xplane_bridge/actuation/pausing.hpp"
 
+#include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "xplane_bridge/core/link/journal.hpp"
@@ -9,6 +11,14 @@ namespace xplane_bridge {
 namespace {
 
 constexpr const char* kPauseEntry = "pause:flight change";
+
+std::vector<core::JournalEntry> ownPauses(const core::Journal& journal) {
+  std::vector<core::JournalEntry> own = journal.own();
+  own.erase(std::remove_if(own.begin(), own.end(),
+                           [](const core::JournalEntry& entry) { return entry.purpose != kPausePurpose; }),
+            own.end());
+  return own;
+}
 
 }  // namespace
 
@@ -36,10 +46,22 @@ void forgetPause(core::SimulatorPort* link) {
   if (const auto journal = link->journal()) journal->remove({kPauseEntry});
 }
 
+bool isPauseOurs(core::SimulatorPort* link) {
+  const auto journal = link->journal();
+  return journal && !ownPauses(*journal).empty();
+}
+
+void leavePause(core::SimulatorPort* link) {
+  if (const auto journal = link->journal()) journal->leave({kPauseEntry}, "X-Plane has not been seen to go on");
+}
+
 bool resumeLeftovers(core::SimulatorPort* link, double timeout_s) {
   const auto journal = link->journal();
   if (!journal) return false;
-  const std::vector<core::JournalEntry> left = journal->orphans(kPausePurpose);
+  std::vector<core::JournalEntry> left = journal->orphans(kPausePurpose);
+  for (core::JournalEntry& own : ownPauses(*journal)) {
+    if (!own.left.empty()) left.push_back(std::move(own));
+  }
   if (left.empty()) return true;
   const PauseOutcome outcome = setPaused(link, false, timeout_s, [] { return false; });
   if (outcome != PauseOutcome::kWasSo && outcome != PauseOutcome::kFollowed) return false;

@@ -55,6 +55,10 @@ std::string TrafficControl::command(const std::vector<core::TrafficPose>& poses,
   follow();
   if (!taken.empty()) report_("traffic: " + listed(taken) + " placed by command", true);
   if (!given.empty()) report_("traffic: " + listed(given) + " given back", true);
+  if (refusal.empty() && !lost_.empty()) {
+    refusal = "aircraft " + listed({lost_.begin(), lost_.end()}) +
+              " released by another client: not placed until a command leaves them out, and a later one names them";
+  }
   return refusal;
 }
 

@@ -47,6 +47,8 @@ class FailureManager {
   void onLink(const core::LinkStatus& status);
   /// Every frame: triggers.
   void onFrame(const core::FlightWatch& watch);
+  /// The next frame is of another X-Plane, or of another flight after a gap: all end, armed ones too.
+  void onRestart();
   /// At least ten times a second.
   void tick();
   /// Nothing is broken any more from here on; what is set is the OverrideManager's to repair.

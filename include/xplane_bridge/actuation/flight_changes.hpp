@@ -71,7 +71,9 @@ class FlightChanges {
 
   /// Puts back what X-Plane had before settings that were to end with the node. What cannot be sent stays in the
   /// journal, for the node's next start.
-  void restoreSettings();
+  void restoreSettings() { endSettings(true); }
+  /// X-Plane is another one, whose time and weather are its own user's: nothing of the last one's comes back.
+  void forgetSettings() { endSettings(false); }
 
   /// The change that is under way ends where it is, X-Plane resumed if it was paused for it, and so does every later
   /// one.
@@ -99,7 +101,8 @@ class FlightChanges {
   /// What went wrong; empty: nothing.
   std::string waitForAirport(const core::AirportStart& start, std::optional<core::ShownFlight>* shown);
   /// Paused or running as the first of both says, which were asked for on the way.
-  void pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who);
+  void endSettings(bool restore);
+  std::string pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who);
   std::string waitForMotion(const core::FlightStart& start, std::optional<core::ShownFlight>* shown);
   std::optional<core::ShownFlight> shownFlight();
   /// Sends them until X-Plane shows them; `done` is the text for when it does.

@@ -39,6 +39,7 @@ class FlightJobs {
   void setWind(const core::UniformWind& wind, std::uint32_t number, const std::string& who);
   /// See FlightChanges.
   void restoreSettings() { changes_.restoreSettings(); }
+  void forgetSettings() { changes_.forgetSettings(); }
   void setTime(const core::TimeSetting& time, std::uint32_t number, const std::string& who);
   void setWeather(const core::Weather& weather, std::uint32_t number, const std::string& who);
   void setAutopilot(const core::AutopilotSetting& setting, std::uint32_t number, const std::string& who);

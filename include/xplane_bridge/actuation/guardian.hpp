@@ -28,6 +28,9 @@ class Guardian {
   /// Starts the program override_guardian that lies beside this one, for the journal entries of this process.
   /// @throws std::runtime_error when it cannot be started
   void start();
+  /// Starts it once more where it has ended by itself (killed, out of memory); returns whether it had. To be called now
+  /// and then. @throws std::runtime_error when it cannot be started
+  bool restartIfEnded();
   /// Where X-Plane is, and what was changed there, from now on.
   void setPeer(const core::Endpoint& peer, const std::string& journal_path);
   /// This process runs, and beat() will be called again within `hang_timeout` [s]; to be called by the thread that must
@@ -49,6 +52,8 @@ class Guardian {
   int socket_ = -1;
   int child_ = -1;
   double last_beat_ = -1e9;  // [s] steady
+  bool wanted_ = false;      // from start() to dismiss()
+  std::string peer_line_;    // what setPeer() has sent last
 };
 
 /// What the parent has sent its guardian, line by line.

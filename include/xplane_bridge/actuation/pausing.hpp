@@ -27,8 +27,12 @@ extern const char* const kPausePurpose;
 /// To be called before such a pause, and once it is over. Throw core::JournalError.
 void recordPause(core::SimulatorPort* link);
 void forgetPause(core::SimulatorPort* link);
-/// Lets X-Plane go on that a crashed run has left paused. Waits up to `timeout_s` twice. Returns whether no such pause
-/// is left. Throws core::JournalError.
+/// Whether such a pause of this process is not over. Throws core::JournalError.
+bool isPauseOurs(core::SimulatorPort* link);
+/// Leaves it to resumeLeftovers(), as X-Plane has not been seen to go on. Throws core::JournalError.
+void leavePause(core::SimulatorPort* link);
+/// Lets X-Plane go on that a crashed run, or leavePause(), has left paused. Waits up to `timeout_s` twice. Returns
+/// whether no such pause is left. Throws core::JournalError.
 bool resumeLeftovers(core::SimulatorPort* link, double timeout_s);
 
 }  // namespace xplane_bridge

@@ -29,12 +29,10 @@ constexpr const char* kFuel = "sim/flightmodel/weight/m_fuel";
 constexpr const char* kPayload = "sim/flightmodel/weight/m_fixed";
 constexpr const char* kStations = "sim/flightmodel/weight/m_stations";
 constexpr std::size_t kStationCount = 9;
-constexpr const char* kCgOld = "sim/flightmodel/misc/cgz_ref_to_default";
-constexpr const char* kCg = "sim/flightmodel2/misc/cg_offset_z";
+// Without fuel in every version. 12.08's cg_offset_z, by which it is to be replaced, includes the fuel.
+constexpr const char* kCg = "sim/flightmodel/misc/cgz_ref_to_default";
 
 std::string element(const std::string& name, std::size_t i) { return name + "[" + std::to_string(i) + "]"; }
-
-bool isCg(const std::string& dataref) { return dataref == kCgOld || dataref == kCg; }
 
 }  // namespace
 
@@ -130,8 +128,7 @@ std::vector<DatarefWrite> stationWrites(double payload, const std::vector<Datare
 
 }  // namespace
 
-std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version,
-                                        const std::vector<DatarefValue>& stations) {
+std::vector<DatarefWrite> loadingWrites(const Loading& loading, const std::vector<DatarefValue>& stations) {
   std::vector<DatarefWrite> out;
   for (std::size_t i = 0; i < loading.fuel_tank.size(); ++i) {
     out.push_back({element(kFuel, i), static_cast<float>(loading.fuel_tank[i])});
@@ -141,16 +138,13 @@ std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion
     out.insert(out.end(), spread.begin(), spread.end());
     if (spread.empty()) out.push_back({kPayload, static_cast<float>(*loading.payload_mass)});
   }
-  if (loading.cg_offset) {
-    const char* const name = version.number >= kFirstOf1208 ? kCg : kCgOld;
-    out.push_back({name, static_cast<float>(*loading.cg_offset)});
-  }
+  if (loading.cg_offset) out.push_back({kCg, static_cast<float>(*loading.cg_offset)});
   return out;
 }
 
 bool matches(const DatarefWrite& loading, double shown) {
   const auto wanted = static_cast<double>(loading.value);
-  const double tolerance = isCg(loading.dataref) ? kCgTolerance : kMassTolerance + kMassShare * wanted;
+  const double tolerance = loading.dataref == kCg ? kCgTolerance : kMassTolerance + kMassShare * wanted;
   return std::abs(shown - wanted) <= tolerance;
 }
 

@@ -221,4 +221,9 @@ std::vector<SettingWrite> weatherWrites(const Weather& weather, SimulatorVersion
   return sheet.take();
 }
 
+std::optional<std::string> cloudCommand(const Weather& weather, SimulatorVersion version) {
+  if (!weather.clouds || !hasRegions(version)) return std::nullopt;
+  return "sim/operation/regen_weather";
+}
+
 }  // namespace xplane_bridge::core

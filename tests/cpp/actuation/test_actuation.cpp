@@ -98,6 +98,26 @@ TEST_F(ActuationTest, AnotherXPlaneIsNotLeftWithTheTrafficOfTheLast) {
   EXPECT_TRUE(actuation_->control().overrides.empty());
 }
 
+TEST_F(ActuationTest, AFailureThatIsArmedEndsWithItsXPlaneHoweverLongTheNextOneHasRun) {
+  const std::string time = "sim/time/total_running_time_sec";
+  sim_.set(kEngineFailure, 0.0F);
+  sim_.set(time, 20.0F);
+  actuation_->onLink(sim_.status());
+  run(3.0);
+  ASSERT_TRUE(actuation_->failures().set({"engine_1", "failed", {}, 1, 100.0}, "test").code ==
+              core::ResultCode::kAccepted);
+  sim_.setState(core::LinkState::kLost);
+  actuation_->onLink(sim_.status());
+  for (int i = 0; i < 90; ++i) sim_.frame(1.0);
+  sim_.set(time, 60.0F);  // more than the last one's, which ran for 90 s meanwhile
+  sim_.set(kFlightTime, 0.5F);
+  sim_.setState(core::LinkState::kConnected);
+  actuation_->onLink(sim_.status());
+  run(0.5);
+  EXPECT_TRUE(actuation_->failures().snapshot().labels.empty());
+  EXPECT_EQ(eventsOf(EventKind::kFailure).back().text, "failure of engine_1 has ended: X-Plane was restarted");
+}
+
 TEST_F(ActuationTest, NewFlightIsReportedAndEndsAuto) {
   actuation_->path().requestMode({1, 2, "test", 0.0});
   ASSERT_EQ(actuation_->control().mode.mode, core::FlightMode::kAuto);

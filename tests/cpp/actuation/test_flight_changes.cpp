@@ -32,6 +32,67 @@ TEST_F(FlightChangesTest, ItsPauseIsInTheJournalWhileItLasts) {
   EXPECT_TRUE(entries().empty());
 }
 
+/// So that the flight goes on where its message, an answer or the simulator fails for a while.
+class FlightChangesResume : public FlightChangesTest {
+ protected:
+  void expectItGoesOn() {
+    EXPECT_FALSE(flight_.paused());
+    EXPECT_TRUE(sim_.journal()->entries().empty());
+  }
+};
+
+TEST_F(FlightChangesResume, IsAskedForAgainWhereItIsLost) {
+  int toggles = 0;
+  const auto obey = sim_.on_message;
+  sim_.on_message = [&](const core::FakeSimulator::Message& message) {
+    if (message.label == "CMND" && ++toggles == 2) return;
+    obey(message);
+  };
+  expectPlaced(place());
+  EXPECT_EQ(toggles, 3);
+  expectItGoesOn();
+}
+
+TEST_F(FlightChangesResume, IsAskedForAgainAfterASilence) {
+  std::optional<double> from;
+  const auto on_frame = sim_.on_frame;
+  sim_.on_frame = [&] {
+    if (!from && flight_.sent("PREL") == 1 && at("local_vx") == 70.0F) from = sim_.time();
+    const bool silent = from && sim_.time() > *from + 0.01 && sim_.time() < *from + 1.5;
+    const bool was_silent = sim_.status().state == LinkState::kStale;
+    if (silent && !was_silent) sim_.setState(LinkState::kStale);
+    if (silent) return;
+    if (was_silent) sim_.setState(flight_.paused() ? LinkState::kPaused : LinkState::kConnected);
+    on_frame();
+  };
+  expectPlaced(place());
+  ASSERT_TRUE(from);
+  expectItGoesOn();
+}
+
+TEST_F(FlightChangesResume, IsLeftToWhoReleasesLeftoversWhereXPlaneIsAway) {
+  flight_.load_time = 45.0;  // longer than is waited for it, and for the pause's end
+  const auto outcome = place();
+  EXPECT_FALSE(outcome.success);
+  EXPECT_NE(outcome.text.find("but X-Plane does not show that it goes on"), std::string::npos) << outcome.text;
+  sim_.run(30.0);
+  ASSERT_TRUE(flight_.paused());
+  OverrideManager overrides(&sim_, [](const std::string&, bool) {});
+  std::string problem;
+  EXPECT_TRUE(giveBackLeftovers(&sim_, &overrides, 1.0, &problem)) << problem;
+  expectItGoesOn();
+}
+
+TEST_F(FlightChangesResume, ThePauseOfTheLastOneIsNotTakenForTheUsers) {
+  flight_.load_time = 45.0;
+  EXPECT_FALSE(place().success);
+  sim_.run(30.0);
+  ASSERT_TRUE(flight_.paused());
+  flight_.load_time = 0.0;
+  expectPlaced(place());
+  expectItGoesOn();
+}
+
 TEST_F(FlightChangesTest, PauseOfTheUsersIsNotInTheJournal) {
   flight_.setPaused(true);
   sim_.run(0.1);

@@ -187,7 +187,9 @@ TEST_F(TrafficControlTest, LeavesWhatAnotherClientHasGivenBack) {
   overrides_.releasedByOthers();
   fly(0.1);
   EXPECT_TRUE(traffic.numbers().empty());
-  EXPECT_EQ(traffic.command({poseOf(3)}, now()), "");
+  EXPECT_EQ(
+      traffic.command({poseOf(3)}, now()),
+      "aircraft 3 released by another client: not placed until a command leaves them out, and a later one names them");
   EXPECT_EQ(sim_.value(kOverride3), 0.0F) << "as long as its source goes on";
   EXPECT_EQ(traffic.command({}, now()), "");
   EXPECT_EQ(traffic.command({poseOf(3)}, now()), "");

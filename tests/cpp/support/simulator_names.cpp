@@ -148,11 +148,12 @@ class Uses {
     for (const auto& settings : {weatherWrites(weather, version_), timeWrites(time)}) {
       for (const SettingWrite& each : settings) set({each.write});
     }
+    if (const auto command = cloudCommand(weather, version_)) print("command", *command, "");
     Loading loading;
     loading.fuel_tank.assign(9, 10.0);
     loading.payload_mass = 100.0;
     loading.cg_offset = 0.1;
-    set(loadingWrites(loading, version_));
+    set(loadingWrites(loading));
     for (const std::string& station : stationDatarefs(version_)) set({{station, 1.0F}});
     const std::vector<std::string> flight = shownFlightDatarefs(version_);
     readAll(flight);

@@ -41,7 +41,7 @@ bool matches(const UniformWind& wind, const std::vector<DatarefValue>& values);
 struct Loading {
   std::vector<double> fuel_tank;       ///< [kg] by tank
   std::optional<double> payload_mass;  ///< [kg]
-  std::optional<double> cg_offset;     ///< [m] aft +
+  std::optional<double> cg_offset;     ///< [m] without fuel, aft +
 };
 
 std::optional<std::string> check(const Loading& loading);
@@ -50,12 +50,9 @@ std::vector<std::string> stationDatarefs(SimulatorVersion version);
 /// What is sent. The balance comes last: X-Plane moves it with the masses.
 /// @param stations values of stationDatarefs(): the payload is spread as it is now, or put on the first one where none
 /// is loaded; without them, or where one is not known, it is written as a sum
-std::vector<DatarefWrite> loadingWrites(const Loading& loading, SimulatorVersion version,
-                                        const std::vector<DatarefValue>& stations = {});
+std::vector<DatarefWrite> loadingWrites(const Loading& loading, const std::vector<DatarefValue>& stations = {});
 /// What X-Plane must show once it took it: the payload as a sum, which the stations make in X-Plane 12.
-inline std::vector<DatarefWrite> loadingShown(const Loading& loading, SimulatorVersion version) {
-  return loadingWrites(loading, version);
-}
+inline std::vector<DatarefWrite> loadingShown(const Loading& loading) { return loadingWrites(loading); }
 /// One of loadingShown() is shown [? stations]; engines burn fuel meanwhile.
 bool matches(const DatarefWrite& loading, double shown);
 

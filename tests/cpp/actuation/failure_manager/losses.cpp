@@ -88,5 +88,16 @@ TEST_F(FailureManagerTest, RepairedByTheOverrideManagerNothingIsLabelled) {
   EXPECT_TRUE(published_[0].labels.empty());
 }
 
+TEST_F(FailureManagerTest, OneThatIsGivenBackWhileItIsWaitedForIsNotShown) {
+  sim_.setReadOnly(kEngine);
+  after(0.3, [this] {
+    overrides_.giveBackAll();
+    failures_.repaired();
+  });
+  const RequestResult result = set(failed("engine_1"));
+  EXPECT_EQ(result.code, ResultCode::kTimeout);
+  EXPECT_EQ(result.text, "everything was given back meanwhile");
+}
+
 }  // namespace
 }  // namespace xplane_bridge

@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "fake_flight.hpp"
 #include "xplane_bridge/actuation/flight_changes.hpp"
+#include "xplane_bridge/actuation/release_worker.hpp"
 
 namespace xplane_bridge {
 

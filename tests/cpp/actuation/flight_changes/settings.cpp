@@ -106,6 +106,22 @@ TEST_F(FlightChangesTest, SettingsThatEndWithTheNodeAreInTheJournalAndComeBack) 
   EXPECT_TRUE(sim_.journal()->entries().empty());
 }
 
+TEST_F(FlightChangesTest, SettingsOfTheLastXPlaneAreNotPutIntoAnotherOne) {
+  const std::string name = "sim/weather/temperature_sealevel_c", real = "sim/weather/use_real_weather_bool";
+  sim_.set(name, 15.0F);
+  sim_.set(real, 1.0F);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  changes_.forgetSettings();
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+  sim_.set(name, -5.0F);
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  EXPECT_EQ(sim_.value(name), -5.0F) << "its own user's";
+}
+
 TEST_F(FlightChangesTest, SettingsStayWithoutRestoreOnExit) {
   const std::string name = "sim/weather/temperature_sealevel_c";
   sim_.set(name, 15.0F);
@@ -115,6 +131,16 @@ TEST_F(FlightChangesTest, SettingsStayWithoutRestoreOnExit) {
   changes_.restoreSettings();
   sim_.run(0.1);
   EXPECT_EQ(sim_.value(name), 30.0F);
+}
+
+TEST_F(FlightChangesTest12, CloudsAreMadeAnewOnceTheyAreShown) {
+  const core::CloudLayer layer{1000.0, 1800.0, 0.5, 2};
+  core::Weather weather;
+  weather.clouds = {layer, layer, layer};
+  for (const auto& each : core::weatherWrites(weather, core::kXPlane12)) sim_.set(each.write.dataref, 0.0F);
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  EXPECT_EQ(sim_.commands(), Names{"sim/operation/regen_weather"});
+  EXPECT_EQ(sim_.value("sim/weather/region/cloud_type[2]"), 2.0F) << "before that";
 }
 
 TEST_F(FlightChangesTest, WhatCouldNotBePutBackIsNotChanged) {

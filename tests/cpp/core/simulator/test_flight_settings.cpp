@@ -72,18 +72,16 @@ TEST(LoadingTest, WritesOnlyWhatIsGiven) {
   EXPECT_TRUE(check(loading)) << "nothing";
   loading.fuel_tank = {50.0, 60.0};
   EXPECT_FALSE(check(loading));
-  auto writes = loadingWrites(loading, kXPlane11);
+  auto writes = loadingWrites(loading);
   ASSERT_EQ(writes.size(), 2u);
   EXPECT_EQ(writes[1].dataref, "sim/flightmodel/weight/m_fuel[1]");
   EXPECT_EQ(writes[1].value, 60.0F);
   loading.payload_mass = 100.0;
   loading.cg_offset = 0.1;
-  writes = loadingWrites(loading, kXPlane11);
+  writes = loadingWrites(loading);
   ASSERT_EQ(writes.size(), 4u);
   EXPECT_EQ(writes[2].dataref, "sim/flightmodel/weight/m_fixed");
-  EXPECT_EQ(writes[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default");
-  EXPECT_EQ(loadingWrites(loading, SimulatorVersion{120000})[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default");
-  EXPECT_EQ(loadingWrites(loading, kXPlane12)[3].dataref, "sim/flightmodel2/misc/cg_offset_z");
+  EXPECT_EQ(writes[3].dataref, "sim/flightmodel/misc/cgz_ref_to_default") << "cg_offset_z has the fuel in it";
 }
 
 TEST(LoadingTest, SpreadsThePayloadOverStationsAsItIs) {
@@ -96,21 +94,21 @@ TEST(LoadingTest, SpreadsThePayloadOverStationsAsItIs) {
   std::vector<DatarefValue> stations(9, 0.0F);
   stations[1] = 30.0F;
   stations[4] = 10.0F;
-  auto writes = loadingWrites(loading, kXPlane12, stations);
+  auto writes = loadingWrites(loading, stations);
   ASSERT_EQ(writes.size(), 10u);
   EXPECT_EQ(writes[0].value, 0.0F);
   EXPECT_EQ(writes[1].dataref, "sim/flightmodel/weight/m_stations[1]");
   EXPECT_EQ(writes[1].value, 150.0F) << "three quarters";
   EXPECT_EQ(writes[4].value, 50.0F);
-  EXPECT_EQ(writes[9].dataref, "sim/flightmodel2/misc/cg_offset_z") << "last";
-  writes = loadingWrites(loading, kXPlane12, std::vector<DatarefValue>(9, 0.0F));
+  EXPECT_EQ(writes[9].dataref, "sim/flightmodel/misc/cgz_ref_to_default") << "last";
+  writes = loadingWrites(loading, std::vector<DatarefValue>(9, 0.0F));
   EXPECT_EQ(writes[0].value, 200.0F) << "on the first one where none is loaded";
   EXPECT_EQ(writes[1].value, 0.0F);
   stations[8].reset();
-  writes = loadingWrites(loading, kXPlane12, stations);
+  writes = loadingWrites(loading, stations);
   ASSERT_EQ(writes.size(), 2u);
   EXPECT_EQ(writes[0].dataref, "sim/flightmodel/weight/m_fixed") << "they are not known";
-  const auto shown = loadingShown(loading, kXPlane12);
+  const auto shown = loadingShown(loading);
   ASSERT_EQ(shown.size(), 2u);
   EXPECT_EQ(shown[0].dataref, "sim/flightmodel/weight/m_fixed");
   EXPECT_EQ(shown[0].value, 200.0F);

@@ -74,7 +74,10 @@ TEST(Weather, OnlyWhatIsGivenIsSent) {
   calm.sea_level_temperature = 20.0;
   EXPECT_EQ(weatherWrites(calm, kXPlane11).size(), 2U);
   Weather clear;
+  EXPECT_FALSE(cloudCommand(clear, SimulatorVersion{121000})) << "no clouds are asked for";
   clear.clouds.emplace();
+  EXPECT_EQ(cloudCommand(clear, SimulatorVersion{121000}).value_or(""), "sim/operation/regen_weather");
+  EXPECT_FALSE(cloudCommand(clear, kXPlane11)) << "they follow at once";
   const auto writes = asMap(weatherWrites(clear, k1208));
   for (const char* layer : {"[0]", "[1]", "[2]"}) {
     EXPECT_EQ(writes.at(std::string("sim/weather/region/cloud_coverage_percent") + layer), 0.0F);
