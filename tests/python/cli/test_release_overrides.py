@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import json
+import re
 import socket
 import struct
 import subprocess
@@ -132,7 +133,19 @@ def test_all_says_where_nothing_can_be_sent(tmp_path: Path) -> None:
     done = release(tmp_path / "none.json", "--all", "--host", NO_WAY)
     assert done.returncode == 1
     assert done.stderr == ""
-    assert done.stdout.count("nothing can be sent there (Permission denied)") == 7
+    assert done.stdout.count("nothing can be sent there (Permission denied)") == 9
+
+
+def test_all_are_those_of_other_aircraft_and_of_the_engines_too(tmp_path: Path) -> None:
+    xplane = XPlane()
+    names = re.findall(r'"(sim/operation/override/override_[a-z_]+)"', TOOL.read_text("utf-8"))
+    aircraft = [f"sim/operation/override/override_planepath[{number}]" for number in range(20)]
+    xplane.values = {name: 1.0 for name in (*names, *aircraft, "sim/flightmodel/engine/ENGN_thro_override")}
+    done = release(tmp_path / "none.json", "--all", "--host", "127.0.0.1", "--port", str(xplane.port))
+    assert done.returncode == 0, done.stdout
+    assert xplane.values.pop("sim/flightmodel/engine/ENGN_thro_override") == -2.0  # what gives the levers back
+    assert set(xplane.values.values()) == {0.0}
+    assert "override_planepath[0..19]: released" in done.stdout
 
 
 @pytest.mark.parametrize("in_the_way", [".lock", ".new"])
