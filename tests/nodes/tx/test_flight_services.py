@@ -24,7 +24,7 @@ POSITION = "sim/flightmodel/position/"
 WEIGHT = "sim/flightmodel/weight/"
 STICK = "sim/joystick/yoke_roll_ratio"
 OVERRIDE = "sim/operation/override/override_joystick_roll"
-CG = {11: "sim/flightmodel/misc/cgz_ref_to_default", 12: "sim/flightmodel2/misc/cg_offset_z"}
+CG = "sim/flightmodel/misc/cgz_ref_to_default"
 WIND = {
     11: ("sim/weather/wind_speed_kt", "sim/weather/wind_direction_degt"),
     12: ("sim/weather/aircraft/wind_now_speed_msc", "sim/weather/aircraft/wind_now_direction_degt"),
@@ -223,7 +223,7 @@ def test_loading_changes_weight_and_balance(flight):
     assert flight.other.read(WEIGHT + "m_total") == pytest.approx(before - 70.0, abs=1.0)
     done(flight, "set_loading", "SetLoading", payload_mass=250.0, cg_offset=0.05)
     assert flight.other.read(WEIGHT + "m_total") == pytest.approx(before - 20.0, abs=1.0)
-    assert flight.other.read(CG[flight.version]) == pytest.approx(0.05, abs=0.002)
+    assert flight.other.read(CG) == pytest.approx(0.05, abs=0.002)
     assert flight.other.read(WEIGHT + "m_fixed") == pytest.approx(250.0, abs=0.1)
     if flight.version == 12:  # half of it elsewhere: as it is spread stays as it is
         flight.other.send(*(protocol.DrefWrite(f"{WEIGHT}m_stations[{i}]", 125.0) for i in (0, 3)))

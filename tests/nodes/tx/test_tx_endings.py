@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from support import process_tree
 from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import (
     AUTO,
@@ -53,6 +54,24 @@ def test_overrides_are_released_however_it_ends(tx, world, end):
     code = node.wait(WAIT_S)
     if end != signal.SIGKILL:
         assert code == 0
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
+
+
+def test_a_guardian_that_is_killed_is_started_again(tx, world):
+    node = tx()
+    world.manual.fly(fields=ROLL, roll=0.5)
+    world.wire.wait(OVERRIDE, 1.0)
+
+    def guardians():
+        return [pid for pid in process_tree.named(process_tree.descendants(node.pid), "override_guard") if process_tree.alive(pid)]
+
+    (first,) = guardians()
+    os.kill(first, signal.SIGKILL)
+    world.wait_for_diagnostics("guardian", lambda status: "started again" in status.message)
+    assert guardians() not in ([], [first])
+    assert "its guardian process had ended" in node.output()
+    node.send_signal(signal.SIGKILL)
+    world.wire.wait(OVERRIDE, 0.0)
     wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
 
 
