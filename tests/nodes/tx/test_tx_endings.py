@@ -63,7 +63,8 @@ def test_a_guardian_that_is_killed_is_started_again(tx, world):
     world.wire.wait(OVERRIDE, 1.0)
 
     def guardians():
-        return [pid for pid in process_tree.named(process_tree.descendants(node.pid), "override_guard") if process_tree.alive(pid)]
+        found = process_tree.named(process_tree.descendants(node.pid), "override_guard")
+        return [pid for pid in found if process_tree.alive(pid)]
 
     (first,) = guardians()
     os.kill(first, signal.SIGKILL)

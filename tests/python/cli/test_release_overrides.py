@@ -140,7 +140,7 @@ def test_all_are_those_of_other_aircraft_and_of_the_engines_too(tmp_path: Path) 
     xplane = XPlane()
     names = re.findall(r'"(sim/operation/override/override_[a-z_]+)"', TOOL.read_text("utf-8"))
     aircraft = [f"sim/operation/override/override_planepath[{number}]" for number in range(20)]
-    xplane.values = {name: 1.0 for name in (*names, *aircraft, "sim/flightmodel/engine/ENGN_thro_override")}
+    xplane.values = dict.fromkeys((*names, *aircraft, "sim/flightmodel/engine/ENGN_thro_override"), 1.0)
     done = release(tmp_path / "none.json", "--all", "--host", "127.0.0.1", "--port", str(xplane.port))
     assert done.returncode == 0, done.stdout
     assert xplane.values.pop("sim/flightmodel/engine/ENGN_thro_override") == -2.0  # what gives the levers back

@@ -57,7 +57,7 @@ def _slip(flight: Flight) -> Answer:
     own = median(_sideslips(flight, samples))
     shown = median([sample[names.SLIP] for sample in samples])
     if abs(own) < _SLIP_DEG or abs(shown) < _BALL_DEG:
-        raise NotTestableError(f"full rudder makes {own:.1f} deg of sideslip and moves the ball by {shown:.1f} deg only")
+        raise NotTestableError(f"full rudder makes {own:.1f} deg of sideslip and moves the ball {shown:.1f} deg only")
     # A ball goes to the side that the wind comes from: from the left where the nose points right of the path.
     text = f"slip_deg is {shown:+.1f} deg with wind from the {'right' if own > 0.0 else 'left'}, {abs(own):.1f} deg"
     return judged(shown * own < 0.0, text, slip_deg=shown, sideslip_deg=own)

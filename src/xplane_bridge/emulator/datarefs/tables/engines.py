@@ -45,7 +45,8 @@ def define(t: Table, sim: Sources) -> None:
     if "reverse-lever" in sim.otherwise:
         t.setting(_ACTUATORS + "throttle_jet_rev_ratio")
     else:
-        lever, mode = (t.store.dataref(name).slots for name in (_ACTUATORS + "throttle_ratio", _ENGINE + "ENGN_propmode"))
+        lever = t.store.dataref(_ACTUATORS + "throttle_ratio").slots
+        mode = t.store.dataref(_ENGINE + "ENGN_propmode").slots
         lever, mode = lever[: len(mode)], mode[: len(lever)]
         t.array(
             _ACTUATORS + "throttle_jet_rev_ratio",
