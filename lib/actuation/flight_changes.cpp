@@ -109,13 +109,6 @@ bool FlightChanges::beginningIsVisible() {
 
 bool FlightChanges::isUp() const { return xplane_bridge::isUp(link_->status()); }
 
-std::string FlightChanges::linkCondition() const {
-  const core::LinkState state = link_->status().state;
-  if (state == core::LinkState::kPaused) return " (it is paused)";
-  if (state != core::LinkState::kConnected) return std::string(" (the link is ") + core::toString(state) + ")";
-  return "";
-}
-
 PauseOutcome FlightChanges::pause(bool paused, const std::string& who) {
   hooks_.pausing(who);
   const auto record = [this, paused] {
@@ -134,7 +127,7 @@ PauseOutcome FlightChanges::pause(bool paused, const std::string& who) {
 FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, const std::string& who) {
   const bool visible = movesAircraft() || beginningIsVisible();
   // Paused, so that the aircraft does not fly between place and motion. A new flight may begin in the other state.
-  const PauseOutcome before = pause(true, who);
+  const PauseOutcome before = firstPause(who);
   PauseOutcome again = PauseOutcome::kUnknown;
   std::optional<core::ShownFlight> shown;
   std::string problem = waitForPlacement(start, visible, &shown);
@@ -149,13 +142,19 @@ FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, cons
   return {core::EventKind::kReset, "the flight goes on at the place, attitude and speed asked for", true};
 }
 
+/// One that is found may be ours, of a change before.
+PauseOutcome FlightChanges::firstPause(const std::string& who) {
+  const bool ours = isPauseOurs(link_);
+  const PauseOutcome outcome = pause(true, who);
+  return ours ? PauseOutcome::kFollowed : outcome;
+}
+
 /// Returns what is to be said where X-Plane does not show it, however often it is asked for.
 std::string FlightChanges::pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who) {
-  // A silent X-Plane has not shown at first whether it was paused; and the pause found may be one of ours.
+  // A silent X-Plane has not shown at first whether it was paused.
   const PauseOutcome first = before == PauseOutcome::kUnknown ? again : before;
-  const bool ours = isPauseOurs(link_);
-  if (first == PauseOutcome::kUnknown && !ours) return "";
-  const bool paused = first == PauseOutcome::kWasSo && !ours;
+  if (first == PauseOutcome::kUnknown) return "";
+  const bool paused = first == PauseOutcome::kWasSo;
   const core::Deadline deadline = deadlineAfter(kPauseAgain);
   do {
     const PauseOutcome last = pause(paused, who);
@@ -262,7 +261,7 @@ FlightChanges::Outcome FlightChanges::placeAt(const core::AirportStart& asked, c
     return failed("the flight has only just begun, so X-Plane would not show a new one" + linkCondition() +
                   ": let it fly for a second, then ask again");
   }
-  const PauseOutcome before = pause(true, who);
+  const PauseOutcome before = firstPause(who);
   PauseOutcome again = PauseOutcome::kUnknown;
   std::optional<core::ShownFlight> shown;
   const std::string problem = waitForAirport(start, &shown);

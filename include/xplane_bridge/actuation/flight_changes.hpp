@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/actuation/pausing.hpp"
 #include "xplane_bridge/core/base/clock.hpp"
 #include "xplane_bridge/core/base/message_constants.hpp"
@@ -102,6 +103,7 @@ class FlightChanges {
   std::string waitForAirport(const core::AirportStart& start, std::optional<core::ShownFlight>* shown);
   /// Paused or running as the first of both says, which were asked for on the way.
   void endSettings(bool restore);
+  PauseOutcome firstPause(const std::string& who);
   std::string pauseAsBefore(PauseOutcome before, PauseOutcome again, const std::string& who);
   std::string waitForMotion(const core::FlightStart& start, std::optional<core::ShownFlight>* shown);
   std::optional<core::ShownFlight> shownFlight();
@@ -127,7 +129,7 @@ class FlightChanges {
   void write(const std::vector<core::DatarefWrite>& writes);
   bool isUp() const;
   /// Why X-Plane may not have shown it, for the end of a sentence; empty: no reason is known.
-  std::string linkCondition() const;
+  std::string linkCondition() const { return xplane_bridge::linkCondition(link_->status()); }
 
   core::SimulatorPort* link_;
   const FlightChangeOptions options_;

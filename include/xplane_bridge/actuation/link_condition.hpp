@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "xplane_bridge/actuation/request_result.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 
@@ -8,6 +10,14 @@ namespace xplane_bridge {
 /// X-Plane answers: what is sent now acts, and can be read back.
 inline bool isUp(const core::LinkStatus& status) {
   return status.state == core::LinkState::kConnected || status.state == core::LinkState::kPaused;
+}
+
+/// What is added to a failure while it does not run: " (it is paused)", " (the link is LOST)"; else nothing.
+inline std::string linkCondition(const core::LinkStatus& status) {
+  if (status.state == core::LinkState::kPaused) return " (it is paused)";
+  if (status.state != core::LinkState::kConnected)
+    return std::string(" (the link is ") + core::toString(status.state) + ")";
+  return "";
 }
 
 /// The answer to a request while it does not.

@@ -145,7 +145,11 @@ void addComputed(FieldGroup group, const core::ClockFilter& clock, MessageValues
       for (std::size_t left = 0; left < 8; left += 2) halves.push_back((f[set][left] - f[set][left + 1]) / 2.0);
     }
     f["delta_aileron"] = {meanOfMoving(halves)};
-    f["delta_elevator"] = {meanOfMoving(f["elevator"])};
+    auto elevators = f["elevator"];
+    for (const char* wings : {"wing_elevator1", "wing_elevator2"}) {
+      elevators.insert(elevators.end(), f[wings].begin(), f[wings].end());
+    }
+    f["delta_elevator"] = {meanOfMoving(elevators)};
     f["delta_rudder"] = {-meanOfMoving(f["rudder"])};
   } else if (group == FieldGroup::kAutopilot) {
     f["target_mach"] = f["target_airspeed"];  // airspeed_is_mach is a number above 0
