@@ -1,8 +1,11 @@
 #include "xplane_bridge/nodes/tx/actuation_diagnostics.hpp"
 
 #include <array>
+#include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <ros/console.h>
 
 #include "xplane_bridge/core/base/text.hpp"
 
@@ -88,6 +91,17 @@ void fillDiagnostics(const FailureSnapshot& failures, diagnostic_updater::Diagno
     status->summary(Level::WARN, "X-Plane does not show the failure of " + core::join(unconfirmed));
   } else {
     status->summary(Level::OK, broken.empty() ? "nothing is broken" : "broken: " + core::join(broken));
+  }
+}
+
+void watchGuardian(Guardian* guardian, diagnostic_updater::DiagnosticStatusWrapper* status) {
+  try {
+    if (!guardian->restartIfEnded()) return status->summary(Level::OK, "runs");
+    status->summary(Level::WARN, "had ended, and was started again");
+    ROS_WARN("its guardian process had ended, and was started again: until then a kill -9 would have left overrides");
+  } catch (const std::runtime_error& error) {
+    status->summary(Level::ERROR, std::string("has ended: after a kill -9 overrides stay held until the next start; ") +
+                                      error.what());
   }
 }
 

@@ -1,7 +1,6 @@
 #include "xplane_bridge/nodes/tx/tx_node.hpp"
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include <sensor_msgs/Joy.h>
@@ -223,25 +222,13 @@ void TxNode::advertiseDiagnostics() {
   addDiagnostics("control", [this](Status& status) {
     if (actuation_) fillDiagnostics(actuation_->control(), &status);
   });
-  addDiagnostics("guardian", [this](Status& status) { watchGuardian(&status); });
+  addDiagnostics("guardian", [this](Status& status) { watchGuardian(&guardian_, &status); });
   addDiagnostics("surfaces", [this](Status& status) {
     if (actuation_) fillDiagnostics(actuation_->surfaces().status(), &status);
   });
   addDiagnostics("failures", [this](Status& status) {
     if (actuation_) fillDiagnostics(actuation_->failures().snapshot(), &status);
   });
-}
-
-void TxNode::watchGuardian(diagnostic_updater::DiagnosticStatusWrapper* status) {
-  using Level = diagnostic_msgs::DiagnosticStatus;
-  try {
-    if (!guardian_.restartIfEnded()) return status->summary(Level::OK, "runs");
-    status->summary(Level::WARN, "had ended, and was started again");
-    ROS_WARN("its guardian process had ended, and was started again: until then a kill -9 would have left overrides");
-  } catch (const std::runtime_error& error) {
-    status->summary(Level::ERROR, std::string("has ended: after a kill -9 overrides stay held until the next start; ") +
-                                      error.what());
-  }
 }
 
 // --- lock-step: commands wait for the end of their frame, and the node's timers are its frames ---

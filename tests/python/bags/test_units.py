@@ -50,7 +50,7 @@ def test_units_of_elements_and_of_kinds_are_no_unit_of_all() -> None:
 float32[2] heat_on      # [0, 1] left, right
 float32[8] oil          # [deg C, or deg F by aircraft] temperature
 float32[] values        # [deg] angle of a stuck surface; [0..1] what remains; [deg/s] rate of a slow one; NaN else
-float32[] since         # [s] raw simulator time; sim/time[0]
+float32[] since         # [s] raw simulator time; sim/time/total_running_time_sec
 """
     units = parse_units(text, "pkg/State")
     assert (units["clock"].each, units["clock"].suffix) == (("h", "min", "s"), "")

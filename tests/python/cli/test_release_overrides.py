@@ -138,7 +138,7 @@ def test_all_says_where_nothing_can_be_sent(tmp_path: Path) -> None:
 
 def test_all_are_those_of_other_aircraft_and_of_the_engines_too(tmp_path: Path) -> None:
     xplane = XPlane()
-    names = re.findall(r'"(sim/operation/override/override_[a-z_]+)"', TOOL.read_text("utf-8"))
+    names = re.findall(r'\("(sim/operation/override/override_[a-z_]+)"', TOOL.read_text("utf-8"))
     aircraft = [f"sim/operation/override/override_planepath[{number}]" for number in range(20)]
     xplane.values = dict.fromkeys((*names, *aircraft, "sim/flightmodel/engine/ENGN_thro_override"), 1.0)
     done = release(tmp_path / "none.json", "--all", "--host", "127.0.0.1", "--port", str(xplane.port))

@@ -61,7 +61,6 @@ class TxNode : public BaseNode {
   void advertiseServices();
   void advertiseLockstep();
   void advertiseDiagnostics();
-  void watchGuardian(diagnostic_updater::DiagnosticStatusWrapper* status);
   /// A service below the node's name: TxServices::serve(), or another of its methods.
   template <class Service>
   void advertiseOwn(const std::string& service);
