@@ -27,7 +27,7 @@ def recorded_aircraft(passports: Sequence[Passport]) -> Recorded:
         why = "the recording does not say which aircraft was flown (no topic experiment)"
         return Recorded("", None, f"{why}: no coefficients; {_REMEDY}")
     if len(found) > 1:
-        names = ", then ".join(dict.fromkeys(_called(*each) for each in found))
+        names = ", then ".join(dict.fromkeys(loaded or file for loaded, file in found))
         return Recorded("", None, f"the recording is of several aircraft ({names}): no coefficients; {_REMEDY}")
     ((loaded, file),) = found
     name = _emulated(loaded)
@@ -36,7 +36,7 @@ def recorded_aircraft(passports: Sequence[Passport]) -> Recorded:
         name = file
     if name and name in geometry_names():
         return Recorded(name, geometry_of(name), "")
-    name = name or _called(loaded, file)
+    name = name or loaded or file
     why = f"config/geometry has no sizes of the recorded aircraft, {name or 'which the recording does not name'}"
     return Recorded(name, None, f"{why}: no coefficients; {_REMEDY}")
 
@@ -53,10 +53,6 @@ def named_geometry(aircraft: str) -> Geometry:
         msg = f"--aircraft {aircraft}: config/geometry has: {have}; give the sizes of another one with --geometry FILE"
         raise IdentificationError(msg)
     return found
-
-
-def _called(loaded: str, file: str) -> str:
-    return loaded or file
 
 
 def _emulated(loaded: str) -> str:

@@ -124,7 +124,7 @@ class WorldSettings:
 
     def _set_balance(self, _index: int, value: float) -> None:
         loaded = self._model().state
-        self._model().set_loading(cg_aft_m=value * loaded.mass_kg / (loaded.mass_kg - sum(loaded.fuel_kg)))
+        self._model().set_loading(cg_aft_m=value * loaded.mass_kg / loaded.dry_mass_kg)
 
     def _set_atmosphere(self, other: str, value: float) -> None:
         """Takes what was written; `other` is its second name, with the value there."""

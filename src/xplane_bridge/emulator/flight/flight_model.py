@@ -249,6 +249,11 @@ class ModelState:
         """Independent of this one."""
         return copy.deepcopy(self)
 
+    @property
+    def dry_mass_kg(self) -> float:
+        """Without fuel."""
+        return self.mass_kg - sum(self.fuel_kg)
+
 
 @dataclass(frozen=True)
 class InitialState:

@@ -33,15 +33,19 @@ def _sideslips(flight: Flight, samples: Sequence[Sample]) -> List[float]:
     return found
 
 
-def _beta(flight: Flight) -> Answer:
+def _slipping(flight: Flight, path: str) -> Tuple[List[float], List[float]]:
+    """Sideslips of a second with the rudder to the right, and what a dataref shows meanwhile."""
     flight.pilot.rudder = 0.4
     flight.wait(1.2)
-    samples = flight.fly((*names.ORIGIN_ANGLES, *names.LOCAL_VELOCITY, *flight.wind_now, names.BETA), 1.0)
-    own = _sideslips(flight, samples)
+    samples = flight.fly((*names.ORIGIN_ANGLES, *names.LOCAL_VELOCITY, *flight.wind_now, path), 1.0)
+    return _sideslips(flight, samples), [sample[path] for sample in samples]
+
+
+def _beta(flight: Flight) -> Answer:
+    own, shown = _slipping(flight, names.BETA)
     size = rms(own)
     if size < _SLIP_DEG:
         raise NotTestableError(f"full rudder makes {size:.1f} deg of sideslip only")
-    shown = [sample[names.BETA] for sample in samples]
     left = rms([a + b for a, b in zip(shown, own)])
     right = rms([a - b for a, b in zip(shown, own)])
     text = (
@@ -51,11 +55,7 @@ def _beta(flight: Flight) -> Answer:
 
 
 def _slip(flight: Flight) -> Answer:
-    flight.pilot.rudder = 0.4
-    flight.wait(1.2)
-    samples = flight.fly((*names.ORIGIN_ANGLES, *names.LOCAL_VELOCITY, *flight.wind_now, names.SLIP), 1.0)
-    own = median(_sideslips(flight, samples))
-    shown = median([sample[names.SLIP] for sample in samples])
+    own, shown = (median(each) for each in _slipping(flight, names.SLIP))
     if abs(own) < _SLIP_DEG or abs(shown) < _BALL_DEG:
         raise NotTestableError(f"full rudder makes {own:.1f} deg of sideslip and moves the ball {shown:.1f} deg only")
     # A ball goes to the side that the wind comes from: from the left where the nose points right of the path.

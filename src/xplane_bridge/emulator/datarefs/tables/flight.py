@@ -171,10 +171,7 @@ def _weights(t: Table, sim: Sources) -> None:
     t.value("sim/aircraft/weight/acf_m_max", lambda f: per_kg * _maximum_mass(f))
     # the list of 12.08 marks the old name as replaced
     # without fuel, whose tanks are at the reference point
-    t.value(
-        "sim/flightmodel/misc/cgz_ref_to_default",
-        lambda f: -f.m.cg_forward_m * f.m.mass_kg / (f.m.mass_kg - sum(f.m.fuel_kg)),
-    )
+    t.value("sim/flightmodel/misc/cgz_ref_to_default", lambda f: -f.m.cg_forward_m * f.m.mass_kg / f.m.dry_mass_kg)
     t.value("sim/flightmodel2/misc/cg_offset_z", lambda f: -f.m.cg_forward_m)
 
 
