@@ -37,7 +37,7 @@ def score(
 
     Args:
         criteria: Of the scenario.
-        time: Scenario time [s] of each sample, shape (n,), increasing; samples that repeat the one before do not count.
+        time: Scenario time [s] of each sample, shape (n,), increasing; each a frame of its own (`frames_of`).
         values: Variable to samples, shape (n,), in the units of scenarios.
         labels: Event label to the scenario time [s] at which it first happened.
         camera: ``paired`` and ``perfect`` shares; empty without camera.
@@ -45,20 +45,7 @@ def score(
     Returns:
         A score each. One that cannot be measured has not passed.
     """
-    if len(time) and criteria:
-        once = _first_of_frames(time, values)
-        if not once.all():
-            time, values = time[once], {name: samples[once] for name, samples in values.items()}
     return [_score(criterion, time, values, labels, camera) for criterion in criteria]
-
-
-def _first_of_frames(time: np.ndarray, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """A frame that a pause repeats is one sample. After a reset time stands, but what is seen is another flight."""
-    changed = np.diff(time) > 0.0
-    for samples in values.values():
-        before, after = samples[:-1], samples[1:]
-        changed |= ~((before == after) | (np.isnan(before) & np.isnan(after)))
-    return np.concatenate(([True], changed))
 
 
 def _score(

@@ -91,14 +91,6 @@ def test_final_angles_are_meant_the_short_way(variable: str, values: np.ndarray,
     assert -180.0 <= got < 360.0
 
 
-def test_a_frame_that_a_pause_repeats_counts_once() -> None:
-    time = np.arange(0.0, 10.0, 0.02)
-    paused = np.sort(np.concatenate([time, np.full(1000, time[-1])]))
-    criteria = [criterion(measure="rms", above=0.0), criterion(measure="final", above=0.0)]
-    found = [[each.value for each in score(criteria, t, {"roll": t.copy()}, {}, {})] for t in (time, paused)]
-    assert found[1] == found[0] == pytest.approx([np.sqrt(np.mean(time**2)), np.mean(time[-51:])])
-
-
 def test_a_window_that_the_flight_did_not_reach_is_not_measured() -> None:
     held = criterion(measure="rms", start=0.0, end=60.0, below=6.0)
     got = one(held, 0 * T)  # T ends at 20 s
