@@ -14,6 +14,10 @@ _WRAPPING = {"roll": -180.0, "heading": 0.0}
 _BEFORE_END_S = 0.1
 #: Windows are that much wider, so that it does not hang on the last bit of a time whether a sample lies in them [s].
 _EDGE_S = 5e-4
+#: Share of the samples a measure looks at that must be known: variables may be unknown a while, as alpha at standstill.
+_LEAST_KNOWN = 0.5
+#: What `final` looks at [s].
+_FINAL_S = 1.0
 
 
 class Score(NamedTuple):
@@ -38,7 +42,7 @@ def score(
     Args:
         criteria: Of the scenario.
         time: Scenario time [s] of each sample, shape (n,), increasing; each a frame of its own (`frames_of`).
-        values: Variable to samples, shape (n,), in the units of scenarios.
+        values: Variable to samples, shape (n,), in the units of scenarios; NaN where it is not known.
         labels: Event label to the scenario time [s] at which it first happened.
         camera: ``paired`` and ``perfect`` shares; empty without camera.
 
@@ -68,21 +72,59 @@ def _score(
     else:
         end = labels[criterion.end] if isinstance(criterion.end, str) else criterion.end
         ended = float(time[-1]) if len(time) else 0.0
-        if end - ended > max([_BEFORE_END_S, *(2.0 * np.diff(time[-2:]))]):
+        if end - ended > _tolerance(time):
             return _unmeasured(criterion, f"the flight ended at {ended:g} s, before {end:g} s")
     inside = (time >= start - _EDGE_S) & (time <= end + _EDGE_S)
     window, samples = time[inside], values[criterion.variable][inside]
-    good = np.isfinite(samples)
-    window, samples = window[good], samples[good]
-    if len(samples) < 2:
+    known = np.isfinite(samples)
+    if np.count_nonzero(known) < 2:
         return _unmeasured(criterion, f"no samples between {start:g} s and {end:g} s")
+    problem = _unknown(criterion, window, known)
+    if problem:
+        return _unmeasured(criterion, problem)
     return _judged(criterion, _measure(criterion, window, samples))
 
 
+def _unknown(criterion: Criterion, time: np.ndarray, known: np.ndarray) -> str:
+    """Why what is known of a window does not do for a measure; empty when it does."""
+    moments, tolerance = time[known], _tolerance(time)
+    name = criterion.variable
+    if criterion.measure == "overshoot" and moments[0] - time[0] > tolerance:
+        return f"{name} is known from {moments[0]:g} s; expected it where the window begins, at {time[0]:g} s"
+    if criterion.measure in ("settling", "final") and time[-1] - moments[-1] > tolerance:
+        return f"{name} is known until {moments[-1]:g} s; expected it where the window ends, at {time[-1]:g} s"
+    if criterion.measure == "final":
+        last = _last_second(time)
+        time, known = time[last], known[last]
+    share = float(np.mean(known))
+    if share < _LEAST_KNOWN:
+        return (
+            f"{name} is known in {100.0 * share:.0f} % of the samples between {time[0]:g} s and "
+            f"{time[-1]:g} s; expected {100.0 * _LEAST_KNOWN:.0f} % or more"
+        )
+    return ""
+
+
+def _tolerance(time: np.ndarray) -> float:
+    """How long a variable may be unknown as if it were not [s]."""
+    return float(max([_BEFORE_END_S, *(2.0 * np.diff(time[-2:]))]))
+
+
+def _last_second(time: np.ndarray) -> np.ndarray:
+    last: np.ndarray = time >= time[-1] - _FINAL_S - _EDGE_S
+    return last
+
+
 def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> float:
+    """Of a window of which enough is known."""
     error = values - criterion.target
     if criterion.variable in _WRAPPING:
         error = (error + 180.0) % 360.0 - 180.0
+    if criterion.measure == "settling":
+        return _settling(time, error, criterion.band)
+    if criterion.measure == "final":
+        time, values = time[_last_second(time)], values[_last_second(time)]
+    error, values = error[np.isfinite(error)], values[np.isfinite(values)]
     if criterion.measure == "rms":
         return float(np.sqrt(np.mean(error**2)))
     if criterion.measure == "peak":
@@ -91,16 +133,23 @@ def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> floa
         # Where it begins on the target, both sides lie beyond it.
         beyond = np.abs(error) if error[0] == 0.0 else -np.sign(error[0]) * error
         return max(0.0, float(beyond.max()))
-    if criterion.measure == "settling":
-        outside = np.flatnonzero(np.abs(error) > criterion.band)
-        if not len(outside):
-            return 0.0
-        if outside[-1] == len(error) - 1:
-            return float("inf")
-        return float(time[outside[-1] + 1] - time[0])
     if criterion.measure == "final":
-        return _mean(criterion.variable, values[time >= time[-1] - 1.0 - _EDGE_S])
+        return _mean(criterion.variable, values)
     return float(values.min() if criterion.measure == "minimum" else values.max())
+
+
+def _settling(time: np.ndarray, error: np.ndarray, band: float) -> float:
+    """From when on it stays within the band: where it is not known for a while, it may have left it."""
+    known = np.flatnonzero(np.isfinite(error))
+    outside = np.flatnonzero(np.abs(error[known]) > band)
+    if len(outside) and outside[-1] == len(known) - 1:
+        return float("inf")
+    begin = int(outside[-1]) + 1 if len(outside) else 0
+    gaps = np.flatnonzero((np.diff(known) > 1) & (np.diff(time[known]) > _tolerance(time)))
+    if len(gaps):
+        begin = max(begin, int(gaps[-1]) + 1)
+    seen = time[known[begin]] - time[0]
+    return float(seen) if begin or seen > _tolerance(time) else 0.0
 
 
 def _mean(variable: str, values: np.ndarray) -> float:

@@ -113,3 +113,52 @@ def test_what_cannot_be_measured_has_not_passed() -> None:
     assert not camera.passed
     good = score([Criterion("p", "paired", above=0.9)], T, {}, {}, {"paired": 0.99})[0]
     assert good.passed
+
+
+def unknown(begin: float, end: float) -> np.ndarray:
+    return np.where((begin <= T) & (end > T), np.nan, 0.0)
+
+
+@pytest.mark.parametrize("measure", ["rms", "peak", "overshoot", "settling", "minimum", "maximum"])
+def test_half_of_a_window_must_be_known(measure: str) -> None:
+    demand = criterion(measure=measure, start=0.0, end=10.0, band=1.0, above=-1.0, below=50.0)
+    got = one(demand, unknown(1.0, 9.0))
+    assert not got.passed
+    assert got.text.endswith("; roll is known in 20 % of the samples between 0 s and 10 s; expected 50 % or more")
+    assert one(demand, unknown(3.0, 7.0)).passed
+    assert one(demand, unknown(10.1, 20.0)).passed  # outside of the window
+
+
+@pytest.mark.parametrize("measure", ["settling", "final"])
+def test_the_end_of_a_window_must_be_known_where_it_is_what_counts(measure: str) -> None:
+    demand = criterion(measure=measure, band=1.0, above=-1.0, below=50.0)
+    got = one(demand, unknown(12.0, 99.0))
+    assert not got.passed
+    assert got.text.endswith("; roll is known until 11.99 s; expected it where the window ends, at 20 s")
+    assert one(demand, unknown(19.95, 99.0)).passed  # a few states
+    assert one(criterion(measure="rms", below=1.0), unknown(12.0, 99.0)).passed
+
+
+def test_final_is_of_the_last_second_of_the_window_whatever_was_known_before() -> None:
+    demand = criterion(measure="final", below=50.0)
+    assert one(demand, T + unknown(0.0, 18.0)).value == pytest.approx(19.5)
+    assert one(demand, T + unknown(0.0, 19.5)).value == pytest.approx(19.75)
+    got = one(demand, T + unknown(0.0, 19.9))
+    assert not got.passed
+    assert got.text.endswith("; roll is known in 11 % of the samples between 19 s and 20 s; expected 50 % or more")
+
+
+def test_overshoot_takes_the_start_of_the_window() -> None:
+    got = one(criterion(measure="overshoot", below=50.0), unknown(0.0, 5.0))
+    assert not got.passed
+    assert got.text.endswith("; roll is known from 5 s; expected it where the window begins, at 0 s")
+
+
+def test_settling_takes_unknown_time_for_outside_of_the_band() -> None:
+    demand = criterion(measure="settling", band=1.0, below=50.0)
+    assert one(demand, unknown(0.0, 5.0)).value == pytest.approx(5.0)
+    assert one(demand, unknown(8.0, 9.0)).value == pytest.approx(9.0)
+    assert one(demand, np.where(T < 3.0, 5.0, unknown(8.0, 9.0))).value == pytest.approx(9.0)
+    assert one(demand, np.where(T < 10.0, 5.0, 0.0) + unknown(8.0, 9.0)).value == pytest.approx(10.0)
+    for few in (unknown(0.0, 0.05), unknown(8.0, 8.05)):
+        assert one(demand, few).value == 0.0
