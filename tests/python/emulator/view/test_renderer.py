@@ -54,6 +54,18 @@ def test_points_appear_where_geometry_puts_them(changes: dict, u: float, v: floa
     assert pixel(replace(LEVEL, **changes), 100.0, 1000.0, 0.0) == pytest.approx((u, v), abs=1e-2)
 
 
+@pytest.mark.parametrize(("vertical_deg", "roll_deg"), [(0.0, 0.0), (30.0, 0.0), (30.0, 20.0)])
+def test_the_ladder_of_the_head_up_display_lies_on_the_horizon(vertical_deg: float, roll_deg: float) -> None:
+    scene = replace(LEVEL, pitch_deg=2.0, roll_deg=roll_deg, vertical_field_of_view_deg=vertical_deg)
+    plain, drawn = (Painter(640, 480, ANCHOR, strip=False, hud=hud).paint(scene).astype(int) for hud in (False, True))
+    changed = np.abs(drawn - plain).max(axis=2) > 40
+    camera = Camera(scene, (640, 480), ANCHOR)
+    for right in (-0.08, 0.08):  # left and right of the ladder's numbers, within its long line
+        at = camera.project(camera.directions_to_camera(np.array(((right, 1.0, 0.0),))))[0]
+        u, v = np.round(at).astype(int)
+        assert changed[v - 2 : v + 3, u].any()
+
+
 def test_pitch_moves_the_horizon_down() -> None:
     # The horizon lies on the eye's own height far away: pitch 10 deg up puts it f tan(10 deg) below the middle.
     far = pixel(replace(LEVEL, pitch_deg=10.0), 0.0, 1e6, 100.0)

@@ -276,11 +276,11 @@ class Painter:
         turn = math.radians(scene.roll_deg)
         along, down = np.array((math.cos(turn), -math.sin(turn))), np.array((math.sin(turn), math.cos(turn)))
         for step in range(-20, 21, 5):
-            offset = math.tan(math.radians(max(-60.0, min(60.0, scene.pitch_deg - step)))) * camera.focal
-            middle = np.array(camera.centre) + down * offset
+            offset = math.tan(math.radians(max(-60.0, min(60.0, scene.pitch_deg - step))))
+            middle = np.array(camera.centre) + down * offset * camera.focals
             if np.hypot(*(middle - camera.centre)) > 0.35 * height:
                 continue
-            half = along * (0.16 if step == 0 else 0.07) * width
+            half = along * (0.16 if step == 0 else 0.07) * width * camera.focals / camera.focal
             ends = [tuple(int(v) for v in middle + sign * half) for sign in (-1, 1)]
             cv2.line(self._picture, ends[0], ends[1], green, thick, cv2.LINE_AA)
             if step:
