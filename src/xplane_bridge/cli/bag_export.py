@@ -63,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="0..1",
         help=f"default: {usual.train_share}",
     )
-    data.add_argument("--seed", type=int, help=f"of the draw with --split-by flight (default: {usual.seed})")
+    data.add_argument("--seed", type=int, help=f"of the draw of --split-by flight (default: {usual.seed})")
     data.add_argument(
         "--labels",
         type=Path,
@@ -110,6 +110,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         if getattr(args, option) is not None and needed not in FORMATS[args.format].options:
             having = ", ".join(name for name, form in FORMATS.items() if needed in form.options)
             p.error(f"--{option.replace('_', '-')} is not for {args.format}; it is for {having}")
+    if args.seed is not None and args.split_by != "flight":
+        p.error(f"--seed {args.seed}: nothing is drawn without --split-by flight: the first part of each flight trains")
     jobs = _jobs(args, output)
     campaign.make_folder(output)
     run = (

@@ -242,6 +242,8 @@ def test_errors_are_one_line(
         (["--split-by", "time", "--format", "tum"], "--split-by is not for tum; it is for imagefolder"),
         (["--seed", "0", "--format", "npz"], "--seed is not for npz; it is for imagefolder"),
         (["--keep-bad-frames", "--format", "mcap"], "--keep-bad-frames is not for mcap; it is for imagefolder"),
+        (["--seed", "3", "--format", "coco"], "--seed 3: nothing is drawn without --split-by flight"),
+        (["--seed", "3", "--split-by", "time", "--format", "coco"], "--seed 3: nothing is drawn without --split-by"),
     ],
 )
 def test_options_of_data_sets_are_refused_by_other_formats(
