@@ -1,6 +1,8 @@
 #include "xplane_bridge/core/state/air_data.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 #include "xplane_bridge/core/base/units.hpp"
@@ -8,9 +10,13 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kTroposphereLapse = 0.0065;  // [K/m]
-constexpr double kTropopause = 11000.0;       // [m]
-constexpr double kTropopauseTemperature = kSeaLevelTemperature - kTroposphereLapse * kTropopause;
+/// A layer of the standard atmosphere, from its base up to the next one.
+struct Layer {
+  double base;   // [m] geopotential
+  double lapse;  // [K/m] by which it gets colder with height
+};
+constexpr std::array<Layer, 5> kLayers{
+    {{0.0, 0.0065}, {11000.0, 0.0}, {20000.0, -0.001}, {32000.0, -0.0028}, {47000.0, 0.0}}};
 
 /// Impact pressure over static pressure at a Mach number; above 1 behind the shock ahead of the tube (Rayleigh).
 double impactRatio(double mach) {
@@ -23,15 +29,26 @@ double impactRatio(double mach) {
 
 double pressureAltitude(double static_pressure) {
   if (!(static_pressure > 0.0)) return std::numeric_limits<double>::quiet_NaN();
-  const double exponent = kStandardGravity / (kAirGasConstant * kTroposphereLapse);
-  const double tropopause_pressure =
-      kSeaLevelPressure * std::pow(kTropopauseTemperature / kSeaLevelTemperature, exponent);
-  if (static_pressure >= tropopause_pressure) {
-    return kSeaLevelTemperature / kTroposphereLapse *
-           (1.0 - std::pow(static_pressure / kSeaLevelPressure, 1.0 / exponent));
+  double temperature = kSeaLevelTemperature;  // [K] and [Pa] at the base of the layer
+  double pressure = kSeaLevelPressure;
+  for (std::size_t k = 0;; ++k) {
+    const auto [base, lapse] = kLayers.at(k);
+    const double exponent = lapse == 0.0 ? 0.0 : kStandardGravity / (kAirGasConstant * lapse);
+    const double scale_height = kAirGasConstant * temperature / kStandardGravity;  // [m] where lapse is 0
+    if (k + 1 < kLayers.size()) {
+      const double thickness = kLayers.at(k + 1).base - base;
+      const double above = temperature - lapse * thickness;
+      const double pressure_above = lapse == 0.0 ? pressure * std::exp(-thickness / scale_height)
+                                                 : pressure * std::pow(above / temperature, exponent);
+      if (static_pressure < pressure_above) {
+        temperature = above;
+        pressure = pressure_above;
+        continue;
+      }
+    }
+    if (lapse == 0.0) return base + scale_height * std::log(pressure / static_pressure);
+    return base + temperature / lapse * (1.0 - std::pow(static_pressure / pressure, 1.0 / exponent));
   }
-  return kTropopause +
-         kAirGasConstant * kTropopauseTemperature / kStandardGravity * std::log(tropopause_pressure / static_pressure);
 }
 
 double equivalentAirspeed(double true_airspeed, double air_density) {

@@ -1,7 +1,7 @@
 #pragma once
 
 /// @file
-/// Standard atmosphere (ICAO Doc 7488, below 20 km) and compressible air data. SI units.
+/// Standard atmosphere (ICAO Doc 7488, up to 51 km) and compressible air data. SI units.
 
 namespace xplane_bridge::core {
 

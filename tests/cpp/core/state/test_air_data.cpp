@@ -16,6 +16,10 @@ TEST(PressureAltitude, MatchesTheStandardAtmosphere) {
   EXPECT_NEAR(pressureAltitude(54019.9), 5000.0, 0.5);
   EXPECT_NEAR(pressureAltitude(22632.1), 11000.0, 0.5);
   EXPECT_NEAR(pressureAltitude(12044.6), 15000.0, 1.0);
+  EXPECT_NEAR(pressureAltitude(2511.02), 25000.0, 1.0);
+  EXPECT_NEAR(pressureAltitude(868.019), 32000.0, 1.0);
+  EXPECT_NEAR(pressureAltitude(277.52), 40000.0, 2.0);
+  EXPECT_NEAR(pressureAltitude(110.906), 47000.0, 2.0);
   EXPECT_LT(pressureAltitude(103000.0), -100.0);
 }
 
