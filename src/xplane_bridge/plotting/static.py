@@ -70,12 +70,12 @@ def _path(figure: PathFigure) -> Figure:
     east, north, up, colour = (values[index] for values in (figure.east, figure.north, figure.up, figure.colour))
     if figure.in_space:
         axes = made.add_subplot(projection="3d")
-        axes.plot(figure.east, figure.north, figure.up, color="0.6", linewidth=0.6)
+        axes.plot(east, north, up, color="0.6", linewidth=0.6)
         dots = axes.scatter(east, north, up, c=colour, s=3)
         axes.set_zlabel("altitude MSL [m]")
     else:
         axes = made.add_subplot()
-        axes.plot(figure.east, figure.north, color="0.6", linewidth=0.6)
+        axes.plot(east, north, color="0.6", linewidth=0.6)
         dots = axes.scatter(east, north, c=colour, s=4)
         axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("east [m]")
