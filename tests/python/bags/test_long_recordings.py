@@ -116,11 +116,15 @@ def test_a_full_disk_is_named(tmp_path: Path, recordings: Dict[float, Path], mon
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", READERS)
 def test_an_hour_of_all_topics_and_pictures_is_read_within_its_memory(tmp_path: Path, name: str) -> None:
-    """What a minute more takes, times the minutes of an hour; `scripts/bench bag_memory` measures the hour itself."""
+    """What a minute more takes, times the minutes of an hour; `scripts/bench bag_memory` measures the hour itself.
+
+    So does this of a report: its first minutes take more than later ones, until its figures have all their points.
+    """
+    minutes = (60.0,) if name == "report" else (4.0, 8.0)
     peaks = []
-    for minutes in (4.0, 8.0):
-        bag = tmp_path / f"{minutes:g}.bag"
-        assert write_long_recording(bag, 60.0 * minutes) > 60e6 * minutes
+    for length in minutes:
+        bag = tmp_path / f"{length:g}.bag"
+        assert write_long_recording(bag, 60.0 * length) > 60e6 * length
         peaks.append(peak_mb(name, bag, tmp_path / "out"))
         bag.unlink()
-    assert peaks[0] + 56.0 * (peaks[1] - peaks[0]) / 4.0 < MEGABYTES
+    assert peaks[0] + (60.0 - minutes[0]) * (peaks[-1] - peaks[0]) / 4.0 < MEGABYTES
