@@ -110,10 +110,8 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
 
 void FailureManager::onFrame(const core::FlightWatch& watch) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  const double before = flight_.sim_time;
   flight_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
   if (stopped_) return;
-  if (flight_.sim_time < before - core::kOvertaking) onRestart();
   for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
 }
 

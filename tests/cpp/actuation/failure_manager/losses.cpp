@@ -50,6 +50,7 @@ TEST_F(FailureManagerTest, RestartedXPlaneHasNothingBroken) {
   sim_.setAll({kEngine, kSurfaceOverride}, 0.0F);
   failures_.onLink(sim_.status());
   surfaces_.onLink(sim_.status());
+  failures_.onRestart();
   sim_.run(0.1);
   EXPECT_TRUE(labelNames().empty());
   EXPECT_TRUE(reported("failure of engine_1 has ended: X-Plane was restarted", "", true));
