@@ -175,6 +175,7 @@ void FailureManager::watchOwn() {
 
 void FailureManager::undo(const core::FailurePlan& plan) {
   pending_.erase(plan.name);
+  obeyed_.erase(plan.name);
   repaired_since_.erase(plan.name);
   repair(plan.datarefs);
 }
@@ -271,7 +272,11 @@ bool FailureManager::settled(Pending* pending) {
   if (!pending->plan.surface || !pending->expected_deg) return settle();
   const double off = surfaces_->readBack(pending->plan.surface->surface) - *pending->expected_deg;
   if (now() - pending->confirmed < kBehaviourWait) return false;
-  if (std::abs(off) <= kBehaviourDeg) return settle();
+  if (std::abs(off) <= kBehaviourDeg) {
+    // A surface that stands still by itself looks stuck: only its later moves tell.
+    obeyed_[name] = {*pending, surfaces_->readBack(pending->plan.surface->surface), now()};
+    return settle();
+  }
   pending->since = now();
   useDriver(*pending);
   return false;
@@ -285,6 +290,23 @@ void FailureManager::watchPending() {
     if (it == pending_.end() || !settled(&it->second)) continue;
     pending_.erase(name);
     dirty_ = true;
+  }
+}
+
+void FailureManager::watchObeyed() {
+  std::vector<std::string> names;
+  for (auto& [name, obeyed] : obeyed_) {
+    const double off = surfaces_->readBack(obeyed.failure.plan.surface->surface) - obeyed.angle_deg;
+    if (!(std::abs(off) > kBehaviourDeg)) obeyed.last = now();
+    if (now() - obeyed.last >= kBehaviourWait) names.push_back(name);
+  }
+  for (const std::string& name : names) {
+    Pending pending = obeyed_.at(name).failure;
+    pending.expected_deg = obeyed_.at(name).angle_deg;
+    pending.since = now();
+    obeyed_.erase(name);
+    pending_[name] = pending;
+    useDriver(pending);
   }
 }
 
@@ -313,12 +335,14 @@ void FailureManager::tick() {
   if (link_status_.state == core::LinkState::kConnected) {
     watchPending();
     watchRepairs();
+    watchObeyed();
   } else {
     // Time stands still for what X-Plane has to show.
     for (auto& [name, pending] : pending_) {
       pending.since = time;
       if (pending.confirmed >= 0.0) pending.confirmed = time;
     }
+    for (auto& [name, obeyed] : obeyed_) obeyed.last = time;
   }
   if (dirty_ || published_driving_ != surfaces_->driving() || time - publish_time_ >= kPublishPeriod) publishLocked();
 }
@@ -333,6 +357,7 @@ void FailureManager::repaired() {
   registry_.clear({}, false);
   for (const auto& [name, pending] : pending_) not_shown_[name] = "everything was given back meanwhile";
   pending_.clear();
+  obeyed_.clear();
 }
 
 void FailureManager::publish() {

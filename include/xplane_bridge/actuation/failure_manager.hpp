@@ -83,6 +83,13 @@ class FailureManager {
     std::optional<double> expected_deg;  // where X-Plane's own failure must bring the surface
   };
 
+  /// X-Plane's own failure of a surface, which stood where it says; kept as long as it lasts.
+  struct Obeyed {
+    Pending failure;
+    double angle_deg = 0.0;
+    double last = 0.0;  // [s] steady: the surface was there
+  };
+
   static constexpr double kBehaviourWait = 1.0;  // [s] in which X-Plane's own failure must move the surface as it says
 
   static std::string described(const core::FailurePlan& plan);
@@ -93,6 +100,7 @@ class FailureManager {
   void useDriver(const Pending& pending);
   bool settled(Pending* pending);
   void watchPending();
+  void watchObeyed();
   void watchRepairs();
   void undo(const core::FailurePlan& plan);
   void repair(const std::vector<std::string>& datarefs);
@@ -129,6 +137,7 @@ class FailureManager {
   bool dirty_ = true;           // labels changed since they were published
   bool published_driving_ = false;
   std::map<std::string, Pending> pending_;
+  std::map<std::string, Obeyed> obeyed_;
   std::map<std::string, std::string> asked_by_;   // by name: who asked for it
   std::map<std::string, std::string> not_shown_;  // by name: those that ended, and why; for await()
   std::map<std::string, double> undone_;          // [s] steady, by dataref: when it was repaired here

@@ -39,6 +39,33 @@ TEST_F(FailureManagerTest12, DriverTakesOverWhereXPlanesOwnFailureDoesNotAct) {
   EXPECT_TRUE(label(FakeAirframe::kLeft).confirmed);
 }
 
+TEST_F(FailureManagerTest12, DriverTakesOverWhenASurfaceThatStoodStillMovesLater) {
+  airframe_.setStick(0.25);
+  sim_.run(0.1);
+  require(broken(FakeAirframe::kLeft, "stuck"));
+  EXPECT_EQ(state(), SurfaceControlState::kIdle) << "it looks stuck";
+  airframe_.setStick(0.5);
+  sim_.run(0.5);
+  airframe_.setStick(0.25);  // not for long
+  sim_.run(2.0);
+  EXPECT_EQ(state(), SurfaceControlState::kIdle);
+  airframe_.setStick(0.5);
+  sim_.run(1.5);
+  EXPECT_TRUE(
+      reported("aileron1_wing2_left: X-Plane's own failure does not act as it says, so that tx_node drives the "
+               "surfaces",
+               kWho, true));
+  EXPECT_EQ(sim_.value(kLock), 0.0F) << "it is repaired";
+  EXPECT_EQ(state(), SurfaceControlState::kDriving);
+  EXPECT_NEAR(sim_.value(kLeft), 5.0, 1e-4);
+  EXPECT_NEAR(sim_.value(kRight), -10.0, 1e-4);
+  EXPECT_TRUE(label(FakeAirframe::kLeft).confirmed);
+  requireClear();
+  airframe_.setStick(0.1);
+  sim_.run(2.0);
+  EXPECT_EQ(state(), SurfaceControlState::kIdle) << "nothing of it is left";
+}
+
 TEST_F(FailureManagerTest12, DriverTakesOverWhereXPlaneDoesNotShowItsFailure) {
   sim_.setReadOnly(kLock);
   const double begin = sim_.time();
