@@ -91,7 +91,7 @@ class _Block(NamedTuple):
 def _search(path: Path, ident: str) -> tuple[Optional[Airport], int]:
     """Find an airport in a file; gives how many there are up to it, too."""
     count = 0
-    by_code: Optional[Airport] = None
+    by_code: Optional[_Block] = None
     try:
         with path.open(encoding="utf-8-sig", errors="replace", newline=None) as file:
             lines = enumerate(file, 1)
@@ -102,11 +102,11 @@ def _search(path: Path, ident: str) -> tuple[Optional[Airport], int]:
                 if len(first) > 4 and first[4].upper() == ident:
                     return _airport(path, version, block), count
                 if by_code is None and _code(block) == ident:
-                    by_code = _airport(path, version, block)
+                    by_code = block  # not read yet: it may be no airport, and the identifier still come
     except OSError as error:
         msg = f"{path}: {error.strerror}"
         raise AptError(msg) from None
-    return by_code, count
+    return None if by_code is None else _airport(path, version, by_code), count
 
 
 def _version(path: Path, lines: Iterable[tuple[int, str]]) -> int:

@@ -62,6 +62,15 @@ def test_an_icao_code_of_the_metadata_counts_too(tmp_path: Path) -> None:
     assert read_airport([written(tmp_path, FILE)], "KICA").ident == "KAAA"
 
 
+def test_a_heliport_with_the_code_does_not_hide_the_airport_of_that_name(tmp_path: Path) -> None:
+    heliport = "17 10 0 0 XHEL Heliport of it\n1302 icao_code KAAA\n\n"
+    at = FILE.index("1   1185")
+    airport = read_airport([written(tmp_path, FILE[:at] + heliport + FILE[at:])], "KAAA")
+    assert (airport.ident, airport.name) == ("KAAA", "First airport")
+    with pytest.raises(AptError, match=r"line 4: XHEL has no land runway"):
+        read_airport([written(tmp_path, FILE[:at] + heliport + "99\n")], "KAAA")
+
+
 def test_files_are_looked_through_in_their_order(tmp_path: Path) -> None:
     mine = written(tmp_path, FILE.replace("First airport", "Mine"), "mine.dat")
     other = written(tmp_path, FILE.replace("KAAA", "KBBB"), "other.dat")
