@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import List, Tuple
+from typing import Any, List, Mapping, Tuple
 
 from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands
 from xplane_bridge.emulator.flight.frame import Frame
@@ -37,6 +37,8 @@ class ScenarioPilot:
             for kind, value in event.actions:
                 if kind == "failure":
                     failure_dataref(value["name"])
+                    if in_part(value):
+                        raise ScenarioError(in_part(value))
                 if kind == "excitation" and "," in value["target"]:
                     raise ScenarioError(
                         "excitation: the emulator's pilot moves one axis; tx_node moves several at once"
@@ -104,6 +106,17 @@ def failure_dataref(name: str) -> str:
     raise ScenarioError(
         f"failure {name!r}: the emulator's pilot can only fail rel_* datarefs, engine_N, generator_N, battery_N, "
         f"bus_N, pitot_N, static_N and gyro_N; surfaces fail through tx_node (set_failure)"
+    )
+
+
+def in_part(failure: Mapping[str, Any]) -> str:
+    """Why a system cannot fail as a `failure` asks for it; empty when it can."""
+    kind, value = failure["kind"], failure["value"]
+    if failure["clear"] or (kind == "failed" and value is None):
+        return ""
+    return (
+        f"failure {failure['name']!r}: kind {kind}, value {value}; expected kind failed, and no value: a system works "
+        "or does not"
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any, Dict, Mapping, Set
 
 from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, SurfaceFault, SurfaceFaultKind
-from xplane_bridge.emulator.scenario_pilot import failure_dataref
+from xplane_bridge.emulator.scenario_pilot import failure_dataref, in_part
 from xplane_bridge.errors import XplaneBridgeError
 
 _WING = re.compile(r"(aileron|spoiler|flap|yaw_brake)(\d?)_wing(\d)_(left|right)")
@@ -81,11 +81,8 @@ class Failures:
             )
         if failure["clear"]:
             self._systems.discard(leaf)
-        elif kind != "failed" or failure["value"] is not None:
-            raise NotFlownError(
-                f"failure {name!r}: kind {kind}, value {failure['value']}; expected kind failed, and no value: a "
-                "system works or does not"
-            )
+        elif in_part(failure):
+            raise NotFlownError(in_part(failure))
         else:
             self._systems.add(leaf)
 

@@ -481,6 +481,9 @@ def test_pilot_fails_an_engine(tmp_path):
 def test_pilot_refuses_what_it_cannot_do():
     with pytest.raises(ScenarioError, match="surfaces fail through tx_node"):
         ScenarioPilot(scenario({"at": 0, "failure": {"name": "aileron1_wing2_left", "kind": "stuck", "value": 5}}))
+    for more in ({"kind": "reduced", "value": 0.5}, {"value": 1}):
+        with pytest.raises(ScenarioError, match=r"engine_1.*expected kind failed, and no value: a system works"):
+            ScenarioPilot(scenario({"at": 0, "failure": {"name": "engine_1", **more}}))
 
 
 @pytest.mark.parametrize("target", ["throttle", "aileron1_wing2_left", "roll,pitch"])
