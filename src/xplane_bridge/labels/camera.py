@@ -54,6 +54,8 @@ class Camera:
         to_optical: Rotation from the world's axes to right, down, forward.
         place: [m] in the world.
         height: [m MSL]
+        focal: [px] the mean of both axes: what sigmas are by
+        focals: [px] across and down
     """
 
     def __init__(self, world: World, pose: Pose, optics: Optics) -> None:
@@ -67,6 +69,7 @@ class Camera:
         self.to_optical: np.ndarray = self.ned_to_optical @ level
         self._velocity = self.ned_to_optical @ pose.velocity
         self.focal = 0.5 * (optics.fx + optics.fy)
+        self.focals: np.ndarray = np.array((optics.fx, optics.fy))
 
     def optical(self, places: np.ndarray) -> np.ndarray:
         """Places (n, 3) of the world as right, down, forward of the camera [m]."""

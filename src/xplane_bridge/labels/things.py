@@ -206,11 +206,11 @@ class Labeller:
             camera.sigma(math.inf, optical, 0.0, 0.0),
             camera.focal * (_SUN_SIGMA if sun.origin else _SUN_SIGMA_NO_ORIGIN),
         )
-        radius = camera.focal * math.tan(_SUN_RADIUS) / float(optical[2])
+        radii = camera.focals * math.tan(_SUN_RADIUS) / float(optical[2])
         return {
             "kind": "sun",
             "centre": _rounded(pixel)[0],
-            "box": _in_picture(camera, _ball(pixel[0], radius)),
+            "box": _in_picture(camera, _ball(pixel[0], radii)),
             **_sure([sigma]),
         }
 
@@ -221,8 +221,8 @@ class Labeller:
         if optical[2] <= NEAR_M or distance > self._farthest_seen(camera.height, other.altitude):
             return None
         centre = camera.pixels(optical[np.newaxis])[0]
-        radius = camera.focal * 0.5 * other.span / float(optical[2])
-        whole = _ball(centre, radius)
+        radii = camera.focals * 0.5 * other.span / float(optical[2])
+        whole = _ball(centre, radii)
         box = _in_picture(camera, whole)
         if box[0] >= box[2] or box[1] >= box[3]:
             return None
@@ -232,7 +232,7 @@ class Labeller:
             "centre": _rounded(centre[np.newaxis])[0],
             "distance_m": round(distance, 1),
             "box": box,
-            "size_px": round(2.0 * radius, 3),
+            "size_px": round(2.0 * float(radii.max()), 3),
             "state": "visible" if box == whole else "cut",
             "seen": "geometric",  # terrain, clouds and the own cockpit stand before it
             **_sure([camera.sigma(distance, optical / distance, other.sigma, other.sigma)]),
@@ -287,8 +287,8 @@ def _box(pixels: np.ndarray) -> list[float]:
     return [round(float(part), 3) for part in (*pixels.min(axis=0), *pixels.max(axis=0))]
 
 
-def _ball(centre: np.ndarray, radius: float) -> list[float]:
-    return _box(np.stack((centre - radius, centre + radius)))
+def _ball(centre: np.ndarray, radii: np.ndarray) -> list[float]:
+    return _box(np.stack((centre - radii, centre + radii)))
 
 
 def _in_picture(camera: Camera, box: Sequence[float]) -> list[float]:

@@ -173,6 +173,16 @@ def test_sun_and_other_aircraft() -> None:
     assert "aircraft" not in labelled(camera, others=[behind])
 
 
+def test_boxes_of_balls_are_by_the_focal_length_of_each_axis() -> None:
+    """A window of 16:9 stretched to 4:3: what is round is a third higher than wide."""
+    camera = Camera(Sphere(), pose(-2000.0, 250.0), OPTICS._replace(fy=F * 4 / 3))
+    seen = labelled(camera, sun=Sun(3.0, 90.0), others=[Other("1", 0.0, 0.0, 250.0, 0.0)])
+    for kind, width in (("aircraft", F * 12.0 / 2000.0), ("sun", 2 * F * math.tan(math.radians(0.265)))):
+        left, top, right, bottom = seen[kind]["box"]
+        assert (right - left, bottom - top) == pytest.approx((width, width * 4 / 3), rel=3e-3), kind
+    assert seen["aircraft"]["size_px"] == pytest.approx(F * 12.0 / 2000.0 * 4 / 3, abs=1e-3)
+
+
 def test_x_planes_own_numbers_hold_on_the_sphere() -> None:
     """KMWH in X-Plane 11: latitude, longitude and local x, z of one place, by another project; WGS 84 is 45 m off."""
     sphere = Sphere()
