@@ -199,20 +199,17 @@ class Labeller:
         pose = camera.pose
         level = self._world.level(*(sun.origin or (pose.latitude, pose.longitude)))
         optical = camera.to_optical @ level.T @ ned
-        pixel = camera.pixels(optical[np.newaxis])
-        if optical[2] <= 0.0 or not camera.inside(pixel)[0]:
+        if optical[2] <= 0.0:
+            return None
+        centre = camera.pixels(optical[np.newaxis])[0]
+        seen = _seen_ball(camera, centre, camera.focals * math.tan(_SUN_RADIUS) / float(optical[2]))
+        if seen is None:
             return None
         sigma = math.hypot(
             camera.sigma(math.inf, optical, 0.0, 0.0),
             camera.focal * (_SUN_SIGMA if sun.origin else _SUN_SIGMA_NO_ORIGIN),
         )
-        radii = camera.focals * math.tan(_SUN_RADIUS) / float(optical[2])
-        return {
-            "kind": "sun",
-            "centre": _rounded(pixel)[0],
-            "box": _in_picture(camera, _ball(pixel[0], radii)),
-            **_sure([sigma]),
-        }
+        return {"kind": "sun", "centre": _rounded(centre[np.newaxis])[0], **seen, **_sure([sigma])}
 
     def _other(self, camera: Camera, other: Other) -> Optional[dict[str, Any]]:
         place = self._world.place(other.latitude, other.longitude, other.altitude)
@@ -222,18 +219,16 @@ class Labeller:
             return None
         centre = camera.pixels(optical[np.newaxis])[0]
         radii = camera.focals * 0.5 * other.span / float(optical[2])
-        whole = _ball(centre, radii)
-        box = _in_picture(camera, whole)
-        if box[0] >= box[2] or box[1] >= box[3]:
+        seen = _seen_ball(camera, centre, radii)
+        if seen is None:
             return None
         return {
             "kind": "aircraft",
             "name": other.name,
             "centre": _rounded(centre[np.newaxis])[0],
             "distance_m": round(distance, 1),
-            "box": box,
+            **seen,
             "size_px": round(2.0 * float(radii.max()), 3),
-            "state": "visible" if box == whole else "cut",
             "seen": "geometric",  # terrain, clouds and the own cockpit stand before it
             **_sure([camera.sigma(distance, optical / distance, other.sigma, other.sigma)]),
         }
@@ -287,13 +282,14 @@ def _box(pixels: np.ndarray) -> list[float]:
     return [round(float(part), 3) for part in (*pixels.min(axis=0), *pixels.max(axis=0))]
 
 
-def _ball(centre: np.ndarray, radii: np.ndarray) -> list[float]:
-    return _box(np.stack((centre - radii, centre + radii)))
-
-
-def _in_picture(camera: Camera, box: Sequence[float]) -> list[float]:
+def _seen_ball(camera: Camera, centre: np.ndarray, radii: np.ndarray) -> Optional[dict[str, Any]]:
+    """The box of a ball's part that is in the picture, and whether that is all of it; None where none is."""
+    whole = np.stack((centre - radii, centre + radii))
     high = np.array((camera.optics.width, camera.optics.height)) - 0.5
-    return _box(np.clip(np.reshape(box, (2, 2)), -0.5, high))
+    part = np.clip(whole, -0.5, high)
+    if (part[0] >= part[1]).any():
+        return None
+    return {"box": _box(part), "state": "visible" if (part == whole).all() else "cut"}
 
 
 def _rounded(pixels: np.ndarray) -> list[list[float]]:

@@ -173,6 +173,21 @@ def test_sun_and_other_aircraft() -> None:
     assert "aircraft" not in labelled(camera, others=[behind])
 
 
+def test_a_sun_that_is_partly_in_the_picture_is_labelled() -> None:
+    camera = Camera(Sphere(), pose(-2000.0, 250.0), OPTICS)
+    origin = (0.0, math.degrees(-2000.0 / R))
+    border = math.degrees(math.atan(240.0 / F))  # of the picture's upper side
+    for above, state in ((-0.4, "visible"), (-0.1, "cut"), (0.1, "cut"), (0.4, None)):
+        sun = labelled(camera, sun=Sun(border + above, 90.0, origin)).get("sun")
+        assert (sun and sun["state"]) == state, above
+        if sun:
+            cosine = math.cos(math.radians(border))
+            radius, below = F * math.radians(0.265) / cosine, -F * math.radians(above) / cosine**2
+            assert sun["box"][3] - sun["box"][1] == pytest.approx(radius + min(radius, below), rel=0.03)
+            assert sun["box"][1] >= -0.5
+            assert (sun["centre"][1] > -0.5) == (above < 0.0)
+
+
 def test_boxes_of_balls_are_by_the_focal_length_of_each_axis() -> None:
     """A window of 16:9 stretched to 4:3: what is round is a third higher than wide."""
     camera = Camera(Sphere(), pose(-2000.0, 250.0), OPTICS._replace(fy=F * 4 / 3))
