@@ -9,13 +9,15 @@ import numpy as np
 from gymnasium import spaces
 
 from xplane_bridge.emulator.aircraft import create_model
-from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
+from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState, TrimError
+from xplane_bridge.emulator.flight.limits import check_turbulence
 from xplane_bridge.errors import is_number
 from xplane_bridge.gym.episodes import Episode, Episodes
 from xplane_bridge.gym.errors import GymError
 from xplane_bridge.gym.flights import Flight, InProcessFlight
 from xplane_bridge.gym.spaces import DEFAULT_AXES, DEFAULT_FIELDS, Commander, Observer
 from xplane_bridge.gym.tasks import Task
+from xplane_bridge.in_process.aircraft import Conditions, initial_state
 
 OVERSPEED = "faster than the never-exceed speed"
 TIME = "time is up"
@@ -112,7 +114,7 @@ class FlyEnv(gymnasium.Env[Any, Any]):
             options: Keys of `episode`, for this episode alone.
 
         Raises:
-            FlightModelError: The aircraft cannot fly like this; of a start that is drawn, in none of 20 draws.
+            FlightModelError: The aircraft cannot fly like this; where that hangs on what is drawn, in none of 20 draws.
             GymError, CampaignError, NotFlownError, ScenarioError: An option makes no sense.
         """
         super().reset(seed=seed)
@@ -174,10 +176,13 @@ class FlyEnv(gymnasium.Env[Any, Any]):
                 self._flight.begin(drawn)
                 break
             except FlightModelError as error:
+                if draws == 1 or (isinstance(error, TrimError) and not episodes.trims_vary):
+                    raise
+                wrong = _refusal(episodes.undrawn()) if draw == 1 else None
+                if wrong is not None:
+                    raise wrong from None
                 if draw < draws:
                     continue
-                if draws == 1:
-                    raise
                 raise FlightModelError(
                     f"{error} (the last of {draws} draws, none of which can be flown: narrow the distributions of "
                     "episode)"
@@ -211,6 +216,18 @@ class FlyEnv(gymnasium.Env[Any, Any]):
             raise GymError("render: no episode has begun; call reset first")
         picture: np.ndarray = self._cameras[width, height].picture(self._flight.truth)
         return picture
+
+
+def _refusal(conditions: Conditions) -> Optional[FlightModelError]:
+    """What is wrong with a number of these, whatever the others are; None: nothing."""
+    try:
+        check_turbulence(conditions.weather.get("turbulence", 0.0))
+        conditions.model().reset(initial_state(conditions.start))
+    except TrimError:
+        return None
+    except FlightModelError as error:
+        return error
+    return None
 
 
 def _flight(bridge: Optional[str]) -> Flight:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple, Union
 
 import numpy as np
 
@@ -21,6 +21,9 @@ _FAILURE_KEYS = ("name", "kind", "value", "at")
 #: Shares drawn for a failure: of its name, kind, value and time.
 _FAILURE_SHARES = len(_FAILURE_KEYS)
 _MOST_SEED = 2**31
+#: What a steady flight hangs on; where the aircraft stands over the ground also the wind against it.
+_TRIMMED = ("on_ground", "altitude", "speed", "temperature_offset", "sea_level_pressure", *LOADING)
+_HOVERED = ("heading", "wind_speed", "wind_from")
 
 _Chosen = Union[float, str, Sequence[float], Parameter]
 
@@ -118,7 +121,24 @@ class Episodes:
     @property
     def vary(self) -> bool:
         """Whether start, weather or loading are drawn, so that the next may be another."""
-        return any(isinstance(chosen, Parameter) for chosen in self._chosen.values())
+        return bool(self._drawn())
+
+    @property
+    def trims_vary(self) -> bool:
+        """Whether the next may be a steady flight where this one is none."""
+        hovers = self._info.hover_thrust_vector is not None or self._info.stall_mps == 0.0
+        return not self._drawn().isdisjoint((*_TRIMMED, *_HOVERED) if hovers else _TRIMMED)
+
+    def undrawn(self) -> Conditions:
+        """What is given as numbers, without what is drawn and without what has no meaning of its own beside that."""
+        out = self._drawn()
+        out |= {"altitude", "speed"} if "on_ground" in out else set()
+        out |= {"cg_aft"} if "payload" in out else set()
+        given = {key: value for key, value in self._given.items() if key in KEYS and key not in out}
+        return Episodes(self._info, self._frame_rate, given).draw(np.random.default_rng(0)).conditions
+
+    def _drawn(self) -> Set[str]:
+        return {key for key, chosen in self._chosen.items() if isinstance(chosen, Parameter)}
 
     def draw(self, random: np.random.Generator) -> Episode:
         """The next episode. As many numbers are drawn whatever is fixed: fixing one thing changes no other."""

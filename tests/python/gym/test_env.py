@@ -153,6 +153,41 @@ def test_a_start_that_no_draw_makes_fly_is_reported() -> None:
     assert "draws" not in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    ("drawn", "options", "text"),
+    [
+        ("speed", {"turbulence": -1}, "turbulence of -1"),
+        ("speed", {"latitude": 200}, "latitude_deg=200.* the latitude within"),
+        ("speed", {"altitude": 0}, "cannot start in the air at 0"),
+        ("altitude", {"speed": 200}, "airspeed 200"),
+        ("payload", {"fuel": 900}, "fuel .*900"),
+        ("roll", {"altitude": 20000}, "no steady flight found"),
+        ("wind_speed", {"altitude": 20000}, "no steady flight found"),
+    ],
+)
+def test_a_wrong_number_is_an_error_at_once_whatever_is_drawn(drawn: str, options: dict, text: str) -> None:
+    env = FlyEnv(episode={drawn: {"uniform": [60, 61]}})
+    with pytest.raises(FlightModelError, match=text) as raised:
+        env.reset(seed=1, options=options)
+    assert "draws" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("aircraft", "episode"),
+    [
+        ("fixed_wing", {"on_ground": {"choice": [1, 0]}, "altitude": 0, "speed": 0}),
+        ("fixed_wing", {"payload": {"choice": [0, 300]}, "cg_aft": 0.25}),
+        ("fixed_wing", {"speed": {"choice": [35, 75]}, "altitude": 4500}),
+        ("multirotor", {"wind_speed": {"choice": [90, 0]}}),
+        ("fixed_wing", {"wind_speed": {"choice": [-5, 5]}, "altitude": 500}),
+    ],
+)
+def test_a_number_that_goes_with_some_draws_waits_for_them(aircraft: str, episode: dict) -> None:
+    env = FlyEnv(aircraft, episode=episode)
+    for seed in range(4):
+        env.reset(seed=seed)
+
+
 def test_fixing_one_thing_changes_no_other_draw() -> None:
     env = FlyEnv(episode={key: {"uniform": [0, 9]} for key in ("wind_speed", "wind_from", "turbulence", "payload")})
     _, drawn = env.reset(seed=4)

@@ -29,6 +29,10 @@ class FlightModelError(ValueError):
     """A flight model was asked for something it cannot do; the message says what, what it expects, and the remedy."""
 
 
+class TrimError(FlightModelError):
+    """Each number of a start is one that there is, but together they make no steady flight."""
+
+
 class SurfaceKind(enum.Enum):
     """What a surface is for."""
 

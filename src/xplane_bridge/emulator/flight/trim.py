@@ -6,7 +6,7 @@ from typing import Callable, Sequence
 
 import numpy as np
 
-from xplane_bridge.emulator.flight.flight_model import FlightModelError
+from xplane_bridge.emulator.flight.flight_model import TrimError
 
 
 def newton(
@@ -30,7 +30,7 @@ def newton(
         what: for the message.
 
     Raises:
-        FlightModelError: no solution within the limits.
+        TrimError: no solution within the limits.
     """
     x = np.array(start, dtype=float)
     low, high = np.array(limits, dtype=float).T
@@ -54,7 +54,7 @@ def newton(
         x, value = candidate, candidate_value
     if np.max(np.abs(value)) < 1e3 * tolerance:
         return x
-    raise FlightModelError(
+    raise TrimError(
         f"{what}: no steady flight found; choose another speed, height or weight "
         f"(the best try leaves accelerations of {', '.join(f'{v:.3g}' for v in value)})"
     )
