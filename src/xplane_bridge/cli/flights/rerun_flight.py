@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any, Dict, Optional, Sequence
+from typing import Any, Dict, Optional, Sequence, Tuple
 
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.passport import Passport, read_passports
@@ -79,11 +79,21 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         scenario.write_text(str(flight["text"]), encoding="utf-8")
     except OSError as error:
         raise RerunError(f"{output}: {error.strerror}") from None
+    there = _made(output / _BAG)
     status = run_scenario.main([str(scenario), *map(str, flight["options"]), "--output", str(output)])
-    if (output / _BAG).is_file():
+    if _made(output / _BAG) not in (None, there):
         for line in changes(passport, passport_of(output / _BAG)):
             print(f"made otherwise: {line}")
     return status
+
+
+def _made(bag: Path) -> Optional[Tuple[int, int]]:
+    """By what a recording differs from the one that had its name before; None where there is none."""
+    try:
+        status = bag.stat()
+    except FileNotFoundError:
+        return None
+    return status.st_ino, status.st_mtime_ns
 
 
 def _say(text: str) -> None:

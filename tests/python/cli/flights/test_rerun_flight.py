@@ -1,0 +1,46 @@
+"""rerun_flight: what it says of the flight that it has flown again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import List
+
+import pytest
+
+from xplane_bridge.bags.passport import Passport
+from xplane_bridge.cli.flights import rerun_flight
+
+
+def passport(path: Path) -> Passport:
+    flight = {"program": "run_scenario", "scenario": "s", "text": "name: s", "options": []}
+    return Passport({"experiment": {"flight": flight}}, {}, {"commit": path.read_text(encoding="utf-8")})
+
+
+@pytest.mark.parametrize(
+    ("flown", "said"), [(False, ""), (True, "made otherwise: commit: recorded -> today\n")], ids=["refused", "flown"]
+)
+@pytest.mark.parametrize("old", [False, True])
+def test_only_a_recording_of_this_run_is_compared(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    old: bool,
+    flown: bool,
+    said: str,
+) -> None:
+    recorded, output = tmp_path / "recorded.bag", tmp_path / "out"
+    recorded.write_text("recorded", encoding="utf-8")
+    if old:
+        output.mkdir()
+        (output / "flight.bag").write_text("old", encoding="utf-8")
+
+    def run(_arguments: List[str]) -> int:
+        if flown:
+            (output / "flight.bag.active").write_text("today", encoding="utf-8")
+            (output / "flight.bag.active").replace(output / "flight.bag")
+        return 0 if flown else 1
+
+    monkeypatch.setattr(rerun_flight, "passport_of", passport)
+    monkeypatch.setattr(rerun_flight.run_scenario, "main", run)
+    assert rerun_flight.main([str(recorded), "--output", str(output)]) == (0 if flown else 1)
+    assert capsys.readouterr().out == said
