@@ -8,13 +8,15 @@ from typing import Any, Mapping, NamedTuple, Optional, Sequence
 import numpy as np
 
 from xplane_bridge.labels.apt import Airport, Runway
-from xplane_bridge.labels.camera import NEAR_M, Camera
+from xplane_bridge.labels.camera import NEAR_M, Camera, clip
 from xplane_bridge.labels.heights import Height, Profile
 from xplane_bridge.labels.world import SIDE_PARTS, RunwayFrame, World
 from xplane_bridge.units import EARTH_RADIUS_M
 
 #: A label less sure than this is `coarse` [px].
 COARSE_PX = 3.0
+#: What is not as wide and as high in the picture is left out: it cannot be seen [px].
+LEAST_PX = 1.0
 #: How well a file's latitudes and longitudes say what X-Plane draws [m].
 MAP_SIGMA_M = 0.5
 #: What other aircraft are taken to measure across by default [m].
@@ -62,6 +64,11 @@ class Labeller:
         self._world, self._map_sigma = world, map_sigma
         frames = [(RunwayFrame(runway, 0), RunwayFrame(runway, 1)) for runway in airport.runways]
         self._runways = list(zip(airport.runways, frames, profiles))
+        self._lowest = min(
+            along.at(part * frame.length).metres
+            for _, (frame, _), along in self._runways
+            for part in np.linspace(0.0, 1.0, SIDE_PARTS + 1)
+        )  #: [m MSL] of the ground there
 
     def label(self, camera: Camera, sun: Optional[Sun], others: Sequence[Other] = ()) -> list[dict[str, Any]]:
         """Label one picture; what lies outside it altogether is left out."""
@@ -81,8 +88,10 @@ class Labeller:
         half, length = 0.5 * frame.width, frame.length
         parts = np.linspace(0.0, length, SIDE_PARTS + 1)
         outline = [(along, -half) for along in parts] + [(along, half) for along in parts[::-1]]
-        polygon = camera.polygon(self._optical(camera, frame, profile, outline))
-        if not len(polygon):
+        optical, beyond = self._optical(camera, frame, profile, outline)
+        polygon = camera.polygon(clip(optical, -beyond))
+        box = _box(polygon)
+        if box is None:
             return None
         near, far = frame.near.displaced, length - frame.far.displaced
         points = {
@@ -98,7 +107,8 @@ class Labeller:
             "centre_far": (far, 0.0),
         }
         named = {name: self._point(camera, frame, profile, *at) for name, at in points.items()}
-        centre = camera.line(self._optical(camera, frame, profile, [(x, 0.0) for x in np.linspace(near, far, 9)]))
+        optical, beyond = self._optical(camera, frame, profile, [(x, 0.0) for x in np.linspace(near, far, 9)])
+        centre = camera.line(optical[beyond <= 0.0])
         heights = [profile.at(frame.from_first_end(along)) for along in (0.0, length)]
         return {
             "kind": "runway",
@@ -107,7 +117,7 @@ class Labeller:
             "points": named,
             "polygon": _rounded(polygon),
             "centre_line": [_rounded(part) for part in centre],
-            "box": _box(polygon),
+            "box": box,
             **_sure([point["sigma_px"] for point in named.values() if point["state"] == "visible"] or [_worst(named)]),
             "height": {
                 "source": profile.source,
@@ -131,7 +141,7 @@ class Labeller:
             parts: [m] along, from its first end.
         """
         _, frames, profile = self._runways[runway]
-        optical = self._optical(camera, frames[0], profile, [(along, right) for along in parts])
+        optical, _ = self._optical(camera, frames[0], profile, [(along, right) for along in parts])
         return camera.pixels(optical), optical[:, 2] > 1.0
 
     def _place(self, frame: RunwayFrame, profile: Profile, along: float, right: float) -> tuple[np.ndarray, Height]:
@@ -141,14 +151,20 @@ class Labeller:
 
     def _optical(
         self, camera: Camera, frame: RunwayFrame, profile: Profile, points: Sequence[tuple[float, float]]
-    ) -> np.ndarray:
-        return camera.optical(np.array([self._place(frame, profile, *point)[0] for point in points]))
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Right, down, forward of the camera (n, 3) of points of a runway; how far beyond the earth's curve [m]."""
+        places, heights = zip(*(self._place(frame, profile, *point) for point in points))
+        optical = camera.optical(np.array(places))
+        # It lies on the ground, so that is as high as its lowest part; a height that is not sure hides nothing.
+        farthest = [self._farthest_seen(self._lowest, camera.height, h.metres + h.sigma) for h in heights]
+        return optical, np.linalg.norm(optical, axis=1) - farthest
 
     def _point(
         self, camera: Camera, frame: RunwayFrame, profile: Profile, along: float, right: float
     ) -> dict[str, Any]:
-        place, height = self._place(frame, profile, along, right)
-        return _point(camera, camera.optical(place)[0], height.sigma, self._map_sigma)
+        (optical,), (beyond,) = self._optical(camera, frame, profile, [(along, right)])
+        sigma_height = profile.at(frame.from_first_end(along)).sigma
+        return _point(camera, optical, sigma_height, self._map_sigma, hidden=beyond > 0.0)
 
     def _approach(self, camera: Camera, frame: RunwayFrame, threshold: Height) -> dict[str, Any]:
         """Where the camera is, seen from the threshold it looks at."""
@@ -215,7 +231,8 @@ class Labeller:
         place = self._world.place(other.latitude, other.longitude, other.altitude)
         optical = camera.optical(place)[0]
         distance = float(np.linalg.norm(optical))
-        if optical[2] <= NEAR_M or distance > self._farthest_seen(camera.height, other.altitude):
+        farthest = self._farthest_seen(min(0.0, self._lowest), camera.height, other.altitude + 0.5 * other.span)
+        if optical[2] <= NEAR_M or distance > farthest:
             return None
         centre = camera.pixels(optical[np.newaxis])[0]
         radii = camera.focals * 0.5 * other.span / float(optical[2])
@@ -233,10 +250,10 @@ class Labeller:
             **_sure([camera.sigma(distance, optical / distance, other.sigma, other.sigma)]),
         }
 
-    def _farthest_seen(self, *heights: float) -> float:
-        """How far apart two at these heights [m MSL] still see each other over the earth's curve [m]."""
-        dips = [self._world.dip(height) for height in heights]
-        return math.inf if not all(dips) else EARTH_RADIUS_M * sum(map(math.tan, dips))
+    def _farthest_seen(self, ground: float, *heights: float) -> float:
+        """How far apart two at these heights [m MSL] still see each other over the curve of the ground [m MSL] [m]."""
+        lowest = min(ground, *heights)
+        return sum(self._world.horizon(height - lowest) for height in heights)
 
 
 def _looked_along(camera: Camera, frame: RunwayFrame) -> int:
@@ -247,11 +264,14 @@ def _looked_along(camera: Camera, frame: RunwayFrame) -> int:
     return 0 if float(forward @ (math.cos(frame.heading), math.sin(frame.heading))) >= 0.0 else 1
 
 
-def _point(camera: Camera, optical: np.ndarray, sigma_height: float, sigma_place: float) -> dict[str, Any]:
+def _point(
+    camera: Camera, optical: np.ndarray, sigma_height: float, sigma_place: float, hidden: bool
+) -> dict[str, Any]:
     distance = float(np.linalg.norm(optical))
     sigma = camera.sigma(distance, optical / distance, sigma_height, sigma_place)
     pixel = camera.pixels(optical[np.newaxis])
-    state = "behind" if optical[2] <= 0.0 else "visible" if camera.inside(pixel)[0] else "outside"
+    state = "behind" if optical[2] <= 0.0 else "outside" if not camera.inside(pixel)[0] else "visible"
+    state = "beyond" if hidden and state == "visible" else state
     u, v = (None, None) if state == "behind" else (round(float(part), 3) for part in pixel[0])
     return {"u": u, "v": v, "state": state, "distance_m": round(distance, 1), **_sure([sigma])}
 
@@ -277,19 +297,20 @@ def _sure(sigmas: Sequence[float]) -> dict[str, Any]:
     return {"sigma_px": round(sigma, 3), "coarse": sigma > COARSE_PX}
 
 
-def _box(pixels: np.ndarray) -> list[float]:
-    """Left, top, right, bottom."""
+def _box(pixels: np.ndarray) -> Optional[list[float]]:
+    """Left, top, right, bottom; None where that is too small to be seen."""
+    if not len(pixels) or (np.ptp(pixels, axis=0) < LEAST_PX).any():
+        return None
     return [round(float(part), 3) for part in (*pixels.min(axis=0), *pixels.max(axis=0))]
 
 
 def _seen_ball(camera: Camera, centre: np.ndarray, radii: np.ndarray) -> Optional[dict[str, Any]]:
-    """The box of a ball's part that is in the picture, and whether that is all of it; None where none is."""
+    """The box of a ball's part that is in the picture, and whether that is all of it; None where none can be seen."""
     whole = np.stack((centre - radii, centre + radii))
     high = np.array((camera.optics.width, camera.optics.height)) - 0.5
     part = np.clip(whole, -0.5, high)
-    if (part[0] >= part[1]).any():
-        return None
-    return {"box": _box(part), "state": "visible" if (part == whole).all() else "cut"}
+    box = _box(part)
+    return None if box is None else {"box": box, "state": "visible" if (part == whole).all() else "cut"}
 
 
 def _rounded(pixels: np.ndarray) -> list[list[float]]:

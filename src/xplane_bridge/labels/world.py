@@ -26,6 +26,9 @@ class World(Protocol):
     def dip(self, height: float) -> float:
         """Angle [rad] of the horizon below the level, seen from a height [m MSL]."""
 
+    def horizon(self, height: float) -> float:
+        """How far away the horizon is [m], seen from a height over it [m]."""
+
 
 class Sphere:
     """X-Plane's earth, in earth-centred axes."""
@@ -46,6 +49,10 @@ class Sphere:
     def dip(self, height: float) -> float:
         """See `World`."""
         return math.acos(EARTH_RADIUS_M / (EARTH_RADIUS_M + max(height, 0.0)))
+
+    def horizon(self, height: float) -> float:
+        """See `World`."""
+        return EARTH_RADIUS_M * math.tan(self.dip(height))
 
 
 class Flat:
@@ -73,6 +80,10 @@ class Flat:
     def dip(self, height: float) -> float:  # noqa: ARG002
         """See `World`."""
         return 0.0
+
+    def horizon(self, height: float) -> float:  # noqa: ARG002
+        """See `World`."""
+        return math.inf
 
 
 class RunwayFrame:

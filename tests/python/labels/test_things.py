@@ -41,7 +41,11 @@ def pose(east: float, height: float, heading: float = 90.0, pitch: float = 0.0, 
 
 
 def labelled(camera: Camera, **others: object) -> dict[str, dict]:
-    things = Labeller(AIRPORT, [EXACT], Sphere(), 0.0).label(camera, others.get("sun"), others.get("others", ()))  # type: ignore[arg-type]
+    return labelled_with(EXACT, camera, **others)
+
+
+def labelled_with(height: Profile, camera: Camera, **others: object) -> dict[str, dict]:
+    things = Labeller(AIRPORT, [height], Sphere(), 0.0).label(camera, others.get("sun"), others.get("others", ()))  # type: ignore[arg-type]
     json.dumps(things, allow_nan=False)
     return {thing["kind"]: thing for thing in things}
 
@@ -151,6 +155,67 @@ def test_what_is_behind_or_beside_is_said_and_cut_off() -> None:
     assert top == pytest.approx(over["points"]["TL"]["v"], abs=0.01)
     assert "runway" not in labelled(Camera(Sphere(), pose(-2000.0, 250.0, 270.0), OPTICS))
     assert "runway" not in labelled(Camera(Sphere(), pose(-2000.0, 250.0, 90.0, 60.0), OPTICS))
+
+
+#: Of a telescope, to which what is far away is large.
+FAR_F = 30000.0
+TELESCOPE = Optics(640, 480, FAR_F, FAR_F, 319.5, 239.5)
+
+
+def test_a_runway_ends_where_it_is_beyond_the_earths_curve() -> None:
+    # From 3 m over its ground, the horizon is at 6186 m: 4000 m before it, the farther part of the runway lies behind.
+    camera = Camera(Sphere(), pose(-4000.0, 103.0), TELESCOPE)
+    runway = labelled(camera)["runway"]
+    states = {name: point["state"] for name, point in runway["points"].items()}
+    assert states["BL"] == states["BR"] == states["threshold_near_left"] == "visible"
+    assert states["TL"] == states["TR"] == states["threshold_far_left"] == states["centre_far"] == "beyond"
+    assert runway["points"]["TL"]["v"] is not None
+    near, horizon = 3.0 / 4000.0 + 4000.0 / 2 / R, math.sqrt(2 * 3.0 / R)
+    assert runway["box"][1::2] == pytest.approx([239.5 + FAR_F * horizon, 239.5 + FAR_F * near], abs=0.02)
+    (centre,) = runway["centre_line"]
+    assert centre[-1][1] == pytest.approx(239.5 + FAR_F * horizon, abs=0.3)
+    beyond = Camera(Sphere(), pose(-7000.0, 103.0), TELESCOPE)
+    assert "runway" not in labelled(beyond)
+    unsure = Profile(np.zeros(1), np.array([100.0]), 2.0, "table", 0.0)
+    assert "runway" in labelled_with(unsure, beyond), "2 m higher it would be seen"
+    flat = Camera(Flat(0.0, 0.0), pose(-7000.0, 103.0), TELESCOPE)
+    assert "runway" in [thing["kind"] for thing in Labeller(AIRPORT, [EXACT], Flat(0.0, 0.0)).label(flat, None)]
+
+
+def test_a_runway_that_climbs_is_not_beyond_itself() -> None:
+    climbs = Profile(np.array([0.0, LENGTH]), np.array([100.0, 120.0]), 0.0, "table", 0.0)
+    for east, heading, height in ((-100.0, 90.0, 101.5), (LENGTH + 100.0, 270.0, 121.5), (-2000.0, 90.0, 95.0)):
+        camera = Camera(Sphere(), pose(east, height, heading), TELESCOPE)
+        points = labelled_with(climbs, camera)["runway"]["points"]
+        assert "beyond" not in {point["state"] for point in points.values()}, east
+
+
+@pytest.mark.parametrize(
+    ("seen", "unseen"),
+    [
+        # A runway's height is 1.19 and 0.95 px, its width 1.02 and 0.97.
+        (pose(-18000.0, 400.0), pose(-20000.0, 400.0)),
+        (pose(-32500.0, 3000.0), pose(-34200.0, 3000.0)),
+    ],
+)
+def test_a_runway_of_less_than_a_pixel_is_left_out(seen: Pose, unseen: Pose) -> None:
+    assert "runway" in labelled(Camera(Sphere(), seen, OPTICS))
+    assert "runway" not in labelled(Camera(Sphere(), unseen, OPTICS))
+
+
+def test_aircraft_of_less_than_a_pixel_or_beyond_the_curve_are_left_out() -> None:
+    camera = Camera(Sphere(), pose(0.0, 250.0, 90.0, -0.6), OPTICS)
+    for distance, seen in ((6600.0, True), (6700.0, False)):
+        other = Other("1", 0.0, math.degrees(distance / R), 250.0, 0.0)
+        assert ("aircraft" in labelled(camera, others=[other])) == seen
+    far = Camera(Sphere(), pose(0.0, 250.0, 90.0, -0.6), TELESCOPE)
+    # The horizon is at 56.5 km, and at 8.7 km from its top 6 m over the sea.
+    for distance, altitude, seen in ((64e3, 0.0, True), (66e3, 0.0, False), (100e3, 0.0, False), (100e3, -10.0, False)):
+        other = Other("1", 0.0, math.degrees(distance / R), altitude, 0.0)
+        assert ("aircraft" in labelled(far, others=[other])) == seen, (distance, altitude)
+    parked = Camera(Sphere(), pose(0.0, -1.0), OPTICS)
+    beside = Other("1", 0.0, math.degrees(3000.0 / R), -2.0, 0.0)
+    assert "aircraft" in labelled(parked, others=[beside]), "on land below the sea's level"
 
 
 def test_sun_and_other_aircraft() -> None:
