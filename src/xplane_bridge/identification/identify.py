@@ -89,19 +89,23 @@ def identify(
         geometry: Sizes of the aircraft, for derivatives as coefficients.
         aircraft: Its name, for the file.
         tail: How long the motion is followed after an excitation [s].
-        validate: Number of the excitation that is kept for validation; None: chosen.
+        validate: Number of the excitation that is kept for validation of the axes that it moves; None: chosen, as for
+            the others.
 
     Raises:
         IdentificationError: There is nothing to identify from. A model that is not to be used is no exception: see
             `AxisResult.refusals`.
     """
     windows, notes = find_windows(flight, tail)
-    if validate is not None and validate not in [w.excitation.number for w in windows]:
-        numbers = ", ".join(str(w.excitation.number) for w in windows)
-        msg = f"excitation {validate} cannot be kept for validation; {flight.name} has: {numbers}"
+    names = list(AXES) if axis is None else [axis]
+    asked = [w.excitation.number for w in windows if not w.excitation.axes.isdisjoint(names)]
+    if validate is not None and asked and validate not in asked:
+        numbers = ", ".join(map(str, asked))
+        of_axis = "" if axis is None else f" for the {axis} axis"
+        msg = f"excitation {validate} cannot be kept for validation; {flight.name} has{of_axis}: {numbers}"
         raise IdentificationError(msg)
     results = {}
-    for name in AXES if axis is None else [axis]:
+    for name in names:
         mine = [w for w in windows if name in w.excitation.axes]
         if mine:
             results[name] = identify_axis(mine, AXES[name], geometry, validate)
@@ -177,10 +181,10 @@ def _moved_inputs(windows: list[Window], axis: Axis) -> tuple[Signal, ...]:
 
 def _split(windows: list[Window], validate: Optional[int]) -> tuple[list[Window], list[Window]]:
     """The windows to fit, and those kept for validation: of each target that has enough its last one."""
-    if validate is not None:
+    if validate in [w.excitation.number for w in windows]:
         spare = [w for w in windows if w.excitation.number == validate]
         rest = [w for w in windows if w.excitation.number != validate]
-        if spare and not rest:
+        if not rest:
             msg = f"{spare[0].excitation.label} is the only window: nothing would be left to fit; fly one more"
             raise IdentificationError(msg)
         return rest, spare

@@ -104,6 +104,14 @@ def test_a_window_that_was_not_used_validates(found: dict[str, AxisResult]) -> N
         assert not result.model.warnings
 
 
+def test_a_window_that_is_named_validates_its_axis_and_leaves_the_other_alone(calm: Recording) -> None:
+    results = identify(calm.flight(), validate=2).results
+    assert [w.excitation.number for w in results["longitudinal"].validation] == [2]
+    assert [w.excitation.number for w in results["lateral"].validation] == [6, 9]
+    with pytest.raises(IdentificationError, match=r"excitation 2 cannot .* flown has for the lateral axis: 4, 5, 6"):
+        identify(calm.flight(), "lateral", validate=2)
+
+
 def test_sensor_noise_changes_little_and_the_intervals_show_it(twin: FlightModel, truth: LinearModel) -> None:
     result = longitudinal(flown(PITCH, model=twin, noise=1.0, seed=4))
     assert error(result, truth, "short_period") < 0.025
