@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 
+import numpy as np
 import pytest
 
 from xplane_bridge.cli.wire.wire_replay import ReplayError, compare, hashes, main, prepare, start_of
@@ -36,6 +37,24 @@ def test_a_late_recorder_has_fewer_messages_and_any_other_difference_is_reported
     assert compare({"/a": [b"4", b"5"]}, replayed) == [("/a", "message 1 of 2 differs")]
     assert compare({"/a": [b"9"]}, replayed) == [("/a", "the first live message is not in the replay")]
     assert compare({"/c": [b"1"]}, replayed) == [("/c", "not in the replay (1 live)")]
+
+
+def test_a_late_recorder_may_begin_at_any_of_equal_messages():
+    def said(live, replayed):
+        return compare({"/a": [b"%d" % i for i in live]}, {"/a": [b"%d" % i for i in replayed]})[0][1]
+
+    assert said([1, 2], [1, 1, 2]) == ""
+    assert said([1, 1, 2], [1, 1, 1, 1, 2, 3]) == ""
+    assert said([1, 2, 1, 3], [1, 2, 1, 2, 1, 3]) == ""
+    assert said([1, 1, 2, 4], [1, 1, 3, 1, 1, 1, 2, 5]) == "message 3 of 4 differs"
+    assert said([1, 1, 1], [1, 1, 2, 1]) == "message 2 of 3 differs"
+    assert said([1] * 50000 + [2], [1] * 99999 + [2]) == ""  # in time, too
+    random = np.random.default_rng(1)
+    for _ in range(300):
+        live, replayed = random.integers(2, size=4).tolist(), random.integers(2, size=9).tolist()
+        runs = [n for n in range(5) if any(replayed[i : i + n] == live[:n] for i in range(10 - n))]
+        words = {0: "the first live message is not in the replay", 4: ""}
+        assert said(live, replayed) == words.get(max(runs), f"message {max(runs)} of 4 differs")
 
 
 def test_hashes_show_where_messages_begin():

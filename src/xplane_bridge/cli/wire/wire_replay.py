@@ -79,15 +79,34 @@ def compare(live: Mapping[str, Sequence[bytes]], replayed: Mapping[str, Sequence
         if not here:
             out.append((topic, f"not in the replay ({len(payloads)} live)"))
             continue
-        start = next((i for i, each in enumerate(here) if each == payloads[0]), None)
-        if start is None:
+        same = _longest_run(payloads, here)
+        if same == 0:
             out.append((topic, "the first live message is not in the replay"))
-            continue
-        same = next(
-            (i for i, each in enumerate(payloads) if start + i >= len(here) or here[start + i] != each), len(payloads)
-        )
-        out.append((topic, "" if same == len(payloads) else f"message {same} of {len(payloads)} differs"))
+        else:
+            out.append((topic, "" if same == len(payloads) else f"message {same} of {len(payloads)} differs"))
     return out
+
+
+def _longest_run(payloads: Sequence[bytes], here: Sequence[bytes]) -> int:
+    """How many of the first payloads follow each other somewhere in these (Knuth, Morris and Pratt).
+
+    Values repeat: the first payload may be there many times, and the run begin at any of them.
+    """
+    fallback, length = [0] * len(payloads), 0
+    for i in range(1, len(payloads)):
+        while length and payloads[i] != payloads[length]:
+            length = fallback[length - 1]
+        length += payloads[i] == payloads[length]
+        fallback[i] = length
+    best = length = 0
+    for each in here:
+        while length and each != payloads[length]:
+            length = fallback[length - 1]
+        length += each == payloads[length]
+        best = max(best, length)
+        if best == len(payloads):
+            break
+    return best
 
 
 def payloads_of(bag: Path, node: str) -> Dict[str, List[bytes]]:
