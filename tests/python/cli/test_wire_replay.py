@@ -89,3 +89,6 @@ def test_a_parameter_is_given_as_key_and_value(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main([str(tmp_path / "x"), "--set", "transport"])
     assert "expected KEY=VALUE" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / "x"), "--set", "rates=[1"])
+    assert "'rates=[1': the value does not parse as YAML: line 1, column 3: expected ','" in capsys.readouterr().err

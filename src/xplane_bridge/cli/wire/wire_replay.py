@@ -13,7 +13,7 @@ import yaml
 
 from xplane_bridge.bags.chunks import BagFile
 from xplane_bridge.cli.entry import guarded, positive
-from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.errors import XplaneBridgeError, yaml_problem
 from xplane_bridge.harness.processes import interrupted_by_signals
 from xplane_bridge.harness.wire_replay import Start, WireReplay
 from xplane_bridge.topics import NAMESPACE
@@ -231,7 +231,11 @@ def _parameter(text: str) -> Tuple[str, Any]:
     if not equals:
         msg = f"{text!r}: expected KEY=VALUE"
         raise argparse.ArgumentTypeError(msg)
-    return key, yaml.safe_load(value)
+    try:
+        return key, yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        msg = f"{text!r}: the value {yaml_problem(error)}"
+        raise argparse.ArgumentTypeError(msg) from None
 
 
 def _address(text: str) -> str:
