@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Optional
+from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from xplane_bridge.labels.world import World
 
 #: Nearest depth that is projected [m].
 NEAR_M = 0.5
+#: Of CameraInfo: the part of the picture that shows the world, where that is not all of it.
+ROI = tuple(f"roi.{name}" for name in ("x_offset", "y_offset", "width", "height"))
 #: Forward, right, down of forward, left, up, and back.
 FRD_OF_FLU = np.diag((1.0, -1.0, -1.0))
 
@@ -40,6 +42,13 @@ class Optics(NamedTuple):
     fy: float
     cx: float
     cy: float
+    roi: Tuple[int, int, int, int] = (0, 0, 0, 0)  #: x_offset, y_offset, width, height [px]; no size: all of it
+
+    def area(self) -> np.ndarray:
+        """Left, top and right, bottom of what shows the world: without the bars of a letterbox."""
+        left, top, width, height = self.roi if self.roi[2] and self.roi[3] else (0, 0, self.width, self.height)
+        corners: np.ndarray = np.array(((left, top), (left + width, top + height))) - 0.5
+        return corners
 
 
 class Camera:
@@ -56,6 +65,7 @@ class Camera:
         height: [m MSL]
         focal: [px] the mean of both axes: what sigmas are by
         focals: [px] across and down
+        area: `Optics.area`
     """
 
     def __init__(self, world: World, pose: Pose, optics: Optics) -> None:
@@ -70,6 +80,7 @@ class Camera:
         self._velocity = self.ned_to_optical @ pose.velocity
         self.focal = 0.5 * (optics.fx + optics.fy)
         self.focals: np.ndarray = np.array((optics.fx, optics.fy))
+        self.area = optics.area()
 
     def optical(self, places: np.ndarray) -> np.ndarray:
         """Places (n, 3) of the world as right, down, forward of the camera [m]."""
@@ -85,7 +96,7 @@ class Camera:
 
     def inside(self, pixels: np.ndarray) -> np.ndarray:
         """Whether pixels (n, 2) lie in the picture, its outermost pixels included."""
-        low, high = -0.5, np.array((self.optics.width, self.optics.height)) - 0.5
+        low, high = self.area
         within: np.ndarray = np.all((pixels >= low) & (pixels <= high), axis=1)
         return within
 
@@ -142,8 +153,8 @@ class Camera:
         return float(np.sqrt(np.sum(np.square(terms))))
 
     def _borders(self) -> tuple[tuple[float, int, float], ...]:
-        right, below = self.optics.width - 0.5, self.optics.height - 0.5
-        return (1.0, 0, -0.5), (-1.0, 0, right), (1.0, 1, -0.5), (-1.0, 1, below)
+        (left, top), (right, bottom) = self.area.tolist()
+        return (1.0, 0, left), (-1.0, 0, right), (1.0, 1, top), (-1.0, 1, bottom)
 
 
 def clip(points: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from xplane_bridge.bags.cameras import chosen_cameras
 from xplane_bridge.constants import ImageQuality
 from xplane_bridge.labels import table as label_table
 from xplane_bridge.labels.apt import Airport
-from xplane_bridge.labels.camera import Camera, Optics, Pose
+from xplane_bridge.labels.camera import ROI, Camera, Optics, Pose
 from xplane_bridge.labels.heights import MEASURED_SIGMA_M, STANDING_M, STANDING_SIGMA_M, Ground, Profile, profile
 from xplane_bridge.labels.table import LabelError
 from xplane_bridge.labels.things import MAP_SIGMA_M, SPAN_M, Labeller, Sun
@@ -175,6 +175,7 @@ class Flight:
                 "stamp_ns": frame.stamp,
                 "width": optics.width,
                 "height": optics.height,
+                "roi": optics.roi,
                 "quality": frame.quality,
                 "others_known": others is not None,
                 "objects": self.labeller.label(frame.camera, suns[frame.name].get(frame.stamp), others or ()),
@@ -234,12 +235,13 @@ def _optics(bags: Bags, topic: str) -> dict[int, Optics]:
         names = ", ".join(map(str, bags.paths))
         msg = f"{names}: no {topic}; record it (launch/record.launch does), or choose other cameras with --camera"
         raise LabelError(msg)
-    infos = bags.read(topic, ["header.stamp", "width", "height", "K"])
+    infos = bags.read(topic, ["header.stamp", "width", "height", "K", *ROI])
     out: dict[int, Optics] = {}
     alike: dict[Optics, Optics] = {}
-    for stamp, width, height, k in zip(infos.stamp.tolist(), infos["width"], infos["height"], infos["K"]):
+    rois = zip(*(infos[name].astype(int).tolist() for name in ROI))
+    for stamp, width, height, k, roi in zip(infos.stamp.tolist(), infos["width"], infos["height"], infos["K"], rois):
         if k[0] > 0.0 and k[4] > 0.0:
-            optics = Optics(int(width), int(height), float(k[0]), float(k[4]), float(k[2]), float(k[5]))
+            optics = Optics(int(width), int(height), float(k[0]), float(k[4]), float(k[2]), float(k[5]), roi)
             out[stamp] = alike.setdefault(optics, optics)
     return out
 

@@ -307,8 +307,7 @@ def _box(pixels: np.ndarray) -> Optional[list[float]]:
 def _seen_ball(camera: Camera, centre: np.ndarray, radii: np.ndarray) -> Optional[dict[str, Any]]:
     """The box of a ball's part that is in the picture, and whether that is all of it; None where none can be seen."""
     whole = np.stack((centre - radii, centre + radii))
-    high = np.array((camera.optics.width, camera.optics.height)) - 0.5
-    part = np.clip(whole, -0.5, high)
+    part = np.clip(whole, *camera.area)
     box = _box(part)
     return None if box is None else {"box": box, "state": "visible" if (part == whole).all() else "cut"}
 

@@ -238,6 +238,27 @@ def test_sun_and_other_aircraft() -> None:
     assert "aircraft" not in labelled(camera, others=[behind])
 
 
+def test_nothing_reaches_into_the_bars_of_a_letterbox() -> None:
+    """16:9 in 4:3: 60 rows of black above and below."""
+    boxed = OPTICS._replace(roi=(0, 60, 640, 360))
+    over = labelled(Camera(Sphere(), pose(1000.0, 110.0), boxed))["runway"]
+    assert over["box"][3] == pytest.approx(419.5)
+    assert max(v for part in over["centre_line"] for _, v in part) == pytest.approx(419.5)
+    nose_up = Camera(Sphere(), pose(-2000.0, 250.0, 90.0, 17.5), boxed)  # the runway is in the lower bar
+    bare = Camera(Sphere(), nose_up.pose, OPTICS)
+    assert labelled(bare)["runway"]["points"]["BL"]["state"] == "visible"
+    assert "runway" not in labelled(nose_up)
+    assert "horizon" in labelled(nose_up)
+    for seen, state in ((bare, "visible"), (nose_up, "cut")):
+        above = Other("1", 0.0, 0.0, 250.0 + 2000.0 * math.tan(math.radians(17.5) + math.atan(180.0 / F)), 0.0)
+        aircraft = labelled(seen, others=[above])["aircraft"]
+        assert aircraft["state"] == state
+        assert (aircraft["box"][1] == pytest.approx(59.5)) == (state == "cut")
+    horizon = Camera(Sphere(), pose(-2000.0, 250.0, 90.0, 20.0), OPTICS)
+    assert "horizon" in labelled(horizon)
+    assert "horizon" not in labelled(Camera(Sphere(), horizon.pose, boxed))
+
+
 def test_a_sun_that_is_partly_in_the_picture_is_labelled() -> None:
     camera = Camera(Sphere(), pose(-2000.0, 250.0), OPTICS)
     origin = (0.0, math.degrees(-2000.0 / R))
