@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 #: Pictures that are taken at a time.
 _PIECE_ROWS = 4096
 _ENDINGS = (".jpg", ".png")
+#: What the instant of a frame follows from.
+_FLOWN = ("header.stamp", "state.header.stamp", "display_delay")
 _SPLITS = ("train", "validation")
 #: The reason of pictures that are left out because they could not be labelled.
 NO_LABELS = "no labels"
@@ -243,9 +245,9 @@ def write_pictures(
             msg = f"{names}: no images of camera {camera.name}; record {topic} (launch/record.launch does){others}"
             raise BagError(msg)
     # One instant for all cameras, also for those that are not exported: no frame is in both splits.
-    stamps = np.concatenate([bags.read(camera.frames, ["header.stamp"]).stamp for camera in cameras(bags)])
-    cut = _split_stamp(stamps, options)
-    del stamps
+    flown = np.concatenate([_flown(bags.read(camera.frames, _FLOWN)) for camera in cameras(bags)])
+    cut = _split_instant(flown, options)
+    del flown
     folder.mkdir(parents=True)
     parts = []
     for camera in chosen:
@@ -254,10 +256,10 @@ def write_pictures(
     return Pictures(folder, parts)
 
 
-def _split_stamp(stamp: np.ndarray, options: Options) -> int:
-    if not len(stamp):
+def _split_instant(flown: np.ndarray, options: Options) -> int:
+    if not len(flown):
         return 0
-    first, last = int(stamp.min()), int(stamp.max())
+    first, last = int(flown.min()), int(flown.max())
     return first + round((last - first) * options.train_share) + (1 if options.train_share >= 1 else 0)
 
 
@@ -270,13 +272,14 @@ def _write_camera(bags: Bags, kept: _Kept, folder: Path, options: Options, train
         folder: Of the flight; exists.
         options: What to keep and how to split.
         train_flight: With ``split_by="flight"``: whether this flight trains.
-        cut: [ns] with ``split_by="time"``: images before it train.
+        cut: [ns] with ``split_by="time"``: images of frames before it train.
     """
     camera = kept.camera
     store = ColumnFile(folder.parent)
     table, constants = bags.read(camera.frames, store=store), bags.constants(camera.frames)
     bad = {name: int(constants[name]) for name in BAD_QUALITY if name in constants}
-    quality, rows = table["quality"], _Rows(table.stamp)
+    # Not by when they are shown: each camera has a delay of its own.
+    quality, rows, flown = table["quality"], _Rows(table.stamp), _flown(table)
     for stamp, ending, content in _images(bags, camera.images):
         kept.images += 1
         row = rows.of(stamp)
@@ -290,7 +293,7 @@ def _write_camera(bags: Bags, kept: _Kept, folder: Path, options: Options, train
         if not kept.takes(stamp):
             kept.left_out[NO_LABELS] += 1
             continue
-        trains = train_flight if options.split_by == "flight" else stamp < cut
+        trains = train_flight if options.split_by == "flight" else int(flown[row]) < cut
         path = folder / kept.add(stamp, row, trains, ending)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from support.flights.drawn_approach import BELLY, FORWARD, write_approach
+from support.flights.drawn_approach import BELLY, FORWARD, add_picture, frame_state, scene, write_approach
 from support.flights.export_flight import export
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from support.white_lines import airport_file, flight_of, measure_flight
 from xplane_bridge.bags import Bags
 from xplane_bridge.cli import flight_report
 from xplane_bridge.cli.sight import label_images
+from xplane_bridge.constants import ImageQuality
 from xplane_bridge.export.cameras import camera_rows
 from xplane_bridge.labels import table
 
@@ -117,6 +120,24 @@ def test_one_instant_splits_all_cameras_also_when_one_is_exported(flight: Path, 
     assert export("--verify", "-o", tmp_path / "one") == 0
 
 
+def test_a_frame_that_two_cameras_show_at_different_times_is_in_one_split(tmp_path: Path) -> None:
+    flight = tmp_path / "flight.bag"
+    with FlightBag(flight) as bag:
+        for k in range(60):
+            t = k / 30.0
+            for view, delay in ((FORWARD, 0.045), (BELLY, 0.085)):
+                frame = frame_state(bag, scene(t), stamp_ns(t + delay), display_delay=delay)
+                if k % 7 == 3:  # no state was paired, or the simulator stood: what is known is when it was shown
+                    frame.update(state={}, quality=int(ImageQuality.STATE_MISSING), frame_sim_time=math.nan)
+                add_picture(bag, view, np.zeros((2, 2, 3), np.uint8), frame)
+    assert export(flight, "--format", "imagefolder", "--keep-bad-frames", "-o", tmp_path) == 0
+    rows = pd.read_csv(tmp_path / "flight" / "labels.csv")
+    assert len(rows) == 120
+    for camera in ("camera", "belly"):  # each has its 48 first frames, of 60
+        own = rows[rows["camera"] == camera].sort_values("stamp_ns")
+        assert own["split"].tolist() == ["train"] * 48 + ["validation"] * 12, camera
+
+
 def test_yolo_is_read_by_supervision(flight: Path, tmp_path: Path) -> None:
     supervision = pytest.importorskip("supervision", reason="supervision needs Python 3.10")
     folder = exported(flight, "yolo", tmp_path)
@@ -198,8 +219,6 @@ def test_the_report_shows_each_camera_with_its_own_labels(flight: Path, tmp_path
 
 
 def test_a_camera_without_pictures_or_camera_info_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from support.flights.synthetic_flight import FlightBag
-
     whole = write_approach(tmp_path / "whole.bag", 2, views=(FORWARD, BELLY))
     for lost, words in (
         ("camera_info", "no /xplane/belly/camera/camera_info; record it"),
