@@ -32,7 +32,7 @@ _NEEDED = 2 | 16
 _HAS_AGL = 2 | 4
 #: What of FrameState labelling goes by.
 _COLUMNS = (
-    *("header.stamp", "quality", "frame_period"),
+    *("header.stamp", "quality", "frame_period", "display_delay"),
     *("camera_pose_source", "body_to_camera", "camera_pose_uncertainty", "camera_pose_uncertainty_deg"),
     *("state.valid", "state.epoch", "state.sim_time", "state.latitude", "state.longitude", "state.altitude_msl"),
     *("state.orientation", "state.angular_velocity", "state.velocity_ned"),
@@ -49,6 +49,7 @@ _UNSURE = (
     | ImageQuality.CLOCK_UNSURE
     | ImageQuality.DELAY_ASSUMED
     | ImageQuality.BORDERLINE
+    | ImageQuality.EPOCH_EDGE
 )
 _MEASURED = 2
 #: What cannot be known of the motion is taken for lively, where it matters.
@@ -85,10 +86,15 @@ class _Seen:
         self.frames = bags.read(camera.frames, _COLUMNS)
         self.infos = _optics(bags, camera.info)
         self.suns = _suns(bags, self.frames.stamp)
+        self._late = _late(bags, self.frames)
 
     def quality(self, row: int) -> int:
         """Give QUALITY_* of a picture."""
         return int(self.frames["quality"][row])
+
+    def pose(self, row: int) -> Pose:
+        """Give where a picture's camera was."""
+        return _pose(self.frames, row, float(self._late[row]))
 
     def why_not(self, row: int) -> str:
         """Give why a picture cannot be labelled; empty where it can."""
@@ -156,7 +162,7 @@ class Flight:
                 if reason:
                     self.left_out[reason + of] += 1
                 else:
-                    camera = Camera(self._world, _pose(seen.frames, row), seen.infos[stamp])
+                    camera = Camera(self._world, seen.pose(row), seen.infos[stamp])
                     epoch, time = (seen.frames[f"state.{name}"][row] for name in ("epoch", "sim_time"))
                     yield Frame(seen.name, stamp, camera, int(epoch), float(time), seen.quality(row))
 
@@ -269,6 +275,23 @@ def _suns(bags: Bags, stamps: np.ndarray) -> dict[int, Sun]:
     return {stamp: suns[max(k, 0)] for stamp, k in zip(stamps.tolist(), newest.tolist())}
 
 
+def _late(bags: Bags, frames: Table) -> np.ndarray:
+    """By how much the states of pictures of a pause are of later than these may show [s]; 0 of other pictures.
+
+    Earlier versions gave what was shown within the display delay of a pause's beginning the state of the pause.
+    """
+    delay = np.nan_to_num(frames["display_delay"].astype(np.float64))
+    late = np.where(frames["quality"] & int(ImageQuality.PAUSED), delay, 0.0)
+    topic = bags.topic_of_type(FLIGHT_STATE)
+    if topic is None or not bags.topics[topic].count or not late.any():
+        return late
+    states = bags.read(topic, ["sim_time"])
+    order = np.argsort(states.stamp, kind="stable")
+    due = np.interp(frames.stamp - 1e9 * delay, states.stamp[order], states["sim_time"][order].astype(np.float64))
+    bounded: np.ndarray = np.clip(frames["state.sim_time"] - due, 0.0, late)
+    return bounded
+
+
 def _ground(bags: Bags, standing: Optional[float]) -> Optional[Ground]:
     topic = bags.topic_of_type(FLIGHT_STATE)
     if topic is None or not bags.topics[topic].count:
@@ -280,13 +303,16 @@ def _ground(bags: Bags, standing: Optional[float]) -> Optional[Ground]:
     return Ground(states["latitude"][good], states["longitude"][good], height, sigma)
 
 
-def _pose(frames: Table, row: int) -> Pose:
+def _pose(frames: Table, row: int, late: float = 0.0) -> Pose:
+    """Give a picture's pose; `late` [s]: by how much its state may be of later than it shows."""
+
     def vector(path: str, axes: str = "xyz") -> np.ndarray:
         return np.array([float(frames[f"{path}.{axis}"][row]) for axis in axes])
 
     quality = int(frames["quality"][row])
     rates, velocity = vector("state.angular_velocity"), vector("state.velocity_ned")
     period = float(frames["frame_period"][row])
+    period = period if period > 0.0 else _LONGEST_FRAME_S
     # A spread as wide as the bound, not an even one: cautious.
     angle, place = float(frames["camera_pose_uncertainty_deg"][row]), float(frames["camera_pose_uncertainty"][row])
     return Pose(
@@ -300,6 +326,6 @@ def _pose(frames: Table, row: int) -> Pose:
         place if math.isfinite(place) else 0.0,
         float(np.linalg.norm(rates)) if np.isfinite(rates).all() else _TURN_RATE,
         velocity if np.isfinite(velocity).all() else np.full(3, _SPEED / math.sqrt(3.0)),
-        period if period > 0.0 else _LONGEST_FRAME_S,
-        bool(quality & _UNSURE),
+        max(period, late),
+        bool(quality & _UNSURE) or late > 0.5 * period,
     )

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
+from support.flights.drawn_approach import FORWARD, PERIOD, add_picture, frame_state, scene
+from support.flights.synthetic_flight import FlightBag, stamp_ns
+from support.white_lines import flight_of
+from xplane_bridge.bags import Bags
+from xplane_bridge.constants import ImageQuality
 from xplane_bridge.labels.flight import _pose
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 #: A row of camera/frame_state: level at 60 m/s to the north, a picture that may be a frame off.
 ROW = {
@@ -38,3 +47,40 @@ def test_a_frame_lasts_as_long_as_x_plane_says() -> None:
 @pytest.mark.parametrize("unknown", [math.nan, 0.0])
 def test_a_frame_of_unknown_length_is_as_long_as_one_can_be(unknown: float) -> None:
     assert pose(frame_period=unknown).period == 0.05
+
+
+def test_a_frame_at_the_edge_of_an_epoch_may_be_its_neighbour() -> None:
+    assert pose(quality=ImageQuality.EPOCH_EDGE).may_be_neighbour
+    assert not pose(quality=ImageQuality.PAUSED).may_be_neighbour
+
+
+@pytest.mark.parametrize("states", [True, False])
+def test_pictures_of_a_pauses_beginning_may_show_what_was_before_it(tmp_path: Path, states: bool) -> None:
+    """As earlier versions recorded it: from the pause on, each picture has the pause's state, also while older show."""
+    delay, begins = 0.1, 1.0
+    path = tmp_path / "flight.bag"
+    with FlightBag(path) as bag:
+        for k in range(75):
+            t = k * PERIOD
+            stood = scene(min(t, begins))
+            frame = frame_state(bag, stood, stamp_ns(t), display_delay=delay)
+            if states:
+                bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), frame["state"])
+            if k % 2:
+                continue
+            paused = t >= begins
+            shown = stood if paused else scene(max(t - delay, 0.0))
+            frame = frame_state(bag, shown, stamp_ns(t), display_delay=delay, quality=128 * paused)
+            add_picture(bag, FORWARD, np.zeros((2, 2, 3), np.uint8), frame)
+    with Bags(path) as bags:
+        poses = {frame.stamp: frame.camera.pose for frame in flight_of(bags).frames()}
+    unsure = {
+        round((stamp - stamp_ns(begins)) / 1e9, 3): pose.period
+        for stamp, pose in poses.items()
+        if pose.may_be_neighbour
+    }
+    if states:  # at the beginning by all of the delay, then by what is left of it
+        assert unsure == pytest.approx({0.0: 0.1, 0.067: 0.0333}, abs=1e-3)
+    else:
+        assert len(unsure) == 23
+        assert set(unsure.values()) == {delay}
