@@ -161,10 +161,9 @@ ExitCode BaseNode::run() {
     requestStop(error.what(), ExitCode::kSetupError);
   }
   spinner_ = std::make_unique<ros::AsyncSpinner>(1);
-  service_spinner_ = std::make_unique<ros::AsyncSpinner>(1, &service_queue_);
   if (!stopping()) {
     spinner_->start();
-    service_spinner_->start();
+    service_threads_.start();
     immediate_.open();
     if (!lockstep() && !wire_) timers_->start();
   }
@@ -232,7 +231,7 @@ void BaseNode::stop() {
     if (started_) {
       joinThreads();
     }
-    service_spinner_->stop();
+    service_threads_.stop();
     if (wire_) wire_->endWorkers();
   });
 }
@@ -244,7 +243,7 @@ void BaseNode::endInputs() {
   if (wire_) wire_->close();
   timers_->stop();
   spinner_->stop();
-  service_queue_.disable();
+  service_threads_.refuse();
   stopInputs();
   const bool workers_idle = !wire_ || wire_->waitForWorkers(kServiceGrace);
   std::unique_lock<std::mutex> lock(service_mutex_);
@@ -256,7 +255,7 @@ void BaseNode::endInputs() {
     ROS_WARN("a service call is still waiting for X-Plane; stopping without it");
   }
   // roscpp's thread does not sleep at a queue that is disabled: it would take a whole processor until the end.
-  if (services_idle) service_spinner_->stop();
+  if (services_idle) service_threads_.stop();
 }
 
 void BaseNode::flushPublishers() {

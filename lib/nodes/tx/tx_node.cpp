@@ -13,8 +13,7 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr std::uint32_t kServiceThreads = 2;  // hold and run work while a step waits
-constexpr double kOldestPoses = 1.0;          // [s] in lock-step; what is older has no stamp of the flight
+constexpr double kOldestPoses = 1.0;  // [s] in lock-step; what is older has no stamp of the flight
 
 }  // namespace
 
@@ -47,7 +46,8 @@ void TxNode::start() {
   lockstep_services_ = std::make_unique<LockstepServices>(
       lockstep_.get(), actuation_.get(), &link(), [this] { return ending(); }, name() + "/lockstep");
   actuation_->start();
-  lockstep_spinner_->start();
+  mode_threads_.start();
+  lockstep_threads_.start();
   startBeating();
 }
 
@@ -85,8 +85,8 @@ void TxNode::stopInputs() {
   heartbeat_.stop();
   guardian_.rest();
   if (lockstep_) lockstep_->stop();
-  lockstep_queue_.disable();
-  lockstep_spinner_->stop();
+  mode_threads_.stop();
+  lockstep_threads_.stop();
   if (actuation_) actuation_->stop();
 }
 
@@ -153,29 +153,31 @@ void TxNode::onTraffic(const TrafficCommand& message) {
   intake_->onTraffic(message, age > 0.0 && age < kOldestPoses ? age : 0.0);
 }
 
-// --- services: they run on the service thread ---
+// --- services ---
 
 template <class Service, class Serve>
-void TxNode::advertiseOwn(const std::string& service, Serve serve) {
+void TxNode::advertiseOwn(const std::string& service, Serve serve, ServiceThreads* threads) {
   using Request = typename Service::Request;
   using Response = typename Service::Response;
   const std::string full_name = name() + "/" + service;
-  advertiseService<Request, Response>(full_name, [this, serve, full_name](const Request& request, Response& response) {
+  const auto serve_now = [this, serve, full_name](const Request& request, Response& response) {
     if (lockstep_) lockstep_->waitUntilOpen();
     heartbeat_.look();
     serve(request, &response, full_name);
-  });
+  };
+  advertiseService<Request, Response>(full_name, serve_now, threads);
 }
 
 template <class Service>
-void TxNode::advertiseOwn(const std::string& service) {
-  advertiseOwn<Service>(service, [this](const auto& request, auto* response, const std::string& who) {
+void TxNode::advertiseOwn(const std::string& service, ServiceThreads* threads) {
+  const auto serve = [this](const auto& request, auto* response, const std::string& who) {
     services_->serve(request, response, who);
-  });
+  };
+  advertiseOwn<Service>(service, serve, threads);
 }
 
 void TxNode::advertiseServices() {
-  advertiseOwn<SetMode>("set_mode");
+  advertiseOwn<SetMode>("set_mode", &mode_threads_);
   advertiseOwn<SetDataref>("set_dataref");
   advertiseOwn<RunCommand>("run_command");
   advertiseOwn<std_srvs::SetBool>("pause");
@@ -199,7 +201,7 @@ void TxNode::advertiseServices() {
 void TxNode::advertiseLockstep() {
   advertiseService<LockstepStep::Request, LockstepStep::Response>(
       "lockstep/step", [this](const auto& request, auto& response) { lockstep_services_->step(request, &response); },
-      &lockstep_queue_);
+      &lockstep_threads_);
   const auto advertise = [this](const std::string& service, bool running, const std::string& answer) {
     advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
         "lockstep/" + service,
@@ -208,11 +210,10 @@ void TxNode::advertiseLockstep() {
           response.success = why_not.empty();
           response.message = response.success ? answer : why_not;
         },
-        &lockstep_queue_);
+        &lockstep_threads_);
   };
   advertise("run", true, "flies on");
   advertise("hold", false, "holds the present frame");
-  lockstep_spinner_ = std::make_unique<ros::AsyncSpinner>(kServiceThreads, &lockstep_queue_);
 }
 
 // --- diagnostics ---

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import signal
+import threading
 import time
 
 import pytest
@@ -383,6 +384,25 @@ def test_override_set_by_service_is_given_back(tx, world):
     node.send_signal(signal.SIGINT)
     world.wire.wait(THROTTLES, 0.0)
     wire.wait(THROTTLE_OVERRIDE, -2.0)
+    wire.close()
+
+
+def test_a_mode_does_not_wait_for_other_services(tx, world):
+    tx(service_timeout=10.0)
+    last = LEVER.replace("[0]", "[7]")
+    wire = WatchedDatarefs(world.xplane.port, last)
+    answers = []
+    # X-Plane has no ninth lever, so tx_node waits to the end for what it is to show.
+    waiting = threading.Thread(
+        target=lambda: answers.append(call(world, "set_dataref", "SetDataref", name=last, values=[0.5, 0.5]))
+    )
+    waiting.start()
+    wire.wait(last, 0.5)
+    assert call(world, "set_mode", "SetMode", mode=AUTO).success
+    assert not answers, "set_dataref still waits"
+    assert world.mode.wait_for(lambda mode: mode.mode == AUTO)
+    waiting.join()
+    assert not answers[0].success
     wire.close()
 
 

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include <diagnostic_updater/diagnostic_updater.h>
-#include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <boost/make_shared.hpp>
 
@@ -30,6 +29,7 @@
 #include "xplane_bridge/nodes/base/node_wire.hpp"
 #include "xplane_bridge/nodes/base/param_loader.hpp"
 #include "xplane_bridge/nodes/base/ros_time.hpp"
+#include "xplane_bridge/nodes/base/service_threads.hpp"
 #include "xplane_bridge/nodes/network/immediate_queue.hpp"
 #include "xplane_bridge/nodes/network/network_thread_driver.hpp"
 
@@ -240,13 +240,13 @@ class BaseNode {
     subscribeWith(&options, Served::kInTurn);
   }
 
-  /// Advertises a service on the service thread, or on that of another `queue`. While stopping, calls fail at once. An
+  /// Advertises a service on the service thread, or on other `threads`. While stopping, calls fail at once. An
   /// exception fails the call and is logged.
   template <class Request, class Response>
   void advertiseService(const std::string& service, std::function<void(const Request&, Response&)> serve,
-                        ros::CallbackQueue* queue = nullptr) {
-    if (wire_) serve = throughWorker<Request, Response>("service " + service, std::move(serve), queue != nullptr);
-    advertiseApart<Request, Response>(service, std::move(serve), queue);
+                        ServiceThreads* threads = nullptr) {
+    if (wire_) serve = throughWorker<Request, Response>("service " + service, std::move(serve), threads != nullptr);
+    advertiseApart<Request, Response>(service, std::move(serve), threads);
   }
 
   /// The same for a service that does not wait, and on which later topics depend: the wire log has it done by the
@@ -273,13 +273,13 @@ class BaseNode {
   /// The same for a service on which nothing else of the node depends: it is no part of the wire log.
   template <class Request, class Response>
   void advertiseApart(const std::string& service, std::function<void(const Request&, Response&)> serve,
-                      ros::CallbackQueue* queue = nullptr) {
+                      ServiceThreads* threads = nullptr) {
     if (replays()) return;
     ros::AdvertiseServiceOptions options;
     options.init<Request, Response>(service, [this, service, serve](Request& request, Response& response) {
       return guardedService(service, [&] { serve(request, response); });
     });
-    options.callback_queue = queue != nullptr ? queue : &service_queue_;
+    options.callback_queue = (threads != nullptr ? threads : &service_threads_)->queue();
     services_.push_back(handle_.advertiseService(options));
   }
 
@@ -374,9 +374,8 @@ class BaseNode {
   ImmediateQueue immediate_;  // of the subscriptions that are served where they are read
   std::vector<ros::Subscriber> subscribers_;
   std::vector<ros::ServiceServer> services_;
-  ros::CallbackQueue service_queue_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
-  std::unique_ptr<ros::AsyncSpinner> service_spinner_;
+  ServiceThreads service_threads_{1};
   std::unique_ptr<ClockTimers> timers_;
 
   std::unique_ptr<NodeWire> wire_;  // null: the wire is neither logged nor replayed, or not in order

@@ -63,16 +63,17 @@ class TxNode : public BaseNode {
   void advertiseDiagnostics();
   /// A service below the node's name: TxServices::serve(), or another of its methods.
   template <class Service>
-  void advertiseOwn(const std::string& service);
+  void advertiseOwn(const std::string& service, ServiceThreads* threads = nullptr);
   template <class Service, class Serve>
-  void advertiseOwn(const std::string& service, Serve serve);
+  void advertiseOwn(const std::string& service, Serve serve, ServiceThreads* threads = nullptr);
 
   TxOptions options_;
   std::unique_ptr<TxLockstep> lockstep_;
   ros::Publisher frame_mode_publisher_;    // in lock-step
   std::optional<ControlMode> frame_mode_;  // to be published at the frame's end
-  ros::CallbackQueue lockstep_queue_;      // lockstep/step waits for frames, which wait for other services
-  std::unique_ptr<ros::AsyncSpinner> lockstep_spinner_;
+  ServiceThreads mode_threads_{1};         // a pilot's wish does not wait for what X-Plane has not shown yet
+  // lockstep/step waits for frames, which wait for other services; hold ends that.
+  ServiceThreads lockstep_threads_{2};
   TxPublishers publishers_;
   Guardian guardian_;
   Heartbeat heartbeat_;
