@@ -273,7 +273,7 @@ bool FailureManager::settled(Pending* pending) {
   const double off = surfaces_->readBack(pending->plan.surface->surface) - *pending->expected_deg;
   if (now() - pending->confirmed < kBehaviourWait) return false;
   if (std::abs(off) <= kBehaviourDeg) {
-    // A surface that stands still by itself looks stuck: only its later moves tell.
+    // A surface that stands still by itself looks stuck, until it moves.
     obeyed_[name] = {*pending, surfaces_->readBack(pending->plan.surface->surface), now()};
     return settle();
   }
