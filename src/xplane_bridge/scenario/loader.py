@@ -6,13 +6,13 @@ import math
 import warnings
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Callable, Collection, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import yaml
 
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
 from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
-from xplane_bridge.errors import is_number, yaml_problem
+from xplane_bridge.errors import yaml_problem
 from xplane_bridge.scenario.holds import HoldGains
 from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS
 from xplane_bridge.scenario.schema import (
@@ -28,6 +28,14 @@ from xplane_bridge.scenario.schema import (
     ScenarioError,
 )
 from xplane_bridge.scenario.traffic import MOST, RANGES
+from xplane_bridge.scenario.values import (
+    expect_mapping,
+    expect_number,
+    expect_numbers,
+    expect_one_of,
+    expect_text,
+    short,
+)
 from xplane_bridge.scenario.world import DISTURBANCE_NEEDS, DISTURBANCES, LAYERS, TIME, WEATHER, WIND
 from xplane_bridge.scenario.yaml_file import read_yaml
 
@@ -75,46 +83,46 @@ def parse_scenario(document: Any) -> Scenario:
     Raises:
         ScenarioError: Says the key's path, what was given, and what was expected.
     """
-    top = _mapping(document, "scenario", _TOP)
-    name = _text(top, "name", "")
+    top = expect_mapping(document, "scenario", _TOP)
+    name = expect_text(top, "name", "")
     if not name:
         raise ScenarioError("name: missing; expected a short name of the scenario")
     aircraft = top.get("aircraft", [])
     aircraft = [aircraft] if isinstance(aircraft, str) else aircraft
     if not isinstance(aircraft, list) or not all(isinstance(item, str) for item in aircraft):
         raise ScenarioError(f"aircraft: {aircraft!r}; expected a name or a list of names")
-    gains = _mapping(top.get("gains", {}), "gains", [item.name for item in fields(HoldGains)])
+    gains = expect_mapping(top.get("gains", {}), "gains", [item.name for item in fields(HoldGains)])
     for key in gains:
-        _number(gains[key], f"gains.{key}", 0.0, math.inf)
+        expect_number(gains[key], f"gains.{key}", 0.0, math.inf)
     start = _start(top.get("start", {}))
     aerodrome = _aerodrome(top.get("aerodrome", {}))
-    controller = _text(top, "controller", "")
+    controller = expect_text(top, "controller", "")
     if controller and not all(controller.partition(":")):
         raise ScenarioError(f"controller: {controller!r}; expected module:class or module:function")
     repeat = top.get("repeat_every")
     if repeat is not None:
-        repeat = _number(repeat, "repeat_every", 1.0, 86400.0)
+        repeat = expect_number(repeat, "repeat_every", 1.0, 86400.0)
     events = top.get("events")
     if not isinstance(events, list) or not events:
-        raise ScenarioError(f"events: {_short(events)}; expected a list of at least one event")
+        raise ScenarioError(f"events: {short(events)}; expected a list of at least one event")
     parsed = tuple(_event(item, f"events[{i}]") for i, item in enumerate(events))
     _check_times(parsed, repeat)
     criteria = _criteria(top.get("criteria", {}), parsed)
-    description = _text(top, "description", "")
+    description = expect_text(top, "description", "")
     return Scenario(name, description, tuple(aircraft), repeat, start, gains, criteria, parsed, controller, aerodrome)
 
 
 def _start(item: Any) -> Dict[str, float]:
-    given = _mapping(item, "start", (*_START, "on_ground"))
+    given = expect_mapping(item, "start", (*_START, "on_ground"))
     on_ground = given.get("on_ground", False)
     if not isinstance(on_ground, bool):
         raise ScenarioError(f"start.on_ground: {on_ground!r}; expected true or false")
-    start = _ranged({key: value for key, value in given.items() if key != "on_ground"}, "start", _START)
+    start = expect_numbers({key: value for key, value in given.items() if key != "on_ground"}, "start", _START)
     return {**start, **({"on_ground": True} if on_ground else {})}
 
 
 def _aerodrome(item: Any) -> Dict[str, float]:
-    given = _ranged(item, "aerodrome", {key: _START[key] for key in _AERODROME})
+    given = expect_numbers(item, "aerodrome", {key: _START[key] for key in _AERODROME})
     missing = [key for key in _AERODROME if key not in given]
     if given and missing:
         raise ScenarioError(f"aerodrome.{missing[0]}: missing; expected {', '.join(_AERODROME)}")
@@ -137,14 +145,14 @@ def _check_times(events: Sequence[Event], repeat: Optional[float]) -> None:
 
 def _criteria(item: Any, events: Sequence[Event]) -> Tuple[Criterion, ...]:
     if not isinstance(item, Mapping):
-        raise ScenarioError(f"criteria: {_short(item)}; expected a mapping of names to criteria")
+        raise ScenarioError(f"criteria: {short(item)}; expected a mapping of names to criteria")
     labels = [value for event in events for kind, value in event.actions if kind == "label"]
     return tuple(_criterion(str(name), value, f"criteria.{name}", labels) for name, value in item.items())
 
 
 def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criterion:
-    given = _mapping(item, path, ("measure", "of", "target", "from", "to", "band", "above", "below"))
-    measure = _one_of(given.get("measure"), f"{path}.measure", MEASURES)
+    given = expect_mapping(item, path, ("measure", "of", "target", "from", "to", "band", "above", "below"))
+    measure = expect_one_of(given.get("measure"), f"{path}.measure", MEASURES)
     bounds = _limits(given, path)
     if not bounds:
         raise ScenarioError(f"{path}: no bound; expected above and/or below")
@@ -153,7 +161,7 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
         if surplus:
             raise ScenarioError(f"{path}.{surplus[0]}: does not go with {measure}; expected bounds only")
         return Criterion(name, measure, above=bounds.get("above"), below=bounds.get("below"))
-    variable = _one_of(given.get("of"), f"{path}.of", SCORED)
+    variable = expect_one_of(given.get("of"), f"{path}.of", SCORED)
     if measure in TARGETED and "target" not in given:
         raise ScenarioError(f"{path}.target: missing; expected what {measure} compares with")
     if measure not in TARGETED and "target" in given:
@@ -166,7 +174,7 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
     if measure != "settling" and "band" in given:
         raise ScenarioError(f"{path}.band: does not go with {measure}; expected it with settling only")
     numbers = {
-        key: _number(given[key], f"{path}.{key}", low, math.inf)
+        key: expect_number(given[key], f"{path}.{key}", low, math.inf)
         for key, low in (("target", -math.inf), ("band", 0.0))
         if key in given
     }
@@ -179,7 +187,11 @@ def _criterion(name: str, item: Any, path: str, labels: Sequence[str]) -> Criter
 
 def _limits(given: Mapping[str, Any], path: str) -> Dict[str, float]:
     """Those of `above` and `below` that are given; nothing is above the higher of two and below the lower one."""
-    out = {key: _number(given[key], f"{path}.{key}", -math.inf, math.inf) for key in ("above", "below") if key in given}
+    out = {
+        key: expect_number(given[key], f"{path}.{key}", -math.inf, math.inf)
+        for key in ("above", "below")
+        if key in given
+    }
     above, below = out.get("above", -math.inf), out.get("below", math.inf)
     if above >= below:
         raise ScenarioError(f"{path}: above {above:g} and below {below:g}, which nothing is; expected above < below")
@@ -192,18 +204,18 @@ def _edge(value: Any, path: str, labels: Sequence[str]) -> Union[float, str]:
             have = ", ".join(repr(label) for label in labels) or "none"
             raise ScenarioError(f"{path}: {value!r}; expected seconds, or the label of an event (there is {have})")
         return value
-    return _number(value, path, 0.0, 1e6)
+    return expect_number(value, path, 0.0, 1e6)
 
 
 def _event(item: Any, path: str) -> Event:
     known = (*_TIMING, *_ACTIONS)
-    event = _mapping(item, path, known)
+    event = expect_mapping(item, path, known)
     if "at" in event and "after" in event:
         raise ScenarioError(f"{path}: has both 'at' and 'after'; expected one of them")
     timing: Dict[str, Any] = {}
     for key, low in (("at", 0.0), ("after", 0.0), ("timeout", 0.0), ("over", 0.0)):
         if key in event:
-            timing[key] = _number(event[key], f"{path}.{key}", low, 1e6)
+            timing[key] = expect_number(event[key], f"{path}.{key}", low, 1e6)
     if "when" in event:
         timing["when"] = _conditions(event["when"], f"{path}.when")
     if "timeout" in event and "when" not in event:
@@ -216,10 +228,10 @@ def _event(item: Any, path: str) -> Event:
 
 def _conditions(item: Any, path: str) -> Tuple[Condition, ...]:
     conditions = []
-    for variable, bounds in _mapping(item, path, VARIABLES).items():
+    for variable, bounds in expect_mapping(item, path, VARIABLES).items():
         place = f"{path}.{variable}"
         if variable == "mode":
-            mode = MODES[_one_of(bounds, place, MODES)]
+            mode = MODES[expect_one_of(bounds, place, MODES)]
             conditions.append(Condition(variable, mode - 0.5, mode + 0.5))
         elif isinstance(bounds, bool):
             if variable not in _YES_OR_NO:
@@ -235,11 +247,11 @@ def _bounds(item: Any, path: str) -> Dict[str, float]:
     if isinstance(item, list):
         if len(item) != 2:
             raise ScenarioError(f"{path}: {item!r}; expected two bounds [low, high]")
-        low, high = (_number(bound, path, -math.inf, math.inf) for bound in item)
+        low, high = (expect_number(bound, path, -math.inf, math.inf) for bound in item)
         return _limits({"above": low, "below": high}, path)
-    limits = _limits(_mapping(item, path, ("above", "below")), path)
+    limits = _limits(expect_mapping(item, path, ("above", "below")), path)
     if not limits:
-        raise ScenarioError(f"{path}: {_short(item)}; expected above and/or below")
+        raise ScenarioError(f"{path}: {short(item)}; expected above and/or below")
     return limits
 
 
@@ -247,19 +259,19 @@ def _bounds(item: Any, path: str) -> Dict[str, float]:
 
 
 def _stick(item: Any, path: str) -> Dict[str, float]:
-    return _ranged(item, path, STICK_AXES, some=True)
+    return expect_numbers(item, path, STICK_AXES, some=True)
 
 
 def _hold(item: Any, path: str) -> Dict[str, Optional[float]]:
     """Targets; null lets one go, and the word `none` all of them."""
     if item is None or item == "none":
         return dict.fromkeys(HOLDS)
-    given = _mapping(item, path, HOLDS)
+    given = expect_mapping(item, path, HOLDS)
     if not given:
         raise ScenarioError(f"{path}: is empty; expected targets of {', '.join(HOLDS)}")
     targets: Dict[str, Optional[float]] = {}
     for key, value in given.items():
-        targets[key] = None if value is None else _number(value, f"{path}.{key}", *HOLDS[key])
+        targets[key] = None if value is None else expect_number(value, f"{path}.{key}", *HOLDS[key])
     return targets
 
 
@@ -268,11 +280,11 @@ def _handles(item: Any, path: str) -> Dict[str, float]:
         for key in OLD_HANDLES.keys() & item.keys():
             warnings.warn(f"{path}.{key}: is now called {OLD_HANDLES[key]}", FutureWarning, stacklevel=2)
         item = {OLD_HANDLES.get(key, key): value for key, value in item.items()}
-    return _ranged(item, path, HANDLES, some=True)
+    return expect_numbers(item, path, HANDLES, some=True)
 
 
 def _buttons(item: Any, path: str) -> Dict[str, List[int]]:
-    given = _mapping(item, path, ("press", "release", "tap"))
+    given = expect_mapping(item, path, ("press", "release", "tap"))
     out = {}
     for key, value in given.items():
         numbers = value if isinstance(value, list) else [value]
@@ -283,18 +295,18 @@ def _buttons(item: Any, path: str) -> Dict[str, List[int]]:
 
 
 def _mode(item: Any, path: str) -> int:
-    return MODES[_one_of(item, path, MODES)]
+    return MODES[expect_one_of(item, path, MODES)]
 
 
 def _failure(item: Any, path: str) -> Dict[str, Any]:
-    given = _mapping(item, path, ("name", "kind", "value", "clear"))
-    name, kind = _text(given, "name", "", path), _text(given, "kind", "failed", path)
+    given = expect_mapping(item, path, ("name", "kind", "value", "clear"))
+    name, kind = expect_text(given, "name", "", path), expect_text(given, "kind", "failed", path)
     if not name:
         raise ScenarioError(f"{path}.name: missing; expected a surface, a system, or a rel_* dataref")
-    _one_of(kind, f"{path}.kind", FAILURE_KINDS)
+    expect_one_of(kind, f"{path}.kind", FAILURE_KINDS)
     value = given.get("value")
     if value is not None:
-        value = _number(value, f"{path}.value", -180.0, 180.0)
+        value = expect_number(value, f"{path}.value", -180.0, 180.0)
     clear = given.get("clear", False)
     if not isinstance(clear, bool):
         raise ScenarioError(f"{path}.clear: {clear!r}; expected true or false")
@@ -303,9 +315,9 @@ def _failure(item: Any, path: str) -> Dict[str, Any]:
 
 def _excitation(item: Any, path: str) -> Dict[str, Any]:
     known = ("kind", "target", "amplitude", "duration", "frequency", "frequency_end", "seed")
-    given = _mapping(item, path, known)
-    kind, target = _text(given, "kind", "", path), _text(given, "target", "", path)
-    _one_of(kind, f"{path}.kind", EXCITATION_KINDS)
+    given = expect_mapping(item, path, known)
+    kind, target = expect_text(given, "kind", "", path), expect_text(given, "target", "", path)
+    expect_one_of(kind, f"{path}.kind", EXCITATION_KINDS)
     if not target:
         raise ScenarioError(f"{path}.target: missing; expected roll, pitch, yaw, throttle or a surface's name")
     if "," in target and kind != "multisine":
@@ -321,23 +333,23 @@ def _excitation(item: Any, path: str) -> Dict[str, Any]:
     ):
         if key not in given and default is None:
             raise ScenarioError(f"{path}.{key}: missing; expected a number from {low} to {high}")
-        out[key] = _number(given.get(key, default), f"{path}.{key}", low, high)
+        out[key] = expect_number(given.get(key, default), f"{path}.{key}", low, high)
     seed = out["seed"]
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= _MOST_SEED:
-        raise ScenarioError(f"{path}.seed: {_short(seed)}; expected a whole number from 0 to {_MOST_SEED}")
+        raise ScenarioError(f"{path}.seed: {short(seed)}; expected a whole number from 0 to {_MOST_SEED}")
     return out
 
 
 def _datarefs(item: Any, path: str) -> Dict[str, float]:
     if not isinstance(item, dict) or not item:
-        raise ScenarioError(f"{path}: {_short(item)}; expected datarefs with their values")
-    return {str(key): _number(value, f"{path}.{key}", -math.inf, math.inf) for key, value in item.items()}
+        raise ScenarioError(f"{path}: {short(item)}; expected datarefs with their values")
+    return {str(key): expect_number(value, f"{path}.{key}", -math.inf, math.inf) for key, value in item.items()}
 
 
 def _reset(item: Any, path: str) -> Dict[str, Any]:
-    given = _mapping(item, path, (*TEXTS, *NUMBERS))
-    out: Dict[str, Any] = _ranged({k: v for k, v in given.items() if k in NUMBERS}, path, NUMBERS)
-    start = _one_of(given.get("start", "place"), f"{path}.start", STARTS)
+    given = expect_mapping(item, path, (*TEXTS, *NUMBERS))
+    out: Dict[str, Any] = expect_numbers({k: v for k, v in given.items() if k in NUMBERS}, path, NUMBERS)
+    start = expect_one_of(given.get("start", "place"), f"{path}.start", STARTS)
     needed = ("latitude", "longitude", "altitude_msl") if start == "place" else ("airport",)
     for key in (*needed, *(("final_distance", "true_airspeed") if start == "final" else ())):
         if key not in given:
@@ -349,21 +361,21 @@ def _reset(item: Any, path: str) -> Dict[str, Any]:
 
 
 def _wind(item: Any, path: str) -> Dict[str, float]:
-    return _ranged(item, path, WIND, some=True)
+    return expect_numbers(item, path, WIND, some=True)
 
 
 def _disturb(item: Any, path: str) -> Dict[str, Any]:
     if not isinstance(item, Mapping) or "kind" not in item:
-        raise ScenarioError(f"{path}: {_short(item)}; expected a mapping with kind: {', '.join(DISTURBANCES)}")
-    kind = _one_of(item["kind"], f"{path}.kind", DISTURBANCES)
+        raise ScenarioError(f"{path}: {short(item)}; expected a mapping with kind: {', '.join(DISTURBANCES)}")
+    kind = expect_one_of(item["kind"], f"{path}.kind", DISTURBANCES)
     ranges = DISTURBANCES[kind]
-    given = _mapping(item, path, ("kind", "horizontal_only", *ranges))
+    given = expect_mapping(item, path, ("kind", "horizontal_only", *ranges))
     out: Dict[str, Any] = {"kind": kind}
     if "horizontal_only" in given:
         if not isinstance(given["horizontal_only"], bool):
-            raise ScenarioError(f"{path}.horizontal_only: {_short(given['horizontal_only'])}; expected true or false")
+            raise ScenarioError(f"{path}.horizontal_only: {short(given['horizontal_only'])}; expected true or false")
         out["horizontal_only"] = given["horizontal_only"]
-    out.update(_ranged({key: value for key, value in given.items() if key in ranges}, path, ranges))
+    out.update(expect_numbers({key: value for key, value in given.items() if key in ranges}, path, ranges))
     for key in DISTURBANCE_NEEDS[kind]:
         if key not in out:
             low, high = ranges[key]
@@ -383,20 +395,20 @@ def _disturb(item: Any, path: str) -> Dict[str, Any]:
 
 
 def _time(item: Any, path: str) -> Dict[str, float]:
-    return _ranged(item, path, TIME, some=True)
+    return expect_numbers(item, path, TIME, some=True)
 
 
 def _weather(item: Any, path: str) -> Dict[str, Any]:
-    given = _mapping(item, path, (*LAYERS, *WEATHER))
+    given = expect_mapping(item, path, (*LAYERS, *WEATHER))
     if not given:
         raise ScenarioError(f"{path}: is empty; expected some of {', '.join((*LAYERS, *WEATHER))}")
-    out: Dict[str, Any] = _ranged({k: v for k, v in given.items() if k in WEATHER}, path, WEATHER)
+    out: Dict[str, Any] = expect_numbers({k: v for k, v in given.items() if k in WEATHER}, path, WEATHER)
     for key, (ranges, needed) in LAYERS.items():
         if key not in given:
             continue
         if not isinstance(given[key], list) or (key == "wind" and not given[key]):
-            raise ScenarioError(f"{path}.{key}: {_short(given[key])}; expected a list of layers, from the lowest up")
-        out[key] = [_ranged(layer, f"{path}.{key}[{i}]", ranges) for i, layer in enumerate(given[key])]
+            raise ScenarioError(f"{path}.{key}: {short(given[key])}; expected a list of layers, from the lowest up")
+        out[key] = [expect_numbers(layer, f"{path}.{key}[{i}]", ranges) for i, layer in enumerate(given[key])]
         for i, layer in enumerate(out[key]):
             for name in needed:
                 if name not in layer:
@@ -409,8 +421,8 @@ def _weather(item: Any, path: str) -> Dict[str, Any]:
 
 def _traffic(item: Any, path: str) -> List[Dict[str, float]]:
     if not isinstance(item, list) or len(item) > MOST:
-        raise ScenarioError(f"{path}: {_short(item)}; expected a list of up to {MOST} aircraft, [] gives them back")
-    out = [_ranged(each, f"{path}[{i}]", {"number": (1, MOST), **RANGES}) for i, each in enumerate(item)]
+        raise ScenarioError(f"{path}: {short(item)}; expected a list of up to {MOST} aircraft, [] gives them back")
+    out = [expect_numbers(each, f"{path}[{i}]", {"number": (1, MOST), **RANGES}) for i, each in enumerate(item)]
     numbers = [each.get("number") for each in out]
     for i, number in enumerate(numbers):
         if number is None or number != int(number) or number in numbers[:i]:
@@ -450,48 +462,3 @@ _ACTIONS: Dict[str, Callable[[Any, str], Any]] = {
     "label": _word,
     "end": _true,
 }
-
-
-# --- helpers ---
-
-
-def _mapping(item: Any, path: str, known: Any) -> Dict[str, Any]:
-    if not isinstance(item, Mapping):
-        raise ScenarioError(f"{path}: {_short(item)}; expected a mapping")
-    for key in item:
-        if key not in known:
-            raise ScenarioError(f"{path}.{key}: unknown key; expected one of {', '.join(known)}")
-    return dict(item)
-
-
-def _ranged(item: Any, path: str, ranges: Mapping[str, Tuple[float, float]], some: bool = False) -> Dict[str, float]:
-    given = _mapping(item, path, ranges)
-    if some and not given:
-        raise ScenarioError(f"{path}: is empty; expected some of {', '.join(ranges)}")
-    return {key: _number(value, f"{path}.{key}", *ranges[key]) for key, value in given.items()}
-
-
-def _one_of(value: Any, path: str, known: Collection[str]) -> str:
-    # A list or a mapping cannot be looked up.
-    if not isinstance(value, str) or value not in known:
-        raise ScenarioError(f"{path}: {_short(value)}; expected one of {', '.join(known)}")
-    return value
-
-
-def _number(value: Any, path: str, low: float, high: float) -> float:
-    if not (is_number(value) and low <= value <= high):
-        bounds = "a number" if math.isinf(low) and math.isinf(high) else f"a number from {low:g} to {high:g}"
-        raise ScenarioError(f"{path}: {_short(value)}; expected {bounds}")
-    return float(value)
-
-
-def _text(mapping: Mapping[str, Any], key: str, default: str, path: str = "") -> str:
-    value = mapping.get(key, default)
-    if not isinstance(value, str):
-        raise ScenarioError(f"{path + '.' if path else ''}{key}: {value!r}; expected a text")
-    return value
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
