@@ -34,6 +34,7 @@ from xplane_bridge.scenario.values import (
     expect_numbers,
     expect_one_of,
     expect_text,
+    expect_whole,
     short,
 )
 from xplane_bridge.scenario.world import DISTURBANCE_NEEDS, DISTURBANCES, LAYERS, TIME, WEATHER, WIND
@@ -324,7 +325,7 @@ def _excitation(item: Any, path: str) -> Dict[str, Any]:
         raise ScenarioError(
             f"{path}.target: {target!r}; expected one target: only a multisine moves several axes at once"
         )
-    out: Dict[str, Any] = {"kind": kind, "target": target, "seed": given.get("seed", 0)}
+    out: Dict[str, Any] = {"kind": kind, "target": target}
     for key, default, low, high in (
         ("amplitude", None, 0.0, 45.0),
         ("duration", None, 0.1, 600.0),
@@ -334,9 +335,7 @@ def _excitation(item: Any, path: str) -> Dict[str, Any]:
         if key not in given and default is None:
             raise ScenarioError(f"{path}.{key}: missing; expected a number from {low} to {high}")
         out[key] = expect_number(given.get(key, default), f"{path}.{key}", low, high)
-    seed = out["seed"]
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= _MOST_SEED:
-        raise ScenarioError(f"{path}.seed: {short(seed)}; expected a whole number from 0 to {_MOST_SEED}")
+    out["seed"] = int(expect_whole(given.get("seed", 0), f"{path}.seed", 0, _MOST_SEED))
     return out
 
 
@@ -385,8 +384,6 @@ def _disturb(item: Any, path: str) -> Dict[str, Any]:
         raise ScenarioError(f"{path}: expected either {pair[0]} or {pair[1]}")
     if kind == "gust" and not (out.get("speed") or out.get("vertical_speed")):
         raise ScenarioError(f"{path}.speed: missing; expected the peak of the gust, up to 50 m/s")
-    if out.get("seed", 0) != int(out.get("seed", 0)):
-        raise ScenarioError(f"{path}.seed: {out['seed']}; expected a whole number")
     if not out.get("horizontal_only") and (kind in ("turbulence", "microburst") or out.get("vertical_speed")):
         raise ScenarioError(
             f"{path}.horizontal_only: missing; expected true: no X-Plane can be sent the vertical wind of a {kind}"
@@ -425,7 +422,7 @@ def _traffic(item: Any, path: str) -> List[Dict[str, float]]:
     out = [expect_numbers(each, f"{path}[{i}]", {"number": (1, MOST), **RANGES}) for i, each in enumerate(item)]
     numbers = [each.get("number") for each in out]
     for i, number in enumerate(numbers):
-        if number is None or number != int(number) or number in numbers[:i]:
+        if number is None or number in numbers[:i]:
             raise ScenarioError(f"{path}[{i}].number: {number}; expected a whole number from 1 to {MOST}, each once")
     return out
 

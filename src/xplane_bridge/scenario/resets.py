@@ -18,7 +18,7 @@ NUMBERS: Mapping[str, Tuple[float, float]] = {
     "runway_end": (0.0, 1.0),
     "final_distance": (500.0, 50000.0),
 }
-_WHOLE = ("spot_index", "runway_end")
+WHOLE = ("spot_index", "runway_end")
 #: Where it begins, as ResetFlight counts; a place is what is meant without.
 STARTS: Mapping[str, int] = {"place": 0, "ramp": 1, "runway": 2, "final": 3}
 TEXTS = ("start", "airport", "spot")
@@ -26,7 +26,7 @@ TEXTS = ("start", "airport", "spot")
 
 def reset_request(value: Mapping[str, Any]) -> Dict[str, Any]:
     """Fields of ResetFlight."""
-    request: Dict[str, Any] = {key: int(number) if key in _WHOLE else number for key, number in value.items()}
+    request: Dict[str, Any] = {key: int(number) if key in WHOLE else number for key, number in value.items()}
     if "start" in request:
         request["start"] = STARTS[request["start"]]
     return request

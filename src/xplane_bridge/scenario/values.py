@@ -6,7 +6,11 @@ import math
 from typing import Any, Collection, Dict, Mapping, Tuple
 
 from xplane_bridge.errors import is_number
+from xplane_bridge.scenario import resets, world
 from xplane_bridge.scenario.schema import ScenarioError
+
+#: Of all keys with ranges those that count something.
+_WHOLE = (*resets.WHOLE, *world.WHOLE, "number")
 
 
 def expect_mapping(item: Any, path: str, known: Any) -> Dict[str, Any]:
@@ -26,7 +30,11 @@ def expect_numbers(
     given = expect_mapping(item, path, ranges)
     if some and not given:
         raise ScenarioError(f"{path}: is empty; expected some of {', '.join(ranges)}")
-    return {key: expect_number(value, f"{path}.{key}", *ranges[key]) for key, value in given.items()}
+    out = {}
+    for key, value in given.items():
+        check = expect_whole if key in _WHOLE else expect_number
+        out[key] = check(value, f"{path}.{key}", *ranges[key])
+    return out
 
 
 def expect_one_of(value: Any, path: str, known: Collection[str]) -> str:
@@ -42,6 +50,13 @@ def expect_number(value: Any, path: str, low: float, high: float) -> float:
     if not (is_number(value) and low <= value <= high):
         bounds = "a number" if math.isinf(low) and math.isinf(high) else f"a number from {low:g} to {high:g}"
         raise ScenarioError(f"{path}: {short(value)}; expected {bounds}")
+    return float(value)
+
+
+def expect_whole(value: Any, path: str, low: float, high: float) -> float:
+    """A number of these bounds without a fraction."""
+    if not (is_number(value) and low <= value <= high and value == int(value)):
+        raise ScenarioError(f"{path}: {short(value)}; expected a whole number from {low:.0f} to {high:.0f}")
     return float(value)
 
 

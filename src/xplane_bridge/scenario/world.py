@@ -50,7 +50,6 @@ DISTURBANCE_NEEDS: Mapping[str, Tuple[str, ...]] = {
 #: Of set_time, each with its bit of `fields`.
 TIME: Ranges = {"date_days": (0.0, 365.0), "zulu_time": (0.0, 86400.0), "time_ratio": (1.0, 16.0)}
 _TIME_BITS = {"date_days": "DATE", "zulu_time": "ZULU_TIME", "time_ratio": "TIME_RATIO"}
-_WHOLE = ("date_days", "time_ratio")
 #: Of a wind layer and of a cloud layer; altitude, speed, base and top must be given.
 WIND_LAYER: Ranges = {
     "altitude": (-500.0, 30000.0),
@@ -80,6 +79,8 @@ _WEATHER_BITS = {
     "sea_level_temperature": "TEMPERATURE",
     "sea_level_pressure": "PRESSURE",
 }
+#: Which of all these are whole numbers.
+WHOLE = ("seed", "date_days", "time_ratio", "type")
 #: Kinds of actions that take tx_node's services, or an X-Plane: nothing that flies in process has them.
 KINDS = ("reset", "wind", "disturb", "weather", "time", "traffic")
 
@@ -91,12 +92,12 @@ def wind_request(value: Mapping[str, float]) -> Dict[str, float]:
 
 def disturbance_request(value: Mapping[str, Any]) -> Dict[str, Any]:
     """Fields of SetDisturbance."""
-    return {key: int(given) if key == "seed" else given for key, given in value.items()}
+    return {key: int(given) if key in WHOLE else given for key, given in value.items()}
 
 
 def time_request(value: Mapping[str, float], bits: Any) -> Dict[str, Any]:
     """Fields of SetTime; `bits` has its constants."""
-    fields = {key: int(number) if key in _WHOLE else number for key, number in value.items()}
+    fields = {key: int(number) if key in WHOLE else number for key, number in value.items()}
     return {"fields": sum(getattr(bits, _TIME_BITS[key]) for key in value), **fields}
 
 
@@ -110,7 +111,7 @@ def weather_request(value: Mapping[str, Any], bits: Any) -> Dict[str, Any]:
         elif key == "clouds":
             for name in CLOUD_LAYER:
                 numbers = [layer.get(name, 0.0) for layer in given]
-                request[f"cloud_{name}"] = [int(number) for number in numbers] if name == "type" else numbers
+                request[f"cloud_{name}"] = [int(number) for number in numbers] if name in WHOLE else numbers
         else:
             request[key] = given
     return request

@@ -58,7 +58,7 @@ def test_it_is_sent_ten_times_a_second_and_its_end_once():
         ({"number": 1}, "expected a list of up to 19 aircraft"),
         ([{"ahead": 100}], r"traffic\[0\].number: None; expected a whole number"),
         ([{"number": 1}, {"number": 1}], r"traffic\[1\].number: 1.0; expected a whole number from 1 to 19, each once"),
-        ([{"number": 20}], "a number from 1 to 19"),
+        ([{"number": 20}], "a whole number from 1 to 19"),
         ([{"number": 1, "speed": 700}], "speed"),
         ([{"number": 1, "behind": 700}], "behind: unknown key"),
     ],
