@@ -225,7 +225,7 @@ ImageAssociator::FrameChoice ImageAssociator::keyedFrame(float key) const {
   return choice;
 }
 
-void ImageAssociator::pairWithFrame(const FrameChoice& frame, bool final, Association& answer) const {
+void ImageAssociator::pairWithFrame(const FrameChoice& frame, bool paused, bool final, Association& answer) const {
   const auto distance = [&frame](const State& state) {
     return static_cast<double>(state.key.sim_time_raw) - frame.raw;
   };
@@ -233,7 +233,9 @@ void ImageAssociator::pairWithFrame(const FrameChoice& frame, bool final, Associ
   const State* after = nullptr;
   for (const State& state : states_) {
     if (distance(state) <= 0.0) {
-      before = &state;
+      // Those of a pause have the time of the last frame before it, and may be placed elsewhere.
+      const bool same_time = before != nullptr && before->key.sim_time_raw == state.key.sim_time_raw;
+      if (!same_time || paused) before = &state;
     } else {
       after = &state;
       break;
@@ -296,13 +298,15 @@ void ImageAssociator::pairByStamp(const ImageMoment& moment, bool final, Associa
   answer.id = answer.id_after = nearest->key.id;
 }
 
-void ImageAssociator::pairPaused(bool final, Association& answer) const {
-  const bool state_paused = !states_.empty() && states_.back().key.paused;
-  answer.pending = !final && !state_paused;
-  if (!answer.pending && !states_.empty()) {
-    answer.method = PairingMethod::kPaused;
-    answer.id = answer.id_after = states_.back().key.id;
-  }
+void ImageAssociator::pairPaused(float paused_at, bool final, Association& answer) const {
+  const auto stands = [paused_at](const State& state) { return state.key.sim_time_raw == paused_at; };
+  const auto newest = std::find_if(states_.rbegin(), states_.rend(), stands);
+  // The first of a pause may come with the newest time of the flight, or be placed elsewhere.
+  const bool found = newest != states_.rend();
+  answer.pending = !final && !(found && newest->key.paused);
+  if (answer.pending || !found) return;
+  answer.method = PairingMethod::kPaused;
+  answer.id = answer.id_after = newest->key.id;
 }
 
 Association ImageAssociator::associate(const ImageMoment& moment, bool final) {
@@ -310,8 +314,8 @@ Association ImageAssociator::associate(const ImageMoment& moment, bool final) {
   std::optional<FrameChoice> frame;
   if (moment.frame_key.has_value()) {
     frame = keyedFrame(*moment.frame_key);
-  } else if (moment.paused) {
-    pairPaused(final, answer);
+  } else if (moment.paused_at.has_value()) {
+    pairPaused(*moment.paused_at, final, answer);
   } else if (!moment.sim_time.has_value()) {
     pairByStamp(moment, final, answer);
   } else if (frame = chooseFrame(moment); !frame.has_value() || (!frame->settled && !final)) {
@@ -325,7 +329,7 @@ Association ImageAssociator::associate(const ImageMoment& moment, bool final) {
     answer.ambiguous = frame->ambiguous;
     answer.at_edge = frame->at_edge;
     answer.frame_period = frame->period;
-    pairWithFrame(*frame, final, answer);
+    pairWithFrame(*frame, moment.paused_at.has_value(), final, answer);
   }
   if (!answer.pending) settle(answer);
   return answer;
@@ -369,7 +373,7 @@ std::uint32_t pairingQuality(const ImageMoment& moment, const Association& answe
   // Stamps alone do not show which frame it is.
   if (answer.method == PairingMethod::kStamp) quality |= kQualityOffFrame | kQualityClockUnsure;
   if (answer.frame_known && moment.uncertainty > 0.5 * answer.frame_period) quality |= kQualityClockUnsure;
-  if (moment.paused || answer.method == PairingMethod::kPaused) quality |= kQualityPaused;
+  if (moment.paused_at.has_value() || answer.method == PairingMethod::kPaused) quality |= kQualityPaused;
   if (answer.at_edge) quality |= kQualityEpochEdge;
   if (answer.ambiguous) quality |= kQualityBorderline;
   return quality;

@@ -13,6 +13,22 @@ namespace xplane_bridge {
 namespace {
 
 constexpr double kOffsetSmoothing = 0.05;
+constexpr std::int64_t kLongestHalfFrame = 50'000'000;  // [ns]
+constexpr std::size_t kEras = 8;
+
+/// Whether what the clock said until then holds for earlier moments only, and does so from that frame on.
+bool endsEra(core::ClockEvent event) {
+  switch (event) {
+    case core::ClockEvent::kPaused:
+    case core::ClockEvent::kResumed:
+    case core::ClockEvent::kReset:
+    case core::ClockEvent::kReplayStarted:
+    case core::ClockEvent::kReplayEnded:
+      return true;
+    default:
+      return false;
+  }
+}
 
 /// A state that nothing is known of: valid = 0 and NaN, never zero for unknown.
 FlightState unknownState() {
@@ -48,8 +64,13 @@ void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, s
   sample.acceleration = core::timeAcceleration(status.time_ratio_requested);
   sample.paused = status.paused;
   sample.replay = status.replay;
+  const core::ClockFilter before = clock_;
   const core::ClockEstimate estimate = clock_.update(sample);
   if (!estimate.usable) return;
+  if (estimate.event == core::ClockEvent::kHostClockStep) eras_.clear();  // host times mean other moments now
+  if (endsEra(estimate.event)) endEra(before, receive_ns);
+  newest_ns_ = receive_ns;
+  newest_raw_ = sample.sim_time;
   newest_sim_time_ = estimate.sim_time;
   core::SimFrame frame;
   frame.sim_time = estimate.sim_time;
@@ -84,6 +105,7 @@ void ImagePairing::forgetClock() {
   const std::lock_guard<std::mutex> lock(mutex_);
   cameras_.clear();
   clock_.reset();
+  eras_.clear();
   status_ = core::SimStatus();
   frame_period_ = 0.0F;
   newest_sim_time_.reset();
@@ -113,20 +135,33 @@ void ImagePairing::forgetOldStates() {
   states_.erase(states_.begin(), oldest.has_value() ? states_.lower_bound(*oldest) : states_.end());
 }
 
+void ImagePairing::endEra(const core::ClockFilter& before, std::int64_t receive_ns) {
+  // Between its last frame and the first of the next one, as between any two frames.
+  const std::int64_t half_frame = std::min((receive_ns - newest_ns_) / 2, kLongestHalfFrame);
+  eras_.push_back({receive_ns - half_frame, before, newest_raw_});
+  if (eras_.size() > kEras) eras_.pop_front();
+  ++eras_ended_;
+}
+
 void ImagePairing::map(core::ImageMoment* moment) const {
-  moment->paused = clock_.paused();
-  moment->sim_time = clock_.simTime(moment->host_time_ns);
-  moment->uncertainty = moment->frame_key.has_value() ? 0.0 : clock_.uncertainty();
-  moment->epoch = clock_.epoch();
+  const auto era = std::find_if(eras_.begin(), eras_.end(),
+                                [moment](const Era& ended) { return moment->host_time_ns < ended.end_ns; });
+  const bool now = era == eras_.end();
+  const core::ClockFilter& clock = now ? clock_ : era->clock;
+  moment->paused_at.reset();
+  if (clock.paused()) moment->paused_at = now ? newest_raw_ : era->sim_time_raw;
+  moment->sim_time = clock.simTime(moment->host_time_ns);
+  moment->uncertainty = moment->frame_key.has_value() ? 0.0 : clock.uncertainty();
+  moment->epoch = clock.epoch();
 }
 
 void ImagePairing::mapAnew(Waiting* picture) const {
   core::ImageMoment& moment = picture->moment;
-  if (moment.paused) return;
   const bool slipped = picture->slips != clock_.slips() && moment.epoch == clock_.epoch() && !clock_.paused();
-  if (moment.sim_time.has_value() && !slipped) return;
+  if (moment.sim_time.has_value() && !slipped && picture->eras == eras_ended_) return;
   map(&moment);
   picture->slips = clock_.slips();
+  picture->eras = eras_ended_;
 }
 
 void ImagePairing::addPicture(const FrameState& picture, std::int64_t shown_ns, std::int64_t now_ns,
@@ -149,6 +184,7 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t shown_ns, 
   if (max_wait_ns_ > 0 && starting) waiting.deadline_ns = std::max(waiting.deadline_ns, grace_until_ns_);
   map(&waiting.moment);
   waiting.slips = clock_.slips();
+  waiting.eras = eras_ended_;
   waiting_.push_back(std::move(waiting));
   flushLocked(now_ns);
 }
@@ -171,7 +207,7 @@ void ImagePairing::flushLocked(std::int64_t now_ns) {
     mapAnew(&picture);
     // Without the simulator's clock the pairing is a makeshift: not before the deadline, the clock may come.
     const bool clock_missing =
-        !picture.moment.frame_key.has_value() && !picture.moment.sim_time.has_value() && !picture.moment.paused;
+        !picture.moment.frame_key.has_value() && !picture.moment.sim_time.has_value() && !picture.moment.paused_at;
     if (clock_missing && !final) return;
     const core::Association association = associator_.associate(picture.moment, final);
     if (association.pending) return;
@@ -207,7 +243,7 @@ void ImagePairing::complete(const core::Association& association, std::int64_t n
 
 void ImagePairing::completePose(const core::Association& association, Waiting* picture) const {
   FrameState& answer = picture->answer;
-  if (answer.camera_pose_source != FrameState::POSE_MEASURED || picture->moment.paused) return;
+  if (answer.camera_pose_source != FrameState::POSE_MEASURED || picture->moment.paused_at) return;
   const auto of_frame = association.frame_known ? cameras_.poseOf(association.frame_sim_time) : std::nullopt;
   if (of_frame) {
     setPose(*of_frame, &answer);

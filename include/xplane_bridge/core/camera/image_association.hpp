@@ -46,7 +46,8 @@ struct ImageMoment {
   double uncertainty = 0.0;       ///< [s] 1-sigma of that mapping, as the ClockFilter states it
   std::uint32_t epoch = 0;        ///< the ClockFilter's epoch of that mapping
   std::int64_t host_time_ns = 0;  ///< [ns] (change - display delay) on the capture host's clock
-  bool paused = false;            ///< the simulator was paused or in replay at that moment
+  /// [s] raw simulator time at which the simulator stood at that moment, paused; empty: it flew, or nothing is known
+  std::optional<float> paused_at;
   /// [s] raw simulator time of the frame shown, where the picture's source knows it: then no clock decides
   std::optional<float> frame_key;
 };
@@ -58,7 +59,7 @@ enum class PairingMethod : std::uint8_t {
   kNearestFrame,  ///< that frame's state was not received; the nearest one was, at most `max_state_offset` away
   kInterpolated,  ///< states come slower than frames: interpolated between `id` and `id_after`
   kStamp,         ///< no simulator clock here: nearest by the two hosts' clocks (only as good as their agreement)
-  kPaused,        ///< simulator paused: the newest state, which does not move
+  kPaused,        ///< simulator paused: the newest state of the time at which it stood
 };
 
 /// Answer for one picture.
@@ -154,8 +155,8 @@ class ImageAssociator {
   [[nodiscard]] double framePeriod() const;
   [[nodiscard]] double statePeriod() const;
   [[nodiscard]] double runningOffset() const;
-  void pairWithFrame(const FrameChoice& frame, bool final, Association& answer) const;
-  void pairPaused(bool final, Association& answer) const;
+  void pairWithFrame(const FrameChoice& frame, bool paused, bool final, Association& answer) const;
+  void pairPaused(float paused_at, bool final, Association& answer) const;
   void pairByStamp(const ImageMoment& moment, bool final, Association& answer) const;
   void settle(const Association& answer);
 

@@ -84,12 +84,21 @@ class ImagePairing {
     core::ImageMoment moment;
     std::int64_t deadline_ns;
     std::uint32_t slips = 0;  ///< of the clock when `moment` was mapped
+    std::size_t eras = 0;     ///< that had ended then
+  };
+  /// The simulator's clock until it was paused, went on, or jumped: pictures are of moments before that, too.
+  struct Era {
+    std::int64_t end_ns;      ///< host time
+    core::ClockFilter clock;  ///< as it was then
+    float sim_time_raw;       ///< [s] of its newest frame
   };
   struct KnownState {
     FlightState::ConstPtr message;
     std::int64_t arrival_ns;
   };
 
+  /// To be called when a frame has ended one. @param before the clock without that frame
+  void endEra(const core::ClockFilter& before, std::int64_t receive_ns);
   void map(core::ImageMoment* moment) const;
   /// Maps again where the clock has come, or learnt of a slip, since.
   void mapAnew(Waiting* picture) const;
@@ -107,6 +116,10 @@ class ImagePairing {
   mutable std::mutex mutex_;
   core::ClockFilter clock_;
   core::ImageAssociator associator_;
+  std::deque<Era> eras_;  // that have ended, the oldest first
+  std::size_t eras_ended_ = 0;
+  std::int64_t newest_ns_ = 0;  // host time of the newest frame
+  float newest_raw_ = 0.0F;     // [s] of the same
   core::SimStatus status_;
   float frame_period_ = 0.0F;
   std::optional<double> newest_sim_time_;  // [s] unwrapped

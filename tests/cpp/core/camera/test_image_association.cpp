@@ -237,13 +237,25 @@ TEST(ImageAssociator, PausedPictureTakesTheStateThatStands) {
   core::ImageAssociator associator;
   feed(associator, 60, 60.0);
   core::ImageMoment moment;
-  moment.paused = true;
+  moment.paused_at = 1.0F;
   EXPECT_TRUE(associator.associate(moment, false).pending);
   associator.addState(stateAt(60, 1.0, 0, true));
   const auto answer = associator.associate(moment, false);
   EXPECT_EQ(answer.method, PairingMethod::kPaused);
   EXPECT_EQ(answer.id, 60U);
   EXPECT_EQ(core::pairingQuality(moment, answer), static_cast<std::uint32_t>(core::kQualityPaused));
+  associator.addState(stateAt(61, 1.0 + 1.0 / 60.0));
+  EXPECT_EQ(associator.associate(moment, true).id, 60U) << "it flies on, but stood at that moment";
+}
+
+TEST(ImageAssociator, PausedPictureTakesNoStateOfAnotherTime) {
+  core::ImageAssociator associator;
+  feed(associator, 60, 60.0);
+  core::ImageMoment moment;
+  moment.paused_at = 1.0F;  // whose states were lost
+  const auto answer = associator.associate(moment, true);
+  EXPECT_EQ(answer.method, PairingMethod::kNone);
+  EXPECT_EQ(core::pairingQuality(moment, answer), core::kQualityPaused | core::kQualityStateMissing);
 }
 
 TEST(ImageAssociator, PairsByStampWithoutASimulatorClockAndFlagsIt) {
@@ -421,7 +433,7 @@ TEST(ImageAssociator, AKeyNamesTheFrameWhateverTheClocksSay) {
   EXPECT_EQ(answer.frame_sim_time, 1000.5);
   moment.sim_time.reset();  // and without any clock
   EXPECT_EQ(associator.associate(moment, false).id, 30U);
-  moment.paused = true;  // or when X-Plane was paused since
+  moment.paused_at = 1.0F;  // or when X-Plane was paused since
   EXPECT_EQ(associator.associate(moment, false).id, 30U);
 }
 

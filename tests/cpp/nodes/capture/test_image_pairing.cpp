@@ -288,6 +288,56 @@ TEST(ImagePairing, StampsOfTheSimulatorAreNotTakenForTheHosts) {
   EXPECT_FALSE(pairing.simTime(kStart + ns(8.0)).has_value());
 }
 
+/// X-Plane is paused for 3 s after 5 s, the pictures go on; `max_wait` [s] is shorter or longer than the clock takes to
+/// be fitted again.
+class Pause : public ::testing::TestWithParam<double> {};
+
+TEST_P(Pause, PairsNoPictureWithAnotherFrame) {
+  constexpr std::uint32_t kPaused = 300, kResumed = 480, kEnd = 700;
+  std::map<std::uint32_t, FrameState> answers;
+  std::map<std::uint32_t, float> truth;
+  ImagePairing pairing(kDelay, GetParam(), [&answers](const auto& answer) { answers[answer.image_count] = answer; });
+  std::vector<std::pair<double, std::function<void(std::int64_t)>>> events;
+  for (std::uint32_t k = 0; k < kEnd; ++k) {
+    const double t = k / kFps;
+    const std::uint32_t flown = std::min(k, kPaused - 1) + (k < kResumed ? 0 : k - kResumed + 1);
+    core::SimStatus status;
+    status.sim_time = static_cast<float>(kSimStart + flown / kFps);
+    status.paused = k >= kPaused && k < kResumed;
+    truth[k] = static_cast<float>(status.sim_time);
+    events.emplace_back(t + 1e-4, [&pairing, status](std::int64_t now) {
+      pairing.addFrame(status, static_cast<float>(1.0 / kFps), now);
+    });
+    const auto state = boost::make_shared<FlightState>();
+    state->sim_time = truth[k];
+    state->paused = status.paused;
+    state->header.stamp.fromNSec(static_cast<std::uint64_t>(kStart + ns(t)));
+    events.emplace_back(t + 3e-4, [&pairing, state](std::int64_t now) { pairing.addState(state, now); });
+    FrameState picture;
+    picture.image_count = k;
+    events.emplace_back(t + kDelay, [&pairing, picture](std::int64_t now) { pairing.addPicture(picture, now, now); });
+    events.emplace_back(t + 0.5 / kFps, [&pairing](std::int64_t now) { pairing.flush(now); });
+  }
+  std::stable_sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [when, event] : events) event(kStart + ns(when));
+  pairing.flush(kStart + ns(kEnd / kFps + 1.0));
+  ASSERT_EQ(answers.size(), kEnd);
+  constexpr std::uint32_t kRefitted = kResumed + 30;  // until then stamps alone pair, and say so
+  for (std::uint32_t k = 60; k < kEnd; ++k) {
+    SCOPED_TRACE("picture of frame " + std::to_string(k));
+    const bool paused = k >= kPaused && k < kResumed;
+    EXPECT_EQ((answers[k].quality & FrameState::QUALITY_PAUSED) != 0, paused);
+    EXPECT_EQ(answers[k].state.paused, paused);
+    if (k >= kResumed && k < kRefitted) continue;
+    EXPECT_EQ(answers[k].state.sim_time, truth[k]);
+    if (k < kPaused - 1) {
+      EXPECT_EQ(answers[k].frame_sim_time, truth[k]);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Waits, Pause, ::testing::Values(0.2, 0.5, 2.0));
+
 /// The wall clock is set after 20 s, while a frame's datagram lies between the kernel's stamp and us. Frames come by
 /// the kernel's stamps, pictures by those of an X server, which like all of the host's steady clock knows nothing of
 /// it.
