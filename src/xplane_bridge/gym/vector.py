@@ -176,6 +176,20 @@ def _work(
             worker.close()
 
 
+def _seeds(seed: Union[int, Sequence[Optional[int]], None], count: int) -> List[Optional[int]]:
+    """One of each environment, as `FlyEnv.reset` takes it: what that would refuse is refused before any is reset."""
+    if seed is None or isinstance(seed, (int, np.integer)):
+        seeds = [None if seed is None else int(seed) + i for i in range(count)]
+    else:
+        seeds = list(seed)
+    if len(seeds) != count:
+        raise GymError(f"seed: {len(seeds)} of them; expected one number, or {count}")
+    for each in seeds:
+        if each is not None and not (isinstance(each, (int, np.integer)) and each >= 0):
+            raise GymError(f"seed: {each!r}; expected whole numbers from 0, or None")
+    return [None if each is None else int(each) for each in seeds]
+
+
 class FlyVectorEnv(VectorEnv[Any, Any, Any]):
     """`num_envs` of `FlyEnv`, with the observations that they have alone with the seeds `seed + index`.
 
@@ -243,12 +257,7 @@ class FlyVectorEnv(VectorEnv[Any, Any, Any]):
                 stay open and are to be reset again.
             WorkerError: A worker has ended; the environments are closed.
         """
-        if seed is None or isinstance(seed, (int, np.integer)):
-            seeds = [None if seed is None else int(seed) + i for i in range(self.num_envs)]
-        else:
-            seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise GymError(f"seed: {len(seeds)} of them; expected one number, or {self.num_envs}")
+        seeds = _seeds(seed, self.num_envs)
         options = None if options is None else dict(options)
         self._flying = False
         shares = [seeds[first:end] for first, end in self._rows]

@@ -242,9 +242,14 @@ def test_wrong_arguments_are_reported_before_a_process_starts(arguments: dict, t
 
 
 def test_wrong_actions_and_seeds_are_reported() -> None:
-    envs = FlyVectorEnv(2, workers=1, axes=("roll",))
+    envs = FlyVectorEnv(2, workers=1, **GUSTY)
     with pytest.raises(GymError, match="seed: 3 of them; expected one number, or 2"):
         envs.reset(seed=[1, 2, 3])
+    for wrong in (-1, [1, -2], [1.5, 2], ["a", None]):
+        with pytest.raises(GymError, match=r"seed: .*; expected whole numbers from 0, or None"):
+            envs.reset(seed=wrong)
+    assert np.array_equal(envs.reset(seed=np.array([3, 4]))[0], envs.reset(seed=3)[0])
+    assert np.array_equal(envs.reset(seed=[np.int64(3), None])[0][0], envs.reset(seed=np.int32(3))[0][0])
     envs.reset(seed=[5, None])
     with pytest.raises(GymError, match=r"actions of shape \(2,\); expected \(2, 1\)"):
         envs.step(np.zeros(2, np.float32))
