@@ -96,10 +96,14 @@ class VirtualStick:
         return axes, buttons
 
     def _handle_button(self, handle: str, value: float) -> Optional[int]:
-        if handle == "gear":
-            return self._buttons.get((handle, value >= 0.5))
-        if handle == "brakes" and (handle, True) in self._buttons:
-            return self._buttons[handle, True] if value > 0.5 else None
+        if handle == "gear" or (handle == "brakes" and (handle, True) in self._buttons):
+            if value not in (0.0, 1.0):
+                raise ScenarioError(
+                    f"{self.name}: {handle} at {value:g}: a button moves it to 0 or 1 only; fly this scenario with "
+                    "commands instead of a stick"
+                )
+            # A pressed button brakes, none lets go.
+            return None if handle == "brakes" and value == 0.0 else self._buttons.get((handle, value == 1.0))
         if value == _SPRUNG:
             return None
         raise ScenarioError(

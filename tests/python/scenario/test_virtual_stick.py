@@ -95,6 +95,9 @@ def test_mode_buttons_below_0_are_none():
         ({"mode": {}}, None, "no button for mode auto"),
         ({"direct": {"roll": {"axis": 0}}}, None, "direct.pitch is missing"),
         ({}, Commands(handles={"flaps": 0.5}), "flaps is moved by a hat"),
+        ({}, Commands(handles={"brakes": 0.4}), r"brakes at 0\.4: a button moves it to 0 or 1 only; fly .* commands"),
+        ({}, Commands(handles={"brakes": 0.9}), r"brakes at 0\.9: a button"),
+        ({}, Commands(handles={"gear": 0.4}), r"gear at 0\.4: a button"),
         ({}, Commands(buttons={40}), "button 40"),
     ],
 )
