@@ -10,7 +10,6 @@ import yaml
 
 from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge.constants import EXCITATION_KINDS
-from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
 from xplane_bridge.scenario import (
     FlightSample,
     Player,
@@ -476,23 +475,6 @@ def test_pilot_fails_an_engine(tmp_path):
     with fly(tmp_path, "name: t\nevents:\n- {at: 0.5, failure: {name: engine_2}}\n", 1.0) as bench:
         running = "sim/flightmodel/engine/ENGN_running"
         assert bench.read(running + "[0]", running + "[1]") == [1.0, 0.0]
-
-
-def test_pilot_refuses_what_it_cannot_do():
-    with pytest.raises(ScenarioError, match="surfaces fail through tx_node"):
-        ScenarioPilot(scenario({"at": 0, "failure": {"name": "aileron1_wing2_left", "kind": "stuck", "value": 5}}))
-    for more in ({"kind": "reduced", "value": 0.5}, {"value": 1}):
-        with pytest.raises(ScenarioError, match=r"engine_1.*expected kind failed, and no value: a system works"):
-            ScenarioPilot(scenario({"at": 0, "failure": {"name": "engine_1", **more}}))
-
-
-@pytest.mark.parametrize("target", ["throttle", "aileron1_wing2_left", "roll,pitch"])
-def test_the_emulators_pilot_refuses_excitations_that_it_does_not_fly(target):
-    excitation = {"kind": "multisine", "amplitude": 0.1, "duration": 2}
-    for axis in ("roll", "pitch", "yaw"):
-        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": axis}}))
-    with pytest.raises(ScenarioError, match=r"excitation.*: the emulator's pilot moves .*; tx_node moves"):
-        ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": target}}))
 
 
 def test_scenario_of_another_aircraft_is_refused(tmp_path):
