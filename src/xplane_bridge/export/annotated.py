@@ -28,7 +28,7 @@ from xplane_bridge.export.dataset import write_frames
 from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels, Thing, keypoints
 from xplane_bridge.export.pictures import NO_LABELS, Options, Picture, Pictures, write_pictures
 from xplane_bridge.export.yolo_yaml import DATA_YAML, data_yaml
-from xplane_bridge.labels.camera import FRD_OF_FLU, ROI, rotation_of
+from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
 from xplane_bridge.units import FOOT_M
 
 if TYPE_CHECKING:
@@ -137,7 +137,6 @@ def _image(picture: Picture, pictures: Pictures, labels: Optional[ImageLabels]) 
         "camera": picture.camera,
         "stamp_ns": picture.stamp,
         "camera_matrix": vector("camera_matrix", range(9)),
-        "camera_roi": [value(f"camera_{name.replace('.', '_')}_px") for name in ROI],
         "body_to_camera": {
             "translation_m": vector("body_to_camera_translation", "xyz"),
             "rotation_xyzw": vector("body_to_camera_rotation", "xyzw"),

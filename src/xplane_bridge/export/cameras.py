@@ -10,7 +10,6 @@ import numpy as np
 
 from xplane_bridge.bags.cameras import cameras
 from xplane_bridge.export.flight import full_names
-from xplane_bridge.labels.camera import ROI
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
@@ -22,7 +21,6 @@ _TURN = tuple(f"body_to_camera.rotation.{axis}" for axis in "xyzw")
 UNITS = {
     "width_px": "px",
     "height_px": "px",
-    "roi_px": "px",
     "camera_matrix": "px",
     "body_to_camera_translation_m": "m",
     "body_to_camera_spread_m": "m",
@@ -42,7 +40,6 @@ class CameraRow(NamedTuple):
     frames: int  #: messages of FrameState
     width_px: int
     height_px: int
-    roi_px: list[int]  #: x_offset, y_offset, width, height of what shows the world; zeros: all of it
     camera_matrix: list[list[float]]  #: K of CameraInfo
     body_to_camera_translation_m: list[float]  #: as in FrameState; of the measured poses where there are some
     body_to_camera_rotation_xyzw: list[float]
@@ -68,7 +65,7 @@ def camera_rows(bags: Bags, names: Sequence[str] = (), topics: Sequence[str] = (
     for camera in cameras(bags):
         if (names and camera.name not in names) or (chosen and camera.frames not in chosen):
             continue
-        intrinsics = _intrinsics(bags, camera.info)
+        width, height, matrix = _intrinsics(bags, camera.info)
         table = bags.read(camera.frames, ["quality", "display_delay", "camera_pose_source", *_PLACE, *_TURN])
         constants = bags.constants(camera.frames)
         measured = table["camera_pose_source"] == constants.get("POSE_MEASURED", -1)
@@ -77,18 +74,16 @@ def camera_rows(bags: Bags, names: Sequence[str] = (), topics: Sequence[str] = (
         assumed = (table["quality"] & int(constants.get("QUALITY_DELAY_ASSUMED", 0))) != 0
         delays = table["display_delay"][assumed if assumed.all() else ~assumed]
         source = "assumed" if assumed.all() else "both" if assumed.any() else "set"
-        yield CameraRow(camera.name, len(table), *intrinsics, *pose, float(np.median(delays)), source)
+        yield CameraRow(camera.name, len(table), width, height, matrix, *pose, float(np.median(delays)), source)
 
 
-def _intrinsics(bags: Bags, topic: str) -> tuple[int, int, list[int], list[list[float]]]:
+def _intrinsics(bags: Bags, topic: str) -> tuple[int, int, list[list[float]]]:
     if topic not in bags.topics or not bags.topics[topic].count:
-        return 0, 0, [0] * 4, [[math.nan] * 3] * 3
-    sizes = ("width", "height", *ROI)
-    infos = bags.read(topic, [*sizes, "K"])
+        return 0, 0, [[math.nan] * 3] * 3
+    infos = bags.read(topic, ["width", "height", "K"])
     matrices = infos["K"]
-    row = _nearest_to_median([*(infos[name] for name in sizes), *matrices.T])
-    width, height, *roi = (int(infos[name][row]) for name in sizes)
-    return width, height, roi, matrices[row].reshape(3, 3).tolist()
+    row = _nearest_to_median([infos["width"], infos["height"], *matrices.T])
+    return int(infos["width"][row]), int(infos["height"][row]), matrices[row].reshape(3, 3).tolist()
 
 
 def _pose(place: np.ndarray, turn: np.ndarray, measured: np.ndarray) -> tuple[list[float], list[float], float, float]:

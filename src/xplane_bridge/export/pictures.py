@@ -2,7 +2,7 @@
 
 Columns: every field of FrameState with the state of the frame the image shows; the latched labels (`flight.labels`)
 at that frame;
-each quality bit, and the bits in words; where the display delay is from; CameraInfo's size, roi and matrix.
+each quality bit, and the bits in words; where the display delay is from; CameraInfo's size and matrix.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from xplane_bridge.export.columns import named
 from xplane_bridge.export.flight import labels as flight_labels
 from xplane_bridge.export.flight import quality_bits
 from xplane_bridge.export.tables import FlightTable
-from xplane_bridge.labels.camera import ROI
 
 if TYPE_CHECKING:
     from xplane_bridge.labels.table import Key
@@ -358,14 +357,14 @@ def _quality(quality: np.ndarray, constants: Mapping[str, Any]) -> dict[str, np.
 
 
 def _camera(bags: Bags, topic: str, stamp: np.ndarray, store: ColumnFile) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield CameraInfo's size, roi and matrix K (row by row), by column; NaN where none has a frame's stamp."""
-    size = {name: f"camera_{name.replace('.', '_')}_px" for name in ("width", "height", *ROI)}
+    """Yield CameraInfo's size and matrix K (row by row), by column; NaN where none has a frame's stamp."""
+    size = {name: f"camera_{name}_px" for name in ("width", "height")}
     matrix = {k: f"camera_matrix_{k}" for k in range(9)}
     if topic not in bags.topics or not bags.topics[topic].count:
         for column in (*size.values(), *matrix.values()):
             yield column, np.full(len(stamp), np.nan)
         return
-    infos = bags.read(topic, ["header.stamp", *size, "K"], store)
+    infos = bags.read(topic, ["header.stamp", "width", "height", "K"], store)
     rows = _Rows(infos.stamp).of_each(stamp)
     for name, column in size.items():
         yield column, np.where(rows >= 0, infos[name][rows], np.nan)

@@ -18,7 +18,6 @@ from xplane_bridge.bags import Bags
 from xplane_bridge.cli import flight_report
 from xplane_bridge.cli.sight import label_images
 from xplane_bridge.constants import ImageQuality
-from xplane_bridge.export.cameras import camera_rows
 from xplane_bridge.labels import table
 
 if TYPE_CHECKING:
@@ -177,32 +176,6 @@ def test_an_image_folder_is_loaded_with_the_pictures_of_both(
         assert row["image"].size == ((640, 360) if row["camera"] == "belly" else (640, 480))
         assert row["camera_matrix_0"] == pytest.approx(FOCAL[row["camera"]], abs=1e-3)
         assert json.loads(row["labels_json"]) == frames[row["camera"], row["stamp_ns"]]["objects"]
-
-
-def test_the_bars_of_a_letterbox_are_no_part_of_the_picture(tmp_path: Path) -> None:
-    roi = (0, 60, 640, 360)
-    flight = write_approach(tmp_path / "flight.bag", FRAMES, far=0.0, views=(FORWARD._replace(roi=roi), BELLY))
-    assert label_images.main([str(flight), *AIRPORT]) == 0
-    lines = table.read(table.beside(flight)).frames
-    lowest = {"camera": 0.0, "belly": 0.0}
-    for (camera, _), line in lines.items():
-        assert line["roi"] == (list(roi) if camera == "camera" else [0, 0, 0, 0])
-        label = runway(line)
-        if label:
-            lowest[camera] = max(lowest[camera], label["box"][3])
-            seen = [point["v"] for point in label["points"].values() if point["state"] == "visible"]
-            assert camera == "belly" or all(59.5 <= v <= 419.5 for v in seen)
-    assert lowest == {"camera": pytest.approx(419.5), "belly": pytest.approx(359.5)}
-    notes = exported(flight, "coco", tmp_path) / "annotations"
-    images = [image for path in notes.glob("*.json") for image in json.loads(path.read_text())["images"]]
-    assert all(image["camera_roi"] == (list(roi) if image["camera"] == "camera" else [0] * 4) for image in images)
-    rows = pd.read_csv(exported(flight, "imagefolder", tmp_path) / "labels.csv")
-    found = rows.loc[
-        rows["camera"] == "camera", [f"camera_roi_{n}_px" for n in ("x_offset", "y_offset", "width", "height")]
-    ]
-    assert found.drop_duplicates().to_numpy().tolist() == [list(roi)]
-    with Bags(flight) as bags:
-        assert [row.roi_px for row in camera_rows(bags)] == [list(roi), [0, 0, 0, 0]]
 
 
 def test_the_report_shows_each_camera_with_its_own_labels(flight: Path, tmp_path: Path) -> None:

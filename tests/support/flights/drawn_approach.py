@@ -40,7 +40,6 @@ class View(NamedTuple):
     fov_deg: float = FOV_DEG
     pitch_deg: float = 0.0
     rotation: tuple[float, float, float, float] = (-0.5, 0.5, -0.5, 0.5)  #: of body_to_camera
-    roi: tuple[int, int, int, int] = (0, 0, 0, 0)  #: CameraInfo's: x_offset, y_offset, width, height
 
     @property
     def matrix(self) -> list[float]:
@@ -132,7 +131,6 @@ def add_picture(bag: FlightBag, view: View, pixels: np.ndarray, frame: Mapping[s
     pose = {**frame["body_to_camera"], "rotation": dict(zip("xyzw", view.rotation))}
     bag.add(f"{view.topics}/frame_state", "xplane_bridge/FrameState", ns, {**frame, "body_to_camera": pose})
     info = {"header": header, "width": view.size[0], "height": view.size[1], "K": view.matrix}
-    info["roi"] = dict(zip(("x_offset", "y_offset", "width", "height"), view.roi))
     bag.add(f"{view.topics}/camera_info", "sensor_msgs/CameraInfo", ns, info)
     jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 90])[1]
     picture = {"header": header, "format": "bgr8; jpeg compressed bgr8", "data": jpeg.reshape(-1)}
