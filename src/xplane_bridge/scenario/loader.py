@@ -221,6 +221,8 @@ def _event(item: Any, path: str) -> Event:
         timing["when"] = _conditions(event["when"], f"{path}.when")
     if "timeout" in event and "when" not in event:
         raise ScenarioError(f"{path}.timeout: without 'when'; expected a condition to wait for")
+    if "over" in event and "stick" not in event:
+        raise ScenarioError(f"{path}.over: without 'stick'; expected stick movements that take so long")
     actions = tuple((key, _ACTIONS[key](value, f"{path}.{key}")) for key, value in event.items() if key in _ACTIONS)
     if not actions and not timing:
         raise ScenarioError(f"{path}: is empty; expected a time, a condition or an action of {', '.join(_ACTIONS)}")

@@ -98,6 +98,7 @@ def test_the_example_of_the_manual_is_a_scenario():
         ({"name": "x", "events": [{"at": 0, "when": {"roll": {"above": 5, "below": 5}}}]}, "roll: above 5 and below 5"),
         ({"name": "x", "events": [{"at": 0, "when": {"altitude": True}}]}, "altitude: True; expected .low, high."),
         ({"name": "x", "events": [{"at": 0, "timeout": 3}]}, "timeout: without 'when'"),
+        ({"name": "x", "events": [{"at": 0, "over": 5, "handles": {"flaps": 1}}]}, "over: without 'stick'; expected"),
         ({"name": "x", "events": [{"at": 0, "reset": {"start": [1]}}]}, r"reset\.start: \[1\]; expected one of place"),
         ({"name": "x", "events": [{"at": 0, "hat": {"y": 1}}]}, r"events\[0\].hat: unknown key; .*handles"),
         ({"name": "x", "events": [{"at": 0, "buttons": {"press": [99]}}]}, "button numbers 0..63"),
