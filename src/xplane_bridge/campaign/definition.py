@@ -12,8 +12,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
-import yaml
-
 from xplane_bridge.analysis.criteria import CAMERA, Criterion
 from xplane_bridge.campaign.distributions import (
     MOST_SOBOL,
@@ -27,13 +25,13 @@ from xplane_bridge.campaign.distributions import (
 from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.emulator.flight.limits import check_atmosphere, check_turbulence, check_wind
-from xplane_bridge.errors import is_number, yaml_problem
+from xplane_bridge.errors import is_number
 from xplane_bridge.in_process.aircraft import LOADING, WEATHER
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
 from xplane_bridge.scenario.schema import STICK_AXES
 from xplane_bridge.scenario.world import KINDS as WORLD_KINDS
-from xplane_bridge.scenario.yaml_file import read_yaml
+from xplane_bridge.scenario.yaml_file import read_yaml_file
 
 _TOP = (
     "name", "description", "scenario", "aircraft", "controller", "arguments", "frame_rate", "longest", "weather",
@@ -163,11 +161,12 @@ def load_campaign(path: Path, flights: Optional[int] = None) -> Campaign:
     Raises:
         CampaignError: It cannot be read, or is no campaign.
     """
-    document = _read_yaml(path)
+    document = read_yaml_file(path, CampaignError)
     if isinstance(document, Mapping) and isinstance(document.get("scenario"), str):
-        document = {**document, "scenario": _read_yaml(_scenario_file(document["scenario"], Path(path)))}
+        file = _scenario_file(document["scenario"], Path(path))
+        document = {**document, "scenario": read_yaml_file(file, CampaignError)}
     try:
-        if flights is not None:
+        if flights is not None and isinstance(document, Mapping):
             document = {**document, "flights": flights}
         return parse_campaign(document)
     except CampaignError as error:
@@ -178,15 +177,6 @@ def _scenario_file(name: str, campaign: Path) -> Path:
     if name.endswith((".yaml", ".yml")):
         return campaign.parent / name
     return config_file("scenarios", f"{name}.yaml")
-
-
-def _read_yaml(path: Path) -> Any:
-    try:
-        return read_yaml(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise CampaignError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except yaml.YAMLError as error:
-        raise CampaignError(f"{path}: {yaml_problem(error)}") from None
 
 
 def parse_campaign(document: Any) -> Campaign:

@@ -8,11 +8,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
-import yaml
-
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
 from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
-from xplane_bridge.errors import yaml_problem
 from xplane_bridge.scenario.holds import HoldGains
 from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS
 from xplane_bridge.scenario.schema import (
@@ -38,7 +35,7 @@ from xplane_bridge.scenario.values import (
     short,
 )
 from xplane_bridge.scenario.world import DISTURBANCE_NEEDS, DISTURBANCES, LAYERS, TIME, WEATHER, WIND
-from xplane_bridge.scenario.yaml_file import read_yaml
+from xplane_bridge.scenario.yaml_file import read_yaml_file
 
 _TOP = (
     *("name", "description", "aircraft", "controller", "repeat_every", "start", "aerodrome", "gains", "criteria"),
@@ -64,14 +61,7 @@ def load_scenario(path: Path) -> Scenario:
     Raises:
         ScenarioError: The file cannot be read, is no YAML, or is no scenario.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror or error}") from None
-    try:
-        document = read_yaml(text)
-    except yaml.YAMLError as error:
-        raise ScenarioError(f"{path}: {yaml_problem(error)}") from None
+    document = read_yaml_file(path, ScenarioError)
     try:
         return parse_scenario(document)
     except ScenarioError as error:

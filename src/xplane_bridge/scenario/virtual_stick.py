@@ -138,8 +138,9 @@ def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:
     """
     try:
         device = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"{file}: {error.strerror}; expected a file of config/joysticks") from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "is not UTF-8 text"
+        raise ScenarioError(f"{file}: {reason}; expected a file of config/joysticks") from None
     except yaml.YAMLError as error:
         raise ScenarioError(f"{file}: {yaml_problem(error)}") from None
     if not isinstance(device, dict):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Any, Type
 
 import yaml
+
+from xplane_bridge.errors import XplaneBridgeError, yaml_problem
 
 
 class _Loader(yaml.SafeLoader):  # type: ignore[misc]
@@ -21,10 +24,17 @@ class _Loader(yaml.SafeLoader):  # type: ignore[misc]
         return node
 
 
-def read_yaml(text: str) -> Any:
-    """A YAML document.
+def read_yaml_file(path: Path, refusal: Type[XplaneBridgeError]) -> Any:
+    """The YAML document of a file.
 
     Raises:
-        yaml.YAMLError: It does not parse, or a key is there twice.
+        refusal: The file cannot be read, is no YAML, or has a key twice.
     """
-    return yaml.load(text, _Loader)
+    try:
+        return yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
+    except OSError as error:
+        raise refusal(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise refusal(f"{path}: is not UTF-8 text") from None
+    except yaml.YAMLError as error:
+        raise refusal(f"{path}: {yaml_problem(error)}") from None

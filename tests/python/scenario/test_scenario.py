@@ -133,6 +133,9 @@ def test_files_that_are_no_scenarios(tmp_path):
     bad.write_text("name: [")
     with pytest.raises(ScenarioError, match=r"bad\.yaml: does not parse as YAML: line 1, column 8: "):
         load_scenario(bad)
+    bad.write_bytes(b"name: M\xfcnchen")
+    with pytest.raises(ScenarioError, match=r"bad\.yaml: is not UTF-8 text"):
+        load_scenario(bad)
     twice = "failure: {name: engine_1}, failure: {name: engine_2}"
     bad.write_text(f"name: x\nevents:\n- {{at: 5, {twice}}}\n")
     with pytest.raises(ScenarioError, match=r"YAML: line 3, column 38: 'failure' is there twice; expected each key"):

@@ -122,3 +122,6 @@ def test_files_that_are_no_devices_are_said(tmp_path):
     (tmp_path / "list.yaml").write_text("[1, 2]", encoding="utf-8")
     with pytest.raises(ScenarioError, match="expected a mapping"):
         load_stick(tmp_path / "list.yaml")
+    (tmp_path / "latin.yaml").write_bytes(b"device: Kn\xfcppel")
+    with pytest.raises(ScenarioError, match=r"latin\.yaml: is not UTF-8 text; expected a file of config/joysticks"):
+        load_stick(tmp_path / "latin.yaml")
