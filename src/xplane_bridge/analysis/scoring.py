@@ -14,7 +14,7 @@ _WRAPPING = {"roll": -180.0, "heading": 0.0}
 _BEFORE_END_S = 0.1
 #: Windows are that much wider, so that it does not hang on the last bit of a time whether a sample lies in them [s].
 _EDGE_S = 5e-4
-#: Share of the samples a measure looks at that must be known: variables may be unknown a while, as alpha at standstill.
+#: Share of the samples a measure looks at that must be known: what X-Plane has not sent is unknown.
 _LEAST_KNOWN = 0.5
 #: What `final` looks at [s].
 _FINAL_S = 1.0
