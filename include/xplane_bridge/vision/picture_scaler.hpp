@@ -42,6 +42,9 @@ class PictureScaler {
   /// @param[out] bgr CV_8UC3 of the output size; its memory is reused when it fits
   void scale(const cv::Mat& source, cv::Mat& bgr);
 
+  /// What of the output [px] shows the source, whose size [px] is given: all of it but for the bars of a letterbox.
+  [[nodiscard]] cv::Rect shows(cv::Size source) const { return layout(source).to; }
+
   /// Camera of the output.
   /// @param source size of the source, [px]
   /// @throws std::invalid_argument when out of range.

@@ -292,6 +292,11 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   const vision::FieldOfView shown{frustum.horizontal_deg, frustum.vertical_deg, frustum.shift_right, frustum.shift_up};
   const sensor_msgs::CameraInfo info = cameraInfo(state.header, grabbed->size, shown);
   state.field_of_view_deg = static_cast<float>(scaler_->intrinsics(grabbed->size, shown).horizontal_fov_deg);
+  const cv::Rect part = scaler_->shows(grabbed->size);
+  state.picture_x = static_cast<std::uint32_t>(part.x);
+  state.picture_y = static_cast<std::uint32_t>(part.y);
+  state.picture_width = static_cast<std::uint32_t>(part.width);
+  state.picture_height = static_cast<std::uint32_t>(part.height);
 
   const bool black = vision::isBlack(grabbed->pixels);
   if (black) state.quality |= FrameState::QUALITY_BLACK;

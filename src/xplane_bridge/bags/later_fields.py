@@ -63,6 +63,10 @@ LATER_FIELDS: Dict[str, Dict[str, Tuple[str, int, str]]] = {
         "body_to_camera.rotation.w": ("float64", 0, "-"),
         "camera_pose_uncertainty_deg": ("float32", 0, "deg"),
         "camera_pose_uncertainty": ("float32", 0, "m"),
+        "picture_x": ("uint32", 0, "px"),
+        "picture_y": ("uint32", 0, "px"),
+        "picture_width": ("uint32", 0, "px"),
+        "picture_height": ("uint32", 0, "px"),
     },
     "xplane_bridge/FuelState": {
         "fuel_selector": ("float32", 0, "-"),
