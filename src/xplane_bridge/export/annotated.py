@@ -137,6 +137,7 @@ def _image(picture: Picture, pictures: Pictures, labels: Optional[ImageLabels]) 
         "camera": picture.camera,
         "stamp_ns": picture.stamp,
         "camera_matrix": vector("camera_matrix", range(9)),
+        "picture": [value(f"picture_{name}_px") for name in ("x", "y", "width", "height")],
         "body_to_camera": {
             "translation_m": vector("body_to_camera_translation", "xyz"),
             "rotation_xyzw": vector("body_to_camera_rotation", "xyzw"),

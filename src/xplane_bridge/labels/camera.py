@@ -10,8 +10,6 @@ from xplane_bridge.labels.world import World
 
 #: Nearest depth that is projected [m].
 NEAR_M = 0.5
-#: Of CameraInfo: the part of the picture that shows the world, where that is not all of it.
-ROI = tuple(f"roi.{name}" for name in ("x_offset", "y_offset", "width", "height"))
 #: Forward, right, down of forward, left, up, and back.
 FRD_OF_FLU = np.diag((1.0, -1.0, -1.0))
 
@@ -42,11 +40,12 @@ class Optics(NamedTuple):
     fy: float
     cx: float
     cy: float
-    roi: Tuple[int, int, int, int] = (0, 0, 0, 0)  #: x_offset, y_offset, width, height [px]; no size: all of it
+    #: What of it shows the world: `picture_*` of FrameState; no size: all of it.
+    shows: Tuple[int, int, int, int] = (0, 0, 0, 0)
 
     def area(self) -> np.ndarray:
         """Left, top and right, bottom of what shows the world: without the bars of a letterbox."""
-        left, top, width, height = self.roi if self.roi[2] and self.roi[3] else (0, 0, self.width, self.height)
+        left, top, width, height = self.shows if self.shows[2] and self.shows[3] else (0, 0, self.width, self.height)
         corners: np.ndarray = np.array(((left, top), (left + width, top + height))) - 0.5
         return corners
 

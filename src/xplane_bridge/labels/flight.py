@@ -16,7 +16,7 @@ from xplane_bridge.bags.cameras import chosen_cameras
 from xplane_bridge.constants import ImageQuality
 from xplane_bridge.labels import table as label_table
 from xplane_bridge.labels.apt import Airport
-from xplane_bridge.labels.camera import ROI, Camera, Optics, Pose
+from xplane_bridge.labels.camera import Camera, Optics, Pose
 from xplane_bridge.labels.heights import MEASURED_SIGMA_M, STANDING_M, STANDING_SIGMA_M, Ground, Profile, profile
 from xplane_bridge.labels.table import LabelError
 from xplane_bridge.labels.things import MAP_SIGMA_M, SPAN_M, Labeller, Sun
@@ -30,10 +30,12 @@ _ORIGIN = ("sim/flightmodel/position/lat_ref", "sim/flightmodel/position/lon_ref
 #: What a picture needs of its state: position and attitude.
 _NEEDED = 2 | 16
 _HAS_AGL = 2 | 4
+_SHOWS = ("picture_x", "picture_y", "picture_width", "picture_height")
 #: What of FrameState labelling goes by.
 _COLUMNS = (
     *("header.stamp", "quality", "frame_period", "display_delay"),
     *("camera_pose_source", "body_to_camera", "camera_pose_uncertainty", "camera_pose_uncertainty_deg"),
+    *_SHOWS,
     *("state.valid", "state.epoch", "state.sim_time", "state.latitude", "state.longitude", "state.altitude_msl"),
     *("state.orientation", "state.angular_velocity", "state.velocity_ned"),
 )
@@ -95,6 +97,11 @@ class _Seen:
     def pose(self, row: int) -> Pose:
         """Give where a picture's camera was."""
         return _pose(self.frames, row, float(self._late[row]))
+
+    def optics(self, row: int) -> Optics:
+        """Give what a picture's camera shows."""
+        x, y, width, height = (int(self.frames[name][row]) for name in _SHOWS)
+        return self.infos[int(self.frames.stamp[row])]._replace(shows=(x, y, width, height))
 
     def why_not(self, row: int) -> str:
         """Give why a picture cannot be labelled; empty where it can."""
@@ -162,7 +169,7 @@ class Flight:
                 if reason:
                     self.left_out[reason + of] += 1
                 else:
-                    camera = Camera(self._world, seen.pose(row), seen.infos[stamp])
+                    camera = Camera(self._world, seen.pose(row), seen.optics(row))
                     epoch, time = (seen.frames[f"state.{name}"][row] for name in ("epoch", "sim_time"))
                     yield Frame(seen.name, stamp, camera, int(epoch), float(time), seen.quality(row))
 
@@ -181,7 +188,7 @@ class Flight:
                 "stamp_ns": frame.stamp,
                 "width": optics.width,
                 "height": optics.height,
-                "roi": optics.roi,
+                "picture": optics.shows,
                 "quality": frame.quality,
                 "others_known": others is not None,
                 "objects": self.labeller.label(frame.camera, suns[frame.name].get(frame.stamp), others or ()),
@@ -241,13 +248,12 @@ def _optics(bags: Bags, topic: str) -> dict[int, Optics]:
         names = ", ".join(map(str, bags.paths))
         msg = f"{names}: no {topic}; record it (launch/record.launch does), or choose other cameras with --camera"
         raise LabelError(msg)
-    infos = bags.read(topic, ["header.stamp", "width", "height", "K", *ROI])
+    infos = bags.read(topic, ["header.stamp", "width", "height", "K"])
     out: dict[int, Optics] = {}
     alike: dict[Optics, Optics] = {}
-    rois = zip(*(infos[name].astype(int).tolist() for name in ROI))
-    for stamp, width, height, k, roi in zip(infos.stamp.tolist(), infos["width"], infos["height"], infos["K"], rois):
+    for stamp, width, height, k in zip(infos.stamp.tolist(), infos["width"], infos["height"], infos["K"]):
         if k[0] > 0.0 and k[4] > 0.0:
-            optics = Optics(int(width), int(height), float(k[0]), float(k[4]), float(k[2]), float(k[5]), roi)
+            optics = Optics(int(width), int(height), float(k[0]), float(k[4]), float(k[2]), float(k[5]))
             out[stamp] = alike.setdefault(optics, optics)
     return out
 

@@ -76,6 +76,24 @@ def runway(frame: dict) -> dict[str, Any]:
     return next((thing for thing in frame["objects"] if thing["kind"] == "runway"), {})
 
 
+def test_what_a_picture_shows_is_what_its_frame_state_says(tmp_path: Path) -> None:
+    """By hand: rows 60 to 419 of 480 show the world, so that nothing visible lies above -0.5 + 60 or below 419.5."""
+    flight = tmp_path / "flight.bag"
+    bars = {"picture_x": 0, "picture_y": 60, "picture_width": 640, "picture_height": 360}
+    with FlightBag(flight) as bag:
+        for k, shows in enumerate(({}, bars)):
+            frame = frame_state(bag, scene(25.0), stamp_ns(k), **shows)
+            add_picture(bag, FORWARD, np.zeros((2, 2, 3), np.uint8), frame)
+    assert label_images.main([str(flight), *AIRPORT]) == 0
+    whole, boxed = table.read(table.beside(flight)).frames.values()
+    assert (whole["picture"], boxed["picture"]) == ([0, 0, 0, 0], [0, 60, 640, 360])
+    assert runway(whole)["box"][3] > 419.5, "near the threshold it reaches below"
+    assert runway(boxed)["box"][3] == pytest.approx(419.5)
+    folder = exported(flight, "coco", tmp_path / "coco", "--train-share", "1")
+    content = json.loads((folder / "annotations" / "train.json").read_text())
+    assert [image["picture"] for image in content["images"]] == [[0, 0, 0, 0], [0, 60, 640, 360]]
+
+
 def test_coco_has_each_cameras_pictures_with_its_own_matrix_pose_and_runway(flight: Path, tmp_path: Path) -> None:
     folder = exported(flight, "coco", tmp_path)
     frames = table.read(table.beside(flight)).frames

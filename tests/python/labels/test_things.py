@@ -240,7 +240,7 @@ def test_sun_and_other_aircraft() -> None:
 
 def test_nothing_reaches_into_the_bars_of_a_letterbox() -> None:
     """16:9 in 4:3: 60 rows of black above and below."""
-    boxed = OPTICS._replace(roi=(0, 60, 640, 360))
+    boxed = OPTICS._replace(shows=(0, 60, 640, 360))
     over = labelled(Camera(Sphere(), pose(1000.0, 110.0), boxed))["runway"]
     assert over["box"][3] == pytest.approx(419.5)
     assert max(v for part in over["centre_line"] for _, v in part) == pytest.approx(419.5)
