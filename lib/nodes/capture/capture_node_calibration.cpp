@@ -101,6 +101,10 @@ core::MeasuredDelay CaptureNode::calibrate() {
         "this window has a field of view of its own, which does not follow X-Plane's: measure the delay "
         "with estimate_latency --camera, or set own_field_of_view to false");
   }
+  if (options_.x11.change_detection == vision::ChangeDetection::kNone) {
+    throw std::runtime_error(
+        "with window/change_detection none it is not known when the window changes: expected auto, damage or checksum");
+  }
   refuseWhileRecorded();
   double own = std::numeric_limits<double>::quiet_NaN();
   {

@@ -115,3 +115,11 @@ def test_the_field_of_view_is_given_back_by_the_end_or_by_the_next_start(world, 
     wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
     wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     asking.join(30.0)
+
+
+def test_it_is_refused_where_changes_of_the_window_are_not_seen(world, display: str) -> None:
+    world.emulator("--window", "--fps", FPS)
+    world.start("capture_node", {"window": {"display": display, "change_detection": "none"}})
+    answer = calibrate(world)
+    assert not answer.success
+    assert "with window/change_detection none it is not known when the window changes" in answer.message
