@@ -41,6 +41,7 @@ bool agrees(const FrustumSample& sample, Frustum* frustum) {
 
 Frustum frustumOf(const FrustumSample& sample, double assumed_deg) {
   Frustum frustum;
+  if (sample.width > 0.0 && sample.height > 0.0) frustum.aspect = sample.width / sample.height;
   frustum.known = isAngle(sample.horizontal_deg);
   frustum.horizontal_deg = frustum.known ? sample.horizontal_deg : assumed_deg;
   if (!frustum.known) return frustum;

@@ -34,6 +34,14 @@ constexpr std::uint32_t kImageQueue = 2;
 // What counts as motion that a camera would show.
 constexpr double kMovedDeg = 0.05;
 constexpr double kMovedMetres = 0.2;
+constexpr double kSameShape = 0.01;  // of the aspect ratio: rounding to pixels, also of a sender that scales
+
+/// Whether a picture of this size [px] can be of the whole window that a frustum is of.
+bool hasShapeOf(const core::Frustum& frustum, cv::Size size) {
+  if (!(frustum.aspect > 0.0)) return true;
+  const double aspect = static_cast<double>(size.width) / size.height;
+  return std::abs(aspect / frustum.aspect - 1.0) <= kSameShape;
+}
 
 bool moved(const FlightState& from, const FlightState& to) {
   const auto turned = [](double a, double b) { return std::abs(std::remainder(b - a, 360.0)) > kMovedDeg; };
@@ -292,6 +300,14 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   const vision::FieldOfView shown{frustum.horizontal_deg, frustum.vertical_deg, frustum.shift_right, frustum.shift_up};
   const sensor_msgs::CameraInfo info = cameraInfo(state.header, grabbed->size, shown);
   state.field_of_view_deg = static_cast<float>(scaler_->intrinsics(grabbed->size, shown).horizontal_fov_deg);
+  if (!hasShapeOf(frustum, grabbed->size)) {
+    state.quality |= FrameState::QUALITY_FOV_ASSUMED;
+    ROS_WARN_THROTTLE(
+        60.0,
+        "pictures of %d x %d px do not have the shape of X-Plane's window, whose field of view camera_info "
+        "goes by: capture the whole window, or state the part's own (own_field_of_view, field_of_view_deg)",
+        grabbed->size.width, grabbed->size.height);
+  }
   const cv::Rect part = scaler_->shows(grabbed->size);
   state.picture_x = static_cast<std::uint32_t>(part.x);
   state.picture_y = static_cast<std::uint32_t>(part.y);

@@ -58,10 +58,14 @@ TEST(PictureScaler, CropOfAWideWindowNarrowsTheView) {
 }
 
 TEST(PictureScaler, LetterboxKeepsTheWholeView) {
-  const Intrinsics camera = PictureScaler(640, 480, FitMode::kLetterbox).intrinsics({1920, 1080}, {60.0});
+  const PictureScaler scaler(640, 480, FitMode::kLetterbox);
+  const Intrinsics camera = scaler.intrinsics({1920, 1080}, {60.0});
   EXPECT_NEAR(camera.fx, 554.256, 5e-4);
   EXPECT_NEAR(camera.fy, camera.fx, 1e-9);
   EXPECT_NEAR(camera.cy, 239.5, 1e-9);
+  EXPECT_EQ(scaler.shows({1920, 1080}), cv::Rect(0, 60, 640, 360));
+  EXPECT_EQ(scaler.shows({480, 960}), cv::Rect(200, 0, 240, 480));
+  EXPECT_EQ(PictureScaler(640, 480, FitMode::kCrop).shows({1920, 1080}), cv::Rect(0, 0, 640, 480));
 }
 
 TEST(PictureScaler, StretchShowsInTheFocalLengths) {

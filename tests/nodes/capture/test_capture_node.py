@@ -40,6 +40,23 @@ def capture(world, display: str, **params: object):
     return world.start("capture_node", {"window": {"display": display, "search_period": 0.05}, **params})
 
 
+def flickering(world, geometry: str) -> ManagedProcess:
+    """A window of almost black pictures that change, so that a late subscriber sees some; WIDTHxHEIGHT in pixels."""
+    code = f"""
+import itertools, tkinter
+root = tkinter.Tk()
+root.title({STILL!r})
+root.geometry({geometry!r})
+colours = itertools.cycle(("#000000", "#010101"))
+def draw():
+    root.configure(bg=next(colours))
+    root.after(100, draw)
+draw()
+root.mainloop()
+"""
+    return ManagedProcess("black", [sys.executable, "-c", code], world.folder)
+
+
 def pixels(image) -> np.ndarray:
     return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
 
@@ -311,30 +328,14 @@ def test_a_picture_that_stands_is_an_error_unless_the_aircraft_has_crashed(world
 def test_a_black_picture_is_reported(world, display) -> None:
     from xplane_bridge.msg import FrameState
 
-    # Drawn again and again, all but black: a late subscriber sees it as well.
-    code = f"""
-import itertools, tkinter
-root = tkinter.Tk()
-root.title({STILL!r})
-colours = itertools.cycle(("#000000", "#010101"))
-def draw():
-    root.configure(bg=next(colours))
-    root.after(100, draw)
-draw()
-root.mainloop()
-"""
-    black = ManagedProcess("black", [sys.executable, "-c", code], world.folder)
     world.point_to(9)  # nothing answers there
     capture(world, display, window={"display": display, "search_period": 0.05, "title": STILL})
     images, states = watch(world, "image", "state")
-    try:
-        black.start()
+    with flickering(world, "200x200"):
         images.wait_for(timeout=WAIT_S)
         assert states.wait_for(timeout=WAIT_S).quality & FrameState.QUALITY_BLACK
         reported = world.wait_for_diagnostics("capture", lambda s: s.level == 1, timeout=WAIT_S)
         assert reported.message == "the picture is black"
-    finally:
-        black.stop()
 
 
 def test_works_alone_on_any_window(world, display) -> None:
@@ -430,11 +431,31 @@ def test_estimate_latency_live_finds_the_delay_of_the_display(world, display, tm
     assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.02)
 
 
+def test_part_of_a_window_is_not_taken_for_the_whole(world, display) -> None:
+    """X-Plane's window has 640 x 480 px; what is captured has another shape."""
+    from xplane_bridge.msg import FrameState
+
+    world.emulator("--fps", FPS)
+    shown = {"window": {"display": display, "search_period": 0.05, "title": STILL}, "fit": "letterbox"}
+    with flickering(world, "320x400"):
+        node = capture(world, display, **shown)
+        (states,) = watch(world, "state")
+        node.wait_for_line("pictures of 320 x 400 px do not have the shape of X-Plane's window", WAIT_S)
+        states.skip_to_now()
+        state = states.then_wait_for(lambda state: state.quality & FrameState.QUALITY_FOV_ASSUMED, timeout=WAIT_S)
+    # 320 x 400 in 640 x 480: 384 columns.
+    assert (state.picture_x, state.picture_y, state.picture_width, state.picture_height) == (128, 0, 384, 480)
+
+
 def test_scaled_output(world, display) -> None:
+    from xplane_bridge.msg import FrameState
+
     window(world)
     capture(world, display, width=320, height=160, fit="crop", max_rate=10.0)
-    images, infos = watch(world, "image", "info")
-    image, info = images.wait_for(), infos.wait_for()
+    images, infos, states = watch(world, "image", "info", "state")
+    image, info, state = images.wait_for(), infos.wait_for(), states.wait_for()
+    assert (state.picture_x, state.picture_y, state.picture_width, state.picture_height) == (0, 0, 320, 160)
+    states.wait_for(lambda state: not state.quality & FrameState.QUALITY_FOV_ASSUMED, timeout=WAIT_S)
     assert pixels(image).shape == (160, 320, 3)
     # 640x480 cropped to 640x320, halved: f = 554.256 / 2.
     assert info.K[0] == pytest.approx(FOCAL_60_DEG / 2, abs=5e-4)

@@ -24,6 +24,7 @@ struct Frustum {
   double vertical_deg = 0.0;    ///< from the lower edge to the upper one, before the shift; 0: pixels are square
   double shift_right = 0.0;     ///< [widths of the window] that the picture's middle lies right of the line of sight
   double shift_up = 0.0;        ///< [heights of the window] likewise, above it
+  double aspect = 0.0;          ///< width of the window over its height; 0: not known
   bool known = false;           ///< X-Plane says it, and its projection matrix, where that answers, agrees
 };
 

@@ -37,6 +37,8 @@ TEST(Frustum, ProportionalHasSquarePixels) {
   EXPECT_TRUE(frustum.known);
   EXPECT_EQ(frustum.horizontal_deg, 90.0);
   EXPECT_EQ(frustum.vertical_deg, 0.0);
+  EXPECT_NEAR(frustum.aspect, 4.0 / 3.0, 1e-12);
+  EXPECT_EQ(core::frustumOf(core::FrustumSample(), 60.0).aspect, 0.0);
 }
 
 TEST(Frustum, AssumedWhereXPlaneDoesNotAnswer) {
