@@ -102,8 +102,11 @@ class VirtualStick:
                     f"{self.name}: {handle} at {value:g}: a button moves it to 0 or 1 only; fly this scenario with "
                     "commands instead of a stick"
                 )
-            # A pressed button brakes, none lets go.
-            return None if handle == "brakes" and value == 0.0 else self._buttons.get((handle, value == 1.0))
+            if handle == "brakes" and value == 0.0:
+                return None  # a pressed button brakes, none lets go
+            if (handle, value == 1.0) not in self._buttons:
+                raise ScenarioError(f"{self.name}: there is no button for gear {'down' if value else 'up'}")
+            return self._buttons[handle, value == 1.0]
         if value == _SPRUNG:
             return None
         raise ScenarioError(

@@ -53,6 +53,8 @@ def test_buttons_for_modes_gear_and_brakes():
     assert stick.mode_button("manual", "auto") == 10
     _, buttons = stick.joy(Commands(handles={"gear": 1.0, "brakes": 1.0}, buttons={3}))
     assert [i for i, pressed in enumerate(buttons) if pressed] == [1, 3, 7]
+    with pytest.raises(ScenarioError, match="there is no button for gear up"):
+        VirtualStick({**device(LEVER), "buttons": {}}).joy(Commands(handles={"gear": 0.0}))
     toggling = VirtualStick({**device(LEVER), "mode": {"toggle": 0}})
     assert toggling.mode_button("auto", "manual") == 0
     assert toggling.mode_button("auto", "auto") is None
