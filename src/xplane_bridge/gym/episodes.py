@@ -107,8 +107,8 @@ class Episodes:
         if not isinstance(failures, (list, tuple)):
             raise GymError(f"episode.failures: {failures!r}; expected a list")
         seed = given.get("seed")
-        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer))):
-            raise GymError(f"episode.seed: {seed!r}; expected a whole number")
+        if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
+            raise GymError(f"episode.seed: {seed!r}; expected a whole number, 0 or more")
         self._info, self._frame_rate, self._given = info, frame_rate, dict(given)
         self._seed = seed
         self._chosen = {key: _chosen(key, given[key]) for key in KEYS if given.get(key) is not None}

@@ -301,6 +301,7 @@ def test_pictures_show_the_flight_and_are_the_same_again() -> None:
         ({"axes": ("rolls",)}, "axes: ['rolls']; expected some of roll"),
         ({"axes": ("throttle", "motors")}, "expected one of throttle, engine_throttles, motors at most"),
         ({"episode": {"wind": 3}}, "episode.wind: unknown key; expected latitude"),
+        ({"episode": {"seed": -1}}, "episode.seed: -1; expected a whole number, 0 or more"),
         ({"episode": {"speed": "fast"}}, "episode.speed: 'fast'; expected a number, or a distribution"),
         ({"episode": {"failures": [{"kind": "stuck"}]}}, "episode.failures[0]: {'kind': 'stuck'}; expected"),
         ({"episode": {"failures": [{"name": "x", "kind": "bent"}]}}, "episode.failures[0].kind: 'bent'; expected one"),
