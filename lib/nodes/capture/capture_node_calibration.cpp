@@ -113,6 +113,11 @@ core::MeasuredDelay CaptureNode::calibrate() {
   }
   if (!std::isfinite(own))
     throw std::runtime_error("X-Plane does not say its field of view: is it heard (link_state)?");
+  if (!options_.set_field_of_view && !link().journal()->orphans(kFieldOfViewPurpose).empty()) {
+    throw std::runtime_error(
+        "the field of view that a killed node has left changed is not given back yet: call again, or run "
+        "release_overrides if that does not help");
+  }
   {
     const std::lock_guard<std::mutex> lock(capture_mutex_);
     if (!source_problem_.empty()) throw std::runtime_error("no picture: " + source_problem_);

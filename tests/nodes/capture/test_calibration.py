@@ -91,17 +91,24 @@ def test_a_window_with_a_view_of_its_own_is_refused_in_words(world) -> None:
     assert "own_field_of_view" in answer.message
 
 
+def asked(world) -> threading.Thread:
+    """Asks for it while the node is to end."""
+
+    def ask() -> None:
+        with pytest.raises(Exception):  # noqa: B017,PT011
+            assert calibrate(world).success
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    return asking
+
+
 @pytest.mark.parametrize("ending", ["stop", "kill"])
 def test_the_field_of_view_is_given_back_by_the_end_or_by_the_next_start(world, display: str, ending: str) -> None:
     emulator, node, _ = start(world, display)
     wire = world.wire(emulator.port)
 
-    def ask() -> None:
-        with pytest.raises(Exception):  # noqa: B017,PT011  # the node ends while it is asked
-            assert calibrate(world).success
-
-    asking = threading.Thread(target=ask)
-    asking.start()
+    asking = asked(world)
     wait_until(lambda: journal_entries(world), 60.0, "the journal's entry")
     wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG + 8.0)
     if ending == "kill":
@@ -114,6 +121,23 @@ def test_the_field_of_view_is_given_back_by_the_end_or_by_the_next_start(world, 
         node.stop()
     wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
     wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
+    asking.join(30.0)
+
+
+def test_what_a_killed_node_has_left_is_not_taken_for_the_users_own(world, display: str) -> None:
+    _, node, _ = start(world, display)
+    asking = asked(world)
+    wait_until(lambda: journal_entries(world), 60.0, "the journal's entry")
+    node.kill()
+    (journal,) = (world.folder / "ros_home" / "xplane_bridge").glob("*[0-9].json")
+    # X-Plane never shows it, so that it stays to be given back.
+    journal.write_text(journal.read_text(encoding="utf-8").replace(FIELD_OF_VIEW, "sim/no/such"), encoding="utf-8")
+    world.start("capture_node", {"window": {"display": display}})
+    wait_until(lambda: "X-Plane does not say" not in calibrate(world).message, 60.0, "X-Plane heard")
+    answer = calibrate(world)
+    assert not answer.success
+    assert "killed node has left changed is not given back yet" in answer.message
+    assert journal_entries(world)
     asking.join(30.0)
 
 
