@@ -111,6 +111,7 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
 void FailureManager::onFrame(const core::FlightWatch& watch) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   flight_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
+  replay_ = watch.replay;
   if (stopped_) return;
   for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
 }
@@ -297,7 +298,7 @@ void FailureManager::watchObeyed() {
   std::vector<std::string> names;
   for (auto& [name, obeyed] : obeyed_) {
     const double off = surfaces_->readBack(obeyed.failure.plan.surface->surface) - obeyed.angle_deg;
-    if (!(std::abs(off) > kBehaviourDeg)) obeyed.last = now();
+    if (replay_ || !(std::abs(off) > kBehaviourDeg)) obeyed.last = now();
     if (now() - obeyed.last >= kBehaviourWait) names.push_back(name);
   }
   for (const std::string& name : names) {
@@ -305,6 +306,13 @@ void FailureManager::watchObeyed() {
     pending.expected_deg = obeyed_.at(name).angle_deg;
     pending.since = now();
     obeyed_.erase(name);
+    const std::string blocked = surfaces_->blockReasonFor(pending.plan.surface->surface);
+    if (!blocked.empty()) {  // better X-Plane's failure than none
+      report_(
+          name + ": X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: " + blocked,
+          pending.who, false);
+      continue;
+    }
     pending_[name] = pending;
     useDriver(pending);
   }

@@ -133,6 +133,7 @@ class FailureManager {
   core::SimulatorVersion version_;
   core::FailureRegistry registry_;
   core::FlightConditions flight_;
+  bool replay_ = false;
   double publish_time_ = -1e9;  // [s] steady
   bool dirty_ = true;           // labels changed since they were published
   bool published_driving_ = false;

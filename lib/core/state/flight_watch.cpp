@@ -33,6 +33,7 @@ constexpr std::size_t kRowCount = sizeof kRows / sizeof kRows[0];
 // Behind them.
 constexpr const char* kCrashed = "sim/flightmodel2/misc/has_crashed";
 constexpr const char* kOnGround = "sim/flightmodel/failures/onground_any";
+constexpr const char* kReplay = "sim/time/is_in_replay";
 
 }  // namespace
 
@@ -42,6 +43,7 @@ const std::vector<std::string>& flightWatchDatarefs() {
     for (const Row& row : kRows) out.emplace_back(row.dataref);
     out.emplace_back(kCrashed);
     out.emplace_back(kOnGround);
+    out.emplace_back(kReplay);
     return out;
   }();
   return names;
@@ -56,6 +58,7 @@ void updateFlightWatch(const RrefView& datagram, FlightWatch* watch) {
     if (index < kRowCount) watch->*kRows[index].value = value * kRows[index].factor;
     if (index == kRowCount) watch->crashed = value != 0.0;
     if (index == kRowCount + 1) watch->on_ground = value != 0.0;
+    if (index == kRowCount + 2) watch->replay = value != 0.0;
   }
 }
 

@@ -31,6 +31,7 @@ struct FlightWatch {
   double yaw_rate_deg_s = std::nan("");    ///< nose right +
   bool on_ground = false;                  ///< a wheel is
   bool crashed = false;
+  bool replay = false;  ///< what X-Plane shows is of earlier
 };
 
 /// What to subscribe; the position is the index.

@@ -66,6 +66,36 @@ TEST_F(FailureManagerTest12, DriverTakesOverWhenASurfaceThatStoodStillMovesLater
   EXPECT_EQ(state(), SurfaceControlState::kIdle) << "nothing of it is left";
 }
 
+TEST_F(FailureManagerTest12, AReplayTellsNothingOfAStuckSurface) {
+  airframe_.setStick(0.25);
+  sim_.run(0.1);
+  require(broken(FakeAirframe::kLeft, "stuck"));
+  watch_.replay = true;
+  airframe_.setStick(0.5);
+  sim_.run(3.0);
+  airframe_.setStick(0.25);
+  sim_.run(0.1);
+  watch_.replay = false;
+  sim_.run(2.0);
+  EXPECT_EQ(state(), SurfaceControlState::kIdle);
+  EXPECT_EQ(sim_.value(kLock), 6.0F);
+}
+
+TEST_F(FailureManagerTest12, XPlanesFailureStaysWhereTheDriverCannotTakeOverLater) {
+  airframe_.setStick(0.25);
+  sim_.run(0.1);
+  require(broken(FakeAirframe::kLeft, "stuck"));
+  blocked_ = "the aircraft is another one";
+  airframe_.setStick(0.5);
+  sim_.run(3.0);
+  EXPECT_TRUE(
+      reported("aileron1_wing2_left: X-Plane's own failure does not act as it says, and tx_node cannot drive the "
+               "surface: the aircraft is another one",
+               kWho, false));
+  EXPECT_EQ(sim_.value(kLock), 6.0F);
+  EXPECT_EQ(labelNames().size(), 1U);
+}
+
 TEST_F(FailureManagerTest12, DriverTakesOverWhereXPlaneDoesNotShowItsFailure) {
   sim_.setReadOnly(kLock);
   const double begin = sim_.time();
