@@ -46,9 +46,9 @@ void TxNode::start() {
   lockstep_services_ = std::make_unique<LockstepServices>(
       lockstep_.get(), actuation_.get(), &link(), [this] { return ending(); }, name() + "/lockstep");
   actuation_->start();
-  mode_threads_.start();
   lockstep_threads_.start();
   startBeating();
+  mode_threads_.start();  // its calls look at the heartbeat
 }
 
 void TxNode::startBeating() {
