@@ -300,7 +300,9 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   const vision::FieldOfView shown{frustum.horizontal_deg, frustum.vertical_deg, frustum.shift_right, frustum.shift_up};
   const sensor_msgs::CameraInfo info = cameraInfo(state.header, grabbed->size, shown);
   state.field_of_view_deg = static_cast<float>(scaler_->intrinsics(grabbed->size, shown).horizontal_fov_deg);
-  if (!hasShapeOf(frustum, grabbed->size)) {
+  // A sender or a video may stretch the window, and X-Plane's vertical angle with it.
+  const bool stretched = frustum.vertical_deg > 0.0 && options_.source != CaptureOptions::Source::kX11;
+  if (!stretched && !hasShapeOf(frustum, grabbed->size)) {
     state.quality |= FrameState::QUALITY_FOV_ASSUMED;
     ROS_WARN_THROTTLE(
         60.0,
