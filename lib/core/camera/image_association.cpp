@@ -231,10 +231,12 @@ void ImageAssociator::pairWithFrame(const FrameChoice& frame, bool paused, bool 
   };
   const State* before = nullptr;
   const State* after = nullptr;
+  bool placed = false;  // at the time of `before`
   for (const State& state : states_) {
     if (distance(state) <= 0.0) {
       // Those of a pause have the time of the last frame before it, and may be placed elsewhere.
       const bool same_time = before != nullptr && before->key.sim_time_raw == state.key.sim_time_raw;
+      placed = same_time && (placed || before->key.position_epoch != state.key.position_epoch);
       if (!same_time || paused) before = &state;
     } else {
       after = &state;
@@ -251,6 +253,7 @@ void ImageAssociator::pairWithFrame(const FrameChoice& frame, bool paused, bool 
   };
   if (nearest != nullptr && std::abs(distance(*nearest)) <= kSameFrame * frame.period) {
     use(PairingMethod::kFrame, *nearest);
+    answer.at_edge = answer.at_edge || (placed && !paused && nearest == before);
     if (frame.inferred) {  // put in evenly between its neighbours; its state knows its time, which other cameras heard
       answer.frame_sim_time = static_cast<double>(nearest->key.sim_time_raw);
       answer.frame_offset -= answer.state_offset;

@@ -68,7 +68,9 @@ void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, s
   const core::ClockEstimate estimate = clock_.update(sample);
   if (!estimate.usable) return;
   if (estimate.event == core::ClockEvent::kHostClockStep) eras_.clear();  // host times mean other moments now
-  if (endsEra(estimate.event)) endEra(before, receive_ns);
+  if (endsEra(estimate.event)) {
+    endEra(before, estimate.event == core::ClockEvent::kPaused ? sample.sim_time : newest_raw_, receive_ns);
+  }
   newest_ns_ = receive_ns;
   newest_raw_ = sample.sim_time;
   newest_sim_time_ = estimate.sim_time;
@@ -135,10 +137,10 @@ void ImagePairing::forgetOldStates() {
   states_.erase(states_.begin(), oldest.has_value() ? states_.lower_bound(*oldest) : states_.end());
 }
 
-void ImagePairing::endEra(const core::ClockFilter& before, std::int64_t receive_ns) {
+void ImagePairing::endEra(const core::ClockFilter& before, float sim_time_raw, std::int64_t receive_ns) {
   // Between its last frame and the first of the next one, as between any two frames.
   const std::int64_t half_frame = std::min((receive_ns - newest_ns_) / 2, kLongestHalfFrame);
-  eras_.push_back({receive_ns - half_frame, before, newest_raw_});
+  eras_.push_back({receive_ns - half_frame, before, sim_time_raw});
   if (eras_.size() > kEras) eras_.pop_front();
   ++eras_ended_;
 }
@@ -151,6 +153,8 @@ void ImagePairing::map(core::ImageMoment* moment) const {
   moment->paused_at.reset();
   if (clock.paused()) moment->paused_at = now ? newest_raw_ : era->sim_time_raw;
   moment->sim_time = clock.simTime(moment->host_time_ns);
+  // No frame of it came later, however late the next era was heard.
+  if (!now && moment->sim_time) moment->sim_time = std::min(*moment->sim_time, clock.unwrap(era->sim_time_raw));
   moment->uncertainty = moment->frame_key.has_value() ? 0.0 : clock.uncertainty();
   moment->epoch = clock.epoch();
 }
@@ -174,7 +178,6 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t shown_ns, 
     waiting.answer.display_delay = display_delay_;
     if (!delay_measured_) waiting.answer.quality |= FrameState::QUALITY_DELAY_ASSUMED;
   }
-  if (status_.replay) waiting.answer.quality |= FrameState::QUALITY_REPLAY;
   waiting.answer.clock_uncertainty = clock_.fitted() || stamps_ == Stamps::kFrames ? clock_.uncertainty() : core::kNaN;
   waiting.answer.frame_period = frame_period_ > 0.0F ? frame_period_ : core::kNaNf;
   waiting.moment.host_time_ns = shown_ns - core::toNanoseconds(waiting.answer.display_delay);
@@ -208,7 +211,8 @@ void ImagePairing::flushLocked(std::int64_t now_ns) {
     // Without the simulator's clock the pairing is a makeshift: not before the deadline, the clock may come.
     const bool clock_missing =
         !picture.moment.frame_key.has_value() && !picture.moment.sim_time.has_value() && !picture.moment.paused_at;
-    if (clock_missing && !final) return;
+    const bool clock_comes = eras_.empty() || picture.moment.host_time_ns >= eras_.back().end_ns;
+    if (clock_missing && clock_comes && !final) return;
     const core::Association association = associator_.associate(picture.moment, final);
     if (association.pending) return;
     complete(association, now_ns, &picture);
@@ -228,11 +232,13 @@ void ImagePairing::complete(const core::Association& association, std::int64_t n
   if (association.method == core::PairingMethod::kNone || state == states_.end() || after == states_.end()) {
     answer.quality |= FrameState::QUALITY_STATE_MISSING;
     answer.state = unknownState();
+    if (status_.replay) answer.quality |= FrameState::QUALITY_REPLAY;
     ++unpaired_;
   } else {
     answer.state = association.method == core::PairingMethod::kInterpolated
                        ? interpolate(*state->second.message, *after->second.message, association.fraction)
                        : *state->second.message;
+    if (answer.state.replay) answer.quality |= FrameState::QUALITY_REPLAY;
     answer.state_age = core::toSeconds(now_ns - after->second.arrival_ns);
     if (association.frame_known) answer.sim_time_error = association.state_offset;
   }

@@ -90,7 +90,7 @@ class ImagePairing {
   struct Era {
     std::int64_t end_ns;      ///< host time
     core::ClockFilter clock;  ///< as it was then
-    float sim_time_raw;       ///< [s] of its newest frame
+    float sim_time_raw;       ///< [s] of its last frame, which may have come as the first of a pause
   };
   struct KnownState {
     FlightState::ConstPtr message;
@@ -98,7 +98,7 @@ class ImagePairing {
   };
 
   /// To be called when a frame has ended one. @param before the clock without that frame
-  void endEra(const core::ClockFilter& before, std::int64_t receive_ns);
+  void endEra(const core::ClockFilter& before, float sim_time_raw, std::int64_t receive_ns);
   void map(core::ImageMoment* moment) const;
   /// Maps again where the clock has come, or learnt of a slip, since.
   void mapAnew(Waiting* picture) const;
