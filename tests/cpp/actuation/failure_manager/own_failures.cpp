@@ -66,7 +66,7 @@ TEST_F(FailureManagerTest12, DriverTakesOverWhenASurfaceThatStoodStillMovesLater
   EXPECT_EQ(state(), SurfaceControlState::kIdle) << "nothing of it is left";
 }
 
-TEST_F(FailureManagerTest12, AReplayTellsNothingOfAStuckSurface) {
+TEST_F(FailureManagerTest12, AReplayIsNoMoveOfAStuckSurface) {
   airframe_.setStick(0.25);
   sim_.run(0.1);
   require(broken(FakeAirframe::kLeft, "stuck"));
