@@ -145,27 +145,29 @@ void ImagePairing::endEra(const core::ClockFilter& before, float sim_time_raw, s
   ++eras_ended_;
 }
 
-void ImagePairing::map(core::ImageMoment* moment) const {
+void ImagePairing::map(Waiting* picture) const {
+  core::ImageMoment& moment = picture->moment;
   const auto era = std::find_if(eras_.begin(), eras_.end(),
-                                [moment](const Era& ended) { return moment->host_time_ns < ended.end_ns; });
-  const bool now = era == eras_.end();
-  const core::ClockFilter& clock = now ? clock_ : era->clock;
-  moment->paused_at.reset();
-  if (clock.paused()) moment->paused_at = now ? newest_raw_ : era->sim_time_raw;
-  moment->sim_time = clock.simTime(moment->host_time_ns);
+                                [&moment](const Era& ended) { return moment.host_time_ns < ended.end_ns; });
+  picture->slips = clock_.slips();
+  picture->eras = eras_ended_;
+  picture->present = era == eras_.end();
+  const core::ClockFilter& clock = picture->present ? clock_ : era->clock;
+  const float last_raw = picture->present ? newest_raw_ : era->sim_time_raw;
+  moment.paused_at.reset();
+  if (clock.paused()) moment.paused_at = last_raw;
+  moment.sim_time = clock.simTime(moment.host_time_ns);
   // No frame of it came later, however late the next era was heard.
-  if (!now && moment->sim_time) moment->sim_time = std::min(*moment->sim_time, clock.unwrap(era->sim_time_raw));
-  moment->uncertainty = moment->frame_key.has_value() ? 0.0 : clock.uncertainty();
-  moment->epoch = clock.epoch();
+  if (!picture->present && moment.sim_time) moment.sim_time = std::min(*moment.sim_time, clock.unwrap(last_raw));
+  moment.uncertainty = moment.frame_key.has_value() ? 0.0 : clock.uncertainty();
+  moment.epoch = clock.epoch();
 }
 
 void ImagePairing::mapAnew(Waiting* picture) const {
-  core::ImageMoment& moment = picture->moment;
+  const core::ImageMoment& moment = picture->moment;
   const bool slipped = picture->slips != clock_.slips() && moment.epoch == clock_.epoch() && !clock_.paused();
   if (moment.sim_time.has_value() && !slipped && picture->eras == eras_ended_) return;
-  map(&moment);
-  picture->slips = clock_.slips();
-  picture->eras = eras_ended_;
+  map(picture);
 }
 
 void ImagePairing::addPicture(const FrameState& picture, std::int64_t shown_ns, std::int64_t now_ns,
@@ -185,9 +187,7 @@ void ImagePairing::addPicture(const FrameState& picture, std::int64_t shown_ns, 
   if (grace_until_ns_ == 0) grace_until_ns_ = now_ns + core::toNanoseconds(kFirstPictures);
   const bool starting = !state_seen_ || (!frame_key.has_value() && !clock_.fitted());
   if (max_wait_ns_ > 0 && starting) waiting.deadline_ns = std::max(waiting.deadline_ns, grace_until_ns_);
-  map(&waiting.moment);
-  waiting.slips = clock_.slips();
-  waiting.eras = eras_ended_;
+  map(&waiting);
   waiting_.push_back(std::move(waiting));
   flushLocked(now_ns);
 }
@@ -211,8 +211,7 @@ void ImagePairing::flushLocked(std::int64_t now_ns) {
     // Without the simulator's clock the pairing is a makeshift: not before the deadline, the clock may come.
     const bool clock_missing =
         !picture.moment.frame_key.has_value() && !picture.moment.sim_time.has_value() && !picture.moment.paused_at;
-    const bool clock_comes = eras_.empty() || picture.moment.host_time_ns >= eras_.back().end_ns;
-    if (clock_missing && clock_comes && !final) return;
+    if (clock_missing && picture.present && !final) return;
     const core::Association association = associator_.associate(picture.moment, final);
     if (association.pending) return;
     complete(association, now_ns, &picture);

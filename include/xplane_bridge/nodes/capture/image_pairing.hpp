@@ -85,6 +85,7 @@ class ImagePairing {
     std::int64_t deadline_ns;
     std::uint32_t slips = 0;  ///< of the clock when `moment` was mapped
     std::size_t eras = 0;     ///< that had ended then
+    bool present = false;     ///< it is of the era that goes on: what its clock does not say yet may come
   };
   /// The simulator's clock until it was paused, went on, or jumped: pictures are of moments before that, too.
   struct Era {
@@ -99,7 +100,7 @@ class ImagePairing {
 
   /// To be called when a frame has ended one. @param before the clock without that frame
   void endEra(const core::ClockFilter& before, float sim_time_raw, std::int64_t receive_ns);
-  void map(core::ImageMoment* moment) const;
+  void map(Waiting* picture) const;
   /// Maps again where the clock has come, or learnt of a slip, since.
   void mapAnew(Waiting* picture) const;
   void flushLocked(std::int64_t now_ns);
