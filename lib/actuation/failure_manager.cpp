@@ -275,7 +275,8 @@ bool FailureManager::settled(Pending* pending) {
   if (now() - pending->confirmed < kBehaviourWait) return false;
   if (std::abs(off) <= kBehaviourDeg) {
     // A surface that stands still by itself looks stuck, until it moves.
-    obeyed_[name] = {*pending, surfaces_->readBack(pending->plan.surface->surface), now()};
+    Obeyed& obeyed = obeyed_[name] = {*pending, now()};
+    obeyed.failure.expected_deg = surfaces_->readBack(pending->plan.surface->surface);
     return settle();
   }
   pending->since = now();
@@ -297,13 +298,12 @@ void FailureManager::watchPending() {
 void FailureManager::watchObeyed() {
   std::vector<std::string> names;
   for (auto& [name, obeyed] : obeyed_) {
-    const double off = surfaces_->readBack(obeyed.failure.plan.surface->surface) - obeyed.angle_deg;
+    const double off = surfaces_->readBack(obeyed.failure.plan.surface->surface) - *obeyed.failure.expected_deg;
     if (replay_ || !(std::abs(off) > kBehaviourDeg)) obeyed.last = now();
     if (now() - obeyed.last >= kBehaviourWait) names.push_back(name);
   }
   for (const std::string& name : names) {
     Pending pending = obeyed_.at(name).failure;
-    pending.expected_deg = obeyed_.at(name).angle_deg;
     pending.since = now();
     obeyed_.erase(name);
     const std::string blocked = surfaces_->blockReasonFor(pending.plan.surface->surface);

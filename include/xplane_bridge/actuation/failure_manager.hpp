@@ -85,8 +85,7 @@ class FailureManager {
 
   /// X-Plane's own failure of a surface, which stood where it says; kept as long as it lasts.
   struct Obeyed {
-    Pending failure;
-    double angle_deg = 0.0;
+    Pending failure;    // expected_deg: where it stood
     double last = 0.0;  // [s] steady: the surface was there
   };
 
