@@ -37,8 +37,9 @@ class ScenarioPilot:
             for kind, value in event.actions:
                 if kind == "failure":
                     failure_dataref(value["name"])
-                    if in_part(value):
-                        raise ScenarioError(in_part(value))
+                    refusal = in_part(value)
+                    if refusal:
+                        raise ScenarioError(refusal)
                 if kind == "excitation" and "," in value["target"]:
                     raise ScenarioError(
                         "excitation: the emulator's pilot moves one axis; tx_node moves several at once"

@@ -79,10 +79,11 @@ class Failures:
                 f"of its surfaces ({', '.join(sorted(self._surfaces))}), engine_1..{self._model.info.engine_count}, or "
                 "a rel_* of its controls"
             )
+        refusal = in_part(failure)
+        if refusal:
+            raise NotFlownError(refusal)
         if failure["clear"]:
             self._systems.discard(leaf)
-        elif in_part(failure):
-            raise NotFlownError(in_part(failure))
         else:
             self._systems.add(leaf)
 
