@@ -1,7 +1,7 @@
 """The root of this package's exceptions, and what readers of files share."""
 
 import math
-from typing import Any
+from typing import Any, Union
 
 
 class XplaneBridgeError(Exception):
@@ -14,6 +14,11 @@ def is_number(value: Any) -> bool:
         return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:
         return False
+
+
+def text_problem(error: Union[OSError, UnicodeDecodeError]) -> str:
+    """Why a file cannot be read as text."""
+    return getattr(error, "strerror", None) or "is not UTF-8 text"
 
 
 def yaml_problem(error: Exception) -> str:

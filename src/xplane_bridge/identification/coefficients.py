@@ -14,7 +14,7 @@ from typing import Any, List, Optional, Tuple
 import numpy as np
 import yaml
 
-from xplane_bridge.errors import yaml_problem
+from xplane_bridge.errors import text_problem, yaml_problem
 from xplane_bridge.identification.model import AxisModel, Estimate, IdentificationError
 from xplane_bridge.resources import share_dir
 
@@ -45,8 +45,7 @@ def read_geometry(path: Path) -> Geometry:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "is not UTF-8 text"
-        msg = f"{path}: {reason}; give a file as in config/geometry"
+        msg = f"{path}: {text_problem(error)}; give a file as in config/geometry"
         raise IdentificationError(msg) from None
     except yaml.YAMLError as error:
         msg = f"{path}: {yaml_problem(error)}"

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from xplane_bridge import __version__
-from xplane_bridge.errors import yaml_problem
+from xplane_bridge.errors import text_problem, yaml_problem
 from xplane_bridge.identification.model import (
     AXES,
     REDUCED,
@@ -56,7 +56,7 @@ def read_model(path: Path) -> LinearModel:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))  # JSON is YAML
     except (OSError, UnicodeDecodeError) as error:
-        msg = f"{path}: {getattr(error, 'strerror', None) or 'is not UTF-8 text'}"
+        msg = f"{path}: {text_problem(error)}"
         raise IdentificationError(msg) from None
     except yaml.YAMLError as error:
         msg = f"{path}: {yaml_problem(error)}"

@@ -12,7 +12,7 @@ from typing import Any, Dict, List, Optional, Tuple
 import numpy as np
 import yaml
 
-from xplane_bridge.errors import yaml_problem
+from xplane_bridge.errors import text_problem, yaml_problem
 from xplane_bridge.scenario.player import Commands
 from xplane_bridge.scenario.schema import Scenario, ScenarioError
 
@@ -142,8 +142,7 @@ def load_stick(file: Path, stick_mode: Optional[int] = None) -> VirtualStick:
     try:
         device = yaml.safe_load(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "is not UTF-8 text"
-        raise ScenarioError(f"{file}: {reason}; expected a file of config/joysticks") from None
+        raise ScenarioError(f"{file}: {text_problem(error)}; expected a file of config/joysticks") from None
     except yaml.YAMLError as error:
         raise ScenarioError(f"{file}: {yaml_problem(error)}") from None
     if not isinstance(device, dict):
