@@ -308,9 +308,9 @@ void FailureManager::watchObeyed() {
     obeyed_.erase(name);
     const std::string blocked = surfaces_->blockReasonFor(pending.plan.surface->surface);
     if (!blocked.empty()) {  // better X-Plane's failure than none
-      report_(
-          name + ": X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: " + blocked,
-          pending.who, false);
+      std::string why = name + ": X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: ";
+      why += blocked;
+      report_(why, pending.who, false);
       continue;
     }
     pending_[name] = pending;
