@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from statistics import NormalDist
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
@@ -149,7 +150,6 @@ class Design:
     def __init__(self, parameters: Sequence[Parameter], sampling: str, flights: int, seed: int) -> None:
         self._parameters = tuple(parameters)
         self._sampling, self._flights, self._seed = sampling, flights, seed
-        self._shares: Optional[np.ndarray] = None
 
     def values(self, flight: int) -> Dict[str, Value]:
         """The parameters of a flight."""
@@ -164,27 +164,26 @@ class Design:
         count = len(self._parameters)
         if self._sampling == "random":
             return [float(x) for x in _generator(self._seed, _POINTS, flight).random(count)]
-        if self._shares is None:
-            self._shares = self._hypercube() if self._sampling == "latin_hypercube" else self._sobol()
-        return [float(x) for x in self._shares[flight]]
+        points = _hypercube if self._sampling == "latin_hypercube" else _sobol
+        return [float(x) for x in points(self._flights, count, self._seed)[flight]]
 
-    def _hypercube(self) -> np.ndarray:
-        """Every parameter has exactly one flight in each of as many equal parts as there are flights."""
-        columns = [
-            (
-                _generator(self._seed, _PERMUTATIONS, i).permutation(self._flights)
-                + _generator(self._seed, _JITTER, i).random(self._flights)
-            )
-            / self._flights
-            for i in range(len(self._parameters))
-        ]
-        return np.array(columns).T.reshape(self._flights, len(self._parameters))
 
-    def _sobol(self) -> np.ndarray:
-        """Sobol's sequence, shifted by a random vector modulo 1 (Cranley and Patterson), which keeps its evenness."""
-        points = sobol_points(self._flights, len(self._parameters))
-        shift = _generator(self._seed, _SCRAMBLING, 0).random(len(self._parameters))
-        return (points + shift) % 1.0
+@lru_cache(maxsize=1)  # of all flights: a worker is given ten at a time
+def _hypercube(flights: int, dimensions: int, seed: int) -> np.ndarray:
+    """Every parameter has exactly one flight in each of as many equal parts as there are flights."""
+    columns = [
+        (_generator(seed, _PERMUTATIONS, i).permutation(flights) + _generator(seed, _JITTER, i).random(flights))
+        / flights
+        for i in range(dimensions)
+    ]
+    return np.array(columns).T.reshape(flights, dimensions)
+
+
+@lru_cache(maxsize=1)
+def _sobol(flights: int, dimensions: int, seed: int) -> np.ndarray:
+    """Sobol's sequence, shifted by a random vector modulo 1 (Cranley and Patterson), which keeps its evenness."""
+    shift = _generator(seed, _SCRAMBLING, 0).random(dimensions)
+    return (sobol_points(flights, dimensions) + shift) % 1.0
 
 
 #: Primitive polynomials and first direction numbers of Joe and Kuo (new-joe-kuo-6.21201): degree, coefficients, m_i.

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from xplane_bridge.campaign import distributions
 from xplane_bridge.campaign.distributions import CampaignError, Design, parse_parameter, sobol_points
 
 
@@ -80,3 +81,15 @@ def test_a_shifted_sobol_sequence_is_even_in_every_dimension() -> None:
     assert points.max() < 1.0
     for column in points.T:
         assert set(np.bincount((column * 8).astype(int), minlength=8)) <= {7, 8, 9}
+
+
+@pytest.mark.parametrize("sampling", ["latin_hypercube", "sobol"])
+def test_chunks_of_flights_share_the_points_of_all(sampling: str) -> None:
+    points = {"latin_hypercube": distributions._hypercube, "sobol": distributions._sobol}[sampling]
+    points.cache_clear()
+    parameters = [parse_parameter(name, {"uniform": [0, 1]}) for name in ("a", "b")]
+    for flight in (0, 10, 20):
+        Design(parameters, sampling, 30, 1).values(flight)
+    assert points.cache_info().misses == 1
+    other_seed = Design(parameters, sampling, 30, 2).values(0)
+    assert other_seed != Design(parameters, sampling, 30, 1).values(0)
