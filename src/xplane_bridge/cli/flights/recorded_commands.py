@@ -116,7 +116,7 @@ def play(commands: Commands, namespace: str, say: Callable[[str], None]) -> None
     def give_back() -> None:
         give_stick_back(lambda: set_mode(SetMode._request_class.MANUAL), service)
 
-    player = _Player(commands, publishers, types, set_mode)
+    player = _Player(commands, publishers, types, set_mode, say)
     place(commands.start, namespace)
     with Borrowed(_NODE, rospy, give_back) as borrowed:
         states = rospy.Subscriber(f"{namespace}/flight_state", msg.FlightState, player.on_state, tcp_nodelay=True)
@@ -190,8 +190,11 @@ def far(state: Any, start: Any) -> float:
 class _Player:
     """Sends what is due at each flight state."""
 
-    def __init__(self, commands: Commands, publishers: Any, types: Any, set_mode: Any) -> None:
-        self._commands, self._publishers, self._types, self._set_mode = commands, publishers, types, set_mode
+    def __init__(
+        self, commands: Commands, publishers: Any, types: Any, set_mode: Any, say: Callable[[str], None]
+    ) -> None:
+        self._commands, self._publishers, self._types = commands, publishers, types
+        self._set_mode, self._say = set_mode, say
         self._next = 0
         self._begin = 0.0
         self._epoch: Any = None
@@ -227,4 +230,6 @@ class _Player:
         """Asks for the recorded mode, where it is another; not from the thread of the states, as it waits."""
         if self._wanted != self._mode:
             self._mode = self._wanted
-            self._set_mode(self._mode)
+            answer = self._set_mode(self._mode)
+            if not answer.success:  # the flight goes on: the stick may have taken over, as it did when recorded
+                self._say(f"mode {self._mode} of the recording is not set: {answer.result.message}")

@@ -27,16 +27,23 @@ def state(time: float, epoch: int) -> Any:
     return SimpleNamespace(**START, sim_time_unwrapped=time, epoch=epoch)
 
 
-def test_a_recorded_mode_is_asked_for_again_where_the_flight_begins_again():
+def test_a_recorded_mode_is_asked_for_where_the_flight_begins_again_and_a_refusal_said():
     commands = Commands([Played(0.5, "control/mode", bytes([AUTO]), "")], START, 10.0)
     asked: list[int] = []
-    player = _Player(commands, {}, {"control/mode": ModeMessage}, asked.append)
+    said: list[str] = []
+
+    def set_mode(mode: int) -> Any:
+        asked.append(mode)
+        return SimpleNamespace(success=len(asked) > 1, result=SimpleNamespace(message="another aircraft"))
+
+    player = _Player(commands, {}, {"control/mode": ModeMessage}, set_mode, said.append)
     for epoch, begin in ((1, 100.0), (2, 0.0)):  # placed in two steps
         for time in (0.0, 1.0):
             player.on_state(state(begin + time, epoch))
             player.change_mode()
             player.change_mode()
     assert asked == [AUTO, AUTO]
+    assert said == ["mode 2 of the recording is not set: another aircraft"]
 
 
 @pytest.mark.parametrize(("shown", "placed"), [(179.9999, -179.9999), (-179.9999, 179.9999), (0.0001, -0.0001)])
