@@ -17,6 +17,8 @@ _THROTTLE = "sim/cockpit2/engine/actuators/throttle_ratio"
 _OVERRIDE = "sim/operation/override/override_"
 #: An axis: attribute of `Controls`, name in `servo_*_ratio` and in the override that takes it.
 _AXES = (("roll", "roll"), ("pitch", "pitch"), ("yaw", "heading"))
+#: What the servos add to the stick on an axis.
+_SHOWN = "sim/joystick/servo_{}_ratio"
 #: In the order in which `Servos.move` takes them.
 _SWITCHES = (
     ap.MASTER,
@@ -46,6 +48,12 @@ class Servos:
         self._switches = store.gather(_SWITCHES)
         self._holds: Optional[HoldAutopilot] = None
         self._throttle: Optional[HoldAutopilot] = None
+
+    def rest(self) -> None:
+        """Nothing is moved, as with an aircraft that was just loaded; one without an autopilot leaves it so."""
+        self._holds = self._throttle = None
+        for _, name in _AXES:
+            self._store.set(_SHOWN.format(name), 0.0)
 
     def move(
         self,
@@ -88,7 +96,7 @@ class Servos:
         everything = joystick or flight_control or autopilot
         for (axis, name), taken in zip(_AXES, taken_axes):
             deflection = 0.0 if everything or taken else deflections[axis]
-            self._store.set(f"sim/joystick/servo_{name}_ratio", deflection)
+            self._store.set(_SHOWN.format(name), deflection)
             setattr(controls, axis, min(max(getattr(controls, axis) + deflection, -1.0), 1.0))
         self._move_levers(dt, frame, info, controls)
 

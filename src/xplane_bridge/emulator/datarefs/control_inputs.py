@@ -176,6 +176,7 @@ class ControlInputs:
             ("mixture_ratio", controls.mixture),
         )
         for name, values in levers:
+            self._store.set(_ACTUATORS + name, 0.0)  # also those of engines that the aircraft before had
             slots = self._store.dataref(_ACTUATORS + name).slots[:engines]
             self._store.values[slots] = values[:engines]
         self._store.set(_ENGINE + "ENGN_propmode", NORMAL)

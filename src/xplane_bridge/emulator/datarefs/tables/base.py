@@ -38,6 +38,7 @@ class Table:
         self._arrays: List[_Computed] = []
         self._always: List[_Computed] = []
         self._scalar_slots: Optional[np.ndarray] = None
+        self._array_slots: List[np.ndarray] = []  # also of those that are not computed yet
         self._defined = 0
         self._idle: Dict[int, Tuple[_Computed, List[_Computed]]] = {}  # what is not computed yet, by slot; and its kind
         self._published: Optional[Tuple[Frame, bool]] = None
@@ -63,6 +64,10 @@ class Table:
     def alias(self, name: str, target: str) -> None:
         """A second name of a dataref."""
         self.store.add_alias(name, target)
+
+    def clear_arrays(self) -> None:
+        """Sets all arrays to 0, as another aircraft's sources may give fewer elements."""
+        self.store.values[np.concatenate(self._array_slots)] = 0.0
 
     def publish(self, frame: Frame, flight_loaded: bool) -> None:
         """Computes what is asked for; before a flight is loaded, only what exists without one."""
@@ -112,6 +117,8 @@ class Table:
     def _define(self, slots: np.ndarray, source: Callable[[Frame], Any], kind: List[_Computed]) -> None:
         computed = _Computed(self._defined, slots, source)
         self._defined += 1
+        if kind is self._arrays:
+            self._array_slots.append(slots)
         self._idle.update((int(slot), (computed, kind)) for slot in slots)
         self.store.defer(slots, lambda: self._begin(computed, kind))
 
