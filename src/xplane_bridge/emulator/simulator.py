@@ -19,7 +19,7 @@ from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, InputO
 from xplane_bridge.emulator.datarefs.failure_datarefs import FailureDatarefs
 from xplane_bridge.emulator.datarefs.placement import Placements
 from xplane_bridge.emulator.datarefs.store import DatarefStore
-from xplane_bridge.emulator.datarefs.tables.controls import surface_dataref
+from xplane_bridge.emulator.datarefs.tables.controls import old_names, surface_dataref
 from xplane_bridge.emulator.datarefs.traffic import Traffic
 from xplane_bridge.emulator.datarefs.world_settings import PRESSURE_INHG, WorldSettings, clip
 from xplane_bridge.emulator.flight.failure_effects import FailureEffects
@@ -329,7 +329,11 @@ class Simulator:
                 f"aircraft {info.name}: X-Plane has no datarefs {', '.join(missing)} for its surfaces"
             )
         self._surface_slots = np.array(slots, dtype=int)
-        self.inputs.bind_surfaces(dict(zip(self._surface_names, map(int, self._surface_slots))))
+        bound = dict(zip(self._surface_names, map(int, self._surface_slots)))
+        old = {self.store.locate(path): name for path, name in old_names(self.model.surfaces).items()}
+        self.inputs.bind_surfaces(bound, {slot: bound[name] for slot, name in old.items()})
+        self._surface_names += old.values()
+        self._surface_slots = np.array([*self._surface_slots, *old], dtype=int)
         self.store.set_text(_IDENTITY + "acf_ICAO", info.icao)
         self.store.set_text(_IDENTITY + "acf_descrip", info.description)
         self.store.set_text(_IDENTITY + "acf_ui_name", info.description)

@@ -121,6 +121,7 @@ class ControlInputs:
         self._surface_commands: Dict[int, float] = {}
         self._throttle_commands: Dict[int, float] = {}
         self._surface_slots: Dict[str, int] = {}
+        self._same_surface: Dict[int, int] = {}
         self._joystick_slots = np.zeros(0, dtype=int)
         self._handles: Callable[[], List[float]] = list  # as connect() makes it
 
@@ -129,8 +130,7 @@ class ControlInputs:
     def watch_surface(self, name: str) -> None:
         """Remembers writes to a dataref that shows surfaces (they count while the surfaces are overridden)."""
         slots = self._store.dataref(name).slots
-        commands = self._surface_commands
-        self._store.on_write(name, lambda index, value: commands.__setitem__(int(slots[index]), value))
+        self._store.on_write(name, lambda index, value: self._command_surface(int(slots[index]), value))
 
     def connect(self, sim: Sources) -> None:
         """Connects the datarefs that act on others."""
@@ -358,9 +358,12 @@ class ControlInputs:
         commands = self._surface_commands
         controls.surface_deg = {name: commands[slot] for name, slot in self._surface_slots.items() if slot in commands}
 
-    def bind_surfaces(self, slots: Dict[str, int]) -> None:
-        """Which slot shows which surface of the loaded aircraft."""
-        self._surface_slots = slots
+    def _command_surface(self, slot: int, value: float) -> None:
+        self._surface_commands[self._same_surface.get(slot, slot)] = value
+
+    def bind_surfaces(self, slots: Dict[str, int], same: Dict[int, int]) -> None:
+        """Which slot shows which surface of the loaded aircraft, and which further slots show the same as one."""
+        self._surface_slots, self._same_surface = slots, same
 
 
 def _clip(value: float, low: float, high: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from support.simulator.emulator_bench import (
+    OVERRIDE,
     fixture_bench,  # noqa: F401
 )
 from xplane_bridge import protocol
@@ -50,3 +51,17 @@ def test_the_servos_of_an_aircraft_without_autopilot_rest(bench):
     assert emulator.read(servo) != [0.0]
     load(emulator, "multirotor")
     assert emulator.read(servo) == [0.0]
+
+
+def test_the_old_names_of_surfaces_are_those_of_the_loaded_aircraft(bench):
+    emulator = bench(aircraft="fixed_wing")
+    old, inner, outer = (f"sim/flightmodel/controls/{name}def" for name in ("lail1", "wing1l_ail1", "wing2l_ail1"))
+    emulator.write({OVERRIDE + "control_surfaces": 1.0, old: 5.0})
+    assert emulator.read(old, inner, outer) == [5.0, 0.0, 5.0]
+    load(emulator, "tiltrotor")
+    emulator.write({inner: 3.0, old: 12.0})
+    assert emulator.read(old, inner, outer) == [12.0, 12.0, 0.0]
+    emulator.write({inner: 3.0})
+    assert emulator.read(old, inner, outer) == [3.0, 3.0, 0.0]
+    load(emulator, "multirotor")
+    assert emulator.read(old, inner, outer) == [0.0, 0.0, 0.0]

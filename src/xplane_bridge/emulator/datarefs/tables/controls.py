@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Callable, Dict, List, Optional
+from typing import Callable, Dict, List, Optional, Sequence
 
 from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.store import DatarefStore
@@ -42,7 +42,7 @@ _ARRAYS = {
     "rud2": "rudder2_deg",
 }
 _OLD_ARRAYS = {"ail1": "ail1_def", "ail2": "ail2_def", "elv1": "elv1_def", "rud1": "rudd_def", "fla1": "fla1_def"}
-#: Datarefs of one surface a side of X-Plane 9's naming: (leaf of the set, side) by name.
+#: Datarefs of one surface a side of X-Plane 9's naming: (leaf of the set, side) by name. See `old_names`.
 _OLD_NAMES = {
     "lail1def": ("ail1", "l"),
     "rail1def": ("ail1", "r"),
@@ -142,9 +142,8 @@ def _surfaces(t: Table, sim: Sources) -> None:
     for leaf in ("ail1", "ail2", "spo1", "spo2", "fla1", "fla2", "yawb", "elv1", "elv2", "rud1", "rud2"):
         for name in single[leaf]:
             sim.watch_surface(name)
-    for name, (leaf, side) in _OLD_NAMES.items():
-        carrier = _carrier(sim, leaf, side)
-        t.alias(_CONTROLS + name, f"{_CONTROLS}{carrier}_{leaf}def")
+    for name in _OLD_NAMES:
+        t.setting(_CONTROLS + name)
         sim.watch_surface(_CONTROLS + name)
 
 
@@ -154,13 +153,15 @@ def _padded(store: DatarefStore, array: str, names: List[str], start: int) -> Li
     return [nothing] * start + names + [nothing] * (store.elements(array) - start - len(names))
 
 
-def _carrier(sim: Sources, leaf: str, side: str) -> str:
-    """The first wing of the loaded aircraft with such a surface on this side; wing 2 where there is none."""
-    for spec in sim.model.surfaces:
-        part, _, its_leaf = spec.name.partition("_")
-        if its_leaf == leaf and part.startswith("wing") and part.endswith(side):
-            return part
-    return "wing2" + side
+def old_names(surfaces: Sequence[SurfaceSpec]) -> Dict[str, str]:
+    """X-Plane 9's datarefs, and which of an aircraft's surfaces each shows: that of the first wing that has one."""
+    out: Dict[str, str] = {}
+    for name, (leaf, side) in _OLD_NAMES.items():
+        for spec in surfaces:
+            part, _, its_leaf = spec.name.partition("_")
+            if its_leaf == leaf and part.startswith("wing") and part.endswith(side):
+                out.setdefault(_CONTROLS + name, spec.name)
+    return out
 
 
 def _stick(t: Table, sim: Sources) -> None:
