@@ -320,6 +320,7 @@ class Simulator:
         self.store.values[self._surface_slots] = 0.0  # of the aircraft before
         self.table.clear_arrays()
         self._servos.rest()
+        self.cameras.take_seat(info)
         self._surface_names = [spec.name for spec in self.model.surfaces]
         paths = [surface_dataref(spec) for spec in self.model.surfaces]
         slots = [self.store.slot(path) for path in paths]

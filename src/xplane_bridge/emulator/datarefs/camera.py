@@ -10,7 +10,7 @@ import numpy as np
 
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight import earth
-from xplane_bridge.emulator.flight.flight_model import InitialState
+from xplane_bridge.emulator.flight.flight_model import InitialState, ModelInfo
 from xplane_bridge.emulator.flight.frame import Clocks, Frame
 
 VIEW = "sim/graphics/view/"
@@ -81,6 +81,11 @@ class Cameras:
         self._drawn: Optional[DrawnCamera] = None
         self._reported: Optional[ReportedView] = None
         self._reported_before: Optional[ReportedView] = None
+
+    def take_seat(self, info: ModelInfo) -> None:
+        """Puts the pilot's head where this aircraft has the eye."""
+        for axis, value in zip("xyz", (0.0, -info.eye_down_m, -info.eye_forward_m)):
+            self._sim.store.set(VIEW + f"pilots_head_{axis}", value)
 
     def drawn(self, frame: Frame) -> DrawnCamera:
         """The camera that the frame is drawn with."""

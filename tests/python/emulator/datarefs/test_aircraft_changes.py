@@ -65,3 +65,12 @@ def test_the_old_names_of_surfaces_are_those_of_the_loaded_aircraft(bench):
     assert emulator.read(old, inner, outer) == [3.0, 3.0, 0.0]
     load(emulator, "multirotor")
     assert emulator.read(old, inner, outer) == [0.0, 0.0, 0.0]
+
+
+def test_the_pilots_head_is_where_the_new_aircraft_has_the_eye(bench):
+    emulator = bench(aircraft="fixed_wing")
+    names = [f"sim/graphics/view/pilots_head_{axis}" for axis in "xyz"]
+    names += [f"sim/aircraft/view/acf_pe{axis}" for axis in "XYZ"]
+    assert emulator.read(*names) == pytest.approx([0.0, 0.65, -0.6] * 2)
+    load(emulator, "tiltrotor")
+    assert emulator.read(*names) == pytest.approx([0.0, 0.2, -2.0] * 2)

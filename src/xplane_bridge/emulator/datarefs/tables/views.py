@@ -29,11 +29,8 @@ def define(t: Table, sim: Sources) -> None:
         t.setting(VIEW + name)
     t.setting(VIEW + "window_width", sim.window_size[0], read_only=True)
     t.setting(VIEW + "window_height", sim.window_size[1], read_only=True)
-    info = sim.model.info
-    for axis, value in zip("xyz", (0.0, -info.eye_down_m, -info.eye_forward_m)):
-        t.setting(VIEW + f"pilots_head_{axis}", value)
-    for angle in ("psi", "the", "phi"):
-        t.setting(VIEW + f"pilots_head_{angle}")
+    for name in ("x", "y", "z", "psi", "the", "phi"):
+        t.setting(VIEW + f"pilots_head_{name}")
     for place, angle in enumerate(("roll", "pitch", "heading")):
         t.value(VIEW + "view_" + angle, _angle(cameras, place))
     for place, axis in enumerate("xyz"):
