@@ -314,7 +314,8 @@ class ModelInfo:
     eye_forward_m: float = 0.0  #: pilot's eye (or camera) from the reference point, FRD
     eye_down_m: float = 0.0
     standing_height_m: float = 0.0  #: of the centre of gravity above the ground, parked at the default loading
-    trim_deg: tuple[tuple[str, float], ...] = ()  #: surface kind -> deflection at full trim
+    trim_deg: tuple[tuple[str, float], ...] = ()  #: surface kind -> deflection at full trim, nose up or right
+    turbines: bool = False  #: whose speeds are ``n1_percent`` and ``n2_percent``
 
 
 class FlightModel(Protocol):

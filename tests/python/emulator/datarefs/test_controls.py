@@ -259,6 +259,16 @@ def test_engine_failure_and_repair(bench):
     assert emulator.read(running + "[1]") == [1.0]
 
 
+def test_a_failed_turbine_has_no_gas_generator_that_turns(bench):
+    emulator = bench(aircraft="tiltrotor")
+    names = [f"sim/flightmodel/engine/ENGN_{name}[{engine}]" for name in ("N1_", "N2_") for engine in (0, 1)]
+    assert emulator.read(*names) == pytest.approx([89.0, 89.0, 100.0, 100.0], abs=0.5)
+    emulator.write({FAILURES + "rel_engfai0": 6.0})
+    emulator.step(60)
+    # the other one drives both rotors through the joined shafts
+    assert emulator.read(*names) == pytest.approx([0.0, 97.6, 100.0, 100.0], abs=0.5)
+
+
 def test_a_failure_that_is_armed_for_later_does_nothing_yet(bench):
     emulator = bench()
     emulator.write({FAILURES + "rel_engfai0": 2.0})

@@ -103,6 +103,7 @@ class Tiltrotor(JsbsimModel):
         eye_down_m=-0.2,
         standing_height_m=STANDING_HEIGHT_M,
         trim_deg=(("elevator", 0.0),),
+        turbines=True,
     )
     surfaces = (
         sided("wing1l_ail1", SurfaceKind.AILERON, Side.LEFT, FLAPERON_DEG, FLAPERON_DEG + FLAP_DROOP_DEG, 80.0),

@@ -96,8 +96,8 @@ def define(t: Table, sim: Sources) -> None:
         ("ENGN_CHT_c", lambda e: _shown(e.cylinder_head_temperature_k, sim, "CHT")),
         ("ENGN_oil_temp_c", lambda e: _shown(e.oil_temperature_k, sim, "oilT")),
         ("ENGN_oil_press_psi", lambda e: e.oil_pressure_pa * PA_TO_PSI),
-        ("ENGN_N1_", lambda e: e.rpm * 100.0 / max(sim.model.info.maximum_rpm, 1.0)),
-        ("ENGN_N2_", lambda e: e.rpm * 100.0 / max(sim.model.info.maximum_rpm, 1.0)),
+        ("ENGN_N1_", lambda e: e.n1_percent if sim.model.info.turbines else _speed_percent(e, sim)),
+        ("ENGN_N2_", lambda e: e.n2_percent if sim.model.info.turbines else _speed_percent(e, sim)),
         ("ENGN_EPR", lambda _: 1.0),
         ("ENGN_EGT", lambda e: _celsius(e.exhaust_gas_temperature_k) / 900.0),
         ("ENGN_ITT", lambda e: _celsius(e.exhaust_gas_temperature_k) / 900.0),
@@ -134,6 +134,10 @@ def define(t: Table, sim: Sources) -> None:
     t.array(engines2 + "prop_rotation_speed_rad_sec", each(lambda e: e.prop_rpm * RPM_TO_RAD_S))
     t.array(engines2 + "prop_pitch_deg", each(lambda e: e.blade_pitch_deg))
     t.array(engines2 + "throttle_used_ratio", each(lambda e: e.throttle))
+
+
+def _speed_percent(engine: EngineState, sim: Sources) -> float:
+    return engine.rpm * 100.0 / max(sim.model.info.maximum_rpm, 1.0)
 
 
 def _shown(kelvin: float, sim: Sources, gauge: str) -> float:
