@@ -245,6 +245,19 @@ def test_throttle_override_of_all_engines_is_released_by_minus_two(bench):
     assert emulator.read(THRO_USE + "[1]") == [pytest.approx(emulator.sim.controls.throttle[1])]
 
 
+def test_limits_of_trim_are_parts_of_the_travel_that_it_moves(bench):
+    emulator = bench(aircraft="fixed_wing", initial=InitialState(on_ground=True))
+    limits, trim = "sim/aircraft/controls/acf_", "sim/cockpit2/controls/elevator_trim"
+    emulator.write({trim: 1.0})
+    emulator.step(60)
+    # up 12.6 of 18 degrees, down 9.1 of 13
+    assert emulator.read(ELEVATOR, limits + "elev_up", limits + "max_trim_elev") == pytest.approx([-12.6, 18.0, 0.7])
+    emulator.write({trim: -1.0})
+    emulator.step(60)
+    assert emulator.read(ELEVATOR, limits + "elev_dn", limits + "min_trim_elev") == pytest.approx([9.1, 13.0, 0.7])
+    assert emulator.read(limits + "max_trim_ailn", limits + "max_trim_rudd") == pytest.approx([0.3, 0.4])
+
+
 # --- failures ---
 
 

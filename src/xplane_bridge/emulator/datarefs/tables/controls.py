@@ -269,7 +269,11 @@ def _spec(sim: Sources, leaf: str) -> Optional[SurfaceSpec]:
 
 
 def _trim_part(sim: Sources, kind: str, leaf: str) -> float:
-    """Part of the surface's travel that full trim moves it."""
+    """Part of the surface's travel that full trim moves it: the elevator up, the others (left ones) down or right."""
     spec = _spec(sim, leaf)
-    trim = dict(sim.model.info.trim_deg).get(kind, 0.0)
-    return abs(trim) / spec.maximum_deg if spec is not None and spec.maximum_deg else 0.0
+    if spec is None:
+        return 0.0
+    trim, travel = dict(sim.model.info.trim_deg).get(kind, 0.0), spec.maximum_deg
+    if spec.kind is SurfaceKind.ELEVATOR:
+        travel = -spec.minimum_deg
+    return abs(trim) / travel if travel else 0.0
