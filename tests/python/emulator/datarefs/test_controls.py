@@ -336,6 +336,17 @@ def test_blocked_pitot_keeps_the_airspeed_of_its_moment(bench):
     assert true < before - 5.0
 
 
+def test_the_second_airspeed_is_of_the_copilots_own_tube(bench):
+    emulator = bench()
+    names = [POSITION + "indicated_airspeed2", "sim/cockpit2/gauges/indicators/airspeed_kts_copilot"]
+    emulator.write({FAILURES + "rel_pitot": 6.0, THROTTLE + "_all": 0.0})
+    (pilots,) = emulator.read(POSITION + "indicated_airspeed")
+    emulator.step(300)
+    second, gauge = emulator.read(*names)
+    assert second == gauge < pilots - 5.0
+    assert emulator.read(POSITION + "indicated_airspeed") == [pytest.approx(pilots, abs=0.5)]
+
+
 def test_generators_and_batteries_feed_the_bus(bench):
     emulator = bench()
     bus = "sim/cockpit2/electrical/bus_volts"

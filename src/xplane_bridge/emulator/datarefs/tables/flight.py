@@ -103,7 +103,7 @@ def _air_data(t: Table, sim: Sources) -> None:
     t.value(_POSITION + "beta", lambda f: beta_sign * math.degrees(f.m.beta_rad))
     t.value(_POSITION + "true_airspeed", lambda f: f.m.true_airspeed_mps)
     t.value(_POSITION + "indicated_airspeed", lambda _: sim.instruments.airspeed_kt)
-    t.value(_POSITION + "indicated_airspeed2", lambda _: sim.instruments.airspeed_kt)
+    t.value(_POSITION + "indicated_airspeed2", lambda _: sim.copilot_instruments.airspeed_kt)
     t.value(_POSITION + "equivalent_airspeed", lambda f: f.m.equivalent_airspeed_mps * MPS_TO_KT)
     t.value("_emulator/keas", lambda f: f.m.equivalent_airspeed_mps * MPS_TO_KT)
     t.value("_emulator/kcas", lambda f: f.m.calibrated_airspeed_mps * MPS_TO_KT)
