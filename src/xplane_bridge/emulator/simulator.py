@@ -140,11 +140,8 @@ class Simulator:
         clocks.frame += 1
         clocks.wall_period = period
         clocks.simulated_period = min(period, 1.0 / MIN_FRAME_RATE)
-        dt = (
-            0.0
-            if clocks.paused
-            else clocks.simulated_period * clip(self.store.get("sim/time/sim_speed"), 0.0, MAX_SIM_SPEED)
-        )
+        clocks.time_ratio = clip(self.store.get("sim/time/sim_speed"), 0.0, MAX_SIM_SPEED)
+        dt = 0.0 if clocks.paused else clocks.simulated_period * clocks.time_ratio
         clocks.advance(dt, self.flying)
         if self.flying:
             self._fly(dt)

@@ -59,6 +59,7 @@ class Clocks:
     date_days: int = 171
     simulated_period: float = 1.0 / 60.0  #: time that this frame advanced the simulation, or would have
     wall_period: float = 1.0 / 60.0  #: time between this frame and the one before
+    time_ratio: float = 1.0  #: simulated time that passes in a second of `simulated_period`, as clients ask for it
     work: float = 0.0  #: time that computing the last frame took
     elapsed: float = 0.0  #: simulated time since the emulator started, also without a flight
     paused: bool = False

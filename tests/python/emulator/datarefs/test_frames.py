@@ -381,6 +381,17 @@ def test_below_20_frames_a_second_simulated_time_slows(bench):
     assert rows[0][3] == pytest.approx(1 / 19.9, rel=1e-6)
 
 
+def test_the_actual_speed_is_that_of_simulated_time(bench):
+    actual, flown = "sim/time/sim_speed_actual", "sim/time/total_flight_time_sec"
+    emulator = bench(fps=10.0)
+    assert emulator.read(actual) == pytest.approx([10.0 / 19.9])
+    emulator.write({"sim/time/sim_speed": 4.0})
+    (before,) = emulator.read(flown)
+    emulator.step(18)
+    ratio, after = emulator.read(actual, flown)
+    assert ratio == pytest.approx(4.0 * 10.0 / 19.9) == pytest.approx((after - before) / 1.9)
+
+
 def test_times_of_row_1_are_in_decimal_hours(bench):
     emulator = bench(sim_time_start=100.0)
     emulator.write({"sim/time/zulu_time_sec": 45000.0})

@@ -199,7 +199,10 @@ def _time(t: Table, sim: Sources) -> None:
     t.setting("sim/time/use_system_time")
     t.setting("sim/time/sim_speed", 1)
     t.setting("sim/time/ground_speed", 1)
-    t.value("sim/time/sim_speed_actual", lambda _: clock.simulated_period / max(clock.wall_period, 1e-6))
+    t.value(
+        "sim/time/sim_speed_actual",
+        lambda _: clock.time_ratio * clock.simulated_period / max(clock.wall_period, 1e-6),
+    )
     t.value("sim/time/framerate_period", lambda _: clock.simulated_period, always=True)
     t.value("sim/operation/misc/frame_rate_period", lambda _: clock.simulated_period, always=True)
     t.value("sim/network/misc/network_time_sec", lambda _: clock.running, always=True)
