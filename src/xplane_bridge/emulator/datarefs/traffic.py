@@ -91,7 +91,8 @@ class Traffic:
         angles = (request.roll_deg, request.pitch_deg, request.heading_deg)
         if not self._placeable or not 1 <= request.aircraft <= MOST or not is_place((*numbers, *angles)):
             return False
-        self.aircraft[request.aircraft] = OtherAircraft(*numbers, *angles)
+        latitude, longitude, elevation = numbers
+        self.aircraft[request.aircraft] = OtherAircraft(latitude, earth.wrap_half_turn(longitude), elevation, *angles)
         self._store.values[self._store.dataref(OVERRIDE).slots[request.aircraft]] = 1.0
         return True
 

@@ -56,7 +56,7 @@ class Clocks:
     running: float = 0.0  #: sim/time/total_running_time_sec
     flight: float = 0.0  #: sim/time/total_flight_time_sec
     zulu: float = 43200.0  #: sim/time/zulu_time_sec
-    date_days: int = 171
+    date_days: int = 171  #: 0 is 1 January; there is no leap year
     simulated_period: float = 1.0 / 60.0  #: time that this frame advanced the simulation, or would have
     wall_period: float = 1.0 / 60.0  #: time between this frame and the one before
     time_ratio: float = 1.0  #: simulated time that passes in a second of `simulated_period`, as clients ask for it
@@ -77,7 +77,7 @@ class Clocks:
             self.zulu += dt
             if self.zulu >= 86400.0:
                 self.zulu -= 86400.0
-                self.date_days = (self.date_days + 1) % 366
+                self.date_days = (self.date_days + 1) % 365
 
 
 @dataclass

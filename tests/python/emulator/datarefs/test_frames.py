@@ -381,6 +381,14 @@ def test_below_20_frames_a_second_simulated_time_slows(bench):
     assert rows[0][3] == pytest.approx(1 / 19.9, rel=1e-6)
 
 
+def test_the_day_after_the_last_one_is_new_year(bench):
+    emulator = bench()
+    emulator.write({"sim/time/local_date_days": 364.0, "sim/time/zulu_time_sec": 86399.5})
+    assert emulator.read("sim/time/local_date_days") == [364.0]
+    emulator.step(60)
+    assert emulator.read("sim/time/local_date_days") == [0.0]
+
+
 def test_the_actual_speed_is_that_of_simulated_time(bench):
     actual, flown = "sim/time/sim_speed_actual", "sim/time/total_flight_time_sec"
     emulator = bench(fps=10.0)

@@ -96,6 +96,8 @@ def test_vehx_holds_another_aircraft_too(bench):
     assert (other.roll_deg, other.pitch_deg, other.heading_deg) == (-10.0, 3.0, 120.0)
     assert emulator.read(OVERRIDE.format(5)) == pytest.approx([1.0])
     assert emulator.read(PLANE.format(5) + "lat")[0] == pytest.approx(37.5, abs=1e-5)
+    client.send(protocol.VehiclePose("VEHX", 5, 37.5, 190.0, 700.0, 120.0, 3.0, -10.0))
+    assert emulator.read(PLANE.format(5) + "lon") == [-170.0]
 
 
 def test_tcas_reports_distance_bearing_and_height(bench):
