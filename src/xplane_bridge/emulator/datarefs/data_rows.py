@@ -14,6 +14,7 @@ import numpy as np
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.controls import WINGS
 from xplane_bridge.emulator.datarefs.tables.systems import BY_ENGINE
+from xplane_bridge.emulator.datarefs.traffic import PLANE
 from xplane_bridge.emulator.flight.frame import M_TO_FT, MPS_TO_FPM, MPS_TO_KT, MPS_TO_MPH
 from xplane_bridge.protocol import FIFTH_BYTE, ROW_COUNT, SLOTS_PER_ROW, UNUSED_SLOT
 
@@ -46,6 +47,10 @@ def _each(name: str, factor: float = 1.0, count: int = SLOTS_PER_ROW) -> List[So
 
 def _wings(leaf: str) -> List[Source]:
     return [f"sim/flightmodel/controls/{wing}_{leaf}def" for wing in WINGS]
+
+
+def _others(leaf: str, factor: float = 1.0) -> List[Source]:
+    return [(PLANE.format(number) + leaf, factor) for number in range(1, SLOTS_PER_ROW)]
 
 
 def layout(is_12: bool, otherwise: FrozenSet[str] = frozenset()) -> Dict[int, Sequence[Source]]:
@@ -197,9 +202,9 @@ def layout(is_12: bool, otherwise: FrozenSet[str] = frozenset()) -> Dict[int, Se
             ("_emulator/distance_m", M_TO_FT),
             ("_emulator/distance_m", 1.0 / 1852.0),
         ),
-        22: (_P + "latitude", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        23: (_P + "longitude", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        24: ((_P + "elevation", M_TO_FT), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        22: (_P + "latitude", *_others("lat")),
+        23: (_P + "longitude", *_others("lon")),
+        24: ((_P + "elevation", M_TO_FT), *_others("el", M_TO_FT)),
         25: _each(_ACT + "throttle_ratio"),
         26: _each(_E + "ENGN_thro_use"),
         27: _each(_E + "ENGN_propmode"),

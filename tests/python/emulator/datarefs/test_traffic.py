@@ -100,6 +100,19 @@ def test_vehx_holds_another_aircraft_too(bench):
     assert emulator.read(PLANE.format(5) + "lon") == [-170.0]
 
 
+def test_rows_22_to_24_show_the_first_seven(bench):
+    emulator = bench(traffic=9)
+    client = emulator.client()
+    client.send(protocol.NetworkTarget(64, "127.0.0.1", client.port, True))
+    client.send(protocol.RowSelection("DSEL", (22, 23, 24)))
+    emulator.step()
+    rows = protocol.decode_data(client.received()[-1]).as_dict()
+    others = [emulator.sim.traffic.aircraft[number] for number in range(1, 8)]
+    assert rows[22][1:] == pytest.approx([other.latitude_deg for other in others], abs=4e-6)
+    assert rows[23][1:] == pytest.approx([other.longitude_deg for other in others], abs=8e-6)
+    assert rows[24][1:] == pytest.approx([other.altitude_m / 0.3048 for other in others], rel=1e-6)
+
+
 def test_tcas_reports_distance_bearing_and_height(bench):
     emulator = bench()
     m = emulator.sim.model.state
