@@ -10,6 +10,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from xplane_bridge.analysis.criteria import CAMERA, MEASURES, SCORED, TARGETED, Criterion
 from xplane_bridge.constants import EXCITATION_KINDS, FAILURE_KINDS
+from xplane_bridge.scenario import excitations
 from xplane_bridge.scenario.holds import HoldGains
 from xplane_bridge.scenario.resets import NUMBERS, STARTS, TEXTS
 from xplane_bridge.scenario.schema import (
@@ -328,6 +329,7 @@ def _excitation(item: Any, path: str) -> Dict[str, Any]:
             raise ScenarioError(f"{path}.{key}: missing; expected a number from {low} to {high}")
         out[key] = expect_number(given.get(key, default), f"{path}.{key}", low, high)
     out["seed"] = int(expect_whole(given.get("seed", 0), f"{path}.seed", 0, _MOST_SEED))
+    excitations.check(out, path)
     return out
 
 

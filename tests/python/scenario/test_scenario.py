@@ -9,12 +9,10 @@ import pytest
 import yaml
 
 from support.simulator.emulator_fixture import EmulatorFixture
-from xplane_bridge.constants import EXCITATION_KINDS
 from xplane_bridge.scenario import (
     FlightSample,
     Player,
     ScenarioError,
-    excitations,
     load_scenario,
     parse_scenario,
 )
@@ -364,53 +362,6 @@ def test_a_stick_movement_ends_the_hold_of_its_axis_and_a_hold_the_one_of_its_gr
     assert (player.targets.pitch, player.targets.altitude) == (5.0, None)
     play(player, 3.5)
     assert player.targets.pitch is None
-
-
-# --- excitations ---
-
-
-@pytest.mark.parametrize(
-    ("kind", "times", "values"),
-    [
-        ("doublet", (0.0, 0.9, 1.1, 1.9, 2.1), (1, 1, -1, -1, 0)),
-        ("3-2-1-1", (0.1, 0.8, 0.9, 1.4, 1.5, 1.7, 1.75, 1.99), (1, 1, -1, -1, 1, 1, -1, -1)),
-    ],
-)
-def test_steps(kind, times, values):
-    parameters = {"kind": kind, "amplitude": 1.0, "duration": 2.0, "frequency": 0.1, "frequency_end": 2.0, "seed": 0}
-    assert [excitations.value(parameters, time) for time in times] == list(values)
-
-
-@pytest.mark.parametrize("kind", ["multisine", "chirp"])
-def test_sines_stay_in_bounds_and_repeat_by_seed(kind):
-    parameters = {"kind": kind, "amplitude": 0.3, "duration": 10.0, "frequency": 0.2, "frequency_end": 2.0, "seed": 4}
-    values = [excitations.value(parameters, i * 0.01) for i in range(1000)]
-    assert max(values) <= 0.3
-    assert min(values) >= -0.3
-    assert max(values) - min(values) > 0.3
-    assert values == [excitations.value(dict(parameters), i * 0.01) for i in range(1000)]
-    assert excitations.value(parameters, 10.0) == excitations.value(parameters, -0.1) == 0.0
-
-
-def test_every_kind_of_the_service_is_played_and_each_as_itself():
-    given = {"amplitude": 1.0, "duration": 2.0, "frequency": 0.1, "frequency_end": 2.0, "seed": 0}
-    played = {
-        kind: tuple(excitations.value({"kind": kind, **given}, i * 0.1) for i in range(20)) for kind in EXCITATION_KINDS
-    }
-    assert len(set(played.values())) == len(EXCITATION_KINDS) == 4
-
-
-def test_an_unknown_kind_is_refused_and_not_played_as_a_multisine():
-    parameters = {
-        "kind": "square",
-        "amplitude": 1.0,
-        "duration": 2.0,
-        "frequency": 0.1,
-        "frequency_end": 2.0,
-        "seed": 0,
-    }
-    with pytest.raises(ScenarioError, match="'square'; expected doublet, 3-2-1-1, multisine or chirp"):
-        excitations.value(parameters, 0.5)
 
 
 # --- the emulator's pilot ---
