@@ -13,8 +13,8 @@ from xplane_bridge.emulator.datarefs import camera
 from xplane_bridge.emulator.datarefs.sources import Actions
 
 _COCKPIT = "sim/cockpit2/controls/"
+_FLAPS = _COCKPIT + "flap_ratio"
 _VIEW = "sim/graphics/view/"
-_FLAP_STEP = 0.25
 _TRIM_STEP = 0.01
 _THROTTLE_STEP = 0.05
 
@@ -67,8 +67,8 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/flight_controls/landing_gear_down": setter(_COCKPIT + "gear_handle_down", 1.0),
         "sim/flight_controls/landing_gear_up": setter(_COCKPIT + "gear_handle_down", 0.0),
         "sim/flight_controls/landing_gear_toggle": toggle(_COCKPIT + "gear_handle_down"),
-        "sim/flight_controls/flaps_up": stepper(_COCKPIT + "flap_ratio", -_FLAP_STEP, 0.0, 1.0),
-        "sim/flight_controls/flaps_down": stepper(_COCKPIT + "flap_ratio", _FLAP_STEP, 0.0, 1.0),
+        "sim/flight_controls/flaps_up": partial(_move_flaps, sim, -1),
+        "sim/flight_controls/flaps_down": partial(_move_flaps, sim, 1),
         "sim/flight_controls/speed_brakes_up_all": setter(_COCKPIT + "speedbrake_ratio", 1.0),
         "sim/flight_controls/speed_brakes_down_all": setter(_COCKPIT + "speedbrake_ratio", 0.0),
         "sim/flight_controls/speed_brakes_toggle": toggle(_COCKPIT + "speedbrake_ratio"),
@@ -110,6 +110,14 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
     for name, (view, external) in VIEWS.items():
         table[f"sim/view/{name}"] = partial(_look, sim, view, external)
     return table
+
+
+def _move_flaps(sim: Actions, notches: int) -> None:
+    """Moves the flap handle on from the notch that is nearest; an aircraft without flaps has none."""
+    detents = sim.model.info.flap_detents
+    if detents:
+        notch = round(sim.store.get(_FLAPS) * detents) + notches
+        sim.store.set(_FLAPS, min(max(notch, 0), detents) / detents)
 
 
 def _look(sim: Actions, view: int, external: bool) -> None:

@@ -153,6 +153,18 @@ def test_handles_and_levers_stay_where_a_row_put_them_also_when_it_ends_within_t
     assert emulator.read("sim/cockpit2/controls/flap_ratio", THROTTLE + "[0]") == pytest.approx([0.5, 0.2])
 
 
+@pytest.mark.parametrize(
+    ("aircraft", "shown"), [("fixed_wing", [1 / 3, 2 / 3, 1.0, 1.0, 2 / 3]), ("multirotor", [0.0] * 5)]
+)
+def test_the_flap_handle_moves_by_the_notches_that_the_aircraft_has(bench, aircraft, shown):
+    emulator = bench(aircraft=aircraft)
+    client, seen = emulator.client(), []
+    for command in ("flaps_down",) * 4 + ("flaps_up",):
+        client.send(protocol.CommandRequest("sim/flight_controls/" + command))
+        seen += emulator.read("sim/cockpit2/controls/flap_ratio")
+    assert seen == pytest.approx(shown)
+
+
 def test_toe_brakes_need_their_override(bench):
     emulator = bench(initial=InitialState(on_ground=True))
     brake = "sim/cockpit2/controls/left_brake_ratio"
