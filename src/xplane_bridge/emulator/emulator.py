@@ -89,7 +89,11 @@ class Emulator:
         if port is None:
             return None
         return XPlaneConnect(
-            self.options.bind, port, lambda: self.sim.position(), lambda: self.sim.model.state.terrain_elevation_m
+            self.options.bind,
+            port,
+            lambda: self.sim.position(),
+            lambda: self.sim.model.state.terrain_elevation_m,
+            lambda name: self.sim.store.get(name),
         )
 
     def _new_simulator(self) -> Simulator:

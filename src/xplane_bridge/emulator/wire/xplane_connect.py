@@ -20,6 +20,7 @@ _TERR = struct.Struct("<5sB3d6f2i")
 #: In a GETT: the aircraft's own place. The plugin's -998 is not X-Plane's -999.
 _OWN_PLACE = -998.0
 _UP = (0.0, 1.0, 0.0)
+_GEAR_HANDLE, _GEAR = "sim/cockpit2/controls/gear_handle_down", "sim/flightmodel2/gear/deploy_ratio"
 
 
 class XPlaneConnect:
@@ -30,6 +31,7 @@ class XPlaneConnect:
         port: UDP port; 0 for a free one.
         position: Gives the aircraft's position in the frame.
         ground: Gives the height of the ground, which is level [m above mean sea level].
+        value: Gives a dataref's value in the frame.
     """
 
     def __init__(
@@ -38,9 +40,11 @@ class XPlaneConnect:
         port: int,
         position: Callable[[], protocol.RposResponse],
         ground: Callable[[], float],
+        value: Callable[[str], float],
     ) -> None:
         self._position = position
         self._ground = ground
+        self._value = value
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
@@ -69,17 +73,16 @@ class XPlaneConnect:
     def _reply(self, datagram: bytes) -> Optional[bytes]:
         here = self._position()
         if datagram[:4] == b"GETP" and len(datagram) == _GETP.size:
-            gear_down = 1
             return _POSI.pack(
                 b"POSI\0",
-                gear_down,  # where the aircraft's number should be: the plugin's own bug
+                int(self._value(_GEAR_HANDLE) != 0.0),  # where the aircraft's number should be: the plugin's own bug
                 here.latitude_deg,
                 here.longitude_deg,
                 here.elevation_m,
                 here.pitch_deg,
                 here.roll_deg,
                 here.heading_deg,
-                float(gear_down),
+                self._value(_GEAR),
             )
         if datagram[:4] == b"GETT" and len(datagram) == _GETT.size:
             _, aircraft, latitude, longitude, altitude = _GETT.unpack(datagram)

@@ -213,6 +213,22 @@ def test_xplane_connect_answers_in_doubles(bench):
     client.close()
 
 
+def test_xplane_connect_gives_gear_and_its_handle(bench):
+    emulator = bench(aircraft="fixed_wing", xplane_connect_port=0)
+    client = XPlaneClient(emulator.emulator.describe()["xpc_port"])
+    seen = []
+    for handle in (0.0, 1.0, 1.0):
+        emulator.write({"sim/cockpit2/controls/gear_handle_down": handle})
+        emulator.step(60)
+        client.send(b"GETP\0\0")
+        emulator.step()
+        (position,) = client.received()
+        seen.append((position[5], *struct.unpack_from("<f", position, 42)))
+    # six seconds from up to down
+    assert seen == [(0, 0.0), (1, pytest.approx(61 / 360)), (1, pytest.approx(122 / 360))]
+    client.close()
+
+
 def test_rpos_stops_at_zero_and_answers_several(bench):
     emulator = bench()
     first, second = emulator.client(), emulator.client()
