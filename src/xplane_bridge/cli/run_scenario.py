@@ -28,7 +28,8 @@ _PICTURES_HZ = 30.0  # in lock-step, as nearly as frames allow; otherwise captur
 #: Options that make a flight what it is.
 _KEPT = ("aircraft", "transport", "joystick", "controller", "camera", "duration", "emulator", "seed")
 _KEPT_LOCKSTEP = ("lockstep", "speed", "controller_node")
-_LONGEST_S = 600.0  # a scenario that has not ended by then waits for something that never comes
+#: A scenario that has not ended so long after its last event could have come waits for something that never comes [s].
+_PATIENCE_S = 600.0
 
 
 def parser() -> argparse.ArgumentParser:
@@ -57,7 +58,8 @@ def parser() -> argparse.ArgumentParser:
         "--duration",
         type=positive,
         metavar="S",
-        help="end after so much simulated time; needed where a scenario repeats",
+        help="end after so much simulated time; needed where a scenario repeats (default: when the scenario ends, or "
+        f"{_PATIENCE_S:g} s after its last event could have come)",
     )
     p.add_argument(
         "--emulator",
@@ -100,7 +102,7 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
         scenario,
         args.scenario,
         args.output or Path(f"scenario_{scenario.name}"),
-        args.duration or _LONGEST_S,
+        args.duration or _longest(scenario),
         aircraft=args.aircraft,
         joystick=args.joystick,
         controller=["sh", "-c", f"exec {args.controller}"] if args.controller else (),
@@ -109,6 +111,11 @@ def plan_of(scenario: Scenario, args: argparse.Namespace) -> FlightPlan:
         transport=args.transport,
         lockstep=lockstep,
     )
+
+
+def _longest(scenario: Scenario) -> float:
+    """[s] of simulated time for which a scenario may fly that ends by itself."""
+    return scenario.last_event + _PATIENCE_S
 
 
 def lockstep_of(args: argparse.Namespace) -> Optional[Lockstep]:
@@ -177,7 +184,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         fly(plan, say=lambda text: print(f"run_scenario: {text}", file=sys.stderr))
     played = json.loads((plan.output / "played.json").read_text(encoding="utf-8"))
     if not played["finished"] and args.duration is None:
-        raise ScenarioError(f"{scenario.name} has not ended within {_LONGEST_S:g} s")
+        raise ScenarioError(
+            f"{scenario.name} has not ended within {_longest(scenario):g} s: it waits for a condition; give it a "
+            "timeout, or --duration"
+        )
     with Bags(plan.bag) as bags:
         scores = judge(scenario, read_flight(bags), played)
     report = {"scenario": scenario.name, "played": played, "criteria": [s._asdict() for s in scores]}

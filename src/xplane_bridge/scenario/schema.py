@@ -105,3 +105,12 @@ class Scenario:
     events: Tuple[Event, ...] = ()
     controller: str = ""  #: module:class or module:function that flies in mode auto; empty: none of its own
     aerodrome: Mapping[str, float] = field(default_factory=dict)  #: what the emulator draws; empty: where it begins
+
+    @property
+    def last_event(self) -> float:
+        """When a round's last event comes at the latest [s], where conditions without a timeout hold at once."""
+        time = 0.0
+        for event in self.events:
+            time = time + event.after if event.at is None else max(time, event.at)
+            time += (event.timeout or 0.0) if event.when else 0.0
+        return time

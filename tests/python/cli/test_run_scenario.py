@@ -80,3 +80,20 @@ def test_a_controller_that_cannot_fly_is_said_before_anything_starts(controller,
     with pytest.raises(CampaignError, match=said):
         plan_of(scenario(controller), parser().parse_args(["s"]))
     assert plan_of(scenario(controller), parser().parse_args(["s", "--controller", "my_own"]))
+
+
+@pytest.mark.parametrize(
+    ("events", "options", "longest"),
+    [
+        ("[{at: 0, label: a}]", [], 600.0),
+        ("[{at: 900, label: a}, {after: 20, label: b}, {at: 30, label: c}]", [], 1520.0),
+        ("[{at: 5, when: {roll: {above: 20}}, timeout: 100, label: a}, {after: 1, label: b}]", [], 706.0),
+        ("[{at: 5, when: {roll: {above: 20}}, label: a}, {at: 30, label: b}]", [], 630.0),
+        ("[{at: 900, label: a}]", ["--duration", "50"], 50.0),
+    ],
+)
+def test_a_long_scenario_flies_to_its_end(tmp_path, events, options, longest):
+    file = tmp_path / "s.yaml"
+    file.write_text(f"name: s\nevents: {events}\n")
+    args = parser().parse_args([str(file), "--output", str(tmp_path / "out"), *options])
+    assert plan_of(load_scenario(file), args).duration == longest
