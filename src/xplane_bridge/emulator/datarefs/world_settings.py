@@ -105,12 +105,15 @@ class WorldSettings:
         self._store.set(speed, wind_mps / factor)
         self._store.set(turbulence, turbulence_mps / TURBULENCE_MPS_PER_UNIT)
 
-    def _set_fuel(self, _index: int, _value: float) -> None:
+    def _set_fuel(self, tank: int, value: float) -> None:
         tanks = self._model().info.tank_count
         slots = self._store.dataref("sim/flightmodel/weight/m_fuel").slots
         self._store.values[slots[tanks:]] = 0.0  # no such tanks
-        fuel = self._store.values[slots[:tanks]]
-        self._model().set_loading(fuel_kg=[clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in fuel])
+        # The other tanks as they are, not as written: what was refused of one would have all others refused.
+        fuel = [*self._model().state.fuel_kg, *[0.0] * tanks][:tanks]
+        if tank < tanks:
+            fuel[tank] = clip(value, 0.0, _MAX_LOAD_KG)
+        self._model().set_loading(fuel_kg=fuel)
 
     def _set_payload(self, _index: int, value: float) -> None:
         if "stations" in self._otherwise:  # the payload is their sum, whatever is written

@@ -103,6 +103,13 @@ def test_loading_is_shown_while_the_flight_stands(bench):
     assert shown == pytest.approx([60.0, 300.0, before - 40.0 + 90.0], abs=0.1)
 
 
+def test_a_refused_tank_leaves_the_others_theirs(bench):
+    emulator = bench(aircraft="fixed_wing")
+    tanks = [f"sim/flightmodel/weight/m_fuel[{tank}]" for tank in (0, 1)]
+    emulator.write({tanks[0]: 130.0, tanks[1]: 50.0})  # 125 kg each
+    assert emulator.read(*tanks) == pytest.approx([100.0, 50.0], abs=0.01)
+
+
 def test_payload_goes_by_stations_in_version_12_only(bench):
     emulator = bench(aircraft="fixed_wing", version="12.10")
     weight = "sim/flightmodel/weight/"

@@ -217,6 +217,7 @@ class KinematicModel:
             self._fuel_kg = [max(0.0, float(x)) for x in fuel_kg][:2]
         if payload_kg is not None:
             self._payload_kg = max(0.0, float(payload_kg))
+        self.state.fuel_kg, self.state.payload_kg = list(self._fuel_kg), self._payload_kg  # shown at once
 
     def set_engine_running(self, engine: int, running: bool) -> None:
         """Starts or stops an engine."""
