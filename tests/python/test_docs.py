@@ -20,6 +20,9 @@ PAGES = sorted(
     if ".workspace" not in path.parts and ".venv" not in path.parts
 )
 INDEX = ROOT / "docs/README.md"
+#: Where pages are named by their path in the clone.
+TEXTS = ("config", "docs", "include", "launch", "lib", "msg", "scripts", "src", "srv")
+NO_TEXTS = (".png", ".jpg", ".pyc", ".gif")
 ARCHITECTURE = ROOT / "docs/architecture.md"
 
 
@@ -44,6 +47,21 @@ def test_no_link_is_dead(page):
         assert target.exists(), f"{page.name} points to {target}"
         if anchor:
             assert anchor in anchors(target), f"{page.name} points to #{anchor} of {target.name}"
+
+
+def test_pages_that_texts_and_messages_name_are_there():
+    dead = []
+    for folder in ("README.md", "CONTRIBUTING.md", *TEXTS):
+        top = ROOT / folder
+        for path in [top] if top.is_file() else sorted(path for path in top.rglob("*") if path.is_file()):
+            if path.suffix not in NO_TEXTS:
+                text = path.read_text(encoding="utf-8", errors="replace")
+                dead += [
+                    (str(path), name)
+                    for name in re.findall(r"\bdocs/[\w/]+\.md\b", text)
+                    if not (ROOT / name).is_file()
+                ]
+    assert dead == []
 
 
 def test_every_page_is_found_from_the_index():
