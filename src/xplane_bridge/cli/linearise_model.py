@@ -24,7 +24,10 @@ def parser() -> argparse.ArgumentParser:
         description="Trims an aircraft of the emulator in level flight, perturbs it and writes its linear model.",
     )
     p.add_argument("aircraft", metavar="AIRCRAFT", help="fixed_wing, or tiltrotor with --speed 70")
-    p.add_argument("--speed", type=positive, metavar="M/S", help="true airspeed; default: at which it starts, of the tiltrotor a hover, which has no such model")
+    p.add_argument(
+        "--speed", type=positive, metavar="M/S",
+        help="true airspeed; default: at which it starts, of the tiltrotor a hover, which has no such model",
+    )  # fmt: skip
     p.add_argument(
         "--altitude", type=number("a height [m]", -400.0, 15000.0), default=1000.0, metavar="M",
         help="above sea level; default: %(default)s",
