@@ -38,7 +38,8 @@ def parser() -> argparse.ArgumentParser:
         description=(
             "Flies a scripted flight with the emulator (no X-Plane needed) by joystick and by a controller, breaks an "
             "aileron (in flights of more than 35 s; judged in those of a minute), records it through the bridge into "
-            "DIR/flight.bag and checks the recording, and that X-Plane got everything back. Exit code 0: all of it worked."
+            "DIR/flight.bag and checks the recording, and that X-Plane got everything back. Exit code 0: all of it "
+            "worked."
         ),
     )
     p.add_argument(
