@@ -89,7 +89,7 @@ struct Names {
       brake_right{"brake_right"}, parking_brake{"parking_brake"}, throttle{"throttle"}, throttle_use{"throttle_use"},
       propeller{"propeller"}, mixture{"mixture"}, engine_faults{"engine_faults"}, surface_faults{"surface_faults"},
       surface_deg{"surface_deg"}, kind{"kind"}, value{"value"}, override_surfaces{"override_surfaces"},
-      override_throttles{"override_throttles"};
+      override_throttles{"override_throttles"}, gear_fault{"gear_fault"};
   Name v_north{"v_north_mps"}, v_east{"v_east_mps"}, alpha{"alpha_rad"}, airspeed{"true_airspeed_mps"},
       surfaces{"surfaces_deg"}, fuel_kg{"fuel_kg"}, gear{"gear"}, engines{"engines"}, on_ground_any{"on_ground_any"},
       on_ground_all{"on_ground_all"}, roll_ratio{"roll_ratio"}, pitch_ratio{"pitch_ratio"}, yaw_ratio{"yaw_ratio"},
@@ -207,7 +207,7 @@ TwinFrame::~TwinFrame() = default;
 void TwinFrame::begin(PyObject* model, double dt, PyObject* controls) const {
   const Parts& p = *parts_;
   const Names& names = p.names;
-  if (p.gear_travel_s > 0.0) {
+  if (p.gear_travel_s > 0.0 && !names.gear_fault.trueFor(controls)) {
     const double wanted = names.gear_down.trueFor(controls) ? 1.0 : 0.0, reach = dt / p.gear_travel_s;
     const double position = p.gear_position.getNumber();
     p.gear_position.set(makeNumber(position + pythonMin(pythonMax(wanted - position, -reach), reach)));

@@ -108,7 +108,7 @@ class LandingGear:
 
     def move(self, dt: float, controls: Controls, ground_speed: float) -> None:
         """Flies on: legs travel, brakes and wheel follow at once. Speed in m/s."""
-        if self._travel_s > 0.0:
+        if self._travel_s > 0.0 and not controls.gear_fault:
             wanted, reach = (1.0 if controls.gear_down else 0.0), dt / self._travel_s
             self.position += min(max(wanted - self.position, -reach), reach)
         for setter, brake in zip(self._set_brakes, (controls.brake_left, controls.brake_right)):

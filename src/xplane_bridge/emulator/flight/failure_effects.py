@@ -56,7 +56,7 @@ class FailureEffects:
             dt: Of the frame [s].
         """
         if not failed:
-            controls.surface_faults, controls.stability_fault = {}, False
+            controls.surface_faults, controls.stability_fault, controls.gear_fault = {}, False, False
             controls.engine_faults = [EngineFault.NONE] * len(controls.engine_faults)
             self._frozen.clear()
             return
@@ -64,7 +64,7 @@ class FailureEffects:
         controls.surface_faults = self._surface_faults(acting, model)
         engines = model.info.engine_count
         controls.engine_faults = [self._engine_fault(i, failed) for i in range(len(controls.engine_faults))]
-        controls.stability_fault = "rel_stbaug" in failed
+        controls.stability_fault, controls.gear_fault = "rel_stbaug" in failed, "rel_gear_act" in failed
         self._limit_stick(controls, failed)
         lock = "rel_conlock" in failed
         self._freeze(controls, "roll", lock or bool(failed & {"rel_ail_L_jam", "rel_ail_R_jam"}))
@@ -77,8 +77,10 @@ class FailureEffects:
                 setattr(controls, attribute, self._frozen[attribute])
             else:
                 self._freeze(controls, attribute, f"rel_trim_{leaf}" in failed)
-        self._freeze(controls, "flap_request", "rel_flap_act" in failed)
-        self._freeze(controls, "gear_down", "rel_gear_act" in failed)
+        if "rel_flap_act" in failed:  # where they are, not where the handle is: what droops as flaps do stops as well
+            controls.flap_request = self._frozen.setdefault("flap_request", model.state.flap_ratio)
+        else:
+            self._frozen.pop("flap_request", None)
         if "rel_lbrakes" in failed:
             controls.brake_left = 0.0
         if "rel_rbrakes" in failed:
@@ -145,6 +147,8 @@ class FailureEffects:
                 if matching(spec):
                     faults[spec.name] = SurfaceFault(kind)
 
+        if "rel_flap_act" in failed:
+            set_all(SurfaceFaultKind.STUCK, lambda s: s.kind is SurfaceKind.FLAP)
         for side, letter in ((Side.LEFT, "L"), (Side.RIGHT, "R")):
             if f"rel_fc_{letter}_flp" in failed:
                 set_all(SurfaceFaultKind.STUCK, lambda s, side=side: s.kind is SurfaceKind.FLAP and s.side is side)

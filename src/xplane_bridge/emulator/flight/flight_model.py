@@ -124,6 +124,7 @@ class Controls:
     surface_faults: dict[str, SurfaceFault] = field(default_factory=dict)  #: by surface name
     engine_faults: list[EngineFault] = field(default_factory=lambda: [EngineFault.NONE] * MAX_ENGINES)
     stability_fault: bool = False  #: the artificial stability has failed, whatever the switch says
+    gear_fault: bool = False  #: the legs stay where they are, also on their way
 
     def copy(self) -> Controls:
         """Independent of this one."""

@@ -42,6 +42,7 @@ def stir(chance: random.Random, controls: Controls, model: FlightModel) -> None:
             kind = chance.choice(list(SurfaceFaultKind))
             value = chance.random() if kind in SHARES else chance.choice([None, chance.uniform(-10.0, 10.0)])
             controls.surface_faults[name] = SurfaceFault(kind, value)
+    controls.gear_fault = chance.random() < 0.2
 
 
 def history(initial: InitialState, frames: int, period: float, turbulence: float) -> List[bytes]:

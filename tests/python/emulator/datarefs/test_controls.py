@@ -301,6 +301,31 @@ def test_a_failure_that_is_armed_for_later_does_nothing_yet(bench):
     assert emulator.read(FAILURES + "rel_engfai0", "sim/flightmodel/engine/ENGN_running") == [2.0, 1.0]
 
 
+@pytest.mark.parametrize("aircraft", ["kinematic", "fixed_wing", "tiltrotor"])
+@pytest.mark.parametrize(
+    ("failure", "handle", "shown", "frames"),
+    [
+        ("rel_flap_act", "flap_ratio", "sim/flightmodel/controls/flaprat", 10),
+        ("rel_gear_act", "gear_handle_down", "sim/flightmodel2/gear/deploy_ratio", 60),
+    ],
+)
+def test_flaps_and_gear_stop_where_their_drive_fails(bench, aircraft, failure, handle, shown, frames):
+    """The tiltrotor's ailerons droop as flaps do, in a quarter of a second."""
+    emulator = bench(aircraft=aircraft)
+    emulator.write({"sim/cockpit2/controls/gear_handle_down": 0.0})
+    emulator.step(600)
+    emulator.write({"sim/cockpit2/controls/" + handle: 1.0})
+    emulator.step(frames)
+    emulator.write({FAILURES + failure: 6.0})
+    (caught,) = emulator.read(shown)
+    assert 0.01 < caught < 0.99
+    emulator.step(120)
+    assert emulator.read(shown, "sim/cockpit2/controls/" + handle) == [pytest.approx(caught, abs=1e-3), 1.0]
+    emulator.write({FAILURES + failure: 0.0})
+    emulator.step(600)
+    assert emulator.read(shown) == [pytest.approx(1.0, abs=1e-3)]
+
+
 def test_rese_repairs_everything(bench):
     emulator = bench()
     emulator.write({FAILURES + "rel_engfai0": 6.0, FAILURES + "rel_pitot": 6.0})

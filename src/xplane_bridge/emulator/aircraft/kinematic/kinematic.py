@@ -274,7 +274,8 @@ class KinematicModel:
             self._gust = np.zeros(3)
         self._time += dt
         self._flap += min(max(controls.flap_request - self._flap, -0.2 * dt), 0.2 * dt)
-        self._gear += min(max(float(controls.gear_down) - self._gear, -0.25 * dt), 0.25 * dt)
+        if not controls.gear_fault:
+            self._gear += min(max(float(controls.gear_down) - self._gear, -0.25 * dt), 0.25 * dt)
         self._tilt += min(max(controls.thrust_vector - self._tilt, -0.2 * dt), 0.2 * dt)
         burnt = sum(throttle) * 0.008 * dt
         self._fuel_kg = [max(0.0, kg - burnt / len(self._fuel_kg)) for kg in self._fuel_kg]
