@@ -22,7 +22,7 @@ from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.controls import old_names, surface_dataref
 from xplane_bridge.emulator.datarefs.traffic import Traffic
 from xplane_bridge.emulator.datarefs.world_settings import PRESSURE_INHG, WorldSettings, clip
-from xplane_bridge.emulator.flight.failure_effects import FailureEffects
+from xplane_bridge.emulator.flight.failure_effects import TRIM_FAILURES, FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
 from xplane_bridge.emulator.flight.frame import Clocks, Frame
 from xplane_bridge.emulator.servos import Servos
@@ -166,6 +166,8 @@ class Simulator:
                 self._autopilot.update(self.frame, altitude_ft, self.failed("rel_otto"), beam)
                 self._servos.move(dt, self.frame, self.model.info, altitude_ft, self.controls, beam)
                 self._effects.apply(self.controls, self._failed, self.model, dt)
+                if not TRIM_FAILURES.isdisjoint(self._failed):
+                    self.inputs.show_trims(self.controls)
                 if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
                     self.model.step(dt, self.controls)
             if not _is_sane(self.model.state):

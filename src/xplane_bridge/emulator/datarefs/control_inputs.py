@@ -42,10 +42,9 @@ _HANDLES = {
 _THROTTLE_ROW = 25
 #: Rudder that auto-coordination gives for sideslip (wind from the right positive: the nose goes right).
 _COORDINATION_PER_DEG = 0.1
+_TRIMS = (_COCKPIT + "elevator_trim", _COCKPIT + "aileron_trim", _COCKPIT + "rudder_trim")
 _HANDLE_NAMES = (
-    _COCKPIT + "elevator_trim",
-    _COCKPIT + "aileron_trim",
-    _COCKPIT + "rudder_trim",
+    *_TRIMS,
     _COCKPIT + "flap_ratio",
     _COCKPIT + "speedbrake_ratio",
     _COCKPIT + "gear_handle_down",
@@ -200,6 +199,11 @@ class ControlInputs:
         """Puts back what `save` gave."""
         for name, values in levers.items():
             self._store.set(name, values)
+
+    def show_trims(self, controls: Controls) -> None:
+        """Shows trims that failures have moved or held: they stay so when that is repaired."""
+        for name, value in zip(_TRIMS, (controls.trim_pitch, controls.trim_roll, controls.trim_yaw)):
+            self._store.set(name, value)
 
     # --- DATA rows ----------------------------------------------------------------------------------------------------
 

@@ -16,6 +16,10 @@ from xplane_bridge.emulator.flight.flight_model import (
 )
 
 _TRIM_RUNAWAY_PER_S = 0.05
+#: Of trims that stand, or run away.
+TRIM_FAILURES = frozenset(
+    name for leaf in ("ail", "elv", "rud") for name in (f"rel_trim_{leaf}", f"rel_{leaf}_trim_run")
+)
 
 _EVENTS = {
     "lock": SurfaceFaultKind.STUCK,

@@ -326,6 +326,27 @@ def test_flaps_and_gear_stop_where_their_drive_fails(bench, aircraft, failure, h
     assert emulator.read(shown) == [pytest.approx(1.0, abs=1e-3)]
 
 
+def test_a_trim_that_runs_away_is_shown_and_stays_there_when_it_is_repaired(bench):
+    emulator = bench()
+    trim, failure = "sim/cockpit2/controls/elevator_trim", FAILURES + "rel_elv_trim_run"
+    emulator.write({failure: 6.0, trim: 0.1})
+    emulator.step(119)
+    assert emulator.read(trim) == [pytest.approx(0.1 + 120 * 0.05 / 60.0)]  # 0.05 a second
+    emulator.write({failure: 0.0})
+    assert emulator.read(trim, ELEVATOR) == pytest.approx([0.2, -4.0], abs=1e-5)  # of 20 degrees
+
+
+def test_a_trim_that_stands_takes_no_write(bench):
+    emulator = bench()
+    trim, failure = "sim/cockpit2/controls/aileron_trim", FAILURES + "rel_trim_ail"
+    emulator.write({failure: 6.0, trim: 0.1})
+    emulator.step()
+    emulator.write({trim: 0.5})
+    assert emulator.read(trim) == [pytest.approx(0.1)]
+    emulator.write({failure: 0.0, trim: 0.5})
+    assert emulator.read(trim) == [0.5]
+
+
 def test_rese_repairs_everything(bench):
     emulator = bench()
     emulator.write({FAILURES + "rel_engfai0": 6.0, FAILURES + "rel_pitot": 6.0})
