@@ -121,7 +121,11 @@ class Server:
             self.ignored[error.reason] += 1
             _LOG.debug("ignored a datagram from %s:%d: %s", *sender[:2], error)
             return
-        reason = self._handlers[type(request)](request, sender)
+        try:
+            reason = self._handlers[type(request)](request, sender)
+        except (ArithmeticError, ValueError) as error:  # a FlightModelError too: numbers that nobody has foreseen
+            reason = "value"
+            _LOG.warning("%s from %s:%d could not be carried out: %s", request, *sender[:2], error)
         if reason is not None:
             self.ignored[reason] += 1
             _LOG.debug("ignored %s from %s:%d: %s", request, *sender[:2], reason)

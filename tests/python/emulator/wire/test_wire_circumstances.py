@@ -19,6 +19,7 @@ from support.simulator.emulator_wire import (
 )
 from xplane_bridge import protocol
 from xplane_bridge.emulator.emulator import Emulator
+from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.emulator.options import Options
 from xplane_bridge.emulator.wire.server import Beacon, PortInUseError
 
@@ -178,6 +179,22 @@ def test_extreme_numbers_in_valid_messages_never_stop_it(bench):
     client.subscribe([TIME])
     emulator.step()
     assert client.received()
+
+
+@pytest.mark.parametrize("error", [OverflowError("too large"), ZeroDivisionError(), FlightModelError("no flight")])
+def test_a_request_that_nobody_can_carry_out_is_counted(bench, monkeypatch, error):
+    emulator = bench()
+
+    def fail():
+        raise error
+
+    monkeypatch.setattr(emulator.sim, "repair_all", fail)
+    client = emulator.client()
+    client.send(protocol.RecoverAll())
+    client.subscribe([TIME])
+    emulator.step()
+    assert client.received()
+    assert emulator.emulator.server.ignored["value"] == 1
 
 
 # --- a computer with two addresses ---
