@@ -11,7 +11,7 @@ import numpy as np
 from xplane_bridge import protocol
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight import earth
-from xplane_bridge.emulator.flight.flight_model import FlightModel, InitialState
+from xplane_bridge.emulator.flight.flight_model import HIGHEST_LATITUDE_DEG, FlightModel, InitialState
 from xplane_bridge.emulator.flight.frame import Frame
 
 _POSITION = "sim/flightmodel/position/"
@@ -98,11 +98,13 @@ class Placements:
 
     @classmethod
     def _is_flyable(cls, changes: Dict[str, object]) -> bool:
+        latitude: float = changes.get("latitude_deg", 0.0)  # type: ignore[assignment]
         elevation: float = changes.get("altitude_m", 0.0)  # type: ignore[assignment]
         velocity: Sequence[float] = changes.get("v_ned_mps", (0.0,))  # type: ignore[assignment]
         rates: Sequence[float] = changes.get("pqr_rad_s", (0.0,))  # type: ignore[assignment]
         return (
-            cls.ELEVATION_M[0] <= elevation <= cls.ELEVATION_M[1]
+            abs(latitude) <= HIGHEST_LATITUDE_DEG
+            and cls.ELEVATION_M[0] <= elevation <= cls.ELEVATION_M[1]
             and max(map(abs, velocity)) <= cls.MAX_SPEED_MPS
             and max(map(abs, rates)) <= cls.MAX_RATE_RAD_S
         )
@@ -133,10 +135,11 @@ class Placements:
 
     @staticmethod
     def set_speed(model: FlightModel, initial: InitialState) -> None:
-        """Gives an aircraft that was started elsewise the speed of `initial`, level and straight ahead."""
+        """Gives an aircraft that was started elsewise the airspeed of `initial`, level and straight ahead."""
         speed = initial.airspeed_mps or 0.0
-        heading = math.radians(initial.heading_deg)
-        model.place(v_ned_mps=[speed * math.cos(heading), speed * math.sin(heading), 0.0], pqr_rad_s=(0.0, 0.0, 0.0))
+        heading, air = math.radians(initial.heading_deg), model.state
+        north, east = speed * math.cos(heading) + air.wind_north_mps, speed * math.sin(heading) + air.wind_east_mps
+        model.place(v_ned_mps=[north, east, 0.0], pqr_rad_s=(0.0, 0.0, 0.0))
 
     @staticmethod
     def place_vehicle(model: FlightModel, request: protocol.VehiclePose) -> bool:
@@ -172,12 +175,12 @@ class Placements:
 
 
 def is_place(numbers: Sequence[float]) -> bool:
-    """Whether latitude, longitude, elevation, and finite further numbers, are those of a place on X-Plane's earth."""
+    """Whether latitude, longitude, elevation, and finite further numbers, are those of a place to put an aircraft."""
     if not all(map(math.isfinite, numbers)):
         return False
     latitude, longitude, elevation = numbers[:3]
     low, high = Placements.ELEVATION_M
-    return abs(latitude) <= 90.0 and abs(longitude) <= 360.0 and low <= elevation <= high
+    return abs(latitude) <= HIGHEST_LATITUDE_DEG and abs(longitude) <= 360.0 and low <= elevation <= high
 
 
 def _attitude(pending: Dict[str, float], frame: Frame) -> Optional[np.ndarray]:

@@ -21,6 +21,8 @@ MAX_ENGINES = 8
 
 #: Longest integration step of a flight model [s]; ``step`` divides what it is given into equal parts no longer.
 MAX_SUBSTEP_S = 1.0 / 240.0
+#: Farther north or south no aircraft is put: the local level has no north at a pole.
+HIGHEST_LATITUDE_DEG = 89.9
 #: Longest time one ``step`` may fly [s].
 MAX_STEP_S = 1.0
 
@@ -278,7 +280,7 @@ class InitialState:
         """Raises a `FlightModelError` for a start that no aircraft can have."""
         speed = 0.0 if self.airspeed_mps is None else self.airspeed_mps
         numbers = (self.latitude_deg, self.longitude_deg, self.heading_deg, self.altitude_m, speed)
-        if not all(math.isfinite(number) for number in numbers) or abs(self.latitude_deg) > 89.9:
+        if not all(math.isfinite(number) for number in numbers) or abs(self.latitude_deg) > HIGHEST_LATITUDE_DEG:
             raise FlightModelError(
                 f"cannot start at {self}: numbers must be finite, the latitude within -89.9..89.9 deg"
             )

@@ -10,7 +10,7 @@ from typing import Any, Callable, Sequence
 import jsbsim
 
 from xplane_bridge import compiled
-from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
+from xplane_bridge.emulator.flight.flight_model import HIGHEST_LATITUDE_DEG, FlightModelError, ModelState
 from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M, GRAVITY_MPS2, KNOT_MPS
 
 POUND_FORCE_N = 4.4482216152605
@@ -153,7 +153,7 @@ def start_motion(
     values = [latitude_deg, longitude_deg, altitude_m, *euler_rad, *v_ned_mps, *pqr_rad_s]
     if not all(math.isfinite(value) for value in values):
         raise FlightModelError(f"cannot place the aircraft at {values}: every number must be finite")
-    if abs(latitude_deg) > 89.9:
+    if abs(latitude_deg) > HIGHEST_LATITUDE_DEG:
         raise FlightModelError(
             f"latitude {latitude_deg} deg: expected -89.9..89.9 (the local level has no north at a pole)"
         )

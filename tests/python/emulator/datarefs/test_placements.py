@@ -46,6 +46,15 @@ def test_prel_gives_a_speed_that_cannot_be_trimmed(bench):
     assert (state.v_east_mps, state.v_north_mps) == pytest.approx((-20.0, 0.0), abs=0.5)
 
 
+def test_prel_gives_a_speed_through_the_air_also_where_it_cannot_be_trimmed(bench):
+    emulator = bench(aircraft="fixed_wing", wind=(0.0, 15.0))
+    place = {"latitude_deg": 37.4, "longitude_deg": 127.6, "elevation_m": 1500.0, "heading_deg": 0.0}
+    emulator.client().send(protocol.Placement(6, speed_mps=29.0, **place))
+    emulator.step()
+    state = emulator.sim.model.state
+    assert (state.true_airspeed_mps, state.v_north_mps) == pytest.approx((29.0, 14.0), abs=0.5)
+
+
 def test_prel_into_the_ground_is_not_flown(bench):
     emulator = bench(aircraft="fixed_wing")
     before = emulator.sim.model.state.altitude_m
@@ -165,6 +174,22 @@ def test_vehs_is_of_x_plane_12_and_leaves_the_flight_model_on(bench, version, mo
     state = emulator.sim.model.state
     assert (abs(state.latitude_deg - 47.0) < 0.1) is moves
     assert state.latitude_deg != 47.0
+
+
+@pytest.mark.parametrize("latitude", [89.95, -90.0])
+def test_at_the_poles_no_aircraft_is_put(bench, latitude):
+    emulator = bench(aircraft="fixed_wing")
+    emulator.client().send(protocol.VehiclePose("VEHX", 0, latitude, 0.0, 1000.0, 0.0, 0.0, 0.0))
+    emulator.step()
+    assert emulator.emulator.server.ignored["value"] == 1
+    assert not emulator.sim.frozen
+    # 90 N as it lies from the origin at 37.5 N: 52.5 degrees ahead
+    radius, angle = 6378145.0, math.radians(52.5)
+    pole = {"local_x": 0.0, "local_y": radius * (math.cos(angle) - 1.0), "local_z": -radius * math.sin(angle)}
+    emulator.write({POSITION + name: value for name, value in pole.items()})
+    emulator.step()
+    assert emulator.sim.model.state.latitude_deg == pytest.approx(37.46, abs=0.01)
+    assert emulator.sim.loads == 1
 
 
 def test_attitude_and_velocity_are_set_by_their_datarefs(bench):
