@@ -102,7 +102,7 @@ class JsbsimModel:
         self._fuel_kg = list(self._loaded_fuel_kg)
         self._payload_kg = self.default_payload_kg
         self._payload_aft_m = 0.0
-        self._trimmed = Controls()
+        self._trimmed = self._flown = Controls()
         self.state = ModelState()
         self._start_jsbsim()
 
@@ -208,6 +208,7 @@ class JsbsimModel:
         self._turbulence.restore(turbulence)
         self._time = initial.sim_time_s
         self._crashed = False
+        self._flown = self._trimmed
         self._read_state(self._trimmed)
         return self.trim_controls
 
@@ -233,6 +234,7 @@ class JsbsimModel:
                 f"step of {dt} s: expected more than 0 and at most {MAX_STEP_S} s; fly longer times in pieces"
             )
         self._surface_set.check(controls)
+        self._flown = controls
         try:
             self._fly(dt, controls)
         except jsbsim.BaseError as error:
@@ -338,7 +340,7 @@ class JsbsimModel:
             chosen(pqr_rad_s, [s.p_rad_s, s.q_rad_s, s.r_rad_s]),
         )
         self._crashed = False
-        return self._read_state(self._trimmed)
+        return self._read_state(self._flown)
 
     def _set_motion(
         self,
@@ -407,7 +409,7 @@ class JsbsimModel:
         self._gear.put(saved["gear"])
         self._put(saved["position"], saved["euler"], saved["v_ned"], saved["pqr"])
         self._time, self._crashed = saved["time"], saved["crashed"]
-        return self._read_state(self._trimmed)
+        return self._read_state(self._flown)
 
     def _put(
         self, position: Sequence[float], euler: Sequence[float], v_ned: Sequence[float], pqr: Sequence[float]

@@ -192,6 +192,18 @@ def test_at_the_poles_no_aircraft_is_put(bench, latitude):
     assert emulator.sim.loads == 1
 
 
+@pytest.mark.parametrize("name", ["fixed_wing", "kinematic"])
+def test_a_move_during_a_pause_leaves_the_levers_where_they_are(bench, name):
+    emulator = bench(aircraft=name, version="12")
+    used = "sim/flightmodel/engine/ENGN_thro_use[0]"
+    emulator.write({"sim/cockpit2/engine/actuators/throttle_ratio_all": 0.9})
+    assert emulator.read(used) == [pytest.approx(0.9)]
+    client = emulator.client()
+    client.send(protocol.CommandRequest("sim/operation/pause_on"))
+    client.send(protocol.VehiclePose("VEHS", 0, 37.0, 127.0, 2000.0, 0.0, 0.0, 0.0))
+    assert emulator.read(used) == [pytest.approx(0.9)]
+
+
 def test_attitude_and_velocity_are_set_by_their_datarefs(bench):
     emulator = bench(aircraft="fixed_wing")
     half = math.radians(30.0) / 2

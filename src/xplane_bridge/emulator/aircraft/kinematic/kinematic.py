@@ -123,7 +123,7 @@ class KinematicModel:
         else:
             lever = min(max(_DRAG_PER_V2 * self._speed**2 / _MAX_THRUST_MPS2, 0.0), 1.0)
             controls.throttle = [lever] * _ENGINES + [0.0] * (MAX_ENGINES - _ENGINES)
-        self.trim_controls = controls
+        self.trim_controls = self._flown = controls
         self.state = ModelState()
         self._flap = self._tilt = 0.0
         self._gear = 1.0
@@ -135,6 +135,7 @@ class KinematicModel:
         """Flies on."""
         if not dt > 0.0:
             raise FlightModelError(f"step of {dt} s; expected more than 0")
+        self._flown = controls
         count = max(1, math.ceil(dt / MAX_SUBSTEP_S - 1e-9))
         for _ in range(count):
             self._substep(dt / count, controls)
@@ -166,8 +167,9 @@ class KinematicModel:
             wanted = (p if a is None else a for a, p in zip((roll_rad, pitch_rad, heading_rad), present))
             self._turn_to(earth.body_to_level(*map(math.degrees, wanted)))
         self._previous = None
-        self._publish(MAX_SUBSTEP_S, self.trim_controls, (0.0, 0.0, 0.0))
-        return self.state
+        s = self.state
+        self._publish(MAX_SUBSTEP_S, self._flown, (s.roll_ratio, s.pitch_ratio, s.yaw_ratio))
+        return s
 
     def save(self) -> bytes:
         """Levers and handles, for a situation."""
