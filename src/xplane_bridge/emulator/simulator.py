@@ -10,8 +10,9 @@ from typing import Callable, Dict, FrozenSet, List, Mapping, Optional, Set, Tupl
 import numpy as np
 
 from xplane_bridge import protocol, xplane_names
+from xplane_bridge.emulator import rpos
 from xplane_bridge.emulator.beam import Beam
-from xplane_bridge.emulator.datarefs import airport_starts, commands, data_rows, tables
+from xplane_bridge.emulator.datarefs import commands, data_rows, tables
 from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments
 from xplane_bridge.emulator.datarefs.autopilot import Autopilot
 from xplane_bridge.emulator.datarefs.camera import Cameras
@@ -23,9 +24,11 @@ from xplane_bridge.emulator.datarefs.tables.controls import old_names, surface_d
 from xplane_bridge.emulator.datarefs.traffic import Traffic
 from xplane_bridge.emulator.datarefs.world_settings import PRESSURE_INHG, WorldSettings, clip
 from xplane_bridge.emulator.flight.failure_effects import TRIM_FAILURES, FailureEffects
-from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState, ModelState
+from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, FlightModelError, InitialState
 from xplane_bridge.emulator.flight.frame import Clocks, Frame
+from xplane_bridge.emulator.flight.limits import is_sane
 from xplane_bridge.emulator.servos import Servos
+from xplane_bridge.emulator.starts import Starts
 
 _LOG = logging.getLogger(__name__)
 
@@ -105,7 +108,7 @@ class Simulator:
         self.flying = False
         self.loads = 0  #: how often a flight or a situation was loaded
         self.frozen = False  #: by VEHX: the flight model stands still until an aircraft or a flight is loaded
-        self._last_start = self.initial
+        self._starts = Starts(self.initial, self.start_flight, lambda: self.model)
         self._load_time = load_time
         self._situations: Dict[str, Tuple[str, bytes, Dict[str, np.ndarray]]] = {}
         self._failed: Set[str] = set()
@@ -146,7 +149,7 @@ class Simulator:
         if self.flying:
             self._fly(dt)
         elif clocks.elapsed >= self._load_time:
-            self._start_first()
+            self._starts.first()
         self.table.publish(self.frame, self.flying)
         if self.flying:
             self._publish_surfaces()
@@ -170,12 +173,12 @@ class Simulator:
                     self.inputs.show_trims(self.controls)
                 if not self.frozen and not self.store.get("sim/operation/override/override_planepath"):
                     self.model.step(dt, self.controls)
-            if not _is_sane(self.model.state):
-                raise FlightModelError("its state is no longer a number")
+            if not is_sane(self.model.state):
+                raise FlightModelError("its motion is none that there is")
         except (FlightModelError, ArithmeticError, ValueError) as error:
             # an aircraft that broke apart: X-Plane too starts the flight again
             _LOG.warning("the flight model gave up (%s): the flight starts again", error)
-            self._start_first()
+            self._starts.first()
         self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
         self.frame.distance += self.frame.ground_speed * dt
         self.traffic.step(dt, self.frame)
@@ -246,18 +249,34 @@ class Simulator:
 
     # --- flights, aircraft, situations --------------------------------------------------------------------------------
 
-    def _start_first(self) -> None:
-        """The flight as configured; on the ground where there is no steady flight with what clients have loaded."""
-        try:
-            self.start_flight(self.initial)
-        except FlightModelError as error:
-            _LOG.warning("%s: the flight starts on the ground", error)
-            self.start_flight(replace(self.initial, on_ground=True))
+    def start_flight(self, initial: InitialState, trimmed: bool = True) -> None:
+        """Begins a flight: levers and trims as the flight needs them, the origin where the aircraft is.
 
-    def start_flight(self, initial: InitialState) -> None:
-        """Begins a flight: levers and trims as the flight needs them, the origin where the aircraft is."""
-        self._last_start = initial
-        self.controls = self.model.reset(initial)
+        Args:
+            initial: How it begins.
+            trimmed: Whether it is a steady one; else its speed is that of `initial`, all else as of a usual one.
+
+        Raises:
+            FlightModelError: There is no such flight; the present one goes on.
+        """
+        present = self.model.save() if self.flying and is_sane(self.model.state) else None
+        try:
+            controls = self.model.reset(initial if trimmed else replace(initial, airspeed_mps=None))
+            if not trimmed:
+                Placements.set_speed(self.model, initial)
+        except (ArithmeticError, ValueError):  # a FlightModelError too
+            if present is not None:
+                self.model.restore(present)
+            raise
+        self._begin(controls, initial.engines_running)
+
+    def restart_flight(self) -> None:
+        """Begins the most recent flight again."""
+        self._starts.again()
+
+    def _begin(self, controls: Controls, powered: bool) -> None:
+        """A flight begins where the model has been put."""
+        self.controls = controls
         self.loads += 1
         self.inputs.start(self.controls, self.model)
         self.frozen, self.flying = False, True
@@ -266,10 +285,9 @@ class Simulator:
         self._placements.clear()
         self.instruments, self.copilot_instruments = Instruments(), Instruments(COPILOT)
         self.electrics = Electrics()
-        powered = float(initial.engines_running)
         for name in ("battery_on", "generator_on", "inverter_on"):
-            self.store.set(_ELECTRICAL + name, powered)
-        self.store.set("sim/cockpit2/switches/avionics_power_on", powered)
+            self.store.set(_ELECTRICAL + name, float(powered))
+        self.store.set("sim/cockpit2/switches/avionics_power_on", float(powered))
         self.frame.start(self.model.state)
         self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
         self._update_instruments()
@@ -277,22 +295,39 @@ class Simulator:
         self._publish_surfaces()
 
     def load_aircraft(self, name: str) -> None:
-        """Loads another aircraft where the present one is; raises FlightModelError if there is none of that name."""
-        before = self.model.state
-        self.model = self._make_model(name)
-        self.aircraft = name
-        self.frame.info = self.model.info
-        self.inputs.release_data()
-        self._bind_aircraft()
+        """Loads another aircraft where the present one is, or before the first flight.
+
+        Raises:
+            FlightModelError: There is none of that name, or none that flies there; the present one flies on.
+        """
+        model, before = self._new_aircraft(name), self.model.state
+        if not self.flying:
+            self._take_aircraft(name, model)
+            return
+        low = before.altitude_m - before.terrain_elevation_m < Placements.GROUND_HEIGHT_M
         start = InitialState(
             latitude_deg=before.latitude_deg,
             longitude_deg=before.longitude_deg,
             heading_deg=math.degrees(before.heading_rad),
-            on_ground=before.on_ground_any,
+            on_ground=before.on_ground_any or low,
             altitude_m=before.altitude_m,
             terrain_elevation_m=before.terrain_elevation_m,
         )
-        self.start_flight(start)
+        controls = model.reset(start)
+        self._take_aircraft(name, model)
+        self._starts.last = start
+        self._begin(controls, start.engines_running)
+
+    def _new_aircraft(self, name: str) -> FlightModel:
+        """An aircraft that can be taken."""
+        model = self._make_model(name)
+        self._surface_slots_of(model)
+        return model
+
+    def _take_aircraft(self, name: str, model: FlightModel) -> None:
+        self.model, self.aircraft, self.frame.info = model, name, model.info
+        self.inputs.release_data()
+        self._bind_aircraft()
 
     def save_situation(self, path: str) -> None:
         """Keeps the whole flight under a name."""
@@ -303,14 +338,17 @@ class Simulator:
         if path not in self._situations:
             return False
         aircraft, situation, levers = self._situations[path]
-        if aircraft != self.aircraft:
-            self.load_aircraft(aircraft)
-        self.model.restore(situation)
-        self.loads += 1
+        model = self.model if aircraft == self.aircraft else self._new_aircraft(aircraft)
+        model.restore(situation)
+        if model is not self.model:
+            self._take_aircraft(aircraft, model)
+            self._begin(model.trim_controls, powered=True)
+        else:
+            self.loads += 1
+            self.frozen = False
+            self.clocks.flight = 0.0
+            self.frame.start(self.model.state)
         self.inputs.restore(levers)
-        self.frozen = False
-        self.clocks.flight = 0.0
-        self.frame.start(self.model.state)
         return True
 
     def _bind_aircraft(self) -> None:
@@ -321,14 +359,7 @@ class Simulator:
         self._servos.rest()
         self.cameras.take_seat(info)
         self._surface_names = [spec.name for spec in self.model.surfaces]
-        paths = [surface_dataref(spec) for spec in self.model.surfaces]
-        slots = [self.store.slot(path) for path in paths]
-        missing = [path for path, slot in zip(paths, slots) if slot is None]
-        if missing:
-            raise FlightModelError(
-                f"aircraft {info.name}: X-Plane has no datarefs {', '.join(missing)} for its surfaces"
-            )
-        self._surface_slots = np.array(slots, dtype=int)
+        self._surface_slots = self._surface_slots_of(self.model)
         bound = dict(zip(self._surface_names, map(int, self._surface_slots)))
         old = {self.store.locate(path): name for path, name in old_names(self.model.surfaces).items()}
         self.inputs.bind_surfaces(bound, {slot: bound[name] for slot, name in old.items()})
@@ -341,6 +372,16 @@ class Simulator:
         self.store.set_text(_IDENTITY + "acf_tailnum", "N0XPB")
         self.store.set_text(_IDENTITY + "acf_relative_path", aircraft_path(info.name))
         self._commands = commands.commands(self)
+
+    def _surface_slots_of(self, model: FlightModel) -> np.ndarray:
+        paths = [surface_dataref(spec) for spec in model.surfaces]
+        slots = [self.store.slot(path) for path in paths]
+        missing = [path for path, slot in zip(paths, slots) if slot is None]
+        if missing:
+            raise FlightModelError(
+                f"aircraft {model.info.name}: X-Plane has no datarefs {', '.join(missing)} for its surfaces"
+            )
+        return np.array(slots, dtype=int)
 
     # --- requests -----------------------------------------------------------------------------------------------------
 
@@ -367,40 +408,12 @@ class Simulator:
         return None
 
     def on_placement(self, request: protocol.Placement) -> Optional[str]:
-        """PREL: a new flight, at a place (start type 6), at the one aerodrome, or where flights start."""
+        """PREL: a new flight."""
         if request.aircraft != 0:
             return "aircraft"
         if "prel" in self.otherwise:
             return "otherwise"
-        if request.start_type == Placements.REPEAT_LAST:
-            initial: Optional[InitialState] = self._last_start
-        elif request.start_type == Placements.START_AT_PLACE:
-            initial = Placements.initial_state(request, self.model.state.terrain_elevation_m)
-        elif request.start_type in airport_starts.TYPES:
-            initial = airport_starts.airport_start(request, self.initial)
-            if initial is None:
-                return "airport"
-        else:
-            initial = self.initial
-        if initial is None:
-            return "value"
-        try:
-            self._start_at(initial)
-        except FlightModelError as error:  # no place to fly from
-            _LOG.info("PREL: %s", error)
-            return "value"
-        return None
-
-    def _start_at(self, initial: InitialState) -> None:
-        """X-Plane trims nothing: the aircraft is there with the speed asked for, whatever it then does."""
-        try:
-            self.start_flight(initial)
-        except FlightModelError:
-            if initial.airspeed_mps is None:
-                raise
-            self.start_flight(replace(initial, airspeed_mps=None))
-            Placements.set_speed(self.model, initial)
-            self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
+        return self._starts.place(request)
 
     def on_aircraft(self, request: protocol.AircraftLoad) -> Optional[str]:
         """ACFN: loads the aircraft named by the path; other aircraft than the user's are ignored."""
@@ -418,6 +431,8 @@ class Simulator:
     def on_situation(self, request: protocol.Situation) -> Optional[str]:
         """SIMO: situations live in memory, by path; movies are not supported."""
         if request.action == protocol.Situation.SAVE:
+            if not self.flying:
+                return "situation"
             self.save_situation(request.path)
             return None
         if request.action == protocol.Situation.LOAD:
@@ -458,30 +473,7 @@ class Simulator:
 
     def position(self) -> protocol.RposResponse:
         """What RPOS says now."""
-        if not self.flying:
-            return protocol.RposResponse(*([0.0] * 13))
-        f, m = self.frame, self.frame.m
-        level = "rpos-axes" not in self.otherwise
-        return protocol.RposResponse(
-            m.longitude_deg,
-            m.latitude_deg,
-            m.altitude_m,
-            f.height,
-            f.true_theta if level else f.theta,
-            f.true_psi if level else f.psi,
-            f.true_phi if level else f.phi,
-            *f.velocity,
-            m.p_rad_s,
-            m.q_rad_s,
-            m.r_rad_s,
-        )
-
-
-def _is_sane(state: ModelState) -> bool:
-    total = state.latitude_deg + state.longitude_deg + state.altitude_m + sum(state.quaternion)
-    return math.isfinite(
-        total + state.u_mps + state.v_mps + state.w_mps + state.p_rad_s + state.q_rad_s + state.r_rad_s
-    )
+        return rpos.response(self.frame, "rpos-axes" not in self.otherwise) if self.flying else rpos.NOWHERE
 
 
 def aircraft_path(name: str) -> str:

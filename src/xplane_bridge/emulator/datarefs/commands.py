@@ -62,7 +62,7 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/operation/pause_off": lambda: sim.pause(False),
         "sim/operation/pause_toggle": lambda: sim.pause(not sim.clocks.paused),
         "sim/operation/fix_all_systems": sim.repair_all,
-        "sim/operation/reset_flight": lambda: sim.start_flight(sim.initial),
+        "sim/operation/reset_flight": sim.restart_flight,
         "sim/operation/freeze_toggle": toggle("sim/operation/override/override_planepath"),
         "sim/flight_controls/landing_gear_down": setter(_COCKPIT + "gear_handle_down", 1.0),
         "sim/flight_controls/landing_gear_up": setter(_COCKPIT + "gear_handle_down", 0.0),

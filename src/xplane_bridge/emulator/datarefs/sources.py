@@ -58,7 +58,6 @@ class Actions(LoadedAircraft, Protocol):
     otherwise: FrozenSet[str]  #: of `otherwise.IDS`
     store: DatarefStore
     clocks: Clocks
-    initial: InitialState  #: where flights start
 
     @property
     def autopilot_commands(self) -> Mapping[str, Callable[[], None]]:
@@ -70,8 +69,8 @@ class Actions(LoadedAircraft, Protocol):
     def repair_all(self) -> None:
         """Repairs everything."""
 
-    def start_flight(self, initial: InitialState) -> None:
-        """Begins a flight."""
+    def restart_flight(self) -> None:
+        """Begins the most recent flight again."""
 
     def move_throttles(self, step: float) -> None:
         """Moves all levers by `step`, within 0..1."""

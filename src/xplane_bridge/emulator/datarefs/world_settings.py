@@ -8,7 +8,7 @@ from typing import Callable, FrozenSet
 
 from xplane_bridge.emulator.datarefs.aircraft_systems import INHG_PA, Weather
 from xplane_bridge.emulator.datarefs.store import DatarefStore
-from xplane_bridge.emulator.flight.flight_model import FlightModel
+from xplane_bridge.emulator.flight.flight_model import FlightModel, FlightModelError
 from xplane_bridge.emulator.flight.frame import Clocks
 from xplane_bridge.units import KNOT_MPS
 
@@ -127,6 +127,8 @@ class WorldSettings:
 
     def _set_balance(self, _index: int, value: float) -> None:
         loaded = self._model().state
+        if loaded.dry_mass_kg <= 0.0:
+            raise FlightModelError(f"{LOADED_CG}: nothing is loaded before the first flight; set it later")
         self._model().set_loading(cg_aft_m=value * loaded.mass_kg / loaded.dry_mass_kg)
 
     def _set_atmosphere(self, other: str, value: float) -> None:

@@ -3,9 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any, Dict, Sequence
 
-from xplane_bridge.emulator.flight.flight_model import FlightModelError
+from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
+
+#: Faster no aircraft moves or turns: a flight model that says so has given up, though its numbers are finite.
+_HIGHEST_SPEED_MPS = 5000.0
+_HIGHEST_RATE_RAD_S = 1000.0
+
+
+def is_sane(state: ModelState) -> bool:
+    """Whether a motion is one that there is: finite numbers, speed and rates within reach."""
+    total = state.latitude_deg + state.longitude_deg + state.altitude_m + sum(state.quaternion)
+    speed = math.hypot(math.hypot(state.u_mps, state.v_mps), state.w_mps)
+    fastest_turn = max(abs(state.p_rad_s), abs(state.q_rad_s), abs(state.r_rad_s))
+    return math.isfinite(total) and speed < _HIGHEST_SPEED_MPS and fastest_turn < _HIGHEST_RATE_RAD_S
 
 
 def check_fuel(fuel_kg: Sequence[float], capacity_kg: Sequence[float]) -> None:

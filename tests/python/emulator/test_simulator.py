@@ -1,0 +1,86 @@
+"""What requests leave of a running emulator: its aircraft, and a flight that goes on."""
+
+from __future__ import annotations
+
+import pytest
+
+from support.simulator.emulator_bench import OVERRIDE, fixture_bench  # noqa: F401
+from xplane_bridge import protocol
+from xplane_bridge.emulator.flight.flight_model import InitialState
+from xplane_bridge.emulator.simulator import aircraft_path
+
+SAVE, LOAD = protocol.Situation(protocol.Situation.SAVE, "a.sit"), protocol.Situation(protocol.Situation.LOAD, "a.sit")
+
+
+def acfn(name):
+    return protocol.AircraftLoad(0, aircraft_path(name))
+
+
+def test_an_aircraft_that_cannot_fly_there_leaves_the_present_one(bench):
+    emulator = bench(aircraft="fixed_wing", version="12")
+    client = emulator.client()
+    client.send(protocol.VehiclePose("VEHS", 0, 37.0, 127.0, 9000.0, 0.0, 0.0, 0.0))
+    emulator.step()
+    model = emulator.sim.model
+    client.send(acfn("multirotor"))
+    emulator.step(60)
+    assert emulator.emulator.server.ignored["aircraft"] == 1
+    assert (emulator.sim.model, emulator.sim.aircraft, emulator.sim.frame.info) == (model, "fixed_wing", model.info)
+    assert emulator.sim.loads == 1
+    letters = emulator.read(*(f"sim/aircraft/view/acf_ICAO[{i}]" for i in range(4)))
+    assert bytes(map(int, letters)).decode() == model.info.icao[:4]
+    assert model.state.true_airspeed_mps == pytest.approx(75.0, abs=5.0)
+
+
+def test_an_aircraft_loaded_just_above_the_ground_stands_on_it(bench):
+    emulator = bench(aircraft="multirotor", initial=InitialState(altitude_m=2.0))
+    emulator.client().send(acfn("fixed_wing"))
+    emulator.step(10)
+    assert emulator.sim.aircraft == "fixed_wing"
+    assert emulator.sim.model.state.on_ground_all
+
+
+def test_an_aircraft_loaded_before_the_first_flight_begins_it(bench):
+    emulator = bench(load_time=0.5, fps=60.0)
+    emulator.client().send(acfn("fixed_wing"))
+    emulator.step(10)
+    assert (emulator.sim.aircraft, emulator.sim.flying) == ("fixed_wing", False)
+    emulator.step(30)
+    assert emulator.sim.flying
+    assert emulator.sim.model.state.altitude_m == pytest.approx(1000.0, abs=1.0)
+    assert emulator.sim.model.state.latitude_deg == pytest.approx(37.4602, abs=1e-3)
+
+
+def test_before_the_first_flight_there_is_nothing_to_save_and_to_balance(bench):
+    emulator = bench(aircraft="fixed_wing", version="12.08", load_time=1.0)
+    assert emulator.sim.on_situation(SAVE) == "situation"
+    assert emulator.sim.on_dref(protocol.DrefWrite("sim/flightmodel2/misc/cg_offset_z", 0.1)) == "value"
+
+
+def test_a_situation_of_another_aircraft_needs_no_flight_where_the_present_one_is(bench):
+    emulator = bench(aircraft="multirotor", version="12")
+    client = emulator.client()
+    client.send(SAVE)
+    emulator.step(2)
+    saved = emulator.sim.model.state.copy()
+    client.send(acfn("fixed_wing"))
+    emulator.step(2)
+    client.send(protocol.VehiclePose("VEHS", 0, 37.0, 127.0, 9000.0, 0.0, 0.0, 0.0))  # higher than it can hover
+    emulator.step()
+    client.send(LOAD)
+    emulator.step(2)
+    assert emulator.sim.aircraft == "multirotor"
+    state = emulator.sim.model.state
+    assert (state.latitude_deg, state.altitude_m) == pytest.approx((saved.latitude_deg, saved.altitude_m), abs=1e-2)
+    emulator.step(120)
+    assert state.altitude_m == pytest.approx(1000.0, abs=1.0)  # its levers came with it
+
+
+def test_a_motion_that_explodes_starts_the_flight_again(bench):
+    emulator = bench(aircraft="tiltrotor")
+    emulator.write({OVERRIDE + "control_surfaces": 1.0, "sim/flightmodel/controls/wing1l_ail1def": 1e10})
+    emulator.step(60)
+    assert emulator.sim.loads > 1
+    emulator.write({OVERRIDE + "control_surfaces": 0.0})
+    emulator.step(60)
+    assert emulator.sim.model.state.altitude_m == pytest.approx(1000.0, abs=20.0)
