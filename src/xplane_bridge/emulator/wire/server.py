@@ -123,7 +123,7 @@ class Server:
             return
         try:
             reason = self._handlers[type(request)](request, sender)
-        except (ArithmeticError, ValueError) as error:  # a FlightModelError too: numbers that nobody has foreseen
+        except (ArithmeticError, ValueError) as error:  # a FlightModelError too: what no handler refuses
             reason = "value"
             _LOG.warning("%s from %s:%d could not be carried out: %s", request, *sender[:2], error)
         if reason is not None:

@@ -182,7 +182,7 @@ def test_extreme_numbers_in_valid_messages_never_stop_it(bench):
 
 
 @pytest.mark.parametrize("error", [OverflowError("too large"), ZeroDivisionError(), FlightModelError("no flight")])
-def test_a_request_that_nobody_can_carry_out_is_counted(bench, monkeypatch, error):
+def test_a_request_whose_handler_raises_is_counted(bench, monkeypatch, error):
     emulator = bench()
 
     def fail():
