@@ -12,6 +12,7 @@ from xplane_bridge import compiled
 from xplane_bridge.campaign.definition import FlightPlan, load_campaign
 from xplane_bridge.campaign.flight import Flight
 from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.datarefs.aircraft_systems import Weather
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.resources import config_file
@@ -35,7 +36,7 @@ def _model(in_cpp: bool) -> Callable[[], Any]:
 
 def _simulator(everything: bool) -> Callable[[], Any]:
     sim = Simulator(create_model, "fixed_wing", initial=InitialState(airspeed_mps=70.0))
-    sim.settings.set_weather(0.0, 0.0, 1.0, 1)
+    sim.settings.set_weather(Weather(turbulence_mps=1.0))
     if everything:
         sim.store.watch_all()
     return lambda: sim.step(1.0 / 60.0)

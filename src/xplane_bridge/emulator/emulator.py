@@ -20,6 +20,7 @@ import numpy as np
 from xplane_bridge import protocol
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
+from xplane_bridge.emulator.datarefs.aircraft_systems import Weather
 from xplane_bridge.emulator.datarefs.control_inputs import InputOptions
 from xplane_bridge.emulator.flight.flight_model import FlightModel
 from xplane_bridge.emulator.lockstep import Fences, LockstepLoop
@@ -116,8 +117,8 @@ class Emulator:
             window_size=o.window_size,
             otherwise=o.otherwise,
             traffic=o.traffic,
+            weather=Weather(*o.wind, o.turbulence),
         )
-        sim.settings.set_weather(*o.wind, o.turbulence, o.seed)
         sim.on_rows(protocol.RowSelection("DSEL", o.data_rows))
         return sim
 

@@ -13,7 +13,7 @@ from xplane_bridge import protocol, xplane_names
 from xplane_bridge.emulator import rpos
 from xplane_bridge.emulator.beam import Beam
 from xplane_bridge.emulator.datarefs import commands, data_rows, tables
-from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments
+from xplane_bridge.emulator.datarefs.aircraft_systems import COPILOT, INHG_PA, Electrics, Instruments, Weather
 from xplane_bridge.emulator.datarefs.autopilot import Autopilot
 from xplane_bridge.emulator.datarefs.camera import Cameras
 from xplane_bridge.emulator.datarefs.control_inputs import ControlInputs, InputOptions, Pilot
@@ -68,6 +68,7 @@ class Simulator:
         window_size: Width and height of the window that the view is drawn in [px].
         otherwise: Of `otherwise.IDS`: in what X-Plane is not as the bridge assumes.
         traffic: How many other aircraft fly.
+        weather: Blows from the first flight's start on.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Simulator:
         window_size: Tuple[int, int] = (1024, 768),
         otherwise: FrozenSet[str] = frozenset(),
         traffic: int = 0,
+        weather: Optional[Weather] = None,
     ) -> None:
         self.version = version
         self.otherwise = otherwise
@@ -128,6 +130,7 @@ class Simulator:
         self._effects = FailureEffects(surface_failures)
         self.inputs.connect(self)
         self.settings = WorldSettings(self.store, self.clocks, lambda: self.model, otherwise)
+        self.settings.set_weather(weather or Weather())
         self._bind_aircraft()
         self.traffic = Traffic(self.store, otherwise)
         self.traffic.start(traffic, self.initial)
@@ -319,9 +322,10 @@ class Simulator:
         self._begin(controls, start.engines_running)
 
     def _new_aircraft(self, name: str) -> FlightModel:
-        """An aircraft that can be taken."""
+        """An aircraft that can be taken, in the weather of now."""
         model = self._make_model(name)
         self._surface_slots_of(model)
+        self.settings.weather.apply(model)
         return model
 
     def _take_aircraft(self, name: str, model: FlightModel) -> None:
@@ -340,6 +344,7 @@ class Simulator:
         aircraft, situation, levers = self._situations[path]
         model = self.model if aircraft == self.aircraft else self._new_aircraft(aircraft)
         model.restore(situation)
+        self.settings.weather.apply(model)  # as clients read it, who may have changed it since
         if model is not self.model:
             self._take_aircraft(aircraft, model)
             self._begin(model.trim_controls, powered=True)

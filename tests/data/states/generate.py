@@ -19,6 +19,7 @@ import numpy as np
 
 from xplane_bridge import xplane_names
 from xplane_bridge.emulator.aircraft.kinematic.kinematic import KinematicModel
+from xplane_bridge.emulator.datarefs.aircraft_systems import Weather
 from xplane_bridge.emulator.datarefs.data_rows import DataRows
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.simulator import Simulator
@@ -52,7 +53,7 @@ def generate(version, paths):
     newest = xplane_names.NEWEST[str(version)]
     sim = Simulator(lambda _: KinematicModel(7), "fixed_wing", version=newest, initial=START, sim_time_start=5000.0)
     rows = DataRows(sim.store, sim.is_12)
-    sim.settings.set_weather(WIND_FROM_DEG, WIND_MPS, 0.0, 1)
+    sim.settings.set_weather(Weather(WIND_FROM_DEG, WIND_MPS))
     sim.store.write("sim/operation/override/override_joystick", 1.0)
     for path, value in (("yoke_roll_ratio", 0.4), ("yoke_pitch_ratio", 0.25), ("yoke_heading_ratio", 0.2)):
         sim.store.write("sim/joystick/" + path, value)

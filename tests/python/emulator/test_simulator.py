@@ -1,4 +1,4 @@
-"""What requests leave of a running emulator: its aircraft, and a flight that goes on."""
+"""What requests leave of a running emulator: its aircraft, its weather, and a flight that goes on."""
 
 from __future__ import annotations
 
@@ -9,11 +9,25 @@ from xplane_bridge import protocol
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.simulator import aircraft_path
 
+REGION = "sim/weather/region/"
 SAVE, LOAD = protocol.Situation(protocol.Situation.SAVE, "a.sit"), protocol.Situation(protocol.Situation.LOAD, "a.sit")
+#: In the emulator's weather of 12: from, speed [m/s], turbulence, temperature [C], pressure [Pa].
+WEATHER = {
+    REGION + "wind_direction_degt": 270.0,
+    REGION + "wind_speed_msc": 10.0,
+    REGION + "sealevel_temperature_c": 35.0,
+    REGION + "sealevel_pressure_pas": 98000.0,
+}
 
 
 def acfn(name):
     return protocol.AircraftLoad(0, aircraft_path(name))
+
+
+def air(emulator):
+    """The air that the aircraft flies in: wind [m/s], temperature 1000 m up [K], pressure as a share of 98000 Pa."""
+    s = emulator.sim.model.state
+    return s.wind_east_mps, s.temperature_k + 0.0065 * (s.altitude_m - 1000.0), s.pressure_pa / 98000.0
 
 
 def test_an_aircraft_that_cannot_fly_there_leaves_the_present_one(bench):
@@ -55,6 +69,44 @@ def test_before_the_first_flight_there_is_nothing_to_save_and_to_balance(bench):
     emulator = bench(aircraft="fixed_wing", version="12.08", load_time=1.0)
     assert emulator.sim.on_situation(SAVE) == "situation"
     assert emulator.sim.on_dref(protocol.DrefWrite("sim/flightmodel2/misc/cg_offset_z", 0.1)) == "value"
+
+
+@pytest.mark.parametrize("name", ["fixed_wing", "multirotor", "kinematic"])
+def test_the_weather_stays_when_an_aircraft_is_loaded(bench, name):
+    emulator = bench(version="12")
+    emulator.write(WEATHER)
+    emulator.step(2)
+    before = air(emulator)
+    emulator.client().send(acfn(name))
+    emulator.step(2)
+    assert emulator.sim.aircraft == name
+    assert air(emulator) == pytest.approx(before, rel=1e-2)
+    assert emulator.read(REGION + "wind_speed_msc") == [10.0]
+
+
+def test_turbulence_stays_when_an_aircraft_is_loaded(bench):
+    emulator = bench(turbulence=1.0)
+    emulator.client().send(acfn("fixed_wing"))
+    gusts = set()
+    for _ in range(10):
+        emulator.step()
+        gusts.add(emulator.sim.model.state.wind_down_mps)
+    assert len(gusts) == 10
+
+
+@pytest.mark.parametrize("name", ["fixed_wing", "kinematic"])
+def test_a_situation_is_flown_in_the_weather_of_now(bench, name):
+    emulator = bench(aircraft=name, version="12")
+    client = emulator.client()
+    client.send(SAVE)
+    emulator.step()
+    emulator.write(WEATHER)
+    emulator.step(2)
+    before = air(emulator)
+    client.send(LOAD)
+    emulator.step(2)
+    assert air(emulator) == pytest.approx(before, rel=3e-3)
+    assert emulator.read(*WEATHER) == list(WEATHER.values())
 
 
 def test_a_situation_of_another_aircraft_needs_no_flight_where_the_present_one_is(bench):

@@ -1,4 +1,4 @@
-"""How the emulator's flights begin: again, and not at all where there is no such flight."""
+"""How the emulator's flights begin: in their wind, again, and not at all where there is no such flight."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import pytest
 
 from support.simulator.emulator_bench import fixture_bench  # noqa: F401
 from xplane_bridge import protocol
+from xplane_bridge.emulator.flight.flight_model import InitialState
 
 RESET = protocol.CommandRequest("sim/operation/reset_flight")
 PLACE = {"latitude_deg": 38.0, "longitude_deg": 127.0, "heading_deg": 0.0}
@@ -15,6 +16,25 @@ WIND = "sim/weather/wind_speed_kt[0]"
 def flown(emulator):
     state = emulator.sim.model.state
     return state.latitude_deg, state.longitude_deg, state.altitude_m, state.true_airspeed_mps
+
+
+def steady(emulator):
+    """Whether it flies a second on at its usual airspeed and height, as felt by who sits in it."""
+    for _ in range(60):
+        emulator.step()
+        state = emulator.sim.model.state
+        assert state.specific_force_z_mps2 == pytest.approx(-9.80665, abs=0.1)
+    return (state.true_airspeed_mps, state.altitude_m) == pytest.approx((75.0, 1000.0), abs=0.2)
+
+
+def test_the_first_flight_begins_trimmed_in_its_wind(bench):
+    emulator = bench(aircraft="fixed_wing", wind=(90.0, 20.0))  # along its heading
+    assert steady(emulator)
+    assert emulator.sim.model.state.v_east_mps == pytest.approx(55.0, abs=0.2)
+    emulator.emulator.leave()
+    emulator.emulator.come_back()
+    assert steady(emulator)
+    assert emulator.sim.loads == 1
 
 
 def test_the_flight_is_reset_to_its_most_recent_start(bench):
@@ -60,3 +80,10 @@ def test_a_refused_prel_leaves_the_flight_and_its_start_as_they_are(bench):
     client.send(protocol.Placement(5))
     emulator.step()
     assert flown(emulator) == pytest.approx((37.4602, 126.4407, 1000.0, 75.0), abs=1e-3)
+
+
+def test_a_start_that_cannot_be_flown_in_its_wind_is_said(bench):
+    with pytest.raises(
+        ValueError, match="in this wind: no steady flight found; choose another speed, height or weight"
+    ):
+        bench(aircraft="multirotor", wind=(0.0, 31.0), initial=InitialState())

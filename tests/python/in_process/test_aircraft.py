@@ -11,6 +11,7 @@ from xplane_bridge import compiled
 from xplane_bridge.compiled import core
 from xplane_bridge.constants import FAILURE_KINDS, SURFACE_FAILURE_KINDS, FlightMode
 from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.datarefs.aircraft_systems import Weather
 from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
@@ -141,7 +142,7 @@ def test_surfaces_have_the_names_of_the_core() -> None:
 def test_the_view_is_what_the_emulator_sends() -> None:
     """Every field that X-Plane has a dataref for, by lib/core/state/sources.txt, against the emulator's own tables."""
     simulator = Simulator(create_model, "fixed_wing", initial=InitialState(heading_deg=30.0, airspeed_mps=70.0))
-    simulator.settings.set_weather(200.0, 7.0, 1.0, 3)
+    simulator.settings.set_weather(Weather(200.0, 7.0, 1.0))
     simulator.inputs._pilot = None
     for _ in range(60):
         simulator.step(1 / 60)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Callable, List, Optional
+from typing import Callable, List, Optional, Tuple
 
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight.flight_model import FlightModel
@@ -152,16 +152,22 @@ def _calibrated_kt(impact_pa: float) -> float:
 
 @dataclass
 class Weather:
-    """Wind, turbulence and pressure that a client or the command line set."""
+    """Wind, turbulence and air as a client or the command line set them: the simulator's, not those of an aircraft."""
 
-    turbulence_mps: float = 0.0
+    wind_from_deg: float = 0.0
+    wind_mps: float = 0.0  #: at every height
+    turbulence_mps: float = 0.0  #: standard deviation of the vertical gust
+    #: Difference from the standard temperature [K], pressure at sea level [Pa]; None: as the aircraft was made.
+    air: Optional[Tuple[float, float]] = None
 
-    def set_wind(self, model: FlightModel, from_deg: float, speed_mps: float) -> None:
-        """Sets the wind that blows at every height."""
-        direction = math.radians(from_deg)
-        model.set_wind(-speed_mps * math.cos(direction), -speed_mps * math.sin(direction), 0.0)
+    def apply(self, model: FlightModel) -> None:
+        """Gives an aircraft all of it."""
+        self.blow(model)
+        model.set_turbulence(self.turbulence_mps)
+        if self.air is not None:
+            model.set_atmosphere(*self.air)
 
-    def set_turbulence(self, model: FlightModel, intensity_mps: float, seed: Optional[int] = None) -> None:
-        """Sets the standard deviation of the vertical gust [m/s]."""
-        self.turbulence_mps = max(0.0, intensity_mps)
-        model.set_turbulence(self.turbulence_mps, seed)
+    def blow(self, model: FlightModel) -> None:
+        """Gives an aircraft the wind."""
+        direction = math.radians(self.wind_from_deg)
+        model.set_wind(-self.wind_mps * math.cos(direction), -self.wind_mps * math.sin(direction), 0.0)

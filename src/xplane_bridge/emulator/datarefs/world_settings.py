@@ -38,7 +38,7 @@ class WorldSettings:
         otherwise: Of `otherwise.IDS`.
 
     Attributes:
-        weather: The present wind and turbulence.
+        weather: The present one.
         stations_kg: The payload by station, as a client has set it last.
     """
 
@@ -83,27 +83,29 @@ class WorldSettings:
         self._wind_settings = (*names, factor)
 
         def set_wind(_index: int, _value: float) -> None:
-            strength = clip(store.get(speed) * factor, 0.0, _MAX_WIND_MPS)
-            self.weather.set_wind(self._model(), math.fmod(store.get(direction), 360.0), strength)
+            self.weather.wind_from_deg = math.fmod(store.get(direction), 360.0)
+            self.weather.wind_mps = clip(store.get(speed) * factor, 0.0, _MAX_WIND_MPS)
+            self.weather.blow(self._model())
 
         store.on_write(direction, set_wind)
         store.on_write(speed, set_wind)
 
         def set_turbulence(_index: int, _value: float) -> None:
             gust = clip(store.get(turbulence) * TURBULENCE_MPS_PER_UNIT, 0.0, _MAX_TURBULENCE_MPS)
-            self.weather.set_turbulence(self._model(), gust)
+            self.weather.turbulence_mps = gust
+            self._model().set_turbulence(gust)
 
         store.on_write(turbulence, set_turbulence)
 
-    def set_weather(self, wind_from_deg: float, wind_mps: float, turbulence_mps: float, seed: int) -> None:
-        """Wind and turbulence of the command line."""
-        self.weather.set_wind(self._model(), wind_from_deg, wind_mps)
-        self.weather.set_turbulence(self._model(), turbulence_mps, seed)
+    def set_weather(self, weather: Weather) -> None:
+        """Takes wind and turbulence of the command line."""
+        self.weather = weather
+        weather.apply(self._model())
         # as clients read it, who put it back
         direction, speed, turbulence, factor = self._wind_settings
-        self._store.set(direction, wind_from_deg)
-        self._store.set(speed, wind_mps / factor)
-        self._store.set(turbulence, turbulence_mps / TURBULENCE_MPS_PER_UNIT)
+        self._store.set(direction, weather.wind_from_deg)
+        self._store.set(speed, weather.wind_mps / factor)
+        self._store.set(turbulence, weather.turbulence_mps / TURBULENCE_MPS_PER_UNIT)
 
     def _set_fuel(self, tank: int, value: float) -> None:
         tanks = self._model().info.tank_count
@@ -134,10 +136,11 @@ class WorldSettings:
     def _set_atmosphere(self, other: str, value: float) -> None:
         """Takes what was written; `other` is its second name, with the value there."""
         self._store.set(other, value)
-        self._model().set_atmosphere(
-            temperature_offset_k=clip(self._store.get(_SEA_LEVEL_TEMPERATURE), *_TEMPERATURE_C) - 15.0,
-            sea_level_pressure_pa=clip(self._store.get(_SEA_LEVEL), *PRESSURE_INHG) * INHG_PA,
+        self.weather.air = (
+            clip(self._store.get(_SEA_LEVEL_TEMPERATURE), *_TEMPERATURE_C) - 15.0,
+            clip(self._store.get(_SEA_LEVEL), *PRESSURE_INHG) * INHG_PA,
         )
+        self._model().set_atmosphere(*self.weather.air)
 
 
 def clip(value: float, low: float, high: float) -> float:

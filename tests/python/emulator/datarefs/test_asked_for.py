@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.datarefs.aircraft_systems import Weather
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.protocol import DrefWrite
 
 
 def simulator(version: str, everything: bool, load_time: float = 0.0) -> Simulator:
+    start, weather = InitialState(airspeed_mps=70.0), Weather(200.0, 7.0, 2.0)
     sim = Simulator(
-        create_model, "fixed_wing", version, initial=InitialState(airspeed_mps=70.0), load_time=load_time, data_rate=60
+        create_model, "fixed_wing", version, initial=start, load_time=load_time, data_rate=60, weather=weather
     )
-    sim.settings.set_weather(200.0, 7.0, 2.0, 3)
     if everything:
         sim.store.watch_all()
     return sim

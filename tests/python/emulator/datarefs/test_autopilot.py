@@ -8,6 +8,7 @@ import pytest
 
 from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge import protocol
+from xplane_bridge.emulator.datarefs.aircraft_systems import Weather
 from xplane_bridge.emulator.flight.flight_model import InitialState
 
 AP = "sim/cockpit2/autopilot/"
@@ -155,7 +156,7 @@ def test_an_ils_is_captured_and_flown_down(emulator):
 
 
 def test_a_radial_of_the_vor_is_captured_in_a_cross_wind(emulator):
-    emulator.sim.settings.set_weather(270.0, 10.0, 0.0, 0)
+    emulator.sim.settings.set_weather(Weather(270.0, 10.0))
     course = tune(emulator, 110300, 20.0)
     assert abs(needle(emulator)) == 2.5
     dials(emulator, heading_dial_deg_mag_pilot=(heading(emulator) - 60.0) % 360.0, airspeed_dial_kts_mach=130.0)
