@@ -23,6 +23,9 @@ _ADDRESS = re.compile(rb"(?<![0-9])((?:[0-9]{1,3}\.){3}[0-9]{1,3})(?![0-9])(\0*)
 _PATH = re.compile(r"~|\.\.?[/\\]|file:|[^/\\]*:[/\\](?!/)|[^/]*\\|(?![^/]*://)[^\s]*/[^\s/]*\.[^\s/]*$")
 #: A user's name behind ~ goes with the folders.
 _SEPARATOR = re.compile(r"^~[^/\\]*|[/\\]")
+#: Parameters for which nodes write _SECRET (kSecrets in lib/nodes/base/parameter_text.cpp); logs of version 0.2.0 and
+#: before have them.
+_SECRETS, _SECRET = ("token",), "..."
 #: Fits wherever an address has stood.
 _SHORTEST = b"0.0.0.0"
 
@@ -87,9 +90,9 @@ class Disguise:
             return value
 
     def value(self, value: Any) -> Any:
-        """A parameter: addresses and hosts replaced, of paths the last part kept."""
+        """A parameter: addresses, hosts and secrets replaced, of paths the last part kept."""
         if isinstance(value, dict):
-            return {key: self.value(each) for key, each in value.items()}
+            return {key: _SECRET if key in _SECRETS and each != "" else self.value(each) for key, each in value.items()}
         if isinstance(value, list):
             return [self.value(each) for each in value]
         if not isinstance(value, str):

@@ -132,6 +132,16 @@ def test_files_of_earlier_flights_have_the_addresses_of_the_datagrams(tmp_path):
     assert b"service x\0peters-laptop" in [event.payload for event in log.events()]
 
 
+def test_a_secret_in_a_log_of_an_earlier_version_is_left_out(tmp_path):
+    comment = about({"host": "127.0.0.1"}, {"source": "sender", "sender": {"token": "window seat", "peer": ""}})
+    path, out = tmp_path / "wire.pcapng", tmp_path / "out.pcapng"
+    path.write_bytes(b"".join(write_pcapng(NOTES, iter(()), comment, "a test")))
+    disguised(path, out)
+    assert OwnLog(out).about["own"] == {"source": "sender", "sender": {"token": "...", "peer": ""}}
+    assert b"window seat" not in out.read_bytes()
+    assert Disguise().value({"token": ""}) == {"token": ""}
+
+
 def test_a_host_called_as_the_words_of_a_file_leaves_it_readable():
     disguise = Disguise()
     disguise.name("xplane", "192.168.1.5")
