@@ -118,6 +118,7 @@ class Emulator:
             otherwise=o.otherwise,
             traffic=o.traffic,
             weather=Weather(*o.wind, o.turbulence),
+            aerodrome=o.aerodrome,
         )
         sim.on_rows(protocol.RowSelection("DSEL", o.data_rows))
         return sim

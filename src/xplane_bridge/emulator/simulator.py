@@ -69,6 +69,7 @@ class Simulator:
         otherwise: Of `otherwise.IDS`: in what X-Plane is not as the bridge assumes.
         traffic: How many other aircraft fly.
         weather: Blows from the first flight's start on.
+        aerodrome: Latitude, longitude and heading [deg] of the one airport's runway; None: where flights start.
     """
 
     def __init__(
@@ -89,6 +90,7 @@ class Simulator:
         otherwise: FrozenSet[str] = frozenset(),
         traffic: int = 0,
         weather: Optional[Weather] = None,
+        aerodrome: Optional[Tuple[float, float, float]] = None,
     ) -> None:
         self.version = version
         self.otherwise = otherwise
@@ -96,6 +98,9 @@ class Simulator:
         self.totals_move = totals_move
         self.internal_version = INTERNAL_VERSIONS[version]
         self.initial = InitialState() if initial is None else initial
+        here = self.initial.latitude_deg, self.initial.longitude_deg, self.initial.heading_deg
+        latitude, longitude, heading = aerodrome or here
+        self.home = replace(self.initial, latitude_deg=latitude, longitude_deg=longitude, heading_deg=heading)
         self.initial_data_rate = data_rate
         self.window_size = window_size
         self._make_model = make_model
@@ -110,7 +115,7 @@ class Simulator:
         self.flying = False
         self.loads = 0  #: how often a flight or a situation was loaded
         self.frozen = False  #: by VEHX: the flight model stands still until an aircraft or a flight is loaded
-        self._starts = Starts(self.initial, self.start_flight, lambda: self.model)
+        self._starts = Starts(self.initial, self.home, self.start_flight, lambda: self.model)
         self._load_time = load_time
         self._situations: Dict[str, Tuple[str, bytes, Dict[str, np.ndarray]]] = {}
         self._failed: Set[str] = set()

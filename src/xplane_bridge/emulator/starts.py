@@ -26,6 +26,7 @@ class Starts:
 
     Args:
         first: The start as configured.
+        home: A flight over the middle of the one airport's runway, along it.
         begin: Begins a flight.
         model: Gives the aircraft of now.
 
@@ -33,9 +34,9 @@ class Starts:
         last: The most recent start.
     """
 
-    def __init__(self, first: InitialState, begin: Begin, model: Callable[[], FlightModel]) -> None:
+    def __init__(self, first: InitialState, home: InitialState, begin: Begin, model: Callable[[], FlightModel]) -> None:
         self.last = first
-        self._first, self._begin, self._model = first, begin, model
+        self._first, self._home, self._begin, self._model = first, home, begin, model
 
     def first(self) -> None:
         """The flight as configured; on the ground where there is no steady flight with what clients have loaded."""
@@ -52,7 +53,7 @@ class Starts:
         elif request.start_type == Placements.START_AT_PLACE:
             initial = Placements.initial_state(request, self._model().state.terrain_elevation_m)
         elif request.start_type in airport_starts.TYPES:
-            initial = airport_starts.airport_start(request, self._first)
+            initial = airport_starts.airport_start(request, self._home)
             if initial is None:
                 return "airport"
         else:

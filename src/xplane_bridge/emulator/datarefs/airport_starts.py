@@ -31,10 +31,10 @@ GROUNDS = (14, 15, 16, 17, 18)
 TYPES = (RAMP, RUNWAY, *APPROACHES_M, *GROUNDS)
 
 
-def airport_start(request: protocol.Placement, initial: InitialState) -> Optional[InitialState]:
-    """The start of a flight at the aerodrome of flights that begin at `initial`.
+def airport_start(request: protocol.Placement, home: InitialState) -> Optional[InitialState]:
+    """The start of a flight at the aerodrome, over whose runway's middle a flight at `home` is.
 
-    It has one ramp (0) and one runway (0), whose end 0 leads along `initial`'s heading. A request without a code means
+    It has one ramp (0) and one runway (0), whose end 0 leads along `home`'s heading. A request without a code means
     the aerodrome where the aircraft is.
 
     Returns:
@@ -44,19 +44,19 @@ def airport_start(request: protocol.Placement, initial: InitialState) -> Optiona
         return None
     if request.runway != 0 or request.runway_direction not in (0, 1):
         return None
-    middle = Place(initial.latitude_deg, initial.longitude_deg)
-    heading = initial.heading_deg + 180.0 * request.runway_direction
+    middle = Place(home.latitude_deg, home.longitude_deg)
+    heading = home.heading_deg + 180.0 * request.runway_direction
     if request.start_type in GROUNDS:
-        return replace(initial, on_ground=True)
+        return replace(home, on_ground=True)
     if request.start_type == RAMP:
-        place = offset(middle, initial.heading_deg + 90.0, RAMP_ASIDE_M)
-        return _at(initial, place, initial.heading_deg - 90.0)
+        place = offset(middle, home.heading_deg + 90.0, RAMP_ASIDE_M)
+        return _at(home, place, home.heading_deg - 90.0)
     if request.start_type == RUNWAY:
-        return _at(initial, offset(middle, heading, LINE_UP_M - HALF_RUNWAY_M), heading)
+        return _at(home, offset(middle, heading, LINE_UP_M - HALF_RUNWAY_M), heading)
     away = APPROACHES_M[request.start_type]
     height = (away + TOUCHDOWN_M) * math.tan(math.radians(GLIDE_PATH_DEG))
-    start = _at(initial, offset(middle, heading, -HALF_RUNWAY_M - away), heading)
-    return replace(start, on_ground=False, altitude_m=initial.terrain_elevation_m + height)
+    start = _at(home, offset(middle, heading, -HALF_RUNWAY_M - away), heading)
+    return replace(start, on_ground=False, altitude_m=home.terrain_elevation_m + height)
 
 
 def _at(initial: InitialState, place: Place, heading_deg: float) -> InitialState:

@@ -1,9 +1,10 @@
 """Radio navigation: the stations round the emulator's aerodrome, and what the aircraft's receivers make of them.
 
-The aerodrome lies where flights start, its runway along their heading, as in the view. It has a VOR/DME, an ILS with
-markers and a DME, a beacon (NDB), and is the GPS's destination. Declination is that of the frame, X-Plane's sphere is
-the earth. How far a needle moves is the emulator's choice, of the usual kind: full scale 2.5 dots, which is 10 degrees
-for a VOR, 2.5 for a localizer, 0.7 for a glideslope (path below the aircraft +) and 5 NM for the GPS.
+The aerodrome lies where `--aerodrome` says, else where flights start, its runway along their heading, as in the view.
+It has a VOR/DME, an ILS with markers and a DME, a beacon (NDB), and is the GPS's destination. Declination is that of
+the frame, X-Plane's sphere is the earth. How far a needle moves is the emulator's choice, of the usual kind: full scale
+2.5 dots, which is 10 degrees for a VOR, 2.5 for a localizer, 0.7 for a glideslope (path below the aircraft +) and 5 NM
+for the GPS.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from xplane_bridge.emulator.flight.frame import Frame, magnetic_declination
 from xplane_bridge.units import EARTH_RADIUS_M
 
 METERS_PER_NM = 1852.0
-#: The runway's middle is where flights start [m].
+#: Of the runway [m].
 HALF_RUNWAY_M = 900.0
 #: Where the localizer stands beyond the runway's end, and the touch-down point behind its threshold [m].
 LOCALIZER_BEYOND_M, TOUCHDOWN_M = 300.0, 300.0
@@ -87,7 +88,7 @@ class Reading:
 
 @dataclass
 class Aerodrome:
-    """The stations, from where flights start."""
+    """The stations."""
 
     stations: List[Station] = field(default_factory=list)
     beacon: Place = Place(0.0, 0.0)
@@ -96,10 +97,10 @@ class Aerodrome:
     markers: List[Place] = field(default_factory=list)
 
     @classmethod
-    def at(cls, initial: InitialState) -> Aerodrome:
-        """The aerodrome of flights that start so."""
-        middle = Place(initial.latitude_deg, initial.longitude_deg, initial.terrain_elevation_m)
-        heading = initial.heading_deg
+    def at(cls, home: InitialState) -> Aerodrome:
+        """The aerodrome of which a flight at `home` is over the runway's middle, along it."""
+        middle = Place(home.latitude_deg, home.longitude_deg, home.terrain_elevation_m)
+        heading = home.heading_deg
 
         def along(distance_m: float) -> Place:
             return offset(middle, heading, distance_m)

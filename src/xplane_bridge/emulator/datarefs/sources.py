@@ -34,6 +34,7 @@ class Sources(LoadedAircraft, Protocol):
     instruments: Instruments
     copilot_instruments: Instruments
     initial: InitialState  #: where flights start
+    home: InitialState  #: a flight over the middle of the one airport's runway, along it
     settings: WorldSettings
     cameras: Cameras
     traffic: Traffic

@@ -1,4 +1,4 @@
-"""Flights that PREL begins at the emulator's aerodrome: distances and bearings from where flights start, by hand."""
+"""Flights that PREL begins at the emulator's aerodrome: distances and bearings from its middle, by hand."""
 
 from __future__ import annotations
 
@@ -83,3 +83,14 @@ def test_without_a_code_the_own_aerodrome_is_meant(emulator):
     x, _, state = begin(emulator, 11)
     assert x == pytest.approx(-840.0, abs=1.0)
     assert state.on_ground_all
+
+
+def test_the_aerodrome_is_where_its_runway_is_drawn():
+    elsewhere = InitialState(latitude_deg=0.2, longitude_deg=10.1, heading_deg=30.0, terrain_elevation_m=100.0)
+    with EmulatorFixture(aircraft="fixed_wing", initial=elsewhere, aerodrome=(0.0, 10.0, 90.0)) as emulator:
+        x, y, _ = begin(emulator, 11, airport="XEMU")
+        assert (x, y) == (pytest.approx(-840.0, abs=1.0), pytest.approx(0.0, abs=1.0))
+        assert math.remainder(emulator.sim.frame.true_psi - 90.0, 360.0) == pytest.approx(0.0, abs=0.5)
+        emulator.client().send(protocol.Placement(0))  # as the emulator began
+        emulator.step()
+        assert emulator.sim.model.state.latitude_deg == pytest.approx(0.2, abs=1e-3)

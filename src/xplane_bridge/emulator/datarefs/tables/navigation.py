@@ -48,8 +48,7 @@ class _Readings:
         self._of: Tuple[int, int] = (-1, -1)
         self._found: Dict[str, radio.Reading] = {}
         self._receivers = radio.Receivers(sim.failed, self._powered)
-        self._initial = sim.initial
-        self._field = radio.Aerodrome.at(self._initial)
+        self.field = radio.Aerodrome.at(sim.home)
 
     def nav(self, f: Frame, number: int) -> radio.Reading:
         """Receiver 1 or 2."""
@@ -57,18 +56,18 @@ class _Readings:
         def read() -> radio.Reading:
             frequency = 10.0 * self._store.get(f"{_OLD}nav{number}_freq_hz")
             obs = self._store.get(f"{_ACTUATORS}nav{number}_obs_deg_mag_pilot")
-            return self._receivers.nav(number, frequency, obs, f, self.field())
+            return self._receivers.nav(number, frequency, obs, f, self.field)
 
         return self._once(f, f"nav{number}", read)
 
     def dme(self, f: Frame) -> radio.Reading:
         """The DME receiver of its own."""
         frequency = 10.0 * self._store.get(_ACTUATORS + "dme_frequency_hz")
-        return self._once(f, "dme", lambda: self._receivers.dme(frequency, f, self.field()))
+        return self._once(f, "dme", lambda: self._receivers.dme(frequency, f, self.field))
 
     def gps(self, f: Frame) -> radio.Reading:
         """The GPS."""
-        return self._once(f, "gps", lambda: self._receivers.gps(f, self.field()))
+        return self._once(f, "gps", lambda: self._receivers.gps(f, self.field))
 
     def selected(self, f: Frame) -> radio.Reading:
         """What the HSI shows."""
@@ -78,18 +77,11 @@ class _Readings:
     def adf(self, f: Frame, number: int) -> float:
         """Relative bearing that ADF 1 or 2 points to."""
         frequency = self._store.get(f"{_ACTUATORS}adf{number}_frequency_hz")
-        return self._receivers.relative_bearing_deg(number, frequency, f, self.field())
+        return self._receivers.relative_bearing_deg(number, frequency, f, self.field)
 
     def marker(self, f: Frame, index: int) -> bool:
         """Whether a marker's lamp is lit."""
-        return self._receivers.marker(index, f, self.field())
-
-    def field(self) -> radio.Aerodrome:
-        """The aerodrome where flights start."""
-        if self._sim.initial is not self._initial:
-            self._initial = self._sim.initial
-            self._field = radio.Aerodrome.at(self._initial)
-        return self._field
+        return self._receivers.marker(index, f, self.field)
 
     def _powered(self) -> bool:
         avionics = self._store.get("sim/cockpit2/switches/avionics_power_on") != 0.0
