@@ -213,15 +213,12 @@ def test_an_excitation_ends_where_tx_node_would_end_it() -> None:
     assert not stick[200:].any()
 
 
-NO_BAND = {"kind": "multisine", "target": "pitch", "amplitude": 0.1, "duration": 2.0, "frequency": 0.6,
-           "frequency_end": 0.9}  # fmt: skip
 LEVER = {**doublet(0.1, 0.5), "target": "throttle"}
 
 
 @pytest.mark.parametrize(
     ("events", "message"),
     [
-        ([{"at": 0.5, "excitation": NO_BAND}], r"at 0\.5 s: excitation frequency_max is 0\.9"),
         ([{"at": 0.5, "excitation": LEVER}], r"at 0\.5 s: no source commands throttle"),
         # What is commanded from the first state flies in the second frame.
         ([{"at": 0, "excitation": doublet(0.1, 0.5)}], "at 0 s: no source commands pitch"),
