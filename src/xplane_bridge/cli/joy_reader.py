@@ -7,10 +7,13 @@ import time
 from typing import Any, List, Optional, Sequence
 
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
-from xplane_bridge.joystick.sdl_reader import JoyReader, JoyState, device_names, start_sdl
+from xplane_bridge.errors import is_number
+from xplane_bridge.joystick.sdl_reader import REST_S, JoyReader, JoyState, device_names, start_sdl
 from xplane_bridge.topics import NAMESPACE, absolute
 
 _DIAGNOSTICS_S = 1.0
+#: So much longer than joystick_mapper_node's joy_timeout is the rest of a joystick that was lost [s].
+_BEYOND_TIMEOUT_S = 0.5
 
 
 def parser() -> argparse.ArgumentParser:
@@ -44,6 +47,15 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
+def rest_s(mapped: Any) -> float:
+    """How long nothing is published of a joystick that was lost [s], so that joystick_mapper_node sees it go.
+
+    Args:
+        mapped: joy_timeout of the parameter server [s], where it is there; what is no number the mapper refuses itself.
+    """
+    return max(REST_S, mapped + _BEYOND_TIMEOUT_S) if is_number(mapped) else REST_S
+
+
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
@@ -53,9 +65,21 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         print("\n".join(f"{index}  {name}" for index, name in enumerate(names)) or "no joystick is plugged in")
         return 0
     pygame = start_sdl()
-    reader = JoyReader(pygame, args.device, args.deadzone, args.autorepeat_rate, args.coalesce_interval)
+    timeout = args.namespace.rstrip("/") + "/joystick_mapper_node/joy_timeout"
+    options = (args.device, args.deadzone, args.autorepeat_rate, args.coalesce_interval)
+    reader = JoyReader(pygame, *options, rest_s=lambda: rest_s(_parameter(timeout)))
     _Node(start_node("joy_reader"), pygame, reader, args.namespace).run()
     return 0
+
+
+def _parameter(name: str) -> Any:
+    """A parameter of another node; None where it is not there, or the master does not answer."""
+    import rospy
+
+    try:
+        return rospy.get_param(name, None)
+    except (OSError, rospy.ROSException):
+        return None
 
 
 class _Node:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import os
 from dataclasses import dataclass, field
-from typing import Any, Dict, Iterable, List, Optional, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Optional, Set, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -25,9 +25,9 @@ SDL_ENVIRONMENT = {
     "SDL_NO_SIGNAL_HANDLERS": "1",  # Ctrl-C is ROS's
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",
 }
-#: For so long after a joystick was lost nothing is published, though it be back at once, so that subscribers see
-#: it go: its levers read 0 until they are touched, which is not where they stood before [s].
-_REST_S = 1.0
+#: For at least so long after a joystick was lost nothing is published, though it be back at once, so that subscribers
+#: see it go: its levers read 0 until they are touched, which is not where they stood before [s].
+REST_S = 1.0
 
 
 class JoystickError(XplaneBridgeError):
@@ -119,6 +119,7 @@ class JoyReader:
         deadzone: [0..1) of each axis' travel from its centre.
         autorepeat_rate: [1/s] of states while nothing changes; 0: none.
         coalesce_interval: [s] in which changes of axes are put into one state; buttons go out at once.
+        rest_s: Gives how long to rest after a joystick was lost [s]: longer than any subscriber takes to see it go.
 
     Raises:
         JoystickError: A number is out of its range.
@@ -131,6 +132,7 @@ class JoyReader:
         deadzone: float = 0.0,
         autorepeat_rate: float = 50.0,
         coalesce_interval: float = 0.005,
+        rest_s: Callable[[], float] = lambda: REST_S,
     ) -> None:
         for name, value, low, high in (
             ("deadzone", deadzone, 0.0, 0.95),
@@ -144,8 +146,11 @@ class JoyReader:
         self._deadzone = deadzone
         self._repeat = 1.0 / autorepeat_rate if autorepeat_rate > 0.0 else float("inf")
         self._coalesce = coalesce_interval
+        self._rest_s = rest_s
         self._device: Any = None
         self._read = ""  # name of the joystick read before
+        self._present = set(self._instance_ids())  # of all that were plugged in before the events now handled
+        self._others: Set[int] = set()  # of those that were plugged in beside ours when ours was lost
         self._state = JoyState()
         self._hats_from = 0
         self._changed_at: Optional[float] = None  # of the oldest axis change that has not been published
@@ -169,11 +174,15 @@ class JoyReader:
         """
         out: List[JoyState] = []
         kinds = self._pygame
+        replugged = False
         for event in events:
+            replugged |= event.type in (kinds.JOYDEVICEADDED, kinds.JOYDEVICEREMOVED)
             if event.type == kinds.JOYDEVICEADDED:
                 if self._device is None:
                     self._look()
             elif event.type == kinds.JOYDEVICEREMOVED:
+                self._present.discard(event.instance_id)
+                self._others.discard(event.instance_id)
                 if self._is_ours(event):
                     # Just before, SDL has let every axis and button go; the user did not.
                     out.clear()
@@ -182,6 +191,8 @@ class JoyReader:
                     self._look()
             elif self._is_ours(event) and self._apply(event, now):
                 out.append(self._take(now))
+        if replugged:
+            self._present = set(self._instance_ids())
         if now < self._rests_until:
             return []
         if self._device is not None and not out and self._is_due(now):
@@ -231,6 +242,11 @@ class JoyReader:
                 if self._changed_at is None:
                     self._changed_at = now
 
+    def _instance_ids(self) -> List[int]:
+        """SDL's names of all joysticks that are plugged in, none of which it gives twice; in its order."""
+        joystick = self._pygame.joystick
+        return [joystick.Joystick(index).get_instance_id() for index in range(joystick.get_count())]
+
     def _look(self) -> None:
         index, problem = self._choose(device_names(self._pygame))
         if index is None:
@@ -249,16 +265,19 @@ class JoyReader:
     def _choose(self, names: List[str]) -> Tuple[Optional[int], str]:
         """As `choose`, but who has flown with one joystick is not handed another one when it is pulled out."""
         index, problem = choose(names, self._wanted)
-        if not self._read or (index is not None and names[index] == self._read):
+        if not self._read:
             return index, problem
-        same = [i for i, name in enumerate(names) if name == self._read]
-        if len(same) == 1:
-            return same[0], ""
+        # Nor one of the same name that was there all the time, perhaps another person's.
+        ids = self._instance_ids()
+        same = [i for i, name in enumerate(names) if name == self._read and ids[i] not in self._others]
+        if index in same or len(same) == 1:
+            return (index if index in same else same[0]), ""
         return None, problem or "looking for it; to read another one, start again"
 
     def _lose(self, now: float) -> None:
         name = self.name
-        self._rests_until = now + _REST_S
+        self._others = self._present
+        self._rests_until = now + self._rest_s()
         self._device.quit()
         self._device = None
         self._look()

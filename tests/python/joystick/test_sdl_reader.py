@@ -216,6 +216,59 @@ def test_no_other_joystick_is_taken_instead(pygame, fakes):
     assert played.settle().axes == [-1.0, 0.0]
 
 
+@pytest.mark.parametrize(("wanted", "ours", "other"), [("", 7, 8), ("0", 7, 8), ("1", 8, 7)])
+def test_another_one_of_the_same_name_is_not_taken_either(pygame, fakes, wanted, ours, other):
+    by_id = {instance: FakeDevice("Stick", instance) for instance in (7, 8, 9)}
+    fakes[:] = [by_id[7], by_id[8]]
+    played = Played(pygame, wanted=wanted)
+    played.settle()
+    fakes.remove(by_id[ours])
+    pygame.event.post(pygame.event.Event(pygame.JOYDEVICEREMOVED, instance_id=ours))
+    pygame.event.post(pygame.event.Event(pygame.JOYAXISMOTION, instance_id=other, axis=0, value=0.9))
+    assert played.step() == []
+    assert played.step(5.0) == []
+    assert played.reader.name == ""
+    fakes.append(by_id[9])  # plugged in again: SDL gives it another id
+    pygame.event.post(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=1))
+    played.settle()
+    pygame.event.post(pygame.event.Event(pygame.JOYAXISMOTION, instance_id=other, axis=0, value=0.9))
+    pygame.event.post(pygame.event.Event(pygame.JOYAXISMOTION, instance_id=9, axis=1, value=1.0))
+    assert played.settle().axes == [0.0, -1.0]
+
+
+def test_one_that_was_plugged_in_beside_it_in_flight_is_another(pygame, fakes):
+    fakes[:] = [FakeDevice("Stick", 7)]
+    played = Played(pygame)
+    fakes.append(FakeDevice("Stick", 8))
+    pygame.event.post(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=1))
+    played.settle()
+    del fakes[0]
+    pygame.event.post(pygame.event.Event(pygame.JOYDEVICEREMOVED, instance_id=7))
+    assert played.step(5.0) == []
+    assert played.reader.name == ""
+
+
+@pytest.mark.parametrize(
+    ("timeout", "rest"), [(None, 1.0), (0.05, 1.0), (0.5, 1.0), (2.0, 2.5), (10, 10.5), ("2", 1.0), (True, 1.0)]
+)
+def test_it_rests_for_longer_than_the_mapper_takes_to_notice(timeout, rest):
+    assert joy_reader.rest_s(timeout) == rest
+
+
+def test_the_rest_is_asked_for_when_a_joystick_is_lost(pygame, fakes):
+    rests = [1.0]
+    fakes[:] = [FakeDevice("Stick", 7)]
+    played = Played(pygame, rest_s=lambda: rests[-1])
+    played.settle()
+    rests.append(3.0)
+    fakes[:] = [FakeDevice("Stick", 8)]
+    pygame.event.post(pygame.event.Event(pygame.JOYDEVICEREMOVED, instance_id=7))
+    pygame.event.post(pygame.event.Event(pygame.JOYDEVICEADDED, device_index=0))
+    assert played.step() == []
+    assert played.step(2.9) == []
+    assert played.step(0.2)[-1].axes == [0.0, 0.0]
+
+
 def test_an_event_beyond_what_the_device_said_it_has_does_no_harm(pygame, fakes):
     fakes[:] = [FakeDevice("Stick", 7)]
     played = Played(pygame)
