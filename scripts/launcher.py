@@ -7,6 +7,7 @@ lib/xplane_bridge/. (After `pip install` the same programs are console scripts a
 
 import importlib
 import os
+import re
 import sys
 
 # Where this file is, links resolved.
@@ -50,9 +51,24 @@ def _use_clone():
     """Takes the interpreter and the generated messages that scripts/setup made, where it has been run."""
     _use_interpreter(os.path.join(_CLONE, ".venv", "bin", "python"))
     generated = os.path.join(_CLONE, ".workspace", "devel", "lib", "python3", "dist-packages")
-    if os.path.isdir(generated):
+    # A catkin workspace that has this clone, and is sourced, has messages of its own, and perhaps newer ones.
+    sourced = any(map(_is_built_of_clone, os.environ.get("PYTHONPATH", "").split(os.pathsep)))
+    if os.path.isdir(generated) and not sourced:
         _add_to_path(generated, first=True)
     _add_to_path(os.path.join(_CLONE, "src"), first=False)
+
+
+def _is_built_of_clone(folder):
+    """Whether a folder of Python packages is that of a devel space with messages of this clone, not of another one."""
+    package = os.path.join(folder, "xplane_bridge")
+    try:
+        with open(os.path.join(package, "__init__.py"), encoding="utf-8") as file:
+            # catkin's file names the folder of the sources.
+            sources = re.search(r"^__extended_path = '(.*)'\.split", file.read(), re.MULTILINE)
+    except OSError:
+        return False
+    is_ours = sources and os.path.realpath(sources.group(1)) == os.path.join(_CLONE, "src")
+    return bool(is_ours) and os.path.isdir(os.path.join(package, "msg"))
 
 
 def _use_install_space():
