@@ -112,7 +112,7 @@ def test_public_headers_are_installed_and_complete(install_space, tmp_path):
     run(["g++", "-std=c++17", "-fsyntax-only", *flags, source])
 
 
-@pytest.mark.parametrize("name", launchers())
+@pytest.mark.parametrize("name", [*launchers(), "release_overrides"])
 @pytest.mark.parametrize("place", ["clone", "devel", "install"])
 def test_programs_start_from_everywhere(name, place, install_space, tmp_path):
     folder = {
@@ -133,7 +133,7 @@ def test_programs_start_from_everywhere(name, place, install_space, tmp_path):
 def wheel_folder(tmp_path_factory):
     """What `pip install` puts into a site folder, without its dependencies."""
     source = tmp_path_factory.mktemp("source")
-    for name in ("src", "config", "cmake", "include", "lib", "msg", "srv"):
+    for name in ("src", "config", "cmake", "include", "lib", "msg", "srv", "scripts"):
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
     for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE", "requirements.txt", "package.xml"):
         shutil.copy(ROOT / name, source)
@@ -150,6 +150,11 @@ def test_pip_installs_all_files_and_the_configuration(wheel_folder):
     config = {p.relative_to(ROOT) for p in (ROOT / "config").rglob("*") if p.is_file()}
     share = wheel_folder / "share" / "xplane_bridge"
     assert sorted(str(p) for p in config if not (share / p).is_file()) == []
+
+
+def test_pip_installs_what_gives_x_plane_back(wheel_folder, tmp_path):
+    said = run([wheel_folder / "bin" / "release_overrides", "--list", "--folder", tmp_path])
+    assert said == f"nothing to release: no journal in {tmp_path}\n"
 
 
 def test_pip_compiles_what_campaigns_need(wheel_folder, tmp_path):
