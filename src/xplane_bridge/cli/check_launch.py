@@ -10,7 +10,7 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import Callable, Dict, List, Mapping, Optional, Sequence
+from typing import Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 import yaml
 
@@ -21,6 +21,8 @@ from xplane_bridge.resources import config_file
 #: The value by which an argument leaves a parameter as its file has it.
 AS_IN_FILE = "config"
 _FLAGS = ("true", "false", "1", "0")
+#: The arguments that name files of parameters of single nodes, each as the file below config/ is called.
+_OF_NODES = ("rx", "tx", "capture", "joystick_reader")
 
 Given = Mapping[str, str]
 Check = Callable[[str, str, Given], str]
@@ -67,14 +69,37 @@ def _joy_config(_: str, value: str, given: Given) -> str:
     path = Path(value)
     if path.suffix != ".yaml":
         path = config_file("joysticks", "README.md").with_name(f"{value}.yaml")
+    elif not path.is_absolute():
+        return _full_path("joy_config", value)
     return _shipped("joystick", "joysticks", "joy_config")("joy_config", str(path), given)
+
+
+def _full_path(name: str, value: str) -> str:
+    """What is said of a file that a node reads: nodes do not run in the folder where roslaunch was started."""
+    return f"a relative path; give the full one, e.g. {name}:=$PWD/{value}"
+
+
+def _composed(path: Path) -> Optional[yaml.Node]:
+    """The content of a YAML file; composed, not constructed: roslaunch knows tags of its own, e.g. for degrees."""
+    return yaml.compose(path.read_text(encoding="utf-8"))
+
+
+def _leaves(node: Optional[yaml.Node], above: str = "") -> Iterator[Tuple[str, yaml.Node]]:
+    """The parameters of a mapping, by their full names (`lockstep/enabled`)."""
+    for key, value in node.value if isinstance(node, yaml.MappingNode) else []:
+        if key.tag == "tag:yaml.org,2002:merge":
+            for merged in value.value if isinstance(value, yaml.SequenceNode) else [value]:
+                yield from _leaves(merged, above)
+        elif isinstance(value, yaml.MappingNode):
+            yield from _leaves(value, f"{above}{key.value}/")
+        else:
+            yield f"{above}{key.value}", value
 
 
 def _parameters(_: str, value: str, __: Given) -> str:
     """A file of parameters: there, readable, YAML, a mapping."""
     try:
-        # Composed, not constructed: roslaunch knows tags of its own, e.g. for degrees.
-        node = yaml.compose(Path(value).read_text(encoding="utf-8"))
+        node = _composed(Path(value))
     except OSError as error:
         return f"{error.strerror}; expected a YAML file of parameters"
     except UnicodeDecodeError:
@@ -84,6 +109,46 @@ def _parameters(_: str, value: str, __: Given) -> str:
     if node is not None and not isinstance(node, yaml.MappingNode):
         return "is YAML, but no list of `key: value`"
     return ""
+
+
+def _common(name: str, value: str, given: Given) -> str:
+    """The shared parameters. Of others at the namespace no node takes notice: they are refused here."""
+    problem = _parameters(name, value, given)
+    if problem:
+        return problem
+    shared = dict(_leaves(_composed(config_file("common.yaml"))))
+    homes: Dict[str, List[str]] = {}
+    for of in _OF_NODES:
+        for key, _ in _leaves(_composed(config_file(f"{of}.yaml"))):
+            homes.setdefault(key, []).append(f"{of}_config")
+    strange = [
+        f"{key} ({'belongs into ' + ' or '.join(homes[key]) if key in homes else 'unknown'})"
+        for key, _ in _leaves(_composed(Path(value)))
+        if key not in shared
+    ]
+    return f"is for {', '.join(shared)}; take out {', '.join(strange)}" if strange else ""
+
+
+def _capture_config(name: str, value: str, given: Given) -> str:
+    """Parameters of capture_node; of a further camera (camera.launch alone has field_of_view) they say which window."""
+    problem = _parameters(name, value, given)
+    if problem or "field_of_view" not in given or "window_index" in given:
+        return problem
+    said = dict(_leaves(_composed(Path(value))))
+    if "source" in said and said["source"].value != "x11":
+        return ""
+    of_window = [f"window/{key}" for key in ("index", "point", "title", "class", "id", "region")]
+    if any(said[key].value not in ("", "-1", []) for key in of_window if key in said):
+        return ""
+    return "does not say which of X-Plane's windows: give window_index:=1, or window: {index: 1} in the file"
+
+
+def _engage(name: str, value: str, given: Given) -> str:
+    """Whether mavros_relay asks for mode AUTO, which only set-points are flown in."""
+    problem = _flag(name, value, given)
+    if problem or value.lower() not in ("true", "1") or given.get("set_points", "").lower() in ("true", "1"):
+        return problem
+    return "needs set_points:=true (default: with aircraft:=multirotor, which alone flies set-points)"
 
 
 def _shipped(kind: str, folder: str, stem: str) -> Check:
@@ -119,6 +184,8 @@ def _recording(_: str, value: str, __: Given) -> str:
 def _scenario(_: str, value: str, __: Given) -> str:
     from xplane_bridge.cli.scenario_player import scenario_of
 
+    if Path(value).suffix in (".yaml", ".yml") and not Path(value).is_absolute():
+        return _full_path("scenario", value)
     try:
         scenario_of(value)
     except XplaneBridgeError as error:
@@ -132,12 +199,15 @@ CHECKS: Dict[str, Check] = {
     **dict.fromkeys(("display_delay", "max_publish_rate", "image_rate", "heading", "pitch", "roll"), _number),
     "field_of_view": _field_of_view,
     **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
-    **dict.fromkeys(("set_points", "engage", "lockstep"), _flag),
+    **dict.fromkeys(("set_points", "lockstep"), _flag),
+    "engage": _engage,
     "compression": _one_of("none", "lz4", "bz2"),
     **dict.fromkeys(("bag", "prefix"), _recording),
     "joystick": _joystick,
     "joy_config": _joy_config,
-    **dict.fromkeys(("common_config", "rx_config", "tx_config", "capture_config"), _parameters),
+    "common_config": _common,
+    **dict.fromkeys(("rx_config", "tx_config", "joystick_reader_config"), _parameters),
+    "capture_config": _capture_config,
     "aircraft_file": _shipped("aircraft", "aircraft", "aircraft"),
     "joy_config_file": _shipped("joystick", "joysticks", "joy_config"),
     "scenario": _scenario,

@@ -90,6 +90,7 @@ PROGRAMS = [
     ("xplane_emulator --pilot none.yaml", 2, ["--pilot none.yaml: expected an existing file"]),
     ("xplane_emulator --pilot broken.yaml", 1, [UNPARSED]),
     ("check_launch bag=/nonexistent/flight.bag", 1, ["there is no folder /nonexistent; make it, then record"]),
+    ("mavros_relay --engage", 2, ["--engage needs --set-points", "multirotor"]),
     ("check_launch prt=49000", 2, ["'prt=49000': expected KEY=VALUE", "port"]),
 ]
 
@@ -104,6 +105,7 @@ LAUNCHES = [
     ("bridge.launch rx:=perhaps", 1, ["rx:=perhaps: expected true or false"]),
     ("rx.launch rx_config:={}/broken.yaml", 1, [UNPARSED]),
     ("rx.launch common_config:={}/list.yaml", 1, ["list.yaml: is YAML, but no list of `key: value`"]),
+    ("rx.launch common_config:={}/strange.yaml", 1, ["take out publish_tf (belongs into rx_config), hots (unknown)"]),
     ("capture.launch capture_config:={}/nothing_in_it", 1, ["nothing_in_it: Is a directory"]),
     ("capture.launch image_rate:=fast", 1, ["image_rate:=fast: expected a number"]),
     ("joystick.launch joy_config:=wheel", 1, ["(joy_config:=wheel)", JOYSTICKS]),
@@ -116,6 +118,7 @@ LAUNCHES = [
     ),
     ("failure.launch scenario:=nothing", 1, ["scenario:=nothing: ", SCENARIOS]),
     ("failure.launch scenario:={}/typo.yaml", 1, ["typo.yaml: scenario.evnts: unknown key; expected one of"]),
+    ("failure.launch scenario:=typo.yaml", 1, ["relative path; give the full one, e.g. scenario:=$PWD/typo.yaml"]),
     ("record.launch split_size:=big", 1, ["split_size:=big: expected a whole number"]),
     ("record.launch bag:=/nonexistent/flight.bag", 1, ["there is no folder /nonexistent; make it, then record"]),
     ("record.launch prefix:=flights/one", 1, ["prefix:=flights/one: there is no folder ", "/flights; make it"]),
@@ -128,9 +131,11 @@ LAUNCHES = [
         ["(joy_config:=wheel)", JOYSTICKS],
     ),
     ("camera.launch window_index:=left", 1, ["window_index:=left: expected a whole number"]),
+    ("camera.launch capture_config:={}/strange.yaml", 1, ["give window_index:=1, or window: {index: 1} in the file"]),
     ("camera.launch heading:=north", 1, ["heading:=north: expected a number"]),
     ("camera.launch field_of_view:=wide", 1, ["field_of_view:=wide: expected a number, or main"]),
     ("mavros.launch engage:=perhaps", 1, ["engage:=perhaps: expected true or false"]),
+    ("mavros.launch engage:=true", 1, ["engage:=True: needs set_points:=true"]),
     ("mavros.launch aircraft:=zeppelin", 1, ["(aircraft:=zeppelin)", AIRCRAFT]),
     ("two_bridges.launch first_host:=127.0.0.1 second_host:=127.0.0.1 first_port:=a", 1, ["port:=a: expected a whole"]),
     (
@@ -154,6 +159,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (path / "typo.yaml").write_text("name: x\nevnts: []\n")
     (path / "soon.yaml").write_text("name: x\nevents:\n  - {at: soon, end: true}\n")
     (path / "list.yaml").write_text("- a\n- b\n")
+    (path / "strange.yaml").write_text("host: 127.0.0.1\npublish_tf: true\nhots: 127.0.0.1\n")
     (path / "nothing_in_it").mkdir()
     return path
 

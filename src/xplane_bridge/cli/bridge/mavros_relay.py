@@ -124,7 +124,10 @@ def subscribe(set_points: SetPoints, mavros: str) -> None:
 @guarded
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Runs until ROS ends."""
-    args = parser().parse_args(ros_arguments(argv))
+    p = parser()
+    args = p.parse_args(ros_arguments(argv))
+    if args.engage and not args.set_points:
+        p.error(f"--engage needs --set-points, which are flown in mode AUTO; they are for {AIRCRAFT} only")
     namespace, mavros = args.namespace.rstrip("/"), args.mavros.rstrip("/")
     start_node("mavros_relay")
     import rospy

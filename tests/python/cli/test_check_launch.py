@@ -1,0 +1,84 @@
+"""What check_launch says of files that launch arguments name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from xplane_bridge.cli.check_launch import problems
+from xplane_bridge.resources import config_file
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("host: 127.0.0.1\nlockstep: {enabled: true}\nlockstep/hold: true\n", []),
+        ("", []),
+        ("max_rate: 10\n", ["max_rate (belongs into tx_config or capture_config)"]),
+        ("rates: {engines: 50}\n", ["rates/engines (belongs into rx_config)"]),
+        ("command_timeout: 0.1\n", ["command_timeout (belongs into tx_config)"]),
+        ("axes: 30\n", ["axes (belongs into joystick_reader_config)"]),
+        ("lockstep: {enable: true}\n", ["lockstep/enable (unknown)"]),
+        ("one: &one {hots: a}\n", ["one/hots (unknown)"]),
+        ("<<: {hots: a}\nport: 49000\n", ["hots (unknown)"]),
+    ],
+)
+def test_keys_of_other_files_are_refused_in_common_config(tmp_path: Path, text: str, said: list[str]) -> None:
+    file = tmp_path / "common.yaml"
+    file.write_text(text, encoding="utf-8")
+    lines = problems({"common_config": str(file)})
+    assert len(lines) == len(said)
+    for line, part in zip(lines, said):
+        assert line.startswith(f"common_config:={file}: is for host, port, ")
+        assert line.endswith(f"; take out {part}")
+
+
+def test_the_shipped_files_are_good() -> None:
+    assert problems({f"{name}_config": str(config_file(f"{name}.yaml")) for name in ("common", "rx", "tx")}) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "good"),
+    [
+        ("scenario", "mine.yaml", False),
+        ("scenario", "../mine.yml", False),
+        ("scenario", "left_aileron_stuck", True),
+        ("scenario", str(config_file("scenarios", "demo.yaml")), True),
+        ("joy_config", "mine.yaml", False),
+        ("joy_config", "xbox", True),
+        ("joy_config", str(config_file("joysticks", "xbox.yaml")), True),
+    ],
+)
+def test_what_a_node_reads_is_named_or_has_its_full_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, value: str, good: bool
+) -> None:
+    (tmp_path / "mine.yaml").write_bytes(config_file("scenarios", "demo.yaml").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    wanted = f"{name}:={value}: a relative path; give the full one, e.g. {name}:=$PWD/{value}"
+    assert problems({name: value}) == ([] if good else [wanted])
+
+
+@pytest.mark.parametrize(
+    ("engage", "set_points", "good"),
+    [("true", "false", False), ("True", "", False), ("1", "true", True), ("false", "false", True)],
+)
+def test_without_set_points_nothing_is_engaged(engage: str, set_points: str, good: bool) -> None:
+    assert (problems({"engage": engage, "set_points": set_points}) == []) == good
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "good"),
+    [
+        ("window: {index: -1, point: [], title: ''}\nwidth: 640\n", {"field_of_view": "main"}, False),
+        ("width: 640\n", {"field_of_view": "main", "window_index": "1"}, True),
+        ("width: 640\n", {}, True),  # of the bridge's own camera: the largest window
+        ("window: {index: 0}\n", {"field_of_view": "main"}, True),
+        ("window: {point: [1920, 0]}\n", {"field_of_view": "main"}, True),
+        ("source: video\n", {"field_of_view": "main"}, True),
+    ],
+)
+def test_a_further_camera_has_a_window_of_its_own(tmp_path: Path, text: str, given: dict[str, str], good: bool) -> None:
+    file = tmp_path / "capture.yaml"
+    file.write_text(text, encoding="utf-8")
+    assert (problems({"capture_config": str(file), **given}) == []) == good
