@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import sys
+import threading
 from pathlib import Path
 from typing import Any, Dict, Optional, Sequence
 
 from xplane_bridge import lockstep
 from xplane_bridge.cli.bridge.loaded_aircraft import LoadedAircraft
-from xplane_bridge.cli.bridge.waiting import wait_for_state
+from xplane_bridge.cli.bridge.waiting import PATIENCE_S, about_joy, surroundings, wait_for_state
 from xplane_bridge.cli.entry import guarded, ros_arguments, start_node
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, load_scenario
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
 from xplane_bridge.scenario.ros_player import RosPlayer
-from xplane_bridge.scenario.virtual_stick import load_stick, refuse_buttons
+from xplane_bridge.scenario.virtual_stick import VirtualStick, load_stick, refuse_buttons
 from xplane_bridge.topics import NAMESPACE, absolute
+
+_DEVICE = "logitech_extreme_3d_pro"
 
 
 def scenario_of(name: str) -> Scenario:
@@ -47,8 +51,8 @@ def add_stick_options(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--joy-config",
         metavar="NAME",
-        default="logitech_extreme_3d_pro",
-        help="device to play: stem of a file in config/joysticks, or a file (%(default)s)",
+        help="device to play: stem of a file in config/joysticks, or a file (default: the one that "
+        f"joystick_mapper_node flies with, else {_DEVICE})",
     )
     p.add_argument("--stick-mode", type=int, choices=(1, 2), help="1: pitch left, throttle right; 2: the other way")
 
@@ -68,25 +72,65 @@ def stick_mode_of(given: Optional[int], mapped: Any) -> Optional[int]:
     return given if mode is None else mode
 
 
+def device_file(name: str) -> Path:
+    """The file of a joystick, by its stem in config/joysticks, or by a path."""
+    file = Path(name)
+    return file if file.suffix == ".yaml" else config_file("joysticks", f"{name}.yaml")
+
+
+def stick_of(joy_config: Optional[str], stick_mode: Optional[int], mapped: Any) -> VirtualStick:
+    """The device to play.
+
+    Args:
+        joy_config: As it was given; None: not at all.
+        stick_mode: Likewise.
+        mapped: Parameters of joystick_mapper_node, which are its device's file; None: it is not there.
+
+    Raises:
+        ScenarioError: joystick_mapper_node would make something else of what is played, or there is no such device.
+    """
+    mapped = mapped if isinstance(mapped, dict) else {}
+    mode = stick_mode_of(stick_mode, mapped.get("stick_mode"))
+    if joy_config is not None or not isinstance(mapped.get("direct"), dict):
+        stick = load_stick(device_file(joy_config or _DEVICE), mode)
+    if not isinstance(mapped.get("direct"), dict):
+        return stick
+    flown = VirtualStick(mapped, mode or 2)
+    if joy_config is not None and stick.name != flown.name:
+        raise ScenarioError(
+            f"--joy-config {joy_config} is {stick.name!r}, but joystick_mapper_node flies with {flown.name!r}; leave "
+            "it out, or start the mapper with the same joy_config"
+        )
+    return flown
+
+
+def _watch_joy(namespace: str, node: str) -> threading.Timer:
+    """Warns on a thread of its own, after some seconds, where what is played moves nothing."""
+
+    def look() -> None:
+        text = about_joy(f"{namespace}/joy", surroundings())
+        if text:
+            print(f"{node}: {text}", file=sys.stderr, flush=True)
+
+    watch = threading.Timer(PATIENCE_S, look)
+    watch.daemon = True
+    return watch
+
+
 def play(
     args: argparse.Namespace, argv: Optional[Sequence[str]], node: str, joystick: bool, log: Optional[Path] = None
 ) -> int:
     """Plays `args.scenario` in a ROS node of this process; returns the exit code."""
     scenario = scenario_of(args.scenario)
-    stick = None
-    if joystick:
-        file = Path(args.joy_config)
-        if file.suffix != ".yaml":
-            file = config_file("joysticks", f"{args.joy_config}.yaml")
-        stick = load_stick(file, args.stick_mode)
-    else:
+    # What can be refused without ROS is refused at once.
+    stick = stick_of(args.joy_config, args.stick_mode, None) if joystick else None
+    if not joystick:
         refuse_buttons(scenario, "--joystick")
     namespace = args.namespace.rstrip("/")
     rospy = start_node(node, argv=None if argv is None else list(argv), **lockstep.node_options(namespace))
     if joystick:
-        mapped = rospy.get_param(f"{namespace}/joystick_mapper_node/stick_mode", None)
-        mode = stick_mode_of(args.stick_mode, mapped)
-        stick = stick if mode == args.stick_mode else load_stick(file, mode)
+        mapped = rospy.get_param(f"{namespace}/joystick_mapper_node", None)
+        stick = stick_of(args.joy_config, args.stick_mode, mapped)
     remedy = f"load one that it is for, or play another scenario (aircraft in {args.scenario} says which it is for)"
     aircraft = LoadedAircraft(namespace, node, scenario.aircraft, remedy, lambda text: player.fail(text))
     kwargs: Dict[str, Any] = {"stick": stick, "log": log, "say": lambda text: print(text, flush=True)}
@@ -96,7 +140,13 @@ def play(
         player = RosPlayer(scenario, namespace, **kwargs)
         aircraft.check()
         wait_for_state(namespace, node)
-    player.run()
+    watch = _watch_joy(namespace, node)
+    if joystick:
+        watch.start()
+    try:
+        player.run()
+    finally:
+        watch.cancel()
     return 0
 
 

@@ -100,6 +100,17 @@ def test_another_aircraft_is_refused_in_words(world, bridge, name, arguments):
     assert "Traceback" not in said
 
 
+def test_a_virtual_joystick_that_no_mapper_takes_says_so(world, bridge):
+    bridge.link(1, "flight data arrive", ("DA62", "The twin"))
+    bridge.fly()
+    with start(world, "virtual_joystick", "demo_flight", "--namespace", world.namespace) as playing:
+        playing.wait_for_line(
+            rf"^virtual_joystick: no node takes {world.namespace}/joy: start joystick_mapper_node \(roslaunch "
+            r"xplane_bridge bridge.launch joystick:=mapper",
+            60,
+        )
+
+
 def test_failure_launch_refuses_too(world, bridge):
     bridge.link(1, "flight data arrive", QUAD)
     bridge.fly()

@@ -5,9 +5,11 @@ from __future__ import annotations
 import shlex
 
 import pytest
+import yaml
 
 from support.deadlines import WAIT_S
-from xplane_bridge.harness import ManagedProcess, wait_until
+from support.nodes.launch_files import load
+from xplane_bridge.harness import ManagedProcess, roslaunch, wait_until
 from xplane_bridge.resources import config_file
 
 SCENARIO = """
@@ -17,18 +19,6 @@ events:
   - {at: 0, stick: {roll: 0.5}}
   - {at: 300, end: true}
 """
-
-
-def load(master, file, *arguments):
-    """The nodes a launch file starts: name to node."""
-    assert master.uri
-    import roslaunch
-
-    roslaunch.substitution_args._rospack = None  # it remembers which packages there were
-    config = roslaunch.config.ROSLaunchConfig()
-    path = str(config_file("common.yaml").parents[1] / "launch" / file)
-    roslaunch.xmlloader.XmlLoader().load(path, config, argv=list(arguments), verbose=False)
-    return {node.name: node for node in config.nodes}, {key: param.value for key, param in config.params.items()}
 
 
 def test_the_mapper_alone_where_another_program_reads_the_device(master):
@@ -47,8 +37,6 @@ def test_the_stick_mode_is_that_of_the_devices_file_unless_given(master, tmp_pat
     for arguments, mode in (((mine,), 1), ((mine, "stick_mode:=2"), 2), (("joy_config:=xbox",), 2)):
         _, params = load(master, "joystick.launch", *arguments)
         assert params["/xplane/joystick_mapper_node/stick_mode"] == mode
-    nodes, _ = load(master, "joystick.launch", "driver:=virtual", mine)
-    assert "--stick-mode" not in nodes["virtual_joystick"].args  # it reads the same file
 
 
 @pytest.mark.parametrize(("given", "device"), [((), ""), (("device:=Extreme 3D",), "Extreme 3D")])
@@ -64,12 +52,12 @@ def test_driver_sdl_is_our_reader(master, given, device):
 
 def test_driver_virtual_plays_a_scenario_as_the_same_device(master):
     of_scenario = ("joy_config:=playstation", "scenario:=multisine", "stick_mode:=1")
-    nodes, _ = load(master, "joystick.launch", "driver:=virtual", *of_scenario)
+    nodes, params = load(master, "joystick.launch", "driver:=virtual", *of_scenario)
     assert set(nodes) == {"joystick_mapper_node", "virtual_joystick"}
-    words = shlex.split(nodes["virtual_joystick"].args)
-    assert words[0] == "multisine"
-    assert words[words.index("--joy-config") + 1].endswith("config/joysticks/playstation.yaml")
-    assert words[words.index("--stick-mode") + 1] == "1"
+    # The device is the mapper's, of the parameter server: no path has to be found, and no stick mode to be repeated.
+    assert shlex.split(nodes["virtual_joystick"].args) == ["multisine", "--namespace", "/xplane"]
+    assert params["/xplane/joystick_mapper_node/device"] == "PlayStation-type gamepad"
+    assert params["/xplane/joystick_mapper_node/stick_mode"] == 1
 
 
 def test_driver_xplane_reads_the_stick_of_the_x_plane_that_is_meant(master):
@@ -91,13 +79,32 @@ def test_driver_xplane_reads_the_stick_of_the_x_plane_that_is_meant(master):
     [
         ("joystick.launch", ("driver:=xplane",), "X-Plane's joystick"),
         ("bridge.launch", ("joystick:=xplane",), "X-Plane's joystick"),
+        ("demo.launch", ("joystick:=xplane",), "X-Plane's joystick"),
         ("bridge.launch", ("joystick:=mapper",), "Logitech Extreme 3D Pro"),
+        ("demo.launch", ("joystick:=mapper",), "Logitech Extreme 3D Pro"),
         ("bridge.launch", ("joystick:=xplane", "joy_config:=xbox"), "Xbox-type gamepad"),
     ],
 )
 def test_the_device_is_x_planes_where_its_joystick_is_read(master, file, given, device):
     _, params = load(master, file, *given)
     assert params["/xplane/joystick_mapper_node/device"] == device
+
+
+@pytest.mark.parametrize(
+    ("file", "driver"),
+    [("joystick.launch", "driver:=xplane"), ("bridge.launch", "joystick:=xplane"), ("demo.launch", "joystick:=xplane")],
+)
+def test_the_reader_of_x_planes_joystick_has_a_file_of_parameters(master, tmp_path, file, driver):
+    own = tmp_path / "reader.yaml"
+    own.write_text("axes: 30\n", encoding="utf-8")
+    for given, axes in (((), 100), ((f"joystick_reader_config:={own}",), 30)):
+        _, params = load(master, file, driver, *given)
+        assert params["/xplane/xplane_joy_node/axes"] == axes
+
+
+def test_a_scenario_is_played_on_the_mappers_device_unless_one_is_given(master):
+    nodes, _ = load(master, "failure.launch", "joystick:=true")
+    assert shlex.split(nodes["scenario_player"].args)[3:] == ["--joystick"]
 
 
 def test_a_scenario_is_played_in_the_stick_mode_that_is_given(master):
@@ -158,6 +165,14 @@ def test_the_bridge_with_a_joystick(master, joystick, started):
     assert ("/xplane/joystick_mapper_node/device" in params) == bool(started)
     without, _ = load(master, "bridge.launch")
     assert set(without) == {"rx_node", "tx_node", "capture_node"}
+
+
+def test_another_device_than_the_mappers_is_not_played(world):
+    device = yaml.safe_load(config_file("joysticks", "logitech_f710.yaml").read_text(encoding="utf-8"))
+    world.set_param("joystick_mapper_node", device)
+    arguments = {"ns": world.namespace.strip("/"), "joystick": True, "joy_config": "xbox", "required": True}
+    with roslaunch(world.master, world.folder, "failure.launch", **arguments) as launch:
+        launch.wait_for_line("--joy-config xbox is 'Xbox-type gamepad', but .* flies with 'Logitech F310/F710'", 60)
 
 
 def test_a_scenario_flies_the_whole_bridge_as_a_joystick(world):

@@ -1,11 +1,14 @@
-"""The stick mode that a player takes where joystick_mapper_node has one."""
+"""The device and the stick mode that a player takes where joystick_mapper_node has them."""
 
 from __future__ import annotations
 
 import pytest
+import yaml
 
-from xplane_bridge.cli.scenario_player import stick_mode_of
+from xplane_bridge.cli.scenario_player import stick_mode_of, stick_of
+from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import ScenarioError
+from xplane_bridge.scenario.player import Commands
 
 
 @pytest.mark.parametrize(
@@ -19,3 +22,46 @@ def test_the_stick_mode_is_the_mappers(given, mapped, mode):
 def test_another_stick_mode_than_the_mappers_is_refused():
     with pytest.raises(ScenarioError, match=r"--stick-mode 2: joystick_mapper_node takes the axes as stick mode 1"):
         stick_mode_of(2, 1)
+
+
+def mapper(stem, **changed):
+    """joystick_mapper_node's parameters: the file of a device, and what an argument has changed."""
+    return {**yaml.safe_load(config_file("joysticks", f"{stem}.yaml").read_text(encoding="utf-8")), **changed}
+
+
+LOGITECH, XBOX = "Logitech Extreme 3D Pro", "Xbox-type gamepad"
+
+
+@pytest.mark.parametrize(
+    ("given", "mapped", "name"),
+    [
+        (None, mapper("xbox"), XBOX),
+        ("xbox", mapper("xbox"), XBOX),
+        (None, None, LOGITECH),
+        ("xbox", None, XBOX),
+        (None, {"stick_mode": 1}, LOGITECH),  # a mapper that was given nothing else yet
+        (None, "a text", LOGITECH),
+    ],
+)
+def test_the_device_is_the_mappers(given, mapped, name):
+    assert stick_of(given, None, mapped).name == name
+
+
+def test_another_device_than_the_mappers_is_refused():
+    with pytest.raises(ScenarioError, match=f"--joy-config xbox is '{XBOX}', but .* flies with '{LOGITECH}'"):
+        stick_of("xbox", None, mapper("logitech_extreme_3d_pro"))
+
+
+def test_what_is_played_is_what_the_mapper_makes_commands_of():
+    """A file of the user's, with another axis; and the mode that stick_mode:= has put beside the file."""
+    mapped = mapper("xbox", direct={**mapper("xbox")["direct"], "roll": {"axis": 5, "scale": -1.0}})
+    commands = Commands(stick={"roll": 0.25, "pitch": 0.0, "yaw": 0.0}, throttle=None, handles={})
+    for given in (None, "xbox"):
+        axes, _ = stick_of(given, None, mapped).joy(commands)
+        assert axes[5] == pytest.approx(-0.25, abs=1e-6)
+    pitch = mapper("xbox")["direct"]["pitch"]
+    assert pitch["axis_mode_1"] != pitch["axis_mode_2"]
+    commands.stick.update(roll=0.0, pitch=1.0)
+    for mode in (1, 2):
+        axes, _ = stick_of(None, None, mapper("xbox", stick_mode=mode)).joy(commands)
+        assert abs(axes[pitch[f"axis_mode_{mode}"]]) == pytest.approx(1.0)

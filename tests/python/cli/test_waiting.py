@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from xplane_bridge.cli.bridge import waiting
-from xplane_bridge.cli.bridge.waiting import Patience, Surroundings, about_service, about_topic
+from xplane_bridge.cli.bridge.waiting import Patience, Surroundings, about_joy, about_service, about_topic
 
 STATE = "xplane_bridge/FlightState"
 THERE = Surroundings(
@@ -47,6 +47,20 @@ def test_services_likewise(service: str, there: Surroundings, words: str) -> Non
     text = about_service(service, there)
     assert service in text
     assert words in text
+
+
+@pytest.mark.parametrize(
+    ("takers", "taken"),
+    [(["/xplane/joystick_mapper_node"], True), (["/xplane/record", "/xplane/joystick_mapper_node"], True),
+     (["/xplane/record"], False), ([], False)],
+)  # fmt: skip
+def test_a_joystick_that_only_a_recorder_hears_moves_nothing(takers: list[str], taken: bool) -> None:
+    every = ["/xplane/record", "/xplane/joystick_mapper_node", "/player"]
+    publishers = {"/rosout": every, "/xplane/control/manual": every[1:2], "/xplane/joy": every[2:]}
+    text = about_joy("/xplane/joy", Surroundings(publishers, {}, [], {"/xplane/joy": takers}))
+    assert (text == "") == taken
+    assert taken or text.startswith("no node takes /xplane/joy: start joystick_mapper_node (roslaunch xplane_bridge")
+    assert about_joy("/xplane/joy", None) == ""
 
 
 def test_it_speaks_after_five_seconds_and_again_only_with_another_reason(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,6 +78,25 @@ def about_service(service: str, there: Optional[Surroundings]) -> str:
     return f"no service {service}: start the node that has it (bridge.launch starts tx_node unless tx:=false)"
 
 
+def about_joy(topic: str, there: Optional[Surroundings]) -> str:
+    """Why a joystick that is played moves nothing; empty where a node makes something of it.
+
+    Args:
+        topic: Full name of `joy`.
+        there: What the master knows; None: it does not answer.
+    """
+    if there is None:
+        return ""
+    # A recorder or a plot, which publish nothing but their log, fly no aircraft.
+    active = {node for name, nodes in there.publishers.items() if name != "/rosout" for node in nodes}
+    if active.intersection(there.subscribers.get(topic, [])):
+        return ""
+    return (
+        f"no node takes {topic}: start joystick_mapper_node (roslaunch xplane_bridge bridge.launch joystick:=mapper; "
+        "where the bridge runs already: joystick.launch)"
+    )
+
+
 def _listed(names: Sequence[str]) -> str:
     return ", ".join(names)
 
