@@ -58,6 +58,18 @@ _PIECE_MESSAGES = 8192
 _PART = re.compile(r"_[0-9]+$")
 
 
+def bags_in(folder: Path, pattern: str = "*.bag") -> list[Path]:
+    """The bags of a folder, by name; not what ``rosbag reindex`` keeps of each: ``NAME.orig.bag`` is the same flight.
+
+    Args:
+        folder: Where to look.
+        pattern: ``**/*.bag`` also looks in the folders in it.
+    """
+    found = sorted(folder.glob(pattern))
+    kept = {path.with_suffix(".orig.bag") for path in found}
+    return [path for path in found if path not in kept]
+
+
 class BagError(XplaneBridgeError):
     """A bag cannot be read; the text is one line with the remedy."""
 
@@ -147,7 +159,7 @@ class Bags:
         self.paths: list[Path] = []
         for item in (Path(p) for p in given):
             if item.is_dir():
-                found = sorted(sorted(item.glob("*.bag")), key=_part)
+                found = sorted(bags_in(item), key=_part)
                 if not found:
                     msg = f"{item}: a directory without any .bag file"
                     raise BagError(msg)

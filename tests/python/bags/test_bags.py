@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer
 
-from xplane_bridge.bags import BagError, Bags
+from xplane_bridge.bags import BagError, Bags, bags_in
 from xplane_bridge.bags.columns import ColumnFile
 
 HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
@@ -363,3 +363,11 @@ def test_a_chunk_that_does_not_unpack_is_named(tmp_path: Path) -> None:
     damage(path, lambda raw: raw.replace(b"BZh", b"BZx"))
     with Bags(path) as bags, pytest.raises(BagError, match=r"a\.bag: damaged data \(a chunk does not unpack"):
         bags.read("/s")
+
+
+def test_what_reindexing_has_kept_of_a_bag_is_no_other_bag(tmp_path: Path) -> None:
+    for name in ("b.bag", "b.orig.bag", "alone.orig.bag", "in/c.d.bag", "in/c.d.orig.bag"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    assert Bags(tmp_path).paths == [tmp_path / "alone.orig.bag", tmp_path / "b.bag"]
+    assert bags_in(tmp_path, "**/*.bag") == [tmp_path / name for name in ("alone.orig.bag", "b.bag", "in/c.d.bag")]

@@ -13,7 +13,7 @@ import yaml
 
 from xplane_bridge.analysis.comparison import SIGNALS, Matched
 from xplane_bridge.analysis.frames import frames_of
-from xplane_bridge.bags import Bags
+from xplane_bridge.bags import Bags, bags_in
 from xplane_bridge.bags.columns import ColumnFile
 from xplane_bridge.bags.flight import Flight, read_flight
 from xplane_bridge.bags.passport import Passport, read_passports
@@ -121,7 +121,7 @@ def paths_of(given: Sequence[Path]) -> List[Tuple[List[Path], str]]:
             if path == parts[path][0]:
                 out.append((parts[path], str(path)))
             continue
-        bags = sorted(path.rglob("*.bag"))
+        bags = bags_in(path, "**/*.bag")
         if not bags:
             raise CompareError(f"{path}: a folder without any .bag file")
         out += [(paths, str(path)) for paths in joined(bags)]

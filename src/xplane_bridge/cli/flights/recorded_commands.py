@@ -24,6 +24,11 @@ _PLAYED = {
     "control/surfaces": "SurfaceCommand",
     "control/mode": "ControlMode",
 }
+#: Fields of a flight state by which an aircraft is placed as in it.
+PLACED_BY = (
+    "latitude", "longitude", "altitude_msl", "roll_deg", "pitch_deg", "heading_true_deg", "true_airspeed",
+    "flight_path_angle_deg",
+)  # fmt: skip
 PLACED_S = 60.0  #: a flight may take so long to load
 _MODE_S = 0.1  # between two looks whether another mode is recorded
 NEAR_M = 100.0  #: [m] within which an aircraft is where it was placed
@@ -71,8 +76,10 @@ def read_commands(bag: Path) -> Commands:
 
 
 def first_of(state: Table) -> Any:
-    """Fields of the first flight state, by name."""
-    return {name: column[0] for name, column in state.columns.items() if column.ndim == 1}
+    """Fields of the first flight state as which an aircraft can be placed, by name; else of the first one."""
+    known = np.all([np.isfinite(state[name]) for name in PLACED_BY if name in state], axis=0)
+    row = int(np.argmax(known))
+    return {name: column[row] for name, column in state.columns.items() if column.ndim == 1}
 
 
 def elapsed_of(state: Table) -> np.ndarray:
@@ -166,14 +173,7 @@ def place(start: Any, namespace: str) -> None:
     from xplane_bridge.srv import ResetFlight
 
     answer = rospy.ServiceProxy(f"{namespace}/tx_node/reset_flight", ResetFlight)(
-        latitude=start["latitude"],
-        longitude=start["longitude"],
-        altitude_msl=start["altitude_msl"],
-        roll_deg=start["roll_deg"],
-        pitch_deg=start["pitch_deg"],
-        heading_true_deg=start["heading_true_deg"] % 360.0,
-        true_airspeed=start["true_airspeed"],
-        flight_path_angle_deg=start["flight_path_angle_deg"],
+        **{**{name: start[name] for name in PLACED_BY}, "heading_true_deg": start["heading_true_deg"] % 360.0}
     )
     if not answer.success:
         raise ReplayError(f"the aircraft is not placed: {answer.result.message}")
@@ -206,7 +206,7 @@ class _Player:
         if self.over.is_set():
             return
         if not self.placed.is_set():
-            if far(state, self._commands.start) > NEAR_M:
+            if not far(state, self._commands.start) <= NEAR_M:  # also where its place is not known
                 return
             self._begin, self._epoch = state.sim_time_unwrapped, state.epoch
             self.placed.set()

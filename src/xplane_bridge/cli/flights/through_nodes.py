@@ -98,7 +98,9 @@ def first_difference(seen: Sequence[Any], states: Table, first: int) -> Optional
         theirs = np.asarray(states[name][first : first + len(mine)], dtype=float)
         if name == "sim_time_unwrapped":  # it begins with X-Plane
             mine, theirs = mine - mine[0], theirs - theirs[0]
-        differing = np.flatnonzero(mine[: len(theirs)] != theirs)
+        mine = mine[: len(theirs)]
+        unknown = np.isnan(mine) & np.isnan(theirs)
+        differing = np.flatnonzero((mine != theirs) & ~unknown)
         if len(differing):
             frame = int(differing[0])
             found.append(Difference(frame, name, float(mine[frame]), float(theirs[frame])))

@@ -6,9 +6,11 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from xplane_bridge.cli.flights.recorded_commands import Commands, Played, _Player, far
+from xplane_bridge.bags import Table
+from xplane_bridge.cli.flights.recorded_commands import PLACED_BY, Commands, Played, _Player, far, first_of
 from xplane_bridge.units import EARTH_RADIUS_M
 
 START = {"latitude": 37.5, "longitude": 127.0, "altitude_msl": 900.0}
@@ -51,3 +53,19 @@ def test_how_far_it_is_from_where_it_was_placed_is_known_also_across_the_date_li
     there = SimpleNamespace(latitude=60.0, longitude=shown, altitude_msl=900.0)
     start = {"latitude": 60.0, "longitude": placed, "altitude_msl": 900.0}
     assert far(there, start) == pytest.approx(math.radians(0.0002) * EARTH_RADIUS_M * 0.5, rel=1e-6)
+
+
+def test_it_is_placed_as_in_the_first_state_that_knows_all_that_takes():
+    known = {name: np.array([np.nan, 1.0, 2.0]) for name in PLACED_BY}
+    known["pitch_deg"] = np.array([0.0, np.nan, 3.0])
+    known["orientation"] = np.zeros((3, 4))
+    table = Table("", "", np.zeros(3, dtype=np.int64), known)
+    assert first_of(table) == {**dict.fromkeys(PLACED_BY, 2.0), "pitch_deg": 3.0}
+
+
+def test_an_aircraft_whose_place_is_not_known_is_not_where_it_was_placed():
+    player = _Player(Commands([], START, 10.0), {}, {}, None, print)
+    player.on_state(SimpleNamespace(**{**START, "latitude": math.nan}, sim_time_unwrapped=0.0, epoch=1))
+    assert not player.placed.is_set()
+    player.on_state(state(0.0, 1))
+    assert player.placed.is_set()
