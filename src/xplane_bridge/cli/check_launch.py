@@ -126,7 +126,7 @@ def _common(name: str, value: str, given: Given) -> str:
         for key, _ in _leaves(_composed(Path(value)))
         if key not in shared
     ]
-    return f"is for {', '.join(shared)}; take out {', '.join(strange)}" if strange else ""
+    return f"take out {', '.join(strange)}; it is for {', '.join(shared)}" if strange else ""
 
 
 def _capture_config(name: str, value: str, given: Given) -> str:
