@@ -11,15 +11,6 @@ namespace {
 // X-Plane binds this port itself for sending; a client on the same machine must not listen on it.
 constexpr int kXPlaneSendingPort = 49001;
 
-std::string frameName(const ParamLoader& shared, const std::string& prefix, const std::string& key,
-                      const std::string& fallback) {
-  const std::string frame = shared.text(key, fallback);
-  if (frame.empty() || frame.front() == '/') {
-    shared.refuse(key, "a text: a frame name, not empty and without a leading slash");
-  }
-  return prefix + frame;
-}
-
 /// Each names a node of its own: an answer counts for one name.
 void checkParticipants(const ParamLoader& in, const std::vector<std::string>& names) {
   for (auto name = names.begin(); name != names.end(); ++name) {
@@ -58,6 +49,14 @@ LockstepOptions loadLockstep(const ParamLoader& shared, const CommonOptions& com
 
 }  // namespace
 
+std::string loadFrameName(const ParamLoader& in, const std::string& key, const std::string& fallback) {
+  std::string frame = in.text(key, fallback);
+  if (frame.empty() || frame.front() == '/') {
+    in.refuse(key, "a text: a frame name, not empty and without a leading slash");
+  }
+  return frame;
+}
+
 CommonOptions loadCommonOptions(const ParamLoader& shared) {
   CommonOptions options;
   options.host = shared.text("host", options.host);
@@ -77,10 +76,10 @@ CommonOptions loadCommonOptions(const ParamLoader& shared) {
   if (!frames.prefix.empty() && frames.prefix.front() == '/') {
     shared.refuse("frame_prefix", "a text without a leading slash, such as first/");
   }
-  frames.map = frameName(shared, frames.prefix, "map_frame", frames.map);
-  frames.map_ned = frameName(shared, frames.prefix, "map_ned_frame", frames.map_ned);
-  frames.base_link = frameName(shared, frames.prefix, "base_link_frame", frames.base_link);
-  frames.base_link_frd = frameName(shared, frames.prefix, "base_link_frd_frame", frames.base_link_frd);
+  frames.map = frames.prefix + loadFrameName(shared, "map_frame", frames.map);
+  frames.map_ned = frames.prefix + loadFrameName(shared, "map_ned_frame", frames.map_ned);
+  frames.base_link = frames.prefix + loadFrameName(shared, "base_link_frame", frames.base_link);
+  frames.base_link_frd = frames.prefix + loadFrameName(shared, "base_link_frd_frame", frames.base_link_frd);
   options.display_delay = shared.number("display_delay", {0.0, 1.0}, options.display_delay);
   options.stale_after = shared.number("stale_after", {0.1, 60.0}, options.stale_after);
   options.lost_after = shared.number("lost_after", {options.stale_after, 3600.0}, options.lost_after);

@@ -3,15 +3,20 @@
 #include <cerrno>
 #include <cstdlib>
 #include <limits>
+#include <map>
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "xplane_bridge/nodes/base/common_options.hpp"
 
 namespace xplane_bridge {
 namespace {
 
 constexpr int kSmallestSide = 16;
 constexpr int kLargestSide = 8192;
+constexpr core::CameraView kNominalViews[] = {core::CameraView::kForward, core::CameraView::kRear,
+                                              core::CameraView::kDown};
 
 std::uint32_t windowId(const ParamLoader& window) {
   const std::string text = window.text("id", "");
@@ -63,6 +68,23 @@ Eigen::Quaterniond mount(const ParamLoader& angles) {
   return core::opticalOrientation(0.0, 0.0, 0.0).inverse() * core::opticalOrientation(roll, pitch, heading);
 }
 
+/// Each is a transform of its own, so each has a name of its own.
+void loadFrames(const ParamLoader& own, CaptureOptions* options) {
+  std::map<std::string, std::string> keys;  // by frame
+  const auto frame = [&](const std::string& key, const std::string& fallback) {
+    std::string name = loadFrameName(own, key, fallback);
+    const auto [same, is_new] = keys.emplace(name, key);
+    // Of two equal names one may be a default, which cannot be refused.
+    if (!is_new) own.refuse(own.has(key) ? key : same->second, "another name than that of the other frame_*");
+    return name;
+  };
+  for (const core::CameraView view : kNominalViews) {
+    const std::string name = core::toString(view);
+    options->frame_ids[static_cast<std::size_t>(view)] = frame("frame_" + name, "camera_" + name + "_optical");
+  }
+  options->measured_frame = frame("frame_measured", "camera_optical");
+}
+
 /// The section of parameters that belongs to a source.
 const char* sectionOf(CaptureOptions::Source source) {
   switch (source) {
@@ -109,13 +131,10 @@ CaptureOptions loadCaptureOptions(const ParamLoader& own) {
   }
   options.mount = mount(own.section("mount"));
   const std::string view = own.choice("assumed_view", {"forward", "rear", "down"}, "forward");
-  for (const core::CameraView candidate :
-       {core::CameraView::kForward, core::CameraView::kRear, core::CameraView::kDown}) {
-    const std::string name = core::toString(candidate);
-    if (name == view) options.assumed_view = candidate;
-    options.frame_ids[static_cast<std::size_t>(candidate)] = own.text("frame_" + name, "camera_" + name + "_optical");
+  for (const core::CameraView candidate : kNominalViews) {
+    if (core::toString(candidate) == view) options.assumed_view = candidate;
   }
-  options.measured_frame = own.text("frame_measured", "camera_optical");
+  loadFrames(own, &options);
   options.nominal_frames = own.boolean("nominal_frames", false);
   options.view_tolerance_deg = own.number("view_tolerance_deg", {0.0, 40.0}, options.view_tolerance_deg);
   const std::vector<double> offset = own.numbers("camera_offset", {-100.0, 100.0});

@@ -10,6 +10,9 @@
 
 namespace xplane_bridge {
 
+/// The name of a coordinate frame, without a prefix. @throws ParamError where it is empty or begins with a slash
+std::string loadFrameName(const ParamLoader& in, const std::string& key, const std::string& fallback);
+
 /// Names of the coordinate frames (`frame_id`) that several nodes use.
 struct FrameNames {
   std::string prefix;                           ///< stands before the names, of those below already
