@@ -21,13 +21,15 @@ void JoystickMapperNode::subscribeInLockstep() {
     modes_.push_back(mode);
     answerFrames();
   });
-  subscribeEvents<sensor_msgs::Joy>("joy", kLockstepQueue,
-                                    [this, stick](const ros::MessageEvent<const sensor_msgs::Joy>& event) {
-                                      if (!core::isNamed(event.getPublisherName(), stick)) return;
-                                      const sensor_msgs::JoyConstPtr& joy = event.getConstMessage();
-                                      frames_.push_back({joy->header.stamp, joy});
-                                      answerFrames();
-                                    });
+  subscribeEvents<sensor_msgs::Joy>("joy", kLockstepQueue, [this](const JoyEvent& event) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!ofTheStick(event)) return;
+    }
+    const sensor_msgs::JoyConstPtr& joy = event.getConstMessage();
+    frames_.push_back({joy->header.stamp, joy});
+    answerFrames();
+  });
   subscribeEvents<std_msgs::Header>(kLockstepDoneTopic, kLockstepQueue,
                                     [this, stick](const ros::MessageEvent<const std_msgs::Header>& event) {
                                       if (!core::isNamed(event.getPublisherName(), stick)) return;

@@ -12,6 +12,7 @@ void JoystickMapperNode::loadParameters(const ParamLoader& own) {
   period_ = 1.0 / own.number("rate", {1.0, 1000.0}, 50.0);
   repeat_ = core::CommandRepeat(period_);
   mapper_ = std::make_unique<core::JoystickMapper>(loadJoystickOptions(own));
+  source_ = std::make_unique<JoySource>(mapper_->options().joy_timeout, lockstep() ? common().lockstep.stick : "");
   if (!lockstep() && !mapper_->options().actions.empty()) {
     functions_ = std::make_unique<JoyFunctions>(loadJoyFunctions(own), [](const std::string& text, bool success) {
       if (success) {
@@ -42,8 +43,8 @@ void JoystickMapperNode::subscribe() {
     subscribeInLockstep();
     return;
   }
-  subscribeTopic<sensor_msgs::Joy>(
-      "joy", 1, [this](const sensor_msgs::JoyConstPtr& joy) { onJoy(*joy); }, Served::kWhereRead);
+  subscribeEvents<sensor_msgs::Joy>(
+      "joy", 1, [this](const JoyEvent& event) { onJoy(event); }, Served::kWhereRead);
   subscribeTopic<ControlMode>("control/mode", 1, [this](const ControlModeConstPtr& mode) {
     if (mode->mode != ControlMode::MANUAL && mode->mode != ControlMode::AUTO) return;
     std::lock_guard<std::mutex> lock(mutex_);
@@ -62,8 +63,19 @@ void JoystickMapperNode::joinThreads() {
   if (functions_) functions_->stop();
 }
 
-void JoystickMapperNode::onJoy(const sensor_msgs::Joy& joy) {
+bool JoystickMapperNode::ofTheStick(const JoyEvent& event) {
+  if (source_->accept(event.getPublisherName(), clock().steadySeconds())) return true;
+  if (source_->problem() != reported_source_) {
+    reported_source_ = source_->problem();
+    ROS_ERROR("%s", reported_source_.c_str());
+  }
+  return false;
+}
+
+void JoystickMapperNode::onJoy(const JoyEvent& event) {
   std::lock_guard<std::mutex> lock(mutex_);
+  if (!ofTheStick(event)) return;
+  const sensor_msgs::Joy& joy = *event.getConstMessage();
   const double time = clock().steadySeconds();
   ++joy_count_;
   if (mapper_->onJoy(joy.axes, joy.buttons, time)) {
@@ -153,7 +165,10 @@ void JoystickMapperNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWra
     status->summary(Level::WARN,
                     mapper_->options().device + (joy_count_ == 0 ? " has not been heard yet" : " is silent"));
   }
+  if (source_->refused() > diagnosed_refusals_) status->mergeSummary(Level::ERROR, source_->problem());
+  diagnosed_refusals_ = source_->refused();
   status->add("Messages (-)", joy_count_);
+  status->add("Messages of other nodes dropped (-)", source_->refused());
   status->add("Messages dropped (-)", mapper_->dropped());
   if (last_joy_ > 0.0) status->add("Silence (s)", time - last_joy_);
   status->add("Commands published (-)", command_sequence_);

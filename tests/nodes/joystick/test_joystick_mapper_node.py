@@ -9,10 +9,11 @@ import yaml
 
 from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import RepeatedJoy
-from xplane_bridge.harness import wait_until
+from xplane_bridge.harness import ManagedProcess, wait_until
 
 JOYSTICKS = Path(__file__).resolve().parents[3] / "config" / "joysticks"
 ROLL, PITCH, YAW, THROTTLE = 1, 2, 4, 8
+DROPPED = "Messages of other nodes dropped (-)"
 
 
 @pytest.fixture
@@ -107,6 +108,29 @@ def test_silent_device_ends_the_commands_and_is_said(world, mapper):
     assert len(world.commands.messages) == count
     stick.plug_in()
     world.commands.wait_for_next()
+
+
+def test_of_two_nodes_on_the_stick_one_counts_and_both_are_named(world, mapper):
+    import rospy
+
+    stick = mapper("logitech_extreme_3d_pro", axes=6, buttons=12)
+    stick.axes[0] = -1.0  # right
+    world.commands.wait_for(lambda c: c.roll == 1.0)
+    before = len(world.commands.messages)
+    left = f"{{axes: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], buttons: {[0] * 12}}}"
+    command = ["rostopic", "pub", "-r", "50", f"{world.namespace}/joy", "sensor_msgs/Joy", left]
+    other = ManagedProcess("other_hand", command, world.folder, env=world.env)
+    other.start()
+    try:
+        status = world.wait_for_diagnostics("joystick", lambda s: int(world.values_of(s)[DROPPED]) > 50)
+        assert status.level == 2
+        assert f"{rospy.get_name()} is on the stick, the messages of /rostopic_" in status.message
+        assert {c.roll for c in world.commands.messages[before:]} == {1.0}
+        assert world.node.output().count("two nodes publish joy") == 1
+        stick.pull_out()
+        world.commands.wait_for_next(lambda c: c.roll == -1.0, WAIT_S)
+    finally:
+        other.stop()
 
 
 def test_device_with_too_few_axes_is_named(world, mapper):

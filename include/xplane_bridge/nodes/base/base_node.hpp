@@ -234,10 +234,11 @@ class BaseNode {
   /// The same for a callback that needs to know the publisher.
   template <class Message>
   void subscribeEvents(const std::string& topic, uint32_t queue_size,
-                       std::function<void(const ros::MessageEvent<const Message>&)> callback) {
+                       std::function<void(const ros::MessageEvent<const Message>&)> callback,
+                       Served served = Served::kInTurn) {
     ros::SubscribeOptions options;
     options.initByFullCallbackType<const ros::MessageEvent<const Message>&>(topic, queue_size, std::move(callback));
-    subscribeWith(&options, Served::kInTurn);
+    subscribeWith(&options, served);
   }
 
   /// Advertises a service on the service thread, or on other `threads`. While stopping, calls fail at once. An

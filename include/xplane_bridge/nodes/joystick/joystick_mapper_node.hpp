@@ -13,6 +13,7 @@
 #include "xplane_bridge/core/control/command_repeat.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/joystick/joy_functions.hpp"
+#include "xplane_bridge/nodes/joystick/joy_source.hpp"
 
 namespace xplane_bridge {
 
@@ -21,7 +22,8 @@ core::JoystickOptions loadJoystickOptions(const ParamLoader& own);
 
 /// `joy` into `control/manual`, `control/surfaces`, `control/mode_request` and calls of tx_node's services, by one of
 /// config/joysticks/. Publishes on every joy message
-/// and, on a timer of its own, in between; nothing while the device is silent for longer than `joy_timeout`.
+/// and, on a timer of its own, in between; nothing while the device is silent for longer than `joy_timeout`. Where
+/// several nodes publish `joy`, one of them counts (JoySource).
 ///
 /// In lock-step it answers a frame when `lockstep/stick` has: by its joy, or by its lockstep/done. Surfaces and
 /// functions of buttons are left out there.
@@ -45,7 +47,10 @@ class JoystickMapperNode : public BaseNode {
   void answerFrames();
   void answer(const Frame& frame);
 
-  void onJoy(const sensor_msgs::Joy& joy);
+  using JoyEvent = ros::MessageEvent<const sensor_msgs::Joy>;
+  void onJoy(const JoyEvent& event);
+  /// Whether the node that sent it is on the stick. `mutex_` is held.
+  bool ofTheStick(const JoyEvent& event);
   void onTimer();
   /// Returns whether a command was published.
   bool publish(double now);
@@ -57,6 +62,7 @@ class JoystickMapperNode : public BaseNode {
   double period_ = 0.02;  // [s]
   std::mutex mutex_;      // the mapper: sticks, timer and diagnostics are three threads
   std::unique_ptr<core::JoystickMapper> mapper_;
+  std::unique_ptr<JoySource> source_;
   ros::Publisher command_publisher_;
   ros::Publisher request_publisher_;
   ros::Publisher surface_publisher_;  // where the file has surfaces
@@ -69,6 +75,8 @@ class JoystickMapperNode : public BaseNode {
   double last_joy_ = 0.0;  // [s] steady
   bool was_alive_ = false;
   std::string reported_problems_;
+  std::string reported_source_;
+  std::uint64_t diagnosed_refusals_ = 0;
   std::vector<std::string> reported_selection_;
 
   // In lock-step, of the subscriptions' thread.
