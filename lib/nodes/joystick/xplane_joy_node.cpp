@@ -62,6 +62,7 @@ void XplaneJoyNode::onValues(const core::RrefView& datagram, const core::Receive
   joy.buttons = stick_->buttons();
   publisher_.publish(joy);
   ++count_;
+  heard_ = clock().steadySeconds();
 }
 
 void XplaneJoyNode::report() {
@@ -80,9 +81,16 @@ void XplaneJoyNode::fillDiagnostics(diagnostic_updater::DiagnosticStatusWrapper*
   using Level = diagnostic_msgs::DiagnosticStatus;
   const std::lock_guard<core::HandlerMutex> lock(*mutex_);
   const std::string problem = stick_->problem();
-  status->summary(problem.empty() ? Level::OK : Level::WARN,
-                  problem.empty() ? "reading X-Plane's axes: " + stick_->describe() : problem);
+  const double silence = clock().steadySeconds() - heard_;
+  if (!problem.empty()) {
+    status->summary(Level::WARN, problem);
+  } else if (count_ > 0 && silence > common().stale_after) {
+    status->summaryf(Level::WARN, "nothing heard for %.1f s: does X-Plane run, and does its computer answer?", silence);
+  } else {
+    status->summary(Level::OK, "reading X-Plane's axes: " + stick_->describe());
+  }
   status->add("Messages (-)", count_);
+  if (count_ > 0) status->addf("Silence (s)", "%.1f", silence);
 }
 
 }  // namespace xplane_bridge

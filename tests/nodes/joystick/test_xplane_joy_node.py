@@ -92,6 +92,15 @@ def test_axes_go_by_what_x_planes_settings_assign_them_to(world, stick):
     joy.wait_for_next(timeout=WAIT_S)
 
 
+def test_an_x_plane_that_is_gone_is_said(world, stick):
+    joy = stick()
+    joy.wait_for(timeout=WAIT_S)
+    world.wait_for_diagnostics("device", lambda s: s.level == 0 and s.message.startswith("reading"), WAIT_S)
+    world.xplane.kill()
+    gone = world.wait_for_diagnostics("device", lambda s: s.level == 1 and "nothing heard for" in s.message, WAIT_S)
+    assert float(world.values_of(gone)["Silence (s)"]) > 0.0
+
+
 def test_without_a_joystick_nothing_is_published_and_it_is_said(world, stick):
     joy = stick("--joystick", "none", buttons=4, rate=20)
     world.wait_for_diagnostics("device", lambda s: s.level == 1 and "X-Plane has no joystick" in s.message, WAIT_S)

@@ -36,6 +36,7 @@ class XplaneJoyNode : public BaseNode {
   core::Subscription values_;
   ros::Publisher publisher_;
   std::uint64_t count_ = 0;
+  double heard_ = 0.0;  // [s] steady, of the last message
   std::string reported_;
 };
 
