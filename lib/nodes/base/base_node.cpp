@@ -83,8 +83,8 @@ void BaseNode::requireState(State wanted, const char* call) const {
 
 void BaseNode::initialize() {
   requireState(State::kCreated, "initialize");
-  const ParamLoader shared = ParamLoader::fromServer(handle_.getNamespace());
-  common_ = loadCommonOptions(shared);
+  shared_ = ParamLoader::fromServer(handle_.getNamespace());
+  common_ = loadCommonOptions(*shared_);
   if (common_.lockstep.enabled) {
     lockstep_clock_.emplace(host_clock_, core::toNanoseconds(common_.lockstep.start_time));
     topics_.keepAll();
@@ -93,7 +93,7 @@ void BaseNode::initialize() {
   moves_ros_time_ = movesRosTime();
   showRosTime();
   const ParamLoader own = ParamLoader::fromServer(private_handle_.getNamespace());
-  openWire(shared, own);
+  openWire(own);
   if (stampsBySimulator()) stampBySimulator();
   timers_ = std::make_unique<ClockTimers>(clock_, ros::getGlobalCallbackQueue());
   loadParameters(own);
@@ -102,7 +102,7 @@ void BaseNode::initialize() {
   takeOverShutdownRequest();
   // With its first log line roscpp registers the node once more, for a cached parameter. Were that the line that says
   // why it ends, the master would take the old node for a new one and end the node that has replaced it.
-  ROS_INFO("%s starts with %s", ros::this_node::getName().c_str(), givenText(shared, own).c_str());
+  ROS_INFO("%s starts with %s", ros::this_node::getName().c_str(), givenText(*shared_, own).c_str());
   diagnostics_ = std::make_unique<diagnostic_updater::Updater>(handle_, private_handle_);
   diagnostics_->setHardwareID("none");
   if (moves_ros_time_ && !lockstep()) subscribers_.push_back(followClock(&immediate_));

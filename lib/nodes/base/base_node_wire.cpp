@@ -9,12 +9,14 @@
 #include <system_error>
 #include <utility>
 
+#include "xplane_bridge/core/base/node_name.hpp"
 #include "xplane_bridge/core/wire/capture_hub.hpp"
 #include "xplane_bridge/core/wire/replay_hub.hpp"
 #include "xplane_bridge/core/wire/udp_hub.hpp"
 #include "xplane_bridge/core/wire/wire_log_hub.hpp"
 #include "xplane_bridge/nodes/base/base_node.hpp"
 #include "xplane_bridge/nodes/base/log_to_ros.hpp"
+#include "xplane_bridge/nodes/base/parameter_text.hpp"
 #include "xplane_bridge/nodes/base/user_folder.hpp"
 
 namespace xplane_bridge {
@@ -27,11 +29,12 @@ constexpr const char* kReplayPublished = "wire_replay_published";  // the node h
 constexpr const char* kReplayReceived = "wire_replay_received";    // and the recorder has all of it
 constexpr double kLongestDelivery = 120.0;                         // [s]
 constexpr std::uint64_t kBytesOfMegabyte = 1'000'000;
-const std::string kUserFile = "file ";  // scripts/wire_replay puts it where the node reads it
+constexpr const char* kUsualNamespace = "/xplane";  // of launch/*.launch
+const std::string kUserFile = "file ";              // scripts/wire_replay puts it where the node reads it
 
 }  // namespace
 
-void BaseNode::openWire(const ParamLoader& shared, const ParamLoader& own) {
+void BaseNode::openWire(const ParamLoader& own) {
   if (!usesLink()) return;
   const std::string replay = own.text("wire_replay", "");
   for (const char* key : {kReplayStart, kReplayPublished, kReplayReceived}) own.allow(key);
@@ -59,7 +62,7 @@ void BaseNode::openWire(const ParamLoader& shared, const ParamLoader& own) {
   if (common_.wire_log.empty()) return;
   core::WireFileOptions file;
   file.file = common_.wire_log;
-  file.node = name().substr(name().rfind('/') + 1);
+  file.node = core::nameInFiles(name(), kUsualNamespace);
   file.file_bytes = static_cast<std::uint64_t>(common_.wire_log_size) * kBytesOfMegabyte;
   file.parts = common_.wire_log_parts;
   XmlRpc::XmlRpcValue about;
@@ -67,9 +70,9 @@ void BaseNode::openWire(const ParamLoader& shared, const ParamLoader& own) {
   about["program"] = std::string(program_invocation_short_name);
   about["namespace"] = handle_.getNamespace();
   about["ordered"] = XmlRpc::XmlRpcValue(ordered);
-  if (const XmlRpc::XmlRpcValue known = shared.known(); known.valid()) about["shared"] = known;
+  if (const XmlRpc::XmlRpcValue known = shared_->known(); known.valid()) about["shared"] = known;
   if (own.tree().valid()) about["own"] = own.tree();
-  file.about = about.toXml();
+  file.about = withoutSecrets(about).toXml();
   auto log = std::make_shared<core::WireLog>(file, host_clock_, logToRos);
   std::unique_ptr<core::DatagramHub> below = std::move(hub_of_link_);
   const bool replays = below != nullptr;

@@ -7,6 +7,7 @@
 #include <ros/param.h>
 
 #include "xplane_bridge/core/base/text.hpp"
+#include "xplane_bridge/nodes/base/parameter_text.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -58,6 +59,11 @@ std::string show(const XmlRpcValue& value) {
   return out.str();
 }
 
+/// As show(), but for a secret, which the log must not have.
+std::string showValueOf(const std::string& key, const XmlRpcValue& value) {
+  return isSecret(core::afterLastSlash(key)) ? kSecret : show(value);
+}
+
 /// As show(), but lists with their elements.
 std::string showAll(const XmlRpcValue& value) {
   if (value.getType() != XmlRpcValue::TypeArray) {
@@ -92,7 +98,7 @@ std::string describe(const char* kind, Range<T> range) {
       wanted.find("one of") == std::string::npos) {
     hint = " (in YAML, quotes make a text, and so does an exponent without a decimal point: write 1.0e-3)";
   }
-  throw ParamError("parameter " + full_key + " is " + show(given) + ", but must be " + wanted + hint +
+  throw ParamError("parameter " + full_key + " is " + showValueOf(full_key, given) + ", but must be " + wanted + hint +
                    "; correct it in the YAML or launch file, or with: rosparam set " + full_key + " VALUE");
 }
 
@@ -338,7 +344,7 @@ std::vector<std::string> ParamLoader::given() const {
 
 void ParamLoader::collectGiven(std::size_t skipped, std::vector<std::string>* texts) const {
   for (const std::string& key : record_->given) {
-    texts->push_back(fullKey(key).substr(skipped) + ": " + showAll(tree_[key]));
+    texts->push_back(fullKey(key).substr(skipped) + ": " + (isSecret(key) ? kSecret : showAll(tree_[key])));
   }
   for (const ParamLoader& child : record_->children) {
     child.collectGiven(skipped, texts);
@@ -349,6 +355,15 @@ XmlRpcValue ParamLoader::known() const {
   XmlRpcValue out;
   for (const std::string& key : record_->known) {
     if (tree_.valid() && tree_.hasMember(key)) out[key] = tree_[key];
+  }
+  return out;
+}
+
+XmlRpcValue ParamLoader::asRead(const XmlRpcValue& later) const {
+  XmlRpcValue out = known();
+  if (later.getType() != XmlRpcValue::TypeStruct) return out;
+  for (const auto& [key, value] : later) {
+    if (record_->known.count(key) == 0) out[key] = value;
   }
   return out;
 }

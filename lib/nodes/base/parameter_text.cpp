@@ -16,6 +16,8 @@ namespace {
 using XmlRpc::XmlRpcValue;
 
 constexpr const char* kOfTheMachine[] = {"host", "port", "data_port", "beacon_port"};
+// Recordings are given to others. Those of src/xplane_bridge/wire_log/anonymous.py, too.
+constexpr const char* kSecrets[] = {"token"};
 
 template <class T>
 T as(const XmlRpcValue& value) {
@@ -112,6 +114,23 @@ XmlRpcValue withoutMachine(const XmlRpcValue& parameters) {
     const bool of_the_machine =
         std::find(std::begin(kOfTheMachine), std::end(kOfTheMachine), key) != std::end(kOfTheMachine);
     if (!of_the_machine) out[key] = withoutFolders(value);
+  }
+  return out;
+}
+
+bool isSecret(const std::string& key) {
+  return std::find(std::begin(kSecrets), std::end(kSecrets), key) != std::end(kSecrets);
+}
+
+XmlRpcValue withoutSecrets(const XmlRpcValue& parameters) {
+  XmlRpcValue out = parameters;
+  if (parameters.getType() == XmlRpcValue::TypeArray) {
+    for (int i = 0; i < out.size(); ++i) out[i] = withoutSecrets(out[i]);
+  } else if (parameters.getType() == XmlRpcValue::TypeStruct) {
+    for (auto& [key, value] : out) {
+      const bool unset = value.getType() == XmlRpcValue::TypeString && as<std::string>(value).empty();
+      value = isSecret(key) && !unset ? XmlRpcValue(kSecret) : withoutSecrets(value);
+    }
   }
   return out;
 }

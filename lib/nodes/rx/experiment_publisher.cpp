@@ -39,6 +39,7 @@ void ExperimentPublisher::advertise(ros::NodeHandle* handle) {
 XmlRpcValue ExperimentPublisher::readParameters(const ros::NodeHandle& handle) const {
   XmlRpcValue parameters;
   if (!handle.getParam(handle.getNamespace(), parameters)) return {};
+  parameters = withoutSecrets(shared_.asRead(parameters));
   return lockstep_ ? withoutMachine(parameters) : parameters;
 }
 

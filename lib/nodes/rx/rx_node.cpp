@@ -72,7 +72,7 @@ void RxNode::loadParameters(const ParamLoader& own) {
   missions_ =
       makeMissionPublishers(options_.rates, common().transport, common().frames, options_.publish_unheard, stamps);
   datarefs_ = std::make_unique<DatarefPublisher>(options_.datarefs, options_.publish_unheard, stamp_clock);
-  experiment_ = std::make_unique<ExperimentPublisher>(common());
+  experiment_ = std::make_unique<ExperimentPublisher>(common(), shared());
   if (options_.traffic_rate > 0) traffic_ = std::make_unique<TrafficPublisher>(options_.traffic_rate, stamps);
   addStreams();
 }

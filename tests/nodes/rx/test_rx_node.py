@@ -364,6 +364,25 @@ def test_the_passport_says_how_the_flight_is_made_and_changes_with_it(world, rx)
     assert len(passports.messages) <= 4
 
 
+def test_the_passport_has_what_is_flown_and_no_secret(world, rx):
+    from xplane_bridge.msg import Experiment
+
+    world.emulator(*KINEMATIC)
+    world.set_param("display_delay", 0.05)
+    world.set_param("capture_node/sender", {"listen": ":49790", "token": "window seat"})
+    passports = world.watch("experiment", Experiment)
+    rx()
+    first = json.loads(passports.wait_for(timeout=WAIT_S).parameters)
+    assert first["capture_node"]["sender"] == {"listen": ":49790", "token": "..."}
+    # As a launch file does that is started later in the namespace: rx_node keeps to what it has read.
+    for key, value in {"display_delay": 0.0, "transport": "data", "tx_node/rate": 50}.items():
+        world.set_param(key, value)
+    last = json.loads(passports.wait_for(lambda p: "tx_node" in p.parameters, WAIT_S).parameters)
+    assert last.pop("tx_node") == {"rate": 50}
+    assert last == first
+    assert first["display_delay"] == 0.05
+
+
 # --- parameters -------------------------------------------------------------------------------------------------------
 
 

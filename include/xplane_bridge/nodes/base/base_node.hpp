@@ -176,6 +176,8 @@ class BaseNode {
   }
 
   const CommonOptions& common() const { return common_; }
+  /// What they were read from. From loadParameters() on.
+  const ParamLoader& shared() const { return *shared_; }
   /// The clock everything in the node goes by. From loadParameters() on.
   const core::Clock& clock() const { return clock_; }
   /// For what must come about while clock() stands.
@@ -306,7 +308,7 @@ class BaseNode {
   void stampBySimulator();
   void subscribeWith(ros::SubscribeOptions* options, Served served);
   void showRosTime() const;
-  void openWire(const ParamLoader& shared, const ParamLoader& own);
+  void openWire(const ParamLoader& own);
   void startWire();
   void logUserFiles();
   void reportReplay() const;
@@ -364,6 +366,7 @@ class BaseNode {
   ros::NodeHandle handle_;
   ros::NodeHandle private_handle_;
   Advertiser topics_;
+  std::optional<ParamLoader> shared_;  // from initialize() on
   CommonOptions common_;
   const core::Clock host_clock_ = core::hostClock();
   core::Clock clock_;

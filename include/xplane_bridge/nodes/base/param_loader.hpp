@@ -74,11 +74,13 @@ class ParamLoader {
   std::vector<std::pair<std::string, double>> namedNumbers(Range<double> range) const;
 
   /// What was read here and in the sections below and is not the default given at the call, in the order of reading:
-  /// "port: 49010", "limits/upper: 1.5", values as on the parameter server.
+  /// "port: 49010", "limits/upper: 1.5", values as on the parameter server, secrets hidden.
   std::vector<std::string> given() const;
 
   /// What is set of the keys that were read so far; a struct, or invalid where there is none of them.
   XmlRpc::XmlRpcValue known() const;
+  /// What is set by now, `later`, with the keys that were read so far as they were then: absent where they were.
+  XmlRpc::XmlRpcValue asRead(const XmlRpc::XmlRpcValue& later) const;
   /// All that is set; invalid where nothing is.
   const XmlRpc::XmlRpcValue& tree() const { return tree_; }
 

@@ -14,4 +14,11 @@ std::string parameterText(const XmlRpc::XmlRpcValue& value);
 /// the paths of files and folders that exist all but the last part.
 XmlRpc::XmlRpcValue withoutMachine(const XmlRpc::XmlRpcValue& parameters);
 
+/// What stands for a secret in recordings, logs and messages.
+constexpr const char* kSecret = "...";
+/// Whether the values of a parameter of this name (without its namespace) are known to those alone who share them.
+bool isSecret(const std::string& key);
+/// Parameters with kSecret for each secret in them that is set.
+XmlRpc::XmlRpcValue withoutSecrets(const XmlRpc::XmlRpcValue& parameters);
+
 }  // namespace xplane_bridge

@@ -15,14 +15,16 @@ namespace xplane_bridge {
 /// Publishes `experiment`, the passport of a flight. One thread calls, or the caller locks, except readParameters().
 class ExperimentPublisher {
  public:
-  explicit ExperimentPublisher(const CommonOptions& common) : lockstep_(common.lockstep.enabled) {
+  /// @param shared what `common` was read from
+  ExperimentPublisher(const CommonOptions& common, const ParamLoader& shared)
+      : lockstep_(common.lockstep.enabled), shared_(shared) {
     message_.aircraft_file = common.aircraft;
   }
 
   void advertise(ros::NodeHandle* handle);
 
-  /// All parameters of the namespace, from the parameter server; takes as long as that does. No valid value: it does
-  /// not answer.
+  /// All parameters of the namespace, from the parameter server; takes as long as that does. The shared ones are those
+  /// that this node goes by: who is started later in the namespace may set others. No valid value: it does not answer.
   XmlRpc::XmlRpcValue readParameters(const ros::NodeHandle& handle) const;
   void setParameters(const XmlRpc::XmlRpcValue& parameters);
 
@@ -32,6 +34,7 @@ class ExperimentPublisher {
 
  private:
   const bool lockstep_;
+  const ParamLoader shared_;
   bool changed_ = true;
   Experiment message_;
   ros::Publisher publisher_;

@@ -182,5 +182,40 @@ TEST(ParamLoader, ReportsWhatWasGivenThatIsNoDefault) {
   EXPECT_TRUE(ParamLoader("/", XmlRpcValue()).given().empty());
 }
 
+TEST(ParamLoader, SaysNoSecret) {
+  XmlRpcValue tree;
+  tree["sender"]["token"] = std::string("window seat");
+  const ParamLoader sender = ParamLoader("/xplane/capture_node", tree).section("sender");
+  sender.text("token", "");
+  EXPECT_EQ(sender.given(), (std::vector<std::string>{"token: ..."}));
+  tree["sender"]["token"] = 1234;
+  const std::string message =
+      messageOf([&] { ParamLoader("/xplane/capture_node", tree).section("sender").text("token", ""); });
+  EXPECT_TRUE(contains(message, "sender/token is ..., but must be a text")) << message;
+}
+
+TEST(ParamLoader, KeepsWhatItReadWhenOthersAreSetLater) {
+  XmlRpcValue tree;
+  tree["host"] = std::string("192.168.1.2");
+  tree["lockstep"]["hold"] = true;
+  tree["others"] = 1;
+  const ParamLoader loader("/xplane", tree);
+  loader.text("host", "");
+  loader.text("transport", "rref");
+  loader.section("lockstep").boolean("hold", false);
+  XmlRpcValue later;
+  later["host"] = std::string("192.168.1.3");
+  later["transport"] = std::string("data");
+  later["others"] = 2;
+  later["tx_node"]["rate"] = 50;
+  const XmlRpcValue now = loader.asRead(later);
+  EXPECT_EQ(static_cast<const std::string&>(now["host"]), "192.168.1.2");
+  EXPECT_FALSE(now.hasMember("transport")) << "it was the default";
+  EXPECT_TRUE(static_cast<const bool&>(now["lockstep"]["hold"]));
+  EXPECT_EQ(static_cast<const int&>(now["others"]), 2);
+  EXPECT_EQ(static_cast<const int&>(now["tx_node"]["rate"]), 50);
+  EXPECT_EQ(static_cast<const std::string&>(loader.asRead(XmlRpcValue())["host"]), "192.168.1.2");
+}
+
 }  // namespace
 }  // namespace xplane_bridge

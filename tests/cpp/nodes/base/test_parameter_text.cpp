@@ -45,5 +45,18 @@ TEST(WithoutMachine, DropsAddressesAndFoldersOfWhatExists) {
   EXPECT_EQ(parameterText(withoutMachine(XmlRpcValue())), "null");
 }
 
+TEST(WithoutSecrets, HidesThoseThatAreSetWhereverTheyAre) {
+  XmlRpcValue tree;
+  tree["capture_node"]["sender"]["token"] = std::string("window seat");
+  tree["capture_node"]["sender"]["listen"] = std::string(":49790");
+  tree["left"]["capture_node"]["sender"]["token"] = std::string();
+  tree["list"][0]["token"] = 5;
+  EXPECT_EQ(parameterText(withoutSecrets(tree)),
+            "{\"capture_node\": {\"sender\": {\"listen\": \":49790\", \"token\": \"...\"}}, \"left\": "
+            "{\"capture_node\": {\"sender\": {\"token\": \"\"}}}, \"list\": [{\"token\": \"...\"}]}");
+  EXPECT_EQ(parameterText(tree["list"][0]["token"]), "5");
+  EXPECT_EQ(parameterText(withoutSecrets(XmlRpcValue())), "null");
+}
+
 }  // namespace
 }  // namespace xplane_bridge
