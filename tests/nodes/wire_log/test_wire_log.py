@@ -12,6 +12,7 @@ from support.nodes.wire_replays import (
     RawTopics,
     assert_replayed,
     assert_same_values,
+    log_of,
     payloads_in,
     replay,
     states_by_time,
@@ -46,7 +47,7 @@ def flight(new_world, tmp_path_factory):
         wait_until(lambda: count() >= before + 200, 60, "200 states after the restart")
         node.stop()
         heard.close()
-        log = folder / "wire.rx_node.pcapng"
+        log = log_of(folder, world.namespace, "rx_node")
         assert node.returncode == 0, node.describe("")
         yield world.namespace, log, heard.payloads, folder
     finally:
@@ -143,7 +144,7 @@ def test_a_recording_becomes_a_regression_test(flight):
     kept = folder / "kept"
     done = replay(path, "--regression", kept)
     assert done.returncode == 0, done.stdout + done.stderr
-    recording, file = kept / "wire.rx_node.pcapng", kept / "wire.rx_node.json"
+    recording, file = kept / path.name, kept / path.with_suffix(".json").name
     expected = json.loads(file.read_text(encoding="utf-8"))
     assert expected["options"] == {"xplane": None, "set": {}}
     done = replay(recording, "--expect", file)

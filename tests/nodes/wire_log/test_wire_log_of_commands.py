@@ -8,7 +8,7 @@ import pytest
 
 from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import AUTO, PITCH, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
-from support.nodes.wire_replays import RawTopics, assert_replayed, by_number, payloads_in, replay
+from support.nodes.wire_replays import RawTopics, assert_replayed, by_number, log_of, payloads_in, replay
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.wire_log import records
 from xplane_bridge.wire_log.own_log import OwnLog
@@ -106,7 +106,7 @@ def flight(new_world, tmp_path_factory):
         heard.close()
         assert node.returncode == 0, node.describe("")
         world.wire.wait(SURFACES, 0.0)
-        yield world.namespace, folder / "wire.tx_node.pcapng", heard.payloads, folder
+        yield world.namespace, log_of(folder, world.namespace, "tx_node"), heard.payloads, folder
     finally:
         for source in sources:
             source.stop()
@@ -139,7 +139,7 @@ def test_the_replay_sends_the_flights_datagrams(flight):
     done = replay(path, "-o", bag, "--sent", again, "--logs", folder / "logs")
     assert done.returncode == 0, done.stdout + done.stderr
     recorded = sent_in(log)
-    sent = sent_in(OwnLog(folder / "again.tx_node.pcapng"))
+    sent = sent_in(OwnLog(log_of(folder, namespace, "tx_node", "again")))
     assert len(recorded) > 300
     first = next((i for i, pair in enumerate(zip(recorded, sent)) if pair[0] != pair[1]), None)
     assert first is None, f"datagram {first} of {len(recorded)}: {recorded[first]} was sent as {sent[first]}"
@@ -155,18 +155,18 @@ def test_the_replay_sends_the_flights_datagrams(flight):
 
 
 def test_two_replays_are_the_same(flight):
-    _, path, _, folder = flight
+    namespace, path, _, folder = flight
     digests = []
     for name in ("one", "two"):
         done = replay(path, "--sent", folder / f"{name}.pcapng")
         assert done.returncode == 0, done.stdout + done.stderr
-        sent = sent_in(OwnLog(folder / f"{name}.tx_node.pcapng"))
+        sent = sent_in(OwnLog(log_of(folder, namespace, "tx_node", name)))
         digests.append(hashlib.sha256(repr(sent).encode()).hexdigest())
     assert digests[0] == digests[1]
 
 
 def test_a_log_that_is_cut_off_replays_up_to_there(flight):
-    _, path, _, folder = flight
+    namespace, path, _, folder = flight
     data = path.read_bytes()
     cut = folder / "cut.tx_node.pcapng"
     cut.write_bytes(data[: len(data) // 2 + 1])
@@ -174,4 +174,4 @@ def test_a_log_that_is_cut_off_replays_up_to_there(flight):
     assert done.returncode == 0, done.stdout + done.stderr
     assert "is cut off; the replay ends there" in done.stdout
     recorded = sent_in(OwnLog(cut))
-    assert sent_in(OwnLog(folder / "cut_again.tx_node.pcapng"))[: len(recorded)] == recorded
+    assert sent_in(OwnLog(log_of(folder, namespace, "tx_node", "cut_again")))[: len(recorded)] == recorded

@@ -11,6 +11,7 @@ from support.nodes.wire_replays import (
     RawTopics,
     assert_replayed,
     assert_same_values,
+    log_of,
     payloads_in,
     replay,
     states_by_time,
@@ -98,7 +99,7 @@ def test_a_flight_with_drops_a_restart_and_another_version_replays(world, second
     node.stop()
     heard.close()
     assert node.returncode == 0, node.describe("")
-    log = OwnLog(world.folder / "wire.rx_node.pcapng")
+    log = OwnLog(log_of(world.folder, world.namespace, "rx_node"))
     received = sum(event.kind == records.RECEIVED for event in log.events())
     assert log.problem == ""
     assert received > 0.9 * flown
@@ -118,6 +119,7 @@ def test_the_parts_that_were_kept_replay_without_the_first(world):
     """The oldest part is deleted for a further one: what is left shows the same flight, from where it begins."""
     world.set_param("wire_log", str(world.folder / "wire.pcapng"))
     world.set_param("wire_log_size", 1)
+    first = log_of(world.folder, world.namespace, "rx_node")
     heard = RawTopics(world.namespace, TOPICS)
     emulator = SteppedEmulator(world, VERSIONS[0])
     try:
@@ -126,16 +128,16 @@ def test_the_parts_that_were_kept_replay_without_the_first(world):
 
         def parts() -> int:
             emulator.fly(AT_ONCE)
-            return len(list(world.folder.glob("wire.rx_node*.pcapng")))
+            return len(list(world.folder.glob(f"{first.stem}*.pcapng")))
 
         wait_until(lambda: parts() >= 4, 120, "four parts")
         node.stop()
     finally:
         emulator.end()
     heard.close()
-    (world.folder / "wire.rx_node.pcapng").unlink()
+    first.unlink()
     bag = world.folder / "rest.bag"
-    done = replay(world.folder / "wire.rx_node_part2.pcapng", "-o", bag)
+    done = replay(first.with_name(f"{first.stem}_part2.pcapng"), "-o", bag)
     assert done.returncode == 0, done.stdout + done.stderr
     there, here = (
         states_by_time(payloads[f"{world.namespace}/flight_state"]) for payloads in (heard.payloads, payloads_in(bag))

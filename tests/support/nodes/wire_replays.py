@@ -15,6 +15,12 @@ from xplane_bridge.resources import program
 REPLAY_S = 300.0
 
 
+def log_of(folder: Path, namespace: str, node: str, stem: str = "wire") -> Path:
+    """The file that a node of a test's namespace writes with `wire_log` at STEM.pcapng: other than in /xplane, it has
+    the namespace in its name."""
+    return folder / f"{stem}.{namespace.strip('/').replace('/', '.')}.{node}.pcapng"
+
+
 class RawTopics:
     """The payloads of topics, as a recorder gets them.
 

@@ -15,5 +15,13 @@ TEST(IsNamed, TakesAFullNameAsItIsAndAShortOneInAnyNamespace) {
   EXPECT_FALSE(isNamed("/a/b/c", "b"));
 }
 
+TEST(NameInFiles, IsTheWholeNameOutsideTheUsualNamespace) {
+  EXPECT_EQ(nameInFiles("/xplane/rx_node", "/xplane"), "rx_node");
+  EXPECT_EQ(nameInFiles("/first/rx_node", "/xplane"), "first.rx_node");
+  EXPECT_EQ(nameInFiles("/xplane/left/capture_node", "/xplane"), "xplane.left.capture_node");
+  EXPECT_EQ(nameInFiles("/xplane2/rx_node", "/xplane"), "xplane2.rx_node");
+  EXPECT_EQ(nameInFiles("/rx_node", "/xplane"), "rx_node");
+}
+
 }  // namespace
 }  // namespace xplane_bridge::core
