@@ -56,12 +56,14 @@ def write_report(
     Raises:
         BagError: The bags cannot be read.
         LabelError: The labels cannot be read.
+        PageError: `output` is a recording.
         ReportError: The file cannot be written; or it is, and shows no flight, because no flight state was recorded.
     """
     from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.flight import read_flight
     from xplane_bridge.labels import table
     from xplane_bridge.plotting import report, static
+    from xplane_bridge.plotting.page_file import refuse_recordings, write_page
 
     known = table.read(labels) if labels else None
 
@@ -70,12 +72,13 @@ def write_report(
             static.save(figure, flight.start, png / f"{figure.key}.png")
 
     with Bags(list(bag_paths)) as bags:
+        refuse_recordings(output, bags.paths)
         try:
             for folder in (output.parent, png):
                 if folder is not None:
                     folder.mkdir(parents=True, exist_ok=True)
             flight = read_flight(bags, ColumnFile(output.parent))
-            output.write_text(report.build(bags, flight, known, save), encoding="utf-8")
+            write_page(output, report.build(bags, flight, known, save))
         except OSError as error:
             msg = f"{error.filename or output}: {error.strerror}"
             raise ReportError(msg) from None

@@ -12,6 +12,7 @@ from xplane_bridge.cli.entry import guarded, number
 from xplane_bridge.cli.linearise_model import add_output_arguments, write_outputs
 from xplane_bridge.identification.coefficients import read_geometry
 from xplane_bridge.identification.model import AXES, IdentificationError
+from xplane_bridge.plotting.page_file import refuse_recordings, write_page
 
 
 def parser() -> argparse.ArgumentParser:
@@ -53,6 +54,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     if geometry is None and args.aircraft is not None:
         geometry = named_geometry(args.aircraft)
     with Bags(args.bags) as bags:
+        for output in filter(None, [args.report, *(args.output or [])]):
+            refuse_recordings(Path(output), bags.paths)
         flight = read_flight(bags)
         aircraft = recorded_aircraft(read_passports(bags))
     without = aircraft.why_not if geometry is None else ""
@@ -78,7 +81,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 def _write_page(page: str, path: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(page, encoding="utf-8")
+        write_page(path, page)
     except OSError as error:
         msg = f"{path}: {error.strerror or error}"
         raise IdentificationError(msg) from None

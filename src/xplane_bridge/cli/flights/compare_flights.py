@@ -75,11 +75,13 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the program."""
     from xplane_bridge.plotting import comparison
+    from xplane_bridge.plotting.page_file import refuse_recordings, write_page
 
     args = parser().parse_args(argv)
     if args.match and args.event is not None:
         raise CompareError("--match and --event: give one of them")
     given = paths_of(args.flights)
+    refuse_recordings(args.output, (path for paths, _ in given for path in paths))
     try:
         args.output.parent.mkdir(parents=True, exist_ok=True)
         store = ColumnFile(args.output.parent)
@@ -99,7 +101,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     flights = [matched(each, name, by, args.event) for each, name in zip(found, names)]
     text = comparison.build(flights, [each.passport for each in found], zero)
     try:
-        args.output.write_text(text, encoding="utf-8")
+        write_page(args.output, text)
     except OSError as error:
         raise CompareError(f"{args.output}: {error.strerror}") from None
     print(args.output)
