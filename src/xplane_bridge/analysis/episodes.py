@@ -40,6 +40,18 @@ def from_values(time: np.ndarray, labels: Sequence[str], end: int) -> list[Episo
     return out
 
 
+def within(stretches: Iterable[Episode], start: int, end: int) -> list[Episode]:
+    """What of them lies in a stretch of time: a latched message is as old as what it says, and the recording is not.
+
+    Args:
+        stretches: Of which those outside are left out.
+        start: [ns]
+        end: [ns]
+    """
+    cut = [Episode(max(e.start, start), min(e.end, end), e.label) for e in stretches]
+    return [e for e in cut if e.end > e.start]
+
+
 def who_flew(time: np.ndarray, modes: Iterable[int], failsafes: Iterable[bool], end: int) -> list[Episode]:
     """Give the stretches flown by ``manual``, ``auto`` or, while their source was silent, ``failsafe``.
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Callable, Optional, Sequence
 
 import numpy as np
 
-from xplane_bridge.analysis.episodes import Episode, from_sets, from_values, who_flew
+from xplane_bridge.analysis.episodes import Episode, from_sets, from_values, who_flew, within
 from xplane_bridge.constants import ControlField
 from xplane_bridge.plotting.spec import Panel, PathFigure, Series, TimeFigure
 
@@ -46,7 +46,11 @@ def all_figures() -> list[tuple[str, str, Callable[[Flight], TimeFigure | PathFi
 
 
 def episodes(flight: Flight) -> list[tuple[str, Episode]]:
-    """Give the stretches to shade: who flew, failures, excitations, disturbances of the air."""
+    """Give the stretches of the flight to shade: who flew, failures, excitations, disturbances of the air."""
+    return [(kind, cut) for kind, e in _episodes(flight) for cut in within([e], flight.start, flight.end)]
+
+
+def _episodes(flight: Flight) -> list[tuple[str, Episode]]:
     out: list[tuple[str, Episode]] = []
     if "mode" in flight.tables:
         table = flight.tables["mode"]

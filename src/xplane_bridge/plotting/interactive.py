@@ -110,9 +110,7 @@ def _rounded(values: np.ndarray) -> np.ndarray:
 
 
 def _path(figure: PathFigure) -> go.Figure:
-    index = np.unique(np.linspace(0, len(figure.east) - 1, MAX_POINTS).astype(int))
-    breaks = np.flatnonzero(~np.isfinite(figure.east))
-    index = np.union1d(index, breaks)
+    index = figure.thinned(MAX_POINTS)
     east, north, up, colour = (
         _rounded(values[index]) for values in (figure.east, figure.north, figure.up, figure.colour)
     )

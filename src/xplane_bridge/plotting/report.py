@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Callable, Optional, Sequence, Union
 import numpy as np
 
 from xplane_bridge.analysis.consistency import Check, check_flight, check_odometry
-from xplane_bridge.analysis.episodes import from_values, who_flew
+from xplane_bridge.analysis.episodes import from_values, who_flew, within
 from xplane_bridge.analysis.odometry import of_frames
 from xplane_bridge.analysis.quality import bit_shares, pace, timing
 from xplane_bridge.analysis.resampling import held
@@ -114,10 +114,17 @@ def _who_flew(flight: Flight) -> str:
     end = max(flight.end, int(table.stamp[-1]))
     for stretch in who_flew(table.stamp, table["mode"], table["failsafe"], end):
         first = int(np.searchsorted(table.stamp, stretch.start, side="right")) - 1
+        begin = max(stretch.start, _recorded_from(table, flight))
         who = f'<span class="bad">{stretch.label}</span>' if stretch.label == "failsafe" else stretch.label
         why, asked_by = (html.escape(str(table[name][first])) for name in ("reason", "requested_by"))
-        rows.append((_seconds(stretch.start, flight), f"{(stretch.end - stretch.start) / 1e9:.1f}", who, why, asked_by))
+        if stretch.end > begin:
+            rows.append((_seconds(begin, flight), f"{(stretch.end - begin) / 1e9:.1f}", who, why, asked_by))
     return "<h3>Who flew</h3>" + rows_table(("at [s]", "for [s]", "who", "why", "asked by"), rows, (0, 1))
+
+
+def _recorded_from(table: Table, flight: Flight) -> int:
+    """[ns] from which on a latched topic was recorded: its first message may be as old as the bridge."""
+    return min(flight.start, int(table.time[0]))
 
 
 def _scenario(flight: Flight) -> str:
@@ -138,9 +145,10 @@ def _links(flight: Flight) -> str:
 
 def _stretches(title: str, column: str, table: Table, labels: Sequence[str], flight: Flight) -> str:
     """List what was so for how long: of a latched topic's messages, the label of each."""
+    end = max(flight.end, int(table.stamp[-1]))
     rows = [
         (_seconds(e.start, flight), f"{(e.end - e.start) / 1e9:.1f}", html.escape(e.label))
-        for e in from_values(table.stamp, labels, max(flight.end, int(table.stamp[-1])))
+        for e in within(from_values(table.stamp, labels, end), _recorded_from(table, flight), end)
     ]
     return f"<h3>{title}</h3>" + rows_table(("at [s]", "for [s]", column), rows, (0, 1))
 

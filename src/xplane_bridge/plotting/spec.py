@@ -78,3 +78,8 @@ class PathFigure:
     colour_label: str
     in_space: bool  #: 3-D
     note: str = ""
+
+    def thinned(self, most: int) -> np.ndarray:
+        """Rows to draw: about `most`, evenly, and all that interrupt the line (NaN)."""
+        rows = np.unique(np.linspace(0, len(self.east) - 1, most).astype(int))
+        return np.union1d(rows, np.flatnonzero(~np.isfinite(self.east)))

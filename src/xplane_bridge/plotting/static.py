@@ -66,7 +66,7 @@ def _time(figure: TimeFigure, start: int) -> Figure:
 
 def _path(figure: PathFigure) -> Figure:
     made = Figure(figsize=(8, 6.4), layout="constrained")
-    index = np.unique(np.linspace(0, len(figure.east) - 1, _MAX_POINTS).astype(int))
+    index = figure.thinned(_MAX_POINTS)
     east, north, up, colour = (values[index] for values in (figure.east, figure.north, figure.up, figure.colour))
     if figure.in_space:
         axes = made.add_subplot(projection="3d")

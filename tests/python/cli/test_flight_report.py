@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -15,7 +18,11 @@ import pytest
 from support.flights.export_flight import write_flight
 from support.flights.synthetic_flight import FlightBag, stamp_ns, write_states
 from xplane_bridge.analysis.quality import QUALITY_WORDS
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.flight import read_flight
 from xplane_bridge.cli import flight_report
+from xplane_bridge.plotting import flight_figures
+from xplane_bridge.plotting.page_file import write_page
 from xplane_bridge.plotting.spec import SHADES, Panel, Series
 from xplane_bridge.resources import share_dir
 
@@ -366,6 +373,7 @@ def test_long_flights_stay_small_and_keep_their_peaks(tmp_path: Path) -> None:
         (["none.bag"], "No such file"),
         (["empty.bag"], "nothing was recorded"),
         (["good.bag", "-o", "dir"], "Is a directory"),
+        (["good.bag", "-o", "./good.bag"], "good.bag: the recording itself is there; expected another file"),
     ],
 )
 def test_errors_are_one_line(
@@ -380,6 +388,44 @@ def test_errors_are_one_line(
     err = capsys.readouterr().err
     assert text in err
     assert err.count("\n") == 1
+    assert (tmp_path / "good.bag").read_bytes().startswith(b"#ROSBAG V2.0")
+
+
+def test_a_bag_whose_name_is_no_text_has_a_report(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"fl\xfcg.bag")
+    write_states(path, 0.1, 50.0)
+    assert flight_report.main([str(path), "-o", str(tmp_path / "r.html")]) == 0
+    assert "fl\\udcfcg.bag" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+def test_an_earlier_report_stays_where_the_new_one_cannot_be_written(tmp_path: Path, monkeypatch: Any) -> None:
+    def full(_self: Path, _data: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device", "part")
+
+    page = tmp_path / "r.html"
+    write_page(page, "earlier")
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match=r"No space left on device: .*r\.html"):
+        write_page(page, "later")
+    assert page.read_text() == "earlier"
+    assert list(tmp_path.iterdir()) == [page]
+
+
+def test_a_mode_that_is_older_than_the_recording_does_not_stretch_it(tmp_path: Path) -> None:
+    """control/mode is latched: its first message came 600 s before the recording that has it."""
+    path = tmp_path / "f.bag"
+    with FlightBag(path) as bag:
+        mode = {"header": bag.header(stamp_ns(-600.0), ""), "mode": 1, "reason": "start"}
+        bag.add("/xplane/control/mode", "xplane_bridge/ControlMode", stamp_ns(-1.0), mode)
+        for k in range(100):
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 50), bag.state(k / 50, k))
+    with Bags(path) as bags:
+        flight = read_flight(bags)
+    shaded = [(e.start - flight.start, e.end - flight.start) for _, e in flight_figures.episodes(flight)]
+    assert shaded == [(0, flight.end - flight.start)]
+    assert flight_report.main([str(path), "-o", str(tmp_path / "r.html")]) == 0
+    table = re.search(r"Who flew</h3>.*?</table>", (tmp_path / "r.html").read_text()).group(0)
+    assert re.findall(r"<td[^>]*>([^<]*)</td>", table)[:5] == ["-1.0", "3.0", "manual", "start", ""]
 
 
 def test_a_value_that_only_rounds_does_not_fill_its_axes_with_noise() -> None:

@@ -10,12 +10,14 @@ import pytest
 from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import Flight, read_flight
+from xplane_bridge.plotting import interactive, static
 from xplane_bridge.plotting.flight_figures import all_figures
+from xplane_bridge.plotting.spec import PathFigure
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from xplane_bridge.plotting.spec import PathFigure, TimeFigure
+    from xplane_bridge.plotting.spec import TimeFigure
 
 
 def figure(flight: Flight, wanted: str) -> TimeFigure | PathFigure:
@@ -85,3 +87,12 @@ def test_the_track_is_broken_at_a_new_origin(tmp_path: Path) -> None:
     track = figure(read(tmp_path / "origin.bag"), "track")
     assert np.nanmax(np.abs(np.diff(track.north))) < 3.01
     assert np.flatnonzero(np.isnan(track.north)).tolist() == [50]
+
+
+def test_a_thinned_track_stays_interrupted_in_every_figure() -> None:
+    east = np.arange(20001.0)
+    east[9_999] = np.nan
+    track = PathFigure("track", "Ground track", east, east, east, np.zeros(20001), "altitude", in_space=False)
+    for drawn in (static._path(track).axes[0].lines[0].get_xdata(), interactive._path(track).data[0].x):
+        assert len(drawn) < 20001
+        assert np.isnan(np.asarray(drawn, dtype=float)).sum() == 1
