@@ -308,7 +308,8 @@ void FailureManager::watchObeyed() {
     obeyed_.erase(name);
     const std::string blocked = surfaces_->blockReasonFor(pending.plan.surface->surface);
     if (!blocked.empty()) {  // better X-Plane's failure than none
-      std::string why = name + ": X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: ";
+      std::string why =
+          name + ": X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: ";
       why += blocked;
       report_(why, pending.who, false);
       continue;
