@@ -8,7 +8,7 @@ import json
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Iterator, List, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Dict, Iterator, List, Optional, Sequence, Union
 
 import numpy as np
 
@@ -103,22 +103,25 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         responses = command_responses(bags)
     require_usable(display, "pictures")
     print(f"display delay       {_text(display)}   gain {display.gain:.3f}, {display.samples} pairs of pictures")
+    usable = {"display delay": display}
+    numbers: Dict[str, Dict[str, Union[float, str]]] = {"display_delay": _numbers(display)}
     for name, result in responses.items():
         try:
             require_usable(result, name, gain_range=None)
         except LatencyError as error:
             print(f"{name:<19} not determined: {error}")
+            numbers[name] = {"not_determined": str(error)}
         else:
             print(f"{name:<19} {_text(result)}")
+            usable[name], numbers[name] = result, _numbers(result)
     try:
         if args.plot:
             from xplane_bridge.plotting.latency import save
 
-            save({"display delay": display, **responses}, args.plot)
+            save(usable, args.plot)
             print(args.plot)
         if args.json:
-            numbers = {name: _numbers(value) for name, value in {"display_delay": display, **responses}.items()}
-            args.json.write_text(json.dumps(numbers, indent=2) + "\n")
+            args.json.write_text(json.dumps(numbers, indent=2, allow_nan=False) + "\n")
     except OSError as error:
         msg = f"{error.filename}: {error.strerror}"
         raise LatencyError(msg) from None
@@ -285,6 +288,6 @@ def _text(result: Delay) -> str:
     return f"{1e3 * result.delay:7.1f} ms   95 % interval {low:.1f} .. {high:.1f} ms"
 
 
-def _numbers(result: Delay) -> dict[str, float]:
+def _numbers(result: Delay) -> Dict[str, Union[float, str]]:
     names = ("delay", "sigma", "low", "high", "gain", "drift", "correlation", "samples")
     return {name: getattr(result, name) for name in names}

@@ -67,7 +67,7 @@ def add_picture(bag: FlightBag, painter: Painter, window: Window, k: int, scale:
     bag.add(f"{window.topics}/frame_state", "xplane_bridge/FrameState", stamp_ns(t), frame)
 
 
-def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False) -> None:
+def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False, aileron: float = 15.0) -> None:
     painter = Painter(320, 240, (47.02, 8.0))
     with FlightBag(path) as bag:
         for k in range(round(DURATION_S * 60)):
@@ -80,7 +80,8 @@ def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = 
                 command = {"header": bag.header(stamp_ns(t), ""), "roll": math.sin(2.1 * new)}
                 bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", stamp_ns(t), command)
             if k % 3 == 0:  # the aileron follows the stick by 45 ms
-                surface = {"header": bag.header(stamp_ns(t), ""), "delta_aileron": 15.0 * math.sin(2.1 * (t - 0.045))}
+                moved = aileron * math.sin(2.1 * (t - 0.045))
+                surface = {"header": bag.header(stamp_ns(t), ""), "delta_aileron": moved}
                 bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", stamp_ns(t), surface)
             if k % 2 == 0 and t > 0.5:
                 for window in windows:
@@ -100,6 +101,18 @@ def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.C
     assert results["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
     assert results["roll command"]["gain"] == pytest.approx(15.0, abs=0.1)
     assert plot.stat().st_size > 5000
+
+
+def test_what_is_not_determined_is_no_number(tmp_path: Path) -> None:
+    bag, plot, numbers = tmp_path / "still.bag", tmp_path / "delay.png", tmp_path / "delay.json"
+    write_bag(bag, Window(0.05), aileron=0.0)
+    assert main([str(bag), "--plot", str(plot), "--json", str(numbers)]) == 0
+    text = numbers.read_text()
+    assert "Infinity" not in text
+    assert "NaN" not in text
+    assert list(json.loads(text)["roll command"]) == ["not_determined"]
+    height, width = cv2.imread(str(plot)).shape[:2]
+    assert width / height == pytest.approx(7.0 / 2.4, rel=0.02)  # one panel
 
 
 def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Path) -> None:
