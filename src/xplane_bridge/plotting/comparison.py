@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from typing import TYPE_CHECKING, Optional, Sequence
+from typing import TYPE_CHECKING, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -167,6 +167,14 @@ def _overlaid(flights: Sequence[Matched], column: str) -> Panel:
     return Panel(f"{name} [{unit}]", series)
 
 
+def _interrupted(reference: Matched, time: np.ndarray, delta: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Differences at some of the reference's samples, with NaN where others are left out, and between its parts."""
+    rows = np.searchsorted(reference.time, time)
+    starts = [part.start for part in reference.parts[1:]]
+    at = np.flatnonzero((np.diff(rows) > 1) | np.isin(rows[1:], starts)) + 1
+    return np.insert(time, at, (time[at - 1] + time[at]) / 2.0), np.insert(delta, at, np.nan)
+
+
 def _between(flights: Sequence[Matched], column: str) -> Panel:
     name, unit, factor, _ = SIGNALS[column]
     series = []
@@ -174,7 +182,8 @@ def _between(flights: Sequence[Matched], column: str) -> Panel:
         if column in flight.values and column in flights[0].values:
             time, delta = difference(flights[0], flight, column)
             if len(time):
-                series.append(Series(flight.name, _ns(time), delta * factor))
+                time, delta = _interrupted(flights[0], time, delta * factor)
+                series.append(Series(flight.name, _ns(time), delta))
     return Panel(f"{name} [{unit}]", series)
 
 

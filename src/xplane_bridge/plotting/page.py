@@ -107,7 +107,8 @@ def number(value: Any, digits: int = 4) -> str:
         return "&ndash;"
     if np.isinf(number):
         return "&infin;" if number > 0.0 else "-&infin;"
-    return f"{number:.{digits}g}" if abs(number) < 10**digits else f"{number:,.0f}"
+    text = f"{number:.{digits}g}"
+    return text if abs(float(text)) < 10**digits else f"{number:,.0f}"  # 9999.7 has five digits once rounded to four
 
 
 def rows_table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:

@@ -18,7 +18,7 @@ from xplane_bridge.analysis.comparison import (
     signal_differences,
     welch,
 )
-from xplane_bridge.plotting.comparison import build
+from xplane_bridge.plotting.comparison import _between, build
 
 
 def flight(offset=0.0, shift=0.0, variant="a", scores=None, name="roll_deg", wrap=False):
@@ -148,3 +148,16 @@ def test_the_page_shows_that_one_settles_and_the_other_never_does(before, after,
     assert rows[0][1:] == [shown[value] for value in (*before, *after)]
     assert " ".join(rows[1][1:5]) == cells
     assert re.sub(r"<.*?>", "", rows[1][5]) == words
+
+
+def test_the_line_of_differences_is_interrupted_where_the_one_or_the_other_is():
+    gappy, cut = flight(1.0), flight()
+    keep = (gappy.time < 20.0) | (gappy.time > 30.0)
+    first = int(np.sum(gappy.time < 20.0))
+    parts = [slice(0, first), slice(first, int(keep.sum()))]
+    cut = Matched("g", "a", gappy.time[keep], {"roll_deg": cut.values["roll_deg"][keep]}, parts)
+    for flights in ([gappy, cut], [cut, gappy]):
+        (series,) = _between(flights, "roll_deg").series
+        assert np.flatnonzero(np.isnan(series.values)).tolist() == [first]
+        assert 20e9 < series.time[first] < 30e9
+        assert (np.diff(series.time) > 0).all()
