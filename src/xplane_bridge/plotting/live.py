@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import itertools
 import sys
 import threading
 import time
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _REFRESH_MS = 50
 _WINDOWLESS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")  #: matplotlib's backends
+_ARRIVALS = itertools.count(1)  #: of samples of all series, in their order: stamps do not say it over a restart
 
 
 def can_show() -> bool:
@@ -39,6 +41,8 @@ class RollingSeries:
 
     def __init__(self, name: str, window: float) -> None:
         self.name = name
+        self.latest = 0  #: number of its newest sample among those of all series
+        self.restarted = 0  #: number of the sample with which it last began anew; 0: it never did
         self._window = window
         self._samples: collections.deque[tuple[float, float]] = collections.deque()
         self._lock = threading.Lock()
@@ -48,6 +52,9 @@ class RollingSeries:
         with self._lock:
             if self._samples and stamp < self._samples[-1][0]:
                 self._samples.clear()
+                self.restarted = self.latest = next(_ARRIVALS)
+            else:
+                self.latest = next(_ARRIVALS)
             self._samples.append((stamp, value))
             while self._samples[0][0] < stamp - self._window:
                 self._samples.popleft()
@@ -132,11 +139,16 @@ class LiveWindow:
         """Draw the newest samples, unless paused."""
         if self._paused:
             return
-        now = max((times[-1] for times, _ in self._all() if len(times)), default=0.0)
+        every = [series for _, group in self._groups for series in group]
+        # Stamps from before a restart that has set the clock back are of no use to find out what is now.
+        restart = max((series.restarted for series in every), default=0)
+        ends = [series.arrays()[0][-1:] for series in every if series.latest >= restart]
+        now = max((float(end[0]) for end in ends if len(end)), default=0.0)
         for ax, lines, (_, group) in zip(self._axes, self._lines, self._groups):
             for line, series in zip(lines, group):
                 times, values = series.arrays()
-                line.set_data(times - now, values)
+                shown = slice(0) if series.latest < restart and (times[-1:] > now).any() else slice(None)
+                line.set_data(times[shown] - now, values[shown])
             ax.relim()
             ax.autoscale_view(scalex=False)
         self._axes[-1].set_xlim(-self._window, 0.0)
@@ -145,9 +157,6 @@ class LiveWindow:
     def save(self, path: Path) -> None:
         """Write what the window shows."""
         self.figure.savefig(path, dpi=120)
-
-    def _all(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        return [series.arrays() for _, group in self._groups for series in group]
 
     def _title(self) -> None:
         state = "paused" if self._paused else "live"

@@ -110,6 +110,24 @@ def test_a_series_keeps_its_window_and_begins_anew_when_time_goes_back() -> None
     assert series.arrays()[0].tolist() == [5.0]
 
 
+def test_a_restart_that_sets_the_clock_back_is_shown_while_another_topic_is_silent(tmp_path: Path) -> None:
+    matplotlib.use("Agg")
+    flown, silent = RollingSeries("roll", 60.0), RollingSeries("wind", 60.0)
+    window = LiveWindow([("a", [flown]), ("b", [silent])], 60.0, tmp_path / "x.png")
+    for t in (5000.0, 5001.0):
+        flown.add(t, 1.0)
+        silent.add(t, 2.0)
+    for t in (0.0, 1.0, 2.0):
+        flown.add(t, 1.0)
+    window.refresh()
+    (roll,), (wind,) = window._lines
+    assert roll.get_xdata().tolist() == [-2.0, -1.0, 0.0]
+    assert wind.get_xdata().tolist() == []
+    silent.add(2.5, 2.0)
+    window.refresh()
+    assert (roll.get_xdata()[-1], wind.get_xdata().tolist()) == (-0.5, [0.0])
+
+
 def plot_for_a_moment(monkeypatch: pytest.MonkeyPatch, png: Path, meanwhile: Callable[[], None]) -> int:
     """Runs `live_plot --after`, for which a topic is there; `meanwhile` is called once it is found."""
 
