@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _MAX_POINTS = 8000
+#: Of any unit: matplotlib's axes, which go a little beyond what they show, do not hold more.
+_MOST = 1e300
 
 
 def save(figure: TimeFigure | PathFigure, start: int, path: Path) -> None:
@@ -36,7 +38,7 @@ def _time(figure: TimeFigure, start: int) -> Figure:
     all_axes = made.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(all_axes, figure.panels):
         for k, series in enumerate(panel.series):
-            time, values = min_max((series.time - start) / 1e9, np.asarray(series.values, dtype=float), _MAX_POINTS)
+            time, values = min_max((series.time - start) / 1e9, _drawable(series.values), _MAX_POINTS)
             axes.plot(
                 time,
                 values,
@@ -64,10 +66,17 @@ def _time(figure: TimeFigure, start: int) -> Figure:
     return made
 
 
+def _drawable(values: np.ndarray) -> np.ndarray:
+    """The values as numbers; NaN where they are too large to be drawn."""
+    numbers = np.asarray(values, dtype=float)
+    return np.where(np.abs(numbers) > _MOST, np.nan, numbers)
+
+
 def _path(figure: PathFigure) -> Figure:
     made = Figure(figsize=(8, 6.4), layout="constrained")
     index = figure.thinned(_MAX_POINTS)
-    east, north, up, colour = (values[index] for values in (figure.east, figure.north, figure.up, figure.colour))
+    columns = (figure.east, figure.north, figure.up, figure.colour)
+    east, north, up, colour = (_drawable(values[index]) for values in columns)
     if figure.in_space:
         axes = made.add_subplot(projection="3d")
         axes.plot(east, north, up, color="0.6", linewidth=0.6)

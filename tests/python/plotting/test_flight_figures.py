@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +13,10 @@ from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import Flight, read_flight
 from xplane_bridge.plotting import interactive, static
 from xplane_bridge.plotting.flight_figures import all_figures
-from xplane_bridge.plotting.spec import PathFigure
+from xplane_bridge.plotting.spec import Panel, PathFigure, Series, TimeFigure
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    from xplane_bridge.plotting.spec import TimeFigure
 
 
 def figure(flight: Flight, wanted: str) -> TimeFigure | PathFigure:
@@ -96,3 +95,15 @@ def test_a_thinned_track_stays_interrupted_in_every_figure() -> None:
     for drawn in (static._path(track).axes[0].lines[0].get_xdata(), interactive._path(track).data[0].x):
         assert len(drawn) < 20001
         assert np.isnan(np.asarray(drawn, dtype=float)).sum() == 1
+
+
+@pytest.mark.parametrize("large", [1e300, 1e308, -1.7e308, np.inf])
+def test_values_too_large_to_be_drawn_do_not_end_a_figure(tmp_path: Path, large: float) -> None:
+    values = np.arange(100.0)
+    values[50] = large
+    track = PathFigure("track", "Ground track", values, values, values, values, "altitude", in_space=False)
+    series = Series("altitude", (1e9 * np.arange(100.0)).astype(np.int64), values)
+    over_time = TimeFigure("altitude", "Altitude", [Panel("altitude [m]", [series])])
+    for figure in (track, replace(track, in_space=True), over_time):
+        static.save(figure, 0, tmp_path / "x.png")
+        assert (tmp_path / "x.png").stat().st_size > 1000
