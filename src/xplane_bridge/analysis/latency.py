@@ -5,7 +5,7 @@ Both compare a signal that is late by an unknown, constant time with the one it 
 
 from __future__ import annotations
 
-from typing import NamedTuple, Optional
+from typing import NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -54,7 +54,12 @@ class Delay(NamedTuple):
 
 
 def fit_delay(
-    late: Motion, lead_time: np.ndarray, lead: np.ndarray, search: tuple[float, float] = (-0.1, 0.4), seed: int = 0
+    late: Motion,
+    lead_time: np.ndarray,
+    lead: np.ndarray,
+    search: tuple[float, float] = (-0.1, 0.4),
+    seed: int = 0,
+    gaps: Sequence[tuple[float, float]] = (),
 ) -> Delay:
     """Find the delay of a signal that follows another one.
 
@@ -64,11 +69,14 @@ def fit_delay(
         lead: The leading signal, in the late one's unit.
         search: [s] shortest and longest delay looked for.
         seed: Of the bootstrap.
+        gaps: [s] begin and end of stretches in which the leading signal is not known: what may lie there is left out.
 
     Raises:
         LatencyError: Too few samples, or the two signals do not belong together.
     """
     inside = (late.begin - search[1] > lead_time[0]) & (late.end - search[0] < lead_time[-1])
+    for last, first in gaps:
+        inside &= (late.end - search[0] <= last) | (late.begin - search[1] >= first)
     begin, end, increment = late.begin[inside], late.end[inside], late.increment[inside]
     if len(begin) < _MIN_SAMPLES:
         msg = f"{len(begin)} usable samples of motion; expected {_MIN_SAMPLES} or more: record at least 30 s of flight"
@@ -204,8 +212,9 @@ def _bootstrap(
     random: np.random.Generator,
 ) -> tuple[float, float, float]:
     """Standard deviation and 95 % interval of the delay over redrawn blocks of time."""
-    block = ((time - time[0]) / BLOCK_S).astype(int)
-    count = int(block[-1]) + 1
+    # Without those that are empty: a pause of 20 s would else leave some draws next to nothing.
+    block = np.unique(((time - time[0]) / BLOCK_S).astype(int), return_inverse=True)[1]
+    count = int(block.max()) + 1
     weighted = matrix * weights[:, np.newaxis]
     normal = np.zeros((count, 3, 3))
     right = np.zeros((count, 3))

@@ -22,6 +22,7 @@ from xplane_bridge.analysis.latency import (
 )
 from xplane_bridge.bags import FLIGHT_STATE, Bags
 from xplane_bridge.bags.cameras import FIRST, cameras, chosen_cameras
+from xplane_bridge.bags.segments import segments
 from xplane_bridge.cli.bridge.waiting import Listener, print_waiting, wait_for_state, wait_until
 from xplane_bridge.cli.entry import guarded, number, start_node
 from xplane_bridge.constants import CameraView, ImageQuality, words
@@ -38,7 +39,12 @@ _VIEWS = {name: number for number, name in words(CameraView).items() if number !
 #: FrameState.POSE_NONE.
 _POSE_NONE = 0
 #: Pictures that say nothing about the delay.
-_USELESS = ImageQuality.DISPLAY_UNKNOWN | ImageQuality.FROZEN | ImageQuality.BLACK | ImageQuality.EXTERNAL_VIEW
+_USELESS = (
+    ImageQuality.DISPLAY_UNKNOWN | ImageQuality.FROZEN | ImageQuality.BLACK | ImageQuality.EXTERNAL_VIEW
+    | ImageQuality.PAUSED | ImageQuality.REPLAY
+)  # fmt: skip
+#: Body rates are not known between states further apart than this: X-Plane was paused, or nothing came [s].
+_LONGEST_STEP_S = 0.1
 #: A command that stays the same for longer rests; until then it may be on its way from one value to the next [s].
 _MOVING_S = 0.06
 #: For which a recording may take longer than it is long: its start, and the writing at its end [s].
@@ -183,7 +189,9 @@ def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float =
 
     motion = rotation_motion(chosen(), ignore_bottom)
     seconds = 1e-9 * (time - zero)
-    return fit_delay(motion, seconds, accumulated_rotation(seconds, rates, axis))
+    parts = segments(time, max_gap=_LONGEST_STEP_S)
+    gaps = [(seconds[before.stop - 1], seconds[after.start]) for before, after in zip(parts, parts[1:])]
+    return fit_delay(motion, seconds, accumulated_rotation(seconds, rates, axis), gaps=gaps)
 
 
 def command_responses(bags: Bags) -> dict[str, Delay]:
@@ -223,7 +231,7 @@ def _refreshes(sent: np.ndarray, value: np.ndarray) -> np.ndarray:
 
 
 def _rates(bags: Bags) -> tuple[np.ndarray, np.ndarray]:
-    """Stamps [ns] and body rates [rad/s] of the longest stretch of one epoch that is not paused."""
+    """Stamps [ns] and body rates [rad/s] of the longest epoch, but for pauses."""
     table = _first_of_type(bags, FLIGHT_STATE)
     if table is None:
         msg = "no flight states: record flight_state too (launch/record.launch does)"

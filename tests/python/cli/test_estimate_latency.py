@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import NamedTuple, Optional
+from typing import Callable, NamedTuple, Optional
 
 import cv2
 import pytest
@@ -44,10 +44,12 @@ def roll_and_rate(t: float, scale: float) -> tuple[float, float]:
     return scale * roll, scale * rate
 
 
-def add_picture(bag: FlightBag, painter: Painter, window: Window, k: int, scale: float) -> None:
+def add_picture(
+    bag: FlightBag, painter: Painter, window: Window, k: int, scale: float, flown: Callable[[float], float]
+) -> None:
     """Write the picture that appears with frame `k` of 60 a second, and its FrameState."""
     t = k / 60
-    shown = t - window.delay
+    shown = flown(t - window.delay)
     scene = Scene(
         frame=k,
         latitude_deg=47.0 + 60.0 * shown / 111000.0,
@@ -67,13 +69,23 @@ def add_picture(bag: FlightBag, painter: Painter, window: Window, k: int, scale:
     bag.add(f"{window.topics}/frame_state", "xplane_bridge/FrameState", stamp_ns(t), frame)
 
 
-def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = False, aileron: float = 15.0) -> None:
+def write_bag(
+    path: Path,
+    *windows: Window,
+    scale: float = 1.0,
+    refresh: bool = False,
+    aileron: float = 15.0,
+    pause: float = 0.0,  # [s] in its middle
+) -> None:
+    def flown(t: float) -> float:
+        return t if t < DURATION_S / 2 else max(DURATION_S / 2, t - pause)
+
     painter = Painter(320, 240, (47.02, 8.0))
     with FlightBag(path) as bag:
-        for k in range(round(DURATION_S * 60)):
+        for k in range(round((DURATION_S + pause) * 60)):
             t = k / 60
-            state = bag.state(t, k)
-            state["angular_velocity"] = {"x": roll_and_rate(t, scale)[1], "y": 0.0, "z": 0.0}
+            state = {**bag.state(t, k), "paused": DURATION_S / 2 <= t < DURATION_S / 2 + pause}
+            state["angular_velocity"] = {"x": roll_and_rate(flown(t), scale)[1], "y": 0.0, "z": 0.0}
             bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
             if k % 3 == 0 or refresh:
                 new = k // 3 * 3 / 60  # when this value was sent for the first time
@@ -85,7 +97,7 @@ def write_bag(path: Path, *windows: Window, scale: float = 1.0, refresh: bool = 
                 bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", stamp_ns(t), surface)
             if k % 2 == 0 and t > 0.5:
                 for window in windows:
-                    add_picture(bag, painter, window, k, scale)
+                    add_picture(bag, painter, window, k, scale, flown)
 
 
 def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -101,6 +113,13 @@ def test_delay_and_response_are_found_and_drawn(tmp_path: Path, capsys: pytest.C
     assert results["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
     assert results["roll command"]["gain"] == pytest.approx(15.0, abs=0.1)
     assert plot.stat().st_size > 5000
+
+
+def test_a_pause_leaves_the_delay_of_the_rest(tmp_path: Path) -> None:
+    bag, numbers = tmp_path / "paused.bag", tmp_path / "delay.json"
+    write_bag(bag, Window(0.085), pause=15.0)
+    assert main([str(bag), "--json", str(numbers)]) == 0
+    assert json.loads(numbers.read_text())["display_delay"]["delay"] == pytest.approx(0.085, abs=0.005)
 
 
 def test_what_is_not_determined_is_no_number(tmp_path: Path) -> None:
