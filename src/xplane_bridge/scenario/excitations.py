@@ -26,7 +26,7 @@ def check(parameters: Mapping[str, Any], path: str = "excitation") -> None:
     """Looks whether there is such an input.
 
     Args:
-        parameters: A checked `excitation`: kind, amplitude, duration [s], frequency, frequency_end [Hz], seed.
+        parameters: An `excitation`: kind, target, amplitude, duration [s], frequency, frequency_end [Hz], seed.
         path: By which errors name it.
 
     Raises:
@@ -64,11 +64,11 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
     """The input at `time_s` after its start, within +-amplitude; 0 before and after.
 
     Args:
-        parameters: As for `check`.
+        parameters: A checked `excitation`; its target is not looked at.
         time_s: Time since the start [s].
 
     Raises:
-        ScenarioError: As by `check`.
+        ScenarioError: No input of this kind is made here.
     """
     duration: float = parameters["duration"]
     amplitude: float = parameters["amplitude"]
@@ -80,10 +80,11 @@ def value(parameters: Mapping[str, Any], time_s: float) -> float:
     if kind == "3-2-1-1":
         pulses = 7.0 * time_s / duration
         return amplitude if pulses < 3.0 or 5.0 <= pulses < 6.0 else -amplitude
-    check(parameters)
     low, high = parameters["frequency"], parameters["frequency_end"]
     if kind == "chirp":
         return amplitude * _window(time_s, duration) * math.sin(2.0 * math.pi * _cycles(low, high, duration, time_s))
+    if kind != "multisine":
+        raise ScenarioError(f"excitation.kind: {kind!r}; expected doublet, 3-2-1-1, multisine or chirp")
     turns, phases, peak = _multisine(low, high, duration, parameters["seed"])
     total = float(np.cos(turns * time_s + phases).sum())
     return amplitude * _window(time_s, duration) * total / peak
