@@ -6,6 +6,7 @@ import argparse
 import atexit
 import functools
 import importlib
+import logging
 import math
 import os
 import signal
@@ -25,11 +26,14 @@ def guarded(main: Main) -> Main:
     """Wrap a program's `main(argv=None) -> exit code`.
 
     An error that the user can put right is one line on stderr and exit code 1; Ctrl-C is 130; a reader that closed the
-    pipe is 0. Anything else is a fault of ours and keeps its traceback.
+    pipe is 0. Anything else is a fault of ours and keeps its traceback. Warnings of the package are lines on stderr.
     """
 
     @functools.wraps(main)
     def wrapped(argv: Optional[Sequence[str]] = None) -> int:
+        package = logging.getLogger("xplane_bridge")
+        for handler in [each for each in package.handlers if isinstance(each, logging.NullHandler)]:
+            package.removeHandler(handler)  # it keeps a library silent, and with it what a program has to say
         try:
             return main(argv)
         except XplaneBridgeError as error:
