@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
@@ -10,12 +11,13 @@ import numpy as np
 from xplane_bridge.bags import FLIGHT_STATE, BagError, Bags, Table, TopicInfo
 from xplane_bridge.bags.cameras import Camera, cameras
 from xplane_bridge.bags.events import RecordedEvent, events_of
-from xplane_bridge.bags.segments import segments
+from xplane_bridge.bags.segments import disordered, segments
 
 if TYPE_CHECKING:
     from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.units import Unit
 
+_LOG = logging.getLogger(__name__)
 ODOMETRY = "nav_msgs/Odometry"
 LABEL = "std_msgs/String"
 #: Role in a flight to message type.
@@ -129,6 +131,20 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
         table = bags.read(camera.frames, store=store).by_stamp()
         flight.cameras.append(CameraFrames(camera, table, bags.constants(camera.frames)))
     if "state" in flight.tables:
-        state = flight.tables["state"]
-        flight.parts = segments(state.stamp, state["epoch"])
+        flight.parts = _parts(bags, flight.tables["state"])
     return flight
+
+
+def _parts(bags: Bags, state: Table) -> list[slice]:
+    """Cut the states; what a clock that was set back has laid among each other belongs to no part but its own."""
+    epoch = state["epoch"].astype(np.int64)
+    mixed = disordered(epoch, state["sim_time_unwrapped"])
+    if mixed.any():
+        _LOG.warning(
+            "%s: the host's clock was set back in flight: by their stamps %d flight states lie among others of another "
+            "time, and each stands for itself; let the clock be slewed, not stepped, while flights are recorded",
+            bags.paths[0],
+            mixed.sum(),
+        )
+        epoch = np.cumsum(np.append(False, (np.diff(epoch) != 0) | mixed[1:] | mixed[:-1]))
+    return segments(state.stamp, epoch)

@@ -1,8 +1,19 @@
 from __future__ import annotations
 
+import logging
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from xplane_bridge.bags.segments import segments
+from support.flights.synthetic_flight import FlightBag, stamp_ns
+from xplane_bridge.bags import Bags
+from xplane_bridge.bags.flight import read_flight
+from xplane_bridge.bags.segments import disordered, segments
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pytest
 
 
 def ns(*seconds: float) -> np.ndarray:
@@ -22,3 +33,26 @@ def test_slow_samples_are_one_segment_and_their_gaps_still_cut() -> None:
     assert segments(ns(0, 1, 2, 4, 5, 6, 16, 17)) == [slice(0, 6), slice(6, 8)]
     assert segments(ns(0, 0, 0)) == [slice(0, 3)]
     assert segments(ns(5)) == [slice(0, 1)]
+
+
+def test_samples_among_those_of_another_time_are_found_within_an_epoch() -> None:
+    # The clock is set back between 5 and 6, by two samples and a half; nothing is behind the begin of an epoch.
+    sim_time = np.array([1.0, 2.0, 3.0, 6.0, 4.0, 7.0, 5.0, 8.0, 9.0, 9.0, 0.0, 1.0])
+    epoch = np.array([1] * 10 + [2] * 2, dtype=np.uint32)
+    assert disordered(epoch, sim_time).tolist() == [False] * 3 + [True] * 4 + [False] * 5
+    assert disordered(epoch[:0], sim_time[:0]).tolist() == []
+
+
+def test_a_clock_set_back_in_flight_is_said_and_cut(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / "f.bag"
+    with FlightBag(path) as bag:
+        for k in range(100):
+            stamp = stamp_ns(k / 50 - (0.25 if k >= 50 else 0.0))
+            state = {**bag.state(k / 50, k), "header": bag.header(stamp, "base_link_frd")}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp, state)
+    with caplog.at_level(logging.WARNING), Bags(path) as bags:
+        flight = read_flight(bags)
+    # Of the first flown second the last quarter lies among the second's first.
+    mixed = [slice(k, k + 1) for k in range(38, 62)]
+    assert flight.parts == [slice(0, 38), *mixed, slice(62, 100)]
+    assert "the host's clock was set back in flight: by their stamps 24 flight states" in caplog.text

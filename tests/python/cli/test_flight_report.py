@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -426,6 +427,20 @@ def test_a_mode_that_is_older_than_the_recording_does_not_stretch_it(tmp_path: P
     assert flight_report.main([str(path), "-o", str(tmp_path / "r.html")]) == 0
     table = re.search(r"Who flew</h3>.*?</table>", (tmp_path / "r.html").read_text()).group(0)
     assert re.findall(r"<td[^>]*>([^<]*)</td>", table)[:5] == ["-1.0", "3.0", "manual", "start", ""]
+
+
+def test_a_warning_about_the_recording_is_a_line_of_the_program(tmp_path: Path) -> None:
+    path = tmp_path / "f.bag"
+    with FlightBag(path) as bag:
+        for k in range(100):
+            stamp = stamp_ns(k / 50 - (0.25 if k >= 50 else 0.0))
+            state = {**bag.state(k / 50, k), "header": bag.header(stamp, "base_link_frd")}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp, state)
+    program = "import sys; from xplane_bridge.cli.flight_report import main; sys.exit(main())"
+    command = [sys.executable, "-W", "ignore", "-c", program, str(path), "-o", str(tmp_path / "r.html")]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stderr
+    assert said.startswith(f"{path}: the host's clock was set back in flight")
+    assert said.count("\n") == 1
 
 
 def test_a_value_that_only_rounds_does_not_fill_its_axes_with_noise() -> None:
