@@ -6,6 +6,8 @@ import asyncio
 import logging
 import os
 import tempfile
+import threading
+import time
 from contextlib import contextmanager
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
@@ -18,6 +20,9 @@ from xplane_bridge.dask_scheduler import connected, watched
 #: How often a task may lose its worker and be flown again.
 _SECOND_CHANCES = 1
 _FIRST_WORKER_S = 30.0
+#: A local cluster without any worker for so long gets new ones: Dask starts a worker that dies again, but on a busy
+#: machine gives up one that dies while it starts, and its flights would wait for ever.
+_EMPTY_S, _LOOK_S = 30.0, 1.0
 
 
 class Cluster:
@@ -145,7 +150,24 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
         local_directory=scratch,
         silence_logs=logging.CRITICAL,
     ) as cluster, Client(cluster) as client:
-        yield Cluster(client)
+        over = threading.Event()
+        threading.Thread(target=_replenish, args=(cluster, workers, over), name="workers", daemon=True).start()
+        try:
+            yield Cluster(client)
+        finally:
+            over.set()
+
+
+def _replenish(cluster: Any, workers: int, over: threading.Event) -> None:
+    """Starts all workers anew where none has been left for a while."""
+    seen = time.monotonic()
+    while not over.wait(_LOOK_S):
+        if cluster.scheduler.workers:
+            seen = time.monotonic()
+        elif time.monotonic() - seen > _EMPTY_S:
+            cluster.scale(0)
+            cluster.scale(workers)
+            seen = time.monotonic()
 
 
 @contextmanager

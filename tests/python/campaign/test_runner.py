@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from xplane_bridge.analysis.intervals import wilson
+from xplane_bridge.campaign import cluster as cluster_module
 from xplane_bridge.campaign.cluster import Cluster, local_cluster, running_cluster
 from xplane_bridge.campaign.definition import Campaign, CampaignError, parse_campaign
 from xplane_bridge.campaign.fingerprint import fingerprint
@@ -98,6 +99,27 @@ def test_one_and_two_workers_and_a_killed_one_give_the_same_table(tmp_path: Path
                 os.kill(killed[0], signal.SIGKILL)
 
         table = CampaignFolder(tmp_path / "killed").fly(campaign, cluster, kill_one)
+    assert killed
+    pd.testing.assert_frame_equal(same(table), expected)
+
+
+@pytest.mark.full
+def test_workers_that_dask_gives_up_are_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster_module, "_EMPTY_S", 2.0)
+    campaign = parse_campaign(document())
+    expected = same(CampaignFolder(tmp_path / "alone").fly(campaign, in_process, quiet))
+    killed: List[int] = []
+    with local_cluster(1) as cluster:
+
+        def kill_all(_count: int) -> None:
+            if not killed:
+                for nanny in cluster._client.cluster.workers.values():
+                    nanny.auto_restart = False
+                killed.extend(cluster.worker_pids())
+                os.kill(killed[0], signal.SIGKILL)
+
+        table = CampaignFolder(tmp_path / "killed").fly(campaign, cluster, kill_all)
     assert killed
     pd.testing.assert_frame_equal(same(table), expected)
 
