@@ -107,15 +107,18 @@ def test_one_and_two_workers_and_a_killed_one_give_the_same_table(tmp_path: Path
 def test_workers_that_dask_gives_up_are_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr(cluster_module, "_EMPTY_S", 2.0)
-    campaign = parse_campaign(document())
+    campaign = parse_campaign(document(flights=60))
     expected = same(CampaignFolder(tmp_path / "alone").fly(campaign, in_process, quiet))
     killed: List[int] = []
     with local_cluster(1) as cluster:
 
+        async def gives_up() -> None:  # as of a worker that ends while it starts
+            pass
+
         def kill_all(_count: int) -> None:
             if not killed:
                 for nanny in cluster._client.cluster.workers.values():
-                    nanny.auto_restart = False
+                    nanny.instantiate = gives_up
                 killed.extend(cluster.worker_pids())
                 os.kill(killed[0], signal.SIGKILL)
 
