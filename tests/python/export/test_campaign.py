@@ -88,6 +88,18 @@ def test_a_bag_of_any_name_is_never_replaced(tmp_path: Path, capsys: pytest.Capt
     assert bag.read_bytes() == before
 
 
+def test_a_bag_whose_name_is_no_text_is_exported(tmp_path: Path) -> None:
+    bag = write_flight(tmp_path / os.fsdecode(b"fl\xfcg.bag"), 0.4)
+    out = tmp_path / "out"
+    assert export(bag, "-o", out) == 0
+    assert export("--verify", "-o", out) == 0
+    assert sorted(name for name in os.listdir(os.fsencode(out)) if not name.startswith(b".")) == [
+        b"README.md",
+        b"fl\xfcg.csv",
+        b"manifest.json",
+    ]
+
+
 def test_what_lies_behind_links_is_not_replaced(split: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
