@@ -18,9 +18,8 @@ import shutil
 import sqlite3
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence, TextIO
+from typing import TYPE_CHECKING, Any, Callable, Iterable, Iterator, NamedTuple, Optional, Sequence
 
 from xplane_bridge import __version__
 from xplane_bridge.bags import BagError, Bags
@@ -31,6 +30,7 @@ from xplane_bridge.export.card import CARD, card
 from xplane_bridge.export.flight import ExportError, frame_quality
 from xplane_bridge.export.formats import ALIASES, FORMATS, Job
 from xplane_bridge.export.yolo_yaml import DATA_YAML, of_all_flights
+from xplane_bridge.whole_file import replaced
 
 if TYPE_CHECKING:
     from xplane_bridge.export.pictures import Options
@@ -406,31 +406,11 @@ def _read_json(path: Path) -> Any:
 
 
 def _write_json(path: Path, content: Any) -> None:
-    with _replaced(path) as file:
+    with replaced(path) as file:
         json.dump(content, file, indent=1, sort_keys=True)
         file.write("\n")
 
 
 def _write_text(path: Path, text: str) -> None:
-    with _replaced(path) as file:
+    with replaced(path) as file:
         file.write(text)
-
-
-@contextmanager
-def _replaced(path: Path) -> Iterator[TextIO]:
-    """Give a file that takes the place of another when it is whole.
-
-    Raises:
-        OSError: It cannot be written; with the name of the other.
-    """
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("w", encoding="utf-8", errors="backslashreplace") as file:  # names of files may be no text
-            yield file
-        os.replace(part, path)
-    except BaseException as error:
-        with suppress(OSError):
-            part.unlink()
-        if not isinstance(error, OSError):
-            raise
-        raise OSError(error.errno, error.strerror, str(path)) from None

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from pathlib import Path
 from typing import Iterable, Union
 
 from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.whole_file import replaced
 
 
 class PageError(XplaneBridgeError):
@@ -28,24 +27,14 @@ def refuse_recordings(path: Path, recordings: Iterable[Union[str, Path]]) -> Non
 def write_page(path: Path, text: str) -> None:
     """Writes a page; what was there before stays until the page is whole.
 
-    Bytes of file names that are no UTF-8 are in it as codes.
-
     Raises:
         OSError: It cannot be written; with its name.
     """
-    data = text.encode("utf-8", "backslashreplace")
     try:
         if path.exists() and not path.is_file():  # a folder, which is an error, or a device
-            path.write_bytes(data)
+            path.write_text(text, encoding="utf-8", errors="backslashreplace")
             return
-        final = path.resolve()
-        part = final.with_name(final.name + ".part")
-        try:
-            part.write_bytes(data)
-            os.replace(part, final)
-        except OSError:
-            with contextlib.suppress(OSError):
-                part.unlink()
-            raise
+        with replaced(path.resolve()) as file:
+            file.write(text)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from None

@@ -400,12 +400,12 @@ def test_a_bag_whose_name_is_no_text_has_a_report(tmp_path: Path) -> None:
 
 
 def test_an_earlier_report_stays_where_the_new_one_cannot_be_written(tmp_path: Path, monkeypatch: Any) -> None:
-    def full(_self: Path, _data: bytes) -> int:
+    def full(_part: Path, _page: Path) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", "part")
 
     page = tmp_path / "r.html"
     write_page(page, "earlier")
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(os, "replace", full)
     with pytest.raises(OSError, match=r"No space left on device: .*r\.html"):
         write_page(page, "later")
     assert page.read_text() == "earlier"
