@@ -91,16 +91,16 @@ def stick_of(joy_config: Optional[str], stick_mode: Optional[int], mapped: Any) 
     """
     mapped = mapped if isinstance(mapped, dict) else {}
     mode = stick_mode_of(stick_mode, mapped.get("stick_mode"))
-    if joy_config is not None or not isinstance(mapped.get("direct"), dict):
-        stick = load_stick(device_file(joy_config or _DEVICE), mode)
     if not isinstance(mapped.get("direct"), dict):
-        return stick
+        return load_stick(device_file(joy_config or _DEVICE), mode)
     flown = VirtualStick(mapped, mode or 2)
-    if joy_config is not None and stick.name != flown.name:
-        raise ScenarioError(
-            f"--joy-config {joy_config} is {stick.name!r}, but joystick_mapper_node flies with {flown.name!r}; leave "
-            "it out, or start the mapper with the same joy_config"
-        )
+    if joy_config is not None:
+        stick = load_stick(device_file(joy_config), mode)
+        if stick.name != flown.name:
+            raise ScenarioError(
+                f"--joy-config {joy_config} is {stick.name!r}, but joystick_mapper_node flies with {flown.name!r}; "
+                "leave it out, or start the mapper with the same joy_config"
+            )
     return flown
 
 

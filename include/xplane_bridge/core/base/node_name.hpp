@@ -8,8 +8,7 @@ namespace xplane_bridge::core {
 bool isNamed(const std::string& who, const std::string& name);
 
 /// What the files of a node have of its full name: in the `usual` namespace the last part ("rx_node"), in another one
-/// all
-/// ("first.rx_node"), so that two bridges do not write into one file.
+/// all ("first.rx_node"), so that two bridges do not write into one file.
 std::string nameInFiles(const std::string& who, const std::string& usual);
 
 }  // namespace xplane_bridge::core
