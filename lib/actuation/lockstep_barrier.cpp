@@ -18,8 +18,8 @@ std::vector<std::string> readerFirst(std::vector<std::string> participants, std:
 
 }  // namespace
 
-LockstepBarrier::LockstepBarrier(std::vector<std::string> participants, std::string reader)
-    : names_(readerFirst(std::move(participants), std::move(reader))) {}
+LockstepBarrier::LockstepBarrier(std::vector<std::string> participants, std::string reader, std::string camera)
+    : names_(readerFirst(std::move(participants), std::move(reader))), camera_(std::move(camera)) {}
 
 std::size_t LockstepBarrier::find(const std::string& who) const {
   const auto found =
@@ -53,9 +53,10 @@ void LockstepBarrier::take(std::size_t participant, std::int64_t stamp_ns, bool 
   }
 }
 
-void LockstepBarrier::answerFrame0(const std::string& reader) {
+void LockstepBarrier::answerFrame0(const std::string& who) {
   const BarrierLock lock(mutex_);
-  if (number_ == 0 && find(reader) == kReader) answered_.insert(kReader);
+  const std::size_t participant = find(who);
+  if (number_ == 0 && participant < names_.size()) answered_.insert(participant);
 }
 
 void LockstepBarrier::answer(const std::string& who, std::int64_t stamp_ns) {
@@ -68,8 +69,12 @@ void LockstepBarrier::answerForAll(const std::string& reader, std::int64_t stamp
   take(find(reader), stamp_ns, true);
 }
 
+bool LockstepBarrier::readsSimulator(std::size_t participant) const {
+  return participant == kReader || core::isNamed(names_[participant], camera_);
+}
+
 bool LockstepBarrier::isMissing(std::size_t participant) const {
-  const bool spared = participant != kReader && (for_all_ || number_ == 0);
+  const bool spared = number_ == 0 ? !readsSimulator(participant) : for_all_ && participant != kReader;
   return !spared && answered_.count(participant) == 0;
 }
 

@@ -21,12 +21,13 @@ class LockstepBarrier {
  public:
   /// @param participants names of nodes: "/a/b" is that one, "b" is /b and any /.../b
   /// @param reader the node without which no participant can answer; its answer is awaited like the others'
-  LockstepBarrier(std::vector<std::string> participants, std::string reader);
+  /// @param camera name of those participants that read the simulator, too
+  LockstepBarrier(std::vector<std::string> participants, std::string reader, std::string camera);
 
-  /// The next frame is here. Number 0 is answered by the reader alone: the others have seen nothing of it.
+  /// The next frame is here. Number 0 is answered by the reader and the cameras alone: the others see nothing of it.
   void open(std::uint32_t number, std::int64_t stamp_ns);
-  /// The reader, by its full name, has answered frame 0.
-  void answerFrame0(const std::string& reader);
+  /// `who`, the full name of a node, has answered frame 0.
+  void answerFrame0(const std::string& who);
   /// `who`, the full name of a node, has answered the frame of this stamp.
   void answer(const std::string& who, std::int64_t stamp_ns);
   /// The reader has answered, and has nothing in this frame that others could answer.
@@ -56,6 +57,7 @@ class LockstepBarrier {
 
   std::size_t find(const std::string& who) const;
   void take(std::size_t participant, std::int64_t stamp_ns, bool for_all);
+  bool readsSimulator(std::size_t participant) const;
   bool isMissing(std::size_t participant) const;
   bool answeredLocked() const;
 
@@ -69,7 +71,8 @@ class LockstepBarrier {
   };
 
   const std::vector<std::string> names_;  // the reader first
-  mutable std::mutex mutex_;              // guards the following
+  const std::string camera_;
+  mutable std::mutex mutex_;  // guards the following
   bool open_ = false;
   std::uint32_t number_ = 0;
   std::int64_t stamp_ns_ = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "xplane_bridge/core/base/node_name.hpp"
 #include "xplane_bridge/nodes/capture/capture_node.hpp"
@@ -99,11 +100,14 @@ CaptureNode::FrameStage CaptureNode::beginPicture(const core::LockstepFrame& fra
 }
 
 void CaptureNode::endFrame(const core::LockstepFrame& frame) {
-  {
-    const FrameLock lock(frame_mutex_);
-    if (frame.number == 0 || frame_ != frame.number || frame_stage_ != FrameStage::kDone) return;
-  }
   std_msgs::Header done;
+  if (frame.number == 0) {
+    if (std::exchange(listens_, true)) return;
+    done.frame_id = kLockstepFrame0;
+  } else {
+    const FrameLock lock(frame_mutex_);
+    if (frame_ != frame.number || frame_stage_ != FrameStage::kDone) return;
+  }
   done.stamp = stampNow();
   done_publisher_.publish(done);
 }

@@ -28,7 +28,7 @@ TxLockstep::TxLockstep(const LockstepOptions& options, core::Clock host, const r
       host_(std::move(host)),
       wake_(std::move(wake)),
       give_up_(std::move(give_up)),
-      barrier_(options.participants, kLockstepReader),
+      barrier_(options.participants, kLockstepReader, kLockstepCamera),
       stamp_ns_(nanoseconds(start)),
       previous_ns_(stamp_ns_) {
   if (options.hold) barrier_.step(0);

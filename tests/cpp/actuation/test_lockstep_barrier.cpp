@@ -13,7 +13,7 @@ class LockstepBarrierTest : public testing::Test {
  protected:
   void SetUp() override { barrier_.open(1, kT1); }
 
-  LockstepBarrier barrier_{{"controller", "/other/player"}, "rx_node"};
+  LockstepBarrier barrier_{{"controller", "/other/player"}, "rx_node", "capture_node"};
 };
 
 TEST_F(LockstepBarrierTest, WaitsForAllParticipantsAndNamesThoseMissing) {
@@ -98,6 +98,23 @@ TEST_F(LockstepBarrierTest, Frame0IsTheReadersAlone) {
   EXPECT_TRUE(barrier_.complete());
 }
 
+TEST(LockstepBarrierCameras, Frame0WaitsForThoseThatReadTheSimulatorToo) {
+  LockstepBarrier barrier({"controller", "/a/capture_node", "/a/b/capture_node"}, "rx_node", "capture_node");
+  barrier.open(0, 0);
+  barrier.answerFrame0("/a/rx_node");
+  EXPECT_EQ(barrier.missing(), (Names{"/a/capture_node", "/a/b/capture_node"}));
+  for (const char* who : {"/a/capture_node", "/a/my_capture_node", "/b/capture_node"}) barrier.answerFrame0(who);
+  EXPECT_EQ(barrier.missing(), Names{"/a/b/capture_node"});
+  EXPECT_FALSE(barrier.complete());
+  barrier.answerFrame0("/a/b/capture_node");
+  EXPECT_TRUE(barrier.complete());
+
+  LockstepBarrier one({"capture_node"}, "rx_node", "capture_node");
+  one.open(0, 0);
+  one.answerFrame0("/a/rx_node");
+  EXPECT_EQ(one.missing(), Names{"capture_node"});
+}
+
 TEST_F(LockstepBarrierTest, AnAnswerWithFrame0sStampIsOfTheFirstFrameThatFlies) {
   barrier_.open(0, 0);
   barrier_.answerFrame0("/xplane/rx_node");
@@ -116,7 +133,7 @@ TEST_F(LockstepBarrierTest, Frame0sAnswerIsOfNoOtherFrame) {
 }
 
 TEST(LockstepBarrierSteps, FliesAsManyFramesAsAreGrantedAndHoldsWithTheLastOneAnswered) {
-  LockstepBarrier barrier({}, "rx_node");
+  LockstepBarrier barrier({}, "rx_node", "capture_node");
   barrier.step(0);
   barrier.open(0, 0);
   barrier.answerFrame0("/rx_node");
@@ -162,7 +179,7 @@ TEST_F(LockstepBarrierTest, AFrameThatEndsWithNoneGrantedGrantsNone) {
 }
 
 TEST(LockstepBarrierOrder, RanksParticipantsAsNamed) {
-  const LockstepBarrier barrier({"b", "a"}, "rx_node");
+  const LockstepBarrier barrier({"b", "a"}, "rx_node", "capture_node");
   EXPECT_LT(barrier.rank("/x/rx_node"), barrier.rank("/x/b"));
   EXPECT_LT(barrier.rank("/x/b"), barrier.rank("/x/a"));
   EXPECT_LT(barrier.rank("/x/a"), barrier.rank("/x/stranger"));

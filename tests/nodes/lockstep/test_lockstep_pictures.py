@@ -141,6 +141,19 @@ def test_a_picture_that_looks_like_the_one_before_comes_too(world, display):
     assert len({image.header.stamp for image in images.messages}) == 20
 
 
+def test_the_first_frame_waits_for_a_camera_that_starts_late(world, display):
+    from std_msgs.msg import Header
+    from xplane_bridge.msg import FrameState
+
+    start(world, "--window", hold=False)
+    done = world.watch("lockstep/done", Header)
+    wait_until(lambda: done.messages, 60, "rx_node's answer to frame 0")
+    pairs = world.watch("camera/frame_state", FrameState)
+    capture(world, display)
+    wait_until(lambda: len(pairs.messages) >= 5, 60, "pictures of five frames")
+    assert [pair.image_count for pair in pairs.messages[:5]] == [1, 2, 3, 4, 5]
+
+
 def test_a_simulator_without_a_renderer_is_named_by_the_watchdog(world, display):
     _, _, tx_node = start(world, watchdog=WATCHDOG_S, hold=False)
     capture(world, display)
@@ -162,7 +175,7 @@ def test_a_window_that_is_not_found_is_named_by_the_watchdog(world, display):
 def test_a_missing_capture_node_is_named_by_the_watchdog(world):
     _, _, tx_node = start(world, "--window", watchdog=WATCHDOG_S, hold=False)
     wait_until(lambda: not tx_node.running, 60, "end of tx_node")
-    assert "frame 1 was not answered by capture_node" in tx_node.describe("")
+    assert "frame 0 was not answered by capture_node" in tx_node.describe("")
 
 
 def test_a_renderer_that_dies_ends_the_emulator_in_words(world, display):

@@ -222,6 +222,7 @@ class CaptureNode : public BaseNode {
 
   // Lock-step.
   ros::Publisher done_publisher_;
+  bool listens_ = false;    // frame 0 is answered; of the link's thread
   std::mutex frame_mutex_;  // guards the following
   core::ClockCondition frame_changed_;
   std::deque<FlightState::ConstPtr> states_;     // of frames that were not begun
