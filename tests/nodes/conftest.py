@@ -6,13 +6,14 @@ import contextlib
 import itertools
 import socket
 from pathlib import Path
-from typing import Any, Callable, Iterator
+from typing import Any, Callable, Generator, Iterator
 
 import pytest
 
 from support.deadlines import WAIT_S
 from support.interrupts import heed_ctrl_c
 from support.nodes.connections import is_connected
+from support.nodes.consoles import ends_of_consoles
 from support.nodes.forked_emulator import ForkedEmulator
 from support.scheduling import long_ones_first, rank
 from xplane_bridge import protocol
@@ -54,6 +55,16 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts long tests first."""
     items.sort(key=lambda item: rank(item.nodeid, LONG))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Adds what the programs of a failed test wrote."""
+    report = yield
+    folder = getattr(item, "funcargs", {}).get("tmp_path")
+    if report.failed and folder is not None:
+        report.sections += [(f"end of {name}", text) for name, text in ends_of_consoles(folder)]
+    return report
 
 
 @pytest.fixture(scope="session")
