@@ -112,10 +112,12 @@ def whole_second(recorder: RecordedTopics) -> tuple[float, float] | None:
 def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     flight.start_bridge()
     recorder = flight.recorder(flight.bridge)
-    recorder.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
-    begin = len(recorder.all("flight_state"))
     link = recorder.wait_for("link_state", lambda link: link["state"] == "CONNECTED", "the link")
     assert link["host"] == flight.simulator.address, "found by its beacon"
+    recorder.wait_for("flight_state", lambda _: True, "a state")
+    recorder.wait_for("camera/frame_state", lambda _: True, "a picture's state")
+    recorder.wait_for("camera/frame_state", lambda s: not s["quality"] & STATE_MISSING, "a paired picture")
+    begin = len(recorder.all("flight_state"))
 
     # The stick of the other machine moves the simulator, and both say so.
     recorder.wait_for("control/applied", lambda a: a["read_back"] and a["roll"] == 1.0, "the stick read back")
