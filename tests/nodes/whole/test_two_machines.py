@@ -30,6 +30,8 @@ STATE_MISSING = 1
 STATES = 4 * FPS
 #: So many pictures with nothing to say against are waited for.
 PERFECT = 90
+#: And so many of them of frames that appeared when they were due.
+JUDGED = PERFECT // 6
 #: What both machines are given: the namespace's parameters are shared.
 _SHARED = f"display_delay:={PIPELINE_DELAY_S}"
 _NOT_PERMITTED = why_no_machines()
@@ -100,6 +102,13 @@ def perfect(recorder: RecordedTopics) -> list[dict[str, Any]]:
     return [state for state in recorder.all("camera/frame_state") if not state["quality"]]
 
 
+def judged(recorder: RecordedTopics, swaps: Path) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """Such pictures with what the raw ones show, of frames that appeared when they were due."""
+    punctual = punctual_frames(swaps, PIPELINE_DELAY_S, FPS)
+    images = {image["stamp"]: image for image in recorder.all("camera/image_raw") if image["frame"] in punctual}
+    return [(state, images[state["stamp"]]) for state in perfect(recorder) if state["stamp"] in images]
+
+
 def whole_second(recorder: RecordedTopics) -> tuple[float, float] | None:
     """Simulator time of the first and the last of FPS frames one after the other of all of which raw pictures came."""
     shown = {np.float32(image["sim_time"]) for image in recorder.all("camera/image_raw") if image["frame"]}
@@ -127,6 +136,7 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     # The paper's rate, in simulator time: every frame of a second of 30 came over as a raw picture. A computer
     # that is busy with other work may need some seconds to have one.
     wait_until(lambda: whole_second(recorder), 2 * WAIT_S, "30 raw pictures in a second")
+    wait_until(lambda: len(judged(recorder, flight.swaps)) >= JUDGED, 2 * WAIT_S, "punctual pictures")
     flight.stop()  # what is still in buffers is written
 
     # States: every frame that was flown, one after the other.
@@ -148,18 +158,14 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     of_it = [image["stamp"] for image in raw if second[0] <= np.float32(image["sim_time"]) <= second[1]]
     assert len(of_it) >= FPS - 1  # the state of the last may have been under way
     assert np.all(np.diff([states[stamp]["image_count"] for stamp in of_it]) == 1), "an image was lost on the way"
-    drawn = [row for row in complete_rows(flight.swaps) if first <= np.float32(row["sim_time"]) <= last]
 
     # Pairing across the machines: the state is that of the very frame. A picture that appeared late because the
     # computer was busy says nothing about that, nor does one whose state came too late.
     missing = sum(bool(state["quality"] & STATE_MISSING) for state in paired)
     assert missing <= 0.1 * len(paired)
-    punctual = punctual_frames(flight.swaps, PIPELINE_DELAY_S, FPS) & {int(row["frame"]) for row in drawn}
-    judged = [
-        (states[s], image) for s, image in images.items() if image["frame"] in punctual and not states[s]["quality"]
-    ]
-    assert len(judged) >= PERFECT // 6
-    assert all(state["sim_time"] == image["sim_time"] for state, image in judged)
+    sure = judged(recorder, flight.swaps)
+    assert len(sure) >= JUDGED
+    assert all(state["sim_time"] == image["sim_time"] for state, image in sure)
 
 
 def test_each_machine_says_that_the_other_is_gone_and_goes_on_when_it_is_back(flight: Flight) -> None:
