@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from support.flights.synthetic_flight import FlightBag, stamp_ns
+from support.flights.synthetic_flight import record_a_clock_set_back
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import read_flight
 from xplane_bridge.bags.segments import disordered, segments
@@ -45,11 +45,7 @@ def test_samples_among_those_of_another_time_are_found_within_an_epoch() -> None
 
 def test_a_clock_set_back_in_flight_is_said_and_cut(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "f.bag"
-    with FlightBag(path) as bag:
-        for k in range(100):
-            stamp = stamp_ns(k / 50 - (0.25 if k >= 50 else 0.0))
-            state = {**bag.state(k / 50, k), "header": bag.header(stamp, "base_link_frd")}
-            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp, state)
+    record_a_clock_set_back(path)
     with caplog.at_level(logging.WARNING), Bags(path) as bags:
         flight = read_flight(bags)
     # Of the first flown second the last quarter lies among the second's first.

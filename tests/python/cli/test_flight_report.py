@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from support.flights.export_flight import write_flight
-from support.flights.synthetic_flight import FlightBag, stamp_ns, write_states
+from support.flights.synthetic_flight import FlightBag, record_a_clock_set_back, stamp_ns, write_states
 from xplane_bridge.analysis.quality import QUALITY_WORDS
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import read_flight
@@ -431,11 +431,7 @@ def test_a_mode_that_is_older_than_the_recording_does_not_stretch_it(tmp_path: P
 
 def test_a_warning_about_the_recording_is_a_line_of_the_program(tmp_path: Path) -> None:
     path = tmp_path / "f.bag"
-    with FlightBag(path) as bag:
-        for k in range(100):
-            stamp = stamp_ns(k / 50 - (0.25 if k >= 50 else 0.0))
-            state = {**bag.state(k / 50, k), "header": bag.header(stamp, "base_link_frd")}
-            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp, state)
+    record_a_clock_set_back(path)
     program = "import sys; from xplane_bridge.cli.flight_report import main; sys.exit(main())"
     command = [sys.executable, "-W", "ignore", "-c", program, str(path), "-o", str(tmp_path / "r.html")]
     said = subprocess.run(command, check=True, capture_output=True, text=True).stderr

@@ -134,6 +134,15 @@ def state_at(t: float) -> dict[str, float]:
     }
 
 
+def record_a_clock_set_back(path: Path) -> None:
+    """Record two seconds of states at 50 Hz; after the first, the host's clock is set back by a quarter of a second."""
+    with FlightBag(path) as bag:
+        for k in range(100):
+            stamp = stamp_ns(k / 50 - (0.25 if k >= 50 else 0.0))
+            state = {**bag.state(k / 50, k), "header": bag.header(stamp, "base_link_frd")}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp, state)
+
+
 class FlightBag:
     """A bag being written; use as a context manager."""
 
