@@ -38,7 +38,7 @@ constexpr std::uint32_t kLockstepQueue = 100;
 constexpr const char* kLockstepDoneTopic = "lockstep/done";
 /// The node whose answer says that a frame's flight_state is published, or that there is none.
 constexpr const char* kLockstepReader = "rx_node";
-/// The participant that reads the simulator as well, which sends a frame once: the first one waits until it listens.
+/// The participant that reads the simulator as well. A frame is sent once, so the first one waits until it listens.
 constexpr const char* kLockstepCamera = "capture_node";
 /// ControlMode as of the end of every frame, so that participants know that they have missed none.
 constexpr const char* kLockstepModeTopic = "lockstep/mode";
