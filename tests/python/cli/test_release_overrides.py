@@ -10,7 +10,9 @@ import struct
 import subprocess
 import sys
 import threading
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Callable, Dict, List, Tuple
 
 import pytest
@@ -110,6 +112,44 @@ def test_a_locked_journal_is_listed_and_all_is_released(left: Tuple[XPlane, Path
     assert len(json.loads(journal.read_text("utf-8"))["entries"]) == 2
     assert release(journal).returncode == 0
     assert not journal.exists()
+
+
+@pytest.fixture
+def subscribed(tmp_path: Path) -> Path:
+    """What a process that is gone has left subscribed."""
+    left = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": False}])
+    return write(tmp_path / f"127.0.0.1_{XPlane().port}_subscriptions.json", left)
+
+
+def test_subscriptions_are_ended_as_soon_as_a_node_has_written_its_own(
+    subscribed: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    loader = SourceFileLoader("release_overrides", str(TOOL))
+    tool = ModuleType(loader.name)
+    loader.exec_module(tool)
+    waits = []
+    with open(f"{subscribed}.lock", "a", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+
+        def sleep(seconds: float) -> None:
+            waits.append(seconds)
+            fcntl.flock(lock, fcntl.LOCK_UN)
+
+        monkeypatch.setattr("time.sleep", sleep)
+        monkeypatch.setattr(sys, "argv", [str(TOOL), "--folder", str(subscribed.parent)])
+        assert tool.main() == 0
+    assert len(waits) == 1
+    assert ": ended" in capsys.readouterr().out
+    assert not subscribed.exists()
+
+
+def test_subscriptions_stay_where_a_node_was_stopped_while_it_wrote_them(subscribed: Path) -> None:
+    with open(f"{subscribed}.lock", "a", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = release(subscribed)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"{subscribed}: a node is writing it, or was stopped while it did")
+    assert ids(subscribed) == ["subscriptions:/rx_node"]
 
 
 def test_where_nothing_can_be_sent_is_said_and_the_next_x_plane_is_released(left: Tuple[XPlane, Path]) -> None:
