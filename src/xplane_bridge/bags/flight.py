@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional
@@ -14,6 +15,8 @@ from xplane_bridge.bags.events import RecordedEvent, events_of
 from xplane_bridge.bags.segments import disordered, segments
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from xplane_bridge.bags.columns import ColumnFile
     from xplane_bridge.bags.units import Unit
 
@@ -131,20 +134,34 @@ def read_flight(bags: Bags, store: Optional[ColumnFile] = None) -> Flight:
         table = bags.read(camera.frames, store=store).by_stamp()
         flight.cameras.append(CameraFrames(camera, table, bags.constants(camera.frames)))
     if "state" in flight.tables:
-        flight.parts = _parts(bags, flight.tables["state"])
+        state = flight.tables["state"]
+        flight.parts = segments(state.stamp, state_epochs(bags, state))
     return flight
 
 
-def _parts(bags: Bags, state: Table) -> list[slice]:
-    """Cut the states; what a clock that was set back has laid among each other belongs to no part but its own."""
+def state_epochs(bags: Bags, state: Table) -> np.ndarray:
+    """Count anew the epochs of flight states that are sorted by stamp: a part of one epoch has one time that goes on.
+
+    What a clock that was set back has laid among each other has an epoch of its own, each state; the log says so.
+
+    Args:
+        bags: From which the states were read.
+        state: With ``epoch`` and ``sim_time_unwrapped``.
+    """
     epoch = state["epoch"].astype(np.int64)
     mixed = disordered(epoch, state["sim_time_unwrapped"])
-    if mixed.any():
-        _LOG.warning(
-            "%s: the host's clock was set back in flight: by their stamps %d flight states lie among others of another "
-            "time, and each stands for itself; let the clock be slewed, not stepped, while flights are recorded",
-            bags.paths[0],
-            mixed.sum(),
-        )
-        epoch = np.cumsum(np.append(False, (np.diff(epoch) != 0) | mixed[1:] | mixed[:-1]))
-    return segments(state.stamp, epoch)
+    if not mixed.any():
+        return epoch
+    _say(bags.paths[0], int(mixed.sum()))
+    return np.cumsum(np.append(False, (np.diff(epoch) != 0) | mixed[1:] | mixed[:-1]))
+
+
+@functools.lru_cache(maxsize=None)
+def _say(path: Path, states: int) -> None:
+    """Once for a flight, which several programs' parts may cut."""
+    _LOG.warning(
+        "%s: the host's clock was set back in flight: by their stamps %d flight states lie among others of another "
+        "time, and each stands for itself; let the clock be slewed, not stepped, while flights are recorded",
+        path,
+        states,
+    )

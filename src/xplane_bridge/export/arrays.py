@@ -44,6 +44,7 @@ from xplane_bridge.analysis.resampling import interpolated
 from xplane_bridge.bags import FLIGHT_STATE, BagError
 from xplane_bridge.bags.cameras import COMPRESSED, RAW
 from xplane_bridge.bags.columns import ColumnFile
+from xplane_bridge.bags.flight import state_epochs
 from xplane_bridge.bags.segments import DEFAULT_MAX_GAP, segments
 from xplane_bridge.export.cameras import UNITS as CAMERA_UNITS
 from xplane_bridge.export.cameras import CameraRow, one_column_each
@@ -330,11 +331,9 @@ def _sim_clock(bags: Bags, state: Optional[str]) -> _SimClock:
     if state is None or not bags.topics[state].count:
         zero = min((info.first_time for info in bags.topics.values() if info.count), default=0)
         return _SimClock(zero, np.empty(0, np.int64), np.empty(0), [])
-    table = bags.read(state, ["header.stamp", "sim_time_unwrapped", "epoch"])
-    order = np.argsort(table.stamp, kind="stable")
-    stamp = table.stamp[order]
-    parts = segments(stamp, table["epoch"][order], DEFAULT_MAX_GAP)
-    return _SimClock(int(stamp[0]), stamp, table["sim_time_unwrapped"][order], parts)
+    table = bags.read(state, ["header.stamp", "sim_time_unwrapped", "epoch"]).by_stamp()
+    parts = segments(table.stamp, state_epochs(bags, table), DEFAULT_MAX_GAP)
+    return _SimClock(int(table.stamp[0]), table.stamp, table["sim_time_unwrapped"], parts)
 
 
 class _Clocks:

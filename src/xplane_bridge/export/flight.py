@@ -10,7 +10,7 @@ import numpy as np
 from xplane_bridge.analysis.resampling import held
 from xplane_bridge.bags import BagError, Bags, Table
 from xplane_bridge.bags.cameras import COMPRESSED, RAW, cameras
-from xplane_bridge.bags.flight import odometry_topic
+from xplane_bridge.bags.flight import odometry_topic, state_epochs
 from xplane_bridge.errors import XplaneBridgeError
 
 FRAME_STATE = "xplane_bridge/FrameState"
@@ -68,11 +68,16 @@ def odometry_of(bags: Bags) -> str:
     return topic
 
 
-def breaks(state: Table) -> np.ndarray:
-    """Count how often time or place has begun anew up to each flight state: a reset, a jump, a new origin of `map`."""
+def breaks(bags: Bags, state: Table) -> np.ndarray:
+    """Count how often time or place has begun anew up to each flight state: a reset, a jump, a new origin of `map`.
+
+    Args:
+        bags: From which the states were read.
+        state: By stamp, with ``epoch``, ``position_epoch`` and ``sim_time_unwrapped``.
+    """
     anew = np.zeros(len(state), dtype=bool)
-    for name in ("epoch", "position_epoch"):
-        anew[1:] |= np.diff(state[name].astype(np.int64)) != 0
+    for epochs in (state_epochs(bags, state), state["position_epoch"].astype(np.int64)):
+        anew[1:] |= np.diff(epochs) != 0
     return np.cumsum(anew)
 
 

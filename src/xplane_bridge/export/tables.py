@@ -101,8 +101,8 @@ def flight_table(
     units = bags.units(topic)
     state = bags.read(topic, store=store).by_stamp()
     base, columns = state.stamp, iter(state.columns.items())
+    parts = segments(state.stamp, breaks(bags, state), DEFAULT_MAX_GAP)
     if rate is not None:
-        parts = segments(state.stamp, breaks(state), DEFAULT_MAX_GAP)
         base = time_base(state.stamp, parts, rate)
         columns = on_base(base, state.stamp, state.columns, units, parts)
     table = FlightTable(len(base), store)

@@ -38,9 +38,9 @@ def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np
     stamp = table.stamp[order]
     position = np.stack([table[name][order] for name in _POSITION], axis=1)
     orientation = np.stack([table[name][order] for name in _ORIENTATION], axis=1)
+    parts = segments(stamp, _breaks(bags, stamp), DEFAULT_MAX_GAP)
     if rate is None:
         return stamp, position, orientation
-    parts = segments(stamp, _breaks(bags, stamp), DEFAULT_MAX_GAP)
     base = time_base(stamp, parts, rate)
     return base, interpolated(base, stamp, position, parts), rotated(base, stamp, orientation, parts)
 
@@ -50,8 +50,8 @@ def _breaks(bags: Bags, stamp: np.ndarray) -> Optional[np.ndarray]:
     topic = bags.topic_of_type(FLIGHT_STATE)
     if topic is None or not bags.topics[topic].count:
         return None
-    state = bags.read(topic, ["header.stamp", "epoch", "position_epoch"]).by_stamp()
-    edges = state.stamp[1:][np.diff(breaks(state)) > 0]
+    state = bags.read(topic, ["header.stamp", "epoch", "position_epoch", "sim_time_unwrapped"]).by_stamp()
+    edges = state.stamp[1:][np.diff(breaks(bags, state)) > 0]
     return np.searchsorted(edges, stamp, side="right")
 
 

@@ -187,7 +187,11 @@ def _check_frames(state: Table, rows: np.ndarray, excitation: Excitation) -> Non
     if len(segments(state.stamp[rows], state["epoch"][rows])) > 1:
         msg = f"{excitation.label}: the flight states have a gap or a reset in it"
         raise IdentificationError(msg)
-    if np.any(np.diff(state["sim_time_unwrapped"][rows]) <= 0.0) or state["paused"][rows].any():
+    steps = np.diff(state["sim_time_unwrapped"][rows])
+    if np.any(steps < 0.0):
+        msg = f"{excitation.label}: the host's clock was set back in it"
+        raise IdentificationError(msg)
+    if np.any(steps == 0.0) or state["paused"][rows].any():
         msg = f"{excitation.label}: simulator time stood still in it"
         raise IdentificationError(msg)
     for name, bit in _NEEDED.items():

@@ -10,7 +10,7 @@ import pytest
 import scipy.io
 
 from support.flights.export_flight import export, write_flight
-from support.flights.synthetic_flight import CLIMB, FlightBag, stamp_ns, state_at
+from support.flights.synthetic_flight import CLIMB, FlightBag, record_a_clock_set_back, stamp_ns, state_at
 from xplane_bridge.bags import Bags
 from xplane_bridge.export import arrays
 
@@ -93,6 +93,17 @@ def test_simulator_time_is_never_interpolated_across_a_gap(tmp_path: Path) -> No
         (label,) = arrays.topic_arrays(bags, ["scenario/label"])
     np.testing.assert_allclose(label.columns["sim_time_unwrapped_s"], [1.0, np.nan, 3.01, np.nan], atol=1e-9)
     assert label.columns["data"].tolist() == ["at 1.0", "at 2.5", "at 3.01", "at 9.0"]
+
+
+def test_simulator_time_is_none_between_two_times_of_a_clock_set_back(tmp_path: Path) -> None:
+    paths = [tmp_path / "states.bag", tmp_path / "labels.bag"]
+    record_a_clock_set_back(paths[0])
+    with FlightBag(paths[1]) as bag:
+        for t in (0.503, 0.883, 1.503):  # the states' stamps from 0.75 to 0.98 s are of two times
+            bag.add("/xplane/scenario/label", "std_msgs/String", stamp_ns(t), {"data": ""})
+    with Bags(paths) as bags:
+        (label,) = arrays.topic_arrays(bags, ["scenario/label"])
+    np.testing.assert_allclose(label.columns["sim_time_unwrapped_s"], [0.503, np.nan, 1.753], atol=1e-9)
 
 
 def test_each_topic_has_the_clock_of_its_own_bridge(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pyarrow.parquet
 import pytest
 
 from support.flights.export_flight import export
-from support.flights.synthetic_flight import FlightBag, stamp_ns
+from support.flights.synthetic_flight import FlightBag, record_a_clock_set_back, stamp_ns
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,6 +26,15 @@ def test_a_time_base_does_not_bridge_a_new_origin(tmp_path: Path) -> None:
     assert export(tmp_path / "flight.bag", "--rate", "50", "-o", tmp_path) == 0
     table = pd.read_csv(tmp_path / "flight.csv")
     assert table["position_north_m"].tolist() == [0.0] * 21 + [5000.0] * 21
+
+
+def test_a_time_base_lies_on_no_line_between_two_times_of_a_clock_set_back(tmp_path: Path) -> None:
+    record_a_clock_set_back(tmp_path / "flight.bag")
+    assert export(tmp_path / "flight.bag", "--rate", "200", "-o", tmp_path) == 0
+    table = pd.read_csv(tmp_path / "flight.csv")
+    off = table["sim_time_unwrapped_s"] - table["time_s"]
+    assert set(off.round(6)) == {0.0, 0.25}
+    assert len(table) > 200
 
 
 def test_commands_without_a_stamp_come_when_they_were_received(tmp_path: Path) -> None:

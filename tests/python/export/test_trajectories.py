@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from support.flights.export_flight import export
-from support.flights.synthetic_flight import FlightBag, stamp_ns
+from support.flights.synthetic_flight import FlightBag, record_a_clock_set_back, stamp_ns
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.flight import read_flight
+from xplane_bridge.export.trajectories import trajectory
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,6 +85,18 @@ def test_a_time_base_does_not_bridge_what_began_anew(tmp_path: Path, form: str, 
     seconds = (time - time[0]) / (1e9 if form == "euroc" else 1.0)
     np.testing.assert_allclose(seconds, [k / 50 for k in range(96) if not 35 < k < 40], atol=1e-6)
     assert x.tolist() == [0.0] * 36 + [5000.0] * 56
+
+
+def test_a_time_base_lies_on_no_line_between_two_times_of_a_clock_set_back(tmp_path: Path) -> None:
+    paths = [tmp_path / "states.bag", tmp_path / "odometry.bag"]
+    record_a_clock_set_back(paths[0])
+    with FlightBag(paths[1]) as bag:
+        for k in range(100):
+            add_odometry(bag, "/xplane/odom", k / 50 - (0.25 if k >= 50 else 0.0), 0.0 if k < 50 else 5000.0)
+    with Bags(paths) as bags:
+        _, position, _ = trajectory(bags, 200.0)
+    assert set(position[:, 0]) == {0.0, 5000.0}
+    assert len(position) > 200
 
 
 def test_a_time_base_needs_no_flight_states(tmp_path: Path) -> None:

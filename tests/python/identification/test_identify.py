@@ -394,6 +394,14 @@ def test_a_gap_is_refused(short: Recording) -> None:
         identify(without(short, state=state))
 
 
+def test_a_clock_set_back_is_refused(short: Recording) -> None:
+    state = list(short.state)
+    times = [{name: row[name] for name in ("sim_time", "sim_time_unwrapped")} for row in state[100:102]]
+    state[100:102] = [{**row, **time} for row, time in zip(state[100:102], reversed(times))]
+    with pytest.raises(IdentificationError, match="the host's clock was set back in it"):
+        identify(without(short, state=state))
+
+
 def test_silent_surfaces_are_refused(short: Recording) -> None:
     surfaces = short.surfaces[:100] + short.surfaces[140:]
     with pytest.raises(IdentificationError, match=r"mission/surfaces is silent for 0\.68 s"):
