@@ -22,6 +22,7 @@ import numpy as np
 
 from xplane_bridge.errors import XplaneBridgeError
 from xplane_bridge.eye import names
+from xplane_bridge.whole_file import replaced
 
 #: Frames by which the datagram that reports a step is later than the step in the picture. 0 until a real
 #: X-Plane has been seen to read its network after it answered.
@@ -94,14 +95,12 @@ class UndoFile:
         Raises:
             CalibrationError: The file cannot be written: then nothing may be changed.
         """
-        draft = self._path.with_suffix(".new")
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            with open(draft, "w", encoding="utf-8") as file:
+            with replaced(self._path) as file:
                 json.dump({"xplane": self._xplane, self._name: value}, file)
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(draft, self._path)
         except OSError as error:
             raise CalibrationError(
                 f"{self._path} cannot be written ({error.strerror}), and without it {self._words} could not be "

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.whole_file import replaced
 
 SCHEMA = 2  #: 1 knew one camera
 ENDING = ".labels.jsonl"
@@ -94,7 +95,6 @@ def write(path: Path, about: Callable[[], Mapping[str, Any]], frames: Iterable[M
     Raises:
         LabelError: It cannot be written.
     """
-    part = path.with_name(path.name + ".part")
     count = 0
     try:
         with tempfile.TemporaryFile("w+", encoding="utf-8", dir=path.parent) as lines:
@@ -102,16 +102,12 @@ def write(path: Path, about: Callable[[], Mapping[str, Any]], frames: Iterable[M
                 lines.write(_line(frame))
                 count += 1
             lines.seek(0)
-            with part.open("w", encoding="utf-8") as file:
+            with replaced(path) as file:
                 file.write(_line({"labels": SCHEMA, **about()}))
                 shutil.copyfileobj(lines, file)
-        part.replace(path)
     except OSError as error:
         msg = f"{path}: {error.strerror}; --output takes another file"
         raise LabelError(msg) from None
-    finally:
-        if part.exists():
-            part.unlink()
     return count
 
 
