@@ -71,7 +71,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             "--commands plays what was recorded"
         )
     output = args.output or Path(f"rerun_{flight['scenario']}")
-    if (output / _BAG).resolve() == args.bag.resolve():
+    if (output / _BAG).resolve() in {path.resolve() for path in Bags(args.bag).paths}:
         raise RerunError(f"--output {output}: the recording itself is there; expected another folder")
     try:
         output.mkdir(parents=True, exist_ok=True)

@@ -44,3 +44,14 @@ def test_only_a_recording_of_this_run_is_compared(
     monkeypatch.setattr(rerun_flight.run_scenario, "main", run)
     assert rerun_flight.main([str(recorded), "--output", str(output)]) == (0 if flown else 1)
     assert capsys.readouterr().out == said
+
+
+@pytest.mark.parametrize("given", ["flight.bag", ""], ids=["file", "folder"])
+def test_a_recording_is_not_flown_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], given: str
+) -> None:
+    (tmp_path / "flight.bag").write_text("recorded", encoding="utf-8")
+    monkeypatch.setattr(rerun_flight, "passport_of", lambda _: passport(tmp_path / "flight.bag"))
+    assert rerun_flight.main([str(tmp_path / given), "--output", str(tmp_path)]) == 1
+    assert "the recording itself is there; expected another folder" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.bag"]
