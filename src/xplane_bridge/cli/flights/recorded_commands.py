@@ -37,7 +37,7 @@ NEAR_M = 100.0  #: [m] within which an aircraft is where it was placed
 class Played(NamedTuple):
     """One message to send."""
 
-    time: float  #: [s] of simulated time since the first flight state of the recording
+    time: float  #: [s] of simulated time since the state `start`; what was sent before is sent with it
     topic: str
     raw: bytes
     md5sum: str
@@ -47,8 +47,8 @@ class Commands(NamedTuple):
     """What a recording holds of who flew, and how."""
 
     messages: List[Played]  #: by time
-    start: Any  #: fields of the first flight state, by name
-    duration: float  #: [s] of simulated time
+    start: Any  #: fields, by name, of the flight state as which the aircraft is placed
+    duration: float  #: [s] of simulated time from there
 
 
 def read_commands(bag: Path) -> Commands:
@@ -64,7 +64,9 @@ def read_commands(bag: Path) -> Commands:
             raise ReplayError(f"{bag}: no flight state in it, by whose simulated time commands are played")
         namespace = topic[: -len("/flight_state")]
         state = bags.read(topic)
+        first = first_of(state)
         elapsed = elapsed_of(state)
+        elapsed = np.maximum(elapsed - elapsed[first], 0.0)
         there = [f"{namespace}/{name}" for name in _PLAYED if f"{namespace}/{name}" in bags.topics]
         messages = []
         for recorded, time_ns, raw in bags.recorded(there) if there else ():
@@ -72,13 +74,17 @@ def read_commands(bag: Path) -> Commands:
             messages.append(Played(time, recorded.topic[len(namespace) + 1 :], raw, recorded.md5sum))
     if not any(message.topic != "control/mode" for message in messages):
         raise ReplayError(f"{bag}: no command in it: {', '.join(_PLAYED)} were not recorded, or no command was sent")
-    return Commands(messages, first_of(state), float(elapsed[-1]))
+    return Commands(messages, fields_of(state, first), float(elapsed[-1]))
 
 
-def first_of(state: Table) -> Any:
-    """Fields of the first flight state as which an aircraft can be placed, by name; else of the first one."""
+def first_of(state: Table) -> int:
+    """The row of the first flight state as which an aircraft can be placed; else of the first one."""
     known = np.all([np.isfinite(state[name]) for name in PLACED_BY if name in state], axis=0)
-    row = int(np.argmax(known))
+    return int(np.argmax(known))
+
+
+def fields_of(state: Table, row: int) -> Any:
+    """Fields of one flight state, by name."""
     return {name: column[row] for name, column in state.columns.items() if column.ndim == 1}
 
 

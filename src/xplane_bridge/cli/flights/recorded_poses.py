@@ -14,7 +14,7 @@ from xplane_bridge.bags import FLIGHT_STATE, Bags
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
 from xplane_bridge.cli.entry import start_node
 from xplane_bridge.cli.flights.borrowed import Borrowed, ReplayError, answered
-from xplane_bridge.cli.flights.recorded_commands import NEAR_M, PLACED_S, elapsed_of, far, first_of, place
+from xplane_bridge.cli.flights.recorded_commands import NEAR_M, PLACED_S, elapsed_of, far, fields_of, first_of, place
 from xplane_bridge.harness.pose_sender import PATH_OVERRIDE, SCENERY, PoseSender, Scenery
 
 _NODE = "rerun_flight"
@@ -65,7 +65,8 @@ def read_poses(bag: Path) -> Poses:
         columns = {name: np.asarray(state[name], dtype=float) for name in _COLUMNS + _VELOCITY}
         good = np.all([np.isfinite(column) for column in columns.values()], axis=0)
         if good.sum() >= 2:
-            return Poses(elapsed[good], {name: column[good] for name, column in columns.items()}, first_of(state))
+            start = fields_of(state, first_of(state))
+            return Poses(elapsed[good], {name: column[good] for name, column in columns.items()}, start)
     raise ReplayError(f"{bag}: no two flight states with a valid pose in it")
 
 

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from support.flights.synthetic_flight import FlightBag, stamp_ns
 from xplane_bridge.bags import Table
-from xplane_bridge.cli.flights.recorded_commands import PLACED_BY, Commands, Played, _Player, far, first_of
+from xplane_bridge.cli.flights.recorded_commands import (
+    PLACED_BY,
+    Commands,
+    Played,
+    _Player,
+    far,
+    fields_of,
+    first_of,
+    read_commands,
+)
 from xplane_bridge.units import EARTH_RADIUS_M
 
 START = {"latitude": 37.5, "longitude": 127.0, "altitude_msl": 900.0}
@@ -60,7 +71,20 @@ def test_it_is_placed_as_in_the_first_state_that_knows_all_that_takes():
     known["pitch_deg"] = np.array([0.0, np.nan, 3.0])
     known["orientation"] = np.zeros((3, 4))
     table = Table("", "", np.zeros(3, dtype=np.int64), known)
-    assert first_of(table) == {**dict.fromkeys(PLACED_BY, 2.0), "pitch_deg": 3.0}
+    assert fields_of(table, first_of(table)) == {**dict.fromkeys(PLACED_BY, 2.0), "pitch_deg": 3.0}
+
+
+def test_commands_are_played_from_the_state_as_which_it_is_placed(tmp_path: Path):
+    with FlightBag(tmp_path / "f.bag") as bag:
+        for k in range(50):
+            known = {} if k >= 20 else {"pitch_deg": math.nan}
+            state = {**bag.state(k / 10, k), **known}
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 10), state)
+            command = {"fields": 1, "roll": k / 50}
+            bag.add("/xplane/control/auto", "xplane_bridge/ControlCommand", stamp_ns(k / 10), command)
+    commands = read_commands(tmp_path / "f.bag")
+    assert [message.time for message in commands.messages] == pytest.approx([max(k - 20, 0) / 10 for k in range(50)])
+    assert commands.duration == pytest.approx(2.9)
 
 
 def test_an_aircraft_whose_place_is_not_known_is_not_where_it_was_placed():
