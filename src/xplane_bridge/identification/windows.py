@@ -7,6 +7,7 @@ simulator time, which both carry from the same frame; stamps and places in the b
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Sequence
 
 import numpy as np
 
@@ -27,6 +28,7 @@ _NEIGHBOURHOOD_S = 5.0
 _LONGEST_GAP_S = 0.15
 #: Two simulator times closer than this are of one frame [s].
 _SAME_FRAME_S = 1e-4
+_NO_END = "no end in the bag"
 #: Share of its movement that an input may still make after the excitation's end.
 _STILL = 0.05
 _NEEDED = {
@@ -112,9 +114,9 @@ def find_windows(flight: Flight, tail: float = TAIL_S) -> tuple[list[Window], li
         raise IdentificationError(msg)
     windows, left_out = [], []
     for k, excitation in enumerate(found):
-        later = [other.start for other in found[k + 1 :] if other.start > excitation.start]
         try:
-            windows.append(_window(flight, excitation, min([excitation.end + tail, *later])))
+            end = _end(flight.tables["state"], excitation, found[k + 1 :], tail)
+            windows.append(_window(flight, excitation, end))
         except IdentificationError as error:
             left_out.append(str(error))
     if not windows:
@@ -130,16 +132,28 @@ def read_excitations(table: Table) -> list[Excitation]:
         number = int(table["id"][k])
         if table["active"][k]:
             start, duration = float(table["start_sim_time"][k]), float(table["duration"][k])
-            # Numbers begin anew with tx_node.
-            if not out or out[-1].number != number or abs(out[-1].start - start) > _SAME_FRAME_S:
+            # Numbers begin anew with tx_node, and times with X-Plane.
+            same = out and out[-1].number == number and abs(out[-1].start - start) <= _SAME_FRAME_S
+            if not same or out[-1].result != _NO_END:
                 targets = tuple(str(table["target"][k]).replace(" ", "").split(","))
                 kind, stamp = str(table["kind"][k]), int(table.stamp[k])
-                out.append(Excitation(number, kind, targets, stamp, start, start + duration, "no end in the bag"))
+                out.append(Excitation(number, kind, targets, stamp, start, start + duration, _NO_END))
         elif out and out[-1].number == number:
             out[-1].result = str(table["result"][k])
             if np.isfinite(table["end_sim_time"][k]):
                 out[-1].end = float(table["end_sim_time"][k])
     return out
+
+
+def _end(state: Table, excitation: Excitation, following: Sequence[Excitation], tail: float) -> float:
+    """Where the window ends [s of simulated time]: `tail` behind the excitation, or where the next one begins."""
+    end = excitation.end + tail
+    rows = _rows(state, excitation, end)
+    if not len(rows):
+        return end
+    # Of another flight, which may have the same simulated times, none.
+    last = state.stamp[rows[-1]]
+    return min([end, *(o.start for o in following if o.start > excitation.start and o.stamp <= last)])
 
 
 def _window(flight: Flight, excitation: Excitation, end: float) -> Window:

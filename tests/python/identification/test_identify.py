@@ -231,19 +231,47 @@ def test_a_simulator_slower_than_real_time_gives_the_same_windows(
             assert np.array_equal(values, other.columns[name]), name
 
 
+HOUR = 3_600_000_000_000  # [ns]
+
+
+def an_hour_later(flown: Recording, simulated_s: float) -> dict[str, list[dict]]:
+    """The rows of another flight, whose simulated time is that of the first and as much more."""
+
+    def later(row: dict) -> dict:
+        moved = {name: row[name] + simulated_s for name in row if name.endswith("sim_time")}
+        begun = {"epoch": row["epoch"] + 100} if "epoch" in row else {}
+        return {**row, **moved, **begun, "stamp": row["stamp"] + HOUR}
+
+    return {role: [later(row) for row in getattr(flown, role)] for role in ("state", "surfaces", "excitation")}
+
+
+def test_a_manoeuvre_is_not_cut_by_one_of_another_flight(calm: Recording) -> None:
+    once, _ = find_windows(calm.flight())
+    for simulated_s in (0.02, 1.0):
+        later = an_hour_later(calm, simulated_s)
+        twice, left_out = find_windows(
+            Recording(*(getattr(calm, role) + rows for role, rows in later.items())).flight()
+        )
+        assert left_out == []
+        assert [len(window.time) for window in twice] == 2 * [len(window.time) for window in once]
+
+
+def test_one_manoeuvre_that_two_flights_begin_with_is_two(short: Recording) -> None:
+    later = an_hour_later(short, 0.0)
+    both = Recording(*(getattr(short, role) + rows for role, rows in later.items()))
+    found, left_out = find_windows(both.flight())
+    assert left_out == []
+    assert len(found) == 2 * len(find_windows(short.flight())[0])
+
+
 def test_each_of_two_flights_with_the_same_simulated_times_has_its_own_frames(calm: Recording) -> None:
     # X-Plane was restarted after the first one, and its time began anew.
-    hour = 3_600_000_000_000
-    later = {
-        role: [{**row, "stamp": row["stamp"] + hour, **({"epoch": row["epoch"] + 100} if "epoch" in row else {})}
-               for row in getattr(calm, role)]
-        for role in ("state", "surfaces", "excitation")
-    }  # fmt: skip
+    later = an_hour_later(calm, 0.0)
     both = Recording(*(getattr(calm, role) + rows for role, rows in later.items()))
     once, _ = find_windows(calm.flight())
     twice, left_out = find_windows(both.flight())
     assert left_out == []
-    assert [int(w.stamp[0]) for w in twice] == [int(w.stamp[0]) + more for more in (0, hour) for w in once]
+    assert [int(w.stamp[0]) for w in twice] == [int(w.stamp[0]) + more for more in (0, HOUR) for w in once]
     # Where the second one's frames are missing, the first one's are not taken for them.
     lost, left_out = find_windows(Recording(calm.state, both.surfaces, both.excitation).flight())
     assert [int(w.stamp[0]) for w in lost] == [int(w.stamp[0]) for w in once]
