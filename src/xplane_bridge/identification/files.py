@@ -54,9 +54,14 @@ def read_model(path: Path) -> LinearModel:
         IdentificationError: It cannot be read, or holds something else.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))  # JSON is YAML
+        text = path.read_text(encoding="utf-8")
+        # To YAML a number as JSON writes it may be a text: 1e-05.
+        content = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
     except (OSError, UnicodeDecodeError) as error:
         msg = f"{path}: {text_problem(error)}"
+        raise IdentificationError(msg) from None
+    except json.JSONDecodeError as error:
+        msg = f"{path}: does not parse as JSON: {error}"
         raise IdentificationError(msg) from None
     except yaml.YAMLError as error:
         msg = f"{path}: {yaml_problem(error)}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.identification import files
 from xplane_bridge.identification.coefficients import geometry_of, read_geometry
 from xplane_bridge.identification.linearisation import Condition, linearise
-from xplane_bridge.identification.model import AXES, IdentificationError, LinearModel, name_modes
+from xplane_bridge.identification.model import AXES, Estimate, IdentificationError, LinearModel, name_modes
 
 #: Found once by other code: 16 perturbed flights of 4 s, the map from frame to frame, its logarithm [1/s].
 KNOWN = {
@@ -179,11 +180,19 @@ def test_a_bad_file_of_sizes_is_refused_in_words(text: str, words: str, tmp_path
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("form", ["yaml", "json"])
+def test_small_numbers_of_a_file_are_numbers(form: str, twin: LinearModel, tmp_path: Path) -> None:
+    trim = {**twin.trim, "beta": Estimate(3e-9, "rad")}
+    files.write_model(replace(twin, trim=trim), tmp_path / f"model.{form}")
+    assert files.read_model(tmp_path / f"model.{form}").trim["beta"].value == 3e-9
+
+
+@pytest.mark.parametrize("ending", ["yaml", "json"])
 @pytest.mark.parametrize("text", ["a: 1\n", "[]\n", "a: [\n"])
-def test_a_file_that_is_no_model_is_refused_in_words(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "model.yaml"
+def test_a_file_that_is_no_model_is_refused_in_words(text: str, ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"model.{ending}"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(IdentificationError, match=r"model\.yaml: (not a model of identify_model|does not parse)"):
+    with pytest.raises(IdentificationError, match=r"model\.\w+: (not a model of identify_model|does not parse)"):
         files.read_model(path)
 
 
