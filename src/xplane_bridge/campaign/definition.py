@@ -152,7 +152,7 @@ def parameter_of(item: Any) -> Optional[str]:
 
 
 def _short(value: Value) -> str:
-    return value if isinstance(value, str) else f"{value:g}"
+    return re.sub(r"\.0$", "", str(value))
 
 
 def load_campaign(path: Path, flights: Optional[int] = None) -> Campaign:
@@ -328,6 +328,10 @@ def find_controller(name: str) -> Any:
         raise CampaignError(
             f"controller: {name!r} cannot be had ({error}); expected module:class or module:function, the module's "
             "folder in PYTHONPATH, or the one you are in"
+        ) from None
+    except Exception as error:  # the user's own code
+        raise CampaignError(
+            f"controller: {name!r}: {module} cannot be imported ({type(error).__name__}: {error})"
         ) from None
     if not callable(found):
         raise CampaignError(f"controller: {name!r} is no class and no function")

@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
             "report.html shows them. What was interrupted, by whatever, goes on where it stopped if started again."
         ),
     )
-    p.add_argument("campaign", metavar="CAMPAIGN", nargs="?", type=Path, help="file; not needed with --refly")
+    p.add_argument("campaign", metavar="CAMPAIGN", nargs="?", type=Path, help="file; none with --refly")
     p.add_argument("-o", "--output", required=True, type=Path, metavar="DIR", help="folder of the campaign's results")
     p.add_argument("--flights", type=int, metavar="N", help="fly so many instead of the file's number")
     p.add_argument("--workers", type=int, metavar="N", help="processes (default: one a processor); 0: fly in this one")
@@ -133,6 +133,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser().parse_args(argv)
     folder = CampaignFolder(args.output)
     if args.refly is not None:
+        given = {"CAMPAIGN": args.campaign, "--flights": args.flights, "--workers": args.workers,
+                 "--scheduler": args.scheduler}  # fmt: skip
+        for name, value in given.items():
+            if value is not None:
+                raise CampaignError(f"{name} {value}: not with --refly, which flies what {args.output} holds")
         return refly(folder, args.refly, args.through_nodes)
     if args.through_nodes:
         raise CampaignError("--through-nodes: flies one flight again; expected --refly I with it")

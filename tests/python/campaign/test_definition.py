@@ -7,7 +7,7 @@ from typing import Optional
 
 import pytest
 
-from xplane_bridge.campaign.definition import CampaignError, load_campaign
+from xplane_bridge.campaign.definition import CampaignError, find_controller, load_campaign, substituted
 
 SCENARIO = b"name: s\naircraft: fixed_wing\nevents: [{at: 1, end: true}]\n"
 NAMING = b"name: c\nscenario: s.yaml\n"
@@ -38,3 +38,22 @@ def test_a_scenario_file_of_a_campaign_is_read_beside_it(tmp_path: Path) -> None
         load_campaign(tmp_path / "c.yaml")
     with pytest.raises(CampaignError, match=r"d\.yaml: cannot be read: No such file"):
         load_campaign(tmp_path / "d.yaml", 3)
+
+
+def test_a_parameter_inside_a_text_keeps_all_digits() -> None:
+    drawn = {"day": 20240102, "t": 0.123456789, "n": 3.0, "kind": "calm"}
+    text = substituted({"table": "gains_$day.csv", "note": "$t $n $kind"}, drawn, "arguments")
+    assert text == {"table": "gains_20240102.csv", "note": "0.123456789 3 calm"}
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [("def fly(state)\n    pass\n", "SyntaxError"), ("gain = 1 / 0\n", "ZeroDivisionError"), ("x = y\n", "'y'")],
+)
+def test_a_controller_with_a_mistake_in_it_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: str, said: str
+) -> None:
+    (tmp_path / "controller_of_a_test.py").write_text(code)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(CampaignError, match=rf"'controller_of_a_test:fly': controller_of_a_test cannot .*{said}"):
+        find_controller("controller_of_a_test:fly")

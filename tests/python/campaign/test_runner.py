@@ -230,6 +230,13 @@ def test_what_cannot_be_written_is_a_line(tmp_path: Path, capsys: pytest.Capture
     assert f"{folder / 'refly_1'}: File exists; " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("given", [["c.yaml"], ["--flights", "3"], ["--workers", "0"], ["--scheduler", "tcp://a:1"]])
+def test_what_refly_would_ignore_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture, given: List[str]) -> None:
+    assert run_campaign.main([*given, "-o", str(tmp_path), "--refly", "1"]) == 1
+    said = capsys.readouterr().err
+    assert f"{given[-1]}: not with --refly, which flies what {tmp_path} holds" in said
+
+
 def test_other_code_under_the_same_campaign_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     campaign = parse_campaign(document(flights=1))
     CampaignFolder(tmp_path).fly(campaign, in_process, quiet)
