@@ -85,6 +85,19 @@ def test_the_program_anonymises(tmp_path, capsys):
     assert "cannot be read: No such file" in capsys.readouterr().err
 
 
+def test_where_nothing_can_be_written_is_said_before_the_replay(tmp_path, capsys):
+    path, there = log(tmp_path / "w.rx_node.pcapng"), tmp_path / "there"
+    there.write_text("")
+    for option, file, said in (
+        ("--output", there, "is there already and is kept"),
+        ("--output", tmp_path / "no" / "replay.bag", f"{tmp_path / 'no'} is no folder"),
+        ("--regression", there, f"{there} cannot be written: File exists"),
+    ):
+        assert main([str(path), option, str(file)]) == 1
+        assert said in capsys.readouterr().err
+    assert there.read_text() == ""
+
+
 def test_a_parameter_is_given_as_key_and_value(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main([str(tmp_path / "x"), "--set", "transport"])

@@ -6,8 +6,9 @@ import argparse
 import hashlib
 import json
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import yaml
 
@@ -346,10 +347,31 @@ def _replay(args: argparse.Namespace, folder: Path) -> int:
         raise
 
 
+@contextmanager
+def _writing(option: str, path: Path) -> Iterator[None]:
+    """Writes a file or makes a folder.
+
+    Raises:
+        ReplayError: It cannot be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        msg = f"{option}: {path} cannot be written: {error.strerror}; give a folder that can be"
+        raise ReplayError(msg) from None
+
+
 def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
     path, options = args.file, Options(args.xplane, dict(args.set))
+    if args.output and args.output.exists():
+        msg = f"--output {args.output}: is there already and is kept: delete it, or give another name"
+        raise ReplayError(msg)
+    if args.output and not args.output.parent.is_dir():
+        msg = f"--output {args.output}: {args.output.parent} is no folder; expected one that is there"
+        raise ReplayError(msg)
     if args.regression:
-        args.regression.mkdir(parents=True, exist_ok=True)
+        with _writing("--regression", args.regression):
+            args.regression.mkdir(parents=True, exist_ok=True)
         path = args.regression / _kept_name(args.file)
         options = _keep(args.file, path, options, written)
     expected = _expectation(args.expect) if args.expect else None
@@ -374,10 +396,12 @@ def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
     if args.regression:
         kept = {"options": {"xplane": options.xplane, "set": dict(options.given)}, "topics": found}
         text = json.dumps(kept, indent=2, sort_keys=True) + "\n"
-        path.with_suffix(".json").write_text(text, encoding="utf-8")
+        with _writing("--regression", path.with_suffix(".json")):
+            path.with_suffix(".json").write_text(text, encoding="utf-8")
         written.clear()
     if args.output:
-        replay.write_bag(args.output)
+        with _writing("--output", args.output):
+            replay.write_bag(args.output)
     code = 0 if expected is None else _say(_judge(expected.topics, found))
     if not args.against:
         return code
