@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -62,7 +63,7 @@ class Camera:
         to_optical: Rotation from the world's axes to right, down, forward.
         place: [m] in the world.
         height: [m MSL]
-        focal: [px] the mean of both axes: what sigmas are by
+        focal: [px] the mean of both axes
         focals: [px] across and down
         area: `Optics.area`
     """
@@ -80,6 +81,8 @@ class Camera:
         self.focal = 0.5 * (optics.fx + optics.fy)
         self.focals: np.ndarray = np.array((optics.fx, optics.fy))
         self.area = optics.area()
+        outermost = np.abs(self.area - (optics.cx, optics.cy)).max(axis=0) / self.focals
+        self._reach = float(np.linalg.norm(outermost))  # tangent of the widest angle in the picture
 
     def optical(self, places: np.ndarray) -> np.ndarray:
         """Places (n, 3) of the world as right, down, forward of the camera [m]."""
@@ -128,32 +131,71 @@ class Camera:
                 parts.append(segment)
         return parts
 
-    def sigma(self, distance: float, direction: np.ndarray, sigma_height: float, sigma_place: float) -> float:
-        """How well a place is known in the picture [px].
+    def sigma(
+        self,
+        distance: float,
+        direction: np.ndarray,
+        sigma_height: float,
+        sigma_place: float,
+        sigma_angle: float = 0.0,
+    ) -> float:
+        """How well a place is known in the picture [px]: by what each error moves its pixel there, at worst.
 
         Args:
             distance: [m]; infinite for directions.
             direction: Unit vector to it: right, down, forward of the camera.
             sigma_height: [m] of the place's height.
             sigma_place: [m] of its place on the map.
+            sigma_angle: [rad] of its direction.
         """
-        pose, focal = self.pose, self.focal
-        down = float(direction @ self.ned_to_optical[:, 2])
-        level = (max(0.0, 1.0 - down * down)) ** 0.5  # of the line of sight: height is seen at right angles to it
-        terms = [0.3, focal * pose.sigma_angle]
-        if np.isfinite(distance):
-            terms += [focal * sigma_height * level / distance, focal * sigma_place / distance]
-            terms.append(focal * pose.sigma_place / distance)
+        pose = self.pose
+        ray, moves = self._moves(direction)
+        turn = _largest(moves @ _cross(ray))
+        terms = [0.3, turn * pose.sigma_angle, turn * sigma_angle]
         if pose.may_be_neighbour:
-            terms.append(focal * pose.turn_rate * pose.period)
-            if np.isfinite(distance):
-                across = self._velocity - direction * float(self._velocity @ direction)
-                terms.append(focal * float(np.linalg.norm(across)) * pose.period / distance)
+            terms.append(turn * pose.turn_rate * pose.period)
+        if np.isfinite(distance):
+            moves = moves / distance
+            terms.append(float(np.linalg.norm(moves @ self.ned_to_optical[:, 2])) * sigma_height)
+            terms += [_largest(moves @ self.ned_to_optical[:, :2]) * sigma_place, _largest(moves) * pose.sigma_place]
+            if pose.may_be_neighbour:
+                terms.append(float(np.linalg.norm(moves @ self._velocity)) * pose.period)
         return float(np.sqrt(np.sum(np.square(terms))))
+
+    def _moves(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What a point's pixel moves by [px], for the point's own motion: derivatives by right, down, forward at 1 m.
+
+        Outside the picture they grow without limit: there those of its border are taken; behind the camera, where there
+        are no pixels, those by the angle.
+
+        Returns:
+            The direction that is taken, and the matrix (2, 3).
+        """
+        if direction[2] <= 0.0:
+            across: np.ndarray = np.linalg.svd(direction[np.newaxis])[2][1:]  # two directions at right angles to it
+            return direction, self.focal * across
+        x, y, z = direction.tolist()
+        inwards = min(1.0, self._reach * z / max(math.hypot(x, y), 1e-12))
+        ray = np.array((inwards * x, inwards * y, z))
+        ray /= np.linalg.norm(ray)
+        x, y, z = ray.tolist()
+        return ray, self.focals[:, np.newaxis] / z * np.array(((1.0, 0.0, -x / z), (0.0, 1.0, -y / z)))
 
     def _borders(self) -> tuple[tuple[float, int, float], ...]:
         (left, top), (right, bottom) = self.area.tolist()
         return (1.0, 0, left), (-1.0, 0, right), (1.0, 1, top), (-1.0, 1, bottom)
+
+
+def _largest(moves: np.ndarray) -> float:
+    """By how much a matrix (2, n) lengthens the vector that it lengthens most: its greatest singular value."""
+    (a, b), (_, c) = (moves @ moves.T).tolist()
+    return math.sqrt(0.5 * (a + c) + math.hypot(0.5 * (a - c), b))
+
+
+def _cross(vector: np.ndarray) -> np.ndarray:
+    """The matrix that gives another vector's cross product with this one."""
+    x, y, z = vector.tolist()
+    return np.array(((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0)))
 
 
 def clip(points: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -221,10 +221,7 @@ class Labeller:
         seen = _seen_ball(camera, centre, camera.focals * math.tan(_SUN_RADIUS) / float(optical[2]))
         if seen is None:
             return None
-        sigma = math.hypot(
-            camera.sigma(math.inf, optical, 0.0, 0.0),
-            camera.focal * (_SUN_SIGMA if sun.origin else _SUN_SIGMA_NO_ORIGIN),
-        )
+        sigma = camera.sigma(math.inf, optical, 0.0, 0.0, _SUN_SIGMA if sun.origin else _SUN_SIGMA_NO_ORIGIN)
         return {"kind": "sun", "centre": _rounded(centre[np.newaxis])[0], **seen, **_sure([sigma])}
 
     def _other(self, camera: Camera, other: Other) -> Optional[dict[str, Any]]:
