@@ -129,12 +129,29 @@ def _common(name: str, value: str, given: Given) -> str:
     return f"take out {', '.join(strange)}; it is for {', '.join(shared)}" if strange else ""
 
 
+def _other_frames(said: Mapping[str, yaml.Node], measured: str) -> str:
+    """Frames that camera.launch would overwrite with its own; copies of the shipped file have the first camera's."""
+    shipped = dict(_leaves(_composed(config_file("capture.yaml"))))
+    stem = measured[: -len("optical")]
+    named = {"frame_measured": measured}
+    named.update({f"frame_{view}": f"{stem}{view}_optical" for view in ("forward", "rear", "down")})
+    others = [
+        f"{key} (here {name})"
+        for key, name in named.items()
+        if key in said and said[key].value not in (name, shipped[key].value)
+    ]
+    return f"take out {', '.join(others)}: a further camera's frames are named after it" if others else ""
+
+
 def _capture_config(name: str, value: str, given: Given) -> str:
     """Parameters of capture_node; of a further camera (camera.launch alone has field_of_view) they say which window."""
     problem = _parameters(name, value, given)
-    if problem or "field_of_view" not in given or "window_index" in given:
+    if problem or "field_of_view" not in given:
         return problem
     said = dict(_leaves(_composed(Path(value))))
+    problem = _other_frames(said, given["frame"]) if "frame" in given else ""
+    if problem or "window_index" in given:
+        return problem
     if "source" in said and said["source"].value != "x11":
         return ""
     of_window = [f"window/{key}" for key in ("index", "point", "title", "class", "id", "region")]
@@ -198,6 +215,7 @@ CHECKS: Dict[str, Check] = {
     "window_index": _whole,
     **dict.fromkeys(("display_delay", "max_publish_rate", "image_rate", "heading", "pitch", "roll"), _number),
     "field_of_view": _field_of_view,
+    "frame": lambda *_: "",  # derived: what capture_config is held against
     **dict.fromkeys(("rx", "tx", "capture", "listen_for_beacon", "publish_tf", "configure_xplane", "required"), _flag),
     **dict.fromkeys(("set_points", "lockstep"), _flag),
     "engage": _engage,

@@ -110,3 +110,38 @@ def test_a_further_cameras_window_is_the_files_where_that_names_one(master: RosM
     _, params = load(master, "camera.launch", "camera:=belly", f"capture_config:={own}")
     assert index not in params
     assert params["/xplane/belly/capture_node/window/point"] == [1920, 0]
+
+
+def test_a_further_cameras_view_is_the_files_unless_an_argument_gives_it(master: RosMaster, tmp_path: Path) -> None:
+    node = "/xplane/belly/capture_node"
+    keys = ("mount/heading_deg", "mount/pitch_deg", "mount/roll_deg", "assumed_view")
+
+    def view(*given: str) -> list[Any]:
+        _, params = load(master, "camera.launch", "camera:=belly", "window_index:=1", *given)
+        assert params[f"{node}/frame_measured"] == "belly_optical"
+        assert params[f"{node}/frame_down"] == "belly_down_optical"
+        return [params.get(f"{node}/{key}") for key in keys]
+
+    down = ["heading:=0", "pitch:=-90", "roll:=0", "assumed_view:=down"]
+    assert view() == [0.0, 0.0, 0.0, "forward"]
+    assert view(*down) == [0.0, -90.0, 0.0, "down"]
+    own = tmp_path / "belly.yaml"
+    own.write_text("mount: {heading_deg: 5.0, pitch_deg: -80.0, roll_deg: 3.0}\nassumed_view: rear\n", encoding="utf-8")
+    assert view(f"capture_config:={own}") == [5.0, -80.0, 3.0, "rear"]
+    assert view(f"capture_config:={own}", "pitch:=-70") == [5.0, -70.0, 3.0, "rear"]
+    assert view(f"capture_config:={own}", *down) == [0.0, -90.0, 0.0, "down"]
+    own.write_text("mount: {pitch_deg: -90.0}\n", encoding="utf-8")
+    assert view(f"capture_config:={own}") == [None, -90.0, None, None], "the node's own defaults"
+
+
+@pytest.mark.parametrize("camera", ["belly", "007"])
+def test_a_further_cameras_frames_are_not_overwritten_silently(
+    master: RosMaster, tmp_path: Path, capfd: pytest.CaptureFixture[str], camera: str
+) -> None:
+    own = tmp_path / "own.yaml"
+    own.write_text(f"window: {{index: 1}}\nframe_measured: {camera}_optical\n", encoding="utf-8")
+    load(master, "camera.launch", f"camera:={camera}", f"capture_config:={own}")
+    own.write_text("window: {index: 1}\nframe_measured: nose\n", encoding="utf-8")
+    with pytest.raises(Exception, match="check_launch"):
+        load(master, "camera.launch", f"camera:={camera}", f"capture_config:={own}")
+    assert f"take out frame_measured (here {camera}_optical)" in capfd.readouterr().err

@@ -81,3 +81,23 @@ def test_a_further_camera_has_a_window_of_its_own(tmp_path: Path, text: str, giv
     file = tmp_path / "capture.yaml"
     file.write_text(text, encoding="utf-8")
     assert (problems({"capture_config": str(file), **given}) == []) == good
+
+
+@pytest.mark.parametrize(
+    ("text", "good"),
+    [
+        (
+            config_file("capture.yaml").read_text(encoding="utf-8"),
+            True,
+        ),  # a copy of the shipped one has the first one's
+        ("frame_measured: belly_optical\nframe_rear: belly_rear_optical\n", True),
+        ("frame_measured: nose\nframe_down: below\n", False),
+    ],
+)
+def test_a_further_cameras_frames_are_named_after_it(tmp_path: Path, text: str, good: bool) -> None:
+    file = tmp_path / "capture.yaml"
+    file.write_text(text, encoding="utf-8")
+    given = {"capture_config": str(file), "window_index": "1", "field_of_view": "main", "frame": "belly_optical"}
+    wanted = "take out frame_measured (here belly_optical), frame_down (here belly_down_optical): a further camera's"
+    lines = problems(given)
+    assert [wanted in line for line in lines] == ([] if good else [True])
