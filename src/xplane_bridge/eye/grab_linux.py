@@ -211,7 +211,7 @@ class LinuxGrabber(Grabber):
         while not self._stop.wait(_POLL_S):
             if time.monotonic() - checked_s > _SEARCH_S:
                 checked_s = time.monotonic()
-                if self._size(window.number) != (window.width, window.height):
+                if self._resized(window):
                     return True
             begun_ns, looked_ns = looked_ns, time.perf_counter_ns()
             if not image.read(window.number):
@@ -221,6 +221,8 @@ class LinuxGrabber(Grabber):
             sample = image.pixels[rows]
             if before is not None and np.array_equal(sample, before):
                 continue
+            if self._resized(window):  # of one that has grown, the upper left part is read
+                return True
             if before is not None:  # the first was there before it was looked at
                 self._take(image.pixels.copy(), change_ns, change_ns - begun_ns)
             before = sample
@@ -230,11 +232,12 @@ class LinuxGrabber(Grabber):
             self._stop.wait(max(0.0, _REST * usual_s - _POLL_S))
         return True
 
-    def _size(self, window: int) -> Optional[Tuple[int, int]]:
+    def _resized(self, window: windows.Window) -> bool:
+        """Whether a window is gone, or has another size than where it was found."""
         attributes = windows.Attributes()
-        if not self._x11.XGetWindowAttributes(self._display, window, ctypes.byref(attributes)):
-            return None
-        return attributes.width, attributes.height
+        if not self._x11.XGetWindowAttributes(self._display, window.number, ctypes.byref(attributes)):
+            return True
+        return (attributes.width, attributes.height) != (window.width, window.height)
 
 
 def _declared(xext: Any) -> Any:

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, Callable, Iterator, List, Tuple
+from typing import Any, Callable, Iterator, List, Set, Tuple
 
 import pytest
 
@@ -105,6 +105,13 @@ def problem_of(grabber: LinuxGrabber) -> str:
     return grabber.problem
 
 
+def shapes_from_now_on(pictures: List[Tuple[Tuple[int, ...], int]]) -> Set[Tuple[int, ...]]:
+    """Shapes of the next few pictures; each is with the time when it was read [ns]."""
+    now_ns = time.perf_counter_ns()
+    wait_until(lambda: sum(read_ns > now_ns for _, read_ns in pictures) > 3, LONGEST_S, "pictures")
+    return {shape for shape, read_ns in pictures if read_ns > now_ns}
+
+
 def segments() -> int:
     """How many pieces of shared memory this process has made that are still there."""
     rows = [line.split() for line in Path("/proc/sysvipc/shm").read_text("ascii").splitlines()]
@@ -159,3 +166,18 @@ def test_a_window_partly_off_the_screen_is_said_and_not_searched_without_rest(di
         finally:
             grabber.stop()
     assert set(pictures) == {(240, 320, 4)}
+
+
+def test_a_window_that_grows_is_not_sent_by_its_upper_left_part(display: str):
+    pictures: List[Tuple[Tuple[int, ...], int]] = []
+    with window(display) as move:
+        move("320x240+100+50")
+        grabber = LinuxGrabber(("X-Plane",), None, lambda pixels, at_ns, _: pictures.append((pixels.shape, at_ns)))
+        grabber.start()
+        try:
+            wait_until(lambda: len(pictures) > 3, LONGEST_S, "pictures")
+            for width, height in ((400, 300), (480, 360), (640, 480)):
+                move(f"{width}x{height}+100+50")
+                assert shapes_from_now_on(pictures) == {(height, width, 4)}
+        finally:
+            grabber.stop()
