@@ -42,13 +42,13 @@ Actuation::Actuation(core::SimulatorPort* link, const ActuationOptions& options,
       traffic_(link, &overrides_, options.traffic,
                [this](const std::string& text, bool success) { say(EventKind::kSetting, text, "", success); }),
       disturbance_(link, kOverridePurpose, hooks_.disturbance, saying(EventKind::kSetting)),
+      releases_(link, &overrides_, hooks_.journal_problem, options.turns, [this] { disturbance_.watch(); }),
       jobs_(
           link, options.flight, changeHooks(),
           [this](std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who) {
             hooks_.event({outcome.kind, outcome.text, who, outcome.success, false, number, sim_time_});
           },
-          options.turns),
-      releases_(link, &overrides_, hooks_.journal_problem, options.turns, [this] { disturbance_.watch(); }) {
+          options.turns) {
   const Lock lock(*mutex_);
   subscribe();
 }
@@ -107,6 +107,7 @@ FlightChangeHooks Actuation::changeHooks() {
     const Lock lock(*mutex_);
     return overrides_.active();
   };
+  hooks.pause_left = [this] { releases_.lookAgain(); };
   return hooks;
 }
 
@@ -136,7 +137,7 @@ void Actuation::onLink(const core::LinkStatus& status) {
     if (status.state != link_status_.state) text = std::string(core::toString(status.state)) + ": " + status.reason;
     if (status.epoch != link_status_.epoch) {
       identity_.reset();
-      reset_detector_.restart();
+      reset_detector_.forgetPlace();
       traffic_.release("X-Plane began anew");
     }
     link_status_ = status;
@@ -153,17 +154,17 @@ void Actuation::onWatch(const core::RrefView& view) {
   const bool crashed = watch_.crashed;
   const double before = watch_.sim_time;
   core::updateFlightWatch(view, &watch_);
+  const bool another = path_.showsAnother(watch_);
+  if (another) reset_detector_.restart();
   // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
-  if (watch_.sim_time < before - core::kOvertaking) {
-    reset_detector_.restart();
-    askIdentity();
-  }
+  if (watch_.sim_time < before - core::kOvertaking) askIdentity();
   if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
   sim_time_ = watch_.sim_time;
   if (watch_.sim_time > before) ++frames_flown_;
-  if (path_.showsAnother(watch_)) {
+  if (another) {
     failures_.onRestart();
     jobs_.forgetSettings();
+    disturbance_.forget();
   }
   failures_.onFrame(watch_);
   excitation_.onFrame(watch_);

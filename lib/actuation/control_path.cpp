@@ -182,16 +182,16 @@ void ControlPath::endAuto(const std::string& why, double time) {
   publishMode();
 }
 
-/// Whether it is the flight of before the gap: both of X-Plane's times have run on, and no further than the gap was
-/// long.
-bool ControlPath::continues(const core::FlightWatch& watch) const {
+/// Whether a time of X-Plane's has run on since before the gap, and no further than the gap was long.
+bool ControlPath::ranOn(double before, double after) const {
   const double longest = now() - last_frame_ + kSameFlight;
-  const auto ran_on = [longest](double before, double after) {
-    return after >= before - core::kOvertaking && after <= before + longest;
-  };
+  return after >= before - core::kOvertaking && after <= before + longest;
+}
+
+/// Whether it is the flight of before the gap: both of X-Plane's times have run on.
+bool ControlPath::continues(const core::FlightWatch& watch) const {
   const bool flight_time_known = std::isfinite(watch_.flight_time);
-  return ran_on(watch_.sim_time, watch.sim_time) &&
-         (!flight_time_known || ran_on(watch_.flight_time, watch.flight_time));
+  return ranOn(watch_.sim_time, watch.sim_time) && (!flight_time_known || ranOn(watch_.flight_time, watch.flight_time));
 }
 
 /// Whether X-Plane was restarted, also where the link has bridged the gap: its total running time has run back, or is
@@ -204,7 +204,8 @@ bool ControlPath::isAnotherXPlane(const core::FlightWatch& watch) const {
 
 bool ControlPath::showsAnother(const core::FlightWatch& watch) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  return isAnotherXPlane(watch) || (!flight_shown_ && !continues(watch));
+  // The flight's time does not show it: X-Plane is silent while it loads, and the flight begins anew.
+  return isAnotherXPlane(watch) || (!flight_shown_ && !ranOn(watch_.sim_time, watch.sim_time));
 }
 
 void ControlPath::beginFlight() {

@@ -145,6 +145,7 @@ FlightChanges::Outcome FlightChanges::place(const core::FlightStart& start, cons
 /// One that is found may be ours, of a change before.
 PauseOutcome FlightChanges::firstPause(const std::string& who) {
   const bool ours = isPauseOurs(link_);
+  if (ours) recordPause(link_);  // no longer left: it must last as long as this change
   const PauseOutcome outcome = pause(true, who);
   return ours ? PauseOutcome::kFollowed : outcome;
 }
@@ -164,6 +165,7 @@ std::string FlightChanges::pauseAsBefore(PauseOutcome before, PauseOutcome again
   } while (!expired(deadline));
   if (paused) return ", but X-Plane does not show that it is paused, as it was" + linkCondition();
   leavePause(link_);
+  hooks_.pause_left();
   return ", but X-Plane does not show that it goes on" + linkCondition() + ": it is let go on when it is back";
 }
 

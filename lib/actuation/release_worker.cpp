@@ -54,6 +54,11 @@ void ReleaseWorker::wake() {
   wanted_.notifyAll();
 }
 
+void ReleaseWorker::lookAgain() {
+  look_again_ = true;
+  wake();
+}
+
 void ReleaseWorker::stop() {
   {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -80,7 +85,8 @@ void ReleaseWorker::loop() {
 
 void ReleaseWorker::work() {
   const core::LinkStatus status = link_->status();
-  if (!isUp(status)) return;
+  const bool was_up = std::exchange(was_up_, isUp(status));
+  if (!was_up_) return;
   std::string problem;  // of the journal
   const auto always = [&problem](const std::function<void()>& step) {
     attempt(&problem, [&step] {
@@ -89,7 +95,10 @@ void ReleaseWorker::work() {
     });
   };
   const double now = link_->clock().steadySeconds();
-  if (std::exchange(epoch_, status.epoch) != status.epoch) {
+  const bool other_epoch = std::exchange(epoch_, status.epoch) != status.epoch;
+  const bool asked = look_again_.exchange(false);
+  // A pause may have been left while X-Plane was silent, for however short a time.
+  if (other_epoch || !was_up || asked) {
     leftovers_ = true;
     retries_ = {};
   }

@@ -208,8 +208,8 @@ class Actuation {
   ViewRequests views_;
   TrafficControl traffic_;
   DisturbanceManager disturbance_;
-  FlightJobs jobs_;
   ReleaseWorker releases_;
+  FlightJobs jobs_;
 
   // Last: they end first.
   core::Subscription watch_subscription_;

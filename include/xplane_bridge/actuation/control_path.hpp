@@ -118,7 +118,7 @@ class ControlPath {
   void onGivenBack(const std::string& why);
   /// The next frame is the first one of a simulator in lock-step, which stood until now: that was no gap.
   void beginFlight();
-  /// Whether this frame, which onFrame() has not had yet, is of another X-Plane, or after a gap of another flight.
+  /// Whether this frame, which onFrame() has not had yet, is of another X-Plane.
   bool showsAnother(const core::FlightWatch& watch);
   /// Every frame of X-Plane.
   void onFrame(const core::FlightWatch& watch);
@@ -148,6 +148,7 @@ class ControlPath {
   void halt(const std::string& why, double time);
   void resetAfterReconnect(bool same_flight, double time);
   bool isAnotherXPlane(const core::FlightWatch& watch) const;
+  bool ranOn(double before, double after) const;
   bool continues(const core::FlightWatch& watch) const;
   void endAuto(const std::string& why, double time);
   void watchFailsafe();

@@ -35,6 +35,7 @@ struct FlightChangeHooks {
   /// `who` is about to pause or resume the flight; empty: it did not come to that.
   std::function<void(const std::string& who)> pausing;
   std::function<std::vector<std::string>()> overrides;  ///< that are set now
+  std::function<void()> pause_left = [] {};             ///< leavePause() was called
 };
 
 struct FlightChangeOptions {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -37,6 +38,9 @@ class ReleaseWorker {
   void start();
   /// Looks at once, instead of at the end of its period: the link has changed.
   void wake();
+  /// The same, also for what was left in this X-Plane meanwhile: this run, too, leaves a pause that X-Plane does not
+  /// end.
+  void lookAgain();
   /// Waits for the release that is under way, up to a second.
   void stop();
 
@@ -50,9 +54,11 @@ class ReleaseWorker {
   OverrideManager* overrides_;
   std::function<void(const std::string&)> problem_;
   std::function<void()> watch_;
-  std::uint32_t epoch_ = 0;  // of the link
-  bool leftovers_ = true;    // of earlier runs may be in this X-Plane
-  Retries retries_;          // to give them back
+  std::uint32_t epoch_ = 0;              // of the link
+  bool was_up_ = false;                  // the link, at the last look
+  bool leftovers_ = true;                // may be in this X-Plane
+  Retries retries_;                      // to give them back
+  std::atomic<bool> look_again_{false};  // there are new ones
   std::mutex mutex_;
   core::ClockCondition wanted_;
   bool now_ = false;  // without waiting for the end of the period

@@ -19,6 +19,7 @@ constexpr double kAskWait = 3.0;  // [s] for X-Plane to show its weather
 constexpr double kRepeat = 1.0;   // [s] after which also what has not changed is sent: datagrams get lost
 constexpr int kTimesPutBack = 2;
 constexpr double kMostWind = 100.0;  // [m/s] as set_wind
+constexpr const char* kNotYet = "the wind of before the last disturbance could not be put back yet";
 constexpr const char* kEntry = "override:the wind before a disturbance";
 
 /// X-Plane answers, or is late with a frame: what it was sent stays.
@@ -44,7 +45,7 @@ std::string DisturbanceManager::begin(const core::DisturbanceSpec& spec, const s
   if (state_ != State::kIdle) return described(label_) + ", runs; one at a time: wait for its end, or stop it";
   if (!link_->journal()) return "there is no journal to note the wind of before in";
   putBack();
-  if (!restores_.empty()) return "the wind of before the last disturbance could not be put back yet";
+  if (!restores_.empty()) return kNotYet;
   version_ = link_->status().version;
   std::vector<std::string> names;
   for (const core::DatarefWrite& each : core::windWrites({}, version_)) names.push_back(each.dataref);
@@ -96,6 +97,7 @@ void DisturbanceManager::onWeather(std::uint32_t id, const std::vector<std::stri
 
 void DisturbanceManager::onFrame(const core::FlightWatch& watch) {
   const Lock lock(mutex_);
+  if (up_ && std::exchange(unsure_, false) && state_ == State::kIdle) putBack();
   if (state_ != State::kRunning || !std::isfinite(watch.sim_time)) return;
   if (!label_.active) {
     label_.active = true;
@@ -137,7 +139,7 @@ void DisturbanceManager::putBack() {
   const auto journal = link_->journal();
   if (restores_.empty() || !journal) return;
   try {
-    if (!up_) {
+    if (!up_ || unsure_) {
       times_put_back_ = 0;
       return journal->leave({kEntry}, "X-Plane went first");
     }
@@ -188,15 +190,31 @@ void DisturbanceManager::onLink(const core::LinkStatus& status) {
   up_ = isThere(status);
   const bool another = status.epoch != epoch_;
   epoch_ = status.epoch;
+  if (another && !restores_.empty()) unsure_ = true;
   if (!up_) return abort("X-Plane is lost");
   if (another) abort("X-Plane began anew");
-  if (!was_up && state_ == State::kIdle) putBack();
+  if (!was_up && !unsure_ && state_ == State::kIdle) putBack();
+}
+
+void DisturbanceManager::forget() {
+  const Lock lock(mutex_);
+  const bool noted = !restores_.empty();
+  restores_.clear();
+  unsure_ = false;
+  abort("X-Plane was restarted");
+  const auto journal = link_->journal();
+  if (!noted || !journal) return;
+  try {
+    journal->remove({kEntry});
+  } catch (const core::JournalError& error) {
+    report_(error.what(), who_, false);
+  }
 }
 
 void DisturbanceManager::watch() {
   std::unique_lock<core::HandlerMutex> lock(mutex_);
   const double now = link_->clock().steadySeconds();
-  if (state_ == State::kIdle && up_ && now >= put_back_again_at_) putBack();
+  if (state_ == State::kIdle && up_ && !unsure_ && now >= put_back_again_at_) putBack();
   const auto journal = link_->journal();
   if (state_ != State::kRunning || !journal || now < looked_at_ + kRepeat) return;
   looked_at_ = now;
@@ -214,6 +232,7 @@ void DisturbanceManager::watch() {
 std::string DisturbanceManager::windRefusal() {
   const Lock lock(mutex_);
   if (state_ == State::kIdle) {
+    if (up_ && unsure_) return kNotYet;
     if (up_) putBack();
     return "";
   }

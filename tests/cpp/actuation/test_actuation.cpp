@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "actuation/actuation_rig.hpp"
@@ -31,6 +33,21 @@ class ActuationTest : public testing::Test, protected ActuationRig {
     EXPECT_NEAR(sim_.value(kRoll), 0.35F, 1e-6);
     EXPECT_EQ(labels_.back().result, "running");
     EXPECT_EQ(eventsOf(EventKind::kExcitation).back().who, "test");
+  }
+  /// Lost for so long; what it is then, the test sets.
+  void beSilent(double seconds) {
+    sim_.setState(core::LinkState::kLost);
+    actuation_->onLink(sim_.status());
+    for (double end = sim_.time() + seconds - 1e-6; sim_.time() < end;) sim_.frame(1.0);
+  }
+  /// Begins a gust.
+  void disturb() {
+    core::DisturbanceSpec spec;
+    spec.from_deg = 270.0;
+    spec.speed = 8.0;
+    spec.duration = 20.0;
+    EXPECT_EQ(actuation_->disturb("gust", spec, "test").result.code, core::ResultCode::kAccepted);
+    run(2.0);
   }
   /// Breaks engine 1; X-Plane's frames go on while that is waited for.
   void failEngine() {
@@ -98,6 +115,48 @@ TEST_F(ActuationTest, AnotherXPlaneIsNotLeftWithTheTrafficOfTheLast) {
   EXPECT_TRUE(actuation_->control().overrides.empty());
 }
 
+TEST_F(ActuationTest, AnotherXPlaneIsNotLeftWithTheWindOfTheLast) {
+  const auto winds = core::windWrites({}, sim_.status().version);
+  const auto seen = [&] { return sim_.value(winds[0].dataref); };
+  for (const core::DatarefWrite& each : winds) sim_.set(each.dataref, 3.0F);
+  sim_.setAll(core::shownWindDatarefs(sim_.status().version), 3.0F);
+  disturb();
+  ASSERT_NE(seen(), 3.0F);
+  beSilent(15.0);
+  ASSERT_EQ(sim_.journal()->entries().size(), 1U);
+  for (const core::DatarefWrite& each : winds) sim_.set(each.dataref, 7.0F);
+  sim_.restart();
+  actuation_->onLink(sim_.status());
+  EXPECT_TRUE(actuation_->windRefusal()) << "which X-Plane it is, its first frame shows";
+  run(3.0);
+  EXPECT_FLOAT_EQ(seen(), 7.0F);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+  EXPECT_FALSE(actuation_->windRefusal());
+  // One that is seen by its time, while a disturbance runs.
+  disturb();
+  ASSERT_NE(seen(), 7.0F);
+  for (const core::DatarefWrite& each : winds) sim_.set(each.dataref, 9.0F);
+  sim_.restart();
+  actuation_->onLink(sim_.status());
+  run(3.0);
+  EXPECT_FLOAT_EQ(seen(), 9.0F);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+TEST_F(ActuationTest, AnXPlaneThatIsBackGetsTheWindOfBeforeADisturbance) {
+  const auto winds = core::windWrites({}, sim_.status().version);
+  for (const core::DatarefWrite& each : winds) sim_.set(each.dataref, 3.0F);
+  sim_.setAll(core::shownWindDatarefs(sim_.status().version), 3.0F);
+  disturb();
+  beSilent(15.0);
+  sim_.setState(core::LinkState::kConnected);
+  actuation_->onLink(sim_.status());
+  run(0.5);
+  for (const core::DatarefWrite& each : winds) EXPECT_FLOAT_EQ(sim_.value(each.dataref), 3.0F) << each.dataref;
+  EXPECT_FALSE(actuation_->windRefusal());
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
 TEST_F(ActuationTest, AFailureThatIsArmedEndsWithItsXPlaneHoweverLongTheNextOneHasRun) {
   const std::string time = "sim/time/total_running_time_sec";
   sim_.set(kEngineFailure, 0.0F);
@@ -116,6 +175,44 @@ TEST_F(ActuationTest, AFailureThatIsArmedEndsWithItsXPlaneHoweverLongTheNextOneH
   run(0.5);
   EXPECT_TRUE(actuation_->failures().snapshot().labels.empty());
   EXPECT_EQ(eventsOf(EventKind::kFailure).back().text, "failure of engine_1 has ended: X-Plane was restarted");
+}
+
+TEST_F(ActuationTest, ALoadThatIsSilentForLongIsANewFlightOfTheSameXPlane) {
+  const std::string zulu = "sim/time/zulu_time_sec";
+  sim_.setAll({kEngineFailure, "sim/time/use_system_time", zulu}, 0.0F);
+  sim_.set("sim/time/total_running_time_sec", 1000.0F);
+  run(0.2);
+  ASSERT_EQ(actuation_->failures().set({"engine_1", "failed", {}, 1, 2000.0}, "test").code,
+            core::ResultCode::kAccepted);
+  core::TimeSetting time;
+  time.zulu_time = 3600.0;
+  time.restore_on_exit = true;
+  actuation_->jobs().setTime(time, 1, "test");
+  while (actuation_->jobs().busy()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_EQ(sim_.journal()->entries().size(), 1U);
+  beSilent(15.0);
+  sim_.set(kFlightTime, 0.3F);
+  sim_.setState(core::LinkState::kConnected);
+  actuation_->onLink(sim_.status());
+  run(0.5);
+  ASSERT_EQ(actuation_->failures().snapshot().labels.size(), 1U) << "still armed";
+  ASSERT_EQ(eventsOf(EventKind::kReset).size(), 1U);
+  EXPECT_EQ(eventsOf(EventKind::kReset)[0].text, "the flight began anew");
+  EXPECT_EQ(sim_.journal()->entries().size(), 1U);
+  EXPECT_TRUE(actuation_->undo(1.0));
+  EXPECT_FLOAT_EQ(sim_.value(zulu), 0.0F);
+}
+
+TEST_F(ActuationTest, AFlightThatGoesOnThroughALongSilenceIsNoNewOne) {
+  const float time = sim_.value("sim/time/total_running_time_sec");
+  beSilent(60.0);
+  sim_.set("sim/time/total_running_time_sec", time + 60.0F);
+  sim_.set(kFlightTime, sim_.value(kFlightTime) + 60.0F);
+  sim_.set("sim/flightmodel/position/latitude", 37.49F);  // 3.3 km on, from standing
+  sim_.setState(core::LinkState::kConnected);
+  actuation_->onLink(sim_.status());
+  run(0.5);
+  EXPECT_TRUE(eventsOf(EventKind::kReset).empty());
 }
 
 TEST_F(ActuationTest, NewFlightIsReportedAndEndsAuto) {

@@ -75,6 +75,7 @@ TEST_F(FlightChangesResume, IsLeftToWhoReleasesLeftoversWhereXPlaneIsAway) {
   const auto outcome = place();
   EXPECT_FALSE(outcome.success);
   EXPECT_NE(outcome.text.find("but X-Plane does not show that it goes on"), std::string::npos) << outcome.text;
+  EXPECT_EQ(pauses_left_, 1);
   sim_.run(30.0);
   ASSERT_TRUE(flight_.paused());
   OverrideManager overrides(&sim_, [](const std::string&, bool) {});
@@ -89,6 +90,13 @@ TEST_F(FlightChangesResume, ThePauseOfTheLastOneIsNotTakenForTheUsers) {
   sim_.run(30.0);
   ASSERT_TRUE(flight_.paused());
   flight_.load_time = 0.0;
+  const auto obey = sim_.on_message;
+  sim_.on_message = [&](const core::FakeSimulator::Message& message) {
+    if (message.label == "PREL") {
+      EXPECT_EQ(sim_.journal()->entries().at(0).left, "") << "none lets it go on yet";
+    }
+    obey(message);
+  };
   expectPlaced(place());
   expectItGoesOn();
 }

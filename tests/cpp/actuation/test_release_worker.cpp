@@ -85,6 +85,39 @@ TEST_F(ReleaseWorkerTest, LetsXPlaneGoOnThatACrashedRunHasPaused) {
   EXPECT_EQ(entries(), 0U);
 }
 
+TEST_F(ReleaseWorkerTest, LetsXPlaneGoOnThatIsBackFromASilence) {
+  worker_.work();
+  recordPause(&sim_);
+  sim_.setState(core::LinkState::kStale);
+  worker_.work();
+  leavePause(&sim_);
+  const std::uint32_t epoch = sim_.status().epoch;
+  sim_.setState(core::LinkState::kPaused);
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.label == "CMND") sim_.setState(core::LinkState::kConnected);
+  };
+  worker_.work();
+  EXPECT_EQ(sim_.status().epoch, epoch) << "it was not lost";
+  EXPECT_EQ(sim_.status().paused, false);
+  EXPECT_EQ(entries(), 0U);
+}
+
+TEST_F(ReleaseWorkerTest, LetsXPlaneGoOnThatHasNotFollowedThoughItWasNeverSilent) {
+  worker_.work();
+  sim_.setState(core::LinkState::kPaused);
+  recordPause(&sim_);
+  leavePause(&sim_);
+  sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+    if (message.label == "CMND") sim_.setState(core::LinkState::kConnected);
+  };
+  worker_.work();
+  EXPECT_EQ(entries(), 1U) << "it has looked already";
+  worker_.lookAgain();
+  worker_.work();
+  EXPECT_EQ(sim_.status().paused, false);
+  EXPECT_EQ(entries(), 0U);
+}
+
 TEST_F(ReleaseWorkerTest, LetsXPlaneGoOnThoughAnOverrideIsNotShownReleased) {
   sim_.setState(core::LinkState::kPaused);
   sim_.on_message = [this](const core::FakeSimulator::Message& message) {

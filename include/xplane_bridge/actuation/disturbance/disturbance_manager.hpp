@@ -52,6 +52,9 @@ class DisturbanceManager {
   /// In each frame.
   void onFrame(const core::FlightWatch& watch);
   void onLink(const core::LinkStatus& status);
+  /// X-Plane is another one, whose weather is its own user's: ends the one that runs, and nothing of the last one's
+  /// comes back. To be called before onFrame().
+  void forget();
   /// Ends the one that runs, as aborted, and puts the weather back.
   void abort(const std::string& why);
   /// The same for good: none begins any more, and the weather is put back at once.
@@ -88,6 +91,7 @@ class DisturbanceManager {
   DisturbanceLabel label_;
   std::optional<core::Disturbance> disturbance_;
   std::vector<core::UndoOperation> restores_;  // what is still to be put back
+  bool unsure_ = false;                        // whether this X-Plane is theirs: its next frame shows it
   int times_put_back_ = 0;
   double put_back_again_at_ = 0.0;  // [s] steady
   bool ended_ = false;

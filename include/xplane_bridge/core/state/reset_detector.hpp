@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -23,6 +24,9 @@ class ResetDetector {
   std::optional<std::string> add(const FlightWatch& now);
   /// What comes next is not to be compared with what was: another X-Plane.
   void restart() { before_ = FlightWatch(); }
+  /// What comes next is after a long silence, in which the aircraft may have been accelerated: only the flight's time
+  /// shows a reset.
+  void forgetPlace() { before_.latitude_deg = before_.longitude_deg = std::nan(""); }
 
  private:
   Options options_;

@@ -237,6 +237,11 @@ TEST_F(DisturbanceManagerTest, PutsTheWeatherBackWhenALostXPlaneIsThereAgain) {
   EXPECT_EQ(journal()[0].left, "X-Plane went first");
   sim_.setState(core::LinkState::kConnected);
   manager_.onLink(sim_.status());
+  EXPECT_NE(manager_.windRefusal(), "") << "which X-Plane it is, its first frame shows";
+  EXPECT_NE(manager_.begin(gust(), "/test"), "");
+  manager_.watch();
+  EXPECT_NE(weather(), before_);
+  fly(0.02);
   EXPECT_EQ(weather(), before_);
   settle();
   EXPECT_TRUE(journal().empty());

@@ -58,6 +58,7 @@ class FlightChangesTest : public testing::Test {
     out.aircraft = [this] { return flight_.aircraft; };
     out.suspend_control = [this](const std::string& reason) { suspensions_.push_back(reason); };
     out.pausing = [this](const std::string& who) { pausing_ = who; };
+    out.pause_left = [this] { ++pauses_left_; };
     return out;
   }
   void after(double seconds, const std::function<void()>& event) { events_.emplace_back(sim_.time() + seconds, event); }
@@ -105,6 +106,7 @@ class FlightChangesTest : public testing::Test {
   std::vector<std::pair<double, std::function<void()>>> events_;  // [s] of the fake clock
   std::vector<std::string> suspensions_;
   std::string pausing_;
+  int pauses_left_ = 0;
   FlightChanges changes_{&sim_, {2.0, 20.0}, hooks()};
 };
 

@@ -54,6 +54,17 @@ TEST(ResetDetector, ReportsAPlaceThatCannotHaveBeenFlownTo) {
   EXPECT_TRUE(detector.add(up));
 }
 
+TEST(ResetDetector, AfterASilenceOnlyTheTimeOfTheFlightShowsAReset) {
+  ResetDetector detector;
+  FlightWatch standing = flying(10.0);
+  standing.ground_speed = 0.0;
+  detector.add(standing);
+  detector.forgetPlace();
+  EXPECT_FALSE(detector.add(flying(70.0))) << "it may have taken off";
+  detector.forgetPlace();
+  EXPECT_TRUE(detector.add(flying(0.3)));
+}
+
 TEST(ResetDetector, ReportsAPlacementWhilePaused) {
   ResetDetector detector;
   detector.add(flying(10.0));
