@@ -227,7 +227,8 @@ X11Connection::Found X11Connection::findWindow(const X11SourceOptions& options) 
     if ((!wanted && text.empty()) || !viewable(window)) continue;
     if (!text.empty()) found.titles.push_back(text);
     if (!wanted || area(window) == 0) continue;
-    const Rank rank{isXPlanes(window), text == options.title};
+    // Of a class without a title no window has the exact one, least of all a menu that has none itself.
+    const Rank rank{isXPlanes(window), !options.title.empty() && text == options.title};
     if (rank < best_rank) continue;
     if (rank > best_rank) best.clear();
     best_rank = rank;

@@ -43,6 +43,16 @@ TEST_F(X11WindowSourceTest, PrefersTheExactTitleThenTheLargest) {
   EXPECT_EQ(source.window(), large.id());
 }
 
+TEST_F(X11WindowSourceTest, OfAClassAnUntitledWindowIsNotPreferred) {
+  TestWindow large(server_.display(), "flight", 320, 240);
+  TestWindow menu(server_.display(), "", 100, 80);
+  X11SourceOptions options = titled(server_, "");
+  options.class_name = "XpClass";
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_)) << source.describe();
+  EXPECT_EQ(source.window(), large.id());
+}
+
 TEST_F(X11WindowSourceTest, OfWindowsAlikeTheIndexChoosesFromTheLeft) {
   TestWindow right(server_.display(), "X-System", 320, 240, 400, 0);
   TestWindow left(server_.display(), "X-System", 100, 80, 10, 20);
