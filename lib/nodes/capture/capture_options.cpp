@@ -1,6 +1,8 @@
 #include "xplane_bridge/nodes/capture/capture_options.hpp"
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <map>
@@ -30,11 +32,16 @@ std::uint32_t windowId(const ParamLoader& window) {
   return static_cast<std::uint32_t>(value);
 }
 
+/// Half a pixel is a mistake: it is refused, not cut off.
+bool areWhole(const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double number) { return number == std::floor(number); });
+}
+
 cv::Rect region(const ParamLoader& window) {
   const std::vector<double> numbers = window.numbers("region", {0.0, 65535.0});
   if (numbers.empty()) return {};
   const auto whole = [](double number) { return static_cast<int>(number); };
-  if (numbers.size() != 4 || whole(numbers[2]) < 1 || whole(numbers[3]) < 1) {
+  if (numbers.size() != 4 || !areWhole(numbers) || whole(numbers[2]) < 1 || whole(numbers[3]) < 1) {
     window.refuse("region", "[x, y, width, height] in pixels of the screen, or []");
   }
   return {whole(numbers[0]), whole(numbers[1]), whole(numbers[2]), whole(numbers[3])};
@@ -49,8 +56,10 @@ vision::X11SourceOptions loadWindow(const ParamLoader& window) {
   x11.title = window.text("title", "");
   x11.index = window.integer("index", {-1, 99}, x11.index);
   const std::vector<double> point = window.numbers("point", {-65535.0, 65535.0});
-  if (point.size() == 2) x11.point = cv::Point(static_cast<int>(point[0]), static_cast<int>(point[1]));
-  if (point.size() != 2 && !point.empty()) window.refuse("point", "[x, y] in pixels of the screen, or []");
+  if (!point.empty() && (point.size() != 2 || !areWhole(point))) {
+    window.refuse("point", "[x, y] in pixels of the screen, or []");
+  }
+  if (!point.empty()) x11.point = cv::Point(static_cast<int>(point[0]), static_cast<int>(point[1]));
   x11.title_is_regex = window.boolean("title_is_regex", false);
   x11.change_detection = vision::changeDetectionFromName(
       window.choice("change_detection", {"auto", "damage", "checksum", "none"}, "auto"));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 namespace xplane_bridge {
 namespace {
@@ -37,6 +38,25 @@ TEST(CaptureOptions, RefusesFramesThatTfDoesNotTake) {
       EXPECT_TRUE(contains(refusal, std::string(key) + " is \"" + name + "\"")) << refusal;
       EXPECT_TRUE(contains(refusal, "not empty and without a leading slash")) << refusal;
     }
+  }
+}
+
+TEST(CaptureOptions, RefusesFractionsOfPixels) {
+  const auto refusal = [](const char* key, const std::vector<double>& numbers) {
+    XmlRpcValue parameters;
+    for (std::size_t i = 0; i < numbers.size(); ++i) parameters["window"][key][static_cast<int>(i)] = numbers[i];
+    return refusalOf(parameters);
+  };
+  EXPECT_EQ(refusal("region", {0.0, 8.0, 640.0, 480.0}), "");
+  EXPECT_EQ(refusal("point", {-100.0, 20.0}), "");
+  for (const std::vector<double>& region : {std::vector<double>{0.5, 8.0, 640.0, 480.0},
+                                            {0.0, 8.5, 640.0, 480.0},
+                                            {0.0, 8.0, 640.9, 480.0},
+                                            {0.0, 8.0, 640.0, 480.1}}) {
+    EXPECT_TRUE(contains(refusal("region", region), "must be [x, y, width, height] in pixels of the screen"));
+  }
+  for (const std::vector<double>& point : {std::vector<double>{100.5, 20.0}, {-100.0, -0.5}}) {
+    EXPECT_TRUE(contains(refusal("point", point), "must be [x, y] in pixels of the screen"));
   }
 }
 
