@@ -276,7 +276,7 @@ void CaptureNode::publishPicture(Grabbed* grabbed) {
   FrameState state;
   const std::int64_t shown_ns = grabbed->display_known ? grabbed->display_ns : grabbed->grab_ns;
   const auto frame_key = grabbed->frame.has_value() ? std::optional<float>(grabbed->frame->sim_time) : std::nullopt;
-  const core::FrameCamera camera = cameraOf(shown_ns, frame_key);
+  const core::FrameCamera camera = cameraOf(shown_ns, grabbed->frame);
   state.header.stamp = toRosTime(stampOfPicture(shown_ns));
   state.header.seq = image_count_;
   describeCamera(camera, &state);

@@ -164,7 +164,7 @@ core::Frustum CaptureNode::frustumOf(const core::FrustumSample& sample) const {
   return own;
 }
 
-core::FrameCamera CaptureNode::cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const {
+core::FrameCamera CaptureNode::cameraOf(std::int64_t shown_ns, const std::optional<vision::ShownFrame>& frame) const {
   bool known = false;
   {
     const std::lock_guard<std::mutex> lock(camera_mutex_);
@@ -172,7 +172,13 @@ core::FrameCamera CaptureNode::cameraOf(std::int64_t shown_ns, std::optional<flo
   }
   core::FrameCamera unknown;
   unknown.frustum = frustumOf(core::FrustumSample());
-  return known ? pairing_->cameraOf(shown_ns, frame_key).value_or(unknown) : unknown;
+  if (!known) return unknown;
+  core::FrameCamera camera =
+      (frame.has_value() ? pairing_->cameraOf(shown_ns, frame->sim_time, frame->delay) : pairing_->cameraOf(shown_ns))
+          .value_or(unknown);
+  // A field of view of the window's own is the same in all frames, heard or not.
+  if (options_.own_field_of_view) camera.frustum = unknown.frustum;
+  return camera;
 }
 
 void CaptureNode::describeCamera(const core::FrameCamera& camera, FrameState* state) const {

@@ -89,11 +89,14 @@ void ImagePairing::addCamera(std::int64_t receive_ns, double sim_time, const cor
   cameras_.add(receive_ns, sim_time, camera);
 }
 
-std::optional<core::FrameCamera> ImagePairing::cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const {
+std::optional<core::FrameCamera> ImagePairing::cameraOf(std::int64_t shown_ns, std::optional<float> frame_key,
+                                                        double own_delay) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::optional<core::FrameCamera> camera;
-  if (frame_key.has_value()) camera = cameras_.ofFrame(static_cast<double>(*frame_key));
-  if (!camera) camera = cameras_.at(shown_ns - core::toNanoseconds(display_delay_));
+  if (!frame_key.has_value()) return cameras_.at(shown_ns - core::toNanoseconds(display_delay_));
+  std::optional<core::FrameCamera> camera = cameras_.ofFrame(static_cast<double>(*frame_key));
+  if (camera) return camera;
+  camera = cameras_.at(shown_ns - core::toNanoseconds(own_delay));
+  if (camera) camera->frustum.known = false;  // of another frame
   return camera;
 }
 

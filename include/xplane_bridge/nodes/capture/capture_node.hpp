@@ -116,7 +116,7 @@ class CaptureNode : public BaseNode {
   void publishJpeg(const std_msgs::Header& header, const std::vector<std::uint8_t>& jpeg);
   bool hasSubscribers() const;
   /// The camera of the frame that a picture shows, as far as X-Plane says. @param shown_ns [ns] by pairingNow()'s clock
-  core::FrameCamera cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const;
+  core::FrameCamera cameraOf(std::int64_t shown_ns, const std::optional<vision::ShownFrame>& frame) const;
   core::Frustum frustumOf(const core::FrustumSample& sample) const;
   sensor_msgs::CameraInfo cameraInfo(const std_msgs::Header& header, cv::Size source,
                                      const vision::FieldOfView& shown) const;

@@ -46,7 +46,10 @@ class ImagePairing {
   /// @param receive_ns [ns] as of addFrame() @param sim_time [s] raw simulator time
   void addCamera(std::int64_t receive_ns, double sim_time, const core::FrameCamera& camera);
   /// The camera of the frame that a picture shows, as addPicture() will be given it; nothing where no frame was heard.
-  [[nodiscard]] std::optional<core::FrameCamera> cameraOf(std::int64_t shown_ns, std::optional<float> frame_key) const;
+  /// Where that very frame was not heard, the camera is of the nearest one, and its frustum not known.
+  /// @param own_delay [s] the picture's own display delay, where it has a key
+  [[nodiscard]] std::optional<core::FrameCamera> cameraOf(std::int64_t shown_ns, std::optional<float> frame_key = {},
+                                                          double own_delay = 0.0) const;
   /// The display delay was measured; pictures that wait keep theirs. @param delay [s]
   void setDisplayDelay(double delay);
   /// The link is new or gone: the simulator's clock is to be learnt anew.

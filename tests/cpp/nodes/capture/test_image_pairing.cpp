@@ -43,7 +43,9 @@ struct Case {
 };
 
 /// Frames of a simulator, the states that another machine makes of them, and the pictures that show them.
-std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, double display_delay) {
+/// @param shown_after [s] from a frame to its display, in truth
+std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, double display_delay,
+                                        double shown_after = kDelay) {
   std::map<std::uint32_t, FrameState> answers;  // by the number of the frame shown
   ImagePairing pairing(display_delay, 0.2,
                        [&answers](const FrameState& answer) { answers[answer.image_count] = answer; });
@@ -75,7 +77,7 @@ std::map<std::uint32_t, FrameState> fly(const Case& clocks, double seconds, doub
     FrameState picture;
     picture.image_count = k;
     picture.camera_pose_source = FrameState::POSE_MEASURED;
-    const std::int64_t shown = clocks.capture.at(t + kDelay + swap(random));
+    const std::int64_t shown = clocks.capture.at(t + shown_after + swap(random));
     events.emplace_back(
         shown, [&pairing, picture, shown](std::int64_t now) { pairing.addPicture(picture, shown, now + ns(0.001)); });
     events.emplace_back(clocks.capture.at(t + 0.5 / kFps), [&pairing](std::int64_t now) { pairing.flush(now); });
@@ -137,6 +139,25 @@ TEST(ImagePairing, DelayWrongByOneFrameIsOneFrameOff) {
     ++judged;
     ASSERT_FLOAT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + (k - 1) / kFps)) << "frame " << k;
     ASSERT_EQ(answer.body_to_camera.translation.x, k - 1);
+  }
+  EXPECT_GT(judged, 1100);
+}
+
+/// A calibration may find that pictures appear before the datagrams of their frames come: they wait for these.
+TEST(ImagePairing, PicturesMayComeBeforeTheirFrames) {
+  constexpr double kEarly = -0.02;
+  const auto answers = fly({"", {}, {}, 1e-4, 1e-4, 5e-4}, 20.0, kEarly, kEarly);
+  int judged = 0;
+  for (const auto& [k, answer] : answers) {
+    if (k < 60) continue;
+    ++judged;
+    ASSERT_EQ(answer.quality & (FrameState::QUALITY_STATE_MISSING | FrameState::QUALITY_OFF_FRAME |
+                                FrameState::QUALITY_DELAY_ASSUMED | FrameState::QUALITY_POSE_UNSURE),
+              0U)
+        << "frame " << k;
+    ASSERT_FLOAT_EQ(answer.state.sim_time, static_cast<float>(kSimStart + k / kFps)) << "frame " << k;
+    ASSERT_EQ(answer.body_to_camera.translation.x, k);
+    ASSERT_EQ(answer.display_delay, kEarly);
   }
   EXPECT_GT(judged, 1100);
 }
@@ -253,6 +274,33 @@ TEST(ImagePairing, AKeyNeedsNoClock) {
     EXPECT_EQ(answers[k].quality, picture.quality);
     EXPECT_EQ(answers[k].display_delay, 0.06);
   }
+}
+
+/// X-Plane's view widens by a degree a frame. Of a picture whose frame was not heard, the one before counts, by the
+/// picture's own delay: three frames where this node's parameter is none. It is no more than a guess.
+TEST(ImagePairing, TheCameraOfAFrameThatWasNotHeardGoesByThePicturesOwnDelay) {
+  ImagePairing pairing(0.0, 0.2, [](const FrameState&) {});
+  constexpr int kLost = 20;
+  const auto key = [](int k) { return static_cast<float>(kSimStart + k / kFps); };
+  for (int k = 0; k < 40; ++k) {
+    if (k == kLost) continue;
+    core::FrameCamera camera;
+    camera.frustum.horizontal_deg = k < kLost ? 60.0 : 80.0;
+    camera.frustum.known = true;
+    pairing.addCamera(kStart + ns(k / kFps), static_cast<double>(key(k)), camera);
+  }
+  const std::int64_t shown = kStart + ns((kLost - 0.1) / kFps + kDelay);
+  const auto lost = pairing.cameraOf(shown, key(kLost), kDelay);
+  ASSERT_TRUE(lost.has_value());
+  EXPECT_EQ(lost->frustum.horizontal_deg, 60.0);
+  EXPECT_FALSE(lost->frustum.known);
+  // Also where its neighbours agree: theirs is not its own.
+  EXPECT_FALSE(pairing.cameraOf(kStart + ns(10 / kFps + kDelay), key(100), kDelay)->frustum.known);
+  const auto heard = pairing.cameraOf(shown, key(kLost + 1), kDelay);
+  EXPECT_EQ(heard->frustum.horizontal_deg, 80.0);
+  EXPECT_TRUE(heard->frustum.known);
+  // Without a key this node's own delay counts.
+  EXPECT_EQ(pairing.cameraOf(shown, {}, kDelay)->frustum.horizontal_deg, 80.0);
 }
 
 /// With `publish_clock` states are stamped with simulator time, which says nothing of the host's; pictures get theirs.
