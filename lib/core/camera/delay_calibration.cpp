@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kEnough = 6;
 constexpr std::size_t kMore = 2;
 // [ns] The delay is looked for within these.
-constexpr double kLeast = -20e6;
+constexpr double kLeast = 1e9 * DelayCalibration::kLeastDelay;
 constexpr double kMost = 500e6;
 // So many more pictures than steps, those that differ most from the one before, may have zoomed; they differ by at
 // least so many grey levels.
@@ -43,6 +43,11 @@ std::vector<double> matches(const std::vector<std::int64_t>& asked, const std::v
 }
 
 }  // namespace
+
+double delayToKeep(double measured) {
+  constexpr double kPrinted = 1e-4;  // the advice has four decimals
+  return std::abs(measured) < 0.5 * kPrinted ? kPrinted : measured;
+}
 
 void DelayCalibration::addFrame(std::int64_t arrival_ns, double field_of_view_deg) {
   frames_.push_back({arrival_ns, field_of_view_deg});
@@ -126,7 +131,9 @@ std::optional<MeasuredDelay> DelayCalibration::settle(std::string* why) const {
   std::vector<double> away;
   away.reserve(best.size());
   for (const double delay_ns : best) away.push_back(std::abs(delay_ns - middle_ns));
-  return MeasuredDelay{1e-9 * middle_ns, static_cast<int>(best.size()), 1e-9 * median(std::move(away))};
+  // Those that agree with a delay at the limit may lie half a frame beyond it.
+  const double delay = std::max(1e-9 * middle_ns, kLeastDelay);
+  return MeasuredDelay{delay, static_cast<int>(best.size()), 1e-9 * median(std::move(away))};
 }
 
 }  // namespace xplane_bridge::core

@@ -80,7 +80,8 @@ CommonOptions loadCommonOptions(const ParamLoader& shared) {
   frames.map_ned = frames.prefix + loadFrameName(shared, "map_ned_frame", frames.map_ned);
   frames.base_link = frames.prefix + loadFrameName(shared, "base_link_frame", frames.base_link);
   frames.base_link_frd = frames.prefix + loadFrameName(shared, "base_link_frd_frame", frames.base_link_frd);
-  options.display_delay = shared.number("display_delay", {0.0, 1.0}, options.display_delay);
+  // A calibration may find a frame's datagram so long behind its picture (core/camera, kLeastDelay).
+  options.display_delay = shared.number("display_delay", {-0.02, 1.0}, options.display_delay);
   options.stale_after = shared.number("stale_after", {0.1, 60.0}, options.stale_after);
   options.lost_after = shared.number("lost_after", {options.stale_after, 3600.0}, options.lost_after);
   options.listen_for_beacon = shared.boolean("listen_for_beacon", options.listen_for_beacon);

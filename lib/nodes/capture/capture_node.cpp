@@ -128,7 +128,7 @@ void CaptureNode::start() {
   });
   encoder_ = std::make_unique<LatestWorker<sensor_msgs::ImageConstPtr>>(
       kPicturesWaiting, [this](sensor_msgs::ImageConstPtr& image) { encodeJpeg(*image); });
-  options_.sender.recorded = [this] { return !recorder().empty(); };
+  options_.sender.recorded = [this] { return !recording().empty(); };
   options_.sender.calibration = sender_calibration_;
   capture_thread_ = std::thread([this] { captureLoop(); });
 }

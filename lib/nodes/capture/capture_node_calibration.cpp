@@ -1,6 +1,7 @@
 /// CaptureNode measures the delay of the display, on request: steps of X-Plane's field of view, seen in the pictures.
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <random>
@@ -35,11 +36,23 @@ bool sameBridges(const std::string& topic, const std::vector<std::string>& topic
   });
 }
 
-/// Of a node that records one of these topics, or of another camera's, its name; empty: none does.
-std::string recorderOf(const std::vector<std::string>& topics) {
+/// Whether a node is a recorder, by its name alone: the master knows no more of it. rosbag's own is record_*, that of
+/// record.launch record; launch files have rosbag_record, flight_bag and the like. A garbage_detector is none.
+bool isRecorder(const std::string& node) {
+  std::string name = "_" + node.substr(node.rfind('/') + 1) + "_";
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const auto has = [&name](const char* part) { return name.find(part) != std::string::npos; };
+  return (has("rosbag") || has("_bag_") || has("record")) && !has("record_watch");
+}
+
+/// Who records one of these topics, or of another camera's: a clause; empty: no node does.
+std::string recordingOf(const std::vector<std::string>& topics) {
   XmlRpc::XmlRpcValue request, response, state;
   request[0] = ros::this_node::getName();
-  if (!ros::master::execute("getSystemState", request, response, state, false)) return "";
+  if (!ros::master::execute("getSystemState", request, response, state, false)) {
+    return "the roscore does not say who records the pictures";
+  }
   XmlRpc::XmlRpcValue& subscribers = state[1];
   for (int i = 0; i < subscribers.size(); ++i) {
     const std::string topic = subscribers[i][0];
@@ -47,10 +60,7 @@ std::string recorderOf(const std::vector<std::string>& topics) {
     XmlRpc::XmlRpcValue& nodes = subscribers[i][1];
     for (int k = 0; k < nodes.size(); ++k) {
       std::string node = nodes[k];
-      // rosbag record's own name, alone and in record.launch, begins so.
-      if (node.compare(node.rfind('/') + 1, 6, "record") == 0 && node.find("record_watch") == std::string::npos) {
-        return node;
-      }
+      if (isRecorder(node)) return node + " records the pictures";
     }
   }
   return "";
@@ -58,9 +68,9 @@ std::string recorderOf(const std::vector<std::string>& topics) {
 
 }  // namespace
 
-std::string CaptureNode::recorder() const {
-  return recorderOf({image_publisher_.getTopic(), jpeg_publisher_.getTopic(), info_publisher_.getTopic(),
-                     frame_state_publisher_.getTopic()});
+std::string CaptureNode::recording() const {
+  return recordingOf({image_publisher_.getTopic(), jpeg_publisher_.getTopic(), info_publisher_.getTopic(),
+                      frame_state_publisher_.getTopic()});
 }
 
 void CaptureNode::serveCalibration(std_srvs::TriggerResponse* response) {
@@ -78,7 +88,7 @@ void CaptureNode::serveCalibration(std_srvs::TriggerResponse* response) {
         text, sizeof text,
         "%.4f s, from %d steps that lie %.1f ms from it; in use until the node ends, display_delay:=%.4f keeps "
         "it",
-        found.delay, found.steps, 1e3 * found.spread, found.delay);
+        found.delay, found.steps, 1e3 * found.spread, core::delayToKeep(found.delay));
     response->success = 1;
     response->message = text;
     ROS_INFO("display delay measured: %s", text);
@@ -170,11 +180,9 @@ std::string CaptureNode::calibrateSender() {
 }
 
 void CaptureNode::refuseWhileRecorded() const {
-  const std::string recording = recorder();
-  if (!recording.empty()) {
-    throw std::runtime_error(recording +
-                             " records the pictures, and the field of view would change in them: call it "
-                             "before or after a recording");
+  const std::string who = recording();
+  if (!who.empty()) {
+    throw std::runtime_error(who + ", and the field of view would change in them: call it before or after a recording");
   }
 }
 

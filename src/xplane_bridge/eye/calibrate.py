@@ -200,7 +200,9 @@ def settle(frames: Sequence[Tuple[int, float]], pictures: Sequence[Tuple[int, fl
         )
     spread_ns = statistics.median(abs(delay_ns - middle_ns) for delay_ns in best)
     lag_ns = FIELD_OF_VIEW_REPORT_LAG * period_ns
-    return Delay(1e-9 * (middle_ns + lag_ns), len(best), 1e-9 * spread_ns)
+    # Those that agree with a delay at the limit may lie half a frame beyond it, where --delay would not take it.
+    delay_s = min(max(_LEAST_S, 1e-9 * (middle_ns + lag_ns)), _MOST_S)
+    return Delay(delay_s, len(best), 1e-9 * spread_ns)
 
 
 class Calibration:

@@ -72,10 +72,13 @@ def test_the_delay_is_measured_and_used(world, display: str) -> None:
     node.check_running()
 
 
-@pytest.mark.parametrize("camera", ["", "belly/"])
-def test_not_in_a_recording_of_this_or_another_camera(world, display: str, camera: str) -> None:
+@pytest.mark.parametrize(
+    ("camera", "name"), [("", ""), ("belly/", ""), ("", "rosbag_record"), ("", "bag"), ("", "my_Recorder")]
+)
+def test_not_in_a_recording_of_this_or_another_camera(world, display: str, camera: str, name: str) -> None:
     emulator, _, _ = start(world, display)
     bag = ["rosbag", "record", "-O", world.folder / "pictures.bag", f"{world.namespace}/{camera}camera/frame_state"]
+    bag += [f"__name:={name}"] if name else []
     with ManagedProcess("rosbag", [str(word) for word in bag], world.folder, env=world.env):
         wait_until(
             lambda: "records the pictures" in calibrate(world).message, 90.0, "a refusal for the recorder's sake"

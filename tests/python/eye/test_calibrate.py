@@ -40,6 +40,14 @@ def test_regular_frames_do_not_hide_whole_periods(delay_ns: int):
     assert (found.steps, found.spread_s) == (10, 0.0)
 
 
+def test_no_result_lies_beyond_what_delay_takes():
+    """One step at -20 ms, and nine at -24 ms, within half a frame of it."""
+    frames, pictures = recording(-24_000_000)
+    first = next(place for place, (_, difference) in enumerate(pictures) if difference == 20.0)
+    pictures[first] = (pictures[first][0] + 4_000_000, 20.0)
+    assert settle(frames, pictures).delay_s == -0.02
+
+
 def test_steps_that_were_missed_do_no_harm_and_too_many_are_said():
     assert settle(*recording(58_000_000, unseen=4)).delay_s == pytest.approx(0.058, abs=1e-9)
     with pytest.raises(CalibrationError, match="were seen in the pictures"):

@@ -44,11 +44,15 @@ def test_it_starts_without_ros_and_without_what_only_linux_has():
     )
 
 
+def test_a_delay_below_zero_is_taken_as_it_may_be_measured():
+    assert "takes no connection" in run("127.0.0.1:9", "--delay", "-0.003").stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
         (["127.0.0.1"], "expected HOST:PORT, e.g. 192.168.1.10:49790"),
-        (["127.0.0.1:9", "--delay", "2"], "expected seconds from 0 to 0.5"),
+        (["127.0.0.1:9", "--delay", "2"], "expected seconds from -0.02 to 0.5"),
         (["127.0.0.1:9", "--delay", "0.1", "--no-calibrate"], "not allowed with"),
         (["127.0.0.1:9", "--quality", "0"], "a whole number from 1 to 100"),
         (["127.0.0.1:9", "--window", "left"], "expected a number from 0 to 255, or a point of the screen X,Y"),

@@ -130,7 +130,8 @@ class CaptureNode : public BaseNode {
   void changeFieldOfView();
 
   // Calibration: service's thread, but for lookForStep() (capture) and restoreFieldOfView() (timer).
-  [[nodiscard]] std::string recorder() const;
+  /// Who records the pictures, a clause; empty: no node does.
+  [[nodiscard]] std::string recording() const;
   void serveCalibration(std_srvs::TriggerResponse* response);
   /// @throws std::runtime_error with a sentence for people
   core::MeasuredDelay calibrate();

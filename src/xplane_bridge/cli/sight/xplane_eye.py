@@ -116,7 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     delay = parser.add_mutually_exclusive_group()
     delay.add_argument(
         "--delay",
-        type=number("seconds from 0 to 0.5", 0.0, 0.5),
+        type=number("seconds from -0.02 to 0.5", -0.02, 0.5),
         metavar="S",
         help="from a frame to its picture, measured before; X-Plane's field of view is then left alone",
     )

@@ -51,6 +51,30 @@ TEST(DelayCalibration, RegularFramesDoNotHideWholePeriods) {
   }
 }
 
+/// common.yaml's `display_delay` takes no less than -0.02, and 0 as not measured.
+TEST(DelayCalibration, WhatIsAdvisedIsAcceptedAndCountsAsMeasured) {
+  std::string why;
+  EXPECT_NEAR(recorded(atRandom(), -19'000'000).settle(&why)->delay, -0.019, 1e-9) << why;
+  // One step at -20 ms, and nine at -24 ms, within half a frame of it.
+  DelayCalibration calibration;
+  double angle = 60.0;
+  const std::vector<int> steps = atRandom();
+  for (int number = 0; number < steps.back() + 40; ++number) {
+    const bool zooms = std::find(steps.begin(), steps.end(), number) != steps.end();
+    if (zooms) angle = angle > 64.0 ? 60.0 : 68.0;
+    calibration.addFrame(number * kPeriod, angle);
+    const std::int64_t early = number == steps.front() ? 20'000'000 : 24'000'000;
+    calibration.addPicture(number * kPeriod - early, zooms ? 20.0 : 1.0);
+  }
+  const auto found = calibration.settle(&why);
+  ASSERT_TRUE(found.has_value()) << why;
+  EXPECT_EQ(found->delay, DelayCalibration::kLeastDelay);
+  EXPECT_EQ(delayToKeep(0.0583), 0.0583);
+  EXPECT_EQ(delayToKeep(-0.003), -0.003);
+  EXPECT_EQ(delayToKeep(0.00006), 0.00006);  // prints as 0.0001
+  for (const double delay : {0.0, 0.00004, -0.00004}) EXPECT_EQ(delayToKeep(delay), 0.0001) << delay;
+}
+
 TEST(DelayCalibration, StepsThatWereMissedDoNoHarmAndTooManyAreSaid) {
   std::string why;
   const auto found = recorded(atRandom(), 58'000'000, 4).settle(&why);

@@ -146,6 +146,8 @@ TEST(CommonOptions, RefusesWhatCannotWork) {
   EXPECT_TRUE(contains(load("transport", "udp"), "one of: rref, data"));
   EXPECT_TRUE(contains(load("map_frame", "/map"), "leading slash"));
   EXPECT_TRUE(contains(load("frame_prefix", "/first"), "without a leading slash"));
+  EXPECT_TRUE(contains(load("display_delay", -0.021), "from -0.02 to 1"));
+  EXPECT_EQ(load("display_delay", -0.02), "");  // what a calibration may find
   EXPECT_TRUE(contains(load("hots", "192.168.1.2"), "did you mean host?"));
   EXPECT_EQ(load("another_nodes_parameter", 3), "");
 }
