@@ -114,7 +114,12 @@ FlightChangeHooks Actuation::changeHooks() {
 void Actuation::subscribe() {
   watch_subscription_ = link_->subscribe(
       {"flight watch", core::flightWatchDatarefs(), core::kEveryFrameRateHz, 2},
-      [this](const core::RrefView& view, const core::ReceiveInfo&) { onWatch(view); }, mutex_);
+      [this](const core::RrefView& view, const core::ReceiveInfo& info) {
+        // By the frame's own epoch: onLink() may come after it.
+        if (std::exchange(watch_epoch_, info.link_epoch) != info.link_epoch) reset_detector_.forgetPlace();
+        onWatch(view);
+      },
+      mutex_);
   identity_subscription_ = link_->subscribe(
       {"aircraft identity", core::AircraftIdentityReader::datarefs(), core::AircraftIdentityReader::kRateHz, 1},
       [this](const core::RrefView& view, const core::ReceiveInfo& info) {
@@ -137,7 +142,6 @@ void Actuation::onLink(const core::LinkStatus& status) {
     if (status.state != link_status_.state) text = std::string(core::toString(status.state)) + ": " + status.reason;
     if (status.epoch != link_status_.epoch) {
       identity_.reset();
-      reset_detector_.forgetPlace();
       traffic_.release("X-Plane began anew");
     }
     link_status_ = status;
@@ -155,9 +159,11 @@ void Actuation::onWatch(const core::RrefView& view) {
   const double before = watch_.sim_time;
   core::updateFlightWatch(view, &watch_);
   const bool another = path_.showsAnother(watch_);
-  if (another) reset_detector_.restart();
   // Restarted within a gap that the link has bridged: total running time only runs back in another X-Plane.
-  if (watch_.sim_time < before - core::kOvertaking) askIdentity();
+  if (watch_.sim_time < before - core::kOvertaking) {
+    reset_detector_.restart();
+    askIdentity();
+  }
   if (const auto reset = reset_detector_.add(watch_)) onReset(*reset);
   sim_time_ = watch_.sim_time;
   if (watch_.sim_time > before) ++frames_flown_;
@@ -322,8 +328,7 @@ Actuation::Disturbed Actuation::disturb(const std::string& kind, core::Disturban
     return Disturbed{{code, std::move(text)}, disturbance_.label().id};
   };
   if (kind == "stop") {
-    if (disturbance_.windRefusal().empty()) return answer(core::ResultCode::kRefused, "no disturbance runs");
-    disturbance_.abort("stopped by " + who);
+    if (!disturbance_.abort("stopped by " + who)) return answer(core::ResultCode::kRefused, "no disturbance runs");
     return answer(core::ResultCode::kAccepted, "it is stopped, and the wind of before is put back");
   }
   const auto known = core::disturbanceKindFrom(kind);

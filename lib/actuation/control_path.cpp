@@ -195,11 +195,14 @@ bool ControlPath::continues(const core::FlightWatch& watch) const {
 }
 
 /// Whether X-Plane was restarted, also where the link has bridged the gap: its total running time has run back, or is
-/// no longer than the gap.
+/// no longer than the gap. One that is paused may have run for less than the gap: its times stand.
 bool ControlPath::isAnotherXPlane(const core::FlightWatch& watch) const {
   if (!std::isfinite(watch_.sim_time)) return false;
   const double gap = now() - last_frame_;
-  return watch.sim_time < watch_.sim_time - core::kOvertaking || (gap > kGap && watch.sim_time <= gap);
+  const auto stands = [](double before, double after) { return std::abs(after - before) <= core::kOvertaking; };
+  const bool is_paused = stands(watch_.sim_time, watch.sim_time) &&
+                         (!std::isfinite(watch_.flight_time) || stands(watch_.flight_time, watch.flight_time));
+  return watch.sim_time < watch_.sim_time - core::kOvertaking || (gap > kGap && watch.sim_time <= gap && !is_paused);
 }
 
 bool ControlPath::showsAnother(const core::FlightWatch& watch) {

@@ -65,6 +65,14 @@ bool resumeLeftovers(core::SimulatorPort* link, double timeout_s) {
   if (left.empty()) return true;
   const PauseOutcome outcome = setPaused(link, false, timeout_s, [] { return false; });
   if (outcome != PauseOutcome::kWasSo && outcome != PauseOutcome::kFollowed) return false;
+  // One that was recorded anew is of a change of the flight that has begun meanwhile.
+  const std::vector<core::JournalEntry> own = ownPauses(*journal);
+  const auto needed = [&own](const core::JournalEntry& entry) {
+    return std::any_of(own.begin(), own.end(), [&entry](const core::JournalEntry& each) {
+      return each.left.empty() && each.id == entry.id && each.owner == entry.owner;
+    });
+  };
+  left.erase(std::remove_if(left.begin(), left.end(), needed), left.end());
   journal->removeUndone(left);
   return true;
 }

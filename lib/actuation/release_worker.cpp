@@ -54,10 +54,7 @@ void ReleaseWorker::wake() {
   wanted_.notifyAll();
 }
 
-void ReleaseWorker::lookAgain() {
-  look_again_ = true;
-  wake();
-}
+void ReleaseWorker::lookAgain() { look_again_ = true; }
 
 void ReleaseWorker::stop() {
   {

@@ -194,6 +194,7 @@ class Actuation {
   core::LinkStatus link_status_;
   core::AircraftIdentityReader identity_;
   core::FlightWatch watch_;
+  std::uint32_t watch_epoch_ = 0;  // of the link, at that frame
   core::ResetDetector reset_detector_;
   unsigned resets_ = 0;   // of the flight, since the start
   std::string pause_by_;  // who has asked for a pause or its end that has not come yet

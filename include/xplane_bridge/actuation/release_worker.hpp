@@ -38,8 +38,8 @@ class ReleaseWorker {
   void start();
   /// Looks at once, instead of at the end of its period: the link has changed.
   void wake();
-  /// The same, also for what was left in this X-Plane meanwhile: this run, too, leaves a pause that X-Plane does not
-  /// end.
+  /// At the end of its period it looks also for what was left in this X-Plane meanwhile: this run, too, leaves a pause
+  /// that X-Plane does not end. Not at once: a change of the flight that waits may begin with that pause.
   void lookAgain();
   /// Waits for the release that is under way, up to a second.
   void stop();

@@ -172,9 +172,11 @@ void DisturbanceManager::end(const std::string& result, bool success) {
   report_(described(label_) + ": " + result, who_, success);
 }
 
-void DisturbanceManager::abort(const std::string& why) {
+bool DisturbanceManager::abort(const std::string& why) {
   const Lock lock(mutex_);
-  if (state_ != State::kIdle) end("aborted: " + why, false);
+  if (state_ == State::kIdle) return false;
+  end("aborted: " + why, false);
+  return true;
 }
 
 void DisturbanceManager::stop(const std::string& why) {
@@ -191,7 +193,10 @@ void DisturbanceManager::onLink(const core::LinkStatus& status) {
   const bool another = status.epoch != epoch_;
   epoch_ = status.epoch;
   if (another && !restores_.empty()) unsure_ = true;
-  if (!up_) return abort("X-Plane is lost");
+  if (!up_) {
+    abort("X-Plane is lost");
+    return;
+  }
   if (another) abort("X-Plane began anew");
   if (!was_up && !unsure_ && state_ == State::kIdle) putBack();
 }

@@ -147,14 +147,22 @@ TEST_F(ActuationTest, AnXPlaneThatIsBackGetsTheWindOfBeforeADisturbance) {
   const auto winds = core::windWrites({}, sim_.status().version);
   for (const core::DatarefWrite& each : winds) sim_.set(each.dataref, 3.0F);
   sim_.setAll(core::shownWindDatarefs(sim_.status().version), 3.0F);
-  disturb();
-  beSilent(15.0);
-  sim_.setState(core::LinkState::kConnected);
-  actuation_->onLink(sim_.status());
-  run(0.5);
-  for (const core::DatarefWrite& each : winds) EXPECT_FLOAT_EQ(sim_.value(each.dataref), 3.0F) << each.dataref;
-  EXPECT_FALSE(actuation_->windRefusal());
-  EXPECT_TRUE(sim_.journal()->entries().empty());
+  // A paused one may be away for longer than it has run.
+  for (const auto& [seconds, state] :
+       {std::pair(15.0, core::LinkState::kConnected), {600.0, core::LinkState::kPaused}}) {
+    disturb();
+    SCOPED_TRACE(seconds);
+    const float flight_time = sim_.value(kFlightTime);
+    beSilent(seconds);
+    if (state == core::LinkState::kPaused) sim_.set(kFlightTime, flight_time);
+    sim_.setState(state);
+    actuation_->onLink(sim_.status());
+    EXPECT_EQ(actuation_->disturb("stop", {}, "test").result.text, "no disturbance runs");
+    run(0.5);
+    for (const core::DatarefWrite& each : winds) EXPECT_FLOAT_EQ(sim_.value(each.dataref), 3.0F) << each.dataref;
+    EXPECT_FALSE(actuation_->windRefusal());
+    EXPECT_TRUE(sim_.journal()->entries().empty());
+  }
 }
 
 TEST_F(ActuationTest, AFailureThatIsArmedEndsWithItsXPlaneHoweverLongTheNextOneHasRun) {
@@ -210,9 +218,27 @@ TEST_F(ActuationTest, AFlightThatGoesOnThroughALongSilenceIsNoNewOne) {
   sim_.set(kFlightTime, sim_.value(kFlightTime) + 60.0F);
   sim_.set("sim/flightmodel/position/latitude", 37.49F);  // 3.3 km on, from standing
   sim_.setState(core::LinkState::kConnected);
+  sim_.frame();  // may come before the link's news
   actuation_->onLink(sim_.status());
   run(0.5);
   EXPECT_TRUE(eventsOf(EventKind::kReset).empty());
+}
+
+TEST_F(ActuationTest, ALoadThatIsSilentForLongerThanXPlaneHadRunIsANewFlight) {
+  sim_.set("sim/time/total_running_time_sec", 5.0F);
+  sim_.set(kFlightTime, 4.0F);
+  actuation_->onLink(sim_.status());
+  run(0.2);
+  const std::size_t before = eventsOf(EventKind::kReset).size();
+  sim_.setState(core::LinkState::kStale);
+  actuation_->onLink(sim_.status());
+  for (int i = 0; i < 8; ++i) sim_.frame(1.0);
+  sim_.set(kFlightTime, 0.3F);
+  sim_.setState(core::LinkState::kConnected);
+  actuation_->onLink(sim_.status());
+  run(0.2);
+  ASSERT_EQ(eventsOf(EventKind::kReset).size(), before + 1);
+  EXPECT_EQ(eventsOf(EventKind::kReset).back().text, "the flight began anew");
 }
 
 TEST_F(ActuationTest, NewFlightIsReportedAndEndsAuto) {

@@ -56,7 +56,7 @@ class DisturbanceManager {
   /// comes back. To be called before onFrame().
   void forget();
   /// Ends the one that runs, as aborted, and puts the weather back.
-  void abort(const std::string& why);
+  bool abort(const std::string& why);
   /// The same for good: none begins any more, and the weather is put back at once.
   void stop(const std::string& why);
   /// Called now and then, without a lock held: ends the one that runs when another process has put the weather back,
