@@ -152,7 +152,7 @@ def parameter_of(item: Any) -> Optional[str]:
 
 
 def _short(value: Value) -> str:
-    return re.sub(r"\.0$", "", str(value))
+    return value if isinstance(value, str) else re.sub(r"\.0$", "", str(value))
 
 
 def load_campaign(path: Path, flights: Optional[int] = None) -> Campaign:

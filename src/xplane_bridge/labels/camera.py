@@ -165,8 +165,8 @@ class Camera:
     def _moves(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What a point's pixel moves by [px], for the point's own motion: derivatives by right, down, forward at 1 m.
 
-        Outside the picture they grow without limit: there those of its border are taken; behind the camera, where there
-        are no pixels, those by the angle.
+        Outside the picture they grow without limit: beyond its farthest corner those of that angle are taken; behind
+        the camera, where there are no pixels, those by the angle alone.
 
         Returns:
             The direction that is taken, and the matrix (2, 3).

@@ -41,9 +41,9 @@ def test_a_scenario_file_of_a_campaign_is_read_beside_it(tmp_path: Path) -> None
 
 
 def test_a_parameter_inside_a_text_keeps_all_digits() -> None:
-    drawn = {"day": 20240102, "t": 0.123456789, "n": 3.0, "kind": "calm"}
+    drawn = {"day": 20240102, "t": 0.123456789, "n": 3.0, "kind": "v2.0"}
     text = substituted({"table": "gains_$day.csv", "note": "$t $n $kind"}, drawn, "arguments")
-    assert text == {"table": "gains_20240102.csv", "note": "0.123456789 3 calm"}
+    assert text == {"table": "gains_20240102.csv", "note": "0.123456789 3 v2.0"}
 
 
 @pytest.mark.parametrize(

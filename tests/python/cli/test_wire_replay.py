@@ -90,7 +90,7 @@ def test_where_nothing_can_be_written_is_said_before_the_replay(tmp_path, capsys
     there.write_text("")
     for option, file, said in (
         ("--output", there, "is there already and is kept"),
-        ("--output", tmp_path / "no" / "replay.bag", f"{tmp_path / 'no'} is no folder"),
+        ("--output", there / "replay.bag", f"{there} cannot be written: File exists"),
         ("--regression", there, f"{there} cannot be written: File exists"),
     ):
         assert main([str(path), option, str(file)]) == 1

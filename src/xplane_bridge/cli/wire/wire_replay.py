@@ -366,12 +366,11 @@ def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
     if args.output and args.output.exists():
         msg = f"--output {args.output}: is there already and is kept: delete it, or give another name"
         raise ReplayError(msg)
-    if args.output and not args.output.parent.is_dir():
-        msg = f"--output {args.output}: {args.output.parent} is no folder; expected one that is there"
-        raise ReplayError(msg)
+    for option, made in (("--output", args.output and args.output.parent), ("--regression", args.regression)):
+        if made:
+            with _writing(option, made):
+                made.mkdir(parents=True, exist_ok=True)
     if args.regression:
-        with _writing("--regression", args.regression):
-            args.regression.mkdir(parents=True, exist_ok=True)
         path = args.regression / _kept_name(args.file)
         options = _keep(args.file, path, options, written)
     expected = _expectation(args.expect) if args.expect else None
