@@ -44,12 +44,18 @@ bool RxNode::frameReady(const core::LockstepFrame& frame) {
     return true;
   }
   const std::lock_guard<std::mutex> lock(mutex_);
+  const bool known_place =
+      last_state_ && last_state_->has(core::FlightState::kValidAttitude | core::FlightState::kValidPosition);
+  if (last_state_ && !known_place) {
+    // Taken when not all of its datarefs had been asked for. Time stands: whole frames since are repetitions of it.
+    flight_->restart();
+    last_state_.reset();
+  }
   const bool current = std::all_of(streams_.begin(), streams_.end(), [](const auto& stream) { return stream.current; });
   const bool checked = flight_->positionCheck().verdict() != core::PositionCheck::Verdict::kUnknown &&
                        (rpos_rate_ == 0 || rpos_rate_ == core::kEveryFrameRateHz);
   const bool known = aircraft_.answers() > 0 && !settings_.values().empty();
-  return adopted_version_ && known && current && (checked || !flight_->wantsRpos()) && last_state_ &&
-         last_state_->has(core::FlightState::kValidAttitude | core::FlightState::kValidPosition);
+  return adopted_version_ && known && current && (checked || !flight_->wantsRpos()) && known_place;
 }
 
 void RxNode::endFrame(const core::LockstepFrame& frame) {

@@ -43,13 +43,14 @@ class Hand {
     return values_[0];
   }
   void zero() { std::fill(values_.begin(), values_.end(), 0.0F); }
-  /// Sends a frame, a sixtieth of a second after the one before.
-  const FlightState* send(double sim_step = 1.0 / 60.0) {
+  /// Sends a frame, a sixtieth of a second after the one before; what was asked for first alone, where it is cut.
+  const FlightState* send(double sim_step = 1.0 / 60.0, std::size_t datarefs = SIZE_MAX) {
     now += kFrame;
     sim_time_ += sim_step;
     (*this)["sim/time/total_running_time_sec"] = static_cast<float>(sim_time_);
     Datagram d = Datagram::labelled("RREF,");
-    for (std::size_t i = 0; i < values_.size(); ++i) d.pair(static_cast<std::int32_t>(i), values_[i]);
+    const std::size_t count = std::min(datarefs, values_.size());
+    for (std::size_t i = 0; i < count; ++i) d.pair(static_cast<std::int32_t>(i), values_[i]);
     return assembler.onRref(d.rref(), now);
   }
   /// The same place and velocity as seen from another scenery origin.
