@@ -101,6 +101,7 @@ def flight_table(
     units = bags.units(topic)
     state = bags.read(topic, store=store).by_stamp()
     base, columns = state.stamp, iter(state.columns.items())
+    # Also where nothing is interpolated: a warning says where the clock was set back.
     parts = segments(state.stamp, breaks(bags, state), DEFAULT_MAX_GAP)
     if rate is not None:
         base = time_base(state.stamp, parts, rate)

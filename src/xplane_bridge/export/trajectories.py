@@ -38,6 +38,7 @@ def trajectory(bags: Bags, rate: Optional[float] = None) -> tuple[np.ndarray, np
     stamp = table.stamp[order]
     position = np.stack([table[name][order] for name in _POSITION], axis=1)
     orientation = np.stack([table[name][order] for name in _ORIENTATION], axis=1)
+    # Also where nothing is interpolated: a warning says where the clock was set back.
     parts = segments(stamp, _breaks(bags, stamp), DEFAULT_MAX_GAP)
     if rate is None:
         return stamp, position, orientation

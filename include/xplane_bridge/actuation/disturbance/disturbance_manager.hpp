@@ -55,7 +55,7 @@ class DisturbanceManager {
   /// X-Plane is another one, whose weather is its own user's: ends the one that runs, and nothing of the last one's
   /// comes back. To be called before onFrame().
   void forget();
-  /// Ends the one that runs, as aborted, and puts the weather back.
+  /// Ends the one that runs, as aborted, and puts the weather back. Returns whether one ran.
   bool abort(const std::string& why);
   /// The same for good: none begins any more, and the weather is put back at once.
   void stop(const std::string& why);
