@@ -12,7 +12,8 @@ import os
 import signal
 import sys
 import threading
-from typing import Any, Callable, List, Optional, Sequence
+from contextlib import contextmanager
+from typing import Any, Callable, Iterator, List, Optional, Sequence, Type
 
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -20,6 +21,15 @@ Main = Callable[..., int]
 
 #: How long init_node may go on after a signal [s]: long for a master that answers.
 _INIT_S = 0.5
+
+
+@contextmanager
+def writing(kind: Type[XplaneBridgeError], subject: object, remedy: str) -> Iterator[None]:
+    """Writes a file or makes a folder; where that cannot be, raises an error of this kind: subject, cause; remedy."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{subject}: {error.strerror or error}; {remedy}") from None
 
 
 def guarded(main: Main) -> Main:

@@ -20,7 +20,7 @@ from xplane_bridge.campaign.distributions import CampaignError
 from xplane_bridge.campaign.flight import Flight
 from xplane_bridge.campaign.runner import TABLE, CampaignFolder, in_process
 from xplane_bridge.campaign.threads import one_thread
-from xplane_bridge.cli.entry import guarded
+from xplane_bridge.cli.entry import guarded, writing
 from xplane_bridge.cli.flights import through_nodes
 from xplane_bridge.in_process.view import FlightView
 
@@ -94,7 +94,11 @@ def refly(folder: CampaignFolder, flight: int, nodes: bool) -> int:
     result = Flight(plan, seen.append if nodes else None).fly(trace=True)
     if result.trace is not None:
         path = folder.folder / f"refly_{flight}.csv"
-        with writing(path, "--refly writes beside the campaign: copy DIR to where you can write, and give the copy"):
+        with writing(
+            CampaignError,
+            path,
+            "--refly writes beside the campaign: copy DIR to where you can write, and give the copy",
+        ):
             pd.DataFrame(result.trace).to_csv(path, index=False, float_format="%.9g")
         print(f"flight {flight}: {path}")
     row = rows.iloc[0]
@@ -109,22 +113,9 @@ def refly(folder: CampaignFolder, flight: int, nodes: bool) -> int:
     if not seen:
         raise CampaignError(f"--through-nodes: flight {flight} did not begin ({result.reason}); expected one that did")
     output = folder.folder / f"refly_{flight}"
-    with writing(output, "the recording goes into a folder of this name"):
+    with writing(CampaignError, output, "the recording goes into a folder of this name"):
         output.mkdir(exist_ok=True)
     return 0 if through_nodes.compare(plan, result, seen, output) else 1
-
-
-@contextmanager
-def writing(path: Path, remedy: str) -> Iterator[None]:
-    """Writes a file or folder of the campaign's.
-
-    Raises:
-        CampaignError: It cannot be written.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise CampaignError(f"{path}: {error.strerror or error}; {remedy}") from None
 
 
 @guarded
@@ -161,5 +152,5 @@ def write_page(folder: CampaignFolder, campaign: Campaign, table: pd.DataFrame) 
             traces[flight] = trace
     refly = f"scripts/run_campaign -o {folder.folder} --refly"
     text, path = report.page(campaign, table, traces, refly), folder.folder / PAGE
-    with writing(path, f"all flights are in {TABLE}: the same command draws them, and flies none again"):
+    with writing(CampaignError, path, f"all flights are in {TABLE}: the same command draws them, and flies none again"):
         path.write_text(text, encoding="utf-8")

@@ -6,14 +6,13 @@ import argparse
 import hashlib
 import json
 import tempfile
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import yaml
 
 from xplane_bridge.bags.chunks import BagFile
-from xplane_bridge.cli.entry import guarded, positive
+from xplane_bridge.cli.entry import guarded, positive, writing
 from xplane_bridge.errors import XplaneBridgeError, yaml_problem
 from xplane_bridge.harness.processes import interrupted_by_signals
 from xplane_bridge.harness.wire_replay import Start, WireReplay
@@ -32,6 +31,8 @@ _NOT_REPLAYED = ("wire_log", "wire_log_size", "wire_log_parts", "listen_for_beac
 _OF_THE_START = "/experiment"
 #: Of the names of captures.
 _ENDINGS = (".pcapng", ".pcap", ".cap")
+#: Where something cannot be written.
+_REMEDY = "give a folder that can be"
 
 
 class ReplayError(XplaneBridgeError):
@@ -347,20 +348,6 @@ def _replay(args: argparse.Namespace, folder: Path) -> int:
         raise
 
 
-@contextmanager
-def _writing(option: str, path: Path) -> Iterator[None]:
-    """Writes a file or makes a folder.
-
-    Raises:
-        ReplayError: It cannot be written.
-    """
-    try:
-        yield
-    except OSError as error:
-        msg = f"{option}: {path} cannot be written: {error.strerror}; give a folder that can be"
-        raise ReplayError(msg) from None
-
-
 def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
     path, options = args.file, Options(args.xplane, dict(args.set))
     if args.output and args.output.exists():
@@ -368,7 +355,7 @@ def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
         raise ReplayError(msg)
     for option, made in (("--output", args.output and args.output.parent), ("--regression", args.regression)):
         if made:
-            with _writing(option, made):
+            with writing(ReplayError, f"{option}: {made} cannot be written", _REMEDY):
                 made.mkdir(parents=True, exist_ok=True)
     if args.regression:
         path = args.regression / _kept_name(args.file)
@@ -395,11 +382,12 @@ def _play(args: argparse.Namespace, folder: Path, written: List[Path]) -> int:
     if args.regression:
         kept = {"options": {"xplane": options.xplane, "set": dict(options.given)}, "topics": found}
         text = json.dumps(kept, indent=2, sort_keys=True) + "\n"
-        with _writing("--regression", path.with_suffix(".json")):
-            path.with_suffix(".json").write_text(text, encoding="utf-8")
+        made = path.with_suffix(".json")
+        with writing(ReplayError, f"--regression: {made} cannot be written", _REMEDY):
+            made.write_text(text, encoding="utf-8")
         written.clear()
     if args.output:
-        with _writing("--output", args.output):
+        with writing(ReplayError, f"--output: {args.output} cannot be written", _REMEDY):
             replay.write_bag(args.output)
     code = 0 if expected is None else _say(_judge(expected.topics, found))
     if not args.against:
