@@ -44,24 +44,33 @@ sys.path.insert(0, {tests!r})
 from support.scheduling import long_ones_first, rank
 LONG = ("test_b.py::test_slow", "test_a.py::test_slow", "test_d.py")
 
+def write(*words):
+    with pathlib.Path({log!r}).open("a") as file:
+        print(*words, file=file)
+
 def pytest_xdist_make_scheduler(config, log):
-    return long_ones_first(config, log, LONG)
+    scheduler = long_ones_first(config, log, LONG)
+    assign = scheduler._assign_work_unit
+
+    def write_and_assign(node):
+        write("given", next(iter(scheduler.workqueue)), node.gateway.id)
+        assign(node)
+
+    scheduler._assign_work_unit = write_and_assign
+    return scheduler
 
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: rank(item.nodeid, LONG))
 
 def pytest_runtest_setup(item):
-    with pathlib.Path({log!r}).open("a") as file:
-        file.write(f"{{item.nodeid}} {{item.config.workerinput['workerid']}}\\n")
+    write("begun", item.nodeid, item.config.workerinput["workerid"])
 """
 FILE = """
-import time
-
 def test_one(): pass
 def test_two(): pass
 def test_three(): pass
-def test_slow_1(): time.sleep(0.3)
-def test_slow_2(): time.sleep(0.3)
+def test_slow_1(): pass
+def test_slow_2(): pass
 """
 
 
@@ -76,11 +85,14 @@ def test_long_ones_begin_and_the_others_stay_with_their_file(tmp_path):
     command = [sys.executable, "-m", "pytest", "-q", "--numprocesses", "2", "--dist", "loadfile", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    begun = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
+    lines = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
+    # in the order in which work is given, since which process is the faster one decides what begins first
+    given = [(unit.partition("/")[2], process) for what, unit, process in lines if what == "given"]
+    long = [f"test_{name}.py::test_slow_{number}" for name in "ba" for number in (1, 2)]
+    assert [unit for unit, _ in given] == [*long, "test_d.py", *(f"test_{name}.py" for name in "abc")]
+    assert len({process for _, process in given[:2]}) == 2, "both at once"
+    begun = [(test, process) for what, test, process in lines if what == "begun"]
     assert len(begun) == 16
-    assert sorted(test for test, _ in begun[:2]) == [f"side_by_side/test_b.py::test_slow_{k}" for k in (1, 2)]
-    assert len({process for _, process in begun[:2]}) == 2, "both at once"
-    assert max(k for k, (test, _) in enumerate(begun) if "test_d" in test) < len(begun) - 3
     for name in "abcd":
         others = {process for test, process in begun if f"test_{name}.py" in test and "slow" not in test}
         assert len(others) == 1, begun
