@@ -38,10 +38,11 @@ class TinyNode : public BaseNode {
       status.add("Gain (-)", gain_);
     });
     advertiseService<GetDataref::Request, GetDataref::Response>(
-        "slow_echo", [](const GetDataref::Request& request, GetDataref::Response& response) {
-          std::this_thread::sleep_for(std::chrono::duration<double>(request.timeout));
-          response.success = true;
+        "endless_echo", [this](const GetDataref::Request& request, GetDataref::Response& response) {
+          trace("echoing");
+          response.success = joined_.get_future().wait_for(kPatience) == std::future_status::ready;
           response.result.message = request.name;
+          trace("echoed");
         });
   }
 
@@ -89,7 +90,10 @@ class TinyNode : public BaseNode {
     trace("final_state");
   }
 
-  void joinThreads() override { trace(ros::ok() ? "join_before_ros" : "join"); }
+  void joinThreads() override {
+    trace(ros::ok() ? "join_before_ros" : "join");
+    joined_.set_value();
+  }
 
  private:
   void say(const std::string& word) {
@@ -112,6 +116,7 @@ class TinyNode : public BaseNode {
   std::string mode_;
   std::ofstream trace_;
   std::promise<void> nudged_;
+  std::promise<void> joined_;
   ros::Publisher pong_;
   ros::Publisher last_word_;
 };
