@@ -113,7 +113,8 @@ def test_silent_device_ends_the_commands_and_is_said(world, mapper):
 def test_of_two_nodes_on_the_stick_one_counts_and_both_are_named(world, mapper):
     import rospy
 
-    stick = mapper("logitech_extreme_3d_pro", axes=6, buttons=12)
+    # longer than this process may be kept from moving the stick
+    stick = mapper("logitech_extreme_3d_pro", axes=6, buttons=12, joy_timeout=10.0)
     stick.axes[0] = -1.0  # right
     world.commands.wait_for(lambda c: c.roll == 1.0)
     before = len(world.commands.messages)
