@@ -45,8 +45,10 @@ class Recording:
     def wait_for(self, topic, count):
         wait_until(lambda: len(self.payloads[topic]) >= count, WAIT_S, f"{count} messages on {topic}")
 
-    def wait_until_quiet(self):
-        """Waits until nothing has come for a second: the simulator stands."""
+    def wait_until_complete(self, expected):
+        """Waits for so many messages a topic, and until nothing further has come for a second: the simulator stands."""
+        for topic, count in expected.items():
+            self.wait_for(topic, count)
         before = -1
         while before != sum(map(len, self.payloads.values())):
             before = sum(map(len, self.payloads.values()))
@@ -94,8 +96,14 @@ def shake(processes, ended, seed):
         os.kill(process.pid, signal.SIGCONT)
 
 
-def fly(world, shaken):
-    """Flies with mode changes, a failure and an excitation; gives what each topic brought."""
+def fly(world, shaken, expected):
+    """Flies with mode changes, a failure and an excitation; gives what each topic brought.
+
+    Args:
+        world: The test's own.
+        shaken: Whether its processes are stopped at random.
+        expected: How many messages topics bring at least.
+    """
     import rospy
 
     processes = start(world)
@@ -119,8 +127,7 @@ def fly(world, shaken):
             shaker.join()
     assert (answer.success, answer.flown) == (True, FRAMES), controller.describe("has failed")
     assert answer.sim_time == pytest.approx(FRAMES / 60, abs=1e-4)
-    recording.wait_for(f"{world.namespace}/flight_state", FRAMES)
-    recording.wait_until_quiet()
+    recording.wait_until_complete(expected)
     recording.close()
     controller.stop()
     print(f"{'shaken' if shaken else 'quiet'}: {FRAMES / 60 / took:.1f} times real time")
@@ -129,22 +136,25 @@ def fly(world, shaken):
 
 def test_a_flight_is_the_same_bytes_under_random_stops(new_world, tmp_path):
     flights = []
+    known = {
+        "/clock": FRAMES + 1,  # and before the flight
+        "/lockstep/flight_state": FRAMES,
+        "/lockstep/control/auto": FRAMES,
+        "/lockstep/experiment": 1,
+        "/lockstep/mission/surfaces": FRAMES // 3,
+    }
+    expected = known
     for number in range(2):
         folder = tmp_path / str(number)
         folder.mkdir()
         world = new_world(folder)
         world.namespace = "/lockstep"  # names of nodes are in some messages
         try:
-            flights.append(fly(world, shaken=number == 1))
+            flights.append(fly(world, number == 1, expected))
         finally:
             world.close()
-    for topic, count in (
-        ("/clock", FRAMES + 1),  # and before the flight
-        ("/lockstep/flight_state", FRAMES),
-        ("/lockstep/control/auto", FRAMES),
-        ("/lockstep/experiment", 1),
-        ("/lockstep/mission/surfaces", FRAMES // 3),
-    ):
+        expected = {topic: count for topic, (count, _) in flights[0].items()}
+    for topic, count in known.items():
         assert flights[0][topic][0] == count, topic
     assert flights[0]["/lockstep/events"][0] >= 8  # modes, failure, dataref, excitation, repair
     differing = {topic for topic, seen in flights[0].items() if flights[1].get(topic) != seen}
@@ -153,9 +163,12 @@ def test_a_flight_is_the_same_bytes_under_random_stops(new_world, tmp_path):
 
 
 def test_a_participant_that_dies_ends_the_run_by_name(world):
-    _, _, tx_node = start(world, watchdog=15.0, hold=False)
+    from std_srvs.srv import Trigger
+
+    _, _, tx_node = start(world, watchdog=15.0)
     controller = start_controller(world, 30)
     try:
+        assert world.call("lockstep/run", Trigger).success
         wait_until(lambda: not tx_node.running, 60, "end of tx_node")
     finally:
         controller.stop()
