@@ -159,15 +159,15 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
 
 
 def _replenish(cluster: Any, workers: int, over: threading.Event) -> None:
-    """Starts all workers anew where none has been left for a while."""
-    seen = time.monotonic()
+    """Starts all workers anew where none has been left for a while, which is longer each time: they may be slow."""
+    seen, patience_s = time.monotonic(), _EMPTY_S
     while not over.wait(_LOOK_S):
         if cluster.scheduler.workers:
             seen = time.monotonic()
-        elif time.monotonic() - seen > _EMPTY_S:
+        elif time.monotonic() - seen > patience_s:
             cluster.scale(0)
             cluster.scale(workers)
-            seen = time.monotonic()
+            seen, patience_s = time.monotonic(), 2.0 * patience_s
 
 
 @contextmanager
