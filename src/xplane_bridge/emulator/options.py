@@ -31,7 +31,7 @@ from xplane_bridge.emulator.wire.server import RREF_REQUESTS_PER_FRAME
 
 KINEMATIC = "kinematic"
 #: What `--otherwise` makes of values a datagram and of requests a frame.
-_SMALL_SPLIT, _FEW_REQUESTS = 20, 50
+_SMALL_SPLIT, _FEW_REQUESTS = 20, 20
 
 
 @dataclass
