@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from support.deadlines import PROGRAM_S
 from support.flights.export_flight import RATE, export, files_of, picture, pictures_in, write_flight
 from support.flights.synthetic_flight import START, FlightBag, stamp_ns, state_at
 
@@ -271,6 +272,6 @@ def test_flights_of_one_name_are_distinguished_by_their_folders(tmp_path: Path) 
 
 def test_the_launcher_runs() -> None:
     launcher = Path(__file__).parents[3] / "scripts" / "bag_export"
-    run = subprocess.run([sys.executable, str(launcher), "--help"], capture_output=True, text=True, timeout=60)
+    run = subprocess.run([sys.executable, str(launcher), "--help"], capture_output=True, text=True, timeout=PROGRAM_S)
     assert run.returncode == 0, run.stderr
     assert "--scheduler" in run.stdout

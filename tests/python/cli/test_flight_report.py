@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 import pytest
 
+from support.deadlines import PROGRAM_S
 from support.flights.export_flight import write_flight
 from support.flights.synthetic_flight import FlightBag, record_a_clock_set_back, stamp_ns, write_states
 from xplane_bridge.analysis.quality import QUALITY_WORDS
@@ -270,7 +271,7 @@ def test_a_real_browser_opens_it_offline_and_links_the_time_axes(page: Path, tmp
         "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}",
         "--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom", f"file://{probed}",
     ]  # fmt: skip
-    run = subprocess.run(command, capture_output=True, text=True, timeout=180)
+    run = subprocess.run(command, capture_output=True, text=True, timeout=PROGRAM_S)
     errors = [line for line in run.stderr.splitlines() if "CONSOLE" in line and ("Uncaught" in line or "Error" in line)]
     assert not errors
     assert 'data-linked="9"' in run.stdout

@@ -17,6 +17,8 @@ from typing import Any, Callable, Dict, List, Tuple
 
 import pytest
 
+from xplane_bridge.harness.ports import free_udp_port
+
 TOOL = Path(__file__).resolve().parents[3] / "scripts" / "release_overrides"
 FOLDER = "sim/operation/override/"
 STICK, THROTTLES = FOLDER + "override_joystick_roll", FOLDER + "override_throttles"
@@ -80,12 +82,6 @@ def left(tmp_path: Path) -> Tuple[XPlane, Path]:
     return xplane, write(tmp_path / f"127.0.0.1_{xplane.port}.json", override(STICK), override(THROTTLES))
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        return int(probe.getsockname()[1])
-
-
 def release(journal: Path, *more: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, str(TOOL), "--folder", str(journal.parent), *more]
     return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
@@ -117,7 +113,9 @@ def test_a_locked_journal_is_listed_and_all_is_released(left: Tuple[XPlane, Path
 @pytest.fixture
 def subscribed(tmp_path: Path) -> Path:
     """What a process that is gone has left subscribed."""
-    left = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": False}])
+    left = entry(
+        "subscriptions:/rx_node", subscriptions=[{"port": free_udp_port(), "datarefs": [STICK], "rpos": False}]
+    )
     return write(tmp_path / f"127.0.0.1_{XPlane().port}_subscriptions.json", left)
 
 
@@ -157,7 +155,9 @@ def test_where_nothing_can_be_sent_is_said_and_the_next_x_plane_is_released(left
     second = journal.rename(journal.with_name(f"localhost_{xplane.port}.json"))  # sorted behind
     unseen = entry("data_output:26", {"op": "data", "row": 26, "values": [-999.0] * 8})
     first = write(journal.with_name(f"{NO_WAY}_49000.json"), override(STICK), unseen)
-    asked = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": True}])
+    asked = entry(
+        "subscriptions:/rx_node", subscriptions=[{"port": free_udp_port(), "datarefs": [STICK], "rpos": True}]
+    )
     ports = write(journal.with_name(f"{NO_WAY}_49000_subscriptions.json"), asked)
     done = release(first)
     assert done.returncode == 1
@@ -191,7 +191,9 @@ def test_all_are_those_of_other_aircraft_and_of_the_engines_too(tmp_path: Path) 
 @pytest.mark.parametrize("in_the_way", [".lock", ".new"])
 def test_a_journal_that_cannot_be_changed_holds_up_nothing(left: Tuple[XPlane, Path], in_the_way: str) -> None:
     xplane, journal = left
-    asked = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": False}])
+    asked = entry(
+        "subscriptions:/rx_node", subscriptions=[{"port": free_udp_port(), "datarefs": [STICK], "rpos": False}]
+    )
     kept = entry("subscriptions:/gone", subscriptions=[{"port": xplane.port, "datarefs": [], "rpos": False}])
     ports = write(journal.with_name(f"{journal.stem}_subscriptions.json"), asked, kept)
     for each in (journal, ports):
@@ -296,14 +298,16 @@ def test_an_entry_that_cannot_be_carried_out_stays_and_the_others_go(
 
 
 def test_damaged_subscriptions_stay_and_the_others_end(tmp_path: Path) -> None:
-    sound = entry("subscriptions:/rx_node", subscriptions=[{"port": free_port(), "datarefs": [STICK], "rpos": False}])
+    sound = entry(
+        "subscriptions:/rx_node", subscriptions=[{"port": free_udp_port(), "datarefs": [STICK], "rpos": False}]
+    )
     damaged = [
         entry("subscriptions:/a", subscriptions=[{"port": 99999, "datarefs": [], "rpos": False}]),
         entry("subscriptions:/b", subscriptions=[{"port": 4711, "datarefs": [7], "rpos": False}]),
         entry("subscriptions:/c", subscriptions=[{"datarefs": [], "rpos": False}]),
         entry("subscriptions:/d"),
     ]
-    file = write(tmp_path / f"127.0.0.1_{free_port()}_subscriptions.json", *damaged, sound)
+    file = write(tmp_path / f"127.0.0.1_{free_udp_port()}_subscriptions.json", *damaged, sound)
     done = release(file)
     assert done.stderr == ""
     assert done.stdout.count("cannot be carried out") == 4

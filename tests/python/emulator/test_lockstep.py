@@ -41,6 +41,9 @@ class Client(XPlaneClient):
             assert packet is not None, "no fence in 10 s"
             found = dict(protocol.decode_rref_response(packet))
             if FENCE_INDEX in found:
+                if FENCE_INDEX + 3 not in found:  # frame 0 was repeated between the requests of its elements
+                    pairs = []
+                    continue
                 self.picture = int(found[FENCE_INDEX + 3])
                 return [int(found[FENCE_INDEX + element]) for element in range(3)], pairs
             pairs += protocol.decode_rref_response(packet)

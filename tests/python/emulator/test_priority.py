@@ -30,7 +30,7 @@ def granted() -> bool:
 
 
 @pytest.mark.skipif(not granted(), reason="no real-time priority here")
-def test_a_thread_without_rest_gives_it_back_and_one_that_rests_keeps_it(monkeypatch, caplog):
+def test_a_thread_without_rest_gives_it_back_and_one_that_rests_keeps_it(caplog):
     """The policies are the kernel's own words."""
     seen: dict[str, int] = {}
     ended = threading.Event()
@@ -48,7 +48,6 @@ def test_a_thread_without_rest_gives_it_back_and_one_that_rests_keeps_it(monkeyp
     def given_back() -> bool:
         return not seen["restless"] & os.SCHED_FIFO
 
-    monkeypatch.setattr(priority, "_PATIENCE_S", 0.05)
     threads = [
         threading.Thread(target=fly, args=(name, work_s, rest_s))
         for name, work_s, rest_s in (("restless", 0.004, 0.0), ("resting", 0.001, 0.004))

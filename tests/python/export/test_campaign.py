@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from support.deadlines import PROGRAM_S
 from support.flights.export_flight import export, files_of, write_flight
 from support.flights.synthetic_flight import stamp_ns
 from xplane_bridge.dask_scheduler import SchedulerError
@@ -144,7 +145,7 @@ def test_an_export_that_was_killed_goes_on(tmp_path: Path, renaming: int) -> Non
     bag = write_flight(tmp_path / "flight.bag", 0.4)
     for arguments in ([], ["--keep-bad-frames"]):  # a first one; one that replaces earlier results
         command = [str(bag), "--format", "yolo", *arguments, "-o", str(tmp_path / "out")]
-        run = subprocess.run([sys.executable, "-c", KILLED, str(renaming), *command], timeout=60, check=False)
+        run = subprocess.run([sys.executable, "-c", KILLED, str(renaming), *command], timeout=PROGRAM_S, check=False)
         assert run.returncode == -signal.SIGKILL
         assert export(*command) == 0
         assert export("--verify", "-o", tmp_path / "out") == 0

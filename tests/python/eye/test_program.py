@@ -11,6 +11,7 @@ from typing import Optional
 import pytest
 
 from support.absent_modules import WITHOUT_THEM
+from support.deadlines import PROGRAM_S
 from xplane_bridge.eye.grab import Grabber
 from xplane_bridge.eye.grab_windows import client_area, is_xplane
 
@@ -29,7 +30,12 @@ sys.exit(code)
 def run(*arguments: str, display: str = ":9999") -> subprocess.CompletedProcess:
     env = {**os.environ, "DISPLAY": display}
     return subprocess.run(
-        [sys.executable, "-c", START, *arguments], env=env, capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", START, *arguments],
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=PROGRAM_S,
+        check=False,
     )
 
 
