@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any, Iterator, List
@@ -20,9 +21,22 @@ from xplane_bridge.campaign.definition import Campaign, CampaignError, parse_cam
 from xplane_bridge.campaign.fingerprint import fingerprint
 from xplane_bridge.campaign.flight import Flight
 from xplane_bridge.campaign.rows import VARYING, cpu_kind, fly_rows
-from xplane_bridge.campaign.runner import CHUNK, TABLE, CampaignFolder, in_process
+from xplane_bridge.campaign.runner import CAMPAIGN, CHUNK, PARTS, TABLE, CampaignFolder, in_process
 from xplane_bridge.cli import run_campaign
 from xplane_bridge.resources import config_file, program
+
+#: Flies a campaign and is killed in place of the renaming that gives a file this name.
+KILLED = """
+import os, signal, sys
+from xplane_bridge.cli.run_campaign import main
+name, rename = sys.argv[1], os.replace
+def replace(source, target):
+    if os.path.basename(target) == name:
+        os.kill(os.getpid(), signal.SIGKILL)
+    rename(source, target)
+os.replace = replace
+sys.exit(main(sys.argv[2:]))
+"""
 
 
 def document(**more: Any) -> dict:
@@ -386,23 +400,24 @@ def test_a_scheduler_that_ends_midway_is_a_line_and_the_same_command_goes_on(
 def test_the_program_killed_at_any_moment_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "c.yaml"
     path.write_text(str(document(flights=13)), encoding="utf-8")  # JSON-like text is YAML
-    command = [str(program("run_campaign")), str(path), "--workers", "0", "-o"]
-    first = subprocess.Popen([*command, str(tmp_path / "killed")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    while not list((tmp_path / "killed/parts").glob("*.parquet")):
-        assert first.poll() is None
-        time.sleep(0.02)
-    first.send_signal(signal.SIGKILL)
-    first.wait()
-    assert not (tmp_path / "killed" / TABLE).exists()
+    folder, parts = tmp_path / "killed", ["flights-00000000-0010.parquet", "flights-00000010-0003.parquet"]
+    arguments = [str(path), "--workers", "0", "-o"]
+    for there, missing in (([], CAMPAIGN), ([], parts[0]), (parts[:1], parts[1]), (parts, TABLE)):
+        killed = [sys.executable, "-c", KILLED, missing, *arguments, str(folder)]
+        assert subprocess.run(killed, check=False, stdout=subprocess.DEVNULL).returncode == -signal.SIGKILL
+        assert [part.name for part in sorted((folder / PARTS).glob("*.parquet"))] == there
+        assert (folder / CAMPAIGN).exists() == (missing != CAMPAIGN)
+        assert not (folder / TABLE).exists()
+    command = str(program("run_campaign"))
     for name in ("killed", "whole"):
-        subprocess.run([*command, str(tmp_path / name)], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([command, *arguments, str(tmp_path / name)], check=True, stdout=subprocess.DEVNULL)
     tables = [same(pd.read_parquet(tmp_path / name / TABLE)) for name in ("killed", "whole")]
     pd.testing.assert_frame_equal(*tables)
-    again = [command[0], "-o", str(tmp_path / "killed"), "--refly", "7"]
+    again = [command, "-o", str(folder), "--refly", "7"]
     assert subprocess.run(again, check=False, stdout=subprocess.DEVNULL).returncode == 0
-    broken = pd.read_parquet(tmp_path / "killed/parts/flights-00000000-0010.parquet")
+    broken = pd.read_parquet(folder / PARTS / parts[0])
     broken.loc[7, "sha256"] = "0" * 64
-    broken.to_parquet(tmp_path / "killed/parts/flights-00000000-0010.parquet")
+    broken.to_parquet(folder / PARTS / parts[0])
     assert subprocess.run(again, check=False, stdout=subprocess.DEVNULL).returncode == 1
 
 
