@@ -5,10 +5,10 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol
 from xplane_bridge.doctor import names
@@ -16,6 +16,7 @@ from xplane_bridge.doctor.observe import beacons, computer, data_output, ports, 
 from xplane_bridge.doctor.observe.beacons import BeaconWatch, Sighting
 from xplane_bridge.doctor.observe.target import Chosen, choose, distinct
 from xplane_bridge.doctor.settings import Settings
+from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.ports import free_udp_port
 
 GROUP = "239.255.1.1"
@@ -25,11 +26,9 @@ VALUES = {names.VERSION: 115501.0, FakeXPlane.TIME: 10.0, names.PAUSED: 0.0, nam
 class Repeat:
     """Sends datagrams again and again, from a thread, within ``with``."""
 
-    def __init__(self, to, *datagrams, multicast=False):
+    def __init__(self, to, *datagrams):
         self._to, self._datagrams = to, datagrams
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        if multicast:
-            self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -51,17 +50,32 @@ class Repeat:
 # --------------------------------------------------------------------------------------------------------- beacons
 
 
-def test_each_x_plane_that_announces_itself_is_heard_once():
+def test_each_x_plane_that_announces_itself_is_heard_once(monkeypatch):
     port = free_udp_port()
     flying = protocol.Beacon(115501, 49000, "lab-pc").encode()
     viewing = protocol.Beacon(115501, 49000, "screen-left", role=2).encode()
-    with Repeat((GROUP, port), flying, viewing, b"hello", multicast=True):
+    opened = beacons._open
+
+    def open_and_send(receiver, *where):
+        """Only what is sent from now on is heard, and in this order."""
+        interfaces = opened(receiver, *where)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+            for datagram in (flying, viewing, flying, viewing, b"hello"):
+                sender.sendto(datagram, (GROUP, port))
+        return interfaces
+
+    def listened():
         watch = beacons.listen(GROUP, port, 0.5)
+        return watch if watch.odd or watch.error else None  # with the last datagram all before it have been read
+
+    monkeypatch.setattr(beacons, "_open", open_and_send)
+    watch = wait_until(listened, WAIT_S, "datagram in the time of listening")
     assert watch.sightings == (
         Sighting("127.0.0.1", 49000, 115501, "lab-pc"),
         Sighting("127.0.0.1", 49000, 115501, "screen-left", flies=False),
     )
-    assert watch.odd > 0
+    assert watch.odd == 1
     assert "lo" in watch.interfaces
     assert not watch.error
 
@@ -133,22 +147,21 @@ def test_a_name_without_an_address_is_said():
 # --------------------------------------------------------------------------------------------------------- answers
 
 
-def test_what_x_plane_has_is_read_and_all_subscriptions_end():
+def test_what_x_plane_has_is_read_and_all_subscriptions_end(monkeypatch):
+    monkeypatch.setattr(simulator, "_MORE_S", WAIT_S)  # it has all that is asked for: the last answer ends it
     on = names.BRIDGE_OVERRIDES[0]
     rows = {names.data_row(index): float(index == 20) for index in range(protocol.ROW_COUNT)}
-    with FakeXPlane({**VALUES, on: 1.0, **rows}) as xplane:
-        answers = simulator.ask("127.0.0.1", xplane.port, 5.0)
+    with FakeXPlane({**VALUES, **dict.fromkeys(names.OVERRIDES, 0.0), on: 1.0, **rows}) as xplane:
+        answers = simulator.ask("127.0.0.1", xplane.port, WAIT_S)
+        assert answers.values.keys() >= {*names.OVERRIDES, *rows}
         assert answers.values[names.VERSION] == 115501
         assert answers.values[FakeXPlane.TIME] > answers.first[FakeXPlane.TIME] > 10
         assert answers.values[on] == 1
         assert {row for row in rows if answers.values[row]} == {names.data_row(20)}
         assert list(answers.sources) == [("127.0.0.1", xplane.port)]
         assert not answers.refused
-        deadline = time.monotonic() + 10
-        while any(xplane.subscriptions.values()) and time.monotonic() < deadline:
-            time.sleep(0.01)
+        wait_until(lambda: not any(xplane.subscriptions.values()), WAIT_S, "end of all subscriptions")
         assert len(xplane.subscriptions) == 2, "the asking socket, and the one that probes the port"
-        assert not any(xplane.subscriptions.values())
         assert not xplane.others, "the doctor writes nothing"
 
 
@@ -165,13 +178,13 @@ def test_requests_come_in_batches_that_one_frame_takes():
             batches.append(0)
 
     with Counted("127.0.0.1", free_udp_port()) as questions:
-        questions.ask([f"sim/{number}" for number in range(250)], 0.1)
+        questions.ask([f"sim/{number}" for number in range(250)], 0.5)
         assert batches == [100, 100, 50]
 
 
 def test_answers_from_another_address_are_taken_and_reported():
     with FakeXPlane(VALUES, reply_from="127.0.0.2") as xplane:
-        answers = simulator.ask("127.0.0.1", xplane.port, 5.0)
+        answers = simulator.ask("127.0.0.1", xplane.port, WAIT_S)
     assert answers.any
     assert list(answers.sources) == [("127.0.0.2", xplane.port)]
 
@@ -217,7 +230,12 @@ def test_rows_that_come_unasked_are_seen_and_taken_ports_left_alone():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other, Repeat(("127.0.0.1", port), packet, b"DATA*"):
         other.bind(("", 0))
         taken = other.getsockname()[1]
-        watch = data_output.watch([port, taken], 0.4)
+
+        def watched():
+            watch = data_output.watch([port, taken], 0.4)
+            return watch if watch.rows else None
+
+        watch = wait_until(watched, WAIT_S, "row in the time of the watch")
     assert watch.rows == {(port, "127.0.0.1"): (3, 20)}
     assert watch.taken == (taken,)
 

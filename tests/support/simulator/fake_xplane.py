@@ -33,6 +33,8 @@ class FakeXPlane:
         self._values = dict(values)
         self._time_step = time_step
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        # A batch of requests may come while this process has no processor.
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
         self._socket.bind(("127.0.0.1", 0))
         self.port: int = self._socket.getsockname()[1]
         self._sender = self._socket

@@ -8,6 +8,7 @@ import os
 import subprocess
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -23,6 +24,7 @@ from xplane_bridge.emulator.view.renderer import (
     StripError,
     read_strip,
 )
+from xplane_bridge.emulator.view.renderer.__main__ import Picture, SwapChain
 from xplane_bridge.emulator.view.renderer.camera import Camera, clip
 from xplane_bridge.emulator.view.renderer.painter import Painter
 from xplane_bridge.emulator.view.renderer.strip import draw_strip
@@ -262,7 +264,37 @@ def display():
     server.wait()
 
 
-def test_process_shows_frames_after_the_pipeline_delay(display: str, tmp_path) -> None:
+def swaps(renderer: RendererProcess, log: Path) -> list[dict[str, str]]:
+    """The window's swap log, each picture held to its delay; it is whole when the process has ended by itself."""
+    assert renderer.alive
+    renderer._child.stdin.close()
+    assert renderer._child.wait(WAIT_S) == 0
+    renderer.close()
+    with log.open() as file:
+        rows = list(csv.DictReader(file))
+    offset = time.time_ns() - time.monotonic_ns()
+    for row in rows:
+        waited = int(row["swap_begin_ns"]) - offset - int(row["frame_monotonic_ns"])
+        assert waited > 0.1499e9
+        assert int(row["swap_end_ns"]) >= int(row["swap_begin_ns"])
+    return rows
+
+
+def test_process_shows_every_frame_that_is_waited_for_after_the_pipeline_delay(display: str, tmp_path: Path) -> None:
+    log = tmp_path / "swaps.csv"
+    options = RendererOptions(ANCHOR, pipeline_delay=0.15, swap_log=log, display=display, hud=True, answers_shown=True)
+    renderer = RendererProcess(options)
+    for frame in range(10):
+        given_ns = time.monotonic_ns()
+        renderer.show(replace(LEVEL, frame=frame, sim_time=frame * 0.05, time_ns=given_ns))
+        wait_until(lambda: renderer.drawn(0.1), WAIT_S, f"frame {frame} on the display")
+        assert time.monotonic_ns() - given_ns > 0.1499e9, "answered before it was shown"
+    assert [int(row["frame"]) for row in swaps(renderer, log)] == list(range(10))
+
+
+def test_frames_that_come_while_others_wait_for_their_display_keep_order_and_delay(
+    display: str, tmp_path: Path
+) -> None:
     log = tmp_path / "swaps.csv"
     renderer = RendererProcess(
         RendererOptions(anchor=ANCHOR, pipeline_delay=0.15, swap_log=log, display=display, hud=True)
@@ -270,18 +302,20 @@ def test_process_shows_frames_after_the_pipeline_delay(display: str, tmp_path) -
     for frame in range(20):
         renderer.show(replace(LEVEL, frame=frame, sim_time=frame * 0.05, time_ns=time.monotonic_ns()))
         time.sleep(0.05)
-    assert renderer.alive
-    renderer.close()
-    with log.open() as file:
-        rows = list(csv.DictReader(file))
-    frames = [int(row["frame"]) for row in rows]
-    assert len(frames) >= 10
+    frames = [int(row["frame"]) for row in swaps(renderer, log)]
     assert frames == sorted(set(frames))
-    offset = time.time_ns() - time.monotonic_ns()
-    for row in rows:
-        waited = int(row["swap_begin_ns"]) - offset - int(row["frame_monotonic_ns"])
-        assert waited > 0.1499e9
-        assert int(row["swap_end_ns"]) >= int(row["swap_begin_ns"])
+    assert frames[-1] == 19, "however late it is, nothing comes after it that could be due too"
+
+
+def test_a_picture_is_left_out_only_where_the_next_one_is_due_too() -> None:
+    chain, later = SwapChain(16, 16), time.monotonic_ns() + 10**15
+    for frame, due_ns in enumerate((1, 2, 3, later, later + 1)):
+        chain.put(Picture(replace(LEVEL, frame=frame), chain.buffer(), due_ns))
+    chain.end()
+    shown = []
+    while not chain.ended:
+        shown.append(chain.next(0.0).scene.frame)
+    assert shown == [2, 3, 4]
 
 
 def test_a_window_whose_program_fails_keeps_no_frame_waiting_and_says_why(display: str, capfd) -> None:
