@@ -30,7 +30,6 @@ LONG = (
     "whole/test_first_day.py::",
     "flights/test_flights.py::",
     "lockstep/test_lockstep_scenario.py::test_runs_with",
-    "flights/test_three_aircraft.py::test_position_loop",
     "flights/test_demo.py::test_the_demo_flies",
     "whole/test_bench.py::",
     "capture/test_labelled_approach.py",

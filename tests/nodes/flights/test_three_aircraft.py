@@ -12,6 +12,7 @@ from support.deadlines import WAIT_S
 from support.flights.position_loop import Motion, PositionLoop
 from support.nodes.tx_fixtures import AUTO, PITCH, ROLL, THROTTLE, YAW, RepeatedJoy, WatchedDatarefs, tx_params
 from xplane_bridge.harness import wait_until
+from xplane_bridge.lockstep import Participant, advertise
 
 JOYSTICK = Path(__file__).resolve().parents[3] / "config" / "joysticks" / "logitech_extreme_3d_pro.yaml"
 
@@ -31,7 +32,8 @@ def start_tx(world, aircraft, *emulator_options):
     world.xplane = world.emulator("--no-beacon", "--start", "air", "--aircraft", aircraft, *emulator_options)
     world.mode = world.watch("control/mode", ControlMode)
     world.set_param("aircraft", aircraft)
-    world.start("tx_node", tx_params(aircraft))
+    # A busy machine's source may be silent for a moment.
+    world.start("tx_node", tx_params(aircraft, command_timeout=5.0))
     world.mode.wait_for()
 
 
@@ -85,17 +87,22 @@ def motion_of(state):
 
 
 def test_position_loop_on_control_auto_hovers_the_quadrotor_60_s_within_a_metre(world):
+    """In lock-step: the simulator waits for the commands of this process, however late it is."""
     import rospy
-    from xplane_bridge.msg import ControlCommand, FlightState, ModeRequest
+    from xplane_bridge.msg import ControlCommand, ControlMode, ModeRequest
+    from xplane_bridge.srv import LockstepStep
 
-    start_tx(world, "multirotor", "--alt", "120", "--heading", "70", "--turbulence", "0.5", "--seed", "4")
+    options = ("--start", "air", "--aircraft", "multirotor", "--alt", "120", "--heading", "70")
+    world.emulator("--no-beacon", "--stepped", "lockstep", *options, "--turbulence", "0.5", "--seed", "4")
+    mode = world.watch("control/mode", ControlMode)
+    lockstep = {"enabled": True, "hold": True, "participants": [rospy.get_name()], "watchdog": WAIT_S}
+    world.set_param("lockstep", lockstep)
+    world.set_param("aircraft", "multirotor")
+    world.set_param("tx_node", tx_params("multirotor"))
     world.start("rx_node")
-    wire = WatchedDatarefs(world.xplane.port, lever(0))
-    wait_until(lambda: wire.value(lever(0)) > 0.0, WAIT_S, "the throttle of the hover")
-    hover = wire.value(lever(0))
-    wire.close()
+    world.start("tx_node")
 
-    commands = rospy.Publisher(f"{world.namespace}/control/auto", ControlCommand, queue_size=1)
+    commands = advertise(f"{world.namespace}/control/auto", ControlCommand)
     requests = rospy.Publisher(f"{world.namespace}/control/mode_request", ModeRequest, queue_size=1)
     for publisher in (commands, requests):
         wait_until(lambda publisher=publisher: publisher.get_num_connections() > 0, WAIT_S, "tx_node's subscription")
@@ -104,25 +111,36 @@ def test_position_loop_on_control_auto_hovers_the_quadrotor_60_s_within_a_metre(
 
     def control(state):
         nonlocal loop
+        if not state.control_throttle > 0.0:
+            return None  # the throttle of the hover is not shown yet
         motion = motion_of(state)
         if loop is None:
-            loop = PositionLoop(motion, hover, motion.heading_rad)
+            loop = PositionLoop(motion, state.control_throttle, motion.heading_rad)
+            request = ModeRequest(mode=AUTO, sequence=1, requester="test")
+            request.header.stamp = state.header.stamp
+            requests.publish(request)
         distances.append((state.sim_time, loop.distance(motion)))
         sticks = loop.step(motion, state.frame_period)
         command = ControlCommand(fields=ROLL | PITCH | YAW | THROTTLE, sequence=len(distances))
-        command.header.stamp = state.header.stamp
         command.roll, command.pitch, command.yaw, command.throttle = sticks
-        commands.publish(command)
+        return command
 
-    states = rospy.Subscriber(f"{world.namespace}/flight_state", FlightState, control, queue_size=1, tcp_nodelay=True)
+    def fly(seconds):
+        frames = round(60 * seconds)
+        answer = world.call("lockstep/step", LockstepStep, frames=frames)
+        assert (answer.success, answer.flown) == (True, frames), answer.result.message
+
+    participant = Participant(control, commands, world.namespace)
     try:
-        wait_until(lambda: loop is not None, WAIT_S, "flight state")
-        requests.publish(ModeRequest(mode=AUTO, sequence=1, requester="test"))
-        world.mode.wait_for(lambda mode: mode.mode == AUTO)
+        wait_until(lambda: participant.connected, WAIT_S, "flight states")
+        fly(1.0)
+        mode.wait_for(lambda each: each.mode == AUTO)
         settled = distances[-1][0] + 5.0
-        wait_until(lambda: distances[-1][0] > settled + 60.0, 180, "a minute of hovering")
+        fly(65.0)
     finally:
-        states.unregister()
-    assert max(distance for sim_time, distance in distances if sim_time > settled) < 1.0
-    assert not world.mode.last.failsafe
-    assert world.mode.last.mode == AUTO
+        participant.close()
+    hovering = [(sim_time, distance) for sim_time, distance in distances if sim_time > settled]
+    assert hovering[-1][0] - hovering[0][0] >= 59.9
+    assert max(distance for _, distance in hovering) < 1.0
+    assert not mode.last.failsafe
+    assert mode.last.mode == AUTO
