@@ -19,7 +19,7 @@ FLY_S = 240.0  # of a busy machine, for a minute and a half of flight
 
 
 @contextlib.contextmanager
-def flown(world, *options, aircraft="fixed_wing"):
+def flown(world, *options, aircraft="fixed_wing", setting_timeout=30.0):
     """Emulator without a pilot, and tx_node."""
     from xplane_bridge.msg import EventList
 
@@ -27,7 +27,7 @@ def flown(world, *options, aircraft="fixed_wing"):
     world.other = world.wire(world.xplane.port)
     world.events = world.watch("events", EventList)
     world.set_param("aircraft", aircraft)
-    world.node = world.start("tx_node", tx_params(aircraft, setting_timeout=5.0))
+    world.node = world.start("tx_node", tx_params(aircraft, setting_timeout=setting_timeout))
     world.events.wait_for(lambda e: any(event.kind == AIRCRAFT for event in e.events), 60.0)
     yield world
 
@@ -116,7 +116,7 @@ def test_what_cannot_be_is_refused(world):
 
 
 def test_an_aircraft_without_one_is_reported(world):
-    with flown(world, aircraft="multirotor"):
+    with flown(world, aircraft="multirotor", setting_timeout=5.0):  # it waits for the time-out
         event = ask(world, fields=bits("MASTER"), master=2)
         assert not event.success
         assert 'does not engage "servos"' in event.text

@@ -7,7 +7,17 @@ import hashlib
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.tx_fixtures import AUTO, PITCH, ROLL, CommandSource, WatchedDatarefs, call, tx_params, write_mixing
+from support.nodes.tx_fixtures import (
+    AUTO,
+    PITCH,
+    ROLL,
+    CommandSource,
+    WatchedDatarefs,
+    call,
+    pause,
+    tx_params,
+    write_mixing,
+)
 from support.nodes.wire_replays import RawTopics, assert_replayed, by_number, log_of, payloads_in, replay
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.wire_log import records
@@ -47,9 +57,7 @@ def request_mode(world, mode):
 @pytest.fixture(scope="module")
 def flight(new_world, tmp_path_factory):
     """A flight in which tx_node does all that it can: its log, and what was heard."""
-    from std_srvs.srv import SetBool
     from xplane_bridge.msg import AppliedCommand, ControlMode, EventList, ExcitationState
-    from xplane_bridge.srv import ResetFlight
 
     folder = tmp_path_factory.mktemp("wire_tx")
     world = new_world(folder)
@@ -62,10 +70,12 @@ def flight(new_world, tmp_path_factory):
         world.set_param("aircraft", "fixed_wing")
         heard = RawTopics(world.namespace, (*TOPICS, "events"))
 
-        def wait_for(topic, kind, condition, timeout=20.0):
+        def wait_for(topic, kind, condition, timeout=WAIT_S):
             return heard.wait_for(f"{world.namespace}/{topic}", kind, condition, timeout)
 
-        node = world.start("tx_node", tx_params())
+        # Late frames are no lost link, and a busy machine's source may be silent for a moment.
+        world.set_param("stale_after", 5.0)
+        node = world.start("tx_node", tx_params(command_timeout=5.0, service_timeout=10.0))
         wait_for("events", EventList, lambda e: any(event.text.startswith("aircraft:") for event in e.events))
         world.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
         manual, auto = sources
@@ -89,17 +99,21 @@ def flight(new_world, tmp_path_factory):
         assert began.success
         wait_for("excitation/state", ExcitationState, lambda s: s.id == began.id and not s.active)
         surfaces = Surfaces(world)
-        surfaces.send(aileron1_wing2_left=4.0)
-        world.wire.wait(SURFACES, 1.0)
+
+        def driven():
+            surfaces.send(aileron1_wing2_left=4.0)
+            return world.wire.value(SURFACES) == 1.0
+
+        wait_until(driven, WAIT_S, "driven surfaces")
         surfaces.send()
         world.wire.wait(SURFACES, 0.0)
         broken = call(world, "set_failure", "SetFailure", name="rudder1_fin1", kind="stuck")
         assert broken.success, broken.result
         assert call(world, "clear_failures", "ClearFailures").success
         assert call(world, "set_dataref", "SetDataref", name="sim/cockpit2/controls/flap_ratio", values=[0.5]).success
-        assert world.call("tx_node/pause", SetBool, True).success
-        assert world.call("tx_node/pause", SetBool, False).success
-        reset = world.call("tx_node/reset_flight", ResetFlight, **reset_request())
+        pause(world, True)
+        pause(world, False)
+        reset = call(world, "reset_flight", "ResetFlight", **reset_request())
         assert reset.success, reset.result
         wait_for("events", EventList, lambda e: any(event.number == reset.event_number for event in e.events), 60.0)
         node.stop()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import (
     CommandSource,
     WatchedDatarefs,
@@ -48,8 +49,11 @@ WATCHED = (
 )
 
 
-def fly(world, *emulator_options, known=True, **params):
-    """Starts emulator (its own pilot flies level) and tx_node; with a mixing file by default."""
+def fly(world, *emulator_options, known=True, stale_after=5.0, **params):
+    """Starts emulator (its own pilot flies level) and tx_node; with a mixing file by default.
+
+    Late frames are no lost link, and a source may be silent for a moment, as all are on a busy machine.
+    """
     from xplane_bridge.msg import AppliedCommand, EventList, FailureState
 
     if known:
@@ -61,8 +65,9 @@ def fly(world, *emulator_options, known=True, **params):
     world.state = world.watch("failures/state", FailureState)
     world.events = world.watch("events", EventList)
     world.applied = world.watch("control/applied", AppliedCommand)
-    world.params = tx_params(**params)
+    world.params = tx_params(**{"command_timeout": 5.0, "service_timeout": 10.0, **params})
     world.set_param("aircraft", "fixed_wing")
+    world.set_param("stale_after", stale_after)
     world.node = world.start("tx_node", world.params)
     world.manual = CommandSource(world, "control/manual")
     world.events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events))
@@ -94,11 +99,11 @@ def fixture_twin(new_world, tmp_path_factory):
 def fixture_healthy(twin):
     """The shared flight, repaired and with X-Plane driving its surfaces, before and after."""
     yield twin
-    twin.manual.stop()
+    twin.manual.let_go()
     done = call(twin, "clear_failures", "ClearFailures", include_simulator=True)
     assert done.success, done.result.message
     twin.wire.wait(SURFACES, 0.0)
-    wait_until(lambda: not twin.state.last.names, 5, "an empty failures/state")
+    wait_until(lambda: not twin.state.last.names, WAIT_S, "an empty failures/state")
 
 
 def fail(world, name, kind="failed", value=None, **trigger):
@@ -114,15 +119,26 @@ def fail(world, name, kind="failed", value=None, **trigger):
     )
 
 
+def wanted(aileron, total):
+    """[deg] where X-Plane's total stick wants an aileron: 15 degrees down, 25 up."""
+    down = total if aileron == LEFT else -total
+    return 15.0 * down if down > 0.0 else 25.0 * down
+
+
 def follows(wire, aileron):
-    """An aileron is where X-Plane's total stick wants it: 15 degrees down, 25 up."""
-    down = wire.value(TOTAL) if aileron == LEFT else -wire.value(TOTAL)
-    return wire.value(aileron) == pytest.approx(15.0 * down if down > 0.0 else 25.0 * down, abs=0.02)
+    """An aileron is where X-Plane's total stick wants it."""
+    return wire.value(aileron) == pytest.approx(wanted(aileron, wire.value(TOTAL)), abs=0.02)
 
 
-def has_said(world, text):
-    """Whether an event with this text has come since the node started."""
-    return any(text in event.text for message in world.events.messages for event in message.events)
+def last_event(world):
+    """Number of the newest event."""
+    return max(event.number for event in world.events.last.events)
+
+
+def has_said(world, text, after):
+    """Whether an event with this text has come after the one with this number."""
+    events = (event for message in world.events.messages for event in message.events)
+    return any(event.number > after and text in event.text for event in events)
 
 
 def said(world, text):

@@ -57,12 +57,18 @@ class WatchedDatarefs:
 
     def history(self, path: str) -> list[float]:
         """Its values that came since one was last asked for, of whatever path."""
+        return [value for (value,) in self.samples(path)]
+
+    def samples(self, *paths: str) -> list[tuple[float, ...]]:
+        """The same of several: each time their values in one datagram, which are of one frame of X-Plane's."""
         found = []
         self._ask()
+        wanted = [self.paths.index(path) for path in paths]
         for packet in self._client.received():
             values = dict(protocol.decode_rref_response(packet))
             self._known.update(values)
-            found += [value for index, value in values.items() if index == self.paths.index(path)]
+            if values.keys() >= set(wanted):
+                found.append(tuple(values[index] for index in wanted))
         return found
 
     def wait(self, path: str, expected: float, timeout: float = WAIT_S, tolerance: float = 1e-4) -> None:
@@ -117,6 +123,12 @@ class CommandSource:
         if self._thread is not None:
             self._thread.join(10)
             self._thread = None
+
+    def let_go(self) -> None:
+        """Centres the stick that it moves, and is silent: for the time-out, the last command flies on."""
+        if self._thread is not None:
+            self.once(roll=0.0, pitch=0.0, yaw=0.0)
+        self.stop()
 
 
 class RepeatedJoy:
@@ -207,6 +219,18 @@ def call(world: Any, service: str, kind: str, /, **request: Any) -> Any:
 
     wait_until(answered, WAIT_S, f"a link to X-Plane for {service}")
     return answers[-1]
+
+
+def pause(world: Any, paused: bool) -> None:
+    """Has tx_node pause X-Plane or let it go on. Again where that is refused for want of a link: nothing was sent."""
+    from std_srvs.srv import SetBool
+
+    def done() -> bool:
+        answer = world.call("tx_node/pause", SetBool, paused)
+        assert answer.success or answer.message == "X-Plane is not connected", answer.message
+        return bool(answer.success)
+
+    wait_until(done, WAIT_S, "a link to X-Plane for pause")
 
 
 #: How the emulator's twin moves its surfaces (docs/experiments/emulator.md), by hand: 15 down, 25 up, 13, 18, 27 deg.
