@@ -33,6 +33,8 @@ def paint():
 paint()
 root.mainloop()
 """
+#: What the diagnosis says where reading a picture takes long, as on a busy machine.
+SLOW = re.compile(r"reading a picture takes (\d+\.\d) ms")
 ORANGE, BLUE = (0x00, 0x80, 0xFF), (0xC0, 0x40, 0x00)  # BGR
 
 
@@ -70,7 +72,9 @@ def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, 
         infos = world.watch("desktop/camera/camera_info", CameraInfo)
         states = world.watch("desktop/camera/frame_state", FrameState)
         images.wait_for(what="a picture", timeout=WAIT_S)
-        status = world.wait_for_diagnostics("capture", lambda s: s.level == 0 and s.message == "capturing")
+        status = world.wait_for_diagnostics(
+            "capture", lambda s: (s.level, s.message) == (0, "capturing") or SLOW.fullmatch(s.message)
+        )
         assert f'"{TITLE}"' in world.values_of(status)["Source"]
         seen = {halves(image) for image in images.wait_for_count(10)}
         assert seen == {(ORANGE, BLUE), (BLUE, ORANGE)}, "both, and no mixture of them"
@@ -103,10 +107,9 @@ def test_pictures_that_take_long_to_read_are_a_warning(world, tmp_path: Path) ->
             window = {"display": server.display, "title": "large", "shared_memory": False}
             world.start("capture_node", {"window": window})
             world.watch("camera/camera_info", CameraInfo)
-            slow = re.compile(r"reading a picture takes (\d+\.\d) ms")
-            status = world.wait_for_diagnostics("capture", lambda s: slow.fullmatch(s.message), timeout=60.0)
+            status = world.wait_for_diagnostics("capture", lambda s: SLOW.fullmatch(s.message), timeout=60.0)
     assert status.level == 1
-    assert float(slow.fullmatch(status.message).group(1)) > 5.0
+    assert float(SLOW.fullmatch(status.message).group(1)) > 5.0
 
 
 def halves(image) -> tuple:

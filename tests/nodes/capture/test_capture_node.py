@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import punctual_frames, schedule_late
+from support.nodes.late_pictures import ShownFrames, display_delays, joined, punctual_frames, schedule_late
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess, wait_until
@@ -95,41 +95,55 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
     emulator = window(world, "--swap-log", swaps)
     world.set_param("display_delay", PIPELINE_DELAY_S)
     world.start("rx_node")
-    capture(world, display)
+    # A busy machine's states come late, but they come; frames and states are kept for 5 s.
+    capture(world, display, max_wait=3.0)
     images, infos, states = watch(world, "image", "info", "state")
-    states.wait_for(lambda state: state.quality == 0, what="a perfectly paired picture")
-    first = len(images.messages)
-    images.wait_for_count(100, timeout=60.0)
-    wait_until(lambda: len(states.messages) > first + 100, WAIT_S, "states of the pictures")
+    began = states.wait_for(lambda state: state.quality == 0, what="a perfectly paired picture").header.stamp
+    shown = ShownFrames(images.messages)
+
+    def judged() -> list:
+        return shown.judged(states.messages, swaps, PIPELINE_DELAY_S, FPS)
+
+    def enough() -> bool:
+        return sum(image.header.stamp >= began for image in joined(images, infos)) >= 100
+
+    wait_until(enough, 2 * WAIT_S, "pictures with info")
+    wait_until(lambda: len(judged()) >= 10, 2 * WAIT_S, "punctual pictures, of which a busy machine has few")
+    taken = [image for image in list(images.messages) if image.header.stamp >= began]
+    last = taken[-1].header.stamp
+    wait_until(lambda: states.last.header.stamp >= last, WAIT_S, "the state of the last picture")
     emulator.stop()
 
     by_stamp = {state.header.stamp: state for state in states.messages}
     assert len(by_stamp) == len(states.messages)
     info_by_stamp = {info.header.stamp: info for info in infos.messages}
-    taken = images.messages[first : first + 100]
-    frames = [read_strip(pixels(image)) for image in taken]
+    frames = [shown.by_stamp()[image.header.stamp] for image in taken]
     assert all(b.frame > a.frame for a, b in zip(frames, frames[1:])), "a picture came twice"
 
-    punctual = punctual_frames(swaps, PIPELINE_DELAY_S, FPS)
-    compared = 0
-    for image, shown in zip(taken, frames):
+    shifts = set()
+    for image in taken:
         assert (image.width, image.height, image.encoding, image.step) == (640, 480, "bgr8", 1920)
         assert image.header.frame_id == "camera_optical"
-        info, state = info_by_stamp[image.header.stamp], by_stamp[image.header.stamp]
-        assert info.header.frame_id == state.header.frame_id == image.header.frame_id
-        assert pytest.approx((FOCAL_60_DEG, 0, 319.5, 0, FOCAL_60_DEG, 239.5, 0, 0, 1), abs=5e-4) == info.K
+        state = by_stamp[image.header.stamp]
+        assert state.header.frame_id == image.header.frame_id
         assert state.view == FrameState.VIEW_FORWARD
         assert state.field_of_view_deg == pytest.approx(60.0, abs=1e-3)
         assert state.display_delay == pytest.approx(PIPELINE_DELAY_S)
         assert not state.quality & FrameState.QUALITY_STATE_MISSING
         assert not state.quality & FrameState.QUALITY_INTERPOLATED
         assert state.grab_time >= state.display_time
-        if state.quality or shown.frame not in punctual:
-            continue
-        compared += 1
-        assert state.state.sim_time == np.float32(shown.sim_time), f"frame {shown.frame}"
+        info = info_by_stamp.get(image.header.stamp)
+        if info is not None:
+            assert info.header.frame_id == image.header.frame_id
+            assert pytest.approx((FOCAL_60_DEG, 0, 319.5, 0, FOCAL_60_DEG, 239.5, 0, 0, 1), abs=5e-4) == info.K
+            shifts.add((info.header.seq - image.header.seq, state.header.seq - image.header.seq))
+    # Numbers count also what a queue of two has lost on a busy machine.
+    assert len(shifts) == 1, "a picture without info or without state was published"
+    pairs = judged()
+    assert len(pairs) >= 10
+    for state, frame in pairs:
+        assert state.state.sim_time == np.float32(frame.sim_time), f"frame {frame.frame}"
         assert state.sim_time_error == pytest.approx(0.0, abs=1e-6)
-    assert compared >= 10, "on a busy machine few pictures are punctual"
 
 
 def test_a_node_that_is_scheduled_late_pairs_no_picture_wrongly(world, display, tmp_path: Path) -> None:
@@ -142,17 +156,20 @@ def test_a_node_that_is_scheduled_late_pairs_no_picture_wrongly(world, display, 
     images, states = watch(world, "image", "state")
     states.wait_for(lambda state: state.quality == 0, what="a perfectly paired picture")
     first = len(states.messages)
-    schedule_late(node, 1.0 / FPS, lambda: sum(state.quality == 0 for state in states.messages[first:]) >= 80)
+    shown = ShownFrames(images.messages)
+
+    def judged() -> list:
+        return shown.judged(states.messages[first:], swaps, PIPELINE_DELAY_S, FPS)
+
+    def enough() -> bool:
+        return sum(state.quality == 0 for state in states.messages[first:]) >= 80 and len(judged()) >= 10
+
+    schedule_late(node, 1.0 / FPS, enough)
     emulator.stop()
-    punctual = punctual_frames(swaps, PIPELINE_DELAY_S, FPS)
-    by_stamp = {state.header.stamp: state for state in states.messages[first:]}
-    compared = 0
-    for image in list(images.messages):
-        shown, state = read_strip(pixels(image)), by_stamp.get(image.header.stamp)
-        if state is not None and state.quality == 0 and shown.frame in punctual:
-            compared += 1
-            assert state.state.sim_time == np.float32(shown.sim_time), f"frame {shown.frame}"
-    assert compared >= 10
+    pairs = judged()
+    assert len(pairs) >= 10
+    for state, frame in pairs:
+        assert state.state.sim_time == np.float32(frame.sim_time), f"frame {frame.frame}"
 
 
 def test_views_and_field_of_view_are_read_back(world, display) -> None:
@@ -178,37 +195,53 @@ def test_views_and_field_of_view_are_read_back(world, display) -> None:
     assert state.camera_pose_source == FrameState.POSE_MEASURED
     write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
     unsure = FrameState.QUALITY_FOV_ASSUMED  # which frame of the change the first pictures show
-    states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3 and not state.quality & unsure)
-    info = infos.wait_for_next()
+    state = states.wait_for_next(lambda s: abs(s.field_of_view_deg - 90.0) < 1e-3 and not s.quality & unsure)
+    since = state.header.stamp
+    wait_until(lambda: any(info.header.stamp >= since for info in joined(infos, states)), WAIT_S, "the info of one")
+    info = next(info for info in joined(infos, states) if info.header.stamp >= since)
     assert info.K[0] == pytest.approx(320.0, abs=1e-3)  # 320 / tan(45 deg)
 
 
-def test_a_picture_has_the_field_of_view_of_the_frame_that_it_shows(world, display) -> None:
+def test_a_picture_has_the_field_of_view_of_the_frame_that_it_shows(world, display, tmp_path: Path) -> None:
     from xplane_bridge.msg import FrameState
 
+    swaps = tmp_path / "swaps.csv"
     world.set_param("display_delay", PIPELINE_DELAY_S)
-    emulator = window(world)
+    emulator = window(world, "--swap-log", swaps)
     world.start("rx_node")
     capture(world, display)
     images, infos, states = watch(world, "image", "info", "state")
-    states.wait_for(lambda state: state.quality == 0, timeout=60.0)
+    # Before it, X-Plane's view may not be known.
+    began = states.wait_for(lambda state: state.quality == 0, timeout=60.0).header.stamp
+
+    frames = ShownFrames(images.messages)
+
+    def punctual_since(stamp) -> int:
+        pictures = [image.header.stamp for image in joined(images, infos, states) if image.header.stamp >= stamp]
+        shown, due = frames.by_stamp(), punctual_frames(swaps, PIPELINE_DELAY_S, FPS)
+        return sum(shown[picture].frame in due for picture in pictures)
+
+    wait_until(lambda: punctual_since(began) >= 3, WAIT_S, "pictures of one field of view")
     write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
-    states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3 and state.quality == 0)
-    for _ in range(FPS // 2):
-        states.wait_for_next()
+    change = states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3 and state.quality == 0)
+    wait_until(lambda: punctual_since(change.header.stamp) >= FPS // 2, WAIT_S, "pictures of the other")
+    pictures = [image for image in joined(images, infos, states) if image.header.stamp >= began]
+    emulator.stop()
     focal = {info.header.stamp: info.K[0] for info in list(infos.messages)}
     quality = {state.header.stamp: state.quality for state in list(states.messages)}
-    seen = [image for image in list(images.messages) if image.header.stamp in focal and image.header.stamp in quality]
-    small = [pixels(image)[::8, ::8, 1].astype(float) for image in seen]
+    shown, punctual = frames.by_stamp(), punctual_frames(swaps, PIPELINE_DELAY_S, FPS)
+    small = [pixels(image)[::8, ::8, 1].astype(float) for image in pictures]
     zoomed = 1 + int(np.argmax([np.abs(b - a).mean() for a, b in zip(small, small[1:])]))
-    sure = 0
-    for k, image in enumerate(seen):
-        stamp = image.header.stamp
+    sure, judged = 0, set()
+    for k, stamp in enumerate(image.header.stamp for image in pictures):
         if not quality[stamp] & FrameState.QUALITY_FOV_ASSUMED:
             sure += 1
-            assert focal[stamp] == pytest.approx(FOCAL_60_DEG if k < zoomed else 320.0, abs=0.01), k - zoomed
+            if shown[stamp].frame in punctual:  # late, it says nothing about the frame that it is taken for
+                judged.add(k < zoomed)
+                assert focal[stamp] == pytest.approx(FOCAL_60_DEG if k < zoomed else 320.0, abs=0.01), k - zoomed
+    assert judged == {True, False}
     assert zoomed >= 2
-    assert len(seen) - sure <= 4, "only beside the change it is not known which frame a picture shows"
+    assert len(pictures) - sure <= 4, "only beside the change it is not known which frame a picture shows"
 
 
 def test_nominal_frames_where_wanted(world, display) -> None:
@@ -420,15 +453,18 @@ events:
 
 def test_estimate_latency_live_finds_the_delay_of_the_display(world, display, tmp_path: Path) -> None:
     (tmp_path / "rolls.yaml").write_text(ROLLS, encoding="utf-8")
-    window(world, "--pilot", tmp_path / "rolls.yaml", "--start", "air")
+    swaps = tmp_path / "swaps.csv"
+    window(world, "--pilot", tmp_path / "rolls.yaml", "--start", "air", "--swap-log", swaps)
     world.start("rx_node")
     command = [program("estimate_latency"), "--live", "15", "--namespace", world.namespace]
     with ManagedProcess("live", [*command, "--json", tmp_path / "live.json"], tmp_path, env=world.env) as live:
         live.wait_for_line(f"waiting: no node publishes {world.namespace}/camera/image_raw/compressed", 60)
+        first = max(display_delays(swaps), default=0)
         capture(world, display)
         assert live.wait(120) == 0, live.output()
+    shown = np.median([delay for frame, delay in display_delays(swaps).items() if frame > first])  # late where busy
     delay = json.loads((tmp_path / "live.json").read_text(encoding="utf-8"))["display_delay"]["delay"]
-    assert delay == pytest.approx(PIPELINE_DELAY_S, abs=0.02)
+    assert delay == pytest.approx(shown, abs=0.02)
 
 
 def test_part_of_a_window_is_not_taken_for_the_whole(world, display) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
+from support.nodes.late_pictures import ShownFrames, joined
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -68,12 +69,12 @@ def test_compressed_has_one_advertiser(world, display, package: Path, tmp_path: 
     with ManagedProcess("capture_node", node, tmp_path, env=environment):
         jpegs = world.watch(TOPIC, CompressedImage)
         images = world.watch("camera/image_raw", Image)
-        jpegs.wait_for_count(PICTURES)
+        wait_until(lambda: len(joined(jpegs, images)) >= PICTURES, WAIT_S, "JPEGs of the images")
         assert advertisers(f"{world.namespace}/{TOPIC}") == [f"{world.namespace}/capture_node"]
-        stamps = [jpeg.header.stamp for jpeg in jpegs.messages]
+        stamps = [jpeg.header.stamp for jpeg in list(jpegs.messages)]
         assert len(set(stamps)) == len(stamps), "a picture came twice"
-        wait_until(lambda: images.last.header.stamp > stamps[PICTURES - 1], WAIT_S, "later images")
-        assert set(stamps[1:PICTURES]) <= {image.header.stamp for image in images.messages}
-        for jpeg in jpegs.messages[:PICTURES]:
+        both, raw = joined(jpegs, images), ShownFrames(images.messages).by_stamp()
+        for jpeg in both:
             assert jpeg.format == "bgr8; jpeg compressed bgr8"
-            read_strip(cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
+            shown = read_strip(cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
+            assert shown == raw[jpeg.header.stamp], "another picture than the raw image of its stamp"

@@ -7,6 +7,7 @@ import struct
 import pytest
 
 from support.deadlines import WAIT_S
+from support.nodes.late_pictures import joined
 from xplane_bridge.harness import wait_until
 
 #: What a build says that has no GeographicLib.
@@ -45,7 +46,9 @@ def test_altitude_is_above_the_ellipsoid_of_the_model(world):
     if not node.running:
         assert WITHOUT in node.output()
         pytest.skip("the package was built without GeographicLib")
-    fix = world.fixes.wait_for_next()
+    # The topics are connected one after the other.
+    wait_until(lambda: joined(world.fixes, world.states), WAIT_S, "a fix and its state")
+    fix = joined(world.fixes, world.states)[0]
     state = world.states.wait_for(lambda s: s.header.stamp == fix.header.stamp)
     assert fix.altitude - state.altitude_msl == pytest.approx(0.1 * state.latitude, abs=0.01)
     assert fix.altitude - state.altitude_msl == pytest.approx(4.0, abs=0.1)

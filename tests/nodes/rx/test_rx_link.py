@@ -23,6 +23,9 @@ from xplane_bridge.harness import ManagedProcess
 from xplane_bridge.harness.ports import free_udp_port
 from xplane_bridge.resources import program
 
+#: Start type of PREL: the flight before, which is that of the emulator's options where there has been none.
+THE_LAST_FLIGHT = 5
+
 
 def wait_for_link(world, name):
     """Waits for a state of the link, by name, after the one waited for last; returns the message."""
@@ -33,14 +36,14 @@ def wait_for_link(world, name):
 
 
 def rx_before_emulator(world, rx, *options):
-    """Starts an emulator whose options count from its start, once rx_node looks for it."""
+    """Starts an emulator whose options count from its start, once rx_node looks for it; gives it."""
     port = free_udp_port()
     world.point_to(port)
     rx()
     link = wait_for_link(world, "SEARCHING")
     assert link.reason
     assert not world.states.messages
-    world.emulator(*options, port=port)
+    return world.emulator(*options, port=port)
 
 
 @both_transports
@@ -66,9 +69,10 @@ def test_search_in_vain_is_said_on_the_console_in_link_state_and_in_diagnostics(
 
 @both_transports
 def test_no_flight_loaded_yet(world, rx):
-    rx_before_emulator(world, rx, *KINEMATIC, "--load-time", 6)
+    emulator = rx_before_emulator(world, rx, *KINEMATIC, "--load-time", 3600)
     world.wait_for_diagnostics("flight state", lambda s: "no flight is loaded" in s.message)
     assert not world.states.messages
+    world.wire(emulator.port).send(protocol.Placement(THE_LAST_FLIGHT))
     state = world.states.wait_for(timeout=WAIT_S)
     assert state.valid == ALL_VALID
     assert state.altitude_msl > 100.0
@@ -76,16 +80,17 @@ def test_no_flight_loaded_yet(world, rx):
 
 @both_transports
 def test_x_plane_killed_and_restarted(world, rx):
-    emulator = world.emulator(*KINEMATIC)
+    # A restart differs from a gap by simulator time that runs anew, however late it is seen.
+    emulator = world.emulator(*KINEMATIC, "--sim-time-start", 1000)
     rx()
-    # A restart differs from a gap by simulator time that runs anew.
-    before = world.states.wait_for(lambda state: state.sim_time > 5.0, WAIT_S)
+    before = world.states.wait_for(timeout=WAIT_S)
     epoch = wait_for_link(world, "CONNECTED").link_epoch
     emulator.kill()
+    world.states.skip_to_now()
     wait_for_link(world, "STALE")
-    emulator.start()
+    world.emulator(*KINEMATIC, port=emulator.port)
     world.links.then_wait_for(lambda link: link.state_name == "CONNECTED" and link.link_epoch > epoch, WAIT_S)
-    after = world.states.wait_for_next(lambda state: state.valid == ALL_VALID and state.sim_time < before.sim_time)
+    after = world.states.then_wait_for(lambda state: state.valid == ALL_VALID and state.sim_time < before.sim_time)
     assert after.epoch > before.epoch
     world.states.wait_for_count(20)
 

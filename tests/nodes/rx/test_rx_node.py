@@ -93,14 +93,14 @@ def test_states_are_complete_true_and_consistent(world, rx, transport, version):
     imus = world.watch("imu/data", Imu)
     fixes = world.watch("global_position/global", NavSatFix)
     rx()
-    world.states.wait_for_count(600, 60.0)
-    link = world.links.last
-    assert link.state_name == "CONNECTED"
+    wait_until(lambda: odoms.connected and imus.connected and fixes.connected, WAIT_S, "connections")
+    world.states.wait_for_count(600, 2 * WAIT_S)
+    link = world.links.wait_for(lambda m: m.state_name == "CONNECTED" and m.xplane_version, WAIT_S)  # not STALE of late
     assert link.transport == transport
     assert link.xplane_version // 10000 == version
+    states = world.states.messages[:]
     emulator.stop()
 
-    states = world.states.messages[:600]
     for state in states:
         assert state.valid == ALL_VALID, f"valid {state.valid:#x} at sim_time {state.sim_time}"
         missing = [name for name, value in numbers_of(state) if not math.isfinite(value)]
@@ -142,6 +142,11 @@ def test_states_are_complete_true_and_consistent(world, rx, transport, version):
     np.testing.assert_allclose([state.beta_deg for state in states], column("beta_deg"), atol=0.05)
     np.testing.assert_allclose([state.alpha_deg for state in states], column("alpha_deg"), atol=0.05)
 
+    # Topics are connected one after the other: from the first message of odometry on each state has one.
+    first = odoms.messages[0].header.stamp
+    states = [state for state in states if state.header.stamp >= first]
+    assert len(states) >= 600
+    odoms.wait_for(lambda odom: odom.header.stamp == states[-1].header.stamp)
     by_stamp = {message.header.stamp: message for message in odoms.messages}
     together = [by_stamp[state.header.stamp] for state in states]
     places = np.array([xyz(odom.pose.pose.position) for odom in together])
@@ -154,11 +159,12 @@ def test_states_are_complete_true_and_consistent(world, rx, transport, version):
         way = np.sum((twists[first:last] + twists[first + 1 : last + 1]) / 2 * steps, axis=0)
         assert np.abs(speed - way / (sim_time[last] - sim_time[first])).max() < 0.02
 
-    fix = {message.header.stamp: message for message in fixes.messages}[states[100].header.stamp]
-    assert (fix.latitude, fix.longitude) == (states[100].latitude, states[100].longitude)
-    assert fix.altitude == states[100].altitude_msl
-    imu = {message.header.stamp: message for message in imus.messages}[states[100].header.stamp]
-    assert imu.linear_acceleration.z == pytest.approx(-states[100].specific_force.z)
+    state = states[-100]
+    fix = fixes.wait_for(lambda fix: fix.header.stamp == state.header.stamp)
+    assert (fix.latitude, fix.longitude) == (state.latitude, state.longitude)
+    assert fix.altitude == state.altitude_msl
+    imu = imus.wait_for(lambda imu: imu.header.stamp == state.header.stamp)
+    assert imu.linear_acceleration.z == pytest.approx(-state.specific_force.z)
 
 
 @both_transports

@@ -7,6 +7,7 @@ import re
 import socket
 import struct
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -18,6 +19,9 @@ from support.nodes.rx_fixtures import (
 )
 from xplane_bridge.harness.ports import free_udp_port
 
+#: What a request's timeout of 0 means.
+DEFAULT_TIMEOUT_S = 1.0
+
 # --- services ---------------------------------------------------------------------------------------------------------
 
 
@@ -27,11 +31,11 @@ def test_get_dataref(world, rx):
     world.emulator(*KINEMATIC)
     rx()
     world.states.wait_for()
-    answer = world.call("get_dataref", GetDataref, "sim/version/xplane_internal_version", 0.0)
+    answer = world.call("get_dataref", GetDataref, "sim/version/xplane_internal_version", 10.0)
     assert answer.success
     assert answer.values == (115501.0,)
     assert math.isfinite(answer.sim_time)
-    answer = world.call("get_dataref", GetDataref, "sim/aircraft/view/acf_ICAO[0:4]", 2.0)
+    answer = world.call("get_dataref", GetDataref, "sim/aircraft/view/acf_ICAO[0:4]", 10.0)
     assert (
         "".join(chr(int(value)) for value in answer.values)
         == world.links.wait_for(lambda link: link.aircraft_icao).aircraft_icao
@@ -44,7 +48,7 @@ def test_get_terrain_of_any_place(world, rx):
     emulator = world.emulator("--terrain", 250, "--alt", 1000, "--xpc-port", 0)
     rx(xpc_port=int(re.search(r'"xpc_port": (\d+)', emulator.output()).group(1)))
     world.states.wait_for()
-    answer = world.call("get_terrain", GetTerrain, 36.5, 127.25, 0.0)
+    answer = world.call("get_terrain", GetTerrain, 36.5, 127.25, 10.0)
     assert answer.success, answer.result.message
     assert (answer.latitude, answer.longitude) == (36.5, 127.25)
     assert answer.terrain_height == pytest.approx(250.0, abs=0.1)
@@ -76,6 +80,9 @@ def test_get_terrain_says_why_not(world, rx):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as plugin:
         plugin.bind(("127.0.0.1", port))
         assert f"nothing answers from 127.0.0.1:{port}" in refusal(timeout, 37.0, 127.0, 0.5)
+        began = time.monotonic()
+        refusal(timeout, 37.0, 127.0, 0.0)
+        assert time.monotonic() - began >= DEFAULT_TIMEOUT_S
         plugin.settimeout(10.0)
 
         def fail_the_probe() -> None:
@@ -86,7 +93,7 @@ def test_get_terrain_says_why_not(world, rx):
 
         probe = threading.Thread(target=fail_the_probe)
         probe.start()
-        assert "finds no terrain there" in refusal(timeout, 38.0, 128.0, 5.0)
+        assert "finds no terrain there" in refusal(timeout, 38.0, 128.0, 10.0)
         probe.join(10.0)
 
 
@@ -94,6 +101,7 @@ def test_get_terrain_says_why_not(world, rx):
     ("name", "timeout", "code", "part"),
     [
         ("sim/no/such_dataref", 0.5, 5, "sim/no/such_dataref"),
+        ("sim/no/such_dataref", 0.0, 5, "sim/no/such_dataref"),
         ("no blanks please", 0.0, 2, "ASCII without blanks"),
         ("sim/a[3:1]", 0.0, 2, "[i:j]"),
         ("sim/time/paused", 60.0, 2, "timeout"),
@@ -106,9 +114,11 @@ def test_get_dataref_says_why_not(world, rx, name, timeout, code, part):
     world.emulator(*KINEMATIC)
     rx()
     world.states.wait_for()
+    began = time.monotonic()
     answer = world.call("get_dataref", GetDataref, name, timeout)
     assert not answer.success
     assert answer.result.code == code
+    assert code != 5 or time.monotonic() - began >= (timeout or DEFAULT_TIMEOUT_S)
     assert part in answer.result.message
 
 

@@ -7,8 +7,11 @@ import random
 import signal
 import time
 from pathlib import Path
-from typing import Callable
+from typing import Any, Callable
 
+import numpy as np
+
+from xplane_bridge.emulator.view.renderer import StripReading, read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess
 
 
@@ -35,6 +38,40 @@ def punctual_frames(swaps: Path, delay_s: float, frame_rate: float) -> set[int]:
         frame_rate: a fifth of a frame earlier or later is punctual [Hz].
     """
     return {frame for frame, delay in display_delays(swaps).items() if abs(delay - delay_s) < 0.2 / frame_rate}
+
+
+class ShownFrames:
+    """Which frames of the emulator's window images show, each read once.
+
+    Args:
+        images: sensor_msgs/Image, of a topic that may bring more.
+    """
+
+    def __init__(self, images: list[Any]) -> None:
+        self._images = images
+        self._read = 0
+        self._by_stamp: dict[Any, StripReading] = {}
+
+    def by_stamp(self) -> dict[Any, StripReading]:
+        """Those of all images so far."""
+        for image in self._images[self._read :]:
+            pixels = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
+            self._by_stamp[image.header.stamp] = read_strip(pixels)
+            self._read += 1
+        return self._by_stamp
+
+    def judged(self, states: list[Any], swaps: Path, delay_s: float, frame_rate: float) -> list[tuple]:
+        """Perfectly paired pictures of `punctual_frames`: the FrameState and what is shown."""
+        shown, punctual = self.by_stamp(), punctual_frames(swaps, delay_s, frame_rate)
+        perfect = [state for state in list(states) if state.quality == 0 and state.header.stamp in shown]
+        pairs = [(state, shown[state.header.stamp]) for state in perfect]
+        return [(state, frame) for state, frame in pairs if frame.frame in punctual]
+
+
+def joined(log: Any, *others: Any) -> list[Any]:
+    """Messages of a topic's log whose stamps all others have, too: a busy computer loses some of a queue of two."""
+    stamps = [{message.header.stamp for message in list(other.messages)} for other in others]
+    return [message for message in list(log.messages) if all(message.header.stamp in each for each in stamps)]
 
 
 def schedule_late(
