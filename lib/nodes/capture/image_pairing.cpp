@@ -43,6 +43,13 @@ core::ClockFilter::Options clockOptions(bool exact) {
   return options;
 }
 
+/// Frames and states are kept for longer than a picture waits: those behind it are paired when its wait is over.
+core::ImageAssociatorOptions associatorOptions(double max_wait) {
+  core::ImageAssociatorOptions options;
+  options.history += max_wait;
+  return options;
+}
+
 }  // namespace
 
 ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publish, Stamps stamps)
@@ -51,7 +58,8 @@ ImagePairing::ImagePairing(double display_delay, double max_wait, Publish publis
       max_wait_ns_(core::toNanoseconds(max_wait)),
       publish_(std::move(publish)),
       stamps_(stamps),
-      clock_(clockOptions(stamps == Stamps::kFrames)) {}
+      clock_(clockOptions(stamps == Stamps::kFrames)),
+      associator_(associatorOptions(max_wait)) {}
 
 void ImagePairing::addFrame(const core::SimStatus& status, float frame_period, std::int64_t receive_ns) {
   const std::lock_guard<std::mutex> lock(mutex_);
