@@ -7,7 +7,7 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr std::size_t kMostFrames = 600;  // several seconds: longer than a picture is on its way
+constexpr std::size_t kMostFrames = 4000;  // 15 s of 266 a second: longer than a picture waits for its state
 
 bool sameFrustum(const Frustum& a, const Frustum& b) {
   return a.horizontal_deg == b.horizontal_deg && a.vertical_deg == b.vertical_deg && a.shift_right == b.shift_right &&

@@ -43,7 +43,8 @@ core::ClockFilter::Options clockOptions(bool exact) {
   return options;
 }
 
-/// Frames and states are kept for longer than a picture waits: those behind it are paired when its wait is over.
+/// Frames and states are kept for longer than a picture waits, in which time may run somewhat faster than usual: those
+/// behind it are paired when its wait is over.
 core::ImageAssociatorOptions associatorOptions(double max_wait) {
   core::ImageAssociatorOptions options;
   options.history += max_wait;
