@@ -163,7 +163,7 @@ def _replenish(cluster: Any, workers: int, over: threading.Event) -> None:
     seen, patience_s = time.monotonic(), _EMPTY_S
     while not over.wait(_LOOK_S):
         if cluster.scheduler.workers:
-            seen = time.monotonic()
+            seen, patience_s = time.monotonic(), _EMPTY_S
         elif time.monotonic() - seen > patience_s:
             cluster.scale(0)
             cluster.scale(workers)

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any, Iterator, List
@@ -139,6 +140,33 @@ def test_workers_that_dask_gives_up_are_replaced(tmp_path: Path, monkeypatch: py
         table = CampaignFolder(tmp_path / "killed").fly(campaign, cluster, kill_all)
     assert killed
     pd.testing.assert_frame_equal(same(table), expected)
+
+
+class SlowCluster:
+    """Dask's, whose workers never come; it is over when they have been started so often."""
+
+    def __init__(self, starts: int) -> None:
+        self.scheduler = self
+        self.workers: List[str] = []
+        self.over = threading.Event()
+        self.starts = starts
+        self.begun_s: List[float] = []
+
+    def scale(self, workers: int) -> None:
+        if workers == 0:
+            return
+        self.begun_s.append(time.monotonic())
+        if len(self.begun_s) == self.starts:
+            self.over.set()
+
+
+def test_workers_that_start_slowly_have_more_time_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster_module, "_EMPTY_S", 0.05)
+    monkeypatch.setattr(cluster_module, "_LOOK_S", 0.01)
+    slow, began_s = SlowCluster(starts=4), time.monotonic()
+    cluster_module._replenish(slow, 2, slow.over)
+    waits = [after - before for before, after in zip([began_s, *slow.begun_s], slow.begun_s)]
+    assert [wait > 0.05 * 2**number for number, wait in enumerate(waits)] == [True] * 4, waits
 
 
 def deadly(state: Any) -> dict:
