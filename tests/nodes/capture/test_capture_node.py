@@ -95,7 +95,7 @@ def test_every_picture_has_its_info_and_the_state_of_its_frame(world, display, t
     emulator = window(world, "--swap-log", swaps)
     world.set_param("display_delay", PIPELINE_DELAY_S)
     world.start("rx_node")
-    # A busy machine's states come late, but they come; frames and states are kept for 5 s.
+    # A busy machine's states come late, but they come.
     capture(world, display, max_wait=3.0)
     images, infos, states = watch(world, "image", "info", "state")
     began = states.wait_for(lambda state: state.quality == 0, what="a perfectly paired picture").header.stamp

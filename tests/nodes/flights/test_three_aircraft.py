@@ -130,11 +130,14 @@ def test_position_loop_on_control_auto_hovers_the_quadrotor_60_s_within_a_metre(
         answer = world.call("lockstep/step", LockstepStep, frames=frames)
         assert (answer.success, answer.flown) == (True, frames), answer.result.message
 
+    def engaged():  # no frame waits for the request, and none is carried out in a hold
+        fly(0.1)
+        return bool(mode.messages) and mode.last.mode == AUTO
+
     participant = Participant(control, commands, world.namespace)
     try:
         wait_until(lambda: participant.connected, WAIT_S, "flight states")
-        fly(1.0)
-        mode.wait_for(lambda each: each.mode == AUTO)
+        wait_until(engaged, WAIT_S, "AUTO")
         settled = distances[-1][0] + 5.0
         fly(65.0)
     finally:

@@ -43,7 +43,7 @@ class Recording:
         return all(map(is_connected, self._subscribers))
 
     def wait_for(self, topic, count):
-        wait_until(lambda: len(self.payloads[topic]) >= count, WAIT_S, f"{count} messages on {topic}")
+        wait_until(lambda: len(self.payloads.get(topic, ())) >= count, WAIT_S, f"{count} messages on {topic}")
 
     def wait_until_complete(self, expected):
         """Waits for so many messages a topic, and until nothing further has come for a second: the simulator stands."""

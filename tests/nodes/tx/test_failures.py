@@ -52,7 +52,6 @@ from xplane_bridge.emulator.simulator import aircraft_path
 from xplane_bridge.harness import wait_until
 
 AT_SIM_TIME, AT_ALTITUDE_ABOVE, AT_SPEED_BELOW = 1, 2, 5
-GAUGES = "sim/cockpit2/gauges/indicators/"
 
 
 def label_of(world, name):
@@ -241,7 +240,8 @@ def test_triggers(healthy):
     wait_for_label(world, "bus_1", active=False, confirmed=False)
     wait_for_label(world, "battery_1", active=True, confirmed=True)  # at once: the twin is slower than that
     wait_for_label(world, "engine_1", active=True, confirmed=True)
-    assert began + 1.0 <= label_of(world, "engine_1")["since_sim_time"] <= asked + 1.0 + 0.2  # some frames
+    some_frames = 0.2  # tx_node's newest one may be older than the one seen here
+    assert began - some_frames <= label_of(world, "engine_1")["since_sim_time"] - 1.0 <= asked + some_frames
     wire.wait(ENGINE, 0.0)
     assert label_of(world, "bus_1")["active"] is False
     assert wire.value(BUS) > 0.0

@@ -69,7 +69,7 @@ def flight(request, new_world, tmp_path_factory):
 @pytest.fixture(scope="module", params=["11.40", "12"])
 def impatient(request, new_world, tmp_path_factory):
     """The same, of tests that wait for tx_node to give up."""
-    world = fly(new_world(tmp_path_factory.mktemp("impatient")), request.param, setting_timeout=2.0, load_timeout=5.0)
+    world = fly(new_world(tmp_path_factory.mktemp("impatient")), request.param, setting_timeout=5.0, load_timeout=5.0)
     yield world
     close(world)
 
@@ -293,12 +293,14 @@ def test_aircraft_is_loaded_and_flown_only_if_it_is_the_one_configured(flight):
 
 
 def test_wind_that_does_not_blow_is_reported(impatient):
+    done(impatient, "set_wind", "SetWind", speed=12.0, from_deg=270.0)
     pause(impatient, True)
     event = ask(impatient, "set_wind", "SetWind", speed=30.0, from_deg=0.0)
     assert not event.success
-    assert "but 0.0" in event.text
+    assert "12.0" in event.text
     assert "(it is paused)" in event.text
     pause(impatient, False)
+    done(impatient, "set_wind", "SetWind", speed=0.0, from_deg=0.0)
 
 
 def test_fuel_without_a_tank_is_reported(impatient):
@@ -328,6 +330,7 @@ def test_reset_to_where_x_plane_does_not_put_it_is_reported(impatient):
     assert not event.success
     assert "its altitude is" in event.text
     assert impatient.other.read("sim/time/paused") == 0.0
+    done(impatient, "reset_flight", "ResetFlight", **HERE)
 
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL], ids=["asked", "killed"])

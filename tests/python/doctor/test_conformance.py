@@ -267,7 +267,9 @@ def test_a_killed_card_is_undone(tmp_path, how):
         command = [sys.executable, "-c", KILLED, "--host", "127.0.0.1", "--port", str(port)]
         environment = {**os.environ, "ROS_HOME": str(tmp_path)}
         words = ["--conformance", "--yes", "--only", "hpath"]
-        card = subprocess.run([*command, *words], env=environment, check=False, stdout=subprocess.DEVNULL)
+        card = subprocess.run(
+            [*command, *words], env=environment, check=False, stdout=subprocess.DEVNULL, timeout=PROGRAM_S
+        )
         assert card.returncode == -signal.SIGKILL
         journal = Journal(tmp_path / "xplane_bridge", "127.0.0.1", port)
         noted = {each["id"] for each in json.loads(journal.file.read_text(encoding="utf-8"))["entries"]}

@@ -35,14 +35,15 @@ class Client(XPlaneClient):
 
     def frame(self):
         """(number, whole seconds, microseconds) of the next fence, and the pairs that came before it."""
-        pairs = []
+        pairs, parts = [], 0
         while True:
             packet = self.wait()
             assert packet is not None, "no fence in 10 s"
             found = dict(protocol.decode_rref_response(packet))
             if FENCE_INDEX in found:
                 if FENCE_INDEX + 3 not in found:  # frame 0 was repeated between the requests of its elements
-                    pairs = []
+                    pairs, parts = [], parts + 1
+                    assert parts < 500, found
                     continue
                 self.picture = int(found[FENCE_INDEX + 3])
                 return [int(found[FENCE_INDEX + element]) for element in range(3)], pairs

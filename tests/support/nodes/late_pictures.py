@@ -11,7 +11,7 @@ from typing import Any, Callable
 
 import numpy as np
 
-from xplane_bridge.emulator.view.renderer import StripReading, read_strip
+from xplane_bridge.emulator.view.renderer import StripError, StripReading, read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess
 
 
@@ -56,8 +56,13 @@ class ShownFrames:
         """Those of all images so far."""
         for image in self._images[self._read :]:
             pixels = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
-            self._by_stamp[image.header.stamp] = read_strip(pixels)
             self._read += 1
+            try:
+                self._by_stamp[image.header.stamp] = read_strip(pixels)
+            except StripError:
+                if self._by_stamp:
+                    raise
+                # the window is black before its first frame
         return self._by_stamp
 
     def judged(self, states: list[Any], swaps: Path, delay_s: float, frame_rate: float) -> list[tuple]:
