@@ -300,7 +300,7 @@ def test_wind_that_does_not_blow_is_reported(impatient):
     assert "12.0" in event.text
     assert "(it is paused)" in event.text
     pause(impatient, False)
-    done(impatient, "set_wind", "SetWind", speed=0.0, from_deg=0.0)
+    done(impatient, "set_wind", "SetWind", speed=0.0, from_deg=360.0)
 
 
 def test_fuel_without_a_tank_is_reported(impatient):
