@@ -10,6 +10,7 @@ from typing import Any, Callable, Dict, List, Tuple
 import numpy as np
 import pytest
 
+from support.kept_problems import KeptProblems
 from xplane_bridge.eye import grab_macos
 from xplane_bridge.eye.grab_macos import Content, MacGrabber, is_full_screen
 from xplane_bridge.harness import wait_until
@@ -91,16 +92,8 @@ class Desktop:
         return {"status": 0, "area": area, "scale": scale, "factor": RETINA, "picture": picture}
 
 
-class Said(MacGrabber):
-    """Keeps what its problem was."""
-
-    @property
-    def problem(self) -> str:
-        return self.problems[-1]
-
-    @problem.setter
-    def problem(self, text: str) -> None:
-        self.__dict__.setdefault("problems", []).append(text)
+class Said(KeptProblems, MacGrabber):
+    pass
 
 
 class Made:

@@ -10,6 +10,7 @@ from typing import Any, Callable, List
 import numpy as np
 import pytest
 
+from support.kept_problems import KeptProblems
 from xplane_bridge.eye import grab_windows
 from xplane_bridge.eye.grab_windows import WindowsGrabber
 from xplane_bridge.harness import wait_until
@@ -85,16 +86,8 @@ class Capture:
         type(self).fault("stop", self)
 
 
-class Said(WindowsGrabber):
-    """Keeps what its problem was."""
-
-    @property
-    def problem(self) -> str:
-        return self.problems[-1]
-
-    @problem.setter
-    def problem(self, text: str) -> None:
-        self.__dict__.setdefault("problems", []).append(text)
+class Said(KeptProblems, WindowsGrabber):
+    pass
 
 
 def no_border_setting(stage: str, capture: Capture) -> None:
