@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import ShownFrames, display_delays, joined, punctual_frames, schedule_late
+from support.nodes.late_pictures import ShownFrames, display_delays, joined, pixels, punctual_frames, schedule_late
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess, wait_until
@@ -55,10 +55,6 @@ draw()
 root.mainloop()
 """
     return ManagedProcess("black", [sys.executable, "-c", code], world.folder)
-
-
-def pixels(image) -> np.ndarray:
-    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
 
 
 def write_dataref(port: int, path: str, value: float) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from support.nodes.late_pictures import punctual_frames
+from support.nodes.late_pictures import pixels, punctual_frames
 from support.nodes.second_camera import NAME, WINDOW, second_camera
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -119,7 +119,3 @@ def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: 
     assert down.field_of_view_deg == pytest.approx(90.0)
     assert cameras[0][1].last.K[0] == pytest.approx(554.256, abs=1e-3)  # 320 / tan(30 deg)
     assert cameras[1][1].last.K[0] == pytest.approx(320.0, abs=1e-3)  # 320 / tan(45 deg)
-
-
-def pixels(image) -> np.ndarray:
-    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from support.nodes.late_pictures import pixels
 from support.nodes.second_camera import NAME, WINDOW, second_camera
 from support.nodes.tx_fixtures import tx_params
 from xplane_bridge.cli.flight_report import write_report
@@ -47,10 +48,6 @@ def have(log, count):
     """Waits until so many messages have come, of those that came already."""
     wait_until(lambda: len(log.messages) >= count, 30, f"{count} messages on {log.topic}")
     assert len(log.messages) == count
-
-
-def pixels(image) -> np.ndarray:
-    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
 
 
 def test_every_picture_is_of_its_own_frame_and_says_nothing_of_wall_time(world, display):

@@ -40,6 +40,11 @@ def punctual_frames(swaps: Path, delay_s: float, frame_rate: float) -> set[int]:
     return {frame for frame, delay in display_delays(swaps).items() if abs(delay - delay_s) < 0.2 / frame_rate}
 
 
+def pixels(image: Any) -> np.ndarray:
+    """Those of a sensor_msgs/Image in bgr8, of shape (height, width, 3)."""
+    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
+
+
 class ShownFrames:
     """Which frames of the emulator's window images show, each read once.
 
@@ -55,10 +60,9 @@ class ShownFrames:
     def by_stamp(self) -> dict[Any, StripReading]:
         """Those of all images so far."""
         for image in self._images[self._read :]:
-            pixels = np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
             self._read += 1
             try:
-                self._by_stamp[image.header.stamp] = read_strip(pixels)
+                self._by_stamp[image.header.stamp] = read_strip(pixels(image))
             except StripError:
                 if self._by_stamp:
                     raise
