@@ -315,12 +315,19 @@ class World:
         return log
 
     def wait_for_diagnostics(
-        self, name: str, condition: Callable[[Any], bool] = lambda _: True, timeout: float = WAIT_S
+        self, name: str, condition: Callable[[Any], bool] = lambda _: True, timeout: float = WAIT_S, heard: Any = None
     ) -> Any:
-        """Waits for a status of one of this namespace's nodes whose name ends in `name`; returns it."""
+        """Waits for a status of one of this namespace's nodes whose name ends in `name`; returns it.
+
+        Args:
+            name: The end of its name.
+            condition: What it has to fulfil.
+            timeout: How long to wait [s].
+            heard: A log of /diagnostics that listens already, for what a single message says; it stays open.
+        """
         from diagnostic_msgs.msg import DiagnosticArray
 
-        log = self.watch("/diagnostics", DiagnosticArray)
+        log = heard or self.watch("/diagnostics", DiagnosticArray)
         prefix = self.namespace.lstrip("/") + "/"
         found: list[Any] = []
 
@@ -332,7 +339,8 @@ class World:
             return bool(found)
 
         log.wait_for(fits, timeout, f"status {name!r}")
-        log.close()
+        if not heard:
+            log.close()
         return found[0]
 
     @staticmethod

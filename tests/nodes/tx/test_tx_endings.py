@@ -68,21 +68,12 @@ def test_a_guardian_that_is_killed_is_started_again(tx, world):
         found = process_tree.named(process_tree.descendants(node.pid), "override_guard")
         return [pid for pid in found if process_tree.alive(pid)]
 
-    def wait_until_said(text):
-        ours = world.namespace.lstrip("/") + "/"
-
-        def says(status):
-            name = status.name.lstrip("/")
-            return name.startswith(ours) and name.endswith("guardian") and text in status.message
-
-        said.wait_for(lambda array: any(map(says, array.status)), what=f"guardian: {text}")
-
     # A single message says that it was started again: it must find this subscriber there.
-    said = world.watch("/diagnostics", DiagnosticArray)
-    wait_until_said("runs")
+    heard = world.watch("/diagnostics", DiagnosticArray)
+    world.wait_for_diagnostics("guardian", lambda status: "runs" in status.message, heard=heard)
     (first,) = guardians()
     os.kill(first, signal.SIGKILL)
-    wait_until_said("started again")
+    world.wait_for_diagnostics("guardian", lambda status: "started again" in status.message, heard=heard)
     assert guardians() not in ([], [first])
     assert "its guardian process had ended" in node.output()
     node.send_signal(signal.SIGKILL)
