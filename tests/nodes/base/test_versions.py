@@ -70,21 +70,23 @@ def done(world, service, kind, **request):
     assert event.success, event.text
 
 
+def pause_and_read(world, paused):
+    pause(world, paused)
+    assert world.other.read(PAUSED) == float(paused)
+
+
 def test_pause_pauses_however_often_it_is_asked_for(flight):
     for paused in (True, True, False, False, True, False):
-        pause(flight, paused)
-        assert flight.other.read(PAUSED) == float(paused)
+        pause_and_read(flight, paused)
 
 
 def test_reset_places_the_flight_and_leaves_it_running_or_paused(flight):
     for paused in (False, True):
-        pause(flight, paused)
-        assert flight.other.read(PAUSED) == float(paused)
+        pause_and_read(flight, paused)
         done(flight, "reset_flight", "ResetFlight", **THERE)
         assert flight.other.read("sim/flightmodel/position/latitude") == pytest.approx(47.2, abs=0.01)
         assert flight.other.read(PAUSED) == float(paused)
-    pause(flight, False)
-    assert flight.other.read(PAUSED) == 0.0
+    pause_and_read(flight, False)
 
 
 def test_another_aircraft_is_loaded_and_flown(flight):
