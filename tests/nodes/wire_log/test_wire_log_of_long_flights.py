@@ -14,7 +14,7 @@ from support.nodes.wire_replays import (
     log_of,
     payloads_in,
     replay,
-    states_by_time,
+    states_by_run_and_time,
 )
 from xplane_bridge.harness import EmulatorProcess
 from xplane_bridge.harness.processes import wait_until
@@ -139,12 +139,11 @@ def test_the_parts_that_were_kept_replay_without_the_first(world):
     bag = world.folder / "rest.bag"
     done = replay(first.with_name(f"{first.stem}_part2.pcapng"), "-o", bag)
     assert done.returncode == 0, done.stdout + done.stderr
-    there, here = (
-        states_by_time(payloads[f"{world.namespace}/flight_state"]) for payloads in (heard.payloads, payloads_in(bag))
-    )
+    topic = f"{world.namespace}/flight_state"
+    there, here = (states_by_run_and_time(payloads[topic]) for payloads in (heard.payloads, payloads_in(bag)))
     # It finds X-Plane first, as at every start; from there on all is there but what was lost on the wire.
-    assert len(here) > max(100, 0.8 * FPS * (max(here) - min(here)))
+    assert len(here) > max(100, 0.8 * FPS * (max(here)[1] - min(here)[1]))
     common = sorted(set(there) & set(here))
     assert len(common) > 0.8 * len(here)
-    for sim_time in common:
-        assert_same_values(here[sim_time], there[sim_time])
+    for moment in common:
+        assert_same_values(here[moment], there[moment])

@@ -95,14 +95,18 @@ def assert_replayed(live: Sequence[bytes], replayed: Sequence[bytes], topic: str
     assert {number: here.get(number) for number in there} == there, topic
 
 
-def states_by_time(payloads: list[bytes]) -> dict[float, Any]:
-    """Flight states by simulator time; of the same time in both runs of X-Plane, the first."""
+def states_by_run_and_time(payloads: list[bytes]) -> dict[tuple[int, float], Any]:
+    """Flight states by X-Plane's run, of which each begins at an earlier simulator time than the one before has
+    reached, and simulator time; of the same time in one run, the first."""
     from xplane_bridge.msg import FlightState
 
-    out: dict[float, Any] = {}
+    out: dict[tuple[int, float], Any] = {}
+    run, before = 0, 0.0
     for payload in payloads:
         state = FlightState().deserialize(payload)
-        out.setdefault(state.sim_time, state)
+        run += state.sim_time < before
+        before = state.sim_time
+        out.setdefault((run, state.sim_time), state)
     return out
 
 
