@@ -94,6 +94,7 @@ void TxLockstep::open(const core::LockstepFrame& frame, const ros::Time& stamp) 
     const Lock lock(mutex_);
     previous_ns_ = std::exchange(stamp_ns_, nanoseconds(stamp));
     closed_ = false;
+    node_ready_ = false;
   }
   progress();
   barrier_.open(frame.number, nanoseconds(stamp));
@@ -108,6 +109,7 @@ bool TxLockstep::ready() {
     const bool handled = !complete || barrier_.number() > 0;
     opened = handled && !handled_;
     handled_ = handled;
+    node_ready_ = true;
   }
   if (opened) opened_.notifyAll();
   if (barrier_.holds()) held_.notifyAll();
@@ -180,8 +182,9 @@ void TxLockstep::progress() {
 std::string TxLockstep::whatIsMissing() const {
   const std::string frame = "frame " + std::to_string(barrier_.number());
   std::vector<std::string> missing = barrier_.missing();
-  if (closed_ || missing.empty()) return "the simulator has not gone on from " + frame;
   for (std::string& each : missing) each += reasonOf(each);
+  if (!node_ready_ && !closed_) missing.emplace_back("tx_node itself, which waits for the simulator's answers");
+  if (closed_ || missing.empty()) return "the simulator has not gone on from " + frame;
   return frame + " was not answered by " + core::join(missing);
 }
 

@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace xplane_bridge {
@@ -77,6 +82,62 @@ TEST_F(TxLockstepTest, ARequestAnswersNoFrame) {
   EXPECT_FALSE(lockstep_.ready());
   lockstep_.takeDone("/player", stamp(1), "");
   EXPECT_TRUE(lockstep_.ready());
+}
+
+/// What the watchdog says once its time is over, which no clock of the host's makes so.
+class TxLockstepWatchdogTest : public testing::Test {
+ protected:
+  static LockstepOptions options() {
+    LockstepOptions out;
+    out.participants = {"player"};
+    out.watchdog = 60.0;
+    return out;
+  }
+  core::Clock clock() {
+    return {[this] { return now_ns_.load(); }, [this] { return now_ns_.load(); }, waiters_};
+  }
+  void passTime(double seconds) {
+    now_ns_ += core::toNanoseconds(seconds);
+    waiters_->wake(now_ns_);
+  }
+  /// What it says, without the time.
+  std::string said() {
+    std::future<std::string> text = said_.get_future();
+    do {  // the watchdog may begin to wait after time has passed
+      passTime(61.0);
+    } while (text.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready);
+    const std::string whole = text.get();
+    return whole.substr(whole.find(" s ") + 3);
+  }
+
+  std::atomic<std::int64_t> now_ns_{0};
+  std::shared_ptr<core::ClockWaiters> waiters_ = std::make_shared<core::ClockWaiters>();
+  std::promise<std::string> said_;
+  bool is_said_ = false;
+  TxLockstep lockstep_{options(), clock(), ros::Time(1000, 0), [] {},
+                       [this](const std::string& text) {
+                         if (!std::exchange(is_said_, true)) said_.set_value(text);
+                       }};
+};
+
+TEST_F(TxLockstepWatchdogTest, ANodeThatWaitsForTheSimulatorNamesItself) {
+  lockstep_.takeDone("/rx_node", ros::Time(1000, 0), kLockstepFrame0);
+  EXPECT_EQ(said(), "frame 0 was not answered by tx_node itself, which waits for the simulator's answers");
+}
+
+TEST_F(TxLockstepWatchdogTest, AllWhoHaveNotAnsweredAreNamedWithTheirReasons) {
+  core::LockstepFrame frame;
+  frame.number = 1;
+  lockstep_.open(frame, ros::Time(1001, 0));
+  EXPECT_FALSE(lockstep_.ready());
+  lockstep_.takeDone("/player", ros::Time(1001, 0), std::string(kLockstepWaits) + "a file");
+  EXPECT_EQ(said(), "frame 1 was not answered by rx_node, player, which waits for a file");
+}
+
+TEST_F(TxLockstepWatchdogTest, ASimulatorThatDoesNotGoOnIsNamed) {
+  lockstep_.takeDone("/rx_node", ros::Time(1000, 0), kLockstepFrame0);
+  EXPECT_TRUE(lockstep_.ready());
+  EXPECT_EQ(said(), "the simulator has not gone on from frame 0");
 }
 
 }  // namespace
