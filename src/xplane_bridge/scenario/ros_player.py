@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import Any, Callable, Dict, Optional, Tuple
 
-from xplane_bridge.constants import COMMAND_FIELDS, FlightMode, words
+from xplane_bridge.constants import COMMAND_FIELDS, FlightMode, ResultCode, words
 from xplane_bridge.scenario.player import Action, Commands, FlightSample, Player
 from xplane_bridge.scenario.resets import reset_request
 from xplane_bridge.scenario.schema import HANDLE_FIELDS, Scenario, ScenarioError
@@ -24,8 +24,9 @@ from xplane_bridge.scenario.world import disturbance_request, time_request, weat
 #: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
 STICK_RATE = 50.0
 _BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_node's failsafe knows better
-_SERVICE_WAIT_S = 15.0
-MODE_WAIT_S = 5.0  #: for a mode to be shown
+_SERVICE_WAIT_S = 15.0  # for a service to be there, and for X-Plane's link
+_AGAIN_S = 0.1  # after a refusal for want of a link
+MODE_WAIT_S = 15.0  #: for a mode to be shown
 _TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
 MODE_NAMES = words(FlightMode)
 
@@ -322,16 +323,24 @@ class RosPlayer:
             self._tapped[button] = now + _TAP_S
 
     def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
+        """Calls tx_node; again while that has no link to X-Plane, as whenever frames are late: nothing was sent then."""
         import rospy
 
         name = f"{self._namespace}/tx_node/{service}"
-        try:
-            rospy.wait_for_service(name, _SERVICE_WAIT_S)
-            response = rospy.ServiceProxy(name, service_type)(**fields)
-        except (rospy.ROSException, rospy.ServiceException) as error:
-            raise ScenarioError(f"{what}: {name} cannot be called: {error}") from None
-        if not response.success:
-            raise ScenarioError(f"{what}: {response.result.message}")
+        deadline = time.monotonic() + _SERVICE_WAIT_S
+        while True:
+            try:
+                rospy.wait_for_service(name, _SERVICE_WAIT_S)
+                response = rospy.ServiceProxy(name, service_type)(**fields)
+            except (rospy.ROSException, rospy.ServiceException) as error:
+                raise ScenarioError(f"{what}: {name} cannot be called: {error}") from None
+            unlinked = not response.success and response.result.code == ResultCode.NO_LINK
+            # Without a link tx_node repairs as soon as it is back; there is nothing to repair the second time.
+            if response.success or (unlinked and service == "clear_failures"):
+                return
+            if not unlinked or time.monotonic() > deadline:
+                raise ScenarioError(f"{what}: {response.result.message}")
+            time.sleep(_AGAIN_S)
 
     def _failure(self, value: Dict[str, Any]) -> None:
         from xplane_bridge.srv import ClearFailures, SetFailure

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import sys
 from types import SimpleNamespace
+from unittest import mock
 
 import pytest
 
-from xplane_bridge.scenario import parse_scenario, ros_player
+from xplane_bridge.constants import ResultCode
+from xplane_bridge.scenario import ScenarioError, parse_scenario, ros_player
 from xplane_bridge.scenario.ros_player import RosPlayer
 
 
@@ -80,3 +83,45 @@ def test_tx_node_hears_the_mode_requests_of_a_second_run(monkeypatch):
     first = player({"at": 60, "end": True})
     monkeypatch.setattr(ros_player.time, "time", lambda: 1060.0)
     assert player({"at": 60, "end": True})._mode_sequence >= first._mode_sequence + 60
+
+
+def called(monkeypatch, codes, event):
+    """Plays an event whose service answers with these codes, one after the other; gives how often it was called."""
+    answers = [
+        SimpleNamespace(success=code <= ResultCode.ACCEPTED, result=SimpleNamespace(code=code, message=code.name))
+        for code in codes
+    ]
+    calls = []
+
+    def proxy(name, _):
+        return lambda **fields: answers[calls.append(name) or min(len(calls), len(answers)) - 1]
+
+    errors = {"ROSException": type("ROSException", (Exception,), {}), "ServiceException": type("E", (Exception,), {})}
+    rospy = SimpleNamespace(wait_for_service=lambda *_: None, ServiceProxy=proxy, **errors)
+    monkeypatch.setitem(sys.modules, "rospy", rospy)
+    monkeypatch.setitem(sys.modules, "xplane_bridge.srv", mock.MagicMock())
+    now = [100.0]
+    monkeypatch.setattr(ros_player.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(ros_player.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    flying = player({"at": 0, **event}, {"at": 60, "end": True})
+    flying._on_state(state(10.0))
+    flying._act(flying._actions.get_nowait())
+    return len(calls)
+
+
+BREAK = {"failure": {"name": "engine_1", "kind": "failed"}}
+NO_LINK, OK, ACCEPTED, REFUSED = ResultCode.NO_LINK, ResultCode.OK, ResultCode.ACCEPTED, ResultCode.REFUSED
+
+
+def test_what_is_refused_for_want_of_a_link_is_asked_for_again(monkeypatch):
+    assert called(monkeypatch, [OK], BREAK) == 1
+    assert called(monkeypatch, [NO_LINK, NO_LINK, ACCEPTED], BREAK) == 3
+    with pytest.raises(ScenarioError, match="failure of engine_1: NO_LINK"):
+        called(monkeypatch, [NO_LINK], BREAK)
+    with pytest.raises(ScenarioError, match="failure of engine_1: REFUSED"):
+        called(monkeypatch, [NO_LINK, REFUSED], BREAK)
+
+
+def test_a_repair_without_a_link_is_not_asked_for_again(monkeypatch):
+    """tx_node repairs when the link is back; a second request finds nothing that is broken, and is refused."""
+    assert called(monkeypatch, [NO_LINK, REFUSED], {"clear_failures": True}) == 1
