@@ -28,8 +28,8 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kFindTime = 2.0;      // [s] until X-Plane's address is known: a name may have to be resolved
-constexpr double kUndoTime = 2.0;      // [s] X-Plane answers within a frame or two, or it is gone too
+constexpr double kFindTime = 10.0;     // [s] until X-Plane's address is known: a name may have to be resolved
+constexpr double kUndoTime = 10.0;     // [s] X-Plane answers within a frame or two, after a hitch, or it is gone too
 constexpr double kAttemptTime = 0.5;   // [s] until a release that is not shown is sent again
 constexpr double kJournalAgain = 0.1;  // [s] until a journal that another process has locked is tried again
 constexpr double kBeatPeriod = 0.05;   // [s] at most often
