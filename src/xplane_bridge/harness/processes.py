@@ -17,6 +17,7 @@ from typing import BinaryIO, Callable, Iterator, Mapping, Optional, Protocol, Se
 from xplane_bridge.errors import XplaneBridgeError
 
 _POLL_S = 0.02
+_KILLED_S = 60.0  # until a killed process is gone: one that waits for a disk goes when that answers
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None, use_errno=True)
 
@@ -245,7 +246,7 @@ class ManagedProcess:
     def kill(self) -> None:
         """Kills its whole process group at once, as a crash would."""
         self._signal_group(signal.SIGKILL)
-        self.wait(5.0)
+        self.wait(_KILLED_S)
 
     def stop(self) -> None:
         """Ends it in good order, and by force what is left of its process group; harmless when it has ended."""

@@ -323,7 +323,7 @@ class RosPlayer:
             self._tapped[button] = now + _TAP_S
 
     def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
-        """Calls tx_node; again while that has no link to X-Plane, as whenever frames are late: nothing was sent then."""
+        """Calls tx_node; again while that has no link to X-Plane, as where frames are late: nothing was sent then."""
         import rospy
 
         name = f"{self._namespace}/tx_node/{service}"
