@@ -135,20 +135,27 @@ def test_one_way_without_a_version_publishes_what_does_not_depend_on_it(world):
 )
 def test_one_way_with_its_version_given_publishes_rates(world, version, parameter, order, unit):
     one_way(world, version, xplane_version=parameter)
-    state = world.states.wait_for(
-        lambda state: state.valid & RATES and min(abs(state.angular_velocity.x), abs(state.angular_velocity.y)) > 1e-3
-    )
-    message = world.rows.wait_for(lambda rows: 1 in rows.index and row(rows, 1)[1] == state.sim_time)
+
+    def turns(state):
+        rates = state.angular_velocity
+        return state.valid & RATES and min(abs(rates.x), abs(rates.y)) > 1e-3
+
+    def both():  # a state and its rows, of which some came before the first was connected
+        states = {state.sim_time: state for state in world.states.messages[:] if turns(state)}
+        rows = {row(rows, 1)[1]: rows for rows in world.rows.messages[:] if 1 in rows.index}
+        return [(states[time], rows[time]) for time in states if time in rows]
+
+    state, message = wait_until(both, WAIT_S, "a state and its rows")[0]
     raw = row(message, 16)
     expected = [raw[slot] * unit for slot in order]
     got = state.angular_velocity
     assert [got.x, got.y, got.z] == pytest.approx(expected, abs=1e-6)
     link = world.wait_for_diagnostics("link to X-Plane", lambda status: "nothing answers" in status.message)
     assert "xplane_version" not in link.message
-    assert world.links.last.xplane_version == parameter
+    world.links.wait_for(lambda link: link.xplane_version == parameter)
 
 
 def test_one_way_with_its_version_given_to_the_launch_file_publishes_rates(world):
     one_way(world, "11", "xplane_version:=115501")
     world.states.wait_for(lambda state: state.valid & RATES, WAIT_S)
-    assert world.links.last.xplane_version == 115501
+    world.links.wait_for(lambda link: link.xplane_version == 115501)

@@ -49,7 +49,7 @@ def flight(request, new_world, tmp_path_factory):
     world.set_param("aircraft", "fixed_wing")
     world.set_param("stale_after", 5.0)  # late frames of a busy machine are no lost link
     world.start("rx_node")
-    world.start("tx_node", tx_params(service_timeout=10.0, setting_timeout=10.0, load_timeout=30.0))
+    world.start("tx_node", tx_params(setting_timeout=10.0, load_timeout=30.0))
     world.events.wait_for(lambda e: any(event.kind == AIRCRAFT for event in e.events))
     world.states.wait_for()
     yield world

@@ -183,6 +183,7 @@ def test_it_holds_and_flies_on_as_asked(world):
 
     start(world, participants=[])
     states = world.watch("flight_state", FlightState)
+    wait_until(lambda: states.connected, WAIT_S, "rx_node's connection")
     answer = step(world, 5)
     assert (answer.flown, answer.sim_time) == (5, pytest.approx(5 / 60))
     last = states.wait_for(lambda state: state.frame_count == 5)
@@ -202,6 +203,7 @@ def test_ros_time_of_a_node_is_that_of_the_frame(world):
     try:
         start(world, participants=[])
         states, diagnostics = world.watch("flight_state", FlightState), world.watch("/diagnostics", DiagnosticArray)
+        wait_until(lambda: states.connected and diagnostics.connected, WAIT_S, "rx_node's connections")
         for number in (1, 2):
             step(world, 50)
             last = states.wait_for(lambda state, count=50 * number: state.frame_count == count)

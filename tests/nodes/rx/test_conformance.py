@@ -22,6 +22,7 @@ GENERATOR_OF_2, GENERATOR_OFF = "sim/cockpit2/electrical/generator_on[1]", "sim/
 ALTITUDE_HOLD, CAPTURED = "sim/cockpit2/autopilot/altitude_hold_status", 2.0
 PROPELLER_COMMAND = 1 << 2  # of EngineStates.valid
 ACCEPTED = 1
+ATTEMPTS = 4
 
 
 def doctor(world, *words, **environment):
@@ -53,6 +54,19 @@ def verdicts(lines):
     return dict(re.fullmatch(r"([a-z0-9-]+): (confirmed|refuted|not testable) \(.*\)", line).groups() for line in lines)
 
 
+def settle(world, wanted, found=None, **environment):
+    """Flies the card until it has these verdicts, by question; again where not: on a busy machine the simulator may be
+    silent for longer than a question looks.
+    """
+    found = dict(found or {})
+    for _ in range(ATTEMPTS):
+        open_ = [question for question in wanted if found.get(question) != wanted[question]]
+        if not open_:
+            break
+        found.update(verdicts(doctor(world, "--only", ",".join(open_), **environment)))
+    assert found == wanted
+
+
 def test_rows_that_are_otherwise_are_not_used(world):
     from xplane_bridge.msg import FlightState, SimStatus
 
@@ -60,7 +74,7 @@ def test_rows_that_are_otherwise_are_not_used(world):
         "--no-beacon", "--version", "12", "--pilot", pilot_file(world, 25), "--otherwise", ",".join(ROWS)
     )
     wire = world.wire(world.xplane.port)
-    assert set(verdicts(doctor(world, "--only", ",".join(ROWS))).values()) == {"refuted"}
+    settle(world, dict.fromkeys(ROWS, "refuted"))
     world.set_param("transport", "data")
     world.set_param("data_port", 0)
     states, status = world.watch("flight_state", FlightState), world.watch("mission/sim", SimStatus)
@@ -106,7 +120,7 @@ def test_systems_whose_rows_are_otherwise_are_right_by_the_file_and_wrong_withou
         "--no-beacon", "--version", "12", "--pilot", pilot_file(world, 0), "--otherwise", ",".join(rows)
     )
     if has_file:
-        assert verdicts(doctor(world, "--only", ",".join(rows))) == dict.fromkeys(rows, "refuted")
+        settle(world, dict.fromkeys(rows, "refuted"))
     wire = world.wire(world.xplane.port)
     wire.send(protocol.DrefWrite(GENERATOR_OF_2, 0.0), protocol.CommandRequest("sim/autopilot/altitude_hold"))
     wire.wait_until_reads(GENERATOR_OFF.format(1), 1.0)
@@ -139,7 +153,7 @@ def test_a_vehs_that_moves_nothing_is_not_sent(world):
     assert verdicts(doctor(world, "--only", "vehs")) == {"vehs": "refuted"}
     events = world.watch("events", EventList)
     world.set_param("aircraft", "fixed_wing")
-    world.start("tx_node", tx_params(setting_timeout=5.0, load_timeout=10.0))
+    world.start("tx_node", tx_params(load_timeout=30.0))
     events.wait_for(lambda e: any("aircraft:" in event.text for event in e.events))
     there = {"latitude": 47.2, "longitude": 8.3, "altitude_msl": 1500.0, "heading_true_deg": 250.0}
     answer = call(world, "reset_flight", "ResetFlight", true_airspeed=75.0, **there)
@@ -174,11 +188,11 @@ def test_the_whole_card_on_the_ground_with_a_window(world, monkeypatch, switches
         words = ["--start", "ground", "--window", "320x240", *(["--otherwise", switches] if switches else [])]
         world.xplane = world.emulator("--no-beacon", "--version", "12", *words)
         if switches:
-            assert verdicts(doctor(world, "--only", switches, DISPLAY=display.display)) == {switches: "refuted"}
+            settle(world, {switches: "refuted"}, DISPLAY=display.display)
             return
-        found = verdicts(doctor(world, DISPLAY=display.display))
-    from xplane_bridge.doctor.conformance.questions import CARD
+        from xplane_bridge.doctor.conformance.questions import CARD
 
-    assert list(found) == [question.id for question in CARD]
-    assert set(found.values()) == {"confirmed"}
+        found = verdicts(doctor(world, DISPLAY=display.display))
+        assert list(found) == [question.id for question in CARD]
+        settle(world, dict.fromkeys(found, "confirmed"), found, DISPLAY=display.display)
     assert world.wire(world.xplane.port).read("sim/flightmodel/failures/onground_any") == 1.0

@@ -144,6 +144,7 @@ def test_a_simulator_that_does_not_wait_is_stepped_by_its_pause(world):
     truth = world.folder / "truth.csv"
     emulator = world.emulator("--fps", 60, "--truth", truth)
     wire = world.wire(emulator.port)
+    world.set_param("stale_after", 5.0)  # late frames are no lost link
     world.start("tx_node", tx_params())
     wait_until(lambda: world.call("lockstep/hold", Trigger).success, WAIT_S, "pause")
     assert wire.read(PAUSED) == 1.0

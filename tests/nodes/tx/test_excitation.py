@@ -45,7 +45,7 @@ def twin(new_world, tmp_path_factory):
     world.set_param("aircraft", "fixed_wing")
     world.set_param("stale_after", 5.0)  # late frames are no lost link
     # A busy machine's source may be silent for a moment, and its services slow.
-    world.start("tx_node", tx_params(command_timeout=5.0, service_timeout=10.0))
+    world.start("tx_node", tx_params(command_timeout=5.0))
     world.manual = CommandSource(world, "control/manual")
     world.events.wait_for(lambda e: any(event.text.startswith("aircraft:") for event in e.events))
     world.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)

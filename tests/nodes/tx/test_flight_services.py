@@ -47,7 +47,7 @@ def fly(world, version="11", **params):
     world.manual = CommandSource(world, "control/manual")
     world.set_param("aircraft", "fixed_wing")
     world.set_param("stale_after", 5.0)  # late frames are no lost link
-    world.node = world.start("tx_node", tx_params(**{"service_timeout": 10.0, **params}))
+    world.node = world.start("tx_node", tx_params(**params))
     world.events.wait_for(lambda e: any(event.kind == AIRCRAFT for event in e.events))
     return world
 

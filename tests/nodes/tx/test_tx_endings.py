@@ -95,7 +95,7 @@ def test_overrides_are_released_on_ctrl_c_of_roslaunch(world):
     launch.send_signal(signal.SIGINT)
     wire.wait(OVERRIDE, 0.0)
     assert launch.wait(WAIT_S) == 0, launch.output()
-    assert not journal_entries(world)
+    wait_until(lambda: not journal_entries(world), WAIT_S, "an empty journal")
     manual.stop()
     wire.close()
 
@@ -164,7 +164,7 @@ def guardians_of(node):
 
 
 def test_a_node_that_hangs_is_relieved_and_flies_again_only_on_request(tx, world):
-    node = tx()
+    node = tx(hang_timeout=1.0)
     world.auto.fly(fields=ROLL, roll=0.5)
     assert call(world, "set_mode", "SetMode", mode=AUTO).success
     world.wire.wait(OVERRIDE, 1.0)
@@ -187,7 +187,7 @@ def test_a_node_that_hangs_is_relieved_and_flies_again_only_on_request(tx, world
 
 
 def test_a_busy_computer_is_no_hang(tx, world):
-    node = tx()
+    node = tx(hang_timeout=1.0)
     world.manual.fly(fields=ROLL, roll=0.5)
     world.wire.wait(OVERRIDE, 1.0)
     loops = [ManagedProcess(f"busy{i}", [sys.executable, "-c", "while True: pass"], world.folder) for i in range(2)]
@@ -253,6 +253,7 @@ def test_what_a_crash_left_and_xplane_does_not_know_is_said_once(world):
     left_by_a_crash(world, {entry: ("override", undo)})
     events = world.watch("events", EventList)
     world.set_param("aircraft", "fixed_wing")
+    world.set_param("stale_after", 5.0)  # of an X-Plane that is silent for a moment it is not said
     world.start("tx_node", tx_params())
     events.wait_for(lambda e: has(e, "could not be seen released"))
     for _ in range(4):  # seconds, in which it is tried again
@@ -262,12 +263,18 @@ def test_what_a_crash_left_and_xplane_does_not_know_is_said_once(world):
 
 
 def release_overrides(world):
-    """Runs the panic tool."""
-    panic = ManagedProcess(
-        "release", ["/usr/bin/python3", ROOT / "scripts" / "release_overrides"], world.folder, env=world.env
-    )
-    panic.start()
-    assert panic.wait(WAIT_S) == 0, panic.output()
+    """Runs the panic tool; again, as it says, where X-Plane has not answered within its two seconds."""
+
+    def done():
+        panic = ManagedProcess(
+            "release", ["/usr/bin/python3", ROOT / "scripts" / "release_overrides"], world.folder, env=world.env
+        )
+        panic.start()
+        code = panic.wait(WAIT_S)
+        assert code == 0 or "X-Plane does not show it" in panic.output(), panic.output()
+        return code == 0
+
+    wait_until(done, WAIT_S, "a release that X-Plane shows")
 
 
 def test_release_overrides_frees_what_a_crash_left(tx, world):

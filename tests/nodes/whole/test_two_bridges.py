@@ -17,7 +17,7 @@ from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import ROLL, CommandSource, WatchedDatarefs
 from xplane_bridge.harness import ManagedProcess, roslaunch, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
-from xplane_bridge.harness.ports import free_tcp_port
+from xplane_bridge.harness.ports import free_udp_port
 from xplane_bridge.resources import program
 
 LONGITUDES = {"first": 20.0, "second": 40.0}
@@ -31,7 +31,7 @@ class Side:
     def __init__(self, world: Any, name: str) -> None:
         self.name, self._world, self.folder = name, world, world.folder / name
         self.namespace = f"{world.namespace}/{name}"
-        self.port = free_tcp_port()
+        self.port = free_udp_port()
         self.display = VirtualDisplay(self.folder)
         self.display.start()
         self.xplane = self._emulator()
@@ -67,7 +67,10 @@ class Side:
     def journal(self) -> list[str]:
         """What is to be undone in this side's X-Plane."""
         file = self._world.folder / "ros_home" / "xplane_bridge" / f"127.0.0.1_{self.port}.json"
-        return [entry["id"] for entry in json.loads(file.read_text("utf-8"))["entries"]] if file.exists() else []
+        try:
+            return [entry["id"] for entry in json.loads(file.read_text("utf-8"))["entries"]]
+        except FileNotFoundError:  # nothing is to be undone
+            return []
 
     def close(self) -> None:
         """Ends it."""

@@ -75,7 +75,7 @@ def flight(new_world, tmp_path_factory):
 
         # Late frames are no lost link, and a busy machine's source may be silent for a moment.
         world.set_param("stale_after", 5.0)
-        node = world.start("tx_node", tx_params(command_timeout=5.0, service_timeout=10.0))
+        node = world.start("tx_node", tx_params(command_timeout=5.0))
         wait_for("events", EventList, lambda e: any(event.text.startswith("aircraft:") for event in e.events))
         world.wait_for_diagnostics("surfaces", lambda s: "ready" in s.message)
         manual, auto = sources

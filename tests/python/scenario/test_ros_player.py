@@ -94,7 +94,11 @@ def called(monkeypatch, codes, event):
     calls = []
 
     def proxy(name, _):
-        return lambda **fields: answers[calls.append(name) or min(len(calls), len(answers)) - 1]
+        def call(**fields):
+            calls.append((name, fields))
+            return answers[min(len(calls), len(answers)) - 1]
+
+        return call
 
     errors = {"ROSException": type("ROSException", (Exception,), {}), "ServiceException": type("E", (Exception,), {})}
     rospy = SimpleNamespace(wait_for_service=lambda *_: None, ServiceProxy=proxy, **errors)

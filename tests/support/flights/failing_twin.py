@@ -65,7 +65,7 @@ def fly(world, *emulator_options, known=True, stale_after=5.0, **params):
     world.state = world.watch("failures/state", FailureState)
     world.events = world.watch("events", EventList)
     world.applied = world.watch("control/applied", AppliedCommand)
-    world.params = tx_params(**{"command_timeout": 5.0, "service_timeout": 10.0, **params})
+    world.params = tx_params(**{"command_timeout": 5.0, **params})
     world.set_param("aircraft", "fixed_wing")
     world.set_param("stale_after", stale_after)
     world.node = world.start("tx_node", world.params)

@@ -168,13 +168,17 @@ class RepeatedJoy:
             self._timer = None
 
 
+#: [s] of tx_node: on a busy machine, one that stands still for a moment has not hung, and neither has X-Plane.
+PATIENCE = {"hang_timeout": 30.0, "service_timeout": 10.0}
+
+
 def tx_params(aircraft: str = "fixed_wing", **params: Any) -> dict[str, Any]:
-    """tx_node's private parameters as tx.launch loads them, with changes."""
+    """tx_node's private parameters as tx.launch loads them, but for PATIENCE, with changes."""
     import yaml
 
     options = yaml.safe_load(config_file("tx.yaml").read_text(encoding="utf-8"))
     options["aircraft"] = yaml.safe_load(config_file("aircraft", f"{aircraft}.yaml").read_text(encoding="utf-8"))
-    options.update(params)
+    options.update({**PATIENCE, **params})
     return options
 
 

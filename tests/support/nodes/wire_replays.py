@@ -61,7 +61,15 @@ class RawTopics:
         return wait_until(look, timeout, f"fitting message on {topic}")
 
     def close(self) -> None:
-        """Hears no more."""
+        """Once the publishers have ended: reads to its end what they have sent, and hears no more."""
+        connections = [each for subscriber in self._subscribers for each in list(subscriber.impl.connections)]
+        read: set[int] = set()
+
+        def all_read() -> bool:  # rospy makes a connection whose end it has read anew, in vain
+            read.update(i for i, each in enumerate(connections) if each.done or each.socket is None)
+            return len(read) == len(connections)
+
+        wait_until(all_read, WAIT_S, "end of the topics that were heard")
         for subscriber in self._subscribers:
             subscriber.unregister()
 
@@ -96,17 +104,18 @@ def assert_replayed(live: Sequence[bytes], replayed: Sequence[bytes], topic: str
 
 
 def states_by_run_and_time(payloads: list[bytes]) -> dict[tuple[int, float], Any]:
-    """Flight states by X-Plane's run, of which each begins at an earlier simulator time than the one before has
-    reached, and simulator time; of the same time in one run, the first."""
+    """Flight states by X-Plane's run, of which each is an epoch, and simulator time, which all begin with; of the same
+    time in one run, the first.
+    """
     from xplane_bridge.msg import FlightState
 
     out: dict[tuple[int, float], Any] = {}
-    run, before = 0, 0.0
+    epochs: list[int] = []
     for payload in payloads:
         state = FlightState().deserialize(payload)
-        run += state.sim_time < before
-        before = state.sim_time
-        out.setdefault((run, state.sim_time), state)
+        if state.epoch not in epochs:
+            epochs.append(state.epoch)
+        out.setdefault((epochs.index(state.epoch), state.sim_time), state)
     return out
 
 
