@@ -69,12 +69,17 @@ def test_compressed_has_one_advertiser(world, display, package: Path, tmp_path: 
     with ManagedProcess("capture_node", node, tmp_path, env=environment):
         jpegs = world.watch(TOPIC, CompressedImage)
         images = world.watch("camera/image_raw", Image)
-        wait_until(lambda: len(joined(jpegs, images)) >= PICTURES, WAIT_S, "JPEGs of the images")
+        shown = ShownFrames(images.messages)  # without those of the window before its first frame
+
+        def both() -> list:
+            raw = shown.by_stamp()
+            return [jpeg for jpeg in joined(jpegs, images) if jpeg.header.stamp in raw]
+
+        wait_until(lambda: len(both()) >= PICTURES, WAIT_S, "JPEGs of the images")
         assert advertisers(f"{world.namespace}/{TOPIC}") == [f"{world.namespace}/capture_node"]
         stamps = [jpeg.header.stamp for jpeg in list(jpegs.messages)]
         assert len(set(stamps)) == len(stamps), "a picture came twice"
-        both, raw = joined(jpegs, images), ShownFrames(images.messages).by_stamp()
-        for jpeg in both:
+        for jpeg in both():
             assert jpeg.format == "bgr8; jpeg compressed bgr8"
-            shown = read_strip(cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
-            assert shown == raw[jpeg.header.stamp], "another picture than the raw image of its stamp"
+            strip = read_strip(cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
+            assert strip == shown.by_stamp()[jpeg.header.stamp], "another picture than the raw image of its stamp"

@@ -11,12 +11,13 @@ import socket
 import threading
 import time
 from pathlib import Path
+from typing import Callable
 
 import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import punctual_frames, schedule_late
+from support.nodes.late_pictures import ShownFrames, joined, punctual_frames, schedule_late
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.eye import program as eye_program
@@ -31,7 +32,8 @@ pytestmark = pytest.mark.usefixtures("screen")
 
 FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
 TIMES_ON_SCREEN = "sim/network/dataout/data_to_screen[1]"
-LONGEST_S = 150.0
+LONGEST_S = 300.0
+LOOK_AFTER = 20  #: further pictures, as looking at all takes time that their programs have not
 FPS = 20
 WIDTH, HEIGHT = 320, 240  #: [px] of window and pictures, small: to be drawn, read, sent and decoded many times
 USERS_DEG = 72.0
@@ -115,6 +117,7 @@ class Scene:
         params = {"source": "sender", "sender": {"listen": f"127.0.0.1:{self.port}", "token": "window seat"}}
         self.node = world.start("capture_node", {**params, "max_rate": 0.0, "width": WIDTH, "height": HEIGHT})
         self.images = world.watch("camera/image_raw", Image)
+        self.shown = ShownFrames(self.images.messages)
         self.jpegs = world.watch("camera/image_raw/compressed", CompressedImage)
         self.states = world.watch("camera/frame_state", FrameState)
 
@@ -133,14 +136,28 @@ class Scene:
 
     def punctual(self) -> list:
         """State and strip of each picture so far that the emulator showed when it was due."""
+        shown = self.shown.by_stamp()
         punctual = punctual_frames(self.folder / "swaps.csv", PIPELINE_DELAY_S, FPS)
-        by_stamp = {state.header.stamp: state for state in list(self.states.messages)}
-        pairs = []
-        for image in list(self.images.messages):
-            shown = read_strip(np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3))
-            if shown.frame in punctual and image.header.stamp in by_stamp:
-                pairs.append((by_stamp[image.header.stamp], shown))
-        return pairs
+        states = [state for state in list(self.states.messages) if state.header.stamp in shown]
+        pairs = [(state, shown[state.header.stamp]) for state in states]
+        return [(state, frame) for state, frame in pairs if frame.frame in punctual]
+
+    def perfect(self) -> int:
+        """How many of them carry no flag."""
+        return sum(state.quality == 0 for state, _ in self.punctual())
+
+    def wait_until_perfect(self, count: int, and_also: Callable[[], bool] = lambda: True) -> None:
+        """Waits for so many: on a busy machine few pictures come when they are due."""
+        seen = -LOOK_AFTER
+
+        def enough() -> bool:
+            nonlocal seen
+            if len(self.states.messages) < seen + LOOK_AFTER:
+                return False
+            seen = len(self.states.messages)
+            return self.perfect() >= count and and_also()
+
+        wait_until(enough, 3 * WAIT_S, f"{count} perfectly paired pictures that were punctual")
 
 
 @pytest.fixture
@@ -186,10 +203,7 @@ def test_regular_frames_and_a_delay_of_three_periods_are_paired_exactly(scene: S
             delay = measure(scene)
         delay_s = float(delay.split()[0]) * 1e-3
         scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
-        for _ in range(ATTEMPTS):  # a busy machine shows few when they are due
-            scene.images.wait_for_count(80, timeout=60.0)
-            if sum(state.quality == 0 for state, _ in scene.punctual()) >= 30:
-                break
+        scene.wait_until_perfect(30, and_also=lambda: len(joined(scene.jpegs, scene.images)) >= 5)
         jpegs, images = list(scene.jpegs.messages), {image.header.stamp: image for image in scene.images.messages}
         pairs = scene.judged()
     check_exact(pairs, 30)
@@ -227,6 +241,7 @@ def test_a_poor_network_costs_pictures_and_mispairs_none(scene: Scene, chance: f
             first, began = len(scene.images.messages), time.monotonic()
             wait_until(lambda: relay.stalls >= 20 and len(scene.images.messages) > first + 60, 90.0, "stalls")
             came, due = len(scene.images.messages) - first, FPS * (time.monotonic() - began)
+            scene.wait_until_perfect(15)
             pairs = scene.judged()
     finally:
         relay.close()
@@ -241,7 +256,18 @@ def test_an_eye_that_looks_too_late_says_so(scene: Scene) -> None:
     with scene.eye("--delay", str(PIPELINE_DELAY_S)) as eye:
         scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
         first = len(scene.states.messages)
-        schedule_late(eye, 1.0 / FPS, lambda: sum(state.quality == 0 for state in scene.states.messages[first:]) >= 60)
+        looked = 0
+
+        def enough() -> bool:
+            nonlocal looked
+            states = scene.states.messages[first:]
+            if sum(state.quality == 0 for state in states) < 60 or len(states) < looked + LOOK_AFTER:
+                return False
+            looked = len(states)
+            late = any(state.quality == FrameState.QUALITY_BORDERLINE for state, _ in scene.punctual())
+            return late and scene.perfect() >= 15
+
+        schedule_late(eye, 1.0 / FPS, enough, 3 * WAIT_S)
         pairs = scene.judged()
     check_exact(pairs, 15)
     assert any(state.quality == FrameState.QUALITY_BORDERLINE for state, _ in pairs)
@@ -284,6 +310,7 @@ def test_the_delay_is_measured_on_request_without_a_restart_but_not_in_a_recordi
             assert wire.read(FIELD_OF_VIEW) == USERS_DEG
             recording.close()
             wait_until(lambda: "records the pictures" not in calibrate(scene).message, 60.0, "the recorder's end")
+            first = len(scene.states.messages)
             message = measure(scene)
             assert re.match(r"\d+\.\d ms, from \d+ steps that lie", message)
             delay = float(message.split()[0]) * 1e-3
@@ -293,8 +320,9 @@ def test_the_delay_is_measured_on_request_without_a_restart_but_not_in_a_recordi
             )
             assert sure.display_delay == pytest.approx(delay, abs=CARRIED_WITHIN_S)
             wire.wait_until_reads(FIELD_OF_VIEW, USERS_DEG)
-            assert not (scene.folder / "undo.json").exists()
-            assert not any(s.quality & FrameState.QUALITY_FROZEN for s in scene.states.messages)
+            wait_until(lambda: not (scene.folder / "undo.json").exists(), WAIT_S, "the end of the note")
+            # Without pictures while it measures; a busy machine may show the same for a second at other times.
+            assert not any(s.quality & FrameState.QUALITY_FROZEN for s in scene.states.messages[first:])
 
 
 def test_an_eye_that_leaves_the_field_of_view_alone_refuses_in_words(scene: Scene) -> None:

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 import yaml
 
-from support.nodes.late_pictures import pixels, punctual_frames
+from support.deadlines import WAIT_S
+from support.nodes.late_pictures import ShownFrames, punctual_frames
 from support.nodes.second_camera import NAME, WINDOW, second_camera
-from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.harness.ports import free_tcp_port
@@ -25,6 +25,7 @@ from xplane_bridge.resources import config_file, program
 FPS = 10
 PIPELINE_DELAY_S = 0.15
 ENOUGH = 40
+PUNCTUAL = 5
 
 
 @contextlib.contextmanager
@@ -76,35 +77,38 @@ def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: 
                 for place in ("", f"{NAME}/")
             ]
 
-            def shared() -> set:
-                """Keys of frames that both cameras have without a flag."""
-                keys = [{s.frame_sim_time for s in list(c[2].messages) if s.quality == 0} for c in cameras]
-                return keys[0] & keys[1]
+            shown = [ShownFrames(camera[0].messages) for camera in cameras]
+            logs = swaps, tmp_path / "swaps_2.csv"
 
-            wait_until(lambda: len(shared()) >= ENOUGH, 90.0, "frames that both cameras have")
+            def shared() -> list:
+                """The states of each frame that both cameras have without a flag."""
+                by_key = [{s.frame_sim_time: s for s in list(c[2].messages) if s.quality == 0} for c in cameras]
+                return [[each[key] for each in by_key] for key in sorted(by_key[0].keys() & by_key[1].keys())]
+
+            def compared() -> list:
+                """Those of which both windows were punctual and both images came, with what these show."""
+                punctual = set.intersection(*(punctual_frames(log, PIPELINE_DELAY_S, FPS) for log in logs))
+                strips = [each.by_stamp() for each in shown]
+                came = [pair for pair in shared() if all(s.header.stamp in each for s, each in zip(pair, strips))]
+                both = [(pair, [each[s.header.stamp] for s, each in zip(pair, strips)]) for pair in came]
+                return [(pair, seen) for pair, seen in both if all(strip.frame in punctual for strip in seen)]
+
+            wait_until(lambda: len(shared()) >= ENOUGH, 3 * WAIT_S, "frames that both cameras have")
+            wait_until(
+                lambda: len(compared()) >= PUNCTUAL, 3 * WAIT_S, "punctual ones, of which a busy machine has few"
+            )
             launch.check_running()
         emulator.stop()
 
-    logs = swaps, tmp_path / "swaps_2.csv"
-    punctual = set.intersection(*(punctual_frames(log, PIPELINE_DELAY_S, FPS) for log in logs))
-    compared = 0
-    states = [{s.frame_sim_time: s for s in camera[2].messages if s.quality == 0} for camera in cameras]
-    images = [{image.header.stamp: image for image in camera[0].messages} for camera in cameras]
-    for key in sorted(shared()):
-        pair = [by_key[key] for by_key in states]
+    for pair in shared():
         assert pair[0].state == pair[1].state, "the same frame, the same state"
-        if not all(state.header.stamp in camera for state, camera in zip(pair, images)):
-            continue  # an image came after the end
-        shown = [read_strip(pixels(camera[state.header.stamp])) for state, camera in zip(pair, images)]
-        if not all(strip.frame in punctual for strip in shown):
-            continue
-        compared += 1
-        assert [np.float32(strip.sim_time) == pair[1].state.sim_time for strip in shown] == [True, True], (
-            [(strip.frame, strip.sim_time) for strip in shown],
+    for pair, strips in compared():
+        assert [np.float32(strip.sim_time) == pair[1].state.sim_time for strip in strips] == [True, True], (
+            [(strip.frame, strip.sim_time) for strip in strips],
             [(state.display_time.to_nsec(), state.grab_time.to_nsec(), state.frame_sim_time) for state in pair],
             [log.read_text() for log in logs],
         )
-    assert compared >= 5, "on a busy machine few windows are punctual"
+    assert len(compared()) >= PUNCTUAL
 
     forward, down = pair
     assert (forward.header.frame_id, forward.view) == ("camera_optical", FrameState.VIEW_FORWARD)

@@ -98,9 +98,9 @@ def test_left_aileron_stuck_rolls_the_aircraft_and_the_others_keep_flying(health
     wire.wait(LEFT, 5.0)
     assert wire.value(SURFACES) == 1.0
     assert "override:" + SURFACES in journal_entries(world)
-    label = label_of(world, "aileron1_wing2_left")
-    assert (label["kinds"], label["values"], label["set_by"]) == ("stuck", 5.0, "bridge")
-    wait_for_label(world, "aileron1_wing2_left", active=True, confirmed=True)
+    wait_for_label(
+        world, "aileron1_wing2_left", kinds="stuck", values=5.0, set_by="bridge", active=True, confirmed=True
+    )
     assert abs(wire.value(RIGHT)) < 2.0, "only one aileron is stuck"
     flown = collected(rolling, (TIME, LEFT, BANK), lambda _, __, bank: bank >= 30.0, "30 degrees of bank")
     rolling.close()
@@ -231,7 +231,7 @@ def test_what_cannot_be_failed_is_said(healthy, request_, code, text):
 
 def test_triggers(healthy):
     world, wire = healthy, healthy.wire
-    began = wire.value(TIME)
+    began = world.state.last.sim_time  # tx_node had come so far: a busy machine's may be behind X-Plane
     done = fail(world, "engine_1", trigger=AT_SIM_TIME, trigger_value=1.0)
     assert (done.success, done.result.code) == (True, ACCEPTED)
     asked = wire.value(TIME)
@@ -240,8 +240,8 @@ def test_triggers(healthy):
     wait_for_label(world, "bus_1", active=False, confirmed=False)
     wait_for_label(world, "battery_1", active=True, confirmed=True)  # at once: the twin is slower than that
     wait_for_label(world, "engine_1", active=True, confirmed=True)
-    some_frames = 0.2  # tx_node's newest one may be older than the one seen here
-    assert began - some_frames <= label_of(world, "engine_1")["since_sim_time"] - 1.0 <= asked + some_frames
+    some_frames = 0.2
+    assert began <= label_of(world, "engine_1")["since_sim_time"] - 1.0 <= asked + some_frames
     wire.wait(ENGINE, 0.0)
     assert label_of(world, "bus_1")["active"] is False
     assert wire.value(BUS) > 0.0
@@ -332,11 +332,11 @@ def test_xplane_12_whose_own_failure_does_not_act(new_world, tmp_path):
     asking.join(WAIT_S)
     assert answer[0].result.code == OK, answer[0].result.message
     wire.wait(LEFT, -25.0)
-    assert label_of(world, name)["since_sim_time"] > said_so, "not while X-Plane only said so"
     assert wire.value(SURFACES) == 1.0
     fcon.wait(up, 0.0)
     said(world, "X-Plane's own failure does not act")
     wait_for_label(world, name, active=True, confirmed=True, kinds="hard_over_up")
+    assert label_of(world, name)["since_sim_time"] > said_so, "not while X-Plane only said so"
     fcon.close()
     close(world)
 

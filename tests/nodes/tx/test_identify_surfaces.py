@@ -69,7 +69,10 @@ def test_identify_then_set_one_aileron_and_keep_flying(world):
         refused = call(world, "set_failure", "SetFailure", name="aileron1_wing2_left", kind="centred")
         assert refused.result.code == REFUSED
         assert "identify_surfaces" in refused.result.message
-        outcome = identify(world)
+        for _ in range(3):  # a busy machine's law may be silent for too long: a limit ends it
+            outcome = identify(world)
+            if outcome.success:
+                break
         assert outcome.success, outcome.text
         labels = [(s.kind, s.target, s.result) for s in world.signals.messages if s.id and not s.active]
         assert {target for _, target, result in labels if result == "done"} == {"roll", "pitch", "yaw"}

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
+from support.nodes.rx_fixtures import ALL_VALID
 from support.nodes.tx_fixtures import WatchedDatarefs, tx_params
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import wait_until
@@ -21,6 +22,7 @@ EARTH_RADIUS_M = 6378145.0
 LATITUDE, LONGITUDE = 37.4602, 126.4407
 TIME = "sim/time/total_running_time_sec"
 OVERRIDE3 = "sim/operation/override/override_planepath[3]"
+IN_A_ROW = 120  #: states of four seconds, at 30 frames a second
 KINEMATIC = ("--model", "kinematic", "--lat", LATITUDE, "--lon", LONGITUDE)
 
 
@@ -74,10 +76,12 @@ def settled_subscriptions(emulator):
 
 
 def test_nothing_is_asked_for_without_a_subscriber(world):
-    from xplane_bridge.msg import TrafficState
+    from xplane_bridge.msg import FlightState, TrafficState
 
     emulator = world.emulator(*KINEMATIC, "--traffic", 1)
+    states = world.watch("flight_state", FlightState)
     world.start("rx_node")
+    states.wait_for(lambda state: state.valid == ALL_VALID, what="a complete state")
     quiet = settled_subscriptions(emulator)
     log = world.watch("traffic/state", TrafficState)
     log.wait_for(lambda state: list(state.number) == [1], WAIT_S, "the other aircraft")
@@ -153,20 +157,27 @@ def fixture_placed(world):
 @pytest.mark.parametrize("way", ["written", "vehx"])
 def test_a_commanded_aircraft_flies_smoothly_and_is_given_back(world, placed, way):
     emulator, _ = placed(traffic_way=way)
-    first = world.traffic.wait_for(lambda state: 3 in list(state.number), WAIT_S, "aircraft 3")
-    world.traffic.wait_for(lambda state: state.sim_time > first.sim_time + 4.0, 60.0, "four seconds of flight")
-    seen = [state for state in world.traffic.messages if 3 in list(state.number)]
-    late_by = []
-    for state in seen:
+
+    def seen():
+        """Without the first, which may be of a frame in the middle of the first nine writes."""
+        return [state for state in world.traffic.messages[:] if 3 in list(state.number)][1:]
+
+    def keeps_up(state):
+        north = math.radians(state.latitude[list(state.number).index(3)] - LATITUDE) * EARTH_RADIUS_M
+        return abs(2000.0 + 50.0 * (state.sim_time - world.begin) - north - 10.0) <= 25.0
+
+    def flies_smoothly():
+        """In nine of ten states of four seconds; a slow machine may stop altogether for a moment."""
+        total = np.cumsum([0, *map(keeps_up, seen())])
+        return bool(np.any(total[IN_A_ROW:] - total[:-IN_A_ROW] >= 0.9 * IN_A_ROW))
+
+    wait_until(flies_smoothly, 2 * WAIT_S, "four seconds of smooth flight")
+    for state in seen():
         i = list(state.number).index(3)
-        north = math.radians(state.latitude[i] - LATITUDE) * EARTH_RADIUS_M
-        late_by.append(2000.0 + 50.0 * (state.sim_time - world.begin) - north)
         assert state.altitude_msl[i] == pytest.approx(900.0, abs=0.1)
         assert state.roll_deg[i] == pytest.approx(10.0, abs=0.05)
         if way == "written":
             assert state.velocity_north[i] == pytest.approx(50.0, abs=0.05)
-    # The pose that is sent is some frames old on a slow machine; which may also stop altogether for a moment.
-    assert sum(abs(metres - 10.0) <= 25.0 for metres in late_by) >= 0.9 * len(late_by), late_by
     wire = world.wire(emulator.port)
     assert wire.read(OVERRIDE3) == 1.0
     placed.stop()
