@@ -54,7 +54,9 @@ RequestResult FailureManager::await(const std::string& name) {
   };
   if (!link_->waitUntil(ended, longest)) return {core::ResultCode::kTimeout, "X-Plane did not show it in time"};
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  if (stopped_ || gone()) return {core::ResultCode::kNoLink, "X-Plane is not connected any more"};
+  // Not kNoLink, with which nothing has been done.
+  if (stopped_) return {core::ResultCode::kTimeout, "tx_node ends before X-Plane has shown it"};
+  if (gone()) return {core::ResultCode::kTimeout, "X-Plane went before it has shown it"};
   if (pending_.count(name) != 0) return {core::ResultCode::kAccepted, "X-Plane is paused: it acts when it goes on"};
   const auto why = not_shown_.find(name);
   if (why != not_shown_.end()) return {core::ResultCode::kTimeout, why->second};

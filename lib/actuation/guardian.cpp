@@ -28,8 +28,9 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kFindTime = 10.0;     // [s] until X-Plane's address is known: a name may have to be resolved
+constexpr double kFindTime = 2.0;      // [s] until X-Plane's address is known
 constexpr double kUndoTime = 10.0;     // [s] X-Plane answers within a frame or two, after a hitch, or it is gone too
+constexpr double kHangTime = 2.0;      // [s] the same while the parent may go on, and record anew what it takes
 constexpr double kAttemptTime = 0.5;   // [s] until a release that is not shown is sent again
 constexpr double kJournalAgain = 0.1;  // [s] until a journal that another process has locked is tried again
 constexpr double kBeatPeriod = 0.05;   // [s] at most often
@@ -191,10 +192,10 @@ std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int6
   return std::make_shared<core::Journal>(path, core::thisProcess("override_guardian"), runs, false);
 }
 
-bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report& report) {
+bool releaseLeftBehind(core::SimulatorPort* link, double time_s, const OverrideManager::Report& report) {
   if (!link->waitUntil([link] { return link->journal() != nullptr; }, kFindTime)) return false;
   OverrideManager overrides(link, report);
-  const core::Deadline deadline(link->clock(), kUndoTime);
+  const core::Deadline deadline(link->clock(), time_s);
   std::string problem;  // of the journal
   do {
     problem.clear();
@@ -207,8 +208,8 @@ bool releaseLeftBehind(core::SimulatorPort* link, const OverrideManager::Report&
 
 namespace {
 
-/// Gives back what the parent has in the journal. Returns whether nothing is left.
-bool undoFor(const GuardianOrders& orders, std::int64_t parent) {
+/// Gives back what the parent has in the journal, for so long [s]. Returns whether nothing is left.
+bool undoFor(const GuardianOrders& orders, std::int64_t parent, double time_s) {
   if (orders.journal.empty()) return true;
   try {
     auto journal = guardedJournal(orders.journal, parent);
@@ -222,7 +223,7 @@ bool undoFor(const GuardianOrders& orders, std::int64_t parent) {
         options, {}, core::hostClock(), [](core::LogLevel, const std::string&) {},
         [journal](const core::Endpoint&) { return journal; });
     link.start();
-    const bool done = releaseLeftBehind(&link, [](const std::string& text, bool success) {
+    const bool done = releaseLeftBehind(&link, time_s, [](const std::string& text, bool success) {
       std::fprintf(stderr, "override_guardian: %s%s\n", success ? "" : "NOT DONE: ", text.c_str());
     });
     link.stop();
@@ -262,7 +263,7 @@ GuardianOrders guard(std::int64_t parent) {
                  static_cast<long long>(parent), orders.hang_timeout);
     // First it must learn that it may not go on as before.
     static_cast<void>(send(STDIN_FILENO, "!", 1, MSG_NOSIGNAL | MSG_DONTWAIT));
-    undoFor(orders, parent);
+    undoFor(orders, parent, kHangTime);
     looked = core::hostClock().steadySeconds();
   }
 }
@@ -280,7 +281,7 @@ int runGuardian(int argc, char** argv) {
   for (int descriptor = STDERR_FILENO + 1; descriptor < last; ++descriptor) close(descriptor);
   const std::int64_t parent = std::strtoll(argv[1], nullptr, 10);
   const GuardianOrders orders = guard(parent);
-  return orders.dismissed || undoFor(orders, parent) ? 0 : 1;
+  return orders.dismissed || undoFor(orders, parent, kUndoTime) ? 0 : 1;
 }
 
 }  // namespace xplane_bridge

@@ -183,7 +183,10 @@ std::string TxLockstep::whatIsMissing() const {
   const std::string frame = "frame " + std::to_string(barrier_.number());
   std::vector<std::string> missing = barrier_.missing();
   for (std::string& each : missing) each += reasonOf(each);
-  if (!node_ready_ && !closed_) missing.emplace_back("tx_node itself, which waits for the simulator's answers");
+  if (!node_ready_ && !closed_) {
+    const bool begins = barrier_.number() == 0;
+    missing.emplace_back(begins ? "tx_node itself, which waits for the simulator's answers" : "tx_node itself");
+  }
   if (closed_ || missing.empty()) return "the simulator has not gone on from " + frame;
   return frame + " was not answered by " + core::join(missing);
 }

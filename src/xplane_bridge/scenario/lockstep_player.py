@@ -25,6 +25,8 @@ class LockstepPlayer(RosPlayer):
         **kwargs: As of RosPlayer.
     """
 
+    _link_wait_s = 0.0  # no frame comes while this node has not answered one
+
     def __init__(self, *args: Any, check: Callable[[], None], **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._check: Optional[Callable[[], None]] = check

@@ -24,7 +24,7 @@ from xplane_bridge.scenario.world import disturbance_request, time_request, weat
 #: Rate of the stick's messages [1/s]; they go on between flight states, as a real stick's do.
 STICK_RATE = 50.0
 _BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_node's failsafe knows better
-_SERVICE_WAIT_S = 15.0  # for a service to be there, and for X-Plane's link
+_SERVICE_WAIT_S = 15.0  # for a service to be there
 _AGAIN_S = 0.1  # after a refusal for want of a link
 MODE_WAIT_S = 15.0  #: for a mode to be shown
 _TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
@@ -90,6 +90,8 @@ class RosPlayer:
         log: Where to write, at the end, when what happened (JSON); None: nowhere.
         say: Called with a line on each event.
     """
+
+    _link_wait_s = 15.0  # for X-Plane's link, where tx_node has none
 
     def __init__(
         self,
@@ -323,22 +325,28 @@ class RosPlayer:
             self._tapped[button] = now + _TAP_S
 
     def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
-        """Calls tx_node; again while that has no link to X-Plane, as where frames are late: nothing was sent then."""
+        """Calls tx_node. Where it has no link to X-Plane, as when a frame is late, it does nothing: then again."""
         import rospy
 
         name = f"{self._namespace}/tx_node/{service}"
-        deadline = time.monotonic() + _SERVICE_WAIT_S
+        deadline = time.monotonic() + self._link_wait_s
+        said = False
         while True:
             try:
                 rospy.wait_for_service(name, _SERVICE_WAIT_S)
                 response = rospy.ServiceProxy(name, service_type)(**fields)
             except (rospy.ROSException, rospy.ServiceException) as error:
                 raise ScenarioError(f"{what}: {name} cannot be called: {error}") from None
-            unlinked = not response.success and response.result.code == ResultCode.NO_LINK
-            # Without a link tx_node repairs as soon as it is back; there is nothing to repair the second time.
-            if response.success or (unlinked and service == "clear_failures"):
+            if response.success:
                 return
-            if not unlinked or time.monotonic() > deadline:
+            unlinked = response.result.code == ResultCode.NO_LINK
+            if unlinked and not said:
+                said = True
+                self._say(f"{what}: {response.result.message}")
+            # Repaired as soon as the link is back; there is nothing to repair the second time.
+            if unlinked and service == "clear_failures":
+                return
+            if not unlinked or time.monotonic() >= deadline:
                 raise ScenarioError(f"{what}: {response.result.message}")
             time.sleep(_AGAIN_S)
 

@@ -11,6 +11,8 @@ import pytest
 
 from xplane_bridge.constants import ResultCode
 from xplane_bridge.scenario import ScenarioError, parse_scenario, ros_player
+from xplane_bridge.scenario.lockstep_player import LockstepPlayer
+from xplane_bridge.scenario.player import Action
 from xplane_bridge.scenario.ros_player import RosPlayer
 
 
@@ -85,8 +87,10 @@ def test_tx_node_hears_the_mode_requests_of_a_second_run(monkeypatch):
     assert player({"at": 60, "end": True})._mode_sequence >= first._mode_sequence + 60
 
 
-def called(monkeypatch, codes, event):
-    """Plays an event whose service answers with these codes, one after the other; gives how often it was called."""
+def calls_of(monkeypatch, codes, event, flying_class=RosPlayer, **options):
+    """Plays an event whose service answers with these codes, one after the other; gives how often it was called, and
+    what was said.
+    """
     answers = [
         SimpleNamespace(success=code <= ResultCode.ACCEPTED, result=SimpleNamespace(code=code, message=code.name))
         for code in codes
@@ -100,17 +104,19 @@ def called(monkeypatch, codes, event):
 
         return call
 
-    errors = {"ROSException": type("ROSException", (Exception,), {}), "ServiceException": type("E", (Exception,), {})}
+    errors = {name: type(name, (Exception,), {}) for name in ("ROSException", "ServiceException")}
     rospy = SimpleNamespace(wait_for_service=lambda *_: None, ServiceProxy=proxy, **errors)
     monkeypatch.setitem(sys.modules, "rospy", rospy)
     monkeypatch.setitem(sys.modules, "xplane_bridge.srv", mock.MagicMock())
     now = [100.0]
     monkeypatch.setattr(ros_player.time, "monotonic", lambda: now[0])
     monkeypatch.setattr(ros_player.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
-    flying = player({"at": 0, **event}, {"at": 60, "end": True})
-    flying._on_state(state(10.0))
-    flying._act(flying._actions.get_nowait())
-    return len(calls)
+    said = []
+    scenario = parse_scenario({"name": "test", "events": [{"at": 0, **event}, {"at": 60, "end": True}]})
+    flying = flying_class(scenario, "/xplane", say=said.append, **options)
+    ((kind, value),) = scenario.events[0].actions
+    flying._act(Action(kind, value, 0.0))
+    return len(calls), said
 
 
 BREAK = {"failure": {"name": "engine_1", "kind": "failed"}}
@@ -118,14 +124,20 @@ NO_LINK, OK, ACCEPTED, REFUSED = ResultCode.NO_LINK, ResultCode.OK, ResultCode.A
 
 
 def test_what_is_refused_for_want_of_a_link_is_asked_for_again(monkeypatch):
-    assert called(monkeypatch, [OK], BREAK) == 1
-    assert called(monkeypatch, [NO_LINK, NO_LINK, ACCEPTED], BREAK) == 3
+    assert calls_of(monkeypatch, [OK], BREAK) == (1, [])
+    assert calls_of(monkeypatch, [NO_LINK, NO_LINK, ACCEPTED], BREAK) == (3, ["failure of engine_1: NO_LINK"])
     with pytest.raises(ScenarioError, match="failure of engine_1: NO_LINK"):
-        called(monkeypatch, [NO_LINK], BREAK)
+        calls_of(monkeypatch, [NO_LINK], BREAK)
     with pytest.raises(ScenarioError, match="failure of engine_1: REFUSED"):
-        called(monkeypatch, [NO_LINK, REFUSED], BREAK)
+        calls_of(monkeypatch, [NO_LINK, REFUSED], BREAK)
 
 
-def test_a_repair_without_a_link_is_not_asked_for_again(monkeypatch):
+def test_a_repair_without_a_link_is_not_asked_for_again_but_said(monkeypatch):
     """tx_node repairs when the link is back; a second request finds nothing that is broken, and is refused."""
-    assert called(monkeypatch, [NO_LINK, REFUSED], {"clear_failures": True}) == 1
+    repairs = {"clear_failures": True}
+    assert calls_of(monkeypatch, [NO_LINK, REFUSED], repairs) == (1, ["repairing everything: NO_LINK"])
+
+
+def test_in_lock_step_no_link_comes_while_a_frame_waits(monkeypatch):
+    with pytest.raises(ScenarioError, match="failure of engine_1: NO_LINK"):
+        calls_of(monkeypatch, [NO_LINK, OK], BREAK, LockstepPlayer, check=lambda: None)

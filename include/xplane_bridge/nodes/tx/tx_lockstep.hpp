@@ -49,7 +49,7 @@ class TxLockstep {
   // The link's thread.
 
   void open(const core::LockstepFrame& frame, const ros::Time& stamp);
-  /// All of the frame was handled, and the node has what it needs of it. Says whether close() may come.
+  /// All of the frame was handled; in frame 0, the flight is known, too. Says whether close() may come.
   bool ready();
   /// Carries out what is due.
   void close();
@@ -107,8 +107,8 @@ class TxLockstep {
   std::int64_t stamp_ns_;
   std::int64_t previous_ns_;  // stamp of the frame before
   bool closed_ = false;       // the present frame
-  bool handled_ = false;      // the present frame, and it is not closed
-  bool node_ready_ = false;   // ready() was asked in the present frame
+  bool handled_ = false;      // the present frame, and it is not closed; of frame 0, until it is answered
+  bool node_ready_ = false;   // ready() was called in the present frame
   std::int64_t progress_ns_ = 0;
   bool stopped_ = false;
   std::thread watchdog_;  // last: it uses all of the above

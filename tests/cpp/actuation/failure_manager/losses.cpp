@@ -31,15 +31,15 @@ TEST_F(FailureManagerTest, LostLinkEndsTheWait) {
   sim_.setReadOnly(kEngine);
   after(0.1, [this] { setLink(LinkState::kLost); });
   const RequestResult result = set(failed("engine_1"));
-  EXPECT_EQ(result.code, ResultCode::kNoLink);
-  EXPECT_EQ(result.text, "X-Plane is not connected any more");
+  EXPECT_EQ(result.code, ResultCode::kTimeout) << "it was sent";
+  EXPECT_EQ(result.text, "X-Plane went before it has shown it");
 }
 
 TEST_F(FailureManagerTest, EndOfTheNodeEndsTheWait) {
   sim_.setReadOnly(kEngine);
   after(0.1, [this] { failures_.stop(); });
   const double begin = sim_.time();
-  EXPECT_EQ(set(failed("engine_1")).code, ResultCode::kNoLink);
+  EXPECT_EQ(set(failed("engine_1")).text, "tx_node ends before X-Plane has shown it");
   EXPECT_NEAR(sim_.time() - begin, 0.1, 0.05);
 }
 

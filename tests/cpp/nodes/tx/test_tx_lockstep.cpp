@@ -125,6 +125,15 @@ TEST_F(TxLockstepWatchdogTest, ANodeThatWaitsForTheSimulatorNamesItself) {
   EXPECT_EQ(said(), "frame 0 was not answered by tx_node itself, which waits for the simulator's answers");
 }
 
+TEST_F(TxLockstepWatchdogTest, ANodeThatHasNotHandledAFrameDoesNotBlameTheSimulator) {
+  core::LockstepFrame frame;
+  frame.number = 1;
+  lockstep_.open(frame, ros::Time(1001, 0));
+  lockstep_.takeDone("/rx_node", ros::Time(1001, 0), "");
+  lockstep_.takeDone("/player", ros::Time(1001, 0), "");
+  EXPECT_EQ(said(), "frame 1 was not answered by tx_node itself");
+}
+
 TEST_F(TxLockstepWatchdogTest, AllWhoHaveNotAnsweredAreNamedWithTheirReasons) {
   core::LockstepFrame frame;
   frame.number = 1;
