@@ -26,6 +26,7 @@ FPS = 10
 PIPELINE_DELAY_S = 0.15
 ENOUGH = 40
 PUNCTUAL = 5
+LOOK_AFTER = 10  #: further pictures
 
 
 @contextlib.contextmanager
@@ -93,10 +94,16 @@ def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: 
                 both = [(pair, [each[s.header.stamp] for s, each in zip(pair, strips)]) for pair in came]
                 return [(pair, seen) for pair, seen in both if all(strip.frame in punctual for strip in seen)]
 
-            wait_until(lambda: len(shared()) >= ENOUGH, 3 * WAIT_S, "frames that both cameras have")
-            wait_until(
-                lambda: len(compared()) >= PUNCTUAL, 3 * WAIT_S, "punctual ones, of which a busy machine has few"
-            )
+            looked = 0
+
+            def enough() -> bool:  # looking at all takes time that the programs have not
+                nonlocal looked
+                if len(cameras[0][2].messages) < looked + LOOK_AFTER:
+                    return False
+                looked = len(cameras[0][2].messages)
+                return len(shared()) >= ENOUGH and len(compared()) >= PUNCTUAL
+
+            wait_until(enough, 4 * WAIT_S, "frames that both cameras have, and windows that were punctual")
             launch.check_running()
         emulator.stop()
 

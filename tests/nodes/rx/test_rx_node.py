@@ -108,7 +108,8 @@ def test_states_are_complete_true_and_consistent(world, rx, transport, version):
     emulator.stop()
     if transport == "data":  # what comes by dataref is unknown at first where a busy simulator was silent for a second
         gaps = [(late.header.stamp - early.header.stamp).to_sec() for early, late in zip(states, states[1:])]
-        states = states[:1] + [state for state, gap in zip(states[1:], gaps) if gap < 0.9]
+        behind = {at + 1 + frames for at, gap in enumerate(gaps) if gap > 0.9 for frames in range(3)}
+        states = [state for number, state in enumerate(states) if number not in behind]
 
     for state in states:
         assert state.valid == ALL_VALID, f"valid {state.valid:#x} at sim_time {state.sim_time}"
@@ -219,9 +220,9 @@ def test_max_publish_rate_thins_evenly(world, rx):
     rx(max_publish_rate=20)
     states = world.states.wait_for_count(40, WAIT_S)
     counts = np.diff([state.frame_count for state in states])
-    each = round(0.05 / np.median([state.frame_period for state in states]))  # 3, but where frames are late
-    assert np.median(counts) == each
-    assert np.mean(abs(counts - each) <= 1) >= 0.9, counts
+    each = 0.05 / np.median([state.frame_period for state in states])  # 3, but where frames are late
+    assert abs(np.median(counts) - each) < 0.7
+    assert np.mean(abs(counts - each) <= 1.5) >= 0.9, counts
     took = (states[-1].header.stamp - states[0].header.stamp).to_sec()
     assert took > 39 * 0.05 - 0.06, "more than 20 a second"
 

@@ -231,7 +231,7 @@ def test_what_cannot_be_failed_is_said(healthy, request_, code, text):
 
 def test_triggers(healthy):
     world, wire = healthy, healthy.wire
-    began = world.state.last.sim_time  # tx_node had come so far: a busy machine's may be behind X-Plane
+    began = world.state.wait_for_next().sim_time  # tx_node had come so far: a busy machine's may be behind X-Plane
     done = fail(world, "engine_1", trigger=AT_SIM_TIME, trigger_value=1.0)
     assert (done.success, done.result.code) == (True, ACCEPTED)
     asked = wire.value(TIME)

@@ -169,6 +169,9 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     assert len(of_it) >= FPS - 1  # the state of the last may have been under way
     assert np.all(np.diff([states[stamp]["image_count"] for stamp in of_it]) == 1), "an image was lost on the way"
 
+    missing = [bool(state["quality"] & STATE_MISSING) for state in states.values()]
+    assert sum(missing[missing.index(False) :]) < 0.5 * len(missing)
+
     # Pairing across the machines: the state is that of the very frame. A picture that appeared late because the
     # computer was busy says nothing about that, nor does one whose state came too late.
     sure = judged(recorder, flight.swaps)

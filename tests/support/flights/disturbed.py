@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import warnings
 from pathlib import Path
 from typing import Callable
 
@@ -12,18 +13,21 @@ from xplane_bridge.bags import Bags
 from xplane_bridge.constants import FlightMode
 
 ATTEMPTS = 3
+_MODE, _LINK = "/xplane/control/mode", "/xplane/link_state"
 _STALE = 3  # of LinkState
 _LATE_S = 0.25  # between states, or between commands of a controller that sends them at 20 Hz or more
 
 
 def is_disturbed(bag: Path) -> bool:
-    """Whether a flight's recording shows what only a program that did not come to run does: late states or commands, a
-    controller that was taken as failed, a link that was taken as lost.
+    """Whether a flight's recording shows what a program does that has not come to run: late states or commands, a
+    controller that was taken as failed, a link that was taken as lost. A defect may show the same, but in all flights.
     """
     if not bag.is_file():
         return False
     with Bags(bag) as bags:
-        modes, links = bags.read("/xplane/control/mode"), bags.read("/xplane/link_state")
+        if not {_MODE, _LINK} <= bags.topics.keys():
+            return False
+        modes, links = bags.read(_MODE), bags.read(_LINK)
         late = [
             np.diff(bags.times(topic)).max(initial=0) > _LATE_S * 1e9
             for topic in ("/xplane/flight_state", "/xplane/control/auto")
@@ -48,5 +52,6 @@ def until_undisturbed(fly: Callable[[Path], subprocess.CompletedProcess[str]], f
         done = fly(out)
         if done.returncode == 0 or not is_disturbed(out / "flight.bag"):
             break
+        warnings.warn(f"flight {attempt} was disturbed, and is flown again:\n{done.stdout}", stacklevel=2)
     assert done.returncode == 0, done.stdout + done.stderr
     return out

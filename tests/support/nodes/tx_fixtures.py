@@ -168,7 +168,8 @@ class RepeatedJoy:
             self._timer = None
 
 
-#: [s] of tx_node: on a busy machine, one that stands still for a moment has not hung, and neither has X-Plane.
+#: [s] of tx_node: on a busy machine, one that stands still for a moment has not hung, and neither has X-Plane. What a
+#: hang does, and that load is none, tests of their own show with the shipped time.
 PATIENCE = {"hang_timeout": 30.0, "service_timeout": 10.0}
 
 

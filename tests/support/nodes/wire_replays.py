@@ -104,8 +104,8 @@ def assert_replayed(live: Sequence[bytes], replayed: Sequence[bytes], topic: str
 
 
 def states_by_run_and_time(payloads: list[bytes]) -> dict[tuple[int, float], Any]:
-    """Flight states by X-Plane's run, of which each is an epoch, and simulator time, which all begin with; of the same
-    time in one run, the first.
+    """Flight states by X-Plane's run and simulator time; of the same time in one run, the first. Each run is an epoch,
+    and there must be states of the first.
     """
     from xplane_bridge.msg import FlightState
 
