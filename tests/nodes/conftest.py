@@ -16,6 +16,7 @@ from support.nodes.connections import is_connected
 from support.nodes.consoles import ends_of_consoles
 from support.nodes.forked_emulator import ForkedEmulator
 from support.scheduling import long_ones_first, rank
+from support.worker_ports import keep_to_own_ports
 from xplane_bridge import protocol
 from xplane_bridge.harness import EmulatorProcess, HarnessError, ManagedProcess, RosMaster, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -43,6 +44,11 @@ LONG = (
 )
 
 heed_ctrl_c()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before any test draws a port."""
+    keep_to_own_ports(config, 0)
 
 
 @pytest.hookimpl(optionalhook=True)

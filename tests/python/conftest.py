@@ -8,6 +8,7 @@ import pytest
 
 from support.interrupts import heed_ctrl_c
 from support.scheduling import long_ones_first, rank
+from support.worker_ports import keep_to_own_ports
 
 #: Files and tests that take long, the longest first.
 LONG = (
@@ -21,6 +22,11 @@ LONG = (
 
 
 heed_ctrl_c()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before any test draws a port."""
+    keep_to_own_ports(config, 8)
 
 
 @pytest.hookimpl(optionalhook=True)

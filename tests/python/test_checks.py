@@ -161,7 +161,7 @@ for i in {{1..6000}}; do sleep 0.01; done"""
     endless.chmod(0o755)
     running = beside_nodes(
         tmp_path,
-        """check_nodes() { touch "$results/nodes"; sleep 100; }
+        """check_nodes() { touch "$results/nodes"; for i in {1..10000}; do sleep 0.01; done; }
 check_python() { "$results/endless"; }
 check_tidy() { touch "$results/tidy"; }""",
     )

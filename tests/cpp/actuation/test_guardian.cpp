@@ -331,9 +331,9 @@ TEST_F(GuardianProcess, GivesBackWhatAParentHasSetThatHangsWithTheJournalsLock) 
 
 TEST_F(GuardianProcess, UndoesWhatAParentThatHangsHasSetAndReportsItWhenItRunsAgain) {
   Flown flown, resting;
-  resting.guardian->beat(0.2);
+  resting.guardian->beat(1.0);
   resting.guardian->rest();
-  flown.guardian->beat(1.0);
+  flown.guardian->beat(2.0);
   EXPECT_FALSE(flown.guardian->hasActed());
   EXPECT_TRUE(undone(flown));
   EXPECT_TRUE(comes([&flown] { return flown.guardian->hasActed(); }));

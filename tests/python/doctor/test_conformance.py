@@ -50,14 +50,39 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+#: Flies the card as the program does, and says at the end for how long it did not come to run at most [s].
+WATCHED = """
+import sys, threading, time
+from xplane_bridge.cli.xplane_doctor import main
+longest = 0.0
+def watch():
+    global longest
+    before = time.monotonic()
+    while True:
+        time.sleep(0.01)
+        now = time.monotonic()
+        longest, before = max(longest, now - before), now
+threading.Thread(target=watch, daemon=True).start()
+try:
+    sys.exit(main(sys.argv[1:]))
+finally:
+    print("stood still for", longest, file=sys.stderr)
+"""
+DOCTOR = (program("xplane_doctor"),)
+#: Longer than this without an answer or without running, a question's windows may be too short [s].
+LATE_S = 0.15
+#: A question is asked again where what it found may be the machine's.
+ATTEMPTS = 4
+
+
 def emulator_options(id_, switched, version):
     words = ["--version", version, "--port", "0", "--bind", "127.0.0.1", "--no-beacon", "--priority", "normal"]
     return [*words, "--fps", str(FPS), *OPTIONS.get(id_, []), *(["--otherwise", id_] if switched else [])]
 
 
 @contextlib.contextmanager
-def emulator(*options):
-    """An emulator in real time; gives its port."""
+def emulator(*options, ended=None):
+    """An emulator in real time; gives its port. What it says of itself at its end is added to `ended`."""
     command = [sys.executable, program("xplane_emulator"), *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         try:
@@ -66,13 +91,16 @@ def emulator(*options):
             yield json.loads(ready.split(" ", 1)[1])["port"]
         finally:
             process.terminate()
+            said = process.stdout.read()
+        if ended is not None:
+            ended.append(json.loads(said.rpartition("STOPPED ")[2]))
 
 
-def doctor(port, home, *words):
+def doctor(port, home, *words, command=DOCTOR):
     """The doctor as users run it: exit code, stdout, stderr."""
-    command = [sys.executable, program("xplane_doctor"), "--host", "127.0.0.1", "--port", str(port), "--conformance"]
+    where = ["--host", "127.0.0.1", "--port", str(port), "--conformance"]
     done = subprocess.run(
-        [*command, *words],
+        [sys.executable, *command, *where, *words],
         env={**os.environ, "ROS_HOME": str(home)},
         capture_output=True,
         text=True,
@@ -138,13 +166,25 @@ def test_names_of_the_card_are_x_planes(version):
 # --------------------------------------------------------------------------------------------------- each question
 
 
-def asked_alone(id_, switched, version, home):
-    with emulator(*emulator_options(id_, switched, version)) as port:
-        code, out, err = doctor(port, home, "--yes", "--only", id_)
-        written = results.file_of(home / "xplane_bridge", "127.0.0.1", port)
-        said = json.loads(written.read_text(encoding="utf-8")) if written.is_file() else None
-        left = Journal(home / "xplane_bridge", "127.0.0.1", port).orphans()
-        return code, out, err, said, left
+def verdict_of(switched):
+    return Verdict.REFUTED if switched else Verdict.CONFIRMED
+
+
+def asked_alone(id_, switched, version, folder):
+    """Exit code, output, file and journal of a question; asked again where it was not answered as it should be while
+    emulator or doctor did not come to run."""
+    for attempt in range(ATTEMPTS):
+        home, ended = folder / str(attempt), []
+        with emulator(*emulator_options(id_, switched, version), ended=ended) as port:
+            code, out, err = doctor(port, home, "--yes", "--only", id_, command=("-c", WATCHED))
+            written = results.file_of(home / "xplane_bridge", "127.0.0.1", port)
+            said = json.loads(written.read_text(encoding="utf-8")) if written.is_file() else None
+            left = Journal(home / "xplane_bridge", "127.0.0.1", port).orphans()
+        answer = code, out, err, said, left
+        stood = float(err.rpartition("stood still for ")[2]), 1e-3 * ended[0]["period_error_ms"]["max"]
+        if out.startswith(f"{id_}: {verdict_of(switched).value} ") or max(stood) < LATE_S:
+            break
+    return answer
 
 
 CASES = [
@@ -171,7 +211,7 @@ def fixture_asked(request, tmp_path_factory):
 def test_a_question_alone_finds_its_switch(asked, case):
     id_, switched, version = case
     code, out, err, said, left = asked[case].result()
-    verdict = Verdict.REFUTED if switched else Verdict.CONFIRMED
+    verdict = verdict_of(switched)
     assert code == 0, err
     assert re.fullmatch(rf"{id_}: {verdict.value} \(.*\d.*\)\n", out), out
     assert said["questions"].keys() == {id_}
@@ -182,8 +222,11 @@ def test_a_question_alone_finds_its_switch(asked, case):
 
 def test_version_11_cannot_show_what_only_12_has(tmp_path):
     with emulator("--version", "11", "--port", "0", "--bind", "127.0.0.1", "--no-beacon") as port:
-        code, out, _ = doctor(port, tmp_path, "--yes", "--only", "vehs,fcon-acts")
-    assert code == 0
+        for _ in range(ATTEMPTS):  # a busy machine's may not answer in time, which is no testing either
+            code, out, err = doctor(port, tmp_path, "--yes", "--only", "vehs,fcon-acts")
+            if code == 0:
+                break
+    assert code == 0, err
     assert [line.split(" (")[0] for line in out.splitlines()] == ["vehs: not testable", "fcon-acts: not testable"]
 
 

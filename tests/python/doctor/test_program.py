@@ -46,6 +46,15 @@ def run(*arguments, **environment):
     return done
 
 
+def run_until(says, *arguments, **environment):
+    """Runs it; again where a busy machine's programs have taken longer than the seconds of its rounds."""
+    for _ in range(4):
+        done = run(*arguments, **environment)
+        if says in done.stdout:
+            break
+    return done
+
+
 def test_one_line_a_finding_and_a_verdict():
     findings = [ok("a", "fine"), note("b", "by the way"), problem("c", 'window "two\nlines"', "close it")]
     assert report.as_text(findings).splitlines() == [
@@ -80,7 +89,7 @@ def test_json_has_all_of_a_finding():
 def test_a_simulator_that_flies_is_found_well(tmp_path):
     values = {names.VERSION: 115501.0, names.PAUSED: 0.0, names.REPLAY: 0.0, FakeXPlane.TIME: 5.0}
     with FakeXPlane(values) as xplane:
-        done = run("--host", "127.0.0.1", "--port", xplane.port, "--json", HOME=str(tmp_path))
+        done = run_until("115501", "--host", "127.0.0.1", "--port", xplane.port, "--json", HOME=str(tmp_path))
     found = {finding["id"]: finding for finding in json.loads(done.stdout)}
     assert found["answer"]["severity"] == "ok"
     assert found["version"]["facts"] == {"version": 115501}
@@ -89,9 +98,10 @@ def test_a_simulator_that_flies_is_found_well(tmp_path):
 
 def test_nothing_on_the_port_is_a_finding_in_words(tmp_path):
     free = free_udp_port()
-    done = run("--host", "127.0.0.1", "--port", free, HOME=str(tmp_path))
+    problem_of_it = f"problem: nothing answers on 127.0.0.1:{free}"
+    done = run_until(problem_of_it, "--host", "127.0.0.1", "--port", free, HOME=str(tmp_path))
     assert done.returncode == 1
-    assert f"problem: nothing answers on 127.0.0.1:{free}" in done.stdout
+    assert problem_of_it in done.stdout
 
 
 @pytest.mark.parametrize("arguments", [["--port", "0"], ["--port", "70000"], ["--port", "x"], ["--colour"], ["more"]])
@@ -119,7 +129,10 @@ def test_it_starts_without_ros_and_without_what_only_linux_has(tmp_path):
 
     values = {names.VERSION: 115501.0, names.PAUSED: 0.0, names.REPLAY: 0.0, FakeXPlane.TIME: 5.0}
     with FakeXPlane(values) as xplane:
-        examined = started("--port", xplane.port)
+        for _ in range(4):  # a busy machine's programs may take longer than the seconds of its rounds
+            examined = started("--port", xplane.port)
+            if "(115501)" in examined.stdout:
+                break
         refused = started("--port", xplane.port, "--conformance", "--yes")
         assert xplane.others == []
     assert "(115501)" in examined.stdout, examined.stderr

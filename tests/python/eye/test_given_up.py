@@ -14,7 +14,7 @@ import pytest
 
 from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol
-from xplane_bridge.eye import calibrate, names, program
+from xplane_bridge.eye import calibrate, names, program, rref
 from xplane_bridge.eye.calibrate import CalibrationError, Delay
 from xplane_bridge.eye.grab import Grabber
 from xplane_bridge.eye.pairing import Decision
@@ -110,6 +110,9 @@ def start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[
     monkeypatch.setattr(calibrate, "_BETWEEN_S", (0.1, 0.12))
     monkeypatch.setattr(calibrate, "_SETTLE_S", 0.1)
     monkeypatch.setattr(program, "_CALIBRATE_AGAIN_S", 0.05)
+    # A busy machine's X-Plane may be silent for a moment.
+    monkeypatch.setattr(rref, "_SILENCE_S", LONGEST_S)
+    monkeypatch.setattr(calibrate, "_WRITE_TIMEOUT_S", LONGEST_S)
     monkeypatch.setattr(program, "Sender", Receiver)
     monkeypatch.setattr(Receiver, "decisions", [], raising=False)
     monkeypatch.setattr(Receiver, "problems", [], raising=False)

@@ -20,13 +20,13 @@ def test_a_port_is_free_and_not_of_those_given_away(monkeypatch, free_port, kind
         given.bind(("127.0.0.1", 0))
         assert first < given.getsockname()[1]
         drawn = itertools.count(first)  # others may have taken those that follow, too
-        monkeypatch.setattr(ports.secrets, "randbelow", lambda count: next(drawn) - (32768 - count))
+        monkeypatch.setattr(ports.secrets, "randbelow", lambda _: next(drawn) - ports._FIRST)
         assert free_port() > first
 
 
 def test_no_free_port_is_said(monkeypatch):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", ports.free_udp_port()))
-        monkeypatch.setattr(ports.secrets, "randbelow", lambda count: taken.getsockname()[1] - (32768 - count))
-        with pytest.raises(HarnessError, match="no free port between 20000 and 32767"):
+        monkeypatch.setattr(ports.secrets, "randbelow", lambda _: taken.getsockname()[1] - ports._FIRST)
+        with pytest.raises(HarnessError, match=f"no free port between {ports._FIRST} and {ports._END - 1}"):
             ports.free_udp_port()

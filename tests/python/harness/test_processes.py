@@ -5,10 +5,10 @@ import signal
 import subprocess
 import sys
 import textwrap
-import time
 
 import pytest
 
+from support.deadlines import WAIT_S
 from support.process_tree import alive
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 
@@ -58,7 +58,7 @@ def test_stop_ends_the_grandchildren_too(tmp_path):
     with python(code, tmp_path) as child:
         grandchild = int(child.wait_for_line(r"^READY (\d+)", 20.0).group(1))
         assert alive(grandchild)
-    wait_until(lambda: not alive(grandchild), 5.0, "end of the grandchild")
+    wait_until(lambda: not alive(grandchild), WAIT_S, "end of the grandchild")
 
 
 def test_stop_leaves_a_process_alone_that_has_got_the_number_of_one_that_ended(tmp_path):
@@ -115,7 +115,4 @@ def test_the_process_ends_when_its_starter_is_killed(tmp_path):
     starter.kill()
     starter.wait()
     starter.stdout.close()
-    deadline = time.monotonic() + 10.0
-    while alive(pid) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert not alive(pid)
+    wait_until(lambda: not alive(pid), WAIT_S, "end of what it has started")
