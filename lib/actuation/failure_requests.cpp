@@ -70,6 +70,7 @@ std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan&
     answered = std::all_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
   }
   if (answered) return std::nullopt;
+  if (!isUp(link_->status())) return noLink();
   if (!plan.surface) {
     return RequestResult{core::ResultCode::kNotSupported,
                          "this X-Plane does not answer to " + plan.datarefs.front() + ": is the name right?"};

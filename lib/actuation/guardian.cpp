@@ -28,7 +28,6 @@
 namespace xplane_bridge {
 namespace {
 
-constexpr double kFindTime = 2.0;      // [s] until X-Plane's address is known
 constexpr double kUndoTime = 10.0;     // [s] X-Plane answers within a frame or two, after a hitch, or it is gone too
 constexpr double kHangTime = 2.0;      // [s] the same while the parent may go on, and record anew what it takes
 constexpr double kAttemptTime = 0.5;   // [s] until a release that is not shown is sent again
@@ -193,9 +192,9 @@ std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int6
 }
 
 bool releaseLeftBehind(core::SimulatorPort* link, double time_s, const OverrideManager::Report& report) {
-  if (!link->waitUntil([link] { return link->journal() != nullptr; }, kFindTime)) return false;
-  OverrideManager overrides(link, report);
   const core::Deadline deadline(link->clock(), time_s);
+  if (!link->waitUntil([link] { return link->journal() != nullptr; }, time_s)) return false;
+  OverrideManager overrides(link, report);
   std::string problem;  // of the journal
   do {
     problem.clear();

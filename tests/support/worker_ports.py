@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import socket
 from typing import Any
 
 from xplane_bridge.harness import ports
 
 _PROCESSES = 16
+_FIRST, _END = ports._FIRST, ports._END
+_free_port = ports._free_port
 
 
 def keep_to_own_ports(config: Any, first: int) -> None:
-    """Has the free ports of this process be none that other processes draw: another program takes a port some time
-    after the draw, and until then it is free.
+    """Has this process draw ports that it has not drawn before, and other workers of up to eight do not draw: a port is
+    free until a program takes it, some time after the draw. Programs that tests start draw of all.
 
     Args:
         config: pytest's.
@@ -19,6 +22,18 @@ def keep_to_own_ports(config: Any, first: int) -> None:
     """
     worker = getattr(config, "workerinput", {}).get("workerid", "gw0")
     number = (first + int(worker[len("gw") :])) % _PROCESSES
-    size = (ports._END - ports._FIRST) // _PROCESSES
-    ports._FIRST += number * size
+    size = (_END - _FIRST) // _PROCESSES
+    ports._FIRST = _FIRST + number * size
     ports._END = ports._FIRST + size
+    drawn: set[int] = set()
+
+    def new_port(kind: socket.SocketKind) -> int:
+        while True:
+            port = _free_port(kind)
+            if len(drawn) >= size // 2:
+                drawn.clear()
+            if port not in drawn:
+                drawn.add(port)
+                return port
+
+    ports._free_port = new_port

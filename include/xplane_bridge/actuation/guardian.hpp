@@ -91,8 +91,8 @@ class HangWatch {
 /// that has not been waited for. It waits for no lock: the parent may hang while it has it.
 std::shared_ptr<core::Journal> guardedJournal(const std::string& path, std::int64_t parent);
 /// Gives back over `link`, whose journal is a guardedJournal(), what was left behind, and lets X-Plane go on if it was
-/// left paused. Waits for X-Plane to be found; then `time_s` [s] for X-Plane to show it and for the journal's lock.
-/// Returns whether nothing is left.
+/// left paused. Waits for `time_s` [s] for X-Plane to be found, to show it, and for the journal's lock. Returns whether
+/// nothing is left.
 bool releaseLeftBehind(core::SimulatorPort* link, double time_s, const OverrideManager::Report& report);
 
 /// The whole of override_guardian's main(). Its argument is the process it guards, its standard input the orders.

@@ -394,7 +394,7 @@ TEST(X11WindowSource, RefusesAPaletteScreenInWords) {
 }
 
 TEST(X11WindowSource, SurvivesTheServerAndFindsItAgain) {
-  // One that is looked for from 0 on finds no such number while this server is away.
+  // Servers that choose their number count from 0 on, and do not take this one while it is away.
   const std::string display = ":" + std::to_string(1000 + getpid() % 50000);
   auto server = std::make_unique<Xvfb>(24, std::vector<std::string>{}, display);
   X11SourceOptions options;

@@ -74,12 +74,7 @@ def test_second_node_of_the_same_name_replaces_the_first_in_order(world, tiny):
     second = tiny(wait=False)
     assert first.wait(WAIT_S) == 0
     assert (world.folder / "first").read_text(encoding="utf-8").split() == STOP_ORDER
-
-    def second_runs():  # latched, a word comes twice to who subscribes as it is said
-        said = [word.data for word in world.last_word.messages]
-        return "running" in said[said.index("undone") if "undone" in said else 1 :]
-
-    wait_until(second_runs, WAIT_S, "the second node's first word")
+    wait_until(lambda: world.trace.exists() and "start" in trace(world), WAIT_S, "the second node's start")
     for _ in range(2):
         world.wait_for_diagnostics("tiny")
     assert second.running

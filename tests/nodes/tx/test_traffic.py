@@ -172,7 +172,6 @@ def test_a_commanded_aircraft_flies_smoothly_and_is_given_back(world, placed, wa
         return bool(np.any(total[IN_A_ROW:] - total[:-IN_A_ROW] >= 0.9 * IN_A_ROW))
 
     wait_until(flies_smoothly, 2 * WAIT_S, "four seconds of smooth flight")
-    assert sum(map(keeps_up, seen())) > 0.5 * len(seen())
     for state in seen():
         i = list(state.number).index(3)
         assert state.altitude_msl[i] == pytest.approx(900.0, abs=0.1)

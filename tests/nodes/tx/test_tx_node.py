@@ -35,7 +35,7 @@ from support.nodes.tx_node_fixtures import (
 from xplane_bridge.constants import ResultCode
 from xplane_bridge.harness import wait_until
 
-OK, NO_LINK, TIMEOUT = ResultCode.OK, ResultCode.NO_LINK, ResultCode.TIMEOUT
+OK, TIMEOUT = ResultCode.OK, ResultCode.TIMEOUT
 MODE = 6  # of Event.kind
 AXES = {OVERRIDE[: -len("roll")] + axis for axis in ("roll", "pitch", "heading")}
 VERTICAL_OFFSET, HORIZONTAL_OFFSET = "field_of_view_vertical_deg", "field_of_view_horizontal_deg"
@@ -57,7 +57,7 @@ def set_view(world, **request):
 
     def done():
         answers.append(call(world, "set_view", "SetView", **request))
-        assert answers[-1].result.code in (OK, NO_LINK, TIMEOUT), answers[-1].result.message
+        assert answers[-1].result.code in (OK, TIMEOUT), answers[-1].result.message
         return answers[-1].success
 
     wait_until(done, WAIT_S, f"the view {request}")

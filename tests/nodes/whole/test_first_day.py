@@ -11,6 +11,7 @@ import csv
 import json
 import re
 import sys
+import time
 import warnings
 from pathlib import Path
 from typing import Any, Iterator
@@ -39,7 +40,7 @@ rosservice() {
   local said attempt
   for attempt in {1..60}; do
     said=$(command rosservice "$@") || { printf '%s\\n' "$said"; return 1; }
-    [[ $said != *'"X-Plane is not connected"'* ]] && break
+    [[ $said != *"X-Plane is not connected"* ]] && break
     sleep 0.5
   done
   printf '%s\\n' "$said"
@@ -225,11 +226,12 @@ def test_the_broken_aileron_of_readme_breaks_on_a_fresh_install(shells: Shells) 
 
 
 def flown(shells: Shells, name: str, text: str, bags: str) -> str:
-    """Types commands that fly in real time; again where the machine has disturbed the last flight, of `bags`."""
+    """Types commands that fly in real time; again where the machine has disturbed one, recorded in `bags`."""
     for attempt in range(ATTEMPTS):
+        began = time.time()
         code, said = shells.type(f"{name}_{attempt}", text, 500.0)
-        newest = sorted(shells.home.glob(bags), key=lambda bag: bag.stat().st_mtime)[-1:]
-        if code == 0 or not any(map(is_disturbed, newest)):
+        recorded = [bag for bag in shells.home.glob(bags) if bag.stat().st_mtime >= began]
+        if code == 0 or not any(map(is_disturbed, recorded)):
             break
         warnings.warn(f"a flight was disturbed, and is flown again:\n{said}", stacklevel=2)
     assert code == 0, said

@@ -170,7 +170,8 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     assert np.all(np.diff([states[stamp]["image_count"] for stamp in of_it]) == 1), "an image was lost on the way"
 
     missing = [bool(state["quality"] & STATE_MISSING) for state in states.values()]
-    assert sum(missing[missing.index(False) :]) < 0.5 * len(missing)
+    since = missing[missing.index(False) :]
+    assert sum(since) < 0.5 * len(since)
 
     # Pairing across the machines: the state is that of the very frame. A picture that appeared late because the
     # computer was busy says nothing about that, nor does one whose state came too late.

@@ -23,8 +23,8 @@ TOOL = Path(__file__).resolve().parents[3] / "scripts" / "release_overrides"
 FOLDER = "sim/operation/override/"
 STICK, THROTTLES = FOLDER + "override_joystick_roll", FOLDER + "override_throttles"
 TIMEOUT_S = 300.0
-#: The tool with ten seconds for each dataref, not two: on a busy machine X-Plane's stand-in may be silent for longer.
-PATIENT = TOOL.read_text("utf-8").replace("\nATTEMPTS = 5\n", "\nATTEMPTS = 25\n")
+#: The tool with six seconds for each dataref, not two: on a busy machine X-Plane's stand-in may be silent for longer.
+PATIENT = TOOL.read_text("utf-8").replace("\nATTEMPTS = 5\n", "\nATTEMPTS = 15\n")
 #: Nothing can be sent there: the system demands that broadcasts are asked for, and says so at once.
 NO_WAY = "255.255.255.255"
 
@@ -85,7 +85,7 @@ def left(tmp_path: Path) -> Tuple[XPlane, Path]:
 
 
 def release(journal: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    assert "ATTEMPTS = 25" in PATIENT
+    assert "ATTEMPTS = 15" in PATIENT
     command = [sys.executable, "-c", PATIENT, "--folder", str(journal.parent), *more]
     return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
 

@@ -94,14 +94,12 @@ class ForeignMemory:
             info.shmid = own
 
 
-NOT_YET = "the window was not looked for yet"
-
-
 def problem_of(grabber: LinuxGrabber) -> str:
     """What the grabber says; it must not become less certain at the next try."""
+    not_yet = grabber.problem
     grabber.start()
     try:
-        wait_until(lambda: grabber.problem not in ("", NOT_YET), LONGEST_S, "the reason")
+        wait_until(lambda: grabber.problem not in ("", not_yet), LONGEST_S, "the reason")
         time.sleep(WATCH_S)
     finally:
         grabber.stop()

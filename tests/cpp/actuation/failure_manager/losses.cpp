@@ -27,6 +27,15 @@ TEST_F(FailureManagerTest, ShortSilenceIsWaitedThrough) {
   require(failed("engine_1"));
 }
 
+TEST_F(FailureManagerTest, LinkThatGoesWhileTheNameIsAskedForSaysNothingOfTheName) {
+  const core::FailureRequest unknown = failed("rel_unknown");
+  EXPECT_EQ(set(unknown).code, ResultCode::kNotSupported);
+  after(0.1, [this] { setLink(LinkState::kLost); });
+  const RequestResult result = set(unknown);
+  EXPECT_EQ(result.code, ResultCode::kNoLink) << result.text;
+  EXPECT_EQ(result.text, "X-Plane is not connected");
+}
+
 TEST_F(FailureManagerTest, LostLinkEndsTheWait) {
   sim_.setReadOnly(kEngine);
   after(0.1, [this] { setLink(LinkState::kLost); });
