@@ -5,10 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
+from support.again import again_until
 from support.deadlines import PROGRAM_S
 from support.nodes.tx_fixtures import ROLL, CommandSource, WatchedDatarefs, tx_params
 from xplane_bridge.resources import config_file, program
@@ -20,19 +22,11 @@ SHIPPED = sorted(path.stem for path in config_file("aircraft", "README.md").pare
 def configured(port: int, folder: Path, *options: str) -> subprocess.CompletedProcess:
     """Runs scripts/aircraft_config; again where X-Plane has not answered in the seconds for which that waits."""
     command = [sys.executable, str(program("aircraft_config")), "--port", str(port), *options]
-    for _ in range(4):
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=PROGRAM_S,
-            check=False,
-        )
-        if "does not answer at" not in done.stderr:
-            break
-    return done
+    streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True}
+    return again_until(
+        lambda done: "does not answer at" not in done.stderr,
+        lambda: subprocess.run(command, cwd=folder, timeout=PROGRAM_S, check=False, **streams),
+    )
 
 
 @pytest.mark.parametrize(("aircraft", "version"), [("fixed_wing", "11"), ("multirotor", "12"), ("tiltrotor", "11")])

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from support.again import again_until
 from support.deadlines import WAIT_S
 from support.nodes.tx_fixtures import AUTO, LAW, WatchedDatarefs, call, tx_params
 from xplane_bridge.harness import ManagedProcess, wait_until
@@ -69,10 +70,8 @@ def test_identify_then_set_one_aileron_and_keep_flying(world):
         refused = call(world, "set_failure", "SetFailure", name="aileron1_wing2_left", kind="centred")
         assert refused.result.code == REFUSED
         assert "identify_surfaces" in refused.result.message
-        for _ in range(3):  # a busy machine's law may be silent for too long: a limit ends it
-            outcome = identify(world)
-            if outcome.success:
-                break
+        # A busy machine's law may be silent for too long: a limit ends it.
+        outcome = again_until(lambda ended: ended.success, lambda: identify(world), 3)
         assert outcome.success, outcome.text
         labels = [(s.kind, s.target, s.result) for s in world.signals.messages if s.id and not s.active]
         assert {target for _, target, result in labels if result == "done"} == {"roll", "pitch", "yaw"}

@@ -17,13 +17,13 @@ from typing import Any, Iterator
 
 import pytest
 
+from support.again import again_until
 from support.nodes.network_namespaces import Machine, TwoMachines, why_no_machines
 from xplane_bridge.harness import ManagedProcess
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import program
 
 READY_S = 60.0
-ATTEMPTS = 4
 _NOT_PERMITTED = why_no_machines()
 
 pytestmark = pytest.mark.skipif(bool(_NOT_PERMITTED), reason=_NOT_PERMITTED)
@@ -100,10 +100,7 @@ class Lab:
 
         Again where it has not: on a busy machine a program may be silent for longer than it listens.
         """
-        for _ in range(ATTEMPTS):
-            diagnosis = self.doctor(*arguments, **environment)
-            if diagnosis.causes == causes:
-                break
+        diagnosis = again_until(lambda found: found.causes == causes, lambda: self.doctor(*arguments, **environment))
         assert diagnosis.causes == causes, diagnosis.findings
         assert diagnosis.exit_code == bool(causes)
         return diagnosis

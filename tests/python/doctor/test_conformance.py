@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from support.again import again_until
 from support.deadlines import PROGRAM_S, WAIT_S
 from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge import protocol, xplane_names
@@ -223,10 +224,8 @@ def test_a_question_alone_finds_its_switch(asked, case):
 
 def test_version_11_cannot_show_what_only_12_has(tmp_path):
     with emulator("--version", "11", "--port", "0", "--bind", "127.0.0.1", "--no-beacon") as port:
-        for _ in range(ATTEMPTS):  # a busy machine's may not answer in time, which is no testing either
-            code, out, err = doctor(port, tmp_path, "--yes", "--only", "vehs,fcon-acts")
-            if code == 0:
-                break
+        words = "--yes", "--only", "vehs,fcon-acts"
+        code, out, err = again_until(lambda done: done[0] == 0, lambda: doctor(port, tmp_path, *words))
     assert code == 0, err
     assert [line.split(" (")[0] for line in out.splitlines()] == ["vehs: not testable", "fcon-acts: not testable"]
 

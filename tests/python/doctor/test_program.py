@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from support.absent_modules import WITHOUT_THEM
+from support.again import again_until
 from support.deadlines import PROGRAM_S, WAIT_S
 from support.simulator.fake_xplane import FakeXPlane
 from xplane_bridge.cli import xplane_doctor
@@ -48,11 +49,7 @@ def run(*arguments, **environment):
 
 def run_until(says, *arguments, **environment):
     """Runs it; again where a busy machine's programs have taken longer than the seconds of its rounds."""
-    for _ in range(4):
-        done = run(*arguments, **environment)
-        if says in done.stdout:
-            break
-    return done
+    return again_until(lambda done: says in done.stdout, lambda: run(*arguments, **environment))
 
 
 def test_one_line_a_finding_and_a_verdict():
@@ -129,10 +126,7 @@ def test_it_starts_without_ros_and_without_what_only_linux_has(tmp_path):
 
     values = {names.VERSION: 115501.0, names.PAUSED: 0.0, names.REPLAY: 0.0, FakeXPlane.TIME: 5.0}
     with FakeXPlane(values) as xplane:
-        for _ in range(4):  # a busy machine's programs may take longer than the seconds of its rounds
-            examined = started("--port", xplane.port)
-            if "(115501)" in examined.stdout:
-                break
+        examined = again_until(lambda done: "(115501)" in done.stdout, lambda: started("--port", xplane.port))
         refused = started("--port", xplane.port, "--conformance", "--yes")
         assert xplane.others == []
     assert "(115501)" in examined.stdout, examined.stderr
