@@ -8,21 +8,19 @@ import warnings
 import pytest
 
 from support.again import again_until
-from support.flights.disturbed import ATTEMPTS, is_disturbed, until_undisturbed
+from support.flights.disturbed import ATTEMPTS, Flown, is_disturbed, until_undisturbed
 from support.flights.synthetic_flight import FlightBag, stamp_ns
-from xplane_bridge.constants import FlightMode
-
-CONNECTED, STALE = 1, 3
+from xplane_bridge.constants import FlightMode, LinkState
 
 
-def record(file, mode=FlightMode.AUTO, failsafe=False, state=CONNECTED, late_s=0.0):
+def record(file, mode=FlightMode.AUTO, failsafe=False, state=LinkState.CONNECTED, late_s=0.0):
     """Two seconds, in which one command and one state come later than the others."""
     with FlightBag(file) as bag:
         for k in range(40):
             time_ns = stamp_ns(0.05 * k + (late_s if k >= 20 else 0.0))
             values = {
                 "control/mode": ("ControlMode", {"mode": mode, "failsafe": failsafe and k == 9}),
-                "link_state": ("LinkState", {"state": state if k == 9 else CONNECTED}),
+                "link_state": ("LinkState", {"state": state if k == 9 else LinkState.CONNECTED}),
                 "flight_state": ("FlightState", {"header": bag.header(time_ns, "", k)}),
                 "control/auto": ("ControlCommand", {}),
             }
@@ -37,7 +35,7 @@ def record(file, mode=FlightMode.AUTO, failsafe=False, state=CONNECTED, late_s=0
         ({}, False),
         ({"failsafe": True}, True),
         ({"failsafe": True, "mode": FlightMode.MANUAL}, False),
-        ({"state": STALE}, True),
+        ({"state": LinkState.STALE}, True),
         ({"late_s": 0.1}, False),
         ({"late_s": 0.3}, True),
     ],
@@ -65,22 +63,22 @@ def test_without_a_recording_no_flight_is_disturbed(tmp_path):
 def test_only_what_was_disturbed_and_missed_its_criteria_is_flown_again(tmp_path, codes, late_s, flights, well):
     flown = []
 
-    def fly(out):
+    def fly(number):
+        out = tmp_path / str(number)
         out.mkdir()
         record(out / "flight.bag", late_s=late_s)
         flown.append(out)
-        return subprocess.CompletedProcess([], codes[len(flown) - 1], "a criterion", "")
+        return Flown.into(out, subprocess.CompletedProcess([], codes[number], "a criterion", ""))
 
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         if well:
-            assert until_undisturbed(fly, tmp_path) == flown[-1]
+            assert until_undisturbed(fly).folder == flown[-1]
         else:
             with pytest.raises(AssertionError, match="a criterion"):
-                until_undisturbed(fly, tmp_path)
+                until_undisturbed(fly)
     assert len(flown) == flights
-    again = sum("was disturbed" in str(warning.message) for warning in said)
-    assert again == (flights - 1 if well else flights * (late_s > 0.0))
+    assert sum("is flown again" in str(warning.message) for warning in said) == flights - 1
 
 
 def test_what_does_not_fit_is_done_again_a_few_times():

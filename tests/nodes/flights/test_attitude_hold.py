@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from pathlib import Path
 
-from support.flights.disturbed import until_undisturbed
+from support.flights.disturbed import Flown, until_undisturbed
 from xplane_bridge.bags import Bags
 from xplane_bridge.constants import FlightMode
 from xplane_bridge.resources import program
@@ -35,11 +34,12 @@ def test_it_turns_and_holds_altitude_and_speed(tmp_path):
     controller = f"sh -c 'sleep 5; exec {hold}'"  # as late as on a busy machine: the scenario waits for it
     command = [sys.executable, str(program("run_scenario")), str(scenario), "--controller", controller]
 
-    def fly(out: Path) -> subprocess.CompletedProcess[str]:
+    def fly(number: int) -> Flown:
+        out = tmp_path / str(number)
         words = [*command, "--output", str(out)]
-        return subprocess.run(words, capture_output=True, text=True, timeout=180, check=False)
+        return Flown.into(out, subprocess.run(words, capture_output=True, text=True, timeout=180, check=False))
 
-    folder = until_undisturbed(fly, tmp_path)
+    folder = until_undisturbed(fly).folder
     scores = json.loads((folder / "scores.json").read_text(encoding="utf-8"))["criteria"]
     assert len(scores) == 4
     with Bags(folder / "flight.bag") as bags:

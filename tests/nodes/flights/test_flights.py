@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from support.flights.disturbed import until_undisturbed
+from support.flights.disturbed import Flown, until_undisturbed
 from xplane_bridge.bags import Bags
 from xplane_bridge.resources import program
 
@@ -18,21 +18,22 @@ from xplane_bridge.resources import program
 IN_LOCK_STEP = ("--lockstep", "--emulator=--fps 20")
 
 
-def flown(name: str, folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+def flown(name: str, folder: Path, *options: str) -> Flown:
     """Flies a scenario, which may miss its criteria."""
     command = [sys.executable, str(program("run_scenario")), name, "--output", str(folder), *options]
-    return subprocess.run(command, capture_output=True, text=True, timeout=550, check=False)
+    return Flown.into(folder, subprocess.run(command, capture_output=True, text=True, timeout=550, check=False))
 
 
 def fly(name: str, folder: Path, *options: str) -> dict:
     """Flies a scenario; gives its report. Every criterion is met."""
-    done = flown(name, folder, *options)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert f"scripts/flight_report {folder / 'flight.bag'} -o {folder / 'report.html'}" in done.stdout.splitlines()[-1]
-    return report_in(folder)
+    return report_of(flown(name, folder, *options))
 
 
-def report_in(folder: Path) -> dict:
+def report_of(flight: Flown) -> dict:
+    """The report of a flight, which has met every criterion."""
+    assert flight.code == 0, flight.said + flight.errors
+    folder = flight.folder
+    assert f"scripts/flight_report {folder / 'flight.bag'} -o {folder / 'report.html'}" in flight.said.splitlines()[-1]
     report = json.loads((folder / "scores.json").read_text(encoding="utf-8"))
     assert report["played"]["finished"]
     assert report["criteria"]
@@ -40,8 +41,8 @@ def report_in(folder: Path) -> dict:
 
 
 def test_the_quadrotor_flies_its_square_through_the_bridge_in_real_time(tmp_path):
-    folder = until_undisturbed(lambda out: flown("quadrotor_square", out), tmp_path)
-    labels = report_in(folder)["played"]["labels"]
+    flight = until_undisturbed(lambda number: flown("quadrotor_square", tmp_path / str(number)))
+    labels = report_of(flight)["played"]["labels"]
     assert labels["touchdown"] > labels["hover"] + 20.0
 
 

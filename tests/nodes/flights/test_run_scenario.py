@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from support.flights.disturbed import until_undisturbed
+from support.flights.disturbed import Flown, until_undisturbed
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.passport import read_passports
 from xplane_bridge.resources import config_file, program
@@ -57,20 +57,17 @@ def run(tmp_path, text, *options, out=None):
 
 @pytest.mark.parametrize("options", [(), ("--joystick", "logitech_extreme_3d_pro")], ids=["commands", "joystick"])
 def test_a_flight_that_meets_its_criteria(tmp_path, options):
-    said = []
+    def fly(number):
+        out = tmp_path / str(number)
+        return Flown.into(out, run(tmp_path, MET, *options, out=out))
 
-    def fly(out):
-        done = run(tmp_path, MET, *options, out=out)
-        said.append(done.stdout)
-        return done
-
-    folder = until_undisturbed(fly, tmp_path)
-    assert "short: 3 of 3 criteria met" in said[-1]
-    report = json.loads((folder / "scores.json").read_text(encoding="utf-8"))
+    flight = until_undisturbed(fly)
+    assert "short: 3 of 3 criteria met" in flight.said
+    report = json.loads((flight.folder / "scores.json").read_text(encoding="utf-8"))
     assert report["played"]["finished"]
     assert report["played"]["labels"]["turn"] == pytest.approx(2.0, abs=0.1)
     assert {c["name"]: c["passed"] for c in report["criteria"]} == {"turns": True, "levels": True, "begins": True}
-    with Bags(folder / "flight.bag") as bags:
+    with Bags(flight.bags) as bags:
         passport = read_passports(bags)[-1]
         aircraft = config_file("aircraft", "fixed_wing.yaml").read_bytes()
         assert (passport.flight["scenario"], passport.flight["text"]) == ("short", MET)

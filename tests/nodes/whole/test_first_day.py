@@ -12,14 +12,13 @@ import json
 import re
 import sys
 import time
-import warnings
 from pathlib import Path
 from typing import Any, Iterator
 
 import cv2
 import pytest
 
-from support.flights.disturbed import ATTEMPTS, is_disturbed
+from support.flights.disturbed import Flown, until_undisturbed
 from support.markdown import Block, blocks
 from support.nodes.network_namespaces import Machine, why_no_machines
 from support.nodes.recorded_topics import RecordedTopics
@@ -227,15 +226,13 @@ def test_the_broken_aileron_of_readme_breaks_on_a_fresh_install(shells: Shells) 
 
 def flown(shells: Shells, name: str, text: str, bags: str) -> str:
     """Types commands that fly in real time; again where the machine has disturbed one, recorded in `bags`."""
-    for attempt in range(ATTEMPTS):
+
+    def fly(number: int) -> Flown:
         began = time.time()
-        code, said = shells.type(f"{name}_{attempt}", text, 500.0)
-        recorded = [bag for bag in shells.home.glob(bags) if bag.stat().st_mtime >= began]
-        if code == 0 or not any(map(is_disturbed, recorded)):
-            break
-        warnings.warn(f"a flight was disturbed, and is flown again:\n{said}", stacklevel=2)
-    assert code == 0, said
-    return said
+        code, said = shells.type(f"{name}_{number}", text, 500.0)
+        return Flown(code, said, [bag for bag in shells.home.glob(bags) if bag.stat().st_mtime >= began])
+
+    return until_undisturbed(fly).said
 
 
 def scores(folder: Path) -> dict[str, dict[str, Any]]:

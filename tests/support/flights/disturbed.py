@@ -5,16 +5,15 @@ from __future__ import annotations
 import subprocess
 import warnings
 from pathlib import Path
-from typing import Callable
+from typing import Callable, NamedTuple, Sequence
 
 import numpy as np
 
 from xplane_bridge.bags import Bags
-from xplane_bridge.constants import FlightMode
+from xplane_bridge.constants import FlightMode, LinkState
 
 ATTEMPTS = 3
 _MODE, _LINK = "/xplane/control/mode", "/xplane/link_state"
-_STALE = 3  # of LinkState
 _LATE_S = 0.25  # between states, or between commands of a controller that sends them at 20 Hz or more
 
 
@@ -34,24 +33,41 @@ def is_disturbed(bag: Path) -> bool:
             if topic in bags.topics
         ]
     failsafe = modes["failsafe"][modes["mode"] == FlightMode.AUTO].any()
-    return bool(any(late) or failsafe or (links["state"] >= _STALE).any())
+    return bool(any(late) or failsafe or (links["state"] >= LinkState.STALE).any())
 
 
-def until_undisturbed(fly: Callable[[Path], subprocess.CompletedProcess[str]], folder: Path) -> Path:
+class Flown(NamedTuple):
+    """A flight by programs."""
+
+    code: int  #: exit code
+    said: str  #: on standard output
+    bags: Sequence[Path]  #: recordings
+    errors: str = ""  #: on standard error
+
+    @classmethod
+    def into(cls, folder: Path, done: subprocess.CompletedProcess[str]) -> Flown:
+        """That of run_scenario with this `--output`."""
+        return cls(done.returncode, done.stdout, [folder / "flight.bag"], done.stderr)
+
+    @property
+    def folder(self) -> Path:
+        """Of its recording."""
+        return self.bags[0].parent
+
+
+def until_undisturbed(fly: Callable[[int], Flown]) -> Flown:
     """Flies until a flight succeeds; again only where it was disturbed.
 
     Args:
-        fly: Flies into a folder that is not there yet, with run_scenario.
-        folder: Of the flights.
+        fly: Flies, and is given the number of flights before.
 
     Returns:
-        The folder of the flight that has succeeded.
+        The flight that has succeeded.
     """
-    for attempt in range(ATTEMPTS):
-        out = folder / f"flight_{attempt}"
-        done = fly(out)
-        if done.returncode == 0 or not is_disturbed(out / "flight.bag"):
+    for number in range(ATTEMPTS):
+        flown = fly(number)
+        if flown.code == 0 or number == ATTEMPTS - 1 or not any(map(is_disturbed, flown.bags)):
             break
-        warnings.warn(f"flight {attempt} was disturbed, and is flown again:\n{done.stdout}", stacklevel=2)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return out
+        warnings.warn(f"flight {number} was disturbed, and is flown again:\n{flown.said}", stacklevel=2)
+    assert flown.code == 0, flown.said + flown.errors
+    return flown
