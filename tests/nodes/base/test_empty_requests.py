@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.tx_fixtures import tx_params
+from support.nodes.tx_fixtures import call_linked, tx_params
 from xplane_bridge.constants import ResultCode
 from xplane_bridge.harness.processes import wait_until
 
@@ -44,15 +44,11 @@ def own_services(world: Any) -> dict[str, Any]:
     found = {}
 
     def class_of(name: str) -> Any:
-        kinds = []
-
-        def said() -> bool:  # again where a busy node has not said it in rosservice's five seconds
+        def said() -> Any:  # again where a busy node has not said it in rosservice's five seconds
             with contextlib.suppress(rosservice.ROSServiceIOException):
-                kinds.append(rosservice.get_service_class_by_name(name))
-            return bool(kinds)
+                return rosservice.get_service_class_by_name(name)
 
-        wait_until(said, WAIT_S, f"the type of {name}")
-        return kinds[0]
+        return wait_until(said, WAIT_S, f"the type of {name}")
 
     for name in rosservice.get_service_list(namespace=world.namespace):
         kind = class_of(name)
@@ -72,13 +68,6 @@ def test_nothing_given_is_refused_by_every_service_that_does_not_mean_it(bridge:
             leaf = name.rsplit("/", 1)[-1]
             assert f'`{leaf} "{{}}"` {MEANT[name]}' in page, "docs/nodes/services.md says what which means"
             continue
-        answers = []
-
-        def judged(name: str = name, kind: Any = kind, answers: list = answers) -> bool:
-            answers.append(bridge.call(name, kind))
-            return answers[-1].result.code != ResultCode.NO_LINK
-
-        wait_until(judged, WAIT_S, f"a link to X-Plane for {name}")
-        answer = answers[-1]
+        answer = call_linked(bridge, name, kind)
         assert (answer.success, answer.result.code) == (False, ResultCode.REFUSED), f"{name}: {answer}"
         assert WORDS.search(answer.result.message), f"{name}: {answer.result.message}"

@@ -53,15 +53,13 @@ def request_mode(world, mode, sequence=1, requester="test"):
 
 def set_view(world, **request):
     """Calls set_view; again where X-Plane has not shown in the second that it is given what it was asked for."""
-    answers = []
 
-    def done():
-        answers.append(call(world, "set_view", "SetView", **request))
-        assert answers[-1].result.code in (OK, TIMEOUT), answers[-1].result.message
-        return answers[-1].success
+    def shown():
+        answer = call(world, "set_view", "SetView", **request)
+        assert answer.result.code in (OK, TIMEOUT), answer.result.message
+        return answer if answer.success else None
 
-    wait_until(done, WAIT_S, f"the view {request}")
-    return answers[-1].result.message
+    return wait_until(shown, WAIT_S, f"the view {request}").result.message
 
 
 def test_nothing_is_touched_before_the_first_command(tx, world):

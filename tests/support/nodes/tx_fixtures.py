@@ -14,7 +14,7 @@ from typing import Any, Callable
 
 from support.deadlines import WAIT_S
 from xplane_bridge import protocol
-from xplane_bridge.constants import ControlField, FlightMode
+from xplane_bridge.constants import ControlField, FlightMode, ResultCode
 from xplane_bridge.harness.processes import wait_until
 from xplane_bridge.harness.xplane_client import XPlaneClient
 from xplane_bridge.resources import config_file
@@ -209,21 +209,24 @@ def take_away(world: Any, path: str, seen: Callable[[], Any]) -> None:
 
 
 def call(world: Any, service: str, kind: str, /, **request: Any) -> Any:
-    """Calls one of tx_node's services, of a type of xplane_bridge.srv.
-
-    Again where it is refused for want of a link, which it is whenever the emulator's frames are late.
-    """
+    """Calls one of tx_node's services, of a type of xplane_bridge.srv; as `call_linked`."""
     import xplane_bridge.srv
 
-    answers = []
+    return call_linked(world, f"tx_node/{service}", getattr(xplane_bridge.srv, kind), **request)
 
-    def answered() -> bool:
-        answers.append(world.call(f"tx_node/{service}", getattr(xplane_bridge.srv, kind), **request))
-        # What this one clears is cleared without a link, too; there is nothing to clear the second time.
-        return kind == "ClearFailures" or answers[-1].result.code != answers[-1].result.NO_LINK
 
-    wait_until(answered, WAIT_S, f"a link to X-Plane for {service}")
-    return answers[-1]
+def call_linked(world: Any, service: str, kind: type, /, **request: Any) -> Any:
+    """Calls a service of the world's; again where it is refused for want of a link, which it is whenever the emulator's
+    frames are late.
+    """
+
+    def answered() -> Any:
+        answer = world.call(service, kind, **request)
+        # What clear_failures clears is cleared without a link, too; there is nothing to clear the second time.
+        refused = answer.result.code == ResultCode.NO_LINK and not service.endswith("/clear_failures")
+        return None if refused else answer
+
+    return wait_until(answered, WAIT_S, f"a link to X-Plane for {service}")
 
 
 def pause(world: Any, paused: bool) -> None:
