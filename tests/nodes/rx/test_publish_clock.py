@@ -8,6 +8,7 @@ import pytest
 from support.deadlines import WAIT_S
 from support.nodes.late_pictures import ShownFrames, complete_rows, joined
 from support.nodes.tx_fixtures import tx_params
+from support.stretches import last_stretch
 from xplane_bridge import protocol
 from xplane_bridge.harness.processes import wait_until
 
@@ -18,14 +19,10 @@ RUNNING_TIME, PAUSED = "sim/time/total_running_time_sec", "sim/time/paused"
 
 
 def whole_run(states, clocks):
-    """IN_A_ROW states one after the other of which more than nine in ten have their time on /clock, or None.
-
-    A busy machine loses some of its queue of one, and may need some seconds to have such.
-    """
-    stamps, shown = [state.header.stamp for state in states], {clock.clock for clock in clocks}
-    missing = np.cumsum([0, *(stamp not in shown for stamp in stamps)])
-    runs = np.flatnonzero(missing[IN_A_ROW:] - missing[:-IN_A_ROW] < 0.1 * IN_A_ROW)
-    return states[runs[-1] : runs[-1] + IN_A_ROW] if len(runs) else None
+    """IN_A_ROW states one after the other of which nearly all have their time on /clock, or None."""
+    shown = {clock.clock for clock in clocks}
+    run = last_stretch((state.header.stamp in shown for state in states), IN_A_ROW)
+    return states[run] if run else None
 
 
 def test_stamps_and_clock_are_simulator_time(world):

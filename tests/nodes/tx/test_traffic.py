@@ -14,6 +14,7 @@ import pytest
 from support.deadlines import WAIT_S
 from support.nodes.rx_fixtures import ALL_VALID
 from support.nodes.tx_fixtures import WatchedDatarefs, tx_params
+from support.stretches import last_stretch
 from xplane_bridge.bags import Bags
 from xplane_bridge.harness import wait_until
 from xplane_bridge.resources import config_file, program
@@ -166,12 +167,7 @@ def test_a_commanded_aircraft_flies_smoothly_and_is_given_back(world, placed, wa
         north = math.radians(state.latitude[list(state.number).index(3)] - LATITUDE) * EARTH_RADIUS_M
         return abs(2000.0 + 50.0 * (state.sim_time - world.begin) - north - 10.0) <= 25.0
 
-    def flies_smoothly():
-        """In nine of ten states of four seconds; a slow machine may stop altogether for a moment."""
-        total = np.cumsum([0, *map(keeps_up, seen())])
-        return bool(np.any(total[IN_A_ROW:] - total[:-IN_A_ROW] >= 0.9 * IN_A_ROW))
-
-    wait_until(flies_smoothly, 2 * WAIT_S, "four seconds of smooth flight")
+    wait_until(lambda: last_stretch(map(keeps_up, seen()), IN_A_ROW), 2 * WAIT_S, "four seconds of smooth flight")
     for state in seen():
         i = list(state.number).index(3)
         assert state.altitude_msl[i] == pytest.approx(900.0, abs=0.1)

@@ -17,6 +17,7 @@ from support.deadlines import WAIT_S
 from support.nodes.late_pictures import complete_rows, punctual_frames
 from support.nodes.network_namespaces import Machine, TwoMachines, why_no_machines
 from support.nodes.recorded_topics import RecordedTopics
+from support.stretches import last_stretch
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
 from xplane_bridge.resources import program
@@ -118,15 +119,6 @@ def whole_second(recorder: RecordedTopics) -> tuple[float, float] | None:
     return (times[whole[0]], times[whole[0] + FPS - 1]) if len(whole) else None
 
 
-def few_missing(recorder: RecordedTopics) -> bool:
-    """Whether nine in ten of PERFECT pictures one after the other have their state: where a busy computer stands still
-    for seconds, those of that time have not.
-    """
-    missing = [bool(state["quality"] & STATE_MISSING) for state in recorder.all("camera/frame_state")]
-    total = np.cumsum([0, *missing])
-    return bool(np.any(total[PERFECT:] - total[:-PERFECT] <= 0.1 * PERFECT)) if len(missing) >= PERFECT else False
-
-
 def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     flight.start_bridge()
     recorder = flight.recorder(flight.bridge)
@@ -145,7 +137,11 @@ def test_everything_arrives_belongs_together_and_flies(flight: Flight) -> None:
     # The paper's rate, in simulator time: every frame of a second of 30 came over as a raw picture. A computer
     # that is busy with other work may need some seconds to have one.
     wait_until(lambda: whole_second(recorder), 4 * WAIT_S, "30 raw pictures in a second")
-    wait_until(lambda: few_missing(recorder), 2 * WAIT_S, "pictures with their state")
+
+    def paired() -> Iterator[bool]:
+        return (not state["quality"] & STATE_MISSING for state in recorder.all("camera/frame_state"))
+
+    wait_until(lambda: last_stretch(paired(), PERFECT), 2 * WAIT_S, "pictures with their state")
     wait_until(lambda: len(judged(recorder, flight.swaps)) >= JUDGED, 2 * WAIT_S, "punctual pictures")
     flight.stop()  # what is still in buffers is written
 
