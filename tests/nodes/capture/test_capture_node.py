@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import socket
 import sys
 import threading
 from pathlib import Path
@@ -13,8 +12,17 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import ShownFrames, display_delays, joined, pixels, punctual_frames, schedule_late
+from support.nodes.late_pictures import (
+    ShownFrames,
+    decoded,
+    display_delays,
+    joined,
+    pixels,
+    punctual_frames,
+    schedule_late,
+)
 from xplane_bridge import protocol
+from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.resources import program
 
@@ -54,16 +62,6 @@ draw()
 root.mainloop()
 """
     return ManagedProcess("black", [sys.executable, "-c", code], world.folder)
-
-
-def write_dataref(port: int, path: str, value: float) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(protocol.DrefWrite(path, value).encode(), ("127.0.0.1", port))
-
-
-def send_command(port: int, path: str) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.sendto(protocol.CommandRequest(path).encode(), ("127.0.0.1", port))
 
 
 def topics() -> dict:
@@ -170,25 +168,25 @@ def test_a_node_that_is_scheduled_late_pairs_no_picture_wrongly(world, display, 
 def test_views_and_field_of_view_are_read_back(world, display) -> None:
     from xplane_bridge.msg import FrameState
 
-    emulator = window(world)
+    wire = world.wire(window(world).port)
     capture(world, display)
     infos, states = watch(world, "info", "state")
     states.wait_for(lambda state: state.view == FrameState.VIEW_FORWARD)
-    write_dataref(emulator.port, HEAD_PSI, 180.0)  # nothing, but in the 3-D cockpit
+    wire.send(protocol.DrefWrite(HEAD_PSI, 180.0))  # nothing, but in the 3-D cockpit
     with pytest.raises(HarnessError):
         states.wait_for_next(lambda state: state.view != FrameState.VIEW_FORWARD, timeout=1.0)
-    send_command(emulator.port, "sim/view/3d_cockpit_cmnd_look")
-    write_dataref(emulator.port, HEAD_PSI, 180.0)
+    wire.send(protocol.CommandRequest("sim/view/3d_cockpit_cmnd_look"))
+    wire.send(protocol.DrefWrite(HEAD_PSI, 180.0))
     state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_REAR)
     assert state.header.frame_id == "camera_optical"
-    write_dataref(emulator.port, HEAD_PSI, 0.0)
-    write_dataref(emulator.port, HEAD_THE, -90.0)
+    wire.send(protocol.DrefWrite(HEAD_PSI, 0.0))
+    wire.send(protocol.DrefWrite(HEAD_THE, -90.0))
     states.wait_for_next(lambda state: state.view == FrameState.VIEW_DOWN)
-    write_dataref(emulator.port, HEAD_THE, -30.0)
+    wire.send(protocol.DrefWrite(HEAD_THE, -30.0))
     state = states.wait_for_next(lambda state: state.view == FrameState.VIEW_UNKNOWN)
     assert not state.quality & FrameState.QUALITY_VIEW_UNKNOWN, "it is none of the three, but it is known"
     assert state.camera_pose_source == FrameState.POSE_MEASURED
-    write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
+    wire.send(protocol.DrefWrite(FIELD_OF_VIEW, 90.0))
     unsure = FrameState.QUALITY_FOV_ASSUMED  # which frame of the change the first pictures show
     state = states.wait_for_next(lambda s: abs(s.field_of_view_deg - 90.0) < 1e-3 and not s.quality & unsure)
     since = state.header.stamp
@@ -217,7 +215,7 @@ def test_a_picture_has_the_field_of_view_of_the_frame_that_it_shows(world, displ
         return sum(shown[picture].frame in due for picture in pictures)
 
     wait_until(lambda: punctual_since(began) >= 3, WAIT_S, "pictures of one field of view")
-    write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
+    world.wire(emulator.port).send(protocol.DrefWrite(FIELD_OF_VIEW, 90.0))
     change = states.wait_for_next(lambda state: abs(state.field_of_view_deg - 90.0) < 1e-3 and state.quality == 0)
     wait_until(lambda: punctual_since(change.header.stamp) >= FPS // 2, WAIT_S, "pictures of the other")
     pictures = [image for image in joined(images, infos, states) if image.header.stamp >= began]
@@ -242,24 +240,24 @@ def test_a_picture_has_the_field_of_view_of_the_frame_that_it_shows(world, displ
 
 
 def test_nominal_frames_where_wanted(world, display) -> None:
-    emulator = window(world)
+    wire = world.wire(window(world).port)
     capture(world, display, nominal_frames=True)
     (states,) = watch(world, "state")
     state = states.wait_for(lambda state: state.camera_pose_source == state.POSE_MEASURED)
     assert state.header.frame_id == "camera_forward_optical"
-    send_command(emulator.port, "sim/view/back")
+    wire.send(protocol.CommandRequest("sim/view/back"))
     states.wait_for_next(lambda state: state.header.frame_id == "camera_rear_optical")
 
 
 def test_camera_info_follows_the_frustum(world, display) -> None:
-    emulator = window(world)
+    wire = world.wire(window(world).port)
     capture(world, display)
     (infos,) = watch(world, "info")
     infos.wait_for()
-    write_dataref(emulator.port, FIELD_OF_VIEW, 90.0)
-    write_dataref(emulator.port, "sim/graphics/view/vertical_field_of_view_deg", 60.0)
-    write_dataref(emulator.port, "sim/graphics/settings/non_proportional_vertical_FOV", 1.0)
-    write_dataref(emulator.port, "sim/graphics/view/field_of_view_horizontal_ratio", 0.25)
+    wire.send(protocol.DrefWrite(FIELD_OF_VIEW, 90.0))
+    wire.send(protocol.DrefWrite("sim/graphics/view/vertical_field_of_view_deg", 60.0))
+    wire.send(protocol.DrefWrite("sim/graphics/settings/non_proportional_vertical_FOV", 1.0))
+    wire.send(protocol.DrefWrite("sim/graphics/view/field_of_view_horizontal_ratio", 0.25))
     # fx = 320 / tan 45 deg, fy = 240 / tan 30 deg; the middle lies a quarter of the width right of the line of sight
     wanted = (320.0, 159.5, 415.692, 239.5)
     infos.wait_for_next(lambda info: (info.K[0], info.K[2], info.K[4], info.K[5]) == pytest.approx(wanted, abs=1e-2))
@@ -287,16 +285,15 @@ def test_three_static_frames(world, display) -> None:
 
 
 def test_one_advertiser_of_compressed_and_it_decodes(world, display) -> None:
-    import cv2
     import rosgraph
 
     window(world)
     capture(world, display)
     (jpegs,) = watch(world, "jpeg")
-    message = jpegs.wait_for()
+    message = jpegs.wait_for(lambda jpeg: decoded(jpeg).any())  # the window is black before its first frame
     assert "jpeg" in message.format
-    decoded = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
-    assert decoded.shape == (480, 640, 3)
+    assert decoded(message).shape == (480, 640, 3)
+    read_strip(decoded(message))
     publishers = dict(rosgraph.Master("/tests").getSystemState()[0])
     assert publishers[f"{world.namespace}/camera/image_raw/compressed"] == [f"{world.namespace}/capture_node"]
 
@@ -395,8 +392,8 @@ def test_works_alone_on_any_window(world, display) -> None:
 
 
 def test_field_of_view_is_set_and_given_back(world, display) -> None:
-    emulator = window(world)
-    write_dataref(emulator.port, FIELD_OF_VIEW, 72.0)
+    wire = world.wire(window(world).port)
+    wire.send(protocol.DrefWrite(FIELD_OF_VIEW, 72.0))
     node = capture(world, display, field_of_view_deg=40.0, set_field_of_view=True)
     (states,) = watch(world, "state")
     states.wait_for(lambda state: abs(state.field_of_view_deg - 40.0) < 1e-3, timeout=WAIT_S)

@@ -7,12 +7,10 @@ import shutil
 from pathlib import Path
 from typing import Iterator
 
-import cv2
-import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import ShownFrames, joined
+from support.nodes.late_pictures import ShownFrames, decoded, joined
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -81,5 +79,5 @@ def test_compressed_has_one_advertiser(world, display, package: Path, tmp_path: 
         assert len(set(stamps)) == len(stamps), "a picture came twice"
         for jpeg in both():
             assert jpeg.format == "bgr8; jpeg compressed bgr8"
-            strip = read_strip(cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR))
+            strip = read_strip(decoded(jpeg))
             assert strip == shown.by_stamp()[jpeg.header.stamp], "another picture than the raw image of its stamp"

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import ShownFrames, joined, punctual_frames, schedule_late
+from support.nodes.late_pictures import ShownFrames, decoded, joined, punctual_frames, schedule_late, seldom
 from xplane_bridge import protocol
 from xplane_bridge.emulator.view.renderer import read_strip
 from xplane_bridge.eye import program as eye_program
@@ -33,7 +33,6 @@ pytestmark = pytest.mark.usefixtures("screen")
 FIELD_OF_VIEW = "sim/graphics/view/field_of_view_deg"
 TIMES_ON_SCREEN = "sim/network/dataout/data_to_screen[1]"
 LONGEST_S = 300.0
-LOOK_AFTER = 20  #: further pictures, as looking at all takes time that their programs have not
 FPS = 20
 WIDTH, HEIGHT = 320, 240  #: [px] of window and pictures, small: to be drawn, read, sent and decoded many times
 USERS_DEG = 72.0
@@ -142,27 +141,20 @@ class Scene:
         pairs = [(state, shown[state.header.stamp]) for state in states]
         return [(state, frame) for state, frame in pairs if frame.frame in punctual]
 
-    def perfect(self) -> int:
-        """How many of them carry no flag."""
-        return sum(state.quality == 0 for state, _ in self.punctual())
-
     def wait_until_perfect(self, count: int, and_also: Callable[[], bool] = lambda: True) -> None:
         """Waits for so many: on a busy machine few pictures come when they are due."""
-        seen = -LOOK_AFTER
-
-        def enough() -> bool:
-            nonlocal seen
-            if len(self.states.messages) < seen + LOOK_AFTER:
-                return False
-            seen = len(self.states.messages)
-            return self.perfect() >= count and and_also()
-
+        enough = seldom(self.states, lambda: perfect(self.punctual()) >= count and and_also())
         wait_until(enough, 3 * WAIT_S, f"{count} perfectly paired pictures that were punctual")
 
 
 @pytest.fixture
 def scene(world, tmp_path: Path) -> Scene:
     return Scene(world, tmp_path)
+
+
+def perfect(pairs: list) -> int:
+    """How many carry no flag."""
+    return sum(state.quality == 0 for state, _ in pairs)
 
 
 def check_exact(pairs: list, at_least: int) -> None:
@@ -194,7 +186,6 @@ def measure(scene: Scene) -> str:
 
 
 def test_regular_frames_and_a_delay_of_three_periods_are_paired_exactly(scene: Scene) -> None:
-    import cv2
     from xplane_bridge.msg import FrameState
 
     with scene.eye() as eye:
@@ -214,8 +205,7 @@ def test_regular_frames_and_a_delay_of_three_periods_are_paired_exactly(scene: S
     for jpeg in jpegs:  # image_raw is what the sender's own JPEG decodes to
         if jpeg.header.stamp in images:
             compared += 1
-            decoded = cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR)
-            assert decoded.tobytes() == images[jpeg.header.stamp].data
+            assert decoded(jpeg).tobytes() == images[jpeg.header.stamp].data
     assert compared >= 5
     image = next(iter(images.values()))
     assert (image.width, image.height, image.encoding) == (WIDTH, HEIGHT, "bgr8")
@@ -256,18 +246,14 @@ def test_an_eye_that_looks_too_late_says_so(scene: Scene) -> None:
     with scene.eye("--delay", str(PIPELINE_DELAY_S)) as eye:
         scene.states.wait_for(lambda state: state.quality == 0, 60.0, "a perfectly paired picture")
         first = len(scene.states.messages)
-        looked = 0
 
         def enough() -> bool:
-            nonlocal looked
-            states = scene.states.messages[first:]
-            if sum(state.quality == 0 for state in states) < 60 or len(states) < looked + LOOK_AFTER:
-                return False
-            looked = len(states)
-            late = any(state.quality == FrameState.QUALITY_BORDERLINE for state, _ in scene.punctual())
-            return late and scene.perfect() >= 15
+            pairs = scene.punctual()
+            late = any(state.quality == FrameState.QUALITY_BORDERLINE for state, _ in pairs)
+            unflagged = sum(state.quality == 0 for state in scene.states.messages[first:])
+            return unflagged >= 60 and late and perfect(pairs) >= 15
 
-        schedule_late(eye, 1.0 / FPS, enough, 3 * WAIT_S)
+        schedule_late(eye, 1.0 / FPS, seldom(scene.states, enough), 3 * WAIT_S)
         pairs = scene.judged()
     check_exact(pairs, 15)
     assert any(state.quality == FrameState.QUALITY_BORDERLINE for state, _ in pairs)

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from support.deadlines import WAIT_S
-from support.nodes.late_pictures import ShownFrames, punctual_frames
+from support.nodes.late_pictures import ShownFrames, punctual_frames, seldom
 from support.nodes.second_camera import NAME, WINDOW, second_camera
 from xplane_bridge.harness import ManagedProcess, wait_until
 from xplane_bridge.harness.display import VirtualDisplay
@@ -26,7 +26,6 @@ FPS = 10
 PIPELINE_DELAY_S = 0.15
 ENOUGH = 40
 PUNCTUAL = 5
-LOOK_AFTER = 10  #: further pictures
 
 
 @contextlib.contextmanager
@@ -94,28 +93,21 @@ def test_forward_and_down_join_by_the_frame(world, tmp_path: Path, monkeypatch: 
                 both = [(pair, [each[s.header.stamp] for s, each in zip(pair, strips)]) for pair in came]
                 return [(pair, seen) for pair, seen in both if all(strip.frame in punctual for strip in seen)]
 
-            looked = 0
-
-            def enough() -> bool:  # looking at all takes time that the programs have not
-                nonlocal looked
-                if len(cameras[0][2].messages) < looked + LOOK_AFTER:
-                    return False
-                looked = len(cameras[0][2].messages)
-                return len(shared()) >= ENOUGH and len(compared()) >= PUNCTUAL
-
+            enough = seldom(cameras[0][2], lambda: len(shared()) >= ENOUGH and len(compared()) >= PUNCTUAL, 10)
             wait_until(enough, 4 * WAIT_S, "frames that both cameras have, and windows that were punctual")
             launch.check_running()
         emulator.stop()
 
     for pair in shared():
         assert pair[0].state == pair[1].state, "the same frame, the same state"
-    for pair, strips in compared():
+    judged = compared()
+    for pair, strips in judged:
         assert [np.float32(strip.sim_time) == pair[1].state.sim_time for strip in strips] == [True, True], (
             [(strip.frame, strip.sim_time) for strip in strips],
             [(state.display_time.to_nsec(), state.grab_time.to_nsec(), state.frame_sim_time) for state in pair],
             [log.read_text() for log in logs],
         )
-    assert len(compared()) >= PUNCTUAL
+    assert len(judged) >= PUNCTUAL
 
     forward, down = pair
     assert (forward.header.frame_id, forward.view) == ("camera_optical", FrameState.VIEW_FORWARD)

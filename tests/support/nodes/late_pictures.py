@@ -45,6 +45,33 @@ def pixels(image: Any) -> np.ndarray:
     return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
 
 
+def decoded(jpeg: Any) -> np.ndarray:
+    """The pixels of a sensor_msgs/CompressedImage, likewise."""
+    import cv2
+
+    return cv2.imdecode(np.frombuffer(jpeg.data, np.uint8), cv2.IMREAD_COLOR)
+
+
+def seldom(log: Any, condition: Callable[[], bool], further: int = 20) -> Callable[[], bool]:
+    """A condition that looks at all pictures, for what asks it all the time: that takes time their programs have not.
+
+    Args:
+        log: Of a topic with a message for each picture.
+        condition: What is asked.
+        further: Only after so many further messages.
+    """
+    looked = -further
+
+    def asked() -> bool:
+        nonlocal looked
+        if len(log.messages) < looked + further:
+            return False
+        looked = len(log.messages)
+        return condition()
+
+    return asked
+
+
 class ShownFrames:
     """Which frames of the emulator's window images show, each read once.
 
