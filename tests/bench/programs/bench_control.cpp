@@ -220,11 +220,10 @@ void run(const bench::Settings& settings) {
     };
     std::int64_t next = bench::now_ns() / kPeriod * kPeriod;
     std::int64_t end = next + kPatience;
-    std::int64_t latest = end;
     bool measuring = false;
     // On a busy computer a short run may have phases in which nothing came yet.
     const auto goes_on = [&](std::int64_t now) {
-      return now < end || (now < latest && measuring && !(ours.complete() && floor.complete()));
+      return now < end || (measuring && now < end + kPatience && !(ours.complete() && floor.complete()));
     };
     for (std::uint64_t turn = 0; goes_on(bench::now_ns()); ++turn) {
       next += kPeriod;
@@ -239,7 +238,6 @@ void run(const bench::Settings& settings) {
       if (!measuring && ours.arrived > 50 && floor.arrived > 50) {
         measuring = true;
         end = bench::now_ns() + static_cast<std::int64_t>(settings.number("seconds") * 1e9);
-        latest = end + kPatience;
       }
     }
     if (!measuring) throw std::runtime_error("the commands did not arrive");

@@ -13,16 +13,24 @@
 namespace xplane_bridge {
 namespace {
 
+ros::Time stamp(std::uint32_t frame) { return {1000U + frame, 0U}; }
+
+LockstepOptions options() {
+  LockstepOptions out;
+  out.participants = {"player"};
+  return out;
+}
+
+void open(TxLockstep* lockstep, std::uint32_t frame) {
+  core::LockstepFrame each;
+  each.number = frame;
+  lockstep->open(each, stamp(frame));
+}
+
 /// Frame k is stamped 1000 + k seconds; there is one participant.
 class TxLockstepTest : public testing::Test {
  protected:
-  static ros::Time stamp(std::uint32_t frame) { return {1000U + frame, 0U}; }
-
-  void open(std::uint32_t frame) {
-    core::LockstepFrame each;
-    each.number = frame;
-    lockstep_.open(each, stamp(frame));
-  }
+  void open(std::uint32_t frame) { xplane_bridge::open(&lockstep_, frame); }
   void request(const std::string& who, std::uint32_t frame, int topic, const std::string& what) {
     lockstep_.takeRequest(who, stamp(frame), topic, [this, what] { done_.push_back(what); });
   }
@@ -35,12 +43,6 @@ class TxLockstepTest : public testing::Test {
   std::vector<std::string> fly(std::uint32_t frame) {
     open(frame);
     return close();
-  }
-
-  static LockstepOptions options() {
-    LockstepOptions out;
-    out.participants = {"player"};
-    return out;
   }
 
   using Texts = std::vector<std::string>;
@@ -87,12 +89,6 @@ TEST_F(TxLockstepTest, ARequestAnswersNoFrame) {
 /// What the watchdog says once its time is over, which no clock of the host's makes so.
 class TxLockstepWatchdogTest : public testing::Test {
  protected:
-  static LockstepOptions options() {
-    LockstepOptions out;
-    out.participants = {"player"};
-    out.watchdog = 60.0;
-    return out;
-  }
   core::Clock clock() {
     return {[this] { return now_ns_.load(); }, [this] { return now_ns_.load(); }, waiters_};
   }
@@ -104,7 +100,7 @@ class TxLockstepWatchdogTest : public testing::Test {
   std::string said() {
     std::future<std::string> text = said_.get_future();
     do {  // the watchdog may begin to wait after time has passed
-      passTime(61.0);
+      passTime(options().watchdog + 1.0);
     } while (text.wait_for(std::chrono::milliseconds(1)) != std::future_status::ready);
     const std::string whole = text.get();
     return whole.substr(whole.find(" s ") + 3);
@@ -114,37 +110,33 @@ class TxLockstepWatchdogTest : public testing::Test {
   std::shared_ptr<core::ClockWaiters> waiters_ = std::make_shared<core::ClockWaiters>();
   std::promise<std::string> said_;
   bool is_said_ = false;
-  TxLockstep lockstep_{options(), clock(), ros::Time(1000, 0), [] {},
+  TxLockstep lockstep_{options(), clock(), stamp(0), [] {},
                        [this](const std::string& text) {
                          if (!std::exchange(is_said_, true)) said_.set_value(text);
                        }};
 };
 
 TEST_F(TxLockstepWatchdogTest, ANodeThatWaitsForTheSimulatorNamesItself) {
-  lockstep_.takeDone("/rx_node", ros::Time(1000, 0), kLockstepFrame0);
+  lockstep_.takeDone("/rx_node", stamp(0), kLockstepFrame0);
   EXPECT_EQ(said(), "frame 0 was not answered by tx_node itself, which waits for the simulator's answers");
 }
 
 TEST_F(TxLockstepWatchdogTest, ANodeThatHasNotHandledAFrameDoesNotBlameTheSimulator) {
-  core::LockstepFrame frame;
-  frame.number = 1;
-  lockstep_.open(frame, ros::Time(1001, 0));
-  lockstep_.takeDone("/rx_node", ros::Time(1001, 0), "");
-  lockstep_.takeDone("/player", ros::Time(1001, 0), "");
+  open(&lockstep_, 1);
+  lockstep_.takeDone("/rx_node", stamp(1), "");
+  lockstep_.takeDone("/player", stamp(1), "");
   EXPECT_EQ(said(), "frame 1 was not answered by tx_node itself");
 }
 
 TEST_F(TxLockstepWatchdogTest, AllWhoHaveNotAnsweredAreNamedWithTheirReasons) {
-  core::LockstepFrame frame;
-  frame.number = 1;
-  lockstep_.open(frame, ros::Time(1001, 0));
+  open(&lockstep_, 1);
   EXPECT_FALSE(lockstep_.ready());
-  lockstep_.takeDone("/player", ros::Time(1001, 0), std::string(kLockstepWaits) + "a file");
+  lockstep_.takeDone("/player", stamp(1), std::string(kLockstepWaits) + "a file");
   EXPECT_EQ(said(), "frame 1 was not answered by rx_node, player, which waits for a file");
 }
 
 TEST_F(TxLockstepWatchdogTest, ASimulatorThatDoesNotGoOnIsNamed) {
-  lockstep_.takeDone("/rx_node", ros::Time(1000, 0), kLockstepFrame0);
+  lockstep_.takeDone("/rx_node", stamp(0), kLockstepFrame0);
   EXPECT_TRUE(lockstep_.ready());
   EXPECT_EQ(said(), "the simulator has not gone on from frame 0");
 }
