@@ -290,17 +290,22 @@ class Simulator:
         self.frozen, self.flying = False, True
         self._autopilot.switch_off()
         self.clocks.flight = 0.0
-        self._placements.clear()
         self.instruments, self.copilot_instruments = Instruments(), Instruments(COPILOT)
         self.electrics = Electrics()
         for name in ("battery_on", "generator_on", "inverter_on"):
             self.store.set(_ELECTRICAL + name, float(powered))
         self.store.set("sim/cockpit2/switches/avionics_power_on", float(powered))
+        self._effects.start()
+        self._begin_frames()
+        self.electrics.update(0.0, self.store, self.frame, self.failed)
+        self._publish_surfaces()
+
+    def _begin_frames(self) -> None:
+        """The aircraft has been put where it is now: nothing of where it was counts."""
+        self._placements.clear()
         self.frame.start(self.model.state)
         self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
         self._update_instruments()
-        self.electrics.update(0.0, self.store, self.frame, self.failed)
-        self._publish_surfaces()
 
     def load_aircraft(self, name: str) -> None:
         """Loads another aircraft where the present one is, or before the first flight.
@@ -357,7 +362,7 @@ class Simulator:
             self.loads += 1
             self.frozen = False
             self.clocks.flight = 0.0
-            self.frame.start(self.model.state)
+            self._begin_frames()
         self.inputs.restore(levers)
         return True
 

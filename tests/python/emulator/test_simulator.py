@@ -128,6 +128,28 @@ def test_a_situation_of_another_aircraft_needs_no_flight_where_the_present_one_i
     assert state.altitude_m == pytest.approx(1000.0, abs=1.0)  # its levers came with it
 
 
+def test_fuel_of_a_loaded_situation_is_that_of_its_resets(bench):
+    emulator = bench(aircraft="fixed_wing")
+    tanks = [f"sim/flightmodel/weight/m_fuel[{tank}]" for tank in (0, 1)]
+    client = emulator.client()
+    emulator.write(dict.fromkeys(tanks, 50.0))
+    for request in (SAVE, acfn("multirotor"), LOAD, protocol.CommandRequest("sim/operation/reset_flight")):
+        emulator.step()
+        client.send(request)
+    assert emulator.read(*tanks) == pytest.approx([50.0, 50.0], abs=0.1)
+
+
+def test_a_failure_holds_the_levers_of_the_aircraft_that_is_flown(bench):
+    emulator = bench(aircraft="fixed_wing")
+    emulator.step()
+    emulator.write({"sim/operation/failures/rel_fc_thr": 6.0})
+    emulator.step()
+    emulator.client().send(acfn("multirotor"))
+    emulator.step(2)
+    hovers = emulator.sim.model.trim_controls.throttle[:4]
+    assert emulator.sim.controls.throttle[:4] == pytest.approx(hovers, abs=1e-6)
+
+
 def test_a_motion_that_explodes_starts_the_flight_again(bench):
     emulator = bench(aircraft="tiltrotor")
     emulator.write({OVERRIDE + "control_surfaces": 1.0, "sim/flightmodel/controls/wing1l_ail1def": 1e10})

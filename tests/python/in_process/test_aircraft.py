@@ -3,6 +3,7 @@ from __future__ import annotations
 import copy
 import re
 import struct
+from typing import Iterator, List
 
 import pytest
 
@@ -94,6 +95,27 @@ def test_what_is_said_to_act_does(leaf: str) -> None:
             seen.append(copy.deepcopy(controls))
         differs |= seen[0] != seen[1]
     assert differs
+
+
+class InOrder(set):
+    """A set that is gone through in an order of the test's."""
+
+    def __init__(self, items: List[str]) -> None:
+        super().__init__(items)
+        self._items = items
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+
+def test_of_two_failures_of_a_surface_always_the_same_acts() -> None:
+    leaves = ["rel_fcon_ailn_1_lft_mxdn", "rel_fcon_ailn_1_lft_mxup"]
+    model, seen = create_model("fixed_wing"), []
+    for order in (leaves, leaves[::-1]):
+        controls = Controls()
+        FailureEffects().apply(controls, InOrder(order), model, 1 / 60)
+        seen.append(controls.surface_faults)
+    assert seen[0] == seen[1] != {}
 
 
 def test_every_kind_of_the_service_breaks_a_surface_in_the_model() -> None:

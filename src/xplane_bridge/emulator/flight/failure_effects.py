@@ -50,6 +50,10 @@ class FailureEffects:
         self._surfaces_break = surfaces_break
         self._frozen: Dict[str, float] = {}
 
+    def start(self) -> None:
+        """A flight begins: what is failed holds its controls, not those of the flight before."""
+        self._frozen.clear()
+
     def apply(self, controls: Controls, failed: Set[str], model: FlightModel, dt: float) -> None:
         """Changes the frame's controls as the failures do.
 
@@ -158,7 +162,7 @@ class FailureEffects:
                 set_all(SurfaceFaultKind.STUCK, lambda s, side=side: s.kind is SurfaceKind.FLAP and s.side is side)
             if f"rel_{letter}_flp_off" in failed:
                 set_all(SurfaceFaultKind.GONE, lambda s, side=side: s.kind is SurfaceKind.FLAP and s.side is side)
-        for leaf in failed:
+        for leaf in sorted(failed):  # of several on one surface always the same one acts
             parts = leaf.split("_")
             if parts[:2] != ["rel", "fcon"]:
                 continue

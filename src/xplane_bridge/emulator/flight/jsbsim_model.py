@@ -54,7 +54,7 @@ from xplane_bridge.emulator.flight.rotors import Rotor, sum_loads
 from xplane_bridge.emulator.flight.turbulence import DrydenTurbulence
 from xplane_bridge.units import FOOT_M
 
-SITUATION_VERSION = 2
+SITUATION_VERSION = 3
 #: Height below which contact with the ground is looked for.
 CRASH_WATCH_M = 20.0
 #: How deep in the ground the lowest point of a placed aircraft may be: the travel of its springs.
@@ -378,7 +378,7 @@ class JsbsimModel:
                 "gusts": self._gusts,
                 "turbulence": self._turbulence.save(),
                 "atmosphere": self._atmosphere,
-                "fuel": self._fuel_kg,
+                "fuel": [self._fuel_kg, self._loaded_fuel_kg],
                 "payload": self._payload_kg,
                 "payload_aft": self._payload_aft_m,
                 "gear": self._gear.position,
@@ -396,8 +396,8 @@ class JsbsimModel:
         self._terrain_m, self._wind, self._gusts = saved["terrain"], list(saved["wind"]), list(saved["gusts"])
         self._turbulence.restore(saved["turbulence"])
         self._atmosphere = tuple(saved["atmosphere"])
-        self._fuel_kg, self._payload_kg = list(saved["fuel"]), saved["payload"]
-        self._payload_aft_m = saved["payload_aft"]
+        self._fuel_kg, self._loaded_fuel_kg = saved["fuel"]
+        self._payload_kg, self._payload_aft_m = saved["payload"], saved["payload_aft"]
         for actuator, values in zip(self._surface_set.actuators, saved["surfaces"]):
             actuator.restore(values)
         for rotor, values in zip(self._rotors, saved["rotors"]):
