@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Callable, FrozenSet
+from typing import Callable, FrozenSet, Sequence
 
 from xplane_bridge.emulator.datarefs.aircraft_systems import INHG_PA, Weather
 from xplane_bridge.emulator.datarefs.store import DatarefStore
@@ -14,6 +14,7 @@ from xplane_bridge.units import KNOT_MPS
 
 #: Vertical gust per unit of X-Plane's turbulence, which goes from 0 to 10 [m/s].
 TURBULENCE_MPS_PER_UNIT = 0.5
+FULL_TURBULENCE_MPS = 10.0 * TURBULENCE_MPS_PER_UNIT
 #: What clients may make of the air and the loading; values beyond are cut to these.
 _TEMPERATURE_C = (-45.0, 75.0)
 PRESSURE_INHG = (25.5, 32.0)
@@ -97,6 +98,12 @@ class WorldSettings:
 
         store.on_write(turbulence, set_turbulence)
 
+    def shown_stations_kg(self) -> Sequence[float]:
+        """The payload by station: as it was set, or where it was set by its sum, all on the first one."""
+        payload_kg = self._model().state.payload_kg
+        as_set = abs(sum(self.stations_kg) - payload_kg) < 0.01
+        return self.stations_kg if as_set else [payload_kg] + [0.0] * (_STATIONS - 1)
+
     def set_weather(self, weather: Weather) -> None:
         """Takes wind and turbulence of the command line."""
         self.weather = weather
@@ -122,10 +129,12 @@ class WorldSettings:
             return
         self._model().set_loading(payload_kg=clip(value, 0.0, _MAX_LOAD_KG))
 
-    def _set_station(self, _index: int, _value: float) -> None:
-        written = self._store.array("sim/flightmodel/weight/m_stations")
-        self.stations_kg = [clip(float(kg), 0.0, _MAX_LOAD_KG) for kg in written]
-        self._model().set_loading(payload_kg=sum(self.stations_kg))
+    def _set_station(self, station: int, value: float) -> None:
+        # The others as they are, not as written: what was refused of one would have all others refused.
+        stations_kg = list(self.shown_stations_kg())
+        stations_kg[station] = clip(value, 0.0, _MAX_LOAD_KG)
+        self._model().set_loading(payload_kg=sum(stations_kg))
+        self.stations_kg = stations_kg
 
     def _set_balance(self, _index: int, value: float) -> None:
         loaded = self._model().state

@@ -15,6 +15,7 @@ from support.simulator.emulator_bench import (
     row,
 )
 from xplane_bridge import protocol
+from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.simulator import aircraft_path
 
 # --- placements ---
@@ -130,6 +131,32 @@ def test_payload_goes_by_stations_in_version_12_only(bench):
     assert shown == pytest.approx([100.0, 25.0, 125.0, before - payload + 125.0], abs=0.1)
     emulator.write({weight + "m_fixed": 60.0})
     assert emulator.read(weight + "m_stations[0]", weight + "m_stations[8]") == pytest.approx([60.0, 0.0])
+
+
+def test_a_refused_station_leaves_the_others_theirs(bench):
+    emulator = bench(aircraft="fixed_wing", version="12.10")
+    stations = [f"sim/flightmodel/weight/m_stations[{station}]" for station in (0, 1)]
+    emulator.write({stations[0]: 50.0, stations[1]: 60.0})
+    emulator.write({stations[1]: 9000.0})
+    assert emulator.read(*stations) == pytest.approx([50.0, 60.0])
+    emulator.write({stations[0]: 40.0})
+    assert emulator.read(*stations) == pytest.approx([40.0, 60.0])
+
+
+def test_what_is_written_with_a_loaded_situation_is_of_its_place(bench):
+    emulator = bench(aircraft="fixed_wing", initial=InitialState(latitude_deg=37.5, longitude_deg=127.0))
+    client = emulator.client()
+    emulator.step()
+    client.send(protocol.Situation(protocol.Situation.SAVE, "here"))
+    emulator.step()
+    client.send(protocol.Placement(6, latitude_deg=47.5, longitude_deg=8.0, elevation_m=1500.0, speed_mps=70.0))
+    emulator.step()
+    client.send(protocol.DrefWrite(POSITION + "local_vx", 50.0))  # of the flight that ends with the load
+    client.send(protocol.Situation(protocol.Situation.LOAD, "here"))
+    client.send(protocol.DrefWrite(POSITION + "local_vy", 0.0))
+    client.send(protocol.DrefWrite(POSITION + "local_vz", -75.0))
+    emulator.step()
+    assert emulator.sim.frame.velocity == pytest.approx((0.0, 0.0, -75.0), abs=0.5)
 
 
 def test_prel_on_a_runway_and_again(bench):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Callable, Sequence
+from typing import Callable
 
 from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import Table
@@ -163,7 +163,7 @@ def _weights(t: Table, sim: Sources) -> None:
     t.array("_emulator/fuel_kg", lambda f: f.m.fuel_kg, size=9)
     t.value(weight + "m_fuel_total", lambda f: sum(f.m.fuel_kg))
     t.value(weight + "m_fixed", lambda f: f.m.payload_kg)
-    t.array(weight + "m_stations", lambda f: _stations(sim.settings.stations_kg, f.m.payload_kg))
+    t.array(weight + "m_stations", lambda _: sim.settings.shown_stations_kg())
     t.value(weight + "m_total", lambda f: f.m.mass_kg)
     t.setting(weight + "m_jettison")
     per_kg = 1.0 / 0.45359237 if "mass-unit" in sim.otherwise else 1.0
@@ -173,12 +173,6 @@ def _weights(t: Table, sim: Sources) -> None:
     # without fuel, whose tanks are at the reference point
     t.value("sim/flightmodel/misc/cgz_ref_to_default", lambda f: -f.m.cg_forward_m * f.m.mass_kg / f.m.dry_mass_kg)
     t.value("sim/flightmodel2/misc/cg_offset_z", lambda f: -f.m.cg_forward_m)
-
-
-def _stations(stations_kg: Sequence[float], payload_kg: float) -> Sequence[float]:
-    """The payload by station: as it was set, or where it was set by its sum, all on the first one."""
-    as_set = abs(sum(stations_kg) - payload_kg) < 0.01
-    return stations_kg if as_set else [payload_kg] + [0.0] * (len(stations_kg) - 1)
 
 
 def _maximum_mass(f: Frame) -> float:
