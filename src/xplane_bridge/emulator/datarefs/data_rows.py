@@ -260,6 +260,7 @@ def layout(is_12: bool, otherwise: FrozenSet[str] = frozenset()) -> Dict[int, Se
             (_F + "M_aero", NM_TO_FTLB),
             (_F + "N_aero", NM_TO_FTLB),
         ),
+        65: (0.0, 0.0, 0.0),
         66: _each("_emulator/gear_force_n", N_TO_LB),
         67: _each("sim/flightmodel2/gear/deploy_ratio"),
         70: _wings("ail1"),
@@ -399,6 +400,8 @@ def layout(is_12: bool, otherwise: FrozenSet[str] = frozenset()) -> Dict[int, Se
         132: ((ground_speed, MPS_TO_KT), (_P + "vh_ind", MPS_TO_FPM), None, 0.0),
         134: _each("sim/flightmodel2/gear/tire_steer_actual_deg"),
         135: (_P + "local_ax", _P + "local_ay", _P + "local_az", _P + "Prad", _P + "Qrad", _P + "Rrad"),
+        137: (0.0,) * 6,
+        138: [f"sim/joystick/servo_{axis}_ratio" for axis in ("pitch", "roll", "heading")],
     }
 
 

@@ -136,11 +136,11 @@ class Frame:
         north, east, down = velocity
         self.ground_speed = math.hypot(north, east)
         if self.ground_speed < PATH_NOISE_BELOW_MPS:
-            self.hpath = (self.clocks.frame * 137.508) % 360.0
-            self.vpath = 0.0
+            self.hpath = (self.clocks.running * 8250.48) % 360.0
         else:
             self.hpath = earth.wrap_degrees(math.degrees(math.atan2(east, north)))
-            self.vpath = math.degrees(math.atan2(-down, self.ground_speed))
+        moves = math.hypot(self.ground_speed, down) >= PATH_NOISE_BELOW_MPS
+        self.vpath = math.degrees(math.atan2(-down, self.ground_speed)) if moves else 0.0
         self.wind_speed = math.hypot(state.wind_north_mps, state.wind_east_mps)
         self.wind_from = (
             earth.wrap_degrees(math.degrees(math.atan2(-state.wind_east_mps, -state.wind_north_mps)))

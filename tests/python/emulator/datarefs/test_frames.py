@@ -229,9 +229,37 @@ def test_hpath_is_noise_when_parked(bench):
     emulator = bench(initial=InitialState(on_ground=True, heading_deg=200.0))
     values = {round(emulator.read(POSITION + "hpath")[0]) for _ in range(5)}
     assert len(values) == 5
+    emulator.sim.pause(True)
+    assert emulator.read(POSITION + "hpath") == emulator.read(POSITION + "hpath")
+
+
+def test_the_path_of_a_vertical_climb_is_vertical(bench):
+    emulator = bench(aircraft="multirotor", initial=InitialState(altitude_m=100.0))
+    emulator.write({f"sim/cockpit2/engine/actuators/throttle_ratio[{motor}]": 0.8 for motor in range(4)})
+    emulator.step(60)
+    vertical, over_ground, path = emulator.read(POSITION + "vh_ind", POSITION + "groundspeed", POSITION + "vpath")
+    assert (vertical > 1.0, over_ground < 0.1) == (True, True)
+    assert path == pytest.approx(90.0, abs=1.0)
 
 
 # --- DATA rows ---
+
+
+def test_rows_of_turbulence_servos_and_forces(bench):
+    emulator = bench(version="12", aircraft="fixed_wing")
+    emulator.write({"sim/weather/region/turbulence[0]": 10.0})
+    servos = [f"sim/joystick/servo_{axis}_ratio" for axis in ("pitch", "roll", "heading")]
+    for command in ("servos_on", "heading"):
+        emulator.client().send(protocol.CommandRequest(f"sim/autopilot/{command}"))
+    emulator.write({"sim/cockpit2/autopilot/heading_dial_deg_mag_pilot": 90.0})
+    emulator.step(30)
+    shown = emulator.read(*servos)
+    rows = emulator.sim.rows.values()
+    assert rows[5][5] == 1.0
+    assert list(rows[138]) == pytest.approx([*shown, *[-999.0] * 5], abs=1e-6)
+    assert shown[1] != 0.0
+    assert list(rows[65]) == [0.0] * 3 + [-999.0] * 5
+    assert list(rows[137]) == [0.0] * 6 + [-999.0] * 2
 
 
 def data(emulator, rows, frames=1):

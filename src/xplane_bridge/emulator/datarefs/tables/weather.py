@@ -6,6 +6,7 @@ from functools import partial
 
 from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.tables.base import Table
+from xplane_bridge.emulator.datarefs.world_settings import FULL_TURBULENCE_MPS
 from xplane_bridge.emulator.flight.frame import PA_TO_INHG, SEA_LEVEL_DENSITY, Frame
 
 METERS_PER_MILE = 1609.344
@@ -18,7 +19,7 @@ def define(t: Table, sim: Sources) -> None:
     # wind_speed_kt is in m/s in spite of its name
     t.value("_emulator/wind_speed_mps", lambda f: f.wind_speed)
     t.value("_emulator/wind_from_deg", lambda f: f.wind_from)
-    t.value("_emulator/turbulence", lambda _: sim.settings.weather.turbulence_mps / 10.0)
+    t.value("_emulator/turbulence", lambda _: min(sim.settings.weather.turbulence_mps / FULL_TURBULENCE_MPS, 1.0))
     t.value("sim/weather/wind_direction_degt", lambda f: f.wind_from)
     t.value("sim/weather/wind_speed_kt", lambda f: f.wind_speed)
     goes = -1.0 if "wind-direction" in sim.otherwise else 1.0
