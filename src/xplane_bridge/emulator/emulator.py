@@ -70,6 +70,7 @@ class Emulator:
         self.sim = self._new_simulator()
         self._server: Optional[Server] = self._new_server(options.port)
         self.port = self._server.port
+        self._xplane_connect_port = options.xplane_connect_port
         self._xplane_connect = self._new_xplane_connect()
         self._beacon = self._new_beacon()
         self._truth = TruthFile(options.truth, self.sim.model) if options.truth is not None else None
@@ -86,7 +87,7 @@ class Emulator:
         return KinematicModel(self.options.seed) if name == KINEMATIC else create_model(name, self.options.seed)
 
     def _new_xplane_connect(self) -> Optional[XPlaneConnect]:
-        port = self.options.xplane_connect_port
+        port = self._xplane_connect_port
         if port is None:
             return None
         return XPlaneConnect(
@@ -351,7 +352,7 @@ class Emulator:
         """Sleeps until the deadline; sends delayed datagrams on the way."""
         while not self.stopping:
             now = time.monotonic()
-            due = self._channel.next_due()
+            due = self._channel.next_due() if self._server is not None else math.inf
             if due <= now and self._server is not None:
                 self._server.flush_delayed(now)
                 continue
@@ -375,15 +376,11 @@ class Emulator:
 
     def leave(self) -> None:
         """What clients see when X-Plane is quit: the port is closed, the beacon gone."""
-        self.server.close()
+        self._close_sockets()
         self._server = None
-        self._close_xplane_connect()
-        if self._beacon is not None:
-            self._beacon.close()
-            self._beacon = None
 
     def come_back(self) -> None:
-        """Starts anew on the same port: no subscriptions, no targets, no overrides, a new flight."""
+        """Starts anew on the same ports: no subscriptions, no targets, no overrides, a new flight."""
         self.sim = self._new_simulator()
         self._server = self._new_server(self.port)
         self._xplane_connect = self._new_xplane_connect()
@@ -440,7 +437,7 @@ class Emulator:
                 break
             if not text:
                 continue
-            if not text.isdigit():
+            if not text.isdecimal():
                 print(f"stepping: expected a number of frames or 'quit', got '{text}'", file=sys.stderr, flush=True)
                 continue
             self.step_frames(int(text))
@@ -482,19 +479,20 @@ class Emulator:
             }
         return report
 
-    def _close_xplane_connect(self) -> None:
+    def _close_sockets(self) -> None:
+        self.server.close()
         if self._xplane_connect is not None:
+            self._xplane_connect_port = self._xplane_connect.port
             self._xplane_connect.close()
             self._xplane_connect = None
+        if self._beacon is not None:
+            self._beacon.close()
+            self._beacon = None
 
     def close(self) -> None:
         """Closes sockets and files; may be called again."""
         if self._server is not None:
-            self._server.close()
-        if self._beacon is not None:
-            self._beacon.close()
-            self._beacon = None
-        self._close_xplane_connect()
+            self._close_sockets()
         if self._truth is not None:
             self._truth.close()
             self._truth = None

@@ -6,7 +6,10 @@ import pytest
 
 from support.simulator.emulator_fixture import EmulatorFixture
 from xplane_bridge import protocol
+from xplane_bridge.emulator.emulator import Emulator
+from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, FaultyChannel, Outage, parse_faults
+from xplane_bridge.harness.xplane_client import XPlaneClient
 
 TIME = "sim/time/total_running_time_sec"
 NO_CLIENT = ("127.0.0.1", 9)
@@ -131,6 +134,23 @@ def test_freeze_stops_frames_and_keeps_subscriptions():
         times = [dict(protocol.decode_rref_response(packet))[0] for packet in client.received()]
         assert len(times) == 10
         assert times[0] == pytest.approx(31 / 60, abs=1e-5)
+
+
+def test_delayed_datagrams_do_not_bring_x_plane_back_early(monkeypatch):
+    fault = parse_faults("delay=50ms,restart=0.5s@0.2")
+    options = Options(
+        aircraft=KINEMATIC, bind="127.0.0.1", port=0, beacon=False, duration=1.0, xplane_connect_port=0, fault=fault
+    )
+    emulator = Emulator(options)
+    port, seen = emulator.describe()["xpc_port"], []
+    leave, come_back = emulator.leave, emulator.come_back
+    monkeypatch.setattr(emulator, "leave", lambda: seen.append((leave(), emulator.describe()["xpc_port"])))
+    monkeypatch.setattr(emulator, "come_back", lambda: seen.append((come_back(), emulator.describe()["xpc_port"])))
+    client = XPlaneClient(emulator.port)
+    client.subscribe([TIME])
+    emulator.run()
+    client.close()
+    assert seen == [(None, None), (None, port)], "it leaves once, and comes back once"
 
 
 def test_restart_closes_the_port_and_forgets_clients():
