@@ -6,6 +6,7 @@ import argparse
 import ipaddress
 import math
 import re
+import socket
 from typing import FrozenSet, List, Optional, Tuple
 
 from xplane_bridge import protocol
@@ -42,8 +43,10 @@ def otherwise_ids(text: str) -> FrozenSet[str]:
 def address(text: str) -> str:
     """An IPv4 address of this machine."""
     try:
-        return str(ipaddress.IPv4Address(text))
-    except ValueError:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind((str(ipaddress.IPv4Address(text)), 0))
+        return text
+    except (ValueError, OSError):
         raise argparse.ArgumentTypeError(f"{text}: expected an IPv4 address of this machine") from None
 
 

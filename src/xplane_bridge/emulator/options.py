@@ -359,7 +359,8 @@ def _options(given: argparse.Namespace) -> Options:
     require(0.0 <= given.turbulence <= 20.0, "--turbulence", given.turbulence, "0..20")
     require(given.load_time >= 0.0, "--load-time", given.load_time, "0 or more")
     require(given.loading_time >= 0.0, "--loading-time", given.loading_time, "0 or more")
-    require(given.duration is None or given.duration > 0.0, "--duration", given.duration, "more than 0")
+    duration = given.duration
+    require(duration is None or 0.0 < duration < math.inf, "--duration", duration, "more than 0, and finite")
     require(given.speed is None or 0.0 <= given.speed <= 300.0, "--speed", given.speed, "0..300")
     require(given.stepped != "fast" or given.duration is not None, "--stepped", "fast", "--duration with it")
     lockstep = given.stepped == "lockstep"
@@ -368,6 +369,16 @@ def _options(given: argparse.Namespace) -> Options:
     require(
         not (lockstep and given.fault), "--fault", given.fault, "none with --stepped lockstep, whose frames all arrive"
     )
+    require(
+        not (lockstep and given.loading_time > 0.0),
+        "--loading-time",
+        given.loading_time,
+        "0 with --stepped lockstep, in which every frame is answered",
+    )
+    require(
+        not (lockstep and given.deaf), "--deaf", "given", "--stepped other than lockstep, whose frames wait for answers"
+    )
+    require(given.seed >= 0, "--seed", given.seed, "0 or more")
     require(given.pilot is None or given.pilot.is_file(), "--pilot", given.pilot, "an existing file")
     try:
         ipaddress.IPv4Address(given.bind)

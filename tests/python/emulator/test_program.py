@@ -173,6 +173,12 @@ def test_options_reach_where_they_belong():
         ("--version 10", "invalid choice: '10'"),
         ("--aerodrome 47,8", "'47,8': expected latitude,longitude,heading in degrees"),
         ("--aerodrome 97,8,0", "'97,8,0': expected latitude,longitude,heading"),
+        ("--seed -1", "--seed -1: expected 0 or more"),
+        ("--stepped fast --duration inf", "--duration inf: expected more than 0, and finite"),
+        ("--stepped lockstep --deaf", "--deaf given: expected --stepped other than lockstep"),
+        ("--stepped lockstep --loading-time 1", "--loading-time 1.0: expected 0 with --stepped lockstep"),
+        ("--answer-from 192.0.2.9", "argument --answer-from: 192.0.2.9: expected an IPv4 address of this machine"),
+        ("--second-beacon here", "argument --second-beacon: here: expected an IPv4 address of this machine"),
     ],
 )
 def test_wrong_options_are_said(arguments, message, capsys):
