@@ -442,3 +442,12 @@ def test_total_stick_under_the_surface_override(bench, mode, moved):
     assert (after - before, stick) == (pytest.approx(moved, abs=1e-6), 0.5)
     emulator.write({OVERRIDE + "control_surfaces": 0.0})
     assert emulator.read(total)[0] - before == pytest.approx(0.25, abs=1e-6)
+
+
+def test_frozen_totals_are_the_stick_of_then_also_where_they_are_asked_for_later(bench):
+    emulator = bench(overridden_totals="frozen")
+    emulator.write({OVERRIDE + "joystick": 1.0, YOKE_ROLL: 0.25})
+    emulator.step(60)
+    emulator.write({OVERRIDE + "control_surfaces": 1.0})
+    emulator.step()
+    assert emulator.read("sim/cockpit2/controls/total_roll_ratio") == [0.25]

@@ -179,6 +179,8 @@ def _stick(t: Table, sim: Sources) -> None:
         t.setting(f"sim/joystick/joystick_{axis}_sensitivity", 0.5)
         t.setting(f"sim/joystick/joystick_{axis}_nullzone")
         t.value(f"{_COCKPIT}total_{axis}_ratio", _total(sim, total))
+        if not sim.totals_move:  # the stick when the surfaces were taken: known also where it is asked for later
+            t.store.watch(t.store.dataref(f"{_COCKPIT}total_{axis}_ratio").slots)
         t.value(f"{_CONTROLS2}{axis}_ratio", total)
         t.setting(f"{_COCKPIT}{trim}_trim")
         t.alias(f"{_CONTROLS2}{trim}_trim", f"{_COCKPIT}{trim}_trim")
