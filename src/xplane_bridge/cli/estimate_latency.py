@@ -28,6 +28,7 @@ from xplane_bridge.cli.entry import guarded, number, start_node
 from xplane_bridge.constants import CameraView, ImageQuality, words
 from xplane_bridge.harness.processes import ManagedProcess
 from xplane_bridge.plotting.figure_file import figure_file
+from xplane_bridge.plotting.page_file import refuse_recordings
 from xplane_bridge.topics import NAMESPACE, absolute
 
 if TYPE_CHECKING:
@@ -105,6 +106,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         space = args.namespace.rstrip("/")
         paths = [stack.enter_context(_recorded(space, args.camera, args.live))] if args.live else args.bags
         bags = stack.enter_context(Bags(paths))
+        for output in filter(None, (args.plot, args.json)):
+            refuse_recordings(output, bags.paths)
         display = display_delay(bags, _VIEWS[args.view] if args.view else None, args.ignore_bottom, args.camera)
         responses = command_responses(bags)
     require_usable(display, "pictures")

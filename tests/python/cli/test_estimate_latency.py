@@ -179,3 +179,15 @@ def test_a_figure_that_cannot_be_written_is_refused_before_anything_is_measured(
         main([str(tmp_path / "flight.bag"), "--plot", str(tmp_path / "none" / "delay.png")])
     assert ended.value.code == 2
     assert f"there is no folder {tmp_path / 'none'}; make it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("option", "name"), [("--json", "flight.bag"), ("--plot", "flight.png")])
+def test_the_recording_is_not_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, name: str
+) -> None:
+    bag = tmp_path / name
+    write_bag(bag)
+    before = bag.read_bytes()
+    assert main([str(bag), option, str(bag)]) == 1
+    assert f"{bag}: the recording itself is there; expected another file to write to" in capsys.readouterr().err
+    assert bag.read_bytes() == before

@@ -130,6 +130,26 @@ def test_pictures_that_cannot_be_labelled_are_counted(tmp_path: Path, capsys: py
         assert frame["objects"][1]["sigma_px"] > sure["objects"][1]["sigma_px"] + 0.1
 
 
+def test_neither_the_recording_nor_what_the_labels_are_made_from_is_written_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = write_approach(tmp_path / "flight.bag", 1)
+    apt = tmp_path / "apt.dat"
+    apt.write_bytes(airport_file().read_bytes())
+    heights = tmp_path / "heights.csv"
+    heights.write_text("15, 0.0\n")
+    before = {path: path.read_bytes() for path in (bag, apt, heights)}
+    given = [str(bag), "--apt", str(airport_file()), str(apt), "--airport", "XEMU", "--heights", str(heights)]
+    for path, said in (
+        (bag, "the recording itself is there; expected another file to write to"),
+        (apt, "a file of --apt or --heights itself is there; expected another file to write to"),
+        (heights, "a file of --apt or --heights itself is there"),
+    ):
+        assert label_images.main([*given, "-o", str(path)]) == 1
+        assert f"{path}: {said}" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in before} == before
+
+
 def test_a_bag_without_pictures_and_one_that_is_too_old(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with FlightBag(tmp_path / "none.bag") as bag:
         bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(0.0), bag.state(0.0, 0))

@@ -11,7 +11,8 @@ from xplane_bridge.cli.entry import guarded, number, positive
 from xplane_bridge.labels.apt import read_airport
 from xplane_bridge.labels.flight import Options, label_flight
 from xplane_bridge.labels.heights import read_table
-from xplane_bridge.labels.table import beside
+from xplane_bridge.labels.table import LabelError, beside
+from xplane_bridge.plotting.page_file import refuse_recordings
 
 
 def parser() -> argparse.ArgumentParser:
@@ -78,6 +79,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     heights = read_table(args.heights, airport) if args.heights else {}
     with Bags(args.bags) as bags:
         path = args.output or beside(bags.paths[0])
+        refuse_recordings(path, bags.paths)
+        if path.resolve() in {Path(file).resolve() for file in (*args.apt, args.heights) if file}:
+            raise LabelError(f"{path}: a file of --apt or --heights itself is there; expected another file to write to")
         options = Options(args.flat_world, args.map_sigma, args.standing_height, args.span)
         count, flight = label_flight(bags, path, airport, heights, options, args.camera)
     about = flight.about()
