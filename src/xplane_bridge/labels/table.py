@@ -14,11 +14,13 @@ import weakref
 from pathlib import Path
 from typing import Any, BinaryIO, Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple
 
-from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.errors import XplaneBridgeError, is_number
 from xplane_bridge.whole_file import replaced
 
 SCHEMA = 2  #: 1 knew one camera
 ENDING = ".labels.jsonl"
+#: What a picture's line has at least.
+_PICTURE = ("camera", "stamp_ns", "width", "height", "objects")
 
 
 #: Of a picture: its camera's name and its stamp [ns].
@@ -118,6 +120,7 @@ def read(path: Path) -> Labels:
         LabelError: It is missing, or not one of this version.
     """
     about: Any = None
+    number = 0
     places: Dict[str, Dict[int, int]] = {}
     try:
         file = path.open("rb")
@@ -127,21 +130,37 @@ def read(path: Path) -> Labels:
     try:
         at = 0
         for line in file:
+            number += 1
             content = json.loads(line)
             if not at:
                 about = content
                 if not isinstance(about, dict) or about.get("labels") != SCHEMA:
                     break
             else:
+                if not _is_picture(content):
+                    raise ValueError
                 places.setdefault(str(content["camera"]), {})[int(content["stamp_ns"])] = at
             at += len(line)
     except (ValueError, KeyError, TypeError):
         about = None
     if not isinstance(about, dict) or about.get("labels") != SCHEMA:
         file.close()
-        msg = f"{path}: no labels of this version; label_images writes them anew"
+        where = f"{path}: line {number}: expected {', '.join(_PICTURE)} of a picture" if number > 1 else path
+        msg = f"{where}: no labels of this version; label_images writes them anew"
         raise LabelError(msg)
     return Labels(about, Frames(file, places))
+
+
+def _is_picture(content: Any) -> bool:
+    """Returns whether a line is a picture's, with what all that read it look at."""
+    if not (isinstance(content, dict) and all(name in content for name in _PICTURE)):
+        return False
+    numbers, objects = [content[name] for name in ("width", "height")], content["objects"]
+    return (
+        all(is_number(size) and size > 0 for size in numbers)
+        and isinstance(objects, list)
+        and all(isinstance(thing, dict) and isinstance(thing.get("kind"), str) for thing in objects)
+    )
 
 
 def digest(path: Path) -> str:

@@ -16,7 +16,8 @@ OBJECTS = [{"kind": "runway", "points": {str(k): {"u": k / 7.0, "v": -k / 3.0} f
 def frames(count: int) -> Iterator[Dict[str, Any]]:
     for camera in ("camera", "belly"):
         for k in range(count // 2):
-            yield {"camera": camera, "stamp_ns": 10**18 + k, "number": k, "objects": OBJECTS}
+            line = {"camera": camera, "stamp_ns": 10**18 + k, "width": 640, "height": 480, "objects": OBJECTS}
+            yield {**line, "number": k}
 
 
 def test_each_picture_has_its_line(tmp_path: Path) -> None:
@@ -78,3 +79,26 @@ def test_what_is_no_file_of_labels_is_refused_in_words(tmp_path: Path, text: str
         table.read(path)
     with pytest.raises(table.LabelError, match="No such file or directory; label_images writes it"):
         table.read(tmp_path / "b.labels.jsonl")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"width": None},
+        {"height": "480"},
+        {"height": 0},
+        {"objects": None},
+        {"objects": {}},
+        {"objects": ["runway"]},
+        {"objects": [{"box": [0, 0, 1, 1]}]},
+        {"stamp_ns": "x"},
+    ],
+)
+def test_a_line_of_something_else_is_refused_by_its_number(tmp_path: Path, changes: Dict[str, Any]) -> None:
+    path = tmp_path / "a.labels.jsonl"
+    first, second = frames(2)
+    changed = {name: value for name, value in {**second, **changes}.items() if value is not None}
+    table.write(path, dict, [first, changed])
+    said = "line 3: expected camera, stamp_ns, width, height, objects of a picture: no labels of this version; label_"
+    with pytest.raises(table.LabelError, match=f"^{path}: {said}"):
+        table.read(path)

@@ -19,7 +19,7 @@ from xplane_bridge.bags.flight import Flight, read_flight
 from xplane_bridge.bags.passport import Passport, read_passports
 from xplane_bridge.cli.entry import guarded
 from xplane_bridge.cli.flights.split_recordings import joined
-from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.errors import XplaneBridgeError, is_number
 from xplane_bridge.scenario import ScenarioError, parse_scenario
 from xplane_bridge.scenario.judging import judge
 
@@ -164,7 +164,25 @@ def read(paths: Sequence[Path], variant: str, store: Optional[ColumnFile] = None
             played = json.loads(beside.read_text(encoding="utf-8"))
         except ValueError as error:
             raise CompareError(f"{beside}: no log of a scenario's player: {error}") from None
+        if not _is_log(played):
+            raise CompareError(
+                f"{beside}: no log of a scenario's player; expected that of run_scenario, or none: move it away"
+            )
     return Read(path, len(paths), variant, flight, labels, passports[-1] if passports else None, played)
+
+
+def _is_log(played: Any) -> bool:
+    """Returns whether it is what a player writes down, as `judge` takes it."""
+    if not isinstance(played, dict) or not played.get("begin"):
+        return isinstance(played, dict)
+    begin, labels = played["begin"], played.get("labels")
+    return (
+        isinstance(begin, dict)
+        and all(is_number(begin.get(name)) for name in ("epoch", "sim_time_unwrapped"))
+        and isinstance(labels, dict)
+        and all(map(is_number, labels.values()))
+        and (not played.get("finished") or is_number(played.get("duration")))
+    )
 
 
 def usual(found: Sequence[Read]) -> str:

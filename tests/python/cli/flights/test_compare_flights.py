@@ -226,6 +226,25 @@ def test_what_cannot_be_compared_is_said(tmp_path, capsys, arguments, message):
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[]",
+        '{"begin": [1]}',
+        '{"begin": {"epoch": 1}, "labels": {}}',
+        '{"begin": {"epoch": 1, "sim_time_unwrapped": 1.0}}',
+        '{"begin": {"epoch": 1, "sim_time_unwrapped": 1.0}, "labels": {}, "finished": true}',
+    ],
+)
+def test_what_is_no_log_of_a_player_is_said(tmp_path, capsys, text):
+    files = [write(tmp_path / f"{name}.bag", played=False) for name in "ab"]
+    (tmp_path / "played.json").write_text(text)
+    assert compare_flights.main([*map(str, files), "-o", str(tmp_path / "page.html")]) == 1
+    err = capsys.readouterr().err
+    assert f"{tmp_path / 'played.json'}: no log of a scenario's player; expected that of run_scenario, or none: " in err
+    assert err.count("\n") == 1
+
+
 def test_a_browser_shows_every_figure_without_an_error(tmp_path):
     browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
     a, b = write(tmp_path / "a.bag"), write(tmp_path / "b.bag", higher=5.0)
