@@ -14,8 +14,8 @@ from xplane_bridge.bags.later_fields import LATER_FIELDS
 
 _DTYPES = {
     "bool": np.dtype("?"),
-    "byte": np.dtype("u1"),
-    "octet": np.dtype("u1"),
+    "byte": np.dtype("i1"),  # signed in ROS 1
+    "octet": np.dtype("i1"),  # as earlier versions of rosbags call it
     "char": np.dtype("u1"),
     "int8": np.dtype("i1"),
     "uint8": np.dtype("u1"),

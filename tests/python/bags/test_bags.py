@@ -115,6 +115,19 @@ def test_lists_of_numbers_vary_and_lists_of_messages_stay_objects(tmp_path: Path
     assert table["n"][0] == 2
 
 
+def test_bytes_are_signed_and_chars_are_not(tmp_path: Path) -> None:
+    fields = "byte one\nbyte[2] two\nbyte[] list\nchar letter\n"
+    raw = b"\xff" + b"\xfe\x02" + struct.pack("<I", 1) + b"\x80" + b"\xff"
+    for definition, message in ((fields, raw), (fields + "string[] names\n", raw + struct.pack("<I", 0))):
+        path = tmp_path / f"{len(message)}.bag"
+        with Bags(write(path, [("/t", "pkg/msg/T", definition, [(0, message), (1, message)])])) as bags:
+            table = bags.read("/t")
+        assert table["one"].tolist() == [-1, -1]
+        assert table["two"].tolist() == [[-2, 2]] * 2
+        assert [list(values) for values in table["list"]] == [[-128]] * 2
+        assert table["letter"].tolist() == [255, 255]
+
+
 def test_lists_beside_texts_stay_lists_where_all_have_one_length(tmp_path: Path) -> None:
     definition = "string[] names\nfloat32[] values\nfloat32[2] axes\n"
     raws = [struct.pack("<II1sI3f", 1, 1, b"a", 1, k, k + 1, k + 2) for k in range(3)]
