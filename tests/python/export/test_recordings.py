@@ -44,6 +44,17 @@ def test_mcap_has_every_message_as_recorded(tmp_path: Path) -> None:
     assert [time for _, time, _ in found] == [time for _, time, _ in expected]
 
 
+def test_mcap_says_what_is_latched(tmp_path: Path) -> None:
+    reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+    assert export(OLD_BAG, "--format", "mcap", "-o", tmp_path) == 0
+    with (tmp_path / f"{OLD_BAG.stem}.mcap").open("rb") as file:
+        channels = reader.make_reader(file).get_summary().channels.values()
+        latching = {channel.topic: channel.metadata["latching"] for channel in channels}
+    assert set(latching.values()) == {"true", "false"}, "as the registry of MCAP has it"
+    assert latching["/xplane/link_state"] == "true"
+    assert latching["/xplane/flight_state"] == "false"
+
+
 def test_mcap_decodes_with_its_ros1_reader(tmp_path: Path) -> None:
     reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
     decoder = pytest.importorskip("mcap_ros1.decoder", reason="mcap-ros1-support is not installed")
