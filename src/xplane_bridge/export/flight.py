@@ -24,8 +24,12 @@ class ExportError(XplaneBridgeError):
 
 
 def full_names(bags: Bags, topics: Sequence[str]) -> list[str]:
-    """Give topics their full names: one that begins with a slash has it, others are below the bridge's name space."""
-    return [topic if topic.startswith("/") else f"{bags.name_space}/{topic}" for topic in topics]
+    """Give topics their full names, each once.
+
+    One that begins with a slash has it, others are below the bridge's name space.
+    """
+    names = (topic if topic.startswith("/") else f"{bags.name_space}/{topic}" for topic in topics)
+    return list(dict.fromkeys(names))
 
 
 def refuse_pictures(bags: Bags, topics: Sequence[str]) -> None:

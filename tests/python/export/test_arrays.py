@@ -55,6 +55,15 @@ def test_every_value_time_and_unit_reads_back(tmp_path: Path, form: str) -> None
     assert list(read("control_mode", "reason")) == ["r", "rr", "rr"]
 
 
+@pytest.mark.parametrize("form", ["npz", "mat"])
+def test_a_topic_that_is_given_twice_is_written_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], form: str
+) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 1.0)
+    assert export(bag, "--format", form, "--topics", "odom", "/xplane/odom", "-o", tmp_path) == 0
+    assert "1 topics, 50 messages" in capsys.readouterr().out
+
+
 def test_npz_has_units_topics_and_lists_without_pickle(tmp_path: Path) -> None:
     assert export(write_flight(tmp_path / "flight.bag"), "--format", "npz", "-o", tmp_path) == 0
     content = np.load(tmp_path / "flight.npz", allow_pickle=False)
