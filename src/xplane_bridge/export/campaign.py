@@ -29,15 +29,12 @@ from xplane_bridge.export.cameras import camera_rows
 from xplane_bridge.export.card import CARD, card
 from xplane_bridge.export.flight import ExportError, frame_quality
 from xplane_bridge.export.formats import ALIASES, FORMATS, Job
+from xplane_bridge.export.made import MANIFEST, RECORDS, SCHEMA, read_manifest, read_record, records, refuse_foreign
 from xplane_bridge.export.yolo_yaml import DATA_YAML, of_all_flights
 from xplane_bridge.whole_file import replaced
 
 if TYPE_CHECKING:
     from xplane_bridge.export.pictures import Options
-
-SCHEMA = 2  #: of the manifest and of the records; 1 knew one format a folder
-MANIFEST = "manifest.json"
-_RECORDS = ".flights"
 
 
 class Outcome(NamedTuple):
@@ -57,7 +54,7 @@ def flights(arguments: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
     Raises:
         BagError: A folder without bags.
-        ExportError: The same bag twice, or two of one name whatever folders it takes.
+        ExportError: The same bag twice, also in two flights, or two of one name whatever folders it takes.
     """
     paths = [Path(argument).resolve() for argument in arguments]
     for path in paths:
@@ -79,7 +76,15 @@ def flights(arguments: Sequence[str]) -> dict[str, tuple[str, ...]]:
             )
             raise ExportError(msg)
         names[name] = path
-    return {name: tuple(str(p) for p in Bags(path).paths) for name, path in names.items()}
+    found = {name: tuple(str(p) for p in Bags(path).paths) for name, path in names.items()}
+    flight_of: dict[Path, Path] = {}
+    for name, bags in found.items():
+        for bag in {Path(path).resolve() for path in bags}:
+            if bag in flight_of:
+                msg = f"{bag} is of two of the given flights, {flight_of[bag]} and {names[name]}; give one of them"
+                raise ExportError(msg)
+            flight_of[bag] = names[name]
+    return found
 
 
 def _parts(path: Path) -> list[str]:
@@ -100,15 +105,15 @@ def choose_training(names: Iterable[str], options: Options) -> set[str]:
 def export_flight(job: Job) -> Outcome:
     """Export one flight; the one function that local processes and cluster workers run."""
     output = Path(job.output)
-    record_file = output / _RECORDS / job.format / f"{job.name}.json"
+    record_file = output / RECORDS / job.format / f"{job.name}.json"
     try:
         key = _key(job)
-        old = _read_json(record_file)
+        old = read_record(record_file)
         if old and old["key"] == key and all((output / f).is_file() for f in old["record"]["files"]):
             return Outcome(job.name, old["record"], "", True)
         record = _export(job, output, key, record_file)
         for alias in (alias for alias, name in ALIASES.items() if name == job.format):
-            _remove(output / _RECORDS / alias / record_file.name)  # of an earlier version, made anew
+            _remove(output / RECORDS / alias / record_file.name)  # of an earlier version, made anew
         return Outcome(job.name, record, "", False)
     except XplaneBridgeError as error:
         return Outcome(job.name, None, str(error), False)
@@ -132,7 +137,7 @@ def _export(job: Job, output: Path, key: dict[str, Any], record_file: Path) -> d
     form = FORMATS[job.format]
     final = output / f"{job.name}{form.ending}"
     _refuse_recordings(final, job)
-    _refuse_foreign(final, job)
+    refuse_foreign(final, job, key["sources"])
     folder = _part(final)
     _remove(folder)
     try:
@@ -181,32 +186,6 @@ def _refuse_recordings(final: Path, job: Job) -> None:
                 "give another folder with -o"
             )
             raise ExportError(msg)
-
-
-def _refuse_foreign(final: Path, job: Job) -> None:
-    """Raise `ExportError` when something is there that is not on the record of this flight's earlier export."""
-    own = False
-    for form, flight, record in _records(Path(job.output)):
-        if any(name.split("/")[0] == final.name for name in record["files"]):
-            if (form, flight) != (job.format, job.name):
-                msg = f"{final} belongs to the {form} export of {flight}; give another folder with -o"
-                raise ExportError(msg)
-            own = True
-    if os.path.lexists(final) and not own:
-        msg = (
-            f"{final} is there already, made by no export that this folder has a record of; expected nothing of that "
-            f"name, for the {job.format} export of {job.name}: give another folder with -o, or move it away"
-        )
-        raise ExportError(msg)
-
-
-def _records(output: Path) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Give format, flight and record of everything exported to the folder."""
-    for path in sorted((output / _RECORDS).glob("*/*.json")):
-        content = _read_json(path)
-        if content is not None and content["key"]["schema"] == SCHEMA:
-            form = path.parent.name
-            yield ALIASES.get(form, form), path.stem, content["record"]
 
 
 def run_local(jobs: Sequence[Job], workers: int) -> Iterator[Outcome]:
@@ -267,13 +246,16 @@ def export(jobs: Sequence[Job], run: Callable[[Sequence[Job]], Iterator[Outcome]
         Every outcome, as it comes.
 
     Raises:
-        ExportError: The manifest, or another file of all flights, cannot be written.
+        ExportError: The manifest, or another file of all flights, cannot be written, or a file of that name, or of a
+            record's, is none.
     """
-    yield from run(jobs)
     output = Path(jobs[0].output)
+    read_manifest(output)  # as the records: refused before the work, not behind it
+    list(records(output))
+    yield from run(jobs)
     exports: dict[str, dict[str, Any]] = {}
-    for form, flight, record in _records(output):
-        exports.setdefault(form, {})[flight] = record
+    for form, flight, made in records(output):
+        exports.setdefault(form, {})[flight] = made["record"]
     counts = {
         form: {"flights": len(flights), "files": sum(len(record["files"]) for record in flights.values())}
         for form, flights in exports.items()
@@ -293,7 +275,7 @@ def _write_shared(output: Path, exports: dict[str, dict[str, Any]]) -> dict[str,
     Returns:
         Name and SHA-256 of each for the manifest.
     """
-    files: dict[str, str] = dict((_read_json(output / MANIFEST) or {}).get("files", {}))
+    files: dict[str, str] = dict((read_manifest(output) or {}).get("files", {}))
     texts = {CARD: card(__version__, exports)} if exports else {}
     if "yolo" in exports:
         texts[DATA_YAML] = of_all_flights(__version__, exports["yolo"])
@@ -329,8 +311,8 @@ def verify(output: Path) -> list[str]:
     Raises:
         ExportError: No manifest there.
     """
-    manifest = _read_json(output / MANIFEST)
-    if manifest is None or manifest.get("schema") != SCHEMA:
+    manifest = read_manifest(output)
+    if manifest is None or manifest["schema"] != SCHEMA:
         msg = f"{output}: no readable {MANIFEST} of this version; export first"
         raise ExportError(msg)
     problems = []
@@ -344,7 +326,7 @@ def verify(output: Path) -> list[str]:
         elif _sha256(path) != checksum:
             problems.append(f"changed: {name}")
     for name in sorted(_files(output, "")):
-        if name not in known and not name.startswith(_RECORDS + "/"):
+        if name not in known and not name.startswith(RECORDS + "/"):
             problems.append(f"not in the manifest: {name}")
     return problems
 
@@ -396,13 +378,6 @@ def _sha256(path: Path) -> str:
         for block in iter(lambda: file.read(1 << 20), b""):
             digest.update(block)
     return digest.hexdigest()
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
 
 
 def _write_json(path: Path, content: Any) -> None:

@@ -154,7 +154,7 @@ def test_an_export_that_was_killed_goes_on(tmp_path: Path, renaming: int) -> Non
 def test_labels_that_cannot_be_used_fail_their_flight_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = [write_flight(tmp_path / f"{name}.bag", 0.4) for name in "ab"]
     header = {"labels": table.SCHEMA, "bags": ["b.bag"], "airport": "XEMU"}
-    frame = {"camera": "camera", "stamp_ns": stamp_ns(0.0), "objects": []}
+    frame = {"camera": "camera", "stamp_ns": stamp_ns(0.0), "width": 32, "height": 24, "objects": []}
     table.beside(given[0]).write_text('{"labels": 1}\n')
     table.beside(given[1]).write_text(f"{json.dumps(header)}\n{json.dumps(frame)}\n")
     assert export(*given, "--format", "coco", "--labels", tmp_path, "--jobs", "1", "-o", tmp_path / "out") == 1
@@ -166,7 +166,7 @@ def test_labels_that_cannot_be_used_fail_their_flight_alone(tmp_path: Path, caps
 
 def write_labels(path: Path, t: float) -> None:
     header = {"labels": table.SCHEMA, "bags": ["flight.bag"], "airport": "XEMU"}
-    frame = {"camera": "camera", "stamp_ns": stamp_ns(t), "objects": []}
+    frame = {"camera": "camera", "stamp_ns": stamp_ns(t), "width": 32, "height": 24, "objects": []}
     path.write_text(f"{json.dumps(header)}\n{json.dumps(frame)}\n")
 
 
@@ -318,6 +318,18 @@ def test_a_folder_and_a_bag_of_one_name_are_refused(tmp_path: Path) -> None:
     folder = str(tmp_path / "data" / "flight")
     with pytest.raises(ExportError, match=f"^{folder} and {bag} would both be exported as .*_data_flight; "):
         flights([folder, bag])
+
+
+def test_a_bag_of_two_flights_is_refused(tmp_path: Path) -> None:
+    first, second = bags(tmp_path, "run/a.bag", "run/b.bag")
+    link = tmp_path / "link.bag"
+    link.symlink_to(second)
+    folder, linked = tmp_path / "run", tmp_path / "linked"
+    linked.mkdir()
+    (linked / "c.bag").symlink_to(first)
+    for given, bag in (([folder, first], first), ([link, folder], second), ([folder, linked], first)):
+        with pytest.raises(ExportError, match=f"^{bag} is of two of the given flights, .*; give one of them$"):
+            flights([str(path) for path in given])
 
 
 def test_a_full_disk_is_said_with_what_was_written(tmp_path: Path) -> None:
