@@ -18,6 +18,7 @@ import json
 import math
 import shutil
 import tempfile
+import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Callable, Iterator, Optional, Sequence, TextIO
 
@@ -29,7 +30,7 @@ from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels
 from xplane_bridge.export.pictures import NO_LABELS, Options, Picture, Pictures, write_pictures
 from xplane_bridge.export.yolo_yaml import DATA_YAML, data_yaml
 from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
-from xplane_bridge.units import FOOT_M
+from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
@@ -39,9 +40,10 @@ _SKELETON = [[1, 2], [2, 3], [3, 4], [4, 1], [5, 6], [7, 8], [9, 10]]
 _SPLITS = ("train", "validation")
 #: Columns of LARD (deel-ai/LARD, version 2), then ours.
 _LARD = (
-    *("image", "height", "width", "type", "original_dataset", "scenario", "airport", "runway", "time_to_landing"),
-    *("weather", "night", "time", "slant_distance", "along_track_distance", "height_above_runway"),
-    *("lateral_path_angle", "vertical_path_angle", "yaw", "pitch", "roll", "watermark_height"),
+    *("uuid", "image", "height", "width", "type", "original_dataset", "scenario", "airport", "runway"),
+    *("time_to_landing", "weather", "night", "time", "lat_cam", "lon_cam", "alt_cam", "yaw", "pitch", "roll"),
+    *("slant_distance", "along_track_distance", "height_above_runway", "lateral_path_angle", "vertical_path_angle"),
+    *("watermark_height", "runway_in_cone"),
     *("x_TR", "y_TR", "x_TL", "y_TL", "x_BL", "y_BL", "x_BR", "y_BR"),
     *("sigma_TR_px", "sigma_TL_px", "sigma_BL_px", "sigma_BR_px", "height_source", "stamp_ns", "camera"),
 )
@@ -208,7 +210,9 @@ def lard(folder: Path, pictures: Pictures, labels: Optional[ImageLabels]) -> Non
 def _lard_row(picture: Picture, thing: Thing, size: tuple[int, int], labels: ImageLabels) -> list[Any]:
     label = thing.label
     heading, pitch, roll = _attitude(picture)
+    latitude, longitude, altitude = _place(picture)
     values: dict[str, Any] = {
+        "uuid": uuid.uuid5(uuid.NAMESPACE_OID, f"{picture.camera} {picture.stamp}"),
         "image": picture.file,
         "width": size[0],
         "height": size[1],
@@ -216,6 +220,10 @@ def _lard_row(picture: Picture, thing: Thing, size: tuple[int, int], labels: Ima
         "original_dataset": "xplane_bridge",
         "airport": labels.about["airport"],
         "runway": label["name"],
+        "lat_cam": latitude,
+        "lon_cam": longitude,
+        "alt_cam": altitude,
+        "runway_in_cone": "UNKNOWN",
         "slant_distance": label["slant_distance_m"] / _MILE_M,
         "along_track_distance": label["along_track_distance_m"] / _MILE_M,
         "height_above_runway": label["height_above_threshold_m"] / FOOT_M,
@@ -224,7 +232,6 @@ def _lard_row(picture: Picture, thing: Thing, size: tuple[int, int], labels: Ima
         "yaw": heading,
         "pitch": 90.0 + pitch,  # theirs: 90 is level
         "roll": roll,
-        "watermark_height": 0,
         "height_source": label["height"]["source"],
         "camera": picture.camera,
         "stamp_ns": picture.stamp,
@@ -237,13 +244,24 @@ def _lard_row(picture: Picture, thing: Thing, size: tuple[int, int], labels: Ima
     return [values.get(name, "") for name in _LARD]
 
 
+def _place(picture: Picture) -> tuple[float, float, float]:
+    """Latitude, longitude [deg] and altitude [m MSL] of the camera."""
+    names = ("latitude_deg", "longitude_deg", "altitude_msl_m")
+    latitude, longitude, altitude = (float(picture.known(f"state_{name}")) for name in names)
+    lever = [float(picture.known(f"body_to_camera_translation_{axis}")) for axis in "xyz"]
+    north, east, down = (_rotation(picture, "state_orientation") @ FRD_OF_FLU @ lever).tolist()
+    turn = math.degrees(east / (EARTH_RADIUS_M * math.cos(math.radians(latitude))))
+    return latitude + math.degrees(north / EARTH_RADIUS_M), math.remainder(longitude + turn, 360.0), altitude - down
+
+
+def _rotation(picture: Picture, prefix: str) -> np.ndarray:
+    return rotation_of(np.array([float(picture.known(f"{prefix}_{axis}")) for axis in "xyzw"]))
+
+
 def _attitude(picture: Picture) -> tuple[float, float, float]:
     """Heading, pitch, roll [deg] of the camera against the local level."""
-
-    def rotation(prefix: str) -> np.ndarray:
-        return rotation_of(np.array([float(picture.known(f"{prefix}_{axis}")) for axis in "xyzw"]))
-
-    optical = rotation("state_orientation") @ FRD_OF_FLU @ rotation("body_to_camera_rotation")
+    body = _rotation(picture, "state_orientation") @ FRD_OF_FLU
+    optical = body @ _rotation(picture, "body_to_camera_rotation")
     right, down, forward = optical[:, 0], optical[:, 1], optical[:, 2]
     heading = math.degrees(math.atan2(forward[1], forward[0])) % 360.0
     pitch = math.degrees(math.asin(float(np.clip(-forward[2], -1.0, 1.0))))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import uuid
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from support.flights.drawn_approach import LEVER, write_approach
+from support.flights.drawn_approach import LEVER, scene, write_approach
 from support.flights.export_flight import export, write_flight
 from support.flights.synthetic_flight import stamp_ns
 from support.white_lines import airport_file
@@ -172,7 +173,33 @@ def test_lard_is_read_by_its_columns(flight: Path, tmp_path: Path) -> None:
     assert first["along_track_distance"] * 1852.0 == pytest.approx(898.8, abs=0.2)
     assert first["height_above_runway"] * 0.3048 == pytest.approx(1200.0 * np.tan(np.radians(3.0)) + 0.56, abs=0.05)
     assert (first["yaw"], first["pitch"], first["roll"]) == pytest.approx((155.5, 88.0, 0.0), abs=1e-6)
+    shown = scene(0.0)
+    ahead, right, down = LEVER  # of an aircraft that is level but for its nose, 0.5 degrees down, and flies to 155.5
+    pitch, heading = np.radians((-0.5 - 1.5, 155.5))
+    level = ahead * np.cos(pitch) + down * np.sin(pitch)
+    north, east = level * np.cos(heading) - right * np.sin(heading), level * np.sin(heading) + right * np.cos(heading)
+    metres = 6378145.0 * np.pi / 180.0
+    assert (first["lat_cam"] - shown.latitude_deg) * metres == pytest.approx(north, abs=1e-3)
+    across = metres * np.cos(np.radians(shown.latitude_deg))
+    assert (first["lon_cam"] - shown.longitude_deg) * across == pytest.approx(east, abs=1e-3)
+    above = ahead * np.sin(pitch) - down * np.cos(pitch)
+    assert first["alt_cam"] - shown.altitude_m == pytest.approx(above, abs=1e-6)
     assert first["lateral_path_angle"] == pytest.approx(np.degrees(np.arctan2(-0.3, 898.8)), abs=0.02)
+
+
+def test_lard_has_the_columns_of_its_version_2(flight: Path, tmp_path: Path) -> None:
+    folder = labelled(flight, "lard", tmp_path)
+    rows = pd.read_csv(folder / "train.csv", sep=";")
+    theirs = (
+        "uuid image height width type original_dataset scenario airport runway time_to_landing weather night time "
+        "lat_cam lon_cam alt_cam yaw pitch roll slant_distance along_track_distance height_above_runway "
+        "lateral_path_angle vertical_path_angle watermark_height runway_in_cone "
+        "x_TR y_TR x_TL y_TL x_BL y_BL x_BR y_BR "
+    )
+    assert " ".join(rows).startswith(theirs)
+    assert rows["watermark_height"].isna().all(), "its tools crop to [0:-0], which is nothing"
+    assert (rows["runway_in_cone"] == "UNKNOWN").all()
+    assert len({uuid.UUID(text) for text in rows["uuid"]}) == len(rows)
 
 
 def test_an_image_folder_takes_labels_too(flight: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
