@@ -235,7 +235,7 @@ void Actuation::onReset(const std::string& how) {
 
 void Actuation::tick() {
   const Lock lock(*mutex_);
-  surfaces_.tick(path_.refusal());
+  surfaces_.tick(path_.requestRefusal());
   failures_.tick();
   path_.tick();
   traffic_.tick(sim_time_);
@@ -304,6 +304,7 @@ std::string Actuation::commandSurfaces(const std::vector<std::string>& names, co
 Actuation::Injected Actuation::inject(const ExcitationRequest& request, const std::string& who) {
   const ExcitationManager::Plan plan = excitation_.plan(request);
   const Lock lock(*mutex_);
+  surfaces_.tick(path_.requestRefusal());
   if (identification_.running() && plan.wrong.empty()) {
     if (!plan.signals.empty()) {
       return {{core::ResultCode::kRefused,
@@ -313,7 +314,7 @@ Actuation::Injected Actuation::inject(const ExcitationRequest& request, const st
     endSignals("stopped by " + who);
     return {{core::ResultCode::kAccepted, "identify_surfaces is stopped"}, excitation_.label().id};
   }
-  RequestResult result = excitation_.inject(request, plan, who, watch_, path_.refusal(), path_.commanded());
+  RequestResult result = excitation_.inject(request, plan, who, watch_, path_.requestRefusal(), path_.commanded());
   return {std::move(result), excitation_.label().id};
 }
 
@@ -356,12 +357,13 @@ std::optional<RequestResult> Actuation::windRefusal() {
 }
 
 IdentificationConditions Actuation::conditions() const {
-  return {path_.refusal(), path_.mode().failsafe, !failures_.snapshot().labels.empty(), path_.commanded()};
+  return {path_.requestRefusal(), path_.mode().failsafe, !failures_.snapshot().labels.empty(), path_.commanded()};
 }
 
 Actuation::Identifying Actuation::identifySurfaces(const IdentificationRequest& request, const std::string& who,
                                                    const std::function<std::uint32_t()>& reserve) {
   const Lock lock(*mutex_);
+  surfaces_.tick(path_.requestRefusal());
   if (link_status_.paused.value_or(false)) {
     return {{core::ResultCode::kRefused, "X-Plane is paused: let it run first"}, 0};
   }

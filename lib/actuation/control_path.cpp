@@ -436,6 +436,13 @@ std::string ControlPath::refusal() const {
   return why_not_;
 }
 
+std::optional<RequestResult> ControlPath::requestRefusal() const {
+  std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  if (why_not_.empty()) return std::nullopt;
+  const bool away = standing_ == Standing::kNotConnected;
+  return RequestResult{away ? core::ResultCode::kNoLink : core::ResultCode::kRefused, why_not_};
+}
+
 core::ModeStatus ControlPath::mode() const {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   return arbiter_.status();

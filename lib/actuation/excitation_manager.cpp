@@ -114,7 +114,7 @@ ExcitationManager::Plan ExcitationManager::plan(const ExcitationRequest& request
 }
 
 RequestResult ExcitationManager::inject(const ExcitationRequest& request, const Plan& plan, const std::string& who,
-                                        const core::FlightWatch& watch, const std::string& blocked_reason,
+                                        const core::FlightWatch& watch, const std::optional<RequestResult>& blocked,
                                         const core::ChannelSet& commanded) {
   if (!plan.wrong.empty()) return {core::ResultCode::kRefused, plan.wrong};
   if (plan.signals.empty()) {
@@ -123,7 +123,7 @@ RequestResult ExcitationManager::inject(const ExcitationRequest& request, const 
     return {core::ResultCode::kAccepted, "excitation " + std::to_string(label_.id) + " is stopped"};
   }
   const core::ExcitationSpec& spec = plan.signals.front().spec();
-  if (!blocked_reason.empty()) return {core::ResultCode::kNoLink, blocked_reason};
+  if (blocked) return *blocked;
   if (running()) {
     return {core::ResultCode::kRefused, "excitation " + std::to_string(label_.id) + " runs on " + label_.target +
                                             "; one at a time: wait for it, or stop it"};

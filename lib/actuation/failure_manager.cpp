@@ -306,11 +306,11 @@ void FailureManager::watchObeyed() {
     Pending pending = obeyed_.at(name).failure;
     pending.since = now();
     obeyed_.erase(name);
-    const std::string blocked = surfaces_->blockReasonFor(pending.plan.surface->surface);
-    if (!blocked.empty()) {  // better X-Plane's failure than none
+    const auto refusal = surfaces_->refusalFor(pending.plan.surface->surface);
+    if (refusal) {  // better X-Plane's failure than none
       std::string why =
           name + ": X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: ";
-      why += blocked;
+      why += refusal->text;
       report_(why, pending.who, false);
       continue;
     }

@@ -75,9 +75,9 @@ std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan&
     return RequestResult{core::ResultCode::kNotSupported,
                          "this X-Plane does not answer to " + plan.datarefs.front() + ": is the name right?"};
   }
-  const std::string blocked = surfaces_->blockReasonFor(plan.surface->surface);
-  if (blocked.empty()) return std::nullopt;
-  return RequestResult{core::ResultCode::kRefused, plan.name + " cannot be broken now: " + blocked};
+  const auto refusal = surfaces_->refusalFor(plan.surface->surface);
+  if (!refusal) return std::nullopt;
+  return RequestResult{refusal->code, plan.name + " cannot be broken now: " + refusal->text};
 }
 
 RequestResult FailureManager::set(const core::FailureRequest& request, const std::string& who) {

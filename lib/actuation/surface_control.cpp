@@ -137,7 +137,7 @@ void SurfaceControl::onSample() {
         abandon("another client has released the surface override");
       } else if (!wanted() && (settled() || !overridden)) {
         giveBack();
-      } else if (blocked_reason_.empty()) {
+      } else if (!blocked_) {
         settling_ = wanted() ? 0.0 : settling_ + dt;
         drive(dt);
         measureLag();
@@ -163,7 +163,7 @@ void SurfaceControl::onSample() {
 /// Surfaces are where X-Plane will have them, or cannot be brought there. In a pause they stand, and run back after it.
 bool SurfaceControl::settled() const {
   const bool there = settling_ > 0.0 && driver_->offTarget() <= kSettledDeg;
-  return there || settling_ > kSettleWait || !(flowing_ || paused_) || !blocked_reason_.empty();
+  return there || settling_ > kSettleWait || !(flowing_ || paused_) || blocked_;
 }
 
 bool SurfaceControl::wanted() const { return !failures_.empty() || !commands_.empty() || offset_; }
@@ -373,9 +373,9 @@ void SurfaceControl::saveModel() {
   report_("the mixing of the surfaces is identified, " + kept, file_problem_.empty());
 }
 
-void SurfaceControl::tick(const std::string& blocked_reason) {
+void SurfaceControl::tick(const std::optional<RequestResult>& blocked) {
   std::lock_guard<std::mutex> lock(mutex_);
-  blocked_reason_ = blocked_reason;
+  blocked_ = blocked;
 }
 
 void SurfaceControl::stop() {

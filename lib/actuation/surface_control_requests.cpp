@@ -145,7 +145,7 @@ void SurfaceControl::clearOffset() {
 
 std::string SurfaceControl::beginIdentification() {
   std::lock_guard<std::mutex> lock(mutex_);
-  if (!blocked_reason_.empty()) return blocked_reason_;
+  if (blocked_) return blocked_->text;
   if (state_ != State::kIdle || wanted()) return "the surfaces are driven one by one: end that first";
   if (disturbed_) return "something of the controls is broken: clear the failures first";
   if (sample_.override_shown != 0.0) return blockReasonLocked();
@@ -196,7 +196,7 @@ SurfaceControl::Sticks SurfaceControl::sticks() const {
 // --- what is ---
 
 std::string SurfaceControl::blockReasonLocked() const {
-  if (!blocked_reason_.empty()) return blocked_reason_;
+  if (blocked_) return blocked_->text;
   if (state_ == State::kTaking || state_ == State::kDriving) return "";
   if (state_ == State::kReleasing && driver_) return "";
   if (now() < not_before_) return "X-Plane did not let the surfaces be taken over a moment ago";
@@ -213,9 +213,11 @@ std::string SurfaceControl::blockReason() const {
   return blockReasonLocked();
 }
 
-std::string SurfaceControl::blockReasonFor(std::size_t surface) const {
+std::optional<RequestResult> SurfaceControl::refusalFor(std::size_t surface) const {
   std::lock_guard<std::mutex> lock(mutex_);
-  return blockReasonForLocked(surface);
+  std::string why = blockReasonForLocked(surface);
+  if (why.empty()) return std::nullopt;
+  return RequestResult{blocked_ ? blocked_->code : core::ResultCode::kRefused, std::move(why)};
 }
 
 std::string SurfaceControl::blockReasonForLocked(std::size_t surface) const {

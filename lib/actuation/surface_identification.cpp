@@ -135,7 +135,7 @@ std::string SurfaceIdentification::beyondLimits(const core::FlightWatch& watch) 
 
 /// Of what decides at the beginning and all the time.
 std::string SurfaceIdentification::whyNot(const core::FlightWatch& watch, const IdentificationConditions& now) const {
-  if (!now.blocked_reason.empty()) return now.blocked_reason;
+  if (now.blocked) return now.blocked->text;
   if (now.failsafe) return "the failsafe flies: its source must be back, or a mode asked for";
   if (now.broken) return "a failure is set: clear_failures first";
   return beyondLimits(watch);
@@ -150,7 +150,7 @@ RequestResult SurfaceIdentification::begin(const IdentificationRequest& request,
   if (running()) return refused("an identification runs already: wait for event " + std::to_string(number_));
   if (const auto wrong = wrongLimit(request)) return refused(*wrong);
   if (excitation_->running()) return refused("an excitation runs: wait for it, or stop it");
-  if (!now.blocked_reason.empty()) return {core::ResultCode::kNoLink, now.blocked_reason};
+  if (now.blocked) return *now.blocked;
   if (!isKnown(watch)) return {core::ResultCode::kNoLink, "X-Plane has not shown the flight yet"};
   limits_ = request;
   limits_.max_roll_deg = orDefault(request.max_roll_deg, std::min(kMaxRollDeg, max_roll_deg_));
@@ -223,7 +223,7 @@ void SurfaceIdentification::signal(const core::FlightWatch& watch, const Identif
   request.max_pitch_deg = limits_.max_pitch_deg;
   request.rest = sticks.stick[axis_];
   const RequestResult result =
-      excitation_->inject(request, excitation_->plan(request), who_, watch, now.blocked_reason, now.commanded);
+      excitation_->inject(request, excitation_->plan(request), who_, watch, now.blocked, now.commanded);
   if (result.code != core::ResultCode::kAccepted) return abort(result.text);
   signal_id_ = excitation_->label().id;
   low_ = high_ = 0.0;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "xplane_bridge/actuation/override_manager.hpp"
+#include "xplane_bridge/actuation/request_result.hpp"
 #include "xplane_bridge/core/control/control_arbiter.hpp"
 #include "xplane_bridge/core/control/control_channels.hpp"
 #include "xplane_bridge/core/control/missing_channels.hpp"
@@ -134,6 +135,8 @@ class ControlPath {
   Standing standing() const;
   /// Why nothing is sent to X-Plane now, in words that say what to do; empty: it is.
   std::string refusal() const;
+  /// What a request that needs commands is refused with now: kNoLink where waiting helps; nullopt: they are sent.
+  std::optional<RequestResult> requestRefusal() const;
   core::ModeStatus mode() const;
   core::SourceStatistics statistics(core::FlightMode source) const;
   /// The channels that a living source commands and X-Plane gets.

@@ -70,10 +70,10 @@ class ExcitationManager {
   Plan plan(const ExcitationRequest& request) const;
   /// Begins or stops one; label() has its number.
   /// @param plan of the request
-  /// @param blocked_reason why nothing may be sent to X-Plane now; empty: it may
+  /// @param blocked what it is refused with, as nothing may be sent to X-Plane now; nullopt: it may
   /// @param commanded the channels that are commanded now
   RequestResult inject(const ExcitationRequest& request, const Plan& plan, const std::string& who,
-                       const core::FlightWatch& watch, const std::string& blocked_reason,
+                       const core::FlightWatch& watch, const std::optional<RequestResult>& blocked,
                        const core::ChannelSet& commanded);
 
   /// Every frame. Returns whether an axis is excited, so that the controls have to be sent anew.

@@ -10,7 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/actuation/override_manager.hpp"
+#include "xplane_bridge/actuation/request_result.hpp"
 #include "xplane_bridge/core/link/simulator_port.hpp"
 #include "xplane_bridge/core/surfaces/mixing_watch.hpp"
 #include "xplane_bridge/core/surfaces/surface_driver.hpp"
@@ -79,8 +81,8 @@ class SurfaceControl {
   void onAircraft(const std::string& aircraft, const std::string& exactly = "");
   /// Whatever is driven ends, failures and commands too.
   void release(const std::string& why);
-  /// At least ten times a second. `blocked_reason`: why nothing may be sent to X-Plane now; empty: it may.
-  void tick(const std::string& blocked_reason);
+  /// At least ten times a second. `blocked`: the refusal, as nothing may be sent to X-Plane now; nullopt: it may.
+  void tick(const std::optional<RequestResult>& blocked);
   /// Ends all driving; OverrideManager releases the overrides.
   void stop();
   /// What was seen until now was no flight: it says nothing about the mixing.
@@ -137,8 +139,8 @@ class SurfaceControl {
 
   /// Why surfaces cannot be driven now, in words that say what to do; empty: they can, or are.
   std::string blockReason() const;
-  /// The same for one surface, which the mixing has to know.
-  std::string blockReasonFor(std::size_t surface) const;
+  /// The same for one surface, which the mixing has to know: kNoLink where waiting helps; nullopt: it can.
+  std::optional<RequestResult> refusalFor(std::size_t surface) const;
   /// The surface override is set, or being taken or given back.
   bool driving() const;
   /// Nothing needs the surfaces any more, but X-Plane has not shown yet that it drives them.
@@ -221,7 +223,7 @@ class SurfaceControl {
   bool flowing_ = false, paused_ = false;
   bool disturbed_ = false;
   bool stopped_ = false;
-  std::string blocked_reason_ = "X-Plane is not connected";
+  std::optional<RequestResult> blocked_ = noLink();
 
   core::MixingWatch watch_;
   std::string file_problem_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "xplane_bridge/actuation/excitation_manager.hpp"
@@ -25,10 +26,10 @@ struct IdentificationRequest {
 
 /// What the rest of tx_node is at, as far as it decides about an identification.
 struct IdentificationConditions {
-  std::string blocked_reason;  ///< why nothing may be sent to X-Plane now; empty: it may
-  bool failsafe = false;       ///< the source that flies is silent
-  bool broken = false;         ///< a failure is active, or waits for its trigger
-  core::ChannelSet commanded;  ///< channels that are commanded now
+  std::optional<RequestResult> blocked;  ///< the refusal, as nothing may be sent to X-Plane now; nullopt: it may
+  bool failsafe = false;                 ///< the source that flies is silent
+  bool broken = false;                   ///< a failure is active, or waits for its trigger
+  core::ChannelSet commanded;            ///< channels that are commanded now
 };
 
 /// Learns how the aircraft moves its surfaces by test signals: two periods of a sine on roll, pitch and yaw, one after

@@ -339,8 +339,7 @@ class RosPlayer:
                 raise ScenarioError(f"{what}: {name} cannot be called: {error}") from None
             if response.success:
                 return
-            # inject_excitation says so for whatever keeps commands from X-Plane.
-            unlinked = response.result.code == ResultCode.NO_LINK and service != "inject_excitation"
+            unlinked = response.result.code == ResultCode.NO_LINK
             if unlinked and not said:
                 said = True
                 self._say(f"{what}: {response.result.message}")

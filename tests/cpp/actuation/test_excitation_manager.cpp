@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "actuation/driven_surfaces_test.hpp"
+#include "xplane_bridge/actuation/link_condition.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -51,7 +53,7 @@ class ExcitationManagerTest : public DrivenSurfacesTest {
   }
 
   RequestResult inject(const ExcitationRequest& request) {
-    return manager_.inject(request, manager_.plan(request), "node/inject", watch_, blocked_, commanded_);
+    return manager_.inject(request, manager_.plan(request), "node/inject", watch_, refusal_, commanded_);
   }
   std::string wrongWith(const ExcitationRequest& request) const { return manager_.plan(request).wrong; }
   void start(const std::string& target, double amplitude) {
@@ -61,6 +63,7 @@ class ExcitationManagerTest : public DrivenSurfacesTest {
 
   core::FlightWatch watch_;
   core::ChannelSet commanded_ = only(Channel::kRoll);
+  std::optional<RequestResult> refusal_;
   bool excited_ = false;
   std::vector<ExcitationLabel> labels_;                               // as published
   std::vector<std::tuple<std::string, std::string, bool>> reported_;  // text, who, success
@@ -289,9 +292,11 @@ TEST_F(ExcitationManagerTest, RefusesWhatIsNotSafeNow) {
   refused(stop, ResultCode::kRefused, "no excitation runs");
   refused(doubletOn("yaw"), ResultCode::kRefused,
           "no source commands yaw: an excitation is added to a command (control/manual or auto)");
-  blocked_ = "X-Plane is not connected";
+  refusal_ = noLink();
   refused(doubletOn("roll"), ResultCode::kNoLink, "X-Plane is not connected");
-  blocked_.clear();
+  refusal_ = RequestResult{ResultCode::kRefused, "tx_node hung: ask for a mode to fly on"};
+  refused(doubletOn("roll"), ResultCode::kRefused, "tx_node hung: ask for a mode to fly on");
+  refusal_.reset();
   const core::FlightWatch known = watch_;
   for (double core::FlightWatch::*member :
        {&core::FlightWatch::sim_time, &core::FlightWatch::roll_deg, &core::FlightWatch::pitch_deg}) {
@@ -359,7 +364,7 @@ TEST_F(ExcitationManagerTest, StopEndsTheOneThatRuns) {
   start("roll", 0.2);
   ExcitationRequest stop;
   stop.kind = "stop";
-  blocked_ = "X-Plane is not connected";
+  refusal_ = noLink();
   const RequestResult result = inject(stop);
   EXPECT_EQ(result.code, ResultCode::kAccepted) << "stopping is always possible";
   EXPECT_EQ(result.text, "excitation 1 is stopped");

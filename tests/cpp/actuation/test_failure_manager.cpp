@@ -118,10 +118,14 @@ TEST_F(FailureManagerTest, RefusesWhatCannotBeBroken) {
           "this X-Plane does not answer to sim/operation/failures/rel_nothing: is the name right?");
   refused(broken("flap1_wing1_left", "stuck"), ResultCode::kRefused,
           "flap1_wing1_left cannot be broken now: flap1_wing1_left has not been seen to move");
-  blocked_ = "the aircraft is another one";
+  block("the aircraft is another one");
   sim_.frame();
   refused(broken(FakeAirframe::kLeft, "stuck"), ResultCode::kRefused,
           "aileron1_wing2_left cannot be broken now: the aircraft is another one");
+  blocked_ = RequestResult{ResultCode::kNoLink, "X-Plane is back, but has not shown its flight yet"};
+  sim_.frame();
+  refused(broken(FakeAirframe::kLeft, "stuck"), ResultCode::kNoLink,
+          "aileron1_wing2_left cannot be broken now: X-Plane is back, but has not shown its flight yet");
   EXPECT_TRUE(sim_.messages().empty());
 }
 

@@ -129,7 +129,7 @@ TEST_F(SurfaceControlTest, WhatMayNotBeDrivenIsGivenBackInAPauseToo) {
   drive();
   setLink(core::LinkState::kPaused);
   surfaces_.setFailures({});
-  blocked_ = "the aircraft is not the one of the configuration";
+  block("the aircraft is not the one of the configuration");
   sim_.run(0.1);
   EXPECT_EQ(state(), State::kIdle);
 }
@@ -192,11 +192,12 @@ TEST_F(SurfaceControlTest, StopEndsDrivingAndLeavesTheOverrideToItsManager) {
 // ------------------------------------------------------------------------------------------------ refusals
 
 TEST_F(SurfaceControlTest, SaysWhatBlocksIt) {
-  blocked_ = "X-Plane is not connected";
+  blocked_ = noLink();
   sim_.frame();
   EXPECT_EQ(surfaces_.blockReason(), "X-Plane is not connected");
-  EXPECT_EQ(surfaces_.blockReasonFor(kLeftNumber), "X-Plane is not connected");
-  blocked_.clear();
+  EXPECT_EQ(surfaces_.refusalFor(kLeftNumber)->code, core::ResultCode::kNoLink);
+  EXPECT_EQ(surfaces_.refusalFor(kLeftNumber)->text, "X-Plane is not connected");
+  blocked_.reset();
   sim_.set(kSurfaceOverride, 1.0F);
   sim_.frame();
   EXPECT_EQ(surfaces_.blockReason(), "another program has set override_control_surfaces and must give it back");
@@ -205,10 +206,12 @@ TEST_F(SurfaceControlTest, SaysWhatBlocksIt) {
   EXPECT_EQ(surfaces_.blockReason(), "X-Plane does not show its surfaces");
   sim_.set(kSurfaceOverride, 0.0F);
   sim_.frame();
-  EXPECT_EQ(surfaces_.blockReasonFor(core::surfaceNumber("flap1_wing1_left").value()),
+  const auto flap = surfaces_.refusalFor(core::surfaceNumber("flap1_wing1_left").value());
+  EXPECT_EQ(flap->code, core::ResultCode::kRefused);
+  EXPECT_EQ(flap->text,
             "flap1_wing1_left has not been seen to move: either this aircraft has none, or its handle has to be moved "
             "once; those that moved: aileron1_wing2_left, aileron1_wing2_right, elevator1_left, rudder1_fin1");
-  EXPECT_EQ(surfaces_.blockReasonFor(kLeftNumber), "");
+  EXPECT_FALSE(surfaces_.refusalFor(kLeftNumber));
   airframe_.hold(FakeAirframe::kRudder, std::nan(""));
   sim_.run(1.2);
   EXPECT_EQ(surfaces_.blockReason(), "X-Plane does not show rudder1_fin1, which the mixing has");
@@ -234,7 +237,7 @@ TEST_F(SurfaceControlTest, RefusedCommandsSayWhatWasExpected) {
   EXPECT_EQ(refusal({FakeAirframe::kLeft}, {25.0F}),
             "aileron1_wing2_left is 25.0 deg: expected its travel, -21.0..21.0");
   EXPECT_NE(refusal({"flap1_wing1_left"}, {1.0F}).find("has not been seen to move"), std::string::npos);
-  blocked_ = "X-Plane is not connected";
+  blocked_ = noLink();
   sim_.frame();
   EXPECT_EQ(refusal({FakeAirframe::kLeft}, {1.0F}), "X-Plane is not connected");
   EXPECT_EQ(surfaces_.status().commands_refused, 5U);

@@ -132,6 +132,13 @@ def test_what_is_refused_for_want_of_a_link_is_asked_for_again(monkeypatch):
         calls_of(monkeypatch, [NO_LINK, REFUSED], BREAK)
 
 
+def test_an_excitation_is_asked_for_again_without_a_link_but_not_where_a_mode_is_needed(monkeypatch):
+    doublet = {"excitation": {"kind": "doublet", "target": "roll", "amplitude": 0.1, "duration": 2}}
+    assert calls_of(monkeypatch, [NO_LINK, ACCEPTED], doublet)[0] == 2
+    with pytest.raises(ScenarioError, match="REFUSED"):
+        calls_of(monkeypatch, [REFUSED, ACCEPTED], doublet)
+
+
 def test_a_repair_without_a_link_is_not_asked_for_again_but_said(monkeypatch):
     """tx_node repairs when the link is back; a second request finds nothing that is broken, and is refused."""
     repairs = {"clear_failures": True}

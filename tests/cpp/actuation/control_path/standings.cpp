@@ -190,6 +190,31 @@ TEST_F(ControlPathTest, AnotherAircraftIsNotFlown) {
   EXPECT_EQ(path->standing(), Standing::kFlying);
 }
 
+TEST_F(ControlPathTest, OnlyWithoutXPlaneIsARequestRefusedForWantOfALink) {
+  const auto refused_with = [this](core::ResultCode code) {
+    const auto refusal = path->requestRefusal();
+    ASSERT_TRUE(refusal) << "it flies";
+    EXPECT_EQ(refusal->code, code) << refusal->text;
+    EXPECT_EQ(refusal->text, path->refusal());
+  };
+  sim.setState(LinkState::kSearching);
+  start(LinkState::kSearching);
+  refused_with(core::ResultCode::kNoLink);
+  setState(LinkState::kConnected);
+  refused_with(core::ResultCode::kNoLink);  // no frame yet
+  frame();
+  EXPECT_FALSE(path->requestRefusal());
+  path->onGivenBack("tx_node hung");
+  refused_with(core::ResultCode::kRefused);
+  ask(FlightMode::kManual);
+  EXPECT_FALSE(path->requestRefusal());
+  path->suspend("another aircraft is being loaded");
+  refused_with(core::ResultCode::kRefused);
+  path->resume();
+  path->onAircraft({"QUAD", "Quadrotor"});
+  refused_with(core::ResultCode::kRefused);
+}
+
 TEST_F(ControlPathTest, OverridesAreGivenBackWhenAnotherAircraftComes) {
   start();
   runWith(rollCommand(0.3), 0.2);

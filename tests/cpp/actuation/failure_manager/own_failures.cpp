@@ -85,7 +85,7 @@ TEST_F(FailureManagerTest12, XPlanesFailureStaysWhereTheDriverCannotTakeOverLate
   airframe_.setStick(0.25);
   sim_.run(0.1);
   require(broken(FakeAirframe::kLeft, "stuck"));
-  blocked_ = "the aircraft is another one";
+  block("the aircraft is another one");
   airframe_.setStick(0.5);
   sim_.run(3.0);
   EXPECT_TRUE(
@@ -110,7 +110,7 @@ TEST_F(FailureManagerTest12, DriverThatCannotTakeOverGivesTheFailureUp) {
   airframe_.setStick(0.25);
   sim_.run(0.1);
   after(0.2, [this] { airframe_.setStick(0.5); });
-  after(0.3, [this] { blocked_ = "the aircraft is another one"; });
+  after(0.3, [this] { block("the aircraft is another one"); });
   const RequestResult result = set(broken(FakeAirframe::kLeft, "stuck"));
   EXPECT_EQ(result.code, ResultCode::kTimeout);
   EXPECT_EQ(result.text, "the aircraft is another one");

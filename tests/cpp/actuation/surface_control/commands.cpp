@@ -118,7 +118,7 @@ TEST_F(SurfaceControlTest, OffsetIsRefusedWhereItCannotAct) {
             "amplitude is 20.5 deg: expected at most half of its travel, 20.0");
   surfaces_.setFailures({stuckAt(6.0)});
   EXPECT_EQ(surfaces_.beginOffset(kLeftNumber, 2.0), "aileron1_wing2_left is broken");
-  blocked_ = "X-Plane is not connected";
+  blocked_ = noLink();
   sim_.frame();
   EXPECT_EQ(surfaces_.beginOffset(kLeftNumber, 2.0), "X-Plane is not connected");
 }

@@ -169,13 +169,13 @@ TEST_F(SurfaceControlTest, SilenceIsWaitedThrough) {
 
 TEST_F(SurfaceControlTest, NothingIsSentWhileItIsBlocked) {
   drive();
-  blocked_ = "the aircraft is not the one of the configuration";
+  block("the aircraft is not the one of the configuration");
   sim_.run(0.1);
   sim_.clearMessages();
   sim_.run(1.0);
   EXPECT_TRUE(sim_.messages().empty());
-  EXPECT_EQ(surfaces_.blockReason(), blocked_);
-  blocked_.clear();
+  EXPECT_EQ(surfaces_.blockReason(), blocked_->text);
+  blocked_.reset();
   sim_.run(0.1);
   EXPECT_FALSE(written(kLeft).empty());
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,6 +37,8 @@ class DrivenSurfacesTest : public testing::Test {
     airframe_.move();
     surfaces_.tick(blocked_);
   }
+  /// Nothing may be sent from the next frame on.
+  void block(const std::string& why) { blocked_ = RequestResult{core::ResultCode::kRefused, why}; }
   std::string folder() const { return sim_.folder() + "/mixing"; }
   std::string shipped() const { return sim_.folder() + "/shipped"; }
   SurfaceControlOptions options() const {
@@ -60,8 +63,8 @@ class DrivenSurfacesTest : public testing::Test {
 
   core::FakeSimulator sim_;
   core::FakeAirframe airframe_{&sim_};
-  std::string blocked_;  // why nothing may be sent
-  Reports reports_;      // of surfaces_
+  std::optional<RequestResult> blocked_;  // nothing may be sent
+  Reports reports_;                       // of surfaces_
   std::vector<SurfaceControl::Echo> echoes_;
   OverrideManager overrides_{&sim_, [](const std::string&, bool) {}};
   SurfaceControl surfaces_{&sim_, &overrides_, options(),
