@@ -170,6 +170,7 @@ void Actuation::onWatch(const core::RrefView& view) {
   if (another) {
     failures_.onRestart();
     jobs_.forgetSettings();
+    views_.forget();
     disturbance_.forget();
   }
   failures_.onFrame(watch_);

@@ -331,7 +331,9 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
   }
   if (stopping_) return "nothing was set";
   const std::lock_guard<std::mutex> lock(restores_mutex_);
-  std::vector<core::UndoOperation> all = restores_;
+  const auto journal = link_->journal();
+  const auto before = journal ? core::ownEntry(*journal, kSettingsEntry) : std::nullopt;
+  std::vector<core::UndoOperation> all = before ? before->undo : std::vector<core::UndoOperation>();
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const bool known = std::any_of(all.begin(), all.end(), [&](const core::UndoOperation& operation) {
       return std::get<core::UndoDref>(operation).path == names[i];
@@ -344,30 +346,26 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
       unknown.push_back(names[i]);
     }
   }
-  const auto journal = link_->journal();
   if (!unknown.empty() || !journal) {
     return "X-Plane does not report " + core::join(unknown.empty() ? names : unknown) +
            ", which could not be put back on exit" + linkCondition();
   }
-  journal->record(kSettingsEntry, kOverridePurpose, all);
-  restores_ = std::move(all);
+  journal->record(kSettingsEntry, kOverridePurpose, std::move(all));
   return "";
 }
 
 void FlightChanges::endSettings(bool restore) {
   const std::lock_guard<std::mutex> lock(restores_mutex_);
   const auto journal = link_->journal();
-  if (restores_.empty() || !journal) return;
+  if (!journal) return;
   try {
-    if (isUp() || !restore) {
-      for (const core::UndoOperation& operation : restores_) {
-        if (restore) link_->sendUndo(operation);
-      }
-      restores_.clear();
-      journal->remove({kSettingsEntry});
-    } else {
-      journal->leave({kSettingsEntry}, "X-Plane went first");
+    const auto entry = core::ownEntry(*journal, kSettingsEntry);
+    if (!entry) return;
+    if (restore && !isUp()) return journal->leave({kSettingsEntry}, "X-Plane went first");
+    for (const core::UndoOperation& operation : entry->undo) {
+      if (restore) link_->sendUndo(operation);
     }
+    journal->removeUndone({*entry});
   } catch (const core::JournalError&) {
     // The next start does it once more, or for the first time.
   }

@@ -9,6 +9,7 @@
 
 #include "xplane_bridge/actuation/link_condition.hpp"
 #include "xplane_bridge/actuation/override_manager.hpp"
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/camera/view_stream.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
 #include "xplane_bridge/core/state/frames.hpp"
@@ -99,7 +100,8 @@ RequestResult ViewRequests::setViewLocked(const core::ViewWish& wish) {
 }
 
 std::string ViewRequests::remember() {
-  if (!link_->journal()) return "there is no journal yet, so that nothing is changed: try again in a second";
+  const auto journal = link_->journal();
+  if (!journal) return "there is no journal yet, so that nothing is changed: try again in a second";
   const std::vector<std::string>& camera = core::cameraDatarefs();
   const auto now = link_->read(camera, kViewReadWait);
   answered_.clear();
@@ -108,24 +110,31 @@ std::string ViewRequests::remember() {
   }
   const auto shown = measured(filled(camera, now));
   if (!shown) return "X-Plane does not say where its camera is (sim/graphics/view/view_*)";
+  if (!core::ownEntry(*journal, kEntry)) before_.clear();
   if (!before_.empty()) return "";
   std::vector<std::string> changed = core::viewDatarefs();
   changed.emplace_back(core::kFieldOfViewDataref);
   const auto values = link_->read(changed, kViewReadWait);
+  std::vector<std::string> unknown;
   for (std::size_t i = 0; i < changed.size(); ++i) {
-    if (values[i] && std::isfinite(*values[i])) before_[changed[i]] = *values[i];
+    if (values[i] && std::isfinite(*values[i])) {
+      before_[changed[i]] = *values[i];
+    } else {
+      unknown.push_back(changed[i]);
+    }
   }
   view_before_ = shown->first;
-  return "";
+  if (unknown.empty()) return "";
+  before_.clear();
+  return "X-Plane does not report " + core::join(unknown) + ", which could not be given back" +
+         linkCondition(link_->status());
 }
 
 void ViewRequests::takeOver(const std::vector<core::DatarefWrite>& writes) {
   const auto journal = link_->journal();
   if (!journal) return;
-  std::vector<core::UndoOperation> undo;
-  for (const core::JournalEntry& entry : journal->own()) {
-    if (entry.id == kEntry) undo = entry.undo;
-  }
+  const auto entry = core::ownEntry(*journal, kEntry);
+  std::vector<core::UndoOperation> undo = entry ? entry->undo : std::vector<core::UndoOperation>();
   const std::size_t known = undo.size();
   for (const core::DatarefWrite& write : writes) {
     const bool there = std::any_of(undo.begin(), undo.end(), [&](const core::UndoOperation& operation) {
@@ -180,20 +189,28 @@ bool ViewRequests::giveBackLocked(double timeout_s) {
   if (before_.empty()) return true;
   const auto journal = link_->journal();
   if (!journal) return false;
+  const auto entry = core::ownEntry(*journal, kEntry);
+  before_.clear();
+  if (!entry) return true;
   const std::string command = core::commandOf(view_before_);
   if (!command.empty()) link_->command(command);
-  before_.clear();
-  for (const core::JournalEntry& entry : journal->own()) {
-    if (entry.id != kEntry) continue;
-    if (link_->undo(entry.undo, timeout_s)) {
-      journal->remove({entry.id});
-    } else {
-      const bool up = isUp(link_->status());
-      journal->leave({entry.id}, up ? "X-Plane did not show the view given back" : "X-Plane went first");
-      return false;
-    }
+  if (link_->undo(entry->undo, timeout_s)) {
+    journal->removeUndone({*entry});
+    return true;
   }
-  return true;
+  const bool up = isUp(link_->status());
+  journal->leave({kEntry}, up ? "X-Plane did not show the view given back" : "X-Plane went first");
+  return false;
+}
+
+void ViewRequests::forget() {
+  const auto journal = link_->journal();
+  if (!journal) return;
+  try {
+    if (const auto entry = core::ownEntry(*journal, kEntry)) journal->removeUndone({*entry});
+  } catch (const core::JournalError&) {
+    // It is given back at the end or by the next start, to whichever X-Plane is there.
+  }
 }
 
 }  // namespace xplane_bridge

@@ -71,8 +71,8 @@ class FlightChanges {
   FlightChangeOutcome saveSituation(const std::string& path);
   FlightChangeOutcome applySituation(const std::string& path);
 
-  /// Puts back what X-Plane had before settings that were to end with the node. What cannot be sent stays in the
-  /// journal, for the node's next start.
+  /// Puts back what X-Plane had before settings that were to end with the node, as far as the journal still holds it.
+  /// What cannot be sent stays there, for the node's next start.
   void restoreSettings() { endSettings(true); }
   /// X-Plane is another one, whose time and weather are its own user's: nothing of the last one's comes back.
   void forgetSettings() { endSettings(false); }
@@ -136,8 +136,7 @@ class FlightChanges {
   const FlightChangeOptions options_;
   const FlightChangeHooks hooks_;
   std::atomic<bool> stopping_{false};
-  std::mutex restores_mutex_;
-  std::vector<core::UndoOperation> restores_;  ///< of settings that end with the node
+  std::mutex restores_mutex_;  ///< held while the journal's entry of settings that end with the node is changed
 };
 
 }  // namespace xplane_bridge

@@ -15,7 +15,8 @@
 namespace xplane_bridge {
 
 /// Turns X-Plane's camera, and gives it back. What is changed is in the journal first, so that the guardian, the next
-/// start and scripts/release_overrides can give it back as well. Thread-safe; all functions wait.
+/// start and scripts/release_overrides can give it back as well: what is not there any more, they have given back.
+/// Thread-safe; all functions but forget() wait.
 class ViewRequests {
  public:
   /// `report(text, who, success)`: what was done, for events and the log; `who` is empty where nothing asked for it.
@@ -29,6 +30,9 @@ class ViewRequests {
   RequestResult setView(const core::ViewWish& wish, const std::string& who);
   /// Brings back what the first setView() found. Returns whether X-Plane shows it, or nothing was changed.
   bool giveBack(double timeout_s);
+  /// X-Plane is another one, whose view is its own user's: nothing of the last one's comes back. Waits for the
+  /// journal's disk only.
+  void forget();
 
  private:
   /// Where X-Plane's camera is.

@@ -145,6 +145,47 @@ TEST_F(ViewRequestsTest, GivesBackWhatTheFirstWishFound) {
   EXPECT_TRUE(journalled().empty());
 }
 
+TEST_F(ViewRequestsTest, WhatAnotherHasGivenBackIsNotGivenBackAgain) {
+  ASSERT_EQ(ask(ViewWish::kDown, 90.0).code, ResultCode::kOk);
+  sim_.journal()->removeUndone(journalled());  // by the guardian in a hang, or scripts/release_overrides
+  sim_.set(kField, 75.0F);                     // the user's own, since
+  look(1017, 0.0F);
+  sim_.clearMessages();
+  EXPECT_TRUE(views_.giveBack(1.0));
+  EXPECT_TRUE(sim_.messages().empty());
+  EXPECT_EQ(sim_.value(kField), 75.0F);
+}
+
+TEST_F(ViewRequestsTest, WhatIsThereAfterAnotherHasGivenBackCounts) {
+  ASSERT_EQ(ask(ViewWish::kDown, 90.0).code, ResultCode::kOk);
+  sim_.journal()->removeUndone(journalled());
+  sim_.set(kField, 75.0F);
+  ASSERT_EQ(ask(ViewWish::kDown, 90.0).code, ResultCode::kOk);
+  EXPECT_TRUE(views_.giveBack(1.0));
+  EXPECT_EQ(sim_.value(kField), 75.0F);
+}
+
+TEST_F(ViewRequestsTest, AnotherXPlaneKeepsItsView) {
+  ASSERT_EQ(ask(ViewWish::kDown, 90.0).code, ResultCode::kOk);
+  views_.forget();
+  EXPECT_TRUE(journalled().empty());
+  sim_.clearMessages();
+  EXPECT_TRUE(views_.giveBack(1.0));
+  EXPECT_TRUE(sim_.messages().empty());
+  views_.forget();  // nothing is there
+}
+
+TEST_F(ViewRequestsTest, WhatDoesNotAnswerInTimeIsNotChanged) {
+  sim_.set(kView + "pilots_head_psi", std::nanf(""));
+  const RequestResult result = ask(ViewWish::kDown);
+  EXPECT_EQ(result.code, ResultCode::kTimeout);
+  EXPECT_EQ(result.text, "X-Plane does not report " + kView + "pilots_head_psi, which could not be given back");
+  EXPECT_TRUE(sim_.messages().empty());
+  EXPECT_TRUE(journalled().empty());
+  sim_.set(kView + "pilots_head_psi", 0.0F);
+  EXPECT_EQ(ask(ViewWish::kDown).code, ResultCode::kOk);
+}
+
 TEST_F(ViewRequestsTest, SilentCameraIsNoSuccess) {
   sim_.on_frame = {};
   sim_.set(kView + "view_heading", std::nanf(""));

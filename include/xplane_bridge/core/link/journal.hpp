@@ -1,11 +1,14 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -164,5 +167,14 @@ std::string journalPath(const std::string& folder, const std::string& host, std:
 using JournalFactory = std::function<std::shared_ptr<Journal>(const Endpoint& peer)>;
 /// Journals in `folder` (by convention ~/.ros/xplane_bridge) in the name of this process as `node`.
 JournalFactory journalsIn(const std::string& folder, const std::string& node);
+
+/// This process's entry of that id; nullopt: there is none, or the guardian, scripts/release_overrides or the loss of
+/// its X-Plane has ended it, so that nothing of it is to be undone any more. Throws JournalError.
+inline std::optional<JournalEntry> ownEntry(const Journal& journal, const std::string& id) {
+  std::vector<JournalEntry> own = journal.own();
+  const auto found = std::find_if(own.begin(), own.end(), [&id](const JournalEntry& entry) { return entry.id == id; });
+  if (found == own.end()) return std::nullopt;
+  return std::move(*found);
+}
 
 }  // namespace xplane_bridge::core

@@ -122,6 +122,27 @@ TEST_F(FlightChangesTest, SettingsOfTheLastXPlaneAreNotPutIntoAnotherOne) {
   EXPECT_EQ(sim_.value(name), -5.0F) << "its own user's";
 }
 
+TEST_F(FlightChangesTest, SettingsThatAnotherHasPutBackAreNotSentAgain) {
+  const std::string name = "sim/weather/temperature_sealevel_c", real = "sim/weather/use_real_weather_bool";
+  sim_.set(name, 15.0F);
+  sim_.set(real, 1.0F);
+  core::Weather weather;
+  weather.sea_level_temperature = 30.0;
+  weather.restore_on_exit = true;
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  ASSERT_EQ(sim_.journal()->entries().size(), 1U);
+  sim_.journal()->removeUndone(sim_.journal()->entries());  // by the guardian in a hang, or scripts/release_overrides
+  sim_.set(name, -5.0F);                                    // the user's own, since
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  EXPECT_EQ(sim_.value(name), -5.0F);
+  // And what is there now counts for the next one.
+  expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  EXPECT_EQ(sim_.value(name), -5.0F);
+}
+
 TEST_F(FlightChangesTest, SettingsStayWithoutRestoreOnExit) {
   const std::string name = "sim/weather/temperature_sealevel_c";
   sim_.set(name, 15.0F);
