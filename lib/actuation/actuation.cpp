@@ -377,6 +377,8 @@ RequestResult Actuation::setPaused(bool paused, const std::string& who) {
   if (link_->inLockstep()) {
     return {core::ResultCode::kNotSupported, "in lock-step the simulator stands between frames: call lockstep/hold"};
   }
+  // What X-Plane shows meanwhile is the pause of the reset itself, which ends with it.
+  if (jobs_.resets()) return {core::ResultCode::kRefused, "reset_flight runs: wait for its event"};
   const auto pausedNow = [this] {
     const core::LinkStatus status = link_->status();
     return isUp(status) ? status.paused : std::nullopt;

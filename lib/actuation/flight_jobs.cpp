@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "xplane_bridge/actuation/link_condition.hpp"
+#include "xplane_bridge/core/base/text.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -26,7 +27,6 @@ void FlightJobs::stop() {
   {
     std::lock_guard<std::mutex> lock(mutex_);
     changes_.stop();
-    jobs_.clear();
   }
   wanted_.notifyAll();
   if (!thread_.joinable()) return;
@@ -64,14 +64,25 @@ std::string FlightJobs::movingCaller() const {
   return moving_caller_;
 }
 
-void FlightJobs::add(std::uint32_t number, const std::string& who, bool moves,
-                     std::function<FlightChangeOutcome()> run) {
-  {
-    std::lock_guard<std::mutex> lock(mutex_);
-    if (changes_.stopping()) return;
-    jobs_.push_back({number, who, moves, std::move(run)});
+bool FlightJobs::resets() const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return resets_;
+}
+
+void FlightJobs::add(Job job) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  if (changes_.stopping()) {
+    lock.unlock();
+    return reportNotBegun(job);
   }
+  jobs_.push_back(std::move(job));
+  lock.unlock();
   wanted_.notifyAll();
+}
+
+void FlightJobs::reportNotBegun(const Job& job) {
+  const std::string service(core::afterLastSlash(job.who));
+  report_(job.number, {job.kind, service + ": not begun, tx_node ends", false}, job.who);
 }
 
 void FlightJobs::loop() {
@@ -79,65 +90,71 @@ void FlightJobs::loop() {
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
     wanted_.wait(&lock, [this] { return changes_.stopping() || !jobs_.empty(); });
-    if (changes_.stopping()) return;
+    if (changes_.stopping()) break;
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
     if (job.moves) moving_caller_ = job.who;
+    resets_ = job.kind == core::EventKind::kReset;
     running_ = true;
     lock.unlock();
     FlightChangeOutcome outcome;
     try {
       outcome = job.run();
     } catch (const std::exception& error) {  // the journal's disk
-      outcome = {core::EventKind::kSetting, job.who + ": " + error.what(), false};
+      outcome = {job.kind, job.who + ": " + error.what(), false};
     }
     if (changes_.stopping() && !outcome.success) outcome.text += " (tx_node ends)";
     report_(job.number, outcome, job.who);
     lock.lock();
     moving_caller_.clear();
+    resets_ = false;
     running_ = false;
   }
+  const std::deque<Job> waiting = std::exchange(jobs_, {});  // none is added any more
+  lock.unlock();
+  for (const Job& job : waiting) reportNotBegun(job);
 }
 
 void FlightJobs::reset(const core::FlightStart& start, std::uint32_t number, const std::string& who) {
-  add(number, who, true, [this, start, who] { return changes_.place(start, who); });
+  add({core::EventKind::kReset, number, who, true, [this, start, who] { return changes_.place(start, who); }});
 }
 
 void FlightJobs::reset(const core::AirportStart& start, std::uint32_t number, const std::string& who) {
-  add(number, who, true, [this, start, who] { return changes_.placeAt(start, who); });
+  add({core::EventKind::kReset, number, who, true, [this, start, who] { return changes_.placeAt(start, who); }});
 }
 
 void FlightJobs::setWind(const core::UniformWind& wind, std::uint32_t number, const std::string& who) {
-  add(number, who, false, [this, wind] { return changes_.applyWind(wind); });
+  add({core::EventKind::kSetting, number, who, false, [this, wind] { return changes_.applyWind(wind); }});
 }
 
 void FlightJobs::setLoading(const core::Loading& loading, std::uint32_t number, const std::string& who) {
-  add(number, who, false, [this, loading] { return changes_.applyLoading(loading); });
+  add({core::EventKind::kSetting, number, who, false, [this, loading] { return changes_.applyLoading(loading); }});
 }
 
 void FlightJobs::setTime(const core::TimeSetting& time, std::uint32_t number, const std::string& who) {
-  add(number, who, false, [this, time] { return changes_.applyTime(time); });
+  add({core::EventKind::kSetting, number, who, false, [this, time] { return changes_.applyTime(time); }});
 }
 
 void FlightJobs::setWeather(const core::Weather& weather, std::uint32_t number, const std::string& who) {
-  add(number, who, false, [this, weather] { return changes_.applyWeather(weather); });
+  add({core::EventKind::kSetting, number, who, false, [this, weather] { return changes_.applyWeather(weather); }});
 }
 
 void FlightJobs::setAutopilot(const core::AutopilotSetting& setting, std::uint32_t number, const std::string& who) {
-  add(number, who, false, [this, setting] { return changes_.applyAutopilot(setting); });
+  add({core::EventKind::kSetting, number, who, false, [this, setting] { return changes_.applyAutopilot(setting); }});
 }
 
 void FlightJobs::loadAircraft(const std::string& path, std::int32_t livery, std::uint32_t number,
                               const std::string& who) {
-  add(number, who, true, [this, path, livery] { return changes_.applyAircraft(path, livery); });
+  add({core::EventKind::kAircraft, number, who, true,
+       [this, path, livery] { return changes_.applyAircraft(path, livery); }});
 }
 
 void FlightJobs::saveSituation(const std::string& path, std::uint32_t number, const std::string& who) {
-  add(number, who, false, [this, path] { return changes_.saveSituation(path); });
+  add({core::EventKind::kSituation, number, who, false, [this, path] { return changes_.saveSituation(path); }});
 }
 
 void FlightJobs::loadSituation(const std::string& path, std::uint32_t number, const std::string& who) {
-  add(number, who, true, [this, path] { return changes_.applySituation(path); });
+  add({core::EventKind::kSituation, number, who, true, [this, path] { return changes_.applySituation(path); }});
 }
 
 }  // namespace xplane_bridge

@@ -22,7 +22,8 @@ class FlightJobs {
  public:
   static constexpr std::size_t kMostWaiting = 8;
 
-  /// The outcome of a job, as the event with the number promised. Called from the jobs' thread, without a lock held.
+  /// The outcome of a job, as the event with the number promised. Called without a lock held, from the jobs' thread, or
+  /// from that of a request which comes after stop().
   using Report = std::function<void(std::uint32_t number, const FlightChangeOutcome& outcome, const std::string& who)>;
 
   /// @param turns of the thread; null: it runs as it likes
@@ -56,18 +57,23 @@ class FlightJobs {
   std::optional<RequestResult> refusal() const;
   /// The caller of the job that runs, if that places the aircraft or loads files; empty: none does.
   std::string movingCaller() const;
-  /// The one at it ends where it is, X-Plane resumed if it was paused for it; the others are dropped. Waits for that.
+  /// reset_flight runs: X-Plane is paused for it, and let go on at its end.
+  bool resets() const;
+  /// The one at it ends where it is, X-Plane resumed if it was paused for it; the others are reported as not begun.
+  /// Waits for that.
   void stop();
 
  private:
   struct Job {
+    core::EventKind kind;  // of the event where it does not come to its end
     std::uint32_t number;
     std::string who;
     bool moves;
     std::function<FlightChangeOutcome()> run;
   };
 
-  void add(std::uint32_t number, const std::string& who, bool moves, std::function<FlightChangeOutcome()> run);
+  void add(Job job);
+  void reportNotBegun(const Job& job);
   void loop();
 
   core::SimulatorPort* link_;
@@ -78,6 +84,7 @@ class FlightJobs {
   std::deque<Job> jobs_;
   std::string moving_caller_;
   bool running_ = false;
+  bool resets_ = false;
   core::ThreadSeat seat_;
   std::thread thread_;  // last: it uses all of the others
 };

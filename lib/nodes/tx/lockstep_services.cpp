@@ -42,19 +42,26 @@ void LockstepServices::stepInLockstep(const LockstepStep::Request& request, Lock
 void LockstepServices::stepFreely(const LockstepStep::Request& request, LockstepStep::Response* response) {
   const std::uint64_t before = actuation_.framesFlown();
   const auto flown = [this, before] { return actuation_.framesFlown() - before; };
-  std::string why_not = request.frames > 0 ? setRunning(true) : "";
+  std::string why_not;
+  std::uint8_t code = ServiceResult::NO_LINK;
+  const auto setPaused = [&](bool paused) {
+    const RequestResult result = actuation_.setPaused(paused, who_);
+    if (result.success() || !why_not.empty()) return;
+    why_not = result.text;
+    if (result.code == core::ResultCode::kRefused) code = ServiceResult::REFUSED;
+  };
+  if (request.frames > 0) setPaused(false);
   while (why_not.empty() && flown() < request.frames && !ending_()) {
     const std::uint64_t seen = flown();
     if (!link_.waitUntil([&] { return flown() != seen || ending_(); }, kFrameWait)) why_not = "no frame comes";
   }
-  const std::string not_held = setRunning(false);
-  if (why_not.empty()) why_not = not_held;
+  setPaused(true);
   response->success = why_not.empty();
   response->flown = static_cast<std::uint32_t>(flown());
   response->sim_time = actuation_.simTime();
   response->result = response->success
                          ? result(ServiceResult::OK, "flown and paused: X-Plane does not wait for answers")
-                         : result(ServiceResult::NO_LINK, why_not);
+                         : result(code, why_not);
 }
 
 }  // namespace xplane_bridge

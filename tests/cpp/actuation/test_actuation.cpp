@@ -275,6 +275,54 @@ TEST_F(ActuationTest, PauseIsReportedWithWhoAskedForIt) {
   EXPECT_EQ(eventsOf(EventKind::kPause).back().who, "") << "what was paused already leaves no name";
 }
 
+TEST_F(ActuationTest, PauseIsRefusedWhileAResetRuns) {
+  sim_.set(kFlightTime, 0.0F);  // waited for, so that X-Plane's frames go on, on the thread of the jobs
+  sim_.frame();
+  sim_.breakJournal();  // which ends the reset before it pauses X-Plane
+  std::vector<RequestResult> answers;
+  sim_.on_frame = [&] {
+    sim_.set(kFlightTime, sim_.value(kFlightTime) + 0.02F);
+    if (!answers.empty()) return;
+    answers.resize(1);
+    answers = {actuation_->setPaused(true, "test"), actuation_->setPaused(false, "test")};
+  };
+  core::FlightStart start;
+  start.latitude_deg = 47.0;
+  actuation_->jobs().reset(start, 1, "test");
+  while (actuation_->jobs().busy()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_EQ(answers.size(), 2U);
+  for (const RequestResult& answer : answers) {
+    EXPECT_EQ(answer.code, core::ResultCode::kRefused);
+    EXPECT_EQ(answer.text, "reset_flight runs: wait for its event");
+  }
+  EXPECT_EQ(actuation_->setPaused(false, "test").code, core::ResultCode::kOk);
+}
+
+TEST_F(ActuationTest, AnotherXPlaneIsNotGivenTheViewOfTheLast) {
+  sim_.journal()->record("view:camera", kOverridePurpose, {core::UndoDref{kRoll, 0.7F}});
+  sim_.restart();
+  sim_.set(kFlightTime, 1.0F);
+  actuation_->onLink(sim_.status());
+  run(0.5);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+TEST_F(ActuationTest, AnIdentificationGoesByWhatIsNowNotByTheLastTick) {
+  sim_.set(core::flightWatchDatarefs().end()[-2], 1.0F);  // a wheel is on the ground
+  sim_.setState(core::LinkState::kLost);
+  actuation_->onLink(sim_.status());
+  run(0.5);
+  const auto asked = [this] { return actuation_->identifySurfaces({}, "test", [] { return 1U; }).result; };
+  ASSERT_EQ(asked().code, core::ResultCode::kNoLink);
+  sim_.setState(core::LinkState::kConnected);
+  actuation_->onLink(sim_.status());
+  sim_.run(2.0);
+  const std::string first = asked().text;
+  EXPECT_EQ(asked().code, core::ResultCode::kRefused) << first;
+  actuation_->tick();
+  EXPECT_EQ(first, asked().text);
+}
+
 TEST_F(ActuationTest, DatarefIsWrittenAndShown) {
   const auto written = actuation_->settings().setDataref(kRoll, {0.5F}, "test");
   EXPECT_EQ(eventsOf(EventKind::kSetting).back().who, "test");

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -46,10 +47,11 @@ class FlightJobsTest : public testing::Test {
     out.suspend_control = [this](const std::string& reason) {
       if (reason.empty()) return;
       callers_.push_back(jobs_.movingCaller());
+      reset_seen_ = reset_seen_ || jobs_.resets();
       at_it_.set_value();
       released_.wait();
     };
-    out.pausing = [](const std::string&) {};
+    out.pausing = [this](const std::string&) { reset_seen_ = reset_seen_ || jobs_.resets(); };
     return out;
   }
   /// The events, once there are so many.
@@ -62,8 +64,9 @@ class FlightJobsTest : public testing::Test {
   core::FakeSimulator sim_{core::kXPlane12};
   core::FakeFlight flight_{&sim_};
   std::function<std::string()> aircraft_ = [] { return "OTHER"; };
-  std::vector<std::string> callers_;  // while an aircraft is being loaded
-  std::promise<void> at_it_;          // the loading of an aircraft has begun, and waits for
+  std::vector<std::string> callers_;     // while an aircraft is being loaded
+  std::atomic<bool> reset_seen_{false};  // where X-Plane is paused, or an aircraft loaded
+  std::promise<void> at_it_;             // the loading of an aircraft has begun, and waits for
   std::promise<void> go_on_;
   std::shared_future<void> released_ = go_on_.get_future().share();
   std::mutex mutex_;
@@ -98,6 +101,7 @@ TEST_F(FlightJobsTest, WhoMovesTheAircraftIsKnownForAsLong) {
   EXPECT_EQ(jobs_.movingCaller(), "node/load_aircraft");
   go_on_.set_value();
   EXPECT_EQ(outcomes(1)[0].text, std::string("loaded ") + kPath + ": OTHER");
+  EXPECT_FALSE(reset_seen_) << "no load is a reset";
   jobs_.saveSituation("Output/a.sit", 2, "node/save_state");
   outcomes(2);
   EXPECT_EQ(jobs_.movingCaller(), "") << "saving moves nothing";
@@ -114,7 +118,7 @@ TEST_F(FlightJobsTest, MoreThanEightAreTooMany) {
   EXPECT_TRUE(jobs_.full());
 }
 
-TEST_F(FlightJobsTest, StopEndsTheOneAtItAndDropsTheOthers) {
+TEST_F(FlightJobsTest, StopEndsTheOneAtItAndReportsTheOthers) {
   flight_.has_files = false;
   jobs_.loadAircraft(kPath, 0, 1, "node/load_aircraft");
   at_it_.get_future().wait();
@@ -123,12 +127,19 @@ TEST_F(FlightJobsTest, StopEndsTheOneAtItAndDropsTheOthers) {
   while (!jobs_.full()) std::this_thread::yield();  // until the stop has been asked for
   go_on_.set_value();
   stopping.join();
-  ASSERT_EQ(outcomes_.size(), 1U);
+  jobs_.saveSituation("Output/b.sit", 3, "node/save_state");
+  go_on_ = std::promise<void>();
+  ASSERT_EQ(outcomes_.size(), 3U);
   EXPECT_FALSE(outcomes_[0].success);
   EXPECT_NE(outcomes_[0].text.find(" (tx_node ends)"), std::string::npos) << outcomes_[0].text;
-  jobs_.saveSituation("Output/b.sit", 3, "node/save_state");
+  for (const std::size_t dropped : {1U, 2U}) {
+    EXPECT_EQ(outcomes_[dropped].number, dropped + 1);
+    EXPECT_EQ(outcomes_[dropped].text, "save_state: not begun, tx_node ends");
+    EXPECT_EQ(outcomes_[dropped].who, "node/save_state");
+    EXPECT_FALSE(outcomes_[dropped].success);
+  }
   EXPECT_EQ(flight_.sent("SIMO"), 0U);
-  go_on_ = std::promise<void>();
+  EXPECT_FALSE(jobs_.busy());
 }
 
 TEST_F(FlightJobsTest, EachKindIsDoneAndSaysWhich) {
@@ -169,6 +180,7 @@ TEST_F(FlightJobsTest, FlightIsPlacedByAJobToo) {
   EXPECT_EQ(events[0].number, 3U);
   EXPECT_TRUE(events[0].success) << events[0].text;
   EXPECT_GT(flight_.sent("VEHS"), 0U);
+  EXPECT_TRUE(reset_seen_);
   go_on_ = std::promise<void>();
 }
 

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "actuation/actuation_rig.hpp"
 
@@ -81,6 +82,27 @@ TEST_F(FreeStepTest, SaysThatNoFrameComesAndPausesAllTheSame) {
   EXPECT_FALSE(response.success);
   EXPECT_EQ(response.result.message, "no frame comes");
   EXPECT_EQ(sim_.commands().size(), 2U) << "resumed, and paused again";
+}
+
+TEST_F(FreeStepTest, IsRefusedWhileAResetRuns) {
+  setPaused(false);
+  sim_.set(kFlightTime, 0.0F);  // waited for, so that X-Plane's frames go on, on the thread of the jobs
+  sim_.frame();
+  sim_.breakJournal();  // which ends the reset before it pauses X-Plane
+  bool asked = false;
+  LockstepStep::Response response;
+  sim_.on_frame = [&] {
+    sim_.set(kFlightTime, sim_.value(kFlightTime) + 0.02F);
+    if (!std::exchange(asked, true)) response = step(5);
+  };
+  core::FlightStart start;
+  start.latitude_deg = 47.0;
+  actuation_->jobs().reset(start, 1, "test");
+  while (actuation_->jobs().busy()) std::this_thread::yield();
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
+  EXPECT_EQ(response.result.message, "reset_flight runs: wait for its event");
+  EXPECT_TRUE(sim_.commands().empty());
 }
 
 TEST_F(FreeStepTest, EndsWithTheNode) {
