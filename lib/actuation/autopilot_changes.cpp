@@ -26,6 +26,10 @@ std::string shownText(const core::AutopilotStep& step, const std::vector<core::D
   return core::join(out);
 }
 
+bool allAnswer(const std::vector<core::DatarefValue>& values) {
+  return std::all_of(values.begin(), values.end(), [](const core::DatarefValue& value) { return value.has_value(); });
+}
+
 /// What takes stick, pedals or surfaces from the autopilot.
 std::vector<std::string> takenFromAutopilot(const std::vector<std::string>& overrides) {
   std::vector<std::string> out;
@@ -43,11 +47,17 @@ std::vector<std::string> takenFromAutopilot(const std::vector<std::string>& over
 std::string FlightChanges::press(const core::AutopilotStep& step) {
   const auto fits = [step](const std::vector<core::DatarefValue>& values) { return core::matches(step, values); };
   std::vector<core::DatarefValue> values = link_->read(step.shown, kPressWait);
-  for (int i = 0; i < kPresses && !fits(values) && !stopping_; ++i) {
+  for (int i = 0; i < kPresses && allAnswer(values) && !fits(values) && !stopping_; ++i) {
     link_->command(step.command);
     values = link_->readUntil(step.shown, kPressWait, fits);
+    // Those of a wait may be from before a silence in which the press has come: the next one would undo it.
+    if (!fits(values)) values = link_->read(step.shown, kPressWait);
   }
   if (fits(values)) return "";
+  if (!allAnswer(values)) {
+    return "X-Plane does not show whether \"" + step.name + "\" is engaged: " + shownText(step, values) +
+           linkCondition();
+  }
   return "X-Plane does not engage \"" + step.name + "\" by " + step.command + ": " + shownText(step, values) +
          linkCondition() + "; has this aircraft an autopilot with it, and has that its power?";
 }

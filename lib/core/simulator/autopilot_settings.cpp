@@ -1,6 +1,7 @@
 #include "xplane_bridge/core/simulator/autopilot_settings.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "setting_texts.hpp"
@@ -9,12 +10,13 @@
 namespace xplane_bridge::core {
 namespace {
 
-constexpr double kHeadingTolerance = 0.6;   // [deg]; dials of many aircraft go in whole degrees
-constexpr double kAltitudeTolerance = 1.0;  // [ft]
-constexpr double kClimbTolerance = 1.0;     // [ft/min]
-constexpr double kAirspeedTolerance = 0.6;  // [kt]; whole knots
-constexpr double kMachTolerance = 0.006;    // hundredths
-constexpr double kFullTurn = 360.0;         // [deg]
+constexpr double kHeadingTolerance = 0.6;    // [deg]; dials of many aircraft go in whole degrees
+constexpr double kAltitudeTolerance = 1.0;   // [ft]
+constexpr float kCapturedTolerance = 20.0F;  // [ft] between the altitude held and the dial
+constexpr double kClimbTolerance = 1.0;      // [ft/min]
+constexpr double kAirspeedTolerance = 0.6;   // [kt]; whole knots
+constexpr double kMachTolerance = 0.006;     // hundredths
+constexpr double kFullTurn = 360.0;          // [deg]
 
 const std::string kAutopilotFolder = "sim/cockpit2/autopilot/";
 const std::string kCommands = "sim/autopilot/";
@@ -142,7 +144,10 @@ std::vector<AutopilotStep> autopilotSteps(const AutopilotSetting& setting, const
   if (setting.vertical) out.push_back(verticalStep(*setting.vertical));
   if (setting.altitude_armed) {
     // An autopilot that has captured the altitude is no longer armed.
-    AutopilotStep arm = modeStep("altitude arm", "altitude_arm", {"altitude_hold_armed", "altitude_hold_status"});
+    AutopilotStep arm =
+        modeStep("altitude arm", "altitude_arm",
+                 {"altitude_hold_armed", "altitude_hold_status", "altitude_hold_ft", "altitude_dial_ft"});
+    arm.at_dial = true;
     if (!*setting.altitude_armed) {
       arm = modeStep("altitude arm off", "altitude_arm", {"altitude_hold_armed"});
       arm.low = arm.high = 0.0F;
@@ -169,8 +174,12 @@ std::vector<SettingWrite> autopilotRestored(const AutopilotSetting& setting, Sim
 }
 
 bool matches(const AutopilotStep& step, const std::vector<DatarefValue>& values) {
-  return std::any_of(values.begin(), values.end(),
-                     [&step](const DatarefValue& value) { return value && *value >= step.low && *value <= step.high; });
+  const auto shows = [&step](const DatarefValue& value) { return value && *value >= step.low && *value <= step.high; };
+  if (!step.at_dial) return std::any_of(values.begin(), values.end(), shows);
+  if (values.size() != step.shown.size()) return false;
+  const DatarefValue& held = values[2];
+  const DatarefValue& dial = values[3];
+  return shows(values[0]) || (shows(values[1]) && held && dial && std::abs(*held - *dial) <= kCapturedTolerance);
 }
 
 }  // namespace xplane_bridge::core

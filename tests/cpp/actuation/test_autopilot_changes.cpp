@@ -100,6 +100,52 @@ TEST_F(AutopilotChangesTest, XPlaneThatDoesNotShowTheModeIsReported) {
   EXPECT_NE(outcome.text.find(kFolder + "nav_status does not answer"), std::string::npos) << outcome.text;
 }
 
+TEST_F(AutopilotChangesTest, NothingIsPressedOfWhichNothingIsShown) {
+  ASSERT_TRUE(changes_.applyAutopilot(heading(270.0)).success);
+  const std::size_t before = sim_.commands().size();
+  AutopilotSetting setting;
+  setting.lateral = LateralMode::kHeading;
+  sim_.setState(core::LinkState::kStale);
+  const FlightChangeOutcome outcome = changes_.applyAutopilot(setting);
+  EXPECT_FALSE(outcome.success);
+  EXPECT_EQ(outcome.text.find("set_autopilot: X-Plane does not show whether \"heading select\" is engaged: " +
+                              kHeading + " does not answer"),
+            0U)
+      << outcome.text;
+  EXPECT_EQ(sim_.commands().size(), before) << "it is engaged, and a press would end that";
+}
+
+TEST_F(AutopilotChangesTest, XPlaneThatIsSilentAfterAPressIsNotPressedAgain) {
+  const auto obey = sim_.on_message;
+  sim_.on_message = [this, obey](const core::FakeSimulator::Message& message) {
+    obey(message);
+    if (message.path == "sim/autopilot/heading") sim_.setState(core::LinkState::kStale);
+  };
+  AutopilotSetting setting;
+  setting.lateral = LateralMode::kHeading;
+  EXPECT_FALSE(changes_.applyAutopilot(setting).success);
+  EXPECT_EQ(sim_.commands(), Names{"sim/autopilot/heading"});
+  EXPECT_EQ(sim_.value(kHeading), 2.0F);
+}
+
+TEST_F(AutopilotChangesTest, AltitudeIsArmedThoughAnotherOneIsHeld) {
+  const std::string armed = kFolder + "altitude_hold_armed";
+  sim_.set(armed, 0.0F);
+  sim_.set(kFolder + "altitude_hold_status", 2.0F);
+  sim_.set(kFolder + "altitude_hold_ft", 1000.0F);
+  sim_.set(kFolder + "altitude_dial_ft", 1000.0F);
+  sim_.on_message = [this, armed](const core::FakeSimulator::Message& message) {
+    if (message.path == "sim/autopilot/altitude_arm") sim_.set(armed, 1.0F - sim_.value(armed));
+  };
+  AutopilotSetting setting;
+  setting.altitude_armed = true;
+  EXPECT_TRUE(changes_.applyAutopilot(setting).success);
+  EXPECT_EQ(sim_.value(armed), 0.0F) << "the altitude of the dial is held already";
+  setting.altitude = 1524.0;  // 5000 ft
+  EXPECT_TRUE(changes_.applyAutopilot(setting).success);
+  EXPECT_EQ(sim_.value(armed), 1.0F);
+}
+
 TEST_F(AutopilotChangesTest, DialThatDoesNotTurnEndsItBeforeAnythingIsEngaged) {
   sim_.setReadOnly(kDial);
   const FlightChangeOutcome outcome = changes_.applyAutopilot(heading(270.0));

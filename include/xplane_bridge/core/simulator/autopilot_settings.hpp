@@ -41,6 +41,9 @@ struct AutopilotStep {
   std::string command;             ///< that presses it
   std::vector<std::string> shown;  ///< datarefs of which one shows it
   float low = 1.0F, high = 1e6F;   ///< from where to where, inclusive
+  /// `shown` is: armed, status, the altitude held [ft], the dial [ft]. The status shows it only where the altitude held
+  /// is that of the dial: the hold of any other altitude has the same status.
+  bool at_dial = false;
 };
 
 std::optional<std::string> check(const AutopilotSetting& setting);

@@ -85,7 +85,11 @@ TEST(Autopilot, SwitchesComeInTheirOrderEachWithWhatShowsIt) {
   EXPECT_TRUE(matches(steps[1], {2.0F})) << "captured";
   EXPECT_FALSE(matches(steps[1], {0.0F}));
   EXPECT_FALSE(matches(steps[1], {std::nullopt}));
-  EXPECT_TRUE(matches(steps[3], {0.0F, 2.0F})) << "the altitude is captured already";
+  EXPECT_TRUE(matches(steps[3], {1.0F, 0.0F, 1000.0F, 5000.0F})) << "armed";
+  EXPECT_TRUE(matches(steps[3], {0.0F, 2.0F, 4990.0F, 5000.0F})) << "the altitude is captured already";
+  EXPECT_FALSE(matches(steps[3], {0.0F, 2.0F, 1000.0F, 5000.0F})) << "another altitude is held";
+  EXPECT_FALSE(matches(steps[3], {0.0F, 2.0F, std::nullopt, 5000.0F}));
+  EXPECT_FALSE(matches(steps[3], {0.0F, 0.0F, 5000.0F, 5000.0F}));
   EXPECT_TRUE(matches(steps[5], {0.0F}));
   EXPECT_FALSE(matches(steps[5], {1.0F}));
 }
