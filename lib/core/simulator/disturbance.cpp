@@ -63,6 +63,7 @@ std::optional<std::string> wrongShear(const DisturbanceSpec& s) {
 std::optional<std::string> wrongMicroburst(const DisturbanceSpec& s) {
   if (auto wrong = outside("latitude", s.latitude_deg, -90.0, 90.0, "deg")) return wrong;
   if (auto wrong = outside("longitude", s.longitude_deg, -180.0, 180.0, "deg")) return wrong;
+  if (auto wrong = noPlace(s.latitude_deg, s.longitude_deg)) return wrong;
   if (auto wrong = outside("radius", s.radius, 100.0, 10000.0, "m")) return wrong;
   return outside("height", s.height, 10.0, 1000.0, "m above ground");
 }

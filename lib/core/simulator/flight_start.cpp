@@ -66,11 +66,7 @@ std::optional<std::string> check(const FlightStart& start) {
   for (const Range& range : kRanges) {
     if (auto wrong = outside(range.name, start.*range.value, range.low, range.high, range.unit)) return wrong;
   }
-  // A request that leaves them out has 0 in both, a place in the open sea.
-  if (start.latitude_deg == 0.0 && start.longitude_deg == 0.0) {
-    return "no place is given: expected latitude and longitude, of which one is not 0";
-  }
-  return std::nullopt;
+  return noPlace(start.latitude_deg, start.longitude_deg);
 }
 
 Placement placementOf(const FlightStart& start) {

@@ -22,6 +22,12 @@ inline std::optional<std::string> outside(const std::string& name, double value,
   return name + " is " + number(value) + ": expected " + number(low) + ".." + number(high) + " [" + unit + "]";
 }
 
+/// A request that leaves the place out has 0 in both, a place in the open sea.
+inline std::optional<std::string> noPlace(double latitude_deg, double longitude_deg) {
+  if (latitude_deg != 0.0 || longitude_deg != 0.0) return std::nullopt;
+  return "no place is given: expected latitude and longitude, of which one is not 0";
+}
+
 /// Whether the weather is set by region, under names of its own.
 inline bool hasRegions(SimulatorVersion version) { return version.number >= kFirstOf1208; }
 

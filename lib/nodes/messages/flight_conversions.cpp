@@ -1,12 +1,24 @@
 #include "xplane_bridge/nodes/messages/flight_conversions.hpp"
 
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 
 namespace xplane_bridge {
 namespace {
 
 std::optional<double> given(float value) {
   return std::isnan(value) ? std::nullopt : std::optional<double>(static_cast<double>(value));
+}
+
+/// In the words in which a ControlCommand is refused.
+template <class Request>
+std::optional<std::string> unknownBits(const Request& request) {
+  const std::uint32_t unknown = request.fields & ~static_cast<std::uint32_t>(Request::ALL_FIELDS);
+  if (unknown == 0) return std::nullopt;
+  char text[64];
+  std::snprintf(text, sizeof text, "fields is 0x%x: bits 0x%x have no meaning", request.fields, unknown);
+  return text;
 }
 
 }  // namespace
@@ -98,10 +110,18 @@ core::Weather toCore(const SetWeather::Request& request) {
   return out;
 }
 
-std::optional<std::string> wrongWith(const SetAutopilot::Request& request) { return core::check(toCore(request)); }
-std::optional<std::string> wrongWith(const SetTime::Request& request) { return core::check(toCore(request)); }
+std::optional<std::string> wrongWith(const SetAutopilot::Request& request) {
+  if (auto wrong = unknownBits(request)) return wrong;
+  return core::check(toCore(request));
+}
+
+std::optional<std::string> wrongWith(const SetTime::Request& request) {
+  if (auto wrong = unknownBits(request)) return wrong;
+  return core::check(toCore(request));
+}
 
 std::optional<std::string> wrongWith(const SetWeather::Request& request) {
+  if (auto wrong = unknownBits(request)) return wrong;
   struct List {
     const char* name;
     std::size_t size, expected;

@@ -41,7 +41,12 @@ std::optional<std::string> wrongWith(const Request& request) {
   const bool final = request.start == Request::FINAL;
   std::string surplus;
   if (request.start == Request::PLACE) {
-    if (!request.airport.empty()) surplus = "airport";
+    surplus = !request.airport.empty() ? "airport" : !request.spot.empty() ? "spot" : "";
+    if (surplus.empty()) {
+      surplus = notZero({{"spot_index", request.spot_index},
+                         {"runway_end", request.runway_end},
+                         {"final_distance", request.final_distance}});
+    }
   } else {
     surplus = notZero({{"latitude", request.latitude},
                        {"longitude", request.longitude},

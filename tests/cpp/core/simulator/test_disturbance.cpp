@@ -55,6 +55,11 @@ TEST(Disturbance, IsRefusedWithWhatWasGivenAndWhatWasExpected) {
   EXPECT_EQ(check(spec), std::nullopt);
   spec.height = 5.0;
   EXPECT_EQ(check(spec).value_or(""), "height is 5: expected 10..1000 [m above ground]");
+  spec = microburst();
+  spec.latitude_deg = 0.0;
+  EXPECT_EQ(check(spec), std::nullopt) << "on the equator";
+  spec.longitude_deg = 0.0;
+  EXPECT_EQ(check(spec).value_or(""), "no place is given: expected latitude and longitude, of which one is not 0");
 }
 
 TEST(Disturbance, WithAVerticalWindIsRefusedUnlessThatMayBeLeftOut) {

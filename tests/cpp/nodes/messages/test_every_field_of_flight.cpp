@@ -103,6 +103,31 @@ TEST(EveryField, OfResetFlightThatDoesNotGoWithTheStartIsNamed) {
   EXPECT_EQ(with(Request::RAMP, ""), std::nullopt);
   EXPECT_EQ(with(Request::RUNWAY, "runway_end"), std::nullopt);
   expectBegins(with(Request::PLACE, ""), "airport does not go with start 0 (PLACE)");
+  for (const char* field : {"spot_index", "runway_end", "final_distance"}) {
+    SCOPED_TRACE(field);
+    MessageValues values;
+    for (const std::string& name : layout.fields()) values[name] = {name == field ? 1.0 : 0.0};
+    expectBegins(wrongWith(layout.make<Request>(values)), std::string(field) + " does not go with start 0 (PLACE)");
+  }
+  Request named;
+  named.latitude = 47.0;
+  EXPECT_EQ(wrongWith(named), std::nullopt);
+  named.spot = "33L";
+  expectBegins(wrongWith(named), "spot does not go with start 0 (PLACE)");
+}
+
+TEST(EveryField, OfBitsWithoutAMeaningIsRefused) {
+  SetTime::Request time;
+  time.fields = SetTime::Request::ZULU_TIME;
+  EXPECT_EQ(wrongWith(time), std::nullopt);
+  time.fields |= 64U;
+  EXPECT_EQ(wrongWith(time).value_or(""), "fields is 0x42: bits 0x40 have no meaning");
+  SetWeather::Request weather;
+  weather.fields = SetWeather::Request::ALL_FIELDS + 1U;
+  EXPECT_EQ(wrongWith(weather).value_or(""), "fields is 0x40: bits 0x40 have no meaning");
+  SetAutopilot::Request autopilot;
+  autopilot.fields = 0x80000000U | SetAutopilot::Request::ALL_FIELDS;
+  EXPECT_EQ(wrongWith(autopilot).value_or(""), "fields is 0x800007ff: bits 0x80000000 have no meaning");
 }
 
 // --- wind, loading, autopilot, time, weather ---
