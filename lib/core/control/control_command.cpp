@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "xplane_bridge/core/control/field_bits.hpp"
+
 namespace xplane_bridge::core {
 namespace {
 
@@ -93,12 +95,7 @@ const char* toString(Refusal refusal) {
 }
 
 std::optional<CommandRefusal> checkCommand(const ControlCommand& command) {
-  if ((command.fields & ~kAllFields) != 0u) {
-    char text[120];
-    std::snprintf(text, sizeof text, "fields is 0x%x: bits 0x%x have no meaning", command.fields,
-                  command.fields & ~kAllFields);
-    return CommandRefusal{Refusal::kUnknownBits, text};
-  }
+  if (const auto wrong = unknownBits(command.fields, kAllFields)) return CommandRefusal{Refusal::kUnknownBits, *wrong};
   for (const auto& row : kScalarChannels) {
     if ((command.fields & row.field) == 0u) continue;
     if (auto wrong = checkValue(command.*row.value, row.range, row.name)) return wrong;

@@ -1,24 +1,14 @@
 #include "xplane_bridge/nodes/messages/flight_conversions.hpp"
 
 #include <cmath>
-#include <cstdint>
-#include <cstdio>
+
+#include "xplane_bridge/core/control/field_bits.hpp"
 
 namespace xplane_bridge {
 namespace {
 
 std::optional<double> given(float value) {
   return std::isnan(value) ? std::nullopt : std::optional<double>(static_cast<double>(value));
-}
-
-/// In the words in which a ControlCommand is refused.
-template <class Request>
-std::optional<std::string> unknownBits(const Request& request) {
-  const std::uint32_t unknown = request.fields & ~static_cast<std::uint32_t>(Request::ALL_FIELDS);
-  if (unknown == 0) return std::nullopt;
-  char text[64];
-  std::snprintf(text, sizeof text, "fields is 0x%x: bits 0x%x have no meaning", request.fields, unknown);
-  return text;
 }
 
 }  // namespace
@@ -111,17 +101,17 @@ core::Weather toCore(const SetWeather::Request& request) {
 }
 
 std::optional<std::string> wrongWith(const SetAutopilot::Request& request) {
-  if (auto wrong = unknownBits(request)) return wrong;
+  if (auto wrong = core::unknownBits(request.fields, request.ALL_FIELDS)) return wrong;
   return core::check(toCore(request));
 }
 
 std::optional<std::string> wrongWith(const SetTime::Request& request) {
-  if (auto wrong = unknownBits(request)) return wrong;
+  if (auto wrong = core::unknownBits(request.fields, request.ALL_FIELDS)) return wrong;
   return core::check(toCore(request));
 }
 
 std::optional<std::string> wrongWith(const SetWeather::Request& request) {
-  if (auto wrong = unknownBits(request)) return wrong;
+  if (auto wrong = core::unknownBits(request.fields, request.ALL_FIELDS)) return wrong;
   struct List {
     const char* name;
     std::size_t size, expected;
