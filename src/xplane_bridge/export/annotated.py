@@ -30,7 +30,7 @@ from xplane_bridge.export.image_labels import CATEGORIES, KEYPOINTS, ImageLabels
 from xplane_bridge.export.pictures import NO_LABELS, Options, Picture, Pictures, write_pictures
 from xplane_bridge.export.yolo_yaml import DATA_YAML, data_yaml
 from xplane_bridge.labels.camera import FRD_OF_FLU, rotation_of
-from xplane_bridge.units import EARTH_RADIUS_M, FOOT_M
+from xplane_bridge.units import FOOT_M, moved
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
@@ -250,8 +250,7 @@ def _place(picture: Picture) -> tuple[float, float, float]:
     latitude, longitude, altitude = (float(picture.known(f"state_{name}")) for name in names)
     lever = [float(picture.known(f"body_to_camera_translation_{axis}")) for axis in "xyz"]
     north, east, down = (_rotation(picture, "state_orientation") @ FRD_OF_FLU @ lever).tolist()
-    turn = math.degrees(east / (EARTH_RADIUS_M * math.cos(math.radians(latitude))))
-    return latitude + math.degrees(north / EARTH_RADIUS_M), math.remainder(longitude + turn, 360.0), altitude - down
+    return (*moved(latitude, longitude, north, east), altitude - down)
 
 
 def _rotation(picture: Picture, prefix: str) -> np.ndarray:

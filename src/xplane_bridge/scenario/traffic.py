@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
-from xplane_bridge.units import EARTH_RADIUS_M
+from xplane_bridge.units import moved
 
 #: Numbers of one aircraft: metres ahead, to the right of and above the own one where it begins, its heading against the
 #: own one's [deg, right +], speed over ground and climb [m/s].
@@ -90,10 +90,3 @@ class ScenarioTraffic:
             "velocity_east": [way.velocity[1] for way in self._ways],
             "velocity_down": [way.velocity[2] for way in self._ways],
         }
-
-
-def moved(latitude: float, longitude: float, north: float, east: float) -> Tuple[float, float]:
-    """A place [deg] so many metres away, for distances that are short on the earth."""
-    across = EARTH_RADIUS_M * max(math.cos(math.radians(latitude)), 1e-6)
-    further = longitude + math.degrees(east / across)
-    return latitude + math.degrees(north / EARTH_RADIUS_M), (further + 180.0) % 360.0 - 180.0

@@ -20,7 +20,7 @@ from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.flight_model import InitialState
 from xplane_bridge.emulator.flight.frame import Frame
 from xplane_bridge.protocol import VehiclePose
-from xplane_bridge.units import EARTH_RADIUS_M
+from xplane_bridge.units import moved
 
 #: Others than the user's aircraft, which is number 0.
 MOST = 19
@@ -175,10 +175,3 @@ class Traffic:
                 other.altitude_m - frame.m.altitude_m,
             )
         return out
-
-
-def moved(latitude_deg: float, longitude_deg: float, north_m: float, east_m: float) -> Tuple[float, float]:
-    """Latitude and longitude of a place so far away, for distances that are short on the earth."""
-    latitude = latitude_deg + math.degrees(north_m / EARTH_RADIUS_M)
-    across = EARTH_RADIUS_M * max(math.cos(math.radians(latitude_deg)), 1e-6)
-    return latitude, earth.wrap_half_turn(longitude_deg + math.degrees(east_m / across))
