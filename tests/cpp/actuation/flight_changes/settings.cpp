@@ -86,61 +86,62 @@ TEST_F(FlightChangesTest, TimeIsShown) {
   EXPECT_EQ(sim_.value("sim/time/zulu_time_sec"), 43200.0F);
 }
 
-TEST_F(FlightChangesTest, SettingsThatEndWithTheNodeAreInTheJournalAndComeBack) {
-  const std::string name = "sim/weather/temperature_sealevel_c", real = "sim/weather/use_real_weather_bool";
-  sim_.set(name, 15.0F);
-  sim_.set(real, 1.0F);
-  core::Weather weather;
-  weather.sea_level_temperature = 30.0;
-  weather.restore_on_exit = true;
+const std::string kTemperature = "sim/weather/temperature_sealevel_c";
+const std::string kRealWeather = "sim/weather/use_real_weather_bool";
+
+/// It is 15 degrees of real weather, and to be 30 until the node ends.
+class BorrowedWeatherTest : public FlightChangesTest {
+ protected:
+  core::Weather warmerUntilTheEnd() {
+    sim_.set(kTemperature, 15.0F);
+    sim_.set(kRealWeather, 1.0F);
+    core::Weather out;
+    out.sea_level_temperature = 30.0;
+    out.restore_on_exit = true;
+    return out;
+  }
+};
+
+TEST_F(BorrowedWeatherTest, SettingsThatEndWithTheNodeAreInTheJournalAndComeBack) {
+  core::Weather weather = warmerUntilTheEnd();
   expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
   weather.sea_level_temperature = 35.0;  // what was there before the first of them counts
   expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
-  EXPECT_EQ(sim_.value(name), 35.0F);
+  EXPECT_EQ(sim_.value(kTemperature), 35.0F);
   ASSERT_EQ(sim_.journal()->entries().size(), 1U);
   EXPECT_EQ(sim_.journal()->entries()[0].undo.size(), 2U);
   changes_.restoreSettings();
   sim_.run(0.1);
-  EXPECT_EQ(sim_.value(name), 15.0F);
-  EXPECT_EQ(sim_.value(real), 1.0F);
+  EXPECT_EQ(sim_.value(kTemperature), 15.0F);
+  EXPECT_EQ(sim_.value(kRealWeather), 1.0F);
   EXPECT_TRUE(sim_.journal()->entries().empty());
 }
 
-TEST_F(FlightChangesTest, SettingsOfTheLastXPlaneAreNotPutIntoAnotherOne) {
-  const std::string name = "sim/weather/temperature_sealevel_c", real = "sim/weather/use_real_weather_bool";
-  sim_.set(name, 15.0F);
-  sim_.set(real, 1.0F);
-  core::Weather weather;
-  weather.sea_level_temperature = 30.0;
-  weather.restore_on_exit = true;
+TEST_F(BorrowedWeatherTest, SettingsOfTheLastXPlaneAreNotPutIntoAnotherOne) {
+  core::Weather weather = warmerUntilTheEnd();
   expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
   changes_.forgetSettings();
   EXPECT_TRUE(sim_.journal()->entries().empty());
-  sim_.set(name, -5.0F);
+  sim_.set(kTemperature, -5.0F);
   changes_.restoreSettings();
   sim_.run(0.1);
-  EXPECT_EQ(sim_.value(name), -5.0F) << "its own user's";
+  EXPECT_EQ(sim_.value(kTemperature), -5.0F) << "its own user's";
 }
 
-TEST_F(FlightChangesTest, SettingsThatAnotherHasPutBackAreNotSentAgain) {
-  const std::string name = "sim/weather/temperature_sealevel_c", real = "sim/weather/use_real_weather_bool";
-  sim_.set(name, 15.0F);
-  sim_.set(real, 1.0F);
-  core::Weather weather;
-  weather.sea_level_temperature = 30.0;
-  weather.restore_on_exit = true;
+TEST_F(BorrowedWeatherTest, SettingsThatAnotherHasPutBackAreNotSentAgain) {
+  core::Weather weather = warmerUntilTheEnd();
   expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
   ASSERT_EQ(sim_.journal()->entries().size(), 1U);
   sim_.journal()->removeUndone(sim_.journal()->entries());  // by the guardian in a hang, or scripts/release_overrides
-  sim_.set(name, -5.0F);                                    // the user's own, since
+  sim_.set(kTemperature, -5.0F);                            // the user's own, since
   changes_.restoreSettings();
   sim_.run(0.1);
-  EXPECT_EQ(sim_.value(name), -5.0F);
+  EXPECT_EQ(sim_.value(kTemperature), -5.0F);
   // And what is there now counts for the next one.
   expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
   changes_.restoreSettings();
   sim_.run(0.1);
-  EXPECT_EQ(sim_.value(name), -5.0F);
+  EXPECT_EQ(sim_.value(kTemperature), -5.0F);
 }
 
 TEST_F(FlightChangesTest, SettingsStayWithoutRestoreOnExit) {
