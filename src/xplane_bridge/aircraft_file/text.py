@@ -65,7 +65,7 @@ def likely_failsafe(kind: str) -> str:
 def yaml_of(seen: Observed, facts: Facts) -> str:
     """The file's text."""
     lines = _comment(seen)
-    lines += [f"name: {facts.name}", f"identity: [{_identity(seen)}]{_identity_note(seen)}"]
+    lines += [f"name: {_scalar(facts.name)}", f"identity: [{_identity(seen)}]{_identity_note(seen)}"]
     lines.append(f"engines: {min(max(seen.engines, 1), 8)}")
     if facts.reverse:
         lines.append("reverse_thrust: true    # levers below 0")
@@ -79,10 +79,24 @@ def yaml_of(seen: Observed, facts: Facts) -> str:
 
 
 def _identity(seen: Observed) -> str:
-    """Quoted where YAML would not take it as a text by itself, as 738 or NO."""
     text = seen.icao or seen.description
-    plain = text.isalnum() and yaml.safe_load(text) == text
-    return text if plain or not text else json.dumps(text)
+    return _scalar(text) if text else ""
+
+
+def _scalar(text: str) -> str:
+    """A text as it stands in the file: quoted where YAML, as roslaunch reads it, would take it for anything else.
+
+    738 and 747_8 are numbers to it, NO is false; what has other characters than a name might end a list.
+    """
+    plain = all(c.isalnum() or c in "_-" for c in text) and _is_read_as(text)
+    return text if plain else json.dumps(text)
+
+
+def _is_read_as(text: str) -> bool:
+    try:
+        return bool(yaml.safe_load(text) == text)
+    except (ValueError, yaml.YAMLError):  # a day that there is not, as 2020-13-01
+        return False
 
 
 def _identity_note(seen: Observed) -> str:

@@ -105,6 +105,33 @@ def test_an_aircraft_is_known_by_its_code_else_by_its_description(seen: Observed
     assert yaml.safe_load(content)["identity"] == ([identity] if identity else [])
 
 
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("citation_x", "name: citation_x\n"),
+        ("s-76", "name: s-76\n"),
+        ("737", 'name: "737"\n'),
+        ("747_8", 'name: "747_8"\n'),  # 7478 to YAML
+        ("007", 'name: "007"\n'),
+        ("on", 'name: "on"\n'),
+        ("no", 'name: "no"\n'),
+        ("null", 'name: "null"\n'),
+        ("-", 'name: "-"\n'),
+        ("2020-13-01", 'name: "2020-13-01"\n'),  # a day that there is not
+        ("0x_", 'name: "0x_"\n'),  # a number without digits
+    ],
+)
+def test_a_name_is_a_text_whatever_yaml_takes_it_for(name: str, line: str) -> None:
+    content = yaml_of(Observed(icao="BE58"), facts_of(Observed(icao="BE58"), asker("--yes", "--name", name)))
+    assert line in content
+    assert yaml.safe_load(content)["name"] == name
+
+
+def test_a_description_of_digits_makes_a_name_that_is_a_text() -> None:
+    seen = Observed(icao="B748", description="747-8")
+    assert yaml.safe_load(yaml_of(seen, facts_of(seen, asker("--yes"))))["name"] == "747_8"
+
+
 def test_a_hover_is_seen_only_while_it_is_flown() -> None:
     flown = {observed.ENGINES: 4.0, observed.HEIGHT: 20.0, observed.GROUND_SPEED: 0.1, observed.CLIMB: -0.1}
     flown[observed.LEVER] = 0.55
