@@ -30,6 +30,8 @@ _ANSWER_S = 1.5
 _REPEAT_S = 0.5
 _ATTEMPTS = 5
 _SHOWN = 1e-3
+#: What X-Plane does not confirm is written twice, so long apart [s].
+_UNCONFIRMED_AGAIN_S = 1.0
 _NETWORK_RATE = "sim/network/dataout/network_data_rate"
 
 Values = Dict[str, float]
@@ -255,22 +257,34 @@ class XPlane:
             What X-Plane does not show, in words.
         """
         left = []
+        again: Dict[str, List[Operation]] = {}
         for entry in reversed(entries):
-            if self._carry_out(entry["undo"]):
-                self.journal.remove([entry["id"]])
-            else:
+            unconfirmed = [each for each in entry["undo"] if each["op"] == "dref" and not _is_confirmed(each)]
+            if not self._carry_out(entry["undo"]):
                 left.append(entry["id"])
+            elif unconfirmed:
+                again[entry["id"]] = unconfirmed
+            else:
+                self.journal.remove([entry["id"]])
+        if again:
+            time.sleep(_UNCONFIRMED_AGAIN_S)
+            for operations in again.values():
+                self._send_all(operations)
+            self.journal.remove(list(again))
         return left
 
     def _carry_out(self, operations: Sequence[Operation]) -> bool:
-        wanted = {each["path"]: each["value"] for each in operations if each["op"] == "dref"}
+        wanted = {each["path"]: each["value"] for each in operations if each["op"] == "dref" and _is_confirmed(each)}
         for _ in range(_ATTEMPTS):
-            for operation in operations:
-                with contextlib.suppress(ConnectionRefusedError):
-                    self._out.socket.sendto(datagram(operation), (self.address, self.port))
+            self._send_all(operations)
             if not wanted or self._shows(wanted):
                 return True
         return False
+
+    def _send_all(self, operations: Sequence[Operation]) -> None:
+        for operation in operations:
+            with contextlib.suppress(ConnectionRefusedError):
+                self._out.socket.sendto(datagram(operation), (self.address, self.port))
 
     def _shows(self, wanted: Values) -> bool:
         def fits(sample: Sample) -> bool:
@@ -328,3 +342,8 @@ class XPlane:
             yield
         finally:
             self.undo([entry for entry in self.journal.own() if entry["id"] == id_])
+
+
+def _is_confirmed(operation: Operation) -> bool:
+    """Whether a write is undone only once X-Plane shows the value."""
+    return bool(operation.get("confirm", True))
