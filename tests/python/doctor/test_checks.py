@@ -302,6 +302,7 @@ def test_a_journal_of_another_x_plane_explains_nothing_here(host, port):
     [
         ("127.0.0.1", "198.51.100.7", True),
         ("198.51.100.7", "127.0.0.1", True),
+        ("198.51.100.8", "198.51.100.7", True),
         ("127.0.0.1", FAR, False),
         (FAR, "127.0.0.1", False),
         ("no_address", "198.51.100.7", False),

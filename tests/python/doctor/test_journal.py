@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import math
+import os
+import socket
+import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from xplane_bridge.doctor.conformance import journal
+from support.deadlines import WAIT_S
+from support.simulator.fake_xplane import FakeXPlane
+from xplane_bridge import protocol
+from xplane_bridge.doctor.conformance import journal, link
 from xplane_bridge.doctor.conformance.journal import Journal, JournalError, write_dataref
+from xplane_bridge.doctor.observe.journals import boot_id, process_status
+from xplane_bridge.harness import wait_until
 
 ALTITUDE = write_dataref("sim/cockpit2/autopilot/altitude_dial_ft", 3000.0)
+STICK, WIND, GUST = (
+    "sim/operation/override/override_joystick_roll",
+    "sim/weather/wind_speed_kt[0]",
+    "sim/weather/shear_speed_kt[0]",
+)
+PROC = Path("/proc")
 
 
 @pytest.fixture(name="notes")
@@ -35,3 +52,82 @@ def test_a_value_that_is_no_number_is_refused_and_the_rest_stays_readable(notes)
     with pytest.raises(JournalError, match="no number cannot be noted"):
         notes.record("b", journal.OVERRIDE, [write_dataref("sim/a", math.nan)])
     assert [entry["id"] for entry in notes.own()] == ["a"]
+
+
+def entry(id_, pid, *undo, purpose="override"):
+    ticks = process_status(PROC, str(pid))[1] if pid else 1
+    owner = {"node": "/xplane/tx_node", "pid": pid or 2**22 + 1, "start_ticks": ticks}
+    owner.update(boot_id=boot_id(PROC), computer=socket.gethostname())
+    return {"id": id_, "purpose": purpose, "owner": owner, "undo": list(undo)}
+
+
+def write(file, *entries):
+    file.write_text(json.dumps({"format": "xplane_bridge journal", "version": 1, "entries": entries}), "utf-8")
+    return file
+
+
+@pytest.mark.parametrize(
+    ("noted", "address", "also", "is_held"),
+    [
+        ("127.0.0.1_49000", "198.51.100.7", (), True),
+        ("198.51.100.7_49000", "127.0.0.1", (), True),
+        ("198.51.100.8_49000", "198.51.100.7", (), True),
+        ("192.0.2.1_49000", "192.0.2.1", (), True),
+        ("192.0.2.2_49000", "192.0.2.1", ("192.0.2.2",), True),
+        ("192.0.2.2_49000", "192.0.2.1", (), False),
+        ("127.0.0.1_49000", "192.0.2.1", (), False),
+        ("127.0.0.1_49010", "127.0.0.1", (), False),
+        ("127.0.0.1_49000_subscriptions", "127.0.0.1", (), False),
+    ],
+)
+def test_who_calls_the_same_x_plane_by_another_address_holds_it(tmp_path, monkeypatch, noted, address, also, is_held):
+    own = ("127.", "198.51.100.")
+    monkeypatch.setattr("xplane_bridge.doctor.observe.computer.is_own", lambda address: address.startswith(own))
+    file = write(tmp_path / f"{noted}.json", entry("override:x", os.getppid()), entry("override:y", 0))
+    said = f"/xplane/tx_node (process {os.getppid()} on {socket.gethostname()}) holds {file}"
+    assert Journal(tmp_path, address, 49000, also=also).holders() == ([said] if is_held else [])
+
+
+def test_a_journal_of_another_address_that_cannot_be_understood_is_said(notes):
+    file = notes.file.with_name("127.0.0.2_49000.json")
+    file.write_text("{", "utf-8")
+    with pytest.raises(JournalError, match=rf"^{file} cannot be understood"):
+        notes.holders()
+
+
+def test_what_x_plane_does_not_confirm_is_written_twice_and_taken_out(tmp_path, monkeypatch):
+    def unconfirmed(path, value):
+        return {**write_dataref(path, value), "confirm": False}
+
+    first = [(STICK, 0.0), (WIND, 4.0), (GUST, 1.0), (WIND, 3.0)]
+    waits, looked_at = [], []
+    with FakeXPlane({}) as xplane:
+        notes = Journal(tmp_path, "127.0.0.1", xplane.port)
+        write(
+            notes.file,
+            entry("disturbance:wind", 0, unconfirmed(GUST, 1.0), unconfirmed(WIND, 3.0)),
+            entry(f"override:{STICK}", 0, write_dataref(STICK, 0.0), unconfirmed(WIND, 4.0)),
+        )
+
+        def written():
+            requests = [protocol.decode_request(datagram) for datagram in xplane.others]
+            return [(request.path, request.value) for request in requests]
+
+        def sleep(seconds):
+            wait_until(lambda: written() == first, WAIT_S, "the first writes")
+            waits.append((seconds, notes.file.exists()))
+
+        def shows(_, wanted):  # the stick alone: the wind is another by then
+            looked_at.append(wanted)
+            return wanted == {STICK: 0.0}
+
+        monkeypatch.setattr(link, "time", SimpleNamespace(monotonic=time.monotonic, sleep=sleep))
+        monkeypatch.setattr(link.XPlane, "_shows", shows)
+        to = link.XPlane("127.0.0.1", xplane.port, notes)
+        assert to.undo(notes.orphans()) == []
+        to.close()
+        again = [(WIND, 4.0), (GUST, 1.0), (WIND, 3.0)]
+        wait_until(lambda: written() == first + again, WAIT_S, "the second writes")
+    assert waits == [(1.0, True)]
+    assert looked_at == [{STICK: 0.0}]
+    assert not notes.file.exists()

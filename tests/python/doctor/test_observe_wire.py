@@ -14,7 +14,7 @@ from xplane_bridge import protocol
 from xplane_bridge.doctor import names
 from xplane_bridge.doctor.observe import beacons, computer, data_output, ports, simulator
 from xplane_bridge.doctor.observe.beacons import BeaconWatch, Sighting
-from xplane_bridge.doctor.observe.target import Chosen, choose, distinct
+from xplane_bridge.doctor.observe.target import Chosen, addresses_of, choose, distinct
 from xplane_bridge.doctor.settings import Settings
 from xplane_bridge.harness import wait_until
 from xplane_bridge.harness.ports import free_udp_port
@@ -136,6 +136,23 @@ HEARD_HERE = BeaconWatch((*HEARD.sightings, Sighting("127.0.0.1", 49008, 115501,
 def test_x_plane_is_found_as_the_nodes_find_it(settings, parameters, watch, expected):
     target = choose(settings, parameters, watch)
     assert (target.address, target.port, target.chosen) == expected
+
+
+def test_a_computer_is_known_by_all_addresses_its_beacon_was_heard_under():
+    watch = BeaconWatch(
+        (
+            Sighting("192.0.2.1", 49000, 115501, "lab-pc"),
+            Sighting("198.51.100.1", 49000, 115501, "lab-pc"),
+            Sighting("198.51.100.1", 49010, 115501, "lab-pc"),
+            Sighting("198.51.100.2", 49000, 115501, "lab-pc-2"),
+        )
+    )
+    for host, port, expected in (
+        ("198.51.100.1", 49000, ("198.51.100.1", "192.0.2.1")),
+        ("198.51.100.1", 49010, ("198.51.100.1",)),
+        ("192.0.2.9", 49000, ("192.0.2.9",)),
+    ):
+        assert addresses_of(choose(Settings(host, port), {}, watch), watch) == expected
 
 
 def test_a_name_without_an_address_is_said():

@@ -7,7 +7,7 @@ from typing import List, Sequence
 from xplane_bridge.doctor import names
 from xplane_bridge.doctor.evidence import Evidence
 from xplane_bridge.doctor.finding import Finding, note, ok, problem, warning
-from xplane_bridge.doctor.observe.computer import is_loopback, is_same_computer
+from xplane_bridge.doctor.observe.computer import is_same_computer
 from xplane_bridge.doctor.observe.journals import Entry, Journal, Owner
 
 _RELEASE = "scripts/release_overrides"
@@ -85,9 +85,8 @@ def _is_examined(evidence: Evidence, journal: Journal) -> bool:
     """Whether a journal is about the X-Plane that was asked."""
     if journal.port != evidence.target.port or not evidence.target.address:
         return False
-    hosts = (journal.host, evidence.target.address)
-    # One computer's X-Plane is reached by its own address and by the loopback's, whichever the node was given.
-    return hosts[0] == hosts[1] or (any(map(is_loopback, hosts)) and is_same_computer(*hosts))
+    # One computer's X-Plane is reached by its own addresses and by the loopback's, whichever the node was given.
+    return is_same_computer(journal.host, evidence.target.address)
 
 
 def _has(entries: Sequence[Entry], path: str) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List, Optional, Sequence
 
 from xplane_bridge.doctor.checks import hints
 from xplane_bridge.doctor.checks.simulator import version_text
@@ -58,8 +58,7 @@ def several(evidence: Evidence) -> List[Finding]:
     found = distinct(evidence.beacons.sightings)
     if len(found) < 2:
         return []
-    those = ", ".join(f"{_name(seen)} port {seen.port} (version {version_text(seen.version)})" for seen, _ in found)
-    text = f"{len(found)} X-Planes announce themselves: {those}"
+    text = those_of([seen for seen, _ in found])
     facts: Dict[str, Any] = {
         "simulators": [{"address": seen.address, "port": seen.port, "name": seen.computer} for seen, _ in found]
     }
@@ -70,6 +69,12 @@ def several(evidence: Evidence) -> List[Finding]:
         f"--port (examined here: {evidence.target})"
     )
     return [problem("several-simulators", text, remedy, **facts)]
+
+
+def those_of(found: Sequence[Sighting]) -> str:
+    """That several X-Planes announce themselves, and which."""
+    those = ", ".join(f"{_name(seen)} port {seen.port} (version {version_text(seen.version)})" for seen in found)
+    return f"{len(found)} X-Planes announce themselves: {those}"
 
 
 def answer(evidence: Evidence) -> List[Finding]:

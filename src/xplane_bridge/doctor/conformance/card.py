@@ -58,6 +58,7 @@ def fly(
     journals: Path,
     questions: Sequence[Question],
     say: Callable[[Question, Answer], None] = lambda _question, _answer: None,
+    also: Sequence[str] = (),
 ) -> Flown:
     """Flies the card.
 
@@ -67,12 +68,13 @@ def fly(
         journals: Folder of the bridge's journals.
         questions: What to ask.
         say: Called with each answer as it comes.
+        also: Other IPv4 addresses of X-Plane's computer: a node may have been given one of them.
 
     Raises:
         CannotRunError: X-Plane does not answer, or a node holds its journal.
     """
     try:
-        return _fly(XPlane(address, port, Journal(journals, address, port)), questions, say)
+        return _fly(XPlane(address, port, Journal(journals, address, port, also=also)), questions, say)
     except JournalError as error:
         raise CannotRunError(str(error)) from None
 
@@ -81,7 +83,7 @@ def _fly(xplane: XPlane, questions: Sequence[Question], say: Callable[[Question,
     holders = xplane.journal.holders()
     if holders:
         who = ", ".join(dict.fromkeys(holders))
-        raise CannotRunError(f"{who} holds {xplane.journal.file}: end it first, the card flies the aircraft itself")
+        raise CannotRunError(f"{who}: end it first, the card flies the aircraft itself")
     answers: Dict[str, Answer] = {}
     left: List[str] = []
     try:

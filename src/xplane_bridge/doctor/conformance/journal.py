@@ -9,10 +9,11 @@ import os
 import socket
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Sequence
+from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence
 
 from xplane_bridge import protocol
-from xplane_bridge.doctor.observe.journals import HEAD, Owner, boot_id, judge_owner, load, process_status
+from xplane_bridge.doctor.observe.computer import is_same_computer
+from xplane_bridge.doctor.observe.journals import HEAD, Owner, boot_id, files, judge_owner, load, process_status
 
 NODE = "xplane_doctor"
 #: Purposes as the nodes have them: tx_node and rx_node undo what a doctor left that was killed.
@@ -67,16 +68,19 @@ class Journal:
         address: IPv4 address of X-Plane.
         port: UDP port it listens on.
         proc: Folder of Linux's process file system.
+        also: Other addresses of its computer.
 
     Raises:
         JournalError: This system has not what the journal needs: it is not Linux.
     """
 
-    def __init__(self, folder: Path, address: str, port: int, proc: Path = Path("/proc")) -> None:
+    def __init__(
+        self, folder: Path, address: str, port: int, proc: Path = Path("/proc"), also: Sequence[str] = ()
+    ) -> None:
         # As the nodes name it: one file whatever loopback address the X-Plane of this computer is called by.
         name = "127.0.0.1" if address.startswith("127.") else address
         self.file = folder / f"{name}_{port}.json"
-        self._proc = proc
+        self._proc, self._port, self._addresses = proc, port, (address, *also)
         try:
             self._fcntl = importlib.import_module("fcntl")  # the doctor starts without it, as on Windows
             self._self: Dict[str, Any] = {
@@ -91,10 +95,11 @@ class Journal:
             raise JournalError(msg) from None
 
     def holders(self) -> List[str]:
-        """Who else has changed this X-Plane and still runs, in words."""
+        """Who else has changed this X-Plane, under whichever address of its computer, and still runs, in words."""
         return [
-            f"{entry['owner']['node']} (process {entry['owner']['pid']} on {entry['owner']['computer']})"
-            for entry in self._load()
+            f"{entry['owner']['node']} (process {entry['owner']['pid']} on {entry['owner']['computer']}) holds {file}"
+            for file in (self.file, *self._others())
+            for entry in self._load(file)
             if entry["purpose"] in (OVERRIDE, DATA_OUTPUT) and not self._is_gone(entry) and not self._is_own(entry)
         ]
 
@@ -129,6 +134,16 @@ class Journal:
         """Takes entries out that are undone."""
         self._change(lambda entries: [entry for entry in entries if entry["id"] not in ids])
 
+    def _others(self) -> List[Path]:
+        """The journals of those who call the same X-Plane by another address."""
+        return [
+            file
+            for file, host, port in files(self.file.parent)
+            if port == self._port
+            and file.name not in (self.file.name, f"{host}_{port}_subscriptions.json")
+            and any(is_same_computer(host, address) for address in self._addresses)
+        ]
+
     def _is_own(self, entry: Entry) -> bool:
         return all(entry["owner"].get(key) == self._self[key] for key in ("pid", "start_ticks", "boot_id"))
 
@@ -158,14 +173,15 @@ class Journal:
                     time.sleep(0.02)
             yield
 
-    def _load(self) -> List[Entry]:
+    def _load(self, file: Optional[Path] = None) -> List[Entry]:
         """Also without the lock, which a hung node may have: the file is replaced as a whole."""
+        file = file or self.file
         try:
-            return load(self.file)
+            return load(file)
         except FileNotFoundError:
             return []
         except (ValueError, KeyError, TypeError, AttributeError) as error:
-            msg = f"{self.file} cannot be understood ({error}): move it away, or restart X-Plane and delete it"
+            msg = f"{file} cannot be understood ({error}): move it away, or restart X-Plane and delete it"
             raise JournalError(msg) from None
 
     def _store(self, entries: List[Entry]) -> None:

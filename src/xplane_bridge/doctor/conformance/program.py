@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from typing import Sequence
+from typing import Any, Mapping, Sequence, Tuple
 
+from xplane_bridge.doctor.checks.link import those_of
 from xplane_bridge.doctor.conformance import card, results
 from xplane_bridge.doctor.conformance.question import Question
 from xplane_bridge.doctor.conformance.verdict import Answer
-from xplane_bridge.doctor.observe import beacons, target
+from xplane_bridge.doctor.observe import beacons, ros, target
 from xplane_bridge.doctor.settings import Settings
 
 _QUESTION = """\
@@ -39,21 +40,14 @@ def main(settings: Settings, only: Sequence[str], yes: bool) -> int:
 
 def _main(settings: Settings, only: Sequence[str], yes: bool) -> int:
     questions = card.chosen(only)
-    heard = (
-        beacons.BeaconWatch()
-        if settings.host
-        else beacons.listen(settings.beacon_group, settings.beacon_port, settings.listen_s)
-    )
-    where = target.choose(settings, {}, heard)
-    if not where.address:
-        raise card.CannotRunError(f"{where.host} has no address: {where.error}")
+    where, addresses = _target(settings)
     if not yes and not _agreed(str(where)):
         raise card.CannotRunError("not flown: answer y, or give --yes")
 
     def say(question: Question, answer: Answer) -> None:
         print(results.line(question, answer), flush=True)
 
-    flown = card.fly(where.address, where.port, settings.journal_folder, questions, say)
+    flown = card.fly(where.address, where.port, settings.journal_folder, questions, say, addresses)
     if flown.answers:
         file = results.file_of(settings.journal_folder, where.address, where.port)
         report = results.store(file, flown, where.address, where.port)
@@ -64,6 +58,24 @@ def _main(settings: Settings, only: Sequence[str], yes: bool) -> int:
         print(f"xplane_doctor: {flown.broken_off}", file=sys.stderr)
         return 2
     return 1 if flown.left else 0
+
+
+def _target(settings: Settings) -> Tuple[target.Target, Tuple[str, ...]]:
+    """The X-Plane that is flown, the one that the nodes would take, and the addresses its computer is known by."""
+    parameters: Mapping[str, Any] = {}
+    heard = beacons.BeaconWatch()
+    named = target.choose(settings, parameters, heard)
+    # Of this computer, named in full, neither adds anything.
+    if not (settings.host and settings.port and named.here):
+        parameters = ros.observe(settings.environment, settings.namespace).parameters
+        heard = beacons.listen(settings.beacon_group, settings.beacon_port, settings.listen_s)
+    where = target.choose(settings, parameters, heard)
+    if not where.address:
+        raise card.CannotRunError(f"{where.host} has no address: {where.error}")
+    found = [seen for seen, _ in target.distinct(heard.sightings)]
+    if where.chosen is target.Chosen.BEACON and len(found) > 1:
+        raise card.CannotRunError(f"{those_of(found)}; name the one that is to be flown: --host and --port")
+    return where, target.addresses_of(where, heard)
 
 
 def _agreed(where: str) -> bool:

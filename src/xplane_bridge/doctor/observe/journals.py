@@ -8,7 +8,7 @@ import re
 import socket
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, Iterator, List, Tuple
 
 #: What a file says of itself.
 HEAD = {"format": "xplane_bridge journal", "version": 1}
@@ -68,11 +68,7 @@ class Journal:
 def read(folder: Path, proc: Path = Path("/proc")) -> Tuple[Journal, ...]:
     """All journals of a folder; none where there is no such folder."""
     found = []
-    for file in sorted(folder.glob("*.json")) if folder.is_dir() else []:
-        match = re.fullmatch(r"(.+)_(\d+)(?:_subscriptions)?\.json", file.name)
-        if not match:
-            continue
-        host, port = match.group(1), int(match.group(2))
+    for file, host, port in files(folder):
         try:
             entries = tuple(_entry(entry, proc) for entry in load(file))
             found.append(Journal(file, host, port, entries))
@@ -81,6 +77,14 @@ def read(folder: Path, proc: Path = Path("/proc")) -> Tuple[Journal, ...]:
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             found.append(Journal(file, host, port, error=f"{type(error).__name__}: {error}"))
     return tuple(found)
+
+
+def files(folder: Path) -> Iterator[Tuple[Path, str, int]]:
+    """The journals of a folder, those of subscriptions as well, each with address and port of its X-Plane."""
+    for file in sorted(folder.glob("*.json")) if folder.is_dir() else []:
+        match = re.fullmatch(r"(.+)_(\d+)(?:_subscriptions)?\.json", file.name)
+        if match:
+            yield file, match.group(1), int(match.group(2))
 
 
 def load(file: Path) -> List[Dict[str, Any]]:

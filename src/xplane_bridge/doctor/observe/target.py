@@ -93,6 +93,15 @@ def distinct(sightings: Sequence[Sighting]) -> List[Tuple[Sighting, Tuple[str, .
     return found
 
 
+def addresses_of(where: Target, beacons: BeaconWatch) -> Tuple[str, ...]:
+    """The address of an X-Plane, and the others that its beacon was heard under."""
+    heard: Tuple[str, ...] = ()
+    for seen, addresses in distinct(beacons.sightings):
+        if seen.port == where.port and any(is_same_computer(where.address, address) for address in addresses):
+            heard += addresses
+    return tuple(dict.fromkeys((where.address, *heard)))
+
+
 def _port_at(given: Target, configured: Any, port: Optional[int], beacons: BeaconWatch) -> int:
     """The port of a host without one: the parameter's where that is of the same host, else its beacon's."""
     if not given.address:
