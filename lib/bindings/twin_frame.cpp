@@ -151,9 +151,9 @@ struct TwinFrame::Parts {
     rudder_deg = constant(twin, "RUDDER_DEG");
     flap_deg = constant(twin, "FLAP_DEG");
     speed_brake_deg = constant(twin, "SPEED_BRAKE_DEG");
-    roll_trim = constant(twin, "ROLL_TRIM");
-    pitch_trim = constant(twin, "PITCH_TRIM");
-    yaw_trim = constant(twin, "YAW_TRIM");
+    aileron_trim = constant(twin, "AILERON_TRIM_DEG");
+    elevator_trim = constant(twin, "ELEVATOR_TRIM_DEG");
+    rudder_trim = constant(twin, "RUDDER_TRIM_DEG");
     stall_warning_rad = constant(twin, "STALL_WARNING_RAD");
     const Object kinds(PyImport_ImportModule("xplane_bridge.emulator.flight.flight_model"));
     engine_faults = members(attribute(kinds.get(), "EngineFault"));
@@ -197,7 +197,7 @@ struct TwinFrame::Parts {
   std::vector<EngineParts> engines;
   double foot = 0.0, slug = 0.0, pound = 0.0, inch = 0.0, earth_radius = 0.0, earth_gravity = 0.0, aileron_up = 0.0,
          aileron_down = 0.0, elevator_up = 0.0, elevator_down = 0.0, rudder_deg = 0.0, flap_deg = 0.0,
-         speed_brake_deg = 0.0, roll_trim = 0.0, pitch_trim = 0.0, yaw_trim = 0.0, stall_warning_rad = 0.0;
+         speed_brake_deg = 0.0, aileron_trim = 0.0, elevator_trim = 0.0, rudder_trim = 0.0, stall_warning_rad = 0.0;
 };
 
 TwinFrame::TwinFrame(PyObject* model) : parts_(std::make_unique<Parts>(model)) {}
@@ -238,22 +238,22 @@ void TwinFrame::begin(PyObject* model, double dt, PyObject* controls) const {
 std::vector<SurfaceOrder> TwinFrame::orders(PyObject* model, PyObject* controls) const {
   const Parts& p = *parts_;
   const Names& names = p.names;
-  const auto command = [&](const Name& stick, double share, const Name& trim) {
-    return clip(stick.numberOf(controls) + share * trim.numberOf(controls), -1.0, 1.0);
-  };
-  const double roll = command(names.roll, p.roll_trim, names.trim_roll);
-  const double pitch = command(names.pitch, p.pitch_trim, names.trim_pitch);
-  const double yaw = command(names.yaw, p.yaw_trim, names.trim_yaw);
+  const double roll = clip(names.roll.numberOf(controls), -1.0, 1.0);
+  const double pitch = clip(names.pitch.numberOf(controls), -1.0, 1.0);
+  const double yaw = clip(names.yaw.numberOf(controls), -1.0, 1.0);
   const Object commands(Py_BuildValue("(ddd)", roll, pitch, yaw));
   names.commands.set(model, commands.get());
-  const double elevator = asymmetric(-pitch, p.elevator_up, p.elevator_down);
+  const double aileron_trim = p.aileron_trim * names.trim_roll.numberOf(controls);
+  const double elevator_trim = p.elevator_trim * names.trim_pitch.numberOf(controls);
+  const double rudder_trim = p.rudder_trim * names.trim_yaw.numberOf(controls);
+  const double elevator = asymmetric(-pitch, p.elevator_up, p.elevator_down) - elevator_trim;
   const double flap = p.flap_deg * names.flap_request.numberOf(controls);
   const double brake = p.speed_brake_deg * names.speedbrake.numberOf(controls);
-  const std::array<double, Parts::kSurfaces> targets{asymmetric(roll, p.aileron_up, p.aileron_down),
-                                                     asymmetric(-roll, p.aileron_up, p.aileron_down),
+  const std::array<double, Parts::kSurfaces> targets{asymmetric(roll, p.aileron_up, p.aileron_down) + aileron_trim,
+                                                     asymmetric(-roll, p.aileron_up, p.aileron_down) - aileron_trim,
                                                      elevator,
                                                      elevator,
-                                                     p.rudder_deg * yaw,
+                                                     p.rudder_deg * yaw + rudder_trim,
                                                      flap,
                                                      flap,
                                                      brake,

@@ -24,7 +24,7 @@ SHARES = (SurfaceFaultKind.REDUCED, SurfaceFaultKind.SLOW)
 
 def stir(chance: random.Random, controls: Controls, model: FlightModel) -> None:
     """Moves everything that can be moved, and breaks some of it."""
-    for axis in ("roll", "pitch", "yaw", "trim_pitch", "flap_request", "speedbrake"):
+    for axis in ("roll", "pitch", "yaw", "trim_roll", "trim_pitch", "trim_yaw", "flap_request", "speedbrake"):
         setattr(controls, axis, chance.uniform(0.0 if axis == "flap_request" else -0.4, 0.4))
     for i in range(2):
         controls.throttle[i], controls.propeller[i] = chance.random(), chance.random()

@@ -22,6 +22,7 @@ THRO_USE = "sim/flightmodel/engine/ENGN_thro_use"
 LEFT_AILERON = "sim/flightmodel/controls/wing2l_ail1def"
 RIGHT_AILERON = "sim/flightmodel/controls/wing2r_ail1def"
 ELEVATOR = "sim/flightmodel/controls/hstab1_elv1def"
+RUDDER = "sim/flightmodel/controls/vstab1_rud1def"
 FAILURES = "sim/operation/failures/"
 
 
@@ -257,16 +258,30 @@ def test_throttle_override_of_all_engines_is_released_by_minus_two(bench):
     assert emulator.read(THRO_USE + "[1]") == [pytest.approx(emulator.sim.controls.throttle[1])]
 
 
+def test_trims_move_the_surfaces_beside_the_stick(bench):
+    """Laminar's totals are yoke, servos and stability augmentation; trims are terms of their own."""
+    emulator = bench(aircraft="fixed_wing", initial=InitialState(on_ground=True))
+    cockpit = "sim/cockpit2/controls/"
+    emulator.write({cockpit + f"{trim}_trim": 0.5 for trim in ("aileron", "elevator", "rudder")})
+    emulator.step(60)
+    surfaces = (LEFT_AILERON, RIGHT_AILERON, ELEVATOR, RUDDER)
+    assert emulator.read(*surfaces) == pytest.approx([2.25, -2.25, -6.3, 5.4])
+    for name in (cockpit + "total_{}_ratio", "sim/joystick/artstab_{}_ratio"):
+        assert emulator.read(*(name.format(axis) for axis in ("roll", "pitch", "heading"))) == [0.0, 0.0, 0.0]
+
+
 def test_limits_of_trim_are_parts_of_the_travel_that_it_moves(bench):
     emulator = bench(aircraft="fixed_wing", initial=InitialState(on_ground=True))
     limits, trim = "sim/aircraft/controls/acf_", "sim/cockpit2/controls/elevator_trim"
     emulator.write({trim: 1.0})
     emulator.step(60)
-    # up 12.6 of 18 degrees, down 9.1 of 13
+    # 12.6 of 18 degrees up, of 13 down
     assert emulator.read(ELEVATOR, limits + "elev_up", limits + "max_trim_elev") == pytest.approx([-12.6, 18.0, 0.7])
     emulator.write({trim: -1.0})
     emulator.step(60)
-    assert emulator.read(ELEVATOR, limits + "elev_dn", limits + "min_trim_elev") == pytest.approx([9.1, 13.0, 0.7])
+    assert emulator.read(ELEVATOR, limits + "elev_dn", limits + "min_trim_elev") == pytest.approx(
+        [12.6, 13.0, 12.6 / 13.0]
+    )
     assert emulator.read(limits + "max_trim_ailn", limits + "max_trim_rudd") == pytest.approx([0.3, 0.4])
 
 

@@ -30,8 +30,8 @@ ELEVATOR_UP_DEG, ELEVATOR_DOWN_DEG = 18.0, 13.0
 RUDDER_DEG = 27.0
 FLAP_DEG = 42.0
 SPEED_BRAKE_DEG = 60.0
-#: Full trim moves a surface as this share of full stick.
-ROLL_TRIM, PITCH_TRIM, YAW_TRIM = 0.3, 0.7, 0.4
+#: What full trim adds to the deflection that the stick asks for.
+AILERON_TRIM_DEG, ELEVATOR_TRIM_DEG, RUDDER_TRIM_DEG = 4.5, 12.6, 10.8
 
 STALL_WARNING_RAD = math.radians(12.5)
 CRUISE_PROPELLER = 0.75
@@ -75,7 +75,7 @@ class FixedWing(JsbsimModel):
         eye_forward_m=0.6,
         eye_down_m=-0.65,
         standing_height_m=1.131,
-        trim_deg=(("aileron", 4.5), ("elevator", 12.6), ("rudder", 10.8)),
+        trim_deg=(("aileron", AILERON_TRIM_DEG), ("elevator", ELEVATOR_TRIM_DEG), ("rudder", RUDDER_TRIM_DEG)),
     )
     surfaces = (
         sided("wing2l_ail1", SurfaceKind.AILERON, Side.LEFT, AILERON_UP_DEG, AILERON_DOWN_DEG, 70.0),
@@ -140,19 +140,21 @@ class FixedWing(JsbsimModel):
 
     def _mix(self, controls: Controls) -> Sequence[float]:
         """Where the controls want the surfaces, in the order of ``surfaces`` [deg]."""
-        roll = min(max(controls.roll + ROLL_TRIM * controls.trim_roll, -1.0), 1.0)
-        pitch = min(max(controls.pitch + PITCH_TRIM * controls.trim_pitch, -1.0), 1.0)
-        yaw = min(max(controls.yaw + YAW_TRIM * controls.trim_yaw, -1.0), 1.0)
+        roll = min(max(controls.roll, -1.0), 1.0)
+        pitch = min(max(controls.pitch, -1.0), 1.0)
+        yaw = min(max(controls.yaw, -1.0), 1.0)
         self._commands = (roll, pitch, yaw)
-        elevator = asymmetric(-pitch, ELEVATOR_UP_DEG, ELEVATOR_DOWN_DEG)
+        aileron_trim = AILERON_TRIM_DEG * controls.trim_roll
+        elevator_trim = ELEVATOR_TRIM_DEG * controls.trim_pitch
+        elevator = asymmetric(-pitch, ELEVATOR_UP_DEG, ELEVATOR_DOWN_DEG) - elevator_trim
         flap = FLAP_DEG * controls.flap_request
         brake = SPEED_BRAKE_DEG * controls.speedbrake
         return (
-            asymmetric(roll, AILERON_UP_DEG, AILERON_DOWN_DEG),
-            asymmetric(-roll, AILERON_UP_DEG, AILERON_DOWN_DEG),
+            asymmetric(roll, AILERON_UP_DEG, AILERON_DOWN_DEG) + aileron_trim,
+            asymmetric(-roll, AILERON_UP_DEG, AILERON_DOWN_DEG) - aileron_trim,
             elevator,
             elevator,
-            RUDDER_DEG * yaw,
+            RUDDER_DEG * yaw + RUDDER_TRIM_DEG * controls.trim_yaw,
             flap,
             flap,
             brake,

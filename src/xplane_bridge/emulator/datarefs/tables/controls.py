@@ -260,8 +260,9 @@ def _limits(t: Table, sim: Sources) -> None:
     t.value("sim/aircraft2/metadata/is_helicopter", lambda _: False)
     trims = {"ailn": ("aileron", "ail1"), "elev": ("elevator", "elv1"), "rudd": ("rudder", "rud1")}
     for name, (kind, leaf) in trims.items():
-        t.value(f"{limits}max_trim_{name}", partial(lambda trim, part, _: _trim_part(sim, trim, part), kind, leaf))
-        t.value(f"{limits}min_trim_{name}", partial(lambda trim, part, _: _trim_part(sim, trim, part), kind, leaf))
+        for end in ("max", "min"):
+            part = partial(_trim_part, sim, kind, leaf, end)
+            t.value(f"{limits}{end}_trim_{name}", partial(lambda part, _: part(), part))
     for end in ("up", "dn"):
         t.setting(f"{limits}hstb_trim_{end}")  # no aircraft here has a stabiliser that trims
 
@@ -270,12 +271,12 @@ def _spec(sim: Sources, leaf: str) -> Optional[SurfaceSpec]:
     return next((spec for spec in sim.model.surfaces if spec.name.endswith("_" + leaf)), None)
 
 
-def _trim_part(sim: Sources, kind: str, leaf: str) -> float:
-    """Part of the surface's travel that full trim moves it: the elevator up, the others (left ones) down or right."""
+def _trim_part(sim: Sources, kind: str, leaf: str, end: str) -> float:
+    """Part of its travel that full trim, nose up or right (`max`) or down or left, moves the surface (of two: down)."""
     spec = _spec(sim, leaf)
     if spec is None:
         return 0.0
     trim, travel = dict(sim.model.info.trim_deg).get(kind, 0.0), spec.maximum_deg
-    if spec.kind is SurfaceKind.ELEVATOR:
+    if spec.kind is SurfaceKind.ELEVATOR and end == "max":
         travel = -spec.minimum_deg
     return abs(trim) / travel if travel else 0.0
