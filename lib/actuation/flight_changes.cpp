@@ -323,11 +323,10 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
   const auto all_known = [](const std::vector<core::DatarefValue>& values) {
     return std::all_of(values.begin(), values.end(), isKnown);
   };
-  std::vector<core::DatarefValue> values;
-  bool complete = false;
-  for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout); !complete && !expired(deadline);) {
+  std::vector<core::DatarefValue> values(names.size());
+  for (const core::Deadline deadline = deadlineAfter(options_.setting_timeout);
+       !all_known(values) && !expired(deadline);) {
     values = link_->readUntil(names, kAnswerWait, all_known);
-    complete = all_known(values);
   }
   if (stopping_) return "nothing was set";
   const std::lock_guard<std::mutex> lock(restores_mutex_);
@@ -350,6 +349,9 @@ std::string FlightChanges::remember(const std::vector<core::SettingWrite>& setti
     return "X-Plane does not report " + core::join(unknown.empty() ? names : unknown) +
            ", which could not be put back on exit" + linkCondition();
   }
+  std::stable_partition(all.begin(), all.end(), [](const core::UndoOperation& operation) {
+    return !core::hasOthersAct(std::get<core::UndoDref>(operation).path);
+  });
   journal->record(kSettingsEntry, kOverridePurpose, std::move(all));
   return "";
 }

@@ -19,12 +19,13 @@ constexpr double kAboveHighest = 1000.0;  // [m] between layers that only repeat
 constexpr double kMetersPerMile = 1609.344;
 constexpr double kOktasOf11 = 6.0;  // cloud_coverage there goes from 0 to 6
 constexpr int kLastType11 = 5, kLastType12 = 3;
+constexpr const char *kRegion = "sim/weather/region/", *kUpdateImmediately = "update_immediately";
 constexpr double kShare = 1e-4;  // of a value, by which float32 may show it otherwise
 
 /// Collects settings under the weather's folder of a version.
 class Sheet {
  public:
-  explicit Sheet(bool regions) : folder_(regions ? "sim/weather/region/" : "sim/weather/") {}
+  explicit Sheet(bool regions) : folder_(regions ? kRegion : "sim/weather/") {}
 
   void send(const std::string& name, double value) { add(name, value, false); }
   void set(const std::string& name, double value) { add(name, value, true); }
@@ -200,7 +201,7 @@ std::vector<SettingWrite> weatherWrites(const Weather& weather, SimulatorVersion
   Sheet sheet(regions);
   if (regions) {
     constexpr int kStaticWeather = 3;
-    sheet.send("update_immediately", 1.0);
+    sheet.send(kUpdateImmediately, 1.0);
     sheet.send("change_mode", kStaticWeather);
     sheet.send("variability_pct", 0.0);
   } else if (!version.is12()) {  // there it cannot be written
@@ -220,6 +221,8 @@ std::vector<SettingWrite> weatherWrites(const Weather& weather, SimulatorVersion
   }
   return sheet.take();
 }
+
+bool hasOthersAct(const std::string& dataref) { return dataref == std::string(kRegion) + kUpdateImmediately; }
 
 std::optional<std::string> cloudCommand(const Weather& weather, SimulatorVersion version) {
   if (!weather.clouds || !hasRegions(version)) return std::nullopt;

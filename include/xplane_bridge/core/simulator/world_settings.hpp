@@ -74,6 +74,8 @@ std::optional<std::string> check(const Weather& weather);
 std::optional<std::string> refusalBy(SimulatorVersion version, const Weather& weather);
 /// Real weather and its changing end. Only for what refusalBy() does not refuse.
 std::vector<SettingWrite> weatherWrites(const Weather& weather, SimulatorVersion version);
+/// Whether this one of its datarefs has the others act at once: it goes back last, for them to.
+bool hasOthersAct(const std::string& dataref);
 /// What has X-Plane draw the clouds that these settings ask for; without it they come up to a minute later, from 12.08
 /// on, where update_immediately is for all but them. nullopt: nothing has to.
 std::optional<std::string> cloudCommand(const Weather& weather, SimulatorVersion version);

@@ -165,6 +165,24 @@ TEST_F(FlightChangesTest12, CloudsAreMadeAnewOnceTheyAreShown) {
   EXPECT_EQ(sim_.value("sim/weather/region/cloud_type[2]"), 2.0F) << "before that";
 }
 
+TEST_F(FlightChangesTest12, WhatHasWeatherActAtOnceGoesBackLast) {
+  core::Weather warmer, denser;
+  warmer.sea_level_temperature = 30.0;
+  denser.sea_level_pressure = 100000.0;
+  for (core::Weather* weather : {&warmer, &denser}) {
+    weather->restore_on_exit = true;
+    for (const auto& each : core::weatherWrites(*weather, core::kXPlane12)) sim_.set(each.write.dataref, 0.0F);
+  }
+  for (const core::Weather& weather : {warmer, denser}) {
+    expect(changes_.applyWeather(weather), EventKind::kSetting, "the weather is set as asked for");
+  }
+  sim_.clearMessages();
+  changes_.restoreSettings();
+  sim_.run(0.1);
+  ASSERT_EQ(sim_.writes().size(), 5U);
+  EXPECT_EQ(sim_.writes().back().first, "sim/weather/region/update_immediately");
+}
+
 TEST_F(FlightChangesTest, WhatCouldNotBePutBackIsNotChanged) {
   core::Weather weather;
   weather.sea_level_temperature = 30.0;
