@@ -67,8 +67,8 @@ void SimLink::findPeer(std::int64_t now_ns) {
     }
     return;
   }
-  // The X-Plane we knew is silent. It is where its beacon comes from now, or it is one that has begun to announce
-  // itself since: never jump to another computer's that has been there all along.
+  // The X-Plane we knew is silent. It is where its beacon comes from now, or it is one of its computer that has begun
+  // to announce itself since: never jump to another computer's, which another user may fly.
   if (now_ns - beacons_.lastHeard(peer_) < toNanoseconds(options_.beacon_settle_s)) {
     return;
   }
@@ -78,7 +78,8 @@ void SimLink::findPeer(std::int64_t now_ns) {
     setPeer(known->endpoint, "no longer heard from " + peer_.addressString() + ": " + toString(*known));
     return;
   }
-  const std::optional<BeaconSighting> restarted = beacons_.onlyNewSince(last_heard_ns_, now_ns);
+  const std::optional<BeaconSighting> restarted =
+      beacons_.onlyNewSince(last_heard_ns_, now_ns, peer_.address, peer_name_);
   if (restarted.has_value() && restarted->endpoint != peer_) {
     setPeer(restarted->endpoint, "come back as " + toString(*restarted));
   }

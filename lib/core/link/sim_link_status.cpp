@@ -31,6 +31,10 @@ void SimLink::findSearchProblems(std::int64_t now_ns, std::vector<std::string>* 
     if (sightings.size() > 1 && !beacons_.at(peer_, now_ns).has_value()) {
       problems->push_back("several X-Planes announce themselves: " + namesOf(sightings) +
                           "; set the parameter host (and port) to the one that is meant");
+    } else if (last_heard_ns_ >= 0 && sightings.size() == 1 &&
+               !beacons_.isOfComputer(sightings.front(), peer_.address, peer_name_)) {
+      problems->push_back("the X-Plane at " + peer_.toString() + " is gone, and " + namesOf(sightings) +
+                          " is on another computer: to go on with that one, set the parameter host to it");
     } else if (!peer_.valid() && sightings.empty() && searched_s > kPatienceS) {
       problems->push_back("no X-Plane announces itself on " + options_.beacon_group + ":" +
                           std::to_string(options_.beacon_port) +

@@ -128,18 +128,32 @@ std::optional<BeaconSighting> BeaconTracker::onlyOne(std::int64_t now_ns) const 
   return sightingOf(*found, now_ns);
 }
 
-std::optional<BeaconSighting> BeaconTracker::onlyNewSince(std::int64_t since_ns, std::int64_t now_ns) const {
-  const Known* found = nullptr;
+bool BeaconTracker::isOfComputer(const BeaconSighting& sighting, std::uint32_t address,
+                                 const std::string& computer_name) const {
+  if (!computer_name.empty() && sighting.computer_name == computer_name) return true;
+  const auto is_its = [&](std::uint32_t each) { return isSame(each, address); };
+  return is_its(sighting.endpoint.address) ||
+         std::any_of(sighting.other_addresses.begin(), sighting.other_addresses.end(), is_its);
+}
+
+std::optional<BeaconSighting> BeaconTracker::onlyNewSince(std::int64_t since_ns, std::int64_t now_ns,
+                                                          std::uint32_t address,
+                                                          const std::string& computer_name) const {
+  std::optional<BeaconSighting> found;
   for (const Known& known : known_) {
     if (!isFresh(known, now_ns) || known.first_ns <= since_ns) {
       continue;
     }
-    if (found != nullptr) {
+    const BeaconSighting sighting = sightingOf(known, now_ns);
+    if (!isOfComputer(sighting, address, computer_name)) {
+      continue;
+    }
+    if (found.has_value()) {
       return std::nullopt;
     }
-    found = &known;
+    found = sighting;
   }
-  return found == nullptr ? std::nullopt : std::optional<BeaconSighting>(sightingOf(*found, now_ns));
+  return found;
 }
 
 }  // namespace xplane_bridge::core

@@ -46,9 +46,12 @@ class BeaconTracker {
   /// The only X-Plane there is, once no other has announced itself for the settling time. Empty while waiting, or
   /// when there are several.
   std::optional<BeaconSighting> onlyOne(std::int64_t now_ns) const;
-  /// The one X-Plane that has begun to announce itself after `since_ns`: the old one after a restart, as long as there
-  /// is no second new one.
-  std::optional<BeaconSighting> onlyNewSince(std::int64_t since_ns, std::int64_t now_ns) const;
+  /// Whether it is on the computer that had this address, or has this name (empty: not known).
+  bool isOfComputer(const BeaconSighting& sighting, std::uint32_t address, const std::string& computer_name) const;
+  /// The one X-Plane of that computer that has begun to announce itself after `since_ns`: the old one after a restart,
+  /// as long as there is no second new one.
+  std::optional<BeaconSighting> onlyNewSince(std::int64_t since_ns, std::int64_t now_ns, std::uint32_t address,
+                                             const std::string& computer_name) const;
 
  private:
   struct Address {

@@ -44,13 +44,14 @@ std::vector<std::uint8_t> data(float speed) {
   return bytes;
 }
 
-/// Of a computer named "sim".
-std::vector<std::uint8_t> beacon() {
+std::vector<std::uint8_t> beacon(const std::string& computer_name = "sim") {
   std::vector<std::uint8_t> bytes = {'B', 'E', 'C', 'N', 0, 1, 2, 1, 0, 0, 0};
   const std::int32_t version = 122015;
   const auto* begin = reinterpret_cast<const std::uint8_t*>(&version);
   bytes.insert(bytes.end(), begin, begin + sizeof(version));
-  bytes.insert(bytes.end(), {1, 0, 0, 0, 0x68, 0xBF, 's', 'i', 'm', 0});  // master, port 49000
+  bytes.insert(bytes.end(), {1, 0, 0, 0, 0x68, 0xBF});  // master, port 49000
+  bytes.insert(bytes.end(), computer_name.begin(), computer_name.end());
+  bytes.push_back(0);
   return bytes;
 }
 
@@ -288,6 +289,45 @@ TEST_F(ScriptedLink, FollowsToTheAddressThatIsLeftOfXPlanesComputer) {
     EXPECT_EQ(link_->status().computer_name, "sim");
     EXPECT_EQ(link_->status().reason, "X-Plane has moved to 10.2.2.3:49000");
     EXPECT_EQ(wire_->sent.back().to, second);
+    flight_.reset();
+    link_.reset();
+  }
+}
+
+TEST_F(ScriptedLink, AnotherComputersXPlaneIsNotTheOneThatIsGone) {
+  SimLinkOptions options = defaults();
+  options.host = "";
+  options.listen_for_beacon = true;
+  for (const bool from_the_start : {false, true}) {  // it begins while ours is gone, or begins again
+    wire_ = std::make_shared<ScriptedHub::Wire>();
+    makeLink(options);
+    const Endpoint neighbours{0x0A010204U, 49000};
+    for (int k = 0; k < 500; ++k) {
+      const int now = 100 * k;
+      const bool ours = now <= 20'000 || now >= 40'000;
+      if (k % 10 == 0 && ours) {
+        arrive(now * kMs, "beacon", beacon(), kXPlane);
+      }
+      if (k % 10 == 5 && (now > 26'000 || (from_the_start && now > 8000 && now < 19'000))) {
+        arrive(now * kMs, "beacon", beacon("lab-2"), neighbours);
+      }
+      if (now > 2000 && ours) {
+        arriveStatus(now * kMs, 50.0F);
+      }
+    }
+    runUntil(39'000 * kMs);
+    EXPECT_EQ(link_->status().state, LinkState::kLost);
+    EXPECT_EQ(link_->status().peer, kXPlane);
+    EXPECT_EQ(link_->status().problems,
+              (std::vector<std::string>{"the X-Plane at 10.1.2.3:49000 is gone, and lab-2 (10.1.2.4:49000, version "
+                                        "122015) is on another computer: to go on with that one, set the parameter "
+                                        "host to it"}));
+    for (const auto& each : wire_->sent) {
+      EXPECT_NE(each.to, neighbours);
+    }
+    runUntil(42'000 * kMs);
+    EXPECT_EQ(link_->status().state, LinkState::kConnected);
+    EXPECT_TRUE(link_->status().problems.empty());
     flight_.reset();
     link_.reset();
   }

@@ -101,7 +101,7 @@ TEST(BeaconTracker, ListensWhereItsBeaconComesFromOnceTheFirstAddressIsSilent) {
   EXPECT_EQ(tracker.onlyOne(3 * kS)->endpoint.address, kOther);
   EXPECT_EQ(tracker.lastHeard({kLan, 49000}), 0);
   EXPECT_EQ(tracker.lastHeard({kOther, 49000}), 3 * kS);
-  EXPECT_FALSE(tracker.onlyNewSince(kS, 3 * kS).has_value()) << "it has been there all along";
+  EXPECT_FALSE(tracker.onlyNewSince(kS, 3 * kS, kLan, "sim").has_value()) << "it has been there all along";
   // The first address comes back: no reason to leave the one that is heard.
   tracker.heard(beacon(), kLan, 4 * kS);
   EXPECT_EQ(toString(tracker.sightings(4 * kS).at(0)),
@@ -131,17 +131,24 @@ TEST(BeaconTracker, OnlyMasterXPlanesCount) {
 
 TEST(BeaconTracker, NewSinceMeansBegunSince) {
   BeaconTracker tracker = makeTracker();
+  const auto only = [&tracker](std::int64_t since_s, std::uint32_t address, const std::string& name) {
+    return tracker.onlyNewSince(since_s * kS, 6 * kS, address, name);
+  };
   Beacon other = beacon();
   other.computer_name = "sim-2";
   tracker.heard(beacon(), kLan, 0);
   tracker.heard(other, kOther, kS);
   tracker.heard(other, kOther, 5 * kS);
-  EXPECT_FALSE(tracker.onlyNewSince(6 * kS, 6 * kS).has_value());
+  EXPECT_FALSE(only(6, kOther, "sim-2").has_value());
   // kOther was away from 1 s to 5 s, longer than the timeout: it has begun anew.
-  EXPECT_EQ(tracker.onlyNewSince(4 * kS, 6 * kS)->endpoint.address, kOther);
+  EXPECT_EQ(only(4, kOther, "")->endpoint.address, kOther);
+  EXPECT_EQ(only(4, kLan, "sim-2")->endpoint.address, kOther) << "its address may change";
+  EXPECT_FALSE(only(4, kLan, "sim").has_value()) << "another computer's";
+  EXPECT_FALSE(only(4, kLan, "").has_value());
   tracker.heard(beacon(49001), kLan, 6 * kS);
-  EXPECT_FALSE(tracker.onlyNewSince(4 * kS, 6 * kS).has_value()) << "two new ones: which?";
-  EXPECT_EQ(tracker.onlyNewSince(5 * kS, 6 * kS)->endpoint, (Endpoint{kLan, 49001}));
+  EXPECT_EQ(only(4, kLan, "sim")->endpoint, (Endpoint{kLan, 49001}));
+  tracker.heard(beacon(49002), kLan, 6 * kS);
+  EXPECT_FALSE(only(4, kLan, "sim").has_value()) << "two new ones: which?";
 }
 
 TEST(BeaconTracker, LastHeard) {
