@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
+#include <utility>
 
 #include "xplane_bridge/core/base/text.hpp"
 
@@ -38,10 +39,28 @@ std::string rangeText(ChannelRange range) {
 
 bool inRange(double value, ChannelRange range) { return value >= range.low && value <= range.high; }
 
+/// A button that another one of them is would do both at once.
+std::optional<std::string> checkButtons(const std::vector<std::pair<std::string, int>>& buttons) {
+  for (std::size_t i = 0; i < buttons.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (buttons[i].second < 0 || buttons[i].second != buttons[k].second) continue;
+      return wrongNumber(buttons[i].first, buttons[i].second, "another button than that of " + buttons[k].first);
+    }
+  }
+  return std::nullopt;
+}
+
+template <class Input>
+std::optional<std::string> checkSteps(const Input& in) {
+  return checkButtons(
+      {{in.key + ".increase_button", in.increase_button}, {in.key + ".decrease_button", in.decrease_button}});
+}
+
 std::optional<std::string> checkIntegrated(const IntegratedInput& in, StickMode mode) {
   const bool has_axis = in.axis.of(mode) >= 0;
   const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
   if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
+  if (auto text = checkSteps(in)) return text;
   if (!std::isfinite(in.rate) || in.rate == 0.0)
     return wrongNumber(in.key + ".rate", in.rate, "a rate other than 0 [1/s]");
   if (!(in.dead_zone >= 0.0 && in.dead_zone < 1.0))
@@ -67,6 +86,7 @@ std::optional<std::string> checkSurface(const SurfaceInput& in, StickMode mode) 
   const bool has_axis = in.axis.of(mode) >= 0;
   const bool has_buttons = in.increase_button >= 0 || in.decrease_button >= 0;
   if (has_axis == has_buttons) return in.key + ": expected either an axis or increase_button and decrease_button";
+  if (auto text = checkSteps(in)) return text;
   if (!std::isfinite(in.rate)) return wrongNumber(in.key + ".rate", in.rate, "a finite number [1/s]");
   if (has_buttons && in.rate == 0.0)
     return wrongNumber(in.key + ".rate", in.rate, "a rate other than 0 [1/s], for buttons");
@@ -82,6 +102,19 @@ std::optional<std::string> checkSurface(const SurfaceInput& in, StickMode mode) 
   }
   if (inRange(in.initial, {in.low, in.high})) return std::nullopt;
   return wrongNumber(in.key + ".initial", in.initial, rangeText({in.low, in.high}) + " [deg]");
+}
+
+/// The last of two inputs of a kind with one target would decide alone.
+template <class Input>
+std::optional<std::string> checkTargets(const std::vector<Input>& inputs) {
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (inputs[i].target != inputs[k].target) continue;
+      return inputs[i].key + ".target is " + toString(inputs[i].target) + ": expected another than that of " +
+             inputs[k].key;
+    }
+  }
+  return std::nullopt;
 }
 
 bool sameSource(const IntegratedInput& a, const IntegratedInput& b, StickMode mode) {
@@ -113,6 +146,8 @@ std::optional<std::string> validate(const JoystickOptions& o) {
       return wrongNumber(in.key + ".dead_zone", in.dead_zone, "0 to below 1");
     if (!(in.expo >= 0.0 && in.expo <= 1.0)) return wrongNumber(in.key + ".expo", in.expo, "0..1");
   }
+  if (auto text = checkTargets(o.direct)) return text;
+  if (auto text = checkTargets(o.integrated)) return text;
   for (std::size_t i = 0; i < o.integrated.size(); ++i) {
     if (auto text = checkIntegrated(o.integrated[i], o.stick_mode)) return text;
     for (std::size_t k = 0; k < o.integrated.size(); ++k) {
@@ -120,6 +155,10 @@ std::optional<std::string> validate(const JoystickOptions& o) {
       if (o.integrated[i].select_button < 0) {
         return wrongNumber(o.integrated[i].key + ".select_button", o.integrated[i].select_button,
                            "a button, because " + o.integrated[k].key + " has the same axis or buttons");
+      }
+      if (auto text = checkButtons({{o.integrated[k].key + ".select_button", o.integrated[k].select_button},
+                                    {o.integrated[i].key + ".select_button", o.integrated[i].select_button}})) {
+        return text;
       }
     }
   }
@@ -130,18 +169,17 @@ std::optional<std::string> validate(const JoystickOptions& o) {
     if (in.released && !inRange(*in.released, range))
       return wrongNumber(in.key + ".released", *in.released, rangeText(range));
   }
-  for (std::size_t i = 0; i < o.surfaces.size(); ++i) {
-    if (auto text = checkSurface(o.surfaces[i], o.stick_mode)) return text;
-    for (std::size_t k = 0; k < i; ++k) {
-      if (o.surfaces[k].select_button != o.surfaces[i].select_button) continue;
-      return wrongNumber(o.surfaces[i].key + ".select_button", o.surfaces[i].select_button,
-                         "another button than that of " + o.surfaces[k].key);
-    }
+  std::vector<std::pair<std::string, int>> chosen_by;
+  for (const SurfaceInput& in : o.surfaces) {
+    if (auto text = checkSurface(in, o.stick_mode)) return text;
+    chosen_by.emplace_back(in.key + ".select_button", in.select_button);
   }
+  if (auto text = checkButtons(chosen_by)) return text;
   for (const ActionButton& in : o.actions) {
     if (in.button < 0) return wrongNumber(in.key + ".button", in.button, "an index from 0");
   }
-  return std::nullopt;
+  return checkButtons(
+      {{"mode.manual", o.mode.manual}, {"mode.auto", o.mode.automatic}, {"mode.toggle", o.mode.toggle}});
 }
 
 double shapeAxis(double j, double dead_zone, double expo) {

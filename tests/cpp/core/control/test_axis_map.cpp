@@ -429,6 +429,25 @@ TEST(AxisMap, OptionsAreCheckedByKey) {
   EXPECT_EQ(complaint([](auto& o) { o.integrated[0].detents = {0.5, 0.5}; }).find("channels.flaps.detents"), 0u);
   EXPECT_EQ(complaint([](auto& o) { o.integrated[0].increase_button = 1; }).find("channels.flaps: expected either"),
             0u);
+  EXPECT_EQ(complaint([](auto& o) {
+              o.integrated[0].axis = {};
+              o.integrated[0].increase_button = o.integrated[0].decrease_button = 1;
+            }),
+            "channels.flaps.decrease_button is 1: expected another button than that of channels.flaps.increase_button");
+  EXPECT_EQ(complaint([](auto& o) { o.direct.push_back(direct(JoyTarget::kRoll, 2)); }),
+            "channels.roll.target is roll: expected another than that of channels.roll");
+  EXPECT_EQ(complaint([](auto& o) { o.integrated.push_back(integrated(JoyTarget::kFlaps, 2, 0.5, 0.0, 1.0)); }),
+            "channels.flaps.target is flaps: expected another than that of channels.flaps");
+  EXPECT_EQ(
+      complaint([](auto& o) {
+        o.integrated.push_back(integrated(JoyTarget::kTrimPitch, 1, 0.5));
+        o.integrated[0].select_button = o.integrated[1].select_button = 4;
+      }),
+      "channels.flaps.select_button is 4: expected another button than that of channels.trim_pitch.select_button");
+  EXPECT_EQ(complaint([](auto& o) { o.mode.manual = o.mode.automatic = 3; }),
+            "mode.auto is 3: expected another button than that of mode.manual");
+  EXPECT_EQ(complaint([](auto& o) { o.mode.automatic = o.mode.toggle = 3; }),
+            "mode.toggle is 3: expected another button than that of mode.auto");
   EXPECT_EQ(complaint([](auto& o) { o.buttons[0].value = 2.0; }).find("buttons.gear_up.value is 2"), 0u);
   EXPECT_EQ(complaint([](auto& o) { o.joy_timeout = 0.0; }).find("joy_timeout"), 0u);
   EXPECT_FALSE(joyTargetFrom("ailerons"));

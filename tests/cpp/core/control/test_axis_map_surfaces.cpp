@@ -138,7 +138,7 @@ TEST(JoySurfaces, ValidateNamesKeyAndValue) {
   o.surfaces[1].select_button = 0;
   EXPECT_EQ(*validate(o),
             "surfaces.aileron1_wing2_right.select_button is 0: expected another button than that of "
-            "surfaces.aileron1_wing2_left");
+            "surfaces.aileron1_wing2_left.select_button");
   o = ailerons();
   o.surfaces[0].high = -30.0;
   EXPECT_EQ(*validate(o), "surfaces.aileron1_wing2_left.high is -30: expected -90..90 [deg], above low");
