@@ -102,9 +102,10 @@ std::optional<core::FrameCamera> ImagePairing::cameraOf(std::int64_t shown_ns, s
                                                         double own_delay) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!frame_key.has_value()) return cameras_.at(shown_ns - core::toNanoseconds(display_delay_));
-  std::optional<core::FrameCamera> camera = cameras_.ofFrame(static_cast<double>(*frame_key));
+  const std::int64_t frame_ns = shown_ns - core::toNanoseconds(own_delay);
+  std::optional<core::FrameCamera> camera = cameras_.ofFrame(static_cast<double>(*frame_key), frame_ns);
   if (camera) return camera;
-  camera = cameras_.at(shown_ns - core::toNanoseconds(own_delay));
+  camera = cameras_.at(frame_ns);
   if (camera) camera->frustum.known = false;  // of another frame
   return camera;
 }

@@ -30,8 +30,9 @@ class CameraHistory {
   /// Forgets everything, as when X-Plane is not heard any more.
   void clear() { frames_.clear(); }
 
-  /// The camera of the newest frame with this raw simulator time [s]; nothing where that was not heard.
-  [[nodiscard]] std::optional<FrameCamera> ofFrame(double sim_time) const;
+  /// The camera of the frame with this raw simulator time [s]; nothing where that was not heard. All frames of a pause
+  /// have the same: of several, the one heard nearest to a host time [ns], and what changes about then is not sure.
+  [[nodiscard]] std::optional<FrameCamera> ofFrame(double sim_time, std::int64_t moment_ns) const;
   /// The newest pose of the frame with this raw simulator time [s], which may have come with another frame.
   [[nodiscard]] std::optional<CheckedPose> poseOf(double sim_time) const;
   /// The camera of the frame heard nearest to a host time [ns], which may be its neighbour: where the frustums differ
