@@ -35,9 +35,10 @@ void RxNode::setOrigin(const SetOrigin::Request& request, SetOrigin::Response& r
     return;
   }
   if (!(std::abs(origin.latitude_deg) <= 90.0 && std::abs(origin.longitude_deg) <= 180.0 &&
-        std::isfinite(origin.height))) {
+        origin.height >= RxOptions::kOriginAltitude.lowest && origin.height <= RxOptions::kOriginAltitude.highest)) {
     response.result = result(ServiceResult::REFUSED,
-                             "latitude must be from -90 to 90, longitude from -180 to 180, altitude_msl finite");
+                             "latitude must be from -90 to 90, longitude from -180 to 180, altitude_msl from -1000 to "
+                             "100000 m");
     return;
   }
   flight_->setMapOrigin(origin);

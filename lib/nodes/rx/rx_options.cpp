@@ -30,7 +30,7 @@ std::optional<core::GeoPoint> loadOrigin(const ParamLoader& own) {
   }
   const ParamLoader origin = own.section("origin");
   return core::GeoPoint{origin.number("latitude", {-90.0, 90.0}), origin.number("longitude", {-180.0, 180.0}),
-                        origin.number("altitude_msl", {-1000.0, 100000.0})};
+                        origin.number("altitude_msl", RxOptions::kOriginAltitude)};
 }
 
 Geoid loadGeoid(const ParamLoader& own) {

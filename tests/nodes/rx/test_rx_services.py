@@ -150,9 +150,13 @@ def test_set_origin_starts_a_new_position_epoch(world, rx):
     state = world.states.wait_for(lambda s: s.position_epoch == answer.position_epoch)
     assert np.hypot(state.position_north, state.position_east) < 100.0
 
-    answer = world.call("set_origin", SetOrigin, False, 91.0, 0.0, 0.0)
-    assert not answer.success
-    assert "from -90 to 90" in answer.result.message
+    for wrong, said in (
+        ((91.0, 0.0, 0.0), "latitude must be from -90 to 90"),
+        ((37.0, 127.0, 1e12), "from -1000 to 100000"),
+    ):
+        answer = world.call("set_origin", SetOrigin, False, *wrong)
+        assert not answer.success
+        assert said in answer.result.message
 
 
 def test_origin_from_parameters(world, rx):

@@ -40,6 +40,8 @@ struct RxOptions {
   bool publish_tf = false;   ///< map -> base_link on /tf
   std::vector<DatarefEntry> datarefs;
 
+  static constexpr Range<double> kOriginAltitude{-1000.0, 100000.0};  ///< [m] of an origin
+
   // transport `data` only
   bool configure_xplane = true;          ///< set rows, rate and target in X-Plane, and restore them
   int data_output_rate = 99;             ///< [1/s] asked of X-Plane's Data Output while we run
