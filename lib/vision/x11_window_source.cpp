@@ -335,12 +335,18 @@ class X11WindowSource::Impl {
     return true;
   }
 
+  // Whether what was drawn to is in the picture: for a region, the whole screen's drawings are reported.
+  [[nodiscard]] bool isCaptured(const xcb_rectangle_t& drawn) const {
+    if (options_.region.empty()) return true;
+    return !(cv::Rect(drawn.x, drawn.y, drawn.width, drawn.height) & options_.region).empty();
+  }
+
   // Remembers what an event says of the window; a drawing is returned.
   std::optional<Change> take(const xcb_generic_event_t& event, std::int64_t arrival_ns) {
     const auto type = static_cast<std::uint8_t>(event.response_type & 0x7fU);
     if (type == connection_->damageEvent() && connection_->hasDamage()) {
       const auto& notify = reinterpret_cast<const xcb_damage_notify_event_t&>(event);
-      if (notify.damage != target_.damage) return std::nullopt;
+      if (notify.damage != target_.damage || !isCaptured(notify.area)) return std::nullopt;
       silent_changes_ = 0;
       damage_silent_ = false;
       return Change{server_clock_.toHost(notify.timestamp, arrival_ns), true};

@@ -125,6 +125,29 @@ TEST_F(X11WindowSourceTest, ADrawingBetweenChangeAndGrabIsThePicturesTimeAndNoFu
   EXPECT_EQ(source.waitChange(kShort, change), WaitResult::kTimeout);
 }
 
+TEST_F(X11WindowSourceTest, OfARegionOnlyDrawingsInItCount) {
+  TestWindow window(server_.display(), "X-System", 320, 240, 0, 0);
+  TestWindow other(server_.display(), "terminal", 100, 100, 500, 400);
+  X11SourceOptions options = titled(server_, "");
+  options.region = cv::Rect(0, 0, 320, 240);
+  X11WindowSource source(options, steadyNow);
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_TRUE(staysQuiet(source));
+  Change change;
+  for (std::uint32_t i = 1; i <= 3; ++i) {
+    window.fill(i);
+    ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);
+    const std::int64_t seen = steadyNow();
+    std::this_thread::sleep_for(milliseconds(30));
+    other.fill(i);
+    EXPECT_EQ(source.waitChange(kShort, change), WaitResult::kTimeout) << "not in the picture";
+    other.fill(0x100 + i);  // reported beside the read
+    ASSERT_EQ(source.grab(change, picture_), GrabResult::kNew);
+    EXPECT_TRUE(picture_.display_time_known);
+    EXPECT_LE(picture_.display_time_ns, seen + 2'000'000);
+  }
+}
+
 // Whatever drawing falls before, into and after a read: the time goes with the pixels.
 TEST_F(X11WindowSourceTest, EveryPictureHasTheTimeOfTheDrawingItShows) {
   constexpr std::uint32_t kDrawings = 120;
