@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
@@ -24,6 +25,9 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr int kSilentChangesToGiveUpDamage = 3;
 // The quickest answer of so many shows how the server's clock stands to ours.
 constexpr int kTimesAsked = 10;
+// A look at the checksum that comes so much later than the quickest of the last ones does not date a change.
+constexpr std::int64_t kLateLookNs = 4'000'000;
+constexpr std::size_t kLooks = 31;
 // Pause between two of those looks; long enough to cost nothing.
 constexpr std::chrono::milliseconds kDamageWatch{250};
 
@@ -65,6 +69,7 @@ class X11WindowSource::Impl {
 
   GrabResult grab(const Change& change, Picture& picture) {
     if (target_.window == XCB_NONE || !grabber_) return GrabResult::kLost;
+    const std::int64_t began_ns = clock_();
     std::uint8_t* data = grabber_->read();
     picture.grab_time_ns = clock_();
     if (data == nullptr) {
@@ -74,6 +79,7 @@ class X11WindowSource::Impl {
       return GrabResult::kLost;
     }
     const Change shown = lastChangeBeforeRead(change, data, picture.grab_time_ns);
+    looked_ns_ = began_ns;
     if (grabber_->sameAsBefore()) return GrabResult::kSame;
     picture.display_time_ns = shown.time_ns;
     picture.display_time_known = shown.time_known;
@@ -403,6 +409,7 @@ class X11WindowSource::Impl {
       return true;
     }
     const std::int64_t looked_ns = clock_();
+    const bool in_time = isInTime(looked_ns);
     const auto sum = grabber_->checksum();
     if (!sum.has_value()) {
       lose(connection_->alive() ? unreadable() : connectionLost());
@@ -420,8 +427,17 @@ class X11WindowSource::Impl {
       return false;
     }
     if (!changed) return false;
-    change = {looked_ns, true};
+    change = {looked_ns, in_time};
     return true;
+  }
+
+  // Whether a change that this look sees first is of its time: nothing kept it from being seen much earlier.
+  bool isInTime(std::int64_t looked_ns) {
+    const std::int64_t unseen_ns = looked_ns - looked_ns_;
+    looked_ns_ = looked_ns;
+    unseen_ns_.push_back(unseen_ns);
+    if (unseen_ns_.size() > kLooks) unseen_ns_.pop_front();
+    return unseen_ns - *std::min_element(unseen_ns_.begin(), unseen_ns_.end()) <= kLateLookNs;
   }
 
   X11SourceOptions options_;
@@ -438,6 +454,8 @@ class X11WindowSource::Impl {
   SteadyClock::time_point next_search_{};
   SteadyClock::time_point next_poll_{};
   std::optional<std::uint64_t> last_checksum_;
+  std::int64_t looked_ns_ = 0;          // when the last look or read began
+  std::deque<std::int64_t> unseen_ns_;  // [ns] between looks
   int silent_changes_ = 0;
   bool damage_silent_ = false;
   bool first_picture_ = false;
