@@ -27,6 +27,9 @@ class X11Grabber {
   /// Whether the last two read() gave the same bytes.
   [[nodiscard]] bool sameAsBefore() const { return same_; }
 
+  /// Whatever the next read() gives is not the same.
+  void forget() { previous_ = nullptr; }
+
   /// Number of the last read()'s request: an event of a lower one was raised before the pixels were read.
   [[nodiscard]] std::uint32_t readSequence() const { return read_sequence_; }
 

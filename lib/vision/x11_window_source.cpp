@@ -87,6 +87,12 @@ class X11WindowSource::Impl {
     return GrabResult::kNew;
   }
 
+  void lookAnew() {
+    if (!grabber_) return;
+    first_picture_ = true;
+    grabber_->forget();
+  }
+
   [[nodiscard]] std::string describe() const {
     if (target_.window == XCB_NONE) return wanted_ + " (" + problem_ + ")";
     std::ostringstream text;
@@ -471,6 +477,7 @@ WaitResult X11WindowSource::waitChange(std::chrono::milliseconds timeout, Change
   return impl_->waitChange(timeout, change);
 }
 GrabResult X11WindowSource::grab(const Change& change, Picture& picture) { return impl_->grab(change, picture); }
+void X11WindowSource::lookAnew() { impl_->lookAnew(); }
 std::string X11WindowSource::describe() const { return impl_->describe(); }
 std::string X11WindowSource::problem() const { return impl_->problem(); }
 std::optional<std::uint32_t> X11WindowSource::window() const { return impl_->window(); }

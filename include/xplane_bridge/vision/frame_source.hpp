@@ -69,6 +69,9 @@ class FrameSource {
   /// Reads the picture that is there now, right after a change.
   [[nodiscard]] virtual GrabResult grab(const Change& change, Picture& picture) = 0;
 
+  /// What can be read at any time counts as changed, and as new, once more. Nothing for sources that only receive.
+  virtual void lookAnew() {}
+
   /// One line for people: what is captured, and how.
   [[nodiscard]] virtual std::string describe() const = 0;
 

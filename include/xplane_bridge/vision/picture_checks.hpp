@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 
 namespace xplane_bridge::vision {
 
@@ -40,6 +41,32 @@ class FrozenCheck {
   std::int64_t after_ns_;
   std::int64_t standing_since_ns_ = 0;  // 0: no picture yet
   std::int64_t moved_at_ns_ = 0;        // 0: never
+};
+
+/// Finds out when a picture that stands, as in a pause, has to be shown to those who came after its last change: once,
+/// where none has changed for a while since the first of them.
+class StandingCheck {
+ public:
+  /// @param after_ns [ns] for how long to wait for a change, > 0
+  explicit StandingCheck(std::int64_t after_ns) : after_ns_(after_ns) {}
+
+  /// A picture was taken for them.
+  void pictureTaken() { shown_ = true; }
+
+  /// @param wanted whether there are subscribers @return whether it is to be shown now
+  bool due(bool wanted, std::int64_t now_ns) {
+    if (!wanted || !since_ns_) {
+      shown_ = false;
+      since_ns_ = wanted ? std::optional<std::int64_t>(now_ns) : std::nullopt;
+    }
+    if (!since_ns_ || shown_ || now_ns - *since_ns_ < after_ns_) return false;
+    return shown_ = true;
+  }
+
+ private:
+  std::int64_t after_ns_;
+  std::optional<std::int64_t> since_ns_;  // they are there
+  bool shown_ = false;
 };
 
 /// Periods between pictures, the latest kPeriods of them. Allocates nothing after its construction but in summary().

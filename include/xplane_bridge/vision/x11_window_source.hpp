@@ -60,6 +60,7 @@ class X11WindowSource : public FrameSource {
 
   [[nodiscard]] WaitResult waitChange(std::chrono::milliseconds timeout, Change& change) override;
   [[nodiscard]] GrabResult grab(const Change& change, Picture& picture) override;
+  void lookAnew() override;
   [[nodiscard]] std::string describe() const override;
   [[nodiscard]] std::string problem() const override;
 

@@ -154,6 +154,7 @@ void CaptureNode::captureLoop() {
     if (result == vision::WaitResult::kChange) takePicture(source.get(), change);
     noteSource(*source, result != vision::WaitResult::kChange);
     if (!calibrating_) repeatFrozen(pairingNow());
+    if (standing_check_.due(hasSubscribers() && !calibrating_, clock().steady_ns())) source->lookAnew();
   }
 }
 
@@ -231,6 +232,7 @@ void CaptureNode::takePicture(vision::FrameSource* source, const vision::Change&
     dropped_ = skipped_ + static_cast<std::uint32_t>(publisher_->dropped());
     grabbed.dropped = dropped_;
   }
+  standing_check_.pictureTaken();
   last_ = grabbed;
   publisher_->pushDroppingOldest(std::move(grabbed));
 }

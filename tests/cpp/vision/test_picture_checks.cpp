@@ -51,6 +51,19 @@ TEST(PeriodMeter, ReportsMeanTheLongestOf99PercentAndTheWorst) {
   EXPECT_NEAR(meter.summary().worst, 0.03, 1e-6) << "older ones have left";
 }
 
+TEST(StandingCheck, IsDueOnceForThoseWhoSeeNothingChange) {
+  vision::StandingCheck check(100);
+  EXPECT_FALSE(check.due(false, 1000));
+  EXPECT_FALSE(check.due(true, 2000)) << "they have just come";
+  EXPECT_FALSE(check.due(true, 2099));
+  EXPECT_TRUE(check.due(true, 2100));
+  EXPECT_FALSE(check.due(true, 9000)) << "once";
+  EXPECT_FALSE(check.due(false, 9001));
+  EXPECT_FALSE(check.due(true, 9002)) << "others";
+  check.pictureTaken();
+  EXPECT_FALSE(check.due(true, 9500)) << "they have seen one";
+}
+
 TEST(FrozenCheck, NeedsAStandingPictureAndAMovingState) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   vision::FrozenCheck check(kSecond);

@@ -180,6 +180,20 @@ TEST_F(X11WindowSourceTest, EveryPictureHasTheTimeOfTheDrawingItShows) {
   }
 }
 
+TEST_F(X11WindowSourceTest, LookingAnewShowsOnceMoreWhatStands) {
+  TestWindow window(server_.display(), "X-System", 320, 240);
+  window.fill(0xff0000);
+  X11WindowSource source(titled(server_), steadyNow);
+  source.lookAnew();  // there is nothing yet
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_TRUE(staysQuiet(source));
+  source.lookAnew();
+  ASSERT_TRUE(nextPicture(source, picture_));
+  EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kRed);
+  EXPECT_FALSE(picture_.display_time_known);
+  EXPECT_TRUE(staysQuiet(source));
+}
+
 TEST_F(X11WindowSourceTest, SeesAWindowThatIsCovered) {
   TestWindow window(server_.display(), "X-System", 320, 240);
   window.fill(0xff0000);

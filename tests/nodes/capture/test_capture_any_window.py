@@ -53,6 +53,15 @@ root.mainloop()
 """
 
 
+STANDING = """
+import tkinter
+root = tkinter.Tk()
+root.title("standing")
+tkinter.Canvas(root, width=400, height=300, highlightthickness=0, background="#ff8000").pack()
+root.mainloop()
+"""
+
+
 @pytest.fixture
 def display(tmp_path: Path) -> Iterator[str]:
     with VirtualDisplay(tmp_path) as server:
@@ -99,6 +108,24 @@ def test_an_ordinary_window_is_captured(world, master: RosMaster, display: str, 
         assert known.state.valid == 0
         assert np.isnan(known.state.latitude)
         launch.check_running()
+
+
+def test_a_window_that_stands_is_shown_to_those_who_come_late(world, tmp_path: Path) -> None:
+    """As X-Plane does in a pause: nothing is drawn any more when they subscribe."""
+    from sensor_msgs.msg import Image
+    from xplane_bridge.msg import FrameState
+
+    world.point_to(9)  # nothing answers there
+    with VirtualDisplay(tmp_path) as server:
+        program = ["env", f"DISPLAY={server.display}", sys.executable, "-c", STANDING]
+        with ManagedProcess("window", program, tmp_path):
+            world.start("capture_node", {"window": {"display": server.display, "title": "standing"}})
+            seen = "Changes of the picture"
+            world.wait_for_diagnostics("capture", lambda s: int(world.values_of(s).get(seen, 0)) > 0)
+            states = world.watch("camera/frame_state", FrameState)
+            images = world.watch("camera/image_raw", Image)
+            assert halves(images.wait_for(what="the picture that stands", timeout=WAIT_S)) == (ORANGE, ORANGE)
+            assert states.wait_for(timeout=WAIT_S).quality & FrameState.QUALITY_DISPLAY_UNKNOWN
 
 
 def test_pictures_that_take_long_to_read_are_a_warning(world, tmp_path: Path) -> None:

@@ -187,6 +187,7 @@ class CaptureNode : public BaseNode {
   std::string source_description_;
   std::string source_problem_;
   vision::FrozenCheck frozen_check_;
+  vision::StandingCheck standing_check_{500'000'000};  // capture's thread
   vision::PeriodMeter periods_;
   FlightState::ConstPtr moved_from_;
   bool frozen_ = false;
