@@ -10,6 +10,7 @@ from xplane_bridge.analysis.criteria import CAMERA, Criterion
 
 #: Variables that wrap at 360 degrees, and the lowest value of each.
 _WRAPPING = {"roll": -180.0, "heading": 0.0}
+_TURN = 360.0
 #: A flight may end this much before a window does: its last state is one of before that moment [s].
 _BEFORE_END_S = 0.1
 #: Windows are that much wider, so that it does not hang on the last bit of a time whether a sample lies in them [s].
@@ -119,7 +120,7 @@ def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> floa
     """Of a window of which enough is known."""
     error = values - criterion.target
     if criterion.variable in _WRAPPING:
-        error = (error + 180.0) % 360.0 - 180.0
+        error = (error + _TURN / 2.0) % _TURN - _TURN / 2.0
     if criterion.measure == "settling":
         return _settling(time, error, criterion.band)
     if criterion.measure == "final":
@@ -130,12 +131,28 @@ def _measure(criterion: Criterion, time: np.ndarray, values: np.ndarray) -> floa
     if criterion.measure == "peak":
         return float(np.abs(error).max())
     if criterion.measure == "overshoot":
-        # Where it begins on the target, both sides lie beyond it.
-        beyond = np.abs(error) if error[0] == 0.0 else -np.sign(error[0]) * error
-        return max(0.0, float(beyond.max()))
+        return _overshoot(error, criterion.variable in _WRAPPING)
     if criterion.measure == "final":
         return _mean(criterion.variable, values)
     return float(values.min() if criterion.measure == "minimum" else values.max())
+
+
+def _overshoot(error: np.ndarray, wraps: bool) -> float:
+    """How far it goes beyond the target, seen from the side on which it begins."""
+    if wraps:
+        error = _continuous(error)
+    if error[0] == 0.0:  # on the target: both sides lie beyond it
+        return float(np.abs(error).max())
+    beyond = -np.sign(error[0]) * error
+    if wraps:  # who turns the other way round comes to the target from its other side, and goes beyond it there
+        beyond = np.maximum(beyond, -_TURN - beyond)
+    return max(0.0, float(beyond.max()))
+
+
+def _continuous(angles: np.ndarray) -> np.ndarray:
+    """Without the jumps by a turn of angles that wrap; the first one stays as it is."""
+    turns = np.cumsum(np.round(np.diff(angles) / _TURN))
+    return angles - _TURN * np.concatenate(([0.0], turns))
 
 
 def _settling(time: np.ndarray, error: np.ndarray, band: float) -> float:
@@ -157,7 +174,7 @@ def _mean(variable: str, values: np.ndarray) -> float:
     if variable not in _WRAPPING:
         return float(np.mean(values))
     lowest = _WRAPPING[variable]
-    return float(lowest + (np.degrees(np.mean(np.unwrap(np.radians(values)))) - lowest) % 360.0)
+    return float(lowest + (np.mean(_continuous(values)) - lowest) % _TURN)
 
 
 def _judged(criterion: Criterion, value: float) -> Score:

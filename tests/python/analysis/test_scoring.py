@@ -40,6 +40,41 @@ def test_where_it_begins_on_the_target_both_sides_are_beyond_it() -> None:
     assert one(criterion(measure="overshoot", target=0.0), rolled).value == pytest.approx(30.0, abs=0.01)
 
 
+def turned(*corners: float) -> np.ndarray:
+    """A heading that goes evenly from corner to corner, past 0 and 360."""
+    return np.interp(T, np.linspace(0.0, 20.0, len(corners)), corners) % 360.0
+
+
+@pytest.mark.parametrize(
+    ("heading", "overshoot"),
+    [
+        (turned(0.1, -0.1, -180.0, -180.0), 0.0),  # left, after a yaw to the right that no target asks for
+        (turned(0.1, -0.1, -180.0, -184.0, -180.0), 4.0),  # and too far
+        (turned(0.1, -0.1, 0.1, 180.0, 183.0, 180.0), 3.0),  # to and fro, and then right
+        (turned(359.9, 360.1, 540.0, 545.0, 540.0), 5.0),
+        (turned(90.0, 180.0, 200.0, 180.0), 20.0),  # the short way
+        (turned(90.0, 0.0, -180.0, -190.0, -180.0), 10.0),  # the long way
+        (turned(90.0, 180.0, 400.0), 220.0),  # on past the target, and more than half a turn
+        (turned(180.0, 174.0, 182.0), 6.0),  # from the target itself
+    ],
+)
+def test_overshoot_of_a_heading_is_seen_from_the_side_from_which_it_turns_to_the_target(
+    heading: np.ndarray, overshoot: float
+) -> None:
+    got = one(criterion(variable="heading", measure="overshoot", target=180.0), heading)
+    assert got.value == pytest.approx(overshoot, abs=0.1)
+    known = heading + unknown(0.3, 1.5) + unknown(16.0, 16.1)  # also where it crosses the border unseen
+    assert one(criterion(variable="heading", measure="overshoot", target=180.0), known).value == pytest.approx(
+        overshoot, abs=0.1
+    )
+
+
+def test_overshoot_of_what_does_not_wrap_has_no_other_side() -> None:
+    climbed = score([criterion(variable="altitude", measure="overshoot", target=1000.0)], T,
+                    {"altitude": 800.0 - 20.0 * T}, {}, {})[0]  # fmt: skip
+    assert climbed.value == 0.0
+
+
 def test_settling_counts_to_the_last_time_outside() -> None:
     roll = np.where(T < 5, 0.0, 30 * np.exp(-0.5 * (T - 5)))
     # 30 exp(-t / 2) = 3 at t = 2 ln 10
