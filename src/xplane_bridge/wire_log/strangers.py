@@ -6,6 +6,7 @@ capture must hold both directions, and begin before the program has asked.
 
 from __future__ import annotations
 
+import logging
 import struct
 from collections import Counter
 from pathlib import Path
@@ -16,10 +17,14 @@ from xplane_bridge.wire_log.capture import Capture, CaptureError
 from xplane_bridge.wire_log.datagrams import Address, Datagram
 from xplane_bridge.wire_log.fragments import DatagramReader
 
+_LOG = logging.getLogger(__name__)
+
 MAGIC = b"xplane_bridge wire capture 1\n"
 _REQUEST, _ANSWER, _ROWS = b"RREF\0", b"RREF,", b"DATA"
 _PAIR = struct.Struct("<if")
 _ROW_BYTES = 36
+#: Where X-Plane is asked, unless a capture shows another port.
+_PORT = 49000
 #: Steady time of the first packet [ns]: clocks of a computer do not begin at 0.
 _START_NS = 1000 * 1_000_000_000
 
@@ -61,7 +66,7 @@ class StrangersCapture:
             self.xplane = self._find(seen)
         #: Where it was asked.
         self.port = next(
-            (to[1] for _, (_, to, data) in seen if data.startswith(_REQUEST) and to[0] == self.xplane), 49000
+            (to[1] for _, (_, to, data) in seen if data.startswith(_REQUEST) and to[0] == self.xplane), _PORT
         )
         self.paths: List[str] = []  #: of all datarefs, by their numbers
         self.answers = 0  #: datagrams with values that have a name
@@ -75,7 +80,8 @@ class StrangersCapture:
                 else ("expected answers (RREF), Data Output (DATA) or positions (RPOS)")
             )
             msg = f"{path} has no values of X-Plane at {self.xplane} that can be used; {lacking}"
-            raise CaptureError("; ".join([msg, *self.left_out()]))
+            remedy = [] if xplane else ["where X-Plane is at another address, give it: --xplane ADDRESS"]
+            raise CaptureError("; ".join([msg, *remedy, *self.left_out()]))
 
     def left_out(self) -> List[str]:
         """What X-Plane has sent and no node gets, in words; of all senders as long as it is not found."""
@@ -99,15 +105,25 @@ class StrangersCapture:
 
     def _find(self, seen: List[Sighting]) -> str:
         votes: Counter[str] = Counter()
+        ports = {_PORT, *(to[1] for _, (_, to, data) in seen if data.startswith(_REQUEST))}
         for _, (source, to, data) in seen:
-            if data.startswith(_REQUEST):
+            # Rows that are written to X-Plane are like those that it sends.
+            if data.startswith(_REQUEST) or (_is_rows(data) and to[1] in ports):
                 votes[to[0]] += 1
             elif data.startswith((_ANSWER, b"BECN", b"RPOS")) or _is_rows(data):
                 votes[source[0]] += 1
         if not votes:
             msg = f"{self.path} has no datagrams of X-Plane; expected RREF, DATA, RPOS or BECN over UDP"
             raise CaptureError("; ".join([msg, *self.left_out()]))
-        return votes.most_common(1)[0][0]
+        found, *others = (address for address, _ in votes.most_common())
+        if others:
+            _LOG.warning(
+                "%s: X-Plane may be at %s; %s is taken, for which most datagrams speak; --xplane ADDRESS takes another",
+                self.path,
+                " or ".join([found, *others]),
+                found,
+            )
+        return found
 
     def _read(self, seen: List[Sighting]) -> Iterator[bytes]:
         clients: Dict[Address, int] = {}

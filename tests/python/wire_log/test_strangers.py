@@ -131,6 +131,37 @@ def test_commands_to_x_plane_on_the_same_computer_are_not_its_data_output(tmp_pa
     assert (strange.rows, strange.left_out()) == (1, [])
 
 
+def test_rows_that_are_written_to_x_plane_do_not_make_their_sender_x_plane(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    rows = frame(("192.168.1.5", 49001), CLIENT, b"DATA*" + struct.pack("<i8f", 17, *range(8)))
+    command = frame(OTHER, XPLANE, b"DATA\0" + struct.pack("<i8f", 8, *range(8)))
+    strange = StrangersCapture(capture(tmp_path / "x.pcapng", rows, command, command, command))
+    assert (strange.xplane, strange.rows, strange.left_out()) == (XPLANE[0], 1, [])
+    # Another port shows by the requests.
+    other_port = (XPLANE[0], 49010)
+    asked = frame(CLIENT, other_port, b"RREF\0" + struct.pack("<ii", 20, 7) + b"sim/time/paused".ljust(400, b"\0"))
+    elsewhere = frame(CLIENT, other_port, b"DATA\0" + bytes(36))
+    file = capture(tmp_path / "y.pcapng", asked, elsewhere, elsewhere, elsewhere, answer(CLIENT, (7, 1.0)))
+    assert StrangersCapture(file).xplane == XPLANE[0]
+    assert caplog.text == ""
+    with pytest.raises(CaptureError, match=r"no values of X-Plane at 192\.168\.1\.5 .*; where .* --xplane ADDRESS"):
+        StrangersCapture(capture(tmp_path / "z.pcapng", command))
+
+
+def test_of_two_addresses_that_may_be_x_plane_the_choice_is_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    row = b"DATA*" + bytes(36)
+    second = ("192.168.1.6", 49000)
+    file = capture(tmp_path / "x.pcapng", frame(second, CLIENT, row), *[frame(XPLANE, CLIENT, row)] * 2)
+    assert (StrangersCapture(file).xplane, StrangersCapture(file, second[0]).xplane) == (XPLANE[0], second[0])
+    assert caplog.messages == [
+        f"{file}: X-Plane may be at 192.168.1.5 or 192.168.1.6; 192.168.1.5 is taken, for which most datagrams speak; "
+        "--xplane ADDRESS takes another"
+    ]
+
+
 def test_what_cannot_be_used_is_refused_in_words(tmp_path):
     with pytest.raises(CaptureError, match="has no datagrams of X-Plane; expected RREF, DATA"):
         StrangersCapture(capture(tmp_path / "a.pcapng", frame(CLIENT, OTHER, b"hello")))
