@@ -9,7 +9,7 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 from xplane_bridge.bags import Bags
 from xplane_bridge.bags.passport import Passport, read_passports
 from xplane_bridge.cli import run_scenario
-from xplane_bridge.cli.entry import guarded, ros_arguments
+from xplane_bridge.cli.entry import guarded, ros_arguments, writing
 from xplane_bridge.cli.flights.recorded_commands import play, read_commands
 from xplane_bridge.cli.flights.recorded_poses import play_poses, read_poses
 from xplane_bridge.errors import XplaneBridgeError
@@ -73,12 +73,15 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     output = args.output or Path(f"rerun_{flight['scenario']}")
     if (output / _BAG).resolve() in {path.resolve() for path in Bags(args.bag).paths}:
         raise RerunError(f"--output {output}: the recording itself is there; expected another folder")
-    try:
+    scenario, text = output / "scenario.yaml", str(flight["text"]).encode()
+    with writing(RerunError, output, "expected a folder that can be written"):
+        if scenario.exists() and scenario.read_bytes() != text:
+            raise RerunError(
+                f"--output {output}: {scenario} is there with another text than the passport's and is kept; "
+                "expected another folder"
+            )
         output.mkdir(parents=True, exist_ok=True)
-        scenario = output / "scenario.yaml"
-        scenario.write_text(str(flight["text"]), encoding="utf-8")
-    except OSError as error:
-        raise RerunError(f"{output}: {error.strerror}") from None
+        scenario.write_bytes(text)
     there = _made(output / _BAG)
     status = run_scenario.main([str(scenario), *map(str, flight["options"]), "--output", str(output)])
     if _made(output / _BAG) not in (None, there):

@@ -55,3 +55,22 @@ def test_a_recording_is_not_flown_over(
     assert rerun_flight.main([str(tmp_path / given), "--output", str(tmp_path)]) == 1
     assert "the recording itself is there; expected another folder" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["flight.bag"]
+
+
+def test_a_scenario_of_the_user_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded, output = tmp_path / "recorded.bag", tmp_path / "out"
+    recorded.write_text("recorded", encoding="utf-8")
+    output.mkdir()
+    scenario = output / "scenario.yaml"
+    flown: List[List[str]] = []
+    monkeypatch.setattr(rerun_flight, "passport_of", passport)
+    monkeypatch.setattr(rerun_flight.run_scenario, "main", lambda arguments: flown.append(arguments) or 0)
+    scenario.write_text("name: mine", encoding="utf-8")
+    assert rerun_flight.main([str(recorded), "--output", str(output)]) == 1
+    assert f"{scenario} is there with another text" in capsys.readouterr().err
+    assert (scenario.read_text(encoding="utf-8"), flown) == ("name: mine", [])
+    scenario.write_text("name: s", encoding="utf-8")  # of an earlier rerun
+    assert rerun_flight.main([str(recorded), "--output", str(output)]) == 0
+    assert len(flown) == 1
