@@ -108,14 +108,14 @@ def parse_parameter(name: str, item: Any, where: str = "parameters.") -> Paramet
             raise CampaignError(f"{path}.choice: {values!r}; expected a list of numbers, or of texts")
     else:
         _check_numbers(kind, values, f"{path}.{kind}")
+    # Whole numbers stay whole, for what takes no others, as the seed of a test signal.
+    whole = kind == "choice" and all(isinstance(v, int) for v in values)
+    numbers = tuple(v if whole or isinstance(v, str) else float(v) for v in values)
     clip = item.get("clip")
     if clip is not None:
         if not (isinstance(clip, list) and len(clip) == 2 and all(map(is_number, clip)) and clip[0] <= clip[1]):
             raise CampaignError(f"{path}.clip: {clip!r}; expected [low, high]")
-        clip = (float(clip[0]), float(clip[1]))
-    # Whole numbers stay whole, for what takes no others, as the seed of a test signal.
-    whole = kind == "choice" and all(isinstance(v, int) for v in values)
-    numbers = tuple(v if whole or isinstance(v, str) else float(v) for v in values)
+        clip = tuple(bound if whole else float(bound) for bound in clip)
     return Parameter(str(name), kind, numbers, str(item.get("unit", "")), clip)
 
 

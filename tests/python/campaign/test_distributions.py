@@ -28,6 +28,20 @@ def test_values_by_hand(item: dict, share: float, value: object) -> None:
 
 
 @pytest.mark.parametrize(
+    ("item", "values"),
+    [
+        ({"choice": [1, 2, 5, 9], "clip": [2, 7]}, [2, 2, 5, 7]),
+        ({"choice": [1, 2, 5, 9], "clip": [1.5, 7]}, [1.5, 2, 5, 7]),
+        ({"choice": [1.0, 2, 5, 9], "clip": [2, 7]}, [2.0, 2.0, 5.0, 7.0]),
+        ({"uniform": [0, 4], "clip": [1, 2]}, [1.0, 1.5, 2.0, 2.0]),
+    ],
+)
+def test_whole_numbers_stay_whole_where_they_are_clipped(item: dict, values: list) -> None:
+    parameter = parse_parameter("p", item)
+    assert repr([parameter.at(share) for share in (0.125, 0.375, 0.625, 0.875)]) == repr(values)
+
+
+@pytest.mark.parametrize(
     ("name", "item", "text"),
     [
         ("a b", {"uniform": [0, 1]}, "parameters.a b: expected a name of letters"),
