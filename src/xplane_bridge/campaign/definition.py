@@ -22,6 +22,7 @@ from xplane_bridge.campaign.distributions import (
     Value,
     parse_parameter,
 )
+from xplane_bridge.campaign.warnings_topic import awaits_stall, messages_a_second
 from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.emulator.flight.limits import check_atmosphere, check_turbulence, check_wind
@@ -308,6 +309,11 @@ def _refuse_unflyable(scenario: Scenario) -> None:
                 )
     if scenario.repeat_every is not None:
         raise CampaignError("scenario.repeat_every: a flight of a campaign has an end; expected none")
+    if awaits_stall(scenario) and messages_a_second() <= 0:
+        raise CampaignError(
+            "scenario.events: waits for stall_warning, and config/rx.yaml asks for no warnings (rates/warnings: 0); "
+            "expected a rate above 0 there"
+        )
     for criterion in scenario.criteria:
         if criterion.measure in CAMERA:
             raise CampaignError(f"scenario.criteria.{criterion.name}: {criterion.measure} takes a camera")

@@ -36,14 +36,15 @@ def fingerprint(campaign: Campaign) -> Fingerprint:
     plan, drawn = campaign.plan(0), campaign.document
     one_of = drawn.get("aircraft") or drawn["scenario"].get("aircraft")
     aircraft = model_names() if "$" in str(one_of) else (plan.aircraft,)
-    files = [config_file("tx.yaml"), *(config_file("aircraft", f"{name}.yaml") for name in sorted(aircraft))]
+    files = [config_file(name) for name in ("rx.yaml", "tx.yaml")]
+    files += [config_file("aircraft", f"{name}.yaml") for name in sorted(aircraft)]
     module = plan.controller.split(":")[0]
     return {
         CPU: cpu_kind(),
         "version of xplane_bridge": __version__,
         "code of xplane_bridge": _package_digest(_PACKAGE),
         "compiled module xplane_bridge._core": _file_digest(compiled),
-        "configuration (config/tx.yaml, config/aircraft)": _digest(files, files[0].parent),
+        "configuration (config/rx.yaml, config/tx.yaml, config/aircraft)": _digest(files, files[0].parent),
         "code of the controller": _controller_digest(module) if module else "none",
         "jsbsim": importlib.import_module("jsbsim").__version__,
         "numpy": np.__version__,

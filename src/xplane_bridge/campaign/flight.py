@@ -13,6 +13,7 @@ import numpy as np
 from xplane_bridge.analysis.scoring import score
 from xplane_bridge.campaign.definition import FlightPlan, make_controller
 from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.campaign.warnings_topic import WarningInStep, awaits_stall, messages_a_second
 from xplane_bridge.compiled import require
 from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
 from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, excitation_limits_deg
@@ -84,7 +85,8 @@ class Flight:
         self._excitation: Optional[Tuple[str, Any]] = None  # target, runner
         self._moved: Tuple[Optional[str], float] = (None, 0.0)  # by it, in this frame
         self._limits = excitation_limits_deg(plan.aircraft)
-        self._modes = deque([0, 0])  # of the last two frames; 0: not known yet
+        self._modes = deque([MANUAL, MANUAL])  # at the end of the last two frames; MANUAL: not known yet
+        self._stall: Optional[WarningInStep] = None  # where the scenario waits for it
         self._truth = hashlib.sha256()
         self._rows: List[Tuple[float, ...]] = []
 
@@ -120,6 +122,8 @@ class Flight:
         self._aircraft = Aircraft(conditions_of(self._plan))
         self._player = Player(self._scenario)
         plan = self._plan
+        if awaits_stall(self._scenario):
+            self._stall = WarningInStep(plan.frame_rate, messages_a_second())
         self._controller = make_controller(plan.controller, plan.arguments) if plan.controller else None
 
     # ---- frames
@@ -130,7 +134,10 @@ class Flight:
             now, view = aircraft.now, aircraft.view()
             if self._watch is not None:
                 self._watch(view)
-            sample = sample_of(view, aircraft.mode, view.stall_warning)
+            # As through the nodes, where who flies and warns in a frame is known later.
+            known_mode = self._modes.popleft()
+            stall = self._stall is not None and self._stall.at(aircraft.frame, view.stall_warning)
+            sample = sample_of(view, known_mode, stall)
             self._record(now, aircraft.state, sample)
             commands = self._player.step(aircraft.shown_time, sample)
             if now >= self._plan.longest and not commands.finished:
@@ -144,8 +151,9 @@ class Flight:
             self._command(MANUAL, command_values(commands))
             if aircraft.mode != mode:  # taken over by the stick
                 self._end_excitation()
+            self._modes.append(aircraft.mode)
             try:
-                self._control(view)
+                self._control(view, known_mode)
             except Exception as error:
                 return CONTROLLER_FAILED, f"at {now:.2f} s: {type(error).__name__}: {error}"
             try:
@@ -158,12 +166,10 @@ class Flight:
                 self._record(aircraft.now, state, sample_of(aircraft.view(), aircraft.mode, False))
                 return CRASHED, f"at {aircraft.now:.2f} s"
 
-    def _control(self, view: FlightView) -> None:
+    def _control(self, view: FlightView, known_mode: int) -> None:
         if self._controller is None:
             return
-        # As through the nodes, where control/mode of a frame is known two frames later.
-        self._modes.append(self._aircraft.mode)
-        if self._modes.popleft() != AUTO and hasattr(self._controller, "restart"):
+        if known_mode != AUTO and hasattr(self._controller, "restart"):
             self._controller.restart()
         self._command(AUTO, dict(self._controller.fly(view)))
 

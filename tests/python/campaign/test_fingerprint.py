@@ -14,6 +14,8 @@ from xplane_bridge.campaign.rows import cpu_kind
 
 CODE, COMPILED, CONTROLLER = "code of xplane_bridge", "compiled module xplane_bridge._core", "code of the controller"
 
+CONFIGURATION = "configuration (config/rx.yaml, config/tx.yaml, config/aircraft)"
+
 
 def campaign(**more: Any) -> Campaign:
     scenario = {"name": "s", "events": [{"at": 1, "end": True}]}
@@ -108,14 +110,16 @@ def test_the_configuration_of_every_aircraft_that_may_be_drawn_counts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "aircraft").mkdir()
-    for name in ("tx", "aircraft/fixed_wing", "aircraft/multirotor", "aircraft/tiltrotor"):
+    for name in ("rx", "tx", "aircraft/fixed_wing", "aircraft/multirotor", "aircraft/tiltrotor"):
         (tmp_path / f"{name}.yaml").write_text("{}", encoding="utf-8")
     monkeypatch.setattr(module, "config_file", lambda *parts: tmp_path.joinpath(*parts))
     drawn = campaign(aircraft="$model", parameters={"model": {"choice": ["fixed_wing", "multirotor"]}})
     before = fresh(drawn), fresh(campaign(aircraft="fixed_wing"))
     (tmp_path / "aircraft/multirotor.yaml").write_text("{a: 1}", encoding="utf-8")
-    assert changed(before[0], fresh(drawn)) == {"configuration (config/tx.yaml, config/aircraft)"}
+    assert changed(before[0], fresh(drawn)) == {CONFIGURATION}
     assert not changed(before[1], fresh(campaign(aircraft="fixed_wing")))
+    (tmp_path / "rx.yaml").write_text("{rates: {warnings: 2}}", encoding="utf-8")  # when a stall warning is seen
+    assert changed(before[1], fresh(campaign(aircraft="fixed_wing"))) == {CONFIGURATION}
 
 
 def test_the_kind_of_cpu_counts_and_differences_are_said(monkeypatch: pytest.MonkeyPatch) -> None:

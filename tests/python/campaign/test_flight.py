@@ -3,13 +3,15 @@ from __future__ import annotations
 import datetime
 import math
 import struct
-from typing import Any, Dict
+from typing import Any, Dict, List
 
 import pytest
 
 from xplane_bridge.campaign.definition import CampaignError, make_controller, parse_campaign
 from xplane_bridge.campaign.flight import Flight
+from xplane_bridge.campaign.warnings_topic import WarningInStep
 from xplane_bridge.compiled import NotCompiledError
+from xplane_bridge.emulator.wire.subscriptions import Pacer
 
 EVENTS = [{"at": 0, "mode": "auto", "stick": {"roll": 0, "pitch": 0, "yaw": 0}}, {"at": 1, "end": True}]
 
@@ -264,8 +266,59 @@ def test_the_stick_takes_over_from_the_controller() -> None:
     ]
     flight = Flight(campaign(events, controller=f"{__name__}:Recorder").plan(0))
     assert flight.fly().outcome == "flown"
-    assert flight._labels["manual"] == pytest.approx(0.5 + 1 / 60)
+    assert flight._labels["manual"] == pytest.approx(0.5 + 2 / 60)
     assert flight._aircraft.mode == 1
+
+
+def test_a_condition_on_the_mode_goes_by_that_of_two_frames_ago_as_through_the_nodes() -> None:
+    when = {"when": {"mode": "auto"}, "mode": "manual", "label": "seen"}
+    flight = Flight(campaign([EVENTS[0], when, {"after": 0.5, "end": True}], controller=f"{__name__}:Recorder").plan(0))
+    assert flight.fly().outcome == "flown"
+    assert flight._labels["seen"] == pytest.approx(2 / 60)
+
+
+STALL = [
+    {"at": 0, "stick": {"roll": 0, "pitch": 0.2, "yaw": 0, "throttle": 0}},
+    {"at": 0.5, "stick": {"pitch": 1}, "over": 3},
+    {"when": {"stall_warning": True}, "timeout": 30, "stick": {"pitch": -0.3, "throttle": 1}, "label": "stalls"},
+    {"after": 0.5, "end": True},
+]
+
+
+@pytest.mark.parametrize("frame_rate", [50, 60])
+def test_a_condition_on_the_stall_warning_goes_by_the_topic_as_through_the_nodes(frame_rate: int) -> None:
+    seen: List[bool] = []
+    c = campaign(STALL, frame_rate=frame_rate, scenario={"start": {"speed": 60, "altitude": 1500}})
+    flight = Flight(c.plan(0), lambda view: seen.append(view.stall_warning))
+    assert flight.fly().outcome == "flown"
+    # config/rx.yaml asks for five messages a second, and one counts in the first frame more than 0.2 s after it.
+    every = frame_rate // 5
+    message = next(frame for frame in range(0, len(seen), every) if seen[frame])
+    assert flight._labels["stalls"] * frame_rate == pytest.approx(message + every + 1)
+
+
+@pytest.mark.parametrize("frame_rate", [20.0, 24.0, 33.3, 50.0, 60.0, 100.0, 128.0, 144.0, 240.0])
+@pytest.mark.parametrize("rate", [1, 2, 5, 7, 30, 1000])
+def test_messages_of_warnings_come_in_the_frames_in_which_the_emulator_sends_them(frame_rate: float, rate: int) -> None:
+    pacer, topic = Pacer(rate), WarningInStep(frame_rate, rate)
+    sent, due, shown, last = [], 0, [], -1
+    for frame in range(1200):
+        due += pacer.due(frame / frame_rate, 1.0 / frame_rate)
+        sent.append(due)
+        # Of each message whether its number is odd: so each differs from the one before.
+        shown.append(topic.at(frame, due % 2 == 1))
+    age = max(0.2, 1.0 / rate)
+    for frame in range(1200):
+        while last + 1 < frame and round((last + 1) / frame_rate * 1e6) < round(frame / frame_rate * 1e6) - age * 1e6:
+            last += 1
+        assert shown[frame] == (last >= 0 and sent[last] % 2 == 1), frame
+
+
+def test_a_stall_warning_that_the_bridge_does_not_publish_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("xplane_bridge.campaign.definition.messages_a_second", lambda: 0)
+    assert campaign().name == "c"
+    with pytest.raises(CampaignError, match=r"waits for stall_warning, and config/rx\.yaml asks for no warnings"):
+        campaign(STALL)
 
 
 def test_without_the_compiled_module_the_way_to_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
