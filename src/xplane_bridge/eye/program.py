@@ -232,18 +232,15 @@ class Eye:
     def _prepare(self) -> None:
         """Measures the delay, where that is wanted and can be; always gives back what a killed eye has left."""
         self._screen.restore()
-        reason = self._why_not_measured()
-        if reason:
-            self._new_calibration().restore()
-            self._calibration = None
-            self._delay_was_sure = self._options.delay_s is not None
-            self._say(reason)
+        if self._left_alone():
             return
         failed = 0
         while failed < _MEASUREMENTS:
             self._wait_for(lambda: self._stream.alive, "waiting for X-Plane")
             self._wait_for(lambda: not self._grabber.problem, "waiting for X-Plane's window")
             try:
+                if self._left_alone():  # a recording may have begun meanwhile
+                    return
                 self._measure()
             except CalibrationError as error:
                 failed += not self._problem()  # one that the end of X-Plane or its window cut short says nothing
@@ -257,6 +254,17 @@ class Eye:
             "Pictures are flagged DELAY_ASSUMED; --delay gives what is known, and capture_node's service "
             "calibrate_display_delay measures anew"
         )
+
+    def _left_alone(self) -> bool:
+        """Whether the delay is not to be measured now, which is said; gives back what was left changed then."""
+        reason = self._why_not_measured()
+        if not reason:
+            return False
+        self._new_calibration().restore()
+        self._calibration = None
+        self._delay_was_sure = self._options.delay_s is not None
+        self._say(reason)
+        return True
 
     def _measure(self) -> str:
         """Measures the delay, which is used from then on; gives what there is to say of it.
@@ -317,15 +325,15 @@ class Eye:
         if self._recorded() and not self._options.while_recorded:
             return (
                 "delay: not measured, as capture_node's pictures are being recorded and X-Plane's view would zoom: "
-                "they are flagged DELAY_ASSUMED; start xplane_eye before the recording, or with --calibrate-now"
+                "they are flagged DELAY_ASSUMED; after the recording, capture_node's service calibrate_display_delay "
+                "measures it; during one, xplane_eye --calibrate-now does"
             )
         return ""
 
     def _recorded(self) -> bool:
         if not isinstance(self._sender, Sender):
             return False
-        self._sender.tried.wait(_ANSWER_S)
-        return self._sender.recorded
+        return self._sender.recorded(_ANSWER_S)
 
     def _new_calibration(self) -> Calibration:
         calibration = Calibration(self._stream.write, lambda: self._field_of_view_deg, self._undo)

@@ -66,10 +66,10 @@ class Sender:
         self._thread = threading.Thread(target=self._run, name="sender", daemon=True)
         self._request = 0
         self._answers: List[bytes] = []
+        self._asked = False  # whether a hello is to be said once more, for what its welcome says
+        self._tried = threading.Event()  # set when that has come, or capture_node does not take pictures
+        self._recorded = False  # as the last welcome says
         #: Pictures that newer ones have replaced, and pictures sent.
-        #: Whether `capture_node` has answered, or does not; and whether its pictures were being recorded then.
-        self.tried = threading.Event()
-        self.recorded = False
         self.replaced = 0
         self.sent = 0
 
@@ -94,6 +94,19 @@ class Sender:
     def report_problem(self, problem: str) -> None:
         """Reports to `capture_node` why there are no pictures; empty when there are."""
         self._problem = problem
+
+    def recorded(self, timeout_s: float) -> bool:
+        """Whether `capture_node`'s pictures are being recorded now, which it is asked.
+
+        Args:
+            timeout_s: It answers within so long, or what it has said last counts; False where it never has.
+        """
+        with self._lock:
+            self._asked = True
+            self._tried.clear()
+        self._wake()
+        self._tried.wait(timeout_s)
+        return self._recorded
 
     def take_request(self) -> int:
         """The number of a request to measure the delay that waits for an answer, once; 0: there is none."""
@@ -129,7 +142,9 @@ class Sender:
             except (OSError, wire.WireError) as error:
                 reason = getattr(error, "strerror", None) or str(error)
                 self._report(f"capture_node at {where} does not take pictures ({reason}); trying again")
-            self.tried.set()
+                with self._lock:
+                    self._asked = False
+                    self._tried.set()
             end = time.monotonic() + pause_s
             while not self._stop and time.monotonic() < end:
                 time.sleep(0.05)
@@ -154,11 +169,12 @@ class _Session:
         self._replies = wire.ReplyReader()
         self._credit = 0
         self._welcome = False
+        self._greeting = False  # a hello has not been answered yet
 
     def run(self) -> None:
         """Ends by an exception, or when the sender ends."""
         try:
-            self._connection.sendall(self._sender._hello)
+            self._greet()
             last_status_s = time.monotonic()
             while not self._sender._stop:
                 readable, _, _ = select.select([self._connection, self._sender._awake], [], [], _STATUS_S)
@@ -166,6 +182,8 @@ class _Session:
                     self._sender._awake.recv(4096)
                 if self._connection in readable:
                     self._take_replies(self._connection.recv(4096))
+                if self._sender._asked and not self._greeting:
+                    self._greet()
                 self._send_answers()
                 self._send_newest()
                 if time.monotonic() - last_status_s >= _STATUS_S and self._welcome:
@@ -176,6 +194,13 @@ class _Session:
                 raise _WelcomedError(error.strerror or str(error)) from None
             raise
 
+    def _greet(self) -> None:
+        """Says hello, which each release of `capture_node` answers, also when it is not the first."""
+        with self._sender._lock:
+            self._sender._asked = False
+        self._greeting = True
+        self._connection.sendall(self._sender._hello)
+
     def _take_replies(self, data: bytes) -> None:
         if not data:
             raise ConnectionError("it closed the connection: is this computer its sender/peer?")
@@ -183,10 +208,14 @@ class _Session:
             if reply.code == wire.REFUSED:
                 raise wire.WireError(wire.REFUSALS.get(reply.number, f"refused for reason {reply.number}"))
             if reply.code == wire.WELCOME:
-                self._welcome = True
-                self._sender.recorded = reply.number == wire.RECORDED
-                self._sender.tried.set()
-                self._credit = CREDIT
+                if not self._welcome:
+                    self._welcome = True
+                    self._credit = CREDIT
+                self._greeting = False
+                with self._sender._lock:
+                    self._sender._recorded = reply.number == wire.RECORDED
+                    if not self._sender._asked:
+                        self._sender._tried.set()
                 self._sender._report("capture_node at {}:{} takes pictures".format(*self._sender._receiver))
             elif reply.code == wire.CALIBRATE:
                 with self._sender._lock:

@@ -11,7 +11,7 @@ import socket
 import threading
 import time
 from pathlib import Path
-from typing import Callable
+from typing import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -321,9 +321,10 @@ def test_an_eye_that_leaves_the_field_of_view_alone_refuses_in_words(scene: Scen
     assert wire.read(FIELD_OF_VIEW) == pytest.approx(60.0)
 
 
-def test_nothing_is_measured_while_the_pictures_are_recorded_but_on_request(scene: Scene) -> None:
+@contextlib.contextmanager
+def recorded(scene: Scene) -> Iterator[None]:
+    """A recorder has the pictures meanwhile."""
     import rosgraph
-    from xplane_bridge.msg import FrameState
 
     topic = f"{scene.world.namespace}/camera/frame_state"
 
@@ -331,10 +332,17 @@ def test_nothing_is_measured_while_the_pictures_are_recorded_but_on_request(scen
         _, subscribers, _ = rosgraph.Master("/test_sender").getSystemState()
         return [node for name, nodes in subscribers if name == topic for node in nodes if "/record" in node]
 
-    wire = scene.world.wire(scene.emulator.port)
     bag = ["rosbag", "record", "-O", str(scene.folder / "pictures.bag"), topic]
     with ManagedProcess("rosbag", bag, scene.folder, env=scene.world.env):
         wait_until(lambda: recorders() != [], 60.0, "the recorder")
+        yield
+
+
+def test_nothing_is_measured_while_the_pictures_are_recorded_but_on_request(scene: Scene) -> None:
+    from xplane_bridge.msg import FrameState
+
+    wire = scene.world.wire(scene.emulator.port)
+    with recorded(scene):
         with scene.eye() as eye:
             eye.wait_for_line("delay: not measured, as capture_node's pictures are being recorded", 60.0)
             assert wire.read(FIELD_OF_VIEW) == pytest.approx(60.0)
@@ -342,6 +350,22 @@ def test_nothing_is_measured_while_the_pictures_are_recorded_but_on_request(scen
         assert state.quality & FrameState.QUALITY_DELAY_ASSUMED
         with scene.eye("--calibrate-now") as eye:
             eye.wait_for_line("calibrating: X-Plane's field of view changes", 60.0)
+
+
+def test_a_recording_that_begins_before_x_plane_does_is_not_measured_in(scene: Scene) -> None:
+    scene.emulator.stop()
+    with scene.eye() as eye:
+        eye.wait_for_line("takes pictures", WAIT_S)
+        eye.wait_for_line("waiting for X-Plane", WAIT_S)
+        with recorded(scene):
+            emulator = scene.world.emulator("--window", "--fps", FPS, port=scene.emulator.port)
+            eye.wait_for_line("delay: not measured, as capture_node's pictures are being recorded", 60.0)
+            scene.states.wait_for(lambda _: True, 60.0, "a picture")
+            assert scene.world.wire(emulator.port).read(FIELD_OF_VIEW) == pytest.approx(60.0)
+        wait_until(lambda: "records the pictures" not in calibrate(scene).message, 60.0, "the recorder's end")
+        # On that request: the connection is still the first one.
+        eye.wait_for_line("calibrating: X-Plane's field of view", 60.0)
+        assert "gone" not in eye.output()
 
 
 def test_a_wrong_token_and_a_missing_sender_are_said(scene: Scene) -> None:

@@ -1,10 +1,12 @@
-"""The eye at a window whose delay cannot be measured: it goes on without, and leaves X-Plane alone."""
+"""The eye where the delay cannot or must not be measured: it goes on without, and leaves X-Plane alone."""
 
 from __future__ import annotations
 
 import os
 import re
 import signal
+import socket
+import struct
 import threading
 from pathlib import Path
 from typing import Any, Callable, Iterator, List
@@ -18,6 +20,7 @@ from xplane_bridge.eye import calibrate, names, program, rref
 from xplane_bridge.eye.calibrate import CalibrationError, Delay
 from xplane_bridge.eye.grab import Grabber
 from xplane_bridge.eye.pairing import Decision
+from xplane_bridge.eye.sender import Sender
 from xplane_bridge.eye.wire import DELAY_ASSUMED
 from xplane_bridge.harness import wait_until
 
@@ -39,13 +42,12 @@ class OwnView(Grabber):
 class Receiver:
     """Instead of a connection to `capture_node`; ends the program by Ctrl-C after some pictures."""
 
-    recorded = False
+    recorded_from = "never"  #: beginning of the problem with which a recording begins
     decisions: List[Decision]
     problems: List[str]
 
     def __init__(self, *_: object) -> None:
-        self.tried = threading.Event()
-        self.tried.set()
+        pass
 
     def __enter__(self) -> None:
         pass
@@ -59,6 +61,9 @@ class Receiver:
     def report_problem(self, problem: str) -> None:
         self.problems.append(problem)
 
+    def recorded(self, _: float) -> bool:
+        return any(problem.startswith(self.recorded_from) for problem in self.problems)
+
     def take_request(self) -> int:
         if len(self.decisions) >= ENOUGH:
             raise KeyboardInterrupt
@@ -68,13 +73,13 @@ class Receiver:
 class Run:
     """The eye, with its parts played by the test."""
 
-    def __init__(self, xplane: FakeXPlane, folder: Path) -> None:
+    def __init__(self, xplane: FakeXPlane, folder: Path, receiver_port: int = 9) -> None:
         self.xplane = xplane
         self.undo = folder / "undo.json"
         self.said: List[str] = []
         self.eye = program.Eye(
             program.EyeOptions(
-                receiver=("127.0.0.1", 9),
+                receiver=("127.0.0.1", receiver_port),
                 xplane=("127.0.0.1", xplane.port),
                 titles=("X-Plane",),
                 window=None,
@@ -86,8 +91,11 @@ class Run:
                 local_port=0,
                 undo_file=self.undo,
             ),
-            self.said.append,
+            lambda line: self.say(line),
         )
+
+    def say(self, line: str) -> None:
+        self.said.append(line)
 
     def __call__(self) -> None:
         limit = threading.Timer(LONGEST_S, os.kill, (os.getpid(), signal.SIGTERM))  # its run ends by that, too
@@ -97,7 +105,6 @@ class Run:
                 self.eye.run()
         finally:
             limit.cancel()
-        assert len(Receiver.decisions) >= ENOUGH, self.said
 
     def written(self) -> List[float]:
         """Values of the field of view that X-Plane was sent."""
@@ -106,7 +113,7 @@ class Run:
 
 
 @pytest.fixture
-def start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[Any], Run]]:
+def start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[..., Run]]:
     monkeypatch.setattr(calibrate, "_BETWEEN_S", (0.1, 0.12))
     monkeypatch.setattr(calibrate, "_SETTLE_S", 0.1)
     monkeypatch.setattr(program, "_CALIBRATE_AGAIN_S", 0.05)
@@ -119,17 +126,18 @@ def start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[
     before = signal.getsignal(signal.SIGTERM)
     with FakeXPlane({FakeXPlane.TIME: 100.0, names.FIELD_OF_VIEW: OWN_DEG}) as xplane:
 
-        def make(grabber: Any) -> Run:
+        def make(grabber: Any, *options: int) -> Run:
             monkeypatch.setattr(program, "grabber_class", lambda: grabber)
-            return Run(xplane, tmp_path)
+            return Run(xplane, tmp_path, *options)
 
         yield make
     signal.signal(signal.SIGTERM, before)
 
 
-def test_after_three_measurements_that_failed_flagged_pictures_go_out(start: Callable[[Any], Run]):
+def test_after_three_measurements_that_failed_flagged_pictures_go_out(start: Callable[..., Run]):
     run = start(OwnView)
     run()
+    assert len(Receiver.decisions) >= ENOUGH, run.said
     assert sum(line.startswith("calibrating") for line in run.said) == 3
     reasons = [line for line in run.said if line.startswith("not calibrated")]
     assert len(reasons) == 3
@@ -161,7 +169,7 @@ class Vanishing(OwnView):
 
 @pytest.mark.parametrize(("cut_short", "own_faults", "measured"), [(5, 2, True), (2, 3, False)])
 def test_measurements_that_a_lost_window_cuts_short_do_not_count(
-    start: Callable[[Any], Run], monkeypatch: pytest.MonkeyPatch, cut_short: int, own_faults: int, measured: bool
+    start: Callable[..., Run], monkeypatch: pytest.MonkeyPatch, cut_short: int, own_faults: int, measured: bool
 ):
     left = [True] * cut_short + [False] * own_faults
 
@@ -174,7 +182,88 @@ def test_measurements_that_a_lost_window_cuts_short_do_not_count(
     monkeypatch.setattr(calibrate.Calibration, "run", measure)
     run = start(Vanishing)
     run()
+    assert len(Receiver.decisions) >= ENOUGH, run.said
     assert left == []
     outcome = next(line for line in run.said if line.startswith("delay"))
     assert outcome.startswith("delay: 20.0 ms" if measured else "delay: not measured")
     assert bool(Receiver.decisions[-1].flags & DELAY_ASSUMED) != measured
+
+
+class CaptureNode:
+    """Welcomes each hello, and says whether its pictures are being recorded just then."""
+
+    def __init__(self) -> None:
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = self._server.getsockname()[1]
+        self.recorded = False
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        while True:
+            try:
+                connection, _ = self._server.accept()
+            except OSError:
+                return
+            with connection, connection.makefile("rb") as stream:
+                while True:
+                    prefix = stream.read(16)
+                    if len(prefix) < 16:
+                        break
+                    header, body = struct.unpack_from("<HI", prefix, 6)
+                    kind = stream.read(header + body)[0]
+                    if kind == 1:
+                        connection.sendall(struct.pack("<4sHHQ", b"XEYA", 1, 0, self.recorded))
+
+    def close(self) -> None:
+        self._server.close()
+
+
+class Hidden(OwnView):
+    """A window that comes as late as the test wants."""
+
+    shown = threading.Event()
+
+    def run(self) -> None:
+        self.problem = "X-Plane has no window yet"
+        self.shown.wait()
+        super().run()
+
+
+def test_a_recording_that_began_while_x_planes_window_was_awaited_is_not_measured_in(
+    start: Callable[..., Run], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(program, "Sender", Sender)
+    monkeypatch.setattr(program, "_ANSWER_S", LONGEST_S)
+    monkeypatch.setattr(Hidden, "shown", threading.Event())
+    node = CaptureNode()
+    try:
+        run = start(Hidden, node.port)
+
+        def say(line: str) -> None:
+            run.said.append(line)
+            if line == "waiting for X-Plane's window":
+                node.recorded = True
+                Hidden.shown.set()
+            elif line.startswith(("delay", "calibrating")):
+                raise KeyboardInterrupt
+
+        run.say = say
+        run()
+    finally:
+        node.close()
+    assert any(line.endswith("takes pictures") for line in run.said)
+    assert "not measured, as capture_node's pictures are being recorded" in run.said[-1]
+    assert run.written() == []
+
+
+def test_a_recording_that_began_after_a_measurement_that_failed_ends_the_attempts(
+    start: Callable[..., Run], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(Receiver, "recorded_from", "not calibrated")
+    run = start(OwnView)
+    run()
+    assert sum(line.startswith("calibrating") for line in run.said) == 1
+    assert any("as capture_node's pictures are being recorded" in line for line in run.said)
+    assert all(decision.flags & DELAY_ASSUMED for decision in Receiver.decisions)
+    wait_until(lambda: run.written()[-1:] == [OWN_DEG], 10.0, "the user's field of view")
+    assert not run.undo.exists()

@@ -19,6 +19,7 @@ from xplane_bridge.harness import wait_until
 PREFIX = struct.Struct("<4sHHII")
 HELLO, PICTURE, STATUS, CALIBRATION = 1, 2, 3, 4
 WELCOME, TAKEN, REFUSED, CALIBRATE = 0, 1, 2, 3
+MOST_OTHERS = 40  #: messages before one that is waited for
 
 
 class Receiver:
@@ -47,11 +48,12 @@ class Receiver:
 
     def message(self, *kinds: int) -> tuple:
         """The next message of these kinds: header and body."""
-        while True:
+        for _ in range(MOST_OTHERS):
             _, _, header_bytes, body_bytes, _ = PREFIX.unpack(self.exactly(PREFIX.size))
             header, body = self.exactly(header_bytes), self.exactly(body_bytes)
             if header[0] in kinds:
                 return header, body
+        raise AssertionError(f"no message of kinds {kinds} among {MOST_OTHERS}")
 
     def picture_index(self) -> int:
         return struct.unpack_from("<Q", self.message(PICTURE)[0], 16)[0]
@@ -180,6 +182,69 @@ def test_what_an_ended_connection_was_asked_is_not_answered_to_the_next(receiver
         receiver.reply(WELCOME)
         receiver.message(STATUS)
         assert eye.take_request() == 0
+
+
+class Asking(threading.Thread):
+    """Asks whether pictures are recorded, on a thread of its own."""
+
+    answer: bool
+
+    def __init__(self, eye: Sender) -> None:
+        super().__init__(daemon=True)
+        self._eye = eye
+        self.start()
+
+    def run(self) -> None:
+        self.answer = self._eye.recorded(20.0)
+
+    def answered(self) -> bool:
+        self.join(20.0)
+        return self.answer
+
+
+def test_whether_pictures_are_recorded_is_asked_anew_and_sends_no_more_pictures(receiver: Receiver):
+    with start(receiver) as eye:
+        receiver.accept()
+        receiver.message(HELLO)
+        receiver.reply(WELCOME, 0)
+        for index in (1, 2):
+            eye.offer(picture(index))
+            assert receiver.picture_index() == index
+        for recorded in (1, 0, 1):
+            asking = Asking(eye)
+            assert receiver.message(HELLO)[1] == b"secrethere:49000"
+            receiver.reply(WELCOME, recorded)
+            assert asking.answered() == bool(recorded)
+        eye.offer(picture(3))
+        for _ in range(2):  # the second is younger than the picture
+            receiver.message(STATUS)
+        assert eye.sent == CREDIT
+
+
+def test_a_question_that_comes_before_the_welcome_is_not_answered_by_it(receiver: Receiver):
+    with start(receiver) as eye:
+        receiver.accept()
+        receiver.message(HELLO)
+        asking = Asking(eye)
+        wait_until(lambda: eye._asked, 10.0, "the question")
+        receiver.reply(WELCOME, 0)
+        receiver.message(HELLO)
+        receiver.reply(WELCOME, 1)
+        assert asking.answered()
+
+
+def test_a_question_of_a_connection_that_ended_is_answered_by_the_next(receiver: Receiver):
+    with start(receiver) as eye:
+        receiver.accept()
+        receiver.message(HELLO)
+        receiver.reply(WELCOME, 0)
+        asking = Asking(eye)
+        receiver.message(HELLO)
+        receiver.connection.close()
+        receiver.accept()
+        receiver.message(HELLO)
+        receiver.reply(WELCOME, 1)
+        assert asking.answered()
 
 
 def test_it_ends_while_no_receiver_answers(monkeypatch: pytest.MonkeyPatch):
