@@ -12,17 +12,16 @@ from typing import Any, Mapping, Optional
 
 import yaml
 
-from xplane_bridge.constants import COMMAND_FIELDS, ControlField
 from xplane_bridge.harness.processes import HarnessError, ManagedProcess, wait_until
 from xplane_bridge.harness.ros import MasterInUse, RosMaster, roslaunch
 from xplane_bridge.lockstep import Participant, advertise
 from xplane_bridge.resources import config_file
+from xplane_bridge.scenario.command_fields import fill_fields
 
 _START_S, _ANSWER_S = 60.0, 60.0
 _LOOK_S = 0.25  # between two looks at whether the nodes still run
 #: A caller may think about its answer for as long as it likes.
 _WATCHDOG_S = 86400.0
-_ENGINE_FIELDS = {"engine_throttles": ControlField.ENGINE_THROTTLES, "motors": ControlField.MOTORS}
 _numbers = count(1)
 
 
@@ -107,7 +106,11 @@ class LockstepBridge:
         Raises:
             HarnessError: The nodes have ended, or no state comes.
         """
-        self._answers.put(_message(command))
+        from xplane_bridge.msg import ControlCommand
+
+        message = ControlCommand()
+        fill_fields(message, command)
+        self._answers.put(message)
         return self._next()
 
     def end(self) -> None:
@@ -166,18 +169,3 @@ def _is_node() -> bool:
     except ImportError:  # ROS comes with the master's environment
         return False
     return bool(rospy.core.is_initialized())
-
-
-def _message(command: Mapping[str, Any]) -> Any:
-    from xplane_bridge.msg import ControlCommand
-
-    message = ControlCommand()
-    for name, value in command.items():
-        if name in _ENGINE_FIELDS:
-            message.fields |= _ENGINE_FIELDS[name].value
-            message.engine_count = len(value)
-            value = [*value, *[0.0] * (8 - len(value))]
-        else:
-            message.fields |= COMMAND_FIELDS[name].bit.value
-        setattr(message, name, value)
-    return message

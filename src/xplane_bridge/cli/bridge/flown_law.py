@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import logging
+import os
 from typing import Any, List, Mapping, Optional, Protocol, Sequence
 
 from xplane_bridge import lockstep
 from xplane_bridge.cli.bridge.loaded_aircraft import AircraftError, LoadedAircraft
 from xplane_bridge.cli.bridge.waiting import wait_for_service, wait_for_state
-from xplane_bridge.constants import COMMAND_FIELDS, FlightMode
+from xplane_bridge.constants import FlightMode
 from xplane_bridge.errors import XplaneBridgeError
+from xplane_bridge.scenario.command_fields import fill_fields
 
+_LOG = logging.getLogger(__name__)
 #: Groups of FlightState that a law may look at.
 _NEEDED = ("POSITION", "AGL", "ATTITUDE", "RATES", "VELOCITY", "AIR_VELOCITY", "AIRSPEEDS", "CONTROLS", "CONTACT")
 _REMEDY = "fly another controller, or this one all the same with --any-aircraft"
@@ -18,12 +22,16 @@ _REMEDY = "fly another controller, or this one all the same with --any-aircraft"
 class Law(Protocol):
     """What flies: the same as in campaigns (docs/experiments/campaigns.md)."""
 
-    def fly(self, state: Any) -> Mapping[str, float]:
+    def fly(self, state: Any) -> Mapping[str, Any]:
         """Fields of ControlCommand for a FlightState; empty: none for now."""
 
 
 class EngageError(XplaneBridgeError):
     """tx_node refused mode AUTO."""
+
+
+class LawError(XplaneBridgeError):
+    """The law raised an exception, or gave what is no command."""
 
 
 class FlownLaw:
@@ -61,6 +69,7 @@ class FlownLaw:
         Raises:
             AircraftError: Another aircraft is loaded.
             EngageError: AUTO was refused.
+            LawError: The law failed.
         """
         import rospy
 
@@ -91,8 +100,7 @@ class FlownLaw:
                     if engage:
                         self._engage()
                 except XplaneBridgeError as error:
-                    self._error = error
-                    self._refuse(str(error))
+                    self._end_by(error)
             return self.command(state)
 
         publisher = lockstep.advertise(self._topic, ControlCommand)
@@ -123,7 +131,19 @@ class FlownLaw:
             self._engage()
 
     def command(self, state: Any) -> Optional[Any]:
-        """The ControlCommand for a FlightState; None while the law has nothing to fly by."""
+        """The ControlCommand for a FlightState; None while the law has nothing to fly by, and once it has failed."""
+        try:
+            return self._commanded(state)
+        except Exception as error:
+            # The traceback is for its author, in the file that rospy logs to; the line at the end says where that is.
+            _LOG.error("%s: what it flies has failed", self._program, exc_info=True)
+            what = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            log = os.environ.get("ROS_LOG_FILENAME", "")
+            where = f"; the traceback is in {log}" if log else ""
+            self._end_by(LawError(f"at {state.sim_time_unwrapped:.2f} s of simulator time: {what}{where}"))
+            return None
+
+    def _commanded(self, state: Any) -> Optional[Any]:
         from xplane_bridge.msg import ControlCommand
 
         needed = sum(getattr(state, f"VALID_{group}") for group in self._needed)
@@ -137,13 +157,15 @@ class FlownLaw:
             return None
         command = ControlCommand(sequence=state.frame_count)
         command.header.stamp = state.header.stamp
-        for name, value in values.items():
-            command.fields |= COMMAND_FIELDS[name].bit.value
-            setattr(command, name, value)
+        fill_fields(command, values)
         if not self._began:
             self._began = True
             print(f"commanding on {self._topic}", flush=True)
         return command
+
+    def _end_by(self, error: XplaneBridgeError) -> None:
+        self._error = error
+        self._refuse(str(error))
 
     def _refuse(self, text: str) -> None:
         import rospy
