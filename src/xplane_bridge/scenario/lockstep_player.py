@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from typing import Any, Callable, Deque, Optional, Tuple
 
 from xplane_bridge import lockstep
+from xplane_bridge.errors import is_number
 from xplane_bridge.lockstep import ModeInStep, Participant, TopicInStep
-from xplane_bridge.scenario.player import Action
+from xplane_bridge.scenario.player import Action, Commands
 from xplane_bridge.scenario.ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
 from xplane_bridge.scenario.schema import ScenarioError
 
-_WARNINGS_AGE_NS = 200_000_000  # of those that count: all of before have come, at 20 of them a second
+#: Age of the warnings that count, at least: one of them a period later has come by then, at rx_node's own rate or more.
+_WARNINGS_AGE_NS = 200_000_000
+_WARNINGS_RATE = 5  # [1/s] of rx_node where its parameter is not set
 _POLL_S = 0.2
 
 
@@ -37,11 +41,14 @@ class LockstepPlayer(RosPlayer):
         variables = {c.variable for event in self._player.scenario.events for c in event.when}
         self._sees_mode = self._stick is not None or "mode" in variables
         self._sees_stall = "stall_warning" in variables
+        self._warnings_age_ns = _WARNINGS_AGE_NS
 
     def _publisher(self, topic: str, message_type: Any) -> Any:
         return lockstep.advertise(topic, message_type)
 
     def _play(self, publisher: Any) -> None:
+        if self._sees_stall and not self._find_warnings_age():
+            return
         import rospy
         from std_srvs.srv import Trigger
 
@@ -63,6 +70,21 @@ class LockstepPlayer(RosPlayer):
         if self._error is None and self._ending.is_set():
             # No frames more; it is answered when the last answer of this node has come.
             rospy.ServiceProxy(service + "step", LockstepStep)(frames=0)
+
+    def _find_warnings_age(self) -> bool:
+        """Follows the rate at which rx_node asks for warnings; fails, and returns False, where it asks for none."""
+        import rospy
+
+        name = self._namespace + "/rx_node/rates/warnings"
+        rate = rospy.get_param(name, _WARNINGS_RATE)
+        if not is_number(rate) or rate <= 0:
+            self.fail(
+                f"{self._player.scenario.name} waits for stall_warning, but {name} is {rate!r}, by which no warnings "
+                "come; expected 1 to 1000: set it in rx_node's parameters (rates: warnings)"
+            )
+            return False
+        self._warnings_age_ns = max(_WARNINGS_AGE_NS, math.ceil(1e9 / rate))
+        return True
 
     def fail(self, error: str) -> None:
         """Ends it with an error; the frame stays unanswered."""
@@ -113,7 +135,7 @@ class LockstepPlayer(RosPlayer):
         if self._modes is not None:
             self._mode = self._modes.at(state)
         if self._warnings is not None:
-            horizon = type(state.header.stamp)(nsecs=state.header.stamp.to_nsec() - _WARNINGS_AGE_NS)
+            horizon = type(state.header.stamp)(nsecs=state.header.stamp.to_nsec() - self._warnings_age_ns)
             last = self._warnings.before(horizon) if horizon > self._first else None
             self._stall = last is not None and last.stall >= 0.5
 
