@@ -152,9 +152,12 @@ class LockstepPlayer(RosPlayer):
         while self._due and self._awaited is None:
             self._act(self._due.popleft())
 
+    def _take_taps(self, commands: Commands) -> None:
+        """Leaves them in their step: each is answered by a message."""
+
     def _request_mode(self, wanted: int) -> None:
         if self._stick is not None:
-            self._tap(self._stick, MODE_NAMES[wanted], self._clock.now)
+            self._tap(self._stick, MODE_NAMES[wanted])
             self._awaited = (wanted, self._clock.now + MODE_WAIT_S)
             return
         from xplane_bridge.srv import SetMode

@@ -57,6 +57,7 @@ class Commands:
     throttle: Optional[float] = None  #: None: never said, leave it
     handles: Dict[str, float] = field(default_factory=dict)  #: those said so far
     buttons: Set[int] = field(default_factory=set)  #: pressed ones
+    taps: Set[int] = field(default_factory=set)  #: those of them that are pressed in this step only
     actions: List[Action] = field(default_factory=list)  #: new ones, in order
     finished: bool = False
 
@@ -121,7 +122,8 @@ class Player:
         self._fire(now, sample, commands.actions)
         self._fly(now, dt, sample, commands)
         commands.handles = dict(self._handles)
-        commands.buttons = self._buttons | self._taps
+        commands.taps = self._taps - self._buttons
+        commands.buttons = self._buttons | commands.taps
         commands.finished = self._finished
         return commands
 

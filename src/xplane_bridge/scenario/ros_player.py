@@ -5,6 +5,7 @@ Stick and handles become commands or a joystick; modes, failures and excitations
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import queue
@@ -13,10 +14,12 @@ import time
 from pathlib import Path
 from typing import Any, Callable, Dict, Optional, Tuple
 
-from xplane_bridge.constants import COMMAND_FIELDS, FlightMode, ResultCode, words
+from xplane_bridge.constants import FlightMode, ResultCode, words
+from xplane_bridge.scenario.command_fields import fill_fields
 from xplane_bridge.scenario.player import Action, Commands, FlightSample, Player
 from xplane_bridge.scenario.resets import reset_request
 from xplane_bridge.scenario.schema import HANDLE_FIELDS, Scenario, ScenarioError
+from xplane_bridge.scenario.taps import Taps
 from xplane_bridge.scenario.traffic import ScenarioTraffic
 from xplane_bridge.scenario.virtual_stick import VirtualStick
 from xplane_bridge.scenario.world import disturbance_request, time_request, weather_request, wind_request
@@ -27,7 +30,6 @@ _BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_no
 _SERVICE_WAIT_S = 15.0  # for a service to be there
 _AGAIN_S = 0.1  # after a refusal for want of a link
 MODE_WAIT_S = 15.0  #: for a mode to be shown
-_TAP_S = 0.15  # of a mode button: longer than the mapper's debouncing
 MODE_NAMES = words(FlightMode)
 
 
@@ -50,14 +52,6 @@ def command_values(commands: Commands) -> Dict[str, float]:
     for handle, value in commands.handles.items():
         values.update(dict.fromkeys(HANDLE_FIELDS[handle], value))
     return values
-
-
-def fill_command(commands: Commands, message: Any) -> None:
-    """Puts `command_values` into a ControlCommand."""
-    message.fields = 0
-    for name, value in command_values(commands).items():
-        message.fields |= COMMAND_FIELDS[name].bit.value
-        setattr(message, name, value)
 
 
 def mode_has_not_come(mode: str) -> str:
@@ -117,7 +111,7 @@ class RosPlayer:
         self._traffic = ScenarioTraffic()
         self._sequence = 0
         self._mode_sequence = int(time.time())  # the next run is heard by the tx_node that heard this one
-        self._tapped: Dict[int, float] = {}  # button to the time of its release
+        self._taps = Taps()
         self._actions: queue.Queue[Optional[Action]] = queue.Queue()
         self._finished = threading.Event()
         self._error: Optional[str] = None
@@ -176,9 +170,9 @@ class RosPlayer:
             self._finished.wait(1.0 / STICK_RATE)
         self._actions.put(None)
         # What the last events asked for is still seen through, while the stick is held.
-        while worker.is_alive() and not rospy.is_shutdown():
+        while not rospy.is_shutdown() and (worker.is_alive() or (self._taps.pending and self._to_send() is not None)):
             self._publish(publisher)
-            worker.join(1.0 / STICK_RATE)
+            time.sleep(1.0 / STICK_RATE)
 
     # --- in -----------------------------------------------------------------------------------------------------------
 
@@ -209,8 +203,9 @@ class RosPlayer:
             self._begin = {"epoch": int(state.epoch), "sim_time_unwrapped": float(state.sim_time_unwrapped)}
             self._say(f"playing {self._player.scenario.name}")
         with self._lock:
-            self._commands = self._player.step(now, sample_of(state, self._mode or 1, self._stall))
-            commands = self._commands
+            self._commands = commands = self._player.step(now, sample_of(state, self._mode or 1, self._stall))
+            if self._stick is not None:
+                self._take_taps(commands)
         for action in commands.actions:
             if action.kind == "traffic":
                 self._traffic.begin(action.value, state, now)
@@ -219,6 +214,12 @@ class RosPlayer:
         self._send_traffic(state, now)
         if commands.finished:
             self._finished.set()
+
+    def _take_taps(self, commands: Commands) -> None:
+        """Keeps what is tapped in one step only: the stick's messages have another rate than the states."""
+        for button in commands.taps:
+            self._taps.add(button)
+        commands.buttons -= commands.taps
 
     def _send_traffic(self, state: Any, now: float) -> None:
         if self._traffic.due(now):
@@ -249,12 +250,11 @@ class RosPlayer:
         if self._stick is None:
             self._sequence += 1
             message.sequence = self._sequence
-            fill_command(commands, message)
+            fill_fields(message, command_values(commands))
         else:
-            axes, buttons = self._stick.joy(commands)
-            for button, released in list(self._tapped.items()):
-                buttons[button] = int(now < released)
-            message.axes, message.buttons = axes, buttons
+            pressed, released = self._taps.look(now)
+            shown = dataclasses.replace(commands, buttons=(commands.buttons - released) | pressed)
+            message.axes, message.buttons = self._stick.joy(shown)
         return message
 
     def _act_all(self) -> None:
@@ -316,13 +316,13 @@ class RosPlayer:
             request.header.stamp = rospy.get_rostime()
             self._mode_publisher.publish(request)
         else:
-            self._tap(self._stick, mode, time.monotonic())
+            self._tap(self._stick, mode)
         wait_for(lambda: self._mode == wanted)
 
-    def _tap(self, stick: VirtualStick, mode: str, now: float) -> None:
+    def _tap(self, stick: VirtualStick, mode: str) -> None:
         button = stick.mode_button(mode, MODE_NAMES.get(self._mode or 0, ""))
         if button is not None:
-            self._tapped[button] = now + _TAP_S
+            self._taps.add(button)
 
     def _call(self, service: str, service_type: Any, what: str, **fields: Any) -> None:
         """Calls tx_node. Where it has no link to X-Plane, as when a frame is late, it does nothing: then again."""

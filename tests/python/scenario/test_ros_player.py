@@ -9,33 +9,12 @@ from unittest import mock
 
 import pytest
 
+from support.flights.states import state
 from xplane_bridge.constants import ResultCode
 from xplane_bridge.scenario import ScenarioError, parse_scenario, ros_player
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
 from xplane_bridge.scenario.player import Action
 from xplane_bridge.scenario.ros_player import RosPlayer
-
-
-def state(sim_time, **values):
-    known = dict.fromkeys(
-        [
-            "roll_deg",
-            "pitch_deg",
-            "heading_true_deg",
-            "altitude_msl",
-            "altitude_agl",
-            "vertical_speed",
-            "calibrated_airspeed",
-            "alpha_deg",
-            "beta_deg",
-            "load_factor_normal",
-        ],
-        0.0,
-    )
-    rates = SimpleNamespace(x=0.0, y=0.0, z=0.0)
-    return SimpleNamespace(
-        **{**known, "epoch": 1, "sim_time_unwrapped": sim_time, "angular_velocity": rates, "on_ground": False, **values}
-    )
 
 
 def player(*events):
