@@ -75,7 +75,7 @@ CASES = {
         rest={"engine_count": 4, "motors": [0.0] * 8},
         flight="multirotor parked",
     ),
-    F.TRIM_ROLL: handle("trim_roll", "aileron_trim", 0.5, moves=surfaces(wing2l_ail1=2.25, wing2r_ail1=-3.75)),
+    F.TRIM_ROLL: handle("trim_roll", "aileron_trim", 0.5, moves=surfaces(wing2l_ail1=2.25, wing2r_ail1=-2.25)),
     F.TRIM_PITCH: handle("trim_pitch", "elevator_trim", 0.5, moves=surfaces(hstab1_elv1=-6.3, hstab2_elv1=-6.3)),
     F.TRIM_YAW: handle("trim_yaw", "rudder_trim", 0.5, moves=surfaces(vstab1_rud1=5.4)),
     F.FLAPS: handle("flaps", "flap_ratio", 0.5, moves=surfaces(wing1l_fla1=21.0, wing1r_fla1=21.0)),
