@@ -326,64 +326,62 @@ TEST_F(X11WindowSourceTest, WorksThroughTheSocketWithoutSharedMemory) {
   EXPECT_EQ(pixelAt(picture_.bgr, 320, 240), kGreen);
 }
 
-TEST_F(X11WindowSourceTest, ChecksumSeesChangesWhereNoEventsAreAskedFor) {
-  TestWindow window(server_.display(), "X-System", 320, 240);
-  X11SourceOptions options = titled(server_);
-  options.change_detection = ChangeDetection::kChecksum;
-  X11WindowSource source(options, steadyNow);
-  ASSERT_TRUE(nextPicture(source, picture_));
-  EXPECT_FALSE(source.usesDamage());
-  EXPECT_TRUE(staysQuiet(source));  // also takes the checksum that the change is measured against
-  window.fill(0x00ff00);
-  ASSERT_TRUE(nextPicture(source, picture_));
+class X11WindowByChecksumTest : public X11WindowSourceTest {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(nextPicture(source_, picture_));
+    EXPECT_TRUE(staysQuiet(source_));  // also takes the checksum that changes are measured against
+  }
+  X11SourceOptions options() const {
+    X11SourceOptions out = titled(server_);
+    out.change_detection = ChangeDetection::kChecksum;
+    return out;
+  }
+
+  TestWindow window_{server_.display(), "X-System", 320, 240};
+  X11WindowSource source_{options(), steadyNow};
+};
+
+TEST_F(X11WindowByChecksumTest, SeesChangesWhereNoEventsAreAskedFor) {
+  EXPECT_FALSE(source_.usesDamage());
+  window_.fill(0x00ff00);
+  ASSERT_TRUE(nextPicture(source_, picture_));
   EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kGreen);
 }
 
-TEST_F(X11WindowSourceTest, ByChecksumALookThatCameInTimeDatesTheChangeAndALateOneDoesNot) {
-  TestWindow window(server_.display(), "X-System", 320, 240);
-  X11SourceOptions options = titled(server_);
-  options.change_detection = ChangeDetection::kChecksum;
-  X11WindowSource source(options, steadyNow);
-  ASSERT_TRUE(nextPicture(source, picture_));
-  EXPECT_TRUE(staysQuiet(source));
+TEST_F(X11WindowByChecksumTest, ALookThatCameInTimeDatesTheChangeAndALateOneDoesNot) {
   std::uint32_t colour = 0;
   for (const int late_ms : {15, 30, 45}) {
-    window.fill(++colour);
+    window_.fill(++colour);
     std::this_thread::sleep_for(milliseconds(late_ms));  // nothing looks meanwhile
-    ASSERT_TRUE(nextPicture(source, picture_));
+    ASSERT_TRUE(nextPicture(source_, picture_));
     EXPECT_FALSE(picture_.display_time_known) << late_ms;
-    EXPECT_TRUE(staysQuiet(source));
+    EXPECT_TRUE(staysQuiet(source_));
   }
   // Drawn beside looks that go on; where the computer is busy, they too may come late.
   const auto deadline = std::chrono::steady_clock::now() + kDeadline;
   do {
     std::thread painter([&] {
       std::this_thread::sleep_for(milliseconds(10));
-      window.fill(++colour);
+      window_.fill(++colour);
     });
-    const bool seen = nextPicture(source, picture_);
+    const bool seen = nextPicture(source_, picture_);
     painter.join();
     ASSERT_TRUE(seen);
   } while (!picture_.display_time_known && std::chrono::steady_clock::now() < deadline);
   EXPECT_TRUE(picture_.display_time_known);
 }
 
-TEST_F(X11WindowSourceTest, ByChecksumADrawingBetweenLookAndReadMakesTheTimeUnknown) {
-  TestWindow window(server_.display(), "X-System", 320, 240);
-  X11SourceOptions options = titled(server_);
-  options.change_detection = ChangeDetection::kChecksum;
-  X11WindowSource source(options, steadyNow);
-  ASSERT_TRUE(nextPicture(source, picture_));
-  EXPECT_TRUE(staysQuiet(source));
-  window.fill(0x00ff00);
+TEST_F(X11WindowByChecksumTest, ADrawingBetweenLookAndReadMakesTheTimeUnknown) {
+  window_.fill(0x00ff00);
   Change change;
-  ASSERT_EQ(source.waitChange(kDeadline, change), WaitResult::kChange);
+  ASSERT_EQ(source_.waitChange(kDeadline, change), WaitResult::kChange);
   change.time_known = true;  // as far as the look goes
-  window.fill(0x0000ff);
-  ASSERT_EQ(source.grab(change, picture_), GrabResult::kNew);
+  window_.fill(0x0000ff);
+  ASSERT_EQ(source_.grab(change, picture_), GrabResult::kNew);
   EXPECT_EQ(pixelAt(picture_.bgr, 100, 100), kBlue);
   EXPECT_FALSE(picture_.display_time_known);
-  EXPECT_EQ(source.waitChange(kShort, change), WaitResult::kTimeout);
+  EXPECT_EQ(source_.waitChange(kShort, change), WaitResult::kTimeout);
 }
 
 TEST_F(X11WindowSourceTest, WithoutDetectionTheDisplayTimeIsUnknown) {
