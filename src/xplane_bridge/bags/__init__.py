@@ -23,7 +23,6 @@ import functools
 import logging
 import re
 import struct
-from contextlib import ExitStack
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
@@ -171,35 +170,36 @@ class Bags:
             raise BagError(msg)
         if len({(path.parent, _PART.sub("", path.stem)) for path in self.paths}) == 1:
             self.paths.sort(key=_part)  # a shell gives them in the order of texts
-        self._stack: Optional[ExitStack] = None
-        self._files: list[BagFile] = []
+        self._open: Optional[list[BagFile]] = None
         self._restarts = Restarts(self.paths[0], self._state_stamps)
 
     def __enter__(self) -> Bags:
         """Open all files."""
-        stack = ExitStack()
+        self._open = []
         try:
             for path in self.paths:
-                file = _opened(path)
-                stack.callback(file.close)
-                self._files.append(file)
+                self._open.append(_opened(path))
             states = self._states()
             if states:
                 let_receive_times_go_on(states, self._epochs, self._files)
         except BaseException:
-            stack.close()
-            self._files = []
+            self.__exit__()
             raise
-        self._stack = stack
         return self
 
     def __exit__(self, *_: object) -> None:
         """Close all files."""
-        if self._stack:
-            self._stack.close()
-        self._stack = None
-        self._files = []
+        for file in self._open or ():
+            file.close()
+        self._open = None
         self._restarts = Restarts(self.paths[0], self._state_stamps)
+
+    @property
+    def _files(self) -> list[BagFile]:
+        if self._open is None:
+            msg = f"{', '.join(map(str, self.paths))}: not open; expected `with Bags(...) as bags:` around it"
+            raise BagError(msg)
+        return self._open
 
     @property
     def topics(self) -> dict[str, TopicInfo]:

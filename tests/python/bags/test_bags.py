@@ -51,6 +51,18 @@ def flight(path: Path, count: int = 5, start: int = 0, **kwargs: object) -> Path
     return write(path, [("/s", "pkg/msg/State", STATE, messages)], **kwargs)
 
 
+def test_bags_that_are_not_open_say_so(tmp_path: Path) -> None:
+    bags = Bags(flight(tmp_path / "a.bag"))
+    reads = (lambda: bags.topics, lambda: bags.read("/s"), lambda: list(bags.messages("/s")))
+    for read in reads:
+        with pytest.raises(BagError, match=r"a\.bag: not open; expected `with Bags\("):
+            read()
+    with bags:
+        assert len(bags.read("/s")) == 5
+    with pytest.raises(BagError, match="not open"):
+        reads[0]()
+
+
 def test_every_kind_of_field_is_decoded_to_its_column(tmp_path: Path) -> None:
     with Bags(flight(tmp_path / "a.bag")) as bags:
         table = bags.read("/s")
