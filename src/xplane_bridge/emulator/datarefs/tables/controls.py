@@ -261,8 +261,7 @@ def _limits(t: Table, sim: Sources) -> None:
     trims = {"ailn": ("aileron", "ail1"), "elev": ("elevator", "elv1"), "rudd": ("rudder", "rud1")}
     for name, (kind, leaf) in trims.items():
         for end in ("max", "min"):
-            part = partial(_trim_part, sim, kind, leaf, end)
-            t.value(f"{limits}{end}_trim_{name}", partial(lambda part, _: part(), part))
+            t.value(f"{limits}{end}_trim_{name}", partial(_trim_part, sim, kind, leaf, end))
     for end in ("up", "dn"):
         t.setting(f"{limits}hstb_trim_{end}")  # no aircraft here has a stabiliser that trims
 
@@ -271,7 +270,7 @@ def _spec(sim: Sources, leaf: str) -> Optional[SurfaceSpec]:
     return next((spec for spec in sim.model.surfaces if spec.name.endswith("_" + leaf)), None)
 
 
-def _trim_part(sim: Sources, kind: str, leaf: str, end: str) -> float:
+def _trim_part(sim: Sources, kind: str, leaf: str, end: str, _: Frame) -> float:
     """Part of its travel that full trim, nose up or right (`max`) or down or left, moves the surface (of two: down)."""
     spec = _spec(sim, leaf)
     if spec is None:
