@@ -22,7 +22,7 @@ from xplane_bridge.campaign.distributions import (
     Value,
     parse_parameter,
 )
-from xplane_bridge.campaign.warnings_topic import awaits_stall, messages_a_second
+from xplane_bridge.campaign.warnings_topic import messages_a_second
 from xplane_bridge.emulator.aircraft import model_names
 from xplane_bridge.emulator.flight.flight_model import FlightModelError
 from xplane_bridge.emulator.flight.limits import check_atmosphere, check_turbulence, check_wind
@@ -31,6 +31,7 @@ from xplane_bridge.in_process.aircraft import LOADING, WEATHER
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
 from xplane_bridge.scenario.schema import STICK_AXES
+from xplane_bridge.scenario.stall_warnings import awaits_stall
 from xplane_bridge.scenario.world import KINDS as WORLD_KINDS
 from xplane_bridge.scenario.yaml_file import read_yaml_file
 

@@ -13,13 +13,14 @@ import numpy as np
 from xplane_bridge.analysis.scoring import score
 from xplane_bridge.campaign.definition import FlightPlan, make_controller
 from xplane_bridge.campaign.distributions import CampaignError
-from xplane_bridge.campaign.warnings_topic import WarningInStep, awaits_stall, messages_a_second
+from xplane_bridge.campaign.warnings_topic import WarningInStep, messages_a_second
 from xplane_bridge.compiled import require
 from xplane_bridge.emulator.flight.flight_model import FlightModelError, ModelState
 from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, excitation_limits_deg
 from xplane_bridge.in_process.view import FlightView
 from xplane_bridge.scenario import FlightSample, Player, parse_scenario
 from xplane_bridge.scenario.ros_player import command_values, sample_of
+from xplane_bridge.scenario.stall_warnings import awaits_stall
 
 #: How a flight can end. Whatever it was, it is a row.
 FLOWN, NO_START, GAVE_UP, CRASHED, UNFINISHED, CONTROLLER_FAILED = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections import deque
 from typing import Any, Callable, Deque, Optional, Tuple
@@ -13,10 +12,8 @@ from xplane_bridge.lockstep import ModeInStep, Participant, TopicInStep
 from xplane_bridge.scenario.player import Action, Commands
 from xplane_bridge.scenario.ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
 from xplane_bridge.scenario.schema import ScenarioError
+from xplane_bridge.scenario.stall_warnings import RATE, age_ns, awaits_stall
 
-#: Age of the warnings that count, at least: one of them a period later has come by then, at rx_node's own rate or more.
-_WARNINGS_AGE_NS = 200_000_000
-_WARNINGS_RATE = 5  # [1/s] of rx_node where its parameter is not set
 _POLL_S = 0.2
 
 
@@ -40,8 +37,8 @@ class LockstepPlayer(RosPlayer):
         self._ending = threading.Event()
         variables = {c.variable for event in self._player.scenario.events for c in event.when}
         self._sees_mode = self._stick is not None or "mode" in variables
-        self._sees_stall = "stall_warning" in variables
-        self._warnings_age_ns = _WARNINGS_AGE_NS
+        self._sees_stall = awaits_stall(self._player.scenario)
+        self._warnings_age_ns = age_ns(RATE)
 
     def _publisher(self, topic: str, message_type: Any) -> Any:
         return lockstep.advertise(topic, message_type)
@@ -76,14 +73,14 @@ class LockstepPlayer(RosPlayer):
         import rospy
 
         name = self._namespace + "/rx_node/rates/warnings"
-        rate = rospy.get_param(name, _WARNINGS_RATE)
+        rate = rospy.get_param(name, RATE)
         if not is_number(rate) or rate <= 0:
             self.fail(
                 f"{self._player.scenario.name} waits for stall_warning, but {name} is {rate!r}, by which no warnings "
                 "come; expected 1 to 1000: set it in rx_node's parameters (rates: warnings)"
             )
             return False
-        self._warnings_age_ns = max(_WARNINGS_AGE_NS, math.ceil(1e9 / rate))
+        self._warnings_age_ns = age_ns(rate)
         return True
 
     def fail(self, error: str) -> None:

@@ -13,8 +13,8 @@ from support.flights.states import state
 from xplane_bridge.lockstep import TopicInStep
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import ScenarioError, parse_scenario
-from xplane_bridge.scenario import lockstep_player as module
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
+from xplane_bridge.scenario.stall_warnings import RATE
 
 FPS, FRAMES = 60, 240
 NAME = "/xplane/rx_node/rates/warnings"
@@ -102,7 +102,7 @@ def test_at_the_shipped_rate_and_above_they_count_after_a_fifth_of_a_second(
 
 def test_the_rate_without_a_parameter_is_the_shipped_one() -> None:
     shipped = yaml.safe_load(config_file("rx.yaml").read_text(encoding="utf-8"))
-    assert shipped["rates"]["warnings"] == module._WARNINGS_RATE
+    assert shipped["rates"]["warnings"] == RATE
 
 
 def test_where_no_warnings_come_it_is_refused_at_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
