@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Mapping, Tuple
 
-from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel
+from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, ModelInfo
 
 #: Channels of one number, and what of `Controls` they are.
 ATTRIBUTES = {
@@ -18,6 +18,8 @@ ATTRIBUTES = {
 def apply_channels(sent: Mapping[str, float], controls: Controls, model: FlightModel) -> None:
     """What the arbiter sends, as the emulator takes it from its datarefs."""
     info = model.info
+    if controls.override_throttles and not any(name.startswith("motors") for name in sent):
+        _give_motors_back(controls, info)
     for name, value in sent.items():
         attribute = ATTRIBUTES.get(name)
         if attribute is not None:
@@ -30,7 +32,17 @@ def apply_channels(sent: Mapping[str, float], controls: Controls, model: FlightM
                 controls.override_throttles = True
                 controls.throttle_use[engine] = value
             else:
-                controls.throttle[engine] = min(max(value, info.min_throttle), info.max_throttle)
+                controls.throttle[engine] = _lever(value, info)
+
+
+def _give_motors_back(controls: Controls, info: ModelInfo) -> None:
+    """Levers fly again, from where the motors were, as tx_node leaves them."""
+    controls.override_throttles = False
+    controls.throttle[:] = [_lever(value, info) for value in controls.throttle_use]
+
+
+def _lever(value: float, info: ModelInfo) -> float:
+    return min(max(value, info.min_throttle), info.max_throttle)
 
 
 @lru_cache(maxsize=None)

@@ -152,6 +152,25 @@ def test_a_value_that_tx_node_refuses_is_refused_in_process(kind: str, value: ob
         )
 
 
+def test_levers_fly_again_when_motors_are_no_longer_commanded() -> None:
+    aircraft = Aircraft(Conditions("multirotor", mode=AUTO))
+    for _ in range(30):
+        assert aircraft.command(AUTO, {"motors": [0.41] * 4}) is None
+        aircraft.step()
+    assert aircraft.controls.override_throttles
+    assert aircraft.controls.throttle_use[:4] == pytest.approx([0.41] * 4)
+    aircraft.set_mode(MANUAL, "pilot")
+    aircraft.command(MANUAL, {"throttle": 0.8})
+    aircraft.step()
+    assert not aircraft.controls.override_throttles
+    assert aircraft.controls.throttle[:4] == pytest.approx([0.41] * 4, abs=0.03)  # no jump
+    for _ in range(120):  # longer than the transition
+        assert aircraft.command(MANUAL, {"throttle": 0.8}) is None
+        aircraft.step()
+    assert aircraft.controls.throttle[:4] == pytest.approx([0.8] * 4)
+    assert [engine.throttle for engine in aircraft.state.engines[:4]] == pytest.approx([0.8] * 4, abs=0.2)
+
+
 def test_surfaces_have_the_names_of_the_core() -> None:
     text = (ROOT / "docs/control/surfaces.md").read_text(encoding="utf-8")
     assert "aileron1_wing2_left" in text
