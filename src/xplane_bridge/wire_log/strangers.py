@@ -20,7 +20,8 @@ from xplane_bridge.wire_log.fragments import DatagramReader
 _LOG = logging.getLogger(__name__)
 
 MAGIC = b"xplane_bridge wire capture 1\n"
-_REQUEST, _ANSWER, _ROWS = b"RREF\0", b"RREF,", b"DATA"
+#: X-Plane 11 and 12, and 10. Requests have any other fifth byte: a NUL, or of some programs (ArduPilot) the digit 0.
+_ANSWER, _ROWS = (b"RREF,", b"RREFO"), b"DATA"
 _PAIR = struct.Struct("<if")
 _ROW_BYTES = 36
 #: Where X-Plane is asked, unless a capture shows another port.
@@ -65,20 +66,20 @@ class StrangersCapture:
         if not xplane:
             self.xplane = self._find(seen)
         #: Where it was asked.
-        self.port = next(
-            (to[1] for _, (_, to, data) in seen if data.startswith(_REQUEST) and to[0] == self.xplane), _PORT
-        )
+        self.port = next((to[1] for _, (_, to, data) in seen if _is_request(data) and to[0] == self.xplane), _PORT)
         self.paths: List[str] = []  #: of all datarefs, by their numbers
         self.answers = 0  #: datagrams with values that have a name
         self.nameless = 0  #: values whose request is not in the capture
         self.rows = 0  #: datagrams of Data Output
+        self._received = 0  # datagrams that a node gets
         self._events = list(self._read(seen))
-        if not self._events:
-            lacking = (
-                "requests for them are not in it: capture from before the program starts"
-                if self.nameless
-                else ("expected answers (RREF), Data Output (DATA) or positions (RPOS)")
-            )
+        if not self._received:
+            if self.nameless:
+                lacking = "requests for them are not in it: capture from before the program starts"
+            elif self.paths:
+                lacking = "only requests are in it: capture what X-Plane sends, too"
+            else:
+                lacking = "expected answers (RREF), Data Output (DATA) or positions (RPOS)"
             msg = f"{path} has no values of X-Plane at {self.xplane} that can be used; {lacking}"
             remedy = [] if xplane else ["where X-Plane is at another address, give it: --xplane ADDRESS"]
             raise CaptureError("; ".join([msg, *remedy, *self.left_out()]))
@@ -105,12 +106,12 @@ class StrangersCapture:
 
     def _find(self, seen: List[Sighting]) -> str:
         votes: Counter[str] = Counter()
-        ports = {_PORT, *(to[1] for _, (_, to, data) in seen if data.startswith(_REQUEST))}
+        ports = {_PORT, *(to[1] for _, (_, to, data) in seen if _is_request(data))}
         for _, (source, to, data) in seen:
             # Rows that are written to X-Plane are like those that it sends.
-            if data.startswith(_REQUEST) or (_is_rows(data) and to[1] in ports):
+            if _is_request(data) or (_is_rows(data) and to[1] in ports):
                 votes[to[0]] += 1
-            elif data.startswith((_ANSWER, b"BECN", b"RPOS")) or _is_rows(data):
+            elif data.startswith((*_ANSWER, b"BECN", b"RPOS")) or _is_rows(data):
                 votes[source[0]] += 1
         if not votes:
             msg = f"{self.path} has no datagrams of X-Plane; expected RREF, DATA, RPOS or BECN over UDP"
@@ -131,7 +132,7 @@ class StrangersCapture:
         numbers: Dict[str, int] = {}
         first: Optional[int] = None
         for time_ns, (source, to, data) in seen:
-            if to[0] == self.xplane and data.startswith(_REQUEST) and len(data) > 13:
+            if to[0] == self.xplane and _is_request(data):
                 rate, index = struct.unpack_from("<ii", data, 5)
                 path = data[13:].split(b"\0")[0].decode("ascii", "replace")
                 client = clients.setdefault(source, len(clients))
@@ -152,6 +153,7 @@ class StrangersCapture:
             if not kind and not data.startswith(_ANSWER):
                 self._others[source] += 1
             if kind:
+                self._received += 1
                 steady_ns = _START_NS + time_ns - first
                 yield records.encode(kind, payload, max(client, 0), time_ns, steady_ns, time_ns, source)
 
@@ -180,6 +182,10 @@ class StrangersCapture:
         """The file that a node plays, in pieces."""
         yield MAGIC
         yield from self._events
+
+
+def _is_request(data: bytes) -> bool:
+    return data.startswith(b"RREF") and not data.startswith(_ANSWER) and len(data) > 13
 
 
 def _is_rows(data: bytes) -> bool:

@@ -19,12 +19,12 @@ def frame(source: tuple[str, int], to: tuple[str, int], payload: bytes) -> bytes
     return bytes(12) + b"\x08\x00" + udp(source, to, payload)
 
 
-def request(client: tuple[str, int], rate: int, index: int, path: str) -> bytes:
-    return frame(client, XPLANE, b"RREF\0" + struct.pack("<ii", rate, index) + path.encode().ljust(400, b"\0"))
+def request(client: tuple[str, int], rate: int, index: int, path: str, label: bytes = b"RREF\0") -> bytes:
+    return frame(client, XPLANE, label + struct.pack("<ii", rate, index) + path.encode().ljust(400, b"\0"))
 
 
-def answer(client: tuple[str, int], *pairs: tuple[int, float]) -> bytes:
-    return frame(XPLANE, client, b"RREF," + b"".join(struct.pack("<if", *pair) for pair in pairs))
+def answer(client: tuple[str, int], *pairs: tuple[int, float], label: bytes = b"RREF,") -> bytes:
+    return frame(XPLANE, client, label + b"".join(struct.pack("<if", *pair) for pair in pairs))
 
 
 def capture(path: Path, *frames: bytes) -> Path:
@@ -162,7 +162,20 @@ def test_of_two_addresses_that_may_be_x_plane_the_choice_is_said(
     ]
 
 
+@pytest.mark.parametrize(("asks", "answers"), [(b"RREF0", b"RREF,"), (b"RREF\0", b"RREFO")])
+def test_programs_and_versions_with_another_fifth_byte_are_read(tmp_path: Path, asks: bytes, answers: bytes) -> None:
+    """ArduPilot asks with a 0; X-Plane 10 answers with an O. An answer of 51 values is as long as a request."""
+    pairs = [(number, 0.5 * number) for number in range(51)]
+    requests = [request(CLIENT, 20, number, f"sim/{number}", label=asks) for number, _ in pairs]
+    strange = StrangersCapture(capture(tmp_path / "x.pcapng", *requests, answer(CLIENT, *pairs, label=answers)))
+    assert (strange.answers, strange.nameless, len(strange.paths)) == (1, 0, 51)
+    values = b"".join(struct.pack("<If", *pair) for pair in pairs)
+    assert values in b"".join(strange.playable())
+
+
 def test_what_cannot_be_used_is_refused_in_words(tmp_path):
+    with pytest.raises(CaptureError, match="only requests are in it: capture what X-Plane sends, too"):
+        StrangersCapture(capture(tmp_path / "r.pcapng", request(CLIENT, 1, 1, "sim/a")))
     with pytest.raises(CaptureError, match="has no datagrams of X-Plane; expected RREF, DATA"):
         StrangersCapture(capture(tmp_path / "a.pcapng", frame(CLIENT, OTHER, b"hello")))
     with pytest.raises(CaptureError, match="capture from before the program starts"):
