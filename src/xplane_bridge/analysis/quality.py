@@ -126,7 +126,8 @@ def pace(time: np.ndarray, state: Mapping[str, np.ndarray], parts: list[slice], 
         return Pace(0.0, 0.0, float("nan"), float("nan"))
     host, simulated = (time[k + 1] - time[k]) / 1e9, sim[k + 1] - sim[k]
     period = state["frame_period"][k + 1]
-    frames = simulated / np.where(period > 0.0, period, np.nan)
+    # The period is one of real time: a frame simulates as many times as long.
+    frames = simulated / (np.where(period > 0.0, period, np.nan) * np.maximum(asked[k + 1], 1.0))
     second = np.cumsum(host).astype(int)
     spans, counts = np.bincount(second, host), np.bincount(second, frames)
     rates = counts[spans > 0.5] / spans[spans > 0.5]
