@@ -35,6 +35,7 @@ class XPlane:
 
     def __init__(self) -> None:
         self.values: Dict[str, float] = {STICK: 1.0, THROTTLES: 1.0}
+        self.rows: List[Tuple[int, Tuple[float, ...]]] = []
         self.on_write: Callable[[], object] = lambda: None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
@@ -48,6 +49,9 @@ class XPlane:
                 self.on_write()
                 if _path(packet[9:]) in self.values:
                     self.values[_path(packet[9:])] = struct.unpack_from("<f", packet, 5)[0]
+            elif packet[:4] == b"DATA":
+                row, *values = struct.unpack_from("<i8f", packet, 5)
+                self.rows.append((row, tuple(values)))
             elif packet[:4] == b"RREF":
                 rate, index = struct.unpack_from("<ii", packet, 5)
                 if rate:
@@ -196,6 +200,44 @@ def test_all_are_those_of_other_aircraft_and_of_the_engines_too(tmp_path: Path) 
     assert xplane.values.pop("sim/flightmodel/engine/ENGN_thro_override") == -2.0  # what gives the levers back
     assert set(xplane.values.values()) == {0.0}
     assert "override_planepath[0..19]: released" in done.stdout
+
+
+def test_all_gives_back_the_rows_of_data_output_too(tmp_path: Path) -> None:
+    xplane = XPlane()
+    done = release(tmp_path / "none.json", "--all", "--port", str(xplane.port))
+    assert {row: set(values) for row, values in xplane.rows} == {row: {-999.0} for row in (8, 11, 13, 25)}
+    assert len(xplane.rows) >= 3 * 4  # one may be lost, and X-Plane shows none
+    assert "rows 8, 11, 13, 25: -999 sent, which X-Plane does not confirm" in done.stdout
+
+
+@pytest.mark.parametrize(("shown", "lever"), [(1.0, 0.6), (0.0, 0.2)])
+def test_levers_go_where_the_motors_were_while_x_plane_does_not_fly_them(
+    tmp_path: Path, shown: float, lever: float
+) -> None:
+    """An X-Plane that was started since has its throttles and levers of its own."""
+    xplane = XPlane()
+    path = "sim/cockpit2/engine/actuators/throttle_ratio[0]"
+    xplane.values = {THROTTLES: shown, path: 0.2}
+    motors = {"op": "dref", "path": path, "value": 0.6, "confirm": False}
+    throttles = entry("override:" + THROTTLES, motors, {"op": "dref", "path": THROTTLES, "value": 0.0})
+    journal = write(tmp_path / f"127.0.0.1_{xplane.port}.json", throttles)
+    assert release(journal).returncode == 0
+    assert xplane.values == {THROTTLES: 0.0, path: pytest.approx(lever)}
+    assert not journal.exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["--list", "--all"], "--list and --all exclude each other"),
+        (["--host", "127.0.0.1"], "--host and --port go with --all"),
+        (["--port", "49001"], "--host and --port go with --all"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(tmp_path: Path, given: List[str], words: str) -> None:
+    done = release(tmp_path / "none.json", *given)
+    assert done.returncode == 2
+    assert words in done.stderr
 
 
 @pytest.mark.parametrize("in_the_way", [".lock", ".new"])
