@@ -25,7 +25,7 @@ _LONGEST_STEP_S = 0.1  # over a longer gap integrators do not go on
 
 def clip(value: float, low: float, high: float) -> float:
     """The value, or the nearer bound."""
-    return min(max(value, low), high)
+    return low if value < low else high if value > high else value
 
 
 class AttitudeHold:

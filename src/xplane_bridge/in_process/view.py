@@ -109,7 +109,7 @@ class FlightView(_Numbers):
     @property
     def angular_velocity(self) -> Vector3:
         """[rad/s] FRD."""
-        return Vector3(self.p, self.q, self.r)
+        return tuple.__new__(Vector3, (self.p, self.q, self.r))  # not by its own, slower one: each frame asks
 
     @property
     def angular_acceleration(self) -> Vector3:

@@ -21,6 +21,7 @@ Rows = Tuple[Vector, Vector, Vector]
 #: How far the aircraft must be beyond the line where the origin changes before it jumps, so that flying along that
 #: line does not make it jump every frame [deg].
 ORIGIN_HYSTERESIS_DEG = 0.001
+_REACH_DEG = 0.5 + ORIGIN_HYSTERESIS_DEG  # from an origin to where it changes
 #: Cosine of the pitch below which roll and heading are one.
 _VERTICAL = 1e-7
 
@@ -167,10 +168,9 @@ class LocalFrame:
         Returns:
             Whether the origin jumped.
         """
-        north = latitude_deg - self.lat_ref
-        east = wrap_half_turn(longitude_deg - self.lon_ref)
-        limit = 0.5 + ORIGIN_HYSTERESIS_DEG
-        if abs(north) <= limit and abs(east) <= limit:
+        north, east = latitude_deg - self.lat_ref, longitude_deg - self.lon_ref
+        # Wrapped only beyond it: this is asked in each frame.
+        if abs(north) <= _REACH_DEG and (abs(east) <= _REACH_DEG or abs(wrap_half_turn(east)) <= _REACH_DEG):
             return False
         origin = nominal_origin(latitude_deg, longitude_deg)
         if origin == (self.lat_ref, self.lon_ref):  # beyond the outermost origin, at a pole
