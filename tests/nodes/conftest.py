@@ -43,6 +43,20 @@ LONG = (
     "whole/test_doctor.py",
 )
 
+#: Of tests that keep a processor busy for a fifth of their time and more: they build, draw, run many programs or fly as
+#: fast as they can. The others wait for simulated time.
+BUSY = (
+    "whole/",
+    "flights/",
+    "wire_log/",
+    "lockstep/test_lockstep_scenario.py",
+    "capture/test_labelled_approach.py",
+    "capture/test_two_cameras.py",
+    "base/test_bad_inputs.py",
+    "base/test_launch_files.py",
+    "joystick/test_joystick_launch.py",
+)
+
 heed_ctrl_c()
 
 
@@ -54,7 +68,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Replaces pytest-xdist's own order of tests."""
-    return long_ones_first(config, log, LONG)
+    return long_ones_first(config, log, LONG, BUSY)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -96,3 +96,44 @@ def test_long_ones_begin_and_the_others_stay_with_their_file(tmp_path):
     for name in "abcd":
         others = {process for test, process in begun if f"test_{name}.py" in test and "slow" not in test}
         assert len(others) == 1, begun
+
+
+BUSY_CONFTEST = """
+import pathlib, sys
+sys.path.insert(0, {tests!r})
+from support.scheduling import long_ones_first
+BUSY = ("busy/", "test_e.py")
+
+def pytest_xdist_make_scheduler(config, log):
+    scheduler = long_ones_first(config, log, ("test_e.py::test_one",), BUSY, at_once=2)
+    assign = scheduler._assign_work_unit
+
+    def write_and_assign(node):
+        assign(node)
+        at_busy = [
+            each.gateway.id for each in scheduler.nodes for scope, unit in scheduler.assigned_work[each].items()
+            if ("/busy/" in scope or "test_e" in scope) and not all(unit.values())
+        ]
+        with pathlib.Path({log!r}).open("a") as file:
+            print(node.gateway.id, *sorted(set(at_busy)), file=file)
+
+    scheduler._assign_work_unit = write_and_assign
+    return scheduler
+"""
+
+
+@pytest.mark.parametrize("waiting", ["abcd", ""])
+def test_only_so_many_processes_run_busy_ones(tmp_path: Path, waiting: str) -> None:
+    folder, log = tmp_path / "side_by_side", tmp_path / "log"
+    (folder / "busy").mkdir(parents=True)
+    (folder / "conftest.py").write_text(BUSY_CONFTEST.format(tests=str(ROOT / "tests"), log=str(log)), encoding="utf-8")
+    files = [*(f"test_{name}.py" for name in waiting), "test_e.py", *(f"busy/test_{number}.py" for number in range(6))]
+    for name in files:
+        (folder / name).write_text(FILE, encoding="utf-8")
+    command = [sys.executable, "-m", "pytest", "-q", "--numprocesses", "4", "--dist", "loadfile", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"{5 * len(files)} passed" in done.stdout
+    lines = [line.split() for line in log.read_text(encoding="utf-8").splitlines()]
+    assert max(len(at_busy) for _, *at_busy in lines) == 2
+    assert len({process for process, *_ in lines}) == 4
