@@ -8,7 +8,8 @@ layout (all lengths inside equal) are decoded together by numpy; a topic whose l
 and only messages that hold lists of messages or of strings are decoded one by one.
 
 Where X-Plane was restarted and stamps go by its time (`publish_clock`), they go back; they are read as going on, and so
-are receive times of a recorder that goes by that time (`bags.restarts`). A warning says by how much.
+are receive times of a recorder that goes by that time (`bags.restarts`). A warning says by how much. Where rx_node was
+restarted, epochs are counted on.
 
 A long recording needs little memory in pieces (`Bags.pieces`), or with its columns in a temporary file (`ColumnFile`).
 
@@ -42,7 +43,7 @@ from xplane_bridge.bags.decoding import (
     decode_objects,
     wanted,
 )
-from xplane_bridge.bags.restarts import Restarts, let_receive_times_go_on
+from xplane_bridge.bags.restarts import STATE_COLUMNS, Restarts, States
 from xplane_bridge.bags.units import Unit, later_units, parse_units
 from xplane_bridge.errors import XplaneBridgeError
 
@@ -171,7 +172,7 @@ class Bags:
         if len({(path.parent, _PART.sub("", path.stem)) for path in self.paths}) == 1:
             self.paths.sort(key=_part)  # a shell gives them in the order of texts
         self._open: Optional[list[BagFile]] = None
-        self._restarts = Restarts(self.paths[0], self._state_stamps)
+        self._restarts = Restarts(self.paths[0], self._states, self._states_of)
 
     def __enter__(self) -> Bags:
         """Open all files."""
@@ -179,9 +180,7 @@ class Bags:
         try:
             for path in self.paths:
                 self._open.append(_opened(path))
-            states = self._states()
-            if states:
-                let_receive_times_go_on(states, self._epochs, self._files)
+            self._restarts.let_receive_times_go_on(self._files)
         except BaseException:
             self.__exit__()
             raise
@@ -192,7 +191,7 @@ class Bags:
         for file in self._open or ():
             file.close()
         self._open = None
-        self._restarts = Restarts(self.paths[0], self._state_stamps)
+        self._restarts = Restarts(self.paths[0], self._states, self._states_of)
 
     @property
     def _files(self) -> list[BagFile]:
@@ -285,9 +284,8 @@ class Bags:
         """
         connections = self._connections(topic)
         filling = Filling(sum(len(file.times(c.id)) for file, c in connections), store)
-        for file, connection in connections:
-            for time, found in self._pieces(file, connection, columns):
-                filling.add(time, self._restarts.columns(time, found))
+        for time, found in self._going_on(topic, columns):
+            filling.add(time, found)
         return _table(topic, connections[-1][1].msgtype, filling, columns)
 
     def pieces(self, topic: str, columns: Optional[Sequence[str]] = None) -> Iterator[Table]:
@@ -300,11 +298,11 @@ class Bags:
         Raises:
             BagError: No such topic or column, or damaged data.
         """
-        for file, connection in self._connections(topic):
-            for time, found in self._pieces(file, connection, columns):
-                filling = Filling(len(time), None)
-                filling.add(time, self._restarts.columns(time, found))
-                yield _table(topic, connection.msgtype, filling, columns)
+        msgtype = self._connections(topic)[-1][1].msgtype
+        for time, found in self._going_on(topic, columns):
+            filling = Filling(len(time), None)
+            filling.add(time, found)
+            yield _table(topic, msgtype, filling, columns)
 
     def messages(self, topic: str, spans: Optional[Sequence[tuple[int, int]]] = None) -> Iterator[tuple[int, Any]]:
         """Yield (receive time [ns], message) of one topic one at a time, in time order: for images and lists.
@@ -333,6 +331,16 @@ class Bags:
         """Give the message types of a topic, as rosbags parses them: (constants, fields) by ``package/msg/Name``."""
         return self._parsed(recorded.topic, recorded.msgtype, recorded.definition)[0]
 
+    def _going_on(
+        self, topic: str, columns: Optional[Sequence[str]]
+    ) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
+        """Receive times and columns of a topic; stamps and epochs go on over restarts."""
+        own = bool(self.own([topic]))
+        for file, connection in self._connections(topic):
+            for time, found in self._pieces(file, connection, columns):
+                moved = self._restarts.columns(time, found)
+                yield time, self._restarts.epochs(time, moved) if own else moved
+
     def _pieces(
         self, file: BagFile, connection: Connection, columns: Optional[Sequence[str]]
     ) -> Iterator[tuple[np.ndarray, dict[str, np.ndarray]]]:
@@ -358,16 +366,8 @@ class Bags:
         topic = self.topic_of_type(FLIGHT_STATE)
         return [] if topic is None else [(file, connection.id) for file, connection in self._connections(topic)]
 
-    def _epochs(self, file: BagFile, id_: int) -> np.ndarray:
-        pieces = self._pieces(file, file.connections[id_], ["epoch"])
-        found = [piece.get("epoch", np.zeros(len(time), np.uint32)) for time, piece in pieces]
-        return np.concatenate([np.empty(0, np.uint32), *found])
-
-    def _state_stamps(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Receive times and stamps of the flight states, as recorded."""
-        for file, id_ in self._states():
-            for time, found in self._pieces(file, file.connections[id_], ["header.stamp"]):
-                yield time, found.get("header.stamp", time)
+    def _states_of(self, file: BagFile, id_: int) -> States:
+        return States.of(self._pieces(file, file.connections[id_], list(STATE_COLUMNS)))
 
     def _undecoded(self, file: BagFile, connections: list[Connection]) -> Iterator[tuple[Recorded, int, bytes]]:
         known = {c.id: Recorded(*c[1:]) for c in connections}

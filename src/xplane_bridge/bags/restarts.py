@@ -1,8 +1,11 @@
-"""Recordings over a restart of X-Plane whose stamps are simulator time, so that they go back: time is made to go on.
+"""Recordings over a restart of X-Plane or of rx_node: stamps and epochs that begin anew are made to go on.
 
 With `publish_clock` a stamp is X-Plane's running time, which begins anew with X-Plane. Stamps of two flights would lie
 among each other, and so would receive times of a recorder that goes by the simulator's time. Both are moved as they are
 read, so that whatever sorts or joins by them has one time that only goes on.
+
+An rx_node counts its epochs from 0. Where it was started anew in a recording, those that it counts are raised as they
+are read, so that an epoch and a simulator time are of one frame.
 """
 
 from __future__ import annotations
@@ -10,11 +13,12 @@ from __future__ import annotations
 import functools
 import logging
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterable, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from xplane_bridge.bags.chunks import BagFile
+from xplane_bridge.bags.segments import DEFAULT_MAX_GAP
 
 _LOG = logging.getLogger(__name__)
 #: A clock that goes back by less was set, or messages overtook each other: they are sorted.
@@ -23,31 +27,142 @@ _FALL_NS = 10**9
 _NEAR_NS = _FALL_NS // 2
 #: Between what was received before and after a restart, where the recorder's clock does not say how long it took.
 _PAUSE_NS = 10**9
+#: Without states for longer, rx_node may have been started anew.
+_INTERRUPTED_NS = round(DEFAULT_MAX_GAP * 1e9)
+#: What `States` are made of beside the time of receipt, in their order.
+STATE_COLUMNS = {
+    "header.stamp": np.int64,
+    "epoch": np.uint32,
+    "sim_time_unwrapped": np.float64,
+    "frame_count": np.uint32,
+}
+
+
+class States(NamedTuple):
+    """What shows a restart, of flight states as recorded; each of shape (n,)."""
+
+    time: np.ndarray  #: int64 [ns] of receipt
+    stamp: np.ndarray  #: int64 [ns]
+    epoch: np.ndarray
+    sim_time: np.ndarray  #: [s] unwrapped
+    frame: np.ndarray  #: their number since the link came up
+
+    @classmethod
+    def of(cls, pieces: Iterable[Tuple[np.ndarray, Mapping[str, np.ndarray]]]) -> States:
+        """Joins receive times and `STATE_COLUMNS`; what old definitions lack is 0."""
+        rows = [[np.empty(0, np.int64), *(np.empty(0, kind) for kind in STATE_COLUMNS.values())]]
+        for time, found in pieces:
+            rows.append(
+                [
+                    time,
+                    *(found.get(name, np.zeros(len(time), kind)) for name, kind in STATE_COLUMNS.items()),
+                ]
+            )
+        return cls(*(np.concatenate(columns) for columns in zip(*rows)))
+
+    def rows(self, rows: np.ndarray) -> States:
+        """Give some, in this order."""
+        return States(*(column[rows] for column in self))
+
+    def raised(self) -> np.ndarray:
+        """Give for each but the first whether its epoch is higher than that of the one before."""
+        raised: np.ndarray = self.epoch[1:] > self.epoch[:-1]
+        return raised
+
+    def counted_anew(self) -> np.ndarray:
+        """Give for each but the first whether rx_node was started anew before it, and counts epochs from 0 again."""
+        fallen = [column[1:] < column[:-1] for column in (self.epoch, self.sim_time, self.frame)]
+        anew: np.ndarray = np.any(fallen, axis=0) & ~self.raised()
+        return anew
+
+
+class _Found(NamedTuple):
+    """From when on [ns, receipt] what is behind restarts differs, and by how much: one more of these than of times."""
+
+    since: np.ndarray
+    by: np.ndarray
+
+    def at(self, time: np.ndarray) -> np.ndarray:
+        found: np.ndarray = self.by[np.searchsorted(self.since, time)]
+        return found
 
 
 class Restarts:
-    """Makes the stamps of a flight's messages go on as their receive times do.
+    """Makes the stamps and the epochs of a flight's messages go on as their receive times do.
 
     Args:
         path: A bag of the flight, for the warning.
-        states: Gives receive times and stamps of the flight states, in pieces; asked when stamps are not host time.
+        connections: Gives those of the flight state: file, number of the connection.
+        states: Gives the states of one, in the order of the file.
     """
 
-    def __init__(self, path: Path, states: Callable[[], Iterable[Tuple[np.ndarray, np.ndarray]]]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        connections: Callable[[], Sequence[Tuple[BagFile, int]]],
+        states: Callable[[BagFile, int], States],
+    ) -> None:
         self._path = path
+        self._connections = connections
         self._states = states
-        self._since: Optional[np.ndarray] = None
-        self._by = np.zeros(1, np.int64)
+        self._found: Optional[Tuple[_Found, _Found]] = None
+        self._interrupted: Optional[bool] = None
+
+    def let_receive_times_go_on(self, files: Sequence[BagFile]) -> None:
+        """Move the receive times of all messages that were recorded after the recorder's clock went back.
+
+        It did where those of the flight states go back, in the order in which they were written, and their epoch is
+        raised or, in one file, counted anew: receive times of files in disorder go back, too.
+
+        Args:
+            files: In the order in which they were recorded.
+        """
+        connections = self._connections()
+        if not connections:
+            return
+        numbers, places, times = [], [], []
+        for file, id_ in connections:
+            places.append(file.places(id_))
+            times.append(file.times(id_))
+            numbers.append(np.full(len(times[-1]), files.index(file)))
+        number, place, time = (np.concatenate(columns) for columns in (numbers, places, times))
+        order = np.lexsort((place, number))
+        number, place, time = number[order], place[order], time[order]
+        new = falls(time)
+        if not len(new):
+            return
+        states = self._recorded().rows(order)
+        restarted = states.raised() | (states.counted_anew() & (np.diff(number) == 0))
+        for k in new[restarted[new - 1]][::-1].tolist():  # from the last: each moves all that follows
+            first = place[k - 1] if number[k - 1] == number[k] else -1
+            step = int(time[k - 1] - time[k]) + _PAUSE_NS
+            files[number[k]].move(int(first), int(place[k]), int(time[k - 1] // 2 + time[k] // 2), step)
+            for file in files[number[k] + 1 :]:
+                file.move(-1, -1, 0, step)
 
     def columns(self, time: np.ndarray, found: Dict[str, np.ndarray]) -> Dict[str, np.ndarray]:
         """Give columns of messages received at these times [ns]; the stamps of headers are moved where they must be."""
         names = [name for name in found if name == "header.stamp" or name.endswith(".header.stamp")]
         if all((np.abs(time - found[name]) < _NEAR_NS).all() for name in names):
             return found
-        if self._since is None:
-            self._since = self._read()
-        by = self._by[np.searchsorted(self._since, time)]
+        by = self._read()[0].at(time)
         return {**found, **{name: np.where(found[name] == 0, 0, found[name] + by) for name in names}}
+
+    def epochs(self, time: np.ndarray, found: Dict[str, np.ndarray]) -> Dict[str, np.ndarray]:
+        """Give columns of rx_node's messages, or of what holds its states; epochs are counted on over its restarts."""
+        names = [name for name in found if name == "epoch" or name.endswith(".epoch")]
+        if not names or not self._is_interrupted():
+            return found
+        by = self._read()[1].at(time)
+        return {**found, **{name: (found[name] + by).astype(found[name].dtype) for name in names}}
+
+    def _is_interrupted(self) -> bool:
+        """Whether rx_node can have been started anew: states are missing. By the index, which is read anyway."""
+        if self._interrupted is None:
+            times = [file.times(id_) for file, id_ in self._connections()]
+            received = np.sort(np.concatenate([np.empty(0, np.int64), *times]))
+            self._interrupted = bool((np.diff(received) > _INTERRUPTED_NS).any())
+        return self._interrupted
 
     def message(self, time: int, message: Any) -> None:
         """Move the stamp of one message's header."""
@@ -57,19 +172,38 @@ class Restarts:
             (moved,) = self.columns(np.array([time]), recorded)["header.stamp"].tolist()
             stamp.sec, stamp.nanosec = divmod(moved, 1_000_000_000)
 
-    def _read(self) -> np.ndarray:
-        """Find the receive times [ns] behind which messages are of the flight after a restart."""
-        pieces = [(np.empty(0, np.int64), np.empty(0, np.int64)), *self._states()]
-        time, stamp = (np.concatenate(columns) for columns in zip(*pieces))
-        order = np.argsort(time, kind="stable")
-        time, stamp = time[order], stamp[order]
+    def _read(self) -> Tuple[_Found, _Found]:
+        """Find by how much stamps [ns] and epochs behind restarts are raised."""
+        if self._found is None:
+            states = self._recorded()
+            states = states.rows(np.argsort(states.time, kind="stable"))
+            stamps = self._stamps(states)
+            self._found = stamps, _epochs(states._replace(stamp=states.stamp + stamps.at(states.time)))
+        return self._found
+
+    def _recorded(self) -> States:
+        """All states, connection by connection."""
+        read = [self._states(file, id_) for file, id_ in self._connections()]
+        return States(*(np.concatenate(columns) for columns in zip(States.of(()), *read)))
+
+    def _stamps(self, states: States) -> _Found:
+        time, stamp = states.time, states.stamp
         new = falls(stamp)
         passed = time[new] - time[new - 1]
-        self._by = np.concatenate([self._by, np.cumsum(stamp[new - 1] - stamp[new] + passed)])
+        by = np.append(0, np.cumsum(stamp[new - 1] - stamp[new] + passed))
         if len(new):
-            _say(self._path, tuple((self._by[1:] / 1e9).tolist()))
-        since: np.ndarray = time[new - 1] + passed // 2
-        return since
+            _say(self._path, tuple((by[1:] / 1e9).tolist()))
+        return _Found(time[new - 1] + passed // 2, by)
+
+
+def _epochs(states: States) -> _Found:
+    """Find where rx_node was started anew; where stamps lie among each other the host's clock was set back instead."""
+    time, stamp = states.time, states.stamp
+    behind = np.maximum.accumulate(stamp)[:-1] < np.minimum.accumulate(stamp[::-1])[::-1][1:]
+    passed = np.diff(time)
+    new = np.flatnonzero(states.counted_anew() & (passed > _INTERRUPTED_NS) & behind) + 1
+    counted = [int(run.max()) + 1 for run in np.split(states.epoch, new)[:-1]]
+    return _Found(time[new - 1] + passed[new - 1] // 2, np.cumsum([0, *counted]))
 
 
 @functools.lru_cache(maxsize=None)
@@ -88,36 +222,3 @@ def falls(time: np.ndarray) -> np.ndarray:
         return np.empty(0, dtype=int)
     before, behind = np.minimum(time[:-3], time[1:-2]), np.maximum(time[2:-1], time[3:])
     return np.flatnonzero(behind < before - _FALL_NS) + 2
-
-
-def let_receive_times_go_on(
-    states: Sequence[Tuple[BagFile, int]], epochs: Callable[[BagFile, int], np.ndarray], files: Sequence[BagFile]
-) -> None:
-    """Move the receive times of all messages that were recorded after the recorder's clock went back.
-
-    It did where those of the flight states go back, in the order in which they were written, and their epoch is raised:
-    receive times of files in disorder go back, too.
-
-    Args:
-        states: The connections of the flight state: file, number of the connection.
-        epochs: Gives the epochs of one, in the order of its receive times.
-        files: In the order in which they were recorded.
-    """
-    numbers, places, times = [], [], []
-    for file, id_ in states:
-        places.append(file.places(id_))
-        times.append(file.times(id_))
-        numbers.append(np.full(len(times[-1]), files.index(file)))
-    number, place, time = (np.concatenate(columns) for columns in (numbers, places, times))
-    order = np.lexsort((place, number))
-    number, place, time = number[order], place[order], time[order]
-    new = falls(time)
-    if not len(new):
-        return
-    epoch = np.concatenate([epochs(file, id_) for file, id_ in states]).astype(np.int64)[order]
-    for k in new[epoch[new] > epoch[new - 1]][::-1].tolist():  # from the last: each moves all that follows
-        first = place[k - 1] if number[k - 1] == number[k] else -1
-        step = int(time[k - 1] - time[k]) + _PAUSE_NS
-        files[number[k]].move(int(first), int(place[k]), int(time[k - 1] // 2 + time[k] // 2), step)
-        for file in files[number[k] + 1 :]:
-            file.move(-1, -1, 0, step)

@@ -1,9 +1,9 @@
-"""Recordings over a restart of X-Plane with stamps of simulator time: two flights, one behind the other."""
+"""Recordings over a restart of X-Plane, or of rx_node too: two flights, one behind the other."""
 
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Dict, List, NamedTuple
+from typing import TYPE_CHECKING, Dict, List, NamedTuple, Tuple
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,7 @@ LOADING_S = 30
 EACH = 80  #: states of a flight
 BOTH = 2 * EACH
 STATE, ODOM, MODE, IMAGE = "/xplane/flight_state", "/xplane/odom", "/xplane/control/mode", "/xplane/camera/image_raw"
+FRAME, TRAFFIC = "/xplane/camera/frame_state", "/xplane/traffic/state"
 
 
 class Received(NamedTuple):
@@ -57,18 +58,27 @@ def time_of(stamp: int) -> Dict[str, int]:
     return dict(zip(("sec", "nanosec"), divmod(stamp, S)))
 
 
-def write(path: Path, received: List[Received], happened: List[Dict[str, object]]) -> None:
+def write(
+    path: Path,
+    received: List[Received],
+    happened: List[Dict[str, object]],
+    epochs: Tuple[int, int] = (1, 2),
+    host_stamps: bool = False,
+) -> None:
     """Writes these states into a bag; the list of events, latched, goes on from bag to bag."""
     with FlightBag(path) as bag:
         for k, flight, stamp, receive in received:
-            header = bag.header(stamp, "")
-            state = {**bag.state(0.0, k), "header": header, "epoch": 1 + flight, "altitude_msl": 1e3 * (flight + 1)}
+            header = bag.header(receive if host_stamps else stamp, "")
+            sim_time, epoch = (stamp - CLOCK) / S, epochs[flight]
+            state = {**bag.state(sim_time, k), "header": header, "epoch": epoch, "altitude_msl": 1e3 * (flight + 1)}
             pose = {"position": {"x": float(flight)}, "orientation": {"w": 1.0}}
             image = {"header": header, "encoding": "mono8", "height": 1, "width": 1, "step": 1, "data": [flight]}
             for topic, msgtype, values in (
                 (ODOM, "nav_msgs/Odometry", {"header": header, "pose": {"pose": pose}}),
                 (STATE, "xplane_bridge/FlightState", state),
                 (IMAGE, "sensor_msgs/Image", image),
+                (FRAME, "xplane_bridge/FrameState", {"header": header, "state": state}),
+                (TRAFFIC, "xplane_bridge/TrafficState", {"header": header, "epoch": epoch, "sim_time": sim_time}),
             ):
                 bag.add(topic, msgtype, receive, values)
             if k in (30, BOTH - 10):  # a stamp of the second flight that is later than that of the first
@@ -78,14 +88,16 @@ def write(path: Path, received: List[Received], happened: List[Dict[str, object]
                 bag.add("/xplane/events", "xplane_bridge/EventList", receive, {"header": header, "events": happened})
 
 
-@pytest.fixture(params=["host", "clock", "host, split", "clock, split"])
+@pytest.fixture(params=["host", "clock", "host, split", "clock, split", "clock, rx_node", "clock, split, rx_node"])
 def recording(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """Where rx_node is started anew with X-Plane, its epochs begin anew."""
+    epochs = (0, 0) if "rx_node" in request.param else (0, 1)
     received = flights("clock" in request.param)
     (tmp_path / "bags").mkdir()
     happened: List[Dict[str, object]] = []
     cuts = [0, 50, 100, BOTH] if "split" in request.param else [0, BOTH]
     for n, (first, end) in enumerate(zip(cuts[:-1], cuts[1:])):
-        write(tmp_path / "bags" / f"flight_{n}.bag", received[first:end], happened)
+        write(tmp_path / "bags" / f"flight_{n}.bag", received[first:end], happened, epochs)
     return tmp_path / "bags"
 
 
@@ -94,7 +106,7 @@ def test_two_flights_lie_behind_each_other(recording: Path, caplog: pytest.LogCa
         flight = read_flight(bags)
         pictures = [(m.header.stamp.sec * S + m.header.stamp.nanosec, int(m.data[0])) for _, m in bags.messages(IMAGE)]
     state, odom = flight.tables["state"], flight.tables["odom"]
-    assert state["epoch"].tolist() == [1] * EACH + [2] * EACH
+    assert state["epoch"].tolist() == [0] * EACH + [1] * EACH
     assert odom["pose.pose.position.x"].tolist() == [0.0] * EACH + [1.0] * EACH
     assert (np.diff(state.stamp) > 0).all()
     assert (np.diff(state.time[[0, EACH - 1, EACH, BOTH - 1]]) > 0).all()
@@ -108,6 +120,20 @@ def test_two_flights_lie_behind_each_other(recording: Path, caplog: pytest.LogCa
     ]
     assert flight.parts == [slice(0, EACH), slice(EACH, BOTH)]
     assert "stamps go back where X-Plane was restarted" in caplog.text
+
+
+def test_an_rx_node_started_anew_counts_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / "flight.bag"
+    received = [each for each in flights(by_clock=False) if each.number % EACH not in (20, 21)]  # none overtakes
+    write(path, received, [], epochs=(1, 1), host_stamps=True)
+    count = len(received) // 2
+    with caplog.at_level(logging.WARNING), Bags(path) as bags:
+        counted = [bags.read(FRAME)["state.epoch"], bags.read(TRAFFIC)["epoch"], bags.read(STATE, ["epoch"])["epoch"]]
+        pieces = np.concatenate([piece["epoch"] for piece in bags.pieces(STATE, ["epoch"])])
+        flight = read_flight(bags)
+    assert [each.tolist() for each in (*counted, pieces)] == [[1] * count + [3] * count] * 4
+    assert flight.parts == [slice(0, count), slice(count, 2 * count)]
+    assert caplog.text == ""
 
 
 def test_a_recording_of_more_than_ten_parts_is_in_their_order(tmp_path: Path) -> None:
