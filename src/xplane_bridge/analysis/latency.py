@@ -174,9 +174,9 @@ def accumulated_rotation(time: np.ndarray, rates: np.ndarray, axis: np.ndarray) 
     return np.concatenate(((0.0,), np.cumsum(steps)))
 
 
-def value_motion(time: np.ndarray, value: np.ndarray) -> Motion:
-    """Increments of a sampled signal between neighbouring samples."""
-    return Motion(time[:-1], time[1:], np.diff(value))
+def value_motion(time: np.ndarray, value: np.ndarray, step: int = 1) -> Motion:
+    """Increments of a sampled signal between each sample and the one so many samples behind."""
+    return Motion(time[:-step], time[step:], value[step:] - value[:-step])
 
 
 def _robust(matrix: np.ndarray, wanted: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Dict, Iterator, List, Optional, Sequence, Unio
 
 import numpy as np
 
+from xplane_bridge.analysis.commands import commanded, of_controls
 from xplane_bridge.analysis.latency import (
     Delay,
     LatencyError,
@@ -198,9 +199,10 @@ def display_delay(bags: Bags, view: Optional[int] = None, ignore_bottom: float =
 
 
 def command_responses(bags: Bags) -> dict[str, Delay]:
-    """Delay from each new command sent to the surface that follows it, where both were recorded and moved.
+    """Delay of each surface behind the command that it follows, where both were recorded and moved.
 
-    A moving command is sent again until its next value comes; only the first sending of a value counts.
+    A moving command is sent again until its next value comes; only the first sending of a value counts. As a control
+    law sees it: a value that holds until the next one is half that time old on average, which is part of the delay.
     """
     commands = _first_of_type(bags, "xplane_bridge/AppliedCommand")
     surfaces = _first_of_type(bags, "xplane_bridge/SurfaceStates")
@@ -209,20 +211,31 @@ def command_responses(bags: Bags) -> dict[str, Delay]:
         return results
     zero = commands.stamp[0]
     lead_time, late_time = 1e-9 * (commands.stamp - zero), 1e-9 * (surfaces.stamp - zero)
-    order, late_order = _increasing(lead_time), _increasing(late_time)
+    own = np.flatnonzero(of_controls(commands.columns))
+    order, late_order = own[_increasing(lead_time[own])], _increasing(late_time)
     for command, surface in _RESPONSES:
         lead, late = commands[command][order], surfaces[surface][late_order]
-        known, known_late = np.isfinite(lead), np.isfinite(late)
+        known, known_late = commanded(commands.columns, command)[order] & np.isfinite(lead), np.isfinite(late)
         if known.sum() < 2 or np.ptp(lead[known]) < 0.02 or known_late.sum() < 2:
             continue
-        motion = value_motion(late_time[late_order][known_late], late[known_late])
-        sent, value = lead_time[order][known], lead[known]
+        sent, value, shown = lead_time[order][known], lead[known], late_time[late_order][known_late]
+        rows = np.flatnonzero(known)
+        gaps = [(lead_time[order[k]], lead_time[order[n]]) for k, n in zip(rows[:-1], rows[1:]) if n - k > 1]
         news = ~_refreshes(sent, value)
+        motion = value_motion(shown, late[known_late], _frames_of_a_value(sent[news], value[news], shown))
         try:
-            results[f"{command} command"] = fit_delay(motion, sent[news], value[news])
+            results[f"{command} command"] = fit_delay(motion, sent[news], value[news], gaps=gaps)
         except LatencyError:
             continue  # too short; the display delay has said so already
     return results
+
+
+def _frames_of_a_value(sent: np.ndarray, value: np.ndarray, shown: np.ndarray) -> int:
+    """For how many frames a moving command holds a value: between neighbouring ones most surfaces would stand still."""
+    changes = sent[1:][np.diff(value) != 0.0]
+    if len(changes) < 2:
+        return 1
+    return max(1, round(float(np.median(np.diff(changes)) / np.median(np.diff(shown)))))
 
 
 def _refreshes(sent: np.ndarray, value: np.ndarray) -> np.ndarray:

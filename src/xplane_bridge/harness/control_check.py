@@ -7,6 +7,7 @@ from typing import Dict, List, NamedTuple, Tuple
 
 import numpy as np
 
+from xplane_bridge.analysis.commands import of_controls
 from xplane_bridge.bags import Bags, Table
 from xplane_bridge.constants import CommandSource, FlightMode
 from xplane_bridge.harness.flight_check import CheckError, Verdict
@@ -91,7 +92,7 @@ def check_modes(modes: Table, applied: Table, joystick: str) -> Verdict:
     time = applied.time / 1e9
     right = total = 0
     for spell in flown:
-        within = (time > spell.start + _SETTLED_S) & (time < spell.end) & (applied["source"] != CommandSource.NONE)
+        within = (time > spell.start + _SETTLED_S) & (time < spell.end) & of_controls(applied.columns)
         if spell is flown[-1]:
             within &= applied["source"] != CommandSource.FAILSAFE  # the end: the stick falls silent
         right += int(np.count_nonzero(applied["source"][within] == _SOURCE_OF[FlightMode(spell.mode)]))

@@ -7,21 +7,19 @@ from typing import TYPE_CHECKING, Callable, Optional, Sequence
 
 import numpy as np
 
+from xplane_bridge.analysis.commands import commanded, of_controls
 from xplane_bridge.analysis.episodes import Episode, from_sets, from_values, who_flew, within
-from xplane_bridge.constants import ControlField
 from xplane_bridge.plotting.spec import Panel, PathFigure, Series, TimeFigure
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Table
     from xplane_bridge.bags.flight import Flight
 
-#: ControlCommand's bits, as in AppliedCommand.fields; THROTTLE, ENGINE_THROTTLES and MOTORS all fill `throttles`.
-_COMMAND_BITS = {
-    "roll": ControlField.ROLL,
-    "pitch": ControlField.PITCH,
-    "yaw": ControlField.YAW,
-    "throttles": ControlField.THROTTLE | ControlField.ENGINE_THROTTLES | ControlField.MOTORS,
-}
+#: Fields of SurfaceStates with a deflection of each panel. What does not move is not drawn.
+_SURFACES = (
+    "aileron1", "aileron2", "spoiler1", "spoiler2", "flap1", "flap2", "speedbrake1", "speedbrake2", "yaw_brake",
+    "wing_elevator1", "wing_elevator2", "elevator", "rudder",
+)  # fmt: skip
 
 
 class MissingError(Exception):
@@ -222,16 +220,16 @@ def _commanded(flight: Flight, column: str, index: Optional[int] = None) -> list
         return []
     t = flight.tables["applied"]
     values = (t[column] if index is None else t[column][:, index]).astype(np.float64)
-    sent = (t["fields"].astype(np.int64) & _COMMAND_BITS[column].value) != 0
+    sent, own = commanded(t.columns, column), of_controls(t.columns)
     if not sent.any():
         return []
-    return [Series("commanded", t.stamp, np.where(sent, values, np.nan), dashed=True, stepped=True)]
+    return [Series("commanded", t.stamp[own], np.where(sent, values, np.nan)[own], dashed=True, stepped=True)]
 
 
 def _surfaces(flight: Flight) -> TimeFigure:
     t = _table(flight, "surfaces", "mission/surfaces")
     panels = []
-    for group in ("aileron1", "aileron2", "spoiler1", "flap1", "speedbrake1", "elevator", "rudder"):
+    for group in _SURFACES:
         if group not in t:
             continue
         series = []

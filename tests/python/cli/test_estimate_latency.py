@@ -74,6 +74,8 @@ def write_bag(
     *windows: Window,
     scale: float = 1.0,
     refresh: bool = False,
+    surfaces_too: bool = False,
+    held: bool = False,
     aileron: float = 15.0,
     pause: float = 0.0,  # [s] in its middle
 ) -> None:
@@ -89,10 +91,14 @@ def write_bag(
             bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(t), state)
             if k % 3 == 0 or refresh:
                 new = k // 3 * 3 / 60  # when this value was sent for the first time
-                command = {"header": bag.header(stamp_ns(t), ""), "roll": math.sin(2.1 * new)}
+                command = {"header": bag.header(stamp_ns(t), ""), "source": 2, "fields": 1, "roll": math.sin(2.1 * new)}
                 bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", stamp_ns(t), command)
-            if k % 3 == 0:  # the aileron follows the stick by 45 ms
-                moved = aileron * math.sin(2.1 * (t - 0.045))
+            if surfaces_too:
+                echo = {"header": bag.header(stamp_ns(t), ""), "surface_names": ["rudder1"]}
+                bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", stamp_ns(t + 0.003), echo)
+            if k % 3 == 0 or held:  # the aileron follows the stick by 45 ms; held: each value of it
+                shown = math.floor((t - 0.045) * 20.0 + 1e-6) / 20.0 if held else t - 0.045
+                moved = aileron * math.sin(2.1 * shown)
                 surface = {"header": bag.header(stamp_ns(t), ""), "delta_aileron": moved}
                 bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", stamp_ns(t), surface)
             if k % 2 == 0 and t > 0.5:
@@ -139,6 +145,22 @@ def test_sending_a_command_again_does_not_make_the_response_faster(tmp_path: Pat
     write_bag(bag, Window(0.05), refresh=True)
     assert main([str(bag), "--json", str(numbers)]) == 0
     assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
+
+
+def test_surfaces_sent_one_by_one_are_no_commands_of_axes(tmp_path: Path) -> None:
+    bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
+    write_bag(bag, Window(0.05), surfaces_too=True)
+    assert main([str(bag), "--json", str(numbers)]) == 0
+    assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045, abs=0.002)
+
+
+def test_a_controller_slower_than_the_frames_has_a_delay(tmp_path: Path) -> None:
+    """It holds its commands for three frames: on average they are half of that older than when they came."""
+    bag, numbers = tmp_path / "flight.bag", tmp_path / "delay.json"
+    write_bag(bag, Window(0.05), refresh=True, held=True)
+    assert main([str(bag), "--json", str(numbers)]) == 0
+    # The first frame that shows a value comes 5 ms after that.
+    assert json.loads(numbers.read_text())["roll command"]["delay"] == pytest.approx(0.045 + 0.025, abs=0.006)
 
 
 def test_of_several_cameras_one_is_measured_about_its_own_line_of_sight(

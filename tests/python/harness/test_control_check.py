@@ -40,7 +40,8 @@ def applied(sources, end=12.0, sequences=None, shown=None):
     for begin, value in sources:
         source[time >= begin] = value
     number = np.arange(len(time)) if sequences is None else sequences
-    return table(time, source=source, sequence=number, read_back=np.ones(len(time)) if shown is None else shown)
+    read_back = np.ones(len(time)) if shown is None else shown
+    return table(time, source=source, fields=np.where(source, 7, 0), sequence=number, read_back=read_back)
 
 
 FLOWN = ((0.0, 1), (4.05, 2), (8.05, 1))

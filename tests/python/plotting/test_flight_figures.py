@@ -88,6 +88,35 @@ def test_the_track_is_broken_at_a_new_origin(tmp_path: Path) -> None:
     assert np.flatnonzero(np.isnan(track.north)).tolist() == [50]
 
 
+def test_a_command_goes_on_while_surfaces_are_sent_one_by_one(tmp_path: Path) -> None:
+    with FlightBag(tmp_path / "both.bag") as bag:
+        for k in range(50):
+            ns = stamp_ns(k / 50)
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", ns, bag.state(k / 50, k))
+            controls = {"header": bag.header(ns, ""), "total_roll": 0.01 * k}
+            bag.add("/xplane/mission/controls", "xplane_bridge/ControlStates", ns, controls)
+            fields = 1 if k < 40 else 2  # then roll is commanded no longer
+            command = {"header": bag.header(ns, ""), "source": 2, "fields": fields, "roll": 0.01 * k}
+            bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", ns, command)
+            echo = {"header": bag.header(ns + 8_000_000, ""), "surface_names": ["rudder1"]}
+            bag.add("/xplane/control/applied", "xplane_bridge/AppliedCommand", ns + 8_000_000, echo)
+    lines = {series.name: series.values for series in figure(read(tmp_path / "both.bag"), "controls").panels[0].series}
+    np.testing.assert_allclose(lines["commanded"], [*(0.01 * np.arange(40)), *[np.nan] * 10], atol=1e-6)
+
+
+def test_every_surface_that_moves_is_drawn(tmp_path: Path) -> None:
+    moving = ("spoiler2", "flap2", "speedbrake2", "yaw_brake", "wing_elevator1", "wing_elevator2")
+    with FlightBag(tmp_path / "wing.bag") as bag:
+        for k in range(50):
+            ns = stamp_ns(k / 50)
+            surfaces = {name: [0.1 * k, -0.1 * k, *[np.nan] * 6] for name in moving}
+            values = {"header": bag.header(ns, ""), **surfaces}
+            bag.add("/xplane/mission/surfaces", "xplane_bridge/SurfaceStates", ns, values)
+    panels = figure(read(tmp_path / "wing.bag"), "surfaces").panels
+    assert [panel.label for panel in panels] == [f"{name} [deg]" for name in moving]
+    assert {tuple(series.name for series in panel.series) for panel in panels} == {("wing 1 left", "wing 1 right")}
+
+
 def test_a_thinned_track_stays_interrupted_in_every_figure() -> None:
     east = np.arange(20001.0)
     east[9_999] = np.nan
