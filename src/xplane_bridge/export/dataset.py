@@ -26,21 +26,15 @@ import pandas as pd
 
 from xplane_bridge.export import tables
 from xplane_bridge.export.pictures import Options, Pictures, Piece, write_pictures
+from xplane_bridge.export.tables import LABELS
 
 if TYPE_CHECKING:
     from xplane_bridge.bags import Bags
     from xplane_bridge.export.image_labels import ImageLabels
 
+
 #: Types of the columns that may lack values: the same in every flight, whatever it lacks.
-_NULLABLE = {
-    "mode": "UInt8",
-    "failsafe": "boolean",
-    "failures": "string",
-    "excitation": "string",
-    "camera_width_px": "Int32",
-    "camera_height_px": "Int32",
-    "labels_json": "string",
-}
+_NULLABLE = {**LABELS, "camera_width_px": "Int32", "camera_height_px": "Int32", "labels_json": "string"}
 
 
 def export_images(

@@ -37,8 +37,11 @@ class Job(NamedTuple):
         if "topics" in options:
             out["topics"] = list(self.topics)
         if "dataset" in options:
-            cameras = list(self.dataset.cameras)
-            out.update({**self.dataset._asdict(), "cameras": cameras}, train_flight=self.train_flight)
+            out.update(self.dataset._asdict(), cameras=list(self.dataset.cameras))
+            if self.dataset.split_by == "flight":
+                out["train_flight"] = self.train_flight
+            else:
+                del out["seed"]  # nothing is drawn
         if self.labels_sha256:
             out["labels_sha256"] = self.labels_sha256
         return out

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Rows that are written at a time.
 _PIECE_ROWS = 8192
+#: Types of the labels of a flight; they may lack values.
+LABELS = {"mode": "UInt8", "failsafe": "boolean", "failures": "string", "excitation": "string"}
 
 
 class FlightTable:
@@ -35,6 +37,7 @@ class FlightTable:
         self.rows = rows
         self.store = store
         self._columns: dict[str, Union[np.ndarray, StoredColumn]] = {}
+        self.nullable: dict[str, str] = {}  #: pandas' types of columns that may lack values: the same in every flight
 
     @property
     def counts(self) -> dict[str, int]:
@@ -111,6 +114,7 @@ def flight_table(
     for path, values in columns:
         table.add(named({path: values}, units))
     table.add(labels(bags, base))
+    table.nullable.update(LABELS)
     for other in further:
         _add_newest(table, bags, other, base)
     return table
@@ -124,6 +128,18 @@ def _add_newest(table: FlightTable, bags: Bags, full: str, base: np.ndarray) -> 
     for path, values in other.columns.items():
         for name, column in named({path: values}, units, prefix.replace("/", "_")).items():
             table.add({name: held(base, other.stamp, column)})
+            kind = _nullable(column)
+            if kind:
+                table.nullable[name] = kind
+
+
+def _nullable(column: np.ndarray) -> str:
+    """The type of a column in which values may be missing; empty where it has values for that, or holds lists."""
+    if column.dtype == bool:
+        return "boolean"
+    if np.issubdtype(column.dtype, np.integer):
+        return str(column.dtype).replace("int", "Int").replace("uI", "UI")
+    return "string" if len(column) and all(isinstance(value, str) for value in column) else ""
 
 
 def write_csv(table: FlightTable, path: Path) -> None:
@@ -137,11 +153,12 @@ def write_csv(table: FlightTable, path: Path) -> None:
 
 def write_parquet(table: FlightTable, path: Path) -> None:
     """Write a table as Parquet with its types."""
-    objects = table.objects()
+    objects = {name: values for name, values in table.objects().items() if name not in table.nullable}
     # Rows that show what each column of objects holds.
     filled = (np.flatnonzero([value is not None for value in values])[:1].tolist() for values in objects.values())
     rows = sorted({row for of_column in filled for row in of_column}) or [0]
-    write_frames(path, table.frames(), schema_of(table.frame(rows[: table.rows]), objects))
+    frames = (frame.astype(table.nullable) for frame in table.frames())
+    write_frames(path, frames, schema_of(table.frame(rows[: table.rows]).astype(table.nullable), objects))
 
 
 def schema_of(sample: pd.DataFrame, objects: Mapping[str, np.ndarray]) -> Any:

@@ -176,6 +176,24 @@ def test_formats_share_a_folder_and_one_manifest(tmp_path: Path, capsys: pytest.
     assert capsys.readouterr().out.splitlines() == ["changed: f1.csv", "missing: f1.euroc.csv"]
 
 
+def test_what_is_not_drawn_is_no_parameter(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    bags = [write_flight(tmp_path / f"f{k}.bag", 0.4) for k in range(4)]
+    out = tmp_path / "out"
+    for given in (bags[:3], bags):
+        capsys.readouterr()
+        assert export(*given, "--format", "imagefolder", "-o", out) == 0
+    assert capsys.readouterr().out.count("(made earlier)") == 3
+
+    def parameters() -> set:
+        records = json.loads((out / "manifest.json").read_text())["exports"]["imagefolder"].values()
+        return set().union(*(record["parameters"] for record in records))
+
+    always = {"cameras", "keep_bad", "split_by", "train_share"}
+    assert parameters() == always
+    assert export(*bags, "--format", "imagefolder", "--split-by", "flight", "-o", out) == 0
+    assert parameters() == {*always, "seed", "train_flight"}
+
+
 def test_a_flight_whose_name_ends_as_another_formats_files_does_not_take_them(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

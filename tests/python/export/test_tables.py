@@ -128,3 +128,29 @@ def test_columns_of_lists_are_the_same_in_every_flight(tmp_path: Path, form: str
         else:
             found.add(str(pyarrow.parquet.read_schema(path).remove_metadata()))
     assert len(found) == 1
+
+
+def test_types_of_what_may_be_missing_are_the_same_in_every_flight(tmp_path: Path) -> None:
+    files = []
+    # Labels and further topics: none, from the middle on, and from the beginning on.
+    for name, first in (("none", 99.0), ("comes", 0.5), ("always", -0.01)):
+        with FlightBag(tmp_path / f"{name}.bag") as bag:
+            for k in range(50):
+                bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 50), bag.state(k / 50, k))
+            ns = stamp_ns(first)
+            link = {"header": bag.header(ns, ""), "link_epoch": 2, "host": "127.0.0.1"}
+            bag.add("/xplane/link_state", "xplane_bridge/LinkState", ns, link)
+            if name != "none":
+                header = {"header": bag.header(ns, "")}
+                bag.add("/xplane/control/mode", "xplane_bridge/ControlMode", ns, {**header, "mode": 2})
+                bag.add("/xplane/failures/state", "xplane_bridge/FailureState", ns, header)
+                bag.add("/xplane/excitation/state", "xplane_bridge/ExcitationState", ns, header)
+        assert export(tmp_path / f"{name}.bag", "--format", "parquet", "--topics", "link_state", "-o", tmp_path) == 0
+        files.append(tmp_path / f"{name}.parquet")
+    schemas = [pyarrow.parquet.read_schema(file).remove_metadata() for file in files]
+    assert schemas[0].equals(schemas[1])
+    assert schemas[1].equals(schemas[2])
+    types = {name: str(schemas[0].field(name).type) for name in ("mode", "failsafe", "link_state_link_epoch")}
+    assert types == {"mode": "uint8", "failsafe": "bool", "link_state_link_epoch": "uint32"}
+    table = pyarrow.parquet.read_table(files).to_pandas()
+    assert table["mode"].isna().tolist() == [True] * 75 + [False] * 75
