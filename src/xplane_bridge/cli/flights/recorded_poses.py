@@ -30,7 +30,7 @@ class Poses(NamedTuple):
 
     time: np.ndarray  #: [s] of simulated time since the first
     columns: Dict[str, np.ndarray]
-    start: Any  #: fields of the first flight state, by name
+    start: Any  #: fields of the flight state with the first, by name
 
     def at(self, time: float) -> Dict[str, float]:
         """The pose at a time, linear between two; the first or last one outside."""
@@ -64,9 +64,11 @@ def read_poses(bag: Path) -> Poses:
         elapsed = elapsed_of(state)
         columns = {name: np.asarray(state[name], dtype=float) for name in _COLUMNS + _VELOCITY}
         good = np.all([np.isfinite(column) for column in columns.values()], axis=0)
+        good[: first_of(state)] = False
         if good.sum() >= 2:
-            start = fields_of(state, first_of(state))
-            return Poses(elapsed[good], {name: column[good] for name, column in columns.items()}, start)
+            time = elapsed[good]
+            start = fields_of(state, int(np.argmax(good)))
+            return Poses(time - time[0], {name: column[good] for name, column in columns.items()}, start)
     raise ReplayError(f"{bag}: no two flight states with a valid pose in it")
 
 

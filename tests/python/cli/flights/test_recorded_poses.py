@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import socket
 
 import numpy as np
 import pytest
 
-from xplane_bridge.cli.flights.recorded_poses import Poses
+from support.flights.synthetic_flight import FlightBag, stamp_ns
+from xplane_bridge.cli.flights.recorded_poses import Poses, read_poses
 from xplane_bridge.harness.pose_sender import PoseSender, Scenery
 
 POSE = {
@@ -44,3 +46,16 @@ def test_a_pose_between_two_lies_on_the_shorter_way_also_across_the_date_line(fi
     poses = Poses(np.array([0.0, 0.5]), columns, None)
     found = [poses.at(time)["longitude"] for time in (0.0, 0.25, 0.5)]
     assert found == pytest.approx([first, between, second], rel=0.0, abs=1e-9)
+
+
+def test_they_begin_where_the_place_is_first_known(tmp_path):
+    with FlightBag(tmp_path / "flight.bag") as bag:
+        for k in range(100):
+            state = {**bag.state(k / 10, k), "flight_path_angle_deg": 2.0}
+            if k < 50:
+                state.update(latitude=math.nan, longitude=math.nan, altitude_msl=math.nan)
+            bag.add("/xplane/flight_state", "xplane_bridge/FlightState", stamp_ns(k / 10), state)
+    poses = read_poses(tmp_path / "flight.bag")
+    assert poses.time == pytest.approx(np.arange(50) / 10)
+    assert poses.at(1.0)["altitude_msl"] == pytest.approx(1000.0 + 2.0 * 6.0)
+    assert poses.start["altitude_msl"] == poses.at(0.0)["altitude_msl"]
