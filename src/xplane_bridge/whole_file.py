@@ -8,23 +8,39 @@ from pathlib import Path
 from typing import Iterator, TextIO
 
 
+def is_special(path: Path) -> bool:
+    """Returns whether there is something that no file may take the place of: a device, a pipe or a folder."""
+    return path.exists() and not path.is_file()
+
+
 @contextmanager
 def replaced(path: Path) -> Iterator[TextIO]:
     """Gives the new file, beside the other one; where it does not become whole, the other stays alone.
 
-    Bytes of file names that are no UTF-8 are written as codes.
+    A symbolic link stays, and what it names is replaced. A device or a pipe is written to as it is. Bytes of file names
+    that are no UTF-8 are written as codes.
 
     Raises:
         OSError: It cannot be written; with the name of the other.
     """
-    part = path.with_name(path.name + ".part")
     try:
-        with part.open("w", encoding="utf-8", errors="backslashreplace") as file:
-            yield file
-        os.replace(part, path)
-    except BaseException as error:
-        with suppress(OSError):
-            part.unlink()
-        if not isinstance(error, OSError):
+        if is_special(path):
+            with _opened(path) as file:
+                yield file
+            return
+        whole = path.resolve()
+        part = whole.with_name(whole.name + ".part")
+        try:
+            with _opened(part) as file:
+                yield file
+            os.replace(part, whole)
+        except BaseException:
+            with suppress(OSError):
+                part.unlink()
             raise
+    except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def _opened(path: Path) -> TextIO:
+    return path.open("w", encoding="utf-8", errors="backslashreplace")

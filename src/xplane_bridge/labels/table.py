@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Tuple
 
 from xplane_bridge.errors import XplaneBridgeError, is_number
-from xplane_bridge.whole_file import replaced
+from xplane_bridge.whole_file import is_special, replaced
 
 SCHEMA = 2  #: 1 knew one camera
 ENDING = ".labels.jsonl"
@@ -99,7 +99,8 @@ def write(path: Path, about: Callable[[], Mapping[str, Any]], frames: Iterable[M
     """
     count = 0
     try:
-        with tempfile.TemporaryFile("w+", encoding="utf-8", dir=path.parent) as lines:
+        folder = None if is_special(path) else path.parent  # no files are made beside devices
+        with tempfile.TemporaryFile("w+", encoding="utf-8", dir=folder) as lines:
             for frame in frames:
                 lines.write(_line(frame))
                 count += 1

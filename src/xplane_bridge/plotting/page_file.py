@@ -30,11 +30,5 @@ def write_page(path: Path, text: str) -> None:
     Raises:
         OSError: It cannot be written; with its name.
     """
-    try:
-        if path.exists() and not path.is_file():  # a folder, which is an error, or a device
-            path.write_text(text, encoding="utf-8", errors="backslashreplace")
-            return
-        with replaced(path.resolve()) as file:
-            file.write(text)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from None
+    with replaced(path) as file:
+        file.write(text)

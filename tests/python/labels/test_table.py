@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 import tracemalloc
 from pathlib import Path
 from typing import Any, Dict, Iterator
@@ -48,6 +50,23 @@ def test_reading_and_writing_take_hardly_more_memory_for_more_pictures(tmp_path:
         tracemalloc.stop()
     assert len(path.read_bytes()) > 1_000_000
     assert peaks[2] - peaks[1] < 300 * 1000, peaks  # bytes a picture
+
+
+def test_a_pipe_is_written_to_and_a_link_is_followed(tmp_path: Path) -> None:
+    pipe, link, file = (tmp_path / name for name in ("pipe", "link", "folder/f.labels.jsonl"))
+    os.mkfifo(pipe)
+    file.parent.mkdir()
+    link.symlink_to(file)
+    got: list[str] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_text()), daemon=True)
+    reader.start()
+    for path in (pipe, link, link):
+        table.write(path, dict, [])
+    reader.join(10.0)
+    assert pipe.is_fifo()
+    assert link.is_symlink()
+    assert got == [file.read_text()] == ['{"labels":2}\n']
+    assert os.listdir(tmp_path / "folder") == [file.name]
 
 
 def test_what_ends_in_an_error_leaves_nothing(tmp_path: Path) -> None:
