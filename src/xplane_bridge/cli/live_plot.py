@@ -83,7 +83,11 @@ def getter(path: str, message_type: Any) -> Callable[[Any], float]:
             if not isinstance(sample, (list, tuple, bytes)):
                 msg = f"{message_type._type}: {name} is no array, so [{index}] does not apply"
                 raise LivePlotError(msg)
-            sample = sample[int(index)] if int(index) < len(sample) else 0.0
+            if sample and int(index) >= len(sample):  # a list of varying length is empty here
+                have = f"{name}[0] to {name}[{len(sample) - 1}]"
+                msg = f"{message_type._type} has no field {path!r}: at {part!r} there is {have}"
+                raise LivePlotError(msg)
+            sample = sample[int(index)] if sample else 0.0
     if not isinstance(sample, (int, float)):
         msg = f"{message_type._type}: {path} is no number ({type(sample).__name__}); give an element or a field of it"
         raise LivePlotError(msg)

@@ -65,6 +65,7 @@ def test_numbers_are_taken_from_nested_fields_and_elements() -> None:
         ("name", "name is no number"),
         ("speeds", "speeds is no number"),
         ("vector[0]", "vector is no array"),
+        ("speeds[3]", "has no field 'speeds[3]': at 'speeds[3]' there is speeds[0] to speeds[2]"),
         ("vector/x/y", "nothing below it"),
     ],
 )
