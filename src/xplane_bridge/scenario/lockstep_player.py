@@ -7,12 +7,11 @@ from collections import deque
 from typing import Any, Callable, Deque, Optional, Tuple
 
 from xplane_bridge import lockstep
-from xplane_bridge.errors import is_number
 from xplane_bridge.lockstep import ModeInStep, Participant, TopicInStep
 from xplane_bridge.scenario.player import Action, Commands
 from xplane_bridge.scenario.ros_player import MODE_NAMES, MODE_WAIT_S, RosPlayer, mode_has_not_come
 from xplane_bridge.scenario.schema import ScenarioError
-from xplane_bridge.scenario.stall_warnings import RATE, age_ns, awaits_stall
+from xplane_bridge.scenario.stall_warnings import RATE, age_ns
 
 _POLL_S = 0.2
 
@@ -37,15 +36,17 @@ class LockstepPlayer(RosPlayer):
         self._ending = threading.Event()
         variables = {c.variable for event in self._player.scenario.events for c in event.when}
         self._sees_mode = self._stick is not None or "mode" in variables
-        self._sees_stall = awaits_stall(self._player.scenario)
         self._warnings_age_ns = age_ns(RATE)
 
     def _publisher(self, topic: str, message_type: Any) -> Any:
         return lockstep.advertise(topic, message_type)
 
     def _play(self, publisher: Any) -> None:
-        if self._sees_stall and not self._find_warnings_age():
-            return
+        if self._sees_stall:
+            rate = self._warnings_rate()
+            if not rate:
+                return
+            self._warnings_age_ns = age_ns(rate)
         import rospy
         from std_srvs.srv import Trigger
 
@@ -67,21 +68,6 @@ class LockstepPlayer(RosPlayer):
         if self._error is None and self._ending.is_set():
             # No frames more; it is answered when the last answer of this node has come.
             rospy.ServiceProxy(service + "step", LockstepStep)(frames=0)
-
-    def _find_warnings_age(self) -> bool:
-        """Follows the rate at which rx_node asks for warnings; fails, and returns False, where it asks for none."""
-        import rospy
-
-        name = self._namespace + "/rx_node/rates/warnings"
-        rate = rospy.get_param(name, RATE)
-        if not is_number(rate) or rate <= 0:
-            self.fail(
-                f"{self._player.scenario.name} waits for stall_warning, but {name} is {rate!r}, by which no warnings "
-                "come; expected 1 to 1000: set it in rx_node's parameters (rates: warnings)"
-            )
-            return False
-        self._warnings_age_ns = age_ns(rate)
-        return True
 
     def fail(self, error: str) -> None:
         """Ends it with an error; the frame stays unanswered."""

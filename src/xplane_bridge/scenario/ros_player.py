@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import Any, Callable, Dict, Optional, Tuple
 
 from xplane_bridge.constants import FlightMode, ResultCode, words
+from xplane_bridge.errors import is_number
 from xplane_bridge.scenario.command_fields import fill_fields
 from xplane_bridge.scenario.player import Action, Commands, FlightSample, Player
 from xplane_bridge.scenario.resets import reset_request
 from xplane_bridge.scenario.schema import HANDLE_FIELDS, Scenario, ScenarioError
+from xplane_bridge.scenario.stall_warnings import RATE, awaits_stall
 from xplane_bridge.scenario.taps import Taps
 from xplane_bridge.scenario.traffic import ScenarioTraffic
 from xplane_bridge.scenario.virtual_stick import VirtualStick
@@ -107,6 +109,7 @@ class RosPlayer:
         self._commands: Optional[Commands] = None
         self._heard = -math.inf  # when the last flight state came
         self._mode: Optional[int] = None
+        self._sees_stall = awaits_stall(scenario)
         self._stall = False
         self._traffic = ScenarioTraffic()
         self._sequence = 0
@@ -159,6 +162,8 @@ class RosPlayer:
 
         from xplane_bridge.msg import ControlMode, FlightState, WarningState
 
+        if self._sees_stall and not self._warnings_rate():
+            return
         topic = self._namespace + "/"
         rospy.Subscriber(topic + "control/mode", ControlMode, self._on_mode)
         rospy.Subscriber(topic + "mission/warnings", WarningState, self._on_warnings)
@@ -173,6 +178,20 @@ class RosPlayer:
         while not rospy.is_shutdown() and (worker.is_alive() or (self._taps.pending and self._to_send() is not None)):
             self._publish(publisher)
             time.sleep(1.0 / STICK_RATE)
+
+    def _warnings_rate(self) -> float:
+        """At which rx_node asks for warnings [1/s]; fails, and returns 0, where it asks for none."""
+        import rospy
+
+        name = self._namespace + "/rx_node/rates/warnings"
+        rate = rospy.get_param(name, RATE)
+        if is_number(rate) and rate > 0:
+            return float(rate)
+        self.fail(
+            f"{self._player.scenario.name} waits for stall_warning, but {name} is {rate!r}, by which no warnings come; "
+            "expected 1 to 1000: set it in rx_node's parameters (rates: warnings)"
+        )
+        return 0.0
 
     # --- in -----------------------------------------------------------------------------------------------------------
 
