@@ -42,11 +42,8 @@ class LockstepPlayer(RosPlayer):
         return lockstep.advertise(topic, message_type)
 
     def _play(self, publisher: Any) -> None:
-        if self._sees_stall:
-            rate = self._warnings_rate()
-            if not rate:
-                return
-            self._warnings_age_ns = age_ns(rate)
+        if self._sees_stall and not self._find_warnings_age():
+            return
         import rospy
         from std_srvs.srv import Trigger
 
@@ -68,6 +65,13 @@ class LockstepPlayer(RosPlayer):
         if self._error is None and self._ending.is_set():
             # No frames more; it is answered when the last answer of this node has come.
             rospy.ServiceProxy(service + "step", LockstepStep)(frames=0)
+
+    def _find_warnings_age(self) -> bool:
+        """Follows the rate at which rx_node asks for warnings; returns False where it asks for none."""
+        rate = self._warnings_rate()
+        if rate > 0.0:
+            self._warnings_age_ns = age_ns(rate)
+        return rate > 0.0
 
     def fail(self, error: str) -> None:
         """Ends it with an error; the frame stays unanswered."""

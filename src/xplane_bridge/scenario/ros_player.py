@@ -158,12 +158,12 @@ class RosPlayer:
         return rospy.Publisher(topic, message_type, queue_size=1, tcp_nodelay=True)
 
     def _play(self, publisher: Any) -> None:
+        if self._sees_stall and not self._warnings_rate():
+            return
         import rospy
 
         from xplane_bridge.msg import ControlMode, FlightState, WarningState
 
-        if self._sees_stall and not self._warnings_rate():
-            return
         topic = self._namespace + "/"
         rospy.Subscriber(topic + "control/mode", ControlMode, self._on_mode)
         rospy.Subscriber(topic + "mission/warnings", WarningState, self._on_warnings)

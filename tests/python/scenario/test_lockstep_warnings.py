@@ -14,6 +14,7 @@ from xplane_bridge.lockstep import TopicInStep
 from xplane_bridge.resources import config_file
 from xplane_bridge.scenario import ScenarioError, parse_scenario
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
+from xplane_bridge.scenario.ros_player import RosPlayer
 from xplane_bridge.scenario.stall_warnings import RATE
 
 FPS, FRAMES = 60, 240
@@ -105,8 +106,11 @@ def test_the_rate_without_a_parameter_is_the_shipped_one() -> None:
     assert shipped["rates"]["warnings"] == RATE
 
 
-def test_where_no_warnings_come_it_is_refused_at_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    player = make(monkeypatch, {NAME: 0})
+@pytest.mark.parametrize("real_time", [False, True])
+def test_where_no_warnings_come_it_is_refused_at_the_start(monkeypatch: pytest.MonkeyPatch, real_time: bool) -> None:
+    player: RosPlayer = make(monkeypatch, {NAME: 0})
+    if real_time:
+        player = RosPlayer(parse_scenario({"name": "stall", "events": EVENTS}), "/xplane", say=lambda _: None)
     monkeypatch.setattr(player, "_advertise", lambda: None)
     with pytest.raises(ScenarioError, match=f"stall waits for stall_warning, but {NAME} is 0, .* expected 1 to 1000"):
         player.run()
