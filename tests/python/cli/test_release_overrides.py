@@ -226,6 +226,17 @@ def test_levers_go_where_the_motors_were_while_x_plane_does_not_fly_them(
     assert not journal.exists()
 
 
+def test_what_x_plane_does_not_confirm_goes_back_whatever_it_shows(tmp_path: Path) -> None:
+    """The wind before a disturbance: its last operation usually shows its value already."""
+    xplane = XPlane()
+    xplane.values = {"sim/weather/wind_speed_kt[0]": 30.0, "sim/weather/use_real_weather_bool": 0.0}
+    back = zip(xplane.values, (5.0, 0.0))
+    undo = [{"op": "dref", "path": path, "value": value, "confirm": False} for path, value in back]
+    journal = write(tmp_path / f"127.0.0.1_{xplane.port}.json", entry("disturbance", *undo))
+    assert release(journal).returncode == 0
+    assert list(xplane.values.values()) == [5.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
