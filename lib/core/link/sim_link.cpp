@@ -50,15 +50,12 @@ SimLink::SimLink(SimLinkOptions options, SimLinkCallbacks callbacks, Clock clock
       jitter_(options_.jitter_seed),
       pacer_(options_.batch_size, options_.batch_spacing_s),
       status_subscription_(statusGroup(options_.status_rate_hz)),
-      reader_(kFirstReadIndex,
-              [this](const std::string& path, std::int32_t rate_hz, std::int32_t index) {
-                requests_.push_back({control_source_, path, rate_hz, index});
-              }),
+      reader_(kFirstReadIndex),
       data_output_(options_.data_output, options_.request_timeout_s,
                    {[this](ByteView message) { send(message); },
                     [this](std::vector<std::string> paths, double timeout_s, DatarefReader::Accept accept,
                            DatarefReader::Done done) {
-                      reader_.start(std::move(paths), now_ns_, now_ns_ + toNanoseconds(timeout_s), std::move(done),
+                      reader_.start(std::move(paths), now_ns_ + toNanoseconds(timeout_s), std::move(done),
                                     std::move(accept));
                     },
                     log_}),
@@ -250,11 +247,8 @@ void SimLink::setRposRate(std::int32_t rate_hz) {
     subscriptions_changed_ = subscriptions_changed_ || (rate_hz > 0) != (rpos_rate_hz_ > 0);
     rpos_rate_hz_ = rate_hz;
     next_rpos_request_ns_ = now_ns_;
-    if (rate_hz == 0) {
-      std::array<std::uint8_t, kRposRequestSize> buffer;
-      if (const EncodeResult size = encodeRpos(buffer, 0); size.ok() && peer_.valid()) {
-        rpos_source_->sendTo({buffer.data(), *size}, peer_);
-      }
+    if (rate_hz == 0 && peer_.valid()) {
+      stopRpos();
     }
   });
 }
@@ -293,8 +287,8 @@ bool SimLink::settled() const {
     }
   }
   const auto answered = [](const Group& group) { return group.subscription.settled(); };
-  return monitor_.state() == LinkState::kConnected && requests_.empty() && reader_.idle() &&
-         status_subscription_.settled() && std::all_of(groups_.begin(), groups_.end(), answered);
+  return monitor_.state() == LinkState::kConnected && !requestsWait() && status_subscription_.settled() &&
+         std::all_of(groups_.begin(), groups_.end(), answered);
 }
 
 std::shared_ptr<Journal> SimLink::journal() const {
@@ -325,7 +319,7 @@ void SimLink::startRead(std::vector<std::string> paths, double timeout_s, Datare
   }
   requireRange("timeout", timeout_s, 0.0, 3600.0);
   post([this, paths = std::move(paths), timeout_s, accept = std::move(accept), done = std::move(done)] {
-    reader_.start(paths, now_ns_, now_ns_ + toNanoseconds(timeout_s), done, accept);
+    reader_.start(paths, now_ns_ + toNanoseconds(timeout_s), done, accept);
   });
 }
 
@@ -395,7 +389,7 @@ void SimLink::stepThrough() {
   } while (hub_->busy());
 }
 
-int SimLink::patienceMs() const { return requests_.empty() ? kThreadStepMs : kRequestStepMs; }
+int SimLink::patienceMs() const { return requestsWait() ? kRequestStepMs : kThreadStepMs; }
 
 bool SimLink::receive() {
   const bool called = receive(0);

@@ -136,7 +136,8 @@ void SimLink::refreshLink(std::int64_t now_ns) {
   const bool came_up = alive && monitor_.epoch() != seen_epoch_;
   if (alive && (!was_alive_ || came_up)) {
     restartSubscriptions(now_ns);
-    requests_.insert(requests_.end(), ended_in_silence_.begin(), ended_in_silence_.end());
+    ends_.insert(ends_.end(), ended_in_silence_.begin(), ended_in_silence_.end());
+    ends_again_.insert(ends_again_.end(), ended_in_silence_.begin(), ended_in_silence_.end());
     ended_in_silence_.clear();
   } else if (!alive && was_alive_) {
     for (Group& group : groups_) {
@@ -189,7 +190,14 @@ void SimLink::updateRpos(std::int64_t now_ns) {
     return;
   }
   sendRposRequest(rpos_source_.get(), rpos_rate_hz_);
+  rpos_asked_ = true;
   next_rpos_request_ns_ = now_ns + jitter_.around(kRposRetryNs);
+}
+
+/// Again when it goes on: that request may be lost.
+void SimLink::stopRpos() {
+  sendRposRequest(rpos_source_.get(), 0);
+  next_rpos_request_ns_ = now_ns_ + kRposRetryNs;
 }
 
 void SimLink::askXpc(std::int64_t now_ns) {
@@ -233,11 +241,20 @@ void SimLink::flushRequests(std::int64_t now_ns) {
       }
     }
   }
-  for (; !requests_.empty() && pacer_.allowance(now_ns, &jitter_) > 0; pacer_.spend(1)) {
-    const Request& request = requests_.front();
-    sendRequest(request.source.get(), request.path, request.rate_hz, request.index);
-    requests_.pop_front();
+  for (; pacer_.allowance(now_ns, &jitter_) > 0; pacer_.spend(1)) {
+    const std::optional<DatarefReader::Request> request = reader_.nextRequest(now_ns);
+    if (!request.has_value()) {
+      break;
+    }
+    sendRequest(control_source_.get(), request->path, request->rate_hz, request->index);
   }
+  const auto end = [&](std::deque<End>* ends) {
+    for (; !ends->empty() && pacer_.allowance(now_ns, &jitter_) > 0; pacer_.spend(1)) {
+      sendEnd(ends->front().source.get(), ends->front().path, ends->front().index);
+      ends->pop_front();
+    }
+  };
+  end(&ends_);
   if (subscribing) {
     for (Group& group : groups_) {
       flush(&group.subscription, group.source.get());
@@ -248,12 +265,9 @@ void SimLink::flushRequests(std::int64_t now_ns) {
     if (!leftover.has_value()) {
       break;
     }
-    if (leftover->dataref.empty()) {
-      sendRposRequest(leftover->source.get(), 0);
-    } else {
-      sendRequest(leftover->source.get(), leftover->dataref, 0, leftover->index);
-    }
+    sendEnd(leftover->source.get(), leftover->dataref, leftover->index);
   }
+  end(&ends_again_);
 }
 
 void SimLink::sendRequest(DatagramSource* source, const std::string& path, std::int32_t rate_hz, std::int32_t index) {
@@ -269,6 +283,14 @@ void SimLink::sendRposRequest(DatagramSource* source, std::int32_t rate_hz) {
   if (const EncodeResult size = encodeRpos(buffer, rate_hz)) {
     source->sendTo({buffer.data(), *size}, peer_);
     ++live_counters_.requests;
+  }
+}
+
+void SimLink::sendEnd(DatagramSource* source, const std::string& path, std::int32_t index) {
+  if (path.empty()) {
+    sendRposRequest(source, 0);
+  } else {
+    sendRequest(source, path, 0, index);
   }
 }
 
@@ -298,8 +320,8 @@ void SimLink::recordSubscriptions() {
 }
 
 void SimLink::forgetSubscriptions() {
-  if (subscriptions_journal_ == nullptr || !monitor_.alive()) {
-    return;  // while it loads, X-Plane does not read that it is to stop, and may be silent for longer than LOST takes
+  if (subscriptions_journal_ == nullptr) {
+    return;
   }
   try {
     subscriptions_journal_->remove({subscriptionsId(*subscriptions_journal_)});
@@ -324,11 +346,19 @@ void SimLink::stopGroup(const Group& group) {
   if (!group.subscription.asked()) {
     return;
   }
-  // One that is silent may only be loading, and goes on sending afterwards.
-  std::deque<Request>& requests = monitor_.alive() ? requests_ : ended_in_silence_;
-  const RrefGroup& stopped = group.subscription.group();
-  for (std::size_t i = 0; i < stopped.datarefs.size(); ++i) {
-    requests.push_back({group.source, stopped.datarefs[i], 0, static_cast<std::int32_t>(i)});
+  endSubscription(group.source, group.subscription.group().datarefs);
+}
+
+/// @param paths in the order of their indices; an empty one: the position stream
+void SimLink::endSubscription(const SourcePtr& source, const std::vector<std::string>& paths) {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const End end{source, paths[i], static_cast<std::int32_t>(i)};
+    if (!monitor_.alive()) {  // it may only be loading, and goes on sending afterwards
+      ended_in_silence_.push_back(end);
+      continue;
+    }
+    ends_.push_back(end);
+    ends_again_.push_back(end);
   }
 }
 
@@ -336,17 +366,14 @@ void SimLink::stopSubscriptions() {
   if (!monitor_.alive()) {
     return;
   }
+  if (rpos_asked_) {
+    endSubscription(rpos_source_, {""});
+  }
   for (const Group& group : groups_) {
     stopGroup(group);
   }
   groups_.clear();
-  const std::vector<std::string>& status = status_subscription_.group().datarefs;
-  for (std::size_t i = 0; i < status.size(); ++i) {
-    requests_.push_back({control_source_, status[i], 0, static_cast<std::int32_t>(i)});
-  }
-  if (rpos_source_ != nullptr && rpos_rate_hz_ > 0) {
-    sendRposRequest(rpos_source_.get(), 0);
-  }
+  endSubscription(control_source_, status_subscription_.group().datarefs);
 }
 
 void SimLink::updateStop(std::int64_t now_ns) {
@@ -355,14 +382,24 @@ void SimLink::updateStop(std::int64_t now_ns) {
     reader_.cancelAll();  // which says that it is not undone, and gives the subscriptions their time
     stop_phase_ = StopPhase::kUnsubscribing;
   }
-  if (stop_phase_ == StopPhase::kUnsubscribing && (requests_.empty() || late())) {
+  if (stop_phase_ == StopPhase::kUnsubscribing && ends_.empty() && reader_.idle()) {
+    stop_phase_ = StopPhase::kUnsubscribingAgain;
+    // While it loads, X-Plane does not read that it is to stop, and may be silent for longer than LOST takes.
+    answered_to_the_end_ = monitor_.alive();
+  } else if (stop_phase_ == StopPhase::kUnsubscribing && late()) {
     stop_phase_ = StopPhase::kDone;
-    if (requests_.empty()) {
+    log_(LogLevel::kWarn, "X-Plane's frames are so slow that " + std::to_string(ends_.size()) +
+                              " subscriptions could not be ended; the next start of this node, or release_overrides, "
+                              "ends them");
+  }
+  if (stop_phase_ == StopPhase::kUnsubscribingAgain && (ends_again_.empty() || late())) {
+    stop_phase_ = StopPhase::kDone;
+    if (!ends_again_.empty()) {
+      log_(LogLevel::kInfo, "X-Plane's frames are so slow that " + std::to_string(ends_again_.size()) +
+                                " subscriptions were ended without a repeat; the next start of this node, or "
+                                "release_overrides, makes sure of it");
+    } else if (answered_to_the_end_) {
       forgetSubscriptions();
-    } else {
-      log_(LogLevel::kWarn, "X-Plane's frames are so slow that " + std::to_string(requests_.size()) +
-                                " subscriptions could not be ended; the next start of this node, or release_overrides, "
-                                "ends them");
     }
   }
   if (stop_phase_ == StopPhase::kDone) {

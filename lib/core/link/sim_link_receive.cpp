@@ -181,8 +181,14 @@ void SimLink::receiveRpos() {
     }
     ++live_counters_.rpos_datagrams;
     heardPeer(received, Stream::kPosition);
+    if (rpos_rate_hz_ == 0) {
+      if (now_ns_ >= next_rpos_request_ns_) {
+        stopRpos();
+      }
+      return;
+    }
     next_rpos_request_ns_ = now_ns_ + jitter_.around(kRposSilenceNs);
-    if (callbacks_.on_rpos && rpos_rate_hz_ > 0) {
+    if (callbacks_.on_rpos) {
       callbacks_.on_rpos(*rpos, infoOf(received));
     }
   });

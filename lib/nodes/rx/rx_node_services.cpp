@@ -49,10 +49,11 @@ void RxNode::setOrigin(const SetOrigin::Request& request, SetOrigin::Response& r
 }
 
 void RxNode::getDataref(const GetDataref::Request& request, GetDataref::Response& response) {
-  {
+  const auto newest_time = [this] {
     const std::lock_guard<std::mutex> lock(mutex_);
-    response.sim_time = last_state_ ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
-  }
+    return last_state_ ? last_state_->sim_time : std::numeric_limits<float>::quiet_NaN();
+  };
+  response.sim_time = newest_time();
   if (!(request.timeout >= 0.0 && request.timeout <= kLongestReadTimeout)) {
     response.result = result(ServiceResult::REFUSED, "timeout must be from 0 (the default of 1 s) to 10 s");
     return;
@@ -72,13 +73,16 @@ void RxNode::getDataref(const GetDataref::Request& request, GetDataref::Response
   for (const core::DatarefValue& value : link().read(paths, timeout)) {
     response.values.push_back(value.value_or(std::numeric_limits<float>::quiet_NaN()));
   }
+  response.sim_time = newest_time();  // a read may last seconds
   const auto missing =
       std::find_if(response.values.begin(), response.values.end(), [](float value) { return std::isnan(value); });
   if (missing != response.values.end()) {
-    response.result =
-        result(ServiceResult::TIMEOUT, "X-Plane did not answer for " +
-                                           paths[static_cast<std::size_t>(missing - response.values.begin())] +
-                                           ": unknown to it, or the link is down");
+    const std::string path = paths[static_cast<std::size_t>(missing - response.values.begin())];
+    response.result = result(ServiceResult::TIMEOUT,
+                             "X-Plane did not answer for " + path + ": unknown to it, or the link is down" +
+                                 (paths.size() > 1 ? ", or not all " + std::to_string(paths.size()) +
+                                                         " elements could be asked for in time: set a longer timeout"
+                                                   : ""));
     return;
   }
   response.result = result(ServiceResult::OK, "read");

@@ -160,7 +160,8 @@ class FakeXPlane {
   std::size_t request_limit = 148;  // RREF requests taken in a frame, more are lost
   std::size_t lost_requests = 0;
   std::size_t pairs_per_datagram = 180;
-  bool ignores_target = false;  // ISE4 is lost
+  bool ignores_target = false;           // ISE4 is lost
+  std::map<std::string, int> lost_ends;  // by label: so many requests that end a subscription are still to be lost
 
  private:
   static sockaddr_in toSockaddr(const Address& address) {
@@ -178,6 +179,8 @@ class FakeXPlane {
     return value;
   }
 
+  bool losesEnd(const std::string& label) { return lost_ends[label]-- > 0; }
+
   void take(const std::string& label, const std::uint8_t* bytes, std::size_t size, const Address& from) {
     labels.push_back(label);
     const auto* text = reinterpret_cast<const char*>(bytes);
@@ -188,7 +191,7 @@ class FakeXPlane {
       }
       const auto index = at<std::int32_t>(bytes + 9);
       if (at<std::int32_t>(bytes + 5) == 0) {
-        subscriptions[from].erase(index);
+        if (!losesEnd(label)) subscriptions[from].erase(index);
       } else {
         subscriptions[from][index] = text + 13;
       }
@@ -198,7 +201,7 @@ class FakeXPlane {
       commands.emplace_back(text + 5);
     } else if (label == "RPOS") {
       if (std::string(text + 5) == "0") {
-        rpos_clients.erase(from);
+        if (!losesEnd(label)) rpos_clients.erase(from);
       } else {
         rpos_clients.insert(from);
       }

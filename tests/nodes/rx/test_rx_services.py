@@ -85,16 +85,23 @@ def test_get_terrain_says_why_not(world, rx):
         assert time.monotonic() - began >= DEFAULT_TIMEOUT_S
         plugin.settimeout(10.0)
 
+        def fail_the_first_probe() -> None:  # there is no answer to GETT then
+            question = asker = None
+            while question != struct.pack("<4sxB", b"GETP", 0):
+                question, asker = plugin.recvfrom(2048)
+            plugin.sendto(struct.pack("<4sxB3d4f", b"POSI", 1, 36.0, 127.0, 300.0, *[0.0] * 4), asker)
+
         def fail_the_probe() -> None:
             question = asker = None
             while question != struct.pack("<4sxB3d", b"GETT", 0, 38.0, 128.0, 0.0):  # not what was asked until now
                 question, asker = plugin.recvfrom(2048)
             plugin.sendto(struct.pack("<4sxB3d6f2i", b"TERR", 0, *[-998.0] * 3, *[0.0] * 6, 0, 0), asker)
 
-        probe = threading.Thread(target=fail_the_probe)
-        probe.start()
-        assert "finds no terrain there" in refusal(timeout, 38.0, 128.0, 10.0)
-        probe.join(10.0)
+        for fail in (fail_the_probe, fail_the_first_probe):
+            probe = threading.Thread(target=fail)
+            probe.start()
+            assert "finds no terrain there" in refusal(timeout, 38.0, 128.0, 10.0)
+            probe.join(10.0)
 
 
 @pytest.mark.parametrize(
@@ -113,13 +120,27 @@ def test_get_dataref_says_why_not(world, rx, name, timeout, code, part):
 
     world.emulator(*KINEMATIC)
     rx()
-    world.states.wait_for()
+    before = world.states.wait_for().sim_time
     began = time.monotonic()
     answer = world.call("get_dataref", GetDataref, name, timeout)
     assert not answer.success
     assert answer.result.code == code
-    assert code != 5 or time.monotonic() - began >= (timeout or DEFAULT_TIMEOUT_S)
+    waited = timeout or DEFAULT_TIMEOUT_S
+    assert code != 5 or time.monotonic() - began >= waited
+    assert code != 5 or answer.sim_time - before > 0.8 * waited  # of the newest state once it is read
     assert part in answer.result.message
+
+
+def test_a_read_in_vain_leaves_the_next_its_turn(world, rx):
+    from xplane_bridge.srv import GetDataref
+
+    world.emulator(*KINEMATIC, "--fps", 20)
+    rx()
+    world.states.wait_for()
+    answer = world.call("get_dataref", GetDataref, "sim/no/such_dataref[0:1024]", 2.0)
+    assert "or not all 1024 elements could be asked for in time" in answer.result.message
+    for _ in range(3):
+        assert world.call("get_dataref", GetDataref, "sim/time/paused", 0.0).success
 
 
 def test_set_origin_starts_a_new_position_epoch(world, rx):

@@ -92,7 +92,7 @@ class SimLink : public SimulatorPort {
   /// X-Plane reads requests, at most kUnsubscribeTime), joins the thread.
   /// Waits. Returns whether everything was undone; what was not, and subscriptions that are left, stay in the journal.
   bool stop(double timeout_s = 1.5);
-  static constexpr double kUnsubscribeTime = 2.5;  ///< [s] for 950 datarefs at 20 frames a second
+  static constexpr double kUnsubscribeTime = 2.5;  ///< [s] for 950 requests at 20 frames a second
   /// Instead of start(): waits up to `timeout_ms` for datagrams, handles them and everything that is due.
   void step(int timeout_ms);
 
@@ -134,11 +134,10 @@ class SimLink : public SimulatorPort {
     RrefSubscription subscription;
     SourcePtr source;
   };
-  /// An RREF request waiting for its turn. Holds the source of a group that may be gone by then.
-  struct Request {
+  /// The end of a subscription, waiting for its turn. Holds the source of a group that may be gone by then.
+  struct End {
     SourcePtr source;
-    std::string path;
-    std::int32_t rate_hz = 0;
+    std::string path;  // empty: the position stream
     std::int32_t index = 0;
   };
 
@@ -200,10 +199,14 @@ class SimLink : public SimulatorPort {
   void restartSubscriptions(std::int64_t now_ns);
   void updateDataOutput(std::int64_t now_ns);
   void updateRpos(std::int64_t now_ns);
+  void stopRpos();
   void askXpc(std::int64_t now_ns);
   void flushRequests(std::int64_t now_ns);
   void sendRequest(DatagramSource* source, const std::string& path, std::int32_t rate_hz, std::int32_t index);
   void sendRposRequest(DatagramSource* source, std::int32_t rate_hz);
+  void sendEnd(DatagramSource* source, const std::string& path, std::int32_t index);
+  void endSubscription(const SourcePtr& source, const std::vector<std::string>& paths);
+  bool requestsWait() const { return !ends_.empty() || !ends_again_.empty() || !reader_.idle(); }
   void removeGroup(const RrefDelivery* delivery);
   void stopGroup(const Group& group);
   void stopSubscriptions();
@@ -285,12 +288,14 @@ class SimLink : public SimulatorPort {
   std::shared_ptr<Journal> subscriptions_journal_;  // null: they are not written down
   bool subscriptions_changed_ = false;              // since recordSubscriptions()
   std::vector<Group> groups_;                       // by falling priority
-  std::deque<Request> requests_;
-  std::deque<Request> ended_in_silence_;  // as requests_, for when X-Plane answers again
+  std::deque<End> ends_;
+  std::deque<End> ends_again_;        // as ends_, after all else: one may be lost, and none is confirmed
+  std::deque<End> ended_in_silence_;  // for when X-Plane answers again
   bool was_alive_ = false;
   std::uint32_t seen_epoch_ = 0;
 
   std::int32_t rpos_rate_hz_ = 0;
+  bool rpos_asked_ = false;
   std::int64_t next_rpos_request_ns_ = 0;
   std::int64_t next_xpc_request_ns_ = 0;
 
@@ -302,10 +307,11 @@ class SimLink : public SimulatorPort {
   LinkCounters live_counters_;  // of this thread; published by maintain()
   UdpCounters retired_udp_;     // of sources that are gone
 
-  enum class StopPhase : std::uint8_t { kRunning, kReleasing, kUnsubscribing, kDone };
+  enum class StopPhase : std::uint8_t { kRunning, kReleasing, kUnsubscribing, kUnsubscribingAgain, kDone };
   StopPhase stop_phase_ = StopPhase::kRunning;
   std::int64_t stop_deadline_ns_ = 0;
   bool released_ = true;
+  bool answered_to_the_end_ = false;  // X-Plane, when the last subscription was ended
 };
 
 }  // namespace xplane_bridge::core

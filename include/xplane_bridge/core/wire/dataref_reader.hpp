@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,58 +15,63 @@ namespace xplane_bridge::core {
 /// One value of a read: empty when X-Plane did not answer in time.
 using DatarefValue = std::optional<float>;
 
-/// Reads datarefs once, by a subscription that is stopped as soon as the values are there. No I/O: requests go through
-/// a function. Times are the steady clock's [ns]. Each read has indices of its own, so that a late answer to an old one
-/// is never taken for the new one's.
+/// Reads datarefs once, by a subscription that is stopped as soon as the values are there. No I/O: requests are fetched
+/// with nextRequest() when they may be sent. Times are the steady clock's [ns]. Each read has indices of its own, so
+/// that a late answer to an old one is never taken for the new one's.
 class DatarefReader {
  public:
-  /// Sends RREF(path, rate, index).
-  using Send = std::function<void(const std::string& path, std::int32_t rate_hz, std::int32_t index)>;
+  /// RREF(path, rate, index).
+  struct Request {
+    std::string path;
+    std::int32_t rate_hz = 0;
+    std::int32_t index = 0;
+  };
   using Done = std::function<void(const std::vector<DatarefValue>&)>;
   using Accept = std::function<bool(const std::vector<DatarefValue>&)>;
 
   /// Indices from `first_index` on are this reader's.
-  DatarefReader(std::int32_t first_index, Send send)
-      : first_index_(first_index), next_index_(first_index), send_(std::move(send)) {}
+  explicit DatarefReader(std::int32_t first_index) : first_index_(first_index), next_index_(first_index) {}
 
   /// Starts a read. It ends, with `done` being called, once every value has arrived and `accept` (if given) likes them,
   /// at the latest at `deadline_ns`.
-  void start(std::vector<std::string> paths, std::int64_t now_ns, std::int64_t deadline_ns, Done done,
-             Accept accept = {});
+  void start(std::vector<std::string> paths, std::int64_t deadline_ns, Done done, Accept accept = {});
 
+  /// The next request to send; empty: none at the moment. What is taken is sent. First what was never asked for, then
+  /// what has not answered, then the ends of reads that are over.
+  std::optional<Request> nextRequest(std::int64_t now_ns);
   /// Takes note of a value; false when the index is none of this reader's.
   bool answered(const RrefPair& pair, std::int64_t now_ns);
-  /// Repeats unanswered requests and ends what is over.
+  /// Ends what is over.
   void update(std::int64_t now_ns);
   /// Ends everything, with the values that are there.
   void cancelAll();
 
-  bool idle() const { return reads_.empty(); }
+  /// Nothing is read, and all that was asked for has been ended.
+  bool idle() const { return reads_.empty() && to_stop_.empty(); }
 
  private:
   struct Read {
     std::vector<std::string> paths;
     std::int32_t base = 0;
     std::vector<DatarefValue> values;
+    std::vector<std::int64_t> asked_ns;  // the last time; of the first ones, as they are asked for in order
     std::int64_t deadline_ns = 0;
-    std::int64_t repeat_ns = 0;
     Done done;
     Accept accept;
   };
   struct Ended {
     std::string path;
-    std::int32_t index = 0;
-    std::int64_t stopped_ns = 0;
+    std::optional<std::int64_t> stopped_ns;  // empty: in to_stop_
   };
 
   bool isComplete(const Read& read) const;
-  void finish(Read read, std::int64_t now_ns);
+  void finish(Read read);
 
   std::int32_t first_index_;
   std::int32_t next_index_;
-  Send send_;
   std::deque<Read> reads_;
-  std::deque<Ended> ended_;  // the latest, to be stopped again if X-Plane missed it
+  std::map<std::int32_t, Ended> ended_;  // by index: the latest, to be stopped again if X-Plane missed it
+  std::deque<std::int32_t> to_stop_;     // indices of ended_
 };
 
 }  // namespace xplane_bridge::core

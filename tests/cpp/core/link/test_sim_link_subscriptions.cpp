@@ -160,6 +160,26 @@ TEST_F(SimLinkTest, FlightGroupComesFirstAndThreeNodesLoseNoRequest) {
   EXPECT_GT(most_requests_, 100U) << "the nodes ask in the same frames";
 }
 
+TEST_F(SimLinkTest, ALongReadInVainLeavesTheNextItsTurn) {
+  FakeXPlane sim;
+  makeLink(optionsFor(sim));
+  ASSERT_GE(runUntilState(LinkState::kConnected, 1.0, {&sim}), 0.0);
+  std::size_t answered = 0;
+  link_->read(std::vector<std::string>(1024, "no/such/dataref"), 2.0,
+              [&](const std::vector<DatarefValue>& values) { answered = values.size(); });
+  ASSERT_GE(runUntil([&] { return answered > 0; }, 2.1, {&sim}), 0.0);
+  for (int k = 0; k < 3; ++k) {
+    DatarefValue paused;
+    link_->read({"sim/time/paused"}, 1.0, [&](const std::vector<DatarefValue>& values) { paused = values[0]; });
+    run(0.2, {&sim});
+    EXPECT_EQ(paused, 0.0F);
+  }
+  run(1.0, {&sim});
+  std::size_t left = 0;
+  for (const auto& [client, indices] : sim.subscriptions) left += indices.size();
+  EXPECT_EQ(left, 4U) << "the link's own";
+}
+
 TEST_F(SimLinkTest, ReplacedGroupDeliversOnlyTheNewList) {
   FakeXPlane sim;
   sim.datarefs["a/b"] = 1.0F;
@@ -274,6 +294,57 @@ TEST_F(SimLinkTest, RposFlowsStopsAndComesBack) {
   run(0.1, {&sim});
   EXPECT_TRUE(sim.rpos_clients.empty());
   EXPECT_THROW(link_->setRposRate(-1), std::invalid_argument);
+}
+
+TEST_F(SimLinkTest, APositionStreamWhoseEndIsLostIsEndedAgainAndStillAtTheExit) {
+  FakeXPlane sim;
+  makeLink(optionsFor(sim));
+  link_->setRposRate(30);
+  ASSERT_GE(runUntil([&] { return rpos_datagrams_ > 0; }, 1.0, {&sim}), 0.0);
+  sim.lost_ends["RPOS"] = 1;
+  link_->setRposRate(0);
+  run(0.5, {&sim});
+  EXPECT_EQ(sim.rpos_clients.size(), 1U) << "the end is lost";
+  const int delivered = rpos_datagrams_;
+  run(1.0, {&sim});
+  EXPECT_TRUE(sim.rpos_clients.empty());
+  EXPECT_EQ(rpos_datagrams_, delivered) << "what is not wanted is not delivered";
+  const auto ends = std::count(sim.labels.begin(), sim.labels.end(), "RPOS");
+  run(3.0, {&sim});
+  EXPECT_EQ(std::count(sim.labels.begin(), sim.labels.end(), "RPOS"), ends) << "it has ended";
+  link_->setRposRate(30);
+  ASSERT_GE(runUntil([&] { return rpos_datagrams_ > delivered; }, 1.0, {&sim}), 0.0);
+  sim.lost_ends["RPOS"] = 1;
+  link_->setRposRate(0);
+  run(0.1, {&sim});
+  link_->stop(1.0);
+  sim.pump();
+  EXPECT_TRUE(sim.rpos_clients.empty());
+}
+
+TEST_F(SimLinkTest, LostEndsOfSubscriptionsAreMadeGood) {
+  FakeXPlane sim;
+  const auto sent = [&sim] {
+    std::size_t datarefs = 0;
+    for (const auto& [client, indices] : sim.subscriptions) datarefs += indices.size();
+    return datarefs;
+  };
+  for (const char* path : {"a/b", "c/d", "e/f"}) sim.datarefs[path] = 1.0F;
+  makeLink(optionsFor(sim));
+  const int id = subscribe(group({"a/b"}));
+  const int other = subscribe(group({"c/d", "e/f"}));
+  ASSERT_GE(runUntil([&] { return datagrams_[id] > 0 && datagrams_[other] > 0; }, 1.0, {&sim}), 0.0);
+  run(0.1, {&sim});
+  ASSERT_EQ(sent(), 7U) << "4 of the link itself";
+  sim.lost_ends["RREF"] = 1;
+  subscriptions_[0].reset();
+  run(0.2, {&sim});
+  EXPECT_EQ(sent(), 6U);
+  sim.lost_ends["RREF"] = 6;
+  link_->stop(1.0);
+  sim.pump();
+  EXPECT_EQ(sent(), 0U);
+  EXPECT_TRUE(link_->journal()->ofSubscriptions()->entries().empty());
 }
 
 TEST_F(SimLinkTest, XPlaneConnectIsAskedForThePosition) {
