@@ -11,17 +11,13 @@ namespace {
 const std::string kJoystickFolder = "sim/joystick/";
 constexpr std::size_t kRoll = 0, kPitch = 1, kYaw = 2;  // of kStickFunctions
 constexpr float kPressed = 0.5F;
-// X-Plane may answer the datarefs of one rate in different frames of a period.
-constexpr double kJoinPeriods = 1.5;
 
 std::string joystickElement(const char* name, int index) {
   return kJoystickFolder + name + "[" + std::to_string(index) + "]";
 }
 
 RrefFrameAssembler assemblerOf(std::size_t size, int rate) {
-  RrefFrameAssembler::Options options;
-  options.join_window = kJoinPeriods / rate;
-  return RrefFrameAssembler(size, 0, options);
+  return RrefFrameAssembler(size, 0, RrefFrameAssembler::Options::atRate(rate));
 }
 
 }  // namespace

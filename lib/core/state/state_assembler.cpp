@@ -13,12 +13,6 @@ constexpr double kFloat32Tolerance = 3.0;
 /// How long values that no row carries wait for each other [s].
 constexpr double kSupplementJoinWindow = 0.1;
 
-/// Slower groups: X-Plane may answer their indices in different frames of a period.
-double missionJoinWindow(int rate) {
-  constexpr double kPeriods = 1.5;
-  return kPeriods / std::max(rate, 1);
-}
-
 /// Distance on the ground and in height [m].
 double distance(const GeoPoint& a, const GeoPoint& b) { return std::hypot(groundDistance(a, b), a.height - b.height); }
 
@@ -60,9 +54,10 @@ FlightStateAssembler::FlightStateAssembler(const Options& options)
 }
 
 std::unique_ptr<RrefFrameAssembler> FlightStateAssembler::makeFrames() const {
-  const double window = options_.transport == Transport::kRref ? options_.join_window : kSupplementJoinWindow;
-  return std::make_unique<RrefFrameAssembler>(decoder_.requests().size(), 0,
-                                              RrefFrameAssembler::Options::joinedWithin(window));
+  RrefFrameAssembler::Options frames = RrefFrameAssembler::Options::atRate(options_.rate);
+  frames.join_window = std::max(frames.join_window,
+                                options_.transport == Transport::kRref ? options_.join_window : kSupplementJoinWindow);
+  return std::make_unique<RrefFrameAssembler>(decoder_.requests().size(), 0, frames);
 }
 
 bool FlightStateAssembler::wantsRpos() const {
@@ -250,8 +245,7 @@ template <typename State>
 MissionAssembler<State>::MissionAssembler(const Options& options)
     : options_(options),
       decoder_(options.transport, options.version, options.engines),
-      frames_(decoder_.requests().size(), 0,
-              RrefFrameAssembler::Options::joinedWithin(missionJoinWindow(options.rate))),
+      frames_(decoder_.requests().size(), 0, RrefFrameAssembler::Options::atRate(std::max(options.rate, 1))),
       unknown_(decoder_.requests().size(), kNaNf) {}
 
 template <typename State>

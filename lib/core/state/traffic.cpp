@@ -26,8 +26,6 @@ enum Tcas : std::size_t { kDistance = std::size(kPose), kBearing, kAltitudeDiffe
 constexpr const char* kRelative[] = {"relative_distance_mtrs", "relative_bearing_degs", "relative_altitude_mtrs"};
 constexpr const char* kTarget[] = {"modeS_id", "modeC_code"};
 constexpr std::int32_t kFirstWithTargets = 115000;
-// X-Plane may answer the datarefs of one rate in different frames of a period.
-constexpr double kJoinPeriods = 1.5;
 
 std::int32_t whole(float value) { return std::isfinite(value) ? static_cast<std::int32_t>(std::lround(value)) : 0; }
 
@@ -48,9 +46,7 @@ void TrafficAssembler::configure(SimulatorVersion version) {
     for (const char* leaf : kTarget) requests_.push_back("sim/cockpit2/tcas/targets/" + std::string(leaf) + element);
   }
   each_ = (requests_.size() - kSharedCount) / static_cast<std::size_t>(options_.aircraft);
-  RrefFrameAssembler::Options frames;
-  frames.join_window = kJoinPeriods / options_.rate;
-  frames_ = RrefFrameAssembler(requests_.size(), 0, frames);
+  frames_ = RrefFrameAssembler(requests_.size(), 0, RrefFrameAssembler::Options::atRate(options_.rate));
 }
 
 TrafficState TrafficAssembler::state() const {

@@ -13,8 +13,6 @@ namespace xplane_bridge {
 namespace {
 
 constexpr std::uint32_t kQueueSize = 100;
-// X-Plane may answer the datarefs of one rate in different frames of a period.
-constexpr double kJoinPeriods = 1.5;
 // Values older than this many of their periods (but not younger than the shortest age) are unknown.
 constexpr double kFreshPeriods = 2.5;
 constexpr double kShortestAge = 0.5;  // [s]
@@ -38,9 +36,7 @@ DatarefPublisher::DatarefPublisher(const std::vector<DatarefEntry>& entries, boo
     }
   }
   for (auto& [rate, batch] : by_rate) {
-    core::RrefFrameAssembler::Options options;
-    options.join_window = kJoinPeriods / rate;
-    batch.frames = core::RrefFrameAssembler(batch.names.size(), 0, options);
+    batch.frames = core::RrefFrameAssembler(batch.names.size(), 0, core::RrefFrameAssembler::Options::atRate(rate));
     batches_.push_back(std::move(batch));
   }
   message_.values.assign(message_.names.size(), std::numeric_limits<float>::quiet_NaN());

@@ -56,6 +56,7 @@ void RxNode::loadParameters(const ParamLoader& own) {
   }
   core::FlightStateAssembler::Options assembler;
   assembler.transport = common().transport;
+  assembler.rate = options_.rates[static_cast<std::size_t>(core::FieldGroup::kFlight)];
   assembler.position = options_.position_source;
   assembler.clock.exact = lockstep();
   flight_ = std::make_unique<core::FlightStateAssembler>(assembler);
@@ -296,7 +297,9 @@ core::FlightState RxNode::stamped(const core::FlightState& state) const {
 }
 
 void RxNode::publishRows(const core::DataView& datagram, const core::ReceiveInfo& info, std::int64_t receive_ns) {
-  rows_message_.header.stamp = stampsBySimulator() ? stampNow() : toRosTime(receive_ns);
+  const bool has_state = last_state_ && last_state_received_ns_ == receive_ns;
+  rows_message_.header.stamp =
+      stampsBySimulator() ? stampNow() : toRosTime(has_state ? last_state_->stamp_ns : receive_ns);
   rows_message_.label.assign(info.label.begin(), info.label.end());
   rows_message_.index.clear();
   rows_message_.values.clear();

@@ -342,6 +342,9 @@ def test_data_rows_are_passed_on_as_they_came(world, rx):
     mach_slot = message.index.index(4) * 8
     assert message.values[mach_slot] == pytest.approx(world.states.wait_for().mach, abs=0.01)
     assert message.values[message.index.index(132) * 8 + 2] == -999.0
+    rows.wait_for_count(20)
+    states = {state.header.stamp for state in world.states.wait_for_count(20)}
+    assert any(message.header.stamp in states for message in rows.messages), "stamped as the state of the same datagram"
 
 
 # --- how it was made --------------------------------------------------------------------------------------------------

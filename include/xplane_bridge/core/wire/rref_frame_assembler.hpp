@@ -19,8 +19,7 @@ namespace xplane_bridge::core {
 class RrefFrameAssembler {
  public:
   struct Options {
-    /// Pieces this long after the first belong to another frame [s]. For groups slower than the frame rate, whose
-    /// indices X-Plane may answer in different frames, give about one and a half periods.
+    /// Pieces this long after the first belong to another frame [s].
     double join_window = 0.005;
     /// Frames in a row without an index before it is taken as silent.
     int frames_until_silent = 3;
@@ -30,6 +29,12 @@ class RrefFrameAssembler {
       Options options;
       options.join_window = seconds;
       return options;
+    }
+    /// For a group that is asked for at this rate: below the frame rate X-Plane may answer its indices in different
+    /// frames of a period, for example one whose first request was lost.
+    static Options atRate(int rate_hz) {
+      constexpr double kPeriods = 1.5;
+      return joinedWithin(kPeriods / rate_hz);
     }
   };
 
