@@ -208,9 +208,11 @@ void DataOutput::update(bool flowing, std::int64_t now_ns) {
 void DataOutput::handleQuiet() {
   const std::string where = " at " + target_.toString() + " although X-Plane answers";
   if (!options_.configure) {
-    quiet_problem_ = true;
     problem_ = "no DATA arrives" + where + ": in X-Plane's Data Output select the rows for network via UDP and this " +
                "address and port, or use configure_xplane: true";
+    if (!std::exchange(quiet_problem_, true)) {
+      services_.log(LogLevel::kWarn, problem_);
+    }
   } else if (!ever_heard_ && tries_ < kMaxTries) {
     ++tries_;
     sendSettings(options_.rows);

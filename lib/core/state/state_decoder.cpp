@@ -131,7 +131,7 @@ std::uint32_t StateDecoder::decode(const std::vector<float>& dataref_values, con
       engines = known > 0 ? static_cast<int>(std::clamp(values[0], 0.0, static_cast<double>(kMaxEngines))) : 0;
     }
     // Of an array by engine every engine must be known; other arrays may be longer than what the aircraft has.
-    const bool complete = plan.per_engine ? (known > 0 && known == wanted) : known > 0;
+    const bool complete = known > 0 && (!plan.per_engine || known == engines);
     if (!complete) known_bits &= ~plan.valid;
   }
   return known_bits;
@@ -158,8 +158,8 @@ void computeCelsius(EngineStates& s) {
 }
 
 void computeEquivalentDeflections(SurfaceStates& s) {
-  // A wing without the surface always shows 0 on both sides; it must not dilute the mean. At neutral all show 0, and so
-  // does the mean then.
+  // A tail or wing without the surface always shows 0 on both sides; it must not dilute the mean. At neutral all show
+  // 0, and so does the mean then.
   const auto mean = [](double sum, int count) { return count > 0 ? static_cast<float>(sum / count) : 0.0F; };
   if ((s.valid & SurfaceStates::kValidAileron1) != 0) {
     double sum = 0.0;
@@ -176,24 +176,30 @@ void computeEquivalentDeflections(SurfaceStates& s) {
     }
     s.delta_aileron = mean(sum, wings);
   }
-  double sum = 0.0;
-  int count = 0;
-  const auto add = [&sum, &count](const auto& surfaces) {
-    for (const float d : surfaces) {
+  if ((s.valid & SurfaceStates::kValidElevator) != 0) {
+    double sum = 0.0;
+    int pairs = 0;
+    const auto add = [&sum, &pairs](const auto& surfaces) {
+      for (std::size_t left = 0; left < surfaces.size(); left += 2) {
+        const float l = surfaces[left], r = surfaces[left + 1];
+        if (!std::isfinite(l) || !std::isfinite(r) || (l == 0.0F && r == 0.0F)) continue;
+        sum += (static_cast<double>(l) + static_cast<double>(r)) / 2.0;
+        ++pairs;
+      }
+    };
+    add(s.elevator);
+    if ((s.valid & SurfaceStates::kValidWingElevator1) != 0) add(s.wing_elevator1);
+    if ((s.valid & SurfaceStates::kValidWingElevator2) != 0) add(s.wing_elevator2);
+    s.delta_elevator = mean(sum, pairs);
+  }
+  if ((s.valid & SurfaceStates::kValidRudder) != 0) {
+    double sum = 0.0;
+    int count = 0;
+    for (const float d : s.rudder) {  // each by itself: most aircraft have one fin, and show 0 for the other
       if (!std::isfinite(d) || d == 0.0F) continue;
       sum += static_cast<double>(d);
       ++count;
     }
-  };
-  if ((s.valid & SurfaceStates::kValidElevator) != 0) {
-    add(s.elevator);
-    if ((s.valid & SurfaceStates::kValidWingElevator1) != 0) add(s.wing_elevator1);
-    if ((s.valid & SurfaceStates::kValidWingElevator2) != 0) add(s.wing_elevator2);
-    s.delta_elevator = mean(sum, count);
-  }
-  if ((s.valid & SurfaceStates::kValidRudder) != 0) {
-    sum = 0.0, count = 0;
-    add(s.rudder);
     s.delta_rudder = -mean(sum, count);
   }
 }

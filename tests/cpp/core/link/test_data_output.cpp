@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -288,8 +289,12 @@ TEST_F(DataOutputTest, NotConfiguringSaysWhatTheUserHasToDo) {
   options.data_output.configure = false;
   options.data_output.port = free_port;
   makeLink(options);
-  run(3.0, {&sim});
+  run(9.0, {&sim});
   EXPECT_TRUE(hasProblem("select the rows"));
+  EXPECT_EQ(std::count_if(log_.begin(), log_.end(),
+                          [](const std::string& line) { return line.find("select the rows") != std::string::npos; }),
+            1)
+      << "once, not every time it is looked at";
   EXPECT_FALSE(isSelected(&sim, 17));
   sim.datarefs[FakeXPlane::rowPath(17)] = 1.0F;
   sim.data_target = {INADDR_LOOPBACK, free_port};

@@ -172,6 +172,16 @@ TEST(StateDecoder, EngineCountBoundsTheArrays) {
   EXPECT_TRUE(std::isnan(s.n1[2]));
 }
 
+TEST(StateDecoder, ArraysOfFewerEnginesThanTheAircraftHasAreNotComplete) {
+  const GroupDecoder<EngineStates> decoder(Transport::kRref, kXPlane11, 2);
+  std::vector<float> values(decoder.requests().size(), 4.0F);  // the count, too
+  EngineStates s;
+  EXPECT_EQ(decoder.decode(values, nullptr, 0, &s) & EngineStates::kValidN1, 0U);
+  EXPECT_EQ(s.count, 4);
+  EXPECT_EQ(s.n1[1], 4.0F);
+  EXPECT_TRUE(std::isnan(s.n1[2]));
+}
+
 TEST(StateDecoder, WithoutEngineCountNothingOfTheEnginesIsKnown) {
   const GroupDecoder<EngineStates> decoder(Transport::kRref, kXPlane11);
   std::vector<float> values(decoder.requests().size(), 1.0F);
@@ -201,6 +211,19 @@ TEST(EquivalentDeflections, MatchHandWorkedNumbers) {
   EXPECT_FLOAT_EQ(s.delta_rudder, -7.0F);
 }
 
+TEST(EquivalentDeflections, CountASurfaceAtExactlyZeroBesideOneThatIsNot) {
+  SurfaceStates s;
+  s.valid = SurfaceStates::kValidAll;
+  s.elevator = {0.0F, 10.0F, 0.0F, 0.0F};
+  s.wing_elevator1.fill(0.0F);
+  s.wing_elevator2.fill(0.0F);
+  computeEquivalentDeflections(s);
+  EXPECT_FLOAT_EQ(s.delta_elevator, 5.0F) << "the left one is stuck";
+  s.elevator[1] = -0.0F;
+  computeEquivalentDeflections(s);
+  EXPECT_EQ(s.delta_elevator, 0.0F);
+}
+
 // A flying wing: its elevons up 10 and 2 pitch it up like an elevator at -6; the tail that it does not have shows 0.
 TEST(EquivalentDeflections, CountElevatorsOnWings) {
   SurfaceStates s;
@@ -208,8 +231,8 @@ TEST(EquivalentDeflections, CountElevatorsOnWings) {
   s.elevator.fill(0.0F);
   s.wing_elevator1.fill(0.0F);
   s.wing_elevator2.fill(0.0F);
-  s.wing_elevator1[0] = -10.0F;
-  s.wing_elevator2[3] = -2.0F;
+  s.wing_elevator1[0] = s.wing_elevator1[1] = -10.0F;
+  s.wing_elevator2[2] = s.wing_elevator2[3] = -2.0F;
   computeEquivalentDeflections(s);
   EXPECT_FLOAT_EQ(s.delta_elevator, -6.0F);
   s.valid &= ~SurfaceStates::kValidWingElevator2;
