@@ -172,6 +172,7 @@ void Actuation::onWatch(const core::RrefView& view) {
     jobs_.forgetSettings();
     views_.forget();
     disturbance_.forget();
+    traffic_.release("X-Plane was restarted");
   }
   failures_.onFrame(watch_);
   excitation_.onFrame(watch_);

@@ -148,6 +148,7 @@ void ControlPath::onAircraft(const core::AircraftIdentity& aircraft) {
   aircraft_ = aircraft;
   aircraft_shown_ = true;
   overrides_->forgetShown();
+  overrides_->forgetPreparations();
   askMissing();
   settle();
 }
@@ -170,6 +171,7 @@ void ControlPath::onNewFlight(const std::string& how) {
     levers.set(core::index(core::leverChannel(engine))).set(core::index(core::motorChannel(engine)));
   }
   arbiter_.forgetSent(levers);
+  overrides_->forgetPreparations();
   endAuto(how, now());
 }
 
@@ -232,7 +234,10 @@ void ControlPath::onFrame(const core::FlightWatch& watch) {
 void ControlPath::resetAfterReconnect(bool same_flight, double time) {
   flight_shown_ = true;
   settle();
-  if (!same_flight) endAuto("X-Plane was restarted", time);
+  if (!same_flight) {
+    endAuto("X-Plane was restarted", time);
+    overrides_->forgetPreparations();
+  }
   overrides_->forgetShown();
   awaiting_read_back_.clear();
   ever_sent_.reset();  // another X-Plane does not know where the handles are

@@ -58,11 +58,15 @@ core::ArbitratedControls ControlPath::withoutMissing(core::ArbitratedControls co
   return controls;
 }
 
+/// Whether X-Plane can be asked, and has shown whether it is the one of before: what is written with a release is not
+/// for another.
+bool ControlPath::canGiveBack() const { return isUp(link_status_) && flight_shown_; }
+
 /// Whether anything is sent. What cannot be is left out of the controls.
 bool ControlPath::fly(core::ArbitratedControls* controls, double time) {
   if (controls->active.none()) {
     // What was taken last, be it by a test signal alone, is X-Plane's again as soon as X-Plane can be asked.
-    if (taken_ && isUp(link_status_)) {
+    if (taken_ && canGiveBack()) {
       overrides_->setRequired({});
       taken_ = false;
     }
@@ -70,7 +74,7 @@ bool ControlPath::fly(core::ArbitratedControls* controls, double time) {
   }
   if (standing_ != Standing::kFlying) {
     warnOnce("commands are not sent: " + why_not_);
-    if (isUp(link_status_)) overrides_->setRequired({});
+    if (canGiveBack()) overrides_->setRequired({});
     return false;
   }
   taken_ = true;

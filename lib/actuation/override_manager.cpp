@@ -10,6 +10,7 @@
 #include "xplane_bridge/core/control/control_channels.hpp"
 #include "xplane_bridge/core/control/control_rows.hpp"
 #include "xplane_bridge/core/link/journal.hpp"
+#include "xplane_bridge/core/link/undo_each.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -22,6 +23,7 @@ constexpr int kReleasedAnswers = 5;
 constexpr float kSame = 1e-3F;
 constexpr float kSamePreparation = 0.01F;
 constexpr double kRecordPeriod = 1.0;  // [s]
+constexpr double kLookPeriod = 1.0;    // [s]
 
 std::string entryId(const std::string& dataref) { return "override:" + dataref; }
 
@@ -42,53 +44,8 @@ core::UndoOperation undoOf(const std::string& dataref) {
   return core::UndoDref{dataref, release ? release->value : 0.0F};
 }
 
-using Operations = std::vector<core::UndoOperation>;
-
-/// Waits until X-Plane shows what each of several, which were sent, has written; returns of which it has. What has
-/// nothing to be read back counts as shown where X-Plane answers, or where none of them has.
-std::vector<bool> awaitEach(core::SimulatorPort* link, const std::vector<Operations>& each, double timeout_s) {
-  std::vector<std::string> paths;
-  std::vector<std::pair<std::size_t, float>> expected;  // of which, and what
-  for (std::size_t i = 0; i < each.size(); ++i) {
-    for (const core::UndoOperation& operation : each[i]) {
-      const auto* dref = std::get_if<core::UndoDref>(&operation);
-      if (dref == nullptr || !dref->confirm) continue;
-      paths.push_back(dref->path);
-      expected.emplace_back(i, dref->value);
-    }
-  }
-  if (paths.empty()) return std::vector<bool>(each.size(), true);
-  const auto missing = [expected](const std::vector<core::DatarefValue>& values) {
-    std::set<std::size_t> out;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      if (!values[k] || !(std::abs(*values[k] - expected[k].second) <= kSame)) out.insert(expected[k].first);
-    }
-    return out;
-  };
-  const auto values =
-      link->readUntil(std::move(paths), timeout_s, [missing](const auto& answers) { return missing(answers).empty(); });
-  const bool answered = std::any_of(values.begin(), values.end(), [](const auto& value) { return value.has_value(); });
-  std::vector<bool> shown(each.size(), answered || isUp(link->status()));
-  for (const std::size_t i : missing(values)) shown[i] = false;
-  return shown;
-}
-
-/// Carries out the operations of each of several; returns of which X-Plane has shown them.
-std::vector<bool> undoEach(core::SimulatorPort* link, std::vector<Operations> each, double timeout_s) {
-  std::set<std::size_t> not_sent;
-  for (std::size_t i = 0; i < each.size(); ++i) {
-    for (const core::UndoOperation& operation : each[i]) {
-      if (link->sendUndo(operation) != core::SendStatus::kSent) not_sent.insert(i);
-    }
-  }
-  for (const std::size_t i : not_sent) each[i].clear();  // there is nothing to wait for
-  std::vector<bool> shown = awaitEach(link, each, timeout_s);
-  for (const std::size_t i : not_sent) shown[i] = false;
-  return shown;
-}
-
 /// Whether the journal must be brought up to date; small changes are not worth its disk.
-bool differ(const std::vector<core::UndoOperation>& a, const std::vector<core::UndoOperation>& b) {
+bool differ(const core::UndoOperations& a, const core::UndoOperations& b) {
   const auto same = [](const core::UndoOperation& one, const core::UndoOperation& other) {
     const auto& first = std::get<core::UndoDref>(one);
     const auto& second = std::get<core::UndoDref>(other);
@@ -172,6 +129,7 @@ void OverrideManager::giveBack(const std::string& dataref) {
   startRelease(dataref);
   for (const core::UndoOperation& operation : releaseOf(dataref)) link_->sendUndo(operation);
   prepared_.erase(dataref);  // from now on it may be commanded otherwise
+  shown_.erase(dataref);
 }
 
 // --- what is written before a release ---
@@ -204,6 +162,12 @@ void OverrideManager::recordPreparations() {
       journal->remove({entryId(dataref)});
     }
   }
+}
+
+void OverrideManager::forgetPreparations() {
+  const Lock lock(*mutex_);
+  for (auto& [dataref, prepared] : prepared_) prepared.writes.clear();
+  recorded_at_ = -1e9;  // the journal has them no second longer
 }
 
 std::set<std::string> OverrideManager::takeAll() {
@@ -279,6 +243,7 @@ std::vector<std::string> OverrideManager::releasedByOthers() {
       if (required_.erase(dataref) != 0) stopped.push_back(dataref);
       acquired_.erase(dataref);
       prepared_.erase(dataref);
+      if (core::rowOfName(dataref)) giveBack(dataref);  // commands have held it again since
     }
     try {
       if (const auto journal = link_->journal()) journal->remove(entryIds(all));
@@ -291,6 +256,27 @@ std::vector<std::string> OverrideManager::releasedByOthers() {
   if (!problem.empty()) report_(problem, false);
   report_(joined(all) + " was released by another client", true);
   return stopped;
+}
+
+void OverrideManager::watchRows() {
+  const auto journal = link_->journal();
+  std::map<std::string, std::string> rows;  // by the id of its entry
+  std::uint64_t releases = 0;
+  {
+    const Lock lock(*mutex_);
+    const double now = link_->clock().steadySeconds();
+    if (!journal || now - rows_looked_at_ < kLookPeriod) return;
+    rows_looked_at_ = now;
+    releases = releases_;
+    for (const std::string& dataref : required_) {
+      if (core::rowOfName(dataref)) rows[entryId(dataref)] = dataref;
+    }
+  }
+  if (rows.empty()) return;
+  for (const core::JournalEntry& entry : journal->own()) rows.erase(entry.id);
+  const Lock lock(*mutex_);
+  if (releases_ != releases) return;  // given back meanwhile by this node, and perhaps taken anew: looked at again
+  for (const auto& [id, dataref] : rows) shown_[dataref].released = kReleasedAnswers;
 }
 
 void OverrideManager::forgetShown() {
@@ -318,6 +304,7 @@ void OverrideManager::setRequired(const std::vector<std::string>& wanted) {
     failed = outcome.failed;
     for (const core::DatarefWrite& each : outcome.set) taken.insert(each.dataref);
     required_.insert(taken.begin(), taken.end());
+    bool changed = !taken.empty();
     for (auto it = required_.begin(); it != required_.end();) {
       if (std::find(wanted.begin(), wanted.end(), *it) != wanted.end()) {
         ++it;
@@ -325,10 +312,12 @@ void OverrideManager::setRequired(const std::vector<std::string>& wanted) {
       }
       const std::string dataref = *it;
       it = required_.erase(it);
+      changed = true;
+      if (isSet(dataref)) continue;  // acquire() holds it on
       giveBack(dataref);
       given.insert(dataref);
     }
-    if (!taken.empty() || !given.empty()) updateWatch();
+    if (changed) updateWatch();
   }
   if (!taken.empty()) report_("set " + joined(taken), true);
   if (!given.empty()) report_("gave back " + joined(given), true);
@@ -402,7 +391,7 @@ bool OverrideManager::releasesPending() const {
 
 void OverrideManager::confirmReleases(double timeout_s) {
   std::vector<std::pair<std::string, std::uint64_t>> pending;
-  std::vector<Operations> operations;
+  std::vector<core::UndoOperations> operations;
   {
     const Lock lock(*mutex_);
     const double now = link_->clock().steadySeconds();
@@ -419,7 +408,7 @@ void OverrideManager::confirmReleases(double timeout_s) {
       operations.push_back({undo});
     }
   }
-  const std::vector<bool> shown = awaitEach(link_, operations, timeout_s);
+  const std::vector<bool> shown = core::awaitEach(link_, operations, timeout_s);
   const auto journal = link_->journal();
   const Lock lock(*mutex_);
   std::set<std::string> done;
@@ -445,7 +434,7 @@ void OverrideManager::reportReleases(const std::string& released, const std::str
 
 bool OverrideManager::releaseAll(double timeout_s) {
   std::vector<std::string> all;
-  std::vector<Operations> operations;
+  std::vector<core::UndoOperations> operations;
   {
     const Lock lock(*mutex_);
     for (const std::string& dataref : takeAll()) startRelease(dataref);
@@ -456,7 +445,7 @@ bool OverrideManager::releaseAll(double timeout_s) {
       operations.push_back(releaseOf(dataref));
     }
   }
-  const std::vector<bool> shown = undoEach(link_, operations, timeout_s);
+  const std::vector<bool> shown = core::undoEach(link_, operations, timeout_s);
   std::set<std::string> done, left;
   for (std::size_t i = 0; i < all.size(); ++i) (shown[i] ? done : left).insert(all[i]);
   if (const auto journal = link_->journal(); journal && !all.empty()) {
@@ -473,11 +462,13 @@ bool OverrideManager::releaseAll(double timeout_s) {
 bool OverrideManager::releaseLeftovers(double timeout_s) {
   const auto journal = link_->journal();
   if (!journal) return false;
+  const core::Deadline deadline(link_->clock(), timeout_s);
   const std::vector<core::JournalEntry> all = journal->orphans(kOverridePurpose);
-  std::vector<Operations> operations;
+  std::vector<core::UndoOperations> operations;
   operations.reserve(all.size());
   for (const core::JournalEntry& entry : all) operations.push_back(entry.undo);
-  const std::vector<bool> shown = undoEach(link_, operations, timeout_s);
+  core::dropPreparationsOfReleased(link_, &operations, timeout_s / 2.0);
+  const std::vector<bool> shown = core::undoEach(link_, operations, deadline.left());
   std::vector<core::JournalEntry> done, left;
   for (std::size_t i = 0; i < all.size(); ++i) (shown[i] ? done : left).push_back(all[i]);
   // This run may have set one of them anew meanwhile: that entry is not theirs.
@@ -486,6 +477,11 @@ bool OverrideManager::releaseLeftovers(double timeout_s) {
   if (!isUp(link_->status()) && known) unreleased_ = causes(left);  // the runs that left them have said so
   reportReleases(causes(done), causes(left));
   return left.empty();
+}
+
+bool OverrideManager::isRequired(const std::string& dataref) const {
+  const Lock lock(*mutex_);
+  return required_.count(dataref) != 0;
 }
 
 std::vector<std::string> OverrideManager::active() const {

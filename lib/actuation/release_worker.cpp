@@ -104,6 +104,7 @@ void ReleaseWorker::work() {
     leftovers_ = !giveBackLeftovers(link_, overrides_, kReleaseAttempt, &problem);
   }
   always([this] { overrides_->recordPreparations(); });
+  always([this] { overrides_->watchRows(); });
   if (watch_) always(watch_);
   always([this] {
     if (overrides_->releasesPending()) overrides_->confirmReleases(kReleaseAttempt);

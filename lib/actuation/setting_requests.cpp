@@ -71,7 +71,15 @@ std::optional<RequestResult> SettingRequests::holdOverrides(const std::vector<co
   std::vector<std::string> set;
   for (const core::DatarefWrite& write : writes) {
     const auto release = core::releaseOf(write.dataref);
-    if (release && write.value != release->value) set.push_back(write.dataref);
+    if (!release) continue;
+    if (write.value != release->value) {
+      set.push_back(write.dataref);
+    } else if (overrides_->isRequired(write.dataref)) {
+      return RequestResult{ResultCode::kRefused,
+                           write.dataref +
+                               " is what tx_node flies by: leave its controls out of the commands, and it is given "
+                               "back; or run scripts/release_overrides, which ends all flying"};
+    }
   }
   // One that X-Plane does not have could never be seen released.
   if (!set.empty() && !link_->inLockstep()) {

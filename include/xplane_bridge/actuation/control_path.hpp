@@ -159,6 +159,7 @@ class ControlPath {
   void afterModeChange(core::FlightMode before);
   void sendCommand(double time);
   void send(double time);
+  bool canGiveBack() const;
   bool fly(core::ArbitratedControls* controls, double time);
   std::vector<core::Channel> notHeld(const core::ChannelSet& channels) const;
   void warnOnce(const std::string& text);

@@ -57,6 +57,8 @@ class OverrideManager {
   void prepareRelease(const std::string& dataref, std::vector<core::UndoOperation> writes);
   /// Brings what has changed of that into the journal, once a second. Writes to the disk, without holding anything up.
   void recordPreparations();
+  /// Another flight begins, with levers of its own: nothing that was prepared in the last one is written any more.
+  void forgetPreparations();
   /// Another process has given everything back: nothing is set any more. Released once more, and confirmed.
   void giveBackAll();
   /// Gives one back that acquire() has set; another one stays as it is.
@@ -68,6 +70,9 @@ class OverrideManager {
   /// set. Its journal entry goes, and it is not set again by itself. Returns those of setRequired(); what acquire() has
   /// set is reported and let go as well, but for the surface override, which its holder watches.
   std::vector<std::string> releasedByOthers();
+  /// X-Plane does not show who holds a DATA row: once a second, rows whose journal entries another process has taken
+  /// out count as released by it, in the next releasedByOthers(). Reads the disk, without holding anything up.
+  void watchRows();
   /// X-Plane may have released everything by itself (restarted, another aircraft): that is not another client.
   void forgetShown();
   /// True while a release has not been read back.
@@ -82,6 +87,8 @@ class OverrideManager {
   /// `timeout_s`. Returns whether nothing is left.
   bool releaseLeftovers(double timeout_s);
 
+  /// Whether setRequired() has it set: what is flown goes by it.
+  bool isRequired(const std::string& dataref) const;
   /// Set now, by name; those that refresh() repeats.
   std::vector<std::string> active() const;
 
@@ -139,6 +146,7 @@ class OverrideManager {
   std::uint64_t releases_ = 0;
   std::map<std::string, Preparation> prepared_;
   double recorded_at_ = -1e9;         // [s] steady
+  double rows_looked_at_ = -1e9;      // [s] steady
   std::vector<std::string> watched_;  // datarefs of the subscription
   std::map<std::string, Shown> shown_;
   bool ended_ = false;               // by releaseAll()

@@ -105,14 +105,16 @@ TEST_F(ActuationTest, AnotherXPlaneIsNotLeftWithTheTrafficOfTheLast) {
   core::TrafficPose pose;
   pose.number = 3;
   pose.place = {37.46, 126.44, 500.0};
-  ASSERT_EQ(actuation_->traffic().command({pose}, actuation_->simTime()), "");
-  ASSERT_FLOAT_EQ(sim_.value(override_name), 1.0F);
-  sim_.restart();
-  sim_.set(override_name, 0.0F);
-  actuation_->onLink(sim_.status());
-  run(3.0);
-  EXPECT_FLOAT_EQ(sim_.value(override_name), 0.0F);
-  EXPECT_TRUE(actuation_->control().overrides.empty());
+  for (const bool bridged : {false, true}) {  // by the link: it is seen by its time alone
+    ASSERT_EQ(actuation_->traffic().command({pose}, actuation_->simTime()), "");
+    ASSERT_FLOAT_EQ(sim_.value(override_name), 1.0F);
+    bridged ? sim_.set("sim/time/total_running_time_sec", 1.0F) : sim_.restart();
+    sim_.set(override_name, 0.0F);
+    actuation_->onLink(sim_.status());
+    run(3.0);
+    EXPECT_FLOAT_EQ(sim_.value(override_name), 0.0F);
+    EXPECT_TRUE(actuation_->control().overrides.empty());
+  }
 }
 
 TEST_F(ActuationTest, AnotherXPlaneIsNotLeftWithTheWindOfTheLast) {

@@ -70,6 +70,14 @@ TEST_F(OverrideManagerTest, JournalComesBeforeTheWrite) {
   EXPECT_EQ(before_write, Names{kJoystick});
 }
 
+TEST_F(OverrideManagerTest, WhatIsHeldOnIsNotSaidToBeGivenBack) {
+  manager_.acquire(kJoystick);  // by set_dataref
+  manager_.setRequired({kJoystick, kThrottles});
+  manager_.setRequired({});
+  EXPECT_EQ(sim_.value(kJoystick), 1.0F);
+  EXPECT_EQ(reports_.back().first, "gave back override_throttles");
+}
+
 TEST_F(OverrideManagerTest, WhatIsNotRequiredAnyMoreIsGivenBack) {
   manager_.setRequired({kJoystick, kThrottles});
   manager_.setRequired({kThrottles});

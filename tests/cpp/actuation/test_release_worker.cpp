@@ -9,6 +9,7 @@
 
 #include "fake_simulator.hpp"
 #include "xplane_bridge/actuation/pausing.hpp"
+#include "xplane_bridge/core/control/control_rows.hpp"
 
 namespace xplane_bridge {
 namespace {
@@ -60,6 +61,13 @@ TEST_F(ReleaseWorkerTest, GivesBackWhatACrashedRunHasLeftInEachXPlane) {
   worker_.work();
   EXPECT_EQ(sim_.value(kThrottles), 0.0F);
   EXPECT_EQ(entries(), 0U);
+}
+
+TEST_F(ReleaseWorkerTest, NoticesRowsThatAnotherProcessHasGivenBack) {
+  overrides_.setRequired({core::rowName(25)});
+  sim_.journal()->remove({"override:" + core::rowName(25)});
+  worker_.work();
+  EXPECT_EQ(overrides_.releasedByOthers(), std::vector<std::string>{core::rowName(25)});
 }
 
 TEST_F(ReleaseWorkerTest, TriesAgainWhatXPlaneDoesNotShow) {

@@ -117,6 +117,22 @@ TEST_F(SettingRequestsTest, AnOverrideIsHeldUntilItIsGivenBack) {
   EXPECT_TRUE(overrides_.active().empty());
 }
 
+TEST_F(SettingRequestsTest, AnOverrideThatIsFlownByIsNotGivenBack) {
+  constexpr const char* kRoll = "sim/operation/override/override_joystick_roll";
+  sim_.set(kRoll, 0.0F);
+  overrides_.acquire(kRoll);  // held by set_dataref as well
+  overrides_.setRequired({kRoll});
+  sim_.clearMessages();
+  const auto written = settings_.setDataref(kRoll, {0.0F}, kWho);
+  EXPECT_EQ(written.result.code, ResultCode::kRefused);
+  EXPECT_EQ(written.result.text.find(std::string(kRoll) + " is what tx_node flies by"), 0U) << written.result.text;
+  EXPECT_TRUE(sim_.messages().empty());
+  EXPECT_EQ(sim_.value(kRoll), 1.0F);
+  overrides_.setRequired({});
+  EXPECT_EQ(settings_.setDataref(kRoll, {0.0F}, kWho).result.code, ResultCode::kOk);
+  EXPECT_EQ(sim_.value(kRoll), 0.0F);
+}
+
 TEST_F(SettingRequestsTest, ACommandWithoutANameIsRefusedWithWhatIsExpected) {
   for (const std::string& name : {std::string(), std::string(2000, 'a')}) {
     const RequestResult command = settings_.runCommand(name);

@@ -106,6 +106,79 @@ TEST_F(MotorsTest, LeverWithoutReverseIsNotBelowZero) {
   EXPECT_FLOAT_EQ(lever(0), 0.0F);
 }
 
+// --- another flight has levers of its own ---
+
+class MotorsOfTheLastFlight : public MotorsTest {
+ protected:
+  /// By a controller, whose motors fly their failsafe once it is silent.
+  void fly() {
+    sim.set(kFlightTime, 50.0F);
+    start();
+    ask(FlightMode::kAuto);
+    for (int i = 0; i < 25; ++i) {
+      path->command(FlightMode::kAuto, motorsCommand(0.6, 0.7));
+      frame();
+    }
+    ASSERT_EQ(sim.value(kMotorOverride), 1.0F);
+    overrides.recordPreparations();
+  }
+  void expectNoneInTheJournal() {
+    overrides.recordPreparations();
+    for (const core::JournalEntry& entry : sim.journal()->entries()) EXPECT_EQ(entry.undo.size(), 1U) << entry.id;
+  }
+  void expectLeversOfTheirOwn() {
+    run(1.0);
+    EXPECT_EQ(sim.value(kMotorOverride), 0.0F);
+    EXPECT_EQ(lever(0), 0.0F);
+    EXPECT_EQ(lever(1), 0.0F);
+  }
+};
+
+TEST_F(MotorsOfTheLastFlight, MoveNoLeverOfANewOne) {
+  fly();
+  path->onNewFlight("the flight began anew");
+  expectNoneInTheJournal();
+  expectLeversOfTheirOwn();
+}
+
+TEST_F(MotorsOfTheLastFlight, HeldByTheirFailsafeMoveNoLeverOfANewOne) {
+  for (int engine = 0; engine < 2; ++engine) {
+    options.arbiter.channels[core::index(core::motorChannel(engine))].failsafe = core::Failsafe::kHold;
+  }
+  fly();
+  run(2.0);
+  ASSERT_TRUE(path->mode().failsafe);
+  path->onNewFlight("the flight began anew");
+  expectLeversOfTheirOwn();
+}
+
+TEST_F(MotorsOfTheLastFlight, MoveNoLeverOfAnotherAircraft) {
+  fly();
+  path->onAircraft({"QUAD", ""});
+  expectNoneInTheJournal();
+  expectLeversOfTheirOwn();
+}
+
+TEST_F(MotorsOfTheLastFlight, MoveNoLeverOfARestartedXPlane) {
+  fly();
+  sim.set(kMotorOverride, 0.0F);
+  restartXPlane();
+  path->tick();  // before its first frame
+  expectLeversOfTheirOwn();
+}
+
+TEST_F(MotorsOfTheLastFlight, MoveTheLeversOfTheSameOneThatComesBack) {
+  fly();
+  setState(LinkState::kLost);
+  run(0.6);
+  setState(LinkState::kConnected);
+  path->tick();
+  EXPECT_EQ(lever(0), 0.0F) << "it has not shown its flight yet";
+  run(1.0);
+  EXPECT_EQ(sim.value(kMotorOverride), 0.0F);
+  EXPECT_FLOAT_EQ(lever(0), 0.6F);
+}
+
 TEST_F(MotorsTest, JournalHasWhatIsToBeWrittenBeforeTheRelease) {
   start();
   runWith(motorsCommand(0.6, 0.7), 0.5);

@@ -44,6 +44,50 @@ TEST_F(ControlPathRowsTest, RowsAreGivenBackWithTheOverrides) {
   EXPECT_EQ(sim.value(kStickOverride), 0.0F);
 }
 
+TEST_F(ControlPathRowsTest, RowsThatAnotherClientHasGivenBackAreNotSentAgain) {
+  core::ControlCommand command;
+  command.fields = core::kFieldThrottle;  // a lever has no override
+  command.throttle = 0.5;
+  const auto fly = [&](double seconds) {
+    for (double end = sim.time() + seconds - 1e-6; sim.time() < end;) {
+      runWith(command, 0.2);
+      overrides.watchRows();  // as the ReleaseWorker does
+    }
+  };
+  start();
+  fly(3.0);
+  ASSERT_EQ(path->standing(), Standing::kFlying);
+  ASSERT_TRUE(inJournal("DATA row 25"));
+  sim.journal()->remove({"override:DATA row 25"});  // as scripts/release_overrides does, after -999
+  fly(1.4);
+  EXPECT_EQ(path->standing(), Standing::kWaitingForMode);
+  EXPECT_EQ(path->refusal(), "another client has released DATA row 25: ask for a mode to fly on");
+  EXPECT_EQ(slotsOf(25, 0).back(), -999.0F) << "commands had gone on for a moment";
+  EXPECT_TRUE(overrides.releasesPending());
+  sim.clearMessages();
+  fly(1.0);
+  EXPECT_TRUE(slotsOf(25, 0).empty());
+  ask(FlightMode::kManual);
+  fly(3.0);
+  EXPECT_EQ(path->standing(), Standing::kFlying);
+  EXPECT_EQ(slotsOf(25, 0).back(), 0.5F);
+  EXPECT_TRUE(inJournal("DATA row 25"));
+}
+
+TEST_F(ControlPathRowsTest, RowsTakenAnewAreNoRelease) {
+  start();
+  for (int i = 0; i < 10; ++i) {
+    runWith(rollCommand(0.4), 0.3);
+    path->suspend("loading");
+    path->resume();
+    overrides.confirmReleases(0.1);
+    runWith(rollCommand(0.4), 0.1);
+    overrides.watchRows();
+  }
+  runWith(rollCommand(0.4), 0.1);
+  EXPECT_EQ(path->standing(), Standing::kFlying);
+}
+
 TEST_F(ControlPathRowsTest, HandlesAreLeftToTheCockpitAfterAChange) {
   core::ControlCommand command;
   command.fields = core::kFieldFlaps;

@@ -110,6 +110,28 @@ TEST_F(PreparedRelease, OfACrashedRunIsWrittenWithItsRelease) {
   EXPECT_EQ(sim_.writes(), (Writes{{kLever, 0.6F}, {kThrottles, 0.0F}}));
 }
 
+TEST_F(PreparedRelease, OfACrashedRunIsNotForAnXPlaneThatWasRestartedSince) {
+  sim_.journalOfAnother().record(std::string("override:") + kThrottles, kOverridePurpose,
+                                 {core::UndoDref{kLever, 0.6F, false}, core::UndoDref{kThrottles, 0.0F}});
+  crashedRunHas(kJoystick);
+  EXPECT_TRUE(manager_.releaseLeftovers(1.0));
+  EXPECT_EQ(sim_.value(kLever), 0.0F) << "its throttles were not overridden";
+  EXPECT_EQ(sim_.value(kJoystick), 0.0F);
+  EXPECT_TRUE(sim_.journal()->entries().empty());
+}
+
+TEST_F(PreparedRelease, IsOverWithTheFlightAlsoInTheJournal) {
+  manager_.setRequired({kThrottles});
+  prepare(0.5F);
+  manager_.recordPreparations();
+  manager_.forgetPreparations();
+  manager_.recordPreparations();
+  EXPECT_EQ(sim_.journal()->entries().at(0).undo.size(), 1U) << "at once";
+  sim_.clearMessages();
+  manager_.setRequired({});
+  EXPECT_EQ(sim_.writes(), (Writes{{kThrottles, 0.0F}}));
+}
+
 TEST_F(OverrideManagerTest, GivenBackByAnotherProcessNothingIsSetAnyMore) {
   manager_.setRequired({kJoystick});
   manager_.acquire(kFailure, 6.0F, false);
