@@ -21,6 +21,7 @@ constexpr double kBehaviourDeg = 2.0;   // [deg] off that counts as obeyed
 constexpr double kRepairedAfter = 0.5;  // [s] without it until a failure counts as repaired in the simulator
 constexpr double kRepairWait = 0.5;     // [s] in which values from before a repair may still come
 constexpr double kSendAgain = 0.3;      // [s] until what X-Plane does not show is sent once more
+constexpr int kLockedAfterFrames = 3;   // of showing it: of the second one the surfaces have arrived by then
 
 // Where X-Plane's own failure brings a surface; nullopt where the law does not give that.
 std::optional<double> expectedAngle(const core::SurfaceFailure& failure, double shown,
@@ -110,10 +111,21 @@ void FailureManager::observe(const std::vector<std::string>& datarefs, const cor
 
 void FailureManager::onFrame(const core::FlightWatch& watch) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
+  if (watch.sim_time > flight_.sim_time) countFrame();
   flight_ = {watch.sim_time, watch.height_agl, watch.indicated_airspeed};
   replay_ = watch.replay;
   if (stopped_) return;
   for (const core::FailurePlan& plan : registry_.due(flight_)) carryOut(plan);
+}
+
+/// A moving surface gets stuck where it is when X-Plane locks it, some frames after it was asked to.
+void FailureManager::countFrame() {
+  for (auto& [name, pending] : pending_) {
+    const auto& surface = pending.plan.surface;
+    if (pending.confirmed < 0.0 || ++pending.frames_shown != kLockedAfterFrames) continue;
+    if (!surface || surface->fault != core::SurfaceFault::kStuck) continue;
+    pending.expected_deg = surfaces_->readBack(surface->surface);
+  }
 }
 
 void FailureManager::onRestart() {
@@ -151,7 +163,7 @@ void FailureManager::carryOut(const core::FailurePlan& plan) {
     giveUp(plan.name, core::whyNotChanged(error));
     return;
   }
-  report_("failure: " + described(plan), pending.who, true);
+  report_("failure: " + described(plan) + alsoBroken(plan), pending.who, true);
   pending_[plan.name] = pending;
   watchOwn();
   applySurfaces();
@@ -225,6 +237,16 @@ void FailureManager::useDriver(const Pending& pending) {
   applySurfaces();
 }
 
+/// Better X-Plane's failure than none: it stays where the driver cannot take the surface, which is said.
+bool FailureManager::staysXPlanes(const Pending& pending) {
+  const auto refusal = surfaces_->refusalFor(pending.plan.surface->surface);
+  if (!refusal) return false;
+  std::string& why = not_shown_[pending.plan.name];
+  why = "X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: " + refusal->text;
+  report_(pending.plan.name + ": " + why, pending.who, false);
+  return true;
+}
+
 bool FailureManager::settled(Pending* pending) {
   const std::string name = pending->plan.name;  // a copy: giveUp() erases `pending`
   const auto settle = [this, pending, &name] {
@@ -279,6 +301,7 @@ bool FailureManager::settled(Pending* pending) {
     obeyed.failure.expected_deg = surfaces_->readBack(pending->plan.surface->surface);
     return settle();
   }
+  if (staysXPlanes(*pending)) return true;
   pending->since = now();
   useDriver(*pending);
   return false;
@@ -306,14 +329,7 @@ void FailureManager::watchObeyed() {
     Pending pending = obeyed_.at(name).failure;
     pending.since = now();
     obeyed_.erase(name);
-    const auto refusal = surfaces_->refusalFor(pending.plan.surface->surface);
-    if (refusal) {  // better X-Plane's failure than none
-      std::string why =
-          name + ": X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: ";
-      why += refusal->text;
-      report_(why, pending.who, false);
-      continue;
-    }
+    if (staysXPlanes(pending)) continue;
     pending_[name] = pending;
     useDriver(pending);
   }

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kWaitSlack = 1.0;  // [s] a service waits beyond what ends by itself
 constexpr double kReadWait = 0.5;   // [s] for one dataref, however late it is
+constexpr const char* kNotNow = " cannot be broken now: ";
 
 }  // namespace
 
@@ -46,7 +47,8 @@ bool FailureManager::gone() const {
   return link_status_.state == core::LinkState::kLost || link_status_.state == core::LinkState::kSearching;
 }
 
-RequestResult FailureManager::await(const std::string& name) {
+RequestResult FailureManager::await(const core::FailurePlan& plan) {
+  const std::string& name = plan.name;
   const double longest = 2.0 * timeout_ + kBehaviourWait + kWaitSlack;
   const auto ended = [this, &name] {
     std::lock_guard<core::HandlerMutex> lock(*mutex_);
@@ -60,7 +62,7 @@ RequestResult FailureManager::await(const std::string& name) {
   if (pending_.count(name) != 0) return {core::ResultCode::kAccepted, "X-Plane is paused: it acts when it goes on"};
   const auto why = not_shown_.find(name);
   if (why != not_shown_.end()) return {core::ResultCode::kTimeout, why->second};
-  return {core::ResultCode::kOk, "X-Plane shows it"};
+  return {core::ResultCode::kOk, "X-Plane shows it" + (registry_.isDriven(name) ? "" : alsoBroken(plan))};
 }
 
 std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan& plan) {
@@ -77,7 +79,20 @@ std::optional<RequestResult> FailureManager::unanswered(const core::FailurePlan&
   }
   const auto refusal = surfaces_->refusalFor(plan.surface->surface);
   if (!refusal) return std::nullopt;
-  return RequestResult{refusal->code, plan.name + " cannot be broken now: " + refusal->text};
+  return RequestResult{refusal->code, plan.name + kNotNow + refusal->text};
+}
+
+/// X-Plane's own failures are of all surfaces of a set on one side: the others of them that the aircraft has, as the
+/// end of a sentence.
+std::string FailureManager::alsoBroken(const core::FailurePlan& plan) const {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < core::surfaceTable().size() && !plan.datarefs.empty(); ++i) {
+    const std::string& name = core::surfaceTable()[i].name;
+    if (name == plan.name || !surfaces_->lawOf(i)) continue;
+    const auto its = core::planFailure({name, plan.kind, plan.value, 0, 0.0}, version_);
+    if (its.plan.datarefs == plan.datarefs) names.push_back(name);
+  }
+  return names.empty() ? "" : "; X-Plane breaks with it " + core::join(names);
 }
 
 RequestResult FailureManager::set(const core::FailureRequest& request, const std::string& who) {
@@ -90,6 +105,11 @@ RequestResult FailureManager::set(const core::FailureRequest& request, const std
     version = version_;
   }
   const auto planned = core::planFailure(request, version);
+  if (const auto surface = core::surfaceNumber(request.name); surface && planned.error == core::FailureError::kNone) {
+    // X-Plane's own failure would break another one.
+    const std::string why = surfaces_->unknownReason(*surface);
+    if (!why.empty()) return {core::ResultCode::kRefused, request.name + kNotNow + why};
+  }
   const bool waits = !link_->inLockstep();
   if (planned.error == core::FailureError::kNone && (waits || planned.plan.datarefs.empty())) {
     if (const auto refused = unanswered(planned.plan)) return *refused;
@@ -102,7 +122,7 @@ RequestResult FailureManager::set(const core::FailureRequest& request, const std
     return {core::ResultCode::kAccepted, "armed; published on events and failures/state when it comes true"};
   if (!waits)
     return {core::ResultCode::kAccepted, "sent; published on events and failures/state when X-Plane shows it"};
-  return await(planned.plan.name);
+  return await(planned.plan);
 }
 
 FailureManager::ClearResult FailureManager::clear(const std::vector<std::string>& names, bool include_simulator,

@@ -103,6 +103,7 @@ void SurfaceControl::onSample() {
   const bool overridden = sample_.override_shown != 0.0;
   switch (state_) {
     case State::kIdle:
+      inputs_.watch(sample_);
       if (!flowing_ || overridden) {
         watch_.interrupt();
       } else if (!disturbed_) {

@@ -222,8 +222,17 @@ std::optional<RequestResult> SurfaceControl::refusalFor(std::size_t surface) con
 
 std::string SurfaceControl::blockReasonForLocked(std::size_t surface) const {
   std::string blocked = blockReasonLocked();
+  return blocked.empty() ? unknownReasonLocked(surface) : blocked;
+}
+
+std::string SurfaceControl::unknownReason(std::size_t surface) const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  return unknownReasonLocked(surface);
+}
+
+std::string SurfaceControl::unknownReasonLocked(std::size_t surface) const {
   const core::MixingModel* model = watch_.model();
-  if (!blocked.empty() || !model || model->lawOf(surface)) return blocked;
+  if (!model || model->lawOf(surface)) return "";
   return nameOf(surface) +
          " has not been seen to move: either this aircraft has none, or its handle has to be moved once; those that "
          "moved: " +

@@ -141,6 +141,13 @@ std::string SurfaceIdentification::whyNot(const core::FlightWatch& watch, const 
   return beyondLimits(watch);
 }
 
+/// Its signal has to go to both sides of the middle.
+std::string SurfaceIdentification::offTheMiddle(std::size_t axis) const {
+  const double total = surfaces_->sticks().total[axis];
+  if (std::abs(total) <= kFarthestRest) return "";
+  return std::string(kAxes[axis]) + " stands at " + inWords(total) + " of full stick: trim it first";
+}
+
 // --- what it does ---
 
 RequestResult SurfaceIdentification::begin(const IdentificationRequest& request, const std::string& who,
@@ -164,6 +171,12 @@ RequestResult SurfaceIdentification::begin(const IdentificationRequest& request,
   if (const std::string why = unsteady(watch); !why.empty()) return refused(why);
   if (const std::string why = whyNot(watch, now); !why.empty()) return refused(why);
   if (const std::string why = surfaces_->beginIdentification(); !why.empty()) return refused(why);
+  for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+    const std::string why = offTheMiddle(axis);
+    if (why.empty()) continue;
+    surfaces_->cancelIdentification();
+    return refused(why);
+  }
   who_ = who;
   axis_ = 0;
   repeats_ = 0;
@@ -207,11 +220,8 @@ void SurfaceIdentification::onFrame(const core::FlightWatch& watch, const Identi
 
 void SurfaceIdentification::signal(const core::FlightWatch& watch, const IdentificationConditions& now) {
   const SurfaceControl::Sticks sticks = surfaces_->sticks();
-  const double total = sticks.total[axis_];
-  if (!(std::abs(total) <= kFarthestRest)) {
-    return abort(std::string(kAxes[axis_]) + " stands at " + inWords(total) + " of full stick: trim it first");
-  }
-  wanted_ = kMargin * surfaces_->excursionNeeded() + std::abs(total);
+  if (const std::string why = offTheMiddle(axis_); !why.empty()) return abort(why);
+  wanted_ = kMargin * surfaces_->excursionNeeded() + std::abs(sticks.total[axis_]);
   const double frequency = std::min(kFrequency, kFastest / (2.0 * core::kPi * wanted_));
   ExcitationRequest request;
   request.kind = core::toString(core::ExcitationShape::kChirp);

@@ -80,6 +80,7 @@ class FailureManager {
     double since = 0.0;                  // [s] steady; when X-Plane was first asked for it
     double sent = 0.0;                   // [s] steady, last
     double confirmed = -1.0;             // [s] steady: the dataref shows it; < 0: not yet
+    int frames_shown = 0;                // of simulator time since then
     std::optional<double> expected_deg;  // where X-Plane's own failure must bring the surface
   };
 
@@ -95,8 +96,10 @@ class FailureManager {
   double now() const;
 
   // All with mutex_ held.
+  void countFrame();
   void carryOut(const core::FailurePlan& plan);
   void useDriver(const Pending& pending);
+  bool staysXPlanes(const Pending& pending);
   bool settled(Pending* pending);
   void watchPending();
   void watchObeyed();
@@ -113,10 +116,11 @@ class FailureManager {
   void publishLocked();
   std::optional<RequestResult> add(const core::FailureRequest& request, const std::string& who);
   bool gone() const;
+  std::string alsoBroken(const core::FailurePlan& plan) const;
 
   // All without it.
   std::optional<RequestResult> unanswered(const core::FailurePlan& plan);
-  RequestResult await(const std::string& name);
+  RequestResult await(const core::FailurePlan& plan);
   RequestResult awaitRepair(const std::vector<std::string>& datarefs, bool given_back);
 
   core::SimulatorPort* link_;
@@ -139,7 +143,7 @@ class FailureManager {
   std::map<std::string, Pending> pending_;
   std::map<std::string, Obeyed> obeyed_;
   std::map<std::string, std::string> asked_by_;   // by name: who asked for it
-  std::map<std::string, std::string> not_shown_;  // by name: those that ended, and why; for await()
+  std::map<std::string, std::string> not_shown_;  // by name: those that ended, or do not act, and why; for await()
   std::map<std::string, double> undone_;          // [s] steady, by dataref: when it was repaired here
   std::map<std::string, double> repaired_since_;  // [s] steady, by name: ours that X-Plane does not show any more
 

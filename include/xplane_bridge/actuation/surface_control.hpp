@@ -141,6 +141,9 @@ class SurfaceControl {
   std::string blockReason() const;
   /// The same for one surface, which the mixing has to know: kNoLink where waiting helps; nullopt: it can.
   std::optional<RequestResult> refusalFor(std::size_t surface) const;
+  /// Why this aircraft may not have the surface, in words that say what to do: its mixing is known, and has no law of
+  /// it. Empty: it has, or no mixing is known.
+  std::string unknownReason(std::size_t surface) const;
   /// The surface override is set, or being taken or given back.
   bool driving() const;
   /// Nothing needs the surfaces any more, but X-Plane has not shown yet that it drives them.
@@ -205,6 +208,7 @@ class SurfaceControl {
   void saveModel();
   std::string blockReasonLocked() const;
   std::string blockReasonForLocked(std::size_t surface) const;
+  std::string unknownReasonLocked(std::size_t surface) const;
   bool followsLocked(std::size_t surface) const;
   bool isBroken(std::size_t surface) const;
 

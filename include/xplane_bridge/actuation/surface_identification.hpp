@@ -67,6 +67,7 @@ class SurfaceIdentification {
 
   std::string unsteady(const core::FlightWatch& watch) const;
   std::string beyondLimits(const core::FlightWatch& watch) const;
+  std::string offTheMiddle(std::size_t axis) const;
   std::string whyNot(const core::FlightWatch& watch, const IdentificationConditions& now) const;
   void signal(const core::FlightWatch& watch, const IdentificationConditions& now);
   void observe();

@@ -15,6 +15,7 @@ constexpr double kStickMoved = 0.05;    // [-] from which on the total must have
 constexpr double kTotalFollows = 0.25;  // [-] of the stick's movement
 constexpr int kFramesStanding = 10;     // until it is believed
 constexpr double kHandleMoved = 0.01;   // [-]
+constexpr double kDeployMoved = 1e-5;   // [-] in a frame; flaps that take a minute move by 8e-5 at 200 frames a second
 
 std::array<double, 3> totals(const MixingInputs& in) { return {in.roll, in.pitch, in.yaw}; }
 
@@ -51,12 +52,25 @@ bool surfaceSampleFrom(const std::vector<float>& values, SurfaceSample* sample) 
   return true;
 }
 
+void DrivenInputs::watch(const SurfaceSample& sample) {
+  if (sample.sim_time == watched_time_) return;  // X-Plane stands
+  const auto moved = [this](double now, double before) {
+    return std::isfinite(watched_time_) && std::abs(now - before) > kDeployMoved;
+  };
+  flap_.moved = moved(sample.inputs.flap1, flap1_) || moved(sample.inputs.flap2, flap2_);
+  speedbrake_.moved = moved(sample.inputs.speedbrake, brake_);
+  watched_time_ = sample.sim_time;
+  flap1_ = sample.inputs.flap1;
+  flap2_ = sample.inputs.flap2;
+  brake_ = sample.inputs.speedbrake;
+}
+
 void DrivenInputs::begin(const SurfaceSample& sample) {
   total_begin_ = totals(sample.inputs);
   stick_begin_ = sample.stick;
   standing_ = {};
-  flap_ = {sample.flap_handle, false};
-  speedbrake_ = {sample.speedbrake_handle, false};
+  flap_.at_begin = sample.flap_handle;
+  speedbrake_.at_begin = sample.speedbrake_handle;
   flap1_ = sample.inputs.flap1;
   flap2_ = sample.inputs.flap2;
   brake_ = sample.inputs.speedbrake;

@@ -44,7 +44,10 @@ class DrivenInputs {
   explicit DrivenInputs(double flap_rate = 0.15, double speedbrake_rate = 1.0)
       : flap_rate_(flap_rate), speedbrake_rate_(speedbrake_rate) {}
 
-  /// From the sample of taking over on.
+  /// Each frame in which X-Plane moves the surfaces: whether flaps and speed brakes are under way.
+  void watch(const SurfaceSample& sample);
+  /// From the sample of taking over on. Flaps and speed brakes that were under way run on; those that stood off their
+  /// handles stay until the handle is moved.
   void begin(const SurfaceSample& sample);
   /// One frame of `dt` [s]. `own`: roll, pitch, yaw as this node commands them now; NaN where it does not.
   MixingInputs step(const SurfaceSample& sample, const std::array<double, 3>& own, double dt);
@@ -52,13 +55,14 @@ class DrivenInputs {
  private:
   struct Handle {
     double at_begin = 0.0;
-    bool moved = false;
+    bool moved = false;  // or what it moves was under way
   };
   static double run(Handle* handle, double shown, double now, double rate, double dt);
 
   double flap_rate_, speedbrake_rate_;
   std::array<double, 3> total_begin_{}, stick_begin_{};
-  std::array<int, 3> standing_{};  // frames in a row in which the total did not follow the stick
+  std::array<int, 3> standing_{};       // frames in a row in which the total did not follow the stick
+  double watched_time_ = std::nan("");  // [s]
   Handle flap_, speedbrake_;
   double flap1_ = 0.0, flap2_ = 0.0, brake_ = 0.0;
 };

@@ -106,15 +106,78 @@ TEST_F(FailureManagerTest12, DriverTakesOverWhereXPlaneDoesNotShowItsFailure) {
   EXPECT_EQ(state(), SurfaceControlState::kIdle);
 }
 
-TEST_F(FailureManagerTest12, DriverThatCannotTakeOverGivesTheFailureUp) {
+TEST_F(FailureManagerTest12, XPlanesFailureStaysWhereTheDriverCannotTakeOver) {
   airframe_.setStick(0.25);
   sim_.run(0.1);
   after(0.2, [this] { airframe_.setStick(0.5); });
   after(0.3, [this] { block("the aircraft is another one"); });
   const RequestResult result = set(broken(FakeAirframe::kLeft, "stuck"));
   EXPECT_EQ(result.code, ResultCode::kTimeout);
-  EXPECT_EQ(result.text, "the aircraft is another one");
-  EXPECT_TRUE(labelNames().empty());
+  EXPECT_EQ(result.text,
+            "X-Plane's own failure does not act as it says, and tx_node cannot drive the surface: the aircraft is "
+            "another one");
+  EXPECT_EQ(sim_.value(kLock), 6.0F);
+  EXPECT_EQ(labelNames(), Names{FakeAirframe::kLeft});
+}
+
+/// X-Plane locks the left aileron three frames after it was asked to; by then it has moved from 5 to 8 deg.
+class MovingSurface : public FailureManagerTest12 {
+ protected:
+  MovingSurface() {
+    airframe_.setStick(0.25);
+    sim_.run(0.1);
+    sim_.on_message = [this](const core::FakeSimulator::Message& message) {
+      if (message.path != kLock) return;
+      if (message.value == 0.0F) return airframe_.letGo(FakeAirframe::kLeft);
+      airframe_.setStick(0.4);
+      after(0.06, [this] { airframe_.hold(FakeAirframe::kLeft, 8.0); });
+    };
+    after(0.3, [this] { airframe_.setStick(0.9); });
+  }
+  void expectXPlanesLock() {
+    require(broken(FakeAirframe::kLeft, "stuck"));
+    sim_.run(2.0);
+    EXPECT_EQ(sim_.value(kLock), 6.0F);
+    EXPECT_EQ(state(), SurfaceControlState::kIdle);
+    EXPECT_NEAR(label(FakeAirframe::kLeft).value, 8.0, 1e-4);
+    EXPECT_TRUE(label(FakeAirframe::kLeft).confirmed);
+  }
+};
+
+TEST_F(MovingSurface, IsStuckWhereXPlaneHasLockedIt) { expectXPlanesLock(); }
+
+TEST_F(MovingSurface, IsStuckThereAlsoWhereItsMixingIsNotKnown) {
+  surfaces_.onAircraft("OTHER");
+  surfaces_.takeAbandoned();
+  expectXPlanesLock();
+}
+
+TEST_F(FailureManagerTest12, SurfaceThatTheAircraftHasNotIsNotBrokenInTheNameOfAnother) {
+  for (const char* kind : {"stuck", "centred", "hard_over_up", "hard_over_down", "gone"}) {
+    refused(broken("aileron1_wing1_left", kind), ResultCode::kRefused,
+            "aileron1_wing1_left cannot be broken now: aileron1_wing1_left has not been seen to move");
+  }
+  core::FailureRequest armed = broken("rudder1_fin2", "stuck");
+  armed.trigger = static_cast<int>(FailureTrigger::kAtSimTime);
+  armed.trigger_value = 5.0;
+  refused(armed, ResultCode::kRefused, "rudder1_fin2 has not been seen to move");
+  EXPECT_TRUE(sim_.messages().empty());
+}
+
+TEST_F(FailureManagerTest12, SurfacesThatXPlaneBreaksTogetherAreNamed) {
+  core::MixingModel mixing = FakeAirframe::mixing("WIDE");
+  core::SurfaceLaw outer = mixing.laws.front();
+  outer.surface = core::surfaceNumber("aileron1_wing3_left").value();
+  mixing.laws.push_back(outer);
+  std::sort(mixing.laws.begin(), mixing.laws.end(), [](const auto& a, const auto& b) { return a.surface < b.surface; });
+  writeMixingFile(folder(), mixing);
+  surfaces_.onAircraft("WIDE");
+  surfaces_.takeAbandoned();
+  const RequestResult left = set(broken(FakeAirframe::kLeft, "stuck"));
+  EXPECT_EQ(left.code, ResultCode::kOk);
+  EXPECT_EQ(left.text, "X-Plane shows it; X-Plane breaks with it aileron1_wing3_left");
+  EXPECT_TRUE(reported("failure: aileron1_wing2_left stuck; X-Plane breaks with it aileron1_wing3_left", kWho, true));
+  require(broken(FakeAirframe::kRight, "stuck"));
 }
 
 TEST_F(FailureManagerTest12, HardOverOfXPlanesMustReachTheEndOfTheTravel) {

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "fixture.hpp"
 
 namespace xplane_bridge {
@@ -54,6 +56,35 @@ TEST_F(SurfaceControlTest, AShippedMixingCountsForExactlyItsAircraftAndWhereTher
   surfaces_.onAircraft("OTHER");
   surfaces_.onAircraft("TEST", "TEST Own one");
   EXPECT_EQ(surfaces_.status().mixed_surfaces.size(), model.laws.size()) << "its own goes first";
+}
+
+TEST_F(SurfaceControlTest, FlapsThatAreUnderWayRunOnWhileTheSurfacesAreDriven) {
+  constexpr const char* kFlap = "flap1_wing1_left";
+  core::MixingModel model = FakeAirframe::mixing("FLAPS");
+  core::SurfaceLaw law;
+  law.surface = core::surfaceNumber(kFlap).value();
+  law.slopes[static_cast<Eigen::Index>(core::MixingTerm::kFlap1)] = 30.0;
+  law.high_deg = 30.0;
+  const auto after = [&law](const core::SurfaceLaw& other) { return other.surface > law.surface; };
+  model.laws.insert(std::find_if(model.laws.begin(), model.laws.end(), after), law);
+  writeMixingFile(folder(), model);
+  float flaps = 0.0F;
+  sim_.on_frame = [&] {
+    eachFrame();
+    if (sim_.value(kSurfaceOverride) != 0.0F) return;  // then X-Plane moves nothing
+    flaps = std::min(flaps + 0.003F, sim_.value("sim/cockpit2/controls/flap_ratio"));
+    sim_.set("sim/flightmodel2/controls/flap1_deploy_ratio", flaps);
+    sim_.set(FakeAirframe::dataref(kFlap), 30.0F * flaps);
+  };
+  surfaces_.onAircraft("FLAPS");
+  sim_.run(1.2);
+  ASSERT_EQ(surfaces_.blockReason(), "");
+  sim_.set("sim/cockpit2/controls/flap_ratio", 1.0F);
+  sim_.run(1.0);
+  drive();
+  EXPECT_LT(sim_.value(FakeAirframe::dataref(kFlap)), 8.0F);
+  sim_.run(8.0);
+  EXPECT_FLOAT_EQ(sim_.value(FakeAirframe::dataref(kFlap)), 30.0F);
 }
 
 TEST_F(SurfaceControlTest, FileThatCannotBeReadIsReported) {

@@ -136,10 +136,10 @@ TEST_F(SurfaceIdentificationTest, IsStoppedDuringASignalAndBetweenTwo) {
   expectGivenUp("stopped by pilot");
 }
 
-TEST_F(SurfaceIdentificationTest, RefusesToReachAcrossAStickThatStandsFarOff) {
-  pilot_ = {0.0, 0.6, 0.0};
-  run(0.5);
+TEST_F(SurfaceIdentificationTest, AStickThatStandsFarOffByThenIsNotReachedAcross) {
   begin();
+  run(0.5);
+  pilot_ = {0.0, 0.6, 0.0};
   run(8.0);
   expectGivenUp("pitch stands at 0.6 of full stick: trim it first");
 }

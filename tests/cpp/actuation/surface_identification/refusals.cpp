@@ -49,6 +49,17 @@ TEST_F(SurfaceIdentificationTest, RefusesWhileAFailureIsSetOrWaits) {
   EXPECT_EQ(refusal(), "a failure is set: clear_failures first");
 }
 
+TEST_F(SurfaceIdentificationTest, RefusesAStickFarOffTheMiddle) {
+  pilot_ = {0.1, 0.2, -0.6};
+  run(0.1);
+  EXPECT_EQ(refusal(), "yaw stands at -0.6 of full stick: trim it first");
+  pilot_ = {};
+  run(0.1);
+  begin();
+  run(15.0);
+  EXPECT_TRUE(outcome().success) << outcome().text;
+}
+
 TEST_F(SurfaceIdentificationTest, RefusesWhileSurfacesAreDriven) {
   begin();
   run(15.0);

@@ -73,13 +73,37 @@ TEST(DrivenInputs, ATotalThatStandsStillIsReplacedByTheStick) {
 
 TEST(DrivenInputs, FlapsRunToTheirHandleOnceItIsMoved) {
   DrivenInputs inputs(0.5);
-  inputs.begin(frame(0.0, 0.0, 0.25, 0.2));  // still running when the surfaces were taken
+  inputs.begin(frame(0.0, 0.0, 0.25, 0.2));  // it stands, but not where its handle does
   EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 0.25, 0.2), kNoCommands, 1.0).flap1, 0.2) << "they stay where they are";
   EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 0.7);
   EXPECT_DOUBLE_EQ(inputs.step(frame(0, 0, 1.0, 0.2), kNoCommands, 1.0).flap1, 1.0);
   const MixingInputs up = inputs.step(frame(0, 0, 0.0, 0.2), kNoCommands, 1.0);
   EXPECT_DOUBLE_EQ(up.flap1, 0.5);
   EXPECT_DOUBLE_EQ(up.flap2, 0.5);
+}
+
+TEST(DrivenInputs, FlapsAndSpeedBrakesThatWereUnderWayRunOnToTheirHandles) {
+  const auto shown = [](double time, double flap, double brake) {
+    SurfaceSample out = frame(0.0, 0.0, 1.0, flap);
+    out.inputs.flap2 = 0.0;  // the aircraft has none
+    out.inputs.speedbrake = brake;
+    out.speedbrake_handle = 0.5;
+    out.sim_time = time;
+    return out;
+  };
+  DrivenInputs inputs(0.5, 0.25);
+  for (const SurfaceSample& sample : {shown(10.0, 0.199, 0.2), shown(10.005, 0.2, 0.2)}) inputs.watch(sample);
+  inputs.watch(shown(10.005, 0.2, 0.2));  // the same frame once more
+  inputs.begin(shown(10.005, 0.2, 0.2));
+  const MixingInputs out = inputs.step(shown(10.01, 0.2, 0.2), kNoCommands, 1.0);
+  EXPECT_DOUBLE_EQ(out.flap1, 0.7);
+  EXPECT_DOUBLE_EQ(out.speedbrake, 0.2) << "it stood";
+  // The next time the speed brake is under way, and X-Plane has been restarted.
+  for (const SurfaceSample& sample : {shown(1.0, 0.2, 0.2), shown(1.005, 0.2, 0.205)}) inputs.watch(sample);
+  inputs.begin(shown(1.005, 0.2, 0.205));
+  const MixingInputs then = inputs.step(shown(1.01, 0.2, 0.205), kNoCommands, 1.0);
+  EXPECT_DOUBLE_EQ(then.flap1, 0.2);
+  EXPECT_DOUBLE_EQ(then.speedbrake, 0.455);
 }
 
 TEST(DrivenInputs, AHandleThatIsNotReceivedForAFrameStopsNothing) {
