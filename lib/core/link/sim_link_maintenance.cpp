@@ -383,24 +383,14 @@ void SimLink::updateStop(std::int64_t now_ns) {
     stop_phase_ = StopPhase::kUnsubscribing;
   }
   if (stop_phase_ == StopPhase::kUnsubscribing && ends_.empty() && reader_.idle()) {
-    stop_phase_ = StopPhase::kUnsubscribingAgain;
+    stop_phase_ = StopPhase::kDone;
     // While it loads, X-Plane does not read that it is to stop, and may be silent for longer than LOST takes.
-    answered_to_the_end_ = monitor_.alive();
+    if (monitor_.alive()) forgetSubscriptions();
   } else if (stop_phase_ == StopPhase::kUnsubscribing && late()) {
     stop_phase_ = StopPhase::kDone;
     log_(LogLevel::kWarn, "X-Plane's frames are so slow that " + std::to_string(ends_.size()) +
                               " subscriptions could not be ended; the next start of this node, or release_overrides, "
                               "ends them");
-  }
-  if (stop_phase_ == StopPhase::kUnsubscribingAgain && (ends_again_.empty() || late())) {
-    stop_phase_ = StopPhase::kDone;
-    if (!ends_again_.empty()) {
-      log_(LogLevel::kInfo, "X-Plane's frames are so slow that " + std::to_string(ends_again_.size()) +
-                                " subscriptions were ended without a repeat; the next start of this node, or "
-                                "release_overrides, makes sure of it");
-    } else if (answered_to_the_end_) {
-      forgetSubscriptions();
-    }
   }
   if (stop_phase_ == StopPhase::kDone) {
     reader_.cancelAll();

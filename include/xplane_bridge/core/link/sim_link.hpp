@@ -92,7 +92,7 @@ class SimLink : public SimulatorPort {
   /// X-Plane reads requests, at most kUnsubscribeTime), joins the thread.
   /// Waits. Returns whether everything was undone; what was not, and subscriptions that are left, stay in the journal.
   bool stop(double timeout_s = 1.5);
-  static constexpr double kUnsubscribeTime = 2.5;  ///< [s] for 950 requests at 20 frames a second
+  static constexpr double kUnsubscribeTime = 2.5;  ///< [s] for 950 datarefs at 20 frames a second
   /// Instead of start(): waits up to `timeout_ms` for datagrams, handles them and everything that is due.
   void step(int timeout_ms);
 
@@ -289,7 +289,7 @@ class SimLink : public SimulatorPort {
   bool subscriptions_changed_ = false;              // since recordSubscriptions()
   std::vector<Group> groups_;                       // by falling priority
   std::deque<End> ends_;
-  std::deque<End> ends_again_;        // as ends_, after all else: one may be lost, and none is confirmed
+  std::deque<End> ends_again_;  // as ends_, after all else, while the node runs: one may be lost, and none is confirmed
   std::deque<End> ended_in_silence_;  // for when X-Plane answers again
   bool was_alive_ = false;
   std::uint32_t seen_epoch_ = 0;
@@ -307,11 +307,10 @@ class SimLink : public SimulatorPort {
   LinkCounters live_counters_;  // of this thread; published by maintain()
   UdpCounters retired_udp_;     // of sources that are gone
 
-  enum class StopPhase : std::uint8_t { kRunning, kReleasing, kUnsubscribing, kUnsubscribingAgain, kDone };
+  enum class StopPhase : std::uint8_t { kRunning, kReleasing, kUnsubscribing, kDone };
   StopPhase stop_phase_ = StopPhase::kRunning;
   std::int64_t stop_deadline_ns_ = 0;
   bool released_ = true;
-  bool answered_to_the_end_ = false;  // X-Plane, when the last subscription was ended
 };
 
 }  // namespace xplane_bridge::core
