@@ -137,7 +137,6 @@ void SimLink::refreshLink(std::int64_t now_ns) {
   if (alive && (!was_alive_ || came_up)) {
     restartSubscriptions(now_ns);
     ends_.insert(ends_.end(), ended_in_silence_.begin(), ended_in_silence_.end());
-    ends_again_.insert(ends_again_.end(), ended_in_silence_.begin(), ended_in_silence_.end());
     ended_in_silence_.clear();
   } else if (!alive && was_alive_) {
     for (Group& group : groups_) {
@@ -248,13 +247,16 @@ void SimLink::flushRequests(std::int64_t now_ns) {
     }
     sendRequest(control_source_.get(), request->path, request->rate_hz, request->index);
   }
-  const auto end = [&](std::deque<End>* ends) {
+  const auto end = [&](std::deque<End>* ends, bool again) {
     for (; !ends->empty() && pacer_.allowance(now_ns, &jitter_) > 0; pacer_.spend(1)) {
       sendEnd(ends->front().source.get(), ends->front().path, ends->front().index);
+      if (again) {
+        ends_again_.push_back(std::move(ends->front()));
+      }
       ends->pop_front();
     }
   };
-  end(&ends_);
+  end(&ends_, stop_phase_ == StopPhase::kRunning);
   if (subscribing) {
     for (Group& group : groups_) {
       flush(&group.subscription, group.source.get());
@@ -267,7 +269,7 @@ void SimLink::flushRequests(std::int64_t now_ns) {
     }
     sendEnd(leftover->source.get(), leftover->dataref, leftover->index);
   }
-  end(&ends_again_);
+  end(&ends_again_, false);
 }
 
 void SimLink::sendRequest(DatagramSource* source, const std::string& path, std::int32_t rate_hz, std::int32_t index) {
@@ -351,14 +353,10 @@ void SimLink::stopGroup(const Group& group) {
 
 /// @param paths in the order of their indices; an empty one: the position stream
 void SimLink::endSubscription(const SourcePtr& source, const std::vector<std::string>& paths) {
+  // One that is silent may only be loading, and goes on sending afterwards.
+  std::deque<End>& ends = monitor_.alive() ? ends_ : ended_in_silence_;
   for (std::size_t i = 0; i < paths.size(); ++i) {
-    const End end{source, paths[i], static_cast<std::int32_t>(i)};
-    if (!monitor_.alive()) {  // it may only be loading, and goes on sending afterwards
-      ended_in_silence_.push_back(end);
-      continue;
-    }
-    ends_.push_back(end);
-    ends_again_.push_back(end);
+    ends.push_back({source, paths[i], static_cast<std::int32_t>(i)});
   }
 }
 
