@@ -380,13 +380,10 @@ RequestResult Actuation::setPaused(bool paused, const std::string& who) {
   }
   // What X-Plane shows meanwhile is the pause of the reset itself, which ends with it.
   if (jobs_.resets()) return {core::ResultCode::kRefused, "reset_flight runs: wait for its event"};
-  const auto pausedNow = [this] {
-    const core::LinkStatus status = link_->status();
-    return isUp(status) ? status.paused : std::nullopt;
-  };
-  if (!pausedNow()) return noLink();
-  if (pausedNow() != paused) setPausing(who);
-  const PauseOutcome outcome = xplane_bridge::setPaused(link_, paused, options_.service_timeout, hooks_.stopping);
+  const core::LinkStatus status = link_->status();
+  if (!isUp(status) || !status.paused) return noLink();
+  const PauseOutcome outcome = xplane_bridge::setPaused(link_, paused, options_.service_timeout, hooks_.stopping,
+                                                        [this, &who] { setPausing(who); });
   if (outcome == PauseOutcome::kWasSo || outcome == PauseOutcome::kFollowed) {
     return {core::ResultCode::kOk, paused ? "paused" : "running"};  // published as an event when it happened
   }

@@ -1,6 +1,7 @@
 #include "xplane_bridge/actuation/pausing.hpp"
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,9 @@ std::vector<core::JournalEntry> ownPauses(const core::Journal& journal) {
 
 PauseOutcome setPaused(core::SimulatorPort* link, bool pause, double timeout_s, const std::function<bool()>& given_up,
                        const std::function<void()>& before) {
+  // One after the other: two that read before either has toggled would toggle twice.
+  static std::mutex turn;
+  const std::lock_guard<std::mutex> lock(turn);
   // Read now: the link's own status may be a fifth of a second old, and a toggle on that would do the opposite.
   const auto shown = link->read({core::kPausedDataref}, timeout_s);
   if (shown.empty() || !shown.front()) return PauseOutcome::kUnknown;

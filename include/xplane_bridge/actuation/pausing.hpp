@@ -15,7 +15,8 @@ enum class PauseOutcome : std::uint8_t {
 };
 
 /// Pauses X-Plane or lets it go on. What X-Plane shows decides whether anything is sent at all, and it is sent once:
-/// before 12.10 there is only a toggle, and a toggle sent twice is none. Waits.
+/// before 12.10 there is only a toggle, and a toggle sent twice is none. Waits, also for others of this process that
+/// do the same. Thread-safe.
 /// @param timeout_s for X-Plane's answer, and again until it shows what was asked for
 /// @param given_up asked while waiting
 /// @param before called right before anything is sent

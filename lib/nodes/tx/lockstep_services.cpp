@@ -8,7 +8,10 @@
 namespace xplane_bridge {
 namespace {
 
+using Turn = std::lock_guard<std::mutex>;
+
 constexpr double kFrameWait = 5.0;  // [s] without a frame in which X-Plane counts as standing
+constexpr const char* kNodeEnds = "tx_node ends";
 
 }  // namespace
 
@@ -25,18 +28,31 @@ std::string LockstepServices::setRunning(bool running) {
     running ? lockstep_->run() : lockstep_->step(0);
     return "";
   }
+  const Turn turn(turn_);
+  note(running ? Asked::kRun : Asked::kHold);
   const RequestResult result = actuation_.setPaused(!running, who_);
   return result.success() ? "" : result.text;
+}
+
+std::uint64_t LockstepServices::note(Asked what) {
+  last_ = what;
+  return ++calls_;
 }
 
 void LockstepServices::stepInLockstep(const LockstepStep::Request& request, LockstepStep::Response* response) {
   const std::uint32_t before = lockstep_->frame();
   lockstep_->step(request.frames);
-  response->success = lockstep_->waitUntilHeld();
+  const TxLockstep::Held held = lockstep_->waitUntilHeld();
+  response->success = held == TxLockstep::Held::kHeld;
   response->flown = lockstep_->frame() - before;
   response->sim_time = actuation_.simTime();
-  response->result =
-      response->success ? result(ServiceResult::OK, "flown and held") : result(ServiceResult::NO_LINK, "tx_node ends");
+  if (response->success) {
+    response->result = result(ServiceResult::OK, "flown and held");
+  } else if (held == TxLockstep::Held::kRuns) {
+    response->result = result(ServiceResult::REFUSED, "lockstep/run was called meanwhile: the flight goes on");
+  } else {
+    response->result = result(ServiceResult::NO_LINK, kNodeEnds);
+  }
 }
 
 void LockstepServices::stepFreely(const LockstepStep::Request& request, LockstepStep::Response* response) {
@@ -50,12 +66,28 @@ void LockstepServices::stepFreely(const LockstepStep::Request& request, Lockstep
     why_not = result.text;
     if (result.code == core::ResultCode::kRefused) code = ServiceResult::REFUSED;
   };
-  if (request.frames > 0) setPaused(false);
-  while (why_not.empty() && flown() < request.frames && !ending_()) {
-    const std::uint64_t seen = flown();
-    if (!link_.waitUntil([&] { return flown() != seen || ending_(); }, kFrameWait)) why_not = "no frame comes";
+  std::uint64_t call = 0;
+  {
+    const Turn turn(turn_);
+    call = note(Asked::kStep);
+    if (request.frames > 0) setPaused(false);
   }
-  setPaused(true);
+  const auto ends = [&] { return calls_ != call || ending_(); };
+  while (why_not.empty() && flown() < request.frames && !ends()) {
+    const std::uint64_t seen = flown();
+    if (!link_.waitUntil([&] { return flown() != seen || ends(); }, kFrameWait)) why_not = "no frame comes";
+  }
+  {
+    const Turn turn(turn_);
+    if (calls_ != call && last_ != Asked::kHold) {
+      code = ServiceResult::REFUSED;
+      why_not = "another lockstep/step or lockstep/run was called meanwhile: X-Plane flies on";
+    } else if (ending_()) {
+      why_not = kNodeEnds;  // who asked for the pause is not there to end it
+    } else {
+      setPaused(true);
+    }
+  }
   response->success = why_not.empty();
   response->flown = static_cast<std::uint32_t>(flown());
   response->sim_time = actuation_.simTime();

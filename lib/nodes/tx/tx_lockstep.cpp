@@ -160,6 +160,7 @@ void TxLockstep::step(std::uint32_t frames) {
 void TxLockstep::run() {
   barrier_.run();
   progress();
+  held_.notifyAll();
   wake_();
 }
 
@@ -168,10 +169,11 @@ void TxLockstep::waitUntilOpen() {
   opened_.wait(&lock, [this] { return stopped_ || handled_; });
 }
 
-bool TxLockstep::waitUntilHeld() {
+TxLockstep::Held TxLockstep::waitUntilHeld() {
   std::unique_lock<std::mutex> lock(mutex_);
-  held_.wait(&lock, [this] { return stopped_ || barrier_.holds(); });
-  return !stopped_;
+  held_.wait(&lock, [this] { return stopped_ || barrier_.holds() || barrier_.isEndless(); });
+  if (stopped_) return Held::kStopped;
+  return barrier_.holds() ? Held::kHeld : Held::kRuns;
 }
 
 void TxLockstep::progress() {

@@ -46,7 +46,8 @@ void TxNode::start() {
   lockstep_services_ = std::make_unique<LockstepServices>(
       lockstep_.get(), actuation_.get(), &link(), [this] { return ending(); }, name() + "/lockstep");
   actuation_->start();
-  lockstep_threads_.start();
+  step_threads_.start();
+  hold_threads_.start();
   startBeating();
   mode_threads_.start();  // its calls look at the heartbeat
 }
@@ -86,7 +87,8 @@ void TxNode::stopInputs() {
   guardian_.rest();
   if (lockstep_) lockstep_->stop();
   mode_threads_.stop();
-  lockstep_threads_.stop();
+  step_threads_.stop();
+  hold_threads_.stop();
   if (actuation_) actuation_->stop();
 }
 
@@ -201,7 +203,7 @@ void TxNode::advertiseServices() {
 void TxNode::advertiseLockstep() {
   advertiseService<LockstepStep::Request, LockstepStep::Response>(
       "lockstep/step", [this](const auto& request, auto& response) { lockstep_services_->step(request, &response); },
-      &lockstep_threads_);
+      &step_threads_);
   const auto advertise = [this](const std::string& service, bool running, const std::string& answer) {
     advertiseService<std_srvs::Trigger::Request, std_srvs::Trigger::Response>(
         "lockstep/" + service,
@@ -210,7 +212,7 @@ void TxNode::advertiseLockstep() {
           response.success = why_not.empty();
           response.message = response.success ? answer : why_not;
         },
-        &lockstep_threads_);
+        &hold_threads_);
   };
   advertise("run", true, "flies on");
   advertise("hold", false, "holds the present frame");

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <future>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "fake_simulator.hpp"
@@ -72,6 +75,22 @@ TEST(Pausing, HasCommandsOfItsOwnFrom12_10) {
   EXPECT_EQ(setPaused(&sim, true, kTimeout, never), PauseOutcome::kFollowed);
   EXPECT_EQ(setPaused(&sim, false, kTimeout, never), PauseOutcome::kFollowed);
   EXPECT_EQ(sim.commands(), (Names{"sim/operation/pause_on", "sim/operation/pause_off"}));
+}
+
+TEST(Pausing, TwoThatAskAtOnceToggleOnce) {
+  core::FakeSimulator sim(core::kXPlane11);
+  obey(&sim);
+  std::promise<void> both_would;
+  PauseOutcome second = PauseOutcome::kUnknown;
+  std::thread another;
+  const auto before = [&] {
+    another = std::thread([&] { second = setPaused(&sim, true, kTimeout, never, [&] { both_would.set_value(); }); });
+    both_would.get_future().wait_for(std::chrono::milliseconds(200));
+  };
+  EXPECT_EQ(setPaused(&sim, true, kTimeout, never, before), PauseOutcome::kFollowed);
+  another.join();
+  EXPECT_EQ(second, PauseOutcome::kWasSo);
+  EXPECT_EQ(sim.commands(), Names{kToggle});
 }
 
 TEST(Pausing, SendsNothingWhereXPlaneDoesNotReportIt) {

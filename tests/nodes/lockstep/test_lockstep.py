@@ -195,6 +195,24 @@ def test_it_holds_and_flies_on_as_asked(world):
     assert world.call("lockstep/hold", Trigger).success
 
 
+def test_hold_ends_however_many_steps_wait(world):
+    from std_srvs.srv import Trigger
+    from xplane_bridge.msg import FlightState
+
+    start(world, participants=[])
+    states = world.watch("flight_state", FlightState)
+    wait_until(lambda: states.connected, WAIT_S, "rx_node's connection")
+    answers = []
+    waiting = [threading.Thread(target=lambda: answers.append(step(world, 1000000))) for _ in range(2)]
+    for thread in waiting:
+        thread.start()
+    states.wait_for(lambda state: state.frame_count > 20)
+    assert world.call("lockstep/hold", Trigger).success
+    for thread in waiting:
+        thread.join(WAIT_S)
+    assert [answer.success for answer in answers] == [True, True]
+
+
 def test_ros_time_of_a_node_is_that_of_the_frame(world):
     from diagnostic_msgs.msg import DiagnosticArray
     from xplane_bridge.msg import FlightState

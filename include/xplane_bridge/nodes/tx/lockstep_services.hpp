@@ -1,6 +1,9 @@
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <functional>
+#include <mutex>
 #include <string>
 
 #include "xplane_bridge/LockstepStep.h"
@@ -10,7 +13,7 @@
 namespace xplane_bridge {
 
 /// lockstep/step, run and hold: of lock-step, or of a simulator that does not wait for participants, which flies and is
-/// paused then. They wait for frames.
+/// paused then. They wait for frames; run and hold end a step that waits. Thread-safe.
 class LockstepServices {
  public:
   /// @param lockstep null without lock-step
@@ -24,6 +27,10 @@ class LockstepServices {
   std::string setRunning(bool running);
 
  private:
+  enum class Asked : std::uint8_t { kStep, kRun, kHold };
+
+  /// Without lock-step; `turn_` is held. @return number of the call
+  std::uint64_t note(Asked what);
   void stepInLockstep(const LockstepStep::Request& request, LockstepStep::Response* response);
   void stepFreely(const LockstepStep::Request& request, LockstepStep::Response* response);
 
@@ -32,6 +39,10 @@ class LockstepServices {
   core::SimulatorPort& link_;
   const std::function<bool()> ending_;
   const std::string who_;
+  // Without lock-step.
+  std::mutex turn_;  // of who pauses X-Plane or lets it go on; guards the following
+  Asked last_ = Asked::kHold;
+  std::atomic<std::uint64_t> calls_{0};  // read without turn_ as well
 };
 
 }  // namespace xplane_bridge

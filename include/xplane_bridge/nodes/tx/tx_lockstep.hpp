@@ -63,8 +63,9 @@ class TxLockstep {
   /// Waits until a frame is open and was handled, or stop(): a participant may have seen a frame before tx_node has,
   /// and what it asks for belongs to that frame.
   void waitUntilOpen();
-  /// Waits until the present frame is answered and held, or stop(). @return whether it is
-  bool waitUntilHeld();
+  enum class Held : std::uint8_t { kHeld, kRuns, kStopped };
+  /// Waits until the present frame is answered and held, or run(), or stop().
+  Held waitUntilHeld();
   std::uint32_t frame() const { return barrier_.number(); }
 
   /// Ends the watchdog and all waiting.

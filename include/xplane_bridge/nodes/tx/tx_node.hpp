@@ -72,8 +72,9 @@ class TxNode : public BaseNode {
   ros::Publisher frame_mode_publisher_;    // in lock-step
   std::optional<ControlMode> frame_mode_;  // to be published at the frame's end
   ServiceThreads mode_threads_{1};         // a pilot's wish does not wait for what X-Plane has not shown yet
-  // lockstep/step waits for frames, which wait for other services; hold ends that.
-  ServiceThreads lockstep_threads_{2};
+  // lockstep/step waits for frames, which wait for other services. However many wait, run and hold end them.
+  ServiceThreads step_threads_{2};
+  ServiceThreads hold_threads_{1};
   TxPublishers publishers_;
   Guardian guardian_;
   Heartbeat heartbeat_;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -38,6 +39,13 @@ class FreeStepTest : public testing::Test, protected ActuationRig {
     LockstepStep::Response response;
     services_.step(request, &response);
     return response;
+  }
+  /// As another thread of the node calls while a step waits.
+  void callInFrame(int frame, const std::function<void()>& call) {
+    sim_.on_frame = [this, frame, call, obey = sim_.on_frame, seen = std::make_shared<int>(0)] {
+      obey();
+      if (++*seen == frame) call();
+    };
   }
 
   int late_ = 1;
@@ -105,9 +113,48 @@ TEST_F(FreeStepTest, IsRefusedWhileAResetRuns) {
   EXPECT_TRUE(sim_.commands().empty());
 }
 
-TEST_F(FreeStepTest, EndsWithTheNode) {
-  ending_ = true;
-  EXPECT_LT(step(1000000).flown, 1000000U);
+TEST_F(FreeStepTest, EndsWithTheNodeAndLeavesXPlaneFlying) {
+  sim_.on_frame = [this] { ending_ = true; };
+  const LockstepStep::Response response = step(1000000);
+  EXPECT_LT(response.flown, 1000000U);
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::NO_LINK);
+  EXPECT_EQ(response.result.message, "tx_node ends");
+  EXPECT_EQ(sim_.commands().size(), 1U) << "resumed, and not paused by a node that is not there to end it";
+}
+
+TEST_F(FreeStepTest, HoldEndsIt) {
+  callInFrame(3, [this] { EXPECT_EQ(services_.setRunning(false), ""); });
+  const double began = sim_.time();
+  const LockstepStep::Response response = step(1000000);
+  EXPECT_TRUE(response.success) << response.result.message;
+  EXPECT_EQ(response.result.code, ServiceResult::OK);
+  EXPECT_GE(response.flown, 3U);
+  EXPECT_LT(response.flown, 20U);
+  EXPECT_LT(sim_.time() - began, 1.0) << "it does not wait for frames of a paused X-Plane";
+  EXPECT_EQ(sim_.status().paused, true);
+  EXPECT_EQ(sim_.commands().size(), 2U) << "resumed, and paused once";
+}
+
+TEST_F(FreeStepTest, RunEndsItAndIsNotPausedAfterwards) {
+  callInFrame(3, [this] { EXPECT_EQ(services_.setRunning(true), ""); });
+  const LockstepStep::Response response = step(1000000);
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
+  EXPECT_EQ(response.result.message, "another lockstep/step or lockstep/run was called meanwhile: X-Plane flies on");
+  EXPECT_LT(response.flown, 20U);
+  EXPECT_EQ(sim_.status().paused, false);
+}
+
+TEST_F(FreeStepTest, AnotherStepTakesItsPlace) {
+  LockstepStep::Response another;
+  callInFrame(3, [&] { another = step(5); });
+  const LockstepStep::Response response = step(1000000);
+  EXPECT_TRUE(another.success) << another.result.message;
+  EXPECT_GE(another.flown, 5U);
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
+  EXPECT_EQ(sim_.status().paused, true);
 }
 
 TEST_F(FreeStepTest, RunsAndHolds) {
@@ -131,6 +178,10 @@ class LockstepStepTest : public testing::Test, protected ActuationRig {
     ended_ = true;
     woken_.notify_all();
   }
+  bool ended() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return ended_;
+  }
   void wake() {
     const std::lock_guard<std::mutex> lock(mutex_);
     asked_ = true;
@@ -139,7 +190,7 @@ class LockstepStepTest : public testing::Test, protected ActuationRig {
   void fly() {
     answer(0);
     while (true) {
-      if (lockstep_.ready()) {
+      if (lockstep_.ready() && !ended()) {
         number_ > 0 ? lockstep_.close() : lockstep_.leaveFrameZero();
         ++number_;
         core::LockstepFrame frame;
@@ -201,6 +252,27 @@ TEST_F(LockstepStepTest, HoldsWhatRuns) {
   const std::uint32_t held = lockstep_.frame();
   EXPECT_EQ(step(2).flown, 2U);
   EXPECT_EQ(lockstep_.frame(), held + 2U);
+}
+
+TEST_F(LockstepStepTest, RunEndsAStepThatWaits) {
+  LockstepStep::Response response;
+  std::thread waiting([&] { response = step(1000000); });
+  while (lockstep_.frame() < 2) std::this_thread::yield();
+  EXPECT_EQ(services_.setRunning(true), "");
+  waiting.join();
+  EXPECT_FALSE(response.success);
+  EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
+  EXPECT_EQ(response.result.message, "lockstep/run was called meanwhile: the flight goes on");
+}
+
+TEST_F(LockstepStepTest, HoldEndsAStepThatWaits) {
+  LockstepStep::Response response;
+  std::thread waiting([&] { response = step(1000000); });
+  while (lockstep_.frame() < 2) std::this_thread::yield();
+  EXPECT_EQ(services_.setRunning(false), "");
+  waiting.join();
+  EXPECT_TRUE(response.success) << response.result.message;
+  EXPECT_LT(response.flown, 1000000U);
 }
 
 TEST_F(LockstepStepTest, SaysThatTheNodeEnds) {
