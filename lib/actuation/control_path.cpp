@@ -99,8 +99,12 @@ void ControlPath::settle() {
   }
   if (standing_ == Standing::kFlying) {
     last_warning_.clear();
-    // Others may have flown since: a lever held at what was sent then would move by itself.
-    if (was_given_back) arbiter_.forgetSent(core::ChannelSet{}.set());
+    if (was_given_back) {
+      // Others may have flown since: a lever held at what was sent then would move by itself, and handles are not known
+      // to be where they were sent.
+      arbiter_.forgetSent(core::ChannelSet{}.set());
+      forgetApplied();
+    }
   } else {
     hooks_.end_excitation("nothing is sent: " + why_not_);
   }
@@ -162,9 +166,7 @@ void ControlPath::onSameAircraft() {
 void ControlPath::onNewFlight(const std::string& how) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
   overrides_->forgetShown();
-  // It has put the handles to its own start.
-  ever_sent_.reset();
-  awaiting_read_back_.clear();
+  forgetApplied();  // it has put the handles to its own start
   // Nor does it begin with levers where they were in the last one, unless a source goes on to command them.
   core::ChannelSet levers;
   for (int engine = 0; engine < core::kMaxEngines; ++engine) {
@@ -239,8 +241,7 @@ void ControlPath::resetAfterReconnect(bool same_flight, double time) {
     overrides_->forgetPreparations();
   }
   overrides_->forgetShown();
-  awaiting_read_back_.clear();
-  ever_sent_.reset();  // another X-Plane does not know where the handles are
+  forgetApplied();  // another X-Plane does not know where the handles are
   const core::ModeStatus& status = arbiter_.status();
   if (time - lastCommandOf(status.mode) <= options_.arbiter.command_timeout) {
     if (standing_ != Standing::kFlying) overrides_->setRequired({});  // it may have another aircraft

@@ -149,6 +149,8 @@ void ControlPath::prepareLevers(const core::ArbitratedControls& controls) {
 
 core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& controls, double time) {
   const core::ChannelSet commanded = arbiter_.commanded();
+  // A handle that is commanded anew is sent, also with the value of before: the cockpit may have moved it since.
+  ever_sent_ &= ~(commanded & ~std::exchange(commanded_, commanded));
   core::ChannelSet out;
   for (std::size_t i = 0; i < core::kChannelCount; ++i) {
     if (!controls.active.test(i)) continue;
@@ -171,6 +173,12 @@ core::ChannelSet ControlPath::channelsToSend(const core::ArbitratedControls& con
 }
 
 // --- read-back ---
+
+/// X-Plane is no longer where it was sent.
+void ControlPath::forgetApplied() {
+  ever_sent_.reset();
+  awaiting_read_back_.clear();
+}
 
 void ControlPath::publishApplied(const core::ArbitratedControls& controls, const core::ChannelSet& sent) {
   AppliedControls applied;

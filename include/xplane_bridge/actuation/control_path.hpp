@@ -168,6 +168,7 @@ class ControlPath {
   core::ChannelSet channelsToSend(const core::ArbitratedControls& controls, double time);
   void publishMode();
   void publishApplied(const core::ArbitratedControls& controls, const core::ChannelSet& sent);
+  void forgetApplied();
   void watchReadBack(const core::ChannelSet& channels);
   void onReadBack(const core::RrefView& view);
   bool isHandle(core::Channel channel) const;
@@ -214,7 +215,8 @@ class ControlPath {
 
   core::ChannelValues last_values_{};                     // of Refresh::kOnChange channels
   std::array<double, core::kChannelCount> changed_at_{};  // [s] steady; of the same
-  core::ChannelSet ever_sent_;                            // in this flight
+  core::ChannelSet ever_sent_;                            // since forgetApplied(); handles as commanded now
+  core::ChannelSet commanded_;                            // as of the last sending
   core::ChannelSet handles_shown_;                        // by X-Plane, since they were changed
   std::vector<core::DatarefWrite> writes_;
 

@@ -38,6 +38,38 @@ TEST_F(HandlesTest, ANewFlightDoesNotGetThoseThatAreOnlyHeld) {
   EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F) << "the same value as before, and commanded again";
 }
 
+TEST_F(HandlesTest, AfterAReleaseByAnotherThoseThatAreCommandedAreSentAgain) {
+  start();
+  core::ControlCommand command = rollAndFlaps(0.25, 0.5);
+  command.fields |= core::kFieldTrimYaw;
+  command.trim_yaw = 0.2;
+  runWith(command, 1.0);
+  sim.set(kStickOverride, 0.0F);
+  runWith(command, 1.0);
+  ASSERT_EQ(path->standing(), Standing::kWaitingForMode);
+  sim.set(kFlapHandle, 0.0F);
+  sim.set(kRudderTrim, 0.0F);
+  runWith(command, 0.5);
+  ASSERT_FLOAT_EQ(sim.value(kFlapHandle), 0.0F);
+  ask(FlightMode::kManual);
+  runWith(command, 1.0);
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F);
+  EXPECT_FLOAT_EQ(sim.value(kRudderTrim), 0.2F);
+  EXPECT_EQ(path->notFollowed(), Texts{});
+}
+
+TEST_F(HandlesTest, OneThatIsCommandedAnewIsSentThoughItIsTheSame) {
+  start();
+  runWith(rollAndFlaps(0.25, 0.5), 1.0);
+  sim.set(kFlapHandle, 0.0F);
+  runWith(rollAndFlaps(0.25, 0.5), 1.0);
+  ASSERT_FLOAT_EQ(sim.value(kFlapHandle), 0.0F) << "it goes on";
+  runWith(rollCommand(0.25), 1.0);
+  ASSERT_FLOAT_EQ(sim.value(kFlapHandle), 0.0F) << "held";
+  runWith(rollAndFlaps(0.25, 0.5), 0.1);
+  EXPECT_FLOAT_EQ(sim.value(kFlapHandle), 0.5F);
+}
+
 TEST_F(HandlesTest, OneThatIsMovedInTheCockpitEndsNoReadBack) {
   start();
   runWith(rollAndFlaps(0.25, 0.5), 1.0);
