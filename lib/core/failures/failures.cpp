@@ -7,6 +7,7 @@
 #include <iterator>
 #include <utility>
 
+#include "xplane_bridge/core/base/text.hpp"
 #include "xplane_bridge/core/failures/failure_names.hpp"
 
 namespace xplane_bridge::core {
@@ -97,6 +98,16 @@ std::string ownSurfaceFailure(const SurfaceInfo& surface, SurfaceFault fault, bo
   return "rel_fcon_" + std::string(stem) + "_" + set + "_" + side + suffix;
 }
 
+/// With a value that is ignored more would break than was asked for.
+std::optional<std::string> checkValue(const FailureRequest& request) {
+  const auto fault = surfaceFaultFrom(request.kind);
+  const bool takes_one =
+      fault == SurfaceFault::kStuck || fault == SurfaceFault::kReduced || fault == SurfaceFault::kSlow;
+  if (takes_one || !request.value) return std::nullopt;
+  return wrongNumber("value", *request.value,
+                     "none (has_value: false) for kind " + request.kind + "; stuck, reduced and slow take one");
+}
+
 FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface, SimulatorVersion version) {
   FailurePlanResult out;
   out.plan = {request.name, request.kind, request.value, {}, std::nullopt};
@@ -104,6 +115,7 @@ FailurePlanResult planSurface(const FailureRequest& request, std::size_t surface
   if (!fault) {
     return refuse(FailureError::kInvalid, "kind is \"" + request.kind + "\": expected " + kSurfaceFaultWords);
   }
+  if (const auto wrong = checkValue(request)) return refuse(FailureError::kInvalid, *wrong);
   if (*fault != SurfaceFault::kGone) {
     const SurfaceFailure failure{surface, *fault, request.value};
     if (const auto wrong = validate(failure)) return refuse(FailureError::kInvalid, request.name + " " + *wrong);
@@ -126,8 +138,11 @@ std::optional<std::string> checkTrigger(const FailureRequest& request) {
   if (request.trigger < 0 || request.trigger > static_cast<int>(FailureTrigger::kAtSpeedBelow)) {
     return "trigger is " + std::to_string(request.trigger) + ": expected 0..5";
   }
-  if (request.trigger == 0) return std::nullopt;
   if (!std::isfinite(request.trigger_value)) return "trigger_value is not a finite number";
+  if (request.trigger == static_cast<int>(FailureTrigger::kNow)) {
+    if (request.trigger_value == 0.0) return std::nullopt;
+    return wrongNumber("trigger_value", request.trigger_value, "0 with trigger 0 (NOW): choose one of 1..5 to wait");
+  }
   if (request.trigger == static_cast<int>(FailureTrigger::kAtSimTime) && request.trigger_value < 0.0) {
     return "trigger_value is " + std::to_string(request.trigger_value) + ": expected 0 s or more from now";
   }
@@ -206,6 +221,7 @@ FailurePlanResult planFailure(const FailureRequest& request, SimulatorVersion ve
   if (request.kind != "failed") {
     return refuse(FailureError::kInvalid, "kind is \"" + request.kind + "\": expected failed for " + request.name);
   }
+  if (const auto wrong = checkValue(request)) return refuse(FailureError::kInvalid, *wrong);
   return out;
 }
 

@@ -218,6 +218,8 @@ def test_systems_fail_and_are_repaired(healthy, name, leaf, where, shows):
         ({"name": "aileron1_wing2_left", "kind": "reduced", "value": 2.0}, REFUSED, "0..1"),
         ({"name": "aileron1_wing4_left", "kind": "stuck"}, REFUSED, "has not been seen to move"),
         ({"name": "engine_1", "trigger": 9}, REFUSED, "trigger is 9"),
+        ({"name": "engine_1", "value": 0.5}, REFUSED, "value is 0.5: expected none"),
+        ({"name": "engine_1", "trigger_value": 3000.0}, REFUSED, "trigger_value is 3000: expected 0"),
         ({"name": "aileron1_wing2_left", "kind": "gone"}, NOT_SUPPORTED, "X-Plane 11"),
         ({"name": "rel_no_such_thing"}, NOT_SUPPORTED, "rel_no_such_thing"),
     ],

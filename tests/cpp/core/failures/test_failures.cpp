@@ -64,6 +64,29 @@ TEST(Failures, UnknownNamesAndKindsAreRefusedInWords) {
   EXPECT_NE(text(request("engine_1", "failed", {}, 1, -1.0)).find("trigger_value"), std::string::npos);
 }
 
+TEST(Failures, WhatAFailureDoesNotUseIsRefused) {
+  const auto text = [](const FailureRequest& r, SimulatorVersion version) {
+    const auto out = planFailure(r, version);
+    EXPECT_EQ(out.error, FailureError::kInvalid) << r.name << " " << r.kind;
+    return out.text;
+  };
+  for (const SimulatorVersion version : {k11, k12}) {
+    for (const char* name : {"engine_1", "rel_pitot"}) {
+      EXPECT_EQ(text(request(name, "failed", 0.5), version),
+                "value is 0.5: expected none (has_value: false) for kind failed; stuck, reduced and slow take one");
+    }
+    for (const char* kind : {"hard_over_up", "hard_over_down", "centred", "floating", "gone"}) {
+      EXPECT_EQ(text(request("rudder1_fin1", kind, 3.0), version).rfind("value is 3: expected none", 0), 0U);
+    }
+    for (const char* kind : {"stuck", "reduced", "slow"}) {
+      EXPECT_EQ(planFailure(request("rudder1_fin1", kind, 0.5), version).error, FailureError::kNone);
+    }
+    EXPECT_EQ(text(request("engine_1", "failed", {}, 0, 3000.0), version),
+              "trigger_value is 3000: expected 0 with trigger 0 (NOW): choose one of 1..5 to wait");
+    EXPECT_NE(text(request("engine_1", "failed", {}, 0, NAN), version), "");
+  }
+}
+
 TEST(Failures, XPlane11FliesEverySurfaceFailure) {
   const auto out = planFailure(request("aileron1_wing2_left", "stuck", 5.0), k11);
   ASSERT_EQ(out.error, FailureError::kNone);
