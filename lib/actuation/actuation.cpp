@@ -246,7 +246,7 @@ void Actuation::tick() {
 void Actuation::onHang() {
   const Lock lock(*mutex_);
   overrides_.giveBackAll();
-  failures_.repaired();
+  failures_.repaired("tx_node hung");
   traffic_.forget();
   disturbance_.abort("tx_node hung");
   path_.onGivenBack("tx_node hung, and its guardian has given back what it had set");
@@ -275,7 +275,7 @@ bool Actuation::undo(double timeout) {
   jobs_.restoreSettings();
   const core::Deadline deadline(link_->clock(), timeout);
   const bool released = overrides_.releaseAll(timeout);  // the aircraft first
-  if (released) failures_.repaired();
+  if (released) failures_.repaired("tx_node ends");
   return views_.giveBack(std::max(deadline.left(), kLeastUndo)) && released;
 }
 

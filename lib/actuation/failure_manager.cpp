@@ -377,12 +377,9 @@ void FailureManager::stop() {
   stopped_ = true;
 }
 
-void FailureManager::repaired() {
+void FailureManager::repaired(const std::string& why) {
   std::lock_guard<core::HandlerMutex> lock(*mutex_);
-  registry_.clear({}, false);
-  for (const auto& [name, pending] : pending_) not_shown_[name] = "everything was given back meanwhile";
-  pending_.clear();
-  obeyed_.clear();
+  end(false, why);
 }
 
 void FailureManager::publish() {

@@ -53,8 +53,9 @@ class FailureManager {
   void tick();
   /// Nothing is broken any more from here on; what is set is the OverrideManager's to repair.
   void stop();
-  /// All that the bridge had broken has been repaired by the OverrideManager.
-  void repaired();
+  /// All that the bridge had broken has been repaired by the OverrideManager, because of what `why` says: all end,
+  /// armed ones too.
+  void repaired(const std::string& why);
   /// Publishes the snapshot once more.
   void publish();
 

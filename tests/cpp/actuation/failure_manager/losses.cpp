@@ -91,7 +91,7 @@ TEST_F(FailureManagerTest, RepairedByTheOverrideManagerNothingIsLabelled) {
   require(failed("engine_1"));
   failures_.stop();
   ASSERT_TRUE(overrides_.releaseAll(1.0));
-  failures_.repaired();
+  failures_.repaired("tx_node ends");
   published_.clear();
   failures_.publish();
   ASSERT_EQ(published_.size(), 1U);
@@ -102,11 +102,29 @@ TEST_F(FailureManagerTest, OneThatIsGivenBackWhileItIsWaitedForIsNotShown) {
   sim_.setReadOnly(kEngine);
   after(0.3, [this] {
     overrides_.giveBackAll();
-    failures_.repaired();
+    failures_.repaired("tx_node hung");
   });
   const RequestResult result = set(failed("engine_1"));
   EXPECT_EQ(result.code, ResultCode::kTimeout);
-  EXPECT_EQ(result.text, "everything was given back meanwhile");
+  EXPECT_EQ(result.text, "tx_node hung");
+}
+
+TEST_F(FailureManagerTest, WhatAHangHasEndedIsReportedArmedOnesToo) {
+  require(failed("engine_1"));
+  require(broken(FakeAirframe::kLeft, "stuck", 6.0));
+  ASSERT_EQ(set(triggered("bus_1", FailureTrigger::kAtAltitudeAbove, 9000.0)).code, ResultCode::kAccepted);
+  overrides_.giveBackAll();
+  failures_.repaired("tx_node hung");
+  sim_.run(0.1);
+  for (const std::string name : {"engine_1", "aileron1_wing2_left", "bus_1"}) {
+    EXPECT_TRUE(reported("failure of " + name + " has ended: tx_node hung", "", true)) << name;
+  }
+  ASSERT_FALSE(published_.empty());
+  EXPECT_TRUE(published_.back().labels.empty()) << "at once";
+  sim_.run(2.0);
+  EXPECT_TRUE(labelNames().empty()) << "nor is it taken for the menu's";
+  EXPECT_EQ(sim_.value(kEngine), 0.0F);
+  EXPECT_EQ(state(), SurfaceControlState::kIdle);
 }
 
 }  // namespace
