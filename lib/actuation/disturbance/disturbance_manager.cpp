@@ -17,6 +17,7 @@ using Lock = std::lock_guard<core::HandlerMutex>;
 
 constexpr double kAskWait = 3.0;  // [s] for X-Plane to show its weather
 constexpr double kRepeat = 1.0;   // [s] after which also what has not changed is sent: datagrams get lost
+constexpr double kGap = 0.4;      // [s] without a frame in which the guardian may have put the weather back
 constexpr int kTimesPutBack = 2;
 constexpr double kMostWind = 100.0;  // [m/s] as set_wind
 constexpr const char* kNotYet = "the wind of before the last disturbance could not be put back yet";
@@ -86,6 +87,8 @@ void DisturbanceManager::onWeather(std::uint32_t id, const std::vector<std::stri
     return end("refused: " + core::whyNotChanged(error), false);
   }
   restores_ = std::move(all);
+  changed_ = false;
+  framed_at_ = link_->clock().steadySeconds();
   times_put_back_ = 0;
   const auto speed = static_cast<double>(*values[weather]);
   label_.steady =
@@ -98,7 +101,9 @@ void DisturbanceManager::onWeather(std::uint32_t id, const std::vector<std::stri
 void DisturbanceManager::onFrame(const core::FlightWatch& watch) {
   const Lock lock(mutex_);
   if (up_ && std::exchange(unsure_, false) && state_ == State::kIdle) putBack();
-  if (state_ != State::kRunning || !std::isfinite(watch.sim_time)) return;
+  if (state_ != State::kRunning) return;
+  if (takeGap() && isPutBackByAnother()) return end("aborted: the wind was put back while no frame came", false);
+  if (!std::isfinite(watch.sim_time)) return;
   if (!label_.active) {
     label_.active = true;
     label_.start_sim_time = watch.sim_time;
@@ -122,6 +127,7 @@ void DisturbanceManager::onFrame(const core::FlightWatch& watch) {
 }
 
 void DisturbanceManager::send(const Eigen::Vector3d& wind_ned) {
+  changed_ = true;
   core::UniformWind wind;
   wind.speed = label_.wind_speed = wind_ned.norm();
   wind.from_deg = label_.wind_from_deg = core::windFromDirectionDeg(wind_ned);
@@ -135,9 +141,32 @@ void DisturbanceManager::send(const Eigen::Vector3d& wind_ned) {
   sent_ = writes;
 }
 
+/// Whether no frame has come for so long that what was put back meanwhile, as after a hang, was not changed again.
+bool DisturbanceManager::takeGap() {
+  const double now = link_->clock().steadySeconds();
+  if (now - std::exchange(framed_at_, now) <= kGap) return false;
+  changed_ = false;
+  return true;
+}
+
+/// By the guardian or another client: the journal has no entry any more, as far as it can be read.
+bool DisturbanceManager::isPutBackByAnother() const {
+  const auto journal = link_->journal();
+  try {
+    return journal && !core::ownEntry(*journal, kEntry);
+  } catch (const core::JournalError&) {
+    return false;
+  }
+}
+
 void DisturbanceManager::putBack() {
   const auto journal = link_->journal();
   if (restores_.empty() || !journal) return;
+  const bool noted = !isPutBackByAnother();
+  if (!noted && !changed_) {
+    restores_.clear();
+    return;
+  }
   try {
     if (!up_ || unsure_) {
       times_put_back_ = 0;
@@ -148,6 +177,7 @@ void DisturbanceManager::putBack() {
       if (link_->sendUndo(operation) != core::SendStatus::kSent) all_sent = false;
     }
     put_back_again_at_ = link_->clock().steadySeconds() + kRepeat;
+    if (noted) changed_ = false;
     if (all_sent) ++times_put_back_;
     if (times_put_back_ < kTimesPutBack) return;
     journal->remove({kEntry});
@@ -161,6 +191,7 @@ void DisturbanceManager::end(const std::string& result, bool success) {
   const bool began = label_.active;
   state_ = State::kIdle;
   disturbance_.reset();
+  takeGap();
   putBack();
   label_.active = false;
   label_.model = label_.commanded = Eigen::Vector3d::Zero();
@@ -225,10 +256,8 @@ void DisturbanceManager::watch() {
   looked_at_ = now;
   const std::uint32_t id = label_.id;
   lock.unlock();  // another process may hold the journal
-  const std::vector<core::JournalEntry> own = journal->own();
+  const bool noted = core::ownEntry(*journal, kEntry).has_value();
   lock.lock();
-  const bool noted =
-      std::any_of(own.begin(), own.end(), [](const core::JournalEntry& entry) { return entry.id == kEntry; });
   // Put back once more: frames may have been sent since.
   if (!noted && state_ == State::kRunning && id == label_.id)
     end("aborted: another client has put the wind back", false);

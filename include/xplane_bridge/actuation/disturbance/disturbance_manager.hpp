@@ -36,7 +36,8 @@ struct DisturbanceLabel {
 
 /// One disturbance at a time: asks X-Plane for its weather, notes that in the journal, writes the wind in each frame of
 /// flight, and puts the weather back when it ends, by whatever way: twice, a second apart, as X-Plane confirms nothing.
-/// Thread-safe; waits for nothing but the journal's disk.
+/// What another process has put back, which the journal shows, is put back once more only where frames have changed it
+/// since. Thread-safe; waits for nothing but the journal's disk.
 class DisturbanceManager {
  public:
   using Publish = std::function<void(const DisturbanceLabel& label)>;
@@ -75,6 +76,8 @@ class DisturbanceManager {
   void onWeather(std::uint32_t id, const std::vector<std::string>& names,
                  const std::vector<core::DatarefValue>& values);
   void send(const Eigen::Vector3d& wind_ned);
+  bool takeGap();
+  bool isPutBackByAnother() const;
   void putBack();
   void end(const std::string& result, bool success);
 
@@ -92,6 +95,8 @@ class DisturbanceManager {
   std::optional<core::Disturbance> disturbance_;
   std::vector<core::UndoOperation> restores_;  // what is still to be put back
   bool unsure_ = false;                        // whether this X-Plane is theirs: its next frame shows it
+  bool changed_ = false;                       // the weather, perhaps since another process has put it back
+  double framed_at_ = 0.0;                     // [s] steady, last
   int times_put_back_ = 0;
   double put_back_again_at_ = 0.0;  // [s] steady
   bool ended_ = false;

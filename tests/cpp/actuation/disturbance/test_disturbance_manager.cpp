@@ -278,6 +278,88 @@ TEST_F(DisturbanceManagerTest, EndsWhenAnotherClientHasPutTheWindBack) {
   EXPECT_EQ(weather(), before_) << "frames since then have changed it again";
 }
 
+/// The guardian has put the weather back while this process stood, and the user has set a wind since.
+class DisturbanceManagerHang : public DisturbanceManagerTest {
+ protected:
+  void hang() {
+    sim_.frame(3.0);
+    sim_.journal()->remove({journal()[0].id});
+    sim_.set(kSpeed11, 40.0F);
+    sim_.clearMessages();
+  }
+  void expectTheUsersWindIsKept() {
+    settle();
+    EXPECT_EQ(sim_.value(kSpeed11), 40.0F);
+    EXPECT_TRUE(sim_.messages().empty());
+    EXPECT_EQ(manager_.windRefusal(), "");
+    EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  }
+};
+
+TEST_F(DisturbanceManagerHang, KeepsTheWindThatWasSetAfterTheGuardianHasPutItBack) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  hang();
+  manager_.abort("tx_node hung");
+  EXPECT_EQ(labels_.back().result, "aborted: tx_node hung");
+  expectTheUsersWindIsKept();
+}
+
+TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereAFrameComesFirst) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  hang();
+  fly(0.1);
+  EXPECT_EQ(labels_.back().result, "aborted: the wind was put back while no frame came");
+  manager_.abort("tx_node hung");
+  expectTheUsersWindIsKept();
+}
+
+TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItIsWatchedFirst) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  hang();
+  manager_.watch();
+  EXPECT_EQ(labels_.back().result, "aborted: another client has put the wind back");
+  expectTheUsersWindIsKept();
+}
+
+TEST_F(DisturbanceManagerHang, KeepsItAlsoWhereItWasPutBackOnce) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  manager_.abort("stopped by /test");
+  hang();
+  manager_.abort("tx_node hung");
+  expectTheUsersWindIsKept();
+}
+
+TEST_F(DisturbanceManagerHang, PutsTheWeatherBackWhereTheGuardianHasNot) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  sim_.frame(3.0);
+  manager_.abort("tx_node hung");
+  EXPECT_EQ(weather(), before_);
+  settle();
+  EXPECT_TRUE(journal().empty());
+}
+
+TEST_F(DisturbanceManagerHang, PutsTheWeatherBackWhereFramesHaveChangedItSince) {
+  begin();
+  EXPECT_EQ(manager_.begin(gust(), "/test"), "");
+  fly(1.0);
+  sim_.frame(1.0);
+  fly(0.1);
+  sim_.journal()->remove({journal()[0].id});  // the guardian is late
+  fly(0.1);
+  manager_.abort("tx_node hung");
+  EXPECT_EQ(weather(), before_);
+}
+
 TEST_F(DisturbanceManagerTest, StandsWhileSimulatorTimeDoes) {
   begin();
   EXPECT_EQ(manager_.begin(gust(), "/test"), "");
