@@ -93,6 +93,10 @@ FlightChangeHooks Actuation::changeHooks() {
     const Lock lock(*mutex_);
     return resets_;
   };
+  hooks.placed = [this] {
+    const Lock lock(*mutex_);
+    onReset("the aircraft was placed");
+  };
   hooks.identities = [this] {
     const Lock lock(*mutex_);
     return identity_.answers();

@@ -27,6 +27,7 @@ namespace xplane_bridge {
 struct FlightChangeHooks {
   std::function<core::FlightWatch()> watch;  ///< the newest frame
   std::function<unsigned()> resets;          ///< how often the flight was reset until now, see core::ResetDetector
+  std::function<void()> placed;              ///< the flight was placed anew, which resets() has not counted
   std::function<unsigned()> identities;      ///< how often X-Plane has shown its aircraft until now
   std::function<std::string()> aircraft;     ///< the aircraft it showed last, in words
   /// Gives everything back and flies nothing until the next call with an empty text; the text says why. Waits until
@@ -84,6 +85,8 @@ class FlightChanges {
 
  private:
   using Outcome = FlightChangeOutcome;
+
+  static constexpr double kPoll = 0.2;  // [s] longest wait without looking at anything else
 
   /// A flight that is to begin.
   struct Beginning {

@@ -35,6 +35,7 @@ class AirportChangesTest : public testing::Test {
     FlightChangeHooks out;
     out.watch = [this] { return flight_.watch(); };
     out.resets = [this] { return flight_.resets(); };
+    out.placed = [] {};
     out.identities = [this] { return flight_.identities; };
     out.aircraft = [this] { return flight_.aircraft; };
     out.suspend_control = [](const std::string&) {};

@@ -280,6 +280,32 @@ TEST_F(FlightChangesTest12, PlaceNearbyIsNotTakenForTheNewOne) {
   EXPECT_EQ(flight_.sent("VEHS"), 4U);
 }
 
+TEST_F(FlightChangesTest12, OneThatIsMovedByLittleIsSaidToBePlaced) {
+  expectPlaced(place());
+  EXPECT_EQ(placed_, 0) << "20 km are a reset anyway";
+  flight_.put(50.0, 1000.0);
+  sim_.run(0.1);
+  bool paused = false;
+  FlightChangeHooks own = hooks();
+  own.placed = [&] {
+    ++placed_;
+    paused = flight_.paused();
+  };
+  FlightChanges changes(&sim_, {2.0, 20.0}, own);
+  const unsigned resets = flight_.resets();
+  expectPlaced(changes.place(here(), "node/reset_flight"));
+  EXPECT_EQ(flight_.resets(), resets);
+  EXPECT_EQ(placed_, 1);
+  EXPECT_TRUE(paused) << "before anything flies on";
+}
+
+TEST_F(FlightChangesTest12, OneThatIsNotMovedIsNotPlaced) {
+  flight_.put(50.0, 1000.0);
+  flight_.ignores_vehs = flight_.ignores_prel = true;
+  EXPECT_FALSE(place().success);
+  EXPECT_EQ(placed_, 0);
+}
+
 TEST_F(FlightChangesTest12, BeginsANewFlightWhereMovingFailsTwice) {
   flight_.ignores_vehs = true;
   const double begin = sim_.time();

@@ -42,6 +42,7 @@ class FlightJobsTest : public testing::Test {
     FlightChangeHooks out;
     out.watch = [this] { return flight_.watch(); };
     out.resets = [this] { return flight_.resets(); };
+    out.placed = [] {};
     out.identities = [this] { return flight_.identities; };
     out.aircraft = [this] { return aircraft_(); };
     out.suspend_control = [this](const std::string& reason) {

@@ -54,6 +54,7 @@ class FlightChangesTest : public testing::Test {
     FlightChangeHooks out;
     out.watch = [this] { return flight_.watch(); };
     out.resets = [this] { return flight_.resets(); };
+    out.placed = [this] { ++placed_; };
     out.identities = [this] { return flight_.identities; };
     out.aircraft = [this] { return flight_.aircraft; };
     out.suspend_control = [this](const std::string& reason) { suspensions_.push_back(reason); };
@@ -107,6 +108,7 @@ class FlightChangesTest : public testing::Test {
   std::vector<std::string> suspensions_;
   std::string pausing_;
   int pauses_left_ = 0;
+  int placed_ = 0;
   FlightChanges changes_{&sim_, {2.0, 20.0}, hooks()};
 };
 
