@@ -24,7 +24,7 @@ from xplane_bridge.identification.model import (
     trim_estimates,
 )
 from xplane_bridge.identification.output_error import Fit, fit, refit, simulate
-from xplane_bridge.identification.windows import TAIL_S, Window, find_windows
+from xplane_bridge.identification.windows import TAIL_S, Window, find_windows, with_known_inputs
 from xplane_bridge.units import GRAVITY_MPS2
 
 #: An input that moves less than this in all windows is none [rad].
@@ -65,7 +65,7 @@ class Identification:
 
     model: LinearModel
     results: dict[str, AxisResult]
-    notes: list[str]  #: manoeuvres that were left out, and why
+    notes: list[str]  #: manoeuvres that were left out, and axes without a model, and why
 
     @property
     def refusals(self) -> list[str]:
@@ -98,27 +98,35 @@ def identify(
     """
     windows, notes = find_windows(flight, tail)
     names = list(AXES) if axis is None else [axis]
-    asked = [w.excitation.number for w in windows if not w.excitation.axes.isdisjoint(names)]
+    usable: dict[str, list[Window]] = {}
+    reasons: list[str] = []
+    for name in names:
+        usable[name], unknown = with_known_inputs(windows, AXES[name])
+        reasons += unknown
+    asked = sorted({w.excitation.number for mine in usable.values() for w in mine})
     if validate is not None and asked and validate not in asked:
         numbers = ", ".join(map(str, asked))
         of_axis = "" if axis is None else f" for the {axis} axis"
         msg = f"excitation {validate} cannot be kept for validation; {flight.name} has{of_axis}: {numbers}"
         raise IdentificationError(msg)
     results = {}
-    for name in names:
-        mine = [w for w in windows if name in w.excitation.axes]
-        if mine:
+    for name, mine in usable.items():
+        if not mine:
+            continue
+        try:
             results[name] = identify_axis(mine, AXES[name], geometry, validate)
-        elif axis is not None:
-            there = "; ".join(w.excitation.label for w in windows)
-            msg = f"{flight.name}: no excitation moves the {name} axis; there is: {there}"
-            raise IdentificationError(msg)
+        except IdentificationError as error:
+            reasons.append(f"no {name} model: {error}")
+    if not results:
+        there = "; ".join(w.excitation.label for w in windows)
+        msg = "; ".join(reasons) or f"no excitation moves the {axis} axis; there is: {there}"
+        raise IdentificationError(f"{flight.name}: {msg}")
     used = [w for result in results.values() for w in result.windows]
     source = {"program": "identify_model", "bag": flight.name, "windows": [w.excitation.label for w in used]}
     model = LinearModel(
         aircraft, trim_estimates(_mean_conditions(used)), {k: r.model for k, r in results.items()}, source
     )
-    return Identification(model, results, notes)
+    return Identification(model, results, notes + reasons)
 
 
 def identify_axis(
@@ -127,7 +135,7 @@ def identify_axis(
     """Identify one axis from its windows.
 
     Raises:
-        IdentificationError: No input moves, or one is not known.
+        IdentificationError: No input moves, or the only window is to be kept for validation.
     """
     inputs = _moved_inputs(windows, axis)
     fitted, spare = _split(windows, validate)
@@ -162,11 +170,6 @@ def identify_axis(
 
 
 def _moved_inputs(windows: list[Window], axis: Axis) -> tuple[Signal, ...]:
-    for window in windows:
-        lost = [s.name for s in axis.inputs if not np.isfinite(window.columns[s.name]).all()]
-        if lost:
-            msg = f"{window.excitation.label}: {', '.join(lost)} not known all the time (bits in `valid` of surfaces)"
-            raise IdentificationError(msg)
     moved = tuple(s for s in axis.inputs if any(np.ptp(w.columns[s.name]) > _LEAST_INPUT_RAD for w in windows))
     if not moved:
         names = " nor ".join(signal_names(axis.inputs))

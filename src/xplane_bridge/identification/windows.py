@@ -125,6 +125,23 @@ def find_windows(flight: Flight, tail: float = TAIL_S) -> tuple[list[Window], li
     return windows, left_out
 
 
+def with_known_inputs(windows: list[Window], axis: Axis) -> tuple[list[Window], list[str]]:
+    """Choose the windows that move an axis and know its inputs in every frame; also why others were left out."""
+    chosen, left_out = [], []
+    for window in windows:
+        if axis.name not in window.excitation.axes:
+            continue
+        unknown = [name for name in signal_names(axis.inputs) if not np.isfinite(window.columns[name]).all()]
+        if unknown:
+            left_out.append(
+                f"{window.excitation.label} for the {axis.name} axis: {', '.join(unknown)} not known all the time "
+                "(bits in `valid` of surfaces)"
+            )
+        else:
+            chosen.append(window)
+    return chosen, left_out
+
+
 def read_excitations(table: Table) -> list[Excitation]:
     """The injections in the order they ran."""
     out: list[Excitation] = []

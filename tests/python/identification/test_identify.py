@@ -12,6 +12,7 @@ import pytest
 
 from support.flights.manoeuvre_flight import LATERAL, PITCH, Film, Manoeuvre, Recording, flown
 from xplane_bridge.bags.flight import Flight
+from xplane_bridge.constants import SurfaceStatesValid
 from xplane_bridge.emulator.aircraft import create_model
 from xplane_bridge.emulator.flight import jsbsim_model
 from xplane_bridge.emulator.flight.flight_model import FlightModel
@@ -441,6 +442,44 @@ def test_a_window_that_is_left_out_is_reported_and_the_others_are_used(calm: Rec
     found = identify(without(calm, excitation=[begin, {**end, "result": "aborted: stopped by /me"}, *rest]))
     assert found.notes == ["excitation 1 (3-2-1-1 on pitch) was aborted: stopped by /me"]
     assert [w.excitation.number for w in found.results["longitudinal"].windows] == [2, 3]
+
+
+def test_a_window_of_an_unknown_input_is_left_out_for_its_axis_alone(calm: Recording) -> None:
+    *_, last, _end = calm.excitation  # yaw
+    rows = [
+        {**row, "valid": row["valid"] & ~SurfaceStatesValid.RUDDER} if 1.0 < late < 1.2 else row
+        for row in calm.surfaces
+        for late in [row["sim_time"] - last["start_sim_time"]]
+    ]
+    found = identify(without(calm, surfaces=rows))
+    assert found.notes == [
+        "excitation 9 (3-2-1-1 on yaw) for the lateral axis: rudder not known all the time (bits in `valid` of "
+        "surfaces)"
+    ]
+    assert [w.excitation.number for w in found.results["lateral"].windows] == [4, 5, 7, 8]
+    assert [w.excitation.number for w in found.results["longitudinal"].windows] == [1, 2]
+    with pytest.raises(IdentificationError, match=r"excitation 9 cannot be kept .* flown has: 1, 2, 3, 4, 5, 6, 7, 8$"):
+        identify(without(calm, surfaces=rows), validate=9)
+
+
+def test_an_axis_without_a_model_does_not_take_that_of_the_other(calm: Recording) -> None:
+    still = without(calm, surfaces=changed(calm.surfaces, delta_aileron=np.float32(0.0), delta_rudder=np.float32(0.0)))
+    found = identify(still)
+    assert list(found.results) == list(found.model.axes) == ["longitudinal"]
+    (note,) = found.notes
+    assert note.startswith("no lateral model: excitation 4 (3-2-1-1 on roll), ")
+    assert "neither aileron nor rudder moves by more than 0.1 deg" in note
+    with pytest.raises(IdentificationError, match=r"^flown: no lateral model: excitation 4 .* neither aileron nor"):
+        identify(still, "lateral")
+
+
+def test_without_a_model_of_any_axis_every_reason_is_said(calm: Recording) -> None:
+    known = SurfaceStatesValid.AILERON1 | SurfaceStatesValid.RUDDER
+    still = {"delta_aileron": np.float32(0.0), "delta_rudder": np.float32(0.0)}
+    with pytest.raises(IdentificationError) as raised:
+        identify(without(calm, surfaces=changed(calm.surfaces, valid=known, **still)))
+    assert "excitation 1 (3-2-1-1 on pitch) for the longitudinal axis: elevator not known" in str(raised.value)
+    assert "; no lateral model: excitation 4 (3-2-1-1 on roll), " in str(raised.value)
 
 
 def test_an_axis_or_a_window_that_is_not_there_is_refused(short: Recording) -> None:
