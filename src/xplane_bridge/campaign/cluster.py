@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import signal
 import tempfile
 import threading
 import time
@@ -133,13 +134,19 @@ def _refuse_another(worker: str, has: Fingerprint, wanted: Fingerprint) -> None:
         )
 
 
+def dask_setup(_worker: Any) -> None:
+    """What Dask runs in each worker of a local cluster as it starts: Ctrl-C in a terminal is for the parent alone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 @contextmanager
 def local_cluster(workers: int) -> Iterator[Cluster]:
     """Processes of this machine, one thread each: two flights in one process would only wait for each other."""
     import dask
     from distributed import Client, LocalCluster
 
-    logging.getLogger("distributed").setLevel(logging.ERROR)
+    # What ends a campaign is raised; a scheduler that is ended at work logs, as critical, all that it could not send.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
     settings = {"distributed.scheduler.allowed-failures": _SECOND_CHANCES, "distributed.worker.memory.terminate": False}
     with tempfile.TemporaryDirectory(prefix="run_campaign_") as scratch, dask.config.set(settings), LocalCluster(
         n_workers=workers,
@@ -149,6 +156,7 @@ def local_cluster(workers: int) -> Iterator[Cluster]:
         host="127.0.0.1",
         local_directory=scratch,
         silence_logs=logging.CRITICAL,
+        preload=[__name__],
     ) as cluster, Client(cluster) as client:
         over = threading.Event()
         threading.Thread(target=_replenish, args=(cluster, workers, over), name="workers", daemon=True).start()

@@ -53,13 +53,13 @@ class CampaignFolder:
         """The campaign that has been flown into the folder.
 
         Raises:
-            CampaignError: There is none.
+            CampaignError: There is none, or it cannot be flown from here.
         """
         try:
-            saved = json.loads((self.folder / CAMPAIGN).read_text(encoding="utf-8"))
-            return parse_campaign(saved["campaign"])
+            document = json.loads((self.folder / CAMPAIGN).read_text(encoding="utf-8"))["campaign"]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise CampaignError(f"{self.folder}: holds no campaign ({error}); fly one into it first") from None
+        return parse_campaign(document)
 
     def fly(self, campaign: Campaign, executor: Executor, progress: Callable[[int], None]) -> pd.DataFrame:
         """Flies what is missing, and writes the table.

@@ -248,6 +248,13 @@ def test_a_folder_of_another_campaign_is_refused_and_so_is_one_in_use(tmp_path: 
         CampaignFolder(tmp_path / "none").load()
 
 
+def test_a_campaign_whose_controller_is_not_there_is_not_called_none(tmp_path: Path) -> None:
+    document_of = {**document(flights=1), "controller": "only_there:Steady"}
+    (tmp_path / CAMPAIGN).write_text(json.dumps({"campaign": document_of}))
+    with pytest.raises(CampaignError, match=r"^controller: 'only_there:Steady' cannot be had \(No module"):
+        CampaignFolder(tmp_path).load()
+
+
 def test_what_cannot_be_written_is_a_line(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     folder, file = tmp_path / "flown", tmp_path / "c.json"
     file.write_text(json.dumps(document(flights=2)))

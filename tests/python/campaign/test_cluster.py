@@ -1,0 +1,75 @@
+"""Ctrl-C with a cluster of this machine's processes, which the terminal sends to all of them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from support.deadlines import PROGRAM_S
+from xplane_bridge.campaign.cluster import local_cluster
+
+RUN = "import sys; from xplane_bridge.cli.run_campaign import main; sys.exit(main())"
+#: Many flights of a tenth of a second.
+CAMPAIGN = """
+name: short
+flights: 4000
+scenario:
+  name: short
+  aircraft: fixed_wing
+  start: {speed: 70, altitude: 1000}
+  criteria: {level: {measure: maximum, of: roll, below: 90}}
+  events: [{at: 0.1, end: true}]
+"""
+
+
+def alive(group: int) -> bool:
+    """Whether a process of it runs."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("to_all", [True, False])
+def test_ctrl_c_ends_all_without_a_word_of_the_workers(tmp_path: Path, to_all: bool) -> None:
+    pytest.importorskip("distributed")
+    (tmp_path / "c.yaml").write_text(CAMPAIGN)
+    command = [sys.executable, "-c", RUN, str(tmp_path / "c.yaml"), "--workers", "2", "-o", str(tmp_path / "c")]
+    with (tmp_path / "log").open("wb") as log:
+        program = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
+    deadline = time.monotonic() + PROGRAM_S
+    try:
+        while not list(tmp_path.glob("c/parts/*.parquet")):
+            assert program.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        (os.killpg if to_all else os.kill)(program.pid, signal.SIGINT)
+        assert program.wait(PROGRAM_S) == 130
+        while alive(program.pid):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+    finally:
+        if alive(program.pid):
+            os.killpg(program.pid, signal.SIGKILL)
+    assert "Traceback" not in (tmp_path / "log").read_text()
+
+
+def test_a_worker_that_was_started_anew_ignores_ctrl_c_too() -> None:
+    pytest.importorskip("distributed")
+    with local_cluster(1) as cluster:
+        client = cluster._client
+        (first,) = client.scheduler_info()["workers"]
+        os.kill(cluster.worker_pids()[0], signal.SIGKILL)
+        deadline = time.monotonic() + PROGRAM_S
+        while set(client.scheduler_info()["workers"]) in (set(), {first}):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        (handler,) = client.run(signal.getsignal, signal.SIGINT).values()
+        assert handler == signal.SIG_IGN
