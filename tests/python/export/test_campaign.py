@@ -20,9 +20,11 @@ from support.flights.synthetic_flight import stamp_ns
 from xplane_bridge.dask_scheduler import SchedulerError
 from xplane_bridge.export import campaign, tables
 from xplane_bridge.export.campaign import flights
+from xplane_bridge.export.card import CARD
 from xplane_bridge.export.flight import ExportError
 from xplane_bridge.export.formats import Job
 from xplane_bridge.export.pictures import Options
+from xplane_bridge.export.yolo_yaml import DATA_YAML
 from xplane_bridge.labels import table
 
 if TYPE_CHECKING:
@@ -128,6 +130,23 @@ def test_what_no_export_made_stays(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "is there already, made by no export that this folder has a record of" in err
     assert "give another folder with -o, or move it away" in err
     assert own.read_text() == "years of work"
+
+
+def test_an_export_beside_files_of_ones_own_is_as_it_was_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag = write_flight(tmp_path / "flight.bag", 0.4)
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in (CARD, DATA_YAML):
+        (out / name).write_text("of my own")
+    assert export(bag, "--format", "csv", "-o", out) == 0
+    assert export("--verify", "-o", out) == 0
+    assert [(out / name).read_text() for name in (CARD, DATA_YAML)] == ["of my own"] * 2
+    (out / "notes.txt").write_text("")
+    capsys.readouterr()
+    assert export("--verify", "-o", out) == 1
+    assert "not in the manifest: notes.txt" in "".join(capsys.readouterr())
 
 
 def test_an_earlier_export_of_the_same_flight_is_replaced(tmp_path: Path) -> None:
