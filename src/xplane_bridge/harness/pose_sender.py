@@ -27,7 +27,9 @@ class Scenery:
     earth_radius: float  #: [m]
 
     def datarefs(self, pose: Mapping[str, float]) -> Dict[str, float]:
-        """What is to be written for a pose: local position, quaternion, local velocity.
+        """What is to be written for a pose: local position, attitude, local velocity.
+
+        X-Plane shows the angles while its flight model is overridden, and flies on from the quaternion.
 
         Args:
             pose: Fields of a FlightState: place, `orientation.*` (frd into ned), `velocity_ned.*`.
@@ -39,9 +41,10 @@ class Scenery:
         north, east, down = origin.T @ offset
         turn = origin.T @ here  # ned here into ned of the origin
         velocity = turn @ np.array([pose[f"velocity_ned.{axis}"] for axis in "xyz"])
-        attitude = _quaternion(turn @ _matrix(*(pose[f"orientation.{axis}"] for axis in "xyzw")))
+        attitude = turn @ _matrix(*(pose[f"orientation.{axis}"] for axis in "xyzw"))
         out = {"local_x": east, "local_y": -down, "local_z": -north}
-        out.update({f"q[{k}]": value for k, value in enumerate(attitude)})
+        out.update(_angles(attitude))
+        out.update({f"q[{k}]": value for k, value in enumerate(_quaternion(attitude))})
         out.update({"local_vx": velocity[1], "local_vy": -velocity[2], "local_vz": -velocity[0]})
         return {_POSITION + name: float(value) for name, value in out.items()}
 
@@ -94,6 +97,13 @@ def _matrix(x: float, y: float, z: float, w: float) -> np.ndarray:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def _angles(matrix: np.ndarray) -> Dict[str, float]:
+    """Pitch, roll and heading of a rotation by X-Plane's names [deg]."""
+    roll, heading = np.arctan2(matrix[2, 1], matrix[2, 2]), np.arctan2(matrix[1, 0], matrix[0, 0])
+    pitch = np.arcsin(np.clip(-matrix[2, 0], -1.0, 1.0))
+    return {"theta": np.degrees(pitch), "phi": np.degrees(roll), "psi": np.degrees(heading) % 360.0}
 
 
 def _quaternion(matrix: np.ndarray) -> np.ndarray:

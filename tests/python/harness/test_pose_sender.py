@@ -46,7 +46,11 @@ def test_attitude_goes_through_as_it_is(heading, roll):
     h, r = np.radians(heading) / 2, np.radians(roll) / 2
     wanted = np.array([np.cos(h) * np.cos(r), np.cos(h) * np.sin(r), np.sin(h) * np.sin(r), np.sin(h) * np.cos(r)])
     attitude = {f"orientation.{axis}": value for axis, value in zip("wxyz", wanted)}
-    assert abs(np.dot(quaternion(written(**attitude)), wanted)) == pytest.approx(1.0)
+    values = written(**attitude)
+    assert abs(np.dot(quaternion(values), wanted)) == pytest.approx(1.0)
+    # the angles are all that is shown while the flight model is off
+    assert (values["theta"], values["phi"]) == pytest.approx((0.0, roll), abs=1e-9)
+    assert (values["psi"] - heading + 180.0) % 360.0 == pytest.approx(180.0, abs=1e-9)
 
 
 def test_far_away_level_is_tilted_against_the_origins_axes():
@@ -54,4 +58,5 @@ def test_far_away_level_is_tilted_against_the_origins_axes():
     q = quaternion(written(latitude=37.5 + degrees))
     tilt = 2.0 * np.degrees(np.arccos(q[0]))
     assert tilt == pytest.approx(degrees)
+    assert written(latitude=37.5 + degrees)["theta"] == pytest.approx(-degrees)
     assert q[2] < 0.0  # further north, the nose of a level aircraft points below the horizon of the origin

@@ -10,7 +10,9 @@ from typing import Callable, Dict, Tuple
 
 from xplane_bridge import xplane_names
 from xplane_bridge.emulator.datarefs import camera
+from xplane_bridge.emulator.datarefs.placement import PATH_OVERRIDE
 from xplane_bridge.emulator.datarefs.sources import Actions
+from xplane_bridge.emulator.datarefs.store import DatarefStore
 
 _COCKPIT = "sim/cockpit2/controls/"
 _FLAPS = _COCKPIT + "flap_ratio"
@@ -55,7 +57,7 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         return lambda: store.set(name, min(max(store.get(name) + step, low), high))
 
     def toggle(name: str) -> Callable[[], None]:
-        return lambda: store.set(name, 0.0 if store.get(name) else 1.0)
+        return partial(_toggle, store, name)
 
     table: Dict[str, Callable[[], None]] = {
         "sim/operation/pause_on": lambda: sim.pause(True),
@@ -63,7 +65,7 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
         "sim/operation/pause_toggle": lambda: sim.pause(not sim.clocks.paused),
         "sim/operation/fix_all_systems": sim.repair_all,
         "sim/operation/reset_flight": sim.restart_flight,
-        "sim/operation/freeze_toggle": toggle("sim/operation/override/override_planepath"),
+        "sim/operation/freeze_toggle": toggle(PATH_OVERRIDE),
         "sim/flight_controls/landing_gear_down": setter(_COCKPIT + "gear_handle_down", 1.0),
         "sim/flight_controls/landing_gear_up": setter(_COCKPIT + "gear_handle_down", 0.0),
         "sim/flight_controls/landing_gear_toggle": toggle(_COCKPIT + "gear_handle_down"),
@@ -110,6 +112,12 @@ def all_commands(sim: Actions) -> Dict[str, Callable[[], None]]:
     for name, (view, external) in VIEWS.items():
         table[f"sim/view/{name}"] = partial(_look, sim, view, external)
     return table
+
+
+def _toggle(store: DatarefStore, name: str) -> None:
+    """Switches a dataref on or off; of an array the first element, as the others are not the user's aircraft's."""
+    slot = store.dataref(name).slots[0]
+    store.values[slot] = 0.0 if store.values[slot] else 1.0
 
 
 def _move_flaps(sim: Actions, notches: int) -> None:

@@ -14,6 +14,8 @@ from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.flight_model import HIGHEST_LATITUDE_DEG, FlightModel, InitialState
 from xplane_bridge.emulator.flight.frame import Frame
 
+#: Of aircraft by their number; 0 is the user's.
+PATH_OVERRIDE = "sim/operation/override/override_planepath"
 _POSITION = "sim/flightmodel/position/"
 _WRITABLE = [
     "local_x",
@@ -38,6 +40,8 @@ class Placements:
     """Collects what clients write to the aircraft's motion in one frame and moves the aircraft at once.
 
     A client that sets a position sends several DREFs; applied one by one they would pass through places in between.
+    The flight model turns the aircraft by `q` and writes the angles; only while it is overridden do the angles count,
+    and then `q` does not.
     """
 
     #: Moves beyond these are not made: X-Plane has no such places, and no flight model flies there.
@@ -53,6 +57,7 @@ class Placements:
     GROUND_SPEED_MPS = 5.0
 
     def __init__(self, store: DatarefStore) -> None:
+        self._store = store
         self._pending: Dict[str, float] = {}
         for leaf in _WRITABLE:
             store.on_write(_POSITION + leaf, partial(self._remember, leaf))
@@ -78,7 +83,7 @@ class Placements:
         latitude = changes.get("latitude_deg", frame.m.latitude_deg)
         longitude = changes.get("longitude_deg", frame.m.longitude_deg)
         to_level = frame.local.from_level(latitude, longitude).T  # type: ignore[arg-type]
-        attitude = _attitude(pending, frame)
+        attitude = _attitude(pending, frame, self._store.get(PATH_OVERRIDE) != 0.0)
         if attitude is not None:
             roll, pitch, heading = earth.euler_degrees(to_level @ attitude)
             changes["roll_rad"], changes["pitch_rad"] = math.radians(roll), math.radians(pitch)
@@ -93,7 +98,7 @@ class Placements:
             rates[i] = pending.get(axis + "rad", rates[i])
         if any(leaf[0] in "PQR" for leaf in pending):
             changes["pqr_rad_s"] = rates
-        if self._is_flyable(changes):
+        if changes and self._is_flyable(changes):
             model.place(**changes)  # type: ignore[arg-type]
 
     @classmethod
@@ -183,15 +188,16 @@ def is_place(numbers: Sequence[float]) -> bool:
     return abs(latitude) <= HIGHEST_LATITUDE_DEG and abs(longitude) <= 360.0 and low <= elevation <= high
 
 
-def _attitude(pending: Dict[str, float], frame: Frame) -> Optional[np.ndarray]:
-    """Body to origin axes as written, by q (which counts) or by angles; None if neither was."""
-    if any(f"q{i}" in pending for i in range(4)):
+def _attitude(pending: Dict[str, float], frame: Frame, overridden: bool) -> Optional[np.ndarray]:
+    """Body to origin axes as written, by the angles where the flight model is overridden, else by q; None: neither."""
+    if overridden:
+        if any(leaf in pending for leaf in ("theta", "phi", "psi")):
+            return earth.body_to_level(
+                pending.get("phi", frame.phi), pending.get("theta", frame.theta), pending.get("psi", frame.psi)
+            )
+    elif any(f"q{i}" in pending for i in range(4)):
         try:
             return earth.rotation_from_quaternion(*(pending.get(f"q{i}", frame.q[i]) for i in range(4)))
         except ValueError:
             return None
-    if any(leaf in pending for leaf in ("theta", "phi", "psi")):
-        return earth.body_to_level(
-            pending.get("phi", frame.phi), pending.get("theta", frame.theta), pending.get("psi", frame.psi)
-        )
     return None

@@ -14,7 +14,7 @@ from typing import Dict, FrozenSet, Tuple
 
 import numpy as np
 
-from xplane_bridge.emulator.datarefs.placement import is_place
+from xplane_bridge.emulator.datarefs.placement import PATH_OVERRIDE, is_place
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.flight import earth
 from xplane_bridge.emulator.flight.flight_model import InitialState
@@ -24,7 +24,6 @@ from xplane_bridge.units import moved
 
 #: Others than the user's aircraft, which is number 0.
 MOST = 19
-OVERRIDE = "sim/operation/override/override_planepath"
 PLANE = "sim/multiplayer/position/" + "plane{}_"
 WRITTEN = ("x", "y", "z", "the", "phi", "psi", "v_x", "v_y", "v_z")
 GEODETIC = ("lat", "lon", "el")
@@ -93,7 +92,7 @@ class Traffic:
             return False
         latitude, longitude, elevation = numbers
         self.aircraft[request.aircraft] = OtherAircraft(latitude, earth.wrap_half_turn(longitude), elevation, *angles)
-        self._store.values[self._store.dataref(OVERRIDE).slots[request.aircraft]] = 1.0
+        self._store.values[self._store.dataref(PATH_OVERRIDE).slots[request.aircraft]] = 1.0
         return True
 
     def poses(self) -> Tuple[Tuple[float, float, float, float, float, float], ...]:
@@ -105,7 +104,7 @@ class Traffic:
 
     def held(self, number: int) -> bool:
         """Whether a client moves it."""
-        return self._store.get(OVERRIDE, number) != 0.0
+        return self._store.get(PATH_OVERRIDE, number) != 0.0
 
     def step(self, dt: float, frame: Frame) -> None:
         """Takes what clients have written, and flies what they do not hold."""

@@ -25,7 +25,7 @@ def test_once_closed_it_moves_nothing_whichever_thread_is_about_to():
         xplane.settimeout(10.0)
         sender = PoseSender(*xplane.getsockname(), Scenery(37.5, 126.5, 6378145.0))
         sender.send(POSE)
-        assert all(xplane.recv(600).startswith(b"DREF\0") for _ in range(10))
+        assert all(xplane.recv(600).startswith(b"DREF\0") for _ in range(13))
         sender.close()
         sender.send(POSE)  # a flight state that was on its way
 

@@ -242,7 +242,7 @@ def test_attitude_and_velocity_are_set_by_their_datarefs(bench):
         math.sin(heading) * math.sin(half),
         math.sin(heading) * math.cos(half),
     )
-    emulator.write({OVERRIDE + "planepath[0]": 1.0})
+    emulator.client().send(protocol.CommandRequest("sim/operation/pause_toggle"))
     emulator.write({f"{POSITION}q[{i}]": value for i, value in enumerate(q)})
     emulator.write({POSITION + "local_vx": 42.4264, POSITION + "local_vy": 0.0, POSITION + "local_vz": -42.4264})
     emulator.step()
@@ -252,6 +252,19 @@ def test_attitude_and_velocity_are_set_by_their_datarefs(bench):
     assert psi == pytest.approx(45.0, abs=0.1)
     assert (vx, vz) == (pytest.approx(42.4264, abs=0.01), pytest.approx(-42.4264, abs=0.01))
     assert theta == pytest.approx(0.0, abs=0.1)
+
+
+def test_the_flight_model_turns_by_q_and_its_override_by_the_angles(bench):
+    emulator = bench(aircraft="fixed_wing")
+    angles = [POSITION + name for name in ("phi", "theta", "psi")]
+    before = emulator.read(*angles)
+    emulator.write(dict(zip(angles, (40.0, 10.0, 90.0))))
+    assert emulator.read(*angles) == pytest.approx(before, abs=0.1)
+    emulator.write({OVERRIDE + "planepath[0]": 1.0})
+    emulator.write(dict(zip(angles, (40.0, 10.0, 90.0))))
+    assert emulator.read(*angles) == pytest.approx([40.0, 10.0, 90.0], abs=1e-3)
+    emulator.write({POSITION + "q[0]": 1.0, POSITION + "q[1]": 0.0, POSITION + "q[2]": 0.0, POSITION + "q[3]": 0.0})
+    assert emulator.read(*angles) == pytest.approx([40.0, 10.0, 90.0], abs=1e-3)
 
 
 def test_local_position_is_set_by_its_datarefs_at_once(bench):

@@ -136,6 +136,16 @@ def test_the_oldest_version_has_no_targets(bench):
     assert not emulator.sim.store.dataref("sim/cockpit2/tcas/targets/modeS_id").visible
 
 
+def test_the_command_that_freezes_the_users_aircraft_leaves_the_others_theirs(bench):
+    emulator = bench()
+    overrides = [OVERRIDE.format(number) for number in range(4)]
+    emulator.write({overrides[1]: 1.0})
+    client = emulator.client()
+    for frozen in (1.0, 0.0):
+        client.send(protocol.CommandRequest("sim/operation/freeze_toggle"))
+        assert emulator.read(*overrides) == [frozen, 1.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("otherwise", "vehx", "written"), [("other-aircraft", False, True), ("other-written", True, False)]
 )
