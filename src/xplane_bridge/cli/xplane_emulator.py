@@ -75,6 +75,6 @@ def _open_view(options: Options, emulator: Emulator) -> Optional[CockpitView]:
         return None
     from xplane_bridge.emulator.view.cockpit_view import CockpitView  # late: without a window, OpenCV is not needed
 
-    view = CockpitView(options)
+    view = CockpitView(emulator.options)  # where the flight starts is also the scenario's to say
     emulator.view = view
     return view

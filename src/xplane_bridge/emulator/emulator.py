@@ -27,14 +27,13 @@ from xplane_bridge.emulator.lockstep import Fences, LockstepLoop
 from xplane_bridge.emulator.options import KINEMATIC, Options
 from xplane_bridge.emulator.pictures import View, wait_until_shown
 from xplane_bridge.emulator.priority import RealTimePriority, collect_seldom, collected_by_hand
-from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
+from xplane_bridge.emulator.scenario_pilot import ScenarioPilot, load_flown, started_as
 from xplane_bridge.emulator.simulator import INTERNAL_VERSIONS, Simulator
 from xplane_bridge.emulator.truth import TruthFile
 from xplane_bridge.emulator.wire.faults import FaultyChannel
 from xplane_bridge.emulator.wire.server import Beacon, Route, Server
 from xplane_bridge.emulator.wire.subscriptions import Address, Subscriptions
 from xplane_bridge.emulator.wire.xplane_connect import XPlaneConnect
-from xplane_bridge.scenario import ScenarioError, load_scenario
 
 _LOG = logging.getLogger(__name__)
 
@@ -56,10 +55,12 @@ class Emulator:
         port: The port it listens on.
         view: What draws the pictures; None: there are none.
         wants_status: Set it to have the statistics printed between two frames, as a `STATUS {json}` line.
+        options: Those given, with the start of the pilot's scenario where they have none.
     """
 
     def __init__(self, options: Options) -> None:
-        self.options = options
+        self._scenario = None if options.pilot is None else load_flown(options.pilot, options.aircraft)
+        self.options = options if self._scenario is None else started_as(self._scenario, options)
         self.period = 1.0 / options.fps
         self.view: Optional[View] = None
         self.stopping = False
@@ -100,7 +101,7 @@ class Emulator:
 
     def _new_simulator(self) -> Simulator:
         o = self.options
-        pilot = self._new_pilot()
+        pilot = None if self._scenario is None else ScenarioPilot(self._scenario)
         inputs = InputOptions(o.joystick == "attached", o.auto_coordination)
         sim = Simulator(
             self._make_model,
@@ -123,16 +124,6 @@ class Emulator:
         )
         sim.on_rows(protocol.RowSelection("DSEL", o.data_rows))
         return sim
-
-    def _new_pilot(self) -> Optional[ScenarioPilot]:
-        path, aircraft = self.options.pilot, self.options.aircraft
-        if path is None:
-            return None
-        scenario = load_scenario(path)
-        if scenario.aircraft and aircraft not in (*scenario.aircraft, KINEMATIC):
-            fits = ", ".join(scenario.aircraft)
-            raise ScenarioError(f"{path}: is a scenario for {fits}, not for {aircraft}: choose --aircraft {fits}")
-        return ScenarioPilot(scenario)
 
     def _new_server(self, port: int) -> Server:
         sim = self.sim
@@ -336,9 +327,7 @@ class Emulator:
             if self._beacon is not None:
                 self._beacon.poll(begin)
             self.run_frame(period, begin, time.time())
-            if self.wants_status:
-                self.wants_status = False
-                print("STATUS " + json.dumps(self.statistics()), flush=True)
+            self._print_wanted_status()
             end = clock()
             self.sim.clocks.work = end - begin
             if len(self._sent_at) < _KEPT_PERIODS:
@@ -389,6 +378,7 @@ class Emulator:
     def step_frames(self, count: int) -> None:
         """Stepped mode: `count` frames of the nominal period, whatever the wall clock says."""
         for _ in range(count):
+            self._print_wanted_status()
             elapsed = self._frames * self.period
             if not self._stepped_fault(elapsed):
                 self.run_frame(self.period, elapsed)
@@ -424,6 +414,7 @@ class Emulator:
             self._send,
             lambda: self.sim.clocks.running,
             lambda: self._picture,
+            self._print_wanted_status,
             self.period,
             o.pace,
         )
@@ -478,6 +469,11 @@ class Emulator:
                 "max": round(float(errors.max()), 3),
             }
         return report
+
+    def _print_wanted_status(self) -> None:
+        if self.wants_status:
+            self.wants_status = False
+            print("STATUS " + json.dumps(self.statistics()), flush=True)
 
     def _close_sockets(self) -> None:
         self.server.close()

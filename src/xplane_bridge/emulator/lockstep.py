@@ -160,6 +160,7 @@ class LockstepLoop:
         hold: Sends what is due without flying; gets the time on the loop's clock [s].
         sim_time: Gives the simulated time [s].
         picture: Gives the number of the frame that the window shows; 0: none.
+        idle: Called now and then while answers are awaited.
         period: Time of one frame [s].
         pace: Simulated time may go by so many times faster than real time; 0: as fast as it goes.
     """
@@ -173,6 +174,7 @@ class LockstepLoop:
         hold: Callable[[float], None],
         sim_time: Callable[[], float],
         picture: Callable[[], int],
+        idle: Callable[[], None],
         period: float,
         pace: float = 0.0,
     ) -> None:
@@ -183,6 +185,7 @@ class LockstepLoop:
         self._hold = hold
         self._sim_time = sim_time
         self._picture = picture
+        self._idle = idle
         self._period = period
         self._pace = pace
         self.waited = 0.0  #: [s] of wall time for answers to frames that were flown
@@ -195,7 +198,7 @@ class LockstepLoop:
             self._fences.send(self._server(), held * self._period, 0, self._sim_time())
             held += 1
             self._await(0, self._period, stopping)
-        self._server().subscriptions.restart_pacers()
+        self._server().restart_pacers()
         began, frame = time.monotonic(), 0
         while (frames is None or frame < frames) and not stopping():
             frame += 1
@@ -214,6 +217,7 @@ class LockstepLoop:
         end = time.monotonic() + patience
         server = self._server()
         while not stopping() and self._fences.answered < frame:
+            self._idle()
             left = end - time.monotonic()
             if left <= 0.0:
                 return

@@ -87,6 +87,51 @@ def wind_from(text: str) -> Tuple[float, float]:
     return wrap_degrees(wind[0]), wind[1]
 
 
+def check_stepping(given: argparse.Namespace, delay: float, jitter: float) -> None:
+    """Raises an `OptionError` for options that do not go with how frames are flown.
+
+    Args:
+        given: The command line.
+        delay: Its `--pipeline-delay` [s].
+        jitter: Its `--frame-jitter` [s].
+    """
+    stepped, duration, every = given.stepped, given.duration, given.picture_every
+    lockstep = stepped == "lockstep"
+    drawn = lockstep and given.window is not None
+    require(stepped != "fast" or duration is not None, "--stepped", "fast", "--duration with it")
+    require(
+        stepped != "lines" or duration is None, "--duration", duration, "none with --stepped, whose lines say how long"
+    )
+    require(
+        stepped is None or jitter == 0.0,
+        "--frame-jitter",
+        given.frame_jitter,
+        "0 with --stepped, whose frames are all of one length",
+    )
+    require(0.0 <= given.pace <= 1000.0, "--pace", given.pace, "0..1000")
+    require(lockstep or given.pace == 0.0, "--pace", given.pace, "--stepped lockstep with it")
+    require(
+        not (lockstep and given.fault), "--fault", given.fault, "none with --stepped lockstep, whose frames all arrive"
+    )
+    require(
+        not (lockstep and given.loading_time > 0.0),
+        "--loading-time",
+        given.loading_time,
+        "0 with --stepped lockstep, in which every frame is answered",
+    )
+    require(
+        not (lockstep and given.deaf), "--deaf", "given", "--stepped other than lockstep, whose frames wait for answers"
+    )
+    require(1 <= every <= 1000, "--picture-every", every, "1..1000")
+    require(drawn or every == 1, "--picture-every", every, "--window and --stepped lockstep with it")
+    require(
+        not drawn or delay == 0.0,
+        "--pipeline-delay",
+        given.pipeline_delay,
+        "0 with --stepped lockstep, where a frame ends when its picture is on display",
+    )
+
+
 def require(good: bool, option: str, given: object, expected: str) -> None:
     """Raises an `OptionError` unless `good`."""
     if not good:

@@ -19,6 +19,7 @@ from xplane_bridge.emulator.option_values import (
     OptionError,
     address,
     aerodrome,
+    check_stepping,
     endpoint,
     otherwise_ids,
     require,
@@ -30,6 +31,16 @@ from xplane_bridge.emulator.wire.faults import FaultPlan, FaultSyntaxError, pars
 from xplane_bridge.emulator.wire.server import RREF_REQUESTS_PER_FRAME
 
 KINEMATIC = "kinematic"
+#: Where a flight starts if neither the command line nor the pilot's scenario says so: by option, its value and the
+#: field of `InitialState`.
+_START = {
+    "start": ("air", "on_ground"),
+    "lat": (37.4602, "latitude_deg"),
+    "lon": (126.4407, "longitude_deg"),
+    "alt": (1000.0, "altitude_m"),
+    "heading": (0.0, "heading_deg"),
+    "speed": (None, "airspeed_mps"),
+}
 #: What `--otherwise` makes of values a datagram and of requests a frame.
 _SMALL_SPLIT, _FEW_REQUESTS = 20, 20
 
@@ -49,6 +60,7 @@ class Options:
     sim_time_start: float = 0.0
     load_time: float = 0.0
     pilot: Optional[Path] = None
+    start_given: FrozenSet[str] = frozenset()  #: fields of `initial` that the pilot's scenario leaves as they are
     truth: Optional[Path] = None
     duration: Optional[float] = None
     #: None: real time; "lines": frames on request; "fast": as fast as it goes; "lockstep": as clients answer
@@ -120,8 +132,12 @@ def parse(arguments: Sequence[str]) -> Options:
     """Reads a command line; exits with a message on a wrong one, as argparse does."""
     parser = _parser()
     given = parser.parse_args(drop_ros_arguments(arguments))
+    start_given = frozenset(field for name, (_, field) in _START.items() if getattr(given, name) is not None)
+    for name, (usual, _) in _START.items():
+        if getattr(given, name) is None:
+            setattr(given, name, usual)
     try:
-        return _options(given)
+        return _options(given, start_given)
     except OptionError as error:
         parser.error(str(error))
 
@@ -142,15 +158,17 @@ def _parser() -> argparse.ArgumentParser:
         help="X-Plane version: names and commands are those of its list (default 11, that is "
         f"{xplane_names.NEWEST['11']}; 12 is {xplane_names.NEWEST['12']})",
     )
-    flight.add_argument("--start", choices=("ground", "air"), default="air", help="(default air)")
-    flight.add_argument("--lat", type=float, default=37.4602, metavar="DEG", help="latitude (default 37.4602)")
-    flight.add_argument("--lon", type=float, default=126.4407, metavar="DEG", help="longitude (default 126.4407)")
-    flight.add_argument("--alt", type=float, default=1000.0, metavar="M", help="altitude MSL in the air (default 1000)")
-    flight.add_argument("--heading", type=float, default=0.0, metavar="DEG", help="true heading (default 0)")
+    flight.add_argument("--start", choices=("ground", "air"), help="(default air)")
+    flight.add_argument("--lat", type=float, metavar="DEG", help="latitude (default 37.4602)")
+    flight.add_argument("--lon", type=float, metavar="DEG", help="longitude (default 126.4407)")
+    flight.add_argument("--alt", type=float, metavar="M", help="altitude MSL in the air (default 1000)")
+    flight.add_argument("--heading", type=float, metavar="DEG", help="true heading (default 0)")
     flight.add_argument("--speed", type=float, metavar="M/S", help="true airspeed in the air (default: the aircraft's)")
     flight.add_argument("--terrain", type=float, default=0.0, metavar="M", help="height of the ground MSL (default 0)")
     flight.add_argument("--engines-off", action="store_true", help="start with the engines stopped")
-    flight.add_argument("--pilot", type=Path, metavar="FILE", help="scenario that flies until a client does")
+    flight.add_argument(
+        "--pilot", type=Path, metavar="FILE", help="scenario that flies until a client does, and where it starts"
+    )
     flight.add_argument(
         "--joystick",
         choices=("attached", "none"),
@@ -342,7 +360,7 @@ def _parser() -> argparse.ArgumentParser:
     return p
 
 
-def _options(given: argparse.Namespace) -> Options:
+def _options(given: argparse.Namespace, start_given: FrozenSet[str]) -> Options:
     finite = ("lat", "lon", "alt", "heading", "terrain", "turbulence", "fps")
     for name in (*finite, "sim_time_start", "load_time", "loading_time"):
         require(
@@ -362,22 +380,6 @@ def _options(given: argparse.Namespace) -> Options:
     duration = given.duration
     require(duration is None or 0.0 < duration < math.inf, "--duration", duration, "more than 0, and finite")
     require(given.speed is None or 0.0 <= given.speed <= 300.0, "--speed", given.speed, "0..300")
-    require(given.stepped != "fast" or given.duration is not None, "--stepped", "fast", "--duration with it")
-    lockstep = given.stepped == "lockstep"
-    require(0.0 <= given.pace <= 1000.0, "--pace", given.pace, "0..1000")
-    require(lockstep or given.pace == 0.0, "--pace", given.pace, "--stepped lockstep with it")
-    require(
-        not (lockstep and given.fault), "--fault", given.fault, "none with --stepped lockstep, whose frames all arrive"
-    )
-    require(
-        not (lockstep and given.loading_time > 0.0),
-        "--loading-time",
-        given.loading_time,
-        "0 with --stepped lockstep, in which every frame is answered",
-    )
-    require(
-        not (lockstep and given.deaf), "--deaf", "given", "--stepped other than lockstep, whose frames wait for answers"
-    )
     require(given.seed >= 0, "--seed", given.seed, "0 or more")
     require(given.pilot is None or given.pilot.is_file(), "--pilot", given.pilot, "an existing file")
     try:
@@ -404,16 +406,9 @@ def _options(given: argparse.Namespace) -> Options:
     if size is None:
         raise OptionError(f"--window {given.window}: expected WIDTHxHEIGHT, e.g. 640x480")
     require(not given.window2 or given.window is not None, "--window2", given.window2, "--window with it")
-    every = given.picture_every
-    require(1 <= every <= 1000, "--picture-every", every, "1..1000")
-    drawn = lockstep and given.window is not None
-    require(drawn or every == 1, "--picture-every", every, "--window and --stepped lockstep with it")
-    require(
-        not drawn or delay == 0.0,
-        "--pipeline-delay",
-        given.pipeline_delay,
-        "0 with --stepped lockstep, where a frame ends when its picture is on display",
-    )
+    require(not given.hud or given.window is not None, "--hud", "given", "--window with it")
+    require(given.swap_log is None or given.window is not None, "--swap-log", given.swap_log, "--window with it")
+    check_stepping(given, delay, jitter)
     group, _, beacon_port = given.beacon_target.partition(":")
     initial = InitialState(
         latitude_deg=given.lat,
@@ -438,6 +433,7 @@ def _options(given: argparse.Namespace) -> Options:
         sim_time_start=given.sim_time_start,
         load_time=given.load_time,
         pilot=given.pilot,
+        start_given=start_given,
         truth=given.truth,
         duration=given.duration,
         stepped=given.stepped,
@@ -465,7 +461,7 @@ def _options(given: argparse.Namespace) -> Options:
         hud=given.hud,
         strip=given.strip,
         swap_log=given.swap_log,
-        picture_every=every,
+        picture_every=given.picture_every,
         joystick=given.joystick,
         auto_coordination=given.auto_coordination,
         loading_time=given.loading_time,

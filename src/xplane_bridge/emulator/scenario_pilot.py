@@ -3,26 +3,47 @@
 from __future__ import annotations
 
 import math
-from typing import Any, List, Mapping, Tuple
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Tuple
 
 from xplane_bridge.emulator.datarefs.control_inputs import PilotCommands
+from xplane_bridge.emulator.flight.earth import wrap_degrees, wrap_half_turn
 from xplane_bridge.emulator.flight.frame import Frame
-from xplane_bridge.scenario import Action, FlightSample, Player, Scenario, ScenarioError
+from xplane_bridge.emulator.options import KINEMATIC, Options
+from xplane_bridge.scenario import Action, FlightSample, Player, Scenario, ScenarioError, load_scenario
 from xplane_bridge.scenario.world import KINDS as WORLD_KINDS
 from xplane_bridge.units import GRAVITY_MPS2
+from xplane_bridge.xplane_names import versions_with
 
+#: Keys of a scenario's `start`, and what of `InitialState` they are.
+START = {
+    "latitude": "latitude_deg", "longitude": "longitude_deg", "heading": "heading_deg", "altitude": "altitude_m",
+    "speed": "airspeed_mps", "on_ground": "on_ground",
+}  # fmt: skip
 _FAILURES = "sim/operation/failures/"
 _TRIMS = {"trim_roll": "aileron_trim", "trim_pitch": "elevator_trim", "trim_yaw": "rudder_trim"}
 _EXCITED = ("roll", "pitch", "yaw")
 _FAILED, _REPAIRED = 6.0, 0.0
-#: Failures of systems by their plain names; {} is the number counted from 0.
-_SYSTEMS = {
-    "engine": "rel_engfai{}",
-    "generator": "rel_genera{}",
-    "battery": "rel_batter{}",
+#: Systems as tx_node has them (lib/core/failures/failures.cpp): how many, and what fails with each.
+_SYSTEMS = (
+    ("engine", 8, ("rel_engfai{from_0}",)),
+    ("bus", 6, ("rel_esys{second_on}",)),
+    ("generator", 8, ("rel_genera{from_0}",)),
+    ("battery", 8, ("rel_batter{from_0}",)),
+    ("pitot", 2, ("rel_pitot{second_on}",)),
+    ("static", 2, ("rel_static{second_on}",)),
+    ("gyro", 2, ("rel_{seat}_ahz", "rel_{seat}_dgy")),
+)
+#: Leaves of the failure datarefs by a system's name: `engine_1`, `bus_2`, ...
+SYSTEMS: Dict[str, Tuple[str, ...]] = {
+    f"{system}_{i + 1}": tuple(
+        leaf.format(from_0=i, second_on=i + 1 if i else "", seat="cop" if i else "ss") for leaf in leaves
+    )
+    for system, count, leaves in _SYSTEMS
+    for i in range(count)
 }
-_NUMBERED = {"bus_1": "rel_esys", "bus_2": "rel_esys2", "pitot_1": "rel_pitot", "pitot_2": "rel_pitot2"}
-_NUMBERED.update({"static_1": "rel_static", "static_2": "rel_static2", "gyro_1": "rel_ss_ahz", "gyro_2": "rel_cop_ahz"})
+_NAMES = ", ".join(f"{system}_1..{count}" for system, count, _ in _SYSTEMS)
 
 
 class ScenarioPilot:
@@ -36,10 +57,7 @@ class ScenarioPilot:
         for event in scenario.events:
             for kind, value in event.actions:
                 if kind == "failure":
-                    failure_dataref(value["name"])
-                    refusal = in_part(value)
-                    if refusal:
-                        raise ScenarioError(refusal)
+                    _check_failure(value)
                 if kind == "excitation" and "," in value["target"]:
                     raise ScenarioError(
                         "excitation: the emulator's pilot moves one axis; tx_node moves several at once"
@@ -83,31 +101,65 @@ class ScenarioPilot:
             names, self._failed = self._failed, []
             return [(name, _REPAIRED) for name in names]
         if action.kind == "failure":
-            name = _FAILURES + failure_dataref(action.value["name"])
+            names = [_FAILURES + leaf for leaf in failure_leaves(action.value["name"])]
             if action.value["clear"]:
-                return [(name, _REPAIRED)]
-            self._failed.append(name)
-            return [(name, _FAILED)]
+                return [(name, _REPAIRED) for name in names]
+            self._failed += names
+            return [(name, _FAILED) for name in names]
         return []
 
 
-def failure_dataref(name: str) -> str:
-    """The `rel_*` leaf of a system's plain name (`engine_1`, `bus_2`, ...) or of itself.
+def load_flown(path: Path, aircraft: str) -> Scenario:
+    """Reads the scenario that the pilot flies with an aircraft.
 
     Raises:
-        ScenarioError: Not expressible as one: surfaces, which take tx_node's algorithm, or an unknown name.
+        ScenarioError: It cannot be read, or is for other aircraft.
     """
-    if name.startswith("rel_"):
-        return name
-    if name in _NUMBERED:
-        return _NUMBERED[name]
-    system, _, number = name.rpartition("_")
-    if system in _SYSTEMS and number.isdigit() and int(number) >= 1:
-        return _SYSTEMS[system].format(int(number) - 1)
-    raise ScenarioError(
-        f"failure {name!r}: the emulator's pilot can only fail rel_* datarefs, engine_N, generator_N, battery_N, "
-        f"bus_N, pitot_N, static_N and gyro_N; surfaces fail through tx_node (set_failure)"
+    scenario = load_scenario(path)
+    if scenario.aircraft and aircraft not in (*scenario.aircraft, KINEMATIC):
+        fits = ", ".join(scenario.aircraft)
+        raise ScenarioError(f"{path}: is a scenario for {fits}, not for {aircraft}: choose --aircraft {fits}")
+    return scenario
+
+
+def started_as(scenario: Scenario, options: Options) -> Options:
+    """The options with a scenario's start and aerodrome, where the command line gives none."""
+    start = {START[key]: value for key, value in scenario.start.items()}
+    fields: Dict[str, Any] = {field: value for field, value in start.items() if field not in options.start_given}
+    initial = replace(options.initial, **fields)
+    initial = replace(
+        initial,
+        longitude_deg=wrap_half_turn(initial.longitude_deg),
+        heading_deg=wrap_degrees(initial.heading_deg),
     )
+    aerodrome = options.aerodrome
+    if aerodrome is None and scenario.aerodrome:
+        place = scenario.aerodrome
+        aerodrome = (place["latitude"], place["longitude"], place["heading"])
+    return replace(options, initial=initial, aerodrome=aerodrome)
+
+
+def failure_leaves(name: str) -> Tuple[str, ...]:
+    """The `rel_*` that fail by a name, a system's or their own; none for surfaces and for what no X-Plane has."""
+    if name.startswith("rel_") and versions_with(_FAILURES + name):
+        return (name,)
+    return SYSTEMS.get(name, ())
+
+
+def _check_failure(failure: Mapping[str, Any]) -> None:
+    """Looks whether the pilot can bring a failure about.
+
+    Raises:
+        ScenarioError: It cannot.
+    """
+    if not failure_leaves(failure["name"]):
+        raise ScenarioError(
+            f"failure {failure['name']!r}: expected {_NAMES}, or a rel_* dataref that X-Plane has; surfaces fail "
+            "through tx_node (set_failure), not by the emulator's pilot"
+        )
+    refusal = in_part(failure)
+    if refusal:
+        raise ScenarioError(refusal)
 
 
 def in_part(failure: Mapping[str, Any]) -> str:

@@ -50,8 +50,9 @@ class Servos:
         self._throttle: Optional[HoldAutopilot] = None
 
     def rest(self) -> None:
-        """Nothing is moved, as with an aircraft that was just loaded; one without an autopilot leaves it so."""
+        """Nothing is moved, as where a flight begins; an aircraft without an autopilot leaves it so."""
         self._holds = self._throttle = None
+        self._store.set(ap.AUTOTHROTTLE, ap.OFF)
         for _, name in _AXES:
             self._store.set(_SHOWN.format(name), 0.0)
 

@@ -21,6 +21,7 @@ from xplane_bridge.emulator.datarefs.failure_datarefs import FailureDatarefs
 from xplane_bridge.emulator.datarefs.placement import Placements
 from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.controls import old_names, surface_dataref
+from xplane_bridge.emulator.datarefs.tables.engines import set_first
 from xplane_bridge.emulator.datarefs.traffic import Traffic
 from xplane_bridge.emulator.datarefs.world_settings import PRESSURE_INHG, WorldSettings, clip
 from xplane_bridge.emulator.flight.failure_effects import TRIM_FAILURES, FailureEffects
@@ -115,7 +116,7 @@ class Simulator:
         self.flying = False
         self.loads = 0  #: how often a flight or a situation was loaded
         self.frozen = False  #: by VEHX: the flight model stands still until an aircraft or a flight is loaded
-        self._starts = Starts(self.initial, self.home, self.start_flight, lambda: self.model)
+        self._starts = Starts(self.initial, self.home, self.start_flight, self._terrain_m)
         self._load_time = load_time
         self._situations: Dict[str, Tuple[str, bytes, Dict[str, np.ndarray]]] = {}
         self._failed: Set[str] = set()
@@ -282,6 +283,9 @@ class Simulator:
         """Begins the most recent flight again."""
         self._starts.again()
 
+    def _terrain_m(self) -> float:
+        return self.model.state.terrain_elevation_m if self.flying else self.home.terrain_elevation_m
+
     def _begin(self, controls: Controls, powered: bool) -> None:
         """A flight begins where the model has been put."""
         self.controls = controls
@@ -289,23 +293,21 @@ class Simulator:
         self.inputs.start(self.controls, self.model)
         self.frozen, self.flying = False, True
         self._autopilot.switch_off()
+        self._servos.rest()
         self.clocks.flight = 0.0
         self.instruments, self.copilot_instruments = Instruments(), Instruments(COPILOT)
         self.electrics = Electrics()
-        for name in ("battery_on", "generator_on", "inverter_on"):
-            self.store.set(_ELECTRICAL + name, float(powered))
+        set_first(self.store, _ELECTRICAL + "battery_on", float(powered), 1)  # there is one
+        set_first(self.store, _ELECTRICAL + "generator_on", float(powered), self.model.info.engine_count)
+        self.store.set(_ELECTRICAL + "inverter_on", float(powered))
         self.store.set("sim/cockpit2/switches/avionics_power_on", float(powered))
         self._effects.start()
-        self._begin_frames()
-        self.electrics.update(0.0, self.store, self.frame, self.failed)
-        self._publish_surfaces()
-
-    def _begin_frames(self) -> None:
-        """The aircraft has been put where it is now: nothing of where it was counts."""
-        self._placements.clear()
+        self._placements.clear()  # nothing of where the aircraft was counts
         self.frame.start(self.model.state)
         self.frame.update(self.model.state, self._altimeter_inhg() * INHG_PA)
         self._update_instruments()
+        self.electrics.update(0.0, self.store, self.frame, self.failed)
+        self._publish_surfaces()
 
     def load_aircraft(self, name: str) -> None:
         """Loads another aircraft where the present one is, or before the first flight.
@@ -357,12 +359,7 @@ class Simulator:
         self.settings.weather.apply(model)  # as clients read it, who may have changed it since
         if model is not self.model:
             self._take_aircraft(aircraft, model)
-            self._begin(model.trim_controls, powered=True)
-        else:
-            self.loads += 1
-            self.frozen = False
-            self.clocks.flight = 0.0
-            self._begin_frames()
+        self._begin(model.trim_controls, powered=True)
         self.inputs.restore(levers)
         return True
 
@@ -371,7 +368,6 @@ class Simulator:
         info = self.model.info
         self.store.values[self._surface_slots] = 0.0  # of the aircraft before
         self.table.clear_arrays()
-        self._servos.rest()
         self.cameras.take_seat(info)
         self._surface_names = [spec.name for spec in self.model.surfaces]
         self._surface_slots = self._surface_slots_of(self.model)

@@ -9,7 +9,7 @@ from typing import Callable, Optional, Protocol
 from xplane_bridge import protocol
 from xplane_bridge.emulator.datarefs import airport_starts
 from xplane_bridge.emulator.datarefs.placement import Placements
-from xplane_bridge.emulator.flight.flight_model import FlightModel, FlightModelError, InitialState
+from xplane_bridge.emulator.flight.flight_model import FlightModelError, InitialState
 
 _LOG = logging.getLogger(__name__)
 
@@ -28,15 +28,15 @@ class Starts:
         first: The start as configured.
         home: A flight over the middle of the one airport's runway, along it.
         begin: Begins a flight.
-        model: Gives the aircraft of now.
+        terrain_m: Gives the height of the ground of now.
 
     Attributes:
         last: The most recent start.
     """
 
-    def __init__(self, first: InitialState, home: InitialState, begin: Begin, model: Callable[[], FlightModel]) -> None:
+    def __init__(self, first: InitialState, home: InitialState, begin: Begin, terrain_m: Callable[[], float]) -> None:
         self.last = first
-        self._first, self._home, self._begin, self._model = first, home, begin, model
+        self._first, self._home, self._begin, self._terrain_m = first, home, begin, terrain_m
 
     def first(self) -> None:
         """The flight as configured; on the ground where there is no steady flight with what clients have loaded."""
@@ -51,7 +51,7 @@ class Starts:
         if request.start_type == Placements.REPEAT_LAST:
             initial: Optional[InitialState] = self.last
         elif request.start_type == Placements.START_AT_PLACE:
-            initial = Placements.initial_state(request, self._model().state.terrain_elevation_m)
+            initial = Placements.initial_state(request, self._terrain_m())
         elif request.start_type in airport_starts.TYPES:
             initial = airport_starts.airport_start(request, self._home)
             if initial is None:

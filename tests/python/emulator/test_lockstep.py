@@ -139,6 +139,25 @@ def test_every_frame_waits_for_its_own_answer(fly):
         assert client.frame()[0] == [number + 1, 0, 20_000 * (number + 1)]
 
 
+def test_data_output_starts_with_the_flight_however_long_frame_0_was_held(fly):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as display:
+        display.bind(("127.0.0.1", 0))
+        display.setblocking(False)
+        client = Client(fly(data_target=display.getsockname(), data_rows=(1,), rate=10).port)
+        client.ask([TIME])
+        for _ in range(25):
+            client.frame()
+        client.leave_hold()
+        for number in range(1, 11):
+            client.answer(number)
+            client.frame()
+        times = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                times.append(protocol.decode_data(display.recv(2000)).as_dict()[1][0])
+    assert [time for time in times if time > 0.0] == pytest.approx([0.02, 0.12, 0.22])  # in frames 1, 6, 11
+
+
 def test_fences_come_last_on_every_socket_and_slow_groups_start_with_the_flight(fly):
     port = fly().port
     fast, slow = Client(port), Client(port)

@@ -10,6 +10,7 @@ import socket
 import struct
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -44,7 +45,10 @@ class Program:
 
     def line(self, word):
         """The JSON of the next line, which must begin with this word."""
+        deadline = threading.Timer(WAIT_S, self.process.kill)
+        deadline.start()
         text = self.process.stdout.readline()
+        deadline.cancel()
         if not text.startswith(word + " "):
             self.process.kill()
             pytest.fail(f"expected {word}, got {text!r}; stderr: {self.process.stderr.read()}")
@@ -137,6 +141,20 @@ def test_sigusr1_has_it_print_its_statistics_and_fly_on(program):
     assert one.stop()[0] == 0
 
 
+@pytest.mark.parametrize(
+    "mode",
+    [("--stepped", "lockstep"), ("--stepped", "fast", "--duration", 1e6), ("--stepped",)],
+    ids=["lockstep", "fast", "lines"],
+)
+def test_it_prints_its_statistics_in_every_stepped_mode(program, mode):
+    one = program(*mode)
+    one.process.send_signal(signal.SIGUSR1)
+    if mode == ("--stepped",):
+        one.say("1")
+    assert one.line("STATUS")["subscriptions"] == {}
+    assert one.stop()[0] == 0
+
+
 def test_options_reach_where_they_belong():
     text = (
         "--start ground --lat -23.2 --lon 313.04 --heading -90 --version 12 --fps 30 --rate 50 --seed 7 --port 0 "
@@ -175,6 +193,10 @@ def test_options_reach_where_they_belong():
         ("--aerodrome 97,8,0", "'97,8,0': expected latitude,longitude,heading"),
         ("--seed -1", "--seed -1: expected 0 or more"),
         ("--stepped fast --duration inf", "--duration inf: expected more than 0, and finite"),
+        ("--stepped --duration 5", "--duration 5.0: expected none with --stepped, whose lines say how long"),
+        ("--stepped --frame-jitter 5ms", "--frame-jitter 5ms: expected 0 with --stepped"),
+        ("--hud", "--hud given: expected --window with it"),
+        ("--swap-log swaps.csv", "--swap-log swaps.csv: expected --window with it"),
         ("--stepped lockstep --deaf", "--deaf given: expected --stepped other than lockstep"),
         ("--stepped lockstep --loading-time 1", "--loading-time 1.0: expected 0 with --stepped lockstep"),
         ("--answer-from 192.0.2.9", "argument --answer-from: 192.0.2.9: expected an IPv4 address of this machine"),

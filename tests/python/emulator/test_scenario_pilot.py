@@ -1,10 +1,18 @@
-"""What the emulator's pilot refuses before it flies."""
+"""What the emulator's pilot refuses before it flies, and where it starts."""
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
-from xplane_bridge.emulator.scenario_pilot import ScenarioPilot
+from support.room_table import ROOT
+from xplane_bridge.emulator.aircraft import create_model
+from xplane_bridge.emulator.emulator import Emulator
+from xplane_bridge.emulator.options import parse
+from xplane_bridge.emulator.scenario_pilot import SYSTEMS, ScenarioPilot, failure_leaves
+from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.scenario import Scenario, ScenarioError, parse_scenario
 
 
@@ -20,6 +28,32 @@ def test_pilot_refuses_what_it_cannot_do() -> None:
             ScenarioPilot(scenario({"at": 0, "failure": {"name": "engine_1", **more}}))
 
 
+def test_a_system_fails_as_by_tx_node() -> None:
+    """The names, their number and the datarefs of lib/core/failures/failures.cpp."""
+    text = (ROOT / "lib/core/failures/failures.cpp").read_text(encoding="utf-8")
+    counts = {name: int(count) for name, count in re.findall(r'^ +\{"(\w+)", (\d),', text, re.MULTILINE)}
+    assert set(SYSTEMS) == {f"{name}_{i + 1}" for name, count in counts.items() for i in range(count)}
+    for leaves in SYSTEMS.values():
+        assert all(failure_leaves(leaf) == (leaf,) for leaf in leaves)
+    assert SYSTEMS["engine_1"] == ("rel_engfai0",)
+    assert (SYSTEMS["bus_1"], SYSTEMS["bus_6"]) == (("rel_esys",), ("rel_esys6",))
+    assert SYSTEMS["gyro_2"] == ("rel_cop_ahz", "rel_cop_dgy")
+    pilot = ScenarioPilot(
+        scenario({"at": 0, "failure": {"name": "gyro_1"}}, {"at": 1, "failure": {"name": "gyro_1", "clear": True}},
+                 {"at": 2, "failure": {"name": "gyro_1"}}, {"at": 3, "clear_failures": True})
+    )  # fmt: skip
+    names = [f"sim/operation/failures/{leaf}" for leaf in ("rel_ss_ahz", "rel_ss_dgy")]
+    frame = Simulator(create_model, "fixed_wing").frame
+    for time, value in enumerate((6.0, 0.0, 6.0, 0.0)):
+        assert set(pilot(float(time), frame).datarefs) == {(name, value) for name in names}
+
+
+@pytest.mark.parametrize("name", ["engine_9", "engine_12", "generator_9", "bus_7", "gyro_3", "rel_nonsense", "wing"])
+def test_the_pilot_refuses_a_failure_that_no_x_plane_has(name: str) -> None:
+    with pytest.raises(ScenarioError, match=rf"failure '{name}': expected engine_1\.\.8, bus_1\.\.6, .* or a rel_\*"):
+        ScenarioPilot(scenario({"at": 0, "failure": {"name": name}}))
+
+
 @pytest.mark.parametrize("target", ["throttle", "aileron1_wing2_left", "roll,pitch"])
 def test_the_emulators_pilot_refuses_excitations_that_it_does_not_fly(target: str) -> None:
     excitation = {"kind": "multisine", "amplitude": 0.1, "duration": 2}
@@ -27,3 +61,41 @@ def test_the_emulators_pilot_refuses_excitations_that_it_does_not_fly(target: st
         ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": axis}}))
     with pytest.raises(ScenarioError, match=r"excitation.*: the emulator's pilot moves .*; tx_node moves"):
         ScenarioPilot(scenario({"at": 0, "excitation": {**excitation, "target": target}}))
+
+
+@pytest.mark.parametrize(
+    ("given", "start"),
+    [
+        ("", (-10.0, 20.0, 2000.0, 270.0, 60.0, False)),
+        ("--alt 1500 --lat 5 --speed 70", (5.0, 20.0, 1500.0, 270.0, 70.0, False)),
+        ("--start ground --lon 21 --heading 10", (-10.0, 21.0, 2000.0, 10.0, 60.0, True)),
+    ],
+)
+def test_a_flight_starts_as_its_scenario_says_where_the_command_line_says_nothing(
+    tmp_path: Path, given: str, start: tuple
+) -> None:
+    text = """
+name: far
+start: {latitude: -10, longitude: 20, altitude: 2000, heading: -90, speed: 60}
+aerodrome: {latitude: -10.1, longitude: 20.1, heading: 45}
+events: [{at: 0, hold: {roll: 0}}]
+"""
+    (tmp_path / "far.yaml").write_text(text, encoding="utf-8")
+    words = f"--port 0 --bind 127.0.0.1 --no-beacon --stepped --model kinematic --pilot {tmp_path / 'far.yaml'} {given}"
+    emulator = Emulator(parse(words.split()))
+    began, home = emulator.sim.initial, emulator.sim.home
+    emulator.close()
+    found = (began.latitude_deg, began.longitude_deg, began.altitude_m, began.heading_deg, began.airspeed_mps)
+    assert (*found, began.on_ground) == start
+    assert (home.latitude_deg, home.longitude_deg, home.heading_deg) == (-10.1, 20.1, 45.0)
+    assert emulator.options.aerodrome == (-10.1, 20.1, 45.0)
+
+
+def test_a_scenario_may_start_on_the_ground(tmp_path: Path) -> None:
+    (tmp_path / "taxi.yaml").write_text("name: taxi\nstart: {on_ground: true}\nevents: [{at: 0, hold: {roll: 0}}]\n")
+    words = ["--port", "0", "--bind", "127.0.0.1", "--no-beacon", "--stepped", "--pilot", str(tmp_path / "taxi.yaml")]
+    for more, on_ground in ((), True), (("--start", "air"), False):
+        emulator = Emulator(parse([*words, *more]))
+        emulator.close()
+        assert emulator.sim.initial.on_ground is on_ground
+        assert emulator.sim.initial.latitude_deg == 37.4602

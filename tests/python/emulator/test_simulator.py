@@ -139,6 +139,37 @@ def test_fuel_of_a_loaded_situation_is_that_of_its_resets(bench):
     assert emulator.read(*tanks) == pytest.approx([50.0, 50.0], abs=0.1)
 
 
+def test_failures_of_a_loaded_situation_hold_what_it_has(bench):
+    emulator = bench(aircraft="fixed_wing")
+    trim, altimeter = "sim/cockpit2/controls/elevator_trim", "sim/cockpit2/gauges/indicators/altitude_ft_pilot"
+    client = emulator.client()
+    saved, shown_ft = emulator.read(trim, altimeter)
+    client.send(SAVE)
+    client.send(protocol.Placement(6, latitude_deg=38.0, longitude_deg=127.0, elevation_m=3000.0, speed_mps=75.0))
+    emulator.step(2)
+    emulator.write({"sim/operation/failures/rel_elv_trim_run": 6.0, "sim/operation/failures/rel_static": 6.0})
+    emulator.step(240)
+    client.send(LOAD)
+    emulator.step()
+    assert emulator.read(trim, altimeter) == [pytest.approx(saved, abs=0.01), pytest.approx(shown_ft, abs=10.0)]
+
+
+def test_a_situation_brings_its_electrical_switches(bench):
+    switches = [f"sim/cockpit2/electrical/{name}_on[0]" for name in ("battery", "generator", "inverter")]
+    switches.append("sim/cockpit2/switches/avionics_power_on")
+    emulator = bench(aircraft="fixed_wing")
+    client = emulator.client()
+    emulator.write(dict.fromkeys(switches[:2], 0.0))
+    emulator.step()
+    client.send(SAVE)
+    emulator.step()
+    emulator.write({name: float(name in switches[:2]) for name in switches})
+    emulator.step()
+    client.send(LOAD)
+    emulator.step()
+    assert emulator.read(*switches) == [0.0, 0.0, 1.0, 1.0]
+
+
 def test_a_failure_holds_the_levers_of_the_aircraft_that_is_flown(bench):
     emulator = bench(aircraft="fixed_wing")
     emulator.step()

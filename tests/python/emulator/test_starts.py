@@ -82,6 +82,15 @@ def test_a_refused_prel_leaves_the_flight_and_its_start_as_they_are(bench):
     assert flown(emulator) == pytest.approx((37.4602, 126.4407, 1000.0, 75.0), abs=1e-3)
 
 
+def test_a_placement_before_the_first_flight_is_over_the_terrain(bench):
+    start = InitialState(altitude_m=1500.0, terrain_elevation_m=500.0)
+    emulator = bench(aircraft="fixed_wing", initial=start, load_time=5.0)
+    emulator.client().send(protocol.Placement(6, elevation_m=1500.0, speed_mps=75.0, **PLACE))
+    emulator.step(2)
+    assert emulator.sim.model.state.terrain_elevation_m == 500.0
+    assert emulator.sim.frame.height == pytest.approx(1000.0, abs=5.0)
+
+
 def test_a_start_that_cannot_be_flown_in_its_wind_is_said(bench):
     with pytest.raises(
         ValueError, match="in this wind: no steady flight found; choose another speed, height or weight"

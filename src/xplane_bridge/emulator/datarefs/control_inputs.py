@@ -11,7 +11,14 @@ import numpy as np
 
 from xplane_bridge.emulator.datarefs.sources import Sources
 from xplane_bridge.emulator.datarefs.store import DatarefStore
-from xplane_bridge.emulator.datarefs.tables.engines import NORMAL, REVERSE, RPM_TO_RAD_S, THROTTLE_RELEASED
+from xplane_bridge.emulator.datarefs.tables.engines import (
+    NORMAL,
+    REVERSE,
+    RPM_TO_RAD_S,
+    THROTTLE_RELEASED,
+    reset_switches,
+    set_first,
+)
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel
 from xplane_bridge.emulator.flight.frame import Frame
 from xplane_bridge.protocol import UNUSED_SLOT
@@ -61,12 +68,16 @@ _READ_HANDLES = (
     _OVERRIDE + "toe_brakes",
     _OVERRIDE + "artstab",
 )
-#: Levers and handles that a saved situation brings back and a new flight sets.
+#: 0 is off; every other position lets an engine run.
+_IGNITION_KEY, _FUEL_SELECTOR = _ACTUATORS + "ignition_key", "sim/cockpit2/fuel/fuel_tank_selector"
+#: Levers, handles and switches that a saved situation brings back and a new flight sets.
 _LEVERS = (
     _ACTUATORS + "throttle_ratio",
     _ENGINE + "ENGN_propmode",
     _ACTUATORS + "prop_ratio",
     _ACTUATORS + "mixture_ratio",
+    _IGNITION_KEY,
+    _FUEL_SELECTOR,
     *_HANDLE_NAMES,
     _COCKPIT + "left_brake_ratio",
     _COCKPIT + "right_brake_ratio",
@@ -74,6 +85,10 @@ _LEVERS = (
     "sim/joystick/yoke_pitch_ratio",
     "sim/joystick/yoke_roll_ratio",
     "sim/joystick/yoke_heading_ratio",
+    "sim/cockpit2/electrical/battery_on",
+    "sim/cockpit2/electrical/generator_on",
+    "sim/cockpit2/electrical/inverter_on",
+    "sim/cockpit2/switches/avionics_power_on",
 )
 
 
@@ -123,6 +138,7 @@ class ControlInputs:
         self._same_surface: Dict[int, int] = {}
         self._joystick_slots = np.zeros(0, dtype=int)
         self._handles: Callable[[], List[float]] = list  # as connect() makes it
+        self._fuel_on = 0.0  # position of the fuel selector, where a flight begins
 
     # --- definition ---------------------------------------------------------------------------------------------------
 
@@ -162,12 +178,13 @@ class ControlInputs:
                 store.values[store.locate(_JOYSTICK + "axis_assignments", axis)] = assignment
                 store.values[store.locate(_JOYSTICK + "axis_reverse", axis)] = reverse
         self._handles = store.gather(_READ_HANDLES)
+        self._fuel_on = store.get(_FUEL_SELECTOR)
         self._joystick_slots = store.dataref(_JOYSTICK + "axis_values").slots[: len(_JOYSTICK_AXES)]
 
     # --- flights ------------------------------------------------------------------------------------------------------
 
     def start(self, controls: Controls, model: FlightModel) -> None:
-        """A flight begins: levers as `controls` has them."""
+        """A flight begins: levers as `controls` has them, switches of the engines on."""
         engines = model.info.engine_count
         levers = (
             ("throttle_ratio", controls.throttle),
@@ -175,10 +192,9 @@ class ControlInputs:
             ("mixture_ratio", controls.mixture),
         )
         for name, values in levers:
-            self._store.set(_ACTUATORS + name, 0.0)  # also those of engines that the aircraft before had
-            slots = self._store.dataref(_ACTUATORS + name).slots[:engines]
-            self._store.values[slots] = values[:engines]
-        self._store.set(_ENGINE + "ENGN_propmode", NORMAL)
+            set_first(self._store, _ACTUATORS + name, values[:engines], engines)
+        reset_switches(self._store, engines)
+        self._store.set(_FUEL_SELECTOR, self._fuel_on)
         for name, value in (
             (_COCKPIT + "elevator_trim", controls.trim_pitch),
             (_COCKPIT + "aileron_trim", controls.trim_roll),
@@ -192,7 +208,7 @@ class ControlInputs:
             self._store.set(name, value)
 
     def save(self) -> Dict[str, np.ndarray]:
-        """Levers and handles, for a situation."""
+        """Levers, handles and switches, for a situation."""
         return {name: self._store.array(name) for name in _LEVERS}
 
     def restore(self, levers: Dict[str, np.ndarray]) -> None:
@@ -341,6 +357,7 @@ class ControlInputs:
         overridden = store.get(_ENGINE + "ENGN_thro_override")  # one number for all engines
         propeller, mixture = store.array(_ACTUATORS + "prop_ratio"), store.array(_ACTUATORS + "mixture_ratio")
         use, mode = store.array(_ENGINE + "ENGN_thro_use"), store.array(_ENGINE + "ENGN_propmode")
+        key, has_fuel = store.array(_IGNITION_KEY), store.get(_FUEL_SELECTOR) != 0.0
         controls.override_throttles = self._overrides("throttles")
         for i in range(info.engine_count):
             lever = -levers[i] if mode[i] == REVERSE else levers[i]
@@ -348,7 +365,8 @@ class ControlInputs:
                 lever = overridden
             controls.throttle[i] = _clip(float(lever), info.min_throttle, info.max_throttle)
             controls.propeller[i] = _clip(float(propeller[i]), 0.0, 1.0)
-            controls.mixture[i] = _clip(float(mixture[i]), 0.0, 1.0)
+            # without a spark or fuel it stops, and fires again while it is turned, as with its mixture cut off
+            controls.mixture[i] = _clip(float(mixture[i]), 0.0, 1.0) if has_fuel and key[i] != 0.0 else 0.0
             controls.throttle_use[i] = _clip(self._throttle_commands.get(i, float(use[i])), -1.0, 1.0)
         if not controls.override_throttles:
             self._throttle_commands.clear()

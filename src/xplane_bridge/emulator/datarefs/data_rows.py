@@ -91,7 +91,7 @@ def layout(is_12: bool, otherwise: FrozenSet[str] = frozenset()) -> Dict[int, Se
             None,
             "_emulator/zulu_hours" if hours else "sim/time/zulu_time_sec",
             "_emulator/local_hours" if hours else "sim/time/local_time_sec",
-            "sim/time/hobbs_time",
+            ("sim/time/hobbs_time", 1.0 / 3600.0),  # the row's is in hours, the dataref in seconds
         ),
         2: (0.0, 0.0, 250000.0),
         3: (

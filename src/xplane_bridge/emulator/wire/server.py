@@ -172,6 +172,11 @@ class Server:
         else:
             self._held += datagrams
 
+    def restart_pacers(self) -> None:
+        """Everything is due in the next frame, and from then on at its rate: for when the loop's clock begins anew."""
+        self._data_pacer = None
+        self.subscriptions.restart_pacers()
+
     def hold(self) -> None:
         """Keeps from now on what `send_frame` would send, for `take_held`; but for DATA."""
         self._held = []

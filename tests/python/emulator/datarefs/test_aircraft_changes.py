@@ -23,10 +23,12 @@ def load(emulator, name):
 def test_elements_that_the_new_aircraft_lacks_are_0(bench):
     emulator = bench(aircraft="multirotor")
     of_engines = [f"{ENGINE}{name}[3]" for name in ("ENGN_running", "ENGN_tacrad", "POINT_thrust")]
-    names = [*of_engines, "sim/flightmodel2/gear/deploy_ratio[3]", ACTUATORS + "throttle_ratio[3]"]
+    switches = [ACTUATORS + f"{name}[3]" for name in ("fuel_pump_on", "igniter_on", "ignition_on", "ignition_key")]
+    switches += ["sim/cockpit2/electrical/generator_on[3]", ENGINE + "ENGN_propmode[3]"]
+    names = [*of_engines, *switches, "sim/flightmodel2/gear/deploy_ratio[3]", ACTUATORS + "throttle_ratio[3]"]
     assert min(emulator.read(*names)) > 0.0
     load(emulator, "fixed_wing")  # two engines, three legs
-    assert emulator.read(*names) == [0.0] * 5
+    assert emulator.read(*names) == [0.0] * len(names)
     assert emulator.read(ENGINE + "ENGN_running[1]", ACTUATORS + "throttle_ratio[1]") == [
         1.0,
         pytest.approx(0.62, abs=0.1),

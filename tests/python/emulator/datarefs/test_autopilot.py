@@ -232,6 +232,23 @@ def test_a_new_flight_begins_without_it(emulator):
     assert shown(emulator, "flight_director_mode", "heading_status") == [0.0, 0.0]
 
 
+def test_a_new_flight_begins_without_autothrottle(emulator):
+    lever = "sim/cockpit2/engine/actuators/throttle_ratio"
+    (trimmed,) = emulator.read(lever)
+    dials(emulator, airspeed_dial_kts_mach=180.0)
+    press(emulator, "autothrottle_on")
+    fly(emulator, 20)
+    assert emulator.read(lever)[0] > trimmed + 0.1
+    press(emulator, "sim/operation/reset_flight")
+    fly(emulator, 1)
+    assert shown(emulator, "autothrottle_enabled") == [0.0]
+    assert emulator.read(lever) == [trimmed]
+    dials(emulator, airspeed_dial_kts_mach=emulator.sim.instruments.airspeed_kt)
+    press(emulator, "autothrottle_on")
+    fly(emulator, 1)
+    assert emulator.read(lever) == pytest.approx([trimmed], abs=0.01)  # nothing of what it had integrated
+
+
 def test_other_aircraft_have_none():
     with EmulatorFixture(aircraft="multirotor") as emulator:
         emulator.step()

@@ -288,6 +288,27 @@ def test_limits_of_trim_are_parts_of_the_travel_that_it_moves(bench):
 # --- failures ---
 
 
+@pytest.mark.parametrize(
+    ("switch", "running"),
+    [
+        ("sim/cockpit2/engine/actuators/ignition_key[0]", [0.0, 1.0]),
+        ("sim/cockpit2/fuel/fuel_tank_selector", [0.0, 0.0]),
+    ],
+)
+def test_a_switch_that_is_off_stops_its_engines(bench, switch, running):
+    emulator = bench(aircraft="fixed_wing")
+    engines = [f"sim/flightmodel/engine/ENGN_running[{engine}]" for engine in (0, 1)]
+    (on,) = emulator.read(switch)
+    emulator.write({switch: 0.0})
+    assert emulator.read(*engines) == running
+    emulator.write({switch: on})
+    emulator.step(60)
+    assert emulator.read(*engines) == [1.0, 1.0]  # the propeller turns it
+    emulator.write({switch: 0.0})
+    emulator.client().send(protocol.Placement(5))
+    assert emulator.read(switch, *engines) == [on, 1.0, 1.0]  # another flight
+
+
 def test_engine_failure_and_repair(bench):
     emulator = bench()
     running = "sim/flightmodel/engine/ENGN_running"

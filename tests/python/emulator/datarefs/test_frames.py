@@ -346,8 +346,10 @@ def test_angles_of_row_17_can_be_those_of_the_origin(bench):
 
 
 def test_engine_rows_have_zeros_for_engines_that_are_not_there(bench):
-    rows = data(bench(aircraft="fixed_wing"), [25, 26, 34, 37, 45], frames=30)
-    for index in (25, 26, 34, 37, 45):
+    engines = (25, 26, 27, 32, 34, 37, 45, 55, 58, 61)
+    rows = data(bench(aircraft="fixed_wing"), [*engines, 57], frames=30)
+    assert rows[57] == (1.0,) + (0.0,) * 7  # batteries
+    for index in engines:
         assert all(value > 0.0 for value in rows[index][:2]), index
         assert rows[index][2:] == (0.0,) * 6
     assert 1000.0 < rows[37][0] < 2800.0
@@ -434,3 +436,6 @@ def test_times_of_row_1_are_in_decimal_hours(bench):
     rows = data(emulator, [1], frames=60)
     assert rows[1][5] == pytest.approx((45000.0 + 1.0) / 3600.0, abs=1e-4)
     assert rows[1][1] == pytest.approx(101.0, abs=1e-4)
+    assert rows[1][7] == pytest.approx(rows[1][2] / 3600.0)
+    hobbs, flown = emulator.read("sim/time/hobbs_time", "sim/time/total_flight_time_sec")
+    assert hobbs == flown  # in seconds

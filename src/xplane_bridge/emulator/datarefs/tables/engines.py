@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Callable, List
+from typing import Callable, List, Sequence, Union
 
 import numpy as np
 
 from xplane_bridge.emulator.datarefs.sources import Sources
+from xplane_bridge.emulator.datarefs.store import DatarefStore
 from xplane_bridge.emulator.datarefs.tables.base import Table
 from xplane_bridge.emulator.flight.flight_model import EngineState
 from xplane_bridge.emulator.flight.frame import PA_TO_INHG, PA_TO_PSI, Frame
@@ -22,11 +23,31 @@ NORMAL, REVERSE = 1.0, 3.0
 #: Value of ENGN_thro_override that gives the engines back to their levers.
 THROTTLE_RELEASED = -2.0
 _FUEL_PRESSURE_PSI = 24.0
+#: Switches of each engine, and where they stand when a flight begins.
+_SWITCHES = (
+    (_ENGINE + "ENGN_propmode", NORMAL),
+    (_ACTUATORS + "fuel_pump_on", 1.0),
+    (_ACTUATORS + "igniter_on", 1.0),
+    (_ACTUATORS + "ignition_on", 3.0),
+    (_ACTUATORS + "ignition_key", 3.0),
+)
 
 
 def each(source: Callable[[EngineState], float]) -> Callable[[Frame], List[float]]:
     """Makes an array source from a source for one engine."""
     return lambda f: [source(engine) for engine in f.m.engines]
+
+
+def set_first(store: DatarefStore, name: str, values: Union[float, Sequence[float]], count: int) -> None:
+    """Sets the first elements, those that the aircraft has; the others are 0."""
+    store.set(name, 0.0)
+    store.values[store.dataref(name).slots[:count]] = values
+
+
+def reset_switches(store: DatarefStore, engines: int) -> None:
+    """Puts the switches of the engines where they stand when a flight begins."""
+    for name, value in _SWITCHES:
+        set_first(store, name, value, engines)
 
 
 def define(t: Table, sim: Sources) -> None:
@@ -40,7 +61,7 @@ def define(t: Table, sim: Sources) -> None:
     # levers
     t.setting(_ACTUATORS + "throttle_ratio")
     t.alias(_ENGINE + "ENGN_thro", _ACTUATORS + "throttle_ratio")
-    t.setting(_ENGINE + "ENGN_propmode", NORMAL)
+    t.setting(_ENGINE + "ENGN_propmode")
     # throttle_ratio is 0..1 also in reverse, which the propeller's mode says; this one is below 0 then
     if "reverse-lever" in sim.otherwise:
         t.setting(_ACTUATORS + "throttle_jet_rev_ratio")
@@ -70,8 +91,8 @@ def define(t: Table, sim: Sources) -> None:
     t.setting(_ENGINE + "ENGN_thro_override", THROTTLE_RELEASED)
     t.setting(_ENGINE + "ENGN_heat")
     t.setting(_ENGINE + "ENGN_cowl")
-    for name, initial in (("fuel_pump_on", 1), ("igniter_on", 1), ("ignition_on", 3), ("ignition_key", 3)):
-        t.setting(_ACTUATORS + name, initial)
+    for name in ("fuel_pump_on", "igniter_on", "ignition_on", "ignition_key"):
+        t.setting(_ACTUATORS + name)
     t.setting(_ACTUATORS + "starter_hit")
     t.setting(_ACTUATORS + "idle_speed")
     t.setting(_ACTUATORS + "fadec_on")

@@ -187,7 +187,7 @@ def _time(t: Table, sim: Sources) -> None:
     t.value("sim/time/zulu_time_sec", lambda _: clock.zulu)
     t.value("sim/time/local_time_sec", lambda f: clock.local(f.m.longitude_deg))
     t.value("sim/time/local_date_days", lambda _: clock.date_days)
-    t.value("sim/time/hobbs_time", lambda _: clock.flight / 3600.0)
+    t.value("sim/time/hobbs_time", lambda _: clock.flight)
     t.value("sim/time/paused", lambda _: clock.paused, always=True)
     t.setting("sim/time/is_in_replay")
     t.setting("sim/time/use_system_time")
