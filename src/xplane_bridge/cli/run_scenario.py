@@ -22,6 +22,7 @@ from xplane_bridge.harness.processes import interrupted_by_signals
 from xplane_bridge.harness.scenario_flight import scenario_plan
 from xplane_bridge.scenario import Scenario, ScenarioError
 from xplane_bridge.scenario.judging import judge
+from xplane_bridge.scenario.late_actions import late_text
 
 _FPS = 60.0
 _PICTURES_HZ = 30.0  # in lock-step, as nearly as frames allow; otherwise capture_node's max_rate says it
@@ -183,6 +184,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     with interrupted_by_signals("run_scenario"), screen(plan.logs, args.headless or not args.camera):
         fly(plan, say=lambda text: print(f"run_scenario: {text}", file=sys.stderr))
     played = json.loads((plan.output / "played.json").read_text(encoding="utf-8"))
+    for entry in played["late"]:
+        print(f"run_scenario: {late_text(entry)}", file=sys.stderr)
     if not played["finished"] and args.duration is None:
         raise ScenarioError(
             f"{scenario.name} has not ended within {_longest(scenario):g} s: it waits for a condition; give it a "

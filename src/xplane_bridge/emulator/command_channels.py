@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Mapping, Tuple
+from typing import Dict, Mapping, Tuple
 
 from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, ModelInfo
 
@@ -13,6 +13,28 @@ ATTRIBUTES = {
     "trim_yaw": "trim_yaw", "flaps": "flap_request", "speedbrake": "speedbrake", "parking_brake": "parking_brake",
     "left_brake": "brake_left", "right_brake": "brake_right", "thrust_vector": "thrust_vector",
 }  # fmt: skip
+#: Trims, both as channels and in `Controls`.
+TRIMS = ("trim_roll", "trim_pitch", "trim_yaw")
+#: How long tx_node sends a trim after a change [s]: kHandleRepeat of lib/actuation/control_path_sending.cpp.
+TRIM_REPEAT_S = 0.3
+
+
+class TrimsOnChange:
+    """Trims as tx_node sends them: for a while after a change, so that one that a failure has moved stays there."""
+
+    def __init__(self) -> None:
+        self._changed: Dict[str, Tuple[float, float]] = {}  # by channel: its value, and since when it is that [s]
+
+    def leave_out(self, sent: Dict[str, float], now: float) -> None:
+        """Takes out of what the arbiter sends the trims that tx_node no longer sends."""
+        for name in TRIMS:
+            if name not in sent:
+                continue
+            value, since = self._changed.get(name, (None, now))
+            if sent[name] != value:
+                self._changed[name] = sent[name], now
+            elif now - since > TRIM_REPEAT_S:
+                del sent[name]
 
 
 def apply_channels(sent: Mapping[str, float], controls: Controls, model: FlightModel) -> None:

@@ -10,9 +10,10 @@ import numpy as np
 from xplane_bridge.campaign.distributions import Parameter, parse_parameter
 from xplane_bridge.constants import FAILURE_KINDS
 from xplane_bridge.emulator.flight.flight_model import ModelInfo
+from xplane_bridge.emulator.scenario_pilot import START
 from xplane_bridge.errors import is_number
 from xplane_bridge.gym.errors import GymError
-from xplane_bridge.in_process.aircraft import AUTO, LOADING, START, WEATHER, Conditions
+from xplane_bridge.in_process.aircraft import AUTO, LOADING, WEATHER, Conditions
 
 ATTITUDE = ("roll", "pitch")
 #: What can be given, in the order in which it is drawn.
@@ -45,12 +46,22 @@ class Episode:
     options: Dict[str, Any]  #: of `reset`, to have this episode again
 
 
+def _plain(item: Any) -> Any:
+    """Python's numbers and lists for NumPy's, which its random generators give."""
+    if isinstance(item, (np.generic, np.ndarray)):
+        return item.tolist()
+    if isinstance(item, (list, tuple)):
+        return [_plain(each) for each in item]
+    return {key: _plain(value) for key, value in item.items()} if isinstance(item, Mapping) else item
+
+
 def _chosen(key: str, item: Any, where: str = "episode.") -> _Chosen:
+    item = _plain(item)
     if isinstance(item, Mapping):
         return parse_parameter(key, item, where)
     if key == "on_ground" and isinstance(item, bool):
         return float(item)
-    if key == "fuel" and isinstance(item, (list, tuple)) and all(map(is_number, item)):
+    if key == "fuel" and isinstance(item, list) and all(map(is_number, item)):
         return [float(kg) for kg in item]
     if not is_number(item):
         tanks = ", a list of one for each tank" if key == "fuel" else ""

@@ -65,10 +65,7 @@ class InProcessFlight:
         for failure in episode.failures:  # a wrong one raises now, not when it is due
             trial.act(failure.action)
         self._to_come = list(episode.failures)
-        # The first state that the bridge can publish is that of the first frame: no command acts in it, and a stick
-        # without an override is centred.
-        controls = self._aircraft.controls
-        controls.roll = controls.pitch = controls.yaw = 0.0
+        # The first state that the bridge can publish is that of the first frame: no command acts in it.
         self._fly()
 
     def state(self) -> Any:

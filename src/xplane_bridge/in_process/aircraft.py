@@ -18,21 +18,18 @@ import yaml
 from xplane_bridge.compiled import require
 from xplane_bridge.constants import FlightMode
 from xplane_bridge.emulator.aircraft import create_model
-from xplane_bridge.emulator.command_channels import apply_channels
+from xplane_bridge.emulator.command_channels import TrimsOnChange, apply_channels
 from xplane_bridge.emulator.flight.earth import LocalFrame
 from xplane_bridge.emulator.flight.flight_model import FlightModel, InitialState, ModelState
 from xplane_bridge.emulator.flight.limits import check_wind
+from xplane_bridge.emulator.scenario_pilot import START
 from xplane_bridge.in_process.failures import Failures
 from xplane_bridge.in_process.view import FlightView
 from xplane_bridge.resources import config_file
 
 #: As plain numbers, which results and files hold.
 MANUAL, AUTO = int(FlightMode.MANUAL), int(FlightMode.AUTO)
-#: Keys of a start, of the weather and of the loading, as scenarios and campaigns have them.
-START = {
-    "latitude": "latitude_deg", "longitude": "longitude_deg", "heading": "heading_deg", "altitude": "altitude_m",
-    "speed": "airspeed_mps", "on_ground": "on_ground",
-}  # fmt: skip
+#: Keys of the weather and of the loading, as scenarios and campaigns have them; those of a start are `START`.
 WEATHER = ("wind_speed", "wind_from", "turbulence", "temperature_offset", "sea_level_pressure")
 LOADING = ("fuel", "payload", "cg_aft")
 #: Where tx_node's clock stands when a flight in lock-step begins [ns], but for whole seconds that change no difference.
@@ -78,15 +75,18 @@ class Conditions:
     seed: int = 0  #: of the turbulence
     mode: Optional[int] = None  #: MANUAL or AUTO; None: as tx_node begins
 
+    @property
+    def air(self) -> Tuple[float, float]:
+        """Difference from the standard temperature [K], pressure at sea level [Pa]."""
+        return self.weather.get("temperature_offset", 0.0), self.weather.get("sea_level_pressure", 101325.0)
+
     def model(self) -> FlightModel:
         """The aircraft, loaded, in its wind and air, before its start."""
         model = create_model(self.aircraft, self.seed)
         from_rad, speed = math.radians(self.weather.get("wind_from", 0.0)), self.weather.get("wind_speed", 0.0)
         check_wind(speed)
         model.set_wind(-speed * math.cos(from_rad), -speed * math.sin(from_rad), 0.0)
-        model.set_atmosphere(
-            self.weather.get("temperature_offset", 0.0), self.weather.get("sea_level_pressure", 101325.0)
-        )
+        model.set_atmosphere(*self.air)
         if self.loading:
             model.set_loading(*(self.loading.get(key) for key in LOADING))
         return model
@@ -114,10 +114,14 @@ class Aircraft:
         self._shown_period = struct.unpack("<f", struct.pack("<f", self.period))[0]  # as X-Plane sends it
         self.frame = 0
         self.model = conditions.model()
+        #: As commanded: what has failed may let something else through.
         self.controls = self.model.reset(initial_state(conditions.start))
+        # A stick that nothing commands is centred, as the emulator's; levers and trims stay as the start left them.
+        self.controls.roll = self.controls.pitch = self.controls.yaw = 0.0
         conditions.disturb(self.model)
         self._origin = LocalFrame(self.model.state.latitude_deg, self.model.state.longitude_deg)
         self.failures = Failures(self.model)
+        self._trims = TrimsOnChange()
         options = arbiter_options(conditions.aircraft)
         if conditions.mode is not None:
             options["initial_mode"] = conditions.mode
@@ -183,9 +187,11 @@ class Aircraft:
         """
         now = self._time
         sent = self._arbiter.step(now) if excited is None else self._arbiter.step(now, excited, value)
+        # Not by a loop or a call, which take longer: few flights command trims.
+        if "trim_pitch" in sent or "trim_roll" in sent or "trim_yaw" in sent:
+            self._trims.leave_out(sent, now)
         apply_channels(sent, self.controls, self.model)
-        self.failures.apply(self.controls, self.period)
-        state = self.model.step(self.period, self.controls)
+        state = self.model.step(self.period, self.failures.apply(self.controls, self.period))
         self.frame += 1
         self._time = self._clock()
         return state

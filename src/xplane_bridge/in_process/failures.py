@@ -3,32 +3,42 @@
 from __future__ import annotations
 
 import re
-from typing import Any, Dict, Mapping, Set
+from typing import Any, Dict, Mapping, Set, Tuple
 
-from xplane_bridge.emulator.flight.failure_effects import FailureEffects
-from xplane_bridge.emulator.flight.flight_model import Controls, FlightModel, SurfaceFault, SurfaceFaultKind
-from xplane_bridge.emulator.scenario_pilot import failure_dataref, in_part
+from xplane_bridge.emulator.command_channels import TRIMS
+from xplane_bridge.emulator.flight.failure_effects import TRIM_FAILURES, FailureEffects
+from xplane_bridge.emulator.flight.flight_model import (
+    Controls,
+    FlightModel,
+    SurfaceFault,
+    SurfaceFaultKind,
+    SurfaceSpec,
+)
+from xplane_bridge.emulator.scenario_pilot import failure_leaves, in_part
 from xplane_bridge.errors import XplaneBridgeError
 
-_WING = re.compile(r"(aileron|spoiler|flap|yaw_brake)(\d?)_wing(\d)_(left|right)")
-_TAIL = re.compile(r"elevator(\d)_(left|right)")
-_FIN = re.compile(r"rudder(\d)_fin(\d)")
-_LEAVES = {"aileron": "ail", "spoiler": "spo", "flap": "fla", "yaw_brake": "yawb"}
+_SIDES = ("left", "right")
+_MOST_STUCK_DEG = 90.0
 #: Systems whose failure does not reach the flight model: they change what instruments and busses show.
 _NOT_FLOWN = re.compile(r"rel_(esys|genera|batter|pitot|static|ss_|cop_)")
 
 
-def model_surface(name: str) -> str:
-    """The flight model's name (`wing2l_ail1`) of the bridge's surface (`aileron1_wing2_left`); "" if it is none."""
-    match = _WING.fullmatch(name)
-    if match:
-        kind, number, wing, side = match.groups()
-        return f"wing{wing}{side[0]}_{_LEAVES[kind]}{number}"
-    match = _TAIL.fullmatch(name)
-    if match:
-        return f"hstab{1 if match.group(2) == 'left' else 2}_elv{match.group(1)}"
-    match = _FIN.fullmatch(name)
-    return f"vstab{match.group(2)}_rud{match.group(1)}" if match else ""
+def _surfaces() -> Dict[str, str]:
+    """The flight models' name (`wing2l_ail1`) of each surface that tx_node knows (`aileron1_wing2_left`)."""
+    names: Dict[str, str] = {}
+    leaves = {"aileron": "ail", "spoiler": "spo", "flap": "fla", "speedbrake": "sbrk", "elevator": "elv"}
+    on_wings = {f"{kind}{i}": f"{leaf}{i}" for kind, leaf in leaves.items() for i in (1, 2)}
+    for kind, leaf in {**on_wings, "yaw_brake": "yawb"}.items():
+        for wing in range(1, 5):
+            names.update({f"{kind}_wing{wing}_{side}": f"wing{wing}{side[0]}_{leaf}" for side in _SIDES})
+    for i in (1, 2):
+        names.update({f"elevator{i}_{side}": f"hstab{half}_elv{i}" for half, side in enumerate(_SIDES, 1)})
+        names.update({f"rudder{i}_fin{fin}": f"vstab{fin}_rud{i}" for fin in (1, 2)})
+    return names
+
+
+#: By the names of docs/control/surfaces.md.
+SURFACES = _surfaces()
 
 
 class NotFlownError(XplaneBridgeError, ValueError):
@@ -40,74 +50,103 @@ class Failures:
 
     def __init__(self, model: FlightModel) -> None:
         self._model = model
-        self._surfaces = {spec.name: spec for spec in model.surfaces}
+        specs = {spec.name: spec for spec in model.surfaces}
+        self._surfaces = {name: specs[own] for name, own in SURFACES.items() if own in specs}
         self._faults: Dict[str, SurfaceFault] = {}
-        self._systems: Set[str] = set()
+        self._broken: Dict[str, Tuple[str, ...]] = {}  # leaves by the name under which they were broken
+        self._systems: Set[str] = set()  # all these leaves
         self._effects = FailureEffects()
-        self._repaired = True  # all systems, also in the controls
+        self._flown = Controls()
+        self._repaired = True  # all systems, also in what they held
 
     def act(self, failure: Mapping[str, Any]) -> None:
-        """A `failure` of a scenario happens, or is cleared.
+        """A `failure` of a scenario happens, or is cleared, by the rules of tx_node; what is not broken stays as it is.
 
         Raises:
-            NotFlownError: This aircraft has no such part, the value is none of that kind, or a flight in process cannot
-                show that it is broken.
-            ScenarioError: No such system.
+            NotFlownError: This aircraft has no such part, the value is none of that kind, it is broken by another name,
+                or a flight in process cannot show that it is broken.
         """
-        name, kind = failure["name"], failure["kind"]
-        surface = model_surface(name) or (name if name in self._surfaces else "")
-        if surface:
-            if surface not in self._surfaces:
-                raise NotFlownError(
-                    f"failure {name!r}: {self._model.info.name} has {', '.join(sorted(self._surfaces))}"
-                )
-            if failure["clear"]:
-                self._faults.pop(surface, None)
-            elif kind == "failed":
-                raise NotFlownError(f"failure {name!r}: kind is missing; expected what the surface does")
-            else:
-                self._faults[surface] = self._fault(surface, failure)
+        name = failure["name"]
+        if name in SURFACES:
+            self._act_on_surface(name, failure)
             return
-        leaf = failure_dataref(name)
-        if _NOT_FLOWN.match(leaf):
+        leaves = failure_leaves(name)
+        if any(_NOT_FLOWN.match(leaf) for leaf in leaves):
             raise NotFlownError(
                 f"failure {name!r}: instruments and busses are not flown in process; it takes the bridge"
             )
-        if not self._effects.acts(leaf, self._model):
+        if not any(self._effects.acts(leaf, self._model) for leaf in leaves):
             raise NotFlownError(
                 f"failure {name!r}: {self._model.info.name} has none of that name that acts in process; expected one "
-                f"of its surfaces ({', '.join(sorted(self._surfaces))}), engine_1..{self._model.info.engine_count}, or "
+                f"of its surfaces ({', '.join(self._surfaces)}), engine_1..{self._model.info.engine_count}, or "
                 "a rel_* of its controls"
             )
         refusal = in_part(failure)
         if refusal:
             raise NotFlownError(refusal)
         if failure["clear"]:
-            self._systems.discard(leaf)
+            self._broken.pop(name, None)
         else:
-            self._systems.add(leaf)
+            for other, broken in self._broken.items():
+                if other != name and not set(broken).isdisjoint(leaves):
+                    raise NotFlownError(f"failure {name!r}: broken already as {other}; expected it to be cleared first")
+            self._broken[name] = leaves
+        self._systems = {leaf for broken in self._broken.values() for leaf in broken}
 
-    def _fault(self, surface: str, failure: Mapping[str, Any]) -> SurfaceFault:
+    def _act_on_surface(self, name: str, failure: Mapping[str, Any]) -> None:
+        if name not in self._surfaces:
+            have = ", ".join(self._surfaces) or "none"
+            raise NotFlownError(f"failure {name!r}: expected a surface that {self._model.info.name} has ({have})")
+        surface = self._surfaces[name]
+        if failure["clear"]:
+            self._faults.pop(surface.name, None)
+        elif failure["kind"] == "failed":
+            raise NotFlownError(f"failure {name!r}: kind is missing; expected what the surface does")
+        else:
+            self._faults[surface.name] = self._fault(surface, failure)
+
+    @staticmethod
+    def _fault(surface: SurfaceSpec, failure: Mapping[str, Any]) -> SurfaceFault:
         """A surface's failure as the flight model has it, which takes the rate of a slow one as a share of its own."""
         kind, value = SurfaceFaultKind(failure["kind"]), failure["value"]
-        if kind is SurfaceFaultKind.SLOW:
+        expected = ""
+        if kind is SurfaceFaultKind.STUCK:
+            if value is not None and not abs(value) <= _MOST_STUCK_DEG:
+                expected = f"-{_MOST_STUCK_DEG:g}..{_MOST_STUCK_DEG:g} deg, or none: where it is"
+        elif kind is SurfaceFaultKind.REDUCED:
+            if value is None or not 0.0 <= value <= 1.0:
+                expected = "0..1 of the effectiveness"
+        elif kind is SurfaceFaultKind.SLOW:
             if value is None or not value > 0.0:
-                raise NotFlownError(f"failure {failure['name']!r}: value is {value}; expected a rate above 0 deg/s")
-            value = min(value / self._surfaces[surface].rate_deg_s, 1.0)
-        elif kind is SurfaceFaultKind.REDUCED and (value is None or not 0.0 <= value <= 1.0):
-            raise NotFlownError(f"failure {failure['name']!r}: value is {value}; expected 0..1 of the effectiveness")
+                expected = "a rate above 0 deg/s"
+            else:
+                value = min(value / surface.rate_deg_s, 1.0)
+        elif value is not None:
+            expected = f"none for kind {kind.value}; stuck, reduced and slow take one"
+        if expected:
+            raise NotFlownError(f"failure {failure['name']!r}: value is {failure['value']}; expected {expected}")
         return SurfaceFault(kind, value)
 
     def clear(self) -> None:
         """Everything is repaired."""
         self._faults.clear()
-        self._systems.clear()
+        self._broken.clear()
+        self._systems = set()
 
-    def apply(self, controls: Controls, dt: float) -> None:
-        """Changes the frame's controls."""
-        if self._systems or not self._repaired:
-            self._effects.apply(controls, self._systems, self._model, dt)
-            self._repaired = not self._systems
-            controls.surface_faults = {**controls.surface_faults, **self._faults}
-        else:
+    def apply(self, controls: Controls, dt: float) -> Controls:
+        """What flies of a frame's controls: they themselves, or what failed systems make of them, until the next call.
+
+        Commanded ones stay as they are, but for trims that failures have moved, as in the emulator.
+        """
+        if self._repaired and not self._systems:
             controls.surface_faults = self._faults
+            return controls
+        flown = self._flown
+        vars(flown).update(vars(controls), throttle=controls.throttle.copy())  # all else is replaced, not changed
+        self._effects.apply(flown, self._systems, self._model, dt)
+        self._repaired = not self._systems
+        flown.surface_faults = {**flown.surface_faults, **self._faults}
+        if not TRIM_FAILURES.isdisjoint(self._systems):
+            for name in TRIMS:
+                setattr(controls, name, getattr(flown, name))
+        return flown

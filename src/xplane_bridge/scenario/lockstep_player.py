@@ -96,10 +96,6 @@ class LockstepPlayer(RosPlayer):
         self._look_around(state)
         if not self._finished.is_set():
             self._play_on(state)
-        while not self._actions.empty():
-            action = self._actions.get()
-            assert action is not None  # that ends the worker of the real-time player, which there is none of
-            self._due.append(action)
         # What is held down in the first message of a stick counts as not pressed.
         if self._stick is None or state.header.stamp != self._first:
             self._act_on()
@@ -127,6 +123,9 @@ class LockstepPlayer(RosPlayer):
             self._stall = last is not None and last.stall >= 0.5
 
     # --- actions ------------------------------------------------------------------------------------------------------
+
+    def _put(self, action: Action) -> None:
+        self._due.append(action)
 
     def _act_on(self) -> None:
         """What has become due, in its order; a mode that a button asks for is awaited before the next."""

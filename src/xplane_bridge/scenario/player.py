@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Set, Tuple
 
 from xplane_bridge.scenario import excitations
 from xplane_bridge.scenario.holds import HoldAutopilot, HoldGains, Targets
@@ -93,7 +93,8 @@ class Player:
         self._handles: Dict[str, float] = {}
         self._buttons: Set[int] = set()
         self._taps: Set[int] = set()
-        self._running: List[Tuple[float, Dict[str, Any]]] = []
+        self._running: List[Tuple[float, Mapping[str, Any]]] = []
+        self._held_back: List[Mapping[str, Any]] = []  # excitations, until there is a command that they are added to
         self._next = 0
         self._start: Optional[float] = None
         self._round_start = 0.0
@@ -119,6 +120,9 @@ class Player:
         now = sim_time - self._start
         commands = Commands()
         self._taps.clear()
+        held_back, self._held_back = self._held_back, []
+        for value in held_back:
+            self._excite(value, now, commands.actions)
         self._fire(now, sample, commands.actions)
         self._fly(now, dt, sample, commands)
         commands.handles = dict(self._handles)
@@ -185,10 +189,16 @@ class Player:
             self._taps |= set(value.get("tap", ()))
         elif kind == "end":
             self._finished = True
-        else:
-            if kind == "excitation":
-                self._running.append((now, value))
+        elif kind != "excitation":
             actions.append(Action(kind, value, now))
+        elif now > 0.0:
+            self._excite(value, now, actions)
+        else:  # the first commands are those of this step
+            self._held_back.append(value)
+
+    def _excite(self, value: Mapping[str, Any], now: float, actions: List[Action]) -> None:
+        self._running.append((now, value))
+        actions.append(Action("excitation", value, now))
 
     def _present(self, axis: str, now: float) -> float:
         """Where a movement of this axis begins: where a hold has it, or else the movement before."""

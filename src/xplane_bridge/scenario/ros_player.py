@@ -12,11 +12,12 @@ import queue
 import threading
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 from xplane_bridge.constants import FlightMode, ResultCode, words
 from xplane_bridge.errors import is_number
 from xplane_bridge.scenario.command_fields import fill_fields
+from xplane_bridge.scenario.late_actions import late_entry, late_text
 from xplane_bridge.scenario.player import Action, Commands, FlightSample, Player
 from xplane_bridge.scenario.resets import reset_request
 from xplane_bridge.scenario.schema import HANDLE_FIELDS, Scenario, ScenarioError
@@ -32,6 +33,7 @@ _BLIND_S = 1.0  # without a flight state, after which the stick is let go: tx_no
 _SERVICE_WAIT_S = 15.0  # for a service to be there
 _AGAIN_S = 0.1  # after a refusal for want of a link
 MODE_WAIT_S = 15.0  #: for a mode to be shown
+_NOT_BROKEN = "is not broken"  # in the answer of clear_failures
 MODE_NAMES = words(FlightMode)
 
 
@@ -115,7 +117,12 @@ class RosPlayer:
         self._sequence = 0
         self._mode_sequence = int(time.time())  # the next run is heard by the tx_node that heard this one
         self._taps = Taps()
-        self._actions: queue.Queue[Optional[Action]] = queue.Queue()
+        # Modes and excitations keep their order, and do not wait until X-Plane has shown the others.
+        self._of_pilot: queue.Queue[Optional[Action]] = queue.Queue()
+        self._of_others: queue.Queue[Optional[Action]] = queue.Queue()
+        self._served = threading.Lock()  # tx_node serves one call after the other
+        self._commanded = threading.Event()
+        self._late: List[Dict[str, Any]] = []
         self._finished = threading.Event()
         self._error: Optional[str] = None
 
@@ -168,14 +175,21 @@ class RosPlayer:
         rospy.Subscriber(topic + "control/mode", ControlMode, self._on_mode)
         rospy.Subscriber(topic + "mission/warnings", WarningState, self._on_warnings)
         rospy.Subscriber(topic + "flight_state", FlightState, self._on_state, tcp_nodelay=True)
-        worker = threading.Thread(target=self._act_all, daemon=True)
-        worker.start()
+        queues = (self._of_pilot, self._of_others)
+        workers = [threading.Thread(target=self._act_all, args=(actions,), daemon=True) for actions in queues]
+        for worker in workers:
+            worker.start()
         while not rospy.is_shutdown() and not self._finished.is_set():
             self._publish(publisher)
             self._finished.wait(1.0 / STICK_RATE)
-        self._actions.put(None)
+        for actions in queues:
+            actions.put(None)
+
+        def acting() -> bool:
+            return any(worker.is_alive() for worker in workers)
+
         # What the last events asked for is still seen through, while the stick is held.
-        while not rospy.is_shutdown() and (worker.is_alive() or (self._taps.pending and self._to_send() is not None)):
+        while not rospy.is_shutdown() and (acting() or (self._taps.pending and self._to_send() is not None)):
             self._publish(publisher)
             time.sleep(1.0 / STICK_RATE)
 
@@ -212,8 +226,8 @@ class RosPlayer:
             raise
 
     def fail(self, error: str) -> None:
-        """Ends it with an error."""
-        self._error = error
+        """Ends it with an error; the first one counts."""
+        self._error = self._error or error
         self._finished.set()
 
     def _play_on(self, state: Any) -> None:
@@ -228,11 +242,21 @@ class RosPlayer:
         for action in commands.actions:
             if action.kind == "traffic":
                 self._traffic.begin(action.value, state, now)
+            elif action.kind == "label":
+                self._show_label(action)
             else:
-                self._actions.put(action)
+                self._put(action)
         self._send_traffic(state, now)
         if commands.finished:
             self._finished.set()
+
+    def _show_label(self, action: Action) -> None:
+        self._labels.setdefault(action.value, action.time)
+        self._label_publisher.publish(str(action.value))
+        self._say(f"{action.time:6.1f} s  {action.value}")
+
+    def _put(self, action: Action) -> None:
+        (self._of_pilot if action.kind in ("mode", "excitation") else self._of_others).put(action)
 
     def _take_taps(self, commands: Commands) -> None:
         """Keeps what is tapped in one step only: the stick's messages have another rate than the states."""
@@ -261,7 +285,10 @@ class RosPlayer:
             return
         message = self._message(publisher, commands, time.monotonic())
         message.header.stamp = rospy.get_rostime()
+        heard = publisher.get_num_connections() > 0
         publisher.publish(message)
+        if heard:
+            self._commanded.set()
 
     def _message(self, publisher: Any, commands: Commands, now: float) -> Any:
         """Stick or commands; `now` [s] is of the clock by which buttons are tapped."""
@@ -276,12 +303,14 @@ class RosPlayer:
             message.axes, message.buttons = self._stick.joy(shown)
         return message
 
-    def _act_all(self) -> None:
+    def _act_all(self, actions: queue.Queue[Optional[Action]]) -> None:
         while True:
-            action = self._actions.get()
-            if action is None:
+            action = actions.get()
+            if action is None or self._error is not None:
                 return
             try:
+                if action.kind == "excitation":  # it is added to a command
+                    self._commanded.wait(_SERVICE_WAIT_S)
                 self._act(action)
             except ScenarioError as error:
                 self.fail(f"{self._player.scenario.name}, at {action.time:.1f} s: {error}")
@@ -291,13 +320,9 @@ class RosPlayer:
                 raise
 
     def _act(self, action: Action) -> None:
-        if action.kind == "label":
-            self._labels.setdefault(action.value, action.time)
-            self._label_publisher.publish(str(action.value))
-            self._say(f"{action.time:6.1f} s  {action.value}")
-            return
         if action.kind == "mode":
             self._request_mode(action.value)
+            self._note_time(action)
             return
         calls: Dict[str, Callable[[Any], None]] = {
             "failure": self._failure,
@@ -311,7 +336,16 @@ class RosPlayer:
             "dataref": self._datarefs,
             "command": self._command,
         }
-        calls[action.kind](action.value)
+        with self._served:
+            self._note_time(action)
+            calls[action.kind](action.value)
+
+    def _note_time(self, action: Action) -> None:
+        """Keeps that an action comes late, if it does."""
+        entry = late_entry(action, self._clock.now)
+        if entry is not None:
+            self._late.append(entry)
+            self._say(late_text(entry))
 
     def _request_mode(self, wanted: int) -> None:
         mode = MODE_NAMES[wanted]
@@ -359,11 +393,12 @@ class RosPlayer:
             if response.success:
                 return
             unlinked = response.result.code == ResultCode.NO_LINK
-            if unlinked and not said:
+            # What is not broken needs no repair, and without a link it is repaired as soon as that is back.
+            done = service == "clear_failures" and (unlinked or _NOT_BROKEN in response.result.message)
+            if (unlinked or done) and not said:
                 said = True
                 self._say(f"{what}: {response.result.message}")
-            # Repaired as soon as the link is back; there is nothing to repair the second time.
-            if unlinked and service == "clear_failures":
+            if done:
                 return
             if not unlinked or time.monotonic() >= deadline:
                 raise ScenarioError(f"{what}: {response.result.message}")
@@ -453,6 +488,7 @@ class RosPlayer:
             "scenario": self._player.scenario.name,
             "begin": self._begin,
             "labels": self._labels,
+            "late": self._late,
             "duration": self._clock.now,
             "finished": self._finished.is_set() and self._error is None,
             "error": self._error,

@@ -86,8 +86,8 @@ KINDS = ("reset", "wind", "disturb", "weather", "time", "traffic")
 
 
 def wind_request(value: Mapping[str, float]) -> Dict[str, float]:
-    """Fields of SetWind. Calm air is asked for from 360 deg: the service takes three zeros for nothing."""
-    return {"speed": 0.0, "from_deg": 360.0, "turbulence": 0.0, **value}
+    """Fields of SetWind. North is 360 deg, also of calm air: the service takes three zeros for nothing."""
+    return {"speed": 0.0, "turbulence": 0.0, **value, "from_deg": value.get("from_deg") or 360.0}
 
 
 def disturbance_request(value: Mapping[str, Any]) -> Dict[str, Any]:

@@ -131,6 +131,32 @@ def test_excitations_restarts_hand_overs_and_failures_come_in_the_same_frames_th
     assert "the same states as in process: 47 fields of 301 frames" in done.stdout, done.stdout + done.stderr
 
 
+def test_levers_and_trims_that_fail_end_in_the_same_place_through_the_nodes(tmp_path):
+    events = [
+        {"at": 0, "stick": {"roll": 0, "pitch": 0, "yaw": 0}, "handles": {"trim_pitch": 0.02}},
+        {"at": 0.5, "failure": {"name": "rel_elv_trim_run"}},
+        {"at": 0.75, "failure": {"name": "rel_throt_lo"}},
+        {"at": 1.1, "handles": {"trim_pitch": 0.05}},
+        {"at": 1.25, "clear_failures": True},
+        {"at": 1.5, "failure": {"name": "rel_fc_ail_R"}, "stick": {"roll": 0.25}},
+        {"at": 1.75, "failure": {"name": "rel_ail_trim_run"}},
+        {"at": 2.5, "clear_failures": True},
+        {"at": 3, "end": True},
+    ]
+    scenario = {**CAMPAIGN["scenario"], "events": events}
+    done = run("-o", flown(tmp_path, scenario=scenario), "--refly", 0, "--through-nodes")
+    assert "the same states as in process: 47 fields of 181 frames" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_stick_that_nothing_commands_is_centred_through_the_nodes_and_in_process(tmp_path):
+    start = {"altitude": "$altitude", "speed": 10, "heading": 90}
+    scenario = {**CAMPAIGN["scenario"], "aircraft": "multirotor", "start": start}
+    scenario["events"] = [{"at": 0, "mode": "auto"}, *CAMPAIGN["scenario"]["events"][1:]]
+    half = {"controller": "support.flights.steady_controller:half_throttle", "arguments": {}, "loading": {}}
+    done = run("-o", flown(tmp_path, scenario=scenario, **half), "--refly", 0, "--through-nodes")
+    assert "the same states as in process: 47 fields of 181 frames" in done.stdout, done.stdout + done.stderr
+
+
 @pytest.mark.parametrize(
     ("changes", "arguments", "message"),
     [

@@ -194,6 +194,13 @@ def test_an_excitation_begins_in_the_frame_after_its_event_as_through_the_nodes(
     assert list(stick[42:44]) == [-tenth, 0.0]
 
 
+def test_an_excitation_of_the_first_event_begins_when_its_axis_is_commanded() -> None:
+    """The first command answers the first state; the excitation is as one of the second state."""
+    assert list(excited({"at": 0, "excitation": doublet(0.1, 0.19)})) == list(
+        excited({"at": 0.01, "excitation": doublet(0.1, 0.19)})
+    )
+
+
 def test_one_excitation_may_begin_where_another_ends_and_not_before() -> None:
     first, second = {"at": 0.5, "excitation": doublet(0.1, 0.19)}, {"at": 0.7, "excitation": doublet(0.2, 0.2)}
     assert excited(first, second)[44] == pytest.approx(0.2)
@@ -222,8 +229,6 @@ LEVER = {**doublet(0.1, 0.5), "target": "throttle"}
     ("events", "message"),
     [
         ([{"at": 0.5, "excitation": LEVER}], r"at 0\.5 s: no source commands throttle"),
-        # What is commanded from the first state flies in the second frame.
-        ([{"at": 0, "excitation": doublet(0.1, 0.5)}], "at 0 s: no source commands pitch"),
         (
             [{"at": 0, "stick": {"roll": 1}}, {"at": 3, "excitation": doublet(0.1, 0.5)}],
             "at 3 s: the attitude is beyond",

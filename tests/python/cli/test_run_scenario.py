@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from argparse import Namespace
+from contextlib import nullcontext
 
 import pytest
 
 from xplane_bridge.campaign.distributions import CampaignError
+from xplane_bridge.cli import run_scenario
 from xplane_bridge.cli.run_scenario import lockstep_of, parser, plan_of
 from xplane_bridge.cli.scenario_player import play
 from xplane_bridge.scenario import ScenarioError, load_scenario, parse_scenario
@@ -50,6 +53,17 @@ def test_buttons_without_a_joystick_are_refused_before_anything_starts(tmp_path)
     assert plan_of(pressing, parser().parse_args([*arguments, "--joystick", "xbox"]))
     with pytest.raises(ScenarioError, match=r"s: events\[1\]\.buttons: .* a joystick \(--joystick\)"):
         play(Namespace(scenario=str(file)), [], "scenario_player", joystick=False)
+
+
+def test_what_was_carried_out_late_is_on_the_console(monkeypatch, tmp_path, capsys):
+    entry = {"action": "failure", "value": {"name": "engine_1"}, "time": 8.2, "late": 1.07}
+    played = json.dumps({"finished": True, "labels": {}, "late": [entry]})
+    monkeypatch.setattr(run_scenario, "fly", lambda plan, **_: (plan.output / "played.json").write_text(played))
+    monkeypatch.setattr(run_scenario, "Bags", nullcontext)
+    monkeypatch.setattr(run_scenario, "read_flight", lambda _: None)
+    monkeypatch.setattr(run_scenario, "judge", lambda *_: [])
+    assert run_scenario.main(["engine_failure", "--output", str(tmp_path)]) == 0
+    assert "run_scenario: warning: failure of 8.2 s was carried out 1.1 s late\n" in capsys.readouterr().err
 
 
 def level(_state):

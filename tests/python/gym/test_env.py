@@ -332,7 +332,7 @@ def test_a_wrong_reset_or_action_is_reported() -> None:
         env.reset(options={"speed": {"uniform": [9, 5]}})
     with pytest.raises(FlightModelError, match="airspeed 200"):
         env.reset(options={"speed": 200})
-    with pytest.raises(NotFlownError, match="wing2l_ail1"):
+    with pytest.raises(NotFlownError, match=r"fixed_wing has \(aileron1_wing2_left"):
         env.reset(options={"failures": [{"name": "aileron2_wing1_left", "kind": "stuck", "at": 9}]})
     env.reset(seed=1)
     with pytest.raises(GymError, match=r"action roll is 1\.5: expected -1\.\.1"):
@@ -341,6 +341,37 @@ def test_a_wrong_reset_or_action_is_reported() -> None:
         env.step(np.array([np.nan], np.float32))
     with pytest.raises(GymError, match=r"action of shape \(2,\); expected 1 numbers: roll"):
         env.step(np.zeros(2, np.float32))
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"speed": np.int64(70)}, {"speed": 70.0}),
+        ({"speed": np.float32(70)}, {"speed": 70.0}),
+        ({"on_ground": np.bool_(True)}, {"on_ground": 1.0}),
+        ({"fuel": [np.float32(20), 30]}, {"fuel": [20.0, 30.0]}),
+        ({"fuel": (np.int64(20), np.int64(30))}, {"fuel": [20.0, 30.0]}),
+        ({"fuel": np.array([20, 30])}, {"fuel": [20.0, 30.0]}),
+        ({"speed": {"uniform": [np.int64(70), np.float32(70)]}}, {"speed": 70.0}),
+        ({"speed": {"normal": [80, 0], "clip": np.array([60, 70])}}, {"speed": 70.0}),
+        ({"payload": {"choice": np.array([50, 50])}}, {"payload": 50}),
+    ],
+)
+def test_numpys_numbers_are_numbers(given: dict, expected: dict) -> None:
+    for env, options in ((FlyEnv(), given), (FlyEnv(episode=given), {})):
+        conditions = env.reset(seed=1, options=options)[1]["conditions"]
+        assert {key: conditions[key] for key in expected} == expected
+
+
+def test_numpys_numbers_are_numbers_of_failures_too() -> None:
+    failure = {
+        "name": "aileron1_wing2_left",
+        "kind": "stuck",
+        "value": np.float32(5.0),
+        "at": {"choice": [np.int64(1)]},
+    }
+    broken = FlyEnv().reset(seed=1, options={"failures": [failure]})[1]["conditions"]["failures"]
+    assert broken == [{**failure, "value": 5.0, "at": 1}]
 
 
 def test_wind_blows_from_where_it_is_said_to() -> None:

@@ -18,8 +18,9 @@ from xplane_bridge.emulator.flight.failure_effects import FailureEffects
 from xplane_bridge.emulator.flight.flight_model import Controls, InitialState, SurfaceFault, SurfaceFaultKind
 from xplane_bridge.emulator.simulator import Simulator
 from xplane_bridge.in_process.aircraft import AUTO, MANUAL, Aircraft, Conditions, arbiter_options
-from xplane_bridge.in_process.failures import Failures, NotFlownError, model_surface
+from xplane_bridge.in_process.failures import SURFACES, Failures, NotFlownError
 from xplane_bridge.in_process.view import FlightView
+from xplane_bridge.xplane_names import datarefs
 
 
 def test_a_surface_fails_in_the_model_and_an_engine_by_its_dataref() -> None:
@@ -27,20 +28,45 @@ def test_a_surface_fails_in_the_model_and_an_engine_by_its_dataref() -> None:
     failures, controls = Failures(model), Controls()
     failures.act({"name": "aileron1_wing2_left", "kind": "stuck", "value": 5.0, "clear": False})
     failures.act({"name": "engine_2", "kind": "failed", "value": None, "clear": False})
-    failures.apply(controls, 1 / 60)
-    assert controls.surface_faults == {"wing2l_ail1": SurfaceFault(SurfaceFaultKind.STUCK, 5.0)}
-    assert [fault.value for fault in controls.engine_faults[:2]] == ["none", "stopped"]
+    flown = failures.apply(controls, 1 / 60)
+    assert flown.surface_faults == {"wing2l_ail1": SurfaceFault(SurfaceFaultKind.STUCK, 5.0)}
+    assert [fault.value for fault in flown.engine_faults[:2]] == ["none", "stopped"]
     failures.act({"name": "aileron1_wing2_left", "kind": "failed", "value": None, "clear": True})
-    failures.apply(controls, 1 / 60)
-    assert controls.surface_faults == {}
-    assert controls.engine_faults[1].value == "stopped"
+    flown = failures.apply(controls, 1 / 60)
+    assert flown.surface_faults == {}
+    assert flown.engine_faults[1].value == "stopped"
     failures.clear()
-    failures.apply(controls, 1 / 60)
-    assert controls.engine_faults[1].value == "none"
+    assert failures.apply(controls, 1 / 60).engine_faults[1].value == "none"
+    assert failures.apply(controls, 1 / 60) is controls
+    assert controls == Controls()
     with pytest.raises(NotFlownError, match="it takes the bridge"):
         failures.act({"name": "pitot_1", "kind": "failed", "value": None, "clear": False})
-    with pytest.raises(NotFlownError, match="wing2l_ail1"):
-        failures.act({"name": "aileron2_wing1_left", "kind": "stuck", "value": None, "clear": False})
+
+
+@pytest.mark.parametrize("name", ["aileron2_wing1_left", "speedbrake1_wing1_left", "elevator1_wing1_left"])
+def test_a_surface_that_the_aircraft_has_not_is_refused_with_those_it_has(name: str) -> None:
+    with pytest.raises(NotFlownError, match=f"{name}': expected a surface that fixed_wing has .aileron1_wing2_left,"):
+        Failures(create_model("fixed_wing")).act({"name": name, "kind": "stuck", "value": None, "clear": False})
+
+
+def act(failures: Failures, name: str, clear: bool = False) -> None:
+    failures.act({"name": name, "kind": "failed", "value": None, "clear": clear})
+
+
+def test_a_system_is_broken_and_repaired_by_one_of_its_names() -> None:
+    """As by tx_node: no other name acts on it, and what is not broken stays as it is."""
+    failures, controls = Failures(create_model("fixed_wing")), Controls()
+    act(failures, "engine_2", clear=True)
+    act(failures, "engine_1")
+    act(failures, "engine_1")
+    act(failures, "rel_engfai0", clear=True)
+    with pytest.raises(NotFlownError, match="rel_engfai0': broken already as engine_1; expected it to be cleared"):
+        act(failures, "rel_engfai0")
+    assert failures.apply(controls, 1 / 60).engine_faults[0].value == "stopped"
+    act(failures, "engine_1", clear=True)
+    act(failures, "rel_engfai0")
+    failures.clear()
+    act(failures, "engine_1")
 
 
 @pytest.mark.parametrize(
@@ -122,7 +148,8 @@ def test_every_kind_of_the_service_breaks_a_surface_in_the_model() -> None:
     assert {kind.value for kind in SurfaceFaultKind} == set(SURFACE_FAILURE_KINDS)
     failures, controls = Failures(create_model("fixed_wing")), Controls()
     for kind in SURFACE_FAILURE_KINDS:
-        failures.act({"name": "aileron1_wing2_left", "kind": kind, "value": 0.5, "clear": False})
+        value = 0.5 if kind in ("stuck", "reduced", "slow") else None
+        failures.act({"name": "aileron1_wing2_left", "kind": kind, "value": value, "clear": False})
         failures.apply(controls, 1 / 60)
         assert controls.surface_faults["wing2l_ail1"].kind.value == kind
     with pytest.raises(NotFlownError, match="kind is missing"):  # of FAILURE_KINDS the one that is for other parts
@@ -139,12 +166,22 @@ def test_a_slow_surface_moves_at_the_rate_of_the_request(rate_deg_s: float, move
     failures.act({"name": "aileron1_wing2_left", "kind": "slow", "value": rate_deg_s, "clear": False})
     controls.roll = 1.0
     for _ in range(6):
-        failures.apply(controls, 1 / 60)
-        after = model.step(1 / 60, controls).surfaces_deg[name]
+        after = model.step(1 / 60, failures.apply(controls, 1 / 60)).surfaces_deg[name]
     assert abs(after - before) == pytest.approx(moved_deg)
 
 
-@pytest.mark.parametrize(("kind", "value"), [("slow", None), ("slow", 0.0), ("reduced", None), ("reduced", 1.5)])
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [
+        ("slow", None),
+        ("slow", 0.0),
+        ("reduced", None),
+        ("reduced", 1.5),
+        ("stuck", 120.0),
+        ("hard_over_up", 5.0),
+        ("gone", 0.0),
+    ],
+)
 def test_a_value_that_tx_node_refuses_is_refused_in_process(kind: str, value: object) -> None:
     with pytest.raises(NotFlownError, match=f"value is {value}; expected"):
         Failures(create_model("fixed_wing")).act(
@@ -172,12 +209,17 @@ def test_levers_fly_again_when_motors_are_no_longer_commanded() -> None:
 
 
 def test_surfaces_have_the_names_of_the_core() -> None:
-    text = (ROOT / "docs/control/surfaces.md").read_text(encoding="utf-8")
-    assert "aileron1_wing2_left" in text
-    assert model_surface("aileron1_wing2_left") == "wing2l_ail1"
-    assert model_surface("elevator1_right") == "hstab2_elv1"
-    assert model_surface("rudder1_fin1") == "vstab1_rud1"
-    assert model_surface("engine_1") == ""
+    """As tests/cpp/core/surfaces/test_surfaces.cpp has them: each leads to X-Plane's dataref of it."""
+    assert len(SURFACES) == len(set(SURFACES.values())) == 96
+    assert SURFACES["aileron1_wing2_left"] == "wing2l_ail1"
+    assert SURFACES["speedbrake2_wing2_left"] == "wing2l_sbrk2"
+    assert SURFACES["yaw_brake_wing3_left"] == "wing3l_yawb"
+    assert SURFACES["elevator1_right"] == "hstab2_elv1"
+    assert SURFACES["elevator2_wing3_right"] == "wing3r_elv2"
+    assert SURFACES["rudder2_fin1"] == "vstab1_rud2"
+    known = datarefs("12.10")
+    for own in SURFACES.values():
+        assert "sbrk" in own or f"sim/flightmodel/controls/{own}def" in known
 
 
 def test_the_view_is_what_the_emulator_sends() -> None:

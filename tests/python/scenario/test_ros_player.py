@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
+import threading
 from types import SimpleNamespace
 from unittest import mock
 
 import pytest
 
 from support.flights.states import state
+from support.room_table import ROOT
 from xplane_bridge.constants import ResultCode
 from xplane_bridge.scenario import ScenarioError, parse_scenario, ros_player
 from xplane_bridge.scenario.lockstep_player import LockstepPlayer
@@ -66,12 +69,14 @@ def test_tx_node_hears_the_mode_requests_of_a_second_run(monkeypatch):
     assert player({"at": 60, "end": True})._mode_sequence >= first._mode_sequence + 60
 
 
-def calls_of(monkeypatch, codes, event, flying_class=RosPlayer, **options):
+def calls_of(monkeypatch, codes, event, flying_class=RosPlayer, message="", **options):
     """Plays an event whose service answers with these codes, one after the other; gives how often it was called, and
-    what was said.
+    what was said. The answers' message is the code's name where none is given.
     """
     answers = [
-        SimpleNamespace(success=code <= ResultCode.ACCEPTED, result=SimpleNamespace(code=code, message=code.name))
+        SimpleNamespace(
+            success=code <= ResultCode.ACCEPTED, result=SimpleNamespace(code=code, message=message or code.name)
+        )
         for code in codes
     ]
     calls = []
@@ -122,6 +127,88 @@ def test_a_repair_without_a_link_is_not_asked_for_again_but_said(monkeypatch):
     """tx_node repairs when the link is back; a second request finds nothing that is broken, and is refused."""
     repairs = {"clear_failures": True}
     assert calls_of(monkeypatch, [NO_LINK, REFUSED], repairs) == (1, ["repairing everything: NO_LINK"])
+
+
+def test_repairing_what_is_not_broken_is_no_error_but_said(monkeypatch):
+    """As in process; tx_node refuses it."""
+    assert ros_player._NOT_BROKEN in (ROOT / "lib/actuation/failure_requests.cpp").read_text(encoding="utf-8")
+    repair = {"failure": {"name": "engine_2", "clear": True}}
+    answer = '"engine_2" is not broken: expected nothing, all is well'
+    assert calls_of(monkeypatch, [REFUSED], repair, message=answer) == (1, [f"repairing engine_2: {answer}"])
+    with pytest.raises(ScenarioError, match="set include_simulator"):
+        calls_of(monkeypatch, [REFUSED], repair, message="engine_2 was failed in the simulator: set include_simulator")
+
+
+def begun(flying):
+    """Starts what carries out a player's actions."""
+    for actions in (flying._of_pilot, flying._of_others):
+        threading.Thread(target=flying._act_all, args=(actions,), daemon=True).start()
+
+
+def test_labels_and_modes_do_not_wait_for_a_failure_and_what_does_is_reported(monkeypatch, tmp_path):
+    said, labels, carried_out = [], [], []
+    scenario = parse_scenario(
+        {
+            "name": "test",
+            "events": [
+                {"at": 1, "failure": {"name": "aileron1_wing2_left", "kind": "hard_over_up"}, "label": "aileron"},
+                {"at": 1.25, "failure": {"name": "engine_1"}, "mode": "auto", "label": "engine"},
+                {"at": 60, "end": True},
+            ],
+        }
+    )
+    flying = RosPlayer(scenario, "/xplane", log=tmp_path / "played.json", say=said.append)
+    flying._label_publisher = SimpleNamespace(publish=labels.append)
+    started, shown, asked, done = (threading.Event() for _ in range(4))
+
+    def fail(value):
+        started.set()
+        assert shown.wait(10.0)
+        carried_out.append(value["name"])
+        if value["name"] == "engine_1":
+            done.set()
+
+    monkeypatch.setattr(flying, "_failure", fail)
+    monkeypatch.setattr(flying, "_request_mode", lambda _: asked.set())
+    begun(flying)
+    flying._on_state(state(10.0))
+    flying._on_state(state(11.0))
+    assert started.wait(10.0)
+    flying._on_state(state(11.25))
+    assert labels == ["aileron", "engine"]
+    assert asked.wait(10.0)
+    flying._on_state(state(12.375))
+    assert carried_out == []
+    shown.set()
+    assert done.wait(10.0)
+    assert carried_out == ["aileron1_wing2_left", "engine_1"]
+    assert said[-1] == "warning: failure of 1.2 s was carried out 1.1 s late"
+    flying._write_log()
+    (late,) = json.loads((tmp_path / "played.json").read_text(encoding="utf-8"))["late"]
+    assert (late["action"], late["value"]["name"]) == ("failure", "engine_1")
+    assert (late["time"], late["late"]) == (1.25, 1.125)
+
+
+def test_an_excitation_waits_for_the_first_command_that_is_heard(monkeypatch):
+    """tx_node refuses one of an axis that nothing commands."""
+    flying = player(
+        {"at": 0, "stick": {"roll": 0}, "excitation": {"kind": "doublet", "target": "roll", "amplitude": 0.1,
+                                                       "duration": 1}},
+        {"at": 60, "end": True},
+    )  # fmt: skip
+    monkeypatch.setitem(sys.modules, "rospy", SimpleNamespace(get_rostime=lambda: None))
+    excited = threading.Event()
+    monkeypatch.setattr(flying, "_excitation", lambda _: excited.set())
+    monkeypatch.setattr(flying, "_message", lambda *_: SimpleNamespace(header=SimpleNamespace(stamp=None)))
+    begun(flying)
+    flying._on_state(state(10.0))
+    flying._on_state(state(10.1))
+    publisher = mock.MagicMock()
+    for listeners in (0, 1):
+        assert not excited.wait(0.1)
+        publisher.get_num_connections.return_value = listeners
+        flying._publish(publisher)
+    assert excited.wait(10.0)
 
 
 def test_in_lock_step_no_link_comes_while_a_frame_waits(monkeypatch):

@@ -105,6 +105,13 @@ def test_time_and_wind_become_requests():
     assert request.keys() <= fields.keys()
     assert time_request({"zulu_time": 3600.5}, bits) == {"fields": 2, "zulu_time": 3600.5}
     assert wind_request(read(wind={"turbulence": 0.2})["wind"]) == {"speed": 0.0, "from_deg": 360.0, "turbulence": 0.2}
+    assert wind_request(read(wind={"speed": 4, "from_deg": 90})["wind"]) == {
+        "speed": 4,
+        "from_deg": 90,
+        "turbulence": 0,
+    }
+    for calm in ({"speed": 0, "from_deg": 0}, {"turbulence": 0}):  # three zeros would be refused as nothing
+        assert wind_request(read(wind=calm)["wind"]) == {"speed": 0.0, "from_deg": 360.0, "turbulence": 0.0}
 
 
 def test_starts_become_requests():

@@ -52,3 +52,8 @@ class Climbs(Steady):
 def level(state: Any) -> Dict[str, float]:
     """Wings level, as a function."""
     return Steady(0.0).fly(state)
+
+
+def half_throttle(_state: Any) -> Dict[str, float]:
+    """Leaves roll and pitch to themselves."""
+    return {"throttle": 0.5, "yaw": 0.0}
