@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import atexit
 import os
 import queue
+import shutil
 import tempfile
 from itertools import count
+from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any, Mapping, Optional
 
@@ -130,10 +131,11 @@ class LockstepBridge:
 
     def _join_ros(self) -> None:
         if LockstepBridge._master is None and not _is_node():
-            folder = tempfile.TemporaryDirectory(prefix="xplane_bridge_master_")
-            LockstepBridge._master = master = RosMaster(Path(folder.name))
-            atexit.register(folder.cleanup)
-            atexit.register(master.stop)  # before that: the last that is registered is the first
+            folder = tempfile.mkdtemp(prefix="xplane_bridge_master_")
+            LockstepBridge._master = master = RosMaster(Path(folder))
+            # Unlike atexit also at the end of a process that multiprocessing has started; higher priorities first.
+            Finalize(None, master.stop, exitpriority=1)
+            Finalize(None, shutil.rmtree, args=(folder,), exitpriority=0)
             master.start()
             master.use_here()
             import rospy

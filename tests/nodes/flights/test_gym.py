@@ -12,6 +12,7 @@ from typing import Any, Tuple
 import numpy as np
 import pytest
 
+from support.deadlines import PROGRAM_S
 from support.room_table import ROOT
 from xplane_bridge.emulator.flight.flight_model import ModelState
 from xplane_bridge.gym import FlyEnv
@@ -46,6 +47,22 @@ def test_an_episode_over_the_nodes_is_the_one_in_process(arguments: dict) -> Non
     assert bridged_truth == truth
     for i, name in enumerate(names):
         assert np.array_equal(bridged[:, i], alone[:, i]), name
+
+
+#: Flies in two processes, each with a ROS master of its own; on a busy machine their nodes take long to end.
+TWO_PROCESSES = """
+from xplane_bridge.gym import FlyVectorEnv, vector
+vector._PATIENCE_S = 60.0
+envs = FlyVectorEnv(2, workers=2, bridge="ros")
+envs.reset(seed=1)
+envs.close()
+"""
+
+
+def test_flights_of_several_processes_over_the_nodes_leave_no_folders(tmp_path: Path) -> None:
+    env = {**os.environ, "TMPDIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", TWO_PROCESSES], env=env, timeout=PROGRAM_S, check=True)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.nightly
