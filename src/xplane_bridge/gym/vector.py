@@ -27,8 +27,8 @@ from xplane_bridge.gym.env import FlyEnv, Observation
 from xplane_bridge.gym.errors import GymError
 
 _STEP, _RESET, _CLOSE = b"s", b"r", b"c"
-#: How long a worker may take to end by itself [s].
-_PATIENCE_S = 5.0
+#: How long a worker may take to end by itself [s]: over the nodes it ends those and a ROS master.
+_PATIENCE_S = 20.0
 #: How long a message is looked for before the process sleeps until it comes [s].
 _LOOK_S = 100e-6
 #: What options of a reset are refused with; the environments can be reset again.
