@@ -223,6 +223,15 @@ class LockstepStepTest : public testing::Test, protected ActuationRig {
     services_.step(request, &response);
     return response;
   }
+  /// A long step, during which another thread of the node calls.
+  LockstepStep::Response stepUntil(const std::function<void()>& call) {
+    LockstepStep::Response response;
+    std::thread waiting([&] { response = step(1000000); });
+    while (lockstep_.frame() < 2) std::this_thread::yield();
+    call();
+    waiting.join();
+    return response;
+  }
 
   std::mutex mutex_;
   std::condition_variable woken_;
@@ -255,22 +264,14 @@ TEST_F(LockstepStepTest, HoldsWhatRuns) {
 }
 
 TEST_F(LockstepStepTest, RunEndsAStepThatWaits) {
-  LockstepStep::Response response;
-  std::thread waiting([&] { response = step(1000000); });
-  while (lockstep_.frame() < 2) std::this_thread::yield();
-  EXPECT_EQ(services_.setRunning(true), "");
-  waiting.join();
+  const LockstepStep::Response response = stepUntil([this] { EXPECT_EQ(services_.setRunning(true), ""); });
   EXPECT_FALSE(response.success);
   EXPECT_EQ(response.result.code, ServiceResult::REFUSED);
   EXPECT_EQ(response.result.message, "lockstep/run was called meanwhile: the flight goes on");
 }
 
 TEST_F(LockstepStepTest, HoldEndsAStepThatWaits) {
-  LockstepStep::Response response;
-  std::thread waiting([&] { response = step(1000000); });
-  while (lockstep_.frame() < 2) std::this_thread::yield();
-  EXPECT_EQ(services_.setRunning(false), "");
-  waiting.join();
+  const LockstepStep::Response response = stepUntil([this] { EXPECT_EQ(services_.setRunning(false), ""); });
   EXPECT_TRUE(response.success) << response.result.message;
   EXPECT_LT(response.flown, 1000000U);
 }
